@@ -84,7 +84,7 @@ def test_cameras_have_the_sampled_parameters_if_the_face_fits() -> None:
     away = np.array(camera.position) - middle
     assert np.linalg.norm(away) == pytest.approx(1000)
     assert away / 1000 == pytest.approx([np.cos(np.pi / 6), 0.5, 0.0], abs=1e-6)
-    assert 2 * camera.half_tangent * 1000 == pytest.approx(500)
+    assert 2 * camera.half_view_tangent * 1000 == pytest.approx(500)
     (x, _), width = project(scene, middle[None] + head.centre_mm, settings.size)[0], settings.size[0]
     assert (x + 0.5) / width == pytest.approx(0.5 + 0.5 * 0.2, abs=2e-3)
     lens = spec("[camera]\nfocal_mm = 48\ndistance_mm = 1200")

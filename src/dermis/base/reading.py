@@ -25,7 +25,7 @@ MALFORMED_DATA_ERRORS = (LookupError, TypeError, AttributeError, ArithmeticError
 """Exceptions raised by code that assumes well-formed data; pass them to `parsing`."""
 MAX_TEXT_BYTES = 1 << 20  # largest file with settings: scenes, lights, tables
 _MIN_READ_BYTES = 1 << 16
-_MAX_BITS = 64  # of integers, as in TOML; all can be converted to float
+_MAX_BITS = 64  # largest size of integers, as in TOML; all can be converted to float
 _MAX_KEY_PARTS = 32  # parts of a dotted key: parsing time grows with the square of their number
 _LONG_KEY_PATTERN = re.compile(
     r"""(?<![\w\\-])(?:(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+)"""

@@ -55,12 +55,13 @@ def fit_isotropic_lobes(lobe: Lobe) -> Floats:
     Axes are roughness (LOBE_TABLE_ROUGHNESSES), view (LOBE_TABLE_COSINES), lobe, and parameter: angle from
     the normal away from the viewer [rad], angle from the plane of incidence [rad], roughness, weight.
 
-    Three lobes are in the plane of incidence; for steep views two or one have weight. The other two are a
-    pair: on both sides of the plane, or in it where the specular lobe is elongated. The fit minimises the
-    expected difference between what the specular lobe and the sum of the isotropic lobes reflect. The
-    expectation is over random environments whose power falls with the harmonic degree, and which have light
-    below the horizon too. Fits proceed from rough and grazing to smooth and steep, each starting at the mean
-    of its neighbours, so that lobes vary smoothly over the table.
+    Three lobes are in the plane of incidence; for views near the normal only two or one of them have weight.
+    The other two are a pair: on both sides of the plane, or in it where the specular lobe is elongated. The
+    fit minimises the expected difference between what the specular lobe and the sum of the isotropic lobes
+    reflect. The expectation is over random environments whose power falls with the harmonic degree, and which
+    have light below the horizon too. Fits proceed from rough surfaces and grazing views to smooth surfaces
+    and views along the normal. Each starts at the mean of its neighbours, so that lobes vary smoothly over
+    the table.
     """
     found: dict[TableNode, Floats] = {}
     cosines, roughnesses = LOBE_TABLE_COSINES.tolist(), LOBE_TABLE_ROUGHNESSES.tolist()

@@ -44,10 +44,11 @@ def isotropic_lobe_table(model: str = "kelemen") -> Floats:
     The first axis is uniform in the logarithm of the roughness from 0.05 to 1, the second in the square root
     of the view's cosine. Directions are stereographic coordinates (x, y) about the mirror direction: the
     direction is 2 x away from the viewer, 2 y across the plane of incidence and 1 - x^2 - y^2 along the
-    mirror direction, all divided by 1 + x^2 + y^2. So lobes follow the mirror direction between the columns,
-    the last two of which are 29 degrees apart. The weighted sum of five lobes approximates the specular lobe,
-    which at grazing views is elongated, off the mirror direction, and ends at the horizon. Lobes of weight 0
-    need no lookup. Models without a shipped table are fitted on first use, which takes half a minute.
+    mirror direction, all divided by 1 + x^2 + y^2. Lobes that are interpolated between columns thus follow
+    the mirror direction; the views of the last two columns are 29 degrees apart. The weighted sum of five
+    lobes approximates the specular lobe, which at grazing views is elongated, off the mirror direction, and
+    ends at the horizon. Lobes of weight 0 need no lookup. Models without a shipped table are fitted on first
+    use, which takes half a minute.
     """
     rows = [row for row in read_rows("dermis.environment", "data/mirrors") if row["model"] == model]
     columns = [

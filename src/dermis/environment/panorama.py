@@ -23,7 +23,7 @@ _MAX_RADIANCE = 1e12  # far above the radiance of the sun; prevents overflow of 
 MAX_SUNS = 4
 _PEAK_FACTOR = 32.0  # radiance above which a texel may belong to a sun, relative to the mean
 _CLUSTER_DEGREES = 8.0
-_MIN_SUN_FRACTION = 0.05  # least irradiance of a sun, relative to that of the mean radiance
+_MIN_SUN_FRACTION = 0.05  # least irradiance by a sun, relative to that by a uniform sky of mean radiance
 
 
 def load_panorama(name: str, max_rows: int = _MAX_ROWS) -> Floats:
@@ -147,8 +147,8 @@ def split_suns(radiance: Floats) -> tuple[Floats, list[Sun]]:
     radiance : (h, w, 3)
 
     A sun is the radiance above 32 times the mean, within 8 degrees of the centre of a bright cluster. At most
-    four suns are extracted, each with at least a twentieth of the irradiance of the mean radiance. This is a
-    simplified median cut of light probes [Debevec2005].
+    four suns are extracted. Each of them causes at least 5 % of the irradiance that a uniform sky with the
+    panorama's mean radiance would cause. This is a simplified median cut of light probes [Debevec2005].
     """
     mean = float(luminance(mean_radiance(radiance)))
     brightness = np.asarray(luminance(radiance), np.float64)

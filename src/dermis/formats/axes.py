@@ -38,7 +38,7 @@ class Axes(NamedTuple):
         return "-y" if self.up in ("z", "-z") else "z"
 
     def or_stated(self, stated: Axes) -> Axes:
-        """Return these axes, chosen by the user, with those that are not set taken from the file.
+        """Return these axes, which the user chose; those that are not set are taken from the file.
 
         stated : axes that the file states
 

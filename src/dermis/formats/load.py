@@ -155,7 +155,7 @@ def _load_uncached(
 
 
 def _settled_axes(chosen: Axes, stated: Axes, source: Path) -> Axes:
-    """Return the axes that the user chose, with those that are not set taken from the file.
+    """Return the axes that the user chose; those that are not set are taken from the file.
 
     Raises DermisError if the front is parallel to the up axis.
     """

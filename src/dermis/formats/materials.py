@@ -96,7 +96,7 @@ class FileMaterial:
         return self.alpha_cutoff if self.alpha_mode == "mask" else _BLENDED_CUTOFF
 
     def skin_pictures(self) -> dict[str, object]:
-        """Return keyword arguments of `load_maps` for skin whose uv are those of its pictures."""
+        """Return keyword arguments of `load_maps` for skin that shows the pictures in its own uv."""
         if self.maps is not None:
             return dict(self.maps)
         return {role: self.textures[role].picture for role in ("colour", "normal") if role in self.textures}

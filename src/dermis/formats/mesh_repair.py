@@ -42,7 +42,7 @@ _MIN_BALANCE = 0.25
 """Absolute visible balance above which the more visible side of a component is its outer side [-]."""
 _MIN_VISIBLE_SAMPLES = 8
 _MIN_VIEW_COSINE = 0.05  # smallest cosine of normal and view; surfaces seen at grazing angles do not count
-_MIN_VISIBLE_FRACTION = 0.02  # relative to the visible samples of the same component without the others
+_MIN_VISIBLE_FRACTION = 0.02  # smallest ratio of visible samples to those visible without other components
 _VIEWS, _VIEW_CELLS = 20, 64  # number of views from outside, and of cells along a side of each view
 _SURFACE_SAMPLES = 120_000  # points on the mesh whose visibility is tested
 _DOUBTFUL_FRACTION = 0.25  # fraction of the samples that is reserved for components that may be inside out
@@ -476,7 +476,7 @@ def _inside_out(surface: _Surface, doubtful: Mask, agreement: Doubles) -> Mask:
     """Return the mask of connected components that are wound inside out.
 
     A component is judged by the side that is visible from outside. If both sides are equally visible, the
-    normals of the file decide; if the component is hidden, it is treated as most of the mesh.
+    normals of the file decide. A hidden component is inside out if the backs of the whole mesh prevail.
 
     doubtful : mask of components that may be inside out
     agreement : mean cosine between the file's normals and the triangles' normals, by component

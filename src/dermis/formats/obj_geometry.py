@@ -237,7 +237,7 @@ def _polypaint(digits: str, count: int) -> tuple[Doubles | None, list[str]]:
 
 
 def _table(path: Path, rows: _Rows, kind: str) -> tuple[Doubles, Index]:
-    """Return each statement's first six numbers (n, 6), NaN for missing ones, and its number of them (n,)."""
+    """Return each statement's first six numbers, padded with NaN, (n, 6), and how many it has (n,)."""
     words = run_starts(rows.text > _SPACE)
     first = np.searchsorted(words, rows.start)
     counts = np.diff(first, append=len(words))

@@ -471,16 +471,16 @@ def _colours(vertices: _Columns) -> tuple[Doubles | None, list[str]]:
     return colours, notes + faults
 
 
-def _picture(names: Sequence[str], numbers: Numbers | None) -> tuple[str | None, list[str]]:
+def _picture(names: Sequence[str], picture_index: Numbers | None) -> tuple[str | None, list[str]]:
     """Return the picture that most faces use, and a note on the other pictures.
 
     names : names of the pictures
-    numbers : (n, 1) picture index of each face, or None
+    picture_index : (n, 1) index of each face's picture in `names`; None if the file states none
     """
     if not names:
         return None, []
     used, counts = np.unique(
-        0 if numbers is None else np.clip(numbers, 0, len(names) - 1), return_counts=True
+        0 if picture_index is None else np.clip(picture_index, 0, len(names) - 1), return_counts=True
     )
     chosen = names[int(used[counts.argmax()])]
     others = [name for name in dict.fromkeys(names) if name != chosen]

@@ -13,8 +13,8 @@ from dermis.formats.size_limits import DAMAGED_ADVICE
 from dermis.mesh.rig import INFLUENCES, MorphTargets, Rig, Skeleton, no_targets
 
 SPLIT_TOLERANCE_MM = 0.01
-"""Coincident vertices that a morph target moves further apart, such as those of touching lips, are separate
-points."""
+"""Distance beyond which coincident vertices that a morph target moves apart become separate points, such as
+those of touching lips [mm]."""
 _MAX_COINCIDENT = 64  # vertices at one position that move differently
 _WEIGHT_TOLERANCE = 0.004  # one step of 8-bit weights
 _MIN_DISPLACEMENT_MM = 1e-4  # smaller displacements are rounding errors and count as 0

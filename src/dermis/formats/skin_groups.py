@@ -114,6 +114,6 @@ def describe_choice(groups: Sequence[MaterialGroup], is_skin: Sequence[bool]) ->
     return f"skin is {_listed(skin)}; not skin: {_listed(other)}. --skin-groups NAME,... chooses others"
 
 
-def _listed(names: Sequence[str], most: int = 6) -> str:
-    shown = ", ".join(repr(name) for name in names[:most])
-    return f"{shown} and {len(names) - most} more" if len(names) > most else shown
+def _listed(names: Sequence[str], max_count: int = 6) -> str:
+    shown = ", ".join(repr(name) for name in names[:max_count])
+    return f"{shown} and {len(names) - max_count} more" if len(names) > max_count else shown

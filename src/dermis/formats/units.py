@@ -23,7 +23,7 @@ _SIZE_IN_MM = (100.0, 1000.0)  # sizes in units of the file for which the unit i
 _FIGURE_MM, _HEAD_MM, _PIECE_MM = 1700.0, 270.0, 150.0  # typical sizes
 _FLATNESS = 0.25  # thickness relative to length below which a mesh is a patch of skin or a hand
 _INCH = 25.4
-_INCH_PENALTY = {_FIGURE_MM: 0.4, _HEAD_MM: 0.4, _PIECE_MM: 9.0}  # added to the error of the log size
+_INCH_PENALTY = {_FIGURE_MM: 0.4, _HEAD_MM: 0.4, _PIECE_MM: 9.0}  # added to the error of log(size)
 _EXPORTED_UNITS_MM = (1.0, 10.0)  # units that programs write although the format requires metres
 _ADVISED_MM = {True: (1200.0, 2200.0), False: (150.0, 500.0)}  # usual sizes: standing figures, other meshes
 

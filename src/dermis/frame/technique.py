@@ -37,7 +37,7 @@ class ProfileSplit:
 
     @property
     def relit_changes(self) -> Floats:
-        """Return (o, 3) weights of the relit Gaussian in the o other profiles, minus that in this one [-]."""
+        """Return the relit Gaussian's weights in the o other profiles minus those in this one, (o, 3) [-]."""
         return np.array([one.relit - self.relit for one in self.others]).reshape(-1, 3)
 
     @property

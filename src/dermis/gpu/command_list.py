@@ -29,8 +29,8 @@ class CommandList(Recorder):
 
     On software adapters each timed stage is submitted separately and waited for.
 
-    timed : see `Timing`; dispatches of several stages share a pass unless each stage is timed. Software
-        adapters time stages whenever anything is timed
+    timed : see `Timing`; on software adapters, "whole" times each stage too. Stages that are not timed
+        individually share compute passes
     uniforms : uniform memory for the records of the passes; new if None
     submitted : number of the last submission, for `Device.wait`
     """

@@ -171,7 +171,7 @@ class Graph(Recorder):
         self._epoch = 0
         self._passes: list[DeclaredPass] = []
         self._uniforms = Uniforms(device)
-        self._dependencies: list[Dependencies] = []  # of earlier frames, the latest new one first
+        self._dependencies: list[Dependencies] = []  # dependencies of earlier frames, the latest first
         self._readbacks: list[tuple[tuple[Buffer, ...], BufferReadback]] = []
 
     def invalidate(self) -> None:

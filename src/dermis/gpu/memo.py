@@ -28,7 +28,7 @@ class CachedResult:
     """
 
     args: tuple[object, ...]
-    value: Any = None  # of the type that the function returns
+    value: Any = None  # its type is that of the function's return value
     parts: list[tuple[FunctionKey, CachedResult]] = field(default_factory=list)
     keys: set[FunctionKey] = field(default_factory=set)
 

@@ -16,15 +16,15 @@ if TYPE_CHECKING:
     from dermis.gpu.device import Device
 
 _DRIVER_LOADING_BYTES = 0.5e9, 0.15e9
-"""Address space to load all drivers, and in addition for each thread of Mesa's adapter; for Mesa 22.3."""
+"""Address space for loading all drivers of Mesa 22.3, and the addition for each thread of its adapter."""
 
 _SOFTWARE_RENDERING_BYTES = 0.9e9, 0.22e9
-"""Address space to render the package's human in software, and in addition for each thread.
+"""Address space for rendering the package's human in software, and the addition for each thread.
 
 Measured at 512x512 with an atlas of 1024.
 """
 
-_MAX_THREADS = 16  # of Mesa's software adapter
+_MAX_THREADS = 16  # largest number of threads of Mesa's software adapter
 
 _CGROUPS = Path("/sys/fs/cgroup")
 

@@ -22,7 +22,7 @@ from dermis.gpu.uniforms import CHUNK_BYTES, Uniforms
 
 T = TypeVar("T")
 Ts = TypeVarTuple("Ts")
-_CACHED_RECORDINGS = 4  # for each function: two states, each in motion and still
+_CACHED_RECORDINGS = 4  # recordings per function: for two states, each with a moving and a still head
 
 
 class Recording(Recorder):

@@ -139,7 +139,7 @@ class _Composer:
         if path in self._included:
             return
         self._included.add(path)
-        conditions: list[bool] = []  # of each open `//#if`
+        conditions: list[bool] = []  # whether each open `//#if` holds
         for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
             directive = _DIRECTIVE.match(line)
             if directive and (directive["option"] or directive["turn"]):

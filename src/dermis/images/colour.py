@@ -82,9 +82,11 @@ def lab(linear: ArrayLike) -> Doubles:
 
 
 def linear_of_xyz(xyz_over_white: ArrayLike) -> Doubles:
-    """Return linear Rec. 709 colours (..., 3) of X, Y and Z over those of white (..., 3), under any light.
+    """Return the linear Rec. 709 colours (..., 3) that look under D65 as given colours do under their light.
 
-    The colours have the same L*a*b* under D65 as the given ones have under their light.
+    Both have the same L*a*b*.
+
+    xyz_over_white : (..., 3) X, Y and Z of the given colours, divided by X, Y and Z of white in their light
     """
     xyz = np.asarray(xyz_over_white, np.float64) * _WHITE_XYZ
     return np.asarray(xyz @ np.linalg.inv(_XYZ_OF_REC709).T)

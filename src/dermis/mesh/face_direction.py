@@ -13,16 +13,21 @@ Direction = Literal["x", "z", "-x", "-z"]
 # Numbers of examined triangles, of points sampled on them, and of points that are mirrored:
 _MAX_TRIANGLES, _SAMPLES, _MIRRORED = 40_000, 6_000, 800
 # Limits for the eyes, relative to the width of both together:
-_MAX_EYE_DEPTH, _MAX_EYE_HEIGHT, _MIN_GAP, _MAX_ASIDE, _MIN_AHEAD, _REACH = 0.67, 0.6, 0.1, 0.25, 0.25, 3.0
+_MAX_EYE_DEPTH, _MAX_EYE_HEIGHT = 0.67, 0.6  # largest extent from back to front, and upwards
+_MIN_GAP = 0.1  # smallest gap between the eyes
+_REACH = 3.0  # horizontal radius around the eyes within which vertices count as the head
+_MIN_AHEAD, _MAX_ASIDE = 0.25, 0.25  # offset of the eyes from the middle of the head: forwards, and to a side
 # Limits for the head, relative to its height:
 _HEAD_WIDTH = 0.68  # largest width of the head without shoulders
 _DEPTHS = 0.5, 1.6  # smallest and largest depth
-_MAX_ASYMMETRY = 0.03  # root mean square distance of mirrored points from the surface
-_MIN_NOSE = 0.04  # protrusion of the middle of the face
-_MIN_RELIEF = 0.03  # see `_relief`
+_MAX_ASYMMETRY = 0.03  # largest root mean square distance of mirrored points from the surface
+_MIN_NOSE = 0.04  # smallest protrusion of the middle of the face
+_MIN_RELIEF = 0.03  # smallest variation of normals, see `_relief`
 _CELL = 0.08  # side of the cells in `_relief`
-_ROW, _RIDGE, _SIDES = 0.05, 0.03, (0.07, 0.12)  # in `_ridge`: height of rows, and distances from the middle
-# Smallest ratio of the asymmetries about both horizontal axes, and of relief and nose in front to the back:
+# Height of the rows in `_ridge`, largest distance of the ridge from the middle, and distances of its sides:
+_ROW, _RIDGE, _SIDES = 0.05, 0.03, (0.07, 0.12)
+# Smallest ratio of the larger to the smaller asymmetry about the horizontal axes, and of relief and of nose
+# at the front to those at the back:
 _MIN_ASYMMETRY_RATIO, _MIN_RELIEF_RATIO, _MIN_NOSE_RATIO = 2.2, 1.4, 1.35
 
 

@@ -157,7 +157,7 @@ class Head:
 
     @property
     def seen_positions_mm(self) -> Floats:
-        """Return the vertices (v, 3) relative to the centre, to the right, upwards and to the front [mm]."""
+        """Return the vertices relative to the centre: their right, up and front components, (v, 3) [mm]."""
         positions = self.mesh.positions - np.array(self.centre_mm, dtype=np.float32)
         return positions if self.skull_mm is not None else positions @ self.axes.T.astype(np.float32)
 

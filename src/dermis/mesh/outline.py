@@ -20,8 +20,8 @@ from dermis.mesh.morph_targets import MorphTargets
 from dermis.mesh.skeleton import Skeleton
 
 _DIRECTIONS, _FEW_DIRECTIONS = 512, 256
-_REFINED_DIRECTIONS = 64, 512, 2048  # in this order, so that points close to chosen ones are skipped
-_CLOSE_MM = 0.5  # largest distance of points beyond the bounds of the chosen ones at which they are skipped
+_REFINED_DIRECTIONS = 64, 512, 2048  # few first, so that later passes skip points close to chosen ones
+_CLOSE_MM = 0.5  # points are skipped if they exceed the bounds of the chosen points by at most this distance
 _BLOCK_NUMBERS = 80_000  # numbers that are computed at a time
 _CANDIDATES_PER_DIRECTION = 16  # candidates per direction; any of them may be outermost in some pose
 _RANDOM_POSES, _SEED = 128, 0

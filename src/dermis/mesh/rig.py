@@ -150,17 +150,19 @@ class Rig(ShortRepr):
         """
         if motion.positions_mm is self.positions_mm:
             return self.outline.pose(motion.weights, motion.matrices)
-        return self._outline_at(motion.positions_mm).pose(motion.weights, motion.matrices)
+        return self._outline_for(motion.positions_mm).pose(motion.weights, motion.matrices)
 
-    def _outline_at(self, positions: Floats) -> RigOutline:
-        """Return the outline of the rig with other rest positions (p, 3) of its control points [mm].
+    def _outline_for(self, rest_positions: Floats) -> RigOutline:
+        """Return the outline of this rig if its control points had other rest positions.
 
-        The last outline is cached; it is returned again for rest positions with the same outline points.
+        The last result is cached; it is returned again if the outline points have the same positions.
+
+        rest_positions : (p, 3) rest positions of all control points [mm]
         """
         points, outline = self._last_outline
-        if not np.array_equal(positions[points].T, outline.rest_mm[:3]):
-            points = np.union1d(self._outline_points, extreme_points(positions))
-            outline = rig_outline(positions, self.targets, self.skeleton, points)
+        if not np.array_equal(rest_positions[points].T, outline.rest_mm[:3]):
+            points = np.union1d(self._outline_points, extreme_points(rest_positions))
+            outline = rig_outline(rest_positions, self.targets, self.skeleton, points)
             vars(self)["_last_outline"] = points, outline
         return outline
 
@@ -199,7 +201,7 @@ class Rig(ShortRepr):
 
     @cached_property
     def _lid_edges(self) -> tuple[Intp, Doubles, RigOutline]:
-        """Return the control points that determine the lid edges, and how they do.
+        """Return the control points, the weights and the outline from which the lid edges are computed.
 
         The second result is the weights (e, n) of the n control points in the points of the edges, the third
         is an outline that poses the control points.

@@ -128,7 +128,8 @@ class _Section(NamedTuple):
     """Section of a mesh with a horizontal plane, seen from the front.
 
     parts : number of separate intervals along x
-    width, middle : sum of the lengths of the intervals, and centre of their range
+    width : total length of the intervals
+    middle : midpoint between the lowest and the highest x of all intervals
     """
 
     parts: int

@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 
 from dermis.base.arrays import Doubles
 from dermis.base.errors import refuse
+from dermis.base.renamed import renamed_attribute
 from dermis.mesh.head import Head
 from dermis.scene.field_errors import Reason
 from dermis.scene.frozen_model import Direction, FrozenModel, Vector
@@ -125,13 +126,15 @@ class Camera(FrozenModel):
         OpenCvCamera
             Arrays K (3, 3) [pixel], R (3, 3) and t (3,) [mm].
         """
-        lens = self.half_tangent, self.principal_point, self.pixel_aspect
+        lens = self.half_view_tangent, self.principal_point, self.pixel_aspect
         return OpenCvCamera(intrinsics(lens, size), *extrinsics(self.position, self.target, self.up))
 
     @property
-    def half_tangent(self) -> float:
-        """Return the tangent of half the vertical angle of view of a camera without lens shift."""
+    def half_view_tangent(self) -> float:
+        """Return the tangent of half the vertical angle of view, as if the camera had no lens shift."""
         return 0.5 * self.frame_mm / math.dist(self.position, self.target)
+
+    half_tangent = renamed_attribute("half_tangent", "half_view_tangent")
 
     def window(self, aspect: float) -> Window:
         """Return the image rectangle at distance 1, from which projection and view rays are computed.
@@ -139,7 +142,7 @@ class Camera(FrozenModel):
         aspect : width of the picture divided by its height
         """
         u, v = self.principal_point
-        half = self.half_tangent
+        half = self.half_view_tangent
         return Window((half * aspect * self.pixel_aspect, half), (1.0 - 2.0 * u, 2.0 * v - 1.0))
 
 

@@ -66,9 +66,11 @@ def looking_at(head: Head, target_mm: ArrayLike, pose: Pose | Mapping[str, float
 
 
 def _eyelid_rotations(rig: Rig, side: str) -> list[BoneRotation]:
-    """Return the gaze targets of one eye of a head from a file, in which they move only the lids.
+    """Return the targets by which the lids of an eye follow its gaze, for a head whose bones turn the eye.
 
-    For each target, the angles are those by which it turns the parametric human's eye.
+    Each is paired with the rotation by which the same target turns the eye of the parametric human.
+
+    side : "Left" or "Right"
     """
     arkit = [rotation for rotation in gaze_rotations() if rotation.target.endswith(side)]
     known = match_targets([rotation.target for rotation in arkit], rig.targets.names)

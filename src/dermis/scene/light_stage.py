@@ -29,8 +29,8 @@ def light_stage(count: int) -> list[DirectionalLight]:
 def light_stage_weights(lights: Sequence[DirectionalLight], environment: Environment) -> NDArray[np.float64]:
     """Return weights (n, 3) of the lights of a light stage that reproduce an environment, linear Rec. 709.
 
-    A weight is the irradiance from the directions that are nearest to a light. The sum of the pictures under
-    each light, times these weights, is the picture under the environment.
+    The weight of a light is the irradiance from all directions to which no other light is nearer. The sum of
+    the pictures under each light, times these weights, is the picture under the environment.
 
     Raises DermisError when the panorama cannot be read.
     """

@@ -15,7 +15,7 @@ _PIXEL_CENTRE = 0.5  # OpenCV's origin is the centre of the first pixel, not the
 _TOLERANCE = 1e-4  # tolerance for rotations and skews that were rounded in files
 _MIN_DISTANCE_MM = 1.0
 _MAX_VALUE = 1e9
-_MAX_PIXELS = 1e6  # along a side
+_MAX_PIXELS = 1e6  # largest number of pixels along a side
 
 
 class OpenCvCamera(NamedTuple):
@@ -73,9 +73,9 @@ def intrinsics(lens: tuple[float, tuple[float, float], float], size: tuple[int, 
         the upper left corner; and width of a pixel divided by its height
     size : width and height of the picture [pixel]
     """
-    half_tangent, principal_point, pixel_aspect = lens
+    half_view_tangent, principal_point, pixel_aspect = lens
     size = _checked_size(size)
-    fy = 0.5 * size[1] / half_tangent
+    fy = 0.5 * size[1] / half_view_tangent
     cx, cy = np.multiply(principal_point, size) - _PIXEL_CENTRE
     return np.array([[fy / pixel_aspect, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
 
@@ -92,13 +92,13 @@ def extrinsics(position: ArrayLike, target: ArrayLike, up: ArrayLike) -> tuple[D
     return rotation, -rotation @ np.asarray(position, np.float64)
 
 
-def _check_intrinsics(k: Doubles) -> None:
-    if k[0, 0] <= 0 or k[1, 1] <= 0 or np.abs(k[2] - (0, 0, 1)).max() > _TOLERANCE:
-        actual = f"its diagonal is {np.diag(k).tolist()} and its last row {k[2].tolist()}"
+def _check_intrinsics(K: Doubles) -> None:
+    if K[0, 0] <= 0 or K[1, 1] <= 0 or np.abs(K[2] - (0, 0, 1)).max() > _TOLERANCE:
+        actual = f"its diagonal is {np.diag(K).tolist()} and its last row {K[2].tolist()}"
         advice = "Pass [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]"
         refuse("K", "fx, fy above 0 and a last row of 0, 0, 1", actual, advice)
-    if abs(k[0, 1]) > _TOLERANCE * k[0, 0] or abs(k[1, 0]) > _TOLERANCE * k[0, 0]:
-        actual, advice = f"its skew is {k[0, 1]:.4g} pixels", "Resample the picture to upright pixels"
+    if abs(K[0, 1]) > _TOLERANCE * K[0, 0] or abs(K[1, 0]) > _TOLERANCE * K[0, 0]:
+        actual, advice = f"its skew is {K[0, 1]:.4g} pixels", "Resample the picture to upright pixels"
         refuse("K", "pixels with right angles", actual, advice)
 
 

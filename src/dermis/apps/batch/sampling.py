@@ -195,12 +195,12 @@ class Sampler:
             return self._uniform(k, name)
         return float(ndtr(sum(weight * self._normal(k, other) for other, weight in weights.items())))
 
-    def _uniform(self, k: int, name: str) -> float:
-        number = k // self.images_per_person if name.startswith(_PERSON_PREFIX) else k
+    def _uniform(self, image: int, name: str) -> float:
+        number = image // self.images_per_person if name.startswith(_PERSON_PREFIX) else image
         return hashed_uniform(self.seed, number, name)
 
-    def _normal(self, k: int, name: str) -> float:
-        return float(ndtri(self._uniform(k, name)))
+    def _normal(self, image: int, name: str) -> float:
+        return float(ndtri(self._uniform(image, name)))
 
     def _target_weights(self, k: int, sampled: Parameters) -> dict[str, float]:
         """Return the weights of all morph targets that the spec can move, for image k.

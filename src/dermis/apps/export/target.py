@@ -296,7 +296,7 @@ class Target(ABC):
 
 
 class JsonTarget(Target):
-    """Base class of targets that only write a JSON file of parameters, not tested in the program."""
+    """Base class of targets that only write a JSON file of parameters, which was not tried in the program."""
 
     suffixes = (".json", "")
     untested = True

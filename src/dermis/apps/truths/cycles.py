@@ -296,4 +296,4 @@ def cycles_camera(scene: Scene) -> SceneDict:
     camera = scene.camera
     check_camera(camera, "Cycles")
     to_world = cycles_look_at(camera.position, np.subtract(camera.target, camera.position), camera.up)
-    return {"to_world": to_world, "half_tangent": camera.half_tangent}
+    return {"to_world": to_world, "half_tangent": camera.half_view_tangent}

@@ -127,7 +127,7 @@ def mitsuba_sensor(
     return {
         "type": "perspective",
         "fov_axis": "y",
-        "fov": float(2.0 * np.degrees(np.arctan(camera.half_tangent))),
+        "fov": float(2.0 * np.degrees(np.arctan(camera.half_view_tangent))),
         "to_world": mi.ScalarTransform4f().look_at(*view),
         "near_clip": 0.5,
         "far_clip": 1e7,

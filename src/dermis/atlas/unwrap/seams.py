@@ -72,8 +72,8 @@ def crossing_edges(edges: Doubles) -> Mask:
     return found
 
 
-def _pairs_cross(some: Doubles, edges: Doubles) -> Mask:
-    a, b = some[:, None, 0], some[:, None, 1]
+def _pairs_cross(block: Doubles, edges: Doubles) -> Mask:
+    a, b = block[:, None, 0], block[:, None, 1]
     c, d = edges[None, :, 0], edges[None, :, 1]
     straddle = cross_2d(b - a, c - a) * cross_2d(b - a, d - a) < 0
     return np.asarray(straddle & (cross_2d(d - c, a - c) * cross_2d(d - c, b - c) < 0))

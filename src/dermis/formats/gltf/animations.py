@@ -110,17 +110,17 @@ def _check_node(nodes: Nodes, node: int, culprit: str) -> None:
 
 
 def _weight_track(
-    document: Document, node: int, sampler: Tree, culprit: str, known: dict[int, tuple[str, ...]]
+    document: Document, node: int, sampler: Tree, culprit: str, mesh_targets: dict[int, tuple[str, ...]]
 ) -> AnimationTrack:
     """Return the track of the morph target weights of a node.
 
     culprit : clip and channel, named in errors
-    known : names of morph targets by mesh index; this function adds the names for the node's mesh
+    mesh_targets : names of morph targets by mesh index; this function adds those of the node's mesh
     """
     mesh = document.items("nodes")[node].get("mesh")
-    if mesh is not None and mesh not in known:
-        known[mesh] = target_names(document.item("meshes", mesh))
-    names = () if mesh is None else known[mesh]
+    if mesh is not None and mesh not in mesh_targets:
+        mesh_targets[mesh] = target_names(document.item("meshes", mesh))
+    names = () if mesh is None else mesh_targets[mesh]
     if not names:
         actual = f"node {node} has no morph targets"
         refuse(culprit, "weights of a mesh with morph targets", actual, DAMAGED_ADVICE)

@@ -44,18 +44,18 @@ class PrimitiveSource(Protocol):
 class SurfacePrimitive:
     """Triangles of one material, with the vertices that they use.
 
-    points : deformable mesh of the head
+    deformable : mesh of the head with its deformation
     faces : (f,) indices of the triangles
     eye : index of the eye whose uv layout a textured eyeball uses; -1 for other surfaces
     """
 
-    points: DeformableMesh
+    deformable: DeformableMesh
     faces: Intp
     eye: int = -1
 
     @property
     def _head(self) -> Head:
-        return self.points.head
+        return self.deformable.head
 
     @cached_property
     def vertices(self) -> Ints:
@@ -71,8 +71,10 @@ class SurfacePrimitive:
         used, mesh = self.vertices, self._head.mesh
         index = binary.add_triangles(np.searchsorted(used, mesh.triangles[self.faces]), len(used))
         uv = mesh.uv[used] if self.eye < 0 else self._eye_uv()
-        attributes = _vertex_attributes(binary, self.points.positions_mm[used], self.points.normals[used], uv)
-        attributes |= _bone_attributes(binary, self.points, used)
+        attributes = _vertex_attributes(
+            binary, self.deformable.positions_mm[used], self.deformable.normals[used], uv
+        )
+        attributes |= _bone_attributes(binary, self.deformable, used)
         primitive: Tree = {"attributes": attributes, "indices": index}
         flags = {"quads": self._has_quads(), "alone": self._is_separate()}
         extras = {key: True for key, value in flags.items() if value}
@@ -111,12 +113,12 @@ class SurfacePrimitive:
 class HairPrimitive:
     """Hairs as tubes; their colours are the texels of a picture with one row."""
 
-    points: DeformableMesh
+    deformable: DeformableMesh
     fibres: FibreTubes
 
     @cached_property
     def _rest_points(self) -> Doubles:
-        return replace(self.points.head.mesh, positions=self.points.positions_mm).points_mm
+        return replace(self.deformable.head.mesh, positions=self.deformable.positions_mm).points_mm
 
     def primitive(self, binary: BufferBuilder) -> Tree:
         """Append vertices and triangles to the buffer; return the primitive without material and targets.
@@ -127,14 +129,14 @@ class HairPrimitive:
         _, uv = self.fibres.colours()
         attributes = _vertex_attributes(binary, positions, normals.astype(np.float32), uv)
         attributes |= _bone_attributes(
-            binary, self.points, np.repeat(self.fibres.root_vertices, self.fibres.vertices_per_hair)
+            binary, self.deformable, np.repeat(self.fibres.root_vertices, self.fibres.vertices_per_hair)
         )
         index = binary.add_triangles(self.fibres.triangles(), len(positions))
         return {"attributes": attributes, "indices": index, "extras": {"dermis": {"hair": True}}}
 
     def target(self, binary: BufferBuilder, target: VertexTarget) -> dict[str, int]:
         """Append position displacements to the buffer and return their accessor; normals do not change."""
-        delta, mesh = np.zeros_like(self._rest_points), self.points.head.mesh
+        delta, mesh = np.zeros_like(self._rest_points), self.deformable.head.mesh
         delta[mesh.point[target.vertex]] = target.delta_mm
         vertex, displacement = self.fibres.displacements_at(self._rest_points, delta)
         (accessor,) = binary.add_displacements(vertex, [to_metres(displacement)], self.fibres.vertex_count)
@@ -157,15 +159,15 @@ def _vertex_attributes(
 
 
 def _bone_attributes(
-    binary: BufferBuilder, points: DeformableMesh, vertex: NDArray[np.integer]
+    binary: BufferBuilder, deformable: DeformableMesh, vertex: NDArray[np.integer]
 ) -> dict[str, int]:
     """Append joints and weights of vertices to the buffer, and return their accessors; {} without a skeleton.
 
     vertex : (v,) indices of the vertices in the mesh
     """
-    if points.rig.skeleton is None:
+    if deformable.rig.skeleton is None:
         return {}
-    bone, weight = points.bone_influences
+    bone, weight = deformable.bone_influences
     return {
         "JOINTS_0": binary.add_accessor(bone[vertex], VERTICES),
         "WEIGHTS_0": binary.add_accessor(weight[vertex], VERTICES),

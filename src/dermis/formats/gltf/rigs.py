@@ -79,7 +79,7 @@ def read_armature(document: Document, nodes: Nodes) -> Armature | None:
 
 
 def _with_static_root(bones: Bones) -> Bones:
-    """Return the bones below an additional root bone at the origin, for meshes that no bone moves."""
+    """Add a root bone at the origin above all bones, for meshes that no bone moves; return all bones."""
     name = node_names([{"name": known} for known in (*bones.names, _STATIC_BONE_NAME)])[-1]
     parent = np.concatenate([[-1], bones.parent]).astype(np.int32)
     local, world = (np.concatenate([np.eye(4)[None], one]) for one in (bones.local, bones.world))
@@ -108,7 +108,7 @@ def read_influences(
 
     The skinning matrices (v, 4, 4) map mesh space to scene space.
 
-    node : index of the mesh's node, which names the skin
+    node : index of the node that carries the mesh and refers to its skin
 
     Raises DermisError for invalid weights and joints.
     """

@@ -48,9 +48,9 @@ _MAX_WEIGHT = 100.0
 
 @dataclass(frozen=True)
 class Avatar:
-    """Properties that a VRM file adds to glTF; the defaults are for other glTF files.
+    """Properties that a VRM file adds to glTF; the defaults describe glTF files without VRM.
 
-    expressions : for each mesh (by `id`) and expression (by name), the weights by morph target index
+    expressions : weights by mesh (Python's `id` of its JSON tree), expression name and morph target index
     """
 
     axes: Axes = DEFAULT_AXES

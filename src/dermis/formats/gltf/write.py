@@ -56,10 +56,10 @@ def encode_head(
     eyes : maps of the eyeballs; None for eyes in a uniform colour
     additions : properties to add to the material of skin
     """
-    binary, points = BufferBuilder(), DeformableMesh(head)
+    binary, deformable = BufferBuilder(), DeformableMesh(head)
     pictures, roles = skin_pictures(head.maps, slopes)
     pictures |= {} if additions is None else additions.pictures
-    parts, materials = _primitive_sources(points, pictures, roles, roughness, eyes)
+    parts, materials = _primitive_sources(deformable, pictures, roles, roughness, eyes)
     if additions is not None:
         materials = [
             additions.apply_to(material) if "dermis" in material.get("extras", {}) else material
@@ -77,7 +77,7 @@ def encode_head(
         "scene": 0,
         "scenes": [{"nodes": roots}],
         "nodes": nodes,
-        "meshes": [_gltf_mesh(points, binary, parts, weights or {})],
+        "meshes": [_gltf_mesh(deformable, binary, parts, weights or {})],
         "skins": skins,
         "materials": [resolve_textures(material, textures) for material in materials],
         "textures": [{"source": index, "sampler": 0} for index in range(len(images))],
@@ -91,7 +91,7 @@ def encode_head(
 
 
 def _primitive_sources(
-    points: DeformableMesh,
+    deformable: DeformableMesh,
     pictures: dict[str, bytes],
     roles: FrozenTree,
     roughness: float,
@@ -102,7 +102,7 @@ def _primitive_sources(
     pictures : PNG files by name; this function adds the pictures of eyes, hairs and parts that are not skin
     roles : entries of the extras of skin, see `skin_pictures`
     """
-    head = points.head
+    head = deformable.head
     eye_materials = [] if eyes is None or head.eyes is None else head.eyes.material.tolist()
     if eyes is not None and eye_materials:
         pictures |= eye_pictures(eyes)
@@ -112,7 +112,7 @@ def _primitive_sources(
     parts, materials = list[PrimitiveSource](), list[Tree]()
     for index in np.unique(head.mesh.material).tolist():
         eye = eye_materials.index(index) if index in eye_materials else -1
-        parts.append(SurfacePrimitive(points, np.flatnonzero(head.mesh.material == index), eye))
+        parts.append(SurfacePrimitive(deformable, np.flatnonzero(head.mesh.material == index), eye))
         own = head.mesh.materials[index]
         if eye >= 0:
             materials.append(eye_material(own))
@@ -123,7 +123,7 @@ def _primitive_sources(
     for name, strands in ((BROWS, head.strands), (HAIR, head.hair)):
         if strands is not None and len(strands):
             fibres = FibreTubes.from_strands(strands, head.mesh, _MAX_HAIRS, _KNOTS_PER_HAIR[name])
-            parts.append(HairPrimitive(points, fibres))
+            parts.append(HairPrimitive(deformable, fibres))
             materials.append(hair_material(name))
             pictures[name] = colours_png(fibres.colours()[0])
     return parts, materials
@@ -137,18 +137,21 @@ def _gltf_asset(head: Head, notes: FrozenTree | None) -> Tree:
 
 
 def _gltf_mesh(
-    points: DeformableMesh, binary: BufferBuilder, parts: list[PrimitiveSource], weights: Mapping[str, float]
+    deformable: DeformableMesh,
+    binary: BufferBuilder,
+    parts: list[PrimitiveSource],
+    weights: Mapping[str, float],
 ) -> Tree:
     """Return the glTF mesh with its primitives, morph targets and default weights.
 
     parts : geometry of each primitive; the material of a primitive has the same index
     """
     primitives = [part.primitive(binary) | {"material": number} for number, part in enumerate(parts)]
-    mesh: Tree = {"name": _mesh_name(points.head), "primitives": primitives}
-    names, rest = points.rig.targets.names, points.rig.targets.rest
+    mesh: Tree = {"name": _mesh_name(deformable.head), "primitives": primitives}
+    names, rest = deformable.rig.targets.names, deformable.rig.targets.rest
     if not names:
         return mesh
-    for target in points.targets():
+    for target in deformable.targets():
         for primitive, part in zip(primitives, parts, strict=True):
             primitive.setdefault("targets", []).append(part.target(binary, target))
     resting = {} if rest is None else dict(zip(names, rest.tolist(), strict=True))

@@ -102,7 +102,7 @@ def capture_clip(culprit: object, name: str, samples: CaptureSamples, head: Head
 
 
 def refuse_unmatched(culprit: object, names: Sequence[str], head: Head) -> None:
-    """Raise the error for a motion of which no name is that of a morph target or bone of the head."""
+    """Raise the error for a motion in which no name matches a morph target or bone of the head."""
     targets = _short_list(head.targets) if head.targets else "none"
     actual = f"it has {_short_list(names)} and the head {targets}"
     advice = "Use a head with targets of these names, such as those of ARKit"
@@ -125,8 +125,8 @@ def frame_rate(times: Doubles) -> float | None:
 def to_seconds(culprit: object, times: Doubles, unit: float | None) -> Doubles:
     """Return times (k,) in seconds.
 
-    unit : unit of the times [s]; None to assume, with a note, the largest in which frames are at most 2 s
-        apart
+    unit : unit of the times [s]; None to assume the largest unit in which frames are at most 2 s apart, which
+        a note states
     """
     if unit is None:
         steps = np.diff(times)
@@ -243,7 +243,7 @@ def find_rotation_bones(skeleton: Skeleton | None) -> RotationBones:
 
     Head, mixamorig:Head and CC_Base_Head are heads; neck, Neck1 and DEF-neck.002 are necks if they are
     ancestors of the head; LeftEye and eye.L are eyes. The head bone gets half of the head's rotation and the
-    necks the other half; without neck bones or without a head bone, the other gets all of it.
+    neck bones share the other half; if there is only a head bone, or only neck bones, they get all of it.
     """
     if skeleton is None:
         return RotationBones({}, {})

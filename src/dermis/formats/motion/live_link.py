@@ -56,7 +56,7 @@ _MAX_ANGLE = 2 * np.pi  # largest angle of a head in radians; larger angles are 
 
 
 class _Timecode(NamedTuple):
-    """Timecode of a frame: seconds since midnight, and frames after them."""
+    """Timecode of a frame: full seconds since midnight, and number of the frame within the second."""
 
     seconds: float
     frames: float
@@ -106,20 +106,21 @@ def _read_table(path: Path, fps: float | None) -> _CaptureTable:
         columns = [k for k, key in enumerate(keys) if key not in _OTHER_COLUMNS]
         time = next((keys.index(key) for key in (*_TIME_COLUMNS, *FRAME_KEYS) if key in keys), None)
         count = keys.index(_COUNT_COLUMN) if _COUNT_COLUMN in keys else None
-        lines, times, rows, counted = [], [], [], []
+        lines, times, rows, states_shapes = [], [], [], []
         for row in filter(_has_text, reader):
             culprit = f"{path}, line {reader.line_num}"
             _check_row(culprit, header, row, count)
             lines.append(culprit)
             times.append("" if time is None else row[time].strip().replace(",", "."))
-            counted.append(count is not None and row[count].strip() not in ("", "0"))
+            states_shapes.append(count is not None and row[count].strip() not in ("", "0"))
             rows.append(_row_values(culprit, header, row, columns))
             check_size(path, len(rows), len(columns))
     if not rows:
         refuse(path, f"{expected} with a header and rows", "it has only its header", "Export it again")
     times_s = _row_times(path, lines, times, None if time is None else keys[time], fps)
     names = [header[k] for k in columns]
-    return _complete_table(path, lines, _CaptureTable(names, times_s, np.array(rows)), np.array(counted))
+    table = _CaptureTable(names, times_s, np.array(rows))
+    return _complete_table(path, lines, table, np.array(states_shapes))
 
 
 def _has_text(row: Sequence[str]) -> bool:
@@ -163,15 +164,15 @@ def _row_values(culprit: str, header: Sequence[str], row: Sequence[str], columns
     return values
 
 
-def _complete_table(path: Path, lines: list[str], table: _CaptureTable, counted: Mask) -> _CaptureTable:
+def _complete_table(path: Path, lines: list[str], table: _CaptureTable, states_shapes: Mask) -> _CaptureTable:
     """Return a table without gaps, with weights as fractions and angles in radians.
 
     lines : name of each row, for errors
-    counted : (k,) mask of rows that state a number of blend shapes above 0
+    states_shapes : (k,) mask of rows that state a number of blend shapes above 0
     """
     values, names = table.values, table.names
     is_angle = np.array([plain_key(name) in _ANGLE_COLUMNS for name in names])
-    lost = _rows_without_face(values, is_angle, counted)
+    lost = _rows_without_face(values, is_angle, states_shapes)
     values[lost] = np.nan
     empty = np.asarray(np.isnan(values).all(axis=0))
     if empty.all():
@@ -191,7 +192,7 @@ def _complete_table(path: Path, lines: list[str], table: _CaptureTable, counted:
     return _CaptureTable(names, table.times_s, fill_gaps(table.times_s, values))
 
 
-def _rows_without_face(values: Doubles, is_angle: Mask, counted: Mask) -> Mask:
+def _rows_without_face(values: Doubles, is_angle: Mask, states_shapes: Mask) -> Mask:
     """Return the mask (k,) of rows without a face: empty rows, and rows of zeros that no face would have.
 
     Rows of zeros show no face if most other rows have a rotated head, or if these rows state no number of
@@ -201,7 +202,8 @@ def _rows_without_face(values: Doubles, is_angle: Mask, counted: Mask) -> Mask:
     zero = np.asarray(~numbers.any(axis=1))
     turned = np.asarray(numbers[:, is_angle].any(axis=1))
     always_turned = bool(turned[~zero].sum() > 0.5 * (~zero).sum())
-    return np.asarray(np.isnan(values).all(axis=1)) | (zero & (always_turned | (~counted & counted.any())))
+    unstated = ~states_shapes & states_shapes.any()
+    return np.asarray(np.isnan(values).all(axis=1)) | (zero & (always_turned | unstated))
 
 
 def _row_times(path: Path, lines: list[str], cells: list[str], key: str | None, fps: float | None) -> Doubles:

@@ -84,11 +84,12 @@ class _CapturedFrame(NamedTuple):
 def load_mediapipe(path: Path, head: Head, fps: float | None = None) -> Clip:
     """Load results of MediaPipe's face landmarker as a clip for a head.
 
-    The file has one result per line, a list of them, or an object with such a list. Keys are those of any
-    API, such as face_blendshapes and faceBlendshapes. Blend shapes are {name: score}, or a list of names and
-    scores for each face; facial transformations (4, 4) are nested or flat lists or objects with data, and
-    rotate the bones found by `find_rotation_bones`; "time" [s], "timestamp_ms" and others are times. Only the
-    first face is used. Frames without a face are interpolated. Assumptions are noted.
+    The file has one result per line, a list of them, or an object with such a list. Keys may be spelled as in
+    any of MediaPipe's APIs, such as face_blendshapes and faceBlendshapes. Blend shapes are {name: score}, or
+    a list of names and scores for each face; facial transformations (4, 4) are nested or flat lists or
+    objects with data, and rotate the bones found by `find_rotation_bones`; "time" [s], "timestamp_ms" and
+    others are times. Only the first face is used. Frames without a face are interpolated. Assumptions are
+    noted.
 
     fps : frame rate if the frames have no time; by default the rate that the file states, or 30
 
@@ -149,7 +150,12 @@ def _plain_fields(record: object) -> dict[str, object]:
 
 
 def _frame_list(document: object) -> list[object]:
-    """Return the frames of a document: a list, the longest list in an object, or the document itself."""
+    """Return the frames in a JSON document.
+
+    A list contains the frames, unless it is the list of blend shapes of a single frame. An object is a single
+    frame if it has blend shapes, a facial transformation or no list; otherwise its longest list contains the
+    frames.
+    """
     if isinstance(document, list):
         is_frame = bool(document) and isinstance(document[0], dict) and bool(document[0].keys() & _SCORE_KEYS)
         return [document] if is_frame else document
@@ -293,7 +299,7 @@ def _frame_times(path: Path, frames: Sequence[_CapturedFrame], fps: float | None
 def _head_angles(
     path: Path, frames: Sequence[_CapturedFrame], times: Doubles, bones: RotationBones
 ) -> tuple[dict[str, Doubles], tuple[str, ...]]:
-    """Return angles (k, 3) by bone name [degrees], and the names of rotations without a bone."""
+    """Return angles (k, 3) by bone name [degrees], and the rotations for which the head has no bone."""
     matrices = [frame.matrix for frame in frames if frame.matrix is not None]
     if not matrices or not bones.head:
         return {}, ("bone for the matrix",) if matrices else ()

@@ -89,7 +89,7 @@ def load_sequence(
     The vertices of the files must have the order of the head's file.
 
     fps : frame rate, by default 30
-    unit_mm : unit of the files [mm]; by default one for which the first mesh is about as large as the head
+    unit_mm : unit of the files [mm]; by default a unit in which the first mesh is about as large as the head
     up, front : axes of the files, see `load_head`; by default the axes of the head's file
 
     Raises DermisError for files that are not frames of that head; the first, the middle and the last file are

@@ -211,7 +211,7 @@ class MaterialReader:
 
 
 def _emission_to_colour(tree: Tree) -> Tree:
-    """Return a material; a picture of emission over a black colour, as in unlit scans, becomes the colour."""
+    """Return a material whose emission picture is its colour if the colour is black, as in unlit scans."""
     textures = tree["textures"]
     if "emission" in textures and "colour" not in textures and tuple(tree["colour"]) == _BLACK:
         textures["colour"], tree["colour"] = textures.pop("emission"), tree["emission"]

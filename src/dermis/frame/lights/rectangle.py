@@ -11,7 +11,7 @@ from dermis.frame.projection import Triple, vector_between, view_axes
 from dermis.scene.lights import Light, RectangleLight
 
 _MAX_PART_RATIO = 0.35  # largest ratio of a part's side to the light's distance from its target
-_MAX_PARTS = 3  # along each side
+_MAX_PARTS = 3  # largest number of parts along each side
 
 
 class _Rectangle(Kind[RectangleLight]):

@@ -47,7 +47,7 @@ class _EyePiece:
     """Connected component of the triangles that a file declares to be eyes, with a fitted sphere."""
 
     points: Index
-    area: Doubles  # around each point [mm2]
+    area: Doubles  # area of the surface around each point [mm2]
     sphere: Sphere
 
     @property

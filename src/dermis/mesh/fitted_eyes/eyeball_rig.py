@@ -134,12 +134,12 @@ def _with_bone(skeleton: Skeleton, name: str, parent: int, origin_mm: Doubles) -
 def _rigid_targets(
     rig: Rig, eyeball: FittedEyeball, bone: str, origin_mm: Doubles
 ) -> tuple[list[BoneRotation], dict[int, Doubles]]:
-    """Approximate the displacements of the file's eyeball by morph targets as rigid motions.
+    """Return the rigid motions that best fit how morph targets move the file's eyeball.
 
-    The result is the rotations of the eyeball's bone, and the translation (3,) by target index [mm].
+    They are rotations of the eyeball's bone, and translations (3,) by the index of the target [mm].
 
     bone : name of the eyeball's bone
-    origin_mm : (3,) position of its joint [mm]
+    origin_mm : (3,) position of the bone's joint [mm]
     """
     rest = rig.positions_mm[eyeball.replaced_points].astype(np.float64)
     deltas = rig.targets.dense(eyeball.replaced_points, len(rig.positions_mm)).astype(np.float64)

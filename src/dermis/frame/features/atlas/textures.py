@@ -221,11 +221,11 @@ def halve_mip(mip: AtlasMip) -> AtlasMip:
 
     own = _square_texels(mip.lit)
     any_own = own[0] | own[1] | own[2] | own[3]
-    counted = np.where(any_own, own, _square_texels(mip.covered))
-    covered = counted[0] | counted[1] | counted[2] | counted[3]
+    measured = np.where(any_own, own, _square_texels(mip.covered))
+    covered = measured[0] | measured[1] | measured[2] | measured[3]
     stitched = covered & ~binary_dilation(any_own, np.ones((3, 3), bool))
     return AtlasMip(
-        covered, covered & ~stitched, _halved_reach(mip.reach, counted), *_halved_gutter(mip, stitched)
+        covered, covered & ~stitched, _halved_reach(mip.reach, measured), *_halved_gutter(mip, stitched)
     )
 
 
@@ -234,17 +234,23 @@ def _square_texels(image: NDArray[np.generic]) -> NDArray[np.generic]:
     return np.stack([image[y::2, x::2] for y in (0, 1) for x in (0, 1)])
 
 
-def _halved_reach(reach: NDArray[np.uint16], counted: NDArray[np.bool_]) -> NDArray[np.uint16]:
-    """Return the reach of each 2 x 2 square, in squares: the smallest reach of its texels in `counted`."""
-    squares = np.zeros((*counted.shape[1:], 4), np.uint16)
+def _halved_reach(reach: NDArray[np.uint16], measured: NDArray[np.bool_]) -> NDArray[np.uint16]:
+    """Return the reach of each 2 x 2 square of texels, (n/2, n/2, 4) [squares].
+
+    It is the smallest reach of the texels of the square that are in a mask.
+
+    reach : (n, n, 4) reach of each texel, see `AtlasMip` [texels]
+    measured : (4, n/2, n/2) mask of texels, as split by `_square_texels`
+    """
+    squares = np.zeros((*measured.shape[1:], 4), np.uint16)
     within = np.array([[0, 1, 0, 1], [1, 0, 1, 0], [0, 0, 1, 1], [1, 1, 0, 0]])  # steps inside the square
     for side in range(4):
         steps = (
             _square_texels(reach[..., side]).astype(np.int16) - within[side].astype(np.int16)[:, None, None]
         )
-        steps[~counted] = np.iinfo(np.int16).max
+        steps[~measured] = np.iinfo(np.int16).max
         squares[..., side] = np.maximum(steps.min(axis=0), 0) // 2
-    squares[~counted.any(axis=0)] = 0
+    squares[~measured.any(axis=0)] = 0
     return squares
 
 

@@ -100,7 +100,7 @@ def _add_intermediate_levels(
 ) -> tuple[NDArray[np.float64], tuple[int, ...]]:
     chain = list(profile_mm2)
     min_cost = chain_cost(chain, texels_per_mm, max_halvings)
-    for side in (2.0**times / texels_per_mm for times in range(max_halvings)):  # of a texel [mm]
+    for side in (2.0**times / texels_per_mm for times in range(max_halvings)):  # side of a texel
         level_mm2 = _HALVING_MARGIN * max(MIN_SMOOTHNESS * (2.0 * side) ** 2, _MIN_DEVIATION * side) ** 2
         if level_mm2 >= profile_mm2[-1]:
             continue

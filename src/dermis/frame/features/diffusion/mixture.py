@@ -30,8 +30,9 @@ class Mixture:
     uv_weights : texture of the blend weights of the other profiles over uv
     entering : one pyramid for each other profile: the light that enters, times the profile's blend weight
     atlas_weights : textures of these blend weights over the atlas, one for each layout
-    sums : texture array of exitance: layer 0 for the first profile alone, then two layers for each other
-        profile with its difference from the first: of all light, and of the light in its `entering` pyramid
+    sums : texture array of exitance. Layer 0 holds all light, scattered by the first profile. Each other
+        profile has two layers with the change that its scattering makes: to all light, and to the light in
+        its `entering` pyramid
     """
 
     uv_weights: Texture

@@ -18,8 +18,8 @@ Floats = NDArray[np.float64]
 Halvings = tuple[tuple[int, ...], ...]
 """For each layout, how often the resolution of each level is halved."""
 MIN_SMOOTHNESS = 0.45
-"""Factor of the squared texel side [mm^2]: larger texels only store light whose standard deviation [mm] is at
-least the product."""
+"""Least blur at reduced resolutions: standard deviation of the stored light [mm], divided by the squared side
+of a texel [mm^2]."""
 MIN_WEIGHT_SUM = 1e-12
 """Least divisor of a sum of weights, for channels without any weight."""
 

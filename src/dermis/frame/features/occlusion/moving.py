@@ -33,7 +33,8 @@ _BORDER_TEXELS = 2.0  # empty texels around the head, so that points lifted off 
 _ANCHOR_RADIUS_MM = 100.0  # distance from the middle of the head at which the weight of anchors falls to 1/e
 _MAX_ANCHORS = 512
 _VERTEX_SHADER = "occlusion/moving_occlusion_vertices.wgsl"
-# Least number of faces of the coarse head, and the largest error of others [mm], a quarter of a texel.
+# Arguments of `coarse_triangles`: least number of faces, and largest distance of omitted vertices from the
+# simplified surface [mm], a quarter of a texel.
 _OCCLUDER_LIMITS = (5_000, 0.4)
 
 

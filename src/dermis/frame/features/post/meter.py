@@ -18,7 +18,7 @@ METER_KEY = 0.85
 MAX_CLIPPED_FRACTION = 0.01
 """Largest fraction of the visible skin that may be overexposed."""
 MIN_HIGHLIGHT_FACTOR = 0.5
-"""Least factor by which highlights reduce the exposure: one stop."""
+"""Least factor by which highlights reduce the exposure, which is one stop."""
 
 
 def shader_constants() -> dict[str, float]:

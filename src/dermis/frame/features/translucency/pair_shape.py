@@ -1,4 +1,4 @@
-"""Shape in which translucent pairs are searched: the head at rest, or another shape that is too strained."""
+"""Shape in which translucent pairs are searched: the head at rest, or a shape too different from it."""
 
 from __future__ import annotations
 

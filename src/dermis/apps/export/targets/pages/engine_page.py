@@ -171,7 +171,7 @@ def page_camera(scene: Scene, centre_mm: Sequence[float]) -> Json:
     """
     camera, centre = scene.camera, np.array(centre_mm)
     position, target = (_METRES_PER_MM * (centre + one) for one in (camera.position, camera.target))
-    fov = 2.0 * math.atan(camera.half_tangent)
+    fov = 2.0 * math.atan(camera.half_view_tangent)
     return {
         "position": flat_tuple(position),
         "target": flat_tuple(target),
