@@ -25,7 +25,8 @@ from dermis.base.private import cache_folder, make_private_folder
 from dermis.gpu.adapters import similar_adapters
 
 _TRIM_VARIABLE = "MALLOC_TRIM_THRESHOLD_"
-"""Variable by which dask's nannies return freed memory at once, which makes large arrays slow to allocate."""
+"""Environment variable by which dask's nannies make workers return freed memory to the system at once; large
+arrays are then slow to allocate."""
 
 
 @dataclass
@@ -33,6 +34,7 @@ class _PluginState:
     """State of a `PartPlugin` in its dask worker.
 
     child : worker process, started for the first task
+    lock : lock that is held while a task is processed
     cleanup : context managers and callbacks that are released together with the process
     stopped : event that is set when the run has ended and rendering must stop
     """

@@ -42,7 +42,7 @@ class EncoderPool:
             return
         pending: deque[_EncoderProcess] = deque()
         try:
-            for number, job in enumerate(jobs):
+            for index, job in enumerate(jobs):
                 parts = _job_buffers(job)
                 size = sum(_page_aligned(part.nbytes) for part in parts)
                 if size > self._size or not self._processes:
@@ -51,7 +51,7 @@ class EncoderPool:
                     self._start_processes(size + _SIZE_MARGIN)
                 if len(pending) == _JOBS_IN_FLIGHT * self._count:
                     yield pending.popleft().result()
-                process = self._processes[number % self._count]
+                process = self._processes[index % self._count]
                 pending.append(process)
                 process.submit(parts)
             while pending:

@@ -23,10 +23,10 @@ from dermis.human.expressions import expand_targets
 MIN_P_VALUE = 1e-6
 """p-value below which a test fails."""
 _MEAN_SCALED_DISTANCE = sqrt(np.pi / 2) * np.log(2)  # mean of the Kolmogorov distribution
-_QUANTILE_COUNT = 10_000  # for the moments of a distribution
+_QUANTILE_COUNT = 10_000  # quantiles from which the moments of a distribution are computed
 _ROUNDING_ERROR = 5e-6  # largest relative error of rounding to six digits
-_MAX_LISTED = 12  # texts per distribution in the table
-_MIN_EXPECTED_COUNT = 5.0  # of a cell of the chi-square test; smaller cells are pooled
+_MAX_LISTED = 12  # largest number of texts per distribution in the table
+_MIN_EXPECTED_COUNT = 5.0  # expected samples in a cell of the chi-square test; smaller cells are pooled
 
 Array = NDArray[np.float64]
 Samples = Sequence[float | str]

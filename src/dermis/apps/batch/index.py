@@ -107,7 +107,7 @@ def _flatten_matrix(value: object) -> object:
 
 
 def _schema(out: Path, spec: Spec) -> pyarrow.Schema:
-    """Return names and types of the index columns; those of parameters are sorted by name."""
+    """Return names and types of the index columns; columns of parameters are sorted by name."""
     arrow = import_extra("pyarrow", "the index of a data set")
     kinds: dict[str, set[type]] = {}
     for rows in _rows_of_shards(out, spec):

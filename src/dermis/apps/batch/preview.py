@@ -25,13 +25,13 @@ from dermis.scene.toml_text import value_text
 SHEET_IMAGES = 16
 """Number of images on the contact sheet."""
 MAX_COUNTED = 20_000
-"""Number of images from which the statistics of the parameter table are computed."""
-_COLUMN_COUNT, _IMAGE_SIDE, _GAP = 4, 192, 4  # of the sheet; lengths in pixels
-_MAX_SIDES = {"atlas": 512, "shadow_size": 1024}  # settings of the sheet's images
+"""Largest number of images from which the statistics of the parameter table are computed."""
+_COLUMN_COUNT, _IMAGE_SIDE, _GAP = 4, 192, 4  # of the contact sheet; lengths in pixels
+_MAX_SIDES = {"atlas": 512, "shadow_size": 1024}  # upper limits of settings for the contact sheet
 _MAX_COLUMN_WIDTH = 60  # characters
-_MEASURED_IMAGES, _UNTIMED_IMAGES = 6, 2  # of an estimate
+_MEASURED_IMAGES, _UNTIMED_IMAGES = 6, 2  # images of an estimate; the first of them are not timed
 _PERSON_IDS = "person.number", "person.seed"
-_MAX_VALUES = 12  # listed values of a text parameter
+_MAX_VALUES = 12  # largest number of listed values of a text parameter
 
 
 class ParameterRow(TypedDict):

@@ -107,10 +107,11 @@ def read_dataset(
 
 
 def decode_image(files: Mapping[str, object], culprit: object = "") -> Image:
-    """Return an image of a data set from its files, which the library webdataset provides as bytes by suffix.
+    """Return an image of a data set from its files; the returned keys are those of `read_dataset`.
 
-    The returned keys are those of `read_dataset`. Raises DermisError for damaged files.
+    Raises DermisError for damaged files.
 
+    files : content of each file as bytes, by suffix, as the library webdataset provides them
     culprit : name of the image in error messages; by default its key
     """
     source = culprit or files.get("__key__", "an image")

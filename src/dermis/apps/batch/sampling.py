@@ -24,7 +24,7 @@ from dermis.human.expressions import TARGET_SIDES, Weights, expand_sides, expand
 Parameters = dict[str, float | int | str]
 _JAW_TARGET = "jawOpen"
 _WEIGHT_POWER = 1.5  # power of uniform numbers, so that small weights are more frequent
-_HASH_BITS = 52  # used bits of the hash; this number of bits plus one half is exact in double precision
+_HASH_BITS = 52  # used bits of the hash; integers of so many bits plus one half are exact in double precision
 _PERSON_PREFIX = "person."
 _SEED_COUNT = 2**32
 _VARIATION_KEYS = "intensity", "asymmetry", "variation"

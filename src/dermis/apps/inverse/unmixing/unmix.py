@@ -96,12 +96,12 @@ def parse_fraction_change(option: str, text: str) -> FractionChange:
 
     Raises DermisError for any other text.
     """
-    factor = text[:1] in "x×*" and bool(text)
+    is_factor = text[:1] in "x×*" and bool(text)
     try:
-        value = float(text[1:] if factor else text)
+        value = float(text[1:] if is_factor else text)
     except ValueError:
         refuse(option, "a factor, such as x2, or a median, such as 0.1", f"got {text!r}", "Correct it")
-    if factor:
+    if is_factor:
         return FractionChange(factor=checked_number(option, value, *_FACTOR_RANGE, "a factor"))
     return FractionChange(median=checked_number(option, value, 0.0, 1.0, "a volume fraction"))
 
@@ -176,7 +176,7 @@ class UnmixResult:
         change : change of the pigments
         adapter : "auto", "cpu" or part of the name of an adapter
 
-        Raises DermisError as `dermis.gpu.open_device`.
+        Raises DermisError as `dermis.gpu.open_device` does.
         """
         lazy_device = self.devices.setdefault(adapter, LazyDevice(adapter))
         return lazy_device.run(lambda device: self._recoloured(device, change))
@@ -246,8 +246,8 @@ def unmix(
     Raises
     ------
     DermisError
-        For files and arrays that are not colour pictures, numbers out of range, and as
-        `dermis.gpu.open_device`.
+        For files and arrays that are not colour pictures, numbers out of range, and for the
+        errors of `dermis.gpu.open_device`.
 
     References
     ----------
