@@ -144,7 +144,7 @@ class _PoolState:
         return event
 
     def _gets_another_task(self, worker: _WorkerProcess) -> bool:
-        """Return whether a worker gets a task: if it has none, or if its only task is tried for the first time.
+        """Return whether a worker gets a task: if it has none, or if its only one is in its first attempt.
 
         A second task lets the worker keep frames in flight between the two. None is given when fewer tasks
         than workers are left.

@@ -17,7 +17,8 @@ TABLE_ROWS = 8192
 
 _GAUSSIAN_CUTOFF = 1e-12  # relative to the peak of a Gaussian
 _FAR_ERROR_FRACTION = 0.2
-"""Fraction of the permitted error given to a slowly decreasing tail, so that distant nodes stay closed."""
+"""Fraction of the permitted error that is spread widely over the radii, so that distant nodes of the octree
+need not be opened."""
 
 
 @dataclass(frozen=True)
