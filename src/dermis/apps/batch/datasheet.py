@@ -135,7 +135,8 @@ def _table(columns: Sequence[str], rows: TableRows) -> str:
 class OutputFormat(TypedDict):
     """File format of an output array, for programs that read the data set.
 
-    A value is (level - zero) * step; a step of 1 and a zero of 0 mean that values are stored unscaled.
+    A stored level encodes the value (level - zero) * step; a step of 1 and a zero of 0 mean that values are
+    stored unscaled.
     """
 
     file: str

@@ -84,7 +84,7 @@ def run(
     parts: tuple[int, int] = (0, 1),
     on_progress: Callable[[Progress], None] = lambda progress: None,
 ) -> RunReport:
-    """Render the missing parts of a data set, or a share of them; if all shards exist then, write its index.
+    """Render missing parts of a data set; if this completes it, write index and datasheet.
 
     pool : workers that render the parts
     shards : (i, n) selects every n-th shard, starting with the i-th (from 0), so that n runs share a data set

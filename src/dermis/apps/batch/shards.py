@@ -64,10 +64,10 @@ def shard_at(index: int, spec: Spec) -> Shard:
 
 
 def list_parts(shard: Shard, spec: Spec) -> list[Part]:
-    """Return the parts of a shard in order: 16 images each, or up to 31 so that no person is split.
+    """Return the parts of a shard in order: 16 images each, or up to 31 to keep people whole.
 
-    They begin at multiples of their size in the data set, at which persons begin too. Persons of more than 32
-    images are split; the first and the last part of a shard may be smaller.
+    They begin at multiples of their size in the data set, at which people begin too. People with more than 32
+    images are split between parts; the first and the last part of a shard may be smaller.
     """
     group = spec.images_per_person
     size = -(-_MIN_PART_IMAGES // group) * group if group <= _MAX_PART_IMAGES else _MIN_PART_IMAGES

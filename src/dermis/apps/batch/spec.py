@@ -32,7 +32,7 @@ MAX_IMAGES = 10**9
 GENERATOR = 2
 """Number of the rules by which seeds become people and pictures: other rules make other people of a seed.
 
-The rules 1 give the people of version 0.1, the rules 2 people with the skin of measured people.
+Number 1 stands for the people of version 0.1, number 2 for people with the skin of measured people.
 """
 COUNT_LINE = re.compile(r"(?m)^count = (\d+)\n")
 """Line of a canonical spec with the number of images, which may be raised to let a data set grow."""

@@ -170,7 +170,7 @@ def _painted_person(head: Head) -> Human | None:
 
 
 def _without_light(scene: Scene) -> Scene:
-    """Return the scene without light, and with a skin whose fixed pigments are those of the head."""
+    """Return the scene without light; the pigments that a fit keeps fixed are those of the head."""
     fixed_pigments = {name: getattr(DEFAULT_SKIN, name) for name in ("epidermis_mm", "eumelanin", "oxygen")}
     if isinstance(scene.head.maps, PaintedMaps):
         look = scene.head.maps.look

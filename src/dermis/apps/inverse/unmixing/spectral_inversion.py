@@ -234,7 +234,7 @@ def _derivatives(residual: Callable[[Floats], Floats], x: Floats, r: Floats, hig
 
 
 def colour_metric(colours: Floats) -> Floats:
-    """Return matrices (n, 3, 3) that turn small differences in L*a*b* into vectors of CIEDE2000's length.
+    """Return matrices (n, 3, 3) that turn small L*a*b* differences into vectors whose length is CIEDE2000.
 
     The rotation term, which only blue colours have, is left out.
 

@@ -28,7 +28,7 @@ def unknown_skin_sd(
     known: Collection[str] = (),
     oxygen_found: bool = False,
 ) -> dict[str, float]:
-    """Return relative standard deviations of melanin and blood, as found with assumed skin parameters.
+    """Return the relative standard deviations of melanin and blood that result from assumed skin parameters.
 
     Skins sampled from the prior are unmixed as if they had the parameters of `skin`. The result is the root
     mean square of the logarithm of the ratio of found to true pigments, over those samples whose found

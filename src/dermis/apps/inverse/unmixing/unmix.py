@@ -143,8 +143,8 @@ class UnmixResult:
         """Return medians of the pigments, colour differences, skin tone, and the fraction of skin texels.
 
         They are computed from every n-th texel, with 512 along the longer side; black texels do not count as
-        skin. "sd" is due to noise, "skin_sd" to oxygen and epidermal thickness, which are assumed and vary as
-        among measured people.
+        skin. "sd" is the standard deviation due to noise. "skin_sd" is the one due to oxygen and epidermal
+        thickness, which are assumed here, but vary among people as measured.
         """
         step = max(1, max(self.melanin.shape) // _SUMMARY_SIDE)
         maps = {name: one[::step, ::step].astype(np.float64) for name, one in self.maps().items()}
@@ -227,8 +227,8 @@ def unmix(
     skin : SkinParameters
         Epidermal thickness, eumelanin and oxygen of the model's skins; melanin and blood are ignored.
     third : {"none", "oxygen"}
-        "oxygen" also estimates the oxygenated fraction of haemoglobin, with a prior around that of `skin` as
-        wide as the distribution of measured people; "none" keeps the fraction of `skin`.
+        "oxygen" also estimates the oxygenated fraction of haemoglobin, with a prior whose mean is the
+        fraction of `skin`, and whose width is that of measured people; "none" keeps the fraction of `skin`.
     noise : float
         Relative standard deviation of a channel [-].
     shading : bool
