@@ -135,9 +135,9 @@ class PartPlugin(WorkerPlugin):  # type: ignore[misc]
         return child
 
 
-def process_task(name: str, task: Shard) -> WorkerEvent:
-    """Process a task with the plugin of the given name; this is the dask task."""
-    event: WorkerEvent = get_worker().plugins[name].process(task)
+def process_task(plugin_name: str, task: Shard) -> WorkerEvent:
+    """Process a task with the plugin `plugin_name`; dask runs this function as its task."""
+    event: WorkerEvent = get_worker().plugins[plugin_name].process(task)
     return event
 
 

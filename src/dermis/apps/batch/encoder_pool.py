@@ -21,13 +21,13 @@ _SIZE_MARGIN = 1 << 18  # spare bytes, so that slightly larger jobs do not resta
 class EncoderPool:
     """Pool of processes to which images are assigned in turn, to be encoded as files.
 
-    count : number of processes; with 0, the calling process encodes
+    process_count : number of processes; with 0, the calling process encodes
     encode : picklable function that takes the arguments in a job and returns the number and the files of an
         image
     """
 
-    def __init__(self, count: int, encode: Callable[..., EncodedImage]) -> None:
-        self._count, self._encode, self._size = count, encode, 0
+    def __init__(self, process_count: int, encode: Callable[..., EncodedImage]) -> None:
+        self._count, self._encode, self._size = process_count, encode, 0
         self._processes: list[_EncoderProcess] = []
 
     def encode_all(self, jobs: Iterable[EncoderJob]) -> Iterator[EncodedImage]:

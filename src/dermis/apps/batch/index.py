@@ -100,10 +100,10 @@ def _row(key: str, shard: str, record: Record) -> IndexRow:
     return {"number": record["number"], "key": key, "shard": shard, **record["parameters"], **tone, **flat}
 
 
-def _flatten_matrix(value: object) -> object:
-    if not isinstance(value, list) or not value or not isinstance(value[0], list):
-        return value
-    return [one for row in value for one in row]
+def _flatten_matrix(matrix: object) -> object:
+    if not isinstance(matrix, list) or not matrix or not isinstance(matrix[0], list):
+        return matrix
+    return [one for row in matrix for one in row]
 
 
 def _schema(out: Path, spec: Spec) -> pyarrow.Schema:

@@ -140,12 +140,12 @@ def contact_sheet(spec: Spec, adapter: str = "auto") -> NDArray[np.uint8]:
     return np.array(sheet)
 
 
-def _row(spec: Spec, name: str, samples: Sequence[Parameters]) -> ParameterRow:
-    values = [sample[name] for sample in samples if name in sample]
-    distribution = spec.distributions.get(name)
+def _row(spec: Spec, parameter: str, samples: Sequence[Parameters]) -> ParameterRow:
+    values = [sample[parameter] for sample in samples if parameter in sample]
+    distribution = spec.distributions.get(parameter)
     text = "" if distribution is None else value_text(distribution.spec_value())
-    first = [sample.get(name) for sample in samples[:SHEET_IMAGES]]
-    row: ParameterRow = {"parameter": name, "drawn": text, "first": first, "images": len(values)}
+    first = [sample.get(parameter) for sample in samples[:SHEET_IMAGES]]
+    row: ParameterRow = {"parameter": parameter, "drawn": text, "first": first, "images": len(values)}
     numbers = [value for value in values if not isinstance(value, str)]
     if not numbers:
         return {**row, "counts": dict(Counter(map(str, values)).most_common())}

@@ -322,6 +322,6 @@ def _head_tone(head: Head) -> SkinTone | None:
 
 
 def _encode(
-    spec: Spec, number: int, observation: Observation, parameters: Parameters, tone: SkinTone | None
+    spec: Spec, image_number: int, observation: Observation, parameters: Parameters, tone: SkinTone | None
 ) -> EncodedImage:
-    return number, encode_record(number, observation, parameters, spec, tone)
+    return image_number, encode_record(image_number, observation, parameters, spec, tone)

@@ -152,11 +152,13 @@ def _checked_surface(positions: ArrayLike, triangles: ArrayLike) -> tuple[Floats
     return vertices, corners
 
 
-def _checked_values(values: ArrayLike, count: int) -> Floats:
+def _checked_values(values: ArrayLike, vertex_count: int) -> Floats:
     vertex_values = np.asarray(values, dtype=np.float64)
-    if not (vertex_values.ndim == 2 and len(vertex_values) == count and np.isfinite(vertex_values).all()):
+    if not (
+        vertex_values.ndim == 2 and len(vertex_values) == vertex_count and np.isfinite(vertex_values).all()
+    ):
         actual = f"got shape {vertex_values.shape}, or values that are not finite"
-        refuse("surface diffusion", f"finite values ({count}, c)", actual, "Give one row per vertex")
+        refuse("surface diffusion", f"finite values ({vertex_count}, c)", actual, "Give one row per vertex")
     return vertex_values
 
 

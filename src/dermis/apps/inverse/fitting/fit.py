@@ -101,23 +101,23 @@ class InitialGuess:
         fixed = pigments.overrides()
         self._table = skin_colour_table(fixed["eumelanin"], fixed["oxygen"], fixed["epidermis_mm"])
 
-    def best(self, count: int) -> FitPoint:
-        """Return the pigments, specular strength and `count` suns with the smallest residual."""
+    def best(self, sun_count: int) -> FitPoint:
+        """Return the pigments, specular strength and `sun_count` suns with the smallest residual."""
         grid = list(product(np.log(_MELANIN_GRID), np.log(_BLOOD_GRID), np.log(_STRENGTH_GRID)))
-        log_skin, suns = self.point.logs, self._select_suns(self.point.logs, count)
+        log_skin, suns = self.point.logs, self._select_suns(self.point.logs, sun_count)
         for _ in range(2):
             trials = [np.array([m, b, log_skin[2], s]) for m, b, s in grid]
             log_skin = trials[int(np.argmin([self._squared_residual(one, suns) for one in trials]))]
-            suns = self._select_suns(log_skin, count)
+            suns = self._select_suns(log_skin, sun_count)
         return replace(self.point, logs=log_skin, suns=self.point.suns[suns])
 
-    def _select_suns(self, logs: Floats, count: int) -> list[int]:
+    def _select_suns(self, logs: Floats, sun_count: int) -> list[int]:
         """Return the indices of the suns with the smallest residual, selected greedily.
 
         logs : (4,) logarithms of the skin unknowns
         """
         selected: list[int] = []
-        for _ in range(count):
+        for _ in range(sun_count):
             remaining = [k for k in range(len(self.point.suns)) if k not in selected]
             selected.append(min(remaining, key=lambda k: self._squared_residual(logs, [*selected, k])))
         return selected

@@ -164,12 +164,14 @@ def _log_focal(size: tuple[int, int]) -> float:
     return float(np.log(size[1] * _PORTRAIT_DISTANCE_MM / _PORTRAIT_HEIGHT_MM))
 
 
-def _macro_prior_sd(name: str) -> float:
-    return _MACRO_SD * (OLD_AGE - YOUNG_AGE if name == "age" else 1.0)
+def _macro_prior_sd(parameter: str) -> float:
+    return _MACRO_SD * (OLD_AGE - YOUNG_AGE if parameter == "age" else 1.0)
 
 
-def _macro_limits(name: str) -> tuple[float, float]:
-    return {"age": (YOUNG_AGE, OLD_AGE), "weight": (-1.0, 1.0), "muscle": (-1.0, 1.0)}.get(name, (0.01, 1.0))
+def _macro_limits(parameter: str) -> tuple[float, float]:
+    return {"age": (YOUNG_AGE, OLD_AGE), "weight": (-1.0, 1.0), "muscle": (-1.0, 1.0)}.get(
+        parameter, (0.01, 1.0)
+    )
 
 
 def _landmark_positions(points: LandmarkPoints, indices: NDArray[np.int64], positions: Floats) -> Floats:

@@ -146,13 +146,13 @@ def _table_texture(device: Device, model: SkinModel) -> Texture:
     return texture
 
 
-def _unmixing_program(device: Device, name: str, model: SkinModel) -> ComputeProgram:
+def _unmixing_program(device: Device, shader_name: str, model: SkinModel) -> ComputeProgram:
     thirds, nodes = model.log_colours.shape[:2]
     numbers = {"NODES": nodes, "THIRDS": thirds, "SHADE": int(model.third == "shade"), "SIDE": _GUESS_SIDE}
-    path = _FOLDER / f"{name}.wgsl"
+    path = _FOLDER / f"{shader_name}.wgsl"
     constants = used_constants(path, (), tuple(numbers.items()))
     make = partial(ComputeProgram, device, path, (), constants)
-    return cached_program(device, ("unmixing", name), tuple(constants.items()), make)
+    return cached_program(device, ("unmixing", shader_name), tuple(constants.items()), make)
 
 
 def _model_record(shader: ComputeProgram, model: SkinModel, noise: float, steps: int) -> UniformRecord:
