@@ -27,7 +27,7 @@ class Octree(NamedTuple):
         [mm]
     points, flux : (n, 3, 3) three points that replace the node's light [mm], and their flux by channel, which
         may be below 0 [mm²]
-    second_moment : (n,) mean square distance of the light from the centre, plus that of the three points; like
+    second_moment : (n,) mean square distance of the light from the centre, plus that of the points; like
         the next two, an error bound of the points in the worst channel [mm²]
     moment_error : (n,) difference between the second moments of the light and of the points [mm²]
     centroid_error : (n,) distance between the centroids of the light and of the points [mm]
