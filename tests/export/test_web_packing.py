@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dermis.apps.export.targets.web.maps import encode_picture
-from dermis.apps.export.targets.web.packing import Packer, byte_planes, encode_seven_bits, quantise
+from dermis.apps.export.targets.web.packing import ByteRunCollector, byte_planes, encode_seven_bits, quantise
 
 
 def test_differences_and_planes_can_be_undone() -> None:
@@ -15,8 +15,8 @@ def test_differences_and_planes_can_be_undone() -> None:
     for _ in range(2):
         found = found.cumsum(0, dtype=np.uint32)
     np.testing.assert_array_equal(found, words)
-    packer = Packer()
-    assert packer.add(words.tobytes()) == packer.add(words.tobytes()) == 0
+    byte_runs = ByteRunCollector()
+    assert byte_runs.add(words.tobytes()) == byte_runs.add(words.tobytes()) == 0
 
 
 def test_packed_text_is_ascii() -> None:

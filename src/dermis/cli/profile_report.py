@@ -243,7 +243,7 @@ _LEGEND_ABOVE: dict[str, Any] = {"frameon": False, "loc": "lower left", "bbox_to
 _LAYER_COLOURS = ("#b8860b", "#8e44ad", "#16808a", "#7f8c8d")
 _DASHES = (0, (4, 3))
 _CHANNEL_NAMES = ("red", "green", "blue")
-_PLOT_FLOOR = 1e-5  # lowest plotted value over the peak of r R(r); smaller ones are noise and invisible
+_PLOT_FLOOR = 1e-5  # lowest plotted value, relative to the peak of r R(r); smaller values are noise
 _DATELESS_METADATA: dict[str, dict[str, str | None]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 """Metadata without dates, so that equal plots are equal files."""
 _MAX_PHOTON_ERROR = 0.3  # relative standard error above which a point is not plotted
@@ -301,6 +301,7 @@ def _add_legend(figure: Figure, axes: Axes) -> None:
 
 
 def _plot_curves(axes: Axes, report: ProfileReport) -> float:
+    """Plot r R(r) of a profile and of its fits per colour channel; return the peak."""
     radial, fit = report.radial, report.fit.profile
     r = radial.radius_mm
     fitted = fit.radiant_exitance(r)
@@ -323,6 +324,7 @@ def _plot_curves(axes: Axes, report: ProfileReport) -> float:
 
 
 def _plot_photons(axes: Axes, profile: RadialProfile) -> float:
+    """Plot r R(r) of a Monte Carlo profile as points with error bars; return the peak."""
     r, peak = profile.radius_mm, 0.0
     error: Floats = profile.standard_error if profile.standard_error is not None else np.zeros((len(r), 3))
     for channel, colour in enumerate(_CHANNEL_COLOURS):

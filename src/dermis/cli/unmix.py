@@ -110,10 +110,10 @@ def unmix(
     if spectra is not None:
         if colour_map is not None:
             refuse("--spectra", "a table of spectra or a colour map", "got both", "Give one of them")
-        of_maps = drop_none(melanin=melanin, blood=blood, oxygen=oxygen, eumelanin=eumelanin)
-        of_maps |= {name: True for name, given in (("shading", shading), ("widths", widths)) if given}
-        if of_maps:
-            option = f"--{next(iter(of_maps))}"
+        map_options = drop_none(melanin=melanin, blood=blood, oxygen=oxygen, eumelanin=eumelanin)
+        map_options |= {name: True for name, given in (("shading", shading), ("widths", widths)) if given}
+        if map_options:
+            option = f"--{next(iter(map_options))}"
             refuse(option, "a colour map", "got --spectra, which writes no maps", "Leave it out")
         return _unmix_spectra(spectra, find, skin, surface, as_json)
     if colour_map is None:

@@ -25,7 +25,7 @@ SKIN_PRESETS: dict[str, dict[str, Any]] = {
     "default": {},
     "deck-2007": {"specular": "kelemen", "rho_s": 0.18, "direction": "lambertian"},
 }
-"""Values of preset skins: the default, and that of the 2007 talk."""
+"""For each preset skin, the settings that differ from the default; "deck-2007" is that of the 2007 talk."""
 
 
 _Fraction = Annotated[float | None, Field(ge=0, le=1)]
@@ -178,7 +178,7 @@ class Skin(FrozenModel):
 
     @property
     def strength(self) -> float:
-        """Return the specular strength rho_s with oiliness, at most 1; 0 without a specular lobe [-]."""
+        """Return the specular strength: rho_s, increased by oiliness to at most 1; 0 without a lobe [-]."""
         oily = min(1.0, self.rho_s * (1.0 + (_OILY_RHO_S_FACTOR - 1.0) * self.oiliness))
         return 0.0 if self.specular == "none" else oily
 

@@ -51,9 +51,9 @@ def atomic_write(target: Path, write: Callable[[Path], object]) -> None:
 def move_into_place(temporary: Path, target: Path, replaces_folder: bool = True) -> None:
     """Rename a temporary file or folder to its final path, replacing a file or folder there.
 
-    replaces_folder : False keeps a folder that is there
+    replaces_folder : whether to replace a folder with content; if False, it is kept and OSError is raised
 
-    Raises OSError if this fails.
+    Raises OSError if the file or folder cannot be renamed.
     """
     if replaces_folder and target.is_dir() and not target.is_symlink():
         replaced = temporary_path(target)

@@ -49,7 +49,7 @@ def sampled_camera(
 
     points : control points of the face, from `face_points`
     motion : displacement of the control points by the pose
-    aspect : width of the picture over its height [-]
+    aspect : ratio of the picture's width to its height [-]
     """
     face = head.control.pose_points(points, motion) - np.array(head.centre_mm)
     values = table_numbers(parameters, "camera")
@@ -99,7 +99,7 @@ def _max_extent(in_view: Doubles, distance: float, aim: AimOffset, frame_mm: flo
     distance : distance of the camera from the face's centre [mm]
     aim : offset of the camera's target to the right and upwards [mm]
     frame_mm : visible height at the face's centre [mm]
-    aspect : width of the picture over its height [-]
+    aspect : ratio of the picture's width to its height [-]
     """
     x, y, z = in_view.T
     back = np.array([-aim[0], -aim[1], distance])
@@ -114,9 +114,9 @@ def _max_extent(in_view: Doubles, distance: float, aim: AimOffset, frame_mm: flo
 
 
 def _camera_axes(yaw_deg: float, pitch_deg: float, roll_deg: float) -> Doubles:
-    """Return the axes of a camera as rows (3, 3): right, up, and back, which points from the face to it.
+    """Return the axes of a camera as rows (3, 3): right, up, and back, from the face to the camera.
 
-    The roll turns the first two clockwise about the last.
+    The roll turns right and up clockwise about back.
     """
     back = np.array(direction_from_angles(yaw_deg, pitch_deg))
     yaw, roll = math.radians(yaw_deg), math.radians(roll_deg)

@@ -118,7 +118,7 @@ def _single_threaded_blas() -> Iterator[None]:
 
 @contextmanager
 def _sigint_blocked() -> Iterator[None]:
-    """Block SIGINT (Ctrl-C) in this process, and permanently in children that are started inside."""
+    """Block SIGINT (Ctrl-C) in this process, and permanently in children started in the block."""
     if not _CAN_BLOCK_SIGNALS:
         yield
         return

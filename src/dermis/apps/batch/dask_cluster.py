@@ -19,7 +19,7 @@ from dermis.base.extras import import_extra
 if TYPE_CHECKING:
     from distributed import Client
 
-_RETRIES = 2  # per part, when a worker reports a loss; dask itself counts workers that die
+_RETRIES = 2  # of a part whose worker reports a lost process; dask itself counts workers that die
 _TASKS_IN_FLIGHT = 1000  # submitted to the scheduler; far more than there are workers
 _TIMEOUT_S = 60.0  # for the scheduler, and for its first worker
 

@@ -25,7 +25,8 @@ from dermis.base.private import cache_folder, make_private_folder
 from dermis.gpu.adapters import similar_adapters
 
 _TRIM_VARIABLE = "MALLOC_TRIM_THRESHOLD_"
-"""Variable by which dask's nannies return freed memory at once, which makes large arrays slow to allocate."""
+"""Environment variable by which dask's nannies make workers return freed memory to the system at once; large
+arrays are then slow to allocate."""
 
 
 @dataclass
@@ -33,6 +34,7 @@ class _PluginState:
     """State of a `PartPlugin` in its dask worker.
 
     child : worker process, started for the first task
+    lock : lock that is held while a task is processed
     cleanup : context managers and callbacks that are released together with the process
     stopped : event that is set when the run has ended and rendering must stop
     """
@@ -133,9 +135,9 @@ class PartPlugin(WorkerPlugin):  # type: ignore[misc]
         return child
 
 
-def process_task(name: str, task: Shard) -> WorkerEvent:
-    """Process a task with the plugin of the given name; this is the dask task."""
-    event: WorkerEvent = get_worker().plugins[name].process(task)
+def process_task(plugin_name: str, task: Shard) -> WorkerEvent:
+    """Process a task with the plugin `plugin_name`; dask runs this function as its task."""
+    event: WorkerEvent = get_worker().plugins[plugin_name].process(task)
     return event
 
 

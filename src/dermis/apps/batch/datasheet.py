@@ -135,7 +135,8 @@ def _table(columns: Sequence[str], rows: TableRows) -> str:
 class OutputFormat(TypedDict):
     """File format of an output array, for programs that read the data set.
 
-    A value is (level - zero) * step; a step of 1 and a zero of 0 mean that values are stored unscaled.
+    A stored level encodes the value (level - zero) * step; a step of 1 and a zero of 0 mean that values are
+    stored unscaled.
     """
 
     file: str
@@ -149,11 +150,11 @@ class OutputFormat(TypedDict):
 
 def output_formats(spec: Spec) -> dict[str, OutputFormat]:
     """Return the file format of each output of a spec."""
-    facts: dict[str, OutputFormat] = {}
+    formats: dict[str, OutputFormat] = {}
     for name in spec.outputs:
         output, file = OUTPUTS[name], file_format(name, spec.encoding)
         step, zero = (1.0, 0) if output.quantisation is None or file != "png" else output.quantisation
-        facts[name] = {
+        formats[name] = {
             "file": file,
             "stored": storage_description(name, spec.encoding),
             "step": step,
@@ -162,7 +163,7 @@ def output_formats(spec: Spec) -> dict[str, OutputFormat]:
             "description": output.description.partition(", see ")[0],  # without links to the documentation
             "background": output.background,
         }
-    return facts
+    return formats
 
 
 def label_names(spec: Spec) -> dict[str, dict[int, str]]:
@@ -176,11 +177,14 @@ def label_names(spec: Spec) -> dict[str, dict[int, str]]:
     return {output: dict(sorted(names.items())) for output, names in by_output.items()}
 
 
-def landmark_names(name: str, spec: Spec) -> list[str]:
-    """Return the ordered names of the landmarks of a preset set or of a landmark table of the spec."""
-    if name in LANDMARK_SETS:
-        return [row["landmark"] for row in read_rows("dermis.human.landmarks", name)]
-    return [landmark for landmark, _ in read_landmark_table(spec.landmark_tables[name])]
+def landmark_names(set_name: str, spec: Spec) -> list[str]:
+    """Return the ordered names of the landmarks in a set.
+
+    set_name : name of a preset landmark set, or of a landmark table of the spec
+    """
+    if set_name in LANDMARK_SETS:
+        return [row["landmark"] for row in read_rows("dermis.human.landmarks", set_name)]
+    return [landmark for landmark, _ in read_landmark_table(spec.landmark_tables[set_name])]
 
 
 def licences(spec: Spec) -> Iterator[tuple[str, str, str]]:

@@ -16,7 +16,7 @@ SampleValue = float | str
 SpecValue = float | str | dict[str, object]
 """Distribution as a TOML value."""
 _MAX_DEVIATIONS = 6.0  # limit of normal samples in standard deviations
-_MIN_PROBABILITY = 1e-6  # of the untruncated normal between the limits
+_MIN_PROBABILITY = 1e-6  # smallest probability of the untruncated normal between the limits
 _MAX_CHOICES = 100_000
 
 

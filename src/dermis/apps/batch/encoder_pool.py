@@ -21,13 +21,13 @@ _SIZE_MARGIN = 1 << 18  # spare bytes, so that slightly larger jobs do not resta
 class EncoderPool:
     """Pool of processes to which images are assigned in turn, to be encoded as files.
 
-    count : number of processes; with 0, the calling process encodes
+    process_count : number of processes; with 0, the calling process encodes
     encode : picklable function that takes the arguments in a job and returns the number and the files of an
         image
     """
 
-    def __init__(self, count: int, encode: Callable[..., EncodedImage]) -> None:
-        self._count, self._encode, self._size = count, encode, 0
+    def __init__(self, process_count: int, encode: Callable[..., EncodedImage]) -> None:
+        self._count, self._encode, self._size = process_count, encode, 0
         self._processes: list[_EncoderProcess] = []
 
     def encode_all(self, jobs: Iterable[EncoderJob]) -> Iterator[EncodedImage]:
@@ -42,7 +42,7 @@ class EncoderPool:
             return
         pending: deque[_EncoderProcess] = deque()
         try:
-            for number, job in enumerate(jobs):
+            for index, job in enumerate(jobs):
                 parts = _job_buffers(job)
                 size = sum(_page_aligned(part.nbytes) for part in parts)
                 if size > self._size or not self._processes:
@@ -51,7 +51,7 @@ class EncoderPool:
                     self._start_processes(size + _SIZE_MARGIN)
                 if len(pending) == _JOBS_IN_FLIGHT * self._count:
                     yield pending.popleft().result()
-                process = self._processes[number % self._count]
+                process = self._processes[index % self._count]
                 pending.append(process)
                 process.submit(parts)
             while pending:

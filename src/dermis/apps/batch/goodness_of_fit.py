@@ -23,10 +23,10 @@ from dermis.human.expressions import expand_targets
 MIN_P_VALUE = 1e-6
 """p-value below which a test fails."""
 _MEAN_SCALED_DISTANCE = sqrt(np.pi / 2) * np.log(2)  # mean of the Kolmogorov distribution
-_QUANTILE_COUNT = 10_000  # for the moments of a distribution
+_QUANTILE_COUNT = 10_000  # quantiles from which the moments of a distribution are computed
 _ROUNDING_ERROR = 5e-6  # largest relative error of rounding to six digits
-_MAX_LISTED = 12  # texts per distribution in the table
-_MIN_EXPECTED_COUNT = 5.0  # of a cell of the chi-square test; smaller cells are pooled
+_MAX_LISTED = 12  # largest number of texts per distribution in the table
+_MIN_EXPECTED_COUNT = 5.0  # expected samples in a cell of the chi-square test; smaller cells are pooled
 
 Array = NDArray[np.float64]
 Samples = Sequence[float | str]
@@ -80,11 +80,11 @@ def fit_tests(out: Path, spec: Spec) -> Iterator[FitTest]:
                 yield _parameter_test(name, distribution, present, spec)
 
 
-def fit_test(name: str, distribution: Distribution, values: Samples) -> FitTest:
+def fit_test(parameter: str, distribution: Distribution, values: Samples) -> FitTest:
     """Return the goodness-of-fit test of samples: Kolmogorov-Smirnov for numbers, chi-square for texts."""
     if any(isinstance(bound, str) for bound in distribution.support):
-        return _text_test(name, text_probabilities(distribution), [str(value) for value in values])
-    return _number_test(name, distribution, np.sort(np.array(values, np.float64)))
+        return _text_test(parameter, text_probabilities(distribution), [str(value) for value in values])
+    return _number_test(parameter, distribution, np.sort(np.array(values, np.float64)))
 
 
 def cumulative_probability(distribution: Distribution, x: Array, *, closed: bool) -> Array:
@@ -130,17 +130,17 @@ def text_probabilities(distribution: Distribution) -> dict[str, float]:
     return {text: weight / total for text, weight in weights.items() if weight}
 
 
-def _parameter_test(name: str, distribution: Distribution, values: Samples, spec: Spec) -> FitTest:
-    if name != "background.kind" or NO_ENVIRONMENT not in spec.distributions["environment.name"].support:
-        return fit_test(name, distribution, values)
+def _parameter_test(parameter: str, distribution: Distribution, values: Samples, spec: Spec) -> FitTest:
+    if parameter != "background.kind" or NO_ENVIRONMENT not in spec.distributions["environment.name"].support:
+        return fit_test(parameter, distribution, values)
     replacement = {"environment": "gradient"}  # in images without an environment, see `Sampler.parameters`
     expected = defaultdict[str, float](float)
     for text, probability in text_probabilities(distribution).items():
         expected[replacement.get(text, text)] += probability
-    return _text_test(name, expected, [replacement.get(str(value), str(value)) for value in values])
+    return _text_test(parameter, expected, [replacement.get(str(value), str(value)) for value in values])
 
 
-def _number_test(name: str, distribution: Distribution, values: Array) -> FitTest:
+def _number_test(parameter: str, distribution: Distribution, values: Array) -> FitTest:
     """Return the Kolmogorov-Smirnov test of sorted samples that were rounded to six digits."""
     count, error = len(values), _ROUNDING_ERROR * np.abs(values)
     up_to = np.searchsorted(values, values, "right") / count
@@ -153,11 +153,11 @@ def _number_test(name: str, distribution: Distribution, values: Array) -> FitTes
     p_value = float(kolmogorov(sqrt(count) * distance))
     expected, observed = _format_moments(quantiles), _format_moments(values)
     return FitTest(
-        name, count, expected, observed, distance, float(_MEAN_SCALED_DISTANCE / sqrt(count)), p_value
+        parameter, count, expected, observed, distance, float(_MEAN_SCALED_DISTANCE / sqrt(count)), p_value
     )
 
 
-def _text_test(name: str, expected: Mapping[str, float], values: Sequence[str]) -> FitTest:
+def _text_test(parameter: str, expected: Mapping[str, float], values: Sequence[str]) -> FitTest:
     """Return the chi-square test of sampled texts.
 
     expected : probability of each text
@@ -169,7 +169,7 @@ def _text_test(name: str, expected: Mapping[str, float], values: Sequence[str]) 
     p_value = 0.0 if counts.keys() - expected.keys() else _chi_square(expected, counts, count)
     probabilities = _format_probabilities(expected)
     found = _format_probabilities({text: counts[text] / count for text in expected})
-    return FitTest(name, count, probabilities, found, distance, expected_distance, p_value)
+    return FitTest(parameter, count, probabilities, found, distance, expected_distance, p_value)
 
 
 def _format_probabilities(probabilities: Mapping[str, float]) -> str:
@@ -197,10 +197,10 @@ def _format_moments(values: Array) -> str:
     return f"{round_significant(float(values.mean())):.5g}, {round_significant(float(values.std())):.5g}"
 
 
-def _index_column(name: str) -> str:
+def _index_column(parameter: str) -> str:
     """Return the name of the index column that holds a parameter's samples.
 
     A parameter that sets a left and a right morph target has two equal columns, of which this is the first.
     """
-    start, _, target = name.partition(".")
-    return f"pose.{expand_targets([target])[0]}" if start == "pose" else name
+    start, _, target = parameter.partition(".")
+    return f"pose.{expand_targets([target])[0]}" if start == "pose" else parameter

@@ -100,14 +100,14 @@ def _row(key: str, shard: str, record: Record) -> IndexRow:
     return {"number": record["number"], "key": key, "shard": shard, **record["parameters"], **tone, **flat}
 
 
-def _flatten_matrix(value: object) -> object:
-    if not isinstance(value, list) or not value or not isinstance(value[0], list):
-        return value
-    return [one for row in value for one in row]
+def _flatten_matrix(matrix: object) -> object:
+    if not isinstance(matrix, list) or not matrix or not isinstance(matrix[0], list):
+        return matrix
+    return [one for row in matrix for one in row]
 
 
 def _schema(out: Path, spec: Spec) -> pyarrow.Schema:
-    """Return names and types of the index columns; those of parameters are sorted by name."""
+    """Return names and types of the index columns; columns of parameters are sorted by name."""
     arrow = import_extra("pyarrow", "the index of a data set")
     kinds: dict[str, set[type]] = {}
     for rows in _rows_of_shards(out, spec):

@@ -67,8 +67,8 @@ def _area_lamp(lamp: Mapping[str, float], turn_deg: float, strength: float) -> L
 
 
 @cache
-def _preset_lights(kind: str) -> tuple[Light, ...]:
-    return preset_lights(kind)
+def _preset_lights(preset: str) -> tuple[Light, ...]:
+    return preset_lights(preset)
 
 
 def _rotate_light(light: Light, degrees: float, strength: float) -> Light:

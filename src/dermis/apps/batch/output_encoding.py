@@ -21,21 +21,21 @@ _NPY_MAGIC = b"\x93NUMPY\x01\x00"
 _MAX_HALF = 65504.0
 
 
-def file_format(name: str, encoding: Encoding) -> str:
+def file_format(output_name: str, encoding: Encoding) -> str:
     """Return the file format in which an output is stored: png, exr or npy.
 
     encoding : requested format; for png, outputs that do not fit into 16-bit integers become exr
     """
-    output = OUTPUTS[name]
+    output = OUTPUTS[output_name]
     if encoding == "npy" or not output.channels:
         return "npy"
     fits = output.quantisation is not None or output.kind == "uint8"
     return "png" if fits and encoding == "png" else "exr"
 
 
-def storage_description(name: str, encoding: Encoding) -> str:
+def storage_description(output_name: str, encoding: Encoding) -> str:
     """Return a text that says how an output is stored, such as "16-bit PNG, level x 1/64"."""
-    output, kind = OUTPUTS[name], file_format(name, encoding)
+    output, kind = OUTPUTS[output_name], file_format(output_name, encoding)
     if kind == "png" and output.quantisation is not None:
         step, zero = output.quantisation
         size = f"{step:g}" if step >= 1e-3 else f"1/{1 / step:.0f}"
@@ -46,16 +46,16 @@ def storage_description(name: str, encoding: Encoding) -> str:
     return f"OpenEXR, {8 * dtype.itemsize}-bit floats" if kind == "exr" else f"NumPy, {dtype.name}"
 
 
-def encode_output(name: str, values: Array, encoding: Encoding) -> bytes:
+def encode_output(output_name: str, values: Array, encoding: Encoding) -> bytes:
     """Return the file of an output array (h, w) or (h, w, c), in the format given by `file_format`.
 
     Raises DermisError for numbers that are not finite.
     """
     if not np.isfinite(values).all():
-        refuse(f"output {name}", "finite numbers", "some are not", "Report this with the spec, please")
-    kind, dtype = file_format(name, encoding), _stored_dtype(OUTPUTS[name], encoding)
+        refuse(f"output {output_name}", "finite numbers", "some are not", "Report this with the spec, please")
+    kind, dtype = file_format(output_name, encoding), _stored_dtype(OUTPUTS[output_name], encoding)
     if kind == "png":
-        return encode_png(np.atleast_3d(quantise(name, values)), use_isal=True)
+        return encode_png(np.atleast_3d(quantise(output_name, values)), use_isal=True)
     limited = np.clip(values, -_MAX_HALF, _MAX_HALF) if dtype.itemsize == 2 else values
     if kind == "npy":
         file = io.BytesIO()
@@ -66,7 +66,7 @@ def encode_output(name: str, values: Array, encoding: Encoding) -> bytes:
     return encode_exr(padded.astype(np.float32 if dtype.itemsize > 2 else np.float16))
 
 
-def decode_output(name: str, kind: str, data: bytes) -> Array:
+def decode_output(output_name: str, kind: str, data: bytes) -> Array:
     """Return an output array (h, w) or (h, w, c) from the bytes of its file.
 
     kind : file format: png, exr or npy
@@ -76,9 +76,9 @@ def decode_output(name: str, kind: str, data: bytes) -> Array:
     picture = _decode_npy(data) if kind == "npy" else decode_exr(data) if kind == "exr" else decode_png(data)
     if not np.isfinite(picture).all():
         raise ValueError("it has numbers that are not finite")
-    if name not in OUTPUTS:
+    if output_name not in OUTPUTS:
         return picture[..., 0] if picture.shape[2] == 1 else picture
-    output = OUTPUTS[name]
+    output = OUTPUTS[output_name]
     if picture.shape[2] < output.channels:
         raise ValueError(f"it has {picture.shape[2]} channels, not {output.channels}")
     picture = picture[..., : output.channels or None]

@@ -56,9 +56,9 @@ def _matches_sha256(path: Path, sha256: str) -> bool:
 
 
 def copy_images(writer: ShardWriter, path: Path, first: int, stop: int) -> None:
-    """Copy a range of images from a shard or part, with the reasons for those that were left out.
+    """Copy a range of images from a shard or part, with the reasons for images that were left out.
 
-    Raises DermisError if it cannot be read.
+    Raises DermisError if the shard or part cannot be read.
     """
     manifest = read_manifest(path)
     writer.add_versions(manifest.made_with)
@@ -72,10 +72,10 @@ def copy_images(writer: ShardWriter, path: Path, first: int, stop: int) -> None:
 
 
 def join_parts(out: Path, shard: Shard, spec: Spec) -> tuple[Part, ...]:
-    """Join the parts of a shard if all of them exist, and remove them; return the damaged ones.
+    """Join the parts of a shard if all of them exist, then remove them; return the damaged parts.
 
-    Damaged parts are removed, and must be rendered again. Several processes may join the same parts at once:
-    they write equal bytes, and parts are only removed when the shard exists.
+    If there are damaged parts, only these are removed, and must be rendered again. Several processes may join
+    the same parts at once: they write equal bytes, and parts are only removed when the shard exists.
 
     Raises DermisError if the shard cannot be written.
     """

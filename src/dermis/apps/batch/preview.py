@@ -25,13 +25,13 @@ from dermis.scene.toml_text import value_text
 SHEET_IMAGES = 16
 """Number of images on the contact sheet."""
 MAX_COUNTED = 20_000
-"""Number of images from which the statistics of the parameter table are computed."""
-_COLUMN_COUNT, _IMAGE_SIDE, _GAP = 4, 192, 4  # of the sheet; lengths in pixels
-_MAX_SIDES = {"atlas": 512, "shadow_size": 1024}  # settings of the sheet's images
+"""Largest number of images from which the statistics of the parameter table are computed."""
+_COLUMN_COUNT, _IMAGE_SIDE, _GAP = 4, 192, 4  # of the contact sheet; lengths in pixels
+_MAX_SIDES = {"atlas": 512, "shadow_size": 1024}  # upper limits of settings for the contact sheet
 _MAX_COLUMN_WIDTH = 60  # characters
-_MEASURED_IMAGES, _UNTIMED_IMAGES = 6, 2  # of an estimate
+_MEASURED_IMAGES, _UNTIMED_IMAGES = 6, 2  # images of an estimate; the first of them are not timed
 _PERSON_IDS = "person.number", "person.seed"
-_MAX_VALUES = 12  # listed values of a text parameter
+_MAX_VALUES = 12  # largest number of listed values of a text parameter
 
 
 class ParameterRow(TypedDict):
@@ -140,12 +140,12 @@ def contact_sheet(spec: Spec, adapter: str = "auto") -> NDArray[np.uint8]:
     return np.array(sheet)
 
 
-def _row(spec: Spec, name: str, samples: Sequence[Parameters]) -> ParameterRow:
-    values = [sample[name] for sample in samples if name in sample]
-    distribution = spec.distributions.get(name)
+def _row(spec: Spec, parameter: str, samples: Sequence[Parameters]) -> ParameterRow:
+    values = [sample[parameter] for sample in samples if parameter in sample]
+    distribution = spec.distributions.get(parameter)
     text = "" if distribution is None else value_text(distribution.spec_value())
-    first = [sample.get(name) for sample in samples[:SHEET_IMAGES]]
-    row: ParameterRow = {"parameter": name, "drawn": text, "first": first, "images": len(values)}
+    first = [sample.get(parameter) for sample in samples[:SHEET_IMAGES]]
+    row: ParameterRow = {"parameter": parameter, "drawn": text, "first": first, "images": len(values)}
     numbers = [value for value in values if not isinstance(value, str)]
     if not numbers:
         return {**row, "counts": dict(Counter(map(str, values)).most_common())}

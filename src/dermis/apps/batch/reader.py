@@ -107,10 +107,11 @@ def read_dataset(
 
 
 def decode_image(files: Mapping[str, object], culprit: object = "") -> Image:
-    """Return an image of a data set from its files, which the library webdataset provides as bytes by suffix.
+    """Return an image of a data set from its files; the returned keys are those of `read_dataset`.
 
-    The returned keys are those of `read_dataset`. Raises DermisError for damaged files.
+    Raises DermisError for damaged files.
 
+    files : content of each file as bytes, by suffix, as the library webdataset provides them
     culprit : name of the image in error messages; by default its key
     """
     source = culprit or files.get("__key__", "an image")
@@ -294,13 +295,13 @@ def _refuse_malformed_record(culprit: object) -> AbstractContextManager[None]:
     return parsing(culprit, "a record of an image", KeyError, TypeError, AttributeError)
 
 
-def _decode_picture(culprit: object, name: str, kind: str, data: object) -> Array:
+def _decode_picture(culprit: object, output_name: str, picture_format: str, data: object) -> Array:
     try:
         if not isinstance(data, bytes):
             raise TypeError("its content is not of type bytes")
-        return decode_output(name, kind, data) if name else decode_png(data)
+        return decode_output(output_name, picture_format, data) if output_name else decode_png(data)
     except DermisError as fault:  # a package is missing
         raise DermisError(f"{culprit}: {fault}") from fault
     except Exception as fault:  # decoders raise anything for damaged data
         actual = f"it cannot be decoded ({error_text(fault)})"
-        refuse(culprit, f"a picture as {kind}", actual, _RESTORE_ADVICE)
+        refuse(culprit, f"a picture as {picture_format}", actual, _RESTORE_ADVICE)

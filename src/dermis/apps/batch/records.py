@@ -79,12 +79,12 @@ def encode_record(
 
 
 def _record(
-    number: int, observation: Observation, parameters: Parameters, spec: Spec, tone: SkinTone | None
+    image_number: int, observation: Observation, parameters: Parameters, spec: Spec, tone: SkinTone | None
 ) -> Record:
     camera, gaze = observation.camera, observation.gaze
     names = {path: name for name, path in spec.landmark_tables.items()}  # records hold no absolute paths
     return {
-        "number": number,
+        "number": image_number,
         "parameters": dict(parameters),
         "skin_tone": None if tone is None else tone.as_json(),
         "camera": {

@@ -30,14 +30,14 @@ from dermis.base.extras import import_extra
 from dermis.base.reading import read_text
 
 SPEC_FILE = "spec.toml"
-"""Name of the spec in the folder of its data set: another one is refused there."""
+"""Name of the copy of the spec in the folder of its data set, where runs with other specs are refused."""
 
 
 class WorkerPool(Protocol):
     """Protocol of worker pools: `ProcessPool` on this machine, or `DaskCluster` on several."""
 
     def render(self, options: RunOptions, tasks: Sequence[Shard]) -> Iterator[WorkerEvent]:
-        """Process the tasks, see `Worker.process`, and those that become necessary; yield events."""
+        """Process the tasks as `Worker.process` does, and render damaged parts again; yield events."""
         ...
 
 
@@ -84,7 +84,7 @@ def run(
     parts: tuple[int, int] = (0, 1),
     on_progress: Callable[[Progress], None] = lambda progress: None,
 ) -> RunReport:
-    """Render the missing parts of a data set, or some of them; then write index and datasheet.
+    """Render missing parts of a data set; if this completes it, write index and datasheet.
 
     pool : workers that render the parts
     shards : (i, n) selects every n-th shard, starting with the i-th (from 0), so that n runs share a data set
@@ -104,13 +104,13 @@ def run(
     share = [part for shard in selected for part in list_parts(shard, spec)][parts[0] :: parts[1]]
     missing = [part for part in share if shard_at(part.index, spec) not in existing]
     verified = [shard for shard in selected if shard in existing][parts[0] :: parts[1]]
-    own = {shard_path(out, one, spec).name for one in (*missing, *(selected if parts[1] == 1 else ()))}
-    remove_unfinished(out, own)
+    own_names = {shard_path(out, one, spec).name for one in (*missing, *(selected if parts[1] == 1 else ()))}
+    remove_unfinished(out, own_names)
     _remove_joined_parts(out, spec, existing)
     try:
         images, damaged, failed = _process(pool, options, [*missing, *verified], on_progress)
     finally:
-        remove_unfinished(out, own)
+        remove_unfinished(out, own_names)
     complete_shards = {shard for shard in all_shards if shard_exists(out, shard, spec)}
     complete = len(complete_shards) == len(all_shards)
     if complete:  # concurrent runs that reach this point write the same bytes
@@ -140,22 +140,22 @@ def claim_folder(out: Path, spec: Spec) -> None:
     atomic_write(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
 
 
-def _must_grow(known: str, spec: Spec, out: Path) -> bool:
-    """Return whether the data set of a known spec is that of this spec, but with fewer images.
+def _must_grow(known_text: str, spec: Spec, out: Path) -> bool:
+    """Return whether the spec in a data set's folder differs from this spec only by having fewer images.
 
-    known : text of the spec in the folder of the data set
+    known_text : text of the spec in the folder
 
     Raises DermisError if there is any other difference.
     """
-    if known == spec.to_toml():
+    if known_text == spec.to_toml():
         return False
-    other_folder, count = "Choose another folder", COUNT_LINE.search(known)
-    generator = GENERATOR_LINE.search(known)
+    other_folder, count = "Choose another folder", COUNT_LINE.search(known_text)
+    generator = GENERATOR_LINE.search(known_text)
     number = int(generator[1]) if generator else 1  # earlier versions wrote none
     if number != GENERATOR:
         actual = f"it was made with number {number}, by another version of dermis"
         refuse(out, f"a data set of generator number {GENERATOR}", actual, f"{other_folder}, or that version")
-    if not count or COUNT_LINE.sub("", known, count=1) != COUNT_LINE.sub("", spec.to_toml(), count=1):
+    if not count or COUNT_LINE.sub("", known_text, count=1) != COUNT_LINE.sub("", spec.to_toml(), count=1):
         advice = f"{other_folder}, or use the spec that the folder was created with"
         refuse(out, "a folder for this data set", f"its {SPEC_FILE} differs from this spec", advice)
     if int(count[1]) > spec.count:
@@ -165,7 +165,7 @@ def _must_grow(known: str, spec: Spec, out: Path) -> bool:
 
 
 def _remove_joined_parts(out: Path, spec: Spec, complete: Iterable[Shard]) -> None:
-    """Remove the parts that an interrupted run has joined to their shard, but not removed."""
+    """Remove parts that an interrupted run has joined into their shard without removing them."""
     if files := part_files(out):
         complete = set(complete)
         for number, path in files.items():

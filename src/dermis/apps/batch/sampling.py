@@ -24,7 +24,7 @@ from dermis.human.expressions import TARGET_SIDES, Weights, expand_sides, expand
 Parameters = dict[str, float | int | str]
 _JAW_TARGET = "jawOpen"
 _WEIGHT_POWER = 1.5  # power of uniform numbers, so that small weights are more frequent
-_HASH_BITS = 52  # used bits of the hash; this number of bits plus one half is exact in double precision
+_HASH_BITS = 52  # used bits of the hash; integers of so many bits plus one half are exact in double precision
 _PERSON_PREFIX = "person."
 _SEED_COUNT = 2**32
 _VARIATION_KEYS = "intensity", "asymmetry", "variation"
@@ -183,24 +183,24 @@ class Sampler:
                 sampled = {name: value for name, value in sampled.items() if not name.startswith(prefixes)}
         return sampled | {f"pose.{name}": weight for name, weight in self._target_weights(k, sampled).items()}
 
-    def _sample(self, k: int, name: str, distribution: Distribution) -> float | str:
+    def _sample(self, k: int, parameter: str, distribution: Distribution) -> float | str:
         is_constant = isinstance(distribution, Constant)
-        value = distribution.quantile(0.5 if is_constant else self._probability(k, name))
+        value = distribution.quantile(0.5 if is_constant else self._probability(k, parameter))
         return value if isinstance(value, str) else round_significant(value)
 
-    def _probability(self, k: int, name: str) -> float:
+    def _probability(self, k: int, parameter: str) -> float:
         """Return the random cumulative probability in (0, 1) at which image k samples a parameter."""
-        weights = self.cholesky_rows.get(name)
+        weights = self.cholesky_rows.get(parameter)
         if weights is None:
-            return self._uniform(k, name)
+            return self._uniform(k, parameter)
         return float(ndtr(sum(weight * self._normal(k, other) for other, weight in weights.items())))
 
-    def _uniform(self, image: int, name: str) -> float:
-        number = image // self.images_per_person if name.startswith(_PERSON_PREFIX) else image
-        return hashed_uniform(self.seed, number, name)
+    def _uniform(self, image: int, parameter: str) -> float:
+        number = image // self.images_per_person if parameter.startswith(_PERSON_PREFIX) else image
+        return hashed_uniform(self.seed, number, parameter)
 
-    def _normal(self, image: int, name: str) -> float:
-        return float(ndtri(self._uniform(image, name)))
+    def _normal(self, image: int, parameter: str) -> float:
+        return float(ndtri(self._uniform(image, parameter)))
 
     def _target_weights(self, k: int, sampled: Parameters) -> dict[str, float]:
         """Return the weights of all morph targets that the spec can move, for image k.

@@ -33,12 +33,12 @@ from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 from dermis.scene.smoothness import SmoothIn
 
-_FULL_HAIR_SIDE = 1000  # side of pictures with all hairs; a close-up shows 230 mm
+_FULL_HAIR_SIDE = 1000  # side from which pictures have all hairs [pixel]; a close-up shows 230 mm
 _MIN_HAIR_FRACTION = 0.2
 _GAZE_DISTANCE_MM = 1e4  # distance of the gaze target if the gaze is given by angles
 _SEED_PARAMETER, _HEAD_PARAMETER = "person.seed", "person.head"
 _CACHED_SAMPLED_PEOPLE, _CACHED_FILE_HEADS = 1, 8  # a sampled person is not used again, a named head is
-_NON_HUMAN_FIELDS = "number", "seed", "head"  # parameters that are not fields of `Human`
+_NON_HUMAN_FIELDS = "number", "seed", "head"  # parameters of people that are not fields of `Human`
 
 
 @dataclass(frozen=True)

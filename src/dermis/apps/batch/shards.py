@@ -20,7 +20,7 @@ from dermis.base.reading import open_regular_file, parsing, read_file
 SHARD_DESCRIPTION = "a shard of a data set"
 _SHARD_NAME = re.compile(r"shard-(\d{5,9})(\.tar)?")
 _PART_NAME = re.compile(r"part-(\d{9})(\.tar)?")
-_VALUE_SEPARATOR = " + "  # of adapters and versions that rendered parts of a shard
+_VALUE_SEPARATOR = " + "  # between the adapters, or versions, that rendered the parts of a shard
 _MAX_REASON_LENGTH = 200  # characters
 _MIN_PART_IMAGES, _MAX_PART_IMAGES = 16, 32
 
@@ -64,13 +64,13 @@ def shard_at(index: int, spec: Spec) -> Shard:
 
 
 def list_parts(shard: Shard, spec: Spec) -> list[Part]:
-    """Return the parts of a shard in order: 16 images each, or up to 31 so that no person is split.
+    """Return the parts of a shard in order: 16 images each, or up to 31 to keep people whole.
 
-    They begin at multiples of their size in the data set, at which persons begin too. Persons of more than 32
-    images are split; the first and the last part of a shard may be smaller.
+    They begin at multiples of their size in the data set, at which people begin too. People with more than 32
+    images are split between parts; the first and the last part of a shard may be smaller.
     """
-    person = spec.images_per_person
-    size = -(-_MIN_PART_IMAGES // person) * person if person <= _MAX_PART_IMAGES else _MIN_PART_IMAGES
+    group = spec.images_per_person
+    size = -(-_MIN_PART_IMAGES // group) * group if group <= _MAX_PART_IMAGES else _MIN_PART_IMAGES
     starts = [shard.first, *range((shard.first // size + 1) * size, shard.stop, size)]
     return [Part(shard.index, *ends) for ends in zip(starts, [*starts[1:], shard.stop], strict=True)]
 
@@ -181,7 +181,7 @@ def read_manifest(path: Path) -> ShardManifest:
 def shard_exists(out: Path, shard: Shard, spec: Spec) -> bool:
     """Return whether a complete shard or part exists at its final path.
 
-    One that the data set had before it grew, with fewer images, is not complete. Raises DermisError for a
+    A shard that has fewer images, from before the data set grew, is not complete. Raises DermisError for a
     shard of another data set.
     """
     path = shard_path(out, shard, spec)
@@ -215,14 +215,14 @@ def part_files(out: Path) -> dict[int, Path]:
     return {int(match[1]): path for path, match in found.items() if match}
 
 
-def remove_unfinished(out: Path, own: Collection[str] | None = None) -> None:
+def remove_unfinished(out: Path, own_names: Collection[str] | None = None) -> None:
     """Remove the temporary files that interrupted runs have left in a data set.
 
-    own : names of the shards and parts that no other run is writing; all if None
+    own_names : names of the shards and parts that no other run is writing; None if there is no other run
     """
     for path, name in unfinished_files(out).items():
         is_images = _SHARD_NAME.fullmatch(name) or _PART_NAME.fullmatch(name)
-        if own is None or name in own or not is_images:
+        if own_names is None or name in own_names or not is_images:
             remove_path(path)
 
 

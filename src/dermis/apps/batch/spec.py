@@ -30,12 +30,12 @@ from dermis.scene.toml_text import key_text, table_text
 
 MAX_IMAGES = 10**9
 GENERATOR = 2
-"""Number of the rules by which seeds become people and pictures: other numbers give other people.
+"""Number of the rules by which seeds become people and pictures: other rules make other people of a seed.
 
-1 has the people of version 0.1, 2 the skin of measured people.
+Number 1 stands for the people of version 0.1, number 2 for people with the skin of measured people.
 """
 COUNT_LINE = re.compile(r"(?m)^count = (\d+)\n")
-"""Line of a canonical spec with the number of images, by which data sets may grow."""
+"""Line of a canonical spec with the number of images, which may be raised to let a data set grow."""
 GENERATOR_LINE = re.compile(r"(?m)^generator = (\d+)\n")
 """Line of a canonical spec with the generator number; earlier versions wrote none."""
 RENDER_DEFAULTS: Mapping[str, Any] = {"atlas": 1024, "exposure": "auto"}
@@ -274,16 +274,18 @@ def _toml_lines(title: str, values: Mapping[str, object]) -> list[str]:
 
     title : dotted name of the table
     """
-    own, below = dict[str, object](), list[str]()
+    own_values, sub_lines = dict[str, object](), list[str]()
     for name, value in values.items():
         path = f"{title}.{key_text(name)}" if title else key_text(name)
         if isinstance(value, FrozenModel | Mapping):
-            below += _toml_lines(path, plain_values(value) if isinstance(value, FrozenModel) else value)
+            sub_lines += _toml_lines(path, plain_values(value) if isinstance(value, FrozenModel) else value)
         elif isinstance(value, tuple) and value and isinstance(value[0], FrozenModel):
-            below += [table_text(f"[[{path}]]", plain_values(one)) for one in value]
+            sub_lines += [table_text(f"[[{path}]]", plain_values(one)) for one in value]
         else:
-            own[name] = value.spec_value() if isinstance(value, Distribution) else value
-    return [table_text(f"[{title}]" if title else "", own), *below] if own or not below else below
+            own_values[name] = value.spec_value() if isinstance(value, Distribution) else value
+    if sub_lines and not own_values:
+        return sub_lines
+    return [table_text(f"[{title}]" if title else "", own_values), *sub_lines]
 
 
 def _expand_patterns(value: object, folder: Path, key: str) -> object:

@@ -30,7 +30,7 @@ _SEED_FIELD = "seed"  # an integer that follows from the person
 _LOOK_MODELS: Mapping[str, type] = {"skin": SkinLook, "eyes": EyeLook, "hair": HairLook}
 _ANCESTRY_PARAMETERS = "person.african", "person.asian", "person.caucasian"
 _ITA_PARAMETER, _MELANIN_PARAMETER = "person.ita", "person.skin.melanin"
-HEAD_NAME = "person.head"
+_HEAD_PARAMETER = "person.head"
 _MAX_NAME_LENGTH = 100  # characters
 
 
@@ -40,7 +40,7 @@ def check_spec(
     groups: Sequence[CorrelationGroup],
     folder: Path,
 ) -> None:
-    """Refuse distributions that cannot be rendered; errors name table and key.
+    """Refuse distributions whose samples cannot be rendered; errors state table and key.
 
     sampled : distribution of each parameter by its dotted name
     expressions : weights of morph targets by name of the expression
@@ -69,9 +69,11 @@ def check_landmarks(names: Sequence[str], folder: Path) -> None:
 
 
 def _check_person(sampled: Mapping[str, Distribution]) -> None:
-    person_keys = [name for name in sampled if name.startswith("person.") and name != HEAD_NAME]
-    if HEAD_NAME in sampled and person_keys:
-        refuse(person_keys[0], "sampled people", f"{HEAD_NAME} names heads", "Remove one of the two keys")
+    person_keys = [name for name in sampled if name.startswith("person.") and name != _HEAD_PARAMETER]
+    if _HEAD_PARAMETER in sampled and person_keys:
+        refuse(
+            person_keys[0], "sampled people", f"{_HEAD_PARAMETER} names heads", "Remove one of the two keys"
+        )
     if _ITA_PARAMETER in sampled and _MELANIN_PARAMETER in sampled:
         advice = "Remove one of the two keys"
         refuse("person: ita", "an ITA or the melanin of the skin", "the spec has both", advice)
@@ -82,9 +84,9 @@ def _check_person(sampled: Mapping[str, Distribution]) -> None:
         refuse("person", "a fraction of african, asian or caucasian above 0", actual, advice)
 
 
-def _check_expression(name: Distribution, expressions: Mapping[str, Weights]) -> None:
+def _check_expression(names: Distribution, expressions: Mapping[str, Weights]) -> None:
     known = [*expressions, RANDOM_EXPRESSION]
-    for value in name.support:
+    for value in names.support:
         if value not in known:
             advice = f"Add [expressions.{value}], or correct it"
             refuse("expression: name", f"one of {', '.join(known)}", f"got {value!r}", advice)
@@ -122,9 +124,9 @@ def _check_names(sampled: Mapping[str, Distribution], folder: Path) -> None:
         UNIFORM,
         *(name for name, sample in SAMPLES.items() if sample.kind == "environment"),
     ]
-    for parameter, known in ((HEAD_NAME, heads), ("environment.name", maps)):
+    for parameter, known in ((_HEAD_PARAMETER, heads), ("environment.name", maps)):
         for name in map(str, sampled[parameter].support if parameter in sampled else ()):
-            is_person = parameter == HEAD_NAME and name.startswith(f"{HUMAN}:")
+            is_person = parameter == _HEAD_PARAMETER and name.startswith(f"{HUMAN}:")
             if name not in known and not is_person and not is_file(folder / name):
                 expected = f"a file in the spec's folder, or one of {', '.join(known)}"
                 refuse(parameter.replace(".", ": "), expected, f"{name!r} is neither", "Check the name")
@@ -153,7 +155,7 @@ def _check_table(
     """Refuse unknown keys of a spec table, and distributions whose limits a model rejects.
 
     known : allowed keys of the table
-    make : class of the model, called with the limits of a distribution
+    make : class or function that makes the model, called with each limit of a distribution
     """
     for name, distribution in table_values(sampled, table).items():
         if name not in known:

@@ -82,7 +82,7 @@ class WorkerSlot:
 
 @dataclass(frozen=True)
 class WorkerEvent:
-    """Progress event sent by a worker; only one of the first two and the last three fields is set.
+    """Progress event sent by a worker; only one of `images`, `done`, `note`, `retry` and `refusal` is set.
 
     images : number of images rendered since the last event
     done : part that is complete, or shard that was verified
@@ -107,7 +107,7 @@ class WorkerEvent:
 class _PlannedImage(NamedTuple):
     """Image to render, with the scene of the preceding image of the same person, if there is one.
 
-    previous : scene relative to which motion vectors are computed; None if there is none
+    previous : scene relative to which motion vectors are computed; None without a preceding image
     """
 
     number: int
@@ -163,10 +163,10 @@ class Worker:
                     rendered += 1
                     send(WorkerEvent(images=1))
                     image = next(images, None)  # all failures before it are known then
-                own = tuple(sorted(one for one in failed if part.first <= one.number < part.stop))
-                for failure in own:
+                part_failures = tuple(sorted(one for one in failed if part.first <= one.number < part.stop))
+                for failure in part_failures:
                     writer.leave_out(*failure)
-            send(WorkerEvent(done=part, rendered=rendered, failed=own, missing=self._join(part)))
+            send(WorkerEvent(done=part, rendered=rendered, failed=part_failures, missing=self._join(part)))
 
     def close(self) -> None:
         """Kill the encoder processes."""
@@ -178,7 +178,7 @@ class Worker:
         planned: deque[tuple[Part, KeptImages]],
         send: Callable[[WorkerEvent], None],
     ) -> Iterator[int]:
-        """Yield the numbers of the images to render; process the tasks in which there are none.
+        """Yield the numbers of the images to render; process at once the tasks that need no rendering.
 
         planned : queue to which each part to write is appended, with the images that are copied
         """
@@ -197,7 +197,7 @@ class Worker:
                 yield from range(kept.stop, task.stop)
 
     def _join(self, part: Part) -> tuple[Part, ...]:
-        """Join the shard of a part if all of its parts exist; return the damaged ones."""
+        """Join the parts of a part's shard if all of them exist; return the damaged parts."""
         spec = self._options.spec
         return join_parts(self._options.out, shard_at(part.index, spec), spec)
 
@@ -256,13 +256,13 @@ class Worker:
         """
         spec = self._options.spec
         for alpha, group in itertools.groupby(plans, lambda plan: plan.settings.background == "none"):
-            each = itertools.tee(group, 3)
+            copies = itertools.tee(group, 3)
             yield from self._renderer.observe(
-                (plan.scene for plan in each[0]),
-                (plan.settings for plan in each[1]),
+                (plan.scene for plan in copies[0]),
+                (plan.settings for plan in copies[1]),
                 alpha=alpha,
                 # motion is relative to these scenes, not to the frame rendered before
-                previous=(plan.previous for plan in each[2]),
+                previous=(plan.previous for plan in copies[2]),
                 outputs=spec.outputs,
                 landmarks=spec.landmark_tables.values(),
             )
@@ -295,7 +295,7 @@ def run_worker(pipe: Connection, slot: WorkerSlot, options: RunOptions) -> None:
 
 
 def available_tasks(pipe: Connection) -> Iterator[Shard]:
-    """Yield the next task of a worker, and those that have arrived when the ones before are in flight."""
+    """Wait for a worker's next task and yield it; then yield the tasks that have arrived in the meantime."""
     yield pipe.recv()
     while pipe.poll():
         yield pipe.recv()
@@ -322,6 +322,6 @@ def _head_tone(head: Head) -> SkinTone | None:
 
 
 def _encode(
-    spec: Spec, number: int, observation: Observation, parameters: Parameters, tone: SkinTone | None
+    spec: Spec, image_number: int, observation: Observation, parameters: Parameters, tone: SkinTone | None
 ) -> EncodedImage:
-    return number, encode_record(number, observation, parameters, spec, tone)
+    return image_number, encode_record(image_number, observation, parameters, spec, tone)

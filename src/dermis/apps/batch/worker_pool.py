@@ -136,17 +136,18 @@ class _PoolState:
         if event.retry:
             self._return_tasks(worker, event.retry)
             self._stop_worker(worker)
-        elif self._may_continue(worker):
+        elif self._gets_another_task(worker):
             self._send_task(worker)
         elif not worker.tasks:
             self._stop_worker(worker)
         self.start_workers()
         return event
 
-    def _may_continue(self, worker: _WorkerProcess) -> bool:
-        """Return whether a worker gets a task: if it has none, or one that is in progress for the first time.
+    def _gets_another_task(self, worker: _WorkerProcess) -> bool:
+        """Return whether a worker gets a task: if it has none, or if its only one is in its first attempt.
 
-        The second one lets it keep frames in flight; there is none when tasks become fewer than workers.
+        A second task lets the worker keep frames in flight between the two. None is given when fewer tasks
+        than workers are left.
         """
         if not worker.tasks:
             return bool(self._queue)
@@ -159,7 +160,7 @@ class _PoolState:
         self._free_slots.append(worker.slot)
 
     def _return_tasks(self, worker: _WorkerProcess, reason: str) -> None:
-        """Return the tasks of a worker that exits to the queue."""
+        """Put the tasks of a worker that exits back into the queue."""
         current, *unstarted = worker.tasks
         if self._attempts[current] >= MAX_ATTEMPTS:
             raise DermisError(

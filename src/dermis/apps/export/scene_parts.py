@@ -13,7 +13,7 @@ from dermis.scene.lights import Light
 
 
 def supported_lights(lights: Iterable[Light], supported: Container[str], program: str) -> list[Light]:
-    """Return the lights, with unsupported ones replaced by point or directional lights, and warn of these.
+    """Return the lights; replace unsupported ones by point or directional lights, with a warning.
 
     supported : kinds of light that the program supports, including point and directional
     program : name of the program for the warnings

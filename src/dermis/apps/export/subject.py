@@ -154,7 +154,7 @@ def load_subject(
     model : model of the reference profile, see `reference_curve`
     head : options of `load_head`
 
-    DermisError : for an unknown name, or an option that does not apply
+    Raises DermisError for an unknown name, and for an option that does not apply.
     """
     path = checked_path(source, "a skin or a head")
     name = str(source)
@@ -185,7 +185,7 @@ def reference_curve(
     model : by default tabulated Monte Carlo for homogeneous media of the package, layered diffusion for other
         tissue, and the Gaussians themselves for a table of Gaussians
 
-    DermisError : for an unknown model, or a model requested for a table of Gaussians
+    Raises DermisError for an unknown model, and for a model requested for a table of Gaussians.
     """
     if model is not None and model not in PROFILE_MODELS:
         refuse(

@@ -62,7 +62,8 @@ def sample_irradiance(
 
     light : function of `MeshPoints` that returns irradiance (n, 3); called for new points only
     spacing_mm : longest side of a small triangle [mm]
-    finest_mm : length down to which sides with a high contrast are halved further; None to keep them [mm]
+    finest_mm : length down to which sides with a high contrast are halved further; None to stop at
+        `spacing_mm` [mm]
     contrast : threshold of a high contrast: difference of irradiance between the ends of a side, relative to
         the largest irradiance [-]
 

@@ -41,32 +41,34 @@ _STRIPE_TEXELS = 40, 64  # smallest numbers of texels across a width and along t
 _MAX_STRIPE_TEXELS = 2**23
 
 
-def mitsuba_emitter(mi: Mitsuba, light: Light, number: int) -> SceneDict:
+def mitsuba_emitter(mi: Mitsuba, light: Light, light_number: int) -> SceneDict:
     """Return Mitsuba's description of a light.
 
     mi : module `mitsuba` with a variant set
-    number : position of the light in the scene, from 1, for messages
+    light_number : position of the light in the scene, from 1, for messages
 
     Raises DermisError for a light without shadows, which a path tracer does not support, and for an unknown
     kind of light: references use no approximations.
     """
-    _check_shadows(light, number, "path tracing")
-    return MITSUBA[light.kind](mi, light, f"light {number}")
+    _check_shadows(light, light_number, "path tracing")
+    return MITSUBA[light.kind](mi, light, f"light {light_number}")
 
 
-def cycles_lamp(light: Light, number: int) -> SceneDict:
+def cycles_lamp(light: Light, light_number: int) -> SceneDict:
     """Return Cycles' description of a light, in Cycles' units.
 
-    number : position of the light in the scene, from 1, for messages
+    light_number : position of the light in the scene, from 1, for messages
     """
-    _check_shadows(light, number, "Cycles")
+    _check_shadows(light, light_number, "Cycles")
     return CYCLES[light.kind](light)
 
 
-def _check_shadows(light: Light, number: int, renderer: str) -> None:
+def _check_shadows(light: Light, light_number: int, renderer: str) -> None:
     if not light.shadows:
         advice = "Set shadows = true"
-        refuse(f"light {number}", f"a light with shadows, for {renderer}", "it has shadows = false", advice)
+        refuse(
+            f"light {light_number}", f"a light with shadows, for {renderer}", "it has shadows = false", advice
+        )
 
 
 def mitsuba_point(mi: Mitsuba, light: PointLight, label: str) -> SceneDict:

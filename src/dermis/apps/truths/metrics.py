@@ -66,7 +66,8 @@ def relative_rmse(
     estimate 4 s² (D + E T)² - 2 (1 - E)² s⁴. Skewed noise is removed as well, but makes this standard error
     too small, by 7 to 16 % for means of 64 exponential samples. Pixels are independent; channels may share
     paths, so their standard deviations are added, which overestimates by at most sqrt(c). The root's standard
-    error is the larger distance to sqrt(E ± error of E), or to 0.
+    error is the larger of its distances to sqrt(E + e) and sqrt(E - e), where e is the error of E; 0 replaces
+    the latter if E < e.
 
     Noise of variance v in the image adds v to D², and 4 v D² - 4 v s² - 2 v² to the estimate of U's variance.
     Only the first term is counted, because few passes estimate v² badly: the standard error is then too large

@@ -38,7 +38,7 @@ _RELATIVE_GAP = 0.97
 second hit of the same surface. That offset skips 0.01 mm of medium on a head, which makes skin with a mean
 free path of 1 mm up to 1 % darker. With two surfaces, an inward ray hits the upper one and skips the lower
 one, an outward ray hits the lower one and skips the upper one, so that only the gap is skipped."""
-_REPORTED_FOLD = 1e-3  # fraction of a folded surface above which a note reports it
+_REPORTED_FOLD = 1e-3  # folded fraction of a surface above which a note reports it
 
 
 @dataclass(frozen=True)

@@ -27,9 +27,10 @@ class Octree(NamedTuple):
         [mm]
     points, flux : (n, 3, 3) three points that replace the node's light [mm], and their flux by channel, which
         may be below 0 [mm²]
-    second_moment, moment_error, centroid_error : (n,) error bounds of the three points, for the worst
-        channel: mean square distance of the light from the centre, plus that of the points [mm²]; difference
-        between the second moments of light and points [mm²]; distance between the centroids of both [mm]
+    second_moment : (n,) mean square distance of the light from the centre, plus that of the points; like
+        the next two, an error bound of the points in the worst channel [mm²]
+    moment_error : (n,) difference between the second moments of the light and of the points [mm²]
+    centroid_error : (n,) distance between the centroids of the light and of the points [mm]
     corners : (m, 3, 3) corners of the triangles [mm]
     irradiance : (m, 3, 3) irradiance at the corners
     area : (m,) areas of the triangles [mm²]

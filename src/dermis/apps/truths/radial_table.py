@@ -17,7 +17,8 @@ TABLE_ROWS = 8192
 
 _GAUSSIAN_CUTOFF = 1e-12  # relative to the peak of a Gaussian
 _FAR_ERROR_FRACTION = 0.2
-"""Fraction of the permitted error given to a slowly decreasing tail, so that distant nodes stay closed."""
+"""Fraction of the permitted error that is spread widely over the radii, so that distant nodes of the octree
+need not be opened."""
 
 
 @dataclass(frozen=True)
@@ -128,10 +129,10 @@ def tabulate_profile(profile: Profile) -> ProfileTable:
 
 
 def _upper_bound(values: Floats, energy: Floats, nonzero: NDArray[np.bool_]) -> Floats:
-    """Return the largest value (rows,) of any channel from each radius on, divided by its energy.
+    """Return the largest value (rows,) of any channel from each radius on, after division by its energy.
 
     values : (rows, 3) function of the radius by channel
-    energy : (3,) energy of the profile
+    energy : (3,) energy of the profile by channel, by which its values are divided
     nonzero : (3,) mask of channels with energy
     """
     largest = np.max(values[:, nonzero] / energy[nonzero], axis=1)

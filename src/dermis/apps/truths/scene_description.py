@@ -63,13 +63,13 @@ def mitsuba_shape(kind: str, radiance: Vector, **shape: MitsubaObject) -> SceneD
 
 
 def mitsuba_projector(
-    mi: Mitsuba, intensity: Floats, cosine: Floats, to_world: MitsubaObject, half_tangent: float
+    mi: Mitsuba, intensity: Floats, cosine: Floats, to_world: MitsubaObject, half_fov_tangent: float
 ) -> SceneDict:
     """Return Mitsuba's projector with a given intensity for each texel of its slide.
 
     intensity : (h, w, 3) radiant intensity [irradiance mm2]
     cosine : (h, w) cosine of the angle between texel and axis
-    half_tangent : tangent of half the horizontal field of view
+    half_fov_tangent : tangent of half the horizontal field of view
     """
     # Mitsuba's slide is the irradiance on a plane perpendicular to the axis, divided by pi.
     slide = intensity * cosine[..., None] ** 3 / np.pi
@@ -77,7 +77,7 @@ def mitsuba_projector(
         "type": "projector",
         "to_world": to_world,
         "fov_axis": "x",
-        "fov": float(2.0 * np.degrees(np.arctan(half_tangent))),
+        "fov": float(2.0 * np.degrees(np.arctan(half_fov_tangent))),
         "irradiance": {
             "type": "bitmap",
             "bitmap": mi.Bitmap(slide.astype(np.float32)),

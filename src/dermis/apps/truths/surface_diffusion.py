@@ -41,8 +41,9 @@ def diffuse_on_surface(
 ) -> Floats:
     """Return vertex values blurred along the surface by a Gaussian of each variance, (k, n, c).
 
-    Each level starts from the one before. Time steps are by TR-BDF2, which is of second order and, unlike the
-    Crank-Nicolson scheme, does not oscillate around points of light.
+    The blur by each variance, called a level, starts from the result of the next smaller variance. Time steps
+    are by TR-BDF2, which is of second order and, unlike the Crank-Nicolson scheme, does not oscillate around
+    points of light.
 
     positions : (n, 3) vertex positions without duplicates, see `welded_surface` [mm]
     triangles : (f, 3) vertex indices
@@ -151,11 +152,13 @@ def _checked_surface(positions: ArrayLike, triangles: ArrayLike) -> tuple[Floats
     return vertices, corners
 
 
-def _checked_values(values: ArrayLike, count: int) -> Floats:
+def _checked_values(values: ArrayLike, vertex_count: int) -> Floats:
     vertex_values = np.asarray(values, dtype=np.float64)
-    if not (vertex_values.ndim == 2 and len(vertex_values) == count and np.isfinite(vertex_values).all()):
+    if not (
+        vertex_values.ndim == 2 and len(vertex_values) == vertex_count and np.isfinite(vertex_values).all()
+    ):
         actual = f"got shape {vertex_values.shape}, or values that are not finite"
-        refuse("surface diffusion", f"finite values ({count}, c)", actual, "Give one row per vertex")
+        refuse("surface diffusion", f"finite values ({vertex_count}, c)", actual, "Give one row per vertex")
     return vertex_values
 
 
@@ -179,9 +182,11 @@ def _check_resolution(vertices: Floats, corners: Index, variances: ArrayLike, st
 
 
 _MIN_TRIANGLE_SLACK = 1e-5
-"""Least slack of the triangle inequality, relative to the mean edge; flatter angles are not usable."""
+"""Smallest excess of two sides of a triangle over the third, relative to the mean edge; flatter triangles
+have unusable angles."""
 _FLIP_TOLERANCE = 1e-6
-"""Edges whose cotangents sum to less than minus this are flipped; four points on a circle sum to 0."""
+"""An edge is flipped if the cotangents of its two opposite angles sum to less than minus this; for four
+points on a circle they sum to 0."""
 _MAX_SWEEPS = 1000
 
 

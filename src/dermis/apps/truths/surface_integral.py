@@ -16,8 +16,8 @@ Floats = NDArray[np.float64]
 
 _POINTS_PER_CALL = 1024  # between two checks for Ctrl-C
 _ERROR_AT_UNIT_BOUND = 1e-3
-"""Error at an error bound of 1, measured on waves, spheres, bumps and the scan. The errors of three points
-are of third order in the size of a patch, their bound is of second order."""
+"""Actual error where the error bound is 1, measured on waves, spheres, bumps and the scan. The errors of
+three points are of third order in the size of a patch, their bound is of second order."""
 _UNCANCELLED_FACTOR = 50.0
 """Factor for errors caused by different light in the channels; they are of second order and cancel less."""
 

@@ -40,7 +40,8 @@ _LOGGER = logging.getLogger("dermis")
 PngEncoding = Literal["colour", "light", "normal", "fraction", "range", "root", "none"]
 """Encoding of a map as PNG. "colour": 8-bit sRGB; "light": 8-bit sRGB of light divided by its 99.9th
 percentile; "normal": a normal n as (n + 1) / 2 in 16 bits; "fraction": a value from 0 to 1 in 16 bits;
-"range": the interval from minimum to maximum in 16 bits; "root": the square root in 16 bits; "none": none."""
+"range": the interval from minimum to maximum in 16 bits; "root": the square root in 16 bits; "none": no PNG
+is written."""
 _SCATTERED_NAME = "scattered"
 _MAX_ATLAS_SIDE = 2048  # of the map in which light is diffused [texel]
 
@@ -129,11 +130,11 @@ class MapFolder(Target):
         return "down" if self.variant == "directx" else "up"
 
 
-def encode_map_exr(name: str, values: Floats) -> bytes:
+def encode_map_exr(map_name: str, values: Floats) -> bytes:
     """Return a map as OpenEXR, with channels R, G, B for colours and vectors, and Y for scalars."""
     names = "Y" if values.ndim == 2 else "RGB"
     channels = [values] if values.ndim == 2 else list(np.moveaxis(values, -1, 0))
-    return encode_exr_parts({name: dict(zip(names, channels, strict=True))}, fast=True)
+    return encode_exr_parts({map_name: dict(zip(names, channels, strict=True))}, fast=True)
 
 
 def quantise_map(values: Floats, encoding: PngEncoding) -> tuple[NDArray[np.uint8 | np.uint16], Ranges]:

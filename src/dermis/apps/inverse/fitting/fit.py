@@ -48,12 +48,13 @@ DEFAULT_NOISE = 0.02
 DEFAULT_SIDE, DEFAULT_ATLAS, SHADOW_SIZE = 128, 256, 512
 _MIN_PIXELS = 200
 _MAX_BLOCK_RESIDUAL = 0.1
-"""Largest residual of blocks of a picture that shows the head, see docs/fit.md [-]."""
+"""Median relative residual of blocks above which a picture probably does not show the head, see docs/fit.md
+[-]."""
 WhitePoint = Sequence[float] | Literal["specular"]
 
 
 def candidate_suns(towards_camera: Floats) -> Floats:
-    """Return directions (k, 3) towards suns that light what a camera sees of the face.
+    """Return directions (k, 3) towards suns that light the side of the face that a camera sees.
 
     towards_camera : (3,) unit vector from the face to the camera
     """
@@ -100,23 +101,23 @@ class InitialGuess:
         fixed = pigments.overrides()
         self._table = skin_colour_table(fixed["eumelanin"], fixed["oxygen"], fixed["epidermis_mm"])
 
-    def best(self, count: int) -> FitPoint:
-        """Return the pigments, specular strength and `count` suns with the smallest residual."""
+    def best(self, sun_count: int) -> FitPoint:
+        """Return the pigments, specular strength and `sun_count` suns with the smallest residual."""
         grid = list(product(np.log(_MELANIN_GRID), np.log(_BLOOD_GRID), np.log(_STRENGTH_GRID)))
-        log_skin, suns = self.point.logs, self._select_suns(self.point.logs, count)
+        log_skin, suns = self.point.logs, self._select_suns(self.point.logs, sun_count)
         for _ in range(2):
             trials = [np.array([m, b, log_skin[2], s]) for m, b, s in grid]
             log_skin = trials[int(np.argmin([self._squared_residual(one, suns) for one in trials]))]
-            suns = self._select_suns(log_skin, count)
+            suns = self._select_suns(log_skin, sun_count)
         return replace(self.point, logs=log_skin, suns=self.point.suns[suns])
 
-    def _select_suns(self, logs: Floats, count: int) -> list[int]:
+    def _select_suns(self, logs: Floats, sun_count: int) -> list[int]:
         """Return the indices of the suns with the smallest residual, selected greedily.
 
         logs : (4,) logarithms of the skin unknowns
         """
         selected: list[int] = []
-        for _ in range(count):
+        for _ in range(sun_count):
             remaining = [k for k in range(len(self.point.suns)) if k not in selected]
             selected.append(min(remaining, key=lambda k: self._squared_residual(logs, [*selected, k])))
         return selected
@@ -181,7 +182,7 @@ def fit(
     suns : int
         Number of directional lights besides the ambient light, 0 to 2.
     exposure : float
-        Factor from radiance to the photograph [-].
+        Ratio of the photograph's linear values to the radiance [-].
     white : (3,) array_like or "specular"
         Colour of the light in the photograph, or "specular" to estimate it from specular reflection.
     noise : float
@@ -205,8 +206,8 @@ def fit(
     Raises
     ------
     DermisError
-        For files and arrays that are not pictures, numbers out of range, pictures without skin, and as
-        `dermis.Renderer`.
+        For files and arrays that are not pictures, numbers out of range, pictures without skin, and for the
+        errors of `dermis.Renderer`.
 
     References
     ----------
@@ -259,7 +260,7 @@ def fit(
 
 
 def _assumed_sd(subject: FitSubject, point: FitPoint) -> dict[str, float]:
-    """Return standard deviations of the logarithms of pigments because parameters of the skin are assumed."""
+    """Return standard deviations of the logarithms of pigments, due to assumed skin parameters."""
     pigments = subject.scene.skin.pigments
     assert pigments is not None
     fixed = {name: getattr(pigments, name) for name in ("eumelanin", *FIXED_PARAMETERS)}
@@ -271,7 +272,7 @@ def _assumed_sd(subject: FitSubject, point: FitPoint) -> dict[str, float]:
 def note_residual(photo: object, residual: float) -> None:
     """Issue a note if the residual of a fit is so large that the picture does not show the head.
 
-    photo : its name
+    photo : name of the photograph, for the note
     residual : median relative residual of blocks of the picture [-]
     """
     if residual > _MAX_BLOCK_RESIDUAL:
@@ -298,7 +299,7 @@ def _find_skin(frames: FaceRenderer, photo: Photograph) -> FitPoint:
 
 
 def _initial_point(problem: FitProblem, candidate: FitPoint, suns: int) -> FitPoint:
-    """Return the start of the fit, found by a coarse search and a finer one around its suns."""
+    """Return the point at which the fit starts, by a coarse search and a finer one around its suns."""
     frames, target, weight = problem.frames, problem.target, problem.initial_weights()
     start = InitialGuess(frames, candidate, target, weight).best(suns)
     if suns:

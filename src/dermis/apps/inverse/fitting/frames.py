@@ -60,7 +60,7 @@ class FaceRenderer:
         self.mask = _erode(skin) & (unclipped > _FULL_COVERAGE)
 
     def basis(self, point: FitPoint) -> Floats:
-        """Render the face under each light alone; return the radiance (9 + k, p, 3).
+        """Render the face under each light alone; return the radiance (9 + k, p, 3) of the p masked pixels.
 
         The first nine lights are ambient lobes of radiance 1, the others suns of irradiance 1.
         """
@@ -78,7 +78,7 @@ class FaceRenderer:
         return both[:, 0], both[:, 1]
 
     def combined(self, point: FitPoint, strengths: Floats, name: str) -> Floats:
-        """Render the face under all lights together; return the radiance (p, 3).
+        """Render the face under all lights together; return the radiance (p, 3) of the masked pixels.
 
         strengths : (9 + k,) strengths of ambient lobes and suns
         name : file name of the ambient light's panorama, without suffix

@@ -91,7 +91,7 @@ def read_photograph(source: str | Path | EmbeddedPicture | ArrayLike) -> Photogr
 
 
 def _area_average(image: Floats, size: tuple[int, int]) -> Floats:
-    """Downsample a picture (h, w, c) by area; a pixel that straddles pixels of the result counts in each.
+    """Downsample a picture (h, w, c): each pixel of the result is the mean over the area that it covers.
 
     size : width and height of the result [pixel]
     """
@@ -116,7 +116,7 @@ class FitSubject:
     scene : head, camera, pose and surface
     person : parametric person whose skin is painted, None for other heads
     table : table [head] of the scene's file; empty for a head without a name or file, which cannot be saved
-    known : names of the pigments that the source states; the others are assumed
+    known : names of the pigments that the scene states; the values of the others are assumed
     """
 
     scene: Scene
@@ -170,7 +170,7 @@ def _painted_person(head: Head) -> Human | None:
 
 
 def _without_light(scene: Scene) -> Scene:
-    """Return the scene without light, and with a skin whose fixed pigments are those of the head."""
+    """Return the scene without light; the pigments that a fit keeps fixed are those of the head."""
     fixed_pigments = {name: getattr(DEFAULT_SKIN, name) for name in ("epidermis_mm", "eumelanin", "oxygen")}
     if isinstance(scene.head.maps, PaintedMaps):
         look = scene.head.maps.look

@@ -1,4 +1,4 @@
-"""Landmarks in a photograph: tables, iBUG's .pts files, JSON of MediaPipe and of dermis render."""
+"""Readers of landmarks in a photograph: tables, iBUG's .pts files, JSON of MediaPipe and dermis render."""
 
 from __future__ import annotations
 
@@ -25,17 +25,20 @@ _SETS: Mapping[int, tuple[str, range]] = {
     468: ("mediapipe", range(468)),
     478: ("mediapipe", range(478)),
 }
-"""Landmark set by the number of landmarks in a file, and their names there in the order of the file."""
-_FIVE = ("face-synthetics-70", (68, 69, 30, 48, 54))
-"""Eyes, tip of the nose and corners of the mouth, each from the left of the picture: face detectors."""
+"""By the number of landmarks in a file: the name of the landmark set, and the numbers of the landmarks in
+that set, in the order of the file."""
+_FIVE_OF_DETECTORS = ("face-synthetics-70", (68, 69, 30, 48, 54))
+"""Landmark set and numbers of the five landmarks of face detectors: the eyes, the tip of the nose and the
+corners of the mouth; eyes and corners from left to right in the picture."""
 _FIVE_OF_DLIB = ("ibug-68", (45, 42, 36, 39, 33))
-"""Outer and inner corner of the eye on the right of the picture, of the other, base of the nose: dlib."""
-_MAX_EYE_LINE = 0.2  # distance of dlib's eye corners from a line, relative to their spread
-_COUNTS = ", ".join(map(str, (5, *_SETS)))
+"""Landmark set and numbers of the five landmarks of dlib: outer and inner corner of the eye on the right of
+the picture, outer and inner corner of the other eye, and base of the nose."""
+_MAX_EYE_LINE = 0.2  # largest distance of dlib's eye corners from a line, relative to their spread
+_KNOWN_COUNTS = ", ".join(map(str, (5, *_SETS)))
 _LIST_KEYS = ("facelandmarks", "multifacelandmarks", "landmarks", "landmark", "value")
 _NAME_COLUMNS = ("name", "landmark", "index", "id", "point", "number", "")
 _PTS_LINE = re.compile(r"(version|n_points)\s*:\s*(\S+)", re.IGNORECASE)
-_MAX_RELATIVE = 2.0  # largest coordinate of a face that is relative to the size of the photograph
+_MAX_RELATIVE = 2.0  # largest coordinate that is taken as relative to the size of the photograph
 
 
 class _Points(NamedTuple):
@@ -93,7 +96,7 @@ def _identify(path: str | Path, points: _Points) -> tuple[str, Sequence[str]]:
             refuse(path, expected, f"got {points.set_name!r}", "Give one of these")
         return points.set_name, names or ()
     if count != 5 and count not in _SETS:
-        expected = f"as many landmarks as a known set ({_COUNTS}), or JSON that names the set"
+        expected = f"as many landmarks as a known set ({_KNOWN_COUNTS}), or JSON that names the set"
         refuse(path, expected, f"got {count}", "Give all landmarks of one of these sets")
     if count == 5:
         notify(f"{path}: five landmarks place the camera, but say little about the shape of the face")
@@ -112,15 +115,16 @@ def _identify(path: str | Path, points: _Points) -> tuple[str, Sequence[str]]:
 
 
 def _identify_five(pixels: Floats) -> tuple[str, Sequence[int]]:
-    """Return the set of five landmarks and their numbers in it, which follow from their arrangement.
+    """Return the name of the set of five landmarks, and their numbers in it, found from their arrangement.
 
-    Four corners of eyes are on a line. Left and right are exchanged if the file starts with the other side.
+    They are those of dlib if the first four are on a line, as the corners of the eyes are. Left and right are
+    exchanged if the file starts with the other side.
     """
     spread = np.linalg.svd(pixels[:4] - pixels[:4].mean(axis=0), compute_uv=False)
     is_dlib = bool(spread[1] < _MAX_EYE_LINE * spread[0])
     right, down = pixels[0] - pixels[2] if is_dlib else pixels[1] - pixels[0], pixels[4] - pixels[0]
     is_mirrored = bool(right[0] * down[1] < right[1] * down[0])
-    name, numbers = _FIVE_OF_DLIB if is_dlib else _FIVE
+    name, numbers = _FIVE_OF_DLIB if is_dlib else _FIVE_OF_DETECTORS
     order = ((2, 3, 0, 1, 4) if is_dlib else (1, 0, 2, 4, 3)) if is_mirrored else range(5)
     return name, [numbers[k] for k in order]
 
@@ -149,11 +153,11 @@ def _from_table(path: str | Path, lines: list[str], size: tuple[int, int]) -> _P
     if len(rows) == 1:  # all coordinates in one line
         rows = [rows[0][k : k + 2] for k in range(0, len(rows[0]), 2)]
     first = [row[0] for row in rows]
-    has_names = len(rows[0]) > 2 and (not all(map(_is_number, first)) or _is_count(first))
+    has_names = len(rows[0]) > 2 and (not all(map(_is_number, first)) or _are_consecutive(first))
     start = 1 if has_names else 0
     if len(rows[0]) > start + 2:
         notify(f"{path}: of its {len(rows[0])} columns those from {start + 3} on are not used")
-    pixels = np.array([[_number(cell) for cell in row[start : start + 2]] for row in rows])
+    pixels = np.array([[_parse_number(cell) for cell in row[start : start + 2]] for row in rows])
     return _Points(_to_pixels(path, pixels, size), first if has_names else None)
 
 
@@ -166,7 +170,7 @@ def _from_named_columns(
             notify(f"{path}: the first of its {len(rows)} rows is used")
         count = sum(re.fullmatch(r"x_\d+", name) is not None for name in header)
         columns = [[header.index(f"{axis}_{k}") for axis in "xy"] for k in range(count)]
-        pixels = np.array([[_number(rows[0][column]) for column in pair] for pair in columns])
+        pixels = np.array([[_parse_number(rows[0][column]) for column in pair] for pair in columns])
         return _Points(_to_pixels(path, pixels, size))
     keys = [plain_key(name) for name in header]
     if not {"x", "y"} <= set(keys):
@@ -176,28 +180,28 @@ def _from_named_columns(
     unused = [header[k] for k in range(len(header)) if k not in (x, y, name)]
     if unused:
         notify(f"{path}: its columns {', '.join(unused)} are not used")
-    pixels = np.array([[_number(row[x]), _number(row[y])] for row in rows])
+    pixels = np.array([[_parse_number(row[x]), _parse_number(row[y])] for row in rows])
     return _Points(_to_pixels(path, pixels, size), None if name is None else [row[name] for row in rows])
 
 
 def _is_number(cell: str) -> bool:
     try:
-        return math.isfinite(_number(cell))
+        return math.isfinite(_parse_number(cell))
     except ValueError:
         return False
 
 
-def _is_count(cells: Sequence[str]) -> bool:
-    """Return whether cells count from 0 or from 1."""
+def _are_consecutive(cells: Sequence[str]) -> bool:
+    """Return whether the cells are 0, 1, 2 and so on, or 1, 2, 3 and so on."""
     return any(list(cells) == [str(k + start) for k in range(len(cells))] for start in (0, 1))
 
 
-def _number(cell: str) -> float:
+def _parse_number(cell: str) -> float:
     return float(cell.replace(",", ".") or "nan")
 
 
 def _to_pixels(path: str | Path, points: Floats, size: tuple[int, int]) -> Floats:
-    """Return coordinates (n, 2) in pixels; those relative to the photograph are converted, with a note."""
+    """Return coordinates (n, 2) in pixels; convert coordinates relative to the photograph, with a note."""
     if points.ndim != 2 or not np.nanmax(np.abs(points), initial=0.0) <= _MAX_RELATIVE:
         return points
     notify(f"{path}: its coordinates are taken as relative to the size of the photograph")

@@ -98,6 +98,8 @@ def mixing_matrix(suns: int) -> Floats:
     The n distributed lobes are those of `lobe_mixtures`, and the 9 ambient lobes those of `lobe_directions`;
     the strengths of k suns follow in both and do not change. Non-negative strengths of the distributed lobes
     make ambient light non-negative.
+
+    suns : number k of suns
     """
     weights, _ = lobe_mixtures()
     matrix = np.zeros((BASIS_SIZE + suns, weights.shape[1] + suns))

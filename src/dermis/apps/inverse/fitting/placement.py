@@ -20,9 +20,9 @@ from dermis.optics.media import Floats
 from dermis.scene.camera import Camera
 
 _LANDMARK_NOISE = 0.004
-"""Standard deviation of a landmark's position, over the height of the photograph."""
+"""Standard deviation of a landmark's position, relative to the height of the photograph [-]."""
 _FOCAL_SD = 0.3
-"""Prior standard deviation of the logarithm of the focal length, around that of a portrait."""
+"""Prior standard deviation of the logarithm of the focal length; the prior mean is that of a portrait."""
 _MACRO_NAMES = ("african", "asian", "caucasian", "sex", "age", "weight", "muscle")
 _MACRO_SD = 0.3
 _TARGET_SD = 0.15
@@ -49,7 +49,7 @@ def align_to_landmarks(subject: FitSubject, landmarks: str | Path, size: tuple[i
     person, head = subject.person, subject.scene.head
     model = _LandmarkModel.for_head(person, head, name, pixels_by_name)
     pixels = np.array([pixels_by_name[one] for one in model.names])
-    solution = np.concatenate([np.zeros(6), [_log_focal(size)], np.zeros(model.count)])
+    solution = np.concatenate([np.zeros(6), [_log_focal(size)], np.zeros(model.unknown_count)])
     solution[:3], solution[5] = (np.pi, 0.0, 0.0), _PORTRAIT_DISTANCE_MM
     for _ in range(_ITERATIONS if person else 1):
         solution = _fit_camera_and_identity(model, pixels, size, solution)
@@ -71,8 +71,8 @@ class _LandmarkModel:
 
     names : names of the n landmarks
     positions : (n, 3) positions at the mean of the priors, relative to the head's centre [mm]
-    derivatives : (u, n, 3) derivatives of the positions by the u unknowns, in standard deviations of their
-        priors [mm]
+    derivatives : (u, n, 3) derivatives of the positions by the u unknowns, each of which is measured in
+        standard deviations of its prior [mm]
     prior : person at the mean of the priors, None for heads of fixed shape
     details : names of the MakeHuman targets that are unknowns
     """
@@ -105,25 +105,27 @@ class _LandmarkModel:
         targets = (one for one in human_targets() if one.startswith(_TARGET_FOLDERS))
         details = tuple(one for one in targets if one.endswith(_TARGET_SUFFIXES))
 
-        def positions_of(other: Human) -> Floats:
+        def person_landmarks(other: Human) -> Floats:
             return np.asarray(
                 _landmark_positions(points, indices, other.positions_mm.astype(np.float64)) - centre
             )
 
-        model = cls(names, positions_of(person), np.zeros((0, 0, 3)), person, details)
+        model = cls(names, person_landmarks(person), np.zeros((0, 0, 3)), person, details)
         unknowns = range(len(_MACRO_NAMES) + len(details))
-        return replace(model, derivatives=np.stack([_derivative(model, positions_of, k) for k in unknowns]))
+        return replace(
+            model, derivatives=np.stack([_derivative(model, person_landmarks, k) for k in unknowns])
+        )
 
     @property
-    def count(self) -> int:
+    def unknown_count(self) -> int:
         """Return the number u of unknowns of the identity, 0 for heads of fixed shape."""
         return len(self.derivatives)
 
     def person(self, identity: Floats) -> Human:
         """Return the person with a given identity.
 
-        identity : (u,) differences of the unknowns from the prior's person, in standard deviations of their
-            priors
+        identity : (u,) differences of the unknowns from those of `prior`, each in standard deviations of its
+            prior
         """
         assert self.prior is not None
         macro: dict[str, Any] = {
@@ -138,15 +140,17 @@ class _LandmarkModel:
         return replace(self.prior, **macro, targets=targets, skin=self.prior.look)
 
 
-def _derivative(model: _LandmarkModel, positions_of: Callable[[Human], Floats], k: int) -> Floats:
+def _derivative(model: _LandmarkModel, person_landmarks: Callable[[Human], Floats], k: int) -> Floats:
     """Return the derivative (n, 3) of landmark positions by the k-th unknown of the identity.
 
     The finite difference steps upwards, or downwards if the prior is at the upper limit of the unknown.
+
+    person_landmarks : function that returns the landmark positions (n, 3) of a person [mm]
     """
     for step in _IDENTITY_STEP, -_IDENTITY_STEP:
         identity = np.zeros(len(_MACRO_NAMES) + len(model.details))
         identity[k] = step
-        change = positions_of(model.person(identity)) - model.positions
+        change = person_landmarks(model.person(identity)) - model.positions
         if change.any():
             break
     return np.asarray(change / step)
@@ -160,12 +164,14 @@ def _log_focal(size: tuple[int, int]) -> float:
     return float(np.log(size[1] * _PORTRAIT_DISTANCE_MM / _PORTRAIT_HEIGHT_MM))
 
 
-def _macro_prior_sd(name: str) -> float:
-    return _MACRO_SD * (OLD_AGE - YOUNG_AGE if name == "age" else 1.0)
+def _macro_prior_sd(parameter: str) -> float:
+    return _MACRO_SD * (OLD_AGE - YOUNG_AGE if parameter == "age" else 1.0)
 
 
-def _macro_limits(name: str) -> tuple[float, float]:
-    return {"age": (YOUNG_AGE, OLD_AGE), "weight": (-1.0, 1.0), "muscle": (-1.0, 1.0)}.get(name, (0.01, 1.0))
+def _macro_limits(parameter: str) -> tuple[float, float]:
+    return {"age": (YOUNG_AGE, OLD_AGE), "weight": (-1.0, 1.0), "muscle": (-1.0, 1.0)}.get(
+        parameter, (0.01, 1.0)
+    )
 
 
 def _landmark_positions(points: LandmarkPoints, indices: NDArray[np.int64], positions: Floats) -> Floats:
@@ -190,7 +196,7 @@ def _fit_camera_and_identity(
         error = (_project_landmarks(x, positions, size) - pixels) / (_LANDMARK_NOISE * size[1])
         return np.concatenate([error.ravel(), [(x[6] - prior_median) / _FOCAL_SD], x[7:]])
 
-    scale = np.concatenate([np.full(3, 0.1), (10.0, 10.0, 100.0), [0.1], np.ones(model.count)])
+    scale = np.concatenate([np.full(3, 0.1), (10.0, 10.0, 100.0), [0.1], np.ones(model.unknown_count)])
     return np.asarray(least_squares(residuals, start, x_scale=scale, loss="soft_l1").x, np.float64)
 
 

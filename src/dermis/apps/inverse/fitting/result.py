@@ -46,7 +46,7 @@ class FitResult:
     point : skin unknowns and directions towards the suns
     strengths : (9 + k,) strengths of the ambient lobes and of the suns
     white : (3,) colour of the light in linear Rec. 709, green 1
-    exposure : factor from radiance to the photograph [-]
+    exposure : ratio of the photograph's linear values to the radiance [-]
     size : width and height of the photograph [pixel]
     uncertainty : standard deviations of the unknowns
     photo, picture : (h, w, 3) photograph and fitted picture at the size of the fit, linear, with exposure and
@@ -85,8 +85,8 @@ class FitResult:
     def summary(self) -> dict[str, Any]:
         """Return the fitted unknowns with uncertainties and priors, as they are written to fit.json.
 
-        Standard deviations are relative for the skin and in degrees for directions. Those of melanin and
-        blood include errors of the renderer and of assumed oxygen and thickness.
+        Standard deviations are relative for the skin and in degrees for directions. The ones of melanin and
+        blood include errors of the renderer, and errors due to assumed oxygen and epidermal thickness.
         """
         uncertainty, sd = self.uncertainty, self.uncertainty.sd
         skin = {}
@@ -184,7 +184,7 @@ def fitted_scene(result: FitResult, folder: Path) -> Scene:
 def result_pictures(result: FitResult) -> dict[str, Floats]:
     """Return the photograph, the fitted picture, and their difference within the mask, linear, by name.
 
-    Grey is no difference.
+    In the difference, grey means equal.
     """
     peak = max(float(np.percentile(result.photo[result.mask], 99.5)), 1e-9)
     difference = np.where(result.mask[..., None], (result.photo - result.picture) / peak, 0.0)

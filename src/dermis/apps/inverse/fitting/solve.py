@@ -16,8 +16,8 @@ from dermis.base.renamed import renamed_attribute
 from dermis.optics.media import Floats
 
 _NOISE_FLOOR = 0.03
-"""Radiance over the photograph's median that is added to a pixel for its standard deviation, so that the
-weight of dark pixels is limited."""
+"""Radiance that is added to that of a pixel before its standard deviation is computed, relative to the
+photograph's median; it limits the weight of dark pixels [-]."""
 ROBUST_LIMIT = 3.0
 """Number of standard deviations above which the weight of a residual decreases [Huber1964]."""
 NO_SD: Mapping[str, float] = MappingProxyType({})
@@ -80,7 +80,7 @@ class FitProblem:
         return self._state(point, self.frames.basis(point) * light_tint(point), weight)
 
     def reweighted_state(self, state: FitState) -> FitState:
-        """Return the state with weights from the model's brightness, which are reduced for outliers."""
+        """Return the state with new weights: those of the model's brightness, reduced for outliers."""
         weights = self.weights(np.maximum(self.target - state.residual, 0.0))
         scaled = np.abs(state.residual * weights)
         limit = self.robust * max(_MAD_TO_SD * float(np.median(scaled)), 1.0)
@@ -136,7 +136,7 @@ class FitProblem:
 
 
 def light_tint(point: FitPoint) -> Floats:
-    """Return the fitted colour of the light over the colour that the user gave (3,), with green 1."""
+    """Return the ratio (3,) of the fitted colour of the light to that given by the user; 1 for green."""
     return np.array([np.exp(point.white[0]), 1.0, np.exp(point.white[1])])
 
 
@@ -190,7 +190,7 @@ def _normal_equations(problem: FitProblem, state: FitState, derivatives: Floats)
 
 
 def _eliminate_lights(state: FitState, J: Floats) -> tuple[Floats, Floats]:
-    """Return the part of weighted derivatives that light strengths cannot compensate, and the residual.
+    """Return the weighted derivatives, less what light strengths can compensate, and the weighted residual.
 
     Suns of strength 0 cannot become weaker and are not eliminated.
 
@@ -204,8 +204,8 @@ def _eliminate_lights(state: FitState, J: Floats) -> tuple[Floats, Floats]:
 _BLOCKS_PER_SIDE = 16
 """Number of blocks along the longer side of the picture; residuals are correlated within a block."""
 SYSTEMATIC_SD = {"melanin": 0.11, "blood": 0.1}
-"""Standard deviations of the logarithms of pigments due to errors of the renderer, so that 68 % of the errors
-of path-traced faces are within one stated standard deviation, see docs/fit.md."""
+"""Standard deviations of the logarithms of pigments due to errors of the renderer. They are chosen so that
+68 % of the errors of fits to path-traced faces are within one stated standard deviation, see docs/fit.md."""
 _LIMIT_TOLERANCE = 1e-6
 _MIN_PRIOR_RATIO = 0.5
 _MIN_CORRELATION = 0.95
@@ -215,12 +215,12 @@ _MIN_CORRELATION = 0.95
 class Uncertainty:
     """Uncertainty of the unknowns of a fit by name.
 
-    Skin and colour of the light are logarithms, directions are angles [rad].
+    Standard deviations of the skin and of the light's colour are those of logarithms; those of directions are
+    angles [rad].
 
     sd : standard deviations, from residuals that are correlated within blocks of the picture, from errors of
         the renderer, and from parameters of the skin that are assumed
-    undetermined : unknowns with a standard deviation of more than half of their prior's, and unknowns at a
-        limit
+    undetermined : unknowns whose standard deviation exceeds half that of their prior, and unknowns at a limit
     correlated : pairs of unknowns that the photograph cannot separate, with their correlation
     singular_values : singular values of the derivatives in units of the priors, largest first
     """

@@ -49,7 +49,7 @@ SUN_STEP = 0.02
 """Step of finite differences of a sun's direction [rad]."""
 SUN_SD = 1.0
 WHITE_SD = 0.2
-"""Prior standard deviation of the logarithms of red over green and of blue over green of the light."""
+"""Prior standard deviation of the logarithms of the ratios red/green and blue/green of the light's colour."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +58,7 @@ class FitPoint:
 
     logs : (4,) logarithms of `SKIN_UNKNOWNS`
     suns : (k, 3) unit vectors towards the suns
-    white : (2,) logarithms of red over green and of blue over green of the light
+    white : (2,) logarithms of the ratios red/green and blue/green of the light, relative to the given colour
     """
 
     logs: Floats

@@ -108,8 +108,8 @@ def recolour(
 
     estimate : (h, w, 3) melanin, blood and the third unknown
     residual : (h, w, 3) original colour divided by the model's colour
-    factors, added : (3,) factor of melanin, blood and the third unknown, and constant that is then added to
-        each
+    factors : (3,) factors of melanin, blood and the third unknown
+    added : (3,) constants that are added to the three products
     """
     table, shader = _table_texture(device, model), _unmixing_program(device, "recolour", model)
     change = shader.record("Change", factors=factors, added=added)
@@ -141,18 +141,18 @@ def _rgba(colours: Pixels) -> Pixels:
 def _table_texture(device: Device, model: SkinModel) -> Texture:
     layers = [_rgba(layer.astype(np.float32)) for layer in model.log_colours]
     texture = make_texture(device, layers[0].shape[1::-1], _TEXTURE_FORMAT, layers=len(layers), use="map")
-    for number, layer in enumerate(layers):
-        upload(device, texture, layer, layer=number)
+    for index, layer in enumerate(layers):
+        upload(device, texture, layer, layer=index)
     return texture
 
 
-def _unmixing_program(device: Device, name: str, model: SkinModel) -> ComputeProgram:
+def _unmixing_program(device: Device, shader_name: str, model: SkinModel) -> ComputeProgram:
     thirds, nodes = model.log_colours.shape[:2]
     numbers = {"NODES": nodes, "THIRDS": thirds, "SHADE": int(model.third == "shade"), "SIDE": _GUESS_SIDE}
-    path = _FOLDER / f"{name}.wgsl"
+    path = _FOLDER / f"{shader_name}.wgsl"
     constants = used_constants(path, (), tuple(numbers.items()))
     make = partial(ComputeProgram, device, path, (), constants)
-    return cached_program(device, ("unmixing", name), tuple(constants.items()), make)
+    return cached_program(device, ("unmixing", shader_name), tuple(constants.items()), make)
 
 
 def _model_record(shader: ComputeProgram, model: SkinModel, noise: float, steps: int) -> UniformRecord:
@@ -164,14 +164,14 @@ def _model_record(shader: ComputeProgram, model: SkinModel, noise: float, steps:
 
 
 _SHADING_SIDE = 256  # longer side of the downsampled picture [texel]
-_SHADING_SIGMA = 1.0 / 24.0  # standard deviation of the blur over the longer side
+_SHADING_SIGMA = 1.0 / 24.0  # standard deviation of the blur, relative to the longer side
 
 
 def estimate_shading(device: Device, colours: Pixels, skin: SkinParameters, noise: float) -> Pixels:
     """Return the low-frequency shading of each texel (h, w), with mean 1 over the skin [-].
 
-    It is the brightness of a downsampled picture that melanin and blood do not explain, low-pass filtered.
-    The weights of the filter are larger where a colour is close to that of a skin.
+    It is the part of the brightness that melanin and blood do not explain, in a downsampled picture that is
+    then low-pass filtered. The weights of the filter are larger where a colour is close to that of a skin.
     """
     small = _block_means(colours)
     estimate, _, residual = Unmixer(device, skin_model(skin, "shade"), noise).unmix(small)

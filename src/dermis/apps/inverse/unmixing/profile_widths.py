@@ -39,8 +39,9 @@ class ProfileMixture:
 
     profiles : pale skin without blood, pale skin with blood, dark skin with blood
     weights : (h, w, 2) weights of the second and the third profile; the first profile has the rest [-]
-    error, single_error : (3,) relative root-mean-square error of ring energies over a grid of pigments, of
-        the mixture and of a single profile in the middle of the grid [-]
+    error : (3,) relative root-mean-square error of the mixture in the energies that emerge through rings,
+        over a grid of pigments [-]
+    single_error : (3,) the same error if one profile, from the middle of the grid, is used everywhere [-]
     """
 
     profiles: tuple[GaussianSum, ...]

@@ -167,9 +167,9 @@ def solve_pigments(
 ) -> PigmentEstimate:
     """Estimate the most probable melanin, blood and third unknown of colours, in float64.
 
-    The cost is the sum of squared differences of logarithms over their variances, and of squared deviations
-    from the priors of blood and of the third unknown. It is minimised by Gauss-Newton steps with Levenberg's
-    damping; unknowns at a limit are fixed there.
+    The cost is the sum of squared differences of logarithms, each divided by its variance, and of squared
+    deviations from the priors of blood and of the third unknown. It is minimised by Gauss-Newton steps
+    with Levenberg's damping; unknowns at a limit are fixed there.
 
     colours : (t, 3) diffuse reflectance, linear Rec. 709 [-]
     noise : relative standard deviation of a channel [-]

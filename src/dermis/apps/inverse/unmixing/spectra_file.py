@@ -31,7 +31,7 @@ from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM
 
 SPECTRAL_SETS = {"none": TWO_UNKNOWNS, "oxygen": THREE_UNKNOWNS, "all": FIVE_UNKNOWNS}
-"""Unknowns of each spectrum by what is found besides melanin and blood."""
+"""Names of the unknown parameters, by a word for what is found besides melanin and blood."""
 _EXPECTED = "a table of reflectance spectra (CSV), a spectrum in each row or in each column"
 _WAVELENGTH = re.compile(r"[^\d.]{0,20}?(\d{3,4}(?:\.\d+)?)\s*(?:nm)?", re.IGNORECASE)
 _MAX_BYTES = 32 << 20
@@ -45,7 +45,7 @@ _MAX_REFLECTANCE = 1.5
 class SpectraTable:
     """Reflectance spectra of a file.
 
-    labels : other columns of each spectrum, by heading
+    labels : for each spectrum, the cells that are not reflectances, by heading
     reflectance : (n, 31) reflectance factors at `WAVELENGTHS_NM`, NaN for spectra with missing values [-]
     """
 
@@ -140,10 +140,10 @@ def _check_grid(path: str | Path, grid: Floats) -> None:
 class UnmixedSpectra:
     """Pigments of the spectra of a table.
 
-    labels : other columns of each spectrum, by heading
+    labels : for each spectrum, the cells that are not reflectances, by heading
     names : parameters that were found
-    fit : parameters of the complete spectra
-    complete : indices of these spectra in the table
+    fit : parameters of the complete spectra, those without missing values
+    complete : indices of the complete spectra in the table
     """
 
     labels: list[dict[str, str]]
@@ -152,7 +152,7 @@ class UnmixedSpectra:
     complete: list[int]
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return number, labels, parameters, RMS residual, CIEDE2000 and residual of each spectrum.
+        """Return a row per spectrum: number, labels, parameters, RMS residual, CIEDE2000 error and residual.
 
         Spectra with missing values have only their number and labels.
         """
@@ -190,7 +190,7 @@ def unmix_spectra(
     skin : parameters that are not found
     surface : reflection of the surface in the spectra, which is subtracted; 0 for spectra without it [-]
 
-    Raises DermisError as `read_spectra`, and for a surface reflectance out of range.
+    Raises DermisError as `read_spectra` does, and for a surface reflectance out of range.
     """
     if find not in SPECTRAL_SETS:
         refuse("--find", ", ".join(SPECTRAL_SETS), f"got {find!r}", "Choose one of them")

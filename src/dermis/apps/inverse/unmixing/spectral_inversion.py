@@ -23,7 +23,7 @@ SPECULAR_INCLUDED = 0.0278
 """Reflectance of the smooth surface of skin, which spectrophotometers include [-]."""
 _STEP = 1e-4  # of finite differences
 _MAX_STEPS = 30
-_MIN_GAIN, _NEGLIGIBLE = 1e-3, 1e-10  # of the sum of squares, relative and absolute
+_MIN_GAIN, _NEGLIGIBLE = 1e-3, 1e-10  # least decrease of the sum of squares: relative, and absolute
 _MIN_CURVATURE = 1e-10
 
 
@@ -99,7 +99,7 @@ class SpectralFit:
         return np.asarray(np.sqrt((self.residual**2).mean(axis=1)))
 
     def weighted_residual(self, criterion: Criterion) -> Floats:
-        """Return what a fit minimises the sum of squares of, (n, 31) for spectra and (n, 1) for colours."""
+        """Return the residuals whose squares a fit minimises: (n, 31) for spectra, (n, 1) for colours."""
         return self.residual if criterion == "spectrum" else self.delta_e()[:, None]
 
     def delta_e(self, weights: Floats | None = None) -> Floats:
@@ -112,7 +112,7 @@ class SpectralFit:
 
 
 def skin_model_spectra(skin: SkinParameters = DEFAULT_SKIN) -> SpectralModel:
-    """Return the package's spectral model; parameters that are not given are those of a skin."""
+    """Return the package's spectral model; parameters that its caller omits are those of `skin`."""
 
     def reflectance(values: Values) -> Floats:
         def parameter(name: str) -> Floats:
@@ -234,7 +234,7 @@ def _derivatives(residual: Callable[[Floats], Floats], x: Floats, r: Floats, hig
 
 
 def colour_metric(colours: Floats) -> Floats:
-    """Return matrices (n, 3, 3) from small differences in L*a*b* to ones whose length is CIEDE2000.
+    """Return matrices (n, 3, 3) that turn small L*a*b* differences into vectors whose length is CIEDE2000.
 
     The rotation term, which only blue colours have, is left out.
 

@@ -17,8 +17,8 @@ from dermis.optics.skin_spectra import skin_reflectance
 FIXED_PARAMETERS = ("oxygen", "epidermis_mm")
 """Parameters that an inversion of colours assumes, and that differ between people."""
 _SAMPLES = 2000
-_KERNEL = 0.35  # standard deviation of weights over the logarithms of melanin and blood
-_MAX_LOG_ERROR = 2.5  # of blood that melanin hides
+_KERNEL_SD = 0.35  # standard deviation of weights over the logarithms of melanin and blood
+_MAX_LOG_ERROR = 2.5  # largest error of a logarithm that counts, for blood that melanin hides
 
 
 def unknown_skin_sd(
@@ -28,10 +28,11 @@ def unknown_skin_sd(
     known: Collection[str] = (),
     oxygen_found: bool = False,
 ) -> dict[str, float]:
-    """Return relative standard deviations of melanin and blood that are found with the oxygen of `skin`.
+    """Return the relative standard deviations of melanin and blood that result from assumed skin parameters.
 
-    Skins of the prior are unmixed with the parameters of `skin`. The result is the root mean square of the
-    logarithms of found over true pigments of those whose result is near the given one.
+    Skins sampled from the prior are unmixed as if they had the parameters of `skin`. The result is the root
+    mean square of the logarithm of the ratio of found to true pigments, over those samples whose found
+    pigments are near the given ones.
 
     melanin, blood : pigments that were found
     skin : parameters that the inversion assumes
@@ -44,7 +45,7 @@ def unknown_skin_sd(
     target = np.log(np.maximum([melanin, blood], 1e-4))
     distance = ((found - target) ** 2).sum(axis=1)
     # Relative to the nearest sample, so that results outside the prior have weights too.
-    weight = np.exp(-0.5 * (distance - distance.min()) / _KERNEL**2)
+    weight = np.exp(-0.5 * (distance - distance.min()) / _KERNEL_SD**2)
     square = weight @ error**2 / weight.sum()
     return dict(zip(("melanin", "blood"), map(float, np.sqrt(square)), strict=True))
 
@@ -53,7 +54,10 @@ def unknown_skin_sd(
 def _unmixed_sample(
     skin: SkinParameters, known: tuple[str, ...], oxygen_found: bool
 ) -> tuple[Floats, Floats]:
-    """Return logarithms (n, 2) of found melanin and blood of skins of the prior, and their errors (n, 2)."""
+    """Return the logarithms (n, 2) of pigments found for samples of the prior, and their errors (n, 2).
+
+    The pigments are melanin and blood.
+    """
     true = skin_prior().sample(_SAMPLES)
     values = true | {name: np.full(_SAMPLES, getattr(skin, name)) for name in known}
     spectra = skin_reflectance(

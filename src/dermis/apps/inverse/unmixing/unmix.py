@@ -96,12 +96,12 @@ def parse_fraction_change(option: str, text: str) -> FractionChange:
 
     Raises DermisError for any other text.
     """
-    factor = text[:1] in "x×*" and bool(text)
+    is_factor = text[:1] in "x×*" and bool(text)
     try:
-        value = float(text[1:] if factor else text)
+        value = float(text[1:] if is_factor else text)
     except ValueError:
         refuse(option, "a factor, such as x2, or a median, such as 0.1", f"got {text!r}", "Correct it")
-    if factor:
+    if is_factor:
         return FractionChange(factor=checked_number(option, value, *_FACTOR_RANGE, "a factor"))
     return FractionChange(median=checked_number(option, value, 0.0, 1.0, "a volume fraction"))
 
@@ -143,8 +143,8 @@ class UnmixResult:
         """Return medians of the pigments, colour differences, skin tone, and the fraction of skin texels.
 
         They are computed from every n-th texel, with 512 along the longer side; black texels do not count as
-        skin. "sd" is due to noise, "skin_sd" to oxygen and epidermal thickness, which are assumed and vary as
-        among measured people.
+        skin. "sd" is the standard deviation due to noise. "skin_sd" is the one due to oxygen and epidermal
+        thickness, which are assumed here, but vary among people as measured.
         """
         step = max(1, max(self.melanin.shape) // _SUMMARY_SIDE)
         maps = {name: one[::step, ::step].astype(np.float64) for name, one in self.maps().items()}
@@ -176,7 +176,7 @@ class UnmixResult:
         change : change of the pigments
         adapter : "auto", "cpu" or part of the name of an adapter
 
-        Raises DermisError as `dermis.gpu.open_device`.
+        Raises DermisError as `dermis.gpu.open_device` does.
         """
         lazy_device = self.devices.setdefault(adapter, LazyDevice(adapter))
         return lazy_device.run(lambda device: self._recoloured(device, change))
@@ -227,8 +227,8 @@ def unmix(
     skin : SkinParameters
         Epidermal thickness, eumelanin and oxygen of the model's skins; melanin and blood are ignored.
     third : {"none", "oxygen"}
-        "oxygen" also estimates the oxygenated fraction of haemoglobin, with a prior around that of `skin` as
-        wide as the distribution of measured people; "none" keeps the fraction of `skin`.
+        "oxygen" also estimates the oxygenated fraction of haemoglobin, with a prior whose mean is the
+        fraction of `skin`, and whose width is that of measured people; "none" keeps the fraction of `skin`.
     noise : float
         Relative standard deviation of a channel [-].
     shading : bool
@@ -246,8 +246,8 @@ def unmix(
     Raises
     ------
     DermisError
-        For files and arrays that are not colour pictures, numbers out of range, and as
-        `dermis.gpu.open_device`.
+        For files and arrays that are not colour pictures, numbers out of range, and for the
+        errors of `dermis.gpu.open_device`.
 
     References
     ----------

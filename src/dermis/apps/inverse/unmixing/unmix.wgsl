@@ -5,7 +5,7 @@
 @group(0) @binding(2) var<storage, read> guesses: array<vec2f>;
 @group(0) @binding(3) var colours: texture_2d<f32>; // diffuse reflectance, linear
 @group(0) @binding(4) var fractions: texture_storage_2d<rgba32float, write>; // melanin, blood, and their standard deviations
-@group(0) @binding(5) var residual: texture_storage_2d<rgba32float, write>; // colour over that of the model; third unknown
+@group(0) @binding(5) var residual: texture_storage_2d<rgba32float, write>; // ratio of the colour to the model's; third unknown
 
 fn initial_guess(logs: vec3f) -> vec2f {
     let position = guess_position(logs);

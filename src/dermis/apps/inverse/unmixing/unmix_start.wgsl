@@ -2,7 +2,7 @@
 //#include "skin_model.wgsl"
 //#include "first_guess.wgsl"
 
-const CANDIDATES: u32 = 64u; // along the roots of melanin and of blood
+const CANDIDATES: u32 = 64u; // number of candidates along the roots of melanin and of blood
 const MAX_STEPS: u32 = 4u;
 
 @group(0) @binding(2) var<storage, read_write> guesses: array<vec2f>;

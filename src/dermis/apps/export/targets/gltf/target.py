@@ -54,7 +54,7 @@ class Gltf(Target):
         return _scatter_parameters(fit_volume(subject.curve, subject.albedo))
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the skin's colour for all colours, and the mean exit radius of light as the distance."""
+        """Return the skin's colour for all colours, and light's mean exit radius as attenuation distance."""
         if self.variant == TRANSMISSION_VARIANT:
             return _diffuse_parameters(subject, _NAIVE_TRANSMISSION, subject.albedo)
         radius_m = 1e-3 * float(2.5 * fit_burley_width(subject.curve).max())

@@ -69,7 +69,7 @@ class LibraryFile:
     def read(self, folder: Path) -> str:
         """Return the text of the file from a node_modules folder of npm.
 
-        DermisError : if it is missing or differs from the expected version
+        Raises DermisError if the file is missing or differs from the expected version.
         """
         expected = f"{self.path} of {self.package} {self.version}, as npm installs it"
         file = folder / self.package / self.path

@@ -108,7 +108,7 @@ def _scattering_distances(d_mm: Floats, version: str) -> Parameters:
     )
 
 
-def asset_text(name: str, parameters: Parameters, version: str) -> str:
+def asset_text(asset_name: str, parameters: Parameters, version: str) -> str:
     """Return the YAML of the asset; the editor adds the profile's hash when it first opens it."""
     values = {one.name: one.value for one in parameters}
     colour, tint = (_rgba(get_numbers(parameters, key)) for key in (_COLOUR_NAME, _TRANSMISSION_NAME))
@@ -118,7 +118,7 @@ def asset_text(name: str, parameters: Parameters, version: str) -> str:
     )
     template = Template(Path(__file__).with_name("profile.asset").read_text("utf-8"))
     return template.substitute(
-        name=json.dumps(name),
+        name=json.dumps(asset_name),
         colour=colour,
         multiplier=multiplier,
         tint=tint,

@@ -17,7 +17,7 @@ from dermis.apps.export.targets.web.maps import (
     quantise_hairs,
     read_texels,
 )
-from dermis.apps.export.targets.web.packing import Packer
+from dermis.apps.export.targets.web.packing import ByteRunCollector
 from dermis.apps.export.targets.web.sliders import Slider, node_changes, node_inputs
 from dermis.frame.capture import ADAPTER_KINDS, capture_frame, capture_renderer, reduce_hair
 from dermis.frame.features.shading.view import pinhole
@@ -41,16 +41,16 @@ class PageContent:
     """Data that the web page embeds: frames, buffers, maps and the poster.
 
     frames_by_kind : JSON description of the captured frames by kind of adapter, "gpu" or "software"
-    packer : collector of the buffers and textures, which compresses them
+    byte_runs : collector of the buffers and textures, which compresses them
     maps : maps encoded as pictures
     pictures : WebP files of the maps; `picture_entries` has indices in this list
     picture_entries : for each role, mip level and layer of a map: index in `pictures`, index of the value
-        curves in `Packer.runs`, and number of colour channels
+        curves in `ByteRunCollector.runs`, and number of colour channels
     poster : (h, w, 3) sRGB picture that the page shows until it renders
     """
 
     frames_by_kind: dict[str, Json] = field(default_factory=dict)
-    packer: Packer = field(default_factory=Packer)
+    byte_runs: ByteRunCollector = field(default_factory=ByteRunCollector)
     maps: MapPictures = field(default_factory=MapPictures)
     pictures: list[bytes] = field(default_factory=list)
     picture_entries: dict[PictureKey, tuple[int, int, int]] = field(default_factory=dict)
@@ -63,7 +63,7 @@ class PageContent:
         """
         if key not in self.picture_entries:
             picture = self.maps.pictures[key]
-            curves = self.packer.add(np.ascontiguousarray(picture.curves).view(np.uint8).reshape(-1))
+            curves = self.byte_runs.add(np.ascontiguousarray(picture.curves).view(np.uint8).reshape(-1))
             self.picture_entries[key] = len(self.pictures), curves, 3 if key[0] == "colour_map" else 0
             self.pictures.append(picture.data)
         return self.picture_entries[key]
@@ -143,12 +143,12 @@ def _capture_frames(
         base, picture = base or inputs, inputs.resources.post.picture
         captured = reduce_hair(capture_frame(capture, inputs), merged_hairs)
         frames.append(NamedFrame(settings.technique, captured, picture, settings.size, merged_hairs))
-        changes = _frame_changes(content.packer, renderer, request, settings, inputs, frames[-1])
+        changes = _frame_changes(content.byte_runs, renderer, request, settings, inputs, frames[-1])
         slider_changes.append(changes)
     captured_frames = [frame.captured for frame in frames]
     picture_maps = content.maps.replace_textures(renderer, capture, captured_frames)
     steps = quantise_hairs(renderer, capture, captured_frames)
-    kind_json = frames_json(capture, frames, picture_maps, steps, content.packer)
+    kind_json = frames_json(capture, frames, picture_maps, steps, content.byte_runs)
     for frame_json, changes in zip(kind_json["frames"], slider_changes, strict=True):
         frame_json["dials"] = changes
     kind_json["maps"] = {str(index): _mip_entries(content, one) for index, one in picture_maps.items()}
@@ -159,7 +159,7 @@ def _capture_frames(
 
 
 def _frame_changes(
-    packer: Packer,
+    byte_runs: ByteRunCollector,
     renderer: Renderer,
     request: PageRequest,
     settings: Settings,
@@ -176,7 +176,7 @@ def _frame_changes(
         if inputs is None:
             return None
         node = reduce_hair(capture_frame(capture, inputs), frame.merged_hairs)
-        return node_changes(frame.captured, node, packer)
+        return node_changes(frame.captured, node, byte_runs)
 
     return {
         slider.name: [*map(changes, node_inputs(slider, lambda one: renderer.prepare(one, settings), base))]

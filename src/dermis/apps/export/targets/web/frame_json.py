@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dermis.apps.export.targets.web.packing import Bytes, Packer
+from dermis.apps.export.targets.web.packing import ByteRunCollector, Bytes
 from dermis.frame.features.post.picture import Picture
 from dermis.gpu.capture import CapturedFrame, CapturedPass, FrameCapture
 
@@ -56,15 +56,15 @@ def frames_json(
     frames: list[NamedFrame],
     picture_maps: PictureMaps,
     steps: dict[int, tuple[float, ...]],
-    packer: Packer,
+    byte_runs: ByteRunCollector,
 ) -> Json:
-    """Return the JSON of frames with their shaders, resources and passes, and add their data to the packer.
+    """Return the JSON of frames with their shaders, resources and passes, and collect their data.
 
     Data that is all zero is not stored, as the page creates resources filled with zeros.
 
     picture_maps : maps that are stored as pictures, by resource index
     steps : quantisation step of each column of quantised float buffers, by resource index
-    packer : collector of the data, to which the JSON refers by byte run
+    byte_runs : collector of the data, to which the JSON refers by byte run
     """
     pictures = [[capture.resource(f.picture.bytes), capture.resource(f.picture.exposed)] for f in frames]
     captured_frames = [frame.captured for frame in frames]
@@ -72,12 +72,12 @@ def frames_json(
     for index in resources_read_first(capture, captured_frames):
         if index in steps:
             floats = capture.read_content(index)[0].view(np.float32).reshape(-1, len(steps[index]))
-            contents[index] = [packer.add_floats(floats, steps[index])]
+            contents[index] = [byte_runs.add_floats(floats, steps[index])]
             continue
         _, picture_count, mip_passes = picture_maps.get(index, PictureMap("", 0, None))
         mips = [] if mip_passes else _mip_bytes(capture, index)[picture_count:]
         if any(one.any() for one in mips):
-            add = packer.add if index not in tables else _column_packer(packer)
+            add = byte_runs.add if index not in tables else _column_packer(byte_runs)
             contents[index] = [-1] * picture_count + [add(one) for one in mips]
     return {
         "shaders": capture.shaders,
@@ -85,17 +85,17 @@ def frames_json(
         "resources": [_camel_keys(one) for one in capture.resources],
         "structs": {name: _struct_json(dtype) for name, dtype in capture.structs.items()},
         "contents": contents,
-        "frames": [_frame_json(one, k, packer) for one, k in zip(frames, pictures, strict=True)],
-        "halved": {k: _passes_json(m.mip_passes, packer) for k, m in picture_maps.items() if m.mip_passes},
+        "frames": [_frame_json(one, k, byte_runs) for one, k in zip(frames, pictures, strict=True)],
+        "halved": {k: _passes_json(m.mip_passes, byte_runs) for k, m in picture_maps.items() if m.mip_passes},
     }
 
 
-def _column_packer(packer: Packer) -> Callable[[Bytes], int]:
+def _column_packer(byte_runs: ByteRunCollector) -> Callable[[Bytes], int]:
     """Return a function that packs each third of a buffer separately and returns the index of the joined run.
 
     The buffers are triangle tables: three columns of equal length, one after the other.
     """
-    return lambda data: packer.add_parts(np.split(data, 3) if len(data) % 3 == 0 else [data])
+    return lambda data: byte_runs.add_parts(np.split(data, 3) if len(data) % 3 == 0 else [data])
 
 
 def _mip_bytes(capture: FrameCapture, index: int) -> list[Bytes]:
@@ -108,8 +108,8 @@ def _mip_bytes(capture: FrameCapture, index: int) -> list[Bytes]:
     return [np.concatenate(parts[k : k + count]) for k in range(0, len(parts), count)]
 
 
-def _frame_json(frame: NamedFrame, picture: list[int], packer: Packer) -> Json:
-    records = [(struct, packer.add(record.tobytes())) for struct, record in frame.captured.records]
+def _frame_json(frame: NamedFrame, picture: list[int], byte_runs: ByteRunCollector) -> Json:
+    records = [(struct, byte_runs.add(record.tobytes())) for struct, record in frame.captured.records]
     return {
         "name": frame.name,
         "size": frame.size,
@@ -117,7 +117,7 @@ def _frame_json(frame: NamedFrame, picture: list[int], packer: Packer) -> Json:
         "picture": picture[0],
         "linear": picture[1],
         "views": {stage: _view_record(frame.captured, stage) for stage in ("visibility", "shadows")},
-        "passes": _passes_json(frame.captured, packer),
+        "passes": _passes_json(frame.captured, byte_runs),
         "records": records,
     }
 
@@ -132,10 +132,10 @@ def _view_record(captured: CapturedFrame, stage: str) -> int:
     return next((k for k in records if k in views), -1)
 
 
-def _passes_json(captured: CapturedFrame, packer: Packer) -> list[Json]:
+def _passes_json(captured: CapturedFrame, byte_runs: ByteRunCollector) -> list[Json]:
     """Return the passes of a frame; bytes that the host writes are given as buffer index and byte run."""
     writes = ((one, one.written) for one in captured.passes)
-    return [{**vars(one), "written": data and (data[0], packer.add(data[1]))} for one, data in writes]
+    return [{**vars(one), "written": data and (data[0], byte_runs.add(data[1]))} for one, data in writes]
 
 
 def _program_json(program: Json) -> Json:

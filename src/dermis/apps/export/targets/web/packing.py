@@ -25,7 +25,7 @@ _TRIAL_ZLIB_LEVEL = 4  # zlib level for the comparison of layouts
 _WORD_TYPES = {1: np.uint8, 2: np.uint16, 4: np.uint32}
 
 
-class Packer:
+class ByteRunCollector:
     """Collector of byte runs for one compressed file, in which equal runs are stored once.
 
     A run is the data of a buffer, texture or record; `runs` describes how each is encoded.

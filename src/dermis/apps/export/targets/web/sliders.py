@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.export.targets.web.frame_json import Json
-from dermis.apps.export.targets.web.packing import Packer
+from dermis.apps.export.targets.web.packing import ByteRunCollector
 from dermis.base.errors import refuse
 from dermis.frame.inputs import FrameInputs
 from dermis.gpu.capture import CapturedFrame, CapturedPass
@@ -63,7 +63,7 @@ def node_inputs(
             yield prepare(scene)
 
 
-def node_changes(base: CapturedFrame, node: CapturedFrame, packer: Packer) -> Json:
+def node_changes(base: CapturedFrame, node: CapturedFrame, byte_runs: ByteRunCollector) -> Json:
     """Return how records and written buffers of a slider node's frame differ from the default frame.
 
     Each change is the index of the record or pass, the first word that differs, and the byte run of the
@@ -71,7 +71,7 @@ def node_changes(base: CapturedFrame, node: CapturedFrame, packer: Packer) -> Js
 
     base, node : captured frames at the default value and at the node
 
-    DermisError : the node's frame has different passes
+    Raises DermisError if the node's frame has different passes.
     """
     stages = [[one.stage for one in captured.passes] for captured in (base, node)]
     if stages[0] != stages[1]:
@@ -82,7 +82,7 @@ def node_changes(base: CapturedFrame, node: CapturedFrame, packer: Packer) -> Js
     written = [
         (k, (_written_floats(one), _written_floats(other))) for k, (one, other) in passes if one.written
     ]
-    return {"records": _differences(records, packer), "written": _differences(written, packer)}
+    return {"records": _differences(records, byte_runs), "written": _differences(written, byte_runs)}
 
 
 def _record_floats(record: UniformRecord) -> Floats:
@@ -107,7 +107,7 @@ def _written_floats(captured_pass: CapturedPass) -> Floats:
 
 
 def _differences(
-    pairs: list[tuple[int, tuple[Floats, Floats]]], packer: Packer
+    pairs: list[tuple[int, tuple[Floats, Floats]]], byte_runs: ByteRunCollector
 ) -> list[tuple[int, int, int]]:
     changes = []
     for index, (before, after) in pairs:
@@ -121,7 +121,7 @@ def _differences(
         changed = np.flatnonzero(difference)
         if len(changed):
             part = difference[changed[0] : changed[-1] + 1]
-            changes.append((index, int(changed[0]), packer.add(part.view(np.uint8))))
+            changes.append((index, int(changed[0]), byte_runs.add(part.view(np.uint8))))
     return changes
 
 

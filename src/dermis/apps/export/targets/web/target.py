@@ -56,7 +56,7 @@ def page_html(content: build.PageContent, sliders: tuple[Slider, ...], title: st
     """
     scene = {
         "forms": content.frames_by_kind,
-        "blobs": content.packer.runs,
+        "blobs": content.byte_runs.runs,
         "images": [len(one) for one in content.pictures],
         "dials": [{"name": one.name, "values": one.values, "rest": one.default_value} for one in sliders],
     }
@@ -69,7 +69,7 @@ def page_html(content: build.PageContent, sliders: tuple[Slider, ...], title: st
         policy="img-src data:",
         poster=f"data:image/webp;base64,{base64.b64encode(_webp(content.poster)).decode()}",
         scene=encode_seven_bits(gzip.compress(json.dumps(scene).encode(), 9, mtime=0)),
-        data=encode_seven_bits(content.packer.compress()),
+        data=encode_seven_bits(content.byte_runs.compress()),
         pictures=encode_seven_bits(b"".join(content.pictures)),
     )
 
