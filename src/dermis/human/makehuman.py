@@ -18,7 +18,7 @@ YOUNG_AGE, OLD_AGE = 25.0, 90.0
 """Ages of the published young and old people [years]."""
 
 DELTA_UNIT_MM = 0.01
-"""Length of a unit of displacements in the published files [mm]."""
+"""Unit of the displacements in the published files [mm]."""
 
 EXPRESSION_PREFIX = "faceunits/"
 """Prefix of the names of the ARKit blend shapes."""
@@ -65,7 +65,7 @@ def morphed_points_mm(weights: Mapping[str, float]) -> Points:
 @cache
 def _target_indices() -> Mapping[str, int]:
     """Return the index of each published morph target by name."""
-    return {name: number for number, name in enumerate(target_deltas().names)}
+    return {name: index for index, name in enumerate(target_deltas().names)}
 
 
 def check_targets(names: Iterable[str]) -> None:
