@@ -41,9 +41,7 @@ from dermis.mesh.subdivide import resolve_levels
 
 _MAX_SEED = 2**32 - 1
 _MIN_BEARD_SHADOW = 0.6  # shadow of shaved hair below a beard
-_ANCESTRY_CONCENTRATION = (
-    0.35  # of the Dirichlet distribution; small, so that most people have mainly one ancestry
-)
+_ANCESTRY_CONCENTRATION = 0.35  # of a Dirichlet distribution; small, so that mostly one ancestry prevails
 _SEX_DEVIATION = 0.08  # standard deviation of `sex` from 0 or 1
 _OPPOSITE_SUFFIXES = {"decr": "incr", "down": "up", "in": "out", "backward": "forward", "concave": "convex"}
 """Suffixes of the names of targets with opposite effects."""
@@ -59,13 +57,8 @@ _FOLDER_DEVIATIONS = {  # standard deviation of the weights of targets by folder
     "ears": 0.25,
     "neck": 0.12,
 }
-_EXCLUDED_TARGETS = (
-    "trans",
-    "age",
-    "fat",
-    "measure",
-    "push",
-)  # words in names of targets for macro quantities and for shifts of whole parts
+# Words in the names of targets for macro quantities and for shifts of whole parts, which are not sampled:
+_EXCLUDED_TARGETS = ("trans", "age", "fat", "measure", "push")
 _SIDE_DEVIATION = 0.2  # of the difference between left and right, relative to that of the weight
 _ASYMMETRY_DEVIATION = 0.1
 _HEAD_SHAPES = ("diamond", "invertedtriangular", "oval", "rectangular", "round", "square", "triangular")
@@ -84,9 +77,7 @@ _FIELD_RANGES = {
     "hair_pheomelanin": (0.0, 10.0),
 }
 _OPTIONAL_FIELDS = "ita", "skin_ancestry"
-_OTHER_SKIN_FRACTION = (
-    0.45  # fraction of Caucasian shapes with one of `_OTHER_SKINS`, if no ancestry is given
-)
+_OTHER_SKIN_FRACTION = 0.45  # of Caucasian shapes: they have one of `_OTHER_SKINS`, if no ancestry is given
 _OTHER_SKINS = ("south asian", "iraqi", "arabian")
 _SHAPE_OF_SKIN = {  # Dirichlet parameters of African, Asian, Caucasian shape by skin group; artist's values
     "african": (3.0, 0.05, 0.05),
@@ -162,7 +153,8 @@ def _sample_ancestry(
     """Return ancestry fractions of the shape (3,), and the weights of the measured groups of the skin.
 
     If the ancestry of the shape is given, the skin follows it. If only a skin ancestry or an ITA is given,
-    the shape follows the skin. Otherwise some people of Caucasian shape have South Asian or Middle Eastern skin.
+    the shape follows the skin. Otherwise some people of Caucasian shape have South Asian or Middle Eastern
+    skin.
 
     macro : numeric fields that are not sampled
     given : all fields that are not sampled

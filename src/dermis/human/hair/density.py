@@ -20,9 +20,7 @@ from dermis.mesh.strands import Roots, interpolate_quads, quad_corners
 
 HEAD_AXIS_Z = -72.0
 """Position of the vertical axis around which the hairline is defined [mm]."""
-_SEQUENCE_STEPS = np.array(
-    [0.7548776662, 0.5698402909]
-)  # steps of a low-discrepancy sequence in the unit square
+_SEQUENCE_STEPS = np.array([0.7548776662, 0.5698402909])  # of a low-discrepancy sequence in the unit square
 _SCALP_BOTTOM_Y = -80.0  # lower end of the hair of the head [mm]
 _HAIRLINE_FADE_MM = (-3.0, 11.0)  # heights above the hairline between which density rises from 0 to 1
 _LIP_FADE_MM = (1.5, 4.5)  # distances from the lips between which the density of the beard rises
@@ -30,10 +28,8 @@ _BEARD_FADE = (0.25, 0.75)  # zone amounts between which the density of the bear
 _HAIRLINE_WAVES = np.array([[0.37, 0.0, 0.23], [0.81, -0.5, 0.0]])  # wave vectors of the hairline [rad/mm]
 
 _SCALP_MARGIN_MM = 25.0  # distance below the hairline down to which quads may have hair
-_HAIR_MARGIN_MM, _BROW_MARGIN_MM = (
-    25.0,
-    8.0,
-)  # distances from hairy quads within which hair may touch the skin
+_HAIR_MARGIN_MM = 25.0  # distance from quads with scalp hair or beard within which it may touch the skin
+_BROW_MARGIN_MM = 8.0  # distance from quads of the brows within which their hairs may touch the skin
 _MIN_BEARD = 0.02  # zone amount above which quads may have a beard
 
 

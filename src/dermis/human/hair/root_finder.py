@@ -19,7 +19,7 @@ Index = NDArray[np.int64]
 SIDE_SIGNS = 1.0, -1.0
 """Sign of x on the left and on the right side."""
 _QUAD_CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)  # corners in quad coordinates
-_MIN_WEIGHT = -1e-9  # smallest barycentric weight of points inside a triangle, with a tolerance
+_MIN_WEIGHT = -1e-9  # smallest barycentric weight of points that count as inside a triangle
 _GRID_CELL_MM = 2.0  # cells of the grid of triangle lists
 _GRID_LOW, _GRID_HIGH = (
     np.array([-70.0, -20.0]),

@@ -108,7 +108,7 @@ def hair_classes(head: Head) -> NDArray[np.uint8]:
 
 @cache
 def _quad_hair_classes() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """Return for each control quad (q,) the class of its brow or lash hairs, and of its scalp or beard hairs."""
+    """Return the classes (q,) of brow or lash hairs on control quads, and those of scalp or beard hairs."""
     mesh = average_head().mesh
     around = quad_corners(mesh, np.arange(len(mesh.quads)))
     middle = average_head().positions_mm.astype(np.float64)[around].mean(axis=1)

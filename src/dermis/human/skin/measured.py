@@ -59,12 +59,10 @@ _EUROPEAN: Mapping[str, float] = MappingProxyType(
 )
 """European fraction of a group, which allows fair hair and light eyes; artist's values except the first."""
 _MAX_DOUBLINGS = 6.0
-_MAX_DEVIATION = (
-    0.7  # of the cheek from its median; larger ones do not change site differences further [doublings]
-)
+_MAX_DEVIATION = 0.7  # of the cheek from its median, to which differences between sites adapt [doublings]
 _MELANIN_RANGE, _BLOOD_RANGE = (5e-4, 0.7), (3e-4, 0.08)
 _EPIDERMIS_RANGE_MM = (0.02, 0.2)
-_ITA_STEP = 1.0  # half width of the intervals in which people of an ITA are counted [degrees]
+_ITA_STEP = 1.0  # half width of the interval over which the density of an ITA is averaged [degrees]
 _MAX_SCORE = 2.9  # largest absolute normal score of an ITA
 # Numbers of melanin fractions, of bisections between two of them, and of steps that reduce blood:
 _ITA_NODES, _BISECTIONS, _MAX_PALING_STEPS = 257, 40, 15

@@ -16,7 +16,7 @@ NOISE_SPACES: tuple[NoiseSpace, ...] = ("body", "lip", "level", "ring")
 """Coordinates in which noise is evaluated.
 
 "body" is the position on the body; "lip" is this position with x warped along the creases of the lips,
-"level" with y warped along the lines of the forehead; "ring" is the distance from the eye, followed by x and y.
+"level" with y warped along the lines of the forehead; "ring" is the distance from the eye, and x and y.
 """
 NoiseRegion = Literal["all", "lips", "lines", "furrows", "folds", "veins", "hairline"]
 NOISE_REGIONS: tuple[NoiseRegion, ...] = ("all", "lips", "lines", "furrows", "folds", "veins", "hairline")
