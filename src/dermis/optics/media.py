@@ -27,10 +27,8 @@ _DJ3_NOTE = (
     "published sum of six Gaussians follows from neither reading: it is the preset gpu-gems-3"
 )
 _ETA_RANGE = 1.0, 2.5  # from an index-matched surface to more than diamond
-_MIN_SCATTERING, _MAX_COEFFICIENT = (
-    1e-6,
-    1e6,
-)  # scattering of clear water; ten times the absorption of a metal [1/mm]
+_MIN_SCATTERING = 1e-6  # that of clear water [1/mm]
+_MAX_COEFFICIENT = 1e6  # ten times the absorption of a metal [1/mm]
 _MIN_THICKNESS_MM, _MAX_THICKNESS_MM = 1e-9, 1e4  # from less than an atom to more than a human body
 _COEFFICIENT_KEYS = ("absorption_per_mm", "scattering_per_mm")
 
