@@ -28,7 +28,7 @@ class TargetDeltas(NamedTuple):
     """Displacements of all published morph targets, concatenated.
 
     names : names of the t targets, with their folders
-    first : (t + 1,) start of each target in `point` and `delta_mm`, followed by their length
+    first : (t + 1,) index in `point` and `delta_mm` at which each target starts, followed by m
     point, delta_mm : (m,) indices of the displaced points, and (m, 3) displacements at a weight of 1 [mm]
     """
 
