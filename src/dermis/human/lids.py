@@ -17,17 +17,17 @@ Index = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 PUBLISHED_EYE_RADIUS_MM = 15.4
-"""Mean radius of the published eyeball of an average eye, which the published lids touch [mm]."""
+"""Mean radius of the published average eyeball, which the published lids touch [mm]."""
 EYE_OFFSET_MM = 2.2
-"""Forward offset of the anatomical from the published eyeball, for equal positions of the cornea [mm]."""
+"""How far the smaller anatomical eyeball is in front of the published one, to align the corneas [mm]."""
 CONTROL_SCALE = 1.0045
 """Size of an eyeball's control mesh relative to its smooth surface."""
 _SKIN_REACH_MM = 15.0  # distance up to which skin follows the lids
 _SKIN_BLEND_MM = 1.0  # blend distance between the lid points that skin follows
-_MIN_HEIGHT_MM = -1.5  # relative to the eyeball; deeper points are never visible
+_MIN_HEIGHT_MM = -1.5  # of lid points above the eyeball; deeper points are never visible
 _LINEAR_RADIUS, _MAX_RADIUS = 0.75, 0.95  # fractions of the radius, see `_compress_radius`
 _CLEARANCES_MM = -0.3, 0.25, 0.75, 1.0  # minimum distances of wall, edge, crest and skin from the eye
-_EDGE_HEIGHT_MM = 0.2  # the smooth surface lies slightly inside its control points
+_EDGE_HEIGHT_MM = 0.2  # of lid edges above the eye, as the smooth surface lies inside its control points
 _ROW_CONTACT = np.array([0, 0.2, 0.6, *21 * [1.0], 0.6, 0.2, 0, 0])
 """Contact of each row of lid_rings.csv with the eyeball, 0 to 1; none around the caruncle."""
 _CARUNCLE_RISE_MM = np.array([[0.3, 0.7, 0.0, 0.0], [0.0, 0.2, 0.0, 0.0], *23 * [4 * [0.0]],
@@ -85,10 +85,12 @@ class LidSide(NamedTuple):
         return self._replace(**{name: np.searchsorted(point, getattr(self, name)) for name in names})
 
 
-def fit_socket(balls: Points) -> EyeSocket:
+def fit_socket(eyeball_points: Points) -> EyeSocket:
     """Return the centre and relative size of a published eyeball, from its points (b, 3) [mm]."""
-    centre = (balls.min(axis=0) + balls.max(axis=0)) / 2
-    return EyeSocket(centre, float(np.linalg.norm(balls - centre, axis=1).mean()) / PUBLISHED_EYE_RADIUS_MM)
+    centre = (eyeball_points.min(axis=0) + eyeball_points.max(axis=0)) / 2
+    return EyeSocket(
+        centre, float(np.linalg.norm(eyeball_points - centre, axis=1).mean()) / PUBLISHED_EYE_RADIUS_MM
+    )
 
 
 def fit_lids(

@@ -18,7 +18,7 @@ YOUNG_AGE, OLD_AGE = 25.0, 90.0
 """Ages of the published young and old people [years]."""
 
 DELTA_UNIT_MM = 0.01
-"""Length of a unit of displacements in the published files [mm]."""
+"""Unit of the displacements in the published files [mm]."""
 
 EXPRESSION_PREFIX = "faceunits/"
 """Prefix of the names of the ARKit blend shapes."""
@@ -28,7 +28,7 @@ class TargetDeltas(NamedTuple):
     """Displacements of all published morph targets, concatenated.
 
     names : names of the t targets, with their folders
-    first : (t + 1,) start of each target in `point` and `delta_mm`, followed by their length
+    first : (t + 1,) index in `point` and `delta_mm` at which each target starts, followed by m
     point, delta_mm : (m,) indices of the displaced points, and (m, 3) displacements at a weight of 1 [mm]
     """
 
@@ -65,7 +65,7 @@ def morphed_points_mm(weights: Mapping[str, float]) -> Points:
 @cache
 def _target_indices() -> Mapping[str, int]:
     """Return the index of each published morph target by name."""
-    return {name: number for number, name in enumerate(target_deltas().names)}
+    return {name: index for index, name in enumerate(target_deltas().names)}
 
 
 def check_targets(names: Iterable[str]) -> None:

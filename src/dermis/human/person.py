@@ -41,7 +41,7 @@ from dermis.mesh.subdivide import resolve_levels
 
 _MAX_SEED = 2**32 - 1
 _MIN_BEARD_SHADOW = 0.6  # shadow of shaved hair below a beard
-_ANCESTRY_CONCENTRATION = 0.35  # of the Dirichlet distribution of ancestries: mostly one for most people
+_ANCESTRY_CONCENTRATION = 0.35  # of a Dirichlet distribution; small, so that mostly one ancestry prevails
 _SEX_DEVIATION = 0.08  # standard deviation of `sex` from 0 or 1
 _OPPOSITE_SUFFIXES = {"decr": "incr", "down": "up", "in": "out", "backward": "forward", "concave": "convex"}
 """Suffixes of the names of targets with opposite effects."""
@@ -57,13 +57,14 @@ _FOLDER_DEVIATIONS = {  # standard deviation of the weights of targets by folder
     "ears": 0.25,
     "neck": 0.12,
 }
-_EXCLUDED_TARGETS = ("trans", "age", "fat", "measure", "push")  # macro quantities, and shifts of whole parts
-_SIDE_DEVIATION = 0.2  # difference between left and right, as a fraction of the deviation
+# Words in the names of targets for macro quantities and for shifts of whole parts, which are not sampled:
+_EXCLUDED_TARGETS = ("trans", "age", "fat", "measure", "push")
+_SIDE_DEVIATION = 0.2  # of the difference between left and right, relative to that of the weight
 _ASYMMETRY_DEVIATION = 0.1
 _HEAD_SHAPES = ("diamond", "invertedtriangular", "oval", "rectangular", "round", "square", "triangular")
 _MAX_SHAPE_WEIGHT = 0.3
 _ANCESTRIES = "african", "asian", "caucasian"
-_LOOK_FIELDS = "targets", "skin", "eyes", "hair"
+_NESTED_FIELDS = "targets", "skin", "eyes", "hair"
 _FIELD_RANGES = {
     "african": (0.0, 1.0),
     "asian": (0.0, 1.0),
@@ -76,9 +77,9 @@ _FIELD_RANGES = {
     "hair_pheomelanin": (0.0, 10.0),
 }
 _OPTIONAL_FIELDS = "ita", "skin_ancestry"
-_OTHER_SKIN_FRACTION = 0.45  # of Caucasian shapes, if no ancestry is given
+_OTHER_SKIN_FRACTION = 0.45  # of Caucasian shapes: they have one of `_OTHER_SKINS`, if no ancestry is given
 _OTHER_SKINS = ("south asian", "iraqi", "arabian")
-_SHAPE_OF_SKIN = {  # Dirichlet distributions of African, Asian, Caucasian shape; artist's values
+_SHAPE_OF_SKIN = {  # Dirichlet parameters of African, Asian, Caucasian shape by skin group; artist's values
     "african": (3.0, 0.05, 0.05),
     "caucasian": (0.05, 0.05, 3.0),
     "chinese": (0.05, 3.0, 0.05),
@@ -98,7 +99,7 @@ def sample_fields(seed: int, given: Mapping[str, Any]) -> dict[str, Any]:
 
     given : fields that are not sampled
     """
-    excluded = *_LOOK_FIELDS, *_OPTIONAL_FIELDS
+    excluded = *_NESTED_FIELDS, *_OPTIONAL_FIELDS
     macro = {name: float(value) for name, value in given.items() if name not in excluded}
     rng = np.random.default_rng(checked_integer("seed", seed, 0, _MAX_SEED))
     sampled = rng.dirichlet((_ANCESTRY_CONCENTRATION,) * 3)
@@ -151,17 +152,21 @@ def _sample_ancestry(
 ) -> tuple[NDArray[np.float64], dict[str, float]]:
     """Return ancestry fractions of the shape (3,), and the weights of the measured groups of the skin.
 
-    Skin follows the shape if that is given, and the shape follows the skin if only that or an ITA is given.
-    Otherwise some people of Caucasian shape have South Asian or Middle Eastern skin.
+    If the ancestry of the shape is given, the skin follows it. If only a skin ancestry or an ITA is given,
+    the shape follows the skin. Otherwise some people of Caucasian shape have South Asian or Middle Eastern
+    skin.
 
-    macro, given : fields that are not sampled
+    macro : numeric fields that are not sampled
+    given : all fields that are not sampled
     sampled : (3,) sampled fractions of the shape
     """
     picks, chance = rng.random(3), rng.random()
     ancestry, shape_given = _ancestry_fractions(macro, sampled), any(name in macro for name in _ANCESTRIES)
     name = str(given.get("skin_ancestry") or "")
     if name or (given.get("ita") is not None and not shape_given):
-        group = _pick(group_weights(0, 0, 0, name) if name else likely_groups(float(given["ita"])), picks[0])
+        group = _pick_name(
+            group_weights(0, 0, 0, name) if name else likely_groups(float(given["ita"])), picks[0]
+        )
         shape = ancestry if shape_given else rng.dirichlet(_SHAPE_OF_SKIN[group])
         return shape, {group: 1.0}
     groups: dict[str, float] = {}
@@ -172,8 +177,8 @@ def _sample_ancestry(
     return ancestry, groups
 
 
-def _pick(weights: Mapping[str, float], chance: float) -> str:
-    """Return the name at a cumulative probability."""
+def _pick_name(weights: Mapping[str, float], chance: float) -> str:
+    """Return the name at which the cumulative weight exceeds `chance`, a number from 0 to 1."""
     ends = np.cumsum(list(weights.values()))
     return list(weights)[min(int(np.searchsorted(ends, chance, "right")), len(weights) - 1)]
 
@@ -212,13 +217,15 @@ def _sample_hair_pigments(rng: np.random.Generator, ancestry: NDArray[np.float64
 def _sample_targets(rng: np.random.Generator) -> Iterator[tuple[str, float]]:
     """Yield random names and weights of morph targets of the face, in a fixed order."""
     common: dict[str, float] = {}
-    samples = iter(rng.standard_normal(sum(1 + bool(one.mirrored) for one in _opposite_targets())).tolist())
+    samples = iter(
+        rng.standard_normal(sum(1 + bool(one.shared_name) for one in _opposite_targets())).tolist()
+    )
     for one in _opposite_targets():
         value = one.spread * next(samples)
         if one.truncated:
             value = min(max(value, -2 * one.spread), 2 * one.spread)
-        if one.mirrored:  # left and right are nearly alike
-            value = common.setdefault(one.mirrored, value) + _SIDE_DEVIATION * one.spread * next(samples)
+        if one.shared_name:  # left and right are nearly alike
+            value = common.setdefault(one.shared_name, value) + _SIDE_DEVIATION * one.spread * next(samples)
         yield (one.more if value > 0 else one.less), abs(value)
     yield f"head/head-{rng.choice(_HEAD_SHAPES)}", float(rng.uniform(0.0, _MAX_SHAPE_WEIGHT))
 
@@ -229,15 +236,15 @@ class _OppositeTargets(NamedTuple):
     less, more : names of the targets for negative and positive weights
     spread : standard deviation of the weight
     truncated : whether the weight is limited to two standard deviations
-    mirrored : key shared with the target of the opposite half of the face, so that both get similar weights;
-        "" for targets in the middle
+    shared_name : name without the side, shared with the target of the opposite half of the face, so that both
+        get similar weights; "" for targets in the middle
     """
 
     less: str
     more: str
     spread: float
     truncated: bool
-    mirrored: str
+    shared_name: str
 
 
 @cache
@@ -254,9 +261,9 @@ def _opposite_targets() -> tuple[_OppositeTargets, ...]:
         for low, high in _OPPOSITE_SUFFIXES.items():
             stem = name.removesuffix(low)
             if stem != name and f"{stem}{high}" in known:
-                side_free = f"{folder}/{local_name[2:].removesuffix(low)}" if sided else ""
+                shared_name = f"{folder}/{local_name[2:].removesuffix(low)}" if sided else ""
                 deviation = _FOLDER_DEVIATIONS[folder]
-                pairs.append(_OppositeTargets(name, f"{stem}{high}", deviation, True, side_free))
+                pairs.append(_OppositeTargets(name, f"{stem}{high}", deviation, True, shared_name))
     return tuple(pairs)
 
 
@@ -275,8 +282,8 @@ class Human:
     weight, muscle : float
         From -1, least, to 1, most; 0 is average [-].
     hair_eumelanin, hair_pheomelanin : float
-        Pigments of hair that is not set by `hair`, 0 to 10 [-]: eumelanin of 0.3 is blond, 1.3 brown, 4 dark,
-        8 black; red hair has 0.3 and a pheomelanin of 2.
+        Pigments of the hair if `hair` is not given, 0 to 10 [-]: eumelanin of 0.3 is blond, 1.3 brown,
+        4 dark, 8 black; red hair has 0.3 and a pheomelanin of 2.
     targets : mapping
         Weights of published morph targets, such as {"nose/nose-hump-incr": 0.5}, normally 0 to 1.
     skin : SkinLook, optional
@@ -286,11 +293,11 @@ class Human:
     hair : HairLook, optional
         Look of the hair; by default typical for the person.
     skin_ancestry : str
-        Measured group whose skin, eyes and hair colour the person has, such as "south asian", so that skin
-        and shape vary apart; "" for those of the shape's ancestries.
+        Measured group whose colours of skin, eyes and hair the person has whatever the shape, such as "south
+        asian"; "" for the colours of the shape's ancestries.
     ita : float, optional
-        Individual typology angle of the cheek of skin that is not set by `skin`, -65 (darkest) to 70
-        (lightest) [degrees]; all else is as measured people of this angle have it.
+        Individual typology angle of the cheek if `skin` is not given, -65 (darkest) to 70 (lightest)
+        [degrees]; the other properties of the skin are those of measured people with this angle.
 
     Raises
     ------
@@ -349,7 +356,8 @@ class Human:
         **given
             Fields that are not sampled, such as `age=70` or `ita=-30`, or some values of targets, skin, eyes
             and hair, such as `skin={"melanin": 0.1}`. Skin and hair are sampled for the given age, sex and
-            ancestry; without any, the ancestry of `ita` is that of measured people.
+            ancestry. If `ita` is given without an ancestry, the ancestry is sampled from measured people with
+            this angle.
 
         Returns
         -------
@@ -388,11 +396,11 @@ class Human:
         maps : Maps, optional
             Maps of the skin; by default painted according to the look of the skin.
         layout : {"own", "hm08"}
-            Uv layout: "own" has most space for the face; "hm08" is that of MakeHuman, for its skins.
+            Uv layout: "own" gives the face most space; "hm08" is the layout of MakeHuman, for its skins.
         subdivide : int or callable
             Levels of Catmull-Clark subdivision, 0 to 3, or a function of the head that returns them.
         hairs : float
-            Fraction of the hairs on head and chin that grow, each wider by the inverse, 0.05 to 1.
+            Fraction of the scalp and beard hairs to create, 0.05 to 1; they are wider, to keep coverage.
 
         Returns
         -------
@@ -505,8 +513,8 @@ class Human:
         """Return the morph target weights for body weight and muscle; average build needs no target."""
         weights = {}
         for kind, fraction in self._adult_fractions().items():
-            for muscle, muscle_fraction in _blend_steps(self.muscle).items():
-                for weight, weight_fraction in _blend_steps(self.weight).items():
+            for muscle, muscle_fraction in _blend_fractions(self.muscle).items():
+                for weight, weight_fraction in _blend_fractions(self.weight).items():
                     if (muscle, weight) != ("average", "average"):
                         name = f"macrodetails/universal-{kind}-{muscle}muscle-{weight}weight"
                         weights[name] = fraction * muscle_fraction * weight_fraction
@@ -530,6 +538,6 @@ def _check_skin_fields(skin_ancestry: object, ita: object) -> None:
         checked_number("ita", ita, *ITA_RANGE, "degrees")
 
 
-def _blend_steps(value: float) -> dict[str, float]:
+def _blend_fractions(value: float) -> dict[str, float]:
     """Return linear blend fractions of "min", "average" and "max" for a parameter from -1 to 1."""
     return {"min": max(-value, 0.0), "average": 1.0 - abs(value), "max": max(value, 0.0)}

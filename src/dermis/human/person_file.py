@@ -26,7 +26,7 @@ from dermis.mesh.head import Head
 
 T = TypeVar("T", Human, SkinLook, EyeLook, HairLook)
 _STRETCH_ATLAS_SIDE = 1024
-"""Largest side of the atlas for the lengths of texels, which vary slowly [texel]."""
+"""Largest side of the atlas from which texel lengths on the skin are computed; they vary slowly [texel]."""
 
 
 def person_numbers(person: Human) -> dict[str, Any]:
@@ -66,17 +66,17 @@ def read_person(path: Path) -> Human:
     return human
 
 
-def _build_dataclass(path: Path, kind: type[T], numbers: Any) -> T:
+def _build_dataclass(path: Path, kind: type[T], values: Any) -> T:
     """Return an instance of a dataclass, such as `Human` or `SkinLook`, from its fields in a file."""
     known = [one.name for one in fields(kind)]
-    if not isinstance(numbers, Mapping):
-        actual = f"got {format_value(numbers)}"
+    if not isinstance(values, Mapping):
+        actual = f"got {format_value(values)}"
         refuse(path, f"numbers of {', '.join(known)}", actual, "Correct the file")
-    for name in numbers:
+    for name in values:
         if name not in known:
             refuse(path, f"names of {', '.join(known)}", f"got {format_value(name)}", "Correct the file")
     try:
-        return kind(**numbers)
+        return kind(**values)
     except DermisError as fault:
         raise DermisError(f"{path}: {fault}") from None
 
@@ -94,7 +94,7 @@ def write_person_glb(
 
     roughness : Beckmann roughness m of skin without a roughness map [-]
     weights : weights of the morph targets of expressions that are active in the file
-    eyes : colour and normal textures of the eyes; they are exported with one colour if None
+    eyes : colour and normal textures of the eyes; if None, the eyes are exported with one colour
     """
     notes = {"person": person_numbers(person)}
     data = encode_head(

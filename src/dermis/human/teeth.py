@@ -15,7 +15,7 @@ Doubles = NDArray[np.float64]
 MM_PER_U, MM_PER_V = 160.0, 40.0
 """Lengths of a unit of u and of v [mm]."""
 ARCH_MIDDLE_U, BITING_EDGE_V = 0.5, 0.02
-"""u between the first teeth, and v of the biting edge."""
+"""u of the gap between the two middle teeth, and v of the biting edge."""
 _ARCH_SAMPLES = 2000
 
 

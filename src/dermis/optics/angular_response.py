@@ -33,7 +33,7 @@ def interpolate_table(column: Callable[[float], Floats], position: float) -> Flo
 
 
 def interpolate_columns(column: Callable[[float], Floats], positions: ArrayLike) -> Floats:
-    """Interpolate a table at c positions in [0, 1]; the last axis of the result has one entry for each.
+    """Interpolate a table at c positions in [0, 1]; the last axis of the result has one entry per position.
 
     column : function that returns a column of the table, see `interpolate_table`
     """
@@ -51,9 +51,9 @@ class AngularResponse:
     the cosines of the incident and the exit direction below the surface.
 
     eta : index of refraction relative to air [-]
-    relative_reflectance : (DIRECTION_ROWS, c) reflectance over that at normal incidence, at incident cosines
+    relative_reflectance : (DIRECTION_ROWS, c) reflectance relative to normal incidence, at incident cosines
         in air whose square roots are evenly spaced from 0 to 1 [-]
-    relative_diffuse_reflectance : (c,) reflectance for uniform light over that at normal incidence [-]
+    relative_diffuse_reflectance : (c,) reflectance for uniform light relative to normal incidence [-]
     single_scattering : (c,) factor of the single-scattering kernel [-]
     mean_kernel : mean of 1/(a + b) over incident and exit directions [-]
     """
@@ -118,8 +118,8 @@ def refracted_cosine(cosine: ArrayLike, eta: float) -> Floats:
 class _HalfSpace:
     """Isotropically scattering half-space below a smooth surface, at discrete directions.
 
-    The medium reflects light by an operator R and the surface reflects it back inside by an operator r. Their
-    multiple reflections R + R r R + ... are summed by solving one linear system.
+    The medium reflects light by an operator R, and the surface reflects it back inside by an operator r. The
+    series of multiple reflections R + R r R + ... is summed by solving one linear system.
     """
 
     def __init__(self, albedo: float, eta: float) -> None:
@@ -135,7 +135,7 @@ class _HalfSpace:
         )
 
     def _reflected_radiance(self, mu: Floats, H: Floats) -> Floats:
-        """Return the radiance over pi reflected by the medium in each direction, (directions, n) [-].
+        """Return pi times the radiance that the medium reflects in each direction, (directions, n) [-].
 
         mu : (n,) cosines of the incident light below the surface
         H : (n,) H function at these cosines

@@ -16,7 +16,7 @@ _EDGE_RESPONSE_ANGLES = 256  # samples of the integral in `edge_response`
 
 
 def radii() -> Floats:
-    """Return the radii at which every cumulative profile is sampled, (n,) [mm]: 0, then log-spaced by 2 %."""
+    """Return the radii at which every cumulative profile is sampled, (n,) [mm]: 0, then log-spaced."""
     return np.concatenate([[0.0], np.geomspace(_MIN_RADIUS_MM, _MAX_RADIUS_MM, _RADII)])
 
 
@@ -25,8 +25,8 @@ class CumulativeProfile:
     """Fraction of the emerging light that leaves within each radius of a narrow beam, in red, green and blue.
 
     radii_mm : (n,) radii, increasing from 0 [mm]
-    fraction : (n, 3) light that emerges within each radius over all emerging light, 0 to 1 [-]
-    energy : (3,) all emerging light over the light that enters [-]
+    fraction : (n, 3) light that emerges within each radius, divided by all emerging light, 0 to 1 [-]
+    energy : (3,) all emerging light, divided by the light that enters [-]
     """
 
     radii_mm: Floats
@@ -38,7 +38,7 @@ class CumulativeProfile:
         """Sample a function of radius as a cumulative profile.
 
         within : function from radii (n,) [mm] to the fraction of the emerging light within each, (n, 3) [-]
-        energy : (3,) all emerging light over the light that enters [-]
+        energy : (3,) all emerging light, divided by the light that enters [-]
         """
         grid = radii()
         return cls(grid, np.asarray(within(grid), np.float64), np.asarray(energy, np.float64))
@@ -47,8 +47,8 @@ class CumulativeProfile:
     def from_radial_profile(cls, profile: RadialProfile, entering_fraction: float = 1.0) -> CumulativeProfile:
         """Accumulate the ring energies of a three-channel radial profile into a cumulative profile.
 
-        entering_fraction : fraction of the incident light that enters, by which a profile per incident power
-            is divided [-]
+        entering_fraction : fraction of the incident light that enters, if the profile is per incident power;
+            the total is divided by it [-]
         """
         total = profile.total
         energy_within = np.concatenate([np.zeros((1, 3)), np.cumsum(profile.ring_energy, axis=0)])

@@ -45,7 +45,7 @@ def equivalent_medium(profile: GaussianSum, total: Floats, eta: float) -> Medium
 
 @lru_cache(maxsize=CACHE_SIZE)
 def _half_space_column(eta: float, from_photons: bool, total: float) -> Floats:
-    """Return albedo and inverse width of the half-space with a given reflectance, a table column (2,).
+    """Return albedo and inverse width of the half-space with a given reflectance, as a table column (2,).
 
     The first element is the square root of 1 minus the single-scattering albedo [-], the second the frequency
     at which the Hankel transform of R(r) has fallen to half of its value at 0 [1/mean free path]. If
@@ -67,7 +67,7 @@ def albedo_for_total(total: float, eta: float, from_photons: bool = False) -> fl
 
     total : reflectance for light at normal incidence [-]
     eta : index of refraction relative to air [-]
-    from_photons : invert tables of photon counts where they exist, not layered diffusion
+    from_photons : whether to invert tables of photon counts where they exist, instead of layered diffusion
     """
     from scipy.optimize import brentq
 
@@ -98,7 +98,7 @@ def _gaussian_transform(gaussians: tuple[tuple[float, float], ...], frequency: f
 
 
 def _cumulative_transform(cumulative: CumulativeProfile, frequency: float) -> float:
-    """Return the Hankel transform of a profile's first channel at a frequency, over its total [-]."""
+    """Return the Hankel transform of a profile's first channel at a frequency, divided by its total [-]."""
     from scipy.special import j0
 
     edges = cumulative.radii_mm

@@ -16,7 +16,7 @@ MAX_GAUSSIANS = 24
 MAX_VARIANCE_MM2 = 1e4
 MAX_WEIGHT = 100.0
 _MIN_VARIANCE_MM2 = 1e-12  # a nanometre squared, far below the wavelengths of light
-_MIN_ALBEDO = 1e-12  # of a channel, so that single precision can divide by it
+_MIN_ALBEDO = 1e-12  # smallest albedo of a channel by which single precision can divide
 _ADVICE = "Correct the profile's table"
 
 
@@ -92,7 +92,7 @@ class GaussianSum:
     def inner_product(self, other: GaussianSum) -> Floats:
         """Return the integral of r R(r) S(r) over r, where S is another sum of Gaussians, (c,) [1/mm2].
 
-        It measures the least-squares error between two profiles.
+        Such products give the least-squares error between two profiles.
         """
         gram = 1 / (4 * np.pi**2 * np.add.outer(self.variance_mm2, other.variance_mm2))
         return np.asarray(np.einsum("ic,ij,jc->c", self.weight, gram, other.weight))

@@ -15,7 +15,7 @@ from dermis.optics.media import SKIN_ETA, Floats, Medium
 from dermis.optics.radial import RadialProfile, missing_light_warnings, radius_grid, ring_edges
 
 HalfSpaceKind = Literal["skin", "matched", "walk"]
-"""Name of a tabulated half-space, which tells its surface and illumination.
+"""Name of a tabulated half-space, which states its surface and illumination.
 
 "skin" has a smooth surface of index 1.4 and "matched" an index-matched one, both lit perpendicularly; "walk"
 has an index-matched surface that is lit uniformly from all directions.
@@ -29,19 +29,19 @@ CountedModel = Literal["counted"]
 COUNTED_MODEL: CountedModel = "counted"
 """Name of the profile model that uses tabulated photon counts."""
 _MIN_STEP, _MAX_STEP = 0.05, 0.4  # step of log r for derivatives: larger where few photons leave
-_STEP = 0.02  # step of log r, over the square root of mean free path / r
+_STEP = 0.02  # step of log r, divided by the square root of mean free path / r
 
 
 class _PhotonTable(NamedTuple):
-    """Monte Carlo photon counts of half-spaces over a = sqrt(1 - albedo), with splines between them.
+    """Monte Carlo photon counts of half-spaces by a = sqrt(1 - albedo), with splines between table rows.
 
-    scale : (m,) values of a, increasing [-]
+    root_absorption : (m,) values of a, increasing [-]
     edges : (k,) radii of the ring edges [mean free path]
     fraction : function from a to the fraction of the emerging light within each edge
     totals : function from a to the total reflectance
     """
 
-    scale: Floats
+    root_absorption: Floats
     edges: Floats
     fraction: Callable[[Floats], Floats]
     totals: Callable[[Floats], Floats]
@@ -97,13 +97,13 @@ def tabulated_albedo(kind: HalfSpaceKind, total: ArrayLike) -> Floats:
     kind : surface and illumination of the half-spaces
     """
     table = _photon_table(kind)
-    fine = np.linspace(table.scale[0], table.scale[-1], 2000)
+    fine = np.linspace(table.root_absorption[0], table.root_absorption[-1], 2000)
     root = np.interp(np.asarray(total, np.float64), table.totals(fine)[::-1], fine[::-1])
     return np.asarray(1.0 - root**2)
 
 
 def _table_position(table: _PhotonTable, albedo: ArrayLike) -> Floats:
-    return np.clip(_root_absorption(albedo), table.scale[0], table.scale[-1])
+    return np.clip(_root_absorption(albedo), table.root_absorption[0], table.root_absorption[-1])
 
 
 def _root_absorption(albedo: ArrayLike) -> Floats:
@@ -123,8 +123,8 @@ def _photon_table(kind: HalfSpaceKind) -> _PhotonTable:
     order = np.argsort(scale)
     splines: Any = [PchipInterpolator(scale[order], values[order], axis=0) for values in (fraction, total)]
     edges = np.array([0.0, *map(float, columns)])
-    from_axis = lambda position: np.pad(splines[0](position), ((0, 0), (1, 0)))  # noqa: E731
-    return _PhotonTable(scale[order], edges, from_axis, splines[1])
+    fraction_at = lambda position: np.pad(splines[0](position), ((0, 0), (1, 0)))  # noqa: E731
+    return _PhotonTable(scale[order], edges, fraction_at, splines[1])
 
 
 def has_photon_table(medium: Medium) -> bool:

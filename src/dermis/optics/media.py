@@ -27,7 +27,8 @@ _DJ3_NOTE = (
     "published sum of six Gaussians follows from neither reading: it is the preset gpu-gems-3"
 )
 _ETA_RANGE = 1.0, 2.5  # from an index-matched surface to more than diamond
-_MIN_SCATTERING, _MAX_COEFFICIENT = 1e-6, 1e6  # clear water, ten times the absorption of a metal [1/mm]
+_MIN_SCATTERING = 1e-6  # that of clear water [1/mm]
+_MAX_COEFFICIENT = 1e6  # ten times the absorption of a metal [1/mm]
 _MIN_THICKNESS_MM, _MAX_THICKNESS_MM = 1e-9, 1e4  # from less than an atom to more than a human body
 _COEFFICIENT_KEYS = ("absorption_per_mm", "scattering_per_mm")
 
@@ -56,7 +57,7 @@ class Layer:
 
     @property
     def alpha_prime(self) -> Floats:
-        """Return the reduced albedo, reduced scattering over reduced extinction, (c,) [-]."""
+        """Return the reduced albedo: reduced scattering divided by reduced extinction, (c,) [-]."""
         return self.sigma_s_prime / self.sigma_t_prime
 
     @property
@@ -97,8 +98,8 @@ class Medium:
         if not self.layers:
             refuse(self.name, "at least one layer", "got none", "Add one")
         checked_number(f"{self.name}: index of refraction", self.eta, *_ETA_RANGE)
-        for count, layer in enumerate(self.layers, 1):
-            _check_layer(f"{self.name}, layer {count} ({layer.name})", layer, count == len(self.layers))
+        for position, layer in enumerate(self.layers, 1):
+            _check_layer(f"{self.name}, layer {position} ({layer.name})", layer, position == len(self.layers))
         if len({len(layer.sigma_a) for layer in self.layers}) > 1:
             refuse(self.name, "the same number of channels in each layer", "they differ", "Correct the lists")
 

@@ -36,7 +36,7 @@ class ColourTable:
         melanin, blood : (k,) fractions of the epidermal and of the dermal volume, 0 to 1 [-]
 
         Interpolation is bilinear in the square roots, in which reflectance is nearly linear. The error is at
-        most 0.0015 for fractions of at least 0.001, and at most 0.006 for less blood.
+        most 0.0015 for fractions of at least 0.001, and at most 0.006 for smaller fractions of blood.
         """
         n = len(self.colours)
         (i, u), (j, v) = (_cell_and_offset(fraction, n) for fraction in (melanin, blood))
@@ -67,7 +67,7 @@ def colour_table(parameters: SkinParameters, nodes: int = _TABLE_NODES) -> Colou
 def spectral_table(parameters: SkinParameters, nodes: int = _TABLE_NODES) -> Floats:
     """Return the diffuse reflectance (n, n, 31) over melanin and blood at `WAVELENGTHS_NM` [-].
 
-    parameters, nodes : as in `colour_table`, whose fractions it has
+    parameters, nodes : as in `colour_table`, which has the same fractions along its axes
     """
     epidermis, dermis = dj2006_layers(parameters, np.linspace(0.0, 1.0, nodes) ** 2)
     blood = np.arange(nodes)
@@ -82,8 +82,9 @@ def spectral_table(parameters: SkinParameters, nodes: int = _TABLE_NODES) -> Flo
 
 
 def _select_rows(layer: Layer, rows: NDArray[np.int64]) -> Layer:
-    """Return a layer with the coefficients of selected rows of stacked layers as its channels, concatenated.
+    """Return one layer whose channels are the concatenated coefficients of selected rows of stacked layers.
 
     layer : stacked layers, with coefficients (n, c)
+    rows : indices of the rows, which may repeat
     """
     return replace(layer, **{name: getattr(layer, name)[rows].ravel() for name in _COEFFICIENT_FIELDS})

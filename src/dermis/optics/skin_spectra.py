@@ -1,4 +1,4 @@
-"""Diffuse reflectance spectra of many skins at once, with pigments of their own."""
+"""Diffuse reflectance spectra of many skins at once, each with its own pigments."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def skin_reflectance(
     baseline: ArrayLike,
     scattering: ArrayLike = 1.0,
 ) -> Floats:
-    """Return the diffuse reflectance of n skins of "dj2006" by layered diffusion, (n, 31) per incident light.
+    """Return the diffuse reflectance of n "dj2006" skins by layered diffusion, (n, 31) per incident light.
 
     All arguments are (n,) arrays or numbers. Surface reflection is not included.
 
@@ -38,8 +38,8 @@ def skin_reflectance(
     oxygen : fraction of oxygenated haemoglobin [-]
     eumelanin_fraction : fraction of melanosomes with eumelanin [-]
     epidermis_mm : thickness of the epidermis [mm]
-    baseline : absorption of bloodless tissue over that of [Jacques1998] [-]
-    scattering : scattering of both layers over that of [DonnerJensen2006] [-]
+    baseline : absorption of bloodless tissue relative to [Jacques1998] [-]
+    scattering : scattering of both layers relative to [DonnerJensen2006] [-]
     """
     m, b, ox, eu = map(_column, (melanin, blood_fraction, oxygen, eumelanin_fraction))
     bloodless = _column(baseline) * baseline_absorption(WAVELENGTHS_NM)

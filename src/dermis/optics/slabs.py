@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 DIRECTION_NODES = 16
 """Number of discrete directions that leave a slab, and of directions that are totally reflected."""
 DEEP_OPTICAL_DEPTH = 1e4
-"""Thickness at which a slab equals a half-space [mean free paths]."""
+"""Thickness from which a slab is treated as a half-space [mean free paths]."""
 _MIN_OPTICAL_DEPTH = 1e-6  # optical depth of a slab in which light scatters at most once
 _EXTRAPOLATION_POINTS = 3  # number of cosines from which values beyond the last cosine are extrapolated
 _MIN_REFLECTANCE = 1e-12
@@ -41,9 +41,10 @@ class PhaseMatrices:
     peak therefore scatters less than the true medium.
 
     albedo : single-scattering albedo of the scaled medium [-]
-    extinction : extinction coefficient of the scaled medium over the reduced extinction coefficient [-]
-    unscaled_extinction : extinction coefficient of the true medium over the reduced extinction coefficient
+    extinction : extinction coefficient of the scaled medium relative to the reduced extinction coefficient
         [-]
+    unscaled_extinction : extinction coefficient of the true medium relative to the reduced extinction
+        coefficient [-]
     backward, forward : (m, m) phase function between two cosines, for scattering that reverses the direction
         of travel along the normal, and for scattering that keeps it; 1 for isotropic scattering [-]
     """
@@ -56,7 +57,7 @@ class PhaseMatrices:
 
 
 def phase_matrices(albedo: float, g: float, cosine: Floats, terms: int) -> PhaseMatrices:
-    """Expand the Henyey-Greenstein phase function in Legendre polynomials between discrete directions.
+    """Return the Henyey-Greenstein phase function between discrete directions, from Legendre polynomials.
 
     albedo : reduced albedo [-]
     g : mean cosine of the scattering angle, at least 0 and less than 1 [-]
@@ -126,7 +127,7 @@ def solve_doubled_slabs(
     nodes: int = DIRECTION_NODES,
     g: float = 0.0,
 ) -> Slabs:
-    """Compute slabs of given thicknesses and all their doublings, in the time of the thickest alone.
+    """Compute slabs of given thicknesses and all their doublings, as fast as the thickest slabs alone.
 
     albedo, eta, nodes, g : arguments of `solve_slabs`
     smallest_depth : (n,) optical depths of similar size [-]
@@ -134,9 +135,9 @@ def solve_doubled_slabs(
         `smallest_depth`
     """
     transport = _Transport.create(albedo, eta, nodes, g)
-    before = transport.doublings(float(np.max(smallest_depth)))
-    tau = np.asarray(smallest_depth, np.float64) / 2.0**before
-    steps = list(_doubling_steps(transport, tau, before + doublings))[before:]
+    initial_doublings = transport.doublings(float(np.max(smallest_depth)))
+    tau = np.asarray(smallest_depth, np.float64) / 2.0**initial_doublings
+    steps = list(_doubling_steps(transport, tau, initial_doublings + doublings))[initial_doublings:]
     R, T, unscattered = (np.concatenate(part) for part in zip(*steps, strict=True))
     return _slabs_in_air(transport, R, T, unscattered)
 
@@ -145,8 +146,8 @@ def half_space_radiance(albedo: float, eta: float, nodes: int, g: float) -> tupl
     """Return discrete directions, their fractions of uniform light, and emerging radiance of a half-space.
 
     The directions are cosines (m,) below the surface. A fraction (m,) tells how much of the light that enters
-    from a uniform sky has this direction. The radiance (m, m), by exit and entry direction, is per light that
-    enters: its mean over exit directions, weighted by the fractions, is the reflectance.
+    from a uniform sky has this direction. The radiance (m, m), by exit and entry direction, is scaled so
+    that its mean over exit directions, weighted by the fractions, is the reflectance.
     """
     transport = _Transport.create(albedo, eta, nodes, g)
     doublings = transport.doublings(DEEP_OPTICAL_DEPTH)
@@ -192,7 +193,7 @@ class _Transport:
 def _slabs_in_air(transport: _Transport, R: Floats, T: Floats, unscattered: Floats) -> Slabs:
     """Return slabs between two faces, lit from air, from the operators of the medium without faces.
 
-    R, T : (n, m, m) reflection and transmission, radiance over pi per power from each direction
+    R, T : (n, m, m) reflection and transmission: pi times the radiance per power from each direction
     unscattered : (n, m) fraction of light that crosses the slab without scattering [-]
     """
     flux, escapes = transport.flux, transport.escapes
@@ -210,7 +211,11 @@ def _slabs_in_air(transport: _Transport, R: Floats, T: Floats, unscattered: Floa
 
 
 def _unscattered_exit(unscattered: Floats, internal: Floats) -> tuple[Floats, Floats]:
-    """Return the unscattered light that leaves on the side of entry and on the far side, (n, m) each [-]."""
+    """Return the unscattered light that leaves on the side of entry and on the far side, (n, m) each [-].
+
+    unscattered : (n, m) fraction of light that crosses the slab without scattering [-]
+    internal : (m,) reflectance of a face from inside [-]
+    """
     down = (1.0 - internal) * unscattered / (1.0 - (unscattered * internal) ** 2)
     return down * unscattered * internal, down
 
@@ -229,8 +234,8 @@ def _doubling_steps(
 ) -> Iterator[tuple[Floats, Floats, Floats]]:
     """Yield reflection, transmission and unscattered light of thin slabs, and again after each doubling.
 
-    Reflection and transmission are (n, m, m): radiance over pi per power from each direction. Unscattered
-    light is (n, m).
+    Reflection and transmission are (n, m, m): pi times the radiance per power from each direction.
+    Unscattered light is (n, m).
 
     tau : (n,) initial thicknesses in reduced mean free paths
     """
@@ -255,12 +260,12 @@ def _add_faces(
 ) -> tuple[Floats, Floats]:
     """Add internal reflection at the upper and the lower face to a slab, for unit power in each direction.
 
-    R, T : (n, m, m) reflection and transmission of the slab without faces, radiance over pi
+    R, T : (n, m, m) reflection and transmission of the slab without faces, as pi times the radiance
     up, down : (n, m, m) R and T as operators, multiplied by the flux of the directions
     unscattered : (n, m) fraction of light that crosses the slab without scattering [-]
     internal : (m,) reflectance of a face from inside [-]
 
-    Returns the scattered radiance over pi that meets the upper face from below, and the lower face from
+    Returns pi times the scattered radiance that meets the upper face from below, and the lower face from
     above.
     """
     if not internal.any():
@@ -287,9 +292,10 @@ def anisotropic_response(total: ArrayLike, eta: float, g: float) -> AngularRespo
     eta : index of refraction relative to air, at least 1 [-]
     g : mean cosine of the scattering angle, at least 0 [-]
 
-    The kernel 1/(a + b) is fitted to the emerging radiance by least squares, once for the mean cosine g and
-    once for 0. The difference of both coefficients is added to the single-scattering factor of isotropic
-    scattering, from `angular_response`.
+    The kernel 1/(a + b), where a and b are the cosines of the incident and the exit direction, is fitted to
+    the emerging radiance by least squares, once for the mean cosine g and once for 0. The difference of the
+    two coefficients is added to the single-scattering factor of `angular_response`, which is for isotropic
+    scattering.
     """
     isotropic = angular_response(total, eta)
     if g == 0.0:

@@ -1,4 +1,4 @@
-"""Light through thin parts such as ears, as weights of Gaussians over the thickness of the part."""
+"""Light through thin parts such as ears: weights of Gaussians as a function of the thickness."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _FREQUENCIES = np.geomspace(0.02, 5.0, 24)  # at which Gaussians are fitted to a
 
 @dataclass(frozen=True, eq=False)
 class ThinParts:
-    """Transmittance and lost reflectance of thin parts over their thickness, as weights of Gaussians.
+    """Transmittance and lost reflectance of thin parts as weights of Gaussians, by thickness of the part.
 
     The thicknesses are evenly spaced in the square root. The weights are those of k Gaussians in 3 channels,
     and relative to the reflectance of a half-space of the medium.
@@ -49,8 +49,8 @@ class ThinParts:
     transmitted : (THICKNESS_ROWS, k, 3) weights of the light that leaves on the far side [-]
     lost : (THICKNESS_ROWS, k, 3) weights of the light that a half-space would reflect, but the thin part does
         not; it is spread like transmitted light [-]
-    directionality : (THICKNESS_ROWS,) strength of the dependence on incident direction, -1 to 1: at 1 it is
-        `oblique_transmittance`, that of deep slabs; at 0 there is none; below 0 it is reversed [-]
+    directionality : (THICKNESS_ROWS,) strength with which transmittance depends on the incident direction,
+        -1 to 1: 1 as in deep slabs, see `oblique_transmittance`; 0 not at all; reversed below 0 [-]
     """
 
     max_thickness_mm: float
@@ -62,7 +62,7 @@ class ThinParts:
 def solve_thin_parts(
     medium: Medium, variance_mm2: Floats, max_thickness_mm: float, g: float = 0.0
 ) -> ThinParts:
-    """Compute transmittance and lost reflectance of slabs of a medium of one layer, over thickness.
+    """Compute transmittance and lost reflectance of slabs of a single-layer medium, by thickness.
 
     variance_mm2 : (k,) variances of the Gaussians that spread light [mm2]
     max_thickness_mm : largest thickness [mm]
@@ -90,13 +90,13 @@ def solve_thin_parts(
 def oblique_transmittance(total: Floats, eta: float, from_photons: bool = False, g: float = 0.0) -> Floats:
     """Return the relative transmittance of deep slabs by incident direction, (DIRECTION_ROWS, c) [-].
 
-    The transmittance for a direction is divided by the transmittance for uniform light, and by the
-    half-space's reflectance for the direction, which is also relative to uniform light. The square roots of
+    The transmittance for a direction, relative to that for uniform light, is divided by the half-space's
+    reflectance for this direction, also relative to that for uniform light. The square roots of
     the incident cosines in air are evenly spaced from 0 to 1.
 
     total : (c,) reflectance of the half-space for light at normal incidence [-]
     eta : index of refraction relative to air [-]
-    from_photons : whether the diffusion profile comes from photon counts instead of diffusion
+    from_photons : whether the diffusion profile comes from photon counts, not from a diffusion model
     g : mean cosine of the scattering angle [-]
     """
     return interpolate_columns(partial(_oblique_column, eta, from_photons, g), total)
@@ -131,7 +131,7 @@ def _relative_transmittance(slabs: Slabs, half_space: Slabs) -> Floats:
 class _SlabTotals(NamedTuple):
     """Transmittance and lost reflectance of n slabs in one channel under uniform light, (n,) each.
 
-    transmittance : transmitted over incident power [-]
+    transmittance : transmitted power, divided by incident power [-]
     relative_transmittance : transmittance divided by the reflectance of the half-space [-]
     lost : reflectance lost by the finite thickness, divided by the reflectance of the half-space [-]
     directionality : strength of the dependence on incident direction, 1 in deep slabs, 0 for none [-]
@@ -164,10 +164,10 @@ def _totals_column(eta: float, g: float, root: float) -> Floats:
     albedo = min(max(1.0 - root**2, MIN_ALBEDO), MAX_ALBEDO)
     slabs = solve_doubled_slabs(albedo, _MIN_OPTICAL_DEPTHS, _DOUBLING_COUNT, eta, _UNIFORM_NODES, g)
     half_space, deep = _deep_transmittance(albedo, eta, _UNIFORM_NODES, g)
-    reflectance, change = half_space.reflected @ half_space.flux, deep - 1.0
+    reflectance, deep_change = half_space.reflected @ half_space.flux, deep - 1.0
     weight = half_space.flux * half_space.reflected[0]
-    own_change = _relative_transmittance(slabs, half_space) - 1.0
-    directionality = own_change @ (weight * change) / (weight * change**2).sum()
+    slab_change = _relative_transmittance(slabs, half_space) - 1.0
+    directionality = slab_change @ (weight * deep_change) / (weight * deep_change**2).sum()
     transmittance = slabs.transmitted @ slabs.flux
     lost = np.maximum(1.0 - slabs.reflected @ slabs.flux / reflectance, 0.0)
     return np.stack([transmittance, transmittance / reflectance, lost, directionality], axis=-1)

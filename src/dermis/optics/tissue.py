@@ -91,7 +91,7 @@ class Tissue:
         return np.asarray(entering * diffusion_profile(self.medium, model, clamp).total)
 
     def with_layers(self, layers: Sequence[Layer]) -> Tissue:
-        """Return a tissue with other layers, but the name and the index of refraction of this one.
+        """Return a tissue with other layers but the same name and index of refraction.
 
         Raises DermisError for a skin made of pigments, and for invalid layers.
         """
@@ -228,17 +228,17 @@ def _from_skin_table(
     if not isinstance(table, dict) or set(document) - {"skin", "name"}:
         refuse(path, "only a table [skin] and a name", "it has other entries", "Remove them")
     values = dict(table)
-    own_structure = values.pop("structure", DEFAULT_STRUCTURE)
+    table_structure = values.pop("structure", DEFAULT_STRUCTURE)
     unknown = sorted(set(values) - fields)
     if unknown:
         known = ", ".join(sorted({"structure", *fields}))
         refuse(path, f"in [skin]: {known}", f"got {', '.join(unknown)}", "Correct the names")
-    if own_structure not in get_args(Structure):
+    if table_structure not in get_args(Structure):
         expected = f"a structure of {', '.join(get_args(Structure))}"
-        refuse(path, expected, f"got {format_value(own_structure)}", "Correct it")
+        refuse(path, expected, f"got {format_value(table_structure)}", "Correct it")
     try:
         parameters = SkinParameters(**values)
     except DermisError as fault:
         raise DermisError(f"{path}: {fault}") from None
-    name, structure = str(document.get("name", path.stem)), structure or own_structure
+    name, structure = str(document.get("name", path.stem)), structure or table_structure
     return _spectral_tissue(name, structure, parameters, overrides)

@@ -27,8 +27,9 @@ _LIP_FADE_MM = (1.5, 4.5)  # distances from the lips between which the density o
 _BEARD_FADE = (0.25, 0.75)  # zone amounts between which the density of the beard rises
 _HAIRLINE_WAVES = np.array([[0.37, 0.0, 0.23], [0.81, -0.5, 0.0]])  # wave vectors of the hairline [rad/mm]
 
-_SCALP_MARGIN_MM = 25.0  # below the hairline, for quads that may have hair
-_HAIR_MARGIN_MM, _BROW_MARGIN_MM = 25.0, 8.0  # around hairy quads, for skin that hair may touch
+_SCALP_MARGIN_MM = 25.0  # distance below the hairline down to which quads may have hair
+_HAIR_MARGIN_MM = 25.0  # distance from quads with scalp hair or beard within which it may touch the skin
+_BROW_MARGIN_MM = 8.0  # distance from quads of the brows within which their hairs may touch the skin
 _MIN_BEARD = 0.02  # zone amount above which quads may have a beard
 
 
@@ -60,13 +61,13 @@ def sample_roots(mesh: Mesh, density: HairDensity, per_cm2: float, rng: np.rando
     near = density.candidates[corner_points].any(axis=1)
     quad_index = np.repeat(np.flatnonzero(near), counts[near])
     ends = np.cumsum(counts)[near]
-    number = np.arange(len(quad_index)) + np.repeat(ends - np.cumsum(counts[near]), counts[near])
-    step = number - (np.cumsum(counts) - counts)[quad_index]
+    threshold_index = np.arange(len(quad_index)) + np.repeat(ends - np.cumsum(counts[near]), counts[near])
+    step = threshold_index - (np.cumsum(counts) - counts)[quad_index]
     position = starts.take(quad_index, axis=0) + step[:, None] * _SEQUENCE_STEPS
     position -= np.floor(position)
     values = average_points().T.take(corner_points.T.take(quad_index, axis=1), axis=1)
     relative = density.relative(interpolate_quads(position, values).T)
-    accepted = np.flatnonzero(threshold.take(number) < relative)
+    accepted = np.flatnonzero(threshold.take(threshold_index) < relative)
     rooted = quad.take(quad_index.take(accepted)).astype(np.int32)
     return Roots(rooted, position.take(accepted, axis=0).astype(np.float32))
 
@@ -154,7 +155,7 @@ def _sum_zones(name: str, rows: Floats, points: Doubles) -> Doubles:
 
 @cache
 def skin_vertices_near_hair(root_finder: RootFinder, bearded: bool) -> Index:
-    """Return the indices of subdivided vertices within reach of hair, to which `SkinSurface` can be limited.
+    """Return the indices of subdivided vertices within reach of hair; `SkinSurface` needs no others.
 
     bearded : whether the beard is included
     """

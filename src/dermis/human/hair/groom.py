@@ -129,7 +129,7 @@ def _hair_group(
 def _join_groups(groups: list[HairGroup], absorption: Doubles) -> Strands:
     """Return the strands of several hair groups as one object.
 
-    absorption : (n, 3) absorption coefficient of each single hair [1/mm], which is spread over wider strands
+    absorption : (n, 3) absorption coefficients of single hairs [1/mm]; lower in strands that are wider
     """
     roots = _concatenate(group.roots for group in groups)
     knots, radius = (np.concatenate([group[k] for group in groups]) for k in (1, 2))

@@ -30,7 +30,8 @@ _PARTING_X = 31.0  # position of the parting of short hair
 _PARTING_WIDTH_MM = 9.0
 _LENGTH_LEVEL_TILT = 0.15  # slope of the levels of equal length, higher in front
 _CROPPED_RISE, _BEARD_RISE = (0.95, 0.75), (0.85, 0.35)  # angles of root and tip to the skin [rad]
-_SHORT_RISE, _TOP_RISE = (0.5, -0.05), (0.55, -0.35)  # angles at the sides, and their increase on top [rad]
+_SHORT_RISE = (0.5, -0.05)  # angles of root and tip of short hair at the sides [rad]
+_TOP_RISE = (0.55, -0.35)  # increase of these angles on top of the head [rad]
 _TUFT_MM = 2.2  # size of the cells in which tips form tufts
 _MIN_HEIGHT_MM = 0.35  # minimum height above the skin
 _HEAD_RADIUS_MM = 85.0
@@ -199,6 +200,7 @@ def _trace_guides(
     root_mm : (g, 3) control points at which the guides grow [mm]
     base_mm, normal : (g, 3) projections of these control points onto the skin [mm], and the skin normals
         there
+    guide, knots : shapes of the guides, and number of knots of each
     """
     root_offset = root_mm - base_mm  # distance of the control points from the smooth surface
     directions, height, step = guide.directions, np.zeros(len(root_mm)), guide.length_mm / (knots - 1)
@@ -343,7 +345,7 @@ def scalp_hair(surface: GrowthSurface, look: HairLook, recession: float) -> list
     comb = partial(comb_scalp, look=look, recession=recession)
     hair, offsets = grow_hair(surface, roots, comb, knot_count(look), _scalp_variation(look), rng)
     hairs_per_cm2 = MAX_PER_CM2 * look.density
-    return [_hair_group(hair, offsets, strands_per_cm2, hairs_per_cm2, _HAIR_RADIUS_MM, rng)]
+    return [_strand_group(hair, offsets, strands_per_cm2, hairs_per_cm2, _HAIR_RADIUS_MM, rng)]
 
 
 def beard_hair(surface: GrowthSurface, look: HairLook) -> list[HairGroup]:
@@ -356,10 +358,10 @@ def beard_hair(surface: GrowthSurface, look: HairLook) -> list[HairGroup]:
     variation = HairVariation(0.3, 0.22, 0.2, 0.05 + 0.1 * look.curl, 0.5 * tight, 1.5)
     comb = partial(comb_beard, look=look)
     hair, offsets = grow_hair(surface, roots, comb, knot_count(look), variation, rng)
-    return [_hair_group(hair, offsets, strands_per_cm2, BEARD_PER_CM2, _BEARD_RADIUS_MM, rng)]
+    return [_strand_group(hair, offsets, strands_per_cm2, BEARD_PER_CM2, _BEARD_RADIUS_MM, rng)]
 
 
-def _hair_group(
+def _strand_group(
     hair: RootFrames,
     offsets: Floats,
     strands_per_cm2: float,

@@ -46,7 +46,7 @@ class HairLook:
     curl : float
         From straight, 0, to tightly coiled, 1 [-].
     fade : float
-        Reduction of the length of short hair at the sides and the nape, 0 to 1 [-].
+        How much shorter short hair is at the sides and the nape than on top, 0 to 1 [-].
     beard_mm : float
         Length of the beard, 0 to 30; 0 for none [mm].
     bushy : float

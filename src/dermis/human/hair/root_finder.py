@@ -19,7 +19,7 @@ Index = NDArray[np.int64]
 SIDE_SIGNS = 1.0, -1.0
 """Sign of x on the left and on the right side."""
 _QUAD_CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)  # corners in quad coordinates
-_MIN_WEIGHT = -1e-9  # tolerance of barycentric weights
+_MIN_WEIGHT = -1e-9  # smallest barycentric weight of points that count as inside a triangle
 _GRID_CELL_MM = 2.0  # cells of the grid of triangle lists
 _GRID_LOW, _GRID_HIGH = (
     np.array([-70.0, -20.0]),
@@ -119,19 +119,19 @@ class RootFinder:
         lid : row of lashes whose edge is used
         side : 1 for the left eye, -1 for the right
         u : (n,) position along the edge, as a fraction of its arc length
-        across : (n,) distance from the edge into the quad, 0 to 1 at its opposite side
+        across : (n,) distance from the edge into the quad: 0 on the edge, 1 on the opposite side of the quad
         """
         key = lid.edge_points, side
         if key not in self._lid_edges:
             self._lid_edges[key] = self._lid_edge(np.array(lid.edge_points), side)
         lengths_mm, quad, frame = self._lid_edges[key]
-        k = np.clip(np.searchsorted(lengths_mm, u * lengths_mm[-1], "right") - 1, 0, len(quad) - 1)
-        t = (u * lengths_mm[-1] - lengths_mm[k]) / (lengths_mm[k + 1] - lengths_mm[k])
-        frame = frame[k]
+        segment = np.clip(np.searchsorted(lengths_mm, u * lengths_mm[-1], "right") - 1, 0, len(quad) - 1)
+        t = (u * lengths_mm[-1] - lengths_mm[segment]) / (lengths_mm[segment + 1] - lengths_mm[segment])
+        frame = frame[segment]
         low = (1 - t)[:, None] * frame[:, 0] + t[:, None] * frame[:, 1]
         high = (1 - t)[:, None] * frame[:, 2] + t[:, None] * frame[:, 3]
         position = (1 - across)[:, None] * low + across[:, None] * high
-        return Roots(quad[k].astype(np.int32), position.astype(np.float32))
+        return Roots(quad[segment].astype(np.int32), position.astype(np.float32))
 
     def _lid_edge(self, edge_points: Index, side: float) -> _LidEdge:
         points, around, eye = self.points_mm, self._quad_points, self._eyes_mm[0 if side > 0 else 1]
@@ -171,13 +171,13 @@ class RootFinder:
         )
         first, last = (np.clip(cell, 0, shape - 1) for cell in grid)
         cells: dict[tuple[int, int], list[int]] = {}
-        for number, ((x0, y0), (x1, y1)) in enumerate(zip(first.tolist(), last.tolist(), strict=True)):
+        for triangle, ((x0, y0), (x1, y1)) in enumerate(zip(first.tolist(), last.tolist(), strict=True)):
             for x in range(x0, x1 + 1):
                 for y in range(y0, y1 + 1):
-                    cells.setdefault((x, y), []).append(number)
+                    cells.setdefault((x, y), []).append(triangle)
         triangle_lists = np.full((*shape, max(map(len, cells.values()))), -1)
-        for (x, y), numbers in cells.items():
-            triangle_lists[x, y, : len(numbers)] = numbers
+        for (x, y), triangles in cells.items():
+            triangle_lists[x, y, : len(triangles)] = triangles
         return _FrontTriangles(triangle_lists, quad, half, corner)
 
 

@@ -97,7 +97,7 @@ class HairGroup(NamedTuple):
 
     roots : roots of the n hairs on the subdivided mesh
     knots, radius : (n, k, 3) knot positions in the root frames, see `Strands`, and (n, k) radii [mm]
-    pigment_factor : factor of the pigment concentrations of the person's hair [-]
+    pigment_factor : pigment concentrations relative to those of the person's look [-]
     hairs_per_strand : number of real hairs that each strand represents
     cover : optical coverage of the roots by surrounding hair, see `Strands` [-]
     """

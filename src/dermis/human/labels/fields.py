@@ -41,10 +41,10 @@ HUMAN_FIELDS = (
 )
 """Label classes of the skin, in order of precedence."""
 LIP_SEAM_MM = np.array([[0.0, -67.3], [10, -66.7], [18, -67.2], [22.2, -67.9]])
-"""Polyline where the lips meet: distance from the middle and height [mm]."""
+"""Polyline where the lips meet: distance from the middle of the face, and height [mm]."""
 _OUTSIDE_FIELD_MM = -1.0
 _MIN_BROW_Z = -30.0  # minimum z of brows
-_HAIRLINE_MARGIN_MM = -8.0  # height above the hairline that separates hair of the head from the beard
+_HAIRLINE_MARGIN_MM = -8.0  # height relative to the hairline below which hair belongs to the beard
 _DENSE_LEVELS = 2
 SIDE_NAMES = "right", "left"
 _PART_CLASSES = {"upper teeth": "teeth", "lower teeth": "teeth", "tongue": "tongue", "cut": "neck"}
@@ -91,24 +91,24 @@ def dense_fields() -> tuple[Doubles, Doubles]:
 
 
 def hair_classes(head: Head) -> NDArray[np.uint8]:
-    """Return the label class (n,) of each hair of a head, first of brows and lashes, then of scalp and beard.
+    """Return the label class (n,) of each hair of a head: brows and lashes first, then scalp and beard.
 
     Hair on meshes of another topology has the class "hair".
     """
-    both = [part for part in (head.strands, head.hair) if part is not None]
-    quads = [part.roots.quad >> (2 * head.levels) for part in both]
+    strand_sets = [strands for strands in (head.strands, head.hair) if strands is not None]
+    quads = [strands.roots.quad >> (2 * head.levels) for strands in strand_sets]
     if not quads:
         return np.zeros(0, np.uint8)
     fine, coarse = _quad_hair_classes()
     if max(int(one.max(initial=0)) for one in quads) >= len(fine):
         return np.full(sum(map(len, quads)), class_number("hair"), np.uint8)
-    tables = [fine if part is head.strands else coarse for part in both]
+    tables = [fine if strands is head.strands else coarse for strands in strand_sets]
     return np.concatenate([table[one] for table, one in zip(tables, quads, strict=True)])
 
 
 @cache
 def _quad_hair_classes() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """Return two label classes (q,) per control quad: of brow or lash hairs, and of scalp or beard hairs."""
+    """Return the classes (q,) of brow or lash hairs on control quads, and those of scalp or beard hairs."""
     mesh = average_head().mesh
     around = quad_corners(mesh, np.arange(len(mesh.quads)))
     middle = average_head().positions_mm.astype(np.float64)[around].mean(axis=1)
@@ -130,8 +130,8 @@ def _ear_field() -> Doubles:
     within = np.zeros(len(around))
     within[part_quads()["ears"]] = 1.0
     count = len(average_head().positions_mm)
-    counted = within, np.ones(len(around))
-    ears, quads = (np.bincount(around.ravel(), np.repeat(each, 4), count) for each in counted)
+    quad_values = within, np.ones(len(around))
+    ears, quads = (np.bincount(around.ravel(), np.repeat(values, 4), count) for values in quad_values)
     return np.asarray(ears / np.maximum(quads, 1.0) - 0.5)
 
 
@@ -152,7 +152,7 @@ _LABEL_CACHE: dict[bytes, MeshLabels] = {}
 
 
 class MeshLabels(NamedTuple):
-    """Label classes of a mesh with sub-triangle borders.
+    """Label classes of a mesh, whose borders may cross triangles.
 
     base : (t,) class of each triangle where no field is positive
     classes : (k,) class of each field; the first positive field at a surface point determines its class
@@ -186,8 +186,8 @@ def _build_labels(head: Head) -> MeshLabels:
     ):
         material_classes[material] = class_number(f"{side}_eye")
     fields = _iris_fields(head.template or head) | _skin_fields(head)
-    none = np.zeros((int(head.mesh.point.max()) + 1, 0))
-    points = np.stack(list(fields.values()), axis=1) if fields else none
+    no_fields = np.zeros((int(head.mesh.point.max()) + 1, 0))
+    points = np.stack(list(fields.values()), axis=1) if fields else no_fields
     classes = np.array([class_number(name) for name in fields], np.uint8)
     values = np.ascontiguousarray(points[head.mesh.point], np.float32)
     return MeshLabels(material_classes[head.mesh.material], classes, values)
@@ -232,9 +232,9 @@ def _skin_fields(head: Head) -> dict[str, Doubles]:
         return {}
     if head.strands is None:
         fields = {name: values for name, values in fields.items() if not name.endswith("brow")}
-    kinds = np.array([material.kind == "skin" for material in mesh.materials])
+    is_skin = np.array([material.kind == "skin" for material in mesh.materials])
     outside = np.ones(count, bool)
-    outside[mesh.point[mesh.triangles[kinds[mesh.material]]]] = False
+    outside[mesh.point[mesh.triangles[is_skin[mesh.material]]]] = False
     return {name: np.where(outside, _OUTSIDE_FIELD_MM, values) for name, values in fields.items()}
 
 

@@ -89,12 +89,12 @@ def _landmark_rows(name: str) -> Rows:
 def _human_landmarks(head: Head, rows: Rows) -> LandmarkPoints:
     quad = np.array([int(row["quad"]) for row in rows], np.int32)
     position = np.array([[float(row["along"]), float(row["across"])] for row in rows], np.float32)
-    fine = refine_roots(average_head().mesh, Roots(quad, position), head.levels)
-    point, weight = quad_corners(head.mesh, fine.quad), quad_weights(fine.position).astype(np.float32)
+    refined = refine_roots(average_head().mesh, Roots(quad, position), head.levels)
+    point, weight = quad_corners(head.mesh, refined.quad), quad_weights(refined.position).astype(np.float32)
     material = np.full(len(rows), -1, np.int32)
     for k in np.flatnonzero([float(row["sunk"]) > 0 for row in rows]):
         assert head.eyes is not None
-        eye_material = head.mesh.material[head.mesh.quads[fine.quad[k], 0]]
+        eye_material = head.mesh.material[head.mesh.quads[refined.quad[k], 0]]
         back = head.eyes.back[head.eyes.material == eye_material][0]
         sunk, apex = float(rows[k]["sunk"]), point[k, weight[k].argmax()]
         point[k], weight[k], material[k] = (apex, back, back, back), (1 - sunk, sunk, 0, 0), eye_material

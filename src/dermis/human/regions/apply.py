@@ -32,7 +32,8 @@ MIN_MAP_SIDE = 1024
 REGION_BLUR_MM = 2.5
 """Standard deviation of the blur of borders between regions [mm]."""
 _DETAIL_MM = 6.0  # finer detail is taken from the head's own maps, the rest from the table
-_MIN_LOCAL_MEAN, _MAX_DETAIL = 0.4, 3.0  # relative to the mean of the map, and to its local mean
+_MIN_LOCAL_MEAN = 0.4  # smallest local mean of a map, relative to its mean
+_MAX_DETAIL = 3.0  # largest value of a map, relative to its local mean
 _GRID_CELL_MM = 2.0
 _MAX_GRID_CELLS = 256  # along the longest side of the grid
 _BLUR_TRUNCATION = 3  # radius of the blur kernel in standard deviations
@@ -92,25 +93,25 @@ def with_regions(head: Head, table: RegionTable | str | Path = DEFAULT_TABLE) ->
 
 
 def _region_map(
-    atlas: Atlas, points: NDArray[np.float64], level: NDArray[np.float64], own_maps: Floats | None
+    atlas: Atlas, points: NDArray[np.float64], level: NDArray[np.float64], own_map: Floats | None
 ) -> Floats:
     """Return a map (h, w) of a regional quantity, multiplied by the fine detail of the head's own map.
 
     points : (n, 3) positions of the covered texels of the atlas [mm]
     level : (n,) quantity at these texels, smoothed across region borders
-    own_maps : (h, w) existing map of the quantity, or None
+    own_map : (h, w) existing map of the quantity, or None
     """
-    if own_maps is None:
+    if own_map is None:
         return _texel_image(atlas, level)
     y, x = np.nonzero(atlas.coverage)
-    height, width = own_maps.shape
-    values = own_maps[y * height // MIN_MAP_SIDE, x * width // MIN_MAP_SIDE].astype(np.float64)
+    height, width = own_map.shape
+    values = own_map[y * height // MIN_MAP_SIDE, x * width // MIN_MAP_SIDE].astype(np.float64)
     local_mean = gaussian_mean(points, values[:, None], _DETAIL_MM)[:, 0]
     local_mean = np.maximum(local_mean, _MIN_LOCAL_MEAN * values.mean())
     local_mean = np.maximum(local_mean, np.finfo(np.float32).eps)
     shape = max(height, MIN_MAP_SIDE), max(width, MIN_MAP_SIDE)
     detail = np.minimum(
-        _resize_map(own_maps, shape) / _resize_map(_texel_image(atlas, local_mean), shape), _MAX_DETAIL
+        _resize_map(own_map, shape) / _resize_map(_texel_image(atlas, local_mean), shape), _MAX_DETAIL
     )
     return np.asarray(detail * _resize_map(_texel_image(atlas, level), shape))
 
@@ -165,7 +166,7 @@ def with_default_regions(head: Head) -> Head:
     """Return a head with roughness and specular maps from the package's region table.
 
     A head with unknown regions or with a roughness map is returned unchanged, and an existing specular map is
-    kept. The specular map is relative: the skin's rho_s is its mean.
+    kept. The specular map is relative: the renderer scales it to a mean of the skin's rho_s.
     """
     if head.maps.has_roughness or known_landmarks(head) is None:
         return head
@@ -179,7 +180,7 @@ def with_default_regions(head: Head) -> Head:
 
     try:
         arrays = cached_arrays(sources, f"regions {_CACHE_VERSION} {MIN_MAP_SIDE} {head.name}", missing, make)
-    except DermisError:  # another head with a known name
+    except DermisError:  # a different head with the name of a known one
         return head
     changed: dict[str, Any] = dict(arrays)
     return replace(head, maps=replace(head.maps, **changed))

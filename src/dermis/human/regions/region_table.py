@@ -36,12 +36,13 @@ REGIONS = (
 _NOSE_OUTLINE = np.array(
     [[-49.0, 7.0], [-46, 15], [-41, 19.5], [-35, 19.5], [-29, 17.5], [-20, 12], [-10, 9], [6, 6]]
 )
-"""Height and half width of the nose."""
+"""Heights on the nose, and its half width at each."""
 _NOSE_BASE = np.array([[0.0, -49.0], [7, -48], [12, -45.5], [18, -43]])
-"""Distance from the middle and height of the base of the nose."""
+"""Distances from the middle of the face, and height of the base of the nose at each."""
 _NASOLABIAL_FOLD = np.array([[-68.0, 27.0], [-60, 24.5], [-50, 21.5], [-43, 20]])
-"""Height and distance from the middle of the fold between upper lip and cheek."""
+"""Heights on the fold between upper lip and cheek, and its distance from the middle of the face at each."""
 _CHIN_OUTLINE = np.array([[-110.0, 26.0], [-68, 22.0]])
+"""Heights on the chin, and its half width at each."""
 
 
 _MIN_NOSE_Z, _JAW_Y = -20.0, -108.0

@@ -40,7 +40,7 @@ HAIRLINE_STEP_DEGREES = 2
 """Angle between samples of `hairline_heights` [degrees]."""
 _HAIRLINE_SAMPLES = 180 // HAIRLINE_STEP_DEGREES + 1
 _SAMPLES_PER_SEGMENT = 4
-_CACHE_SIZE = 32  # tables of receding hair
+_CACHE_SIZE = 32  # number of cached tables, one for each recession of the hair
 _CROWN_ZONE = "crown"  # zone where hair thins first
 _TEMPLE_RECESSION_MM, _FOREHEAD_RECESSION_MM = 22.0, 16.0  # maximum recession of the hairline
 _TEMPLE_DEGREES, _TEMPLE_WIDTH_DEGREES, _FOREHEAD_WIDTH_DEGREES = 33.0, 15.0, 38.0  # from the front
@@ -71,7 +71,7 @@ def zone_table(recession: float = 0.0, sites: SiteDifferences | None = None) -> 
     Columns: centre [mm], a zero, inverse radii [1/mm], a zero, and the sixteen `ZONE_AMOUNTS`.
 
     recession : thinning of hair at the crown, 0 to 1, see `SkinLook`
-    sites : differences of pigments between measured sites; none if None
+    sites : differences of pigments between measured sites; None for equal pigments
     """
     rows = read_rows(__package__, "zones")
     for row in rows:
@@ -81,18 +81,18 @@ def zone_table(recession: float = 0.0, sites: SiteDifferences | None = None) -> 
     centres, radii, amounts = (float_columns(rows, names) for names in columns)
     amounts = np.hstack([amounts, np.zeros((len(rows), len(ZONE_AMOUNTS) - len(_TABLE_AMOUNTS)))])
     if sites is not None:
-        columns_of = [ZONE_AMOUNTS.index(name) for name in ("melanin", "blood", "oxygen")]
-        amounts[:, columns_of] += _site_amounts() @ np.vstack([np.zeros(3), sites.array()])
-    none = np.zeros((len(rows), 1))
-    return np.hstack([centres, none, 1.0 / radii, none, amounts]).astype(np.float32)
+        pigment_columns = [ZONE_AMOUNTS.index(name) for name in ("melanin", "blood", "oxygen")]
+        amounts[:, pigment_columns] += _site_amounts() @ np.vstack([np.zeros(3), sites.array()])
+    zero = np.zeros((len(rows), 1))
+    return np.hstack([centres, zero, 1.0 / radii, zero, amounts]).astype(np.float32)
 
 
 @cache
 def _site_amounts() -> NDArray[np.float64]:
-    """Return the amounts (k, 7) by which zones paint a difference of one at each site and none at the others.
+    """Return the amounts (k, 7) of the k zones that paint a difference of 1 at one site and 0 at the others.
 
-    The sites are the cheek and `FACE_SITES`. The zones of a site share its difference; as zones overlap, the
-    shares are scaled so that the sum is exact at the places of the sites.
+    Each column is for one site: the cheek and `FACE_SITES`. The zones of a site share its difference. As
+    zones overlap, the shares are adjusted so that the sum of all zones is exact at the places of the sites.
     """
     zones, names = read_rows(__package__, "zones"), (_REFERENCE_SITE, *FACE_SITES)
     places = {row["site"]: row for row in read_rows(__package__, "sites")}
@@ -143,8 +143,8 @@ def fold_curves() -> Folds:
         knots.append(np.column_stack([curve, np.linspace(0.0, 1.0, len(curve))]))
         dimensions = [float(rows[0][name]) for name in ("width", "young", "old")]
         movement = rows[0]["movement"]
-        number = 1 + MOVEMENTS.index(movement) if movement else 0
-        curves.append(np.array([*_bounding_sphere(curve), *dimensions, number]))
+        movement_code = 1 + MOVEMENTS.index(movement) if movement else 0
+        curves.append(np.array([*_bounding_sphere(curve), *dimensions, movement_code]))
     first = np.cumsum([0, *map(len, knots)]).astype(np.uint32)
     return Folds(np.concatenate(knots).astype(np.float32), np.stack(curves).astype(np.float32), first)
 
@@ -161,7 +161,7 @@ def table_sizes() -> dict[str, int]:
 
 
 def _sample_count(knots: int) -> int:
-    """Return the number of samples of the spline through a number of knots."""
+    """Return the number of samples of a spline with a given number of knots."""
     return _SAMPLES_PER_SEGMENT * (knots - 1) + 1
 
 

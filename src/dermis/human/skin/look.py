@@ -25,20 +25,20 @@ from dermis.optics.pigments.parameters import DEFAULT_SKIN
 FIELD_RANGES: dict[str, tuple[float, float]] = {"seed": (0, 2**32 - 1), "epidermis_mm": (0.01, 0.5)}
 """Ranges of the numeric fields whose range is not 0 to 1."""
 SITES_FIELD = "sites"
-"""Field of `SkinLook` that is no number."""
+"""Name of the only field of `SkinLook` that is not a number."""
 # Artist's values.
 _TYPICAL_FRECKLES = {"african": 0.02, "asian": 0.06, "caucasian": 0.16}
 _TYPICAL_IRIS = {"african": 0.95, "asian": 0.85, "caucasian": 0.4}
-_AGE_SPOTS_FROM = 45.0
-_MAX_AGE_FOLDS = 1.0  # `age` of the look at an age of 90
+_AGE_SPOTS_FROM = 45.0  # age from which there are age spots [years]
+_MAX_AGE_FOLDS = 1.0  # `SkinLook.age` of people of 90 years
 
 
 @dataclass(frozen=True)
 class SkinLook:
     """Pigments and texture of the skin.
 
-    Pigments are those of the cheek; `sites` has the differences elsewhere. Those of `Human` are medians of
-    measured people.
+    The pigments are those of the cheek; `sites` tells how they differ on other parts of the head. `Human`
+    uses the medians of measured people by default.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class SkinLook:
     epidermis_mm : float
         Thickness of the epidermis, 0.01 to 0.5 [mm].
     redness : float
-        Strength of the differences of blood between parts of the face, 0 to 1; 0.5 is typical [-].
+        How much the blood content differs between parts of the face, 0 to 1; 0.5 is typical [-].
     freckles : float
         Density of freckles, 0 to 1 [-].
     moles : float
@@ -77,7 +77,7 @@ class SkinLook:
     seed : int
         Seed of the pattern of spots and lines, 0 to 2**32 - 1.
     sites : SiteDifferences or mapping
-        Differences of the pigments of other sites of the head from the cheek; by default those of measured
+        Differences in pigments between other sites of the head and the cheek; by default those of measured
         people.
 
     Raises
@@ -119,7 +119,7 @@ class SkinLook:
 
 
 def _checked_sites(value: Any) -> SiteDifferences:
-    """Return differences of sites, which a file has as a mapping."""
+    """Return the differences between sites, converted if they are a mapping, as in files of people."""
     known = [one.name for one in fields(SiteDifferences)]
     if isinstance(value, Mapping) and value.keys() <= set(known):
         return SiteDifferences(**value)
@@ -136,7 +136,7 @@ class Demographics(NamedTuple):
     sex : from 0, female, to 1, male [-]
     age : age [years]
     skin_groups : weights of the measured groups that the skin follows, see `measured.group_weights`
-    ita : individual typology angle of the cheek that was asked for, or None [degrees]
+    ita : requested individual typology angle of the cheek, or None [degrees]
     """
 
     african: float
@@ -166,18 +166,18 @@ def typical_skin(demographics: Demographics) -> SkinLook:
 
     Source: [Lu2025] for the pigments.
     """
-    return _look(demographics, *typical_pigments(*_pigment_arguments(demographics)))
+    return _typical_look(demographics, *typical_pigments(*_pigment_arguments(demographics)))
 
 
-def _look(demographics: Demographics, pigments: MeasuredPigments, sites: SiteDifferences) -> SkinLook:
+def _typical_look(demographics: Demographics, pigments: MeasuredPigments, sites: SiteDifferences) -> SkinLook:
     """Return the typical look of a person with given pigments."""
     old = (demographics.age - YOUNG_AGE) / (OLD_AGE - YOUNG_AGE)
-    lines = max(demographics.age - _AGE_SPOTS_FROM, 0.0) / (OLD_AGE - _AGE_SPOTS_FROM)
+    spot_progress = max(demographics.age - _AGE_SPOTS_FROM, 0.0) / (OLD_AGE - _AGE_SPOTS_FROM)
     return SkinLook(
         **pigments._asdict(),
         freckles=demographics.pigmented_mean(_TYPICAL_FRECKLES),
         moles=0.3,
-        spots=0.7 * lines * (0.4 + 0.6 * pigment_ancestry(demographics.skin_groups)[2]),
+        spots=0.7 * spot_progress * (0.4 + 0.6 * pigment_ancestry(demographics.skin_groups)[2]),
         veins=0.2 + 0.5 * old,
         beard=0.45 * max(2.0 * demographics.sex - 1.0, 0.0),
         oil=0.45 - 0.25 * old,
@@ -215,7 +215,7 @@ def sample_skin(
     Source: [Lu2025] for the pigments.
     """
     pigments, sites = sample_pigments(pigment_rng, *_pigment_arguments(demographics))
-    typical = _look(demographics, pigments, sites)
+    typical = _typical_look(demographics, pigments, sites)
     n = rng.normal(size=8)
     freckled = float(rng.beta(0.4, 3.0)) * (1.0 - min(typical.melanin / 0.1, 1.0))
     seed = int(rng.integers(2**31))

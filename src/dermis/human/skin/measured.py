@@ -49,20 +49,22 @@ FACE_SITES: Final = ("cheek_bone", "forehead", "chin", "nose_tip", "ear_lobe", "
 UNIONS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
     {"asian": ("chinese", "japanese", "southeast asian"), "middle eastern": ("iraqi", "arabian")}
 )
-"""Groups that a name stands for together, with equal weights."""
+"""Names that each stand for several groups with equal weights."""
 SKIN_ANCESTRIES: Final = (*GROUPS.values(), *UNIONS)
 """Names of skin ancestries."""
 ITA_RANGE: Final = (-65.0, 70.0)
-"""Range of the individual typology angle that a person can be asked for [degrees]."""
+"""Range of the individual typology angle (ITA) that can be requested for a person [degrees]."""
 _EUROPEAN: Mapping[str, float] = MappingProxyType(
     {"caucasian": 1.0, "iraqi": 0.3, "arabian": 0.3, "south asian": 0.1}
 )
-"""Probability-like weight of fair hair and light eyes by group; an artist's choice but for the first."""
+"""European fraction of a group, which allows fair hair and light eyes; artist's values except the first."""
 _MAX_DOUBLINGS = 6.0
-_MAX_DEVIATION = 0.7  # of the cheek from its median to which differences of sites respond [doublings]
+_MAX_DEVIATION = 0.7  # of the cheek from its median, to which differences between sites adapt [doublings]
 _MELANIN_RANGE, _BLOOD_RANGE = (5e-4, 0.7), (3e-4, 0.08)
 _EPIDERMIS_RANGE_MM = (0.02, 0.2)
-_ITA_STEP, _MAX_SCORE = 1.0, 2.9
+_ITA_STEP = 1.0  # half width of the interval over which the density of an ITA is averaged [degrees]
+_MAX_SCORE = 2.9  # largest absolute normal score of an ITA
+# Numbers of melanin fractions, of bisections between two of them, and of steps that reduce blood:
 _ITA_NODES, _BISECTIONS, _MAX_PALING_STEPS = 257, 40, 15
 Weights = Mapping[str, float]
 """Weights of groups, with a sum of 1."""
@@ -126,12 +128,12 @@ class SiteDifferences:
 
 
 class _Group(NamedTuple):
-    """Distribution of one group.
+    """Distribution of the pigments in one group of people.
 
     quantiles : (4, k) quantiles of the four variables
     ita : (k,) quantiles of the ITA [degrees]
     correlation : (5, 5) correlation of the normal scores of the four variables and of the ITA
-    sites : (12, 3) differences of melanin, blood [doublings] and oxygen from the cheek
+    sites : (12, 3) differences between each site and the cheek: melanin, blood [doublings] and oxygen [-]
     """
 
     quantiles: Doubles
@@ -147,10 +149,11 @@ class MeasuredTable(NamedTuple):
 
     probabilities : (k,) probabilities of the quantiles
     groups : distribution by name of the group
-    sex, age : (4,) difference between male and female, and between old and young
+    sex, age : (4,) differences of the variables: male minus female, and old minus young
     mean_age_term : mean of `age_term` over the ages that `Human.drawn` samples
-    site_slope, site_spread : (12, 2) slope of a site's difference of melanin and blood over the deviation of
-        the cheek from its median, and standard deviation around it [doublings]
+    site_slope : (12, 2) change of a site's difference of melanin and of blood per deviation of the cheek from
+        its median [-]
+    site_spread : (12, 2) standard deviation of these differences around their mean [doublings]
     """
 
     probabilities: Doubles
@@ -162,12 +165,12 @@ class MeasuredTable(NamedTuple):
     site_spread: Doubles
 
     def mixture(self, name: str, weights: Weights) -> Doubles:
-        """Return a field of `_Group` averaged over a mixture of groups."""
+        """Return the field `name` of `_Group`, averaged over a mixture of groups."""
         parts = [weight * np.asarray(getattr(self.groups[one], name)) for one, weight in weights.items()]
         return np.asarray(np.sum(parts, axis=0))
 
     def variables(self, weights: Weights, sex: ArrayLike, age: ArrayLike, scores: Doubles) -> Doubles:
-        """Return the four variables (n, 4) of people of a mixture of groups.
+        """Return the four variables (n, 4) of n people from a mixture of groups.
 
         sex, age : (n,) or one number
         scores : (n, 4) standard normal scores, correlated as in the archive
@@ -247,12 +250,12 @@ def pigment_ancestry(weights: Weights) -> tuple[float, float, float]:
 
 
 def likely_groups(ita: float) -> dict[str, float]:
-    """Return the probability of each group among measured people of an ITA, with an equal prior."""
+    """Return the probability of each group for a person of a given ITA, if all groups are equally common."""
     table = measured_table()
     density = {}
     for name, group in table.groups.items():
         low, high = _ita_scores(np.array([ita - _ITA_STEP, ita + _ITA_STEP]), group.ita)
-        density[name] = float(np.exp(-0.125 * (low + high) ** 2) * (high - low))  # of the normal score
+        density[name] = float(np.exp(-0.125 * (low + high) ** 2) * (high - low))  # normal density times width
     total = sum(density.values())
     return {name: value / total for name, value in density.items()}
 
@@ -260,21 +263,23 @@ def likely_groups(ita: float) -> dict[str, float]:
 def typical_pigments(
     weights: Weights, sex: float, age: float, ita: float | None = None
 ) -> tuple[MeasuredPigments, SiteDifferences]:
-    """Return the median pigments of people of a mixture of groups, sex and age, or of those of an ITA."""
-    return _person(weights, sex, age, ita, np.zeros(4), None)
+    """Return the median pigments of people of a mixture of groups, a sex, an age and, optionally, an ITA."""
+    return _pigments_and_sites(weights, sex, age, ita, np.zeros(4), None)
 
 
 def sample_pigments(
     rng: np.random.Generator, weights: Weights, sex: float, age: float, ita: float | None = None
 ) -> tuple[MeasuredPigments, SiteDifferences]:
-    """Return random pigments of a person of a mixture of groups, with correlations as measured.
+    """Return random pigments of a person from a mixture of groups, with correlations as measured.
 
     The number of random draws does not depend on the arguments.
     """
-    return _person(weights, sex, age, ita, rng.standard_normal(4), rng.standard_normal((len(SITES), 2)))
+    return _pigments_and_sites(
+        weights, sex, age, ita, rng.standard_normal(4), rng.standard_normal((len(SITES), 2))
+    )
 
 
-def _person(
+def _pigments_and_sites(
     weights: Weights,
     sex: float,
     age: float,
@@ -282,6 +287,11 @@ def _person(
     normals: Doubles,
     site_normals: Doubles | None,
 ) -> tuple[MeasuredPigments, SiteDifferences]:
+    """Return the pigments of a person and their differences between sites.
+
+    normals : (4,) independent standard normal numbers, zeros for a typical person
+    site_normals : (12, 2) independent standard normal numbers; None for a typical person
+    """
     table = measured_table()
     correlation = table.mixture("correlation", weights)
     covariance, mean = correlation[:4, :4], np.zeros(4)
@@ -290,7 +300,7 @@ def _person(
         mean, covariance = slope * _ita_score(ita, weights), covariance - np.outer(slope, slope)
     scores = mean + square_root(covariance) @ normals
     variables = table.variables(weights, sex, age, scores[None])
-    pigments = _pigments(variables[0])
+    pigments = _clipped_pigments(variables[0])
     if ita is not None:
         pigments = with_ita(pigments, ita)
         variables[0, 0] = np.log2(pigments.melanin)
@@ -298,7 +308,7 @@ def _person(
     normals_or_zeros = np.zeros((1, len(SITES), 2)) if site_normals is None else site_normals[None]
     middle = variables if not typical or ita is not None else np.tile(_median(weights), (1, 1))
     sites = table.site_variables(weights, middle, normals_or_zeros)[0]
-    oxygen = variables[0, 2] + sites[:, 2]  # may be beyond 1, where skin is redder than the model's
+    oxygen = variables[0, 2] + sites[:, 2]  # may exceed 1, where skin is redder than the model allows
     sites[:, 2] = np.clip(oxygen, 0.0, 1.0) - pigments.oxygen
     names = [name.replace(" ", "_") for name in SITES]
     rows = {name: tuple(np.round(sites[names.index(name)], 4).tolist()) for name in FACE_SITES}
@@ -310,7 +320,7 @@ def _median(weights: Weights) -> Doubles:
     return table.mixture("quantiles", weights)[:, len(table.probabilities) // 2]
 
 
-def _pigments(values: Doubles) -> MeasuredPigments:
+def _clipped_pigments(values: Doubles) -> MeasuredPigments:
     melanin, blood, epidermis = np.exp2(values[[0, 1, 3]])
     return MeasuredPigments(
         float(np.clip(melanin, *_MELANIN_RANGE)),
@@ -323,9 +333,9 @@ def _pigments(values: Doubles) -> MeasuredPigments:
 def with_ita(
     pigments: MeasuredPigments, ita: float, eumelanin: float = DEFAULT_SKIN.eumelanin
 ) -> MeasuredPigments:
-    """Return pigments with the melanin that gives a skin an ITA.
+    """Return pigments with the melanin fraction that results in a given ITA.
 
-    Where no melanin does, as for very light skin full of blood, there is also less blood with more oxygen.
+    If none does, as for very light skin with much blood, blood is also reduced and its oxygenation raised.
     """
     for _ in range(_MAX_PALING_STEPS):
         table = skin_colour_table(eumelanin, pigments.oxygen, pigments.epidermis_mm)
@@ -352,7 +362,7 @@ def _ita_score(ita: float, weights: Weights) -> float:
 
 
 def _ita_scores(ita: Doubles, quantiles: Doubles) -> Doubles:
-    """Return standard normal scores of ITAs by interpolation of quantiles, beyond them in proportion."""
+    """Return standard normal scores of ITAs, interpolated and linearly extrapolated from quantiles."""
     from scipy.special import ndtri
 
     nodes = ndtri(measured_table().probabilities)

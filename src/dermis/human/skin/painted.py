@@ -14,10 +14,10 @@ from dermis.human.skin.look import SkinLook
 from dermis.mesh.maps import Maps
 
 LIP_THICKNESS_RATIO = 0.6
-"""Thickness of the epidermis of the lips over that of the cheek [-]."""
+"""Thickness of the epidermis of the lips relative to the cheek [-]."""
 _MIN_OXYGEN_RANGE = 1e-3
 MIN_SIDE, MAX_SIDE = 256, 4096
-"""Sides of painted maps [texels]."""
+"""Smallest and largest side of painted maps [texels]."""
 
 
 def mean_colour(look: SkinLook) -> NDArray[np.float64]:
@@ -37,9 +37,9 @@ def oxygen_range(look: SkinLook) -> tuple[float, float]:
 
 
 def painted_colour_tables(look: SkinLook) -> NDArray[np.float32]:
-    """Return colour tables (3, n, n, 3) by pigment fractions, as in `ColourTable`.
+    """Return three colour tables (3, n, n, 3) by pigment fractions, as in `ColourTable`.
 
-    They are those of skin at both ends of `oxygen_range`, and of lips.
+    The first two are for skin at the two ends of `oxygen_range`, the third is for lips.
     """
     lips = look.oxygen, LIP_THICKNESS_RATIO * look.epidermis_mm
     kinds = *((oxygen, look.epidermis_mm) for oxygen in oxygen_range(look)), lips
@@ -58,10 +58,10 @@ class PaintedMaps(Maps):
 
     @property
     def has_roughness(self) -> bool:
-        """Return True, as a roughness map is painted if none is given."""
+        """Return whether there is a roughness map; True, because one is painted if none is given."""
         return True
 
     @cached_property
     def mean_colour(self) -> NDArray[np.float64] | None:
-        """Return the mean colour (3,) of the colour map, or of the look without one, linear Rec. 709 [-]."""
+        """Return the mean colour (3,) of the colour map, or else of the look, linear Rec. 709 [-]."""
         return super().mean_colour if self.colour is not None else mean_colour(self.look)

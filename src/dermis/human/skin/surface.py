@@ -53,8 +53,8 @@ def lid_rings() -> NDArray[np.int64]:
 
 def _load_array(name: str) -> Floats:
     file = resources.files("dermis.human").joinpath("data", "average.npz")
-    with resources.as_file(file) as path, np.load(path) as vertices_mm:
-        return np.asarray(vertices_mm[name].astype(np.float32) * np.float32(_STORED_UNIT_MM))
+    with resources.as_file(file) as path, np.load(path) as stored:
+        return np.asarray(stored[name].astype(np.float32) * np.float32(_STORED_UNIT_MM))
 
 
 _SURFACE_CACHE: dict[bytes, PaintedSurface] = {}
@@ -81,7 +81,7 @@ class PaintedSurface:
 
 
 def painted_surface(mesh: Mesh, stencils: Stencils | None) -> PaintedSurface:
-    """Return the skin triangles of a human's mesh, cached by topology, as they do not depend on the person.
+    """Return the skin triangles of a human's mesh; they are equal for all people and cached by topology.
 
     stencils : subdivision stencils that give the points of the mesh; None without subdivision
     """
@@ -96,15 +96,14 @@ def painted_surface(mesh: Mesh, stencils: Stencils | None) -> PaintedSurface:
 
 def _build_surface(mesh: Mesh, stencils: Stencils | None) -> PaintedSurface:
     points_mm, fields = average_surface()
-    both = np.hstack([points_mm, fields]).astype(np.float64)
-    others = np.zeros(
-        (int(mesh.point.max() if stencils is None else stencils.point.max()) + 1, both.shape[1])
-    )
-    control = np.concatenate([both, others[len(both) :]])  # zeros for eyeballs, which are not painted
+    skin = np.hstack([points_mm, fields]).astype(np.float64)
+    count = int(mesh.point.max() if stencils is None else stencils.point.max()) + 1
+    eyeballs = np.zeros((count, skin.shape[1]))[len(skin) :]  # zeros, as eyeballs are not painted
+    control = np.concatenate([skin, eyeballs])
     points = control if stencils is None else stencils.points(control)
     vertices_mm = points[mesh.point].astype(np.float32)
-    kinds = np.array([material.kind == "skin" for material in mesh.materials])
-    triangles = mesh.triangles[kinds[mesh.material]]
+    is_skin = np.array([material.kind == "skin" for material in mesh.materials])
+    triangles = mesh.triangles[is_skin[mesh.material]]
     normals = vertex_normals(vertices_mm[:, :3], mesh.point, mesh.triangles)
     density = _log_mm_per_uv(mesh.uv, vertices_mm[:, :3], triangles)
     vertices = np.column_stack([mesh.uv, vertices_mm[:, :3], normals, vertices_mm[:, 3:], density]).astype(

@@ -13,16 +13,19 @@ from numpy.typing import NDArray
 
 NoiseSpace = Literal["body", "lip", "level", "ring"]
 NOISE_SPACES: tuple[NoiseSpace, ...] = ("body", "lip", "level", "ring")
-"""Domains of noise: position on the body; position with x warped along the creases of the lips; with y warped
-along the lines of the forehead; distance from the eye with x and y."""
+"""Coordinates in which noise is evaluated.
+
+"body" is the position on the body; "lip" is this position with x warped along the creases of the lips,
+"level" with y warped along the lines of the forehead; "ring" is the distance from the eye, and x and y.
+"""
 NoiseRegion = Literal["all", "lips", "lines", "furrows", "folds", "veins", "hairline"]
 NOISE_REGIONS: tuple[NoiseRegion, ...] = ("all", "lips", "lines", "furrows", "folds", "veins", "hairline")
-"""Regions of noise: everywhere, lips, fine lines, lines and folds, folds, veins, hairline."""
+"""Parts of the skin with noise: "all" is everywhere, "lines" are fine lines, "furrows" lines and folds."""
 _OCTAVE_ROTATION = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
 """Rotation between octaves of a fractal, so that their lattices do not align."""
-_OCTAVE_SCALE = 0.49
+_OCTAVE_SCALE = 0.49  # ratio of the feature sizes of consecutive octaves
 ZONE_BORDER_NOISES = 2
-"""Number of the first noises, with a single octave, that warp the borders of zones."""
+"""Number of noises that warp the borders of zones: the first of `NOISES`, with a single octave each."""
 TILE_SIDE = 512
 """Side of the tile of fine relief [texel]."""
 TILE_LENGTH_MM = 32.0

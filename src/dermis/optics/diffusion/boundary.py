@@ -21,8 +21,8 @@ def fresnel(cosine: ArrayLike, eta: float) -> Floats:
     """Return the Fresnel reflectance for unpolarised light at cosines of incidence [-].
 
     cosine : cosine of the angle of incidence, 0 to 1
-    eta : index of refraction behind the surface over that in front of it; less than 1 for light that leaves
-        the medium
+    eta : index of refraction behind the surface, divided by the index in front of it; less than 1 for light
+        that leaves the medium
 
     Source: [Born1999] section 1.5.
     """

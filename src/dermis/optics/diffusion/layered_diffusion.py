@@ -39,7 +39,7 @@ class _Face(NamedTuple):
 class _DownwardTransfer(NamedTuple):
     """Coefficients that yield the fluence at the lower face of a sublayer from the fluence at its upper face.
 
-    All are 0 for a semi-infinite sublayer, the last of a half-space.
+    All are 0 for a semi-infinite sublayer, which can only be the last one.
     """
 
     E: Floats | float = 0.0
@@ -71,7 +71,7 @@ def solve(frequency: ArrayLike, medium: Medium, A: float, source: Source = "beam
 def solve_reflectance(frequency: ArrayLike, medium: Medium, A: float, source: Source = "beam") -> Floats:
     """Return the Hankel transform of R(r) of a layered medium, (n, c) [-].
 
-    R(r) is per power that enters. This is faster than `solve`, which also returns that of T(r).
+    R(r) is per power that enters. This is faster than `solve`, which also computes T(r).
 
     frequency : (n,) frequencies s > 0 [1/mm]
     A : boundary mismatch with air [-]
@@ -81,9 +81,9 @@ def solve_reflectance(frequency: ArrayLike, medium: Medium, A: float, source: So
 
 
 def solve_two_layers(upper: Layer, thickness_mm: ArrayLike, lower: Layer, A: float) -> Floats:
-    """Return the total reflectance of upper layers on half-spaces per power that enters (n, c) [-].
+    """Return the total reflectance of n upper layers on half-spaces, per power that enters, (n, c) [-].
 
-    upper, lower : layers with coefficients (n, c), or (c,) where all stacks have the same
+    upper, lower : layers with coefficients (n, c), or (c,) if these are the same for all n skins
     thickness_mm : (n, 1) thicknesses of the upper layers, or one number [mm]
     A : boundary mismatch with air [-]
     """
@@ -145,7 +145,7 @@ def _propagate_up(s: Floats, sublayer: _Sublayer, below: _Face) -> tuple[_Face, 
     D, sigma_t = layer.D, layer.sigma_t_prime
     q = np.sqrt(layer.sigma_tr**2 + s**2)
     source = layer.sigma_s_prime * sublayer.beam / D
-    slope = source / (sigma_t + q)  # of the particular solution that is 0 at the upper face
+    slope = source / (sigma_t + q)  # slope of the particular solution that is 0 at the upper face
     if np.all(np.isinf(d)):
         return _Face(D * q, D * slope), _DownwardTransfer()
     E = np.exp(-q * d)

@@ -39,7 +39,7 @@ MODEL_SOURCES: dict[DiffusionModel, tuple[str, ...]] = {
     "layered-point": ("Kienle1998", "Haskell1994"),
 }
 _MIN_ACCURATE_ALBEDO = 0.9  # reduced albedo below which the error of the dipole exceeds 10 %
-_NOTABLE_NEGATIVE = 0.005  # negative light over the total reflectance, above which a warning is given
+_NOTABLE_NEGATIVE = 0.005  # ratio of negative light to total reflectance above which a warning is given
 
 
 def diffusion_profile(
@@ -77,7 +77,7 @@ def diffusion_profile(
 def diffusion_rings(
     medium: Medium, model: DiffusionModel = "layered", clamp: Clamp = "layer", rgb: Floats | None = None
 ) -> RingTarget:
-    """Return only the ring energies that `diffusion_profile` computes, as a target for fits of many media."""
+    """Return only the ring energies that `diffusion_profile` computes, to fit many media faster."""
     grid, values, total = _sampled_profile(medium, model, clamp, rgb)
     edges = ring_edges()
     return RingTarget(edges, np.diff(enclosed_energy(edges, grid, values), axis=0), total)
@@ -154,9 +154,9 @@ def _medium_warnings(medium: Medium, model: DiffusionModel, clamp: Clamp) -> lis
 
 
 def _first_event_albedo(medium: Medium) -> Floats:
-    """Return the probability that a photon's event in the first mean free path is scattering, (c,) [-].
+    """Return the fraction of events in the first mean free path below the surface that scatter, (c,) [-].
 
-    The alternative is absorption.
+    The other events absorb.
     """
     depth, scattered = np.zeros(medium.channels), np.zeros(medium.channels)
     for layer in medium.layers:

@@ -12,7 +12,7 @@ from dermis.optics.fits.targets import RingTarget, ring_error
 from dermis.optics.media import Floats
 
 _MEDIAN_RADIUS_FACTOR = 1.58  # s times the radius within which half of the light leaves
-_UNITY_FRACTION = 0.997
+_UNITY_FRACTION = 0.997  # fraction of the light within the radius that Unity displays
 UNREAL_FACTOR = 0.6
 _UNREAL_MIN_DISTANCE_CM = 0.1
 
@@ -124,10 +124,11 @@ def _fit_shape(target: RingTarget) -> float:
 class UnityParameters:
     """Diffusion profile settings of Unity's HDRP at world scale 1.
 
-    scattering_colour : scattering distance 1 / s of each channel over the largest of them, linear Rec. 709
-        [-]
+    scattering_colour : scattering distance 1 / s of each channel, divided by the largest of them, linear
+        Rec. 709 [-]
     multiplier_mm : largest scattering distance 1 / s [mm]
-    max_radius_mm : radius with 99.7 % of the light of the widest channel, which the editor displays [mm]
+    max_radius_mm : radius within which 99.7 % of the light of the widest channel leaves; displayed in the
+        editor [mm]
     """
 
     scattering_colour: tuple[float, ...]

@@ -148,7 +148,7 @@ def _with_energy_equation(target: FitTarget) -> tuple[DesignFunction, Floats]:
 def _variances_of_fit(initial: GaussianSum | None, channel: int | None, terms: int) -> Floats | None:
     """Return the start variances from a similar fit, or None if it has another number of Gaussians.
 
-    channel : index of the channel whose Gaussians are used; None for those of all channels
+    channel : index of the channel whose Gaussians are used; None to use the Gaussians of all channels
     terms : number of Gaussians of the new fit
     """
     if initial is None:
@@ -225,6 +225,6 @@ def _hashable_sum(profile: GaussianSum) -> _HashableSum:
 
 
 def _combined_ring_target(profiles: Sequence[GaussianSum]) -> RingTarget:
-    """Return ring energies of several profiles as one target, whose channels are those of all profiles."""
+    """Return ring energies of several profiles as one target, which has the channels of all profiles."""
     within = np.hstack([one.energy_within(_RING_EDGES_MM) for one in profiles])
     return RingTarget(_RING_EDGES_MM, np.diff(within, axis=0), np.hstack([one.albedo for one in profiles]))

@@ -15,7 +15,7 @@ SECTOR_COUNT = 16
 """Number of equal sectors of a quarter circle into which each ring is divided."""
 
 _QUADRATURE_NODES = 8
-_START_FRACTIONS = ((0.3, 0.9), (0.1, 0.6))  # fractions of the light within both Gaussians of a start
+_START_FRACTIONS = ((0.3, 0.9), (0.1, 0.6))  # light within the radii that set the two variances of a start
 
 
 @dataclass(frozen=True)

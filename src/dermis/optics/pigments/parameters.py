@@ -30,7 +30,7 @@ class SkinParameters:
     oxygen : fraction of oxygenated haemoglobin, 0 to 1 [-]
     epidermis_mm : thickness of the epidermis; measured values are 0.05 to 0.1 [mm]
     epidermal_blood : fraction of the epidermal volume that is blood, in "donner2008" only, 0 to 1 [-]
-    baseline : absorption of tissue without blood and melanin over that of [Jacques1998], 0 to 1 [-]
+    baseline : absorption of tissue without blood and melanin, relative to [Jacques1998], 0 to 1 [-]
     oiliness : specular strength rho_s of the surface, 0 to 1; it does not affect light below the surface [-]
 
     The defaults of baseline, epidermis_mm and oxygen fit the spectra of measured people best, see

@@ -1,4 +1,4 @@
-"""Distribution of the pigments of people's skins, as a mixture of normal distributions without groups."""
+"""Distribution of the pigments of people's skins: one mixture of normal distributions for all people."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from dermis.optics.media import Floats
 
 PRIOR_NAMES = ("melanin", "blood", "oxygen", "epidermis_mm")
 """Parameters of the prior; all but oxygen are distributed by their logarithms."""
-_LINEAR = PRIOR_NAMES.index("oxygen")
+_OXYGEN_INDEX = PRIOR_NAMES.index("oxygen")
 _SMALLEST_FRACTION = 1e-4
 _COVARIANCE = [f"{a}_{b}" for i, a in enumerate(PRIOR_NAMES) for b in PRIOR_NAMES[: i + 1]]
 PRIOR_COLUMNS = ("weight", *PRIOR_NAMES, *_COVARIANCE)
@@ -21,7 +21,9 @@ PRIOR_COLUMNS = ("weight", *PRIOR_NAMES, *_COVARIANCE)
 
 @dataclass(frozen=True, eq=False)
 class SkinPrior:
-    """Mixture of k normal distributions of `PRIOR_NAMES`, which are logarithms except for oxygen.
+    """Mixture of k normal distributions of the logarithms of the parameters `PRIOR_NAMES`.
+
+    Oxygen is distributed by its value, not by its logarithm.
 
     weight : (k,) weights, with a sum of 1
     mean : (k, 4) means
@@ -33,7 +35,7 @@ class SkinPrior:
     covariance: Floats
 
     def moments(self, name: str) -> tuple[float, float]:
-        """Return mean and standard deviation of one parameter; of its logarithm, except for oxygen."""
+        """Return mean and standard deviation of the logarithm of a parameter, or of oxygen itself."""
         i = PRIOR_NAMES.index(name)
         mean = float(self.weight @ self.mean[:, i])
         second = float(self.weight @ (self.covariance[:, i, i] + self.mean[:, i] ** 2))
@@ -54,7 +56,7 @@ class SkinPrior:
         return SkinPrior(weights / weights.sum(), np.array(mean), np.array(covariance))
 
     def sample(self, count: int, seed: int = 0) -> dict[str, Floats]:
-        """Return `count` skins as values (count,) by name; oxygen is clipped to 0 to 1."""
+        """Return random parameters (count,) of skins, by name; oxygen is clipped to 0 to 1."""
         rng = np.random.default_rng(seed)
         component = rng.choice(len(self.weight), size=count, p=self.weight)
         values, vectors = np.linalg.eigh(self.covariance)
@@ -62,15 +64,15 @@ class SkinPrior:
         points = self.mean[component] + np.einsum(
             "nij,nj->ni", roots[component], rng.standard_normal((count, len(PRIOR_NAMES)))
         )
-        columns = {name: np.exp(points[:, i]) for i, name in enumerate(PRIOR_NAMES) if i != _LINEAR}
-        return columns | {"oxygen": np.clip(points[:, _LINEAR], 0.0, 1.0)}
+        columns = {name: np.exp(points[:, i]) for i, name in enumerate(PRIOR_NAMES) if i != _OXYGEN_INDEX}
+        return columns | {"oxygen": np.clip(points[:, _OXYGEN_INDEX], 0.0, 1.0)}
 
 
 @cache
 def skin_prior() -> SkinPrior:
-    """Return the distribution of the archive's people over all groups and sites of living skin.
+    """Return the distribution of people's pigments, over all groups and sites of the archive.
 
-    Source: [Lu2025], inverted by the package's model.
+    Source: [Lu2025], whose spectra are converted to pigments by the package's model.
     """
     rows = read_rows("dermis.optics", "data/skin_priors")
     count = len(PRIOR_NAMES)
@@ -83,7 +85,7 @@ def skin_prior() -> SkinPrior:
 
 
 def prior_points(values: dict[str, Floats]) -> Floats:
-    """Return parameters (n,) by name as points (n, 4) of the space of the prior."""
+    """Convert parameters (n,) by name to points (n, 4) in the coordinates of `SkinPrior`."""
     columns = [np.log(np.maximum(values[name], _SMALLEST_FRACTION)) for name in PRIOR_NAMES]
-    columns[_LINEAR] = values["oxygen"]
+    columns[_OXYGEN_INDEX] = values["oxygen"]
     return np.stack(columns, axis=-1)

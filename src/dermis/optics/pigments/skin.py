@@ -23,7 +23,7 @@ from dermis.optics.pigments.spectra import (
 )
 
 LEAKED_MELANIN: Final = 0.175
-"""Absorption of the melanin sheet over that of all melanin in the epidermis, after [Donner2008] [-]."""
+"""Ratio of the absorption of the melanin sheet to that of all epidermal melanin, after [Donner2008] [-]."""
 
 _MELANIN_SHEET_MM = 0.001
 _STRATUM_CORNEUM_MM, _PAPILLARY_DERMIS_MM = 0.01, 0.2
@@ -102,7 +102,7 @@ def _biospec(p: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats) ->
 def _epidermis(
     p: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats, blood_fraction: float = 0.0
 ) -> Layer:
-    """Return the epidermis, whose volume is melanosomes, a fraction of blood, and bloodless tissue."""
+    """Return the epidermis, a mixture of melanosomes, a given fraction of blood, and bloodless tissue."""
     sigma_a = _epidermal_absorption(p, p.melanin, wavelength_nm, blood_fraction)
     return Layer(sigma_a, sigma_s_prime, p.epidermis_mm, "epidermis")
 
@@ -116,7 +116,7 @@ def _epidermal_absorption(
 
 
 def _dermis(p: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats, name: str = "dermis") -> Layer:
-    """Return a semi-infinite dermis, whose volume is blood and bloodless tissue."""
+    """Return a semi-infinite dermis, a mixture of blood and bloodless tissue."""
     sigma_a = _dermal_absorption(p, p.blood, wavelength_nm)
     return Layer(sigma_a, DERMIS_SCATTERING_RATIO * sigma_s_prime, name=name)
 

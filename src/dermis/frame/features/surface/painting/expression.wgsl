@@ -1,18 +1,18 @@
 // Relief and colour of a face with an expression: folds deepen, and the blood content changes.
 
 struct Expression {
-    folding: array<vec4f, 2>, // amount of each movement; the last component is the flush
+    folding: array<vec4f, 2>, // amounts of the movements that deepen folds, and last of the flush
     pressed: f32, // amount by which blood is pressed out of the lips
     side: u32, // of the maps [texels]
 }
 
-// Factors of the skin colour at a full flush, and with the blood pressed out: artistic values.
+// Factors by which a full flush, and a full loss of blood, multiply the skin colour: artistic values.
 const FLUSH: vec3f = vec3f(0.97, 0.80, 0.82);
 const PALE: vec3f = vec3f(1.08, 1.22, 1.20);
 
 @group(0) @binding(0) var<uniform> expression: Expression;
 @group(0) @binding(1) var colour_at_rest: texture_2d<f32>;
-@group(0) @binding(2) var expression_deltas: texture_2d_array<f32>; // height that full movements add [mm]; gain or loss of blood
+@group(0) @binding(2) var expression_deltas: texture_2d_array<f32>; // heights that full movements add [mm], and last the gain or loss of blood
 @group(0) @binding(3) var<storage, read> heights_at_rest: array<f32>; // with a border of one texel [mm]
 @group(0) @binding(4) var<storage, read_write> heights: array<f32>;
 @group(0) @binding(5) var colour: texture_storage_2d<rgba16float, write>;

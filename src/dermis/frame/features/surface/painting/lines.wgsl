@@ -9,7 +9,7 @@ const LINE_MM: f32 = 0.07;
 const CREASE_MM: f32 = 0.16;
 const MOLE_MM: f32 = 0.18;
 
-// Depth of a groove along the zeros of a noise, limited to the resolution of texels.
+// Depth of a groove along the zeros of a noise n, made wider and shallower where texels do not resolve it.
 fn groove(n: f32, sharpness: f32, texel_mm: f32, blob_mm: f32) -> f32 {
     let finest = min(sharpness, 0.45 * blob_mm / texel_mm);
     let side = max(1.0 - abs(n) * finest, 0.0);
@@ -45,7 +45,7 @@ fn fold_height(spot: Spot) -> f32 {
     );
     let p = spot.left + FOLD_WANDER_MM * bend;
     var k = 0u;
-    loop { // over the folds that reach this texel, as in make_noise
+    loop { // over the folds that reach this texel; nested loops as in make_noise
         loop {
             if (k >= FOLDS) {
                 break;

@@ -18,7 +18,7 @@ fn fractions(words: vec3u) -> vec3f {
     return vec3f(words >> vec3u(8u)) * (1.0 / 16777216.0);
 }
 
-const MAX_NOISE: f32 = 2.1; // bound of all noise below
+const MAX_NOISE: f32 = 2.1; // bound of the magnitude of gradient_noise
 
 // Smooth noise of about -1 to 1 with features of one unit. Source: [Perlin2002], with gradients of any length.
 fn gradient_noise(position: vec3f, seed: u32) -> f32 {
@@ -42,12 +42,12 @@ fn visible(blob_mm: f32, texel_mm: f32) -> f32 {
 
 struct Dots {
     spacing_mm: f32,
-    smallest: f32, // radius, relative to the spacing
+    smallest: f32, // smallest and largest radius, relative to the spacing
     largest: f32,
     ragged_mm: f32,
 }
 
-// Round soft dots with 1 at their centres; fainter for centres off the surface. Source: [Worley1996] for points in the cells
+// Sum of round soft dots, each 1 at its centre and fainter if the centre is off the surface. Source: [Worley1996] for points in the cells
 // of a lattice.
 // density : fraction of the dots that is visible, some of them faintly
 fn dots(position_mm: vec3f, normal: vec3f, kind: Dots, density: f32, texel_mm: f32, seed: u32) -> f32 {

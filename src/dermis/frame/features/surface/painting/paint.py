@@ -63,7 +63,7 @@ _PADDING = (0, 0), (0, 2)  # padding from two to four columns
 _CACHE_FOLDER = "painted"
 _WORD_BYTES = 4
 _MAP_NAMES = ("colour", "specular", "roughness")
-_FOLDING_FLOATS = FOLD_MOVEMENTS + 1  # floats of `folding` in the shader record; the last is the flush
+_FOLDING_VALUE_COUNT = FOLD_MOVEMENTS + 1  # numbers in `folding` of the shader: fold movements and flush
 
 
 def painting_lists() -> Mapping[str, Callable[[], Sequence[ShaderListMember]]]:
@@ -155,7 +155,7 @@ class RestMaps(NamedTuple):
 
     colour, specular, roughness : textures with views of their mip levels
     heights : buffer of heights with a border of one texel [mm]
-    deltas : texture of the changes by expressions, None unless requested
+    deltas : texture of the changes by expressions, None if they were not requested
     """
 
     colour: map_mips.MippedTexture
@@ -166,7 +166,7 @@ class RestMaps(NamedTuple):
 
 
 def cached_rest_maps(device: Device, inputs: PaintInputs, side: int, animated: bool = False) -> RestMaps:
-    """Return the painted maps at rest; software adapters, which paint slowly, cache them on disk.
+    """Return the painted maps at rest, cached on disk for software adapters, which paint slowly.
 
     Only the first maps that a device paints are stored, because programs that render many people rarely need
     the same person again.
@@ -196,7 +196,7 @@ def paint_rest_maps(device: Device, inputs: PaintInputs, side: int) -> RestMaps:
     maps = {name: map_mips.empty_map(device, (side, side)) for name in _MAP_NAMES}
     heights = device.storage_buffer(_WORD_BYTES * (side + 2) ** 2)
     deltas = make_texture(device, (side, side), HALF_FORMAT, layers=2)
-    into = {name: one.levels[0] for name, one in maps.items()}
+    outputs = {name: one.levels[0] for name, one in maps.items()}
     tables: Bindings = {
         "tables": inputs.tables,
         "colour_tables": _upload_colour_tables(device, inputs),
@@ -204,7 +204,7 @@ def paint_rest_maps(device: Device, inputs: PaintInputs, side: int) -> RestMaps:
         "expression_deltas": deltas,
     }
     frame = CommandList(device, timed=False)
-    frame.compute("maps", program(device, _SKIN_SHADER), {**surface, **tables, **into}, (side, side))
+    frame.compute("maps", program(device, _SKIN_SHADER), {**surface, **tables, **outputs}, (side, side))
     frame.submit()
     return RestMaps(**maps, heights=heights, deltas=deltas)
 
@@ -278,8 +278,8 @@ def draw_expression(graph: Graph, maps: ExpressionMaps, amounts: NDArray[np.floa
     amounts : (9,) strength of each facial movement, from `human.skin.face.movement_weights` [-]
     """
     shader, side = program(graph.device, "surface/painting/expression.wgsl"), maps.colour.size[0]
-    folding = amounts[:_FOLDING_FLOATS].reshape(2, 4)
-    record = shader.record("Expression", folding=folding, pressed=amounts[_FOLDING_FLOATS], side=side)
+    folding = amounts[:_FOLDING_VALUE_COUNT].reshape(2, 4)
+    record = shader.record("Expression", folding=folding, pressed=amounts[_FOLDING_VALUE_COUNT], side=side)
     graph.compute("maps", shader, maps.bindings | {"expression": record}, (side, side))
     graph.repeat(_fill_maps, maps)
 
@@ -291,7 +291,7 @@ def _fill_maps(graph: Recorder, maps: ExpressionMaps) -> None:
 
 
 class PaintedTextures(NamedTuple):
-    """Painted textures with all mip levels, as skin.wgsl of the picture reads them."""
+    """Painted textures with all mip levels, as the shader that renders skin reads them."""
 
     colour: Texture
     specular: Texture
@@ -341,7 +341,7 @@ def paint_textures(
 
 
 def paint_arrays(device: Device, surface: PaintedSurface, look: SkinLook, side: int) -> Maps:
-    """Paint the maps of a look as arrays, without the relief that is finer than maps.
+    """Paint the maps of a look as arrays, without pores and furrows, which are too fine for maps.
 
     Heights fade to 0 outside the charts.
     """

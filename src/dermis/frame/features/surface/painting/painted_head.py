@@ -49,7 +49,7 @@ def paint_head(device: Device, head: Head, side: int) -> tuple[Head, EyeTextures
 def with_painted_maps(device: Device, head: Head, side: int) -> Head:
     """Return a head whose painted maps are arrays.
 
-    Maps from files and heads without painted maps are unchanged.
+    Maps from files are kept, and heads without painted maps are returned unchanged.
 
     side : side of the painted maps, a power of two from 256 to 4096 [texels]
 
@@ -62,7 +62,7 @@ def with_painted_maps(device: Device, head: Head, side: int) -> Head:
     if not isinstance(maps, PaintedMaps):
         return head
     painted = paint.paint_arrays(device, painted_surface(head.mesh, head.control.stencils), maps.look, side)
-    own = {field.name: getattr(maps, field.name) for field in fields(painted)}
-    if own["normal"] is not None:
+    given_maps = {field.name: getattr(maps, field.name) for field in fields(painted)}
+    if given_maps["normal"] is not None:
         painted = replace(painted, height=None)
-    return replace(head, maps=replace(painted, **{k: v for k, v in own.items() if v is not None}))
+    return replace(head, maps=replace(painted, **{k: v for k, v in given_maps.items() if v is not None}))

@@ -21,7 +21,7 @@ struct Paint {
     beard: f32,
     oil: f32,
     age: f32,
-    low_oxygen: f32, // of the two colour tables of skin
+    low_oxygen: f32, // oxygen saturations of the two colour tables of skin
     high_oxygen: f32,
 }
 

@@ -12,14 +12,14 @@
 @group(0) @binding(14) var<storage, read_write> heights: array<f32>; // with a border of one texel [mm]
 
 // Artistic values.
-const PATCHES: f32 = 0.22; // of melanin [doublings]
-const BLOTCHES: f32 = 0.40; // of blood
+const PATCHES: f32 = 0.22; // amplitude of patches of melanin [doublings]
+const BLOTCHES: f32 = 0.40; // amplitude of blotches of blood [doublings]
 const FRECKLE: f32 = 1.7;
 const AGE_SPOT: f32 = 1.3;
 const MOLE: f32 = 3.4;
-const TAN: f32 = 1.2; // between covered and most exposed skin
-const TYPICAL_TAN: f32 = 0.3; // that measured differences between sites include
-const LIPS: u32 = 2u; // colour table
+const TAN: f32 = 1.2; // melanin of the most exposed skin relative to covered skin [doublings]
+const TYPICAL_TAN: f32 = 0.3; // tan that the measured differences between sites include
+const LIPS: u32 = 2u; // index of the colour table of lips
 const LIP_BLOOD: f32 = 1.9;
 const LIP_MELANIN: f32 = 0.5;
 const MUCOSA_BLOOD: f32 = 3.2;
@@ -27,20 +27,20 @@ const RED_LIDS: f32 = 0.8;
 const RED_SLIT: f32 = 1.0;
 const STUBBLE_COLOUR: vec3f = vec3f(0.095, 0.085, 0.08); // hair below the surface; scattering makes it blueish
 const BEARD_COLOUR: vec3f = vec3f(0.11, 0.10, 0.095);
-const VEIN_COLOUR: vec3f = vec3f(0.80, 0.90, 1.0); // factor
-const STRENGTH: f32 = 0.86; // of the specular reflection, relative to the default
+const VEIN_COLOUR: vec3f = vec3f(0.80, 0.90, 1.0); // factor of the skin colour
+const STRENGTH: f32 = 0.86; // strength of the specular reflection, relative to the default
 const OILY_STRENGTH: f32 = 0.44;
 const ROUGHNESS: f32 = 0.36;
 const OILY_ROUGHNESS: f32 = -0.10;
 const LIP_STRENGTH: f32 = 0.28;
 const LIP_ROUGHNESS: f32 = -0.07;
-const WET_STRENGTH: f32 = 0.55; // of the inside of the mouth and the lids' edges
+const WET_STRENGTH: f32 = 0.55; // added inside the mouth and on the lids' edges
 const WET_ROUGHNESS: f32 = -0.12;
 const INNER_LID: vec3f = vec3f(0.46, 0.19, 0.155); // inner side of the lids, and the caruncle
-const TEARS: f32 = 0.11; // roughness there
-const UNEVEN: f32 = 0.15; // of the oil
+const TEARS: f32 = 0.11; // roughness of the inner side of the lids
+const UNEVEN: f32 = 0.15; // relative variation of gloss by uneven oil
 
-// Colour for fractions of melanin and blood, bilinear in their square roots.
+// Colour for fractions of melanin and blood, interpolated bilinearly in their square roots.
 fn colour_of(table: u32, melanin: f32, blood: f32) -> vec3f {
     let nodes = f32(textureDimensions(colour_tables).x);
     let place = sqrt(saturate(vec2f(blood, melanin))) * (nodes - 1.0);
@@ -103,7 +103,7 @@ fn gloss(lip: f32, wet: f32, hair: f32, tears: f32) -> vec2f {
     return vec2f(clamp(strength, 0.3, 2.2), mix(clamp(m, 0.15, 0.6), TEARS, tears));
 }
 
-// flush, pressed: gain of blood, and loss by pressure [-]
+// flush, pressed : gain of blood by a flush, and its loss by pressure [-]
 fn store_deltas(at: vec2u, share: f32, flush: f32, pressed: f32) {
     textureStore(expression_deltas, at, 0, share * vec4f(deepened[0], deepened[1], deepened[2], deepened[3]));
     textureStore(expression_deltas, at, 1, vec4f(share * vec3f(deepened[4], deepened[5], deepened[6]), flush - pressed));

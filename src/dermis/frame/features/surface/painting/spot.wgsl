@@ -18,9 +18,9 @@
 //#fill const DEGREES: f32 = {degrees};
 
 struct Noise {
-    x: vec4f, // rows of the matrix to the lattice; w of the first: feature size [mm], 0 for noise that is never filtered
-    y: vec4f, // w: strength
-    z: vec4f, // w: seed, as bits
+    x: vec4f, // x, y and z: rows of the matrix to the lattice; x.w: feature size [mm], 0 for noise that is never filtered
+    y: vec4f, // y.w: strength
+    z: vec4f, // z.w: seed, as bits
     which: vec4f, // noise, space and region, as bits
 }
 
@@ -32,7 +32,7 @@ struct Zone {
 
 struct Fold {
     ball: vec4f, // centre and radius [mm]
-    size: vec4f, // width, depth in a young and in an old face [mm], number of the movement
+    size: vec4f, // width, depth in a young and in an old face [mm]; number of the movement that deepens it, or 0
     knots: vec4f, // first and last index
 }
 
@@ -50,15 +50,15 @@ struct Tables {
 // Artistic values.
 const WANDER_MM: f32 = 5.0; // displacement of the borders of zones
 const LIP_WANDER_MM: f32 = 0.45; // displacement of the border of the lips
-const LIP_MM: vec2f = vec2f(-1.1, 1.3); // range around their border over which skin turns into lips
-const HAIRLINE_MM: vec2f = vec2f(-9.0, 16.0); // range around the hairline over which hair becomes dense
+const LIP_MM: vec2f = vec2f(-1.1, 1.3); // distances inside the border of the lips between which skin turns into lips
+const HAIRLINE_MM: vec2f = vec2f(-9.0, 16.0); // heights above the hairline between which hair becomes dense
 const HAIRLINE_WANDER_MM: vec2f = vec2f(5.0, 4.0);
 const LOWEST_HAIR_MM: f32 = -80.0;
 const EYE: vec2f = vec2f(29.5, -0.5); // centre of the lines around an eye [mm]
 const HEAD_AXIS_Z: f32 = -72.0;
 
 const FOLD_WANDER_MM: f32 = 2.4;
-const FOLD_REACH: f32 = 6.0; // in widths of a fold
+const FOLD_REACH: f32 = 6.0; // distance at which a fold ends, in widths of the fold
 
 // Attributes of a texel.
 struct Spot {
@@ -162,7 +162,7 @@ fn make_textures(spot: Spot) {
     make_noise(spot, WANDER_ROWS, NOISE_ROWS, grounds_of(spot));
 }
 
-// Bits of the regions of a texel, extended by the largest displacement of their borders.
+// Bits of the regions that contain a texel; regions are extended by the largest displacement of their borders.
 fn grounds_of(spot: Spot) -> u32 {
     let lips = spot.fields.x > LIP_MM.x - LIP_WANDER_MM * MAX_NOISE;
     let lines = zone_of(ZONE_LEVEL) != 0.0 || zone_of(ZONE_AROUND) != 0.0;
@@ -184,7 +184,7 @@ fn width_of(fold: Fold, texel_mm: f32) -> f32 {
     return sqrt(fold.size.x * fold.size.x + 0.64 * texel_mm * texel_mm);
 }
 
-// Whether a fold can reach a texel with any displacement.
+// Whether a fold can reach a texel, however noise displaces it.
 fn near_folds(spot: Spot) -> bool {
     var near = false;
     for (var k = 0u; k < FOLDS; k++) {
@@ -201,7 +201,7 @@ fn sum_zones(spot: Spot) {
     }
     let p = spot.left + WANDER_MM * vec3f(noise[NOISE_WANDER_X], noise[NOISE_WANDER_Y], 0.0);
     var k = 0u;
-    loop { // over the zones that reach this texel, as in make_noise
+    loop { // over the zones that reach this texel; nested loops as in make_noise
         var away = 0.0;
         loop {
             if (k >= ZONES) {
