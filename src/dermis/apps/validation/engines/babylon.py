@@ -82,7 +82,7 @@ def measured_radiance(page: Page, colour: Floats, metres: float, pixel: float, a
 def predicted_radiance(colour: Floats, metres: float, pixel: float, azimuth: float) -> Floats:
     """Return the radiance (side, side, 3) predicted from the shader's sample positions.
 
-    Like the shader, the prediction rounds the positions to whole pixels.
+    Positions are rounded to whole pixels.
 
     colour : diffusion profile, which Babylon.js expresses as a colour
     metres : metersPerUnit of the scene, in which a unit is a millimetre

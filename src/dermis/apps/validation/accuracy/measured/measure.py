@@ -110,7 +110,7 @@ def measured_page() -> None:
 
 
 def _models(archive: Archive) -> JsonObject:
-    """Return errors of the former and the present default skin, and of two between, also by group and site."""
+    """Return errors of the former and the present default skin, and two between; also by group and site."""
     skins = {
         "former": FORMER_SKIN,
         "half": replace(FORMER_SKIN, baseline=0.5),

@@ -66,8 +66,8 @@ def measured_parts(results: JsonObject) -> dict[str, str]:
         "residual": _residual(results["models"]),
         "groups": "\n\n".join(
             [
-                _cells("group", list(GROUPS.values()), present["groups"]),
-                _cells("site", SITES, present["by_site"]),
+                _category_table("group", list(GROUPS.values()), present["groups"]),
+                _category_table("site", SITES, present["by_site"]),
             ]
         ),
         "sites": _sites(results["sites"]),
@@ -171,7 +171,7 @@ def _residual(models: JsonObject) -> str:
     return _table(heads, rows)
 
 
-def _cells(kind: str, names: Sequence[str], rows: Sequence[Sequence[float]]) -> str:
+def _category_table(kind: str, names: Sequence[str], rows: Sequence[Sequence[float]]) -> str:
     cells = [
         [name, f"{count:.0f}", f"{two:.2f}", f"{three:.2f}", f"{five:.4f}"]
         for name, (count, two, three, five) in zip(names, rows, strict=True)
