@@ -53,7 +53,7 @@ def jittered_grid(count: int, rng: np.random.Generator, spread: float = 0.85) ->
 
 
 def pores(positions: Doubles, rng: np.random.Generator) -> Doubles:
-    """Return the (n,) height of skin with pores: smooth elliptic pits of several sizes and directions [mm]."""
+    """Return the (n,) height of skin with pores, elliptic pits of several sizes and directions [mm]."""
     middle = jittered_grid(PORES_A_SIDE, rng)
     share = rng.random(len(middle)) ** 1.3
     radius, depth = (low + share * (high - low) for low, high in (PORE_MM, PORE_DEPTH_MM))
