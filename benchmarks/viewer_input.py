@@ -82,7 +82,8 @@ class Plan:
 class Motion:
     """One kind of change from frame to frame.
 
-    start : initial state
+    start : function that returns the initial state
+    change : function that returns the next state, given a state and the index of the frame
     """
 
     start: Callable[[ViewerState], ViewerState]

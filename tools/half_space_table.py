@@ -59,7 +59,11 @@ def main(photons: int = PHOTONS) -> None:
 
 
 def trace_photons(eta: float, diffuse: bool, absorbed: Floats, photons: int, events: int) -> Floats:
-    """Return the (k, m) light that leaves through each ring and beyond the last, for each albedo [-]."""
+    """Return the fraction (k, m) of the light that leaves through each ring, for each albedo [-].
+
+    diffuse : whether light enters from all directions
+    events : scattering events after which a path ends
+    """
 
     def batch(seeds: np.random.SeedSequence) -> Floats:
         escaped = np.zeros((len(EDGES), len(absorbed)))

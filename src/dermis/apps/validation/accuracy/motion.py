@@ -125,7 +125,7 @@ def picture_error(
 
 
 def _with_centre(head: Head, shape: Head) -> Head:
-    """Return a head after setting its centre to that of a shape; lights and cameras are relative to it."""
+    """Set the centre of a head to that of a shape, because lights and cameras are relative to the centre."""
     for one in (head, head.bare):
         vars(one)["centre_mm"] = shape.centre_mm
     return head

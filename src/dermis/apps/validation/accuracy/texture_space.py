@@ -128,9 +128,9 @@ def mean_and_percentile(uniform: Floats) -> str:
 
 
 def region_rows(subject: ComparisonSubject, integral: ReferenceImage, light: str) -> list[str]:
-    """Return Markdown rows by region of the face: errors of texture space, and errors that any map has.
+    """Return Markdown rows by region of the face: errors of texture space, and of a perfect map.
 
-    The latter are the errors of the heat equation on the surface, which needs no map.
+    Diffusion on the surface itself, by the heat equation, represents a perfect map.
     """
     landmarks = known_landmarks(subject.scene.head)
     assert landmarks is not None

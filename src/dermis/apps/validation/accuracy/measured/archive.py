@@ -102,7 +102,7 @@ def read_archive() -> Archive:
 
 @cache
 def colour_weights(illuminant: str) -> Floats:
-    """Return weights (3, 31) that convert spectra to linear Rec. 709, with the L*a*b* of the illuminant.
+    """Return weights (3, 31) from spectra to linear Rec. 709 colours with the L*a*b* under an illuminant.
 
     illuminant : key of `ILLUMINANTS`
 

@@ -49,9 +49,9 @@ bilirubin, carotene, methaemoglobin : absorption of the dermis at the peak of ba
     [1/mm]
 """
 _BANDS = {"bilirubin": (460.0, 28.0), "carotene": (480.0, 20.0), "methaemoglobin": (630.0, 18.0)}
-_OUTER_STEPS = 6
-_INNER_STEPS = 4
-_STEP = 0.02
+_OUTER_STEPS = 6  # of the constants
+_INNER_STEPS = 4  # of the unknowns of spectra, in each outer step
+_DERIVATIVE_STEP = 0.02
 _MIN_GAIN = 1e-4
 _NOTABLE_CORRELATION = 0.85
 
@@ -167,8 +167,8 @@ def fit_constants(
         columns = []
         for i in range(len(z)):
             moved = z.copy()
-            moved[i] += _STEP
-            columns.append((solve(moved, fit, _INNER_STEPS)[1] - r) / _STEP)
+            moved[i] += _DERIVATIVE_STEP
+            columns.append((solve(moved, fit, _INNER_STEPS)[1] - r) / _DERIVATIVE_STEP)
         J = np.stack(columns, axis=-1)
         H, g = J.T @ J, -J.T @ r
         for _ in range(5):
