@@ -59,7 +59,7 @@ def main(photons: int = PHOTONS) -> None:
 
 
 def trace_photons(eta: float, diffuse: bool, absorbed: Floats, photons: int, events: int) -> Floats:
-    """Return the fraction (k, m) of the light that leaves through each ring, for each albedo [-].
+    """Return the light (k, m) that leaves through each ring and outside the last, for each albedo [-].
 
     diffuse : whether light enters from all directions
     events : scattering events after which a path ends

@@ -125,7 +125,7 @@ def picture_error(
 
 
 def _with_centre(head: Head, shape: Head) -> Head:
-    """Set the centre of a head to that of a shape, because lights and cameras are relative to the centre."""
+    """Set a head's centre, to which lights and cameras are relative, to that of a shape; return the head."""
     for one in (head, head.bare):
         vars(one)["centre_mm"] = shape.centre_mm
     return head
