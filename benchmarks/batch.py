@@ -43,11 +43,15 @@ from dermis.cli.options import parse_size
 from dermis.frame.renderer import Renderer
 
 OUTPUTS, LANDMARKS = ("depth", "normal", "label"), ("ibug-68",)
-_FROM, _TO = 0.25, 0.9  # measured part of the images, without start and end of the processes
-_STILL = {"light": {"kind": "studio"}, "environment": {"name": "none"}, "background": {"kind": "gradient"}}
+_RATE_BEGIN, _RATE_END = 0.25, 0.9  # part of the images that is timed, without start and end of processes
+_SAME_LIGHT = {
+    "light": {"kind": "studio"},
+    "environment": {"name": "none"},
+    "background": {"kind": "gradient"},
+}
 _DISK_BYTES = 1 << 28
 _MOST_STEPS = 40
-MARKS = 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 20_000
+MEMORY_MARKS = 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 20_000
 """Numbers of images after which the memory of a worker is read."""
 
 
@@ -56,7 +60,7 @@ class Plan:
     """Extent of the measurements.
 
     images : number of images of each run, per worker
-    out : folder on the disk to measure; None for a temporary folder
+    out : folder on the disk to write to and to measure; None for a temporary folder
     """
 
     adapter: str = "auto"
@@ -74,15 +78,17 @@ def spec_for(plan: Plan, images: int, *, moving: bool = False) -> Spec:
     tables |= {"outputs": list(OUTPUTS), "landmarks": list(LANDMARKS)}
     tables["render"] = {**tables["render"], "atlas": plan.atlas, "shadow_size": plan.atlas}
     if moving:
-        tables |= {"images_per_person": images, **_STILL}
+        tables |= {"images_per_person": images, **_SAME_LIGHT}
         tables.pop("correlated", None)
     return parse_spec(tables)
 
 
 @dataclass
-class Clock:
-    """Times at which images were finished, and the memory of the workers.
+class RunRecorder:
+    """Times at which images of a run were finished, and the memory of its workers.
 
+    seen : times [s], each with the number of images finished by then
+    memory : resident memory of the largest worker at the begin and the end of the timed part [byte]
     resident : resident memory of the largest worker, by number of images per worker [byte]
     """
 
@@ -94,34 +100,34 @@ class Clock:
     def record(self, progress: Progress) -> None:
         """Record the progress of a run."""
         self.seen.append((time.monotonic(), progress.images))
-        for mark in MARKS:
+        for mark in MEMORY_MARKS:
             if mark not in self.resident and progress.images >= mark * self.workers:
                 self.resident[mark] = max((_resident(one.pid) for one in active_children()), default=0)
         share = progress.images / progress.total
-        if (len(self.memory) == 0 and share >= _FROM) or (len(self.memory) == 1 and share >= _TO):
+        if (len(self.memory) == 0 and share >= _RATE_BEGIN) or (len(self.memory) == 1 and share >= _RATE_END):
             self.memory.append(max((_resident(one.pid) for one in active_children()), default=0))
 
     def rate(self) -> float:
-        """Return the number of images per second between the first and the last image."""
+        """Return the number of images per second in the timed part of the run."""
         total = self.seen[-1][1]
-        (began, first), *_ = [one for one in self.seen if one[1] >= _FROM * total]
-        *_, (ended, last) = [one for one in self.seen if one[1] <= max(_TO * total, first + 1)]
+        (began, first), *_ = [one for one in self.seen if one[1] >= _RATE_BEGIN * total]
+        *_, (ended, last) = [one for one in self.seen if one[1] <= max(_RATE_END * total, first + 1)]
         return (last - first) / (ended - began) if ended > began else 0.0
 
 
 def measured_run(plan: Plan, pool: WorkerPool, spec: Spec, encoders: int, count: int = 1) -> JsonObject:
     """Return images/s, bytes per image, and the memory of a worker at begin and end of a run [byte]."""
-    clock, began = Clock(workers=count), time.monotonic()
+    recorder, began = RunRecorder(workers=count), time.monotonic()
     with _folder(plan) as out:
-        report = run_batch(RunOptions(spec, out, encoders), pool, on_progress=clock.record)
+        report = run_batch(RunOptions(spec, out, encoders), pool, on_progress=recorder.record)
         size = sum(path.stat().st_size for path in out.rglob("shard-*") if path.is_file())
     return {
         "images": report.images,
-        "images_per_s": clock.rate(),
+        "images_per_s": recorder.rate(),
         "seconds": time.monotonic() - began,
         "bytes_per_image": size / max(report.images, 1),
-        "worker_bytes": clock.memory,
-        "resident_bytes": {str(mark): size for mark, size in clock.resident.items()},
+        "worker_bytes": recorder.memory,
+        "resident_bytes": {str(mark): size for mark, size in recorder.resident.items()},
     }
 
 
@@ -134,7 +140,7 @@ def workers(plan: Plan, count: int, *, moving: bool = False) -> JsonObject:
 
 
 def dask(plan: Plan, count: int) -> JsonObject:
-    """Measure the same run with local processes and with dask workers, timed by complete parts."""
+    """Measure the same run with local processes and with dask workers, and the ratio of their rates."""
     distributed = import_extra("distributed", "the comparison with dask")
     slots, encoders = SlotRequest(plan.adapter, workers=count, encoders=plan.encoders).slots()
     spec = spec_for(plan, plan.images * count)
@@ -158,7 +164,7 @@ def dask(plan: Plan, count: int) -> JsonObject:
 
 
 def steps(plan: Plan) -> JsonObject:
-    """Return the median time of each step of an image in one process [ms]."""
+    """Return the median time of each step that makes an image, in one process [ms]."""
     spec = spec_for(plan, min(_MOST_STEPS, plan.images))
     maker, renderer = SceneBuilder(spec), Renderer(plan.adapter, cache_ttl=16)
 

@@ -17,9 +17,9 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "scale.md"
 RESULTS = ROOT / "benchmarks" / "results"
 IMAGES = 10_000_000
-_SHARD = 1000  # images
+_SHARD_IMAGES = 1000
 _KINDS = {"new": "new people", "moving": "one person, moving"}
-_HEADS = (
+_COLUMNS = (
     "task",
     "workers",
     "adapters",
@@ -39,7 +39,7 @@ def main() -> None:
 
 def page(machines: Sequence[JsonObject]) -> str:
     """Return the text of the page."""
-    return "\n".join([_HEAD, *map(_machine, machines)])
+    return "\n".join([_INTRODUCTION, *map(_machine, machines)])
 
 
 def _machine(figures: JsonObject) -> str:
@@ -57,12 +57,15 @@ def _machine(figures: JsonObject) -> str:
     if steps := figures.get("steps"):
         rows = [(name.replace("_", " "), f"{ms:.3g}") for name, ms in steps.items()]
         parts += ["### Steps of a single image\n", _table(("step", "ms"), rows)]
-    parts += [f"### Extrapolation: {IMAGES:,} images of new people\n", _table(("", ""), paper(figures))]
+    parts += [
+        f"### Extrapolation: {IMAGES:,} images of new people\n",
+        _table(("", ""), extrapolation(figures)),
+    ]
     return "\n".join(parts)
 
 
 def _remarks(figures: JsonObject) -> str:
-    """Return remarks on the figures of a machine, which continue a sentence."""
+    """Return the remarks on the measurements of a machine, to follow another sentence."""
     return f" {figures['note']}" if "note" in figures else ""
 
 
@@ -87,7 +90,7 @@ def _rates(figures: JsonObject) -> str:
             ratio = one["images_per_s"] / runs[0]["images_per_s"]
             who = one["workers"], one["adapters"], one["encoders"]
             rows.append((words, *who, f"{one['images_per_s']:.3g}", f"{ratio:.2f}", memory))
-    text = _table(_HEADS, rows) + _memory(figures)
+    text = _table(_COLUMNS, rows) + _memory(figures)
     if dask := figures.get("dask"):
         ratio = dask["dask_over_plain"]
         text += (
@@ -97,8 +100,8 @@ def _rates(figures: JsonObject) -> str:
     return text
 
 
-def paper(figures: JsonObject) -> list[tuple[str, str]]:
-    """Return the extrapolated times of larger data sets at the rate of the fastest run."""
+def extrapolation(figures: JsonObject) -> list[tuple[str, str]]:
+    """Return table rows with time and space for `IMAGES` images, at the rate of the fastest run."""
     best = max(figures["new"], key=lambda one: float(one["images_per_s"]))
     rate, size = best["images_per_s"], best["bytes_per_image"]
     hours, limits = IMAGES / rate / 3600, ceilings(figures, best)
@@ -107,7 +110,7 @@ def paper(figures: JsonObject) -> list[tuple[str, str]]:
         ("hours on this machine", f"{hours:,.0f}"),
         ("adapter hours", f"{hours * best['adapters']:,.0f}"),
         ("bytes", f"{IMAGES * size / 1e12:.3g} TB"),
-        ("files", f"{IMAGES // _SHARD:,} shards of {_SHARD * size / 1e6:,.0f} MB"),
+        ("files", f"{IMAGES // _SHARD_IMAGES:,} shards of {_SHARD_IMAGES * size / 1e6:,.0f} MB"),
         *((f"limit by {name}", f"{limit:,.3g} images/s") for name, limit in limits.items()),
     ]
     if "steps" in figures and "disk" in figures:
@@ -116,7 +119,7 @@ def paper(figures: JsonObject) -> list[tuple[str, str]]:
 
 
 def ceilings(figures: JsonObject, run: JsonObject) -> dict[str, float]:
-    """Return the images/s that each measured step alone would permit."""
+    """Return the images/s that each measured step would permit if it were the only limit."""
     found, encoders = {}, run["workers"] * run["encoders"]
     if steps := figures.get("steps"):
         drawing = steps["parameters"] + steps["scene"] + steps["draw_and_read"]
@@ -134,7 +137,7 @@ def _table(heads: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
     return "".join(f"| {' | '.join(map(str, line))} |\n" for line in lines)
 
 
-_HEAD = f"""\
+_INTRODUCTION = f"""\
 # Data sets at scale
 
 This page lists measured rates of `dermis batch`, and the time and space that {IMAGES:,} images need at these

@@ -1,4 +1,4 @@
-"""Compare data sets by Cycles and by dermis on one CPU: seconds per image of a new person, and its noise.
+"""Compare data sets by Cycles and by dermis on one CPU: seconds and noise of an image of a new person.
 
 Needs DERMIS_BLENDER_PYTHON, a Python interpreter with bpy. Cycles renders people written by `dermis head`,
 with subsurface scattering, depth, normals and material indices. `dermis batch` renders people with hair,
@@ -116,7 +116,7 @@ def _cycles(
 
 
 def _ours(folder: Path, images: int, side: int, adapter: str) -> JsonObject:
-    """Return the row of dermis: the time of a run, minus that of a run with one image."""
+    """Return the row of dermis: time of a long run minus that of a run with one image, per further image."""
     spec = folder / "spec.toml"
     spec.write_text(_run([*_DERMIS, "batch", "--example"]), encoding="utf-8")
     spent = [_batch(spec, folder / f"of-{count}", count, side, adapter) for count in (1, 1, 1 + images)]

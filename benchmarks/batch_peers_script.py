@@ -35,10 +35,10 @@ def main(folder: Path) -> None:
 
 
 def measure(folder: Path, person: Path, plan: dict[str, Any]) -> dict[str, Any]:
-    """Return the times of a person, and times and noise of each setting."""
+    """Return the time to build the scene of a person, and the times and the noise of each setting."""
     began, worked = time.perf_counter(), time.process_time()
     make_scene(person, plan["size"])
-    made = time.perf_counter() - began, time.process_time() - worked
+    build_times = time.perf_counter() - began, time.process_time() - worked
     found = {}
     for setting in plan["settings"]:
         both = [render(folder / "out", setting, seed) for seed in (1, 2)]
@@ -46,7 +46,7 @@ def measure(folder: Path, person: Path, plan: dict[str, Any]) -> dict[str, Any]:
         head = first[..., 3] > 0.99
         apart = float(np.sqrt(np.mean((first[head, :3] - second[head, :3]) ** 2) / 2.0))
         found[setting["name"]] = {"times": times, "noise": apart / float(first[head, :3].mean())}
-    return {"person": person.stem, "made": made, "settings": found}
+    return {"person": person.stem, "made": build_times, "settings": found}
 
 
 def make_scene(person: Path, size: list[int]) -> None:
@@ -74,11 +74,11 @@ def make_scene(person: Path, size: list[int]) -> None:
     camera.lens, camera.clip_start = _LENS_MM, 0.01
     bpy.context.scene.camera = add("camera", camera)
     aim(bpy.context.scene.camera, Vector((0.0, -_FAR_M, 0.0)), middle)
-    set_render(size)
+    set_render_settings(size)
 
 
-def set_render(size: list[int]) -> None:
-    """Set up Cycles, the size and the passes."""
+def set_render_settings(size: list[int]) -> None:
+    """Set up Cycles, the size of pictures, and their passes."""
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
     scene.render.resolution_x, scene.render.resolution_y = size
@@ -90,10 +90,10 @@ def set_render(size: list[int]) -> None:
     layer.use_pass_z = layer.use_pass_normal = layer.use_pass_material_index = True
     for number, material in enumerate(bpy.data.materials):
         material.pass_index = number + 1
-    written_as("OPEN_EXR_MULTILAYER")
+    set_file_format("OPEN_EXR_MULTILAYER")
 
 
-def written_as(kind: str) -> None:
+def set_file_format(kind: str) -> None:
     """Set the file format of the pictures."""
     settings = bpy.context.scene.render.image_settings
     if hasattr(settings, "media_type"):  # required since Blender 5.0
@@ -116,11 +116,11 @@ def render(path: Path, setting: dict[str, Any], seed: int) -> tuple[Any, tuple[f
 def combined(path: Path) -> Any:
     """Return the combined pass of a multilayer file, loaded by Blender."""
     settings = bpy.context.scene.render.image_settings
-    written_as("OPEN_EXR")
+    set_file_format("OPEN_EXR")
     settings.color_depth, settings.color_mode = "32", "RGBA"
     flat = path.with_name("flat.exr")
     bpy.data.images["Render Result"].save_render(str(flat))
-    written_as("OPEN_EXR_MULTILAYER")
+    set_file_format("OPEN_EXR_MULTILAYER")
     image = bpy.data.images.load(str(flat))
     width, height = image.size
     pixels = np.empty(width * height * 4, np.float32)

@@ -1,4 +1,4 @@
-"""Time skins of few Gaussians with and without intermediate blurs.
+"""Time frames of skins with few Gaussians, with and without intermediate blur levels.
 
 python benchmarks/few_gaussians.py -o result.json
 """
@@ -29,8 +29,8 @@ from dermis.scene.heads import load_head
 from dermis.scene.techniques import TECHNIQUES
 
 _AT_ONCE = "at-once"
-_ON_GPU, _ON_CPU = BenchmarkCase(), BenchmarkCase((512, 512), atlas=1024)
-_COUNTS = (1, 2, 3, 4, 6)
+_GPU_CASE, _CPU_CASE = BenchmarkCase(), BenchmarkCase((512, 512), atlas=1024)
+_GAUSSIAN_COUNTS = (1, 2, 3, 4, 6)
 
 
 class AtOnce(TextureSpace):
@@ -63,10 +63,13 @@ def main(
         check_output(output, (".json",))
     renderer, loaded = Renderer(adapter), load_head(head)
     software = renderer.device.adapter.kind == "CPU"
-    base_case = _ON_CPU if software else _ON_GPU
+    base_case = _CPU_CASE if software else _GPU_CASE
     base_case = replace(base_case, atlas=atlas or base_case.atlas)
-    effort = CPU_FRAME_COUNTS if software else FrameCounts(warmup=60, sequence=1, timed=15)
-    rows = [measured(renderer, loaded, replace(base_case, gaussians=count), effort) for count in _COUNTS]
+    frame_counts = CPU_FRAME_COUNTS if software else FrameCounts(warmup=60, sequence=1, timed=15)
+    rows = [
+        compare_variants(renderer, loaded, replace(base_case, gaussians=count), frame_counts)
+        for count in _GAUSSIAN_COUNTS
+    ]
     found = {"adapter": renderer.device.adapter.name, "atlas": base_case.atlas, "rows": rows}
     if output is not None:
         with atomic_file(output) as partial:
@@ -75,8 +78,10 @@ def main(
     return 0
 
 
-def measured(renderer: Renderer, head: Head, case: BenchmarkCase, effort: FrameCounts) -> JsonObject:
-    """Return the device times of both variants [ms], and the relative RMSE of their pictures."""
+def compare_variants(
+    renderer: Renderer, head: Head, case: BenchmarkCase, frame_counts: FrameCounts
+) -> JsonObject:
+    """Return device times with and without intermediate levels [ms], and the relative RMSE of pictures."""
     row: JsonObject = {"gaussians": case.gaussians}
     pictures = []
     with tempfile.TemporaryDirectory() as folder, TECHNIQUES.including(_AT_ONCE, AtOnce()):
@@ -85,7 +90,7 @@ def measured(renderer: Renderer, head: Head, case: BenchmarkCase, effort: FrameC
             settings = case_settings(replace(case, technique=technique))
             pictures.append(renderer.draw(scenes[0], settings).linear())
             blur = renderer.prepare(scenes[0], settings).blurs[0]
-            drawn = stage_ms(renderer, cycle([*scenes[1:], scenes[0]]), settings, effort)
+            drawn = stage_ms(renderer, cycle([*scenes[1:], scenes[0]]), settings, frame_counts)
             row[name] = {stage: round(drawn[stage], 4) for stage in ("diffuse", "combine", "total")}
             row[name] |= {"sigma_mm": np.sqrt(blur.variance_mm2).round(2).tolist(), "halvings": blur.halvings}
     one, other = pictures

@@ -24,7 +24,7 @@ from dermis.base.atomic_write import atomic_file, check_output
 from dermis.base.command_line import run_script
 from dermis.base.console import print_json
 
-_WARM = 2  # warm runs after each cold run
+_WARM_RUNS = 2  # after each cold run
 
 
 def main(
@@ -52,7 +52,7 @@ def main(
     """
     if output is not None:
         check_output(output, (".json",))
-    found = {f"atlas {side}": pictures(head, side, adapter, runs) for side in atlas}
+    found = {f"atlas {side}": run_times(head, side, adapter, runs) for side in atlas}
     print_json({"head": head, "seconds": found})
     if output is not None:
         with atomic_file(output) as trial:
@@ -60,21 +60,21 @@ def main(
     return 0
 
 
-def pictures(head: str, side: int, adapter: str, runs: int) -> dict[str, dict[str, float]]:
+def run_times(head: str, side: int, adapter: str, runs: int) -> dict[str, dict[str, float]]:
     """Return the least and median time of the process with empty and with filled caches [s]."""
     cold, warm = list[float](), list[float]()
     for _ in range(runs):
         with tempfile.TemporaryDirectory() as folder:
             caches = os.environ | {"XDG_CACHE_HOME": folder, "DERMIS_CACHE": f"{folder}/dermis"}
-            cold.append(seconds(head, side, adapter, Path(folder), caches))
-            warm += [seconds(head, side, adapter, Path(folder), caches) for _ in range(_WARM)]
+            cold.append(run_time_s(head, side, adapter, Path(folder), caches))
+            warm += [run_time_s(head, side, adapter, Path(folder), caches) for _ in range(_WARM_RUNS)]
     return {
         name: {"least": min(times), "median": statistics.median(times)}
         for name, times in (("cold", cold), ("warm", warm))
     }
 
 
-def seconds(head: str, side: int, adapter: str, folder: Path, environment: Mapping[str, str]) -> float:
+def run_time_s(head: str, side: int, adapter: str, folder: Path, environment: Mapping[str, str]) -> float:
     """Return the time of one process [s]."""
     command = [sys.executable, "-m", "dermis", "render", head, "-o", str(folder / "picture.png")]
     options = ["--atlas", str(side), "--adapter", adapter]

@@ -45,8 +45,8 @@ _SEED = 2411  # the settings were chosen on scenes of seed 24
 _MELANIN, _BLOOD, _ROUGHNESS = (-2.2, -0.8), (-2.5, -1.5), (0.2, 0.4)  # melanin, blood: log10
 LOBE = "torrance-sparrow-smith"
 """Specular lobe of the true skin, with a single slope distribution."""
-_PAINT = 1024
-_ROWS = 32
+_PAINT_SIDE = 1024  # side of painted maps [texel]
+_SKY_ROWS = 32  # rows of pixels of a panorama
 _FACE_MM = 250.0
 
 
@@ -55,7 +55,7 @@ class Case:
     """Face with known light and skin.
 
     towards : (3,) unit vector to the sun
-    sun : fraction of the irradiance of a surface facing the sun that the sun contributes [-]
+    sun : fraction of the irradiance on a surface facing the sun that comes from the sun, not from the sky [-]
     """
 
     number: int
@@ -69,7 +69,7 @@ class Case:
 
 
 def case(number: int) -> Case:
-    """Return the case of a number, always the same."""
+    """Return the case with a number; equal numbers give equal cases."""
     random = np.random.default_rng((_SEED, number))
     melanin, blood = (float(10.0 ** random.uniform(*span)) for span in (_MELANIN, _BLOOD))
     roughness = float(random.uniform(*_ROUGHNESS))
@@ -80,7 +80,7 @@ def case(number: int) -> Case:
     towards = np.array([np.sin(turn) * np.cos(tilt), np.sin(tilt), np.cos(turn) * np.cos(tilt)])
     radiance = _sky(random)
     strength = float(random.uniform(1.0, 3.0))
-    arriving = _facing(radiance, towards)
+    arriving = _sky_irradiance(radiance, towards)
     lights = [DirectionalLight(direction=tuple(-towards), irradiance=strength, angle_degrees=0.53)]  # type: ignore[arg-type]
     yaw = np.radians(random.uniform(-25.0, 25.0))
     eye = 1100.0 * np.array([np.sin(yaw), 0.0, np.cos(yaw)])
@@ -94,7 +94,7 @@ def case(number: int) -> Case:
 
 def _sky(random: np.random.Generator) -> NDArray[np.float64]:
     """Return the (h, w) radiance of a sky: a constant and three wide lobes."""
-    towards = directions(_ROWS, 2 * _ROWS)
+    towards = directions(_SKY_ROWS, 2 * _SKY_ROWS)
     radiance = np.full(towards.shape[:2], random.uniform(0.05, 0.2))
     for _ in range(3):
         middle = random.standard_normal(3) + np.array([0.0, 0.6, 0.6])
@@ -103,10 +103,10 @@ def _sky(random: np.random.Generator) -> NDArray[np.float64]:
     return radiance
 
 
-def _facing(radiance: NDArray[np.float64], towards: NDArray[np.float64]) -> float:
-    """Return the irradiance of a surface that faces a direction."""
-    cosine = np.maximum(directions(_ROWS, 2 * _ROWS) @ towards, 0.0)
-    return float((radiance * cosine * solid_angles(_ROWS, 2 * _ROWS)).sum())
+def _sky_irradiance(radiance: NDArray[np.float64], towards: NDArray[np.float64]) -> float:
+    """Return the irradiance that the sky casts on a surface facing a direction."""
+    cosine = np.maximum(directions(_SKY_ROWS, 2 * _SKY_ROWS) @ towards, 0.0)
+    return float((radiance * cosine * solid_angles(_SKY_ROWS, 2 * _SKY_ROWS)).sum())
 
 
 def _panorama(number: int, radiance: NDArray[np.float64]) -> Path:
@@ -121,19 +121,18 @@ def photograph(
 ) -> PathTraced:
     """Return the path-traced picture of a case; the surface is a dielectric of index 1.4.
 
-    A medium without refraction has one colour under uniform light and a darker one where light and view
-    directions face it. The painted colours are those measured by a colorimeter: light at 45 degrees, seen
-    from the front.
+    A medium without refraction is darker when it is lit and seen from the front than under uniform light. The
+    painted colours are as measured by a colorimeter: lit at 45 degrees, seen from the front.
     """
-    paint = person_textures(renderer, one.scene, _PAINT)
-    paint = replace(paint, colour=_measured(paint.colour))
+    paint = person_textures(renderer, one.scene, _PAINT_SIDE)
+    paint = replace(paint, colour=_under_uniform_light(paint.colour))
     rough = np.clip(paint.roughness * (one.roughness / DEFAULT_ROUGHNESS), 0.05, 1.0).astype(np.float32)
     paint = replace(paint, roughness=rough)
     return path_trace_view(renderer, one.scene, paint, (side, side), samples, variant=variant)
 
 
-def _measured(colour: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return the colours under uniform light of media that have the given colours at 45 degrees to 0."""
+def _under_uniform_light(colour: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return colours of media under uniform light, given their colours lit at 45 and seen at 0 degrees."""
     albedo = 1.0 - np.linspace(1.0, 0.01, 48) ** 2
     seen = [np.pi * float(reflected_radiance(np.sqrt(0.5), 1.0, float(one))) for one in albedo]
     return np.interp(colour, seen, [diffuse_albedo(float(one)) for one in albedo]).astype(np.float32)
@@ -141,7 +140,7 @@ def _measured(colour: NDArray[np.float32]) -> NDArray[np.float32]:
 
 RESULTS = Path(__file__).parent / "results" / "fitting.json"
 _NO_LIMIT = 1e9
-"""Residual limit that disables the robust loss, which would discard the long tails of path noise."""
+"""Residual limit so large that it disables the robust loss, which would discard the strong noise of paths."""
 
 
 def main(
@@ -202,7 +201,7 @@ def fitted(one: Case, image: NDArray[np.float32], adapter: str) -> JsonObject:
     skin = one.scene.skin.model_copy(update={"pigments": held, "roughness": 0.3, "rho_s": 0.5})
     given = replace(one.scene, skin=skin, lights=(), environment=None)
     found = fit(image, given, robust=_NO_LIMIT, adapter=adapter)
-    return {"scene": one.number, **_against(one, found)} | {
+    return {"scene": one.number, **_compared_with_truth(one, found)} | {
         "seconds": found.seconds,
         "processor_seconds": time.process_time() - began,
         "frames": found.frames,
@@ -211,14 +210,14 @@ def fitted(one: Case, image: NDArray[np.float32], adapter: str) -> JsonObject:
     }
 
 
-def _against(one: Case, found: FitResult) -> JsonObject:
+def _compared_with_truth(one: Case, found: FitResult) -> JsonObject:
     figures: JsonObject = {}
     for name in ("melanin", "blood", "roughness"):
         true = float(getattr(one, name))
         figures[name] = {"true": true, "found": found.values[name], "relative_sd": found.uncertainty.sd[name]}
-    way = found.suns[0][0]
+    sun_direction = found.suns[0][0]
     figures["rho_s"] = found.values["rho_s"]
-    figures["sun_degrees"] = float(np.degrees(np.arccos(np.clip(way @ one.towards, -1.0, 1.0))))
+    figures["sun_degrees"] = float(np.degrees(np.arccos(np.clip(sun_direction @ one.towards, -1.0, 1.0))))
     figures["sun_share"] = one.sun
     return figures
 

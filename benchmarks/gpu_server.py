@@ -59,7 +59,7 @@ MAX_DURATION_S = 150.0
 
 
 def run_time_s(words: list[str], longest_s: float = MAX_DURATION_S) -> float:
-    """Return the run time of a program [s], whose notes are printed.
+    """Return the run time of a program [s], and print what it writes to stderr.
 
     Raises DermisError with its last output if it failed or took too long.
     """
@@ -116,8 +116,8 @@ class Plan:
     """Extent of the measurements.
 
     head : sample or file
-    usual : frame for lights and options
-    cases, film : frames of `dermis bench`
+    base_case : frame for lights and options
+    cases, film : frames of `dermis bench` with the presets interactive and film
     effort : frame counts for lights and options
     images, image : number of images in a sequence, and their settings
     viewer : options of `benchmarks/viewer.py`
@@ -134,7 +134,7 @@ class Plan:
     viewer: tuple[str, ...] = ()
 
 
-def plan_of(adapter: str, head: str) -> Plan:
+def full_plan(adapter: str, head: str) -> Plan:
     """Return the plan with the sizes of the documentation."""
     film = BENCHMARK_PRESETS["film"]
     base_case, *others = film.cases()
@@ -173,7 +173,7 @@ def bench(plan: Plan, head: Head, renderer: Renderer) -> JsonObject:
 
 
 def film(plan: Plan, head: Head, renderer: Renderer) -> JsonObject:
-    """Measure film frames: the default one, the fragment shaders of 2007, and the most triangles."""
+    """Measure film frames: the base frame, one with fragment shaders of 2007, and one with most triangles."""
     return benchmark_json(run_benchmark(plan.film, plan.head, plan.adapter))
 
 
@@ -256,7 +256,7 @@ def _settings(case: BenchmarkCase) -> Settings:
 
 
 def _scenes(case: BenchmarkCase, head: Head, count: int) -> list[Scene]:
-    """Return moving scenes that name their profile, because they outlive the folder of profile files."""
+    """Return moving scenes with a named profile, because the folder of profile files is deleted."""
     with tempfile.TemporaryDirectory() as folder:
         moving = case_scenes(case, head, Path(folder), max(2, count))
     return [replace(scene, skin=scene.skin.model_copy(update={"profile": "gpu-gems-3"})) for scene in moving]
@@ -290,7 +290,7 @@ def _consume_s(images: Iterable[NDArray[np.generic]], suffix: str) -> float:
 
 
 PARTS = ("bench", "lobes", "sequences", "lights", "options", "start", "viewer", "film")
-"""Parts by importance; lobes early, because an idle device is three times as slow."""
+"""Parts, the most important first; lobes early, before the device is idle and three times as slow."""
 _NEEDED_S = {"bench": 0, "film": 120, "viewer": 120}  # duration of a part on a slow server [s]
 _DIGITS = 5
 
@@ -323,7 +323,7 @@ def main(
     """
     target = check_output(output, (".json",), "Choose such a name")
     name = ("lee_perry_smith" if is_available("lee_perry_smith") else "human") if head == "auto" else head
-    plan = (quick_plan if quick else plan_of)(adapter, name)
+    plan = (quick_plan if quick else full_plan)(adapter, name)
     measure(plan, _parse_parts(parts), minutes, lambda figures: write_results(target, figures, _DIGITS))
 
 

@@ -135,7 +135,7 @@ def python_ms(renderer: Renderer, scenes: Iterator[Scene], settings: Settings, e
 
 
 def people(renderer: Renderer, case: BenchmarkCase, head: Head) -> list[float]:
-    """Return the times to the first frame of other people with the same topology [ms]."""
+    """Return the time to the first frame of each of several other people, with the same topology [ms]."""
     settings, found = case_settings(case), []
     renderer.draw(Scene(head), settings)
     for number in range(_PEOPLE):

@@ -47,8 +47,8 @@ SKINS, TRIALS, NOISE, SEED = 200, 64, 0.01, 7
 SIDES = 1024, 2048, 4096
 BANDS = (0.0, 0.01, 0.05, 0.2, 0.5)
 THICK_MM = 0.05, 0.25
-_MELANIN, _BLOOD = (-2.5, -0.35), (-3.0, -1.0)  # decimal exponents
-_COUNTED = ((0.005, 0.005), (0.02, 0.01), (0.06, 0.02), (0.15, 0.01), (0.3, 0.03))
+_MELANIN, _BLOOD = (-2.5, -0.35), (-3.0, -1.0)  # ranges of the decimal logarithms
+_MONTE_CARLO_PIGMENTS = ((0.005, 0.005), (0.02, 0.01), (0.06, 0.02), (0.15, 0.01), (0.3, 0.03))
 _PHOTONS = 40_000
 _SIDE = 192
 
@@ -81,9 +81,9 @@ def main(
         print_lines(json.dumps(speed))
         return 0
     results |= {"skins": SKINS, "noise": NOISE, "photons": _PHOTONS}
-    results["known"] = {str(mm): known(replace(DEFAULT_SKIN, epidermis_mm=mm)) for mm in THICK_MM}
+    results["known"] = {str(mm): known_skin_errors(replace(DEFAULT_SKIN, epidermis_mm=mm)) for mm in THICK_MM}
     results["mistaken"] = model_error_cases()
-    results["counted"] = counted()
+    results["counted"] = monte_carlo_errors()
     results["shading"] = shading(adapter)
     results["speed"] = speed
     write_results(output, results, 4)
@@ -102,8 +102,8 @@ def colour_of(skin: SkinParameters) -> Floats:
     return np.asarray((1.0 - normal_reflectance(1.4)) * total @ rgb_weights(WAVELENGTHS_NM).T)
 
 
-def known(skin: SkinParameters) -> list[JsonObject]:
-    """Return the errors on skins of the model itself, by bands of melanin, with and without noise."""
+def known_skin_errors(skin: SkinParameters) -> list[JsonObject]:
+    """Return errors for skins that the model describes exactly, without and with noise, by melanin."""
     m, b = skins()
     colours = np.stack([colour_of(replace(skin, melanin=x, blood=y)) for x, y in zip(m, b, strict=True)])
     model = skin_model(skin)
@@ -136,7 +136,7 @@ def known(skin: SkinParameters) -> list[JsonObject]:
 
 
 def bound(model: SkinModel, m: Floats, b: Floats, colours: Floats) -> Floats:
-    """Return the relative Cramér-Rao bound of blood without a prior, for noise alone."""
+    """Return the least relative error of blood that noise permits without a prior: the Cramér-Rao bound."""
     found = np.stack([np.sqrt(m), np.sqrt(b), np.full(len(m), model.prior_mean)], axis=-1)
     slopes = model.evaluate(found)[1][:, :, :2]
     weighed = np.einsum("tci,tc,tcj->tij", slopes, inverse_variances(colours, NOISE), slopes)
@@ -152,27 +152,27 @@ def model_error_cases() -> JsonObject:
         "bloodless tissue as in [Jacques1998]": {"baseline": 1.0},
     }
     m, b = skins(SEED + 1)
-    prior_mean = (m > 0.005) & (m < 0.2) & (b > 0.003) & (b < 0.05)
-    m, b = m[prior_mean], b[prior_mean]
+    usual = (m > 0.005) & (m < 0.2) & (b > 0.003) & (b < 0.05)
+    m, b = m[usual], b[usual]
     results = {}
     for name, other in cases.items():
         skin = replace(DEFAULT_SKIN, **other)
         colours = np.stack([colour_of(replace(skin, melanin=x, blood=y)) for x, y in zip(m, b, strict=True)])
-        results[name] = {third: _off(third, colours, m, b) for third in ("none", "oxygen")}
+        results[name] = {third: _median_errors(third, colours, m, b) for third in ("none", "oxygen")}
     return results
 
 
-def _off(third: ThirdUnknown, colours: Floats, m: Floats, b: Floats) -> dict[str, float]:
+def _median_errors(third: ThirdUnknown, colours: Floats, m: Floats, b: Floats) -> dict[str, float]:
     found = solve_pigments(skin_model(DEFAULT_SKIN, third), colours, NOISE)
     ratios = {"melanin": found.melanin / m, "blood": found.blood / b}
     left = delta_e_2000(colours, colours / found.residual)
     return {name: float(np.median(one)) for name, one in ratios.items()} | {"delta_e": float(np.median(left))}
 
 
-def counted() -> list[JsonObject]:
-    """Return the errors on skins whose colours are Monte Carlo results, including the error of diffusion."""
+def monte_carlo_errors() -> list[JsonObject]:
+    """Return errors for skins with colours by Monte Carlo; they include the error of the diffusion model."""
     results = []
-    for m, b in _COUNTED:
+    for m, b in _MONTE_CARLO_PIGMENTS:
         pigments = {"melanin": m, "blood": b}
         tissue = load_tissue("spectral", pigments=pigments)
         colour = monte_carlo_profile(tissue.medium, tissue.rgb, _PHOTONS, seed=SEED).total[None]
@@ -192,7 +192,7 @@ def counted() -> list[JsonObject]:
 
 
 def supplied(folder: Path) -> list[JsonObject]:
-    """Return the median errors on skins whose colours another program computed, by bands of melanin."""
+    """Return the median errors for skins with colours computed by another program, by bands of melanin."""
     table = np.genfromtxt(
         folder / "spectral_srgb_diffusion.csv", delimiter=",", names=True, dtype=None, encoding="utf-8"
     )
@@ -219,7 +219,7 @@ def supplied(folder: Path) -> list[JsonObject]:
 
 
 def shading(adapter: str) -> JsonObject:
-    """Return the results on a synthetic map under uneven light: removed shading and remaining errors."""
+    """Return errors for a synthetic map under uneven light, without and with an estimate of the shading."""
     random = np.random.default_rng(SEED)
     fields = [gaussian_filter(random.standard_normal((_SIDE, _SIDE)), s, mode="wrap") for s in (3, 4, 40)]
     m, b, light = (one / one.std() for one in fields)
@@ -228,8 +228,8 @@ def shading(adapter: str) -> JsonObject:
     colours *= 1.0 + NOISE * random.standard_normal(colours.shape)
     colours = np.clip(colours, 0.0, 1.0)
     results: JsonObject = {"light": float(np.log(light).std())}
-    for name, taken in (("kept", False), ("divided", True)):
-        found = unmix(colours, shading=taken, adapter=adapter)
+    for name, removes_shading in (("kept", False), ("divided", True)):
+        found = unmix(colours, shading=removes_shading, adapter=adapter)
         results[name] = {
             "melanin": float(np.median(np.abs(found.melanin / m - 1.0))),
             "blood": float(np.median(np.abs(found.blood / b - 1.0))),

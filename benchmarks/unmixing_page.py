@@ -175,10 +175,10 @@ def _errors(cases: Sequence[JsonObject], words: str) -> list[tuple[str, ...]]:
     rows = []
     for name in ("melanin", "blood", "roughness", "rho_s"):
         pairs = [(one["rho_s"], _TRUE_STRENGTH) if name == "rho_s" else _pair(one[name]) for one in cases]
-        shares = name in ("melanin", "blood")
-        off = [a / b - 1.0 if shares else a - b for a, b in pairs]
-        results = _percent if shares else _thousandths
-        rows.append((words, name, *_spread([abs(x) for x in off], results), results(statistics.median(off))))
+        is_relative = name in ("melanin", "blood")
+        off = [a / b - 1.0 if is_relative else a - b for a, b in pairs]
+        text_of = _percent if is_relative else _thousandths
+        rows.append((words, name, *_spread([abs(x) for x in off], text_of), text_of(statistics.median(off))))
     turns = [one["sun_degrees"] for one in cases]
     return [*rows, (words, "direction of the sun", *_spread(turns, lambda x: f"{x:.1f} degrees"), "")]
 
@@ -202,10 +202,10 @@ def _thousandths(value: float) -> str:
     return f"{value:.3f}"
 
 
-def _spread(values: Sequence[float], results: Callable[[float], str]) -> tuple[str, str, str]:
+def _spread(values: Sequence[float], text_of: Callable[[float], str]) -> tuple[str, str, str]:
     ordered = sorted(values)
     most = ordered[math.ceil(0.9 * len(ordered)) - 1]
-    return results(statistics.median(ordered)), results(most), results(ordered[-1])
+    return text_of(statistics.median(ordered)), text_of(most), text_of(ordered[-1])
 
 
 def _percent(share: float) -> str:

@@ -47,7 +47,7 @@ def tables(results: JsonObject) -> str:
 
 
 def _figures(results: JsonObject, section: str) -> JsonObject:
-    """Return the figures of a section, without the reason why it ended."""
+    """Return the figures of a section, without the reason why it ended early."""
     return {name: one for name, one in results.get(section, {}).items() if name != "ended"}
 
 

@@ -54,12 +54,12 @@ class Clock:
 
 
 Change = Callable[[ViewerState, int], ViewerState]
-_SETTLING = 2  # frames before the first that is counted
+_UNTIMED_FRAMES = 2  # frames before the first that is timed
 PIGMENTED = "light"  # profile with pigment sliders
 _TARGETS = 52
 STEP = 0.02  # rotation per frame [rad]
 _REST_S = 30.0  # time limit; usually tenths of a second suffice
-FEWEST = 3  # least number of values of a median, regardless of the remaining time
+MIN_REPEATS = 3  # least number of values of a median, even if no time is left
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,8 @@ class Plan:
 class Motion:
     """One kind of change from frame to frame.
 
-    start : initial state
+    start : function that returns the initial state
+    change : function that returns the next state, given a state and the index of the frame
     """
 
     start: Callable[[ViewerState], ViewerState]
@@ -90,7 +91,7 @@ class Motion:
 
 
 class ConstantQuality(QualityController):
-    """Quality controller with constant quality: that of the settings."""
+    """Quality controller that always keeps the quality of the settings."""
 
     def limited_settings(self, wanted: Settings, size: tuple[int, int], moving: bool) -> Settings:
         """Return the settings at the size of the window."""
@@ -163,7 +164,7 @@ def slider_position(driver: InputDriver, name: str) -> tuple[float, float] | Non
     """Return the position of a pigment slider in the window; None if it must be scrolled into view."""
     driver.viewer.panel.is_visible = True
     driver.set_state(driver.first.with_skin(profile=PIGMENTED))
-    for _ in range(FEWEST):
+    for _ in range(MIN_REPEATS):
         driver.frame()
     driver.viewer.panel.is_visible = False
     place = driver.viewer.session.positions[name]
@@ -216,13 +217,13 @@ def speeds(driver: InputDriver, plan: Plan, clock: Clock) -> Iterator[tuple[str,
 def _speed(driver: InputDriver, motion: Motion, frames: int, clock: Clock) -> JsonObject:
     session = driver.viewer.session
     driver.set_state(motion.start(driver.first))
-    for k in range(_SETTLING):
+    for k in range(_UNTIMED_FRAMES):
         driver.set_state(motion.change(session.state, k))
         driver.frame()
     times, prepared, processor = [], [], processor_s()
-    for k in counted(frames, clock):
+    for k in timed_indices(frames, clock):
         began = time.perf_counter()
-        driver.set_state(motion.change(session.state, _SETTLING + k))
+        driver.set_state(motion.change(session.state, _UNTIMED_FRAMES + k))
         driver.frame()
         times.append(time.perf_counter() - began)
         prepared.append(session.view_renderer.rendered.setup_ms if session.view_renderer.rendered else 0.0)
@@ -239,10 +240,10 @@ def _speed(driver: InputDriver, motion: Motion, frames: int, clock: Clock) -> Js
     }
 
 
-def counted(most: int, clock: Clock) -> Iterator[int]:
-    """Yield 0, 1, 2 and so on while time is left."""
+def timed_indices(most: int, clock: Clock) -> Iterator[int]:
+    """Yield 0, 1, 2 and so on below `most` while time is left, but at least `MIN_REPEATS` values."""
     for k in range(most):
-        if k >= FEWEST and clock.over:
+        if k >= MIN_REPEATS and clock.over:
             return
         yield k
 

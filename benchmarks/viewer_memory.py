@@ -1,4 +1,4 @@
-"""Measure latency, and memory of the viewer while everything in it changes."""
+"""Measure the latency of the viewer, and its memory during random changes of everything in it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
-from viewer_input import FEWEST, MOTIONS, STEP, Clock, InputDriver, Plan, counted, spread
+from viewer_input import MIN_REPEATS, MOTIONS, STEP, Clock, InputDriver, Plan, spread, timed_indices
 from viewer_page import resident_mb
 
 from dermis.apps.validation.pages import JsonObject
@@ -20,7 +20,7 @@ from dermis.gpu.memory import allocated_bytes
 from dermis.scene.environment import Environment
 from dermis.scene.lights import light_presets
 
-_PATIENCE = 100  # largest number of frames to wait
+_MAX_WAIT_FRAMES = 100
 _PIXELS = 6.0  # distance of a drag between two frames
 
 
@@ -35,9 +35,9 @@ def delays(driver: InputDriver, plan: Plan, clock: Clock) -> Iterator[tuple[str,
     driver.frame()
     frame_s, chance = _frame_s(driver), random.Random(7)
     waits = (chance.random() * frame_s for _ in range(plan.frames))
-    drags = zip(counted(plan.frames, clock.share(0.3)), waits, strict=False)
+    drags = zip(timed_indices(plan.frames, clock.share(0.3)), waits, strict=False)
     yield "in a drag", spread([_delay_in_frame(driver, x - _PIXELS * (k % 9), y, wait) for k, wait in drags])
-    rests = counted(plan.frames, clock)
+    rests = timed_indices(plan.frames, clock)
     yield "from rest", spread([_delay(driver, x + _PIXELS * (1 - k % 2), y) for k in rests])
     driver.event("pointer_up", x, y)
     driver.frame()
@@ -46,7 +46,7 @@ def delays(driver: InputDriver, plan: Plan, clock: Clock) -> Iterator[tuple[str,
 def _frame_s(driver: InputDriver) -> float:
     """Return the least time of a frame with a turning camera [s]."""
     times = []
-    for _ in range(FEWEST):
+    for _ in range(MIN_REPEATS):
         began = time.perf_counter()
         driver.set_state(MOTIONS["camera"].change(driver.viewer.session.state, 0))
         driver.frame()
@@ -55,11 +55,11 @@ def _frame_s(driver: InputDriver) -> float:
 
 
 def _delay(driver: InputDriver, x: float, y: float) -> float:
-    """Return the latency of a move when the camera is at rest [s]."""
+    """Return the latency of a pointer move when the camera is at rest [s]."""
     driver.rest()
     before, began = driver.frame(), time.perf_counter()
     driver.event("pointer_move", x, y)
-    for _ in range(_PATIENCE):  # fast frames show the camera when it has hardly moved
+    for _ in range(_MAX_WAIT_FRAMES):  # fast frames show the camera when it has hardly moved
         picture, now = driver.frame(), time.perf_counter()
         if not np.array_equal(before, picture):
             return now - began
@@ -67,7 +67,7 @@ def _delay(driver: InputDriver, x: float, y: float) -> float:
 
 
 def _delay_in_frame(driver: InputDriver, x: float, y: float, wait_s: float) -> float:
-    """Return the latency of a move that occurs while a frame is drawn [s]."""
+    """Return the latency of a pointer move that occurs while a frame is drawn [s]."""
     actual: list[float] = []
 
     def move() -> None:
@@ -87,7 +87,7 @@ def _delay_in_frame(driver: InputDriver, x: float, y: float, wait_s: float) -> f
 
 
 Kind = Callable[[ViewerState, random.Random], ViewerState]
-_SAMPLES = 60  # memory samples over the whole measurement
+_SAMPLE_COUNT = 60  # memory samples over the whole measurement
 _ACTIONS = ("split", "undo", "redo", "size", "panel", "preset", "start again")
 
 
@@ -132,11 +132,13 @@ KINDS: dict[str, Kind] = {
         _choice(r, "picture", "diffuse", "irradiance", "blur 1", "normals", "atlas")
     ),
 }
-"""Changes of a state; combinations that cannot be rendered leave the last picture, as for users."""
+"""Random changes of a state by name; if a state cannot be rendered, the viewer keeps its last picture."""
 
 
 def memory_samples(driver: InputDriver, plan: Plan, minutes: float, changes: int) -> JsonObject:
-    """Return the memory over at least the given minutes and changes; each change is drawn."""
+    """Return memory samples during random changes, each of which is drawn.
+
+    minutes, changes : least duration and least number of changes"""
     chance, session = random.Random(11), driver.viewer.session
     done, samples = 0, list[dict[str, float]]()
     counts = dict.fromkeys((*KINDS, *_ACTIONS), 0)
@@ -147,7 +149,7 @@ def memory_samples(driver: InputDriver, plan: Plan, minutes: float, changes: int
     begun = time.perf_counter()
     while (now := time.perf_counter() - begun) < 60.0 * minutes or done < changes:
         part = min(now / max(1e-9, 60.0 * minutes), done / max(1, changes))
-        if part * _SAMPLES >= len(samples):
+        if part * _SAMPLE_COUNT >= len(samples):
             samples.append(_sample(now, done))
         kind = chance.choice(list(counts))
         _change(driver, kind, chance, plan)
@@ -189,7 +191,7 @@ def _change(driver: InputDriver, kind: str, chance: random.Random, plan: Plan) -
 
 
 def growth(samples: Sequence[dict[str, float]]) -> JsonObject:
-    """Return the slopes of the second half of the samples [MB per 1000 changes]."""
+    """Return the growth of the memory in the second half of the samples [MB per 1000 changes]."""
     late = samples[len(samples) // 2 :]
     x = [one["changes"] / 1e3 for one in late]
     names = ("resident_mb", "device_mb")

@@ -49,7 +49,7 @@ def served(plan: Plan, clock: Clock) -> Iterator[tuple[str, int]]:
 
 
 def _address(output: IO[str], patience_s: float) -> str:
-    """Return the URL of the page, which is the only output of the server."""
+    """Return the URL of the page, which the server prints as its only output."""
     with selectors.DefaultSelector() as waiting:
         waiting.register(output, selectors.EVENT_READ)
         words = output.readline().split() if waiting.select(patience_s) else []
@@ -79,7 +79,7 @@ _WATCHED_S = 8.0
 _FIRST_S = 30.0  # time limit for the first picture of a motion, whose data may have to be computed
 _REPEATS = 20
 _PIXELS = 6.0
-Place = tuple[float, float]
+Position = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ class Picture:
     at: float
 
     @property
-    def name(self) -> bytes:
+    def digest(self) -> bytes:
         """Return a hash that distinguishes pictures."""
         return hashlib.sha256(self.data).digest()
 
@@ -103,7 +103,7 @@ class Page:
     """Client with the protocol of the page of rendercanvas."""
 
     def __init__(self, url: str, size: tuple[int, int], clock: Clock) -> None:
-        self._socket = _connected(url.replace("http", "ws", 1), clock)
+        self._socket = _open_socket(url.replace("http", "ws", 1), clock)
         self.size, self.clock = size, clock
         self._last: Picture | None = None
         self.send("resize", width=size[0], height=size[1], pwidth=size[0], pheight=size[1], ratio=1.0)
@@ -120,7 +120,7 @@ class Page:
         self.send(kind, x=x, y=y, **state)
 
     def next_picture(self, timeout_s: float) -> Picture | None:
-        """Return the next frame after confirming it; None after the timeout."""
+        """Return the next frame and confirm to the server that it has arrived; None after the timeout."""
         until = time.perf_counter() + timeout_s
         while (left := until - time.perf_counter()) > 0.0:
             try:
@@ -151,7 +151,7 @@ class Page:
     @property
     def picture_hash(self) -> bytes:
         """Return the hash of the last picture, empty before the first."""
-        return self._last.name if self._last else b""
+        return self._last.digest if self._last else b""
 
     @property
     def patience_s(self) -> float:
@@ -163,7 +163,7 @@ class Page:
         self._socket.close()
 
 
-def _connected(url: str, clock: Clock) -> Any:
+def _open_socket(url: str, clock: Clock) -> Any:
     """Return an open socket, which the caller closes."""
     from websockets.sync.client import connect
 
@@ -176,8 +176,8 @@ def _connected(url: str, clock: Clock) -> Any:
             time.sleep(0.1)
 
 
-def page_figures(plan: Plan, slider: Place | None, clock: Clock) -> Iterator[tuple[str, Any]]:
-    """Yield frame rates and latencies including everything between page and picture.
+def page_figures(plan: Plan, slider: Position | None, clock: Clock) -> Iterator[tuple[str, Any]]:
+    """Yield frame rates and latencies as seen by the page, including encoding and transfer of pictures.
 
     slider : position of the melanin slider in the panel, if it is visible
     """
@@ -190,14 +190,14 @@ def page_figures(plan: Plan, slider: Place | None, clock: Clock) -> Iterator[tup
         yield "camera", _motion(page, middle)
         yield "light", _motion(page, middle, "Shift")
         if slider:
-            yield "melanin", _slide(page, slider)
-        yield "encoding", _encoding(still)
-        yield "delay", spread(_delays(page, middle))
+            yield "melanin", _slider_motion(page, slider)
+        yield "encoding", _encoding_times_ms(still)
+        yield "delay", spread(_latencies(page, middle))
         yield "resident_mb", [begun, resident_mb(pid)]
         page.close()
 
 
-def _motion(page: Page, position: Place, *modifiers: str) -> dict[str, float]:
+def _motion(page: Page, position: Position, *modifiers: str) -> dict[str, float]:
     """Return the frame rate of a drag back and forth; repeated frames do not count.
 
     The time runs from the second picture, because the first may still be the picture at rest.
@@ -224,7 +224,7 @@ def _motion(page: Page, position: Place, *modifiers: str) -> dict[str, float]:
 
 
 def _dragged(
-    page: Page, position: Place, modifiers: Sequence[str], moves: Iterator[int], seconds: float
+    page: Page, position: Position, modifiers: Sequence[str], moves: Iterator[int], seconds: float
 ) -> Iterator[Picture]:
     """Yield distinct pictures while a pointer moves back and forth."""
     x, y = position
@@ -235,12 +235,12 @@ def _dragged(
             due_s += 1.0 / _MOVES_PER_S
             page.pointer("pointer_move", x + 1.5 * (100 - abs(next(moves) % 200 - 100)), y, *modifiers)
         actual = page.next_picture(due_s - now)
-        if actual and actual.name != known:
-            known = actual.name
+        if actual and actual.digest != known:
+            known = actual.digest
             yield actual
 
 
-def _slide(page: Page, position: Place) -> dict[str, float]:
+def _slider_motion(page: Page, position: Position) -> dict[str, float]:
     """Return the frame rate while a slider of the panel moves back and forth.
 
     Raises RuntimeError if the skin does not change.
@@ -263,17 +263,19 @@ def _pixels(picture: Picture) -> NDArray[np.uint8]:
     return np.array(Image.open(io.BytesIO(picture.data)).convert("RGBA"))
 
 
-def _delays(page: Page, position: Place) -> list[float]:
-    """Return latencies from a move at rest to the first different picture [s]; fewer if time is short."""
+def _latencies(page: Page, position: Position) -> list[float]:
+    """Return latencies from a pointer move at rest to the first different picture [s].
+
+    There are fewer values if time is short."""
     x, y = position
     page.pointer("pointer_down", x, y)
     found, one_s = list[float](), 0.0
     while len(found) < _REPEATS and (not found or page.clock.remaining_s > 2.0 * one_s):
         first = time.perf_counter()
-        seen = {page.settle().name}
+        seen = {page.settle().digest}
         began = time.perf_counter()
         page.pointer("pointer_move", x + _PIXELS * (1 - len(found) % 2), y)
-        while (actual := page.next_picture(page.patience_s)) and actual.name in seen:
+        while (actual := page.next_picture(page.patience_s)) and actual.digest in seen:
             pass
         if actual is None:
             raise RuntimeError("no picture comes")
@@ -283,7 +285,7 @@ def _delays(page: Page, position: Place) -> list[float]:
     return found
 
 
-def _encoding(still: Picture) -> dict[str, float]:
+def _encoding_times_ms(still: Picture) -> dict[str, float]:
     """Return the time to encode a picture [ms]."""
     array, times = _pixels(still), {}
     for name, lossless in (("jpeg_ms", False), ("png_ms", True)):

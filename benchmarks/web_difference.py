@@ -1,7 +1,8 @@
 """Measure the difference between the pictures of an exported page and of `dermis render`.
 
-Headless Chromium on its software adapter renders the page in both forms. Its linear pictures are compared
-with those of a renderer that uses the decoded maps of the page, and these with those of the original maps.
+Headless Chromium, on its software adapter, renders the page in its two forms. Its linear pictures are
+compared with pictures by dermis that use the decoded maps of the page; these are compared with pictures by
+dermis that use the original maps.
 """
 
 from __future__ import annotations
@@ -24,9 +25,9 @@ from dermis.base.command_line import run_script
 from dermis.base.console import print_lines
 from dermis.frame.capture import capture_renderer
 
-ATLAS, MAP = 512, 1024  # sizes of the exported page
-SHOWN = ("software", 512), ("gpu", 256)
-LINEAR = """async () => {
+ATLAS_SIDE, MAP_SIDE = 512, 1024  # of the exported page [texel]
+FORMS_AND_SIDES = ("software", 512), ("gpu", 256)
+READ_LINEAR_PICTURE = """async () => {
   const page = dermis, frame = page.player.frame, device = page.gpuScene.device, [width, height] = frame.size;
   const buffer = device.createBuffer({ size: 16 * width * height, usage: 9 });
   const encoder = device.createCommandEncoder();
@@ -42,16 +43,16 @@ LINEAR = """async () => {
 
 
 def main(head: str, adapter: str = "auto") -> None:
-    """Print a row for each form and size."""
+    """Print a table row for each form of the page, at the size at which it is measured."""
     scene = dermis.Scene(dermis.load_head(head))
-    scene = replace(scene, head=with_reduced_maps(scene.head, MAP))
-    settings = dermis.Settings(atlas=ATLAS)
+    scene = replace(scene, head=with_reduced_maps(scene.head, MAP_SIDE))
+    settings = dermis.Settings(atlas=ATLAS_SIDE)
     print_lines("| head | form | size | difference | loss by maps and hairs |", "|---|---|---|---|---|")
-    for form, side in SHOWN:
+    for form, side in FORMS_AND_SIDES:
         settings_for = settings.model_copy(update={"size": (side, side)})
-        given = capture_renderer(form, adapter).draw(scene, settings_for).linear()
+        original = capture_renderer(form, adapter).draw(scene, settings_for).linear()
         references = list[NDArray[np.float32]]()
-        made = build_content(
+        content = build_content(
             PageRequest(scene, (), settings, {form: (side,)}, adapter),
             lambda renderer, *_, settings_for=settings_for, references=references: references.append(
                 renderer.draw(scene, settings_for).linear()
@@ -59,9 +60,9 @@ def main(head: str, adapter: str = "auto") -> None:
         )
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / "head.html"
-            file.write_text(page_html(made, (), head, ""), encoding="utf-8")
+            file.write_text(page_html(content, (), head, ""), encoding="utf-8")
             picture = render_page(file, side)
-        off, lost = distance(picture, references[0]), distance(references[0], given)
+        off, lost = distance(picture, references[0]), distance(references[0], original)
         print_lines(f"| {head} | {form} | {side} x {side} | {off:.2%} | {lost:.2%} |")
 
 
@@ -70,12 +71,12 @@ def render_page(file: Path, side: int) -> NDArray[np.float32]:
     with chromium_page(side, [*FLAGS, *SOFTWARE]) as page:
         page.goto(file.as_uri())
         page.wait_for_function(f"() => {STATE} && {STATE} !== 'loading'", timeout=120_000)
-        raw = base64.b64decode(page.evaluate(LINEAR))
+        raw = base64.b64decode(page.evaluate(READ_LINEAR_PICTURE))
     return np.frombuffer(raw, np.float32).reshape(side, side, 4)[..., :3]
 
 
 def distance(picture: NDArray[np.float32], reference: NDArray[np.float32]) -> float:
-    """Return the relative RMSE."""
+    """Return the relative RMSE of a picture against a reference."""
     return float(np.sqrt(((picture - reference) ** 2).mean() / (reference**2).mean()))
 
 

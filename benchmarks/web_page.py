@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 SOFTWARE = ["--use-webgpu-adapter=swiftshader"]
 FLAGS = ["--no-sandbox", "--enable-unsafe-webgpu", "--js-flags=--expose-gc", "--enable-precise-memory-info"]
 HARDWARE = ["--enable-features=Vulkan", "--ignore-gpu-blocklist", "--use-angle=vulkan"]
-FRAMES = 4
+FRAMES = 4  # timed frames of each kind
 STATE = "document.documentElement.dataset.state"
-MOVE = "async () => { dermis.state.yaw += 0.02; dermis.touch(); await dermis.idle(); }"
-STILL = "async () => { dermis.state.yaw += 0.02; dermis.rest(); await dermis.idle(); }"
+TURN_IN_MOTION = "async () => { dermis.state.yaw += 0.02; dermis.touch(); await dermis.idle(); }"
+TURN_AND_REST = "async () => { dermis.state.yaw += 0.02; dermis.rest(); await dermis.idle(); }"
 
 
 def processor_s() -> float:
@@ -40,7 +40,7 @@ def processor_s() -> float:
 
 
 def timed(page: Page, script: str, count: int) -> tuple[float, float]:
-    """Return wall time and CPU time per call [s]."""
+    """Return wall time and CPU time per run of a script in the page [s]."""
     began, used = time.perf_counter(), processor_s()
     for _ in range(count):
         page.evaluate(script)
@@ -48,7 +48,7 @@ def timed(page: Page, script: str, count: int) -> tuple[float, float]:
 
 
 def resident_mb() -> float:
-    """Return the memory of all processes of the browser, with proportional parts of shared memory [MB]."""
+    """Return the memory of all processes of the browser; shared memory counts once in total [MB]."""
     total = 0
     for folder in Path("/proc").iterdir():
         try:
@@ -64,7 +64,7 @@ def turn_head(page: Page, minutes: float) -> None:
     """Turn the head for some minutes, and print the memory each minute."""
     began, frames, minute = time.monotonic(), 0, 0
     while minute <= minutes:
-        page.evaluate(MOVE)
+        page.evaluate(TURN_IN_MOTION)
         frames += 1
         if time.monotonic() - began >= 60 * minute:
             page.evaluate("window.gc && gc()")
@@ -107,8 +107,8 @@ def main(
         if minutes:
             turn_head(page, minutes)
             return
-        rows = {"first picture": first, "frame at rest, camera turned": timed(page, STILL, FRAMES)}
-        rows["frame in motion"] = timed(page, MOVE, FRAMES)
+        rows = {"first picture": first, "frame at rest, camera turned": timed(page, TURN_AND_REST, FRAMES)}
+        rows["frame in motion"] = timed(page, TURN_IN_MOTION, FRAMES)
         size = page.evaluate("dermis.player.frame.size")
         for name, (wall, processor) in rows.items():
             sys.stdout.write(f"{name}: {wall:.2f} s wall time, {processor:.2f} s CPU time\n")

@@ -39,7 +39,7 @@ PAIRS: dict[str, tuple[tuple[float, float], tuple[float, float]]] = {
 }
 """Absorption and reduced scattering coefficients of the left and the right medium [1/mm]."""
 HALF_MM, STRIPS, PHOTONS, SEED = 14.0, 140, 40_000, 3
-_JUDGED, _CENTRAL = slice(40, 100), slice(20, 120)  # strips to compare, and strips to light
+_COMPARED, _SUMMED = slice(40, 100), slice(20, 120)  # strips for RMS errors, and for errors of the total
 _FRAMES = 12
 
 
@@ -70,11 +70,16 @@ def main(
 
 
 def border(sigma_a: tuple[float, float], sigma_s: tuple[float, float]) -> JsonObject:
-    """Return the errors of each rule at the border of two media: RMS over the true maximum, and energy."""
+    """Return the errors of each mixing rule at the border of two media.
+
+    "rms" and "worst" are RMS errors relative to the true maximum, means and largest over light patterns."""
     edges = np.linspace(-HALF_MM, HALF_MM, STRIPS + 1)
     a, s = np.array(sigma_a), np.array(sigma_s)
     true = strip_transfer(a, s, edges, PHOTONS, SEED)
-    alone = [along(strip_transfer(np.full(2, a[k]), np.full(2, s[k]), edges, PHOTONS, SEED)) for k in (0, 1)]
+    alone = [
+        light_by_distance(strip_transfer(np.full(2, a[k]), np.full(2, s[k]), edges, PHOTONS, SEED))
+        for k in (0, 1)
+    ]
     colour = [one[0] + 2.0 * one[1:].sum() for one in alone]
     right = edges[:-1] >= 0.0
     apart = np.abs(np.subtract.outer(np.arange(STRIPS), np.arange(STRIPS)))
@@ -88,17 +93,17 @@ def border(sigma_a: tuple[float, float], sigma_s: tuple[float, float]) -> JsonOb
     return {"albedo": colour, "rules": results}
 
 
-def along(matrix: Floats) -> Floats:
-    """Return the (n,) light of one medium by distance in strips."""
+def light_by_distance(matrix: Floats) -> Floats:
+    """Return the mean light (n,) at a distance of 0 to n - 1 strips from a lit strip, in one medium."""
     found = np.zeros(STRIPS)
     for k in range(STRIPS):
-        pairs = [matrix[i, j] for i in range(STRIPS)[_JUDGED] for j in (i - k, i + k) if 0 <= j < STRIPS]
+        pairs = [matrix[i, j] for i in range(STRIPS)[_COMPARED] for j in (i - k, i + k) if 0 <= j < STRIPS]
         found[k] = np.mean(pairs) if pairs else 0.0
     return found
 
 
 def rules(white: list[Floats], right: NDArray[np.bool_]) -> dict[str, Floats]:
-    """Return the white kernels of each mixing rule, from row to column."""
+    """Return the kernel of each mixing rule for white skin: light from strips (rows) to strips (columns)."""
     leaves = np.where(right[None], white[1], white[0])
     enters = np.where(right[:, None], white[1], white[0])
     return {
@@ -122,23 +127,23 @@ def patterns(edges: Floats) -> Iterator[Floats]:
 
 
 def errors(light: Floats, kernel: Floats, tint: Floats, true: Floats) -> tuple[float, float, float]:
-    """Return RMS error over the maximum, error of the total, and RMS error of the white kernel alone."""
+    """Return RMS error relative to the maximum, error of the total, and error of the total of white skin."""
     made, wanted = tint * ((light * tint) @ kernel), light @ true
-    off = np.sqrt(((made - wanted)[_JUDGED] ** 2).mean()) / wanted[_JUDGED].max()
-    energy = made[_CENTRAL].sum() / wanted[_CENTRAL].sum() - 1.0
-    near = light[_JUDGED]  # far from the outer edges of the strips
-    return float(off), float(energy), float((near @ kernel[_JUDGED]).sum() / near.sum() - 1.0)
+    off = np.sqrt(((made - wanted)[_COMPARED] ** 2).mean()) / wanted[_COMPARED].max()
+    energy = made[_SUMMED].sum() / wanted[_SUMMED].sum() - 1.0
+    near = light[_COMPARED]  # far from the outer edges of the strips
+    return float(off), float(energy), float((near @ kernel[_COMPARED]).sum() / near.sum() - 1.0)
 
 
 def grid(adapter: str) -> JsonObject:
-    """Return the width errors that remain with three profiles, over a grid of melanin and blood."""
+    """Return errors of profile widths with one and with three profiles, on a grid of melanin and blood."""
     m, b = np.meshgrid(np.geomspace(0.01, 0.15, 64), np.geomspace(0.002, 0.06, 64))
     colours = skin_model().colours(m.ravel(), b.ravel()).reshape(64, 64, 3)
     return profile_mixture(unmix(colours, adapter=adapter)).summary()
 
 
 def cost(adapter: str, atlas: int) -> JsonObject:
-    """Return the median frame times of the human by number of profiles, relit each time [ms]."""
+    """Return the median frame times of the human under changing light, by number of profiles [ms]."""
     renderer, head = Renderer(adapter), dermis.load_head("human")
     settings = dermis.Settings(size=(1920, 1080), atlas=atlas)
     results: JsonObject = {"adapter": renderer.device.adapter.name, "atlas": atlas}

@@ -21,11 +21,11 @@ ROOTS = (0.01, 0.02, 0.04, 0.07, 0.1, 0.14, 0.19, 0.25, 0.32, 0.4, 0.48, 0.56, 0
 """Values of sqrt(1 - albedo); Cycles accepts no albedo below 0.2."""
 RADII = np.concatenate([[0.0], np.geomspace(0.03, 200.0, 32)])
 """Radii within which light is counted [mean free paths]."""
-MOST = 256
+MAX_STEPS = 256
 """Number of steps after which Cycles ends a walk."""
 ETA = 1.4
-ENTRIES = ("straight", "skin")
-PLACE = Path(__file__).resolve().parents[1] / "src/dermis/apps/export/targets/blender/cycles_walk.csv"
+ENTRIES = ("straight", "skin")  # initial directions of walks, as in HEADER
+OUT = Path(__file__).resolve().parents[1] / "src/dermis/apps/export/targets/blender/cycles_walk.csv"
 HEADER = """\
 # quantity: fraction of the light that leaves a half-space along its normal and entered within a radius of
 #   that point: isotropic random walks of Cycles, of at most {most} steps, leaving an index-matched surface.
@@ -53,14 +53,14 @@ def _entering(skin: bool, rng: RandomState) -> tuple[float, float, float]:
 
 @compiled
 def _walks(photons: int, skin: bool, powers: Floats, radii: Floats, rng: RandomState, tally: Floats) -> None:
-    """Add the weights of photons that leave to their ring in `tally` (albedos, radii + 1).
+    """Trace photons, and add the weights of those that leave to their ring in `tally` (albedos, radii + 1).
 
-    powers : (albedos, MOST) albedo^n
+    powers : (albedos, MAX_STEPS) albedo^n
     """
     for _ in range(photons):
         x = y = z = 0.0
         ux, uy, uz = _entering(skin, rng)
-        for step in range(MOST):
+        for step in range(MAX_STEPS):
             path = -math.log(random_uniform(rng))
             if z + path * uz < 0.0:
                 path = -z / uz
@@ -74,7 +74,7 @@ def _walks(photons: int, skin: bool, powers: Floats, radii: Floats, rng: RandomS
 def main(photons: int = 4_000_000) -> None:
     """Simulate both entry distributions and write the table."""
     albedo = 1.0 - np.array(ROOTS) ** 2
-    powers = albedo[:, None] ** np.arange(MOST)
+    powers = albedo[:, None] ** np.arange(MAX_STEPS)
     lines = []
     for number, entry in enumerate(ENTRIES):
         tally = np.zeros((len(ROOTS), len(RADII) + 1))
@@ -85,8 +85,8 @@ def main(photons: int = 4_000_000) -> None:
             lines += [
                 f"{entry},{root:g},{r:.5g},{share:.5f}" for r, share in zip(RADII[1:], row, strict=True)
             ]
-    header = HEADER.format(photons=f"{photons:,}", most=MOST, eta=ETA)
-    PLACE.write_text(header + "\n".join(lines) + "\n", encoding="utf-8")
+    header = HEADER.format(photons=f"{photons:,}", most=MAX_STEPS, eta=ETA)
+    OUT.write_text(header + "\n".join(lines) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

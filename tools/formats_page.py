@@ -1,4 +1,4 @@
-"""Write docs/formats.md from its template and the properties of files that readers declare."""
+"""Write docs/formats.md from its template and the file properties that the readers declare."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ SETTINGS, TARGETS = dermis.Settings(size=(1920, 1080), atlas=2048), 52
 
 
 def changes(scene: dermis.Scene) -> dict[str, tuple[dermis.Scene, dermis.Settings]]:
-    """Return the changed scene and settings of each mark in the table."""
+    """Return, for each column of marks in the table, the scene and settings after a change."""
     key, *others = scene.lights
     moved = key.model_copy(update={"position": tuple(c + 20.0 for c in key.position)})  # type: ignore[union-attr]
     rough = scene.skin.model_copy(update={"roughness": 0.4})
@@ -41,7 +41,11 @@ def full_listing(renderer: dermis.Renderer, scene: dermis.Scene) -> FrameListing
 
 
 def stage_rows(listing: FrameListing, ms: dict[str, float], marks: dict[str, set[str]]) -> Iterable[str]:
-    """Yield the table row of each stage."""
+    """Yield the table row of each stage.
+
+    ms : device times of the stages [ms]
+    marks : names of the stages that run after each change
+    """
     for stage in dict.fromkeys(one.stage for one in listing.passes):
         own = [one for one in listing.passes if one.stage == stage]
         shaders = ", ".join(f"`{name}`" for name in dict.fromkeys(one.shader for one in own))

@@ -24,12 +24,13 @@ Words = NDArray[np.uint64]
 
 OUT = Path(__file__).parent.parent / "src" / "dermis" / "optics" / "data" / "half_space.csv"
 KINDS = {"skin": (1.4, False), "matched": (1.0, False), "walk": (1.0, True)}
-"""Index of refraction of the surface, and whether light enters by the cosine of all directions."""
-ABSORBED = np.concatenate([np.geomspace(1e-5, 0.2, 25), np.linspace(0.25, 0.95, 15), [0.98]])
+"""For each kind of profile: index of refraction of the surface, and whether light enters from all directions,
+weighted by their cosines, instead of along the normal."""
+ABSORPTIONS = np.concatenate([np.geomspace(1e-5, 0.2, 25), np.linspace(0.25, 0.95, 15), [0.98]])
 EDGES = np.concatenate([[0.0], np.geomspace(1e-3, 3e3, 96)])
 PHOTONS, BATCHES = 3_000_000, 40
-DARK, MORE = 0.2, 8  # least absorption at which few photons count, and factor of their number
-EVENTS, FEW_EVENTS = 200_000, 200  # then weights are negligible, or 1/7 for absorption 1e-5
+DARK_ABSORPTION, DARK_PHOTON_FACTOR = 0.2, 8  # absorption from which few photons leave, so more are traced
+EVENTS, DARK_EVENTS = 200_000, 200  # limits of paths; weights are then negligible, or 1/7 for absorption 1e-5
 HEAD = """\
 # quantity: cumulative share of the light leaving a homogeneous half-space around a thin beam, of all that
 #   leaves; total is that of what enters; kind skin has a smooth surface of index 1.4 lit at right angles,
@@ -45,12 +46,12 @@ def main(photons: int = PHOTONS) -> None:
     """Trace all photons and write the table."""
     lines = [HEAD + ",".join(["kind", "albedo", "total", *(f"{edge:.5g}" for edge in EDGES[1:])])]
     for kind, (eta, diffuse) in KINDS.items():
-        dark = ABSORBED >= DARK
-        bright_left = trace_photons(eta, diffuse, ABSORBED[~dark], photons, EVENTS)
-        dark_left = trace_photons(eta, diffuse, ABSORBED[dark], MORE * photons, FEW_EVENTS)
+        dark = ABSORPTIONS >= DARK_ABSORPTION
+        bright_left = trace_photons(eta, diffuse, ABSORPTIONS[~dark], photons, EVENTS)
+        dark_left = trace_photons(eta, diffuse, ABSORPTIONS[dark], DARK_PHOTON_FACTOR * photons, DARK_EVENTS)
         escaped = np.hstack([bright_left, dark_left])
         total, within = escaped.sum(axis=0), np.cumsum(escaped[:-1], axis=0)
-        for i, absorbed in enumerate(ABSORBED):
+        for i, absorbed in enumerate(ABSORPTIONS):
             shares = ",".join(f"{share:.5f}" for share in within[:, i] / total[i])
             lines.append(f"{kind},{1.0 - absorbed:.6g},{total[i]:.6g},{shares}")
     with atomic_file(OUT) as trial:
@@ -58,7 +59,11 @@ def main(photons: int = PHOTONS) -> None:
 
 
 def trace_photons(eta: float, diffuse: bool, absorbed: Floats, photons: int, events: int) -> Floats:
-    """Return the (k, m) light that leaves through each ring and beyond the last, for each albedo [-]."""
+    """Return the light (k, m) that leaves through each ring and outside the last, for each albedo [-].
+
+    diffuse : whether light enters from all directions
+    events : scattering events after which a path ends
+    """
 
     def batch(seeds: np.random.SeedSequence) -> Floats:
         escaped = np.zeros((len(EDGES), len(absorbed)))

@@ -24,13 +24,13 @@ Arrays = dict[str, NDArray[Any]]
 
 OUT = Path(__file__).parent.parent / "src" / "dermis" / "human" / "data" / "human.npz"
 MM = 100.0  # length of a unit of the published positions
-MEAN = {
+MEAN_PERSON = {
     f"macrodetails/{people}-{sex}-young": 1 / 6
     for people in ("african", "asian", "caucasian")
     for sex in ("female", "male")
 }
 """Target weights of the mean person, on whom edges, seams and densities are defined."""
-BONES = {  # bones of the file, by the beginning of their names, that each bone replaces
+BONES = {  # by bone of the bust: beginnings of the names of the published bones that it replaces
     "spine": ("spine", "breast"),
     "clavicle.L": ("clavicle.L", "shoulder01.L", "upperarm01.L", "upperarm02.L", "lowerarm01.L"),
     "clavicle.R": ("clavicle.R", "shoulder01.R", "upperarm01.R", "upperarm02.R", "lowerarm01.R"),
@@ -43,15 +43,15 @@ BONES = {  # bones of the file, by the beginning of their names, that each bone 
     "eye.R": ("eye.R",),
 }
 CORNER_MM = 25.0  # approximate radius of the cut's corners
-RELAXING = 40  # smoothing steps along the edge of the cut, which crosses the folds of the armpits
-ACROSS = 4  # number of quads of the cap from front to back
+SMOOTHING_STEPS = 40  # smoothing steps along the edge of the cut, which crosses the folds of the armpits
+CAP_QUADS = 4  # number of quads of the cap from front to back
 
 
 def main(folder: Path) -> None:
     """Build the bust and write the file."""
     with np.load(folder / "human.npz") as found:
         data = {name: found[name] for name in found}
-    mean = MM * data["positions_dm"].astype(np.float64) + person(data, MEAN)
+    mean = MM * data["positions_dm"].astype(np.float64) + displaced_by(data, MEAN_PERSON)
     data = without_groups(data, "eyelashes")
     quads, kept, mix = clip_to_bust(data, mean)
     shape = capped(quads, data["quad_group"][kept].astype(np.int64), mix, mean)
@@ -67,7 +67,7 @@ def main(folder: Path) -> None:
 class Shape(NamedTuple):
     """Mesh whose points are linear combinations of the published points.
 
-    quads, group : (q, 4) points and (q,) groups of the quads; the last group is that of the caps
+    quads, group : (q, 4) point indices and (q,) group indices of the quads; the caps are the last group
     mix : (n, p) sparse weights of the published points
     """
 
@@ -86,7 +86,7 @@ def displacements(data: Arrays, index: int) -> tuple[Index, Doubles]:
     return data["target_vertex"][part].astype(np.int64), DELTA_UNIT_MM * data["target_delta_um10"][part]
 
 
-def person(data: Arrays, weights: dict[str, float]) -> Doubles:
+def displaced_by(data: Arrays, weights: dict[str, float]) -> Doubles:
     """Return the (p, 3) displacements of the base mesh by weighted targets [mm]."""
     names, added = list(map(str, data["target_names"])), np.zeros(data["positions_dm"].shape)
     for name, weight in weights.items():
@@ -154,7 +154,7 @@ def crossing(outer: Doubles, inner: Doubles) -> float:
 
 
 def capped(quads: Index, group: Index, mix: Any, points_mm: Doubles) -> Shape:
-    """Return the bust with its opening closed by a strip of quads from front to back."""
+    """Return the bust with its opening closed by caps: rows of quads from front to back."""
     loop = border(quads[group == 0])
     where = mix[loop] @ points_mm
     top = int(np.argmax(np.where(where[:, 0] > 0, where[:, 1], -np.inf)))  # where front and back separate
@@ -165,14 +165,14 @@ def capped(quads: Index, group: Index, mix: Any, points_mm: Doubles) -> Shape:
     mix, loop = vstack([mix, mix[loop]]).tocsr(), copies
     front, back = loop[: half + 1], np.r_[loop[0], loop[: half - 1 : -1]]
     columns, mixes, count = [front[1:-1]], [mix], mix.shape[0]
-    for k in range(1, ACROSS):
-        mixes.append((1 - k / ACROSS) * mix[front[1:-1]] + (k / ACROSS) * mix[back[1:-1]])
+    for k in range(1, CAP_QUADS):
+        mixes.append((1 - k / CAP_QUADS) * mix[front[1:-1]] + (k / CAP_QUADS) * mix[back[1:-1]])
         columns.append(count + np.arange(half - 1))
         count += half - 1
     columns.append(back[1:-1])
     rows = np.stack(columns, axis=1)
-    tips = [[loop[0], *rows[0, k : k + 3][::-1]] for k in range(0, ACROSS, 2)]
-    tips += [[loop[half], *rows[-1, k : k + 3]] for k in range(0, ACROSS, 2)]
+    tips = [[loop[0], *rows[0, k : k + 3][::-1]] for k in range(0, CAP_QUADS, 2)]
+    tips += [[loop[half], *rows[-1, k : k + 3]] for k in range(0, CAP_QUADS, 2)]
     between = np.stack([rows[:-1, :-1], rows[1:, :-1], rows[1:, 1:], rows[:-1, 1:]], axis=-1).reshape(-1, 4)
     caps = np.concatenate([np.array(tips), between[:, ::-1]])
     group = np.concatenate([group, np.full(len(caps), group.max() + 1)])
@@ -180,12 +180,12 @@ def capped(quads: Index, group: Index, mix: Any, points_mm: Doubles) -> Shape:
 
 
 def relaxed(mix: Any, loop: Index) -> Any:
-    """Return the mixing weights with the points of a loop moved towards their neighbours, without spikes."""
+    """Return the mixing weights after the points of a loop are moved towards their neighbours."""
     n = len(loop)
     around: Any = (0.5 * eye_array(n) + 0.25 * (eye_array(n, k=1) + eye_array(n, k=-1))).tolil()
     around[0, n - 1] = around[n - 1, 0] = 0.25
     rows = mix[loop]
-    for _ in range(RELAXING):
+    for _ in range(SMOOTHING_STEPS):
         rows = around.tocsr() @ rows
     held = np.ones(mix.shape[0])
     held[loop] = 0.0
@@ -194,7 +194,7 @@ def relaxed(mix: Any, loop: Index) -> Any:
 
 
 def border(quads: Index) -> Index:
-    """Return the only border loop, with the mesh on its left side."""
+    """Return the points of the only border of the mesh in order, with the mesh on the left side."""
     sides = np.stack([quads, np.roll(quads, -1, axis=1)], axis=-1).reshape(-1, 2)
     there = set(map(tuple, sides.tolist()))
     after = {a: b for a, b in there if (b, a) not in there}
@@ -208,7 +208,7 @@ def border(quads: Index) -> Index:
 
 
 def bust(data: Arrays, shape: Shape) -> Arrays:
-    """Return the arrays of the bust without its uv layout; joints follow the points of the mesh."""
+    """Return the arrays of the bust, except its uv layout; positions of joints follow those of points."""
     joints, published = data["joint_vertices"].astype(np.int64), len(data["positions_dm"])
     rows = np.repeat(np.arange(len(joints)), joints.shape[1])
     means = coo_array(

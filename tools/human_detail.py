@@ -21,12 +21,12 @@ OUT = Path(__file__).parent.parent / "src" / "dermis" / "human" / "data" / "deta
 PORES_A_SIDE = 30
 PORE_MM = (0.06, 0.19)
 """Radius of the smallest and the largest pore [mm], an artist's choice."""
-PORE_DEPTH_MM = (0.03, 0.085)
+PORE_DEPTH_MM = (0.03, 0.085)  # of the smallest and the largest pore
 CELLS_A_SIDE, FINE_CELLS_A_SIDE = 44, 92
 """Cells per side of the coarse and the fine net of furrows, 0.7 and 0.35 mm wide."""
-FURROW_MM, FURROW_DEPTH_MM, CUSHION_MM = 0.11, 0.032, 0.016
-FINE_SHARE = 0.4
-SOFT = 0.6
+FURROW_MM, FURROW_DEPTH_MM, CUSHION_MM = 0.11, 0.032, 0.016  # width and depth of furrows, height of cells
+FINE_FRACTION = 0.4  # height of the fine net relative to the coarse net
+BLUR_TEXELS = 0.6
 """Standard deviation of the final blur [texels]."""
 
 
@@ -37,14 +37,14 @@ def main() -> None:
     positions = np.stack(np.meshgrid(across, across), axis=-1).reshape(-1, 2)
     layers = [pores(positions, rng), furrows(positions, rng), np.zeros(len(positions))]
     heights = gaussian_filter(
-        np.stack(layers, axis=-1).reshape(TILE_SIDE, TILE_SIDE, 3), (SOFT, SOFT, 0), mode="wrap"
+        np.stack(layers, axis=-1).reshape(TILE_SIDE, TILE_SIDE, 3), (BLUR_TEXELS, BLUR_TEXELS, 0), mode="wrap"
     )
     levels = np.clip(np.rint(255 * (heights / MAX_HEIGHT_MM + 0.75)), 0, 255).astype(np.uint8)
     Image.fromarray(levels).save(OUT, optimize=True)
     sys.stdout.write(f"{OUT}  {OUT.stat().st_size / 1e3:.0f} kB\n")
 
 
-def scattered(count: int, rng: np.random.Generator, spread: float = 0.85) -> Doubles:
+def jittered_grid(count: int, rng: np.random.Generator, spread: float = 0.85) -> Doubles:
     """Return (count², 2) jittered positions, one in each cell of a grid over the tile [mm]."""
     cell = np.stack(np.meshgrid(np.arange(count), np.arange(count)), axis=-1).reshape(-1, 2)
     return np.asarray(
@@ -53,8 +53,8 @@ def scattered(count: int, rng: np.random.Generator, spread: float = 0.85) -> Dou
 
 
 def pores(positions: Doubles, rng: np.random.Generator) -> Doubles:
-    """Return the (n,) height of skin with pores, smooth pits of different inclination [mm]."""
-    middle = scattered(PORES_A_SIDE, rng)
+    """Return the (n,) height of skin with pores, elliptic pits of several sizes and directions [mm]."""
+    middle = jittered_grid(PORES_A_SIDE, rng)
     share = rng.random(len(middle)) ** 1.3
     radius, depth = (low + share * (high - low) for low, high in (PORE_MM, PORE_DEPTH_MM))
     depth *= rng.random(len(middle)) < 0.85
@@ -73,12 +73,16 @@ def pores(positions: Doubles, rng: np.random.Generator) -> Doubles:
 def furrows(positions: Doubles, rng: np.random.Generator) -> Doubles:
     """Return the (n,) height of skin with a coarse and a fine net of furrows [mm]."""
     coarse = net(positions, CELLS_A_SIDE, 1.0, rng)
-    return np.asarray(coarse + FINE_SHARE * net(positions, FINE_CELLS_A_SIDE, 0.55, rng))
+    return np.asarray(coarse + FINE_FRACTION * net(positions, FINE_CELLS_A_SIDE, 0.55, rng))
 
 
 def net(positions: Doubles, count: int, size: float, rng: np.random.Generator) -> Doubles:
-    """Return the (n,) height of a net of furrows between convex cells [mm]."""
-    middle = scattered(count, rng, 0.8)
+    """Return the (n,) height of a net of furrows between convex cells [mm].
+
+    count : number of cells per side of the tile
+    size : width of the furrows relative to `FURROW_MM`
+    """
+    middle = jittered_grid(count, rng, 0.8)
     uneven = 0.5 + rng.random(len(middle))
     distance, near = nearest(positions, middle, 2)
     between = distance[:, 1] - distance[:, 0]

@@ -31,8 +31,8 @@ LEVEL = 3
 """Level of the subdivision on which distances are measured."""
 FARTHEST_MM = 25.0
 """Distance at which fields end; nothing is painted farther from a border."""
-SMOOTH = 0.05
-"""Weight of a control point's own value in the fit, which keeps points without influence."""
+PRIOR_WEIGHT = 0.05
+"""Weight of the initial value of a control point in the fit, which determines points without influence."""
 ROOT_MM = 1.5
 """Largest distance of the roots of lash strips from the skin."""
 
@@ -51,8 +51,8 @@ def main(folder: Path) -> None:
     masks = {name: mask(folder, name, mesh.uv) for name in ("lips", "inside-mouth")}
     inside = masks["inside-mouth"]
     found = {
-        "lips": signed(mesh, skin, np.where(inside > 0.5, 1.0, masks["lips"]), ignored=inside > 0.5),
-        "mouth": -signed(mesh, skin, inside),
+        "lips": signed_distance(mesh, skin, np.where(inside > 0.5, 1.0, masks["lips"]), ignored=inside > 0.5),
+        "mouth": -signed_distance(mesh, skin, inside),
         "lids": distance_to(mesh, lash_roots(folder, mesh, skin)),
     }
     assert tuple(found) == BORDER_FIELDS
@@ -66,12 +66,12 @@ def main(folder: Path) -> None:
 
 
 def in_hundredths_mm(values_mm: NDArray[np.floating]) -> NDArray[np.int32]:
-    """Return values in the units of the published displacements; the breast exceeds the range of 16 bits."""
+    """Return values in the unit of the published displacements, as 32 bits: the breast exceeds 16 bits."""
     return np.asarray(np.rint(values_mm / DELTA_UNIT_MM), np.int32)
 
 
 def skin_vertices(mesh: Mesh) -> Index:
-    """Return the vertices of the skin."""
+    """Return the indices of the vertices of the skin."""
     kinds = np.array([material.kind == "skin" for material in mesh.materials])
     return np.unique(mesh.triangles[kinds[mesh.material]])
 
@@ -83,7 +83,9 @@ def mask(folder: Path, name: str, uv: NDArray[np.float32]) -> Doubles:
     return np.asarray(map_coordinates(picture, place, order=1, mode="nearest"))
 
 
-def signed(mesh: Mesh, skin: Index, share: Doubles, ignored: NDArray[np.bool_] | None = None) -> Doubles:
+def signed_distance(
+    mesh: Mesh, skin: Index, share: Doubles, ignored: NDArray[np.bool_] | None = None
+) -> Doubles:
     """Return the (v,) signed distance from the contour where a fraction is one half, positive inside [mm].
 
     ignored : mask of vertices whose edges are not part of the contour
@@ -107,13 +109,13 @@ def distance_to(mesh: Mesh, points: Doubles) -> Doubles:
 
 
 def lash_roots(folder: Path, mesh: Mesh, skin: Index) -> Doubles:
-    """Return (n, 3) points where the published lash strips touch the lids, with points in between [mm]."""
+    """Return (n, 3) points along the edges of the published lash strips that touch the lids [mm]."""
     with np.load(folder / "human.npz") as found:
         data: Arrays = {name: found[name] for name in found}
     names = list(map(str, data["group_names"]))
     strips = [k for k, name in enumerate(names) if "eyelashes" in name]
     quads = data["quads"][np.isin(data["quad_group"], strips)].astype(np.int64)
-    places = published(data)
+    places = published_points_mm(data)
     used = np.unique(quads)
     distance = np.full(len(places), np.inf)
     distance[used] = cKDTree(mesh.positions[skin]).query(places[used])[0]
@@ -123,7 +125,7 @@ def lash_roots(folder: Path, mesh: Mesh, skin: Index) -> Doubles:
     return np.asarray(((1 - steps) * places[sides[:, 0]] + steps * places[sides[:, 1]]).reshape(-1, 3))
 
 
-def published(data: Arrays) -> Doubles:
+def published_points_mm(data: Arrays) -> Doubles:
     """Return the (p, 3) published points of the average person, relative to the midpoint of the eyes [mm]."""
     names = list(map(str, data["target_names"]))
     places = MM * data["positions_dm"].astype(np.float64)
@@ -136,17 +138,18 @@ def published(data: Arrays) -> Doubles:
 
 
 def fit(matrix: csr_array, point: Index, values: Doubles) -> Doubles:
-    """Return (p, k) control point values whose smooth surface interpolates the vertex values (v, k).
+    """Return values (p, k) at control points, from which subdivision gives the vertex values (v, k).
 
+    matrix : weights of the control points at each point of the subdivided mesh
     point : (v,) matrix row of each vertex
     """
     rows = matrix[point]
     near = np.asarray(rows.T @ values) / np.maximum(np.asarray(rows.sum(axis=0)).reshape(-1, 1), 1e-9)
     near[np.asarray(rows.sum(axis=0)).ravel() < 1e-9] = -FARTHEST_MM
     n = matrix.shape[1]
-    whole = vstack([rows, SMOOTH * csr_array((np.ones(n), (np.arange(n), np.arange(n))))]).tocsr()
+    whole = vstack([rows, PRIOR_WEIGHT * csr_array((np.ones(n), (np.arange(n), np.arange(n))))]).tocsr()
     columns = [
-        lsqr(whole, np.r_[values[:, k], SMOOTH * near[:, k]], x0=near[:, k], iter_lim=200)[0]
+        lsqr(whole, np.r_[values[:, k], PRIOR_WEIGHT * near[:, k]], x0=near[:, k], iter_lim=200)[0]
         for k in range(values.shape[1])
     ]
     return np.stack(columns, axis=1)

@@ -22,7 +22,7 @@ _UPPER, _LOWER = np.arange(13), np.r_[12:28, 0]  # rows of lid_rings.csv, from c
 _EDGE, _CREST = 1, 2  # columns of lid_rings.csv
 _SEAM_MM = np.array([[0.0, -67.3], [10, -66.7], [18, -67.2], [22.2, -67.9]])  # x, y where the lips meet
 _CORNER_MM = 22.2
-_AHEAD = 0.4  # weight of z relative to height in the search for the edge of a lip
+_DEPTH_WEIGHT = 0.4  # weight of z relative to height in the search for the edge of a lip
 _NEAR_MM = 1.2  # search radius around a position in the front plane
 # Artist's values on the average human, seen from the front and the side: the outline of the face from in
 # front of the ear at the height of the eyes, over the angle of the jaw, to the chin [mm].
@@ -79,7 +79,7 @@ class Surface:
         return int(those[np.linalg.norm(self.at_mm[those] - wanted, axis=1).argmin()])
 
     def frontmost(self, x: float, y: float) -> int:
-        """Return the index of the candidate that is visible from the front at x, y [mm]."""
+        """Return the index of the candidate that is seen from the front at the position x, y [mm]."""
         off = np.hypot(self.at_mm[:, 0] - x, self.at_mm[:, 1] - y)
         near = np.flatnonzero(self.face & (off < _NEAR_MM))
         first = near[self.at_mm[near, 2] > self.at_mm[near, 2].max() - _NEAR_MM]
@@ -106,7 +106,7 @@ class Surface:
         return self.nearest(position, self.skin & (np.abs(self.lids) < 0.12) & (self.at_mm[:, 0] > 0))
 
     def lip_border(self, upper: bool) -> Doubles:
-        """Return the (n, 3) outer border of a lip, from its corner to the centre [mm]."""
+        """Return the (n, 3) outer border of a lip, from the corner of the mouth to its centre [mm]."""
         seam = np.interp(np.abs(self.at_mm[:, 0]), *_SEAM_MM.T)
         side = (self.at_mm[:, 1] > seam + 0.4) if upper else (self.at_mm[:, 1] < seam - 0.4)
         those = self.face & side & (np.abs(self.lips) < 0.3) & (np.abs(self.at_mm[:, 0] - 10.5) < 11.0)
@@ -132,7 +132,7 @@ class Surface:
         for x in np.linspace(20.0, 0.0, 21):
             near = those[np.abs(self.at_mm[those, 0] - x) < 0.5]
             height = self.at_mm[near, 1] if upper else -self.at_mm[near, 1]
-            edge = near[(height - _AHEAD * self.at_mm[near, 2]).argmin()]
+            edge = near[(height - _DEPTH_WEIGHT * self.at_mm[near, 2]).argmin()]
             rows.append(self.at_mm[edge] * [0, 1, 1] + [x, 0, 0])
         return np.concatenate([self.at_mm[[self.mouth_corner()]], np.stack(rows)])
 
@@ -170,7 +170,7 @@ class Surface:
         return int(those[self.at_mm[those, 2].argmax()])
 
 
-def arcs(path: Doubles, shares: Doubles) -> Doubles:
+def points_along(path: Doubles, shares: Doubles) -> Doubles:
     """Return (n, 3) points at fractions (n,) of the length of a path."""
     run = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
     return np.stack([np.interp(shares * run[-1], run, column) for column in path.T], axis=-1)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from human_landmark_candidates import Doubles, Surface, arcs
+from human_landmark_candidates import Doubles, Surface, points_along
 
 from dermis.mesh.eyeball import CORNEA_MM, IRIS_BEHIND_MM, SCLERA_MM, apex_mm
 
-Place = tuple[int, float]
-Named = dict[str, Place]
+Anchor = tuple[int, float]
+"""Index of a candidate, and depth below the surface."""
+Anchors = dict[str, Anchor]
 
 _REFRACTION = 1.336  # index of refraction of cornea and aqueous humour, as in the frame
 _SEEN_MM = 1.0 / (_REFRACTION / IRIS_BEHIND_MM - (_REFRACTION - 1.0) / CORNEA_MM)
@@ -20,7 +21,7 @@ _WING, _NOSTRIL, _ALA = (14.6, -42.6), (8.0, -46.2), (17.6, -37.5)
 _OVAL_MM = (69.0, -15.0, 54.0)  # half its width, height of the largest width, and height of the top
 
 
-def ibug(surface: Surface) -> Named:
+def ibug(surface: Surface) -> Anchors:
     """Return the 68 landmarks of iBUG, numbered from 0."""
     left = _half(surface)
     both = {name: (left[name], surface.opposite(left[name])) for name in left}
@@ -41,22 +42,24 @@ def ibug(surface: Surface) -> Named:
     return {str(k): (both[name][side == "R"], 0.0) for k, (side, name) in enumerate(order)}
 
 
-def face_synthetics(surface: Surface) -> Named:
-    """Return the 68 landmarks and the pupils."""
+def face_synthetics(surface: Surface) -> Anchors:
+    """Return the 70 landmarks of FaceSynthetics: the 68 of iBUG, then the pupils."""
     left, right = (surface.apex(name) for name in ("left eye", "right eye"))
     return ibug(surface) | {"68": (right, PUPIL), "69": (left, PUPIL)}
 
 
 def _half(surface: Surface) -> dict[str, int]:
-    """Return the candidates of the left side and of the midline by name."""
-    found = {f"jaw {k}": surface.nearest(p) for k, p in enumerate(arcs(surface.jaw(), np.arange(9) / 8))}
+    """Return the indices of the candidates of the left side and of the midline, by name of the landmark."""
+    found = {
+        f"jaw {k}": surface.nearest(p) for k, p in enumerate(points_along(surface.jaw(), np.arange(9) / 8))
+    }
     found["jaw 8"] = surface.midline(float(surface.jaw()[-1, 1]))
     found |= {f"brow {k}": surface.nearest(p) for k, p in enumerate(_brow(surface, 0.0, 5))}
     heights = np.linspace(_NASION_Y, _TIP_Y, 4)
     found |= {f"bridge {k}": surface.midline(y) for k, y in enumerate(heights)}
     found |= {"subnasale": surface.midline(_SUBNASALE_Y)}
     found |= {"wing": surface.frontmost(*_WING), "nostril": surface.frontmost(*_NOSTRIL)}
-    upper, lower = (arcs(surface.lid(up), np.arange(4) / 3) for up in (True, False))
+    upper, lower = (points_along(surface.lid(up), np.arange(4) / 3) for up in (True, False))
     for name, place in zip(("inner", "up 1", "up 2", "outer"), upper, strict=True):
         found[f"eye {name}"] = surface.on_lid(place)
     for name, place in zip(("down 1", "down 2"), lower[1:3], strict=True):
@@ -67,23 +70,23 @@ def _half(surface: Surface) -> dict[str, int]:
 def _lips(surface: Surface) -> dict[str, int]:
     upper, lower = surface.lip_border(True), surface.lip_border(False)
     peak = int(upper[:, 1].argmax())
-    wanted = {"up side": arcs(upper[: peak + 1], np.array([0.5]))[0], "up peak": upper[peak]}
+    wanted = {"up side": points_along(upper[: peak + 1], np.array([0.5]))[0], "up peak": upper[peak]}
     wanted |= {"up middle": upper[-1], "low middle": lower[-1]}
-    wanted |= dict(zip(("low 1", "low 2"), arcs(lower, np.array([1, 2]) / 3), strict=True))
+    wanted |= dict(zip(("low 1", "low 2"), points_along(lower, np.array([1, 2]) / 3), strict=True))
     found = {name: surface.nearest(place) for name, place in wanted.items()}
     found |= {"lips": surface.mouth_corner()}
     for word, up in (("up", True), ("low", False)):
         inner = surface.inner_lip(up)
-        found[f"in {word}"] = surface.on_inner_lip(arcs(inner, np.array([0.5]))[0], up)
+        found[f"in {word}"] = surface.on_inner_lip(points_along(inner, np.array([0.5]))[0], up)
         found[f"in {word} middle"] = surface.on_inner_lip(inner[-1], up)
     return found
 
 
 def _brow(surface: Surface, across: float, count: int) -> Doubles:
-    return arcs(surface.brow(across), np.linspace(0.0, 1.0, count))
+    return points_along(surface.brow(across), np.linspace(0.0, 1.0, count))
 
 
-def mediapipe(surface: Surface) -> Named:
+def mediapipe(surface: Surface) -> Anchors:
     """Return the landmarks of face outline, brows, eyes, lips, nose ridge and irises."""
     left = {**_oval(surface), **_eye(surface), **_brows(surface), **_mouth(surface), **_nose(surface)}
     found = {name: (candidate, 0.0) for name, (candidate, _) in left.items()}
@@ -93,7 +96,7 @@ def mediapipe(surface: Surface) -> Named:
     return dict(sorted(found.items(), key=lambda one: int(one[0])))
 
 
-Pairs = dict[str, tuple[int, str]]  # by name: number on the left, candidate, and number on the right or ""
+Pairs = dict[str, tuple[int, str]]  # candidate, and number on the right or "", by number on the left
 
 
 def _pairs(left: str, right: str, candidates: list[int]) -> Pairs:
@@ -109,14 +112,14 @@ def _oval(surface: Surface) -> Pairs:
         surface.midline(top),
         *(surface.frontmost(0.97 * a, b) for a, b in zip(x[1:], y[1:], strict=True)),
     ]
-    below = [surface.nearest(p) for p in arcs(surface.jaw()[2:], np.arange(1, 11) / 10)]
+    below = [surface.nearest(p) for p in points_along(surface.jaw()[2:], np.arange(1, 11) / 10)]
     left = "10 338 297 332 284 251 389 356 454 323 361 288 397 365 379 378 400 377 152"
     right = "10 109 67 103 54 21 162 127 234 93 132 58 172 136 150 149 176 148 152"
     return _pairs(left, right, [*above, *below])
 
 
 def _eye(surface: Surface) -> Pairs:
-    upper, lower = (arcs(surface.lid(up), np.arange(9) / 8) for up in (True, False))
+    upper, lower = (points_along(surface.lid(up), np.arange(9) / 8) for up in (True, False))
     up = _pairs("362 398 384 385 386 387 388 466 263", "133 173 157 158 159 160 161 246 33",
                 [surface.on_lid(p) for p in upper])  # fmt: skip
     return up | _pairs("382 381 380 374 373 390 249", "155 154 153 145 144 163 7",
@@ -133,15 +136,15 @@ def _brows(surface: Surface) -> Pairs:
 def _mouth(surface: Surface) -> Pairs:
     upper, lower = surface.lip_border(True), surface.lip_border(False)
     peak = int(upper[:, 1].argmax())
-    above = [*arcs(upper[: peak + 1], np.arange(1, 5) / 4), upper[-1]]
+    above = [*points_along(upper[: peak + 1], np.arange(1, 5) / 4), upper[-1]]
     found = _pairs("409 270 269 267 0", "185 40 39 37 0", [surface.nearest(p) for p in above])
-    below = arcs(lower, np.arange(1, 6) / 5)
+    below = points_along(lower, np.arange(1, 6) / 5)
     found |= _pairs("375 321 405 314 17", "146 91 181 84 17", [surface.nearest(p) for p in below])
     corner = surface.mouth_corner()
     found |= _pairs("291 308", "61 78", [corner, corner])
     for up, left, right in ((True, "415 310 311 312 13", "191 80 81 82 13"),
                             (False, "324 318 402 317 14", "95 88 178 87 14")):  # fmt: skip
-        inner = arcs(surface.inner_lip(up), np.arange(1, 6) / 5)
+        inner = points_along(surface.inner_lip(up), np.arange(1, 6) / 5)
         found |= _pairs(left, right, [surface.on_inner_lip(p, up) for p in inner])
     return found
 

@@ -18,7 +18,7 @@ Index = NDArray[np.int64]
 
 CHART_PADDING = 1 / 256
 _CROWN_Z, _CROWN_SLOPE, _EAR_Y = 15.0, 0.25, 715.0  # seam over the crown of the mean person [mm]
-_LOOSE = 0.05  # weight of the triangles that fill holes during flattening
+_FILLING_WEIGHT = 0.05  # weight of the triangles that fill holes during flattening
 FACE, SCALP, EARS, TRUNK, HIDDEN, PLAIN = 1.0, 0.35, 0.7, 0.26, 0.14, 0.06
 """Texels per mm relative to the face: face, back of the head, ears, neck and chest, mouth and eye sockets,
 and parts that are not skin."""
@@ -31,8 +31,8 @@ def human_layout(
 
     points_mm : (n, 3) points of the mean person [mm]
     quads : (q, 4) points, caps last
-    published : (k, 4) corners of all quads but the caps in the published layout
-    uv : (v, 2) published layout, v up
+    published : (k, 4) uv corners of all quads but the caps, in the published layout
+    uv : (v, 2) uv of the published layout, v up
     group : (q,) group of each quad, 0 for skin
     """
     published, uv = _with_seams(points_mm, quads[: len(published)], published, uv)
@@ -71,14 +71,14 @@ def _flattened(points_mm: Doubles, quads: Index, corner: Index, uv: Doubles, gro
     density = _head_density(middle) if middle[:, 1].max() > 800 else np.full(len(middle), TRUNK)
     filled, more = _filled(triangles, points)
     rest = len(filled) - len(triangles)
-    weight = np.r_[np.ones(len(triangles)), np.full(rest, _LOOSE)]
+    weight = np.r_[np.ones(len(triangles)), np.full(rest, _FILLING_WEIGHT)]
     dense = np.r_[density, np.full(rest, float(np.max(density)))]
     made[used] = _upright(flatten(more, filled, dense, weight)[: len(used)], points)
     return made
 
 
 def _with_seams(points_mm: Doubles, quads: Index, corner: Index, uv: Doubles) -> tuple[Index, Doubles]:
-    """Return the published corners with an additional seam over crown and behind the ears, and their uv."""
+    """Return the uv corners and the uv, after an additional cut over the crown and behind the ears."""
     island, middle = _islands(corner)[corner[:, 0]], points_mm[quads].mean(axis=1)
     head = np.flatnonzero(island == island[middle[:, 1].argmax()])
     behind = middle[head, 2] < _CROWN_Z + _CROWN_SLOPE * (middle[head, 1] - _EAR_Y)
@@ -89,7 +89,7 @@ def _with_seams(points_mm: Doubles, quads: Index, corner: Index, uv: Doubles) ->
     return made, np.vstack([uv, uv[used]])
 
 
-def rise(values: Doubles, low: float, high: float) -> Doubles:
+def smooth_step(values: Doubles, low: float, high: float) -> Doubles:
     """Return a smooth step from 0 at `low` to 1 at `high`; decreasing if `low` is greater."""
     t: Doubles = np.clip((values - low) / (high - low), 0, 1)
     return t * t * (3 - 2 * t)
@@ -98,9 +98,9 @@ def rise(values: Doubles, low: float, high: float) -> Doubles:
 def _head_density(middle: Doubles) -> Doubles:
     """Return the (f,) texels per mm of the head's triangles with centres (f, 3) [mm]."""
     x, y, z = np.abs(middle[:, 0]), middle[:, 1], middle[:, 2]
-    front = rise(z, -10, 100) * rise(y, 850, 790) * rise(y, 600, 650)
+    front = smooth_step(z, -10, 100) * smooth_step(y, 850, 790) * smooth_step(y, 600, 650)
     density = SCALP + (FACE - SCALP) * front
-    ear = rise(np.hypot(x - 75, (y - 715) / 1.6) + 0.5 * np.abs(z - 42), 45, 20)
+    ear = smooth_step(np.hypot(x - 75, (y - 715) / 1.6) + 0.5 * np.abs(z - 42), 45, 20)
     return np.asarray(np.maximum(density, EARS * ear))
 
 
@@ -131,7 +131,7 @@ def _upright(flat: Doubles, points: Doubles) -> Doubles:
 
 
 def _unrolled(points: Doubles) -> Doubles:
-    """Return the points of a strip by their depth and their distance along the strip."""
+    """Return flat coordinates of the points of a strip: distance along the strip, and depth."""
     order = np.argsort(np.arctan2(points[:, 0], points[:, 1].max() + 1 - points[:, 1]), kind="stable")
     along = np.zeros(len(points))
     along[order] = np.r_[0, np.cumsum(np.linalg.norm(np.diff(points[order][:, :2], axis=0), axis=1))]
@@ -139,7 +139,7 @@ def _unrolled(points: Doubles) -> Doubles:
 
 
 def _strip(caps: Index) -> Index:
-    """Return the corners of the caps, numbered by their points."""
+    """Return the uv corners of the caps: one corner for each of their points."""
     return np.unique(caps, return_inverse=True)[1].reshape(-1, 4) if len(caps) else caps
 
 

@@ -35,7 +35,7 @@ def main(folder: Path) -> None:
 
 
 def parts(folder: Path) -> dict[str, NDArray[np.int64]]:
-    """Return the quad indices of each part."""
+    """Return the indices of the quads of each part."""
     with np.load(HUMAN / "data" / "human.npz") as found:
         data: dict[str, NDArray[Any]] = {name: found[name] for name in found}
     u, v = data["uv1"][data["quads_uv1"].astype(int)].mean(axis=1).T

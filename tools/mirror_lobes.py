@@ -1,4 +1,4 @@
-"""Make src/dermis/environment/data/mirrors.csv: specular lobes as sums of isotropic ones.
+"""Make src/dermis/environment/data/mirrors.csv: specular lobes as sums of isotropic lobes.
 
 Takes two or three minutes. The method is described in `dermis.environment.isotropic_fits`.
 """

@@ -23,7 +23,7 @@ DATA = Path(os.environ.get("DERMIS_DATA", "../shared")) / "heads"
 SKIN = DATA / "makehuman" / "skins" / "young_lightskinned_male_diffuse.png"
 MAN = dermis.Human(sex=1, age=25)
 SIDE, FPS, ATLAS = 1024, "30", 1024
-SECONDS, CAPTURED = 6.0, 60
+SECONDS, CAPTURE_FPS = 6.0, 60
 Keys = Sequence[tuple[float, float]]
 BLINKS = [(at + after, shut) for at in (1.35, 3.95) for after, shut in ((-0.08, 0), (0, 1), (0.14, 0))]
 MOTION: dict[str, Keys] = {
@@ -52,7 +52,7 @@ MOTION: dict[str, Keys] = {
     "HeadPitch": [(1.6, 0), (2.3, -0.08), (3.2, 0.06), (4.2, 0)],
     "HeadRoll": [(3.9, 0), (4.6, 0.1), (5.0, 0.1), (5.7, 0)],
 }
-"""Keys (seconds, value) by column; angles in radians."""
+"""Keys (seconds, value) of each column of the CSV; angles in radians."""
 PAIRED = ("MouthSmile", "CheekSquint", "MouthStretch", "MouthPress", "BrowOuterUp", "EyeWide", "EyeBlink")
 """Columns that exist for the left and the right side."""
 
@@ -97,9 +97,9 @@ def capture() -> str:
         for side in (("Left", "Right") if name in PAIRED else ("",))
     }
     rows = [",".join(["Timecode", "BlendShapeCount", *columns])]
-    for number in range(round(SECONDS * CAPTURED) + 1):
-        seconds, frame = divmod(number, CAPTURED)
-        values = [f"{value_at(keys, number / CAPTURED):.6f}" for keys in columns.values()]
+    for number in range(round(SECONDS * CAPTURE_FPS) + 1):
+        seconds, frame = divmod(number, CAPTURE_FPS)
+        values = [f"{value_at(keys, number / CAPTURE_FPS):.6f}" for keys in columns.values()]
         rows.append(",".join([f"12:00:{seconds:02}:{frame:02}.000", "52", *values]))
     return "\n".join([*rows, ""])
 

@@ -23,6 +23,7 @@ SCENE = ("--atlas", "1024", "--samples", "4")
 PATIENCE_S = 300.0
 REFINED_S = 45.0  # time without a change; software adapters render still pictures slowly
 ANSWERED_S = 2.0
+# positions of controls in the page, to click on [pixel]
 VIEW_LIST, IRRADIANCE = (30, 168), (30, 251)
 COMPARE, FREEZE = (100, 243), (30, 268)
 CHROMIUM = "chromium", "chromium-browser", "google-chrome"

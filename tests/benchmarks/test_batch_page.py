@@ -31,10 +31,10 @@ def told(**more: Any) -> dict[str, Any]:
 
 
 def test_extrapolation_uses_the_fastest_run() -> None:
-    from batch_page import paper
+    from batch_page import extrapolation
 
     steps = {"parameters": 1.0, "scene": 5.0, "draw_and_read": 4.0, "encode": 50.0}
-    rows = dict(paper(told(steps=steps, disk={"bytes_per_s": 5e8})))
+    rows = dict(extrapolation(told(steps=steps, disk={"bytes_per_s": 5e8})))
     assert (rows["hours on this machine"], rows["adapter hours"]) == ("14", "28")
     assert (rows["bytes"], rows["files"]) == ("10 TB", "10,000 shards of 1,000 MB")
     assert rows["limit by the workers' own time"] == "200 images/s"
@@ -52,22 +52,22 @@ def test_the_page_has_each_run_with_its_ratio() -> None:
 
 
 def test_memory_is_listed_by_number_of_images() -> None:
-    from batch import Clock
+    from batch import RunRecorder
     from batch_page import page
 
     from dermis.apps.batch.run import Progress
 
-    clock = Clock(workers=2)
+    recorder = RunRecorder(workers=2)
     for images in range(1, 50):
-        clock.record(Progress(images, 50))
-    assert list(clock.resident) == [10, 20]
+        recorder.record(Progress(images, 50))
+    assert list(recorder.resident) == [10, 20]
     run = told()["new"][1] | {"resident_bytes": {"10": 5 * 10**8, "20": 6 * 10**8}}
     text = page([told(new=[run])])
     assert "| new people | 2 | 10 | 500 |" in text and "| new people | 2 | 20 | 600 |" in text
 
 
 def test_the_rate_is_measured_in_the_middle_of_the_run() -> None:
-    from batch import Clock
+    from batch import RunRecorder
 
-    clock = Clock([(10.0 if n == 1 else 20.0 + 0.5 * n, n) for n in range(1, 101)])
-    assert clock.rate() == pytest.approx(2.0)
+    recorder = RunRecorder([(10.0 if n == 1 else 20.0 + 0.5 * n, n) for n in range(1, 101)])
+    assert recorder.rate() == pytest.approx(2.0)

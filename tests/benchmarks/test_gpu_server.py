@@ -142,7 +142,7 @@ def test_unknown_part_names_are_refused(server: Any, tmp_path: Path) -> None:
 
 
 def test_the_full_plan_covers_all_tables_of_the_documentation(server: Any) -> None:
-    plan = server.plan_of("auto", "human")
+    plan = server.full_plan("auto", "human")
     assert (
         plan.base_case.image == (1920, 1080) and plan.base_case.atlas == 2048 and plan.base_case.lights == 3
     )

@@ -1,4 +1,4 @@
-"""Pages of the documentation with measured tables, their results, and a browser for exported pages."""
+"""Helpers for documentation pages with measured tables, for files of results, and for pages in Chromium."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def in_checkout(path: Path) -> Path:
 
 
 def add_tests_to_path() -> None:
-    """Make the modules in the folder tests importable, as some measurements use their meshes.
+    """Make the modules in the folder tests importable, because some measurements use meshes that they build.
 
     Raises DermisError where the tests are missing.
     """
@@ -71,7 +71,7 @@ def template_path(page: Path) -> Path:
 def fill_page(page: Path, **parts: object) -> None:
     """Write docs/NAME.md from docs/templates/NAME.md.
 
-    parts : texts and numbers by placeholder of the template
+    parts : text or number for each placeholder of the template
     """
     write_page(page, in_checkout(template_path(page)).read_text(encoding="utf-8").format(**parts))
 
@@ -84,7 +84,7 @@ def print_tables(tables: Mapping[str, str]) -> None:
 def write_results(path: Path, figures: Mapping[str, Any], digits: int | None = None) -> None:
     """Write measured results to a JSON file, atomically.
 
-    figures : JSON-compatible values
+    figures : measured values, JSON-compatible
     digits : significant digits of floats; None for all digits
     """
     values = figures if digits is None else _rounded(figures, digits)

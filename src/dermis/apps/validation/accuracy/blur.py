@@ -98,7 +98,7 @@ def point_row(device: Device, texels_per_mm: float) -> str:
 
 
 def sheared_row(device: Device, degrees: float) -> str:
-    """Return a Markdown row with the principal widths of a blurred point of light over the exact width.
+    """Return a Markdown row with the ratios of a blurred point's two principal widths to the exact width.
 
     degrees : angle between the uv axes on the flat surface [degrees]
     """
@@ -137,9 +137,10 @@ def surface_tables(adapter: str) -> dict[str, str]:
 
 
 def harmonic_row(renderer: Renderer, radius_mm: float) -> str:
-    """Return a Markdown row: the fraction that a blur on a sphere keeps of light proportional to x.
+    """Return a Markdown row with the fraction of light proportional to x that a blur on a sphere preserves.
 
-    The widest Gaussian is applied on the atlas, by the heat equation, and by the Gaussian of chord length.
+    The blur by the widest Gaussian is computed on the atlas, by the heat equation on the sphere, and by a
+    Gaussian of the chord length.
     """
     from atlas_reading import shown
     from cut_meshes import cut_sphere
@@ -239,7 +240,7 @@ def seam_row(renderer: Renderer, name: str, head: Head, side: int, where: PointF
     """Return a Markdown row with the discontinuities across seams, with a column for each seam method.
 
     side : side of the atlas [texel]
-    where : selects seam points by position
+    where : function that returns the mask of the seam points to use, given their positions
     """
     first, second = seam_side_points(head, where)
     cells = []
@@ -252,7 +253,7 @@ def seam_row(renderer: Renderer, name: str, head: Head, side: int, where: PointF
 def seam_side_points(head: Head, where: PointFilter) -> tuple[Points, Points]:
     """Return corresponding points on the two sides of seams, where they face the lights.
 
-    where : selects seam points by position
+    where : function that returns the mask of the seam points to use, given their positions
     """
     from atlas_reading import Points, seam_points
 

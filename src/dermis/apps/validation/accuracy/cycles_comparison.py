@@ -1,6 +1,6 @@
 """Highlights and skins rendered by dermis, compared with those of Cycles for docs/accuracy.md.
 
-Both need Blender's Python, so the page shows the last measurement (benchmarks/results).
+Both comparisons need Blender's Python, so the page shows their last results (benchmarks/results).
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ TWO_LOBES = (
     (NARROW_WEIGHT, NARROW_FACTOR * SKIN_ROUGHNESS),
     (1.0 - NARROW_WEIGHT, WIDE_FACTOR * SKIN_ROUGHNESS),
 )
-LIT_QUANTILE = 0.6  # quantile of the lit pixels above which they are compared
+LIT_QUANTILE = 0.6  # quantile of brightness above which lit pixels are compared
 GRAIN_BLUR_PX = 6.0  # standard deviation of the blur that removes the grain [pixel]
 
 HEAD_NAMES = {"scan": "lee_perry_smith", "human": "human"}
@@ -221,8 +221,8 @@ def with_normal_map(head: Head) -> Head:
 def principled_skin(head: Head) -> PrincipledSkin:
     """Return the Cycles material with the head's colours and the mean exit offset of its profile in dermis.
 
-    The mean distance between entry and exit by Burley's profile is 2.5 d, where d is the mean free path over
-    a factor of the colour.
+    By Burley's profile, the mean distance between entry and exit is 2.5 d, where d is the mean free path
+    divided by a factor that depends on the colour.
     """
     assert head.maps.colour is not None and head.maps.mean_colour is not None
     profile, colour = load_profile(Skin().profile), head.maps.mean_colour

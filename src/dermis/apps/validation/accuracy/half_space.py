@@ -39,7 +39,7 @@ def half_space(adapter: str = "auto") -> None:
 
 
 def direction_table(head: Head, adapter: str) -> str:
-    """Return Markdown rows with the errors by direction, for each channel of skin1 and for default skin."""
+    """Return a Markdown table of how reflection depends on direction, by channel, for two skins."""
     layer = media()["skin1"].layers[0]
     albedo = layer.sigma_s_prime / (layer.sigma_a + layer.sigma_s_prime)
     forward = layer.sigma_s_prime / (layer.sigma_a * (1.0 - FORWARD_G) + layer.sigma_s_prime)
@@ -101,7 +101,7 @@ def _direction_errors(albedo: float) -> tuple[float, float]:
 
 
 def _monte_carlo_ratio(albedo: float, mean_cosine: float, eta: float) -> float:
-    """Return the reflectance for light at 81 degrees over that at normal incidence, by Monte Carlo [-].
+    """Return the ratio of the reflectance at 81 degrees to that at normal incidence, by Monte Carlo [-].
 
     mean_cosine : mean cosine of the scattering angle [-]
     """

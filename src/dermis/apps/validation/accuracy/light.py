@@ -27,7 +27,7 @@ from dermis.specular.cosines import Cosines
 from dermis.specular.kelemen import kelemen
 
 PANORAMAS = ("royal_esplanade", "lebombo")
-VIEW_DEGREES = (0, 15, 30, 45, 60, 70, 75, 80, 85)  # of the view from the normal [degrees]
+VIEW_DEGREES = (0, 15, 30, 45, 60, 70, 75, 80, 85)  # angle between view and normal [degrees]
 FINE_ROUGHNESS = 0.25  # below this roughness, lobes are summed over smaller texels
 Array = NDArray[np.floating]
 UP = np.array([0.0, 1.0, 0.0])
@@ -101,9 +101,9 @@ def reflection_error(name: str, m: float, angle: float, count: int = 320) -> flo
     mirror_direction = 2 * cosine * normals - views
     tangent = cosine * along - np.sqrt(1 - cosine**2) * normals
     bitangent, sampled = np.cross(normals, along), np.zeros((count, 3))
-    for x, y, wide, weight in lobe_parameters(cosine, m):
+    for x, y, lobe_roughness, weight in lobe_parameters(cosine, m):
         direction = normalise(2 * (x * tangent + y * bitangent) + (1 - x**2 - y**2) * mirror_direction)
-        sampled += weight * lobe_radiance(prefiltered.layers, direction, wide)
+        sampled += weight * lobe_radiance(prefiltered.layers, direction, lobe_roughness)
     error = directional_albedo(cosine, m) * sampled - np.array(exact)
     return float(np.sqrt((error**2).mean()) / np.mean(exact))
 
@@ -153,7 +153,9 @@ def lobe_radiance(layers: Array, towards: Array, m: float) -> Array:
 
 
 def furnace_extremes(renderer: dermis.Renderer, head: Head, energy: str, **values: str) -> Array:
-    """Return minimum, mean and maximum of outgoing over incoming radiance, for a white head in uniform light.
+    """Return minimum, mean and maximum ratio of outgoing to incoming radiance on a white head.
+
+    The light is uniform.
 
     energy : energy conservation scheme
     """

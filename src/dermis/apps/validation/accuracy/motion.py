@@ -1,4 +1,4 @@
-"""Posed heads compared with heads loaded in that shape, for docs/motion.md."""
+"""Pictures of posed heads, compared with those of heads loaded in the posed shape, for docs/motion.md."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ DEFORMATIONS: dict[str, Callable[[Points], Points]] = {
     "ears 20 % thinner": lambda points: _with_thinner_ears(points, 0.2),
     "ears 40 % thinner": lambda points: _with_thinner_ears(points, 0.4),
 }
-"""Positions (p, 3) of a mesh sequence from those of the head at rest."""
+"""Functions that return deformed positions (p, 3), as of a mesh sequence, given those of the head at rest."""
 LIGHT_AND_CAMERA = {"front": ("studio", "portrait"), "back": ("rim", "ear")}
 SETTINGS = Settings(size=(384, 384), atlas=1024, samples=4)
 OCCLUSION_ATLAS_SIDE = 512
@@ -64,7 +64,7 @@ _MIN_OCCLUSION_CHANGE = 0.02
 
 
 def motion(adapter: str = "auto") -> None:
-    """Compare posed heads with heads loaded in that shape and write docs/motion.md.
+    """Compare posed heads with heads loaded in the posed shape, and write docs/motion.md.
 
     Takes some minutes. Needs the published heads of MakeHuman in DERMIS_DATA, and the folder tests of a
     checkout.
@@ -112,7 +112,7 @@ def picture_error(
 
     person : (p, 3) positions in the rest pose [mm]
     weights : morph target weights of the expression
-    view : camera preset
+    view : key of `LIGHT_AND_CAMERA`
     """
     rebuilt = rebuilt_head(head, posed_points(head, person, weights))
     lights, camera = LIGHT_AND_CAMERA[view]
@@ -125,14 +125,16 @@ def picture_error(
 
 
 def _with_centre(head: Head, shape: Head) -> Head:
-    """Return a head after setting its centre to that of a shape; lights and cameras are relative to it."""
+    """Set a head's centre, to which lights and cameras are relative, to that of a shape; return the head."""
     for one in (head, head.bare):
         vars(one)["centre_mm"] = shape.centre_mm
     return head
 
 
 def expression_rows(renderer: Renderer, head: Head, persons: Mapping[str, Points]) -> Iterator[str]:
-    """Yield Markdown rows, one per expression: the picture error of the worst person, from front and back.
+    """Yield Markdown rows, one per expression: the largest picture error over all people.
+
+    Heads are seen from the front and from the back.
 
     persons : positions in the rest pose by name of the person [mm]
     """
@@ -157,13 +159,13 @@ def deformation_rows(renderer: Renderer, head: Head) -> Iterator[str]:
 
 
 def _with_thinner_ears(points: Points, fraction: float) -> Points:
-    """Return points (p, 3) of which those beside the scan's head are scaled along z about its origin."""
+    """Return points (p, 3) of the scan with thinner ears: points at its sides are scaled along z."""
     ear = np.clip((np.abs(points[:, :1]) - 65.0) / 10.0, 0.0, 1.0)
     return (points * (1.0 - ear * [0.0, 0.0, fraction])).astype(np.float32)
 
 
 def seam_rows(renderer: Renderer, head: Head, persons: Mapping[str, Points]) -> Iterator[str]:
-    """Yield Markdown rows with discontinuities across seams: at rest, in expressions, and of other people.
+    """Yield Markdown rows with discontinuities across seams: at rest, in expressions, and for other people.
 
     persons : positions in the rest pose by name of the person [mm]
     """
@@ -232,7 +234,7 @@ def baked_occlusion(renderer: Renderer, head: Head, shape: Head, *sampling: int)
 
     head : head whose atlas is used
     shape : head loaded in the shape of a pose
-    sampling : number of directions and side of depth maps [texel]; those of frames by default
+    sampling : number of directions and side of depth maps [texel]; by default, those that frames use
     """
     inputs = renderer.prepare(Scene(head), BAKE_SETTINGS)
     texels, atlas = (

@@ -45,7 +45,7 @@ def optics() -> None:
 
 
 def tissue_by_name(name: str) -> Tissue:
-    """Return a tissue; homogeneous skin has the index of refraction of its measurement [Jensen2001]."""
+    """Return a tissue by name; homogeneous skin has the index of refraction assumed by [Jensen2001]."""
     tissue = load_tissue(name)
     return Tissue(media()[name].with_eta(1.3)) if name.startswith("skin") else tissue
 
@@ -164,7 +164,7 @@ def error_against_published_sum(profile: RadialProfile) -> Floats:
 
 
 def published_errors() -> str:
-    """Return text on published layers: the errors of diffusion models against the published Gaussians."""
+    """Return text with errors of diffusion models for published layers, against the published Gaussians."""
     variants: tuple[tuple[str, DiffusionModel, Clamp], ...] = (
         ("multipole as printed", "multipole", "none"),
         ("multipole", "multipole", "layer"),

@@ -47,7 +47,7 @@ def exact_response(medium: Medium, thickness: float, g: float = 0.0) -> Array:
     """Return reflectance and transmittance of a slab by adding and doubling, (2, angles, 3).
 
     thickness : thickness of the slab [mm]
-    g : mean cosine of the scattering angle; the medium's coefficients are reduced ones
+    g : mean cosine of the scattering angle; the medium's scattering coefficient already has the factor 1 - g
     """
     layer, response = medium.layers[0], np.empty((2, len(INCIDENT_DEGREES), 3))
     inner_cosine = refracted_cosine(np.cos(np.radians(INCIDENT_DEGREES)), medium.eta)
@@ -151,7 +151,7 @@ def _direction_pairs_error(albedo: float, eta: float, g: float) -> float:
 
 
 def _error_cells(response: Array, reference: Array) -> str:
-    """Return table cells on transmittance, then on reflectance: RMS error, and ratio in red by angle."""
+    """Return table cells for transmittance, then reflectance: RMS error, and ratio of red light by angle."""
     flux, cells = np.sqrt(np.cos(np.radians(INCIDENT_DEGREES)))[:, None], []
     for side in (1, 0):
         ours, exact = response[side], reference[side]

@@ -1,4 +1,4 @@
-"""Errors of the albedo tables of surface reflection, and white furnaces."""
+"""Errors of the albedo tables of surface reflection, and tests of white spheres in uniform light."""
 
 from __future__ import annotations
 
@@ -66,11 +66,12 @@ def beckmann_table_error() -> float:
 
 
 def furnace_cell(model: EnergyScheme, m: float, rho_s: float) -> str:
-    """Return a table cell with minimum, mean and maximum of outgoing over incoming light.
+    """Return a table cell with minimum, mean and maximum of the ratio of outgoing to incoming light.
 
     The light is uniform, and the surface a white sphere.
 
     model : energy conservation scheme
+    m, rho_s : roughness and specular strength of the surface
     """
     albedo, mean = (read_albedo("kelemen", VIEW_COSINES, np.array(m))[..., k] for k in (0, 1))
     exact = directional_albedo(VIEW_COSINES, m)

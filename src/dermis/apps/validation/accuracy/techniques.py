@@ -53,7 +53,7 @@ def techniques(adapter: str = "auto") -> None:
     path_traced: dict[str, dict[str, Comparison]] = {}
     for medium in ("skin1", "skin2"):
         parts[f"traced_{medium}"], comparison = technique_rows(head, "path-traced", medium, adapter)
-        parts[f"floor_{medium}"] = albedo_rows(head, medium, comparison["front"], adapter)
+        parts[f"floor_{medium}"] = lambertian_limit(head, medium, comparison["front"], adapter)
         path_traced[medium] = comparison
     parts["direction"] = direction_rows(head, SAMPLES_BY_LIGHT, SETTINGS, adapter)
     parts["counted"] = profile_model_rows(head, path_traced, adapter)
@@ -103,7 +103,7 @@ def technique_rows(
 
 
 def fine_atlas_row(head: Head, adapter: str) -> str:
-    """Return a Markdown row on the laser's stripe against the heat equation, with an atlas of 2048 texels."""
+    """Return a Markdown row of errors against the heat equation, for the laser and an atlas side of 2048."""
     settings, only = SETTINGS.model_copy(update={"atlas": 2048}), ("texture-space",)
     comparison = _compare(
         head, "heat", only, "laser", adapter, region="ear", settings=settings, model="layered"
@@ -114,7 +114,7 @@ def fine_atlas_row(head: Head, adapter: str) -> str:
 def profile_model_rows(head: Head, path_traced: dict[str, dict[str, Comparison]], adapter: str) -> str:
     """Return Markdown rows of errors against path tracing, by scattering model of the profile.
 
-    path_traced : comparisons with Monte Carlo profiles, by medium and light
+    path_traced : comparisons in which techniques use Monte Carlo profiles, by medium and light
     """
     rows, techniques = [], ("texture-space", "screen-space")
     for light in SAMPLES_BY_LIGHT:
@@ -136,10 +136,10 @@ def _error_and_energy(comparison: Comparison, row: ComparisonRow) -> str:
     return f"{row.relrmse:.4f} | {energy}"
 
 
-def albedo_rows(head: Head, medium: str, path_traced: Comparison, adapter: str) -> str:
-    """Return text with the error and energy of Lambertian skin with a half-space's directional albedo.
+def lambertian_limit(head: Head, medium: str, path_traced: Comparison, adapter: str) -> str:
+    """Return text with the least error that Lambertian skin can have under the front light, and its energy.
 
-    The scene has the front light; these errors are the least that Lambertian skin can have.
+    Its albedo is the directional albedo of a half-space.
 
     path_traced : comparison with path tracing in this light
     """

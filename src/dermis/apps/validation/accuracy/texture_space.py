@@ -62,9 +62,9 @@ def tables(head: Head, settings: Settings, adapter: str) -> dict[str, str]:
 
 
 def render(subject: ComparisonSubject, technique: str, **changes: object) -> Floats:
-    """Return the linear radiance (h, w, 3) of a technique, at the sampling of the references.
+    """Return the linear radiance (h, w, 3) of a technique, sampled like the references.
 
-    There is one sample per pixel and no interreflection.
+    They have one sample per pixel and no interreflection.
 
     changes : further settings
     """
@@ -79,9 +79,10 @@ def atlas_rows(
 ) -> list[str]:
     """Return Markdown rows with errors of texture space by atlas size, against two references.
 
-    Errors are also given relative to those without scattering.
+    Each error is also given as a ratio to the error of an image without scattering.
 
-    integral, normalised : surface integral, and the integral divided by that of uniform light
+    integral : surface integral
+    normalised : surface integral divided by the surface integral under uniform light
     """
     unscattered, rows = render(subject, "none"), []
     for side in ATLAS_SIDES:
@@ -107,7 +108,7 @@ def zero_width_row(subject: ComparisonSubject, light: str) -> str:
 
 
 def uniform_light_integral(subject: ComparisonSubject) -> Floats:
-    """Return the light (h, w, 3) that leaves under an irradiance of 1, by the surface integral."""
+    """Return the light (h, w, 3) that leaves under an irradiance of 1 everywhere, by the surface integral."""
     samples = irradiance_samples(subject)
     uniform_samples = replace(samples, irradiance=np.ones_like(samples.irradiance))
     visible = surface_points(subject.renderer, subject.scene, subject.settings)
@@ -127,9 +128,9 @@ def mean_and_percentile(uniform: Floats) -> str:
 
 
 def region_rows(subject: ComparisonSubject, integral: ReferenceImage, light: str) -> list[str]:
-    """Return Markdown rows by region of the face: errors of texture space, and errors that a perfect map has.
+    """Return Markdown rows by region of the face: errors of texture space, and of a perfect map.
 
-    The heat equation on the surface takes the place of a perfect map.
+    Diffusion on the surface itself, by the heat equation, represents a perfect map.
     """
     landmarks = known_landmarks(subject.scene.head)
     assert landmarks is not None

@@ -144,7 +144,7 @@ def comparison_cells(
 ) -> str:
     """Return table cells with energy ratio and relative RMSE against the surface integral.
 
-    Cells without light through thin parts precede those with it.
+    Frames without light through thin parts come first, then frames with it.
 
     point_filter : selects the compared points by position and normal
     spacing : largest distance of the irradiance samples [mm]

@@ -24,7 +24,7 @@ from dermis.scene.skin import Skin
 GPU_GEMS_3 = "gpu-gems-3"
 FRAGMENT_TECHNIQUE = "published-fragments"
 """Technique with the passes of GPU Gems 3 in the graphics pipeline; `GPU_GEMS_3` has compute passes."""
-_SHIFT_MM = 2.0
+_SHIFT_MM = 2.0  # largest movement of camera and lights
 _MIN_WEIGHT = 1e-3
 _RIG_ROTATION_DEGREES = 25.0  # between two copies of the studio's lights
 

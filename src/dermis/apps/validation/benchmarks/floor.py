@@ -1,4 +1,4 @@
-"""Lower bounds ("floors") of stage times: the bytes that a stage must move, at the rate of a copy."""
+"""Lower bounds ("floors") of stage times: the time to copy the bytes that a stage must move."""
 
 from __future__ import annotations
 

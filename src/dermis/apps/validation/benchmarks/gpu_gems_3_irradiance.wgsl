@@ -4,7 +4,7 @@
 //#include "surface/packed_surface.wgsl"
 
 struct Entering {
-    scale: f32, // stored value over light
+    scale: f32, // factor from light to stored value
 }
 
 @group(0) @binding(30) var surfaces: texture_2d_array<u32>; // as packed by surface_texels.wgsl

@@ -2,7 +2,7 @@
 //#include "surface/lobe.wgsl"
 
 override LIGHTS: u32 = 16u; // per point
-override IDLE: bool = false; // without the lobe, for the cost of the loop
+override IDLE: bool = false; // omits the lobe, to measure the cost of the loop alone
 
 @group(0) @binding(30) var sums: texture_storage_2d<r32float, write>;
 

@@ -80,7 +80,7 @@ class BenchmarkRow:
 
     @property
     def floor_ratio(self) -> float:
-        """Return the device time of the whole frame over its lower bound."""
+        """Return the ratio of the whole frame's device time to its lower bound."""
         return self.gpu_ms["total"] / self.floor_ms["total"]
 
 

@@ -146,8 +146,8 @@ def write_report(path: Path, benchmark: Benchmark) -> None:
 def _html_table(lines: Sequence[tuple[str, ...]]) -> str:
     """Return an HTML table whose first row has the column titles."""
     rows = []
-    for number, line in enumerate(lines):
-        tag = "td" if number else "th"
+    for index, line in enumerate(lines):
+        tag = "td" if index else "th"
         rows.append("".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in line))
     return "<table>" + "".join(f"<tr>{row}</tr>" for row in rows) + "</table>"
 
@@ -168,7 +168,7 @@ def three_digits(number: float) -> str:
 
 
 def scaling_plots(benchmark: Benchmark) -> str:
-    """Return SVG plots of device time and its lower bound over each size that the cases vary."""
+    """Return SVG plots of device time and its lower bound, one for each parameter that the cases vary."""
     axes_names = [name for name in _SCALING_AXES if any(row.case.varies == name for row in benchmark.rows)]
     if not axes_names:
         return ""

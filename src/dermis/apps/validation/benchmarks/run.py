@@ -69,7 +69,7 @@ class Benchmark:
         return next((row for row in rows if row.case.technique == technique), None)
 
     def ratio(self, technique: str) -> float | None:
-        """Return the device time of the base frame with another technique, over that of the base frame."""
+        """Return the ratio of device times: the base frame with another technique to the base frame."""
         other = self.row_of(technique)
         return other.gpu_ms["total"] / self.base_row.gpu_ms["total"] if other and self.base_row else None
 

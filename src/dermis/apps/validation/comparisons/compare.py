@@ -35,9 +35,9 @@ _WHITE_PERCENTILE = 99.0
 class ComparisonRow:
     """Errors of a technique against a reference, with standard errors where the reference has noise.
 
-    relrmse, relrmse_se : root mean square error over the root mean square of the reference [-]
+    relrmse, relrmse_se : ratio of the root mean square error to the root mean square of the reference [-]
     flip : mean perceived difference from 0 to 1 by FLIP; None without the package flip-evaluator
-    energy_ratio, energy_ratio_se : total light of the technique over that of the reference [-]
+    energy_ratio, energy_ratio_se : ratio of the technique's total light to that of the reference [-]
     ms : device time of a frame [ms]
     """
 
@@ -94,13 +94,13 @@ def compare(
 
     against : name of the reference in `references.REFERENCES`
     light, region : names in `scenes.LIGHTS` and `scenes.REGIONS`
-    medium : name of a medium, whose surface is index-matched here
-    direction : angular distribution of the techniques' skin; None for that of the reference
+    medium : name of a medium; its surface is made index-matched
+    direction : angular distribution of the light that leaves the rendered skin; None for the reference's
     model : scattering model of the medium's profile; see `medium_gaussians` for the default
     samples : paths per pixel of a path-traced reference
 
-    Raises DermisError for unknown names, pictures without the head, and scenes that the reference does not
-    support.
+    Raises DermisError for unknown names, pictures that do not show the head, and scenes that the reference
+    does not support.
     """
     check_names(against, light, region, medium)
     settings = settings or Settings(size=(256, 256), atlas=1024)

@@ -41,8 +41,9 @@ class PersonComparison:
     ours, reference : (h, w, 3) linear radiance by dermis, and by path tracing
     variance : (h, w, 3) variance of the reference's noise
     mask : (h, w) pixels that are compared
-    relrmse, energy : relative RMSE, and total light by dermis over that of the reference, over the mask
-    energy_by_channel : total light by dermis over that of the reference, in red, green and blue
+    relrmse : relative RMSE within the mask [-]
+    energy : ratio of the total light by dermis to that of the reference, within the mask [-]
+    energy_by_channel : the same ratio in red, green and blue [-]
     samples : paths per pixel
     seconds : duration of path tracing [s]
     """
@@ -125,7 +126,9 @@ def path_trace_view(
     progress: Callable[[int, int], None] | None = None,
     variant: MitsubaVariant = "scalar_rgb",
 ) -> PathTraced:
-    """Path-trace a person, in a medium with the mean exit offset of the profile that dermis uses.
+    """Path-trace a person.
+
+    In the medium, light exits at the same mean distance from its entry as by the profile that dermis uses.
 
     textures : maps of the skin as dermis paints them, from `person_textures`
     size : width and height of the picture [pixel]
@@ -174,7 +177,7 @@ class View:
     camera : function that returns the camera for a head
     light : name of a light preset or of a panorama
     pose : name of an expression; None for the rest pose
-    sample_factor : factor of the number of paths per pixel
+    sample_factor : factor by which the number of paths per pixel is multiplied
     """
 
     camera: Callable[[Head], Camera]
@@ -265,15 +268,15 @@ def as_softbox(light: Light) -> Light:
 
 _PUPIL_RADIUS_MM = 4.0  # around the middle, for the position of the pupil
 _IRIS_INNER_MM, _IRIS_OUTER_MM = 2.6, 5.0  # ring of the iris, as seen from the front
-_HIGHLIGHT_FACTOR = 1.6  # brightness of highlights over the median of the ring
+_HIGHLIGHT_FACTOR = 1.6  # least brightness of highlights, relative to the median of the ring
 
 
 class IrisErrors(NamedTuple):
     """Errors of an iris as rendered by dermis against the path-traced reference.
 
     right, down : shift of the reference's pupil from that of dermis [pixel]
-    brightness : mean brightness by dermis over that of the reference, on the ring of the iris without
-        highlights [-]
+    brightness : ratio of the mean brightness by dermis to that of the reference, on the ring of the iris
+        without highlights [-]
     left_half, right_half : the brightness ratio on each half of the ring [-]
     """
 
@@ -285,7 +288,7 @@ class IrisErrors(NamedTuple):
 
 
 def iris_errors(pair: PersonComparison, frame_mm: float) -> IrisErrors:
-    """Return the errors of an iris, in pictures that show an eye from the front in their middle.
+    """Return the errors of an iris, in pictures whose centre shows an eye from the front.
 
     frame_mm : visible height [mm]
     """
@@ -314,7 +317,7 @@ def _without_highlights(image: Floats, ring: Mask) -> Mask:
 
 
 def _image_shift(ours: Floats, reference: Floats, noise: Floats, region: Mask) -> tuple[Estimate, Estimate]:
-    """Return how far the reference is shifted to the right and down against the picture by dermis [pixel].
+    """Return the shift of the reference relative to the picture by dermis, to the right and down [pixel].
 
     Shift and brightness are fitted together by least squares.
 

@@ -25,7 +25,9 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-_SPACING_MM, _FINEST_MM = 3.0, 0.2  # at twice the spacing, a laser's stripe loses 1.5 % of its light
+# Spacing of irradiance samples, and the least spacing, at sharp edges. At twice the spacing, a laser's stripe
+# loses 1.5 % of its light.
+_SPACING_MM, _FINEST_MM = 3.0, 0.2
 _HEAT_RADIUS_MM = 10.0
 _MIN_VARIANCE_MM2 = 0.25  # for narrower Gaussians the surface is nearly flat
 _FULL_COVERAGE = 0.999  # fraction of a pixel from which it counts as covered
@@ -69,7 +71,7 @@ class ReferenceImage:
 
 
 def surface_integral(subject: ComparisonSubject, samples: int) -> ReferenceImage:
-    """Return the reference that integrates the profile over the surface, by Euclidean distance.
+    """Return the reference image by an integral of the profile over the surface, with Euclidean distances.
 
     samples : ignored, as there is no noise
     """
@@ -83,7 +85,7 @@ def surface_integral(subject: ComparisonSubject, samples: int) -> ReferenceImage
 
 
 def surface_heat(subject: ComparisonSubject, samples: int) -> ReferenceImage:
-    """Return the reference that diffuses the profile by the heat equation on the surface.
+    """Return the reference image in which the heat equation on the surface diffuses the irradiance.
 
     Only the surroundings of the camera's target are computed.
 
@@ -100,9 +102,9 @@ def surface_heat_around(
     light: IrradianceSamples,
     min_mm2: float = _MIN_VARIANCE_MM2,
 ) -> ReferenceImage:
-    """Return the reference that diffuses the profile by the heat equation around a visible point.
+    """Return the reference image by the heat equation on the surface, around a visible point.
 
-    Each Gaussian of the profile is the light after some time of diffusion along the surface.
+    Each Gaussian of the profile corresponds to diffusion along the surface for some time.
 
     target_mm : point relative to the head's centre; the nearest visible point is the centre of the patch [mm]
     radius_mm : radius of the patch in which pixels are compared [mm]
@@ -146,7 +148,7 @@ def irradiance_samples(subject: ComparisonSubject) -> IrradianceSamples:
 
 
 def path_traced_reference(subject: ComparisonSubject, samples: int) -> ReferenceImage:
-    """Return the reference that path-traces the medium, without the assumptions of a profile.
+    """Return the reference image by path tracing in the medium, without the assumptions of a profile.
 
     samples : paths per pixel
     """

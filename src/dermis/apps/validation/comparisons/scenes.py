@@ -25,7 +25,7 @@ from dermis.scene.skin import Skin
 
 _WHITE_IRRADIANCE = (3.14, 3.14, 3.14)
 _NOSE_POINT_MM = (14.0, -28.0, 90.0)  # between tip, wing and lip, relative to the head's centre [mm]
-_EAR_RANGE_MM = 60.0  # above and below the centre, where the head is widest at the ears
+_EAR_RANGE_MM = 60.0  # largest height above or below the centre at which ears are sought
 
 
 def _front_lights(head: Head) -> tuple[Light, ...]:
@@ -102,7 +102,10 @@ def comparison_scene(head: Head, light: str, region: str, profile: str) -> Scene
 def medium_scene(
     head: Head, light: str, region: str, medium: Medium, model: ModelName | None = None
 ) -> Iterator[tuple[Scene, GaussianSum]]:
-    """Yield `comparison_scene` with a medium's profile in a temporary file, deleted after the context."""
+    """Yield a `comparison_scene` with a medium's profile, and the profile.
+
+    The profile is in a temporary file, which is deleted when the context ends.
+    """
     profile = medium_gaussians(medium, model)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "profile.toml"
@@ -116,7 +119,7 @@ def default_region(light: str) -> str:
 
 
 ModelName = Literal["counted", "layered", "montecarlo"]
-"""Model of a profile: table of Monte Carlo profiles, layered diffusion, or Monte Carlo."""
+"""Source of a profile: table of Monte Carlo profiles, layered diffusion, or a new Monte Carlo simulation."""
 _PHOTONS = 2_000_000  # per channel
 
 

@@ -6,12 +6,12 @@ from dermis.base.command_line import run_script
 
 HERE = "dermis.apps.validation.engines"
 COMMANDS = {
-    f"{HERE}.page:page": "Write the tables of docs/engines.md between their marks.",
-    f"{HERE}.babylon:babylon": "Measure edges of light in Babylon.js; needs Chromium and DERMIS_BABYLON.",
-    f"{HERE}.blender:blender": "Measure edges, heads and a picture in Cycles; needs two Pythons with bpy.",
+    f"{HERE}.page:page": "Write the tables of docs/engines.md between their markers.",
+    f"{HERE}.babylon:babylon": "Measure a half-lit plane in Babylon.js; needs Chromium and DERMIS_BABYLON.",
+    f"{HERE}.blender:blender": "Measure half-lit planes and heads in Cycles; needs two Pythons with bpy.",
     f"{HERE}.gltf:gltf": "Compute errors of skins in glTF's draft of volume scattering.",
     f"{HERE}.heads:heads": "Render one head in all installed programs and compare it with ours.",
-    f"{HERE}.mitsuba:mitsuba": "Measure edges of light in Mitsuba.",
+    f"{HERE}.mitsuba:mitsuba": "Measure a half-lit plane in Mitsuba.",
     f"{HERE}.openpbr:openpbr": "Compute errors of skins in OpenPBR, MaterialX's profile and pbrt.",
 }
 

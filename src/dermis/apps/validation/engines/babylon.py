@@ -1,4 +1,7 @@
-"""Edges of light on exported skin in Babylon.js: a half-lit plane in headless Chromium."""
+"""Edge responses of exported skin in Babylon.js: light scattered across the edge of a half-lit plane.
+
+Headless Chromium draws the plane.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +30,7 @@ PAGE = Path(__file__).with_name("babylon.html")
 RESULTS_FILE = RESULTS / "engines_babylon.json"
 LIBRARY_VARIABLE = "DERMIS_BABYLON"
 CANVAS_SIDE, LIT_RADIANCE = 640, 0.9
-PIXELS_PER_WIDTH = 14.0  # pixels in the largest d
+PIXELS_PER_WIDTH = 14.0  # number of pixels that the largest Burley width covers
 DIRECTION_COUNT = 5
 Floats = NDArray[np.floating]
 
@@ -61,11 +64,12 @@ def babylon_page(library: Path) -> Iterator[Page]:
 
 
 def measured_radiance(page: Page, colour: Floats, metres: float, pixel: float, azimuth: float) -> Floats:
-    """Return the radiance (side, side, 3) that Babylon.js draws, relative to that far from the edge in light.
+    """Return the radiance (side, side, 3) that Babylon.js draws, relative to that far inside the light.
 
     Row 0 is at the bottom.
 
-    colour, metres : diffusion profile (a colour), and metersPerUnit of a scene in mm
+    colour : diffusion profile, which Babylon.js expresses as a colour
+    metres : metersPerUnit of the scene, in which a unit is a millimetre
     pixel : size of a pixel [mm]
     azimuth : direction across the edge of the light [rad]
     """
@@ -76,9 +80,12 @@ def measured_radiance(page: Page, colour: Floats, metres: float, pixel: float, a
 
 
 def predicted_radiance(colour: Floats, metres: float, pixel: float, azimuth: float) -> Floats:
-    """Return the radiance (side, side, 3) predicted from the shader's sample positions, rounded to pixels.
+    """Return the radiance (side, side, 3) predicted from the shader's sample positions.
 
-    colour, metres : diffusion profile (a colour), and metersPerUnit of a scene in mm
+    Positions are rounded to whole pixels.
+
+    colour : diffusion profile, which Babylon.js expresses as a colour
+    metres : metersPerUnit of the scene, in which a unit is a millimetre
     pixel : size of a pixel [mm]
     azimuth : direction across the edge of the light [rad]
     """
@@ -100,6 +107,7 @@ def edge_profile(picture: Floats, pixel: float, azimuth: float, x_mm: Floats, ha
     pixel : size of a pixel [mm]
     azimuth : direction across the edge [rad]
     x_mm : (n,) evenly spaced distances from the edge, positive in the light
+    half_width_mm : half the width of the strip [mm]
     """
     middle = (np.arange(CANVAS_SIDE) + 0.5 - 0.5 * CANVAS_SIDE) * pixel
     x, y = middle[None, :], middle[:, None]
@@ -113,10 +121,13 @@ def edge_profile(picture: Floats, pixel: float, azimuth: float, x_mm: Floats, ha
 
 
 def edge_responses(page: Page, colour: Floats, metres: float, d_mm: Floats) -> JsonObject:
-    """Return edge responses averaged over azimuths: measured, predicted, and those of Burley profiles.
+    """Return the measured and predicted edge responses of a diffusion profile, averaged over azimuths.
 
-    colour, metres : diffusion profile (a colour), and metersPerUnit of a scene in mm
-    d_mm : (3,) widths of the Burley profiles [mm]
+    The result also has the largest errors against the prediction and against exact Burley profiles.
+
+    colour : diffusion profile, which Babylon.js expresses as a colour
+    metres : metersPerUnit of the scene, in which a unit is a millimetre
+    d_mm : (3,) widths of the Burley profiles, by channel [mm]
     """
     widest = float(d_mm.max())
     pixel = widest / PIXELS_PER_WIDTH
@@ -150,7 +161,7 @@ def _max_by_channel(difference: Floats, near: NDArray[np.bool_]) -> list[float]:
 
 
 def fitted_widths(x_mm: Floats, edge: Floats) -> list[float]:
-    """Return the widths of the Burley profiles whose edge responses are closest, by channel [mm].
+    """Return the width of the Burley profile that fits the measured edge response best, by channel [mm].
 
     x_mm : (n,) distances from the edge
     edge : (n, 3) measured edge responses
@@ -162,7 +173,7 @@ def fitted_widths(x_mm: Floats, edge: Floats) -> list[float]:
 
 
 def exported_skin(page: Page, name: str) -> JsonObject:
-    """Return edge responses of a skin with its exported parameters, and their error against its profile."""
+    """Return the edge responses of a skin with exported parameters, and their errors against its profile."""
     subject, target = load_subject(name), TARGETS["babylon"].with_variant(None)
     rows = target.parameters(subject, target.resolve_version(None))
     colour = np.array(get_numbers(rows, "subSurface.scatteringDiffusionProfile"))
@@ -179,7 +190,7 @@ DIFFUSION_COLOURS = {"white": (1, 1, 1), "grey": (0.5, 0.5, 0.5), "coloured": (1
 
 
 def babylon() -> None:
-    """Measure edges of light in Babylon.js and write benchmarks/results/engines_babylon.json.
+    """Measure light across the edge of a half-lit plane; write benchmarks/results/engines_babylon.json.
 
     DERMIS_BABYLON names the folder that npm has installed the package babylonjs into. Chromium draws with its
     software WebGL.

@@ -41,7 +41,7 @@ BIN_COUNT, BIN_COLUMNS, PIXEL_ROWS = (
 )  # bins from -6 d to 6 d, pixels across a bin, and rows of pixels
 SAMPLES_BY_METHOD = {"burley": 512}
 DEFAULT_SAMPLES = 1024
-SEED_COUNT = 2  # pictures per channel, whose difference gives the noise
+SEED_COUNT = 2  # pictures per channel; their difference gives the noise
 HEAD_SIDE, HEAD_SAMPLES, HEAD_SEEDS = 192, 32, 2
 PICTURE_SIDE, PICTURE_SAMPLES = 320, 48
 METHODS_BY_VERSION = {"4.5": ("random-walk-skin",), "5.2": ("random-walk-skin", "random-walk", "burley")}
@@ -49,7 +49,7 @@ PLANE_TASK = BlenderTask("Cycles", "to render a half-lit plane", "See the messag
 
 
 def blender(python_45: Path, python_52: Path, *parts: Measurement) -> None:
-    """Measure exported skin in Cycles and write benchmarks/results/engines_blender.json, in half an hour.
+    """Measure exported skin in Cycles and write benchmarks/results/engines_blender.json; takes half an hour.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def column_positions() -> Floats:
 
 
 def measure_edge(python: Path, version: str, method: str, name: str) -> JsonObject:
-    """Return the edge response of a skin as measured, as predicted, and by its reference profile.
+    """Return the measured and the predicted edge response of a skin, and their errors.
 
     python : Python with Blender's module bpy
     name : name of the skin
@@ -132,7 +132,7 @@ def measure_edge(python: Path, version: str, method: str, name: str) -> JsonObje
 
 
 def binned_response(curve: CumulativeProfile, d_mm: Floats) -> Floats:
-    """Return the edge response (3, BINS) of a cumulative profile, averaged over the pixels in each bin.
+    """Return the edge response (3, BIN_COUNT) of a cumulative profile, averaged over the pixels in each bin.
 
     d_mm : (3,) Burley widths of the channels, which set the width of the bins [mm]
     """

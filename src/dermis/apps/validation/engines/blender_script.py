@@ -1,7 +1,7 @@
 """Script that renders a half-lit plane of exported skin in Cycles, run by Blender's Python: SCRIPT FOLDER.
 
 FOLDER contains skin.py, as written by `dermis export --to blender`, and passes.json. The script adds
-done.json: Blender's version and, for each pass, the radiance of each column of pixels, lit for x > 0.
+done.json: Blender's version and, for each pass, the radiance of each column of pixels. Light is at x > 0.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def main(folder: Path) -> None:
 
 
 def set_channel(shader: Any, description: dict[str, Any], channel: int) -> None:
-    """Give all channels the colour and radius of one, so that all paths contribute to that channel.
+    """Give all channels the colour and radius of one channel, so that all paths contribute to it.
 
     description : subsurface parameters of the exported skin
     """

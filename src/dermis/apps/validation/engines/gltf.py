@@ -1,4 +1,4 @@
-"""Predicted errors of skins in glTF's draft of volume scattering, by how its parameters are chosen."""
+"""Predicted errors of skins in glTF's draft of volume scattering, for several choices of its parameters."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ VERSION = TARGET.versions[-1]
 def skin_results(name: str) -> JsonObject:
     """Return the fitted glTF parameters of a skin, and the predicted errors of several choices.
 
-    The choices are the fit, parameters set without a fit, and the albedo in place of the multiple-scattering
-    colour.
+    The choices are fitted parameters, parameters set without a fit, and fitted parameters in which the albedo
+    replaces the multiple-scattering colour.
     """
     subject = load_subject(name)
     volume = fit_volume(subject.curve, subject.albedo)

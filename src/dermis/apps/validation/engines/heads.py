@@ -1,7 +1,7 @@
-"""One exported head with its camera and lights in dermis, Cycles, Babylon.js and Mitsuba.
+"""Pictures of one exported head, with the same camera and lights, by dermis, Cycles, Babylon.js and Mitsuba.
 
-Hair is omitted, because each program draws it differently. Lights are parallel, as on the page for
-Babylon.js.
+Hair is omitted, because each program draws it differently. Lights are directional, like those of the page
+that is exported for Babylon.js.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ HEAD_LIGHTS = (
     DirectionalLight(direction=(0.8, -0.5, -0.7), irradiance=(3.4, 3.3, 3.1)),
     DirectionalLight(direction=(-0.9, -0.2, -0.3), irradiance=(0.8, 0.85, 0.95)),
 )
-LIT_THRESHOLD = 0.25  # of the mean light; darker pixels are in shadow
+LIT_THRESHOLD = 0.25  # fraction of the mean light; darker pixels are in shadow
 HIGHLIGHT_RADIANCE = 0.75  # radiance above which a pixel is a highlight; white skin has 1
 HIGHLIGHT_WIDTH_PX = 9  # width of the square around a highlight that is excluded
 Floats = NDArray[np.float64]
@@ -71,7 +71,7 @@ def heads() -> None:
 
 
 def available_renderers(subject: Subject, ours: Floats) -> dict[str, Callable[[], list[Floats]]]:
-    """Return a function for each installed program, by name, that renders linear pictures (h, w, 4).
+    """Return, by name of each installed program, a function that renders linear pictures (h, w, 4).
 
     ours : (h, w, 4) picture by dermis, whose alpha replaces that of programs without alpha
     """

@@ -1,4 +1,4 @@
-"""Edges of light on exported skin in Mitsuba: a half-lit plane compared with profile and prediction.
+"""Edge responses of exported skin in Mitsuba: light scattered across the edge of a half-lit plane.
 
 A lamp covers half of a plane of the exported medium and almost touches it. By reciprocity, the radiance along
 the normal at a distance from the lamp's edge is the edge response of the profile.
@@ -35,7 +35,8 @@ COMPARED_SKINS: dict[str, tuple[Boundary, ...]] = {
     "skin2": ("matched", "smooth", "rough"),
     "dj3": ("matched", "smooth"),
 }
-"""Surface models for which each skin is measured, by its name."""
+"""Surface models for which each skin is measured, by name of the skin."""
+# half the width of the view [Burley widths]; numbers of pixels, of rendering passes, and of samples per pixel
 _REACH_D, _PIXELS, _PASSES, _SUBSAMPLES = 3.0, 8, 8, 16
 _LAMP_HEIGHT_D = 0.01
 _PLANE_HALF_SIDE_D = 500.0
@@ -47,8 +48,8 @@ def half_lit_plane(
 ) -> MitsubaObject:
     """Return a scene of the plane z = 0, lit where x > 0, in an orthographic view around the edge.
 
-    The camera is below the surface, except for a rough one: any other surface transmits light along the
-    normal without changing its direction.
+    The camera is below the surface, because light along the normal crosses a smooth surface undeflected; a
+    rough surface deflects it, so there the camera is above.
 
     d_mm : Burley width of the profile; the view spans 3 d on each side of the edge [mm]
     black : whether the medium absorbs all light, so that only the surface reflects
@@ -145,7 +146,7 @@ def measure_skin(mi: Mitsuba, subject: Subject, boundary: Boundary, samples: int
 
 
 def mitsuba(*, samples: int = 32000, output: Path = RESULTS_FILE, variant: str = "scalar_rgb") -> None:
-    """Measure edges of light on all skins under all surface models and write the results.
+    """Measure light across the edge of a half-lit plane, for all skins and surface models.
 
     Parameters
     ----------

@@ -22,14 +22,14 @@ from dermis.base.extras import import_extra
 
 RESULTS_FILE = RESULTS / "engines_openpbr.json"
 COMPARED_SKINS = "skin1", "skin2", "marble", "dj3", "light", "gpu-gems-3"
-_MISSING_PLUGIN_ERROR = "MissingShaderIdInRegistry"  # of a plug-in that usd-core does not include
+_MISSING_PLUGIN_ERROR = "MissingShaderIdInRegistry"  # reported for a plug-in that usd-core does not include
 
 
 def skin_errors() -> JsonObject:
     """Return exported radii and predicted errors of each skin in OpenPBR, MaterialX and pbrt.
 
-    The errors are those of fitted parameters, of parameters without a fit, and of radii interpreted as the
-    width of a Burley profile.
+    Errors are given for fitted parameters, for parameters set without a fit, and for fitted radii that are
+    interpreted as widths of a Burley profile.
     """
     results: JsonObject = {}
     for name in COMPARED_SKINS:

@@ -12,7 +12,7 @@ from dermis.base.console import print_lines
 
 PAGE = DOCS / "engines.md"
 COMPARED_SKINS = "skin1", "skin2", "dj3", "medium"
-_EXCLUDED = ("maps",)  # a baked light map has no skin parameters
+_EXCLUDED_TARGETS = ("maps",)  # a baked light map has no skin parameters
 _COLUMNS = "target", "version", "variant", "skin", "cdf", "edge", "energy", "edge, published values typed in"
 _BLENDER_EDGE_HEADER = (
     "| method | skin | 4.5 against predicted | 5.2 against predicted | noise | 5.2 against the profile"
@@ -24,7 +24,7 @@ _BLENDER_HEAD_HEADER = """\
 
 
 def page() -> None:
-    """Replace the tables of docs/engines.md, and print those of Blender."""
+    """Replace the tables in docs/engines.md, and print the tables for Blender."""
     write_page(PAGE, fill_tables(in_checkout(PAGE).read_text("utf-8")))
     print_lines(blender_tables())
 
@@ -43,10 +43,10 @@ def fill_tables(text: str) -> str:
 
 
 def predicted_table() -> str:
-    """Return a Markdown table of the predicted errors of the newest version of each target and variant."""
+    """Return a Markdown table of predicted errors, for each variant of each target in its newest version."""
     lines = []
     subjects = [load_subject(name) for name in COMPARED_SKINS]
-    for name in sorted(set(TARGETS) - set(_EXCLUDED), key=str.lower):
+    for name in sorted(set(TARGETS) - set(_EXCLUDED_TARGETS), key=str.lower):
         for variant in TARGETS[name].variants or (None,):
             target = TARGETS[name].with_variant(variant)
             for subject in subjects:
@@ -68,7 +68,7 @@ def rgb_cell(values: Sequence[float]) -> str:
 
 
 def mitsuba_table() -> str:
-    """Return a Markdown table of measured edges of light in Mitsuba."""
+    """Return a Markdown table of the edge responses of a half-lit plane, measured in Mitsuba."""
     errors = "difference from the prediction", "standard error", "difference from the exported profile"
     heads = "skin", "boundary", *errors
     edges = read_results(RESULTS / "engines_mitsuba.json")["edges"]
@@ -78,7 +78,7 @@ def mitsuba_table() -> str:
 
 
 def babylon_table() -> str:
-    """Return a Markdown table of measured edges of light in Babylon.js."""
+    """Return a Markdown table of the edge responses of a half-lit plane, measured in Babylon.js."""
     errors = "difference from the prediction", "from exact lobes", "from the skin's profile"
     heads = "profile", "d [mm]", "measured width of the nearest lobe [mm]", *errors
     differences = (f"measured_less_{name}" for name in ("predicted", "lobes", "profile"))
@@ -89,7 +89,7 @@ def babylon_table() -> str:
 
 
 def heads_table() -> str:
-    """Return a Markdown table that compares a head in all programs with its picture by dermis."""
+    """Return a Markdown table that compares other programs' pictures of a head with the picture by dermis."""
     titles = "program", "outline [px]", "lit skin relative to dermis", "relative RMSE", "pixels"
     return markdown_table(titles, map(_head_row, read_results(RESULTS / "engines_heads.json")["heads"]))
 
@@ -101,7 +101,7 @@ def _head_row(row: JsonObject) -> list[str]:
 
 
 def blender_tables() -> str:
-    """Return Markdown tables of edges and heads in Blender, which are inserted by hand."""
+    """Return Markdown tables of edge responses and heads in Blender, to be copied into the page by hand."""
     results = read_results(RESULTS / "engines_blender.json")
     edges, heads = _blender_edges(results["edges"]), _blender_heads(results["heads"])
     return "\n".join([_BLENDER_EDGE_HEADER, *edges, "", _BLENDER_HEAD_HEADER, *heads]) + "\n"

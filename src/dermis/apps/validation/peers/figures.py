@@ -1,4 +1,4 @@
-"""Noise and errors of dermis, Cycles and Mitsuba, and the time in which Cycles reaches dermis's error."""
+"""Noise and errors of dermis, Cycles and Mitsuba, and the time that Cycles needs for dermis's error."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from dermis.apps.validation.peers.rendering import DERMIS_VARIANTS, GPU_GEMS_3_V
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 CYCLES_NAMES = {"random-walk": "Cycles, random walk", "burley": "Cycles, Burley"}
-CLEAN_NOISE = 0.05
-"""Relative noise of an image that is nearly clean."""
+LOW_NOISE = 0.05
+"""Relative noise of an image in which noise is hardly visible [-]."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,8 @@ class RendererRow:
     """Times and errors of a renderer with one setting.
 
     setting : technique of dermis, or paths per pixel of a path tracer
-    seconds, core_seconds : elapsed time and CPU time of one image [s]; None for a mean that was not rendered
+    seconds, core_seconds : elapsed and CPU time of one image [s]; None if the row is an average of other
+        images and was not itself rendered
     noise : relative RMSE of the image's own noise [-]
     relrmse, energy_ratio : errors against the reference, with standard errors; None for the reference itself
     """
@@ -56,8 +57,8 @@ def scene_results(renders: PeerRenders) -> JsonObject:
     mask = common_mask(renders)
     means = {method: mean_of_passes(turns) for method, turns in renders.cycles.items()}
     ours = [_dermis_row(renders, name, mask) for name in DERMIS_VARIANTS]
-    of_2007 = [_dermis_row(renders, name, mask) for name in GPU_GEMS_3_VARIANTS]
-    rows = [*ours, *of_2007, _mitsuba_row(renders, mask)]
+    gpu_gems_3 = [_dermis_row(renders, name, mask) for name in GPU_GEMS_3_VARIANTS]
+    rows = [*ours, *gpu_gems_3, _mitsuba_row(renders, mask)]
     for method, mean in means.items():
         rows += _cycles_rows(renders, method, mean, mask)
     scene: JsonObject = {
@@ -67,7 +68,7 @@ def scene_results(renders: PeerRenders) -> JsonObject:
         "rows": [asdict(row) for row in rows],
         "left_out": renders.left_out,
         "ours_energy_put_right": {name: _corrected_error(renders, name, mask) for name in DERMIS_VARIANTS},
-        "published": {row.setting: _time_ratios(row, ours[0]) for row in of_2007},
+        "published": {row.setting: _time_ratios(row, ours[0]) for row in gpu_gems_3},
     }
     if "random-walk" in means:
         mean = means["random-walk"]
@@ -94,7 +95,7 @@ def mean_of_passes(turns: Sequence[Sequence[CyclesPass]]) -> MeanImage:
 
     The variance follows from the differences between passes with equal numbers of paths and different seeds.
 
-    turns : passes for each seed, one for each number of paths
+    turns : for each seed, one pass for each number of paths
     """
     levels = [level[0].samples for level in zip(*turns, strict=True)]
     image, variance = np.zeros(turns[0][0].image.shape), np.zeros(turns[0][0].image.shape)
@@ -106,7 +107,7 @@ def mean_of_passes(turns: Sequence[Sequence[CyclesPass]]) -> MeanImage:
 
 
 def pass_noise(one: NDArray[np.floating], other: NDArray[np.floating], mean: MeanImage, mask: Mask) -> float:
-    """Return the relative RMSE of the noise of a pass, from another pass with a different seed [-].
+    """Return the relative RMSE of the noise of a pass, estimated from a pass with another seed [-].
 
     mean : mean of all passes
     """
@@ -117,7 +118,7 @@ def pass_noise(one: NDArray[np.floating], other: NDArray[np.floating], mean: Mea
 def samples_for_noise(noise: float, samples: Sequence[int], noises: Sequence[float]) -> float:
     """Return the number of paths per pixel at which the noise reaches a given value.
 
-    It is extrapolated as 1 / sqrt(N) from the measured number with the most similar noise.
+    Noise is assumed proportional to 1 / sqrt(N), from the measured N whose noise is most similar.
 
     samples, noises : measured numbers of paths N, and their noise
     """
@@ -126,7 +127,7 @@ def samples_for_noise(noise: float, samples: Sequence[int], noises: Sequence[flo
 
 
 def _signal_energy(mean: MeanImage, mask: Mask) -> float:
-    """Return the sum of squares of a picture over a mask, less that of its noise."""
+    """Return the sum of squares of a picture over a mask, minus the part that is due to noise."""
     return float((mean.image**2 - mean.variance)[mask].sum())
 
 
@@ -143,7 +144,7 @@ def _dermis_row(renders: PeerRenders, name: str, mask: Mask) -> RendererRow:
 
 
 def _time_ratios(row: RendererRow, ours: RendererRow) -> dict[str, float]:
-    """Return the elapsed and the CPU time of a row over those of the row `ours` [-]."""
+    """Return the ratios of the elapsed and CPU times of a row to those of the row `ours` [-]."""
     assert row.seconds and row.core_seconds and ours.seconds and ours.core_seconds
     return {"ratio": row.seconds / ours.seconds, "core_ratio": row.core_seconds / ours.core_seconds}
 
@@ -158,7 +159,7 @@ def _mitsuba_row(renders: PeerRenders, mask: Mask) -> RendererRow:
 
 
 def _cycles_rows(renders: PeerRenders, method: str, mean: MeanImage, mask: Mask) -> list[RendererRow]:
-    """Return rows of Cycles: one for each number of paths, and one for the mean without its noise."""
+    """Return rows of Cycles: one for each number of paths, and one for the mean of all, without noise."""
     reference, rows = renders.reference, []
     for level in zip(*renders.cycles[method], strict=True):
         pairs = [(one.image, reference.image, mask, reference.variance) for one in level]
@@ -175,7 +176,7 @@ def _cycles_rows(renders: PeerRenders, method: str, mean: MeanImage, mask: Mask)
 
 
 def _equal_error_costs(renders: PeerRenders, mean: MeanImage, ours: RendererRow, mask: Mask) -> JsonObject:
-    """Return the paths and the time with which a random walk reaches dermis's error, and low noise.
+    """Return the paths and the time that a random walk needs for dermis's error, and for low noise.
 
     ours : row of dermis, whose error against the reference is the goal
     """
@@ -183,7 +184,7 @@ def _equal_error_costs(renders: PeerRenders, mean: MeanImage, ours: RendererRow,
     bias = relative_rmse(mean.image, reference.image, mask, reference.variance, mean.variance).value
     samples = [level[0].samples for level in levels]
     noises = [pass_noise(one.image, other.image, mean, mask) for one, other in levels]
-    sample_counts = {"clean": samples_for_noise(CLEAN_NOISE, samples, noises)}
+    sample_counts = {"clean": samples_for_noise(LOW_NOISE, samples, noises)}
     assert ours.relrmse is not None
     if ours.relrmse > bias:
         # Errors are relative to the reference, noise to the method's own mean.
@@ -193,16 +194,16 @@ def _equal_error_costs(renders: PeerRenders, mean: MeanImage, ours: RendererRow,
     return {goal: _cycles_cost(count, levels[-1], ours) for goal, count in sample_counts.items()}
 
 
-def _cycles_cost(count: float, level: Sequence[CyclesPass], ours: RendererRow) -> dict[str, float]:
+def _cycles_cost(paths: float, level: Sequence[CyclesPass], ours: RendererRow) -> dict[str, float]:
     """Return the time of Cycles for a number of paths per pixel, and its ratio to a frame of dermis.
 
     level : measured passes, from whose time per path the cost is extrapolated
     """
-    seconds = count * statistics.mean(one.seconds / one.samples for one in level)
-    core_seconds = count * statistics.mean(one.core_seconds / one.samples for one in level)
+    seconds = paths * statistics.mean(one.seconds / one.samples for one in level)
+    core_seconds = paths * statistics.mean(one.core_seconds / one.samples for one in level)
     assert ours.seconds is not None and ours.core_seconds is not None
     ratios = {"ratio": seconds / ours.seconds, "core_ratio": core_seconds / ours.core_seconds}
-    return {"samples": count, "seconds": seconds, **ratios}
+    return {"samples": paths, "seconds": seconds, **ratios}
 
 
 def _corrected_error(renders: PeerRenders, name: str, mask: Mask) -> float:

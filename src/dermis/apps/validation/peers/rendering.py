@@ -1,4 +1,4 @@
-"""Renderings of a scene by dermis, Cycles and Mitsuba in turns, so that a slow phase affects all of them."""
+"""Renderings of a scene by dermis, Cycles and Mitsuba in turns, so that slow phases affect all three."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ GPU_GEMS_3_VARIANTS = {
 FIRST_SEEDS = (100, 200)
 """Seeds of the first pass of each turn; further passes have the following seeds."""
 _PROGRESS_STEPS = {"ours": 35, "random-walk": 5, "burley": 2, "path-traced": 20}
-"""Relative times of a turn of frames and of one path per pixel, for the progress bar."""
+"""Relative durations, for the progress bar: a turn of dermis, and one path per pixel of other renderers."""
 
 
 @dataclass(frozen=True)
@@ -100,8 +100,8 @@ class PeerRenders:
 
     light, region : names of the scene's light and of the visible region
     ours : frames of dermis by names in `DERMIS_VARIANTS` and `GPU_GEMS_3_VARIANTS`
-    cycles : passes of Cycles by method, for each seed and each of `PeerPlan.samples`
-    left_out : reasons why methods of Cycles are missing
+    cycles : passes of Cycles by method: for each seed, one pass for each number in `PeerPlan.samples`
+    left_out : reason why a method of Cycles is missing, by method
     reference : path-traced image by Mitsuba
     reference_core_seconds : CPU time of Mitsuba, including loading of the scene [s]
     """
@@ -134,7 +134,7 @@ def render_peers(
     ours: dict[str, FrameTimes] = {}
     left_out: dict[str, str] = {}
 
-    def per_pass(done: int, total: int) -> None:
+    def report_pass(done: int, total: int) -> None:
         on_progress(SAMPLES_PER_PASS * _PROGRESS_STEPS["path-traced"])
 
     scene_context = medium_scene(head, light, default_region(light), medium)
@@ -151,7 +151,7 @@ def render_peers(
         _add_frames(ours, renderer, scene, plan)
         on_progress(_PROGRESS_STEPS["ours"])
         cpu_started = time.process_time()
-        reference = path_trace(scene, medium, plan.paths, settings, use_cache=False, progress=per_pass)
+        reference = path_trace(scene, medium, plan.paths, settings, use_cache=False, progress=report_pass)
         core_seconds = time.process_time() - cpu_started
         _add_frames(ours, renderer, scene, plan)
         on_progress(_PROGRESS_STEPS["ours"])
@@ -170,7 +170,7 @@ def _cycles_passes(
 
 
 def _add_frames(ours: dict[str, FrameTimes], renderer: Renderer, scene: Scene, plan: PeerPlan) -> None:
-    """Time further frames of each variant of dermis, which recompute all stages with warm caches.
+    """Time further frames of each variant of dermis; each recomputes all stages, with warm caches.
 
     ours : frames by variant, to which times are added
     """

@@ -27,6 +27,7 @@ RESULTS_FILE, PAGE = RESULTS / "peers.json", DOCS / "peers.md"
 DEFAULT_LIGHTS = ("front", "back")
 QUICK_PLAN = PeerPlan(side=160, samples=(4, 16), paths=16, frames=3)
 TARGET_RATIO = 50.0
+"""Goal for the time of Cycles, relative to a frame of dermis with the same error [-]."""
 _COLUMNS = ("renderer", "", "seconds", "noise", "relative RMSE", "energy ratio")
 
 
@@ -46,7 +47,7 @@ def peers(
     head:
         A sample or a file.
     lights:
-        Names of front, back and laser, separated by commas.
+        Names of lights, separated by commas: front, back or laser.
     quick:
         A small image with few paths, to check that everything works. Writes only the file of -o.
     side:
@@ -111,11 +112,11 @@ def compare_peers(head: str, lights: list[str], plan: PeerPlan, adapter: str) ->
 
 def software_versions(scenes: list[PeerRenders]) -> dict[str, str]:
     """Return the versions of Python, NumPy and all renderers, by name."""
-    numbers = {name: version(name) for name in ("dermis", "wgpu", "mitsuba", "numpy")}
+    versions = {name: version(name) for name in ("dermis", "wgpu", "mitsuba", "numpy")}
     passes = [turns[0][0] for one in scenes for turns in one.cycles.values() if turns]
     if passes:
-        numbers["Blender"] = passes[0].version
-    return numbers | {"Python": platform.python_version()}
+        versions["Blender"] = passes[0].version
+    return versions | {"Python": platform.python_version()}
 
 
 def cpu_model() -> str:
@@ -197,7 +198,7 @@ def _ratio_text(ratio: float) -> str:
 def _burley_sentence(scene: JsonObject) -> str:
     """Return a sentence that compares the error of Burley's profile with that of dermis.
 
-    The former is against Cycles' random walk, the latter against path tracing.
+    The error of Burley's profile is relative to Cycles' random walk, the error of dermis to path tracing.
     """
     burley_error, error = scene["burley_against_random_walk"]
     verdicts = []

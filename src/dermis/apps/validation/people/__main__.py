@@ -1,4 +1,4 @@
-"""Commands that hold drawn people against a spectral archive of measured people.
+"""Commands that compare randomly drawn people with a spectral archive of measured people.
 
 They need the archive in the folder DERMIS_DATA, see docs/measured.md.
 """
@@ -10,7 +10,7 @@ from dermis.base.command_line import run_script
 HERE = "dermis.apps.validation.people"
 COMMANDS = {
     f"{HERE}.table:table": "Write the table of measured people in the package.",
-    f"{HERE}.drawn:people": "Print drawn people against the archive.",
+    f"{HERE}.drawn:people": "Print a comparison of drawn people with the archive.",
     f"{HERE}.drawn:page": "Measure the variation of people and write docs/measured.md.",
 }
 """Functions that run as commands, with their descriptions."""

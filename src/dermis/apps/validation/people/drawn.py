@@ -1,4 +1,4 @@
-"""Drawn people against the archive: distributions of the cheek's colour by group, and medians by site."""
+"""Randomly drawn people compared with the archive: colours of the cheek by group, and medians by site."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ HEAD_SITES: Final = ("cheek", *(name.replace("_", " ") for name in FACE_SITES))
 """Sites of the archive that are painted on a head."""
 _SEEDS = 2000
 _PERMUTATIONS = 200
-_SAME_PEOPLE, _TOLERANCE = 50, 1.0
+_MANY_PEOPLE, _TOLERANCE = 50, 1.0  # people with whom medians should agree, and largest difference [CIELAB]
 _QUANTITIES = "L*", "a*", "b*", "ITA"
-_OLD = 55.0
+_OLD = 55.0  # least age of the older people [years]
 
 
 class DrawnPeople(NamedTuple):
@@ -41,7 +41,7 @@ class DrawnPeople(NamedTuple):
 
 
 def site_unknowns(look: SkinLook) -> Doubles:
-    """Return the unknowns (7, 4) of `model_spectra` for a look at `HEAD_SITES`."""
+    """Return the unknowns (7, 4) of `model_spectra` that the skin of a look has at `HEAD_SITES`."""
     differences = np.vstack([np.zeros(3), look.sites.array()])
     fractions = np.array([look.melanin, look.blood]) * np.exp2(differences[:, :2])
     oxygen = np.clip(look.oxygen + differences[:, 2], 0.0, 1.0)
@@ -51,7 +51,7 @@ def site_unknowns(look: SkinLook) -> Doubles:
 
 @logged_step("drawing people")
 def draw_people(group: str, seeds: Sequence[int]) -> DrawnPeople:
-    """Return the colours of people of a measured group, without rendering."""
+    """Return randomly drawn people of a measured group, with colours by the model, without rendering."""
     drawn = [Human.drawn(seed, skin_ancestry=group) for seed in seeds]
     unknowns = np.concatenate([site_unknowns(one.look) for one in drawn])
     colours = model_lab(unknowns).reshape(len(drawn), len(HEAD_SITES), 3)
@@ -64,7 +64,7 @@ def draw_all(seeds: int = _SEEDS) -> dict[str, DrawnPeople]:
 
 
 def people(seeds: int = _SEEDS) -> None:
-    """Print drawn people against the archive.
+    """Print a comparison of drawn people with the archive.
 
     Parameters
     ----------
@@ -119,9 +119,9 @@ def cheek_table(archive: Archive, drawn: Mapping[str, DrawnPeople]) -> str:
 
 
 def two_sample_distance(a: Doubles, b: Doubles) -> tuple[float, float, float]:
-    """Return the energy distance of two samples, and mean and 95 % quantile for samples of one population.
+    """Return the energy distance of two samples, and its mean and 95 % quantile for equal populations.
 
-    The last two are found by permutation.
+    The last two are estimated by permutation.
     """
     rng, both = np.random.default_rng(0), np.concatenate([a, b])
     permuted = []
@@ -134,7 +134,7 @@ def two_sample_distance(a: Doubles, b: Doubles) -> tuple[float, float, float]:
 def site_differences(
     archive: Archive, drawn: Mapping[str, DrawnPeople]
 ) -> Iterator[tuple[str, str, int, Doubles, Doubles]]:
-    """Yield group, site, people, median colour (3,) of the archive, and the difference (3,) of that drawn."""
+    """Yield group, site, number of people, measured median (3,), and drawn minus measured median (3,)."""
     for code, group in GROUPS.items():
         for k, site in enumerate(HEAD_SITES):
             measured = _measured(archive, code, site)
@@ -151,7 +151,7 @@ def sites_table(archive: Archive, drawn: Mapping[str, DrawnPeople]) -> str:
         "|---|---|---|---|---|---|",
     ]
     for group, site, count, median, difference in site_differences(archive, drawn):
-        outside = count >= _SAME_PEOPLE and np.abs(difference).max() > _TOLERANCE
+        outside = count >= _MANY_PEOPLE and np.abs(difference).max() > _TOLERANCE
         texts = (
             ", ".join(f"{one:{form}}" for one in values)
             for values, form in ((median, ".1f"), (difference, "+.1f"))
@@ -163,16 +163,16 @@ def sites_table(archive: Archive, drawn: Mapping[str, DrawnPeople]) -> str:
 
 
 def sex_age_table(archive: Archive, drawn: Mapping[str, DrawnPeople]) -> str:
-    """Return a Markdown table of differences of the cheek between sexes and ages, mean over the groups."""
+    """Return a Markdown table of colour differences of the cheek by sex and age, averaged over the groups."""
     lines = ["| difference | archive: L*, a*, b* | drawn |", "|---|---|---|"]
     for name in ("men minus women", "from 55 years minus below 45"):
         both = []
         for is_drawn in (False, True):
             differences, counts = [], []
             for code, group in GROUPS.items():
-                measured, own = _measured(archive, code, "cheek"), drawn[group]
-                colours = own.cielab[:, 0] if is_drawn else measured.cielab
-                sex, age = (own.sex, own.age) if is_drawn else (measured.sex, measured.age)
+                measured, drawn_group = _measured(archive, code, "cheek"), drawn[group]
+                colours = drawn_group.cielab[:, 0] if is_drawn else measured.cielab
+                sex, age = (drawn_group.sex, drawn_group.age) if is_drawn else (measured.sex, measured.age)
                 first, second = (sex > 0.5, sex < 0.5) if "men" in name else (age >= _OLD, age < 45.0)
                 if min(first.sum(), second.sum()) >= 5:
                     differences.append(np.median(colours[first], axis=0) - np.median(colours[second], axis=0))
@@ -183,7 +183,7 @@ def sex_age_table(archive: Archive, drawn: Mapping[str, DrawnPeople]) -> str:
 
 
 def empty_cells(archive: Archive) -> str:
-    """Return the cells without measurements as text, which have pooled differences from the cheek."""
+    """Return text that lists sites without measurements by group; the package uses pooled values there."""
     parts = []
     for k, group in enumerate(GROUPS.values()):
         empty = [

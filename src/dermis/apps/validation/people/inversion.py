@@ -23,7 +23,7 @@ _NODES = 65
 _PRIOR_OXYGEN, _PRIOR_OXYGEN_SD, _PRIOR_LOG_MM_SD = 0.7, 0.3, 0.3
 _START_MELANIN, _START_BLOOD = 0.04, 0.01
 _LAB_SD: Final = 0.1
-"""Standard deviation to which colours are matched, CIELAB; spectra follow as far as the colour allows."""
+"""Standard deviation of colours in the fit [CIELAB]; small, so that colours take precedence over spectra."""
 _SPECTRUM_SD: Final = 0.01
 _STEPS = 30
 _DERIVATIVE_STEP = 1e-3
@@ -72,12 +72,12 @@ def model_lab(unknowns: Doubles) -> Doubles:
 
 
 def invert_spectra(reflectance: Doubles) -> Doubles:
-    """Return the unknowns (n, 4) of `model_spectra` that match the colours, then the shapes, of spectra.
+    """Return the unknowns (n, 4) of `model_spectra` that match the colours of spectra, then their shapes.
 
     reflectance : (n, 31) at `WAVELENGTHS_NM`, without surface reflection [-]
 
-    Gauss-Newton steps with Levenberg's damping; the priors of oxygen and thickness only matter where the
-    spectrum leaves them open.
+    Takes Gauss-Newton steps with Levenberg's damping. The priors of oxygen and thickness only matter where
+    the spectrum does not determine these unknowns.
     """
     target = lab(reflectance @ rgb_weights(WAVELENGTHS_NM).T)
     prior = np.array([_PRIOR_OXYGEN, np.log(DEFAULT_SKIN.epidermis_mm)])
@@ -116,7 +116,10 @@ def _moved(x: Doubles, column: int) -> Doubles:
 
 
 def to_variables(unknowns: Doubles) -> Doubles:
-    """Return log2 of melanin and blood, oxygen, and log2 of the thickness [mm], (n, 4)."""
+    """Return log2 of melanin and blood, oxygen, and log2 of the thickness [mm], (n, 4).
+
+    unknowns : as in `model_spectra`
+    """
     melanin, blood, oxygen, log_mm = unknowns.T
     return np.column_stack([2.0 * np.log2(melanin), 2.0 * np.log2(blood), oxygen, log_mm / np.log(2.0)])
 

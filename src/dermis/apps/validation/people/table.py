@@ -40,11 +40,11 @@ TABLE_FILE, CELLS_FILE = "measured.json", "measured_cells.csv"
 _PROBABILITIES = (0.005, 0.025, 0.1, 0.25, 0.5, 0.75, 0.9, 0.975, 0.995)
 _CHEEK = SITES.index("cheek")
 _POOLING_PEOPLE = 30.0  # number of people of a group that weigh as much as the pooled correlation
-_MIN_PEOPLE = 20  # of a cell that is not filled from the pooled model
+_MIN_PEOPLE = 20  # least number of people of a cell (group and site) that is not filled from the pooled model
 _SMALL_CELL_PEOPLE = 10.0  # number of people of a small cell that weigh as much as the pooled difference
 _POPULATION = 2000
 _SHIFT_SD: Final = np.array([0.5, 0.5, 0.15, 0.15])
-"""Scale of the corrections of the four variables that make medians of colours agree."""
+"""Typical size of the corrections of the four variables by which median colours are made to agree."""
 _COLOUR_SD = 0.05
 _SOURCE = "Lu et al. 2025, International Skin Spectra Archive, CC BY 4.0, doi 10.6084/m9.figshare.28228571.v4"
 _THICKNESS_TRIALS = (-0.6, -0.4, -0.2, 0.0, 0.2)
@@ -53,8 +53,8 @@ _MAX_STEP = 1.0  # of a correction, in `_SHIFT_SD`
 _CALIBRATION_STEPS = 6
 _WINSOR_PERCENT = 5.0
 _TRUE_SPREAD = 0.5
-"""Fraction of the spread of differences between sites that people have; pressure and placing of the probe add
-the rest. With all of it, drawn foreheads, necks and hands vary more than measured ones."""
+"""Fraction of the measured spread of differences between sites that is due to people; pressure and placing of
+the probe cause the rest. With the whole spread, drawn foreheads, necks and hands would vary too much."""
 _HEADER = """\
 # quantity: medians of measured skin by group, site, sex and age group: CIELAB under D65 without specular
 #   reflection, melanin, blood, oxygen and thickness by the package's own model; covariances of CIELAB and of
@@ -87,7 +87,7 @@ def build_table(archive: Archive, variables: Doubles) -> dict[str, Any]:
 
     variables : (n, 4) variables of the measurements, from `to_variables`
     """
-    cheek, y = person_means(archive, variables, _CHEEK)
+    cheek, y = person_medians(archive, variables, _CHEEK)
     sex, age = _effects(cheek, y)
     ages, sexes = _population()
     document: dict[str, Any] = {
@@ -116,7 +116,7 @@ def build_table(archive: Archive, variables: Doubles) -> dict[str, Any]:
     return document
 
 
-def person_means(archive: Archive, variables: Doubles, site: int) -> tuple[Archive, Doubles]:
+def person_medians(archive: Archive, variables: Doubles, site: int) -> tuple[Archive, Doubles]:
     """Return one measurement for each person at a site: the one in the middle by lightness."""
     rows = np.flatnonzero(archive.site == site)
     order = rows[np.lexsort((archive.cielab[rows, 0], archive.person[rows]))]
@@ -132,7 +132,7 @@ def _by_group(archive: Archive) -> Iterator[tuple[str, NDArray[np.bool_]]]:
 
 
 def _effects(cheek: Archive, y: Doubles) -> tuple[Doubles, Doubles]:
-    """Return the effects (4,) of sex and of `age_term` by least squares, with a level for each group."""
+    """Return the effects (4,) of sex and of `age_term`, by least squares with an intercept for each group."""
     known = np.isfinite(cheek.sex) & np.isfinite(cheek.age)
     levels = (cheek.group[known, None] == np.arange(len(GROUPS))).astype(np.float64)
     terms = np.column_stack([levels, cheek.sex[known], age_term(cheek.age[known])])
@@ -159,15 +159,16 @@ def _scores(y: Doubles, rows: Archive) -> Doubles:
 
 
 def _sites(archive: Archive, variables: Doubles) -> tuple[Doubles, Doubles, Doubles]:
-    """Return differences of sites from the cheek: medians (g, 12, 3), slopes and spreads (12, 2).
+    """Return how sites differ from the cheek: medians (g, 12, 3), slopes (12, 2) and spreads (12, 2).
 
+    A slope is the change of the difference with the deviation of the cheek from the median of its group.
     Cells with too few people are mixed with the mean of the other groups, weighted by people.
     """
     shifts, counts = np.zeros((len(GROUPS), len(SITES), 3)), np.zeros((len(GROUPS), len(SITES)))
     slope, spread = np.zeros((len(SITES), 2)), np.zeros((len(SITES), 2))
-    cheek, y = person_means(archive, variables, _CHEEK)
+    cheek, y = person_medians(archive, variables, _CHEEK)
     for site in (k for k in range(len(SITES)) if k != _CHEEK):
-        other, z = person_means(archive, variables, site)
+        other, z = person_medians(archive, variables, site)
         _, here, there = np.intersect1d(cheek.person, other.person, return_indices=True)
         difference, deviation = z[there, :3] - y[here, :3], y[here].copy()
         for k in range(len(GROUPS)):
@@ -183,8 +184,8 @@ def _sites(archive: Archive, variables: Doubles) -> tuple[Doubles, Doubles, Doub
         spread[site] = _TRUE_SPREAD * np.std(d - slope[site] * x, axis=0)
         filled = counts[:, site] >= _MIN_PEOPLE
         pooled = np.average(shifts[filled, site], axis=0, weights=counts[filled, site])
-        own = (counts[:, site] / (counts[:, site] + _SMALL_CELL_PEOPLE))[~filled, None]
-        shifts[~filled, site] = own * shifts[~filled, site] + (1.0 - own) * pooled
+        weight = (counts[:, site] / (counts[:, site] + _SMALL_CELL_PEOPLE))[~filled, None]
+        shifts[~filled, site] = weight * shifts[~filled, site] + (1.0 - weight) * pooled
     return shifts, slope, spread
 
 
@@ -200,9 +201,10 @@ def _population() -> tuple[Doubles, Doubles]:
 
 
 def _calibrate(document: dict[str, Any], archive: Archive, ages: Doubles, sexes: Doubles) -> None:
-    """Correct quantiles and differences of sites until median colours of drawn people are the archive's.
+    """Correct quantiles and site differences until median colours of drawn people equal the archive's.
 
-    The thickness of the epidermis, which spectra leave open, is that with which sites of the head agree best.
+    Spectra do not determine the thickness of the epidermis: the one with which the sites of the head agree
+    best is chosen.
     """
     rng = np.random.default_rng(1)
     population = _Population(
@@ -254,16 +256,17 @@ def _calibrate_group(document: dict[str, Any], name: str, own: Archive, people: 
 
 
 def _drawn_cheeks(document: dict[str, Any], group: str, people: _Population) -> tuple[MeasuredTable, Doubles]:
-    """Return the table so far, and the variables (n, 4) of the cheeks of drawn people of a group."""
+    """Return the table as it is now, and the variables (n, 4) of the cheeks of drawn people of a group."""
     found, weights = parse_table(document), {group: 1.0}
     scores = people.normals @ square_root(found.mixture("correlation", weights)[:4, :4])
     return found, found.variables(weights, people.sexes, people.ages, scores)
 
 
 def _matching_shift(y: Doubles, target: Doubles, count: int) -> tuple[Doubles, Doubles]:
-    """Return the shift (4,) of variables by which a median colour becomes a target, and the error (3,) left.
+    """Return the shift (4,) of variables that moves a median colour to a target, and the error (3,) left.
 
     y : (n, 4) variables of people
+    target : (3,) median colour to reach [CIELAB]
     count : number of variables that may be shifted
     """
     shift, used = np.zeros(4), np.arange(4) < count

@@ -30,7 +30,7 @@ _UNIT_FORMATS = {"_per_mm": "%.3g", "_mm": "%.4g mm", "_degrees": "%.4g°"}  # b
 _TALL_LIST_FLAG = int(imgui.ComboFlags_.height_largest)
 _TOOLTIP_WIDTH = 260.0
 _NO_DISPLAY_NAMES: Mapping[str, str] = MappingProxyType({})
-_CUSTOM_CHOICE = "own"
+_CUSTOM_CHOICE = "own"  # choice of a number or colour instead of a keyword
 _PLOT_HEIGHT = 130.0
 _PLOT_BASE_FLAGS = implot.Flags_.no_menus | implot.Flags_.no_box_select | implot.Flags_.no_mouse_text
 _PLOT_FLAGS = int(_PLOT_BASE_FLAGS | implot.Flags_.no_inputs | implot.Flags_.no_legend)
@@ -39,10 +39,10 @@ _MAX_VISIBLE_ROWS = 14
 
 @dataclass(frozen=True)
 class FieldStyle:
-    """Presentation of a field in the panel, where it differs from that of the model.
+    """Presentation of a field in the panel, where it differs from the defaults that follow from the model.
 
     label : label to show; in "shown###name" the name identifies the control in positions and undo
-    value_range : range of the slider, None for that of the model
+    value_range : range of the slider, None for the range that the model declares
     unit : size of one displayed unit, in units of the field; 0.01 displays a fraction in percent
     number_format : printf format of the number
     options : integers to choose from in a drop-down list
@@ -296,7 +296,7 @@ def begin_plot(label: str, axes: tuple[str, str], x_range: tuple[float, float], 
 def record_position(session: Session, label: str) -> None:
     """Record the position of the last control in the window, so that scripts can click on it.
 
-    The position is in the left part of the control, because its label may be in the right part.
+    The position is in the left part of the control, because the right part may be its label.
 
     label : label whose part after "###", if any, is the key of the position
     """

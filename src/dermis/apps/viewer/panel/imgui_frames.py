@@ -54,7 +54,7 @@ ReportError = Callable[[Exception], None]
 class ImguiFrames:
     """Dear ImGui context, with the GPU resources that draw it.
 
-    report_error : function that receives errors of a layout; later frames are still drawn
+    report_error : function that receives errors raised during a layout; later frames are still drawn
     """
 
     def __init__(self, report_error: ReportError) -> None:
@@ -68,7 +68,7 @@ class ImguiFrames:
         """
         # A context holds its font texture, which belongs to one device.
         self._context = imgui.create_context()
-        self._plots = implot.create_context()
+        self._plot_context = implot.create_context()
         self.enter()
         set_style()
         self._is_new = True
@@ -78,7 +78,7 @@ class ImguiFrames:
     def enter(self) -> None:
         """Make this the current context of Dear ImGui."""
         imgui.set_current_context(self._context)
-        implot.set_current_context(self._plots)
+        implot.set_current_context(self._plot_context)
 
     def lay_out(self, size: tuple[float, float], draw: Callable[[], None]) -> None:
         """Process pending input and lay out the next frame, which `render` then draws.
@@ -113,7 +113,7 @@ class ImguiFrames:
     def _recreate_context(self) -> None:
         """Replace the context after an error of Dear ImGui; open sections of the panel are reset."""
         self._has_layout = False
-        implot.destroy_context(self._plots)
+        implot.destroy_context(self._plot_context)
         imgui.destroy_context(self._context)
         self.open(self._device, self._target)
 

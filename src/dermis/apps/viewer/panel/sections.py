@@ -70,7 +70,7 @@ _SETTING_STYLES = {
     "background": FieldStyle(custom_value=lambda session: (0.2, 0.2, 0.2)),
 }
 _PICTURE_SETTINGS = ("exposure", "tone", "bloom", "background", "background_blur")
-_OTHER_SETTINGS = ("size", "parts")  # determined by the window and by the view
+_DETERMINED_SETTINGS = ("size", "parts")  # determined by the window and by the view
 
 
 def draw_lights(session: Session) -> None:
@@ -167,7 +167,7 @@ def has_expressions(session: Session) -> bool:
 
 
 def can_move(session: Session) -> bool:
-    """Return whether there is a motion, or a head with morph targets or bones."""
+    """Return whether a motion is loaded, or the head has morph targets or bones."""
     return has_expressions(session) or session.player.has_motion
 
 
@@ -354,7 +354,7 @@ def draw_technique(session: Session) -> None:
     New settings appear here by default.
     """
     settings = session.state.settings
-    kind, excluded = type(settings), {*_PICTURE_SETTINGS, *_OTHER_SETTINGS}
+    kind, excluded = type(settings), {*_PICTURE_SETTINGS, *_DETERMINED_SETTINGS}
     names = sorted(
         (name for name in fields_under("", kind) if name not in excluded),
         key=lambda name: not field_choices(kind, name),
@@ -370,7 +370,7 @@ def draw_picture(session: Session) -> None:
 
 
 def draw_talk(session: Session) -> None:
-    """Draw the skin fields and settings by which faults of the 2007 talk are reproduced for comparison."""
+    """Draw the skin fields and settings that reproduce faults shown in the talk of 2007, for comparison."""
     state, skin, settings = session.state, session.state.scene.skin, session.state.settings
     draw_fields(session, skin, state.with_skin, SURFACE_STYLES, fields_under(COMPARISONS, type(skin)))
     names = fields_under(COMPARISONS, type(settings))

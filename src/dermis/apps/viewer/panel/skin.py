@@ -147,7 +147,7 @@ def _plot_profile(session: Session) -> None:
 
 @lru_cache(maxsize=16)
 def _profile_layers(profile: str) -> tuple[TissueLayer, ...]:
-    """Return the tissue layers of a named profile, cached; none for a profile that is a sum of Gaussians."""
+    """Return the tissue layers of a named profile, () if it is a sum of Gaussians; results are cached."""
     try:
         return tissue_layers(Skin(profile=profile))
     except (

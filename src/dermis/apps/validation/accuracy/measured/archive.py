@@ -1,4 +1,4 @@
-"""Measured reflectance spectra of the International Skin Spectra Archive, people's folds, and illuminants."""
+"""Reflectance spectra of the International Skin Spectra Archive, with folds of people, and illuminants."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from dermis.optics.media import Floats
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, interpolate_spectrum, rgb_weights
 
 ARCHIVE_FILE = "reference/measured/issa_skin_spectra.csv.gz"
-FOLDS = 5
+FOLDS = 5  # number of parts of the people for cross-validation
 GROUPS = {
     "CA": "Caucasian",
     "CN": "Chinese",
@@ -55,8 +55,8 @@ class Archive:
     """Spectra of n measurements, with the person, group and site of each.
 
     spectra : (n, 31) diffuse reflectance at `WAVELENGTHS_NM`, without the surface's reflection [-]
-    person : (n,) number of the person
-    fold : (n,) index of the fold of the person, 0 to `FOLDS` - 1
+    person : (n,) number that identifies the person
+    fold : (n,) index of the cross-validation fold that contains the person, 0 to `FOLDS` - 1
     group : (n,) key of `GROUPS`
     site : (n,) index in `SITES`
 
@@ -93,7 +93,8 @@ def read_archive() -> Archive:
     with gzip.open(data_file(ARCHIVE_FILE), "rt", encoding="utf-8") as file:
         rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
     spectra = float_columns(rows, " ".join(f"r{nm:.0f}" for nm in WAVELENGTHS_NM)) - SPECULAR_INCLUDED
-    # A person is a subject of an origin. The hash spreads people over folds independently of their order.
+    # Subjects are numbered separately for each origin. The hash spreads people over folds independently of
+    # their order.
     person = np.array([crc32(f"{row['origin']}/{row['subject']}".encode()) for row in rows])
     group = np.array([row["group"] for row in rows])
     return Archive(spectra, person, person % FOLDS, group, np.array([int(row["site"]) - 1 for row in rows]))
@@ -101,7 +102,7 @@ def read_archive() -> Archive:
 
 @cache
 def colour_weights(illuminant: str) -> Floats:
-    """Return weights (3, 31) from spectra to XYZ over white, as linear Rec. 709 that has the same L*a*b*.
+    """Return weights (3, 31) from spectra to linear Rec. 709 colours with the L*a*b* under an illuminant.
 
     illuminant : key of `ILLUMINANTS`
 

@@ -1,4 +1,4 @@
-"""Decoder of BioSkin, a published network from pigments to reflectance, evaluated without its framework."""
+"""Decoder of BioSkin, a published network that maps pigments to reflectance, evaluated without PyTorch."""
 
 from __future__ import annotations
 
@@ -18,8 +18,9 @@ _FIRST_NM, _STEP_NM = 380.0, 2.0  # wavelengths of the decoder
 _INPUTS = ("melanin", "blood", "epidermis_mm", "oxygen", "eumelanin")
 _MIDDLE = {"melanin": 0.3, "blood": 0.3, "epidermis_mm": 0.4, "oxygen": 0.7, "eumelanin": 0.74}
 BIOSKIN_UNKNOWNS = {name: SpectralUnknown(name, 0.0, 1.0, _MIDDLE[name]) for name in _INPUTS}
-"""Inputs of the decoder, each warped to 0 to 1 by its authors; starts are within their plausible ranges."""
+"""Inputs of the decoder, which its authors map to 0 to 1; fits start from plausible values."""
 BIOSKIN_SETS = (("melanin", "blood"), ("melanin", "blood", "oxygen"), _INPUTS)
+"""Inputs to fit, with two, three and five unknowns."""
 
 
 def bioskin_model(weights: Path) -> SpectralModel:
@@ -27,7 +28,7 @@ def bioskin_model(weights: Path) -> SpectralModel:
 
     weights : the published file pretrained_models/BioSkin.pt
 
-    Raises DermisError for files of other contents.
+    Raises DermisError if the file is not that of BioSkin.
 
     Source: [Aliaga2023].
     """
@@ -47,10 +48,10 @@ def bioskin_model(weights: Path) -> SpectralModel:
 
 
 class _TensorReader(pickle.Unpickler):
-    """Reader of a dictionary of tensors that constructs nothing else."""
+    """Unpickler that loads a dictionary of tensors and refuses to construct any other object."""
 
     def find_class(self, module: str, name: str) -> object:
-        """Return the few names that such files contain; refuse all others."""
+        """Return the object for a name that such files contain; raise UnpicklingError for any other name."""
         if (module, name) == ("torch._utils", "_rebuild_tensor_v2"):
             return lambda storage, offset, size, *rest: (storage, offset, size)
         if (module, name) == ("collections", "OrderedDict"):

@@ -1,4 +1,4 @@
-"""Constants that all people share, fitted to measured spectra, and what residual spectra ask for."""
+"""Constants that all people share and additions to the skin model, fitted to measured spectra."""
 
 from __future__ import annotations
 
@@ -41,23 +41,23 @@ CONSTANTS = UNKNOWNS | {
 }
 """Constants that may be fitted, and additions to the package's model.
 
-dermis : scattering of the dermis over that of the epidermis
-small_fibres : Rayleigh scattering over that of [DonnerJensen2006]
-vessel_mm : mean path through a vessel, whose inside the light does not reach where blood absorbs much
+dermis : ratio of the scattering of the dermis to that of the epidermis
+small_fibres : ratio of Rayleigh scattering to that of [DonnerJensen2006]
+vessel_mm : mean path through a vessel; light does not reach its inside if blood absorbs strongly
 bandwidth_nm : half width of the instrument's triangular band
 bilirubin, carotene, methaemoglobin : absorption of the dermis at the peak of bands at 460, 480 and 630 nm
     [1/mm]
 """
 _BANDS = {"bilirubin": (460.0, 28.0), "carotene": (480.0, 20.0), "methaemoglobin": (630.0, 18.0)}
-_OUTER_STEPS = 6
-_INNER_STEPS = 4
-_STEP = 0.02
+_OUTER_STEPS = 6  # of the constants
+_INNER_STEPS = 4  # of the unknowns of spectra, in each outer step
+_DERIVATIVE_STEP = 0.02
 _MIN_GAIN = 1e-4
 _NOTABLE_CORRELATION = 0.85
 
 
 def extended_model(constants: Mapping[str, float]) -> ExtendedModel:
-    """Return the model of skin with given constants, and the package's values for the others."""
+    """Return the model of skin with the given constants; all others have the package's values."""
     return ExtendedModel(dict(constants))
 
 
@@ -65,13 +65,16 @@ def extended_model(constants: Mapping[str, float]) -> ExtendedModel:
 class ExtendedModel:
     """Spectral model of skin with additions that the package's model does not have.
 
-    constants : values of some of `CONSTANTS`, which the parameters of a fit override
+    constants : values of some of `CONSTANTS`; parameters of the same names in a call override them
     """
 
     constants: dict[str, float]
 
     def __call__(self, values: Values) -> Floats:
-        """Return the diffuse reflectances (n, 31) of skins."""
+        """Return the diffuse reflectances (n, 31) of skins.
+
+        values : parameters of the skins by name
+        """
         defaults = {"vessel_mm": 0.0, "bandwidth_nm": 0.0, "scattering": 1.0}
 
         def parameter(name: str) -> Floats:
@@ -119,7 +122,7 @@ def _blood_in_bands(oxygen: float, half_width_nm: float) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class SharedFit:
-    """Constants that fit all spectra best, with unknowns of their own for each spectrum.
+    """Constants that all spectra share, and separate unknowns for each spectrum, as fitted together.
 
     constants : values by name
     fit : unknowns of each spectrum
@@ -140,11 +143,11 @@ def fit_constants(
 ) -> SharedFit:
     """Fit shared constants and each spectrum's unknowns by least squares, in alternation.
 
-    unknowns : parameters of each spectrum
-    free : names of `CONSTANTS` that are fitted
-    fixed : values of other constants
+    unknowns : names of the parameters that each spectrum has separately
+    free : names of the `CONSTANTS` to fit, which all spectra share
+    fixed : values of constants that are not fitted
     """
-    own = [UNKNOWNS[name] for name in unknowns]
+    separate = [UNKNOWNS[name] for name in unknowns]
     shared = [CONSTANTS[name] for name in free]
     z = np.array([one.coordinate(dict(fixed or {}).get(one.name, one.start)) for one in shared])
 
@@ -155,7 +158,7 @@ def fit_constants(
     def solve(point: Floats, start: SpectralFit | None, steps: int) -> tuple[SpectralFit, Floats]:
         model = extended_model(constants(point))
         first = None if start is None else start.values
-        found = invert_spectra(spectra, model, own, criterion, first, steps)
+        found = invert_spectra(spectra, model, separate, criterion, first, steps)
         return found, found.weighted_residual(criterion).ravel()
 
     fit, r = solve(z, None, 25)
@@ -164,8 +167,8 @@ def fit_constants(
         columns = []
         for i in range(len(z)):
             moved = z.copy()
-            moved[i] += _STEP
-            columns.append((solve(moved, fit, _INNER_STEPS)[1] - r) / _STEP)
+            moved[i] += _DERIVATIVE_STEP
+            columns.append((solve(moved, fit, _INNER_STEPS)[1] - r) / _DERIVATIVE_STEP)
         J = np.stack(columns, axis=-1)
         H, g = J.T @ J, -J.T @ r
         for _ in range(5):

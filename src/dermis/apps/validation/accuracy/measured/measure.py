@@ -52,8 +52,8 @@ from dermis.optics.skin_spectra import two_layer_reflectance
 RESULT_FILE = RESULTS / "measured.json"
 FORMER_SKIN = replace(DEFAULT_SKIN, baseline=1.0, epidermis_mm=0.05, oxygen=0.75)
 """Default skin before it was compared with the archive."""
-_SAMPLE, _CONSTANTS_SAMPLE = 1500, 600
-_AT_LIMIT, _MATCHED = 1e-6, 0.25
+_SAMPLE, _CONSTANTS_SAMPLE = 1500, 600  # numbers of spectra, for published models and for fits of constants
+_AT_LIMIT, _MATCHED = 1e-6, 0.25  # tolerance of oxygen at a bound [-], and of a matched colour [CIEDE2000]
 _NEIGHBOURS = 80  # of other people, for the local regression of colours
 _PERCENTILES = 50.0, 95.0
 _DONNER_JENSEN = SkinParameters(baseline=1.0, epidermis_mm=0.25, oxygen=0.75)
@@ -110,7 +110,7 @@ def measured_page() -> None:
 
 
 def _models(archive: Archive) -> JsonObject:
-    """Return errors of the former and of the present default skin, in total and by group and site."""
+    """Return errors of the former and the present default skin, and two between; also by group and site."""
     skins = {
         "former": FORMER_SKIN,
         "half": replace(FORMER_SKIN, baseline=0.5),
@@ -144,8 +144,10 @@ def _models(archive: Archive) -> JsonObject:
                 "five": five.residual.mean(axis=0),
             }
             results[name]["lights"] = _lights({"two": two, "three": three, "five": five})
-            results[name]["groups"] = _by_cell(archive, list(GROUPS), archive.group, two, three, five)
-            results[name]["by_site"] = _by_cell(archive, range(len(SITES)), archive.site, two, three, five)
+            results[name]["groups"] = _by_category(archive, list(GROUPS), archive.group, two, three, five)
+            results[name]["by_site"] = _by_category(
+                archive, range(len(SITES)), archive.site, two, three, five
+            )
         if name == "present":
             results["medians"] = {
                 one: _percentiles(values, (5.0, 50.0, 95.0)) for one, values in five.values.items()
@@ -154,10 +156,10 @@ def _models(archive: Archive) -> JsonObject:
 
 
 def _surface(archive: Archive) -> JsonObject:
-    """Return differences of colours from a smooth surface through those of other people.
+    """Return the differences between colours and a smooth surface through the colours of other people.
 
-    It is the limit of models with two unknowns that are the same for all: the third coordinate of the colours
-    is predicted from the first two by local linear regression.
+    Models with two unknowns per spectrum, and the same constants for all people, cannot do better. The third
+    coordinate of a colour is predicted from the first two by local linear regression.
     """
     from scipy.spatial import cKDTree
 
@@ -181,7 +183,10 @@ def _surface(archive: Archive) -> JsonObject:
 
 
 def _limits(archive: Archive) -> JsonObject:
-    """Return how many fits by colour with three unknowns end at the limits of oxygen, and do not match."""
+    """Return three fractions of the colour fits with three unknowns.
+
+    The first two have oxygenation 0 and 1; the last do not reproduce the measured colour.
+    """
     fit = fit_skin(archive.spectra, THREE_UNKNOWNS, "colour")
     oxygen = fit.values["oxygen"]
     return {
@@ -191,18 +196,18 @@ def _limits(archive: Archive) -> JsonObject:
     }
 
 
-def _by_cell(
+def _by_category(
     archive: Archive,
-    cells: Sequence[object],
+    categories: Sequence[object],
     labels: np.ndarray,
     two: SpectralFit,
     three: SpectralFit,
     five: SpectralFit,
 ) -> list[list[float]]:
-    """Return number, colour errors and RMS for each group or site."""
+    """Return number of spectra, median colour errors and median RMS for each group or site."""
     rows = []
-    for cell in cells:
-        chosen = labels == cell
+    for category in categories:
+        chosen = labels == category
         medians = [float(np.median(one.delta_e()[chosen])) for one in (two, three)]
         rows.append([int(chosen.sum()), *medians, float(np.median(five.rms[chosen]))])
     return rows
@@ -217,7 +222,7 @@ def _lights(fits: dict[str, SpectralFit]) -> JsonObject:
 
 
 def _folds(archive: Archive) -> list[JsonObject]:
-    """Return constants that four folds of people ask for, and errors of the fifth with them."""
+    """Return, for each fold of people, constants fitted to the other folds, and its errors with them."""
     rows = []
     for fold in range(FOLDS):
         known = archive.where(archive.fold != fold).sample(_CONSTANTS_SAMPLE, fold)
@@ -292,7 +297,7 @@ def _jacques_model(values: Values) -> Floats:
 
 
 def _additions(sample: Archive) -> list[JsonObject]:
-    """Return what each addition to the model improves, with three and with five unknowns by spectrum."""
+    """Return the errors with each addition to the model, with three and with five unknowns per spectrum."""
     rows = []
     for name, free in _ADDITIONS.items():
         row: JsonObject = {"name": name}
@@ -311,7 +316,7 @@ def _additions(sample: Archive) -> list[JsonObject]:
 
 
 def _sites(archive: Archive) -> list[JsonObject]:
-    """Return thickness and oxygen that each site asks for, by colour with two unknowns and by spectrum."""
+    """Return thickness and oxygen that fit each site best, by colour with two unknowns and by spectrum."""
     rows = []
     for site in range(len(SITES)):
         sample = archive.where(archive.site == site).sample(300, site)
@@ -332,7 +337,7 @@ def _sites(archive: Archive) -> list[JsonObject]:
 
 
 def _edge(sample: Archive) -> JsonObject:
-    """Return the light that apertures miss, and the constants of spectra that are corrected for it."""
+    """Return the light that apertures miss, and the constants fitted to spectra corrected for it."""
     skins = [replace(DEFAULT_SKIN, melanin=m, blood=0.008) for m in _EDGE_MELANIN]
     losses = [edge_loss(one, _EDGE_NM) for one in skins]
     model = ExtendedModel({"baseline": DEFAULT_SKIN.baseline, "oxygen": DEFAULT_SKIN.oxygen})
@@ -366,7 +371,7 @@ def _percentiles(values: Floats, at: Sequence[float] = _PERCENTILES) -> list[flo
 
 
 def _lists(value: object) -> JsonObject:
-    """Return nested dictionaries with arrays as lists."""
+    """Return nested dictionaries in which lists replace arrays."""
     if isinstance(value, np.ndarray):
         return value.tolist()  # type: ignore[no-any-return]
     if isinstance(value, dict):

@@ -12,7 +12,7 @@ from dermis.optics.pigments.parameters import DEFAULT_SKIN
 PAGE = DOCS / "measured.md"
 RESULT_FILE = RESULTS / "measured.json"
 PEOPLE_FILE = RESULTS / "people.json"
-"""Tables about drawn people, by `python -m dermis.apps.validation.people page`."""
+"""Tables about drawn people, written by `python -m dermis.apps.validation.people page`."""
 _SKIN_NAMES = {
     "former": "absorption of [Jacques1998]",
     "half": "half of it",
@@ -66,8 +66,8 @@ def measured_parts(results: JsonObject) -> dict[str, str]:
         "residual": _residual(results["models"]),
         "groups": "\n\n".join(
             [
-                _cells("group", list(GROUPS.values()), present["groups"]),
-                _cells("site", SITES, present["by_site"]),
+                _category_table("group", list(GROUPS.values()), present["groups"]),
+                _category_table("site", SITES, present["by_site"]),
             ]
         ),
         "sites": _sites(results["sites"]),
@@ -90,10 +90,10 @@ def _models(models: JsonObject) -> str:
                 [
                     f"**{label}**" if name == "present" else label,
                     subset,
-                    _pair(one["two"]),
+                    _joined(one["two"]),
                     f"{100 * one['above_2']:.0f} %",
-                    _pair(one["three"]),
-                    *(_pair(one[f"rms_{n}"], 4) for n in ("two", "three", "five")),
+                    _joined(one["three"]),
+                    *(_joined(one[f"rms_{n}"], 4) for n in ("two", "three", "five")),
                 ]
             )
     return _table(heads, rows)
@@ -107,12 +107,12 @@ def _folds(folds: Sequence[JsonObject]) -> str:
         constants = fold["constants"]
         for label in ("fitted", "default"):
             errors = fold[label]
-            own = [f"{constants[name]:.3g}" for name in ("baseline", "epidermis_mm", "oxygen")]
+            constant_cells = [f"{constants[name]:.3g}" for name in ("baseline", "epidermis_mm", "oxygen")]
             rows.append(
                 [
                     str(number) if label == "fitted" else "",
                     str(fold["people"]) if label == "fitted" else "",
-                    *(own if label == "fitted" else [""] * 3),
+                    *(constant_cells if label == "fitted" else [""] * 3),
                     "of the other parts" if label == "fitted" else "the package's",
                     f"{errors['two']:.2f}",
                     f"{errors['two_face']:.2f}",
@@ -124,7 +124,7 @@ def _folds(folds: Sequence[JsonObject]) -> str:
 
 
 def _confounded(results: JsonObject) -> dict[str, str]:
-    """Return constants that the spectra hardly separate, and the factors of spectra without lost light."""
+    """Return pairs of constants that the spectra hardly distinguish, and constants of corrected spectra."""
     pairs = {}
     for row in results["additions"]:
         for label in ("three", "five"):
@@ -171,7 +171,7 @@ def _residual(models: JsonObject) -> str:
     return _table(heads, rows)
 
 
-def _cells(kind: str, names: Sequence[str], rows: Sequence[Sequence[float]]) -> str:
+def _category_table(kind: str, names: Sequence[str], rows: Sequence[Sequence[float]]) -> str:
     cells = [
         [name, f"{count:.0f}", f"{two:.2f}", f"{three:.2f}", f"{five:.4f}"]
         for name, (count, two, three, five) in zip(names, rows, strict=True)
@@ -199,7 +199,7 @@ def _sites(sites: Sequence[JsonObject]) -> str:
 
 def _lights(lights: JsonObject) -> str:
     labels = {"two": "two, by colour", "three": "three, by colour", "five": "five, by spectrum"}
-    rows = [[label, *(_pair(lights[name][one]) for one in ILLUMINANTS)] for name, label in labels.items()]
+    rows = [[label, *(_joined(lights[name][one]) for one in ILLUMINANTS)] for name, label in labels.items()]
     return _table(("unknowns", *ILLUMINANTS), rows)
 
 
@@ -207,8 +207,8 @@ def _alternatives(models: JsonObject) -> str:
     heads = ("model", "two, by colour", "three, by colour", "two, RMS", "three, RMS", "five, RMS")
     rows = []
     for name, errors in models.items():
-        cells = [_pair(errors[f"colour_{n}"]) for n in (2, 3)]
-        rows.append([_MODEL_NAMES[name], *cells, *(_pair(errors[f"spectrum_{n}"], 4) for n in (2, 3, 5))])
+        cells = [_joined(errors[f"colour_{n}"]) for n in (2, 3)]
+        rows.append([_MODEL_NAMES[name], *cells, *(_joined(errors[f"spectrum_{n}"], 4) for n in (2, 3, 5))])
     return _table(heads, rows)
 
 
@@ -223,7 +223,7 @@ def _edge(edge: JsonObject) -> str:
 
 
 def _corrected(edge: JsonObject) -> str:
-    """Return a sentence about the constants of spectra that are corrected for the lost light."""
+    """Return text on constants fitted to spectra as measured, and to spectra corrected for lost light."""
     parts = [
         f"{_constants(edge[name]['constants'])} (RMS {edge[name]['rms']:.4f}) {label}"
         for name, label in (
@@ -235,7 +235,7 @@ def _corrected(edge: JsonObject) -> str:
     return "; ".join(parts)
 
 
-def _pair(values: Sequence[float], digits: int = 2) -> str:
+def _joined(values: Sequence[float], digits: int = 2) -> str:
     return " / ".join(f"{one:.{digits}f}" for one in values)
 
 

@@ -16,7 +16,7 @@ from dermis.optics.pigments.priors import PRIOR_COLUMNS, PRIOR_NAMES, SkinPrior,
 
 _COMPONENTS = 3
 _ITERATIONS = 300
-_CALLOUS = ("palm", "ring finger")
+_CALLOUS_SITES = ("palm", "ring finger")
 """Sites with a thick stratum corneum, which is not part of the model."""
 _HEADER = """# quantity: mixture of normal distributions of log melanin, log blood, oxygen and
 #   log epidermis_mm
@@ -27,9 +27,9 @@ _HEADER = """# quantity: mixture of normal distributions of log melanin, log blo
 
 
 def priors() -> None:
-    """Fit the distribution of people's pigments to the archive, and write the package's table of it."""
+    """Fit the distribution of people's pigments to the archive, and write it as a table of the package."""
     archive = read_archive()
-    living = archive.where(~np.isin(archive.site, [SITES.index(name) for name in _CALLOUS]))
+    living = archive.where(~np.isin(archive.site, [SITES.index(name) for name in _CALLOUS_SITES]))
     fit = fit_skin(living.spectra, PRIOR_NAMES)
     prior = fit_mixture(prior_points(fit.values), _COMPONENTS)
     path = Path(str(files("dermis.optics"))) / "data" / "skin_priors.csv"
@@ -39,7 +39,7 @@ def priors() -> None:
 
 
 def table(prior: SkinPrior) -> str:
-    """Return the rows of the table, with its headings."""
+    """Return the CSV text of a distribution: column names, and one row per component."""
     lower = np.tril_indices(len(PRIOR_NAMES))
     lines = [",".join(PRIOR_COLUMNS)]
     for weight, mean, covariance in zip(prior.weight, prior.mean, prior.covariance, strict=True):
@@ -51,7 +51,8 @@ def fit_mixture(points: Floats, components: int) -> SkinPrior:
     """Fit a mixture of normal distributions by expectation maximisation.
 
     points : (n, d) points
-    components : number of distributions, which start from parts of equal size along the first axis
+    components : number of distributions; each starts from an equal part of the points, in order along the
+        first axis
     """
     count, dimensions = points.shape
     parts = np.argsort(np.argsort(points[:, 0])) * components // count

@@ -11,7 +11,7 @@ from dermis.optics.pigments.skin import spectral_medium
 
 APERTURES_MM = {"8 mm of 11 mm": (4.0, 5.5), "3 mm of 6 mm": (1.5, 3.0)}
 """Radii of the measured and of the lit disc of common apertures [mm]."""
-_RADII = 400  # of points of the measured disc
+_RADIUS_COUNT = 400  # number of points of the measured disc, by their radii
 
 
 def edge_loss(
@@ -19,8 +19,8 @@ def edge_loss(
 ) -> dict[str, Floats]:
     """Return the fraction of the reflected light that each aperture misses, by wavelength [-].
 
-    A spectrophotometer compares skin with an opaque white tile. Light that enters the skin near the edge of
-    the lit disc leaves outside it, and the light of the dark surroundings that would replace it is missing.
+    A spectrophotometer compares skin with an opaque white tile. In skin, some light that enters near the edge
+    of the lit disc leaves outside the disc, and no light returns from the dark surroundings in exchange.
 
     photons : number of photons per wavelength
 
@@ -39,12 +39,12 @@ def _missing(run: SlabResult, measured_mm: float, lit_mm: float) -> float:
 
 
 def lit_fraction(distance_mm: Floats, measured_mm: float, lit_mm: float) -> Floats:
-    """Return the part of circles around points of the measured disc that lies in the lit disc, mean (n,) [-].
+    """Return the mean fraction (n,) of circles around points of the measured disc inside the lit disc [-].
 
     distance_mm : (n,) radii of the circles
     measured_mm, lit_mm : radii of the two concentric discs
     """
     r = np.maximum(distance_mm, 1e-12)
-    point = np.sqrt((np.arange(_RADII) + 0.5) / _RADII)[:, None] * measured_mm
+    point = np.sqrt((np.arange(_RADIUS_COUNT) + 0.5) / _RADIUS_COUNT)[:, None] * measured_mm
     cosine = (lit_mm**2 - point**2 - r**2) / (2.0 * point * r)
     return np.asarray((1.0 - np.arccos(np.clip(cosine, -1.0, 1.0)) / np.pi).mean(axis=0))
