@@ -1,4 +1,4 @@
-"""The command `dermis head`: people of the parametric human as files for other programs."""
+"""The command `dermis head`: write people of the parametric human model to files for other programs."""
 
 from __future__ import annotations
 

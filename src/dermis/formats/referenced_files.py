@@ -30,7 +30,7 @@ def find_referenced_file(path: Path, name: str) -> Path | None:
 def resolve_uri(path: Path, uri: str) -> Path:
     """Return the path of a file that a glTF file references by a relative URI; it need not exist.
 
-    Raises DermisError for a file outside the folder, even if a link in the folder leads to it.
+    Raises DermisError for a file outside the folder of the glTF file, even if a link in it leads there.
     """
     file = _resolve_below(path.parent, PureWindowsPath(unquote(uri)))
     if file is None or ":" in uri.partition("/")[0]:

@@ -18,7 +18,7 @@ _MEAN_SAMPLES, _MAX_STRIDE = 64, 16  # samples of means along each side, and lar
 class PartMaps(ShortRepr):
     """Common texture maps of the groups that are not skin, whose uv refer to these maps.
 
-    colour : (H, W, 4) base colour, linear Rec. 709, and opacity, shifted so that it is cut out below 0.5 [-]
+    colour : (H, W, 4) base colour, linear Rec. 709, and opacity; surfaces are cut out below 0.5 [-]
     surface : (H, W, 4) slopes as in `Maps.normal`, perceptual roughness and metalness [-]
     emission : (H, W, 3) emitted radiance, or None
     """

@@ -106,7 +106,7 @@ class RigOutline(ShortRepr):
 def rig_outline(
     positions: Floats, targets: MorphTargets, skeleton: Skeleton | None, points: Intp
 ) -> RigOutline:
-    """Return the outline of a rig that consists of the given points, with their targets and weights.
+    """Return the outline formed by some points of a rig, with their morph targets and bone weights.
 
     positions : (p, 3) positions of all control points at rest [mm]
     points : (s,) indices of the outline points

@@ -126,7 +126,7 @@ class Tissue:
         return profile
 
     def rings(self) -> RingTarget:
-        """Return the ring energies of the default profile as a target for fits, faster than `profile`."""
+        """Return the energy of the default profile in concentric rings, a target for fits."""
         model = self.default_model
         if model == COUNTED_MODEL:
             return self.profile().rings()

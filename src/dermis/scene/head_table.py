@@ -43,7 +43,7 @@ def _eye_limits(name: str) -> Any:
 
 
 class EyeTable(FrozenModel):
-    """Eye settings in a [head] table; fields that are None keep the head's eye look."""
+    """Eye settings in a [head] table; fields that are None leave the appearance that the head defines."""
 
     eumelanin: Annotated[float | None, _eye_limits("eumelanin")] = None
     """Eumelanin of the iris, from 0 for blue to 1 for the darkest brown."""

@@ -62,7 +62,7 @@ def sampled_camera(
     frame *= max(_max_extent(in_view, distance, (0.0, 0.0), frame, aspect) / _MAX_FACE_EXTENT, 1.0)
 
     def aim(fraction: float) -> AimOffset:
-        """Return the aim offset that moves the face by a fraction of its sampled offset in the picture."""
+        """Return the camera's aim offset for a fraction of the shift of the face that is sampled."""
         return -0.5 * frame * fraction * offset[0], -0.5 * frame * fraction * offset[1]
 
     fraction, low, high = 1.0, 0.0, 1.0

@@ -28,7 +28,7 @@ class LostProcessError(DermisError):
 
 @dataclass(frozen=True)
 class ChildProcess:
-    """Child process with the parent's end of the pipe between them."""
+    """Child process, and the parent's end of the pipe to it."""
 
     process: SpawnProcess
     pipe: Connection

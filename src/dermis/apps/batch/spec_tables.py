@@ -70,7 +70,7 @@ class NumberField(DistributionField):
 
 
 class NameField(DistributionField):
-    """Annotation of a field whose samples are names of a list; without a list, any names or files."""
+    """Annotation of a field that samples names: those of a list, or without one any names or files."""
 
     def __init__(self, known: Callable[[], Iterable[str]] | None = None) -> None:
         self.known = known

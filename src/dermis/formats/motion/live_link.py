@@ -211,7 +211,7 @@ def _row_times(path: Path, lines: list[str], cells: list[str], key: str | None, 
 
     lines : name of each row, for errors
     cells : time of each row: a timecode or a number, as text
-    key : plain name of the column of times or frame numbers; None if there is no such column
+    key : normalised name of the column of times or frame numbers; None if there is no such column
     fps : frame rate of the timecode; None to estimate it
     """
     if key is None:

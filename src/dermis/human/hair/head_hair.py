@@ -166,8 +166,8 @@ def grow_hair(
     """Return the root frames of hairs, and the offsets (k, 3, n) of their knots from the roots [mm].
 
     roots : hair roots on quads of the control mesh; guides grow at the corners of these quads
-    comb : function of root positions on the average person and skin normals, both (g, 3), that returns guide
-        shapes
+    comb : function that returns guide shapes for two arrays (g, 3): root positions on the average person, and
+        skin normals
     knots : number of knots per hair
 
     In all arrays the hair index comes last, which suits vectorised operations. For results that are equal on

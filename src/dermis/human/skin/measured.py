@@ -289,8 +289,8 @@ def _pigments_and_sites(
 ) -> tuple[MeasuredPigments, SiteDifferences]:
     """Return the pigments of a person and their differences between sites.
 
-    normals : (4,) independent standard normal numbers, zeros for a typical person
-    site_normals : (12, 2) independent standard normal numbers; None for a typical person
+    normals : (4,) independent samples of the standard normal distribution, zeros for a typical person
+    site_normals : (12, 2) independent samples of it; None for a typical person
     """
     table = measured_table()
     correlation = table.mixture("correlation", weights)

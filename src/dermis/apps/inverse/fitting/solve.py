@@ -72,7 +72,7 @@ class FitProblem:
         return np.asarray(1.0 / (self.noise * (radiance + _NOISE_FLOOR * float(np.median(self.target)))))
 
     def initial_weights(self) -> Floats:
-        """Return the inverse standard deviations (p, 3) that follow from the photograph's brightness."""
+        """Return the inverse standard deviations (p, 3) of pixels, by the brightness of the photograph."""
         return self.weights(self.target.mean(axis=1, keepdims=True) * np.ones(3))
 
     def state(self, point: FitPoint, weight: Floats) -> FitState:

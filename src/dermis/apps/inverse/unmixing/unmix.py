@@ -92,7 +92,7 @@ class PigmentChange:
 
 
 def parse_fraction_change(option: str, text: str) -> FractionChange:
-    """Parse the text of an option: x2 is a factor, 0.1 a median.
+    """Parse the text of an option: "x2" multiplies the fraction by 2, "0.1" sets its median to 0.1.
 
     Raises DermisError for any other text.
     """

@@ -66,8 +66,8 @@ _MIN_OCCLUSION_CHANGE = 0.02
 def motion(adapter: str = "auto") -> None:
     """Compare posed heads with heads loaded in the posed shape, and write docs/motion.md.
 
-    Takes some minutes. Needs the published heads of MakeHuman in DERMIS_DATA, and the folder tests of a
-    checkout.
+    Takes some minutes. Needs the published heads of MakeHuman in DERMIS_DATA, and a checkout with its folder
+    `tests`.
     """
     in_checkout(PAGE)
     add_tests_to_path()

@@ -76,7 +76,7 @@ def rendered_response(renderer: dermis.Renderer, skin: Skin, thickness: float) -
 
 
 def skins_by_direction(medium: Medium, folder: str) -> dict[str, Skin]:
-    """Return a Lambertian and a half-space skin with a medium's profile, by name of the angular distribution.
+    """Return skins with a medium's profile whose light leaves as Lambertian or as from a half-space, by name.
 
     folder : folder for the file of the profile
     """

@@ -41,7 +41,7 @@ class DrawnPeople(NamedTuple):
 
 
 def site_unknowns(look: SkinLook) -> Doubles:
-    """Return the unknowns (7, 4) of `model_spectra` that the skin of a look has at `HEAD_SITES`."""
+    """Return the unknowns (7, 4) of `model_spectra` for a skin look at each of `HEAD_SITES`."""
     differences = np.vstack([np.zeros(3), look.sites.array()])
     fractions = np.array([look.melanin, look.blood]) * np.exp2(differences[:, :2])
     oxygen = np.clip(look.oxygen + differences[:, 2], 0.0, 1.0)

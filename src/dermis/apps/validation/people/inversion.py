@@ -72,7 +72,7 @@ def model_lab(unknowns: Doubles) -> Doubles:
 
 
 def invert_spectra(reflectance: Doubles) -> Doubles:
-    """Return the unknowns (n, 4) of `model_spectra` that match the colours of spectra, then their shapes.
+    """Return the unknowns (n, 4) of `model_spectra` that match spectra, colours before shapes.
 
     reflectance : (n, 31) at `WAVELENGTHS_NM`, without surface reflection [-]
 

@@ -41,8 +41,8 @@ def draw(
     view : uniform record of the struct Shade
     constants : pipeline constants of the lights, the surface and the technique
     scattered : texture of the light below the skin over the atlas, or tables of pre-integrated skin
-    subsurface : texture layers for the light below the skin, which the image then lacks, and for the fraction
-        of it that leaves towards the camera; None to add this light to the image
+    subsurface : texture layers that receive the subsurface light and the fraction of that light that leaves
+        towards the camera; the image is then without this light. None to add the light to the image
     """
     device, (width, height) = graph.device, size
     bindings = {**lighting, "shade": view, "visibility_buffer": visibility.texture, "scattered": scattered}

@@ -207,7 +207,7 @@ def _views_record(shader: Program, layers: ViewLayers, clips: Matrix, head: Head
 
 
 def _depth_range_mm(clip: Matrix) -> float:
-    """Return the length that depths 0 to 1 would span if all depth steps were as long as the longest [mm].
+    """Return the length of the longest depth step, extrapolated to the range of depths from 0 to 1 [mm].
 
     Divided by the number of steps, it bounds the error of an integer depth.
 

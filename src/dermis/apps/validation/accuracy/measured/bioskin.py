@@ -51,7 +51,7 @@ class _TensorReader(pickle.Unpickler):
     """Unpickler that loads a dictionary of tensors and refuses to construct any other object."""
 
     def find_class(self, module: str, name: str) -> object:
-        """Return the object for a name that such files contain; raise UnpicklingError for any other name."""
+        """Return the object for a name in files of weights; raise UnpicklingError for any other name."""
         if (module, name) == ("torch._utils", "_rebuild_tensor_v2"):
             return lambda storage, offset, size, *rest: (storage, offset, size)
         if (module, name) == ("collections", "OrderedDict"):
