@@ -21,6 +21,7 @@ from dermis.atlas.build import cached_atlas
 from dermis.base import disk
 from dermis.base.disk import cached_array
 from dermis.formats.load import RiggedMesh, cached_rigged
+from dermis.mesh.file_vertices import FileVertices
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.primitives import plane, uv_sphere
 
@@ -311,7 +312,9 @@ def test_mesh_round_trip(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
 
     def load() -> RiggedMesh:
         made.append(1)
-        return RiggedMesh(mesh, None)
+        vertex = np.arange(len(mesh.positions), dtype=np.int32)
+        vertices = FileVertices(len(vertex), vertex, mesh.point, mesh.triangles, np.eye(3))
+        return RiggedMesh(mesh, None, file_vertices=vertices)
 
     first, second = (cached_rigged(b"file", "up y", load).mesh for _ in range(2))
     for one in (first, second):
