@@ -66,7 +66,6 @@ def draw_profile(session: Session) -> None:
         session, "profile", skin.profile, (*_SKIN_PROFILES, "", *other_media), with_profile, PROFILE_NAMES
     )
     draw_fields(session, skin, with_skin, ALBEDO_STYLES, ["albedo"])
-    _draw_tone(session)
     if skin.profile in SKINS:
         _draw_pigments(session, skin)
     elif layers := skin.layers or _profile_layers(skin.profile):
@@ -92,6 +91,7 @@ def draw_surface(session: Session) -> None:
             imgui.text_disabled("rho_s is set by the regions")
         elif name not in _PROFILE_FIELDS:
             draw_fields(session, state.scene.skin, state.with_skin, SURFACE_STYLES, [name])
+    _draw_tone(session)
 
 
 def _draw_tone(session: Session) -> None:
