@@ -293,8 +293,8 @@ class Human:
     hair : HairLook, optional
         Look of the hair; by default typical for the person.
     skin_ancestry : str
-        Measured group whose colours of skin, eyes and hair the person has whatever the shape, such as "south
-        asian"; "" for the colours of the shape's ancestries.
+        Measured group that determines the colours of skin, eyes and hair independently of the shape, such as
+        "south asian"; "" for the colours of the shape's ancestries.
     ita : float, optional
         Individual typology angle of the cheek if `skin` is not given, -65 (darkest) to 70 (lightest)
         [degrees]; the other properties of the skin are those of measured people with this angle.

@@ -180,10 +180,10 @@ class PersonTable(FrozenModel):
     caucasian: Annotated[Distribution | None, _FRACTION_FIELD] = None
     """Fraction of Caucasian ancestry."""
     skin_ancestry: Annotated[Distribution | None, NameField(lambda: SKIN_ANCESTRIES)] = None
-    """Measured group whose skin, eyes and hair colour people have, whatever their shape."""
+    """Measured group that determines the colours of skin, eyes and hair, independently of the shape."""
     ita: Annotated[Distribution | None, _ITA_FIELD] = None
-    """Individual typology angle of the cheek, from -65 (darkest) to 70 (lightest) [degrees]; all else is as
-    measured people of this angle have it."""
+    """Individual typology angle of the cheek, from -65 (darkest) to 70 (lightest) [degrees]; the other
+    pigments are typical of measured people with this angle."""
     weight: Annotated[Distribution | None, _SIGNED_FIELD] = None
     """Body weight, from -1 (lowest) to 1 (highest)."""
     muscle: Annotated[Distribution | None, _SIGNED_FIELD] = None

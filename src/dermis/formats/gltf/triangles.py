@@ -70,7 +70,7 @@ GLTF_PROPERTIES = (
     refused("buffers without data", "such as the fallback of a compressed one"),
     drawn_with_note(
         "names of materials and meshes, such as `Face_00_SKIN`, `Hair_00_HAIR`, `Tops_01_CLOTH`",
-        "they decide [what is skin](#materials-and-parts)",
+        "used to find [which parts are skin](#materials-and-parts)",
     ),
     no_effect("`asset`, `extras`, other names", "information for programs and people"),
 )
