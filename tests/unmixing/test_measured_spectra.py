@@ -17,13 +17,9 @@ from dermis.apps.inverse.unmixing.spectral_inversion import (
     fit_skin,
     skin_model_spectra,
 )
-from dermis.apps.validation.accuracy.measured.archive import (
-    CHEEK_AND_FOREHEAD,
-    ILLUMINANTS,
-    Archive,
-    colour_weights,
-    read_archive,
-)
+from dermis.apps.validation.accuracy.measured.illuminants import ILLUMINANTS, colour_weights
+from dermis.apps.validation.accuracy.measured.measure import CHEEK_AND_FOREHEAD
+from dermis.apps.validation.spectral_archive import Archive, read_archive
 from dermis.base.errors import DermisError, DermisWarning
 from dermis.images.colour import delta_e_2000, lab, linear_of_lab
 from dermis.optics.media import Floats
@@ -138,7 +134,7 @@ def test_other_tables_are_refused(tmp_path: Path, text: str, told: str) -> None:
 
 def test_measured_people_have_the_colours_of_the_model(archive: Archive) -> None:
     """The limits are the goals of the model: without half of the baseline absorption all are exceeded."""
-    sample = archive.where(np.isin(archive.site, CHEEK_AND_FOREHEAD)).sample(500)
+    sample = archive.rows(np.isin(archive.site, CHEEK_AND_FOREHEAD)).sample(500)
     two, three = (fit_skin(sample.spectra, n, "colour").delta_e() for n in (TWO_UNKNOWNS, THREE_UNKNOWNS))
     assert np.median(two) < 0.85 and np.median(three) < 0.25
     assert np.median(fit_skin(sample.spectra, FIVE_UNKNOWNS).rms) < 0.006
@@ -146,4 +142,4 @@ def test_measured_people_have_the_colours_of_the_model(archive: Archive) -> None
 
 def test_people_are_in_one_part_only(archive: Archive) -> None:
     parts = {(person, fold) for person, fold in zip(archive.person, archive.fold, strict=True)}
-    assert len(parts) == len(set(archive.person)) and len(archive) == 10464
+    assert len(parts) == len(set(archive.person)) and len(archive.spectra) == 10464

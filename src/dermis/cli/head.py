@@ -108,9 +108,9 @@ def head(
     muscle:
         Muscle mass, -1 (lowest) to 1 (highest). [default: 0]
     skin_ancestry:
-        Measured group that determines the colours of skin, eyes and hair, independently of the shape: african,
-        arabian, asian, caucasian, chinese, iraqi, japanese, middle eastern, south asian or southeast asian.
-        [default: that of the shape]
+        Measured group that determines the colours of skin, eyes and hair, independently of the shape:
+        african, arabian, asian, caucasian, chinese, iraqi, japanese, middle eastern, south asian or
+        southeast asian. [default: that of the shape]
     ita:
         Individual typology angle of the cheek, -65 (darkest) to 70 (lightest); the other pigments are typical
         of measured people with this angle [degrees]. [default: from the person]

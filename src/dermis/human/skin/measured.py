@@ -40,11 +40,11 @@ GROUPS: Final[Mapping[str, str]] = MappingProxyType(
 )
 """Groups of the archive by its codes; "southeast asian" is Thai, "south asian" is Pakistani."""
 SITES: Final = (
-    "back of hand", "cheek", "cheek bone", "chin", "ear lobe", "forehead",
+    "back of hand", "cheek", "cheekbone", "chin", "ear lobe", "forehead",
     "inner arm", "neck", "nose tip", "outer arm", "palm", "ring finger",
 )  # fmt: skip
 """Sites of the archive, in the order of its codes from 1."""
-FACE_SITES: Final = ("cheek_bone", "forehead", "chin", "nose_tip", "ear_lobe", "neck")
+FACE_SITES: Final = ("cheekbone", "forehead", "chin", "nose_tip", "ear_lobe", "neck")
 """Sites of the head beside the cheek, as fields of `SiteDifferences`."""
 UNIONS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
     {"asian": ("chinese", "japanese", "southeast asian"), "middle eastern": ("iraqi", "arabian")}
@@ -91,7 +91,7 @@ class SiteDifferences:
 
     Parameters
     ----------
-    cheek_bone, forehead, chin, nose_tip, ear_lobe, neck : tuple of float
+    cheekbone, forehead, chin, nose_tip, ear_lobe, neck : tuple of float
         Difference of melanin and of blood [doublings], and of the oxygen saturation [-].
 
     Examples
@@ -101,7 +101,7 @@ class SiteDifferences:
     -1.0
     """
 
-    cheek_bone: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    cheekbone: tuple[float, float, float] = (0.0, 0.0, 0.0)
     forehead: tuple[float, float, float] = (0.0, 0.0, 0.0)
     chin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     nose_tip: tuple[float, float, float] = (0.0, 0.0, 0.0)

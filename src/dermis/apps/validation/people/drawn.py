@@ -10,8 +10,8 @@ from scipy.stats import energy_distance
 
 from dermis.apps.validation.accuracy.measured.page import PEOPLE_FILE, write_measured_page
 from dermis.apps.validation.pages import print_tables, write_results
-from dermis.apps.validation.people.archive import Archive, load_archive
 from dermis.apps.validation.people.inversion import model_lab
+from dermis.apps.validation.spectral_archive import Archive, read_archive
 from dermis.base.arrays import Doubles
 from dermis.base.progress import logged_step
 from dermis.human.person import Human
@@ -87,7 +87,7 @@ def page(seeds: int = _SEEDS) -> None:
 
 
 def _tables(seeds: int) -> dict[str, str]:
-    archive, drawn = load_archive(), draw_all(seeds)
+    archive, drawn = read_archive(), draw_all(seeds)
     return {
         "people_cheek": cheek_table(archive, drawn),
         "people_sites": sites_table(archive, drawn),
@@ -185,9 +185,9 @@ def sex_age_table(archive: Archive, drawn: Mapping[str, DrawnPeople]) -> str:
 def empty_cells(archive: Archive) -> str:
     """Return text that lists sites without measurements by group; the package uses pooled values there."""
     parts = []
-    for k, group in enumerate(GROUPS.values()):
+    for code, group in GROUPS.items():
         empty = [
-            site for j, site in enumerate(SITES) if not ((archive.group == k) & (archive.site == j)).any()
+            site for j, site in enumerate(SITES) if not ((archive.group == code) & (archive.site == j)).any()
         ]
         if empty:
             parts.append(f"{group}: {', '.join(empty)}")
@@ -195,7 +195,7 @@ def empty_cells(archive: Archive) -> str:
 
 
 def _measured(archive: Archive, code: str, site: str) -> Archive:
-    return archive.rows((archive.group == list(GROUPS).index(code)) & (archive.site == SITES.index(site)))
+    return archive.rows((archive.group == code) & (archive.site == SITES.index(site)))
 
 
 def _with_ita(cielab: Doubles) -> Doubles:

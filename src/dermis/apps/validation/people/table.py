@@ -14,13 +14,13 @@ from scipy.special import ndtri
 from scipy.stats import rankdata
 
 from dermis.apps.validation.pages import CHECKOUT, in_checkout
-from dermis.apps.validation.people.archive import AGE_MIDDLES, Archive, load_archive
 from dermis.apps.validation.people.inversion import (
     from_variables,
     invert_spectra,
     model_lab,
     to_variables,
 )
+from dermis.apps.validation.spectral_archive import AGE_MIDDLES, Archive, read_archive
 from dermis.base.arrays import Doubles
 from dermis.base.atomic_write import atomic_file
 from dermis.base.console import print_lines
@@ -69,8 +69,8 @@ _HEADER = """\
 
 def table() -> None:
     """Write the table of measured people in the package from the archive."""
-    archive = load_archive()
-    variables = to_variables(invert_spectra(archive.reflectance))
+    archive = read_archive()
+    variables = to_variables(invert_spectra(archive.spectra))
     document = build_table(archive, variables)
     folder = in_checkout(DATA)
     with atomic_file(folder / TABLE_FILE) as file:
@@ -127,14 +127,14 @@ def person_medians(archive: Archive, variables: Doubles, site: int) -> tuple[Arc
 
 
 def _by_group(archive: Archive) -> Iterator[tuple[str, NDArray[np.bool_]]]:
-    for k, code in enumerate(GROUPS):
-        yield code, archive.group == k
+    for code in GROUPS:
+        yield code, archive.group == code
 
 
 def _effects(cheek: Archive, y: Doubles) -> tuple[Doubles, Doubles]:
     """Return the effects (4,) of sex and of `age_term`, by least squares with an intercept for each group."""
     known = np.isfinite(cheek.sex) & np.isfinite(cheek.age)
-    levels = (cheek.group[known, None] == np.arange(len(GROUPS))).astype(np.float64)
+    levels = (cheek.group[known, None] == np.array(list(GROUPS))).astype(np.float64)
     terms = np.column_stack([levels, cheek.sex[known], age_term(cheek.age[known])])
     low, high = np.percentile(y, (1.0, 99.0), axis=0)
     found = np.linalg.lstsq(terms, np.clip(y[known], low, high), rcond=None)[0]
@@ -171,14 +171,15 @@ def _sites(archive: Archive, variables: Doubles) -> tuple[Doubles, Doubles, Doub
         other, z = person_medians(archive, variables, site)
         _, here, there = np.intersect1d(cheek.person, other.person, return_indices=True)
         difference, deviation = z[there, :3] - y[here, :3], y[here].copy()
+        group = np.array([list(GROUPS).index(code) for code in cheek.group[here]])
         for k in range(len(GROUPS)):
-            rows = cheek.group[here] == k
+            rows = group == k
             counts[k, site] = rows.sum()
             if counts[k, site] > 0:
                 shifts[k, site] = np.median(difference[rows], axis=0)
                 deviation[rows] -= np.median(deviation[rows], axis=0)
                 difference[rows] -= shifts[k, site]
-        used = counts[cheek.group[here], site] >= _MIN_PEOPLE
+        used = counts[group, site] >= _MIN_PEOPLE
         x, d = (_winsorised(one[used, :2]) for one in (deviation, difference))
         slope[site] = (x * d).sum(axis=0) / (x * x).sum(axis=0)
         spread[site] = _TRUE_SPREAD * np.std(d - slope[site] * x, axis=0)

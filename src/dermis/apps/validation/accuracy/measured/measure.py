@@ -20,22 +20,15 @@ from dermis.apps.inverse.unmixing.spectral_inversion import (
     fit_skin,
     invert_spectra,
 )
-from dermis.apps.validation.accuracy.measured.archive import (
-    CHEEK_AND_FOREHEAD,
-    FOLDS,
-    GROUPS,
-    ILLUMINANTS,
-    SITES,
-    Archive,
-    colour_weights,
-    read_archive,
-)
 from dermis.apps.validation.accuracy.measured.bioskin import BIOSKIN_SETS, BIOSKIN_UNKNOWNS, bioskin_model
 from dermis.apps.validation.accuracy.measured.constants import ExtendedModel, fit_constants
-from dermis.apps.validation.accuracy.measured.page import write_measured_page
+from dermis.apps.validation.accuracy.measured.illuminants import ILLUMINANTS, colour_weights
+from dermis.apps.validation.accuracy.measured.page import GROUP_LABELS, RESULT_FILE, write_measured_page
 from dermis.apps.validation.accuracy.measured.probe import APERTURES_MM, edge_loss
-from dermis.apps.validation.pages import RESULTS, JsonObject, read_results, write_results
+from dermis.apps.validation.pages import JsonObject, read_results, write_results
+from dermis.apps.validation.spectral_archive import FOLDS, Archive, read_archive
 from dermis.base.console import print_lines
+from dermis.human.skin.measured import SITES
 from dermis.images.colour import delta_e_2000, lab, linear_of_lab
 from dermis.optics.media import Floats
 from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
@@ -49,7 +42,8 @@ from dermis.optics.pigments.spectra import (
 )
 from dermis.optics.skin_spectra import two_layer_reflectance
 
-RESULT_FILE = RESULTS / "measured.json"
+CHEEK_AND_FOREHEAD = SITES.index("cheek"), SITES.index("forehead")
+"""Indices of the two facial sites that most people have."""
 FORMER_SKIN = replace(DEFAULT_SKIN, baseline=1.0, epidermis_mm=0.05, oxygen=0.75)
 """Default skin before it was compared with the archive."""
 _SAMPLE, _CONSTANTS_SAMPLE = 1500, 600  # numbers of spectra, for published models and for fits of constants
@@ -86,7 +80,7 @@ def measured(bioskin: Path | None = None, only: str | None = None) -> None:
     """
     archive = read_archive()
     parts: dict[str, Callable[[], object]] = {
-        "counts": lambda: {"spectra": len(archive), "folds": FOLDS},
+        "counts": lambda: {"spectra": len(archive.spectra), "folds": FOLDS},
         "models": lambda: _models(archive),
         "surface": lambda: _surface(archive),
         "limits": lambda: _limits(archive),
@@ -118,7 +112,7 @@ def _models(archive: Archive) -> JsonObject:
         "present": DEFAULT_SKIN,
     }
     face = np.isin(archive.site, CHEEK_AND_FOREHEAD)
-    subsets = {"all": np.ones(len(archive), bool), "cheek and forehead": face}
+    subsets = {"all": np.ones(len(archive.spectra), bool), "cheek and forehead": face}
     results: JsonObject = {}
     for name, skin in skins.items():
         two, three = (fit_skin(archive.spectra, n, "colour", skin) for n in (TWO_UNKNOWNS, THREE_UNKNOWNS))
@@ -144,7 +138,9 @@ def _models(archive: Archive) -> JsonObject:
                 "five": five.residual.mean(axis=0),
             }
             results[name]["lights"] = _lights({"two": two, "three": three, "five": five})
-            results[name]["groups"] = _by_category(archive, list(GROUPS), archive.group, two, three, five)
+            results[name]["groups"] = _by_category(
+                archive, list(GROUP_LABELS), archive.group, two, three, five
+            )
             results[name]["by_site"] = _by_category(
                 archive, range(len(SITES)), archive.site, two, three, five
             )
@@ -165,8 +161,8 @@ def _surface(archive: Archive) -> JsonObject:
 
     face = np.isin(archive.site, CHEEK_AND_FOREHEAD)
     results: JsonObject = {}
-    for label, chosen in (("all", np.ones(len(archive), bool)), ("cheek and forehead", face)):
-        part = archive.where(chosen)
+    for label, chosen in (("all", np.ones(len(archive.spectra), bool)), ("cheek and forehead", face)):
+        part = archive.rows(chosen)
         colours = lab(part.spectra @ rgb_weights().T)
         mean, scale = colours.mean(axis=0), colour_metric(np.median(colours, axis=0)[None])[0]
         axes = np.linalg.svd((colours - mean) @ scale.T, full_matrices=False)[2]
@@ -225,12 +221,12 @@ def _folds(archive: Archive) -> list[JsonObject]:
     """Return, for each fold of people, constants fitted to the other folds, and its errors with them."""
     rows = []
     for fold in range(FOLDS):
-        known = archive.where(archive.fold != fold).sample(_CONSTANTS_SAMPLE, fold)
-        held = archive.where(archive.fold == fold)
+        known = archive.rows(archive.fold != fold).sample(_CONSTANTS_SAMPLE, fold)
+        held = archive.rows(archive.fold == fold)
         spectral = fit_constants(known.spectra, THREE_UNKNOWNS, ("baseline", "epidermis_mm"))
         colour = fit_constants(known.spectra, TWO_UNKNOWNS, ("oxygen",), "colour", spectral.constants)
         skin = replace(DEFAULT_SKIN, **colour.constants | {"oxygen": min(1.0, colour.constants["oxygen"])})
-        row: JsonObject = {"constants": colour.constants, "people": len(held)}
+        row: JsonObject = {"constants": colour.constants, "people": len(held.spectra)}
         for label, one in (("fitted", skin), ("default", DEFAULT_SKIN)):
             two, three = (fit_skin(held.spectra, n, "colour", one) for n in (TWO_UNKNOWNS, THREE_UNKNOWNS))
             five = fit_skin(held.spectra, FIVE_UNKNOWNS, "spectrum", one)
@@ -319,7 +315,7 @@ def _sites(archive: Archive) -> list[JsonObject]:
     """Return thickness and oxygen that fit each site best, by colour with two unknowns and by spectrum."""
     rows = []
     for site in range(len(SITES)):
-        sample = archive.where(archive.site == site).sample(300, site)
+        sample = archive.rows(archive.site == site).sample(300, site)
         fixed = {"baseline": DEFAULT_SKIN.baseline}
         spectral = fit_constants(sample.spectra, THREE_UNKNOWNS, ("epidermis_mm",), fixed=fixed)
         colour = fit_constants(sample.spectra, TWO_UNKNOWNS, ("epidermis_mm", "oxygen"), "colour", fixed)

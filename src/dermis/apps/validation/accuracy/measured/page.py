@@ -4,15 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from dermis.apps.validation.accuracy.measured.archive import GROUPS, ILLUMINANTS, SITES
+from dermis.apps.validation.accuracy.measured.illuminants import ILLUMINANTS
 from dermis.apps.validation.accuracy.measured.probe import APERTURES_MM
 from dermis.apps.validation.pages import DOCS, RESULTS, JsonObject, fill_page, read_results
+from dermis.human.skin.measured import SITES
 from dermis.optics.pigments.parameters import DEFAULT_SKIN
 
 PAGE = DOCS / "measured.md"
 RESULT_FILE = RESULTS / "measured.json"
 PEOPLE_FILE = RESULTS / "people.json"
 """Tables about drawn people, written by `python -m dermis.apps.validation.people page`."""
+GROUP_LABELS = {
+    "CA": "Caucasian",
+    "CN": "Chinese",
+    "JP": "Japanese",
+    "TH": "Thai",
+    "SA": "South Asian",
+    "IQ": "Middle Eastern (Iraq)",
+    "AB": "Middle Eastern (Arabia)",
+    "AF": "African",
+}
+"""Names of the archive's groups on the page, by their codes."""
 _SKIN_NAMES = {
     "former": "absorption of [Jacques1998]",
     "half": "half of it",
@@ -66,7 +78,7 @@ def measured_parts(results: JsonObject) -> dict[str, str]:
         "residual": _residual(results["models"]),
         "groups": "\n\n".join(
             [
-                _category_table("group", list(GROUPS.values()), present["groups"]),
+                _category_table("group", list(GROUP_LABELS.values()), present["groups"]),
                 _category_table("site", SITES, present["by_site"]),
             ]
         ),

@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from dermis.apps.inverse.unmixing.spectral_inversion import fit_skin
-from dermis.apps.validation.accuracy.measured.archive import SITES, read_archive
+from dermis.apps.validation.spectral_archive import read_archive
 from dermis.base.atomic_write import atomic_file
 from dermis.base.console import print_lines
+from dermis.human.skin.measured import SITES
 from dermis.optics.media import Floats
 from dermis.optics.pigments.priors import PRIOR_COLUMNS, PRIOR_NAMES, SkinPrior, prior_points
 
@@ -29,7 +30,7 @@ _HEADER = """# quantity: mixture of normal distributions of log melanin, log blo
 def priors() -> None:
     """Fit the distribution of people's pigments to the archive, and write it as a table of the package."""
     archive = read_archive()
-    living = archive.where(~np.isin(archive.site, [SITES.index(name) for name in _CALLOUS_SITES]))
+    living = archive.rows(~np.isin(archive.site, [SITES.index(name) for name in _CALLOUS_SITES]))
     fit = fit_skin(living.spectra, PRIOR_NAMES)
     prior = fit_mixture(prior_points(fit.values), _COMPONENTS)
     path = Path(str(files("dermis.optics"))) / "data" / "skin_priors.csv"
