@@ -70,7 +70,7 @@ def test_a_killed_worker_loses_no_shard(
 
 def test_a_bad_head_ends_the_run(cluster: Any, tmp_path: Path) -> None:
     spec = read(write_spec(tmp_path, "bad.obj"))
-    with pytest.raises(DermisError, match=r"image \d: .*bad\.obj"):
+    with pytest.raises(DermisError, match=r"image \d+: .*bad\.obj"):
         drawn(cluster, spec, tmp_path / "out")
 
 
