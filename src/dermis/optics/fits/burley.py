@@ -59,7 +59,7 @@ class BurleyProfile:
 
 
 def shape_factor(albedo: ArrayLike) -> Floats:
-    """Return s times the mean free path, for the shape s of Burley's profile at normal incidence [-].
+    """Return Burley's shape s times the mean free path, for a narrow beam at normal incidence [-].
 
     albedo : total reflectance A [-]
 
@@ -70,7 +70,7 @@ def shape_factor(albedo: ArrayLike) -> Floats:
 
 
 def shape_factor_diffuse(albedo: ArrayLike) -> Floats:
-    """Return s times the diffuse mean free path 1 / sigma_tr, for the shape s of Burley's profile [-].
+    """Return Burley's shape s times the diffuse mean free path 1 / sigma_tr [-].
 
     albedo : total reflectance A [-]
 
@@ -95,7 +95,7 @@ class BurleyFit:
 
 
 def fit_burley(target: RingTarget) -> BurleyFit:
-    """Fit Burley's profile to ring energies with the smallest error, keeping each channel's total."""
+    """Fit Burley's profile to ring energies with the smallest error; each channel keeps its total."""
     shape = np.array([_fit_shape(target.channel(i)) for i in range(len(target.total))])
     profile = BurleyProfile(target.total, shape)
     return BurleyFit(
@@ -158,8 +158,8 @@ class UnrealParameters:
     surface_albedo : diffuse albedo, linear Rec. 709 [-]
     mean_free_path_colour : mean free path of each channel divided by `mean_free_path_distance_cm`, linear
         Rec. 709 [-]
-    mean_free_path_distance_cm : largest mean free path of a channel, or the smallest that the engine accepts
-        [cm]
+    mean_free_path_distance_cm : largest mean free path of the three channels, but at least the smallest value
+        that the engine accepts [cm]
     world_unit_scale : scale of the scene; 1 is life-size [-]
     """
 
