@@ -1,4 +1,4 @@
-"""Common maps of several materials, baked from their pictures, factors and vertex colours."""
+"""Texture maps shared by several materials, baked from their pictures, factors and vertex colours."""
 
 from __future__ import annotations
 
@@ -31,10 +31,11 @@ _ROLE_DEFAULTS: Mapping[Role, tuple[float, ...]] = {
 
 @dataclass(frozen=True, eq=False)
 class PackedTextures:
-    """Common layout and maps of several materials.
+    """Uv layout and texture maps that several materials share.
 
-    vertices, uv : (n,) vertex indices in the mesh, and (n, 2) their uv in the common maps
-    maps : by role, such as colour or roughness, the map (side, side, k), multiplied by the materials' factors
+    vertices, uv : (n,) vertex indices in the mesh, and (n, 2) uv of these vertices in the shared maps
+    maps : shared map (side, side, k) of each role, such as colour or roughness, multiplied by the materials'
+        factors
     notes : sentences for users about lost detail
     """
 
@@ -51,11 +52,11 @@ def pack_textures(
     members: Mask,
     required: Sequence[Role] = ("colour",),
 ) -> PackedTextures:
-    """Return the common layout and maps of selected materials of a mesh.
+    """Bake one uv layout and one set of texture maps for selected materials of a mesh.
 
     surface, materials : surface data and materials of the mesh's file
     members : (m,) mask of the mesh's materials that share the maps
-    required : roles that have a map even if no material has a picture for them
+    required : roles for which a map is baked even if no material has a picture for the role
     """
     tiles, side, scale = lay_out_tiles(mesh, surface, materials, members)
     baker = _Baker(mesh, surface, materials, tiles, side)
@@ -70,7 +71,7 @@ def pack_textures(
 
 @dataclass(frozen=True, eq=False)
 class _Baker:
-    """Baker of maps for a layout of tiles."""
+    """Baker of texture maps for a layout of tiles."""
 
     mesh: Mesh
     surface: FileSurface
@@ -79,12 +80,12 @@ class _Baker:
     side: int
 
     def roles(self, required: Sequence[Role]) -> list[Role]:
-        """Return the required roles and those for which a material has a picture."""
+        """Return the required roles, and the roles for which a material has a picture."""
         used = {role for tile in self.tiles for role in self._material(tile).textures}
         return [role for role in _ROLE_DEFAULTS if role in used or role in required]
 
     def bake(self, role: Role) -> Floats:
-        """Return the common map (side, side, k) of a role."""
+        """Return the shared map (side, side, k) of a role."""
         default = np.array(_ROLE_DEFAULTS[role], np.float32)
         channels = len(default) + (role == "colour")  # opacity
         baked = np.zeros((self.side, self.side, channels), np.float32)

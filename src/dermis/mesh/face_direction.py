@@ -38,8 +38,8 @@ def face_direction(positions: Doubles, triangles: Index, eyes: Doubles) -> Direc
     triangles : (f, 3) vertex indices
     eyes : (n, 3) vertices of eyeballs, or joints of the eyes; empty if they are not known
 
-    Eyes lie in front of the middle of the head. Without them, the head must be symmetric about a vertical
-    plane, and the front is the side of more relief with a ridge in its middle, the nose.
+    Eyes lie in front of the middle of the head. If no eyes are known, the head must be symmetric about a
+    vertical plane, and its front is the side with more relief and with a ridge in the middle, the nose.
     """
     if not len(triangles):
         return None
@@ -99,7 +99,12 @@ def _direction(axis: int, sign: float) -> Direction:
 
 
 def _head_height(points: Doubles) -> float:
-    """Return the height of the head at the top of points (n, 3), down to where shoulders exceed its width."""
+    """Return the height of the head of a figure.
+
+    It extends from the top down to where the figure becomes wider than a head, at the shoulders.
+
+    points : (n, 3) points of the figure, Y up
+    """
     ordered = points[np.argsort(-points[:, 1])]
     depth, across = ordered[0, 1] - ordered[:, 1], ordered[:, ::2]
     widths = np.maximum.accumulate(across) - np.minimum.accumulate(across)
@@ -148,7 +153,7 @@ def _relief(points: Doubles, normals: Doubles) -> float:
 
 
 def _ridge(points: Doubles, front: int) -> float:
-    """Return how far the middle of a face protrudes beyond both sides, at the height where it does most.
+    """Return the largest distance at any height by which the middle of a face protrudes beyond its sides.
 
     points : (n, 3) points of the front or back of a head
     front : index of the coordinate along which the face may look
@@ -160,5 +165,5 @@ def _ridge(points: Doubles, front: int) -> float:
     middle, left, right = reach = np.zeros((3, row.max(initial=0) + 1))
     for deepest, band in zip(reach, bands, strict=True):
         np.maximum.at(deepest, row[band], depth[band])
-    known = (middle > 0) & (left > 0) & (right > 0)
-    return float((middle - np.maximum(left, right))[known].max(initial=0.0))
+    has_points = (middle > 0) & (left > 0) & (right > 0)
+    return float((middle - np.maximum(left, right))[has_points].max(initial=0.0))

@@ -109,7 +109,7 @@ def hidden_triangles(surface: FlatSurface, piece: Index, packing: Packing, size:
 def _drawing_order(surface: FlatSurface, piece: Index, members: Index) -> Index:
     """Return triangle indices sorted so that triangles mirrored within their piece come first.
 
-    They are then overwritten by the other triangles.
+    Texels that mirrored triangles share with other triangles are thus owned by the other triangles.
 
     members : (t,) indices of the triangles
     """
@@ -131,7 +131,7 @@ def _repeat_edge(coverage: Coverage, piece: Index, beyond_end: Mask, y: Index, x
     A blur along the edge then reads the same light from a gutter as from the rim of a piece.
 
     beyond_end : (h, w) mask of texels beyond the end of the surface
-    y, x : (n,) row and column of the gutter texels among them
+    y, x : (n,) row and column of the gutter texels in this mask
     """
     last = np.array(beyond_end.shape) - 1
     piece_of_texel, from_y, from_x = piece[coverage.anchor_triangle[y, x]], y.copy(), x.copy()

@@ -72,7 +72,7 @@ class _PieceGrid(NamedTuple):
     """Texel grid with one piece and its gutters.
 
     owner : (h, w) triangle that owns the texel, -1 in gutters, -2 elsewhere
-    row : (h, w) index of each texel in `anchored`, where the texels of the piece precede those of the gutters
+    row : (h, w) index of each texel in `anchored`, where the texels of the piece precede the gutter texels
     anchored : texels of piece and gutters with their anchors
     packing, border, sides : position, border and border sides of the piece on the grid
     nearest : nearest border points of the gutter texels
@@ -154,7 +154,7 @@ def _gap_pairs(surface: FlatSurface, mapped: Mask, grid: _PieceGrid) -> tuple[In
 def _texel_points(surface: FlatSurface, mapped: Mask, grid: _PieceGrid, chosen: Index) -> Doubles:
     """Return the surface point of each texel of the grid (n, 3), or NaN where it is not computed [mm].
 
-    It is computed for the texels in `chosen`, except for those beyond the end of the surface.
+    Points are computed for the texels in `chosen`, except for texels beyond the end of the surface.
     """
     owner, texels = grid.owner[grid.owner >= 0], grid.anchored.texels
     points, is_chosen = np.full((len(texels), 3), np.nan), np.zeros(len(texels), np.bool_)
@@ -206,7 +206,7 @@ def _cut_length_mm(surface: FlatSurface, members: Index, part: Index) -> float:
 
 
 def _cut_piece(surface: FlatSurface, mapped: Mask, members: Index, gutter_mm: float) -> Index | None:
-    """Cut a chart piece where its gutters meet; return the part of each triangle (t,), or None without cuts.
+    """Cut a chart piece where its gutters meet; return the part of each triangle (t,), or None if uncut.
 
     members : (t,) indices of the piece's triangles
     """
@@ -242,7 +242,7 @@ def _conflict_clusters(conflicts: Conflicts, reach: float) -> list[Index]:
 
 
 def _within_reach(points: Doubles, others: Doubles, reach: float) -> Mask:
-    """Return the mask of points (..., 2) within about `reach` of any of the other points (n, 2)."""
+    """Return the mask (...) of `points` (..., 2) within about `reach` of any point in `others` (n, 2)."""
     cell = reach / _CELLS_PER_GUTTER
     low = np.floor(others.min(axis=0) / cell) - _CELLS_PER_GUTTER - 1
     disc = np.argwhere(
@@ -259,9 +259,9 @@ def _within_reach(points: Doubles, others: Doubles, reach: float) -> Mask:
 def _conflict_strip(
     surface: FlatSurface, members: Index, overlap: Conflicts, half: Mask, reach: float
 ) -> Mask:
-    """Return the mask (t,) of the triangles near meeting gutters on one side of a line.
+    """Return the mask (t,) of triangles near meeting gutters, on one side of a line through the piece.
 
-    It is the side on which these triangles have the smaller area.
+    The side is the one on which the triangles near meeting gutters have the smaller area.
 
     half : (t,) mask of triangles on one side of the line
     reach : gutter width [texel]
@@ -276,7 +276,7 @@ def _conflict_strip(
 
 
 def _best_line(overlap: Conflicts, reach: float) -> tuple[Doubles, float, int]:
-    """Return the line that separates most conflicts per length.
+    """Return the line that separates the most conflicts per length of the cut along it.
 
     Returns its normal and offset, and the number of conflicts that it separates.
     """
@@ -300,7 +300,7 @@ def _best_line(overlap: Conflicts, reach: float) -> tuple[Doubles, float, int]:
 
 
 def _connected_parts(surface: FlatSurface, members: Index, part: Index, gutter_mm: float) -> Index | None:
-    """Divide the parts of a cut chart into connected ones, and merge small ones into their largest neighbour.
+    """Divide the parts of a cut chart into connected parts; merge small parts into their largest neighbour.
 
     Returns the part of each triangle (t,), or None if only one part remains.
     """

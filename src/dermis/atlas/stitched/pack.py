@@ -26,11 +26,11 @@ _MASK_EXCESS = 1.15  # ratio of the scale of the next masks to the found scale
 
 
 def place_shapes(shapes: Sequence[Sequence[Span]], n: int) -> list[tuple[int, int]] | None:
-    """Return the column and row of each shape on n x n cells, or None if they do not all fit.
+    """Return the column and row at which each shape is placed on n x n cells, or None if not all shapes fit.
 
     Each shape is placed at the first free position, searched row by row.
 
-    shapes : cells of each shape as runs, from row and column 0
+    shapes : cells of each shape as runs (row, first and last column), counted from row and column 0
     """
     occupied, corners = 0, []
     for spans in shapes:
@@ -160,14 +160,14 @@ def _find_layout(pieces: list[_Piece], cells: int, width: GutterWidth) -> _Layou
     area = sum(float(np.abs(one.surface.area_uv).sum()) * one.scale**2 for one in pieces)
     top = cells / float(np.sqrt(area))
     for _ in range(_MAX_MASK_ATTEMPTS):
-        found = _largest_scale([_piece_mask(one, top, width) for one in pieces], cells, top)
+        found = _find_largest_scale([_piece_mask(one, top, width) for one in pieces], cells, top)
         if found is None or found.scale > _MASK_RATIO * top:
             return found
         top = _MASK_EXCESS * found.scale
     return None
 
 
-def _largest_scale(masks: list[_PieceMask], cells: int, top: float) -> _Layout | None:
+def _find_largest_scale(masks: list[_PieceMask], cells: int, top: float) -> _Layout | None:
     """Return the layout with the largest scale below `top`, for the best of several orders of the pieces.
 
     The best order is searched with coarse cells.
@@ -222,7 +222,7 @@ def _try_scale(masks: list[_PieceMask], scale: float, cells: int, order: int) ->
 
 
 def _scaled_mask(mask: _PieceMask, scale: float) -> tuple[Mask, Doubles]:
-    """Return the mask (h, w) of all cells that a piece touches at another scale, and its margin there."""
+    """Return the mask (h, w) of all cells that a piece touches at another scale, and its scaled margin."""
     row, first, last = (mask.spans.T - mask.margin[[1, 0, 0], None]) * scale
     top, bottom = np.floor(row).astype(int), np.ceil(row + scale).astype(int) - 1
     left, right = np.floor(first).astype(int), np.ceil(last + scale).astype(int) - 1
@@ -236,7 +236,7 @@ def _scaled_mask(mask: _PieceMask, scale: float) -> tuple[Mask, Doubles]:
 
 
 def _piece_mask(piece: _Piece, scale: float, width: GutterWidth) -> _PieceMask:
-    """Return the cells in which a piece with its gutter may need a texel, at one scale."""
+    """Return the cells in which a piece and its gutter may need a texel, at a scale of the packing."""
     margin = np.ceil(_gutter_extent(piece, scale, width)) + 2
     columns, rows = np.ceil(piece.extent * scale + 2 * margin).astype(int) + 1
     ones = np.ones(len(piece.uv))

@@ -65,7 +65,7 @@ class AnchoredTexels(NamedTuple):
     step_mm: Doubles
 
     def select(self, selected: Index) -> AnchoredTexels:
-        """Return the texels at the given indices."""
+        """Return the texels at some indices."""
         return AnchoredTexels._make(part[selected] for part in self)
 
 

@@ -29,7 +29,7 @@ def opposite_sides(triangles: Index) -> Index:
 def neighbours(triangles: Index) -> Index:
     """Return the index of the triangle across each side 01, 12 and 20, (f, 3).
 
-    Across a side without exactly one neighbour, it is the triangle itself.
+    Across a side without exactly one neighbour, the index is that of the triangle itself.
     """
     return (opposite_sides(triangles) % len(triangles)).reshape(3, -1).T
 
@@ -68,7 +68,7 @@ def _smooth_borders(chart: Index, triangles: Index) -> Index:
 
 
 def connected_pieces(chart: Index, adjacent: Index) -> Index:
-    """Return the index of each triangle's connected piece (f,), where a piece is part of one chart.
+    """Return the index (f,) of the connected piece of each triangle; every piece belongs to one chart.
 
     chart : (f,) chart of each triangle
     adjacent : (f, 3) neighbours of each triangle, from `neighbours`

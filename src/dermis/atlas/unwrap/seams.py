@@ -119,12 +119,12 @@ class ChartMesh(NamedTuple):
         return FlatCharts(corners, point, uv_mm, piece, faulty_triangles(uv_mm, corners, piece))
 
     def subset(self, chosen: Mask) -> ChartMesh:
-        """Return the triangles for which a mask is true."""
+        """Return the mesh of the triangles that a mask selects."""
         return ChartMesh(self.positions, self.triangles[chosen])
 
 
 def flatten_charts(mesh: ChartMesh, chart: Index) -> FlatCharts:
-    """Flatten charts (f,) without faulty triangles, changing the charts where necessary."""
+    """Flatten charts (f,) so that no triangle is faulty; charts are changed where necessary."""
     flat = mesh.flatten(chart)
     while flat.faulty.any():
         flat = mesh.flatten(_repair_charts(mesh, flat, 0))

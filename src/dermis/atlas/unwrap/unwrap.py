@@ -1,4 +1,4 @@
-"""Unwrapping of a mesh into a uv layout with given or random charts, and packing of charts."""
+"""Unwrapping of a mesh into a uv layout with desired or random charts, and packing of charts."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ _MIN_CHART_AREA_MM2 = 1e-6
 
 
 def pack_charts(outlines: list[Doubles], padding: float) -> tuple[float, Doubles]:
-    """Pack charts into the unit square; return their common scale and the offset (c, 2) of each.
+    """Pack charts into the unit square; return the scale of all charts and the offset (c, 2) of each chart.
 
-    Each chart is dropped onto those below at the column where it gets lowest [Levy2002]; the best of several
-    orders is returned.
+    Each chart is dropped onto the charts below, at the column where it comes to rest lowest [Levy2002]; the
+    best of several orders is returned.
 
     outlines : edges (k, 2, 2) of each chart's border, counter-clockwise
     padding : width of the empty space between charts as a fraction of the square's side; half as much is left

@@ -56,7 +56,7 @@ class _EyePiece:
 
     @property
     def fault(self) -> str:
-        """Return why this component is not an eyeball, as a phrase such as "is a ..."; empty if it is one."""
+        """Return why this component is not an eyeball, such as "is a ball of ..."; empty for an eyeball."""
         (low, high), (_, radius, deviation) = RADIUS_RANGE_MM, self.sphere
         if len(self.points) < _MIN_POINTS:
             return f"has only {len(self.points)} points"
@@ -71,7 +71,8 @@ class _EyePiece:
 def find_eyeballs(mesh: Mesh) -> tuple[tuple[DetectedEyeball, DetectedEyeball] | None, str]:
     """Find the left and the right eyeball of a mesh.
 
-    If there are not two, the result is None with the reason, which is empty if the file declares no eyes.
+    Returns both eyeballs and an empty text, or None and the reason why there are not two. The reason is empty
+    if the file declares no eyes.
     """
     eye_triangles = np.flatnonzero(np.array([material.eye for material in mesh.materials])[mesh.material])
     if not len(eye_triangles):
@@ -142,7 +143,7 @@ class Sphere(NamedTuple):
     """Sphere fitted to points.
 
     centre, radius : (3,) centre and radius of the sphere [mm]
-    deviation : 85th percentile by area of the points' distance from the sphere, divided by the radius [-]
+    deviation : distance from the sphere that 85 % of the surface does not exceed, divided by the radius [-]
     """
 
     centre: Doubles
