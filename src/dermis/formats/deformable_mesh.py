@@ -98,7 +98,10 @@ class DeformableMesh:
             yield VertexTarget(vertex, delta_mm[vertex], normal[vertex])
 
     def _normal_changes(self, delta_mm: Floats) -> Floats:
-        """Return the changes of unit normals (v, 3) when vertices are displaced by `delta_mm` (v, 3) [mm]."""
+        """Return the changes (v, 3) of the unit normals that result from displacements of the vertices.
+
+        delta_mm : (v, 3) displacements [mm]
+        """
         mesh, change = self.head.mesh, np.zeros_like(delta_mm)
         moves = np.asarray(delta_mm.any(axis=1))
         changed = moves[mesh.triangles].any(axis=1)

@@ -51,7 +51,7 @@ MESH_FORMATS = Registry[MeshFormat](
 
 
 def find_format(path: str | Path) -> MeshFormat | None:
-    """Return the format of a mesh file by its suffix, or None."""
+    """Return the format of a mesh file by its suffix; None for an unknown suffix."""
     suffix = Path(path).suffix.lower()
     return next((one for one in MESH_FORMATS.values() if suffix in one.suffixes), None)
 

@@ -24,7 +24,7 @@ from dermis.formats.polygons import (
     refuse_without_faces,
     without_small_polygons,
 )
-from dermis.formats.text_files import listed, parse_numbers, run_starts
+from dermis.formats.text_files import list_names, parse_numbers, run_starts
 from dermis.formats.vertex_colours import linear_colours
 
 _MAX_LINES = 12_000_000
@@ -206,7 +206,7 @@ def _refuse_line(path: Path, rows: _Rows, index: int, expected: str, actual: str
 def _vertices(path: Path, rows: _Rows) -> tuple[Doubles, Doubles | None, list[str]]:
     """Return positions (n, 3), linear colours (n, 3) or None, and notes.
 
-    One number after the position is a weight, by which the position is divided; three are a colour.
+    One number after the position is a weight, by which the position is divided; three numbers are a colour.
     """
     table, counts = _table(path, rows, "v")
     positions, notes = table[:, :3], list[str]()
@@ -237,7 +237,7 @@ def _polypaint(digits: str, count: int) -> tuple[Doubles | None, list[str]]:
 
 
 def _table(path: Path, rows: _Rows, kind: str) -> tuple[Doubles, Index]:
-    """Return each statement's first six numbers, padded with NaN, (n, 6), and how many it has (n,)."""
+    """Return the first six numbers (n, 6) of each statement, padded with NaN, and their true count (n,)."""
     words = run_starts(rows.text > _SPACE)
     first = np.searchsorted(words, rows.start)
     counts = np.diff(first, append=len(words))
@@ -267,7 +267,10 @@ def _first_non_numeric(rows: _Rows, dtype: type[np.float64] | type[np.int64]) ->
 
 
 def _faces(path: Path, rows: Mapping[str, _Rows]) -> tuple[Index, Index]:
-    """Return each face's number of corners, and indices of position, uv, normal (c, 3) per corner or -1."""
+    """Return the number of corners of each face, and position, uv and normal index of each corner (c, 3).
+
+    The index is -1 for a corner without uv or normal.
+    """
     faces = rows["f"]
     slash = faces.text == _SLASH
     spaced = replace(faces, text=np.where(slash, np.uint8(_SPACE), faces.text))
@@ -331,7 +334,7 @@ def _unread_notes(keys: Collection[str], statements: Sequence[_Statement], has_n
     """
     kinds = {key: _KINDS_LEFT_OUT.get(key) for key in keys if key not in _WITHOUT_EFFECT}
     names = [f"{key} ({kind})" if kind else key for key, kind in kinds.items()]
-    notes = [f"statements are left out: {listed(names)}"] if names else []
+    notes = [f"statements are left out: {list_names(names)}"] if names else []
     smoothing = {value for _, key, value in statements if key == "s"}
     if not has_normals and (len(smoothing) > 1 or smoothing & {"0", "off"}):
         notes.append("smoothing groups (s) are left out: the surface is smooth everywhere")

@@ -191,7 +191,7 @@ def _parse_mtl(text: str) -> dict[str, MtlMaterial]:
             current = materials.setdefault(value.strip(), MtlMaterial())
         elif key in TEXTURE_ROLES and value.strip():
             current.textures[TEXTURE_ROLES[key]] = _parse_texture(word, value.strip())
-        elif key in NUMERIC_STATEMENTS and len(numbers := _numbers(value)) >= NUMERIC_STATEMENTS[key]:
+        elif key in NUMERIC_STATEMENTS and len(numbers := _parse_numbers(value)) >= NUMERIC_STATEMENTS[key]:
             current.numbers[key] = numbers
         elif key not in _WITHOUT_EFFECT:
             current.unread.append(word)
@@ -203,7 +203,7 @@ def picture_name(texture: MtlTexture, udim: int = _FIRST_UDIM) -> str:
     return _UDIM.sub(str(udim), texture.name)
 
 
-def _numbers(value: str) -> list[float]:
+def _parse_numbers(value: str) -> list[float]:
     words = value.split()
     return [float(word) for word in words] if all(map(_NUMBER_PATTERN.fullmatch, words)) else []
 
@@ -248,7 +248,8 @@ def with_materials(
     Parts whose pictures are a sequence of UDIM tiles are divided into one part for each tile.
 
     path : path of the OBJ file
-    parts : mesh parts; the first name of a part's group is the name of its material, if that has one
+    parts : mesh parts; if a part has a material, the first name of the part's group is the name of the
+        material
     """
     materials: list[FileMaterial] = []
     notes = [f"mtllib: {name} is not in its folder. {_MISSING_ADVICE}" for name in library.missing]
@@ -261,7 +262,7 @@ def with_materials(
             continue
         own = library.materials[name]
         has_tiles = any(_UDIM.search(texture.name) for texture in own.textures.values())
-        for udim, piece in _tiles(part) if has_tiles else ((_FIRST_UDIM, part),):
+        for udim, piece in _udim_tiles(part) if has_tiles else ((_FIRST_UDIM, part),):
             if (name, udim) not in index:
                 index[name, udim] = len(materials)
                 materials.append(_file_material(path, name, own, udim))
@@ -270,7 +271,7 @@ def with_materials(
     return assigned, tuple(materials), notes
 
 
-def _tiles(part: MeshPart) -> list[tuple[int, MeshPart]]:
+def _udim_tiles(part: MeshPart) -> list[tuple[int, MeshPart]]:
     """Divide a part into the UDIM tiles of its triangles; return the number and the part of each tile."""
     if part.uv is None or not len(part.triangles):
         return [(_FIRST_UDIM, part)]

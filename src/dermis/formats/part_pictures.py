@@ -28,14 +28,14 @@ its maximum."""
 
 @dataclass(frozen=True, eq=False)
 class PartPictures:
-    """Pictures of the parts of a mesh that are not skin, in their common uv layout."""
+    """Pictures of the parts of a mesh that are not skin, in the uv layout that these parts share."""
 
     mesh: Mesh
     maps: PartMaps
 
     @classmethod
     def of(cls, head: Head) -> PartPictures | None:
-        """Return the pictures of a head's parts, or None if it has no maps of parts."""
+        """Return the pictures of a head's parts that are not skin; None for a head without maps of parts."""
         return None if head.maps.parts is None else cls(head.mesh, head.maps.parts)
 
     def roles(self, material: Material) -> set[PartRole]:
@@ -64,7 +64,7 @@ class PartPictures:
             return dict(zip(levels, pool.map(encode_png, levels.values()), strict=True))
 
     def emission(self, material: Material) -> tuple[float, tuple[float, ...]]:
-        """Return the largest radiance that a part emits, and the colour by which its picture is multiplied.
+        """Return the largest radiance that a part emits, and the colour that multiplies its emission picture.
 
         A part without a picture of its emission emits this colour.
         """

@@ -26,7 +26,7 @@ from dermis.formats.polygons import (
     without_small_polygons,
 )
 from dermis.formats.referenced_files import find_referenced_file
-from dermis.formats.text_files import decode_text, listed, parse_numbers, run_starts
+from dermis.formats.text_files import decode_text, list_names, parse_numbers, run_starts
 from dermis.formats.vertex_colours import linear_colours
 from dermis.mesh.geometry import expand_runs, weld
 
@@ -92,7 +92,7 @@ _STRUCT_CODES = dict(zip(dict.fromkeys(_TYPES.values()), "bBhHiIfdqQe", strict=T
 
 
 class _Property(NamedTuple):
-    """Property of an element; a list if `length_dtype` is not ""."""
+    """Property of an element: a list if `length_dtype`, the type of the list's length, is not ""."""
 
     name: str
     dtype: str
@@ -116,7 +116,7 @@ class _List(NamedTuple):
 class _Header(NamedTuple):
     """Header of a PLY file.
 
-    order : byte order, "=" for text
+    order : byte order as in NumPy types, "=" for text
     size : size of the header in bytes
     pictures : file names of pictures, in comments
     """
@@ -143,11 +143,11 @@ class _Columns(dict[str, "Numbers | _List"]):
         return np.column_stack(columns)
 
     def take_first(self, choices: Sequence[Sequence[str]]) -> Numbers | None:
-        """Return the first existing set of properties as an array (n, k)."""
+        """Return the first set of properties that exists as an array (n, k); None if there is none."""
         return next((one for names in choices if (one := self.take(names)) is not None), None)
 
     def take_list(self, names: Sequence[str]) -> _List | None:
-        """Return the first existing list property among some names."""
+        """Return the first existing list property among some names; None if none exists."""
         for name in names:
             if isinstance(column := self.get(name), _List):
                 self.used.add(name)
@@ -166,7 +166,7 @@ def read_ply(path: Path) -> MeshFile:
     vertices, faces, strips = (tables.get(name, _Columns()) for name in ("vertex", "face", "tristrips"))
     positions = vertices.take("xyz")
     if positions is None:
-        refuse(path, "vertices with x, y and z", f"they have {listed(vertices)}", limits.DAMAGED_ADVICE)
+        refuse(path, "vertices with x, y and z", f"they have {list_names(vertices)}", limits.DAMAGED_ADVICE)
     counts, index = _polygons(path, faces, strips, len(positions))
     uv, uv_index = _uv(path, vertices, faces, counts, index)
     normals = vertices.take(("nx", "ny", "nz"))
@@ -402,14 +402,14 @@ class _ListStep(NamedTuple):
     item_size: int
 
 
-def _polygons(path: Path, faces: _Columns, strips: _Columns, points: int) -> tuple[Index, Index]:
+def _polygons(path: Path, faces: _Columns, strips: _Columns, vertex_count: int) -> tuple[Index, Index]:
     """Return the number of corners of each face and strip triangle, and the vertex of each corner.
 
-    points : number of vertices in the file
+    vertex_count : number of vertices in the file
     """
     own, counts, index = faces.take_list(_FACE_NAMES), np.empty(0, np.int64), np.empty(0, np.int64)
     if faces and own is None:
-        refuse(path, f"faces with {_FACE_NAMES[0]}", f"they have {listed(faces)}", limits.DAMAGED_ADVICE)
+        refuse(path, f"faces with {_FACE_NAMES[0]}", f"they have {list_names(faces)}", limits.DAMAGED_ADVICE)
     if own is not None:
         counts, index = own.lengths, own.items.astype(np.int64)
     if (strip := strips.take_list(_FACE_NAMES)) is not None:
@@ -417,9 +417,9 @@ def _polygons(path: Path, faces: _Columns, strips: _Columns, points: int) -> tup
         counts = np.concatenate([counts, np.full(len(triangles), 3)])
         index = np.concatenate([index, triangles.ravel()])
     check_polygon_sizes(path, counts)
-    if len(index) and (index.min() < 0 or index.max() >= points):
+    if len(index) and (index.min() < 0 or index.max() >= vertex_count):
         actual = f"they run from {index.min()} to {index.max()}"
-        refuse(path, f"triangle indices from 0 to {points - 1}", actual, limits.DAMAGED_ADVICE)
+        refuse(path, f"triangle indices from 0 to {vertex_count - 1}", actual, limits.DAMAGED_ADVICE)
     return counts, index
 
 
@@ -484,7 +484,7 @@ def _picture(names: Sequence[str], picture_index: Numbers | None) -> tuple[str |
     )
     chosen = names[int(used[counts.argmax()])]
     others = [name for name in dict.fromkeys(names) if name != chosen]
-    return chosen, [f"of several pictures {chosen} is used; left out: {listed(others)}"] if others else []
+    return chosen, [f"of several pictures {chosen} is used; left out: {list_names(others)}"] if others else []
 
 
 def _unread_notes(tables: Mapping[str, _Columns]) -> list[str]:
@@ -498,4 +498,4 @@ def _unread_notes(tables: Mapping[str, _Columns]) -> list[str]:
         and name not in (*columns.used, *_WITHOUT_EFFECT)
         and not name.startswith(_SCALAR_PREFIX)
     ]
-    return [f"these are left out: {listed(ignored)}"] if ignored else []
+    return [f"these are left out: {list_names(ignored)}"] if ignored else []

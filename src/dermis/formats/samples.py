@@ -72,13 +72,13 @@ def fetch_sample(name: str) -> dict[str, Path]:
 
     name : a key of `SAMPLES`
 
-    If DERMIS_DATA is set, that folder must contain the files and nothing is downloaded.
+    If DERMIS_DATA is set, the folder that it names must contain the files, and nothing is downloaded.
 
     Raises DermisError for an unknown sample, without a network, and for files with unexpected hashes.
     """
     sample = _find_sample(name)
     paths = {role: _sample_folder(sample) / file.name for role, file in sample.files.items()}
-    missing = [role for role, file in sample.files.items() if not _has_known_hash(paths[role], file)]
+    missing = [role for role, file in sample.files.items() if not _has_expected_hash(paths[role], file)]
     if missing and _data_folder():
         _refuse_data(paths[missing[0]])
     if missing:
@@ -93,7 +93,7 @@ def is_available(name: str) -> bool:
     """
     sample = _find_sample(name)
     folder = _sample_folder(sample)
-    return all(_has_known_hash(folder / file.name, file) for file in sample.files.values())
+    return all(_has_expected_hash(folder / file.name, file) for file in sample.files.values())
 
 
 def _find_sample(name: str) -> Sample:
@@ -111,8 +111,8 @@ def _sample_folder(sample: Sample) -> Path:
     return Path(base) / sample.folder
 
 
-def _has_known_hash(path: Path, file: SampleFile) -> bool:
-    """Return whether a file exists and has the SHA-256 of the sample."""
+def _has_expected_hash(path: Path, file: SampleFile) -> bool:
+    """Return whether a file exists and has the expected SHA-256."""
     try:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):  # a pipe would block the reader

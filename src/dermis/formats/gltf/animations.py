@@ -49,7 +49,7 @@ class _Keyframes(NamedTuple):
 
 
 def clip_names(path: Path) -> tuple[str, ...]:
-    """Return the names of a file's animation clips; a clip without a name gets one by its index: "clip 0"."""
+    """Return the names of a file's animation clips; "clip 0", by its index, for a clip without a name."""
     return _document_clip_names(read_document(path))
 
 
@@ -130,6 +130,11 @@ def _weight_track(
 
 
 def _merge_tracks(path: str, members: list[tuple[str, _Keyframes]]) -> AnimationTrack:
+    """Merge animated nodes or targets with equal key times into one track.
+
+    path : animated property, see `AnimationTrack`
+    members : name and keyframes of each node or target
+    """
     keys = members[0][1]
     values = np.stack([own.values for _, own in members], axis=-2)
     curve = AnimationCurve(keys.times_s, values, keys.kind, is_rotation=path == "rotation")

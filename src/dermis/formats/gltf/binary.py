@@ -34,7 +34,7 @@ class BufferBuilder:
     def add_view(self, data: bytes, target: int | None = None) -> int:
         """Append bytes to the buffer and return the index of their buffer view.
 
-        target : `VERTICES` or `INDICES`; None for data that is neither
+        target : `VERTICES` or `INDICES`; None for other data
         """
         self.data += b"\0" * (-len(self.data) % 4)
         entry = {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(data)}
@@ -46,7 +46,7 @@ class BufferBuilder:
         """Append n elements of k components, (n, k), and return the index of their accessor.
 
         rows : float32 or unsigned integers
-        target : `VERTICES` or `INDICES`; None for data that is neither
+        target : `VERTICES` or `INDICES`; None for other data
         bounded : whether to store each component's minimum and maximum, which glTF requires for positions
         """
         values = _little_endian(rows)
@@ -57,17 +57,17 @@ class BufferBuilder:
     def add_triangles(self, index: Numbers, count: int) -> int:
         """Append the vertex indices of triangles, (f, 3), and return the index of their accessor.
 
-        count : number of vertices of the primitive, which decides the integer type
+        count : number of vertices of the primitive, by which the smallest sufficient integer type is chosen
         """
         return self.add_accessor(index.reshape(-1, 1).astype(_index_dtype(count)), INDICES)
 
     def add_displacements(self, row: Numbers, columns: Sequence[Numbers], count: int) -> list[int]:
         """Append arrays (count, 3) that are mostly 0, and return the indices of their accessors.
 
-        They are stored as sparse accessors, or densely if that is smaller.
+        The arrays are stored as sparse accessors, or as dense accessors if these are smaller.
 
         row : (m,) indices of the rows that are not 0, in increasing order, the same for all arrays
-        columns : for each array, the values of these rows (m, 3)
+        columns : for each array, the values (m, 3) of the rows in `row`
         count : number of vertices
         """
         if not len(row):

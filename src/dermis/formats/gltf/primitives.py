@@ -65,8 +65,8 @@ class SurfacePrimitive:
     def primitive(self, binary: BufferBuilder) -> Tree:
         """Append vertices and triangles to the buffer; return the primitive without material and targets.
 
-        Its extras record whether triangles form quads, and whether points are not shared with other
-        primitives.
+        The extras of the primitive record whether its triangles form quads, and whether no other primitive
+        shares its points.
         """
         used, mesh = self.vertices, self._head.mesh
         index = binary.add_triangles(np.searchsorted(used, mesh.triangles[self.faces]), len(used))
@@ -111,7 +111,7 @@ class SurfacePrimitive:
 
 @dataclass(frozen=True, eq=False)
 class HairPrimitive:
-    """Hairs as tubes; their colours are the texels of a picture with one row."""
+    """Hairs as tubes; the colours of the hairs are the texels of a picture with one row."""
 
     deformable: DeformableMesh
     fibres: FibreTubes
@@ -123,7 +123,7 @@ class HairPrimitive:
     def primitive(self, binary: BufferBuilder) -> Tree:
         """Append vertices and triangles to the buffer; return the primitive without material and targets.
 
-        Its extras mark it as hair, which `read_gltf` skips.
+        The extras of the primitive mark it as hair, so that `read_gltf` skips it.
         """
         positions, normals = self.fibres.pose_vertices(self._rest_points)
         _, uv = self.fibres.colours()
@@ -161,7 +161,7 @@ def _vertex_attributes(
 def _bone_attributes(
     binary: BufferBuilder, deformable: DeformableMesh, vertex: NDArray[np.integer]
 ) -> dict[str, int]:
-    """Append joints and weights of vertices to the buffer, and return their accessors; {} without a skeleton.
+    """Append joints and weights of vertices to the buffer; return their accessors, {} without a skeleton.
 
     vertex : (v,) indices of the vertices in the mesh
     """
@@ -188,7 +188,7 @@ class FibreTubes:
     def from_strands(cls, strands: Strands, mesh: Mesh, max_hairs: int, knots: int) -> FibreTubes:
         """Return tubes for at most `max_hairs` hairs with `knots` knots each.
 
-        They are widened to cover as much area as all hairs of `strands`, and their absorption is reduced
+        The tubes are widened to cover as much area as all hairs of `strands`, and their absorption is reduced
         accordingly.
         """
         count = min(len(strands), max_hairs)
@@ -259,7 +259,7 @@ class FibreTubes:
     def displacements_at(self, points_mm: Doubles, delta_mm: Doubles) -> tuple[Index, Doubles]:
         """Return the tube vertices that move when the skin is displaced.
 
-        They are vertex indices (k,) and displacements (k, 3) [mm].
+        Returns vertex indices (k,) and displacements (k, 3) [mm].
 
         points_mm, delta_mm : (p, 3) points of the mesh at rest, and their displacements
         """
@@ -293,7 +293,7 @@ class FibreTubes:
         return np.asarray((start[:, None, None] + np.concatenate(faces)).reshape(-1, 3), np.int64)
 
     def colours(self) -> tuple[Floats, Floats]:
-        """Return a palette of c linear hair colours (1, c, 3), and uv of the tube vertices in it (n m, 2)."""
+        """Return a palette of c linear hair colours (1, c, 3), and uv (n m, 2) of the tube vertices in it."""
         absorbance = self.strands.absorption * self.strands.radius_mm.max(axis=1, keepdims=True)
         albedo = np.exp(-_ALBEDO_EXPONENT * np.sqrt(absorbance.astype(np.float64)))
         order = np.argsort(albedo.sum(axis=1), kind="stable")

@@ -87,7 +87,7 @@ def read_materials(document: Document) -> tuple[FileMaterial, ...]:
 
 
 class _Reader:
-    """Reader of one material; properties without effect are collected for its note."""
+    """Reader of one material; it collects the properties without effect, which a note lists."""
 
     def __init__(self, document: Document, material: Tree) -> None:
         self.document, self.material = document, material
@@ -130,7 +130,7 @@ class _Reader:
         )
 
     def _own_maps(self, extras: Tree) -> dict[str, object]:
-        """Return keyword arguments of `load_maps` from the extras of a file that this package wrote."""
+        """Return keyword arguments of `load_maps` from the extras that this package writes to its files."""
         colour = extras.get("colour") or (self.material.get("pbrMetallicRoughness") or {}).get(
             "baseColorTexture"
         )
@@ -177,7 +177,7 @@ class _Reader:
         return r, g, b
 
     def _texture(self, reference: Tree | None, channel: int | None) -> Texture | None:
-        """Return the texture that a material references; None without a reference or a readable picture.
+        """Return the texture that a material references; None without reference or readable picture.
 
         channel : see `Texture`
         """
@@ -211,9 +211,11 @@ class _Reader:
 
 
 def read_picture(document: Document, source: Any) -> EmbeddedPicture:
-    """Return the image with an index in a document; its format is detected from its content.
+    """Return an image of a document, selected by index; its format is detected from its content.
 
-    Raises DermisError for a file outside the folder.
+    source : index of the image
+
+    Raises DermisError for an image file outside the folder of the document.
     """
     image = document.item("images", source)
     name = f"{document.path}, image {image.get('name', source)}"

@@ -30,7 +30,7 @@ from dermis.formats.gltf.rigs import (
 from dermis.formats.gltf.unread import LIGHTS, note_unread
 from dermis.formats.materials import FileMaterial
 from dermis.formats.parts import GREY, MaterialGroup, MeshFile, MeshPart, find_quads
-from dermis.formats.text_files import listed
+from dermis.formats.text_files import list_names
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 _MAX_COUNTS = {
@@ -107,7 +107,7 @@ def _refuse_extensions(document: Document) -> None:
     unsupported = [name for name in required if name not in _READ_EXTENSIONS]
     if unsupported:
         advice = next((_ADVICE[name] for name in unsupported if name in _ADVICE), _OTHER_ADVICE)
-        refuse(document.path, "plain glTF", f"the file requires {listed(unsupported)}", advice)
+        refuse(document.path, "plain glTF", f"the file requires {list_names(unsupported)}", advice)
 
 
 @dataclass
@@ -115,7 +115,7 @@ class _SceneReader:
     """Reader of the primitives of a glTF scene as mesh parts.
 
     weights : default weights of morph targets by name
-    notes : notes on content that was not read
+    notes : notes on content that was not read, as keys
     """
 
     document: Document
@@ -254,7 +254,7 @@ class _SceneReader:
 
 
 def _own_extras(primitive: Tree) -> Tree:
-    """Return the "dermis" entry of a primitive's extras, which exports of this package write, else {}."""
+    """Return the "dermis" entry of a primitive's extras, which this package writes; {} in other files."""
     extras = primitive.get("extras")
     own = extras.get("dermis") if isinstance(extras, dict) else None
     return own if isinstance(own, dict) else {}
@@ -276,9 +276,10 @@ def _transform_part(part: MeshPart, targets: dict[str, VertexDisplacements], mat
 
 
 def _nearest_rigid(matrix: Doubles) -> Doubles:
-    """Return the rigid transform that a matrix (4, 4) equals except for rounding errors.
+    """Return the rigid transform that a matrix (4, 4) approximates up to rounding errors.
 
-    Other matrices are returned unchanged. The errors come from exporters, which write scales like 1.0000001.
+    Matrices that are not nearly rigid are returned unchanged. The rounding errors come from exporters, which
+    write scales like 1.0000001.
     """
     deviation = np.abs(matrix[:3, :3] @ matrix[:3, :3].T - np.eye(3)).max()
     if not 1e-13 < deviation < 1e-5:
@@ -319,8 +320,8 @@ def _skin_part(
 def _normal_matrix(linear: Doubles) -> Doubles:
     """Return the matrices (..., 3, 3) that transform normals for linear transforms (..., 3, 3).
 
-    They are scaled so that a uniform scale preserves the length of normals. Cofactors are used because they
-    are also valid for singular transforms.
+    The matrices are scaled so that a uniform scale preserves the length of normals. Cofactors are used
+    because cofactors exist for singular transforms, too.
     """
     rows = [linear[..., k, :] for k in range(3)]
     cofactors = np.stack([np.cross(rows[(i + 1) % 3], rows[(i + 2) % 3]) for i in range(3)], axis=-2)

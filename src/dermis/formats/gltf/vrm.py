@@ -13,7 +13,7 @@ from dermis.formats.axes import DEFAULT_AXES, Axes
 from dermis.formats.gltf.document import Document, Tree
 from dermis.formats.gltf.rigs import VertexDisplacements
 from dermis.formats.size_limits import MAX_DISPLACEMENTS, MAX_TARGETS, check_limit
-from dermis.formats.text_files import listed
+from dermis.formats.text_files import list_names
 
 VRM_0, VRM_1 = "VRM", "VRMC_vrm"
 """Extensions of VRM 0.x, whose avatars look along -Z, and of VRM 1.0, whose avatars look along +Z."""
@@ -50,7 +50,8 @@ _MAX_WEIGHT = 100.0
 class Avatar:
     """Properties that a VRM file adds to glTF; the defaults describe glTF files without VRM.
 
-    expressions : weights by mesh (Python's `id` of its JSON tree), expression name and morph target index
+    expressions : for each mesh (Python's `id` of its JSON tree), the expressions by name; an expression maps
+        the index of a morph target to its weight
     """
 
     axes: Axes = DEFAULT_AXES
@@ -60,10 +61,10 @@ class Avatar:
     def with_expressions(
         self, mesh: Tree, names: Sequence[str], targets: dict[str, VertexDisplacements]
     ) -> dict[str, VertexDisplacements]:
-        """Return the morph targets of a primitive, with its expressions added as further morph targets.
+        """Return the morph targets of a primitive, with the expressions added as further morph targets.
 
         names : names of the morph targets of the mesh
-        targets : targets of the primitive, by name
+        targets : morph targets of the primitive, by name
 
         An expression with the name of a morph target is omitted.
 
@@ -165,7 +166,7 @@ def _notes(extensions: Tree, avatar: Tree, is_vrm_0: bool) -> Iterator[str]:
     materials = avatar.get("materialProperties") or ()
     toon = [str(one.get("name")) for one in materials if "MToon" in str(one.get("shader"))]
     if toon:
-        yield f"cartoon shading (shade colour, outline, rim light) is not drawn: {listed(toon)}"
+        yield f"cartoon shading (shade colour, outline, rim light) is not drawn: {list_names(toon)}"
 
 
 def _sum_displacements(sources: Sequence[tuple[VertexDisplacements, float]]) -> VertexDisplacements:

@@ -74,9 +74,9 @@ def load_live_link(path: Path, head: Head, fps: float | None = None) -> Clip:
     """Load a CSV file of Live Link Face as a clip for a head.
 
     Columns are identified by name, in any order: Timecode or another time, blend shapes, and angles [rad]
-    HeadPitch, HeadYaw and HeadRoll about the head's x, y and z axes, likewise for LeftEye and RightEye.
-    They rotate the bones found by `find_rotation_bones`. Columns are separated by commas, semicolons or tabs.
-    Empty cells and frames without a face are interpolated, weights in percent and angles in degrees are
+    HeadPitch, HeadYaw and HeadRoll about the head's x, y and z axes, likewise for LeftEye and RightEye. The
+    angles rotate the bones found by `find_rotation_bones`. Columns are separated by commas, semicolons or
+    tabs. Empty cells and frames without a face are interpolated, weights in percent and angles in degrees are
     converted, each with a note.
 
     fps : frame rate of the timecode; by default estimated from its largest frame number
@@ -195,8 +195,8 @@ def _complete_table(path: Path, lines: list[str], table: _CaptureTable, states_s
 def _rows_without_face(values: Doubles, is_angle: Mask, states_shapes: Mask) -> Mask:
     """Return the mask (k,) of rows without a face: empty rows, and rows of zeros that no face would have.
 
-    Rows of zeros show no face if most other rows have a rotated head, or if these rows state no number of
-    blend shapes and others do.
+    Rows of zeros show no face if most other rows have a rotated head, or if the rows of zeros state no number
+    of blend shapes and other rows do.
     """
     numbers = np.nan_to_num(values)
     zero = np.asarray(~numbers.any(axis=1))

@@ -84,12 +84,12 @@ class _CapturedFrame(NamedTuple):
 def load_mediapipe(path: Path, head: Head, fps: float | None = None) -> Clip:
     """Load results of MediaPipe's face landmarker as a clip for a head.
 
-    The file has one result per line, a list of them, or an object with such a list. Keys may be spelled as in
-    any of MediaPipe's APIs, such as face_blendshapes and faceBlendshapes. Blend shapes are {name: score}, or
-    a list of names and scores for each face; facial transformations (4, 4) are nested or flat lists or
-    objects with data, and rotate the bones found by `find_rotation_bones`; "time" [s], "timestamp_ms" and
-    others are times. Only the first face is used. Frames without a face are interpolated. Assumptions are
-    noted.
+    The file has one result per line, a list of results, or an object that contains such a list. Keys may be
+    spelled as in any of MediaPipe's APIs, such as face_blendshapes and faceBlendshapes. Blend shapes are
+    {name: score}, or a list of names and scores for each face; facial transformations (4, 4) are nested or
+    flat lists or objects with data, and rotate the bones found by `find_rotation_bones`; "time" [s],
+    "timestamp_ms" and similar keys are times. Only the first face is used. Frames without a face are
+    interpolated. Notes state all assumptions.
 
     fps : frame rate if the frames have no time; by default the rate that the file states, or 30
 
@@ -200,7 +200,7 @@ def _parse_frame(culprit: str, index: int, record: object, columns: dict[str, in
 
 
 def _first_face(value: object) -> tuple[object, int]:
-    """Return the blend shapes of the first face, None for no face, and the number of faces.
+    """Return the blend shapes of the first face, or None if there is no face, and the number of faces.
 
     value : blend shapes of one face, an object around their list, or a list of such values, one for each face
     """
@@ -245,7 +245,8 @@ def _facial_transformation(culprit: str, value: object) -> Doubles | None:
     The translation is in the last column of the result. A flat list without a translation is taken to be in
     column-major order, as MediaPipe's APIs return it.
 
-    value : matrix as a nested or flat list, an object with it, or a list of either
+    value : matrix as a nested or flat list, an object that contains the matrix, or a list of matrices or such
+        objects
     """
     by_columns = False
     while isinstance(value, dict) or (isinstance(value, list) and value and not _is_row(value[0])):
@@ -270,7 +271,7 @@ def _facial_transformation(culprit: str, value: object) -> Doubles | None:
 
 
 def _is_row(value: object) -> bool:
-    """Return whether the first entry of a list is a row or a number of a matrix, not a whole matrix."""
+    """Return whether the first entry of a list is a row or a number of one matrix, not a whole matrix."""
     is_nested = isinstance(value, list) and (len(value) != 4 or isinstance(value[0], list))
     return not is_nested and not isinstance(value, dict)
 

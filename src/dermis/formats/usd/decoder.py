@@ -83,14 +83,14 @@ class _SceneReader:
         self.vertices = self.triangles = 0
 
     def read(self) -> Arrays:
-        """Return the arrays of all meshes, whose names begin with the mesh's number, and the JSON "scene"."""
+        """Return the arrays of all meshes by name, mesh number first, and the scene as JSON, "scene"."""
         meshes, unread = list[Tree](), Counter[str]()
         for count, prim in enumerate(self._prims()):
             limits.check_limit(self.path, count, limits.MAX_NODES, "prims", "Export the head alone")
             if prim.IsA(self.geom.Mesh):
                 if self._is_visible(prim):
                     limits.check_limit(self.path, len(meshes), limits.MAX_GROUPS, "meshes", "Join some")
-                    meshes.append(self._mesh(self.geom.Mesh(prim), str(len(meshes))))
+                    meshes.append(self._add_mesh(self.geom.Mesh(prim), str(len(meshes))))
             elif prim.GetTypeName() not in _TYPES_WITHOUT_NOTE:
                 unread[str(prim.GetTypeName())] += 1
         if unread:
@@ -123,7 +123,7 @@ class _SceneReader:
         is_hidden = shown.ComputePurpose() in _HIDDEN_PURPOSES
         return not is_hidden and shown.ComputeVisibility(self.time) != "invisible"
 
-    def _mesh(self, mesh: UsdGeom.Mesh, mesh_number: str) -> Tree:
+    def _add_mesh(self, mesh: UsdGeom.Mesh, mesh_number: str) -> Tree:
         """Add the arrays of a mesh to the answer, and return its names and materials."""
         prim, matrix = mesh.GetPrim(), np.array(self.transform_cache.GetLocalToWorldTransform(mesh.GetPrim()))
         points, faces = self._geometry(mesh)
@@ -139,7 +139,7 @@ class _SceneReader:
             if primvar is not None:
                 arrays |= {name: primvar.values, f"{name} index": primvar.corner_index[order]}
         if normals is not None and np.linalg.det(matrix[:3, :3]) != 0:
-            arrays["normals"] = _normalised(normals.values @ np.linalg.inv(matrix[:3, :3]).T)
+            arrays["normals"] = _normalise(normals.values @ np.linalg.inv(matrix[:3, :3]).T)
         if colours is not None:
             arrays["colours"] = colours
         self.arrays |= {
@@ -204,7 +204,7 @@ class _SceneReader:
         return self.material_index[key]
 
     def _uv(self, prim: Usd.Prim, faces: _Faces, materials: list[int]) -> _Primvar | None:
-        """Return the uv that the mesh's materials name, else uv with a usual name; None without any."""
+        """Return the uv that the mesh's materials name, else the uv with a usual name; None without uv."""
         named = dict.fromkeys(one for k in materials if k >= 0 and (one := self.materials[k].get("uv")))
         if len(named) > 1:
             self.notes[_SEVERAL_UV_NOTE] = None
@@ -215,7 +215,7 @@ class _SceneReader:
         return next((one for one in found if one is not None), None)
 
     def _primvar(self, primvar: UsdGeom.Primvar, faces: _Faces, width: int) -> _Primvar | None:
-        """Return a primvar if its elements have `width` numbers, else None."""
+        """Convert a primvar of the file; return None unless its elements have `width` numbers."""
         if not primvar or not primvar.HasValue():
             return None
         values = np.array(primvar.Get(self.time), np.float64)
@@ -263,7 +263,7 @@ class _SceneReader:
         return None, np.clip(np.column_stack(sums) / weight[:, None], 0.0, 1.0)
 
 
-def _normalised(vectors: Doubles) -> Doubles:
+def _normalise(vectors: Doubles) -> Doubles:
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     return np.asarray(vectors / np.where(length > 0, length, 1.0))
 

@@ -23,7 +23,7 @@ _ADVICE = "Flatten it into one file (usdcat --flatten), or export a .usdz"
 
 
 class OpenedStage(NamedTuple):
-    """Stage of a USD file, and the folder of its layers; the layers of a package were copied there."""
+    """Stage of a USD file, and the folder of its layers, to which the layers of a package are copied."""
 
     stage: Usd.Stage
     folder: Path
@@ -111,7 +111,12 @@ def _layer_names(path: Path, layer: Sdf.Layer) -> Iterator[str]:
 
 
 def _layer_file(layer: Path, name: str, folder: Path) -> Path | None:
-    """Return the file of a layer that another layer references; None if it is not a layer in the folder."""
+    """Return the file of a layer that another layer references; None for a file outside the folder.
+
+    layer : file of the referencing layer
+    name : name by which it references the other layer
+    folder : folder that must contain all layers
+    """
     if any(mark in name for mark in ":[`\0"):  # names with schemes, packages or expressions
         return None
     file = (layer.parent / name).resolve()

@@ -162,7 +162,7 @@ class _Pictures:
         return "folder of the file" if self.package is None else "package"
 
     def _find_picture(self, name: str) -> PathLike | None:
-        """Return the picture with a name relative to the layers, or None."""
+        """Return the picture with a name relative to the layers; None if it does not exist."""
         if self.package is None:
             return find_referenced_file(self.path, name) if name else None
         if name not in self.sizes:

@@ -187,7 +187,7 @@ class MaterialReader:
         return found
 
     def _source(self, shader: UsdShade.Shader, input_name: str) -> _Source | None:
-        """Return the output to which an input of a shader is connected, or None."""
+        """Return the shader output to which an input of a shader is connected; None without a connection."""
         for attribute in self._attributes(shader, input_name):
             kind, output = str(attribute.GetName()).split(":", 1)
             if kind == "outputs":
