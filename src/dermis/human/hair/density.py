@@ -155,7 +155,7 @@ def _sum_zones(name: str, rows: Floats, points: Doubles) -> Doubles:
 
 @cache
 def skin_vertices_near_hair(root_finder: RootFinder, bearded: bool) -> Index:
-    """Return the indices of subdivided vertices within reach of hair; `SkinSurface` needs no others.
+    """Return the indices of the subdivided vertices within reach of hair, which `SkinSurface` needs.
 
     bearded : whether the beard is included
     """

@@ -41,8 +41,8 @@ def add_hair(
     root_finder : root finder of the template person, on whom brows and lashes are defined
     look : length, density, curl and colour of the hair
     recession : recession of the hairline, 0 to 1, see `SkinLook`
-    hairs : fraction of scalp and beard hairs to generate; the hairs are widened by its inverse to keep
-        coverage
+    hairs : fraction of scalp and beard hairs to generate; the hairs are widened by the inverse of this
+        fraction, so that coverage stays the same
     """
     skin = SkinSurface(head.mesh, skin_vertices_near_hair(root_finder, look.beard_mm > 0.0))
     surface = GrowthSurface(head, control_head.mesh, skin, hairs)
@@ -129,7 +129,7 @@ def _hair_group(
 def _join_groups(groups: list[HairGroup], absorption: Doubles) -> Strands:
     """Return the strands of several hair groups as one object.
 
-    absorption : (n, 3) absorption coefficients of single hairs [1/mm]; lower in strands that are wider
+    absorption : (n, 3) absorption coefficients of single hairs [1/mm]; wider strands get lower coefficients
     """
     roots = _concatenate(group.roots for group in groups)
     knots, radius = (np.concatenate([group[k] for group in groups]) for k in (1, 2))
@@ -159,8 +159,7 @@ def _fine_hair_absorption(groups: list[HairGroup], look: HairLook) -> Doubles:
 def _mixed_hair_absorption(groups: list[HairGroup], look: HairLook) -> Doubles:
     """Return absorption coefficients (n, 3) of strands that each represent white and pigmented hairs [1/mm].
 
-    A mixture of white and brown hairs looks grey, which brown hair with less pigment would not: it looks
-    blond.
+    A mixture of white and brown hairs looks grey, whereas brown hair with less pigment looks blond.
     """
     rng, n = np.random.default_rng((look.seed, 6)), sum(len(group.radius) for group in groups)
     white = rng.binomial(_HAIRS_PER_COLOUR, look.grey, n)[:, None] / _HAIRS_PER_COLOUR

@@ -198,9 +198,9 @@ def _trace_guides(
     """Trace guide hairs over the skin; return the offsets (g, k, 3) of their knots from their roots [mm].
 
     root_mm : (g, 3) control points at which the guides grow [mm]
-    base_mm, normal : (g, 3) projections of these control points onto the skin [mm], and the skin normals
-        there
-    guide, knots : shapes of the guides, and number of knots of each
+    base_mm, normal : (g, 3) projections of these control points onto the skin [mm], and the skin normals at
+        the projections
+    guide, knots : shapes of the guides, and number of knots of each guide
     """
     root_offset = root_mm - base_mm  # distance of the control points from the smooth surface
     directions, height, step = guide.directions, np.zeros(len(root_mm)), guide.length_mm / (knots - 1)
@@ -369,7 +369,7 @@ def _strand_group(
     radius_mm: float,
     rng: np.random.Generator,
 ) -> HairGroup:
-    """Return strands with radii and coverage; each is wide enough to represent several hairs.
+    """Return strands with radii and coverage; each strand is wide enough to represent several hairs.
 
     hair : frames of the strand roots
     offsets : (k, 3, n) knot offsets from the roots, from `grow_hair` [mm]

@@ -44,13 +44,13 @@ class HairLook:
     density : float
         Density of the hair of the head, 0 to 1; 1 is 200 hairs per cm2 [-].
     curl : float
-        From straight, 0, to tightly coiled, 1 [-].
+        Curl of all hair, from 0, straight, to 1, tightly coiled [-].
     fade : float
-        How much shorter short hair is at the sides and the nape than on top, 0 to 1 [-].
+        Fraction by which "short" hair is shorter at the sides and the nape than on top, 0 to 1 [-].
     beard_mm : float
-        Length of the beard, 0 to 30; 0 for none [mm].
+        Length of the beard, 0 to 30; 0 for no beard [mm].
     bushy : float
-        Brows, from sparse and short, 0, to dense and long, 1 [-].
+        Bushiness of the brows, from 0, sparse and short, to 1, dense and long [-].
     grey : float
         Fraction of hairs without pigment, 0 to 1 [-].
     eumelanin, pheomelanin : float
@@ -116,7 +116,7 @@ def typical_hair(demographics: Demographics, eumelanin: float, pheomelanin: floa
 
 
 def sample_hair(rng: np.random.Generator, demographics: Demographics, typical: HairLook) -> HairLook:
-    """Return a random hair look around the typical one of a person.
+    """Return a random hair look around the typical hair look of a person.
 
     Men have cropped or shaved hair more often than women, and only men have beards. The order of random draws
     does not depend on the person.

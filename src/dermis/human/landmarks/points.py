@@ -29,8 +29,8 @@ class LandmarkPoints:
 
     names : names of the n landmarks in the order of the set
     point, weight : (n, 4) indices of the mesh points and their weights
-    material : (n,) index of the material that must be visible at the landmark for it to count as visible;
-        -1 for any material
+    material : (n,) a landmark counts as visible only where the material with this index is seen; -1 for any
+        material
     """
 
     names: tuple[str, ...]
@@ -59,7 +59,7 @@ def landmark_points(head: Head, name: str) -> LandmarkPoints:
 def check_landmarks(name: object) -> str:
     """Validate the name of a landmark set or the path of a landmark table, and return it.
 
-    Raises DermisError if it is neither.
+    Raises DermisError if it is neither a published set nor a .csv file.
     """
     text = str(checked_path(name, "a set of landmarks or its table"))
     if text not in LANDMARK_SETS and not text.endswith(".csv"):
