@@ -69,8 +69,8 @@ def make_bind_group(
 class ResourceCache(Generic[T]):
     """Cache keyed by the identity of resources; an entry is dropped when one of its resources is released.
 
-    A bind group keeps the memory of its resources allocated, so it must be dropped as soon as one of them is
-    no longer used elsewhere.
+    A bind group keeps the memory of its resources allocated. It must therefore be dropped as soon as nothing
+    else uses one of its resources.
     """
 
     def __init__(self) -> None:
@@ -88,7 +88,7 @@ class ResourceCache(Generic[T]):
         return len(self._keys)
 
     def find(self, key: ResourceKey) -> T | None:
-        """Return the cached entry for a key of `resource_key`, or None."""
+        """Return the cached entry for a key of `resource_key`, or None without an entry."""
         return self._entries.get(key)
 
     def add(self, key: ResourceKey, resources: Sequence[object], entry: T) -> None:

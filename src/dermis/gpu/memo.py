@@ -21,9 +21,10 @@ FunctionKey = tuple[Callable[..., object], str]
 class CachedResult:
     """Cached result of a function call.
 
-    args : arguments of the call, compared with later ones
+    args : arguments of the call, which are compared with the arguments of later calls
     value : return value
-    parts : results that the function itself took from the cache; they count as used whenever this one is used
+    parts : results that the function itself took from the cache; the parts count as used whenever this result
+        is used
     keys : keys of this result and of all its parts
     """
 
@@ -67,8 +68,8 @@ class Memo:
         """Return `function(*args, *untracked)`, or the cached result of a call with equal `args`.
 
         untracked : further arguments that do not affect the result and are not compared
-        owner : name of the caller that the result is for, such as a feature, if several callers use the same
-            function
+        owner : name of the caller, such as a feature, if several callers use the same function; their results
+            are cached separately
         """
         key = function, owner
         results = self._results.setdefault(key, [])

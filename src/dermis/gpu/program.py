@@ -69,7 +69,7 @@ class Program:
         self._layout = device.handle.create_pipeline_layout(bind_group_layouts=[self._group_layout])
 
     def record(self, struct: str, **values: object) -> UniformRecord:
-        """Return a uniform record for a struct of the shader: zeros, except for the given members."""
+        """Return a uniform record for a struct of the shader; members without a value are 0."""
         return make_record(self.source.text, struct, **values)
 
     def record_positions(self, resources: Bindings, uniforms: Uniforms) -> tuple[int, ...]:
@@ -113,7 +113,7 @@ class Program:
     def uniform_values(self, resources: Bindings, uniforms: Uniforms) -> tuple[Hashable, ...]:
         """Return the bytes of the uniform records that the shader reads, as part of a pass's key.
 
-        Large records are returned whole, as several passes share their hash.
+        Large records are returned as a whole, because several passes share the hash of a record.
         """
         found: list[Hashable] = []
         records: UniformRecords = resources  # type: ignore[assignment]  # no cast, which costs time
@@ -199,7 +199,8 @@ class RenderProgram(Program):
 
     targets : texture formats of the colour targets; empty to draw only depth
     depth_compare : wgpu's name of the depth test, such as "less"; None for no depth attachment
-    has_fragment : whether `fragment` runs, which may discard pixels of a depth pass; by default with targets
+    has_fragment : whether `fragment` runs, which may discard pixels of a depth pass; by default only if there
+        are targets
     raster : depth test and format of the first target, for players of captured frames
     """
 
@@ -247,7 +248,7 @@ def cached_program(device: Device, shader: Hashable, constants: Constants, make:
 
 
 def used_constants(path: Path, folders: Sequence[Folder], constants: Constants) -> dict[str, float]:
-    """Return the pipeline constants that a shader declares, by name; others would be an error in WebGPU."""
+    """Return those pipeline constants that a shader declares, by name; WebGPU refuses all others."""
     text = shader_source(path, folders).text
     return {name: value for name, value in constants if f"override {name}:" in text}
 

@@ -35,7 +35,7 @@ class ShaderListMember(NamedTuple):
     """Member of a list that `//#include <list>` and `//#each list` expand, such as one light type.
 
     name : name in scene files; in shaders, {name} has underscores for hyphens and {NAME} is in capitals
-    file : shader file to include; None if the member has none
+    file : shader file to include; None for a member without a file
     words : replacements for further {words} in `//#each` lines
     """
 
