@@ -109,7 +109,7 @@ def _mixing_bytes(request: FrameRequest) -> float:
 
 
 def _halved_settings(settings: Settings, option: str) -> Settings | None:
-    """Return settings with half the value of a size option, None if that is too small.
+    """Return settings with half the value of a size option, None if half the value is too small.
 
     For "size", the samples per pixel are halved first.
     """

@@ -134,7 +134,7 @@ def workgroup_grid(count: int, workgroup: int = WORKGROUP_SIZE) -> tuple[int, in
 def registry_version() -> int:
     """Return a number that changes whenever a light, a lobe or an output is registered or removed.
 
-    Shaders that list these are then compiled again.
+    Shaders that list lights, lobes or outputs are then compiled again.
     """
     return KINDS.changes + MODELS.changes + OUTPUTS.changes
 

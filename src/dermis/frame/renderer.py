@@ -405,8 +405,8 @@ class Renderer:
         linear : bool
             True returns float32 linear Rec. 709 instead of sRGB bytes.
         previous : Scene or iterable of Scene, optional
-            Scene before the first one, for motion vectors between consecutive scenes of the same head; or the
-            previous scene of each scene.
+            Scene before the first scene, for motion vectors between consecutive scenes of the same head; or
+            the previous scene of each scene.
         landmarks : iterable of str
             Landmark sets (keys of `dermis.human.landmarks.sets.LANDMARK_SETS`), or files of rows name,vertex.
 

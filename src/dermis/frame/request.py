@@ -24,8 +24,9 @@ from dermis.scene.skin import Skin
 class FrameRequest:
     """Everything on which the cached resources of a frame depend.
 
-    profile : diffusion profile of the skin, the first one if a map blends several
-    rest_positions_mm : (p, 3) control points of the person at rest [mm], None if they are the topology's
+    profile : diffusion profile of the skin, the first profile if a map blends several profiles
+    rest_positions_mm : (p, 3) control points of the person at rest [mm], None if they equal those of the
+        topology
     environment_map : prefiltered map of `environment`
     light_part_counts : number of parts into which each light is divided, suns of the environment last
     shadow_layers : number of shadow maps

@@ -47,7 +47,7 @@ class ProfileSplit:
 
 
 class TechniqueResources:
-    """Tables and textures of a technique; this base class has none."""
+    """Tables and textures of a technique; this base class has no fields."""
 
 
 class TechniqueTraits:

@@ -30,7 +30,7 @@ class Kind(Generic[L]):
     Attributes
     ----------
     always : bool
-        Whether all shaders include this kind of light; others are compiled only for scenes that use them.
+        Whether all shaders include this kind of light; other kinds are compiled only for scenes with them.
     punctual : bool
         Whether all light comes from one position or from one direction; False for area lights.
     round : bool

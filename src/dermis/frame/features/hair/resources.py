@@ -43,7 +43,7 @@ _HAIRS_DTYPE = np.dtype([*((name, "u4") for name in _COUNT_MEMBERS), ("width_sca
 
 
 class StrandCounts(NamedTuple):
-    """Number of strands of one group, fine or coarse, and of the knots of each strand."""
+    """Number of strands of one group (fine or coarse), and number of knots of each strand."""
 
     hairs: int
     knots: int
@@ -53,7 +53,7 @@ class StrandCounts(NamedTuple):
         return (self.hairs if hairs is None else hairs) * self.knots
 
     def all_segments(self, hairs: int | None = None) -> int:
-        """Return the total number of segments between knots of the first `hairs` strands, or of all."""
+        """Return the number of segments between knots of the first `hairs` strands, or of all strands."""
         return (self.hairs if hairs is None else hairs) * (self.knots - 1)
 
 
@@ -98,7 +98,7 @@ def strand_counts(strands: Strands | None) -> StrandCounts:
 
 
 def strand_capacity(head: Head) -> StrandCapacity:
-    """Return the capacity for the strands of a head, rounded up so that most heads can share buffers."""
+    """Return the buffer capacity for the strands of a head, rounded up so that most heads share buffers."""
     fine, coarse = map(strand_counts, (head.strands, head.hair))
     knots = fine.all_knots() + coarse.all_knots()
     step = _KNOT_CAPACITY_STEP if coarse.hairs else _FINE_CAPACITY_STEP
@@ -130,7 +130,7 @@ def make_strand_picture(device: Device, capacity: StrandCapacity, size: tuple[in
 def chains_per_tile(device: Device, tiles: int) -> int:
     """Return the number of linked lists of segments per tile of the picture.
 
-    It is 1 on software adapters, and where a buffer cannot hold more.
+    The number is 1 on software adapters, and where a buffer cannot hold more lists.
 
     tiles : number of tiles of the picture
     """
@@ -165,7 +165,8 @@ class StrandTables:
     shadow_casters : number of coarse strands that cast the shadows of all coarse strands
     centre_mm : (3,) centre of the roots of the coarse strands at rest [mm]
     mean_width_mm : mean width of the coarse strands [mm]
-    mean_cover : projected area of hair per area of skin around the root of a coarse strand, on average [-]
+    mean_cover : mean over the coarse strands of `Strands.cover`, the projected area of hair per area of skin
+        around the root [-]
     """
 
     strands: Buffer
@@ -280,7 +281,7 @@ def _knot_rows(strands: Strands) -> NDArray[np.float32]:
 
 
 def mean_skin_albedo(head: Head) -> tuple[float, ...]:
-    """Return the mean (3,) albedo of the colour map, or a default without one [-]."""
+    """Return the mean (3,) albedo of the colour map, or a default albedo if there is no map [-]."""
     colour = head.maps.mean_colour
     return (DEFAULT_COLOUR,) * 3 if colour is None else tuple(colour.tolist())
 
