@@ -29,7 +29,7 @@ _GROWTH = 1.02  # step by which the side of the map grows until all tiles fit
 class Tile:
     """Rectangle of the shared map that shows one material of the mesh.
 
-    material : index of the file's material, -1 for none
+    material : index of the file's material, -1 if there is none
     vertices, triangles : indices of vertices and triangles in the mesh
     uv : (n, 2) positions of the vertices in the material's pictures, v down
     low, high : (2,) lowest and highest position in the pictures that the tile shows

@@ -304,7 +304,7 @@ class GroupNames(NamedTuple):
 class FileSurface(NamedTuple):
     """Data of a mesh file with which the file's materials and pictures are applied to the mesh.
 
-    in_file : (m,) for each material of the mesh, the index of its material in the file, -1 for none
+    in_file : (m,) for each material of the mesh, the index of its material in the file, -1 if there is none
     has_uv : (m,) mask of materials whose triangles have uv in the file
     colours : (v, 3) linear colours of vertices, or None
     other_uv : additional uv sets (v, 2), by their index in the file

@@ -27,8 +27,8 @@ class MeshFormat:
 
     suffixes : file name suffixes in lower case, with the dot
     read : function that reads a file; it may raise any exception for a damaged one
-    properties : properties of the files, except those of materials, and what the reader does with them
-    materials : properties of materials, and what the reader does with them
+    properties : properties of the files, except properties of materials, and what the reader does with each
+    materials : properties of materials, and what the reader does with each
     """
 
     suffixes: tuple[str, ...]

@@ -29,7 +29,7 @@ _GREY_TEST_SAMPLES = 256  # compared texels along a side
 def read_obj_text(path: Path) -> str:
     """Return the text of a .obj file, with line feeds as its only line ends.
 
-    Raises DermisError when it cannot be read or is too large.
+    Raises DermisError when the file cannot be read or is too large.
     """
     data = read_file(path, "an OBJ file", limits.MAX_FILE_BYTES)
     with parsing(path, "an OBJ file"):

@@ -99,7 +99,7 @@ _UDIM_COLUMNS, _FIRST_UDIM, _MAX_UDIM = 10, 1001, 1100
 class MtlTexture:
     """Picture that a material of an .mtl file references.
 
-    key : statement that references it, such as map_Kd
+    key : statement that references the picture, such as map_Kd
     name : file name as written
     factor : option -bm, by which the map is multiplied [-]
     scale, offset : options -s and -o along u and v, where v points up

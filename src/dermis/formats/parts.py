@@ -45,7 +45,7 @@ class MaterialGroup:
 
     names : name of the group's material if it has a name, then name of the mesh or OBJ group
     colour : diffuse reflectance, linear [-]
-    material : index of the file's material, -1 for none
+    material : index of the file's material, -1 if there is none
     """
 
     names: tuple[str, ...]

@@ -395,7 +395,7 @@ class _ElementReader:
 
 
 class _ListStep(NamedTuple):
-    """List in a row: bytes between the previous list and this one, type of its length, size of an item."""
+    """List in a row: bytes after the previous list, type of the list's length, and size of an item [byte]."""
 
     skip: int
     length: np.dtype[Any]
@@ -438,7 +438,7 @@ def _strip_triangles(strips: _List) -> Index:
 def _uv(
     path: Path, vertices: _Columns, faces: _Columns, counts: Index, index: Index
 ) -> tuple[Doubles, Index]:
-    """Return uv coordinates (t, 2), and the index of each corner's uv, -1 for none.
+    """Return uv coordinates (t, 2), and the index of each corner's uv, -1 if there is none.
 
     counts, index : number of corners of each polygon, and the vertex of each corner
     """

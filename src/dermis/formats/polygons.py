@@ -23,7 +23,7 @@ class Polygons:
     """Polygons of a file.
 
     counts : (n,) number of corners of each polygon, at least 3
-    corners : (c, 3) indices of position, uv and normal of each corner, -1 for none
+    corners : (c, 3) indices of position, uv and normal of each corner, -1 if there is none
     positions : (p, 3)
     uv : (t, 2)
     normals : (m, 3)

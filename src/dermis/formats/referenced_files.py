@@ -1,4 +1,4 @@
-"""Files referenced by a mesh file; only those in the folder of the mesh file or below it are read."""
+"""Files referenced by a mesh file; files outside the folder of the mesh file are not read."""
 
 from __future__ import annotations
 

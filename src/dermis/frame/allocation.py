@@ -1,4 +1,4 @@
-"""Allocation of those resources of a frame that depend on neither the camera nor the lights' positions."""
+"""Allocation of the resources of a frame that depend neither on the camera nor on positions of lights."""
 
 from __future__ import annotations
 

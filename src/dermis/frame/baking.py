@@ -163,7 +163,7 @@ def _bake_points(
 
 
 def _bake_bindings(renderer: Renderer, inputs: FrameInputs, scene: Scene) -> MutableBindings:
-    """Return the shader resources of bake.wgsl: those of a rendered frame, plus curvature and thickness."""
+    """Return the resources of bake.wgsl: resources of a rendered frame, plus curvature and thickness."""
     resources, device = inputs.resources, renderer.device
     skin_curvature = make_curvature(device, scene.head.topology.mesh)
     frame = CommandList(device, timed=False)

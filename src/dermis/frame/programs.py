@@ -117,7 +117,7 @@ def shader_options(source: str, store: str, labels: bool, constants: Constants =
 def program_constants(
     device: Device, path: Path, folders: Sequence[Folder], constants: Constants = ()
 ) -> dict[str, float]:
-    """Return the values of `constants`, and of those `device_constants` that the shader declares, by name."""
+    """Return the values of `constants`, and of the `device_constants` that the shader declares, by name."""
     return used_constants(path, folders, device_constants(device)) | dict(constants)
 
 

@@ -32,7 +32,7 @@ class FrameRequest:
     shadow_layers : number of shadow maps
     posed : whether the scene has a pose
     view_name : cache key of the scene, for callers that draw several scenes in turn
-    other_profiles : profiles that a map blends with `profile`; they have the same Gaussians
+    other_profiles : profiles that a map blends with `profile`; all have the same Gaussians
     blend_weights : (h, w, 2) map of the weights of the other profiles [-], None for a single profile
     outputs, landmarks : names of the outputs and landmark sets that are requested besides the picture
     """

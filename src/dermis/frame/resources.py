@@ -48,7 +48,7 @@ class Resources:
     outputs : resources of the outputs besides the picture, None if none are requested
     suns : number of lights that the environment adds
     gaussians : number of Gaussians of the profile
-    unscattered_fraction : fraction of the skin's triangles outside the atlas, where no light scatters [-]
+    unscattered_fraction : fraction of the skin's triangles outside the atlas, on which no light scatters [-]
     """
 
     shape: shape.Resources

@@ -94,7 +94,7 @@ class CapturedFrame:
 
 
 class FrameCapture(Graph):
-    """Recorder that captures declared frames as data instead of running them.
+    """Recorder that captures the passes of a declared frame as data instead of running the passes.
 
     shaders : WGSL texts of the shaders
     programs : for each program its shader, constants, bindings and, for render programs, depth test and

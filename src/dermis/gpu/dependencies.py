@@ -62,7 +62,7 @@ class Access:
     """Resources that a program reads and writes with one set of bindings.
 
     id : unique number of the combination of program and resources
-    reads, writes : states of the resources; those that are read and written are in both
+    reads, writes : states of the resources; a resource that is read and written is in both
     dispatches : native dispatches of earlier frames with their bind groups, by stage, workgroups and
         positions of the uniform records
     """
@@ -79,7 +79,7 @@ def unique_id() -> int:
 
 
 def mark_scratch(device: Device, resource: R) -> R:
-    """Mark a texture or buffer as scratch, so that no pass runs only to update it, and return it."""
+    """Mark a texture or buffer as scratch and return it; no pass runs only to update a scratch resource."""
     resource_state(device, resource).scratch = True
     return resource
 

@@ -1,4 +1,4 @@
-"""Frame graph: passes are declared in order, and only those with stale output run."""
+"""Frame graph: passes are declared in order, and only the passes with stale output run."""
 
 from __future__ import annotations
 
@@ -152,7 +152,7 @@ class DeclaredPass:
 
 
 class Graph(Recorder):
-    """Frame graph: a recorder that runs only those declared passes whose output is stale.
+    """Frame graph: a recorder that runs only the declared passes whose output is stale.
 
     The resources that a pass reads and writes follow from the bindings of its shader. The version of its
     output is a hash of the program, the resources and their versions, the workgroups, and the uniforms that

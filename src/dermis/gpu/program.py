@@ -248,7 +248,7 @@ def cached_program(device: Device, shader: Hashable, constants: Constants, make:
 
 
 def used_constants(path: Path, folders: Sequence[Folder], constants: Constants) -> dict[str, float]:
-    """Return those pipeline constants that a shader declares, by name; WebGPU refuses all others."""
+    """Return the pipeline constants that a shader declares, by name; WebGPU refuses all other constants."""
     text = shader_source(path, folders).text
     return {name: value for name, value in constants if f"override {name}:" in text}
 

@@ -18,7 +18,7 @@ class FileVertices(ShortRepr):
     count : number of vertices that the triangles of the file use
     vertex, point : (n,) vertex indices in the file, and the head's point at each of these vertices
     triangles : (f, 3) triangles of the head before any subdivision, as indices in `vertex`
-    to_head : (3, 3) rotation from the axes of the file to those of the head
+    to_head : (3, 3) rotation from the axes of the file to the axes of the head
     """
 
     count: int

@@ -155,7 +155,7 @@ def uv_cross(corners: NDArray[np.floating]) -> Doubles:
 
 
 def unit(vectors: Doubles, fallback: Doubles) -> Doubles:
-    """Normalise vectors (n, 3); those of length 0 are replaced by `fallback` (n, 3)."""
+    """Normalise vectors (n, 3); vectors of length 0 are replaced by `fallback` (n, 3)."""
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     usable = length > 0
     return np.where(usable, vectors / np.where(usable, length, 1), fallback)

@@ -35,7 +35,7 @@ class Head:
     maps : Maps
         Colour, relief and other maps.
     attribution : str, optional
-        Credit that pictures of the head require, empty for none.
+        Credit that pictures of the head require, empty if there is none.
     rig : Rig, optional
         Morph targets and bones; None for a head whose poses state the positions of all its points.
     eyes : Eyes, optional
@@ -44,7 +44,7 @@ class Head:
         Strands of brows and lashes (`strands`), and of scalp and beard (`hair`). The strands of `hair` are in
         random order, so that the first n strands are a random sample.
     note : str, optional
-        Parts of the file that are not used, with reasons; empty for none.
+        Parts of the file that are not used, with reasons; empty if there is none.
     levels : int, optional
         Levels of subdivision of the mesh.
     template : Head, optional

@@ -34,7 +34,7 @@ class Material:
     roughness : perceptual roughness of an opaque group, see glTF [-]; None for wet eyes and teeth
     metalness : 1 for metal [-]
     emission : radiance that the group emits, linear Rec. 709
-    opacity_cutoff : opacity below which the group is cut out; 0 for none
+    opacity_cutoff : opacity below which the group is cut out; 0 to cut out nothing
     """
 
     name: str
@@ -135,7 +135,7 @@ class Mesh(ShortRepr):
 
 
 def _valid_normals(normals: Floats, computed: Floats) -> Floats:
-    """Return the normals of a file where they are finite and nearly unit vectors, else computed ones, (v, 3).
+    """Return the file's normals (v, 3), replaced by computed normals where not finite or not of unit length.
 
     normals, computed : (v, 3) normals of the file, and normals computed from the triangles
     """

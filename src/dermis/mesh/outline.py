@@ -154,7 +154,7 @@ def find_outline_points(positions: Floats, targets: MorphTargets, skeleton: Skel
 
 
 def _select_extreme(chosen: Mask, positions: Floats, count: int = _DIRECTIONS) -> None:
-    """Select further points, which exceed the bounds of the selected ones in one of `count` directions.
+    """Select points that exceed the bounds of the points selected before, in one of `count` directions.
 
     chosen : (p,) mask of the selected points, which this function extends
     positions : (p, 3) positions of all points

@@ -188,7 +188,7 @@ def polygons(mesh: Mesh) -> tuple[Index, Index, Ints]:
 def coarse_triangles(head: Head, min_faces: int, tolerance_mm: float) -> Ints:
     """Return triangles (t, 3) that cover a subdivided head with fewer levels of subdivision in flat regions.
 
-    The vertices are those of the subdivided mesh. Triangles with an opacity map are left out.
+    The indices refer to the vertices of the subdivided mesh. Triangles with an opacity map are left out.
 
     min_faces : smallest number of faces of the coarsest level
     tolerance_mm : largest distance of a vertex that is left out from the coarse edge that replaces it

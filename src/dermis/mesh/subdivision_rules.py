@@ -83,7 +83,7 @@ def _find_sides(cage: Cage) -> _Sides:
 
 
 def refine_loop(cage: Cage) -> tuple[csr_array, Cage]:
-    """Return the weights (q, p) of old points in the new ones, and four triangles for each triangle.
+    """Return the weights (q, p) of old points in the new points, and four triangles for each triangle.
 
     Of the four triangles, three are at the corners of the old triangle and one is in its middle. Old points
     come first, then one point on each edge. Borders become cubic B-splines.
@@ -110,7 +110,7 @@ def refine_loop(cage: Cage) -> tuple[csr_array, Cage]:
 
 
 def refine_catmull_clark(cage: Cage) -> tuple[csr_array, Cage]:
-    """Return the weights (q, p) of old points in the new ones, and a quad for each corner of each face.
+    """Return the weights (q, p) of old points in the new points, and a quad for each corner of each face.
 
     Old points come first, then one point on each edge, then one in each face. The first corner of a quad is
     an old point, the third is the centre of the face. Borders become cubic B-splines.

@@ -1,4 +1,4 @@
-"""Homogeneous medium equivalent to a diffusion profile, and the lateral offset of oblique light in it."""
+"""Homogeneous medium equivalent to a diffusion profile, and its lateral offset of oblique light."""
 
 from __future__ import annotations
 

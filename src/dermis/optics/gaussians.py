@@ -84,7 +84,7 @@ class GaussianSum:
     def hankel(self, frequency: ArrayLike) -> Floats:
         """Return the Hankel transform of R(r) at frequencies s [1/mm], (..., c) [-].
 
-        It is the integral of 2 pi r R(r) J0(s r) over r, with the Bessel function J0.
+        The transform is the integral of 2 pi r R(r) J0(s r) over r, with the Bessel function J0.
         """
         s = np.asarray(frequency, dtype=np.float64)[..., None]
         return np.asarray(np.exp(-self.variance_mm2 * s**2 / 2) @ self.weight)

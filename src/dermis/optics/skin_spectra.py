@@ -1,4 +1,4 @@
-"""Diffuse reflectance spectra of many skins at once, each with its own pigments."""
+"""Diffuse reflectance spectra of many skins at once; the pigments differ between the skins."""
 
 from __future__ import annotations
 
@@ -72,5 +72,5 @@ def two_layer_reflectance(
 
 
 def _as_column(value: ArrayLike) -> Floats:
-    """Return an (n,) array as (n, 1), and a number as it is."""
+    """Return an (n,) array as (n, 1), and a number unchanged."""
     return np.asarray(value, np.float64)[..., None]

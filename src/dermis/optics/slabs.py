@@ -222,7 +222,10 @@ def _unscattered_exit(unscattered: Floats, internal: Floats) -> tuple[Floats, Fl
 
 
 def _quadrature(eta: float, nodes: int) -> tuple[Floats, Floats]:
-    """Return nodes and weights over cosines in a medium: escaping directions, then totally reflected ones."""
+    """Return nodes and weights over cosines in a medium: directions that escape, then all other directions.
+
+    A direction escapes if it is not totally reflected at the face.
+    """
     critical = critical_cosine(eta)
     spans = [(critical, 1.0), (0.0, critical)] if critical > 0.0 else [(0.0, 1.0)]
     parts = [gauss_legendre(low, high, nodes) for low, high in spans]
@@ -286,8 +289,8 @@ def _add_faces(
 def anisotropic_response(total: ArrayLike, eta: float, g: float) -> AngularResponse:
     """Return the angular response of half-spaces with anisotropic scattering.
 
-    Their reduced absorption and scattering coefficients are equal to those of isotropically scattering
-    half-spaces with the reflectances `total`.
+    The reduced absorption and scattering coefficients equal those of isotropically scattering half-spaces
+    with the reflectances `total`.
 
     total : (c,) reflectance of the isotropic half-spaces for light at normal incidence [-]
     eta : index of refraction relative to air, at least 1 [-]

@@ -45,13 +45,12 @@ class ThinParts:
     The thicknesses are evenly spaced in the square root. The weights are those of k Gaussians in 3 channels,
     and relative to the reflectance of a half-space of the medium.
 
-    max_thickness_mm : thickness at the last index; at index 0 it is 0 [mm]
+    max_thickness_mm : thickness at the last index; the thickness at index 0 is 0 [mm]
     transmitted : (THICKNESS_ROWS, k, 3) weights of the light that leaves on the far side [-]
     lost : (THICKNESS_ROWS, k, 3) weights of the light that a half-space would reflect and the thin part does
         not; lost light is spread like transmitted light [-]
-    directionality : (THICKNESS_ROWS,) how strongly transmittance depends on the incident direction, -1 to 1:
-        at 1 as in deep slabs, see `oblique_transmittance`; at 0 it does not; below 0 the dependence is
-        reversed [-]
+    directionality : (THICKNESS_ROWS,) how strongly transmittance depends on the incident direction, from 1
+        (as in deep slabs, see `oblique_transmittance`) over 0 (not at all) to -1 (in the opposite sense) [-]
     """
 
     max_thickness_mm: float

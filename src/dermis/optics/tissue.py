@@ -108,7 +108,7 @@ class Tissue:
     def profile(self, model: ProfileModel | None = None, clamp: Clamp = "layer") -> RadialProfile:
         """Return the diffusion profile R(r) of the tissue in linear Rec. 709.
 
-        R(r) is per power that enters the tissue; for a skin made of pigments it is per incident power.
+        R(r) is per power that enters the tissue; for a skin made of pigments, per incident power.
 
         model : model that computes the profile; by default `default_model`
         clamp : position of the multipole's source in layers thinner than a mean free path

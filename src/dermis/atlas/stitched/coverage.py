@@ -26,14 +26,14 @@ from dermis.base.arrays import Floats, Index, Ints, Mask
 class Coverage:
     """Surface points that the texels of an (h, w) grid show.
 
-    The anchor of a texel is the nearest point of the piece to which the texel belongs: inside the piece it is
-    the point that the texel shows, in the gutter a point on the border.
+    The anchor of a texel is the nearest point of the piece to which the texel belongs: inside the piece the
+    anchor is the point that the texel shows, in the gutter a point on the border.
 
-    triangle : (h, w) index of the triangle that the texel shows, -1 for none
+    triangle : (h, w) index of the triangle that the texel shows, -1 if there is none
     weights : (h, w, 2) barycentric weights of that triangle's second and third corner
-    anchor_triangle : (h, w) index of the anchor's triangle, -1 for none
+    anchor_triangle : (h, w) index of the anchor's triangle, -1 if there is none
     anchor_weights : (h, w, 2) barycentric weights of the anchor
-    piece : (h, w) piece to which the texel or gutter belongs, -1 for none
+    piece : (h, w) piece to which the texel or gutter belongs, -1 if there is none
     gutter : (h, w) mask of gutter texels, which copy light
     distance_mm : (h, w) distance from the piece on the surface [mm]
     """
@@ -58,7 +58,7 @@ def compute_coverage(
 ) -> Coverage:
     """Compute the surface points that the texels of packed pieces and their gutters show.
 
-    piece : (f,) piece of each triangle, -1 for none
+    piece : (f,) piece of each triangle, -1 if there is none
     members : (t,) indices of the triangles to rasterise
     border : border of the pieces, see `find_border`
     shape : height and width of the grid of texels

@@ -56,7 +56,7 @@ class GutterWidth(NamedTuple):
 def find_border(surface: FlatSurface, piece: Index, members: Index) -> Border:
     """Return the triangle sides at which pieces of charts end.
 
-    piece : (f,) piece of each triangle, -1 for none
+    piece : (f,) piece of each triangle, -1 if there is none
     members : (t,) indices of the triangles whose sides are examined, each in a piece
     """
     neighbour = surface.uv_neighbour[members]

@@ -88,7 +88,7 @@ class _PieceGrid(NamedTuple):
 
 
 def find_conflicts(surface: FlatSurface, mapped: Mask, members: Index, gutter_mm: float) -> Conflicts:
-    """Find where gutters of one chart piece meet, by drawing the piece on a texel grid of its own.
+    """Find where gutters of one chart piece meet, by drawing the piece on a separate texel grid.
 
     mapped : (f,) mask of triangles that belong to any piece
     members : (t,) indices of the triangles of this piece
@@ -152,7 +152,7 @@ def _gap_pairs(surface: FlatSurface, mapped: Mask, grid: _PieceGrid) -> tuple[In
 
 
 def _texel_points(surface: FlatSurface, mapped: Mask, grid: _PieceGrid, chosen: Index) -> Doubles:
-    """Return the surface point of each texel of the grid (n, 3), or NaN where it is not computed [mm].
+    """Return the surface points (n, 3) of all texels of the grid, NaN for points that are not computed [mm].
 
     Points are computed for the texels in `chosen`, except for texels beyond the end of the surface.
     """
@@ -172,7 +172,7 @@ def _texel_points(surface: FlatSurface, mapped: Mask, grid: _PieceGrid, chosen: 
 def cut_overlaps(surface: FlatSurface, piece: Index, gutter_mm: float) -> Index:
     """Cut charts along straight lines until few of their gutters overlap; return piece indices (f,).
 
-    piece : (f,) piece of each triangle before the cuts, -1 for none
+    piece : (f,) piece of each triangle before the cuts, -1 if there is none
     gutter_mm : width of the gutters [mm]
     """
     done, count = np.full(len(piece), -1, np.int64), 0
@@ -261,7 +261,7 @@ def _conflict_strip(
 ) -> Mask:
     """Return the mask (t,) of triangles near meeting gutters, on one side of a line through the piece.
 
-    The side is the one on which the triangles near meeting gutters have the smaller area.
+    The chosen side is where the triangles near meeting gutters have the smaller area.
 
     half : (t,) mask of triangles on one side of the line
     reach : gutter width [texel]
@@ -278,7 +278,7 @@ def _conflict_strip(
 def _best_line(overlap: Conflicts, reach: float) -> tuple[Doubles, float, int]:
     """Return the line that separates the most conflicts per length of the cut along it.
 
-    Returns its normal and offset, and the number of conflicts that it separates.
+    Returns normal and offset of the line, and the number of conflicts that the line separates.
     """
     close = overlap.inside[
         _within_reach(overlap.inside, np.concatenate((overlap.first, overlap.second)), reach)

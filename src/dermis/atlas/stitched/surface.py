@@ -20,7 +20,7 @@ class Adjacency(NamedTuple):
     """Adjacency of triangles, by which geodesics cross edges; sides are 01, 12 and 20 of each triangle.
 
     planar_corners : (f, 3, 2) corners in the triangle's own plane, counter-clockwise from outside [mm]
-    neighbour : (f, 3) index of the triangle across each side, -1 for none
+    neighbour : (f, 3) index of the triangle across each side, -1 if there is none
     neighbour_side : (f, 3) side of the neighbour at the shared edge
     flipped : (f, 3) mask of neighbours that face the opposite way
     apex : (f, 3, 2) third corner relative to each side: coordinates along the side and to its left, as

@@ -14,8 +14,8 @@ _BEND_PENALTY = 3.0  # extra length that a step across a right angle counts, rel
 def opposite_sides(triangles: Index) -> Index:
     """Return for each triangle side the index of the neighbour's side at the same edge, (3 f,).
 
-    Sides are numbered as in `geometry.edges`: all 01, then all 12, then all 20. A side without exactly one
-    neighbour has its own index.
+    Sides are numbered as in `geometry.edges`: all 01, then all 12, then all 20. For a side without exactly
+    one neighbour, the result is the index of the side itself.
     """
     _, of_side, counts = edges(triangles)
     side = np.argsort(of_side, kind="stable")

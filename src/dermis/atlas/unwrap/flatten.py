@@ -32,7 +32,7 @@ def planar_triangles(corners: NDArray[np.floating]) -> Complexes:
 def affine_coefficients(shapes: Complexes, positions: Complexes) -> tuple[Complexes, Complexes]:
     """Return a and b (f,) of the maps z -> a z + b conj(z) + c from `shapes` to `positions`.
 
-    The singular values of a map are |a| + |b| and |a| - |b|, the latter negative where it mirrors the
+    The singular values of a map are |a| + |b| and |a| - |b|; the second is negative where the map mirrors the
     triangle. The nearest rotation is a / |a|.
 
     shapes, positions : (f, 3) corners of the triangles as complex numbers, before and after the map
@@ -112,8 +112,8 @@ def flatten(points: Doubles, triangles: Index, density: Doubles, weight: Doubles
     density : (f,) desired ratio of length in the plane to length on the surface [-]
     weight : (f,) importance of each triangle's stretch [-]
 
-    The initial map is a least squares conformal map [Levy2002] in the Hermitian form of [Mullen2008]. It is
-    then made as rigid as possible [Liu2008], with higher weights for strongly compressed triangles as in
+    The initial map is a least squares conformal map [Levy2002] in the Hermitian form of [Mullen2008]. The map
+    is then made as rigid as possible [Liu2008], with higher weights for strongly compressed triangles as in
     [Rabinovich2017].
     """
     shapes = planar_triangles(points[triangles])
@@ -191,7 +191,7 @@ def _factorise(matrix: Any) -> Any:
 
 
 def _stiffness(a: Complexes, b: Complexes) -> Doubles:
-    """Return weights (f,) that are 1 for unstretched triangles, larger for compressed and mirrored ones.
+    """Return weights (f,): 1 for unstretched triangles, larger for compressed and mirrored triangles.
 
     a, b : (f,) coefficients of the affine maps, from `affine_coefficients`
     """

@@ -23,7 +23,7 @@ def border_edges(corners: Index) -> tuple[Index, Index]:
 
 
 def split_at_seams(triangles: Index, chart: Index) -> tuple[Index, Index]:
-    """Split vertices at seams; return each triangle's new vertices (f, 3), and the old vertex of each (v,).
+    """Split vertices at seams; return triangles of new vertices (f, 3), and the old vertex of each (v,).
 
     Two triangles share the vertices of their common edge only if they belong to one chart.
 

@@ -64,7 +64,7 @@ def pack_charts(outlines: list[Doubles], padding: float) -> tuple[float, Doubles
 
 
 def _packing_orders(size: Doubles) -> Iterator[Index]:
-    """Yield orders in which charts are dropped: by height, by width, and random ones.
+    """Yield orders in which charts are dropped: by height, by width, and random orders.
 
     size : (c, 2) width and height of each chart
     """
@@ -139,7 +139,7 @@ def unwrap(
     upright: ArrayLike = DEFAULT_UP_DIRECTION,
     padding: float = CHART_PADDING,
 ) -> UvLayout:
-    """Unwrap a mesh into a uv layout in which no triangle is mirrored and none overlaps another.
+    """Unwrap a mesh into a uv layout in which no triangle is mirrored and no two triangles overlap.
 
     Where the border of a flattened chart crosses itself, triangles are moved to an adjacent chart; a chart
     that does not flatten even then is split.

@@ -115,7 +115,7 @@ def _weight_track(
     """Return the track of the morph target weights of a node.
 
     culprit : clip and channel, named in errors
-    mesh_targets : names of morph targets by mesh index; this function adds those of the node's mesh
+    mesh_targets : names of morph targets by mesh index; this function adds the names of the node's mesh
     """
     mesh = document.items("nodes")[node].get("mesh")
     if mesh is not None and mesh not in mesh_targets:

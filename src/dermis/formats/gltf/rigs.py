@@ -181,8 +181,8 @@ class VertexDisplacements(NamedTuple):
 def target_names(mesh: Tree) -> tuple[str, ...]:
     """Return the names of a mesh's morph targets.
 
-    Most programs write them as "targetNames" in the mesh's extras; a target without a name is called "target
-    0", by its index.
+    Most programs write the names as "targetNames" in the mesh's extras; a target without a name is called
+    "target 0", by its index.
     """
     counts = [len(primitive.get("targets", [])) for primitive in mesh["primitives"]]
     extras = mesh.get("extras")
@@ -223,8 +223,8 @@ def read_targets(
 def default_weights(document: Document, nodes: Nodes) -> dict[str, float]:
     """Return the default weights of the scene's morph targets by name; weights of 0 are omitted.
 
-    Weights of a node override those of its mesh. Targets with the same name in several meshes are one target;
-    the first weight is used.
+    Weights of a node override the weights of its mesh. Targets with the same name in several meshes are one
+    target; the first weight is used.
     """
     defaults: dict[str, float] = {}
     names: dict[int, tuple[str, ...]] = {}

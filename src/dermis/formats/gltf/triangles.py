@@ -87,7 +87,7 @@ def read_gltf(path: Path) -> MeshFile:
     """Read the scene of a .glb or .gltf file in its rest pose.
 
     Joints have the transforms of their nodes, and morph targets their default weights. A mesh with a skin is
-    transformed by its joints, independently of its own node.
+    transformed by its joints; the transform of its node has no effect.
     """
     document = read_document(path)
     _refuse_extensions(document)
@@ -263,7 +263,7 @@ def _own_extras(primitive: Tree) -> Tree:
 def _transform_part(part: MeshPart, targets: dict[str, VertexDisplacements], matrix: Doubles) -> MeshPart:
     """Return a mesh part and its morph targets transformed by `matrix` (4, 4).
 
-    Reflections reverse the vertex order of triangles, so that they still face outwards.
+    Reflections reverse the vertex order of triangles, so that triangles still face outwards.
     """
     linear = matrix[:3, :3]
     return replace(

@@ -31,8 +31,8 @@ class _UsedTrack(NamedTuple):
 
     path : "translation", "rotation", "scale" or "weights"
     columns : indices in the track of the bones or morph targets that the head has
-    indices : for each of these columns, the index of its bone or morph target among all animated ones of the
-        head
+    indices : for each of these columns, the index of its bone or morph target among all animated bones or
+        morph targets of the head
     """
 
     path: str

@@ -45,9 +45,9 @@ def is_sequence(path: Path) -> bool:
 
 
 def frame_files(path: Path) -> list[Path]:
-    """Return the mesh files in a folder, or those that match a pattern, sorted by the number in their names.
+    """Return the mesh files in a folder or with names that match a pattern, sorted by number.
 
-    path : folder, or pattern such as face_%05d.obj or face_*.obj
+    path : folder, or pattern such as face_%05d.obj or face_*.obj; the number is the last in the name
 
     Raises DermisError when there are no files, or files of several formats.
     """
@@ -94,7 +94,7 @@ def load_sequence(
         the head's file
 
     Raises DermisError for files that are not frames of that head; the first, the middle and the last file are
-    read immediately, the others on demand.
+    read immediately, all other files on demand.
     """
     files, rate = frame_files(path), DEFAULT_FRAME_RATE if fps is None else fps
     axes, source = Axes(up, front), head.file_vertices
@@ -243,7 +243,7 @@ class FrameReader:
     times as fast.
 
     unit_mm : length of the files' unit [mm]; None for the default of the format
-    to_head : (3, 3) rotation from the axes of the files to those of the head
+    to_head : (3, 3) rotation from the axes of the files to the axes of the head
     """
 
     unit_mm: float | None = None

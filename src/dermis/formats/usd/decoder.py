@@ -172,7 +172,7 @@ class _SceneReader:
         return np.arange(len(faces.vertex))
 
     def _material_groups(self, prim: Usd.Prim, count: int) -> tuple[list[int], Index]:
-        """Return the list of a mesh's materials, -1 for none, and each face's index in this list (count,).
+        """Return the list of a mesh's materials (-1: none), and each face's index in this list (count,).
 
         Faces that are holes have the index -1.
         """
@@ -233,7 +233,7 @@ class _SceneReader:
         return _Primvar(values, element)
 
     def _normals(self, mesh: UsdGeom.Mesh, faces: _Faces) -> _Primvar | None:
-        """Return the normals of a mesh; None if it has none, or is a subdivision surface."""
+        """Return the normals of a mesh; None for a mesh without normals or a subdivision surface."""
         if mesh.GetSubdivisionSchemeAttr().Get(self.time) != "none":
             return None
         primvars = self.geom.PrimvarsAPI(mesh.GetPrim())

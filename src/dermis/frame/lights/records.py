@@ -75,7 +75,7 @@ def light_constants(scene: Scene) -> tuple[tuple[str, int], ...]:
 
 
 def oblique_constants(constants: Constants) -> Constants:
-    """Return `constants`; if they set HALF_SPACE, add the pipeline constant that enables oblique incidence.
+    """Return `constants`, plus the constant that enables oblique incidence if HALF_SPACE is among them.
 
     Only passes that know the shape of the surface around a point may use the result.
     """

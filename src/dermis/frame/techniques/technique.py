@@ -79,7 +79,7 @@ class Technique(TechniqueTraits):
     def make(
         self, memo: Memo, device: Device, settings: Settings, profile: GaussianSum
     ) -> TechniqueResources | None:
-        """Return the tables and textures of the technique, cached by the memo; None if it needs none."""
+        """Return the tables and textures of the technique, cached by the memo; None if there are none."""
         return None
 
     def make_subsurface_layers(

@@ -121,7 +121,7 @@ def label_texels(head: Head, atlas: Atlas, table: RegionTable) -> NDArray[np.uin
     """Return the region (n,) of each covered atlas texel in row order, as indices into `REGIONS`.
 
     The first of these sources that exists is used: label map or landmarks of the table, label map of the
-    head, landmarks known to the package. Raises DermisError for a head without any of them.
+    head, landmarks known to the package. Raises DermisError for a head without any of these sources.
     """
     if table.labels is not None:
         return _labels_from_map(load_labels(table.labels), atlas, str(table.labels))

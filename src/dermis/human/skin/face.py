@@ -154,7 +154,7 @@ def fold_curves() -> Folds:
 def table_sizes() -> dict[str, int]:
     """Return the sizes of the tables of zones, folds, knots and hairline, without computing their splines.
 
-    The shaders need them as constants, and SciPy would be slow to import.
+    The shaders need these sizes as constants, and an import of SciPy, which computes the splines, is slow.
     """
     lengths = Counter(row["fold"] for row in read_rows(__package__, "folds")).values()
     knots = sum(map(_sample_count, lengths))

@@ -122,7 +122,7 @@ def _add_gaze(
     """Return the left and the right eyeball, with their gaze and the points of cornea and iris.
 
     left, right : connected components that are the scleras
-    pieces : all connected components of the eyes; those inside a sclera belong to its eyeball
+    pieces : all connected components of the eyes; components inside a sclera belong to the same eyeball
     """
     positions = mesh.points_mm
     centre = (left.sphere.centre + right.sphere.centre) / 2

@@ -123,7 +123,7 @@ class Lids:
 def lids_in_front(corners_mm: Doubles, ball: Sphere, ahead: Doubles) -> Lids:
     """Return the surfaces in front of an eyeball, mostly its lids.
 
-    corners_mm : (f, 3, 3) corners of all triangles except those of eyeballs, in head space
+    corners_mm : (f, 3, 3) corners of all triangles except the triangles of eyeballs, in head space
     ball : sphere of the eyeball
     ahead : (3,) unit vector of the direction of gaze
     """

@@ -62,7 +62,7 @@ def solve(frequency: ArrayLike, medium: Medium, A: float, source: Source = "beam
     frequency : (n,) frequencies s > 0 [1/mm]
     A : boundary mismatch with air; internal interfaces are index-matched [-]
     source : "beam" distributes first scattering along the beam, so that R(r) diverges logarithmically at r =
-        0; "point" places it one mean free path deep, so that R(r) is finite
+        0; "point" places first scattering one mean free path deep, so that R(r) is finite
 
     Source: [Haskell1994] for the boundary, [Kienle1998] for layers, [Farrell1992] for the beam.
     """
@@ -101,7 +101,7 @@ def solve_thicknesses(
     """Return the Hankel transforms of R(r) and T(r) of n slabs of one material, (n, m, c) each [-].
 
     frequency : (m,) frequencies s > 0 [1/mm]
-    layer : absorption and scattering of the slabs; its own thickness is ignored
+    layer : absorption and scattering of the slabs; its field `thickness_mm` is ignored
     thickness_mm : (n,) thicknesses of the slabs [mm]
     A : boundary mismatch with air [-]
     """

@@ -44,7 +44,7 @@ class BurleyProfile:
     def hankel(self, frequency: ArrayLike) -> Floats:
         """Return the Hankel transform of R(r) at frequencies k [1/mm], (..., c) [-].
 
-        It is the integral of 2 pi r R(r) J0(k r) over r, with the Bessel function J0.
+        The transform is the integral of 2 pi r R(r) J0(k r) over r, with the Bessel function J0.
         """
         k = np.asarray(frequency, dtype=np.float64)[..., None]
         s = self.shape
@@ -124,8 +124,8 @@ def _fit_shape(target: RingTarget) -> float:
 class UnityParameters:
     """Diffusion profile settings of Unity's HDRP at world scale 1.
 
-    scattering_colour : scattering distance 1 / s of each channel, divided by the largest of them, linear
-        Rec. 709 [-]
+    scattering_colour : scattering distance 1 / s of each channel, divided by the largest of the three
+        distances, linear Rec. 709 [-]
     multiplier_mm : largest scattering distance 1 / s [mm]
     max_radius_mm : radius within which 99.7 % of the light of the widest channel leaves; displayed in the
         editor [mm]

@@ -87,7 +87,8 @@ def skin_prior() -> SkinPrior:
 def prior_points(values: dict[str, Floats]) -> Floats:
     """Convert the parameters of n skins to points (n, 4) in the coordinates of `SkinPrior`.
 
-    values : (n,) values of each of `PRIOR_NAMES`; the point has their logarithms, but the value of oxygen
+    values : (n,) values of each of `PRIOR_NAMES`; points contain the logarithms of these values, but oxygen
+        itself
     """
     columns = [np.log(np.maximum(values[name], _SMALLEST_FRACTION)) for name in PRIOR_NAMES]
     columns[_OXYGEN_INDEX] = values["oxygen"]

@@ -112,7 +112,7 @@ def _rms_density(stretch: NDArray[np.float16]) -> float:
 def _median_density(stretch: NDArray[np.float16], inside: NDArray[np.bool_]) -> float:
     """Return the median over texels of the smaller of the densities along u and v [texels/mm].
 
-    inside : mask of the texels to count: those inside charts, gutters excluded
+    inside : mask of the texels to count: texels inside charts, gutters excluded
 
     Non-negative half floats are ordered like their 16-bit patterns, and a histogram of the patterns is faster
     than sorting.

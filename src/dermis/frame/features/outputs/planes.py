@@ -107,6 +107,6 @@ def stage_program(device: Device, planes: Planes, constants: Constants = ()) -> 
 def draw_planes(graph: Recorder, planes: Planes, shader: ComputeProgram, bindings: Bindings) -> None:
     """Declare the pass that computes the outputs of a stage for each pixel.
 
-    bindings : resources of the shader, apart from the planes themselves
+    bindings : resources of the shader, apart from the planes
     """
     graph.compute("outputs", shader, {**bindings, "planes": planes.buffer}, planes.size)

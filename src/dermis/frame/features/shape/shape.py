@@ -1,4 +1,4 @@
-"""Shape of a head on the device: control points, their motion, and the surface through them."""
+"""Shape of a head on the device: control points, their motion, and the surface through these points."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class ShapeTables:
     surface : vertices and triangles by their names in shape_vertices.wgsl
     control, points, vertices : numbers of control points, of points after subdivision, and of vertices
     targets, bones : numbers of morph targets and of bones
-    has_contacts : whether some points, such as those of the lids, are kept outside the eyeballs
+    has_contacts : whether some points, such as points of the lids, are kept outside the eyeballs
     """
 
     morphs: dict[str, Buffer]

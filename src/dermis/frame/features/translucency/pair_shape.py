@@ -47,8 +47,8 @@ def pair_positions_mm(memo: Memo, request: FrameRequest) -> Floats | None:
     """Return the control points of the shape in which pairs are searched [mm], None for the head at rest.
 
     Pairs of the topology follow other shapes, such as the frames of a mesh sequence: only their weights
-    change. A shape that strains the surface by more than `MAX_STRAIN` has pairs of its own. People of one
-    template always share its pairs.
+    change. Pairs are searched separately for a shape that strains the surface by more than `MAX_STRAIN`.
+    People of one template always share the pairs of the template.
     """
     positions = request.rest_positions_mm
     if positions is None or request.is_shared:
