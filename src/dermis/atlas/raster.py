@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from dermis.atlas.atlas import GUTTER_TEXELS, MAX_SHEAR, Atlas
 from dermis.base.arrays import Doubles, Index, Ints, Mask
-from dermis.mesh.geometry import MIN_UV_CROSS, components, cross_2d, edges, expand_runs, uv_cross, weld
+from dermis.mesh.geometry import MIN_UV_CROSS, cross_2d, edges, expand_runs, label_components, uv_cross, weld
 from dermis.mesh.mesh import Mesh
 
 _EDGE_TOLERANCE = 1e-6  # texel centres this far outside an edge still count as covered [texel]
@@ -28,7 +28,7 @@ def find_charts(mesh: Mesh) -> Ints:
     order = np.argsort(edge_of_side, kind="stable")
     shared = edge_of_side[order][1:] == edge_of_side[order][:-1]
     a, b = faces[order][:-1][shared], faces[order][1:][shared]
-    return components(len(mesh.triangles), a, b).astype(np.int32)
+    return label_components(len(mesh.triangles), a, b).astype(np.int32)
 
 
 def triangle_uv_area(mesh: Mesh) -> Doubles:

@@ -13,7 +13,7 @@ from dermis.formats.load import FileSurface
 from dermis.formats.maps import MAX_SIDE
 from dermis.formats.materials import FileMaterial, Texture
 from dermis.images.io import read_size
-from dermis.mesh.geometry import components, triangle_areas
+from dermis.mesh.geometry import label_components, triangle_areas
 from dermis.mesh.mesh import Mesh
 
 UV_TOLERANCE = 2e-2
@@ -22,7 +22,7 @@ PADDING = 8
 """Texels around each tile that continue its border, so that mip levels do not mix materials."""
 _PLAIN_SIDE = 16  # side of a tile without pictures that is not skin [texel]
 _MIN_SKIN_SIDE = 256  # smallest side of a tile of skin without pictures [texel]
-_GROWTH = 1.02  # step by which the side of the map grows until all tiles fit
+_SIDE_GROWTH = 1.02  # step by which the side of the map grows until all tiles fit
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +120,7 @@ def _move_charts(
     if uv.min() > -UV_TOLERANCE and uv.max() < 1.0 + UV_TOLERANCE:
         return uv
     corner = np.searchsorted(vertices, mesh.triangles[triangles])
-    chart = components(len(vertices), corner[:, :2].ravel(), corner[:, 1:].ravel())
+    chart = label_components(len(vertices), corner[:, :2].ravel(), corner[:, 1:].ravel())
     count = int(chart.max()) + 1
     low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
     np.minimum.at(low, chart, uv)
@@ -180,4 +180,4 @@ def _pack_in_rows(sizes: Sequence[tuple[int, ...]]) -> tuple[int, list[tuple[int
             x, shelf = x + width, max(shelf, height)
         if y + shelf <= side:
             return int(np.ceil(side)), [(int(x) + PADDING, int(y) + PADDING) for x, y in corners]
-        side *= _GROWTH
+        side *= _SIDE_GROWTH

@@ -92,12 +92,10 @@ class RawMesh:
         """Return the sides of the triangles, grouped by edge."""
         return _group_sides(self.corners)
 
-    def with_triangles(self, selected: Mask) -> RawMesh:
+    def with_triangles(self, mask: Mask) -> RawMesh:
         """Return the mesh with the triangles that a mask (f,) selects."""
-        quads = (np.cumsum(selected) - 1)[self.quads[selected[self.quads].all(axis=1)]]
-        return replace(
-            self, triangles=self.triangles[selected], material=self.material[selected], quads=quads
-        )
+        quads = (np.cumsum(mask) - 1)[self.quads[mask[self.quads].all(axis=1)]]
+        return replace(self, triangles=self.triangles[mask], material=self.material[mask], quads=quads)
 
     def with_corners(self, corners: Index) -> RawMesh:
         """Return the mesh with new points at corners (f, 3); vertices at several points are duplicated."""
@@ -107,7 +105,7 @@ class RawMesh:
         triangles[moved] = len(self.point) + number.reshape(-1)
         source = np.concatenate((np.arange(len(self.point)), copies // stride))
         point = np.concatenate((self.point, copies % stride)).astype(np.int32)
-        return replace(self._select(source), point=point, triangles=triangles)
+        return replace(self._select_vertices(source), point=point, triangles=triangles)
 
     def compact(self) -> RawMesh:
         """Return the mesh without unused vertices and points, and without quads whose halves were parted."""
@@ -115,9 +113,9 @@ class RawMesh:
         point = np.unique(self.point[used], return_inverse=True)[1].reshape(-1).astype(np.int32)
         first, second = triangles[self.quads[:, 0]], triangles[self.quads[:, 1]]
         whole = (first[:, [0, 2]] == second[:, [2, 0]]).all(axis=1)
-        return replace(self._select(used), point=point, triangles=triangles, quads=self.quads[whole])
+        return replace(self._select_vertices(used), point=point, triangles=triangles, quads=self.quads[whole])
 
-    def _select(self, source: Index) -> RawMesh:
+    def _select_vertices(self, source: Index) -> RawMesh:
         """Return the mesh with the vertices at the given indices (n,); points and triangles are unchanged."""
         return replace(
             self,

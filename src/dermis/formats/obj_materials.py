@@ -77,7 +77,7 @@ _PART_ROLES: Mapping[str, Role] = {
     "normal": "normal",
 }
 _NUMBER = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
-_OPTION = re.compile(
+_OPTION_PATTERN = re.compile(
     rf"-(?:bm\s+(?P<factor>{_NUMBER})"
     rf"|(?P<transform>[ost])(?P<numbers>(?:\s+{_NUMBER}(?=\s)){{1,3}})"
     r"|clamp\s+(?P<clamp>\S+)"
@@ -87,7 +87,7 @@ _OPTION = re.compile(
 )
 _NEUTRAL_OPTIONS = ("mm 0 1", "blendu on", "blendv on", "boost 0", "cc off")
 _NUMBER_PATTERN = re.compile(_NUMBER)
-_UDIM = re.compile(r"<udim>|%\(udim\)d", re.IGNORECASE)
+_UDIM_PATTERN = re.compile(r"<udim>|%\(udim\)d", re.IGNORECASE)
 _MISSING_ADVICE = "Put it there, or set maps by options (--colour, --normal, ...)"
 _USUAL_KD = (0.0, 0.588, 0.64, 0.8, 1.0)  # default values of programs, which accompany a colour map
 _MAX_LINE = 4096  # characters
@@ -200,7 +200,7 @@ def _parse_mtl(text: str) -> dict[str, MtlMaterial]:
 
 def picture_name(texture: MtlTexture, udim: int = _FIRST_UDIM) -> str:
     """Return the file name of a texture's picture; for UDIM tiles, the file name of the tile `udim`."""
-    return _UDIM.sub(str(udim), texture.name)
+    return _UDIM_PATTERN.sub(str(udim), texture.name)
 
 
 def _parse_numbers(value: str) -> list[float]:
@@ -215,7 +215,7 @@ def _parse_texture(key: str, statement: str) -> MtlTexture:
     statement : text after the key, options first
     """
     texture, start = MtlTexture(key, ""), 0
-    while option := _OPTION.match(statement, start):
+    while option := _OPTION_PATTERN.match(statement, start):
         texture, start = _with_option(texture, option), option.end()
     name, factor = statement[start:], texture.factor
     match name.rsplit(maxsplit=2):
@@ -261,7 +261,7 @@ def with_materials(
             assigned.append(part)
             continue
         own = library.materials[name]
-        has_tiles = any(_UDIM.search(texture.name) for texture in own.textures.values())
+        has_tiles = any(_UDIM_PATTERN.search(texture.name) for texture in own.textures.values())
         for udim, piece in _udim_tiles(part) if has_tiles else ((_FIRST_UDIM, part),):
             if (name, udim) not in index:
                 index[name, udim] = len(materials)

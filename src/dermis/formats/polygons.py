@@ -58,9 +58,11 @@ class Polygons:
         ends = np.cumsum(np.bincount(rank))[:-1]
         pieces = np.split(counts, ends), np.split(corners, np.cumsum(counts)[ends - 1])
         chosen = [groups[one] for one in keys[by_first] // 2]
-        return [self._part(*piece, order) for piece in zip(chosen, *pieces, strict=True)]
+        return [self._build_part(*piece, order) for piece in zip(chosen, *pieces, strict=True)]
 
-    def _part(self, group: MaterialGroup, counts: Index, corners: Index, order: TriangleOrder) -> MeshPart:
+    def _build_part(
+        self, group: MaterialGroup, counts: Index, corners: Index, order: TriangleOrder
+    ) -> MeshPart:
         """Return selected polygons as a part with one vertex per combination of position, normal and uv."""
         vertex, uv, normal = corners.T + np.array([[0], [1], [1]])
         if not uv.all():

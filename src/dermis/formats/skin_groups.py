@@ -71,7 +71,7 @@ def choose_skin(
     groups : names of the parts
     scatters : for each part, whether the file states that light scatters below its surface
     """
-    words = [_words(group) for group in groups]
+    words = [_group_words(group) for group in groups]
     is_other = [bool(own & set(OTHER_WORDS)) for own in words]
     named = [_has_skin_word(own) for own in words]
     body = [bool(own & set(BODY_WORDS)) and not other for own, other in zip(words, is_other, strict=True)]
@@ -82,7 +82,7 @@ def choose_skin(
     return covering if any(covering) else [True] * len(parts)
 
 
-def _words(group: MaterialGroup) -> set[str]:
+def _group_words(group: MaterialGroup) -> set[str]:
     return {word.casefold() for name in group.names for word in _WORD_PATTERN.findall(name)}
 
 

@@ -21,8 +21,8 @@ UNITS_MM = (1.0, 10.0, 25.4, 100.0, 1000.0)
 _SIZE_MM = (1.0, 3000.0)  # smallest and largest accepted size
 _SIZE_IN_MM = (100.0, 1000.0)  # sizes in units of the file for which the unit is assumed to be the millimetre
 _FIGURE_MM, _HEAD_MM, _PIECE_MM = 1700.0, 270.0, 150.0  # typical sizes
-_FLATNESS = 0.25  # thickness relative to length below which a mesh is a patch of skin or a hand
-_INCH = 25.4
+_MAX_FLATNESS = 0.25  # thickness relative to length below which a mesh is a patch of skin or a hand
+_INCH_MM = 25.4
 _INCH_PENALTY = {_FIGURE_MM: 0.4, _HEAD_MM: 0.4, _PIECE_MM: 9.0}  # added to the error of log(size)
 _EXPORTED_UNITS_MM = (1.0, 10.0)  # units that programs write although the format requires metres
 _ADVISED_MM = {True: (1200.0, 2200.0), False: (150.0, 500.0)}  # usual sizes: standing figures, other meshes
@@ -69,10 +69,10 @@ def guess_unit_mm(positions: Floats, triangles: Ints) -> float:
         thickness, width, length = principal_sizes(positions)
         if size == 0 or _is_in_mm(positions):
             return 1.0
-        is_piece = length > MAX_ELONGATION * width or thickness < _FLATNESS * length
+        is_piece = length > MAX_ELONGATION * width or thickness < _MAX_FLATNESS * length
         typical = _PIECE_MM if is_piece else _HEAD_MM
     penalty = _INCH_PENALTY[typical]
-    return min(UNITS_MM, key=lambda unit: abs(log(size * unit / typical)) + penalty * (unit == _INCH))
+    return min(UNITS_MM, key=lambda unit: abs(log(size * unit / typical)) + penalty * (unit == _INCH_MM))
 
 
 def _is_in_mm(positions: Floats) -> bool:

@@ -106,12 +106,12 @@ class ResourceCache(Generic[T]):
             def on_release(_: object) -> None:
                 cache = this()
                 if cache is not None:
-                    cache._drop(identity)
+                    cache._drop_entries(identity)
 
             self._keys[identity] = weakref.ref(resource, on_release), set()
         return self._keys[identity][1]
 
-    def _drop(self, identity: int) -> None:
+    def _drop_entries(self, identity: int) -> None:
         _, keys = self._keys.pop(identity)
         for key in keys:
             self._entries.pop(key, None)

@@ -318,16 +318,16 @@ class Timestamps:
         is_full = len(self._stages) >= self._queries.count - 1  # the last one is for the end
         if is_full or (self._frame_only and self._stages):
             return None
-        return self._add(stage)
+        return self._add_timestamp(stage)
 
-    def _add(self, stage: str) -> TimestampWrites:
+    def _add_timestamp(self, stage: str) -> TimestampWrites:
         self._stages.append(stage)
         return {"query_set": self._queries, "beginning_of_pass_write_index": len(self._stages) - 1}
 
     def end(self, encoder: Untyped) -> None:
         """Encode the final timestamp and the copy of all timestamps to a buffer."""
         if self._stages:
-            encoder.begin_compute_pass(label="end", timestamp_writes=self._add("end")).end()
+            encoder.begin_compute_pass(label="end", timestamp_writes=self._add_timestamp("end")).end()
             encoder.resolve_query_set(self._queries, 0, len(self._stages), self._resolved, 0)
 
     def stage_ms(self) -> dict[str, float]:

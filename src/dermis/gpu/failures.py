@@ -79,17 +79,17 @@ class ReopeningDevice:
         Raises DermisError if both devices are lost, and DeviceError for other errors of the driver.
         """
         try:
-            return self._run(job)
+            return self._run_job(job)
         except DeviceLostError as lost:
             if not self._reopens:
                 raise
             notify(f"{lost.name} was lost by its driver; it is opened again, and the frame is restarted")
         try:
-            return self._run(job)
+            return self._run_job(job)
         except DeviceLostError as lost:
             raise lost.lost_twice() from lost
 
-    def _run(self, job: Callable[[], T]) -> T:
+    def _run_job(self, job: Callable[[], T]) -> T:
         device = self._device or self._open_device()
         try:
             with gpu_failures(device):

@@ -198,7 +198,7 @@ class Graph(Recorder):
         def run(frame: CommandList) -> None:
             frame.dispatch(stage, program, resources, groups, access=access)
 
-        self._add(stage, program, resources, groups, access, writes, run)
+        self._declare_pass(stage, program, resources, groups, access, writes, run)
 
     def write(self, stage: str, buffer: Buffer, data: bytes) -> None:
         """Declare a write of bytes from the host to a buffer, see `Recorder.write`."""
@@ -232,7 +232,7 @@ class Graph(Recorder):
         access = program.access(resources)
         index_state = None if indices is None else resource_state(self.device, indices)
         more_keys = layer, target.clear_depth, index_state
-        self._add(stage, program, resources, (vertices,), access, writes, run, more_keys)
+        self._declare_pass(stage, program, resources, (vertices,), access, writes, run, more_keys)
 
     def fill(
         self, stage: str, program: RenderProgram, resources: Bindings, targets: Sequence[TextureOrView]
@@ -243,7 +243,7 @@ class Graph(Recorder):
         def run(frame: CommandList) -> None:
             frame.fill(stage, program, resources, targets)
 
-        self._add(stage, program, resources, (3,), program.access(resources), writes, run)
+        self._declare_pass(stage, program, resources, (3,), program.access(resources), writes, run)
 
     def repeat(self, record: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
         """Declare the compute passes that `record(recorder, *args)` adds, recorded once per set of arguments.
@@ -298,7 +298,7 @@ class Graph(Recorder):
         self._dependencies = [Dependencies(passes), *self._dependencies][:_CACHED_DEPENDENCIES]
         return self._dependencies[0]
 
-    def _add(
+    def _declare_pass(
         self,
         stage: str,
         program: Program,

@@ -58,7 +58,7 @@ class Program:
         self.constants = dict(constants or {})
         self.source = shader_source(path, folders)
         self.bindings: tuple[Binding, ...] = shader_bindings(self.source.text)
-        self._module = self._compile(path)
+        self._module = self._compile_shader(path)
         self._uniforms = [b for b in self.bindings if _is_uniform(b)]
         self._resource_bindings = [b for b in self.bindings if not _is_uniform(b)]
         self._get_resources = _binding_getter([b.name for b in self._resource_bindings])
@@ -143,7 +143,7 @@ class Program:
             self.device, self._group_layout, (*self._resource_bindings, *self._uniforms), bound, sizes
         )
 
-    def _compile(self, path: Path) -> Untyped:
+    def _compile_shader(self, path: Path) -> Untyped:
         try:
             return self.device.handle.create_shader_module(code=self.source.text, label=path.name)
         except Exception as error:

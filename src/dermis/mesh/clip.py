@@ -14,7 +14,7 @@ _MAX_NAMES = 8  # largest number of names in a note
 MAX_DURATION_S = 86_400.0
 _MAX_TIME_S = 1e9
 _MIN_RATE, _MAX_RATE = 0.001, 1000.0
-_ROUNDING = 1e-6  # fraction of a frame by which rounding may put the last frame behind the end
+_ROUNDING_TOLERANCE = 1e-6  # fraction of a frame by which rounding may put the last frame behind the end
 
 
 def check_rate(culprit: object, rate: object) -> float:
@@ -101,7 +101,7 @@ class Clip(ShortRepr):
         DermisError
             For an invalid rate.
         """
-        return math.floor(self.duration_s * check_rate(f"{self.name}: rate", rate) + _ROUNDING) + 1
+        return math.floor(self.duration_s * check_rate(f"{self.name}: rate", rate) + _ROUNDING_TOLERANCE) + 1
 
     def __post_init__(self) -> None:
         """Refuse an invalid duration."""

@@ -143,7 +143,7 @@ def eyeball_uv(quads_per_edge: int = QUADS_PER_EDGE) -> Doubles:
 
     quads_per_edge : number of quads along a cube edge, see `build_eyeball`
     """
-    x, y, z = _directions(quads_per_edge).T
+    x, y, z = _point_directions(quads_per_edge).T
     angle, azimuth = np.arccos(np.clip(z, -1.0, 1.0)), np.arctan2(y, x)
     radius = UV_RIM * angle / np.pi
     return 0.5 + np.stack([radius * np.cos(azimuth), -radius * np.sin(azimuth)], axis=-1)
@@ -154,12 +154,12 @@ def axis_points(quads_per_edge: int = QUADS_PER_EDGE) -> tuple[int, int, int]:
 
     quads_per_edge : number of quads along a cube edge, see `build_eyeball`
     """
-    directions, axes = _directions(quads_per_edge), ((0, 0, 1), (0, 0, -1), (1, 0, 0))
+    directions, axes = _point_directions(quads_per_edge), ((0, 0, 1), (0, 0, -1), (1, 0, 0))
     apex, back, right = (int(np.argmax(directions @ np.array(axis))) for axis in axes)
     return apex, back, right
 
 
-def _directions(quads_per_edge: int) -> Doubles:
+def _point_directions(quads_per_edge: int) -> Doubles:
     points, _ = build_eyeball(quads_per_edge)
     return np.asarray(points / np.linalg.norm(points, axis=1, keepdims=True))
 

@@ -154,7 +154,7 @@ def uv_cross(corners: NDArray[np.floating]) -> Doubles:
     return cross_2d(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
 
 
-def unit(vectors: Doubles, fallback: Doubles) -> Doubles:
+def normalise_vectors(vectors: Doubles, fallback: Doubles) -> Doubles:
     """Normalise vectors (n, 3); vectors of length 0 are replaced by `fallback` (n, 3)."""
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     usable = length > 0
@@ -193,7 +193,7 @@ def _nonzero_tangents(dpdu: Doubles, dpdv: Doubles, normals: Doubles) -> tuple[F
     """
     # the axis that is least parallel to the normal
     axis = np.eye(3)[np.abs(normals).argmin(axis=1)]
-    across = unit(np.cross(axis, normals), axis)
+    across = normalise_vectors(np.cross(axis, normals), axis)
     short = np.minimum(np.linalg.norm(dpdu, axis=1), np.linalg.norm(dpdv, axis=1)) < 1e-6
     u = np.where(short[:, None], across, dpdu)
     v = np.where(short[:, None], np.cross(across, normals), dpdv)
@@ -221,7 +221,7 @@ def cross_columns(a: NDArray[T], b: NDArray[T]) -> NDArray[T]:
     return result
 
 
-def components(count: int, a: NDArray[np.integer], b: NDArray[np.integer]) -> Index:
+def label_components(count: int, a: NDArray[np.integer], b: NDArray[np.integer]) -> Index:
     """Return for each node of a graph the number of its connected component, (n,).
 
     Components are numbered in the order in which they first appear.

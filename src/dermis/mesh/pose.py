@@ -96,10 +96,12 @@ class Pose(ShortRepr):
             For names that the rig does not have, and for invalid numbers and shapes.
         """
         return Motion(
-            self._weights(rig, culprit), self._matrices(rig, culprit), self._positions(rig, culprit)
+            self._target_weights(rig, culprit),
+            self._bone_matrices(rig, culprit),
+            self._rest_positions(rig, culprit),
         )
 
-    def _weights(self, rig: Rig, culprit: object) -> Floats:
+    def _target_weights(self, rig: Rig, culprit: object) -> Floats:
         weights = np.zeros(len(rig.targets.names), np.float32)
         if not self.weights:
             return weights
@@ -112,7 +114,7 @@ class Pose(ShortRepr):
         weights[targets] = values if rig.targets.rest is None else values - rig.targets.rest[targets]
         return weights
 
-    def _matrices(self, rig: Rig, culprit: object) -> Floats:
+    def _bone_matrices(self, rig: Rig, culprit: object) -> Floats:
         bone_values = self._all_bones(rig)
         if not bone_values:
             return rig.rest.matrices
@@ -143,7 +145,7 @@ class Pose(ShortRepr):
                 bones[bone] = [a + self.weights[target] * b for a, b in zip(before, degrees, strict=True)]
         return bones
 
-    def _positions(self, rig: Rig, culprit: object) -> Floats:
+    def _rest_positions(self, rig: Rig, culprit: object) -> Floats:
         if self.positions_mm is None:
             return rig.positions_mm
         try:

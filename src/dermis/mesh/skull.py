@@ -56,7 +56,7 @@ def is_standing_figure(positions: Floats, triangles: Ints) -> bool:
     low, high = ends.min(axis=1), ends.max(axis=1)
     levels = (_HEAD_SECTION, *_NECK_SECTIONS, *_SHOULDER_SECTIONS)
     heights = [float(points[:, 1].min()) + level * height for level in levels]
-    head, *others = (_section(points, triangles[(low <= y) & (high > y)], y) for y in heights)
+    head, *others = (_horizontal_section(points, triangles[(low <= y) & (high > y)], y) for y in heights)
     neck = min(others[: len(_NECK_SECTIONS)], key=lambda one: one.width)
     shoulders = max(others[len(_NECK_SECTIONS) :], key=lambda one: one.width)
     return (
@@ -143,7 +143,7 @@ class _Section(NamedTuple):
     middle: float
 
 
-def _section(positions: Doubles, cut: Ints, height: float) -> _Section:
+def _horizontal_section(positions: Doubles, cut: Ints, height: float) -> _Section:
     """Return the section of a mesh with the horizontal plane at a height.
 
     cut : (n, 3) vertex indices of the triangles that the plane cuts

@@ -56,7 +56,7 @@ def refuse_mcml(path: Path) -> NoReturn:
     refuse(path, expected, actual, "; ".join([advice, *values]))
 
 
-def _layer_entries(n: float, mu_a: float, mu_s: float, g: float, thickness_cm: float) -> str:
+def _layer_entries(eta: float, mu_a: float, mu_s: float, g: float, thickness_cm: float) -> str:
     """Convert a layer of MCML to the keys and values of the TOML files of this package."""
     thickness = (
         f"thickness_mm {10 * thickness_cm:.4g}"
@@ -66,7 +66,7 @@ def _layer_entries(n: float, mu_a: float, mu_s: float, g: float, thickness_cm: f
     coefficients = (
         f"absorption_per_mm {mu_a / 10:.4g}, scattering_per_mm {_reduced_scattering(mu_s, g) / 10:.4g}"
     )
-    return f"{coefficients}, {thickness}, eta {n:.4g}"
+    return f"{coefficients}, {thickness}, eta {eta:.4g}"
 
 
 def _reduced_scattering(mu_s: float, g: float) -> float:

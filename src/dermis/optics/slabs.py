@@ -179,7 +179,7 @@ class _Transport:
 
     @classmethod
     def create(cls, albedo: float, eta: float, nodes: int, g: float) -> _Transport:
-        mu, weight = _quadrature(eta, nodes)
+        mu, weight = _direction_quadrature(eta, nodes)
         internal, escapes = internal_reflectance(mu, eta), mu > critical_cosine(eta)
         return cls(mu, 2.0 * weight * mu, internal, escapes, phase_matrices(albedo, g, mu, nodes))
 
@@ -221,7 +221,7 @@ def _unscattered_exit(unscattered: Floats, internal: Floats) -> tuple[Floats, Fl
     return down * unscattered * internal, down
 
 
-def _quadrature(eta: float, nodes: int) -> tuple[Floats, Floats]:
+def _direction_quadrature(eta: float, nodes: int) -> tuple[Floats, Floats]:
     """Return nodes and weights over cosines in a medium: directions that escape, then all other directions.
 
     A direction escapes if it is not totally reflected at the face.
@@ -321,10 +321,12 @@ def _response_column(eta: float, g: float, total: float) -> Floats:
     """
     a, fraction, radiance = half_space_radiance(albedo_for_reflectance(total, eta), eta, DIRECTION_NODES, g)
     reflectance = fraction @ radiance
-    normal = float(_interpolate(a, reflectance, np.ones(1))[0])
+    normal = float(_interpolate_over_cosines(a, reflectance, np.ones(1))[0])
     if normal <= _MIN_REFLECTANCE:
         return np.append(np.ones(DIRECTION_ROWS + 1), 0.0)
-    table = _interpolate(a, reflectance, refracted_cosine(np.linspace(0.0, 1.0, DIRECTION_ROWS) ** 2, eta))
+    table = _interpolate_over_cosines(
+        a, reflectance, refracted_cosine(np.linspace(0.0, 1.0, DIRECTION_ROWS) ** 2, eta)
+    )
     air = np.sqrt(np.maximum(1.0 - eta**2 * (1.0 - a**2), 0.0))
     kernel = 1.0 / (a[:, None] + a) - mean_single_scattering_kernel(air, eta)
     deviation = radiance - reflectance
@@ -333,7 +335,7 @@ def _response_column(eta: float, g: float, total: float) -> Floats:
     return np.concatenate([table, [fraction @ reflectance, single_scattering]]) / normal
 
 
-def _interpolate(sample_cosine: Floats, values: Floats, cosine: Floats) -> Floats:
+def _interpolate_over_cosines(sample_cosine: Floats, values: Floats, cosine: Floats) -> Floats:
     """Interpolate samples over cosines linearly, and extrapolate beyond them by a polynomial.
 
     sample_cosine : (m,) cosines of the samples

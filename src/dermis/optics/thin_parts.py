@@ -35,7 +35,9 @@ _UNIFORM_NODES = 8  # number of discrete directions for uniform light
 _MIN_OPTICAL_DEPTHS, _DOUBLING_COUNT = 1e-4 * np.array([1.0, 2.0**0.5]), 25
 _OPTICAL_DEPTHS = (_MIN_OPTICAL_DEPTHS * 2.0 ** np.arange(_DOUBLING_COUNT + 1)[:, None]).ravel()
 _MIN_TRANSMITTANCE = 1e-300  # replaces the transmittance 0 of thick black slabs in divisions
-_FREQUENCIES = np.geomspace(0.02, 5.0, 24)  # at which Gaussians are fitted to a profile [1/mean free path]
+_FIT_FREQUENCIES = np.geomspace(
+    0.02, 5.0, 24
+)  # at which Gaussians are fitted to a profile [1/mean free path]
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,7 +184,7 @@ def _spread_weights(medium: Medium, thickness_mm: Floats, variance_mm2: Floats) 
     from scipy.optimize import nnls
 
     layer, A, stiffness = medium.layers[0], boundary_mismatch(medium.eta, "exact"), 100.0
-    s = _FREQUENCIES * float(layer.sigma_t_prime[0])
+    s = _FIT_FREQUENCIES * float(layer.sigma_t_prime[0])
     frequency = np.concatenate([hankel.ZERO_FREQUENCY, s])
     transform = solve_thicknesses(frequency, layer, thickness_mm, A)[1][..., 0]
     # the last row makes the weights sum to 1

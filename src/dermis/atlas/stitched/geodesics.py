@@ -45,9 +45,9 @@ class Geodesics(NamedTuple):
     direction: Complex
     orientation: Doubles
 
-    def select(self, selected: Mask) -> Geodesics:
+    def select(self, mask: Mask) -> Geodesics:
         """Return the geodesics that a mask selects."""
-        return Geodesics._make(part[selected] for part in self)
+        return Geodesics._make(part[mask] for part in self)
 
 
 class GeodesicEnds(NamedTuple):

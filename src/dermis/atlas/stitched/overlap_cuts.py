@@ -28,7 +28,7 @@ from dermis.atlas.stitched.texels import (
 )
 from dermis.atlas.unwrap.charts import connected_pieces
 from dermis.base.arrays import Doubles, Index, Ints, Mask
-from dermis.mesh.geometry import components
+from dermis.mesh.geometry import label_components
 
 _MIN_TEXEL_MM = 0.9  # smallest texel of the grids on which overlaps are searched
 _MAX_TEXELS = 100_000  # largest number of texels of a piece on such a grid
@@ -151,14 +151,14 @@ def _gap_pairs(surface: FlatSurface, mapped: Mask, grid: _PieceGrid) -> tuple[In
     return first[gap], second[gap]
 
 
-def _texel_points(surface: FlatSurface, mapped: Mask, grid: _PieceGrid, chosen: Index) -> Doubles:
+def _texel_points(surface: FlatSurface, mapped: Mask, grid: _PieceGrid, chosen_texels: Index) -> Doubles:
     """Return the surface points (n, 3) of all texels of the grid, NaN for points that are not computed [mm].
 
-    Points are computed for the texels in `chosen`, except for texels beyond the end of the surface.
+    Points are computed for the texels in `chosen_texels`, except for texels beyond the end of the surface.
     """
     owner, texels = grid.owner[grid.owner >= 0], grid.anchored.texels
     points, is_chosen = np.full((len(texels), 3), np.nan), np.zeros(len(texels), np.bool_)
-    is_chosen[chosen] = True
+    is_chosen[chosen_texels] = True
     members, beyond = np.flatnonzero(is_chosen[: len(owner)]), np.flatnonzero(is_chosen[len(owner) :])
     f = owner[members]
     points[members] = surface.points(f, barycentric_weights(grid.packing.corners[f], texels[members]))
@@ -237,7 +237,7 @@ def _conflict_clusters(conflicts: Conflicts, reach: float) -> list[Index]:
     cells = np.floor((conflicts.first + conflicts.second) / 2 / (_CLUSTER_CELL * reach)).astype(np.int64)
     cells, cell_of = np.unique(cells, axis=0, return_inverse=True)
     adjacent = np.abs(cells[:, None] - cells).max(axis=2) <= 1
-    label = components(len(cells), *np.nonzero(adjacent))[cell_of.reshape(-1)]
+    label = label_components(len(cells), *np.nonzero(adjacent))[cell_of.reshape(-1)]
     return [np.flatnonzero(label == k) for k in range(label.max(initial=-1) + 1)]
 
 

@@ -64,9 +64,9 @@ class AnchoredTexels(NamedTuple):
     anchors: Doubles
     step_mm: Doubles
 
-    def select(self, selected: Index) -> AnchoredTexels:
+    def select(self, indices: Index) -> AnchoredTexels:
         """Return the texels at some indices."""
-        return AnchoredTexels._make(part[selected] for part in self)
+        return AnchoredTexels._make(part[indices] for part in self)
 
 
 def unconnected_pairs(surface: FlatSurface, owner: Ints, axis: int) -> tuple[Index, Index]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dermis.base.arrays import Doubles, Index, Mask
-from dermis.mesh.geometry import components, edges, sum_by_index, triangle_areas
+from dermis.mesh.geometry import edges, label_components, sum_by_index, triangle_areas
 
 _SMOOTHING_STEPS = 4
 _BEND_PENALTY = 3.0  # extra length that a step across a right angle counts, relative to the step's length
@@ -75,7 +75,7 @@ def connected_pieces(chart: Index, adjacent: Index) -> Index:
     """
     here, there = np.repeat(np.arange(len(chart)), 3), adjacent.ravel()
     same = (chart[here] == chart[there]) & (here < there)
-    return components(len(chart), here[same], there[same])
+    return label_components(len(chart), here[same], there[same])
 
 
 def _stray_triangles(chart: Index, adjacent: Index) -> Mask:

@@ -18,7 +18,7 @@ from dermis.mesh.mesh import Mesh, build_mesh
 
 _GRID_CELLS = 512  # number of cells along each side of the map
 _MAX_PLACEMENTS = 1000  # largest number of charts that are placed, in all orders together
-_BISECTIONS = 9  # number of trials in the search for the scale
+_BISECTION_COUNT = 9  # number of trials in the search for the scale
 _MIN_SCALE_GAIN = 1.004  # gain of scale for which the search is repeated with another order
 CHART_PADDING = 1 / 128
 """Empty space between charts as a fraction of the map's side: 8 texels at 1024."""
@@ -51,7 +51,7 @@ def pack_charts(outlines: list[Doubles], padding: float) -> tuple[float, Doubles
         low, high = best, bound
         if cells is not None and _drop_charts(shifted, order, best * _MIN_SCALE_GAIN, padding) is None:
             continue
-        for _ in range(_BISECTIONS):
+        for _ in range(_BISECTION_COUNT):
             scale = (low + high) / 2
             found = _drop_charts(shifted, order, scale, padding)
             if found is None:

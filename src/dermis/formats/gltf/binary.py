@@ -49,8 +49,8 @@ class BufferBuilder:
         target : `VERTICES` or `INDICES`; None for other data
         bounded : whether to store each component's minimum and maximum, which glTF requires for positions
         """
-        values = _little_endian(rows)
-        bounds = _bounds(values) if bounded else {}
+        values = _to_little_endian(rows)
+        bounds = _component_bounds(values) if bounded else {}
         view = self.add_view(values.tobytes(), target)
         return self._append_accessor(values, {"bufferView": view} | bounds)
 
@@ -75,11 +75,11 @@ class BufferBuilder:
         index = row.astype(_index_dtype(count))
         if len(row) * (12 + index.itemsize) >= 12 * count:
             return [self._dense_accessor(row, values, count) for values in columns]
-        indices = {"bufferView": self.add_view(_little_endian(index).tobytes())}
-        indices["componentType"] = _COMPONENT_TYPES[_little_endian(index).dtype.str]
+        indices = {"bufferView": self.add_view(_to_little_endian(index).tobytes())}
+        indices["componentType"] = _COMPONENT_TYPES[_to_little_endian(index).dtype.str]
         accessors = []
         for values in columns:
-            stored = _little_endian(values)
+            stored = _to_little_endian(values)
             view = {"bufferView": self.add_view(stored.tobytes())}
             sparse = {"count": len(row), "indices": dict(indices), "values": view}
             low, high = np.minimum(stored.min(axis=0), 0), np.maximum(stored.max(axis=0), 0)
@@ -109,12 +109,12 @@ class BufferBuilder:
         return len(self.accessors) - 1
 
 
-def _little_endian(rows: Numbers) -> Numbers:
+def _to_little_endian(rows: Numbers) -> Numbers:
     """Return a contiguous array in little-endian byte order, which glTF requires."""
     return np.ascontiguousarray(rows, rows.dtype.newbyteorder("<"))
 
 
-def _bounds(values: Numbers) -> dict[str, list[float]]:
+def _component_bounds(values: Numbers) -> dict[str, list[float]]:
     return {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
 
 

@@ -15,9 +15,9 @@ from dermis.formats import size_limits as limits
 from dermis.formats.gltf.document import Document, Tree
 
 EXTENSION = "KHR_draco_mesh_compression"
-_TRIANGLES = 4
-_DECODER = "dermis.formats.gltf.draco_decoder"
-_ADVICE = "Decimate it, or export without compression"
+_TRIANGLES_MODE = 4
+_DECODER_MODULE = "dermis.formats.gltf.draco_decoder"
+_SIZE_ADVICE = "Decimate it, or export without compression"
 
 
 class _Primitive(NamedTuple):
@@ -48,7 +48,7 @@ def decompress(document: Document) -> None:
     views = [document.read_view(one.extension["bufferView"]) for one in primitives]
     request = {str(number): np.frombuffer(view, np.uint8) for number, view in enumerate(views)}
     size = sum(map(len, views))
-    answer = run_decoder(_DECODER, request, size, document.path, "valid geometry compressed by Draco")
+    answer = run_decoder(_DECODER_MODULE, request, size, document.path, "valid geometry compressed by Draco")
     for number, primitive in enumerate(primitives):
         _store_attributes(document, primitive, answer, str(number))
 
@@ -66,8 +66,8 @@ def _check_sizes(document: Document, primitives: list[Tree]) -> None:
     """Refuse more vertices or triangles than allowed, by the sizes that accessors state."""
     vertices = [document.item("accessors", one["attributes"]["POSITION"])["count"] for one in primitives]
     corners = [document.item("accessors", one["indices"])["count"] for one in primitives if "indices" in one]
-    limits.check_limit(document.path, sum(vertices), limits.MAX_VERTICES, "vertices", _ADVICE)
-    limits.check_limit(document.path, sum(corners) // 3, limits.MAX_TRIANGLES, "triangles", _ADVICE)
+    limits.check_limit(document.path, sum(vertices), limits.MAX_VERTICES, "vertices", _SIZE_ADVICE)
+    limits.check_limit(document.path, sum(corners) // 3, limits.MAX_TRIANGLES, "triangles", _SIZE_ADVICE)
 
 
 def _store_attributes(document: Document, primitive: _Primitive, answer: Arrays, mesh_name: str) -> None:
@@ -79,7 +79,7 @@ def _store_attributes(document: Document, primitive: _Primitive, answer: Arrays,
     if "indices" in tree:
         triangles = answer[f"{mesh_name}/triangles"]
         _replace_accessor(document, tree["indices"], triangles.reshape(-1, 1), "indices of triangles")
-        tree["mode"] = _TRIANGLES
+        tree["mode"] = _TRIANGLES_MODE
 
 
 def _replace_accessor(document: Document, accessor: int, values: Numbers, items: str) -> None:

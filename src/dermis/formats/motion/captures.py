@@ -259,7 +259,7 @@ def find_rotation_bones(skeleton: Skeleton | None) -> RotationBones:
     head = heads[0] if heads else None
     necks = [bone for bone, (kind, side) in enumerate(words) if kind in _NECK_WORDS and not side]
     if head is not None:
-        ancestors = _ancestors(skeleton, head)
+        ancestors = _bone_ancestors(skeleton, head)
         necks = [bone for bone in necks if bone in ancestors]
     eyes: dict[str, str] = {}
     for bone, (kind, side) in enumerate(words):
@@ -304,7 +304,7 @@ def _euler_angles(rotations: Doubles) -> Doubles:
     return unwrap_degrees(np.array([matrix_angles(matrix) for matrix in matrices]))
 
 
-def _ancestors(skeleton: Skeleton, bone: int) -> set[int]:
+def _bone_ancestors(skeleton: Skeleton, bone: int) -> set[int]:
     ancestors = set()
     while (bone := int(skeleton.parent[bone])) >= 0:
         ancestors.add(bone)

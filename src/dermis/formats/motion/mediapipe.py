@@ -54,7 +54,7 @@ _SCORE_KEYS = ("score", "value", "weight")
 _RATE_KEYS = ("fps", "framerate")
 _DEFAULT_RATE = 30.0
 _MAX_MATRIX_VALUE = 1e6
-_EXPECTED = "results of MediaPipe in JSON"
+_EXPECTED_CONTENT = "results of MediaPipe in JSON"
 _LINE_ADVICE = "Correct or remove the line"
 _RECORD_ADVICE = "Record with output_face_blendshapes (JavaScript: outputFaceBlendshapes) set to true"
 
@@ -106,7 +106,7 @@ def load_mediapipe(path: Path, head: Head, fps: float | None = None) -> Clip:
     if lost == len(frames):
         found = ", ".join(record) if isinstance(record, dict) and record else "nothing"
         actual = f"no frame has any (the last one has {found})"
-        refuse(path, f"{_EXPECTED} with blendshapes", actual, _RECORD_ADVICE)
+        refuse(path, f"{_EXPECTED_CONTENT} with blendshapes", actual, _RECORD_ADVICE)
     note_lost_frames(path, lost, len(frames))
     if several:
         notify(f"{path}: {several} of {len(frames)} frames show several faces; the first one is used")
@@ -125,20 +125,22 @@ def load_mediapipe(path: Path, head: Head, fps: float | None = None) -> Clip:
 
 def _read_records(path: Path) -> tuple[float | None, Iterator[tuple[str, object]]]:
     """Return the frame rate that a file states, and its frames, each with its name for errors."""
-    text = read_text(path, _EXPECTED, MAX_CLIP_BYTES)
+    text = read_text(path, _EXPECTED_CONTENT, MAX_CLIP_BYTES)
     lines = ((f"{path}, line {k}", line) for k, line in enumerate(io.StringIO(text), 1) if line.strip())
     first, second = next(lines, None), next(lines, None)
     if first is None:
-        refuse(path, _EXPECTED, "it is empty", "Record it again")
+        refuse(path, _EXPECTED_CONTENT, "it is empty", "Record it again")
     try:
-        document = parse_json(first[1], first[0], _EXPECTED)
+        document = parse_json(first[1], first[0], _EXPECTED_CONTENT)
     except DermisError:
         if second is None:
             raise
-        document = parse_json(text, path, _EXPECTED)  # an object over several lines
+        document = parse_json(text, path, _EXPECTED_CONTENT)  # an object over several lines
     else:
         if second is not None:
-            rest = ((name, parse_json(line, name, _EXPECTED)) for name, line in chain([second], lines))
+            rest = (
+                (name, parse_json(line, name, _EXPECTED_CONTENT)) for name, line in chain([second], lines)
+            )
             return None, chain([(first[0], document)], rest)
     fields = _plain_fields(document)
     rate = next((check_rate(f"{path}: {key}", fields[key]) for key in _RATE_KEYS if key in fields), None)

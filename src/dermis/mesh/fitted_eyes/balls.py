@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dermis.base.arrays import Doubles, Index
-from dermis.mesh.geometry import components, triangle_areas
+from dermis.mesh.geometry import label_components, triangle_areas
 from dermis.mesh.mesh import Mesh
 
 RADIUS_RANGE_MM = 8.0, 20.0
@@ -99,7 +99,7 @@ def _eye_pieces(mesh: Mesh, eye_triangles: Index) -> list[_EyePiece]:
     corners = mesh.point[mesh.triangles[eye_triangles]].astype(np.int64)
     points, triangles = np.unique(corners, return_inverse=True)
     triangles = triangles.reshape(-1, 3)
-    label = components(len(points), triangles[:, [0, 1]].ravel(), triangles[:, [1, 2]].ravel())
+    label = label_components(len(points), triangles[:, [0, 1]].ravel(), triangles[:, [1, 2]].ravel())
     thirds = np.repeat(triangle_areas(mesh.positions[mesh.triangles[eye_triangles]]) / 3, 3)
     area = np.bincount(triangles.ravel(), thirds, minlength=len(points))
     positions = mesh.points_mm[points]

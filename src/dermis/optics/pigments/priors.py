@@ -14,8 +14,8 @@ PRIOR_NAMES = ("melanin", "blood", "oxygen", "epidermis_mm")
 """Parameters of the prior; all but oxygen are distributed by their logarithms."""
 _OXYGEN_INDEX = PRIOR_NAMES.index("oxygen")
 _SMALLEST_FRACTION = 1e-4
-_COVARIANCE = [f"{a}_{b}" for i, a in enumerate(PRIOR_NAMES) for b in PRIOR_NAMES[: i + 1]]
-PRIOR_COLUMNS = ("weight", *PRIOR_NAMES, *_COVARIANCE)
+_COVARIANCE_COLUMNS = [f"{a}_{b}" for i, a in enumerate(PRIOR_NAMES) for b in PRIOR_NAMES[: i + 1]]
+PRIOR_COLUMNS = ("weight", *PRIOR_NAMES, *_COVARIANCE_COLUMNS)
 """Columns of the table: weight, mean and lower triangle of the covariance of each component."""
 
 
@@ -76,7 +76,7 @@ def skin_prior() -> SkinPrior:
     """
     rows = read_rows("dermis.optics", "data/skin_priors")
     count = len(PRIOR_NAMES)
-    lower = float_columns(rows, " ".join(_COVARIANCE))
+    lower = float_columns(rows, " ".join(_COVARIANCE_COLUMNS))
     covariance = np.zeros((len(rows), count, count))
     i, j = np.tril_indices(count)
     covariance[:, i, j] = covariance[:, j, i] = lower

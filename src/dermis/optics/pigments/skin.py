@@ -69,28 +69,32 @@ def spectral_medium(
     return Medium(structure, stack, SKIN_ETA, notes, sources)
 
 
-def _dj2006(parameters: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats) -> tuple[Layer, ...]:
+def _build_dj2006(
+    parameters: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats
+) -> tuple[Layer, ...]:
     """Return epidermis and dermis after [DonnerJensen2006]."""
-    return _epidermis(parameters, wavelength_nm, sigma_s_prime), _dermis(
+    return _epidermis_layer(parameters, wavelength_nm, sigma_s_prime), _dermis_layer(
         parameters, wavelength_nm, sigma_s_prime
     )
 
 
-def _donner2008(
+def _build_donner2008(
     parameters: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats
 ) -> tuple[Layer, ...]:
     """Return epidermis, melanin sheet and dermis after equations 11 and 12 of [Donner2008]."""
     melanin = parameters.melanin * melanosome(wavelength_nm, parameters.eumelanin)
     sheet_sigma_a = LEAKED_MELANIN * melanin * parameters.epidermis_mm / _MELANIN_SHEET_MM
     return (
-        _epidermis(parameters, wavelength_nm, sigma_s_prime, parameters.epidermal_blood),
+        _epidermis_layer(parameters, wavelength_nm, sigma_s_prime, parameters.epidermal_blood),
         # Diffusion needs scattering everywhere; in so thin a sheet it has no visible effect.
         Layer(sheet_sigma_a, sigma_s_prime, _MELANIN_SHEET_MM, "melanin sheet"),
-        _dermis(parameters, wavelength_nm, sigma_s_prime),
+        _dermis_layer(parameters, wavelength_nm, sigma_s_prime),
     )
 
 
-def _biospec(parameters: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats) -> tuple[Layer, ...]:
+def _build_biospec(
+    parameters: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats
+) -> tuple[Layer, ...]:
     """Return four skin layers after [KrishnaswamyBaranoski2004], with constants of its author's code."""
     reticular = replace(parameters, blood=_RETICULAR_BLOOD_RATIO * parameters.blood)
     return (
@@ -100,16 +104,16 @@ def _biospec(parameters: SkinParameters, wavelength_nm: Floats, sigma_s_prime: F
             _STRATUM_CORNEUM_MM,
             "stratum corneum",
         ),
-        _epidermis(parameters, wavelength_nm, sigma_s_prime),
+        _epidermis_layer(parameters, wavelength_nm, sigma_s_prime),
         replace(
-            _dermis(parameters, wavelength_nm, sigma_s_prime, "papillary dermis"),
+            _dermis_layer(parameters, wavelength_nm, sigma_s_prime, "papillary dermis"),
             thickness_mm=_PAPILLARY_DERMIS_MM,
         ),
-        _dermis(reticular, wavelength_nm, sigma_s_prime, "reticular dermis"),
+        _dermis_layer(reticular, wavelength_nm, sigma_s_prime, "reticular dermis"),
     )
 
 
-def _epidermis(
+def _epidermis_layer(
     parameters: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats, blood_fraction: float = 0.0
 ) -> Layer:
     """Return the epidermis, a mixture of melanosomes, a given fraction of blood, and bloodless tissue."""
@@ -125,7 +129,7 @@ def _epidermal_absorption(
     return np.asarray(pigment + blood_fraction * blood(wavelength_nm, parameters.oxygen) + tissue)
 
 
-def _dermis(
+def _dermis_layer(
     parameters: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats, name: str = "dermis"
 ) -> Layer:
     """Return a semi-infinite dermis, a mixture of blood and bloodless tissue."""
@@ -162,18 +166,18 @@ def dj2006_layers(parameters: SkinParameters, fractions: Floats) -> tuple[Layer,
 
 _STRUCTURES: dict[str, tuple[_LayerBuilder, str, tuple[str, ...]]] = {
     "dj2006": (
-        _dj2006,
+        _build_dj2006,
         "formulae as quoted by public code; the thickness of the epidermis is not known to be the paper's",
         ("DonnerJensen2006", "Jacques1998", "Prahl1999"),
     ),
     "donner2008": (
-        _donner2008,
+        _build_donner2008,
         f"the sheet adds {LEAKED_MELANIN:.1%} of what the melanin above it absorbs, as public code reads the "
         f"paper; carotene is left out; {_THIN_NOTE}",
         ("Donner2008", "DonnerJensen2006", "Jacques1998", "Prahl1999"),
     ),
     "biospec": (
-        _biospec,
+        _build_biospec,
         "BioSpec traces rays and has no reduced scattering: the law of dj2006 is used instead; its epidermis "
         "is 0.1 mm thick, its reticular dermis 1.8 mm on a mirror, but semi-infinite here; carotene and "
         f"bilirubin are left out; {_THIN_NOTE}",
