@@ -24,7 +24,7 @@ _MAX_ASYMMETRY = 0.03  # largest root mean square distance of mirrored points fr
 _MIN_NOSE = 0.04  # smallest protrusion of the middle of the face
 _MIN_RELIEF = 0.03  # smallest variation of normals, see `_normal_variation`
 _VARIATION_CELL = 0.08  # side of the cells in `_normal_variation`
-# Height of the rows in `_ridge`, largest distance of the ridge from the middle, and distances of its sides:
+# Height of the rows in `_ridge_height`, largest distance of the ridge from the middle, distance of its sides:
 _ROW, _RIDGE, _SIDES = 0.05, 0.03, (0.07, 0.12)
 # Smallest ratio of the larger to the smaller asymmetry about the horizontal axes, and of relief and of nose
 # at the front to those at the back:
