@@ -24,8 +24,8 @@ _GRAB_RADIUS_PX = 8.0  # distance from the divider within which a pointer grabs 
 class Controls:
     """Conversion of input events to steps of the undo history.
 
-    displayed_state : function that returns the state on screen, which differs from the history during
-        playback
+    displayed_state : function that returns the state on screen; during playback, it differs from the state
+        of the history
     light : index of the light that Shift-drag moves; an index after the last light means the environment
     """
 
@@ -74,7 +74,7 @@ class Controls:
         self._pinch = _measure_pinch(event)
 
     def _release(self, event: Event, size: Point) -> None:
-        """End a drag at the position of the release, which may differ from that of the last move."""
+        """End a drag at the position of the release, which may differ from the position of the last move."""
         if self._pressed_button and not self._pinch and (event["x"], event["y"]) != self._pointer_position:
             self._drag(event, size)
         self._pressed_button, self._pinch = 0, None
@@ -97,9 +97,10 @@ class Controls:
         self.history.change(new_state, f"drag {self._gesture_count}")
 
     def _pan_and_zoom(self, pinch: tuple[float, float, float] | None, size: Point) -> None:
-        """Pan and zoom with two fingers; lifting one of them does not move the picture.
+        """Pan and zoom with two fingers; lifting one finger does not move the picture.
 
-        pinch : midpoint (x, y) and distance of the fingers, None for fewer than two
+        pinch : midpoint (x, y) and distance of the two fingers [logical pixel]; None for fewer than two
+            fingers
         """
         if pinch and self._pinch:
             (x, y, spread), (x0, y0, spread0) = pinch, self._pinch
@@ -112,7 +113,7 @@ class Controls:
     def _zoom(self, factor: float, pointer: Point, size: Point, gesture: str) -> None:
         """Move the camera nearer or farther, or scale the atlas around the pointer.
 
-        factor : factor of the visible height; below 1 zooms in
+        factor : factor by which the visible height is multiplied; a factor below 1 zooms in
         gesture : name of the gesture, which is undone in one step
         """
         state = self.history.state
@@ -124,7 +125,10 @@ class Controls:
         self.history.change(new_state, gesture)
 
     def _drag_unit(self, size: Point) -> float:
-        """Return the length that drags are divided by: image height, or shorter side for the atlas view."""
+        """Return the length by which drags are divided [logical pixel].
+
+        The length is the height of the picture, or, in the atlas view, the shorter side of the picture.
+        """
         return max(1.0, min(size) if self.history.state.view == ATLAS_VIEW_NAME else size[1])
 
     def _focus(self, event: Event, size: Point) -> None:
@@ -148,7 +152,7 @@ class Controls:
 
 
 class SplitView:
-    """Before/after comparison: a frozen state left of a divider, the live state right of it.
+    """Before/after comparison: a frozen state left of a divider, and the live state right of the divider.
 
     frozen_state : state on the left, rendered with the live camera; None without a divider
     divider_position : fraction of the picture width left of the divider
@@ -161,7 +165,7 @@ class SplitView:
         self.is_dragged = False
 
     def freeze(self, state: ViewerState) -> None:
-        """Show a divider, with the given state left of it."""
+        """Show a divider, with the given state left of the divider."""
         self.frozen_state = state
 
     def release(self) -> None:
@@ -169,7 +173,7 @@ class SplitView:
         self.frozen_state, self.is_dragged = None, False
 
     def handle(self, event: Event, width: float) -> bool:
-        """Process a pointer event; return whether it drags the divider.
+        """Process a pointer event; return whether the event drags the divider.
 
         width : logical width of the picture
         """
@@ -205,7 +209,7 @@ def _pan(state: ViewerState, right: float, down: float) -> ViewerState:
 
 
 def _measure_pinch(event: Event) -> tuple[float, float, float] | None:
-    """Return the midpoint (x, y) and the distance of two fingers; None for fewer than two."""
+    """Return the midpoint (x, y) and the distance of two fingers; None for fewer than two fingers."""
     touches = list((event.get("touches") or {}).values())
     if len(touches) < 2:
         return None

@@ -23,22 +23,22 @@ _EASING_TIME_S = 0.05  # time constant with which the displayed camera approache
 
 def camera_axes(camera: Camera) -> tuple[Floats, Floats, Floats]:
     """Return the unit vectors of a camera: right and up in the image plane, and forward."""
-    forward = _unit(np.subtract(camera.target, camera.position))
-    right = _unit(np.cross(forward, camera.up))
+    forward = _normalise(np.subtract(camera.target, camera.position))
+    right = _normalise(np.cross(forward, camera.up))
     return right, np.cross(right, forward), forward
 
 
 def orbit(camera: Camera, yaw: float, pitch: float) -> Camera:
     """Orbit the camera around its target, without passing over the top or bottom.
 
-    yaw, pitch : angles to the right and up [rad]
+    yaw, pitch : angles by which the camera moves to the right and up [rad]
     """
-    up = _unit(np.array(camera.up, dtype=np.float64))
+    up = _normalise(np.array(camera.up, dtype=np.float64))
     offset = np.subtract(camera.position, camera.target)
     distance = float(np.linalg.norm(offset))
     elevation = math.asin(max(-1.0, min(1.0, float(offset @ up) / distance)))
     limit = max(_MAX_ELEVATION, abs(elevation))
-    horizontal = _rotation(up, yaw) @ _unit(offset - (offset @ up) * up)
+    horizontal = _rotation_matrix(up, yaw) @ _normalise(offset - (offset @ up) * up)
     elevation = max(-limit, min(limit, elevation + pitch))
     offset = distance * (math.cos(elevation) * horizontal + math.sin(elevation) * up)
     return _with_position(camera, np.array(camera.target) + offset, camera.target)
@@ -57,7 +57,7 @@ def pan(camera: Camera, right: float, up: float) -> Camera:
 def dolly(camera: Camera, factor: float) -> Camera:
     """Move the camera nearer (factor below 1) or farther; closer than 90 mm, zoom the lens instead.
 
-    factor : factor of the visible height at the target [-]
+    factor : factor by which the visible height at the target is multiplied [-]
     """
     frame_mm = max(_FRAME_RANGE_MM[0], min(_FRAME_RANGE_MM[1], factor * camera.frame_mm))
     offset = np.subtract(camera.position, camera.target)
@@ -69,7 +69,7 @@ def dolly(camera: Camera, factor: float) -> Camera:
 
 
 def focus(camera: Camera, point: ArrayLike) -> Camera:
-    """Shift the camera so that a point becomes its target; direction and distance are unchanged."""
+    """Shift the camera so that a point becomes the target; direction and distance are unchanged."""
     shift = np.subtract(point, camera.target)
     return _with_position(camera, np.array(camera.position) + shift, point)
 
@@ -81,7 +81,7 @@ class CameraEasing:
         self.camera = camera
 
     def advance(self, target: Camera, seconds: float) -> Camera:
-        """Move the displayed camera towards a target for some time, and return it.
+        """Move the displayed camera towards another camera, and return the displayed camera.
 
         target : camera to approach
         seconds : time since the last call [s]
@@ -111,7 +111,7 @@ def interpolate_cameras(a: Camera, b: Camera, t: float) -> Camera:
     frame = a.frame_mm * (b.frame_mm / a.frame_mm) ** t
     camera = validated_copy(
         b,
-        position=_clamped_tuple(target + distance * _unit(direction)),
+        position=_clamped_tuple(target + distance * _normalise(direction)),
         target=_clamped_tuple(target),
         up=_clamped_tuple(up) if np.linalg.norm(np.cross(up, direction)) > 1e-3 else b.up,
         frame_mm=frame,
@@ -153,8 +153,8 @@ def pick(scene: Scene, camera: Camera, x: float, y: float, aspect: float) -> Flo
 def drag_light(state: ViewerState, index: int, right: float, up: float) -> ViewerState:
     """Orbit a light around its target in the direction of a drag, or rotate the environment.
 
-    index : index of the light; any other index means the environment
-    right, up : angles [rad]
+    index : index of the light; an index after the last light means the environment
+    right, up : angles of the drag, to the right and up on screen [rad]
     """
     if index < len(state.scene.lights):
         lights = list(state.scene.lights)
@@ -172,10 +172,11 @@ def orbit_light(light: Light, camera: Camera, right: float, up: float) -> Light:
 
     The rotation changes the direction of a directional light, and the position of any other light.
 
-    right, up : angles [rad]; positive ones move a light in front of its target to the right and up on screen
+    right, up : angles [rad]; positive angles move a light between target and camera to the right and up on
+        screen
     """
     x, y, _ = camera_axes(camera)
-    rotation = _rotation(y, right) @ _rotation(x, -up)
+    rotation = _rotation_matrix(y, right) @ _rotation_matrix(x, -up)
     if isinstance(light, DirectionalLight):
         return validated_copy(light, direction=_clamped_tuple(rotation @ np.array(light.direction)))
     offset = rotation @ np.subtract(light.position, light.target)
@@ -203,7 +204,7 @@ def _interpolate(a: ArrayLike, b: ArrayLike, t: float) -> Floats:
     return (1.0 - t) * np.array(a, dtype=np.float64) + t * np.array(b, dtype=np.float64)
 
 
-def _rotation(axis: Floats, angle: float) -> Floats:
+def _rotation_matrix(axis: Floats, angle: float) -> Floats:
     """Return the (3, 3) matrix of a rotation around a unit axis.
 
     angle : angle [rad]
@@ -213,5 +214,5 @@ def _rotation(axis: Floats, angle: float) -> Floats:
     return np.asarray(np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * (cross @ cross))
 
 
-def _unit(v: Floats) -> Floats:
+def _normalise(v: Floats) -> Floats:
     return np.asarray(v / np.linalg.norm(v))

@@ -38,7 +38,7 @@ class AtlasView:
 
     layer : map to show, one of `views.ATLAS_LAYERS`
     centre : uv at the centre of the picture, u to the right and v down [-]
-    span : part of the atlas along the picture's shorter side, 1 for the whole side of the atlas [-]
+    span : length in the atlas that the picture's shorter side shows; 1 is the side of the atlas [-]
     """
 
     layer: str = "irradiance"
@@ -56,8 +56,9 @@ class AtlasView:
     def zoomed(self, factor: float, x: float, y: float) -> AtlasView:
         """Return the view zoomed around the cursor.
 
-        factor : factor of the visible extent; below 1 zooms in
-        x, y : cursor relative to the centre of the picture, right and down, in fractions of its shorter side
+        factor : factor by which the visible extent is multiplied; a factor below 1 zooms in
+        x, y : cursor relative to the centre of the picture, right and down, in fractions of the picture's
+            shorter side
         """
         span = min(_MAX_SPAN, max(_MIN_SPAN, factor * self.span))
         (u, v), reduction = self.centre, self.span - span
@@ -142,7 +143,7 @@ class ViewerState:
         return self._with_scene(environment=environment)
 
     def with_view(self, name: str) -> ViewerState:
-        """Return a copy that shows another of `views.VIEW_NAMES`."""
+        """Return a copy that shows another view, one of `views.VIEW_NAMES`."""
         return replace(self, view=name)
 
     def with_atlas_view(self, atlas_view: AtlasView) -> ViewerState:
@@ -154,7 +155,7 @@ class ViewerState:
         return self._with_scene(pose=pose)
 
     def with_motion(self, clip: Clip, seconds: float) -> ViewerState:
-        """Return a copy with the pose of a motion; morph targets and bones that it does not move are kept.
+        """Return a copy posed by a motion; morph targets and bones that the motion does not move are kept.
 
         seconds : time in the motion [s]
 
@@ -215,11 +216,11 @@ def _load_named_state(name: str) -> ViewerState:
 
 
 def make_state(subject: Head | Human | Scene | ViewerState | str | os.PathLike[str]) -> ViewerState:
-    """Return the initial state of a viewer for a head, person or scene, or for the name of one.
+    """Return the initial state of a viewer for a head, person or scene.
 
-    A state is returned unchanged.
+    subject : head, person, scene, or the name or file of one of these; a viewer state is returned unchanged
 
-    Raises DermisError for anything else.
+    Raises DermisError for a subject of another type, and if a named subject cannot be loaded.
     """
     if isinstance(subject, ViewerState):
         return subject
@@ -287,7 +288,7 @@ class UndoHistory:
 
     @property
     def can_undo(self) -> bool:
-        """Return whether there is an earlier state."""
+        """Return whether there is a state before the current state."""
         return len(self._past) > 1
 
     @property
@@ -296,7 +297,7 @@ class UndoHistory:
         return bool(self._undone)
 
     def change(self, state: ViewerState, gesture: str = "") -> None:
-        """Add a state; within one gesture it replaces the last state.
+        """Add a state; within one gesture, the new state replaces the last state.
 
         gesture : name of the gesture, empty for a change that is undone separately
         """

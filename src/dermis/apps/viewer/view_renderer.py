@@ -31,7 +31,7 @@ from dermis.mesh.mesh import Mesh
 from dermis.scene.camera import Camera
 from dermis.scene.settings import MAX_SAMPLE_COUNT, Settings
 
-_BUDGET_MS = {True: 100.0, False: 33.0}  # time of a frame in motion on a software adapter and on a GPU
+_FRAME_BUDGET_MS = {True: 100.0, False: 33.0}  # time of a frame in motion on a software adapter and on a GPU
 _SLOW_RATIO, _FAST_RATIO = 1.25, 0.45  # ratios of frame time to budget at which the quality changes
 _STREAK_LENGTH = 2  # consecutive slow or fast frames before a change; a single one may have relit the atlas
 
@@ -41,7 +41,7 @@ class Quality:
     """Upper limits of the render settings in motion; still frames are rendered without limits.
 
     scale : factor of the image size [-]
-    samples, atlas, shadow_size : maximum values of these settings
+    samples, atlas, shadow_size : maximum values of the fields of `Settings` with these names
     """
 
     scale: float
@@ -70,7 +70,7 @@ class QualityController:
 
     def __init__(self, software: bool) -> None:
         self.software = software
-        self._budget_ms = _BUDGET_MS[software]
+        self._budget_ms = _FRAME_BUDGET_MS[software]
         self._level = self._best_level = _BEST_LEVEL_ON_CPU if software else 0
         self._streak = 0
 
@@ -175,7 +175,7 @@ class ViewRenderer:
         size: tuple[int, int],
         moving: bool,
     ) -> Images:
-        """Return the images of the live and the frozen state; the second is None if no state is frozen.
+        """Return the image of the live state, and the image of the frozen state or None.
 
         moving : whether the picture is changing, which limits its quality
 
@@ -190,7 +190,7 @@ class ViewRenderer:
     def render_image(
         self, state: ViewerState, camera: Camera, size: tuple[int, int], moving: bool
     ) -> Texture:
-        """Return a texture of sRGB bytes for a state; cached if nothing has changed.
+        """Return a texture of sRGB bytes for a state; the last texture is reused if nothing has changed.
 
         size : size of the view; in motion the texture may be smaller [pixel]
         moving : whether the picture is changing, which limits its quality
@@ -245,9 +245,9 @@ class ViewRenderer:
     def screenshot(self, path: Path, state: ViewerState, size: tuple[int, int]) -> None:
         """Render the view of a state to a file: .png (tone-mapped) or .exr (linear).
 
-        size : width and height [pixel]
+        size : width and height of the picture [pixel]
 
-        Raises DermisError if that is not possible.
+        Raises DermisError if the picture cannot be rendered or written.
         """
         if self.is_preparing:
             refuse("picture", "a head that is ready", "it is being prepared", "Try again in a moment")
@@ -313,7 +313,7 @@ T = TypeVar("T")
 class HeadPreparation:
     """Preparation of new heads for rendering, in a thread that handles one head at a time.
 
-    Nothing else is drawn while it runs.
+    Nothing else is drawn while a head is being prepared.
 
     request_frame : function that requests a frame, called from another thread when a preparation ends
     """
@@ -327,7 +327,7 @@ class HeadPreparation:
 
     @property
     def is_running(self) -> bool:
-        """Return whether a head is being prepared, or has been prepared and is not yet drawn."""
+        """Return whether a head is being prepared, or has been prepared but has not yet been drawn."""
         return self._future is not None
 
     def reset(self) -> None:
@@ -335,9 +335,11 @@ class HeadPreparation:
         self._ready_mesh = self._future = self._next_mesh = self._held_image = None
 
     def prepare_head(self, view_renderer: ViewRenderer, state: ViewerState) -> Texture | None:
-        """Start to prepare the head of `state` if it is new; return the last image until it is ready.
+        """Start to prepare a new head; return the last image until the preparation has ended.
 
-        Returns None once the state can be drawn. Raises the exception that stopped the preparation, once.
+        state : state with the head
+
+        Returns None once `state` can be drawn. Raises the exception that stopped a preparation, once.
         """
         if self._future is not None:
             if not self._future.done():

@@ -94,7 +94,7 @@ class Viewer:
     adapter : "auto", "cpu" or part of an adapter's name
     clock : function that returns the time [s]
     motion : motion to play
-    view_renderer : renderer that has already prepared the state, None to create one
+    view_renderer : renderer that has already prepared the state; None to create a renderer
 
     `failure` is the error that closed the canvas because the device failed twice or could not be reopened.
 
@@ -201,7 +201,7 @@ class Viewer:
     def _render_images(
         self, state: ViewerState, camera: Camera, size: tuple[int, int], moving: bool
     ) -> Images:
-        """Return the live and the frozen image; if `state` cannot be rendered, the last image and None."""
+        """Return the live and frozen images, or the last image and None if `state` cannot be rendered."""
         import wgpu
 
         session = self.session

@@ -63,7 +63,7 @@ class IntermediateViews:
     def draw(self, scene: Scene, settings: Settings, view: str, side: str = "") -> Texture:
         """Return an image of sRGB bytes that shows an intermediate result of the last frame on the head.
 
-        view : name of the view
+        view : name of the view, one of `VIEW_NAMES`
         side : name of the side of the divider, empty for the live side
 
         Raises DermisError if the technique does not compute it.
@@ -155,7 +155,7 @@ class IntermediateViews:
 
 
 def draw_thickness(device: Device, translucency: Translucency, target: Texture) -> Texture:
-    """Compute the least tissue thickness below each cell of the coarse atlas, and return the texture [mm].
+    """Compute the least tissue thickness below each cell of the coarse atlas; return it in a texture [mm].
 
     The thickness is the least depth of a cell below the tangent planes of its source cells. It is at most the
     radius within which source cells are searched.

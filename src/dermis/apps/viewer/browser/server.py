@@ -94,7 +94,7 @@ async def prepare_viewer(
 ) -> Viewer:
     """Prepare the first frame in a thread and return the viewer; pages display the progress.
 
-    If that fails, pages show the reason and the server stops.
+    If the preparation fails, pages show the reason and the server stops.
 
     http_server : running server of the pages
     load : function that loads the initial state and motion, called in a thread
@@ -150,7 +150,7 @@ _ALL_INTERFACES = "0.0.0.0", "::"
 class Address(NamedTuple):
     """Address at which the page is served.
 
-    token : secret part of the URL, empty for none
+    token : secret part of the URL, empty for a URL without a secret
     """
 
     host: str
@@ -219,7 +219,7 @@ def run_server(
 
     start : function that returns the coroutine
 
-    The result is None if the coroutine has not ended. Raises the exceptions of the coroutine.
+    The result is None if the server exits before the coroutine ends. Raises the exceptions of the coroutine.
     """
 
     async def run() -> T | None:

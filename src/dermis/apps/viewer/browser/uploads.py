@@ -36,7 +36,8 @@ class Uploads:
 
     app : application that handles all other requests
     canvas : `PageCanvas` whose ticket the page must send, and which receives the path and name of each file
-    folder : folder of the files, which are numbered; the name given by the page is only displayed
+    folder : folder for the received files; files are named by numbers, and the name given by the page is only
+        displayed
     """
 
     def __init__(self, app: App, canvas: PageCanvas, folder: Path) -> None:
@@ -50,7 +51,7 @@ class Uploads:
         if scope["type"] != "http" or scope["method"] != "POST" or _UPLOAD_PATH not in parts[-2:-1]:
             await self._app(scope, receive, send)
             return
-        headers, name = dict(scope["headers"]), _printable(parts[-1])
+        headers, name = dict(scope["headers"]), _printable_name(parts[-1])
         status, answer = 200, ""
         response_headers = [(b"content-type", b"text/plain; charset=utf-8")]
         try:
@@ -63,7 +64,7 @@ class Uploads:
         await send({"type": "http.response.body", "body": answer.encode()})
 
     def _accept(self, name: str, headers: dict[bytes, bytes]) -> tuple[str, Callable[[Path, str], None]]:
-        """Return the suffix of an upload, one of `HEAD_FILE_SUFFIXES`, and the function that opens it.
+        """Return the suffix of an upload, one of `HEAD_FILE_SUFFIXES`, and the function that opens the file.
 
         Raises DermisError for an upload that is not permitted.
         """
@@ -94,8 +95,8 @@ class Uploads:
     async def _store(self, name: str, suffix: str, receive: Receive) -> Path:
         """Receive a file and return its path; a rejected file is deleted.
 
-        name : name given by the page, for messages
-        suffix : suffix of the file
+        name : name given by the page, for error messages
+        suffix : suffix of the stored file
         """
         self._count += 1
         folder = self._folder / str(self._count)  # separate folders: a scene may refer to files beside it
@@ -104,7 +105,7 @@ class Uploads:
             folder.mkdir(mode=0o700)
             try:
                 with path.open("xb") as file:
-                    await self._copy(name, receive, file)
+                    await self._copy_body(name, receive, file)
             except BaseException:
                 path.unlink(missing_ok=True)
                 folder.rmdir()
@@ -122,7 +123,7 @@ class Uploads:
         finally:
             self._is_busy = False
 
-    async def _copy(self, name: str, receive: Receive, file: BinaryIO) -> None:
+    async def _copy_body(self, name: str, receive: Receive, file: BinaryIO) -> None:
         more, size = True, 0
         while more:
             try:
@@ -137,6 +138,6 @@ class Uploads:
             more = message.get("more_body", False)
 
 
-def _printable(name: str) -> str:
+def _printable_name(name: str) -> str:
     """Return a file name with printable characters only, shortened for messages."""
     return "".join(character if character.isprintable() else "_" for character in name)[-_MAX_CHARACTERS:]

@@ -81,7 +81,7 @@ class ImguiFrames:
         implot.set_current_context(self._plot_context)
 
     def lay_out(self, size: tuple[float, float], draw: Callable[[], None]) -> None:
-        """Process pending input and lay out the next frame, which `render` then draws.
+        """Process pending input and lay out the next frame; `render` draws this frame.
 
         size : logical size of the window
         draw : function that declares the windows and controls
@@ -100,7 +100,7 @@ class ImguiFrames:
             self._recreate_context()
 
     def render(self, target: TextureView) -> None:
-        """Draw the last layout over the target; nothing if that layout failed."""
+        """Draw the last layout over the target; draw nothing if that layout failed."""
         if not self._has_layout:
             return
         encoder = self._device.handle.create_command_encoder()

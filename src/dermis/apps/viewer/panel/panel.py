@@ -91,7 +91,7 @@ def draw_messages(lines: Sequence[str], left: float, size: tuple[float, float]) 
 
 
 def draw_help(left: float, size: tuple[float, float]) -> None:
-    """Draw the list of shortcuts in the centre of the picture; pointers pass through it.
+    """Draw the list of shortcuts in the centre of the picture; pointer events pass through the list.
 
     left : left edge of the picture
     size : logical size of the window
@@ -126,7 +126,9 @@ _BUTTON_MARGIN, _BUTTON_ALPHA = 8.0, 0.6  # of the button that opens the panel
 
 
 class Panel:
-    """Control panel with its sections; it decides which events are for the panel, not the picture.
+    """Control panel with its sections.
+
+    The panel decides which input events are for the panel, and which events are for the picture.
 
     is_visible : whether the panel is shown in a wide window
     is_drawer_open : whether the panel is shown in a narrow window, as a drawer over the picture
@@ -173,7 +175,7 @@ class Panel:
             self.is_visible = not self.is_visible
 
     def handle_event(self, event: Event, size: tuple[float, float]) -> bool:
-        """Process an event if it is for the panel and not for the picture; return whether it is.
+        """Process an input event of the panel; return False for an event that is for the picture.
 
         size : logical size of the window
         """
@@ -211,7 +213,7 @@ class Panel:
         self._frames.lay_out(size, lambda: self._draw_windows(size))
 
     def _run_shortcut(self, event: Event) -> bool:
-        """Run the shortcut of a key, if it has one; return whether it has."""
+        """Run the shortcut of a pressed key; return False if the key has no shortcut."""
         key, session = str(event["key"]), self._session
         if {"Control", "Meta"} & set(event.get("modifiers", ())):
             if key.lower() != "s":
@@ -230,7 +232,7 @@ class Panel:
         return True
 
     def _close_topmost(self) -> bool:
-        """Close the topmost popup, help or search; return whether there was one."""
+        """Close the popup, the help or the search, whichever is on top; return False if nothing is open."""
         if self._has_popup:
             imgui.internal.close_popup_to_level(0, False)
             self._has_popup = False
@@ -243,7 +245,7 @@ class Panel:
         return True
 
     def _is_over_panel(self, x: float, y: float, size: tuple[float, float]) -> bool:
-        """Return whether a position is over the panel; Dear ImGui would know this only one frame later.
+        """Return whether a position is over the panel; Dear ImGui could answer this only one frame later.
 
         x, y : position of the pointer in the window
         size : logical size of the window

@@ -70,7 +70,7 @@ _SETTING_STYLES = {
     "background": FieldStyle(custom_value=lambda session: (0.2, 0.2, 0.2)),
 }
 _PICTURE_SETTINGS = ("exposure", "tone", "bloom", "background", "background_blur")
-_DETERMINED_SETTINGS = ("size", "parts")  # determined by the window and by the view
+_SETTINGS_SET_ELSEWHERE = ("size", "parts")  # determined by the window and by the view
 
 
 def draw_lights(session: Session) -> None:
@@ -96,7 +96,7 @@ def _add_light(session: Session, kind: str) -> ViewerState:
 
 
 def _draw_light_selector(session: Session) -> None:
-    """Draw a radio button for each light and one for the environment."""
+    """Draw a radio button for each light, and another radio button for the environment."""
     lights, controls = session.state.scene.lights, session.controls
     for index, light in enumerate(lights):
         if imgui.radio_button(f"{index + 1}##{light.kind}", controls.light == index):
@@ -132,7 +132,7 @@ def _draw_light(session: Session, index: int, light: Light) -> None:
 
 
 def _cone_styles(light: Light) -> dict[str, FieldStyle]:
-    """Return slider ranges of a spotlight, whose outer cone is wider than its inner cone."""
+    """Return slider ranges with which a spotlight's outer cone stays wider than the inner cone."""
     if not isinstance(light, SpotLight):
         return {}
     inner = SliderRange(0.5, light.outer_degrees - _MIN_FADE_DEGREES)
@@ -236,7 +236,7 @@ def _draw_weight(session: Session, name: str, animated: frozenset[str]) -> None:
 
 
 def _draw_angles(session: Session, name: str, animated: frozenset[str]) -> None:
-    """Draw a slider for each of the three angles of a bone, and change only the one that is moved.
+    """Draw a slider for each of the three angles of a bone; a drag changes only the angle of one slider.
 
     animated : names of morph targets and bones that the playing motion moves
     """
@@ -295,7 +295,7 @@ def _draw_head_list(session: Session) -> None:
 
 
 def _person_seed(session: Session) -> int:
-    """Return the seed of the displayed person, 0 for another head."""
+    """Return the seed of the displayed random person; 0 if the head is not a random person."""
     seed = str(session.state.head.get("name", "")).removeprefix(f"{HUMAN}:")
     return int(seed) if seed.isdecimal() else 0
 
@@ -351,10 +351,10 @@ def draw_comparison(session: Session) -> None:
 def draw_technique(session: Session) -> None:
     """Draw the settings that no other section shows, drop-down lists first.
 
-    New settings appear here by default.
+    A new field of `Settings` appears in this section unless another section shows it.
     """
     settings = session.state.settings
-    kind, excluded = type(settings), {*_PICTURE_SETTINGS, *_DETERMINED_SETTINGS}
+    kind, excluded = type(settings), {*_PICTURE_SETTINGS, *_SETTINGS_SET_ELSEWHERE}
     names = sorted(
         (name for name in fields_under("", kind) if name not in excluded),
         key=lambda name: not field_choices(kind, name),
@@ -402,7 +402,7 @@ def draw_files(session: Session) -> None:
 
 
 def draw_timing(session: Session) -> None:
-    """Plot the device times of the stages over the last frames, and list those of the last frame."""
+    """Plot the device times of the stages over the last frames, and list the times of the last frame."""
     series = stage_series(list(session.view_renderer.stage_times))
     if not series:
         imgui.text_disabled("this adapter reports no times")
@@ -418,7 +418,12 @@ def draw_timing(session: Session) -> None:
 
 
 def stage_series(frames: Sequence[dict[str, float]]) -> dict[str, Floats]:
-    """Return the times of each stage in n frames, (n,) by stage; 0 if a frame lacks the stage [ms]."""
+    """Return the times (n,) of each stage in n frames, by stage name [ms].
+
+    The time is 0 in frames without the stage.
+
+    frames : times of the stages of each frame, by stage name [ms]
+    """
     names = dict.fromkeys(name for frame in frames for name in frame if name != _TOTAL_LABEL)
     return {name: np.array([frame.get(name, 0.0) for frame in frames], np.float64) for name in names}
 
@@ -428,7 +433,7 @@ def _plot_stacked(
 ) -> None:
     """Plot the times of stages as stacked areas, with the last frame at the right edge.
 
-    series : (n,) times of each stage [ms]
+    series : (n,) times of each stage, by stage name [ms]
     colours : colour of each stage
     total : (n,) total times of the frames [ms]
     """

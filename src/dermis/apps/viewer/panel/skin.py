@@ -78,7 +78,7 @@ def draw_profile(session: Session) -> None:
 
 
 def draw_surface(session: Session) -> None:
-    """Draw the skin fields that do not belong to the profile; new fields appear here by default."""
+    """Draw the fields of `Skin` except those of the profile section; new fields appear by default."""
     state, earlier_states = session.state, session.history.states
     for name in fields_under("", type(state.scene.skin)):
         if name == "rho_s":
@@ -147,7 +147,7 @@ def _plot_profile(session: Session) -> None:
 
 @lru_cache(maxsize=16)
 def _profile_layers(profile: str) -> tuple[TissueLayer, ...]:
-    """Return the tissue layers of a named profile, () if it is a sum of Gaussians; results are cached."""
+    """Return the tissue layers of a named profile, or () for a sum of Gaussians; the results are cached."""
     try:
         return tissue_layers(Skin(profile=profile))
     except (
@@ -184,6 +184,6 @@ def _draw_layer(session: Session, layers: Layers, index: int) -> None:
 
 
 def _replace_layer(session: Session, layers: Layers, index: int, *new_layers: TissueLayer) -> ViewerState:
-    """Return the state in which one tissue layer is replaced by zero or more others."""
+    """Return the state in which one tissue layer is replaced by zero or more new layers."""
     all_layers = (*layers[:index], *new_layers, *layers[index + 1 :])
     return session.state.with_skin(layers=[layer.model_dump() for layer in all_layers])

@@ -57,11 +57,11 @@ class SkinAppearance(NamedTuple):
     roughness : Beckmann m, a number or a map (n, n)
     transmittance : (n, n, 3) map by which a refracting surface scales light on entry and again on exit; None
         for uniform skin
-    dimming : (n, n) fraction of the leaving light that an index-matched surface absorbs; None for uniform
+    dimming : (n, n) fraction of the emerging light that an index-matched surface absorbs; None for uniform
         skin
-    opaque : PLY file of each other material, by material index
-    pictured : roles of the pictures of a material, by material index, for materials with pictures
-    pictures : PNG files by role
+    opaque : PLY file of each material except skin, by material index
+    pictured : roles of a material's pictures, by material index; materials without pictures are absent
+    pictures : PNG files of the pictures that all materials share, by role
     """
 
     media: Mapping[Boundary, IsotropicMedium]
@@ -140,14 +140,14 @@ def surface_description(
     return {"type": "roughdielectric", "id": "skin_surface", **facets, **refraction}
 
 
-def _lower_surface(dimmed: bool) -> SceneDict:
+def _lower_surface(has_dimming: bool) -> SceneDict:
     """Return Mitsuba's description of the inner layer of an index-matched surface.
 
     This layer absorbs part of the light that leaves the skin, where the skin is darker than its medium.
 
-    dimmed : whether the skin has a texture of the absorbed fraction
+    has_dimming : whether the skin has a texture of the absorbed fraction
     """
-    if not dimmed:
+    if not has_dimming:
         return {"type": "null", "id": "skin_below"}
     black = {"type": "diffuse", "reflectance": mitsuba_rgb((0.0, 0.0, 0.0))}
     return {"type": "mask", "opacity": _texture("held_back"), "bsdf": black, "id": "skin_below"}
@@ -158,15 +158,15 @@ def _scene_elements(
     scene: Scene,
     appearance: SkinAppearance,
     boundary: Boundary,
-    picture: tuple[int, int, int],
+    size_and_samples: tuple[int, int, int],
 ) -> list[ET.Element]:
-    """Return the XML elements of camera, lights and other materials, and the inclusion of the skin's file.
+    """Return the XML elements of the scene without skin, and the element that includes the skin's XML file.
 
     boundary : surface model of the skin that is included by default
-    picture : width and height [pixel], and samples per pixel
+    size_and_samples : width and height of the picture [pixel], and samples per pixel
     """
-    sizes = zip(("width", "height", "samples"), map(str, picture), strict=True)
-    sensor = mitsuba_sensor(backend, scene.camera, picture[:2])
+    sizes = zip(("width", "height", "samples"), map(str, size_and_samples), strict=True)
+    sensor = mitsuba_sensor(backend, scene.camera, size_and_samples[:2])
     sensor["film"] |= {"width": xml.Override("integer", "width"), "height": xml.Override("integer", "height")}
     sensor["sampler"]["sample_count"] = xml.Override("integer", "samples")
     # Spectral multiple importance sampling, as extinction differs between channels.
@@ -216,7 +216,10 @@ def _skin_elements(
 
 
 def _part_surface(roles: set[PartRole]) -> SceneDict:
-    """Return Mitsuba's description of the surface of a part that is not skin, with pictures."""
+    """Return Mitsuba's description of a surface that is not skin and has pictures.
+
+    roles : roles of these pictures
+    """
     bsdf: SceneDict = {"type": "principled", "eta": _PART_IOR, "roughness": _OPAQUE_ROUGHNESS}
     bsdf |= {name: _part_texture(role) for role, name in _PART_INPUTS.items() if role in roles}
     if "normal" in roles:

@@ -80,7 +80,7 @@ def input_name(shader: str, name: str) -> str:
 
 
 class MapType(NamedTuple):
-    """Type and colour space of a map in MaterialX, and its colour space in UsdPreviewSurface."""
+    """Type and colour space of a map in MaterialX, and colour space of the map in UsdPreviewSurface."""
 
     type: str
     space: str
@@ -106,7 +106,7 @@ MAP_TYPES: Mapping[str, MapType] = {
 class OpenPbrMaterial:
     """OpenPBR material: values of its inputs, and the maps that set other inputs.
 
-    name : any text
+    name : name of the material; any text
     values : value of each input without a map; lengths in metres
     maps : role of the map of each input with a map, such as "colour"
     """

@@ -56,7 +56,7 @@ _RELATIVE_BALL_DISTANCE, _RELATIVE_BALL_FRAME = (
 
 
 class DiffusionTable(NamedTuple):
-    """Radial profiles of pbrt's subsurface material, by albedo, at one index of refraction.
+    """Radial profiles of pbrt's subsurface material for a range of albedos, at one index of refraction.
 
     albedo : (n,) single-scattering albedos
     radius : (m,) radii [mean free paths]
@@ -99,7 +99,7 @@ def diffusion_table(eta: float) -> DiffusionTable:
 
 
 def _multiple_scattering(radius: Floats, albedo: float, eta: float) -> Floats:
-    """Return the radiant exitance (m,) of light scattered more than once, for an extinction of 1.
+    """Return the radiant exitance (m,) of light scattered more than once, for a unit extinction coefficient.
 
     radius : (m,) distances from a beam of unit power [mean free paths]
     """
@@ -121,7 +121,7 @@ def _multiple_scattering(radius: Floats, albedo: float, eta: float) -> Floats:
 
 
 def _single_scattering(radius: Floats, eta: float) -> Floats:
-    """Return the radiant exitance (m,) of light scattered once, per unit albedo, for an extinction of 1.
+    """Return the radiant exitance (m,) of light scattered once, for unit albedo and extinction coefficient.
 
     radius : (m,) distances from a beam of unit power [mean free paths]
     """
@@ -174,12 +174,12 @@ class Pbrt(Target):
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the reflectance, and the mean free paths for which pbrt is closest to the reference."""
+        """Return the reflectance, and the mean free paths with the profile closest to the reference."""
         path = fit_scale(subject.curve, _unit_curve(subject.albedo))
         return _parameters(subject, path, "1 / (sigma_a + sigma_s); a unit is 1 mm")
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the skin's colour, and published diffuse mean free paths in place of mean free paths."""
+        """Return the skin's colour as reflectance, and published diffuse mean free paths as mfp."""
         return _parameters(subject, published_mean_free_path_mm(subject), "as published, 1 / sigma_tr")
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
@@ -210,11 +210,11 @@ def _unit_curve(reflectance: Floats) -> CumulativeProfile:
     return CumulativeProfile.from_function(within, total)
 
 
-def _parameters(subject: Subject, path_mm: Floats, meaning: str) -> Parameters:
+def _parameters(subject: Subject, mean_free_path_mm: Floats, meaning: str) -> Parameters:
     skin, colour = subject.skin, flat_tuple(subject.clipped_albedo())
     return (
         Parameter(_REFLECTANCE_NAME, colour, "-", "of the light that enters, or a texture"),
-        Parameter(_MFP_NAME, flat_tuple(path_mm), "mm", meaning),
+        Parameter(_MFP_NAME, flat_tuple(mean_free_path_mm), "mm", meaning),
         Parameter("scale", 1.0, "-", "factor of mfp; must not be changed"),
         Parameter("g", 0.0, "-", "the mean free paths are reduced ones"),
         Parameter("eta", SKIN_ETA, "-", "index of refraction of the skin"),

@@ -82,7 +82,10 @@ def add_mesh(
 
 
 def texture_coordinates(head: Head) -> Floats:
-    """Return (v, 2) texture coordinates with v downwards; those of eyes refer to the painted eye textures."""
+    """Return the texture coordinates (v, 2) of all vertices, with v downwards.
+
+    Vertices of eyes have coordinates in the painted eye textures.
+    """
     mesh, uv = head.mesh, head.mesh.uv.copy()
     if head.eyes is not None:
         frames = head.eyes.frames(head.control, head.control.rest)
@@ -93,9 +96,9 @@ def texture_coordinates(head: Head) -> Floats:
 
 
 def _add_uv(prim: UsdGeom.Mesh, uv: Floats, polygons: Polygons) -> None:
-    """Add texture coordinates to a mesh as face-varying values.
+    """Add texture coordinates to a mesh as face-varying values, with v upwards as in USD.
 
-    uv : (v, 2) texture coordinates of the vertices, with v downwards; USD has v upwards
+    uv : (v, 2) texture coordinates of the vertices, with v downwards
     """
     upwards = np.ascontiguousarray(np.column_stack([uv[:, 0], 1.0 - uv[:, 1]]), np.float32)
     types, tokens = Sdf.ValueTypeNames, UsdGeom.Tokens
@@ -164,7 +167,7 @@ def unique_usd_names(names: Sequence[str]) -> list[str]:
 
 
 def _add_joints(prim: UsdSkel.Skeleton, skeleton: Skeleton | None) -> list[str]:
-    """Set the joints of a USD skeleton and return their paths; a head without bones gets a single joint."""
+    """Set the joints of a USD skeleton, and return their paths; a head without bones gets one joint."""
     joints, rest, bind = ["root"], np.eye(4)[None], np.eye(4)[None]
     if skeleton is not None:
         joints = []
@@ -178,7 +181,10 @@ def _add_joints(prim: UsdSkel.Skeleton, skeleton: Skeleton | None) -> list[str]:
 
 
 def _bone_transforms(skeleton: Skeleton) -> tuple[Doubles, Doubles]:
-    """Return each bone's rest transform to its parent, and bind transform to the head, (b, 4, 4) [m]."""
+    """Return the rest and bind transforms of the bones, each (b, 4, 4), in metres.
+
+    The rest transform of a bone is relative to the bone's parent; the bind transform is relative to the head.
+    """
     to_file = np.diag([METRES_PER_MM, METRES_PER_MM, METRES_PER_MM, 1.0]) @ skeleton.to_head
     scale = float(np.cbrt(abs(np.linalg.det(to_file[:3, :3]))))
     enlarge, reduce = (np.diag([factor, factor, factor, 1.0]) for factor in (scale, 1.0 / scale))

@@ -39,7 +39,8 @@ class PictureMap(NamedTuple):
 
     role : name of the map's binding in shaders, such as "colour_map"
     mips : number of mip levels stored as pictures
-    mip_passes : passes that compute further levels on the device; None if those are stored as texels
+    mip_passes : passes that compute further mip levels on the device; None if further levels are stored as
+        texels
     """
 
     role: str
@@ -63,7 +64,7 @@ def frames_json(
     Data that is all zero is not stored, as the page creates resources filled with zeros.
 
     picture_maps : maps that are stored as pictures, by resource index
-    steps : quantisation step of each column of quantised float buffers, by resource index
+    steps : quantisation step of each column of a quantised float buffer, by resource index
     byte_runs : collector of the data, to which the JSON refers by byte run
     """
     pictures = [[capture.resource(f.picture.bytes), capture.resource(f.picture.exposed)] for f in frames]
@@ -91,9 +92,9 @@ def frames_json(
 
 
 def _column_packer(byte_runs: ByteRunCollector) -> Callable[[Bytes], int]:
-    """Return a function that packs each third of a buffer separately and returns the index of the joined run.
+    """Return a function that adds a triangle table to `byte_runs` and returns the index of the byte run.
 
-    The buffers are triangle tables: three columns of equal length, one after the other.
+    A triangle table has three columns of equal length, one after the other; each column is packed separately.
     """
     return lambda data: byte_runs.add_parts(np.split(data, 3) if len(data) % 3 == 0 else [data])
 
@@ -186,7 +187,7 @@ def resources_read_first(capture: FrameCapture, frames: Frames) -> list[int]:
 
 
 def resources_bound_as(capture: FrameCapture, frames: Frames, names: tuple[str, ...]) -> dict[int, str]:
-    """Return, by resource index, the name under which shaders bind a resource, if it is one of `names`."""
+    """Return the name under which shaders bind each resource, by resource index, for bindings in `names`."""
     found: dict[int, str] = {}
     for one in (one for frame in frames for one in frame.passes if one.program is not None):
         bound_names = [name for _, name, _ in capture.programs[one.program or 0]["bindings"]]

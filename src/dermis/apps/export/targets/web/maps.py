@@ -32,7 +32,7 @@ _COLOUR_CHANNELS = 3
 class Picture:
     """One layer of a map, encoded as a WebP picture.
 
-    data : WebP file; for maps other than colours a grey picture with the channels below each other
+    data : WebP file; for a map that is not a colour, a grey picture with the channels below each other
     curves : (c, 256) value that each of the 256 levels of a channel decodes to
     texels : (h, w, c) texels decoded from the picture
     """
@@ -74,7 +74,10 @@ def _value_curve(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _nearest_steps(values: Halves, curve: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """Return for each texel the index of the nearest value of an increasing curve."""
+    """Return the index of the curve value nearest to each texel.
+
+    curve : increasing values
+    """
     midpoints = 0.5 * (curve[1:] + curve[:-1])
     return np.searchsorted(midpoints, values.astype(np.float64)).astype(np.uint8)
 
@@ -104,7 +107,7 @@ _MAP_ROLES = (_COLOUR_ROLE, "relief_map", "slope_map", "specular_map", "roughnes
 class MapPictures:
     """WebP pictures of all maps that the page stores, by role, mip level and layer.
 
-    Where the device can compute further mip levels, only the first is stored.
+    For a map whose further mip levels the device can compute, only the first mip level is stored.
     """
 
     pictures: dict[PictureKey, Picture] = field(default_factory=dict)
@@ -117,7 +120,8 @@ class MapPictures:
     def replace_textures(self, renderer: Renderer, capture: FrameCapture, frames: Frames) -> PictureMaps:
         """Encode the frames' maps as pictures, and upload the decoded texels to the renderer's textures.
 
-        The renderer then shows the same maps as the page. Returns the maps by resource index.
+        The renderer then draws with the maps that the page decodes. Returns the replaced maps by resource
+        index.
         """
         maps = {}
         for index, role in _picture_textures(capture, frames).items():
@@ -164,9 +168,9 @@ def _reduce_map(values: NDArray[np.float32], max_side: int) -> NDArray[np.float3
 
 
 def quantise_hairs(renderer: Renderer, capture: FrameCapture, frames: Frames) -> dict[int, tuple[float, ...]]:
-    """Round hair knots in the device's buffers so that they compress well.
+    """Round the hair knots in the device's buffers to multiples of a step, so that the buffers compress well.
 
-    Returns the quantisation step of each column by resource index.
+    Returns the steps of a buffer's columns, by resource index of the buffer.
     """
     buffers = resources_bound_as(capture, frames, ("knots",))
     for index in buffers:

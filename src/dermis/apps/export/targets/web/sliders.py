@@ -34,8 +34,8 @@ class Slider:
 
     values : increasing values of the nodes; one of them is `default_value`
     default_value : value with which the page starts
-    scenes : scene at each node; None for the node of the default
-    changes_pose_only : whether the scenes differ from the default in the head's pose only
+    scenes : scene at each node; None at the node of the default value
+    changes_pose_only : whether these scenes differ from the default scene only in the head's pose
     """
 
     name: str
@@ -48,7 +48,7 @@ class Slider:
 def node_inputs(
     slider: Slider, prepare: Callable[[Scene], FrameInputs], base: FrameInputs
 ) -> Iterator[FrameInputs | None]:
-    """Yield the frame inputs at each node of a slider; None for the node of the default value.
+    """Yield the frame inputs at each node of a slider; None at the node of the default value.
 
     prepare : function that returns the frame inputs of a scene
     base : frame inputs of the default scene
@@ -161,10 +161,10 @@ def _pigment_sliders(scene: Scene) -> list[Slider]:
     return sliders
 
 
-def _with_pigment(scene: Scene, maps: PaintedMaps, name: str, value: float) -> Scene:
+def _with_pigment(scene: Scene, maps: PaintedMaps, pigment: str, value: float) -> Scene:
     assert scene.skin.pigments is not None
-    pigments = scene.skin.pigments.model_copy(update={name: value})
-    changed: Any = {name: value}
+    pigments = scene.skin.pigments.model_copy(update={pigment: value})
+    changed: Any = {pigment: value}
     painted = replace(maps, look=replace(maps.look, **changed))
     skin = scene.skin.model_copy(update={"pigments": pigments})
     return replace(scene, head=replace(scene.head, maps=painted), skin=skin)

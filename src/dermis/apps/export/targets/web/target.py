@@ -119,7 +119,7 @@ class Web(Target):
         return self.parameters(subject, version)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the cumulative profile of the sum of Gaussians."""
+        """Return the cumulative profile of the Gaussians with which the page diffuses light."""
         _, variance, *weight = (np.array(get_numbers(parameters, one.name)) for one in parameters)
         return gaussian_curve(variance, np.stack(weight, axis=1), subject.curve.energy)
 
