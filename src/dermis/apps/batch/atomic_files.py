@@ -17,7 +17,7 @@ _UNFINISHED = re.compile(r"\.(.+)-[0-9a-f]{12}\.unfinished")
 
 
 def temporary_path(target: Path) -> Path:
-    """Return an unused hidden path beside `target`, for a file or folder that will be renamed to it."""
+    """Return an unused hidden path beside `target`, for a file or folder that will be renamed to `target`."""
     return target.with_name(f".{target.name}-{secrets.token_hex(6)}.unfinished")
 
 
@@ -51,7 +51,8 @@ def atomic_write(target: Path, write: Callable[[Path], object]) -> None:
 def move_into_place(temporary: Path, target: Path, replaces_folder: bool = True) -> None:
     """Rename a temporary file or folder to its final path, replacing a file or folder there.
 
-    replaces_folder : whether to replace a folder with content; if False, it is kept and OSError is raised
+    replaces_folder : whether to replace a folder that is not empty; if False, such a folder is kept and
+        OSError is raised
 
     Raises OSError if the file or folder cannot be renamed.
     """
@@ -83,7 +84,7 @@ def flush_to_disk(path: Path) -> None:
 
 
 def remove_path(path: Path) -> None:
-    """Remove a file, or a folder with its content; do nothing if it does not exist."""
+    """Remove a file, or a folder with all content; do nothing if the path does not exist."""
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path, ignore_errors=True)
         return
@@ -92,7 +93,7 @@ def remove_path(path: Path) -> None:
 
 
 def unfinished_files(folder: Path) -> dict[Path, str]:
-    """Return the temporary files of interrupted writes in a folder, each with the name of its target."""
+    """Return the names of the final files by temporary path, for the writes interrupted in a folder."""
     with contextlib.suppress(OSError):
         found = {path: _UNFINISHED.fullmatch(path.name) for path in sorted(folder.iterdir())}
         return {path: match[1] for path, match in found.items() if match}

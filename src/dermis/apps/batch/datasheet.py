@@ -26,7 +26,7 @@ from dermis.human.model import MAKEHUMAN_CREDIT
 from dermis.scene.outputs import OUTPUTS
 
 README_FILE, DESCRIPTION_FILE = "README.md", "dataset.json"
-_MAX_LISTED = 50
+_MAX_LISTED_FAILURES = 50
 _LABEL_OUTPUTS = "label", "label_face_synthetics"
 _NAMES_WITHOUT_FILES = {"none", "uniform", "human"}
 
@@ -75,7 +75,7 @@ def _readme(out: Path, spec: Spec, manifests: Sequence[ShardManifest]) -> str:
         tests=_tests_table(fit_tests(out, spec)),
         licences=_table(("part", "by", "licence"), licences(spec)),
         made_with=_software_table(manifests),
-        left_out=failed + _table(("image", "reason"), left_out[:_MAX_LISTED]) if left_out else "",
+        left_out=failed + _table(("image", "reason"), left_out[:_MAX_LISTED_FAILURES]) if left_out else "",
     )
 
 

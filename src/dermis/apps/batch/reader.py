@@ -1,4 +1,4 @@
-"""Reader of data sets; their files are treated as untrusted."""
+"""Reader of data sets, whose files are treated as untrusted input."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ def decode_image(files: Mapping[str, object], culprit: object = "") -> Image:
     Raises DermisError for damaged files.
 
     files : content of each file as bytes, by suffix, as the library webdataset provides them
-    culprit : name of the image in error messages; by default its key
+    culprit : name of the image in error messages; by default the image's key
     """
     source = culprit or files.get("__key__", "an image")
     data = {suffix: content for suffix, content in files.items() if not suffix.startswith("__")}
@@ -134,7 +134,7 @@ def decode_image(files: Mapping[str, object], culprit: object = "") -> Image:
 
 
 def read_record(data: bytes, culprit: object) -> Record:
-    """Return the record of an image from the bytes of its JSON file; its landmarks are not checked.
+    """Return the record of an image from the bytes of its JSON file, without a check of the landmarks.
 
     culprit : name of the file in error messages
 
@@ -156,9 +156,10 @@ def read_record(data: bytes, culprit: object) -> Record:
 
 @contextmanager
 def shard_files(path: Path) -> Iterator[dict[str, FileReaders]]:
-    """Yield a reader for each file of a shard, grouped by image key and by suffix.
+    """Yield functions that read the files of a shard, as nested dictionaries: image key, then file suffix.
 
-    The files can be read inside the context. Raises DermisError if the shard is truncated or not a shard.
+    The functions can be called inside the with block. Raises DermisError if the shard is truncated, or if the
+    path is not a shard.
     """
     if path.is_dir():
         names = sorted(one.name for one in path.iterdir())
@@ -202,9 +203,9 @@ def _read_tar_member(path: Path, file: BinaryIO, member: TarMember) -> bytes:
 
 
 def _select_shards(path: Path, shards: Iterable[int] | None) -> list[Path]:
-    """Return the paths of the shards with given numbers in a data set, or the path if it is a shard.
+    """Return the paths of shards to read: shards of a data set, or `path` alone if it is a shard.
 
-    shards : shard numbers; all shards of the data set if None
+    shards : numbers of the shards; None for all shards of the data set
     """
     if shard_index(path) is not None or path.suffix == ".tar":
         return [path]

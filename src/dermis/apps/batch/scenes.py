@@ -152,15 +152,18 @@ def sampled_person(parameters: Parameters) -> Human:
 
 @cache
 def _subdivision_levels(size: tuple[int, int]) -> int:
-    """Return the number of subdivisions that suits a picture size [pixel].
+    """Return the number of times that heads are subdivided for a picture size [pixel].
 
-    It is equal for all sampled people, so that their heads share one topology.
+    The number is equal for all sampled people, so that all their heads have the same topology.
     """
     return max(MIN_HUMAN_LEVELS, SmoothIn(size=size)(Human().head(subdivide=0)))
 
 
 def _hair_fraction(size: tuple[int, int]) -> float:
-    """Return the fraction of all hairs to generate: those that a picture of this size [pixel] can resolve."""
+    """Return the fraction of the hairs to generate, which is smaller for small pictures.
+
+    size : width and height of the picture [pixel]
+    """
     return min(1.0, max(_MIN_HAIR_FRACTION, max(size) / _FULL_HAIR_SIDE))
 
 

@@ -1,4 +1,4 @@
-"""Shards: the files or folders of consecutive images of a data set; and parts, in which they are rendered."""
+"""Shards and parts of a data set: a shard is a file or folder of images, and is rendered in parts."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _MIN_PART_IMAGES, _MAX_PART_IMAGES = 16, 32
 
 @dataclass(frozen=True, order=True, slots=True)
 class Shard:
-    """Number of a shard, and its range of image numbers, from `first` up to but excluding `stop`."""
+    """Number of a shard, and the shard's range of image numbers, from `first` up to but excluding `stop`."""
 
     index: int
     first: int
@@ -43,7 +43,7 @@ class Shard:
 
 
 class Part(Shard):
-    """Part of a shard, the unit of work: the number of its shard, and its own range of image numbers."""
+    """Part of a shard, the unit of work: number of the shard, and range of image numbers of the part."""
 
     __slots__ = ()
 
@@ -64,10 +64,11 @@ def shard_at(index: int, spec: Spec) -> Shard:
 
 
 def list_parts(shard: Shard, spec: Spec) -> list[Part]:
-    """Return the parts of a shard in order: 16 images each, or up to 31 to keep people whole.
+    """Return the parts of a shard in order: 16 images each, or up to 32 so that parts contain whole people.
 
-    They begin at multiples of their size in the data set, at which people begin too. People with more than 32
-    images are split between parts; the first and the last part of a shard may be smaller.
+    The number of a part's first image is a multiple of the part size, except for the first part of a shard.
+    The first and the last part of a shard may be smaller. People with more than 32 images are split between
+    parts.
     """
     group = spec.images_per_person
     size = -(-_MIN_PART_IMAGES // group) * group if group <= _MAX_PART_IMAGES else _MIN_PART_IMAGES
@@ -95,9 +96,9 @@ def image_key(number: int) -> str:
 class ShardWriter:
     """Context manager that writes a shard or a part, which is renamed to its final path on a normal exit.
 
-    adapter : name of the adapter that renders the images, for the manifest; none if all images are copied
+    adapter : name of the adapter that renders the images, for the manifest; "" if all images are copied
 
-    Raises DermisError if the shard cannot be written; nothing of it is then left on the disk.
+    Raises DermisError if the shard cannot be written; the temporary file is then removed.
     """
 
     def __init__(self, out: Path, shard: Shard, spec: Spec, adapter: str = "") -> None:
@@ -181,8 +182,8 @@ def read_manifest(path: Path) -> ShardManifest:
 def shard_exists(out: Path, shard: Shard, spec: Spec) -> bool:
     """Return whether a complete shard or part exists at its final path.
 
-    A shard that has fewer images, from before the data set grew, is not complete. Raises DermisError for a
-    shard of another data set.
+    A shard that was written before the data set grew, and has fewer images, is not complete. Raises
+    DermisError for a shard of another data set.
     """
     path = shard_path(out, shard, spec)
     try:
@@ -197,7 +198,7 @@ def shard_exists(out: Path, shard: Shard, spec: Spec) -> bool:
 
 
 def is_intact(out: Path, shard: Shard, spec: Spec) -> bool:
-    """Return whether a shard or part exists and matches its SHA-256, by reading all of it.
+    """Read a shard or part completely, and return whether it exists and matches its SHA-256.
 
     Raises DermisError for a shard of another data set.
     """
@@ -215,14 +216,15 @@ def part_files(out: Path) -> dict[int, Path]:
     return {int(match[1]): path for path, match in found.items() if match}
 
 
-def remove_unfinished(out: Path, own_names: Collection[str] | None = None) -> None:
+def remove_unfinished(out: Path, removable_names: Collection[str] | None = None) -> None:
     """Remove the temporary files that interrupted runs have left in a data set.
 
-    own_names : names of the shards and parts that no other run is writing; None if there is no other run
+    removable_names : names of shards and parts that no other run is writing; temporary files of other shards
+        and parts are kept. None if there is no other run
     """
     for path, name in unfinished_files(out).items():
         is_images = _SHARD_NAME.fullmatch(name) or _PART_NAME.fullmatch(name)
-        if own_names is None or name in own_names or not is_images:
+        if removable_names is None or name in removable_names or not is_images:
             remove_path(path)
 
 

@@ -137,19 +137,20 @@ class Spec(FrozenModel):
 
     @property
     def landmark_tables(self) -> Mapping[str, str]:
-        """Return each landmark set by name: the name of a preset set, or the path of a landmark table."""
+        """Return the source of each landmark set by name: a preset set's name, or a landmark table's path."""
         return {name: name if name in LANDMARK_SETS else str(self.folder / name) for name in self.landmarks}
 
     @property
     def pose_targets(self) -> frozenset[str]:
-        """Return the morph targets that [pose] names, singly or as a left and right pair."""
+        """Return the morph targets that the [pose] table names, directly or as a pair of left and right."""
         return frozenset(expand_targets(self.pose))
 
     def parameters(self, k: int) -> Parameters:
         """Return the sampled parameters of image k by name: texts, and numbers with six significant digits.
 
-        They are equal on every machine and in any order, and changing or adding a distribution changes no
-        other parameter. Parameters that an image does not use, such as those of unused lamps, are omitted.
+        The parameters are equal on every machine and in any order of images. Changing or adding a
+        distribution changes no other parameter. Parameters that an image does not use, such as those of
+        unused lamps, are omitted.
 
         Raises DermisError if k is not the number of an image.
         """
@@ -164,7 +165,7 @@ class Spec(FrozenModel):
         return "\n".join([_TOML_HEADER, *_toml_lines("", values)])
 
     def digest(self) -> str:
-        """Return the SHA-256 of the canonical TOML without `count`, which identifies the data set."""
+        """Return the SHA-256 of the canonical TOML without `count`; this hash identifies the data set."""
         if not self._digest:
             text = COUNT_LINE.sub("", self.to_toml(), count=1)
             digest = hashlib.sha256(text.encode()).hexdigest()
@@ -172,26 +173,26 @@ class Spec(FrozenModel):
         return self._digest
 
 
-def _table_distributions(name: str, value: object) -> dict[str, Distribution]:
-    """Return the distributions in a TOML table and its subtables, by dotted name.
+def _table_distributions(table_name: str, value: object) -> dict[str, Distribution]:
+    """Return the distributions in a TOML table and in the table's subtables, by dotted name.
 
-    name : name of the table
+    table_name : name of the table
     """
     if isinstance(value, Distribution):
-        return {name: value}
+        return {table_name: value}
     parts = plain_values(value) if isinstance(value, FrozenModel) else value
     if not isinstance(parts, Mapping):
         return {}
     found: dict[str, Distribution] = {}
     for key, part in parts.items():
-        found |= _table_distributions(f"{name}.{key}" if name else key, part)
+        found |= _table_distributions(f"{table_name}.{key}" if table_name else key, part)
     return found
 
 
 def load_spec(path: str | Path, **values: object) -> Spec:
-    """Return the spec in a TOML file; paths in it are relative to its folder.
+    """Return the spec in a TOML file; paths in the file are relative to the folder of the file.
 
-    values : `count`, `seed`, `size` or `format` that replace those of the file
+    values : `count`, `seed`, `size` or `format`, in place of the values in the file
 
     Raises DermisError with table and key for values that cannot be rendered, and for missing files.
     """
@@ -289,7 +290,7 @@ def _toml_lines(title: str, values: Mapping[str, object]) -> list[str]:
 
 
 def _expand_patterns(value: object, folder: Path, key: str) -> object:
-    """Return a spec value with each {files = PATTERN} in it replaced by a `FileChoice` of sorted files.
+    """Return a spec value in which a `FileChoice` of sorted files replaces each {files = PATTERN}.
 
     key : dotted name of the value in error messages
 
@@ -330,10 +331,10 @@ def _file_hashes(names: Iterable[str], folder: Path) -> dict[str, str]:
 
 
 def _check_hashes(expected: Mapping[str, str], actual: Mapping[str, str]) -> None:
-    """Refuse files that have changed since the spec was written.
+    """Raise DermisError if files have changed since the spec was written.
 
     expected : SHA-256 by file name, as stored in the spec
-    actual : SHA-256 by file name now
+    actual : SHA-256 of the present files, by file name
     """
     for name in sorted(expected.keys() | actual.keys()):
         if expected.get(name) != actual.get(name):

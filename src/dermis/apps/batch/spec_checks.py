@@ -1,4 +1,4 @@
-"""Checks of a spec across its tables, and of names and values against the models that they refer to."""
+"""Checks of a spec: consistency between tables, and whether names exist and models accept the values."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def check_spec(
     groups: Sequence[CorrelationGroup],
     folder: Path,
 ) -> None:
-    """Refuse distributions whose samples cannot be rendered; errors state table and key.
+    """Raise DermisError for distributions whose samples cannot be rendered; the message states table and key.
 
     sampled : distribution of each parameter by its dotted name
     expressions : weights of morph targets by name of the expression
@@ -56,7 +56,7 @@ def check_spec(
 
 
 def check_landmarks(names: Sequence[str], folder: Path) -> None:
-    """Refuse names that are neither a preset landmark set nor a readable landmark table."""
+    """Raise DermisError for names that are neither a preset landmark set nor a readable landmark table."""
     for name in names:
         if name in LANDMARK_SETS:
             continue
@@ -117,7 +117,10 @@ def _check_light(sampled: Mapping[str, Distribution]) -> None:
 
 
 def _check_names(sampled: Mapping[str, Distribution], folder: Path) -> None:
-    """Refuse heads and environments that are neither part of the package nor files in the folder."""
+    """Raise DermisError for heads and environments that are neither part of the package nor in the folder.
+
+    folder : folder to which file names in the spec are relative
+    """
     heads = [HUMAN, *(name for name, sample in SAMPLES.items() if sample.kind == "head")]
     maps = [
         NO_ENVIRONMENT,
@@ -133,7 +136,7 @@ def _check_names(sampled: Mapping[str, Distribution], folder: Path) -> None:
 
 
 def _check_looks(sampled: Mapping[str, Distribution]) -> None:
-    """Refuse parameters of people, skins and morph targets with unknown names or invalid values."""
+    """Raise DermisError for unknown names or invalid values of people, skins and morph targets."""
     for part, kind in _LOOK_MODELS.items():
         known = [one.name for one in fields(kind) if one.name not in (_SEED_FIELD, SITES_FIELD)]
         _check_table(f"person.{part}", sampled, known, kind)
@@ -149,20 +152,22 @@ def _check_looks(sampled: Mapping[str, Distribution]) -> None:
 def _check_table(
     table: str,
     sampled: Mapping[str, Distribution],
-    known: Sequence[str],
-    make: Callable[..., object],
+    allowed_keys: Sequence[str],
+    make_model: Callable[..., object],
 ) -> None:
-    """Refuse unknown keys of a spec table, and distributions whose limits a model rejects.
+    """Raise DermisError for unknown keys of a spec table, and for distributions whose limits a model rejects.
 
-    known : allowed keys of the table
-    make : class or function that makes the model, called with each limit of a distribution
+    allowed_keys : allowed keys of the table
+    make_model : class or function that makes the model; called with each limit of a distribution
     """
     for name, distribution in table_values(sampled, table).items():
-        if name not in known:
-            listed = ", ".join(known) if len(known) < 40 else "those of dermis head --list-targets"
+        if name not in allowed_keys:
+            listed = (
+                ", ".join(allowed_keys) if len(allowed_keys) < 40 else "those of dermis head --list-targets"
+            )
             refuse(f"{table}: {name}", f"one of {listed}", "this name is unknown", "Correct it")
         for bound in distribution.support:
             try:
-                make(**{name: bound})
+                make_model(**{name: bound})
             except DermisError as error:
                 raise DermisError(f"{table}: {error}") from None
