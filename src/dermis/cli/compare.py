@@ -144,8 +144,9 @@ def _refuse_unused_options(subject: str, options: Options) -> None:
 
 
 def _comparison_arguments(options: Options, sizes: Options) -> Options:
-    """Return the keyword arguments of `dermis.apps.validation.comparisons.compare` for the options.
+    """Return the keyword arguments of `dermis.apps.validation.comparisons.compare` for the command line.
 
+    options : options given on the command line, by name
     sizes : picture and atlas sizes given on the command line
     """
     from dermis.apps.validation.comparisons.scenes import default_region
@@ -337,7 +338,11 @@ def _lobe_figure(m: float) -> Figure:
 def _lobe_intensity(name: str, m: float) -> Doubles:
     """Return the reflected intensity f cos(theta_i) cos(theta_o), (3, n), for the BRDF f of a model [1/sr].
 
-    The rows are the angles of incidence `_INCIDENT_COLOURS`, the columns the angles `_view_angles`.
+    The rows are for the angles of incidence in `_INCIDENT_COLOURS`, the columns for the angles of
+    `_view_angles`.
+
+    name : name of the specular model
+    m : Beckmann roughness [-]
     """
     angle = _view_angles()
     view = np.stack([np.sin(angle), 0.0 * angle, np.cos(angle)], axis=-1)

@@ -43,6 +43,9 @@ def lights(name: str = "", /, *, as_json: JsonOption = False) -> int:
 
 
 def _first_sentence(text: str) -> str:
-    """Return the first sentence of the comment at the top of a TOML file, which describes a light preset."""
+    """Return the first sentence of the comment at the top of a light preset: its summary.
+
+    text : TOML of the preset
+    """
     comment = " ".join(line.lstrip("# ") for line in text.split("\n\n")[0].splitlines())
     return comment.split(". ")[0].rstrip(".") + "."

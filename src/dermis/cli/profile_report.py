@@ -62,7 +62,10 @@ def gaussian_fit(
 
 
 def additional_fit(radial: RadialProfile, kind: str) -> BurleyFit | SeparableFit | None:
-    """Return the fit named by --fit-kind, "burley" or "separable"; None for "gaussian"."""
+    """Return the fit that --fit-kind requests in addition to Gaussians; None for "gaussian".
+
+    kind : "burley", "separable" or "gaussian"
+    """
     if kind == "burley":
         return fit_burley(radial.rings())
     return fit_separable(radial.rings()) if kind == "separable" else None
@@ -77,7 +80,7 @@ class ProfileReport:
     fit : fitted Gaussians and their error
     other_fit : Burley or separable fit; None if not requested
     through_mm : thicknesses at which the transmitted colour is reported [mm]
-    model_error : error of the diffusion model relative to Monte Carlo, None if unknown
+    model_error : error of the diffusion model relative to Monte Carlo; None if this error is unknown
     spectrum : (31,) total reflectance by wavelength; None for tissue given by RGB coefficients [-]
     """
 
@@ -301,7 +304,7 @@ def _add_legend(figure: Figure, axes: Axes) -> None:
 
 
 def _plot_curves(axes: Axes, report: ProfileReport) -> float:
-    """Plot r R(r) of a profile and of its fits per colour channel; return the peak."""
+    """Plot r R(r) of a diffusion profile and of its fits per colour channel; return the maximum [1/mm]."""
     radial, fit = report.radial, report.fit.profile
     r = radial.radius_mm
     fitted = fit.radiant_exitance(r)
@@ -324,7 +327,7 @@ def _plot_curves(axes: Axes, report: ProfileReport) -> float:
 
 
 def _plot_photons(axes: Axes, profile: RadialProfile) -> float:
-    """Plot r R(r) of a Monte Carlo profile as points with error bars; return the peak."""
+    """Plot r R(r) of a Monte Carlo profile as points with error bars; return the maximum [1/mm]."""
     r, peak = profile.radius_mm, 0.0
     error: Floats = profile.standard_error if profile.standard_error is not None else np.zeros((len(r), 3))
     for channel, colour in enumerate(_CHANNEL_COLOURS):

@@ -148,7 +148,7 @@ def note_subdivision(name: str, options: SceneOptions, head: Head) -> None:
 
 
 def _check_values(name: str, options: SceneOptions) -> None:
-    """Validate all options before the head is loaded, which takes longer."""
+    """Validate all options before the head is loaded, as loading takes longer than the validation."""
     from dermis.environment.panorama import panorama_file
     from dermis.optics.profiles import load_profile
 
@@ -204,8 +204,9 @@ def _merge_environment(scene_environment: Environment | None, options: Options) 
 def _select_lights(
     scene: Scene, name: str | None, environment: Environment | None, *, replaces_environment: bool
 ) -> tuple[Light, ...]:
-    """Return the lights of --lights; none if only --env is given; otherwise those of the scene.
+    """Return the lights of --lights; without --lights, no lights if --env is given, else the scene's lights.
 
+    name : value of --lights: name of a lighting rig, or path of a file; None if the option is not given
     replaces_environment : whether --env replaces the environment
     """
     from dermis.scene import load_lights

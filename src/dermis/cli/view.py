@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from dermis.apps.viewer.state import ViewerState
 
 _HOST, _PORT, _WINDOW = "127.0.0.1", 8765, (1280, 800)
-_ATLAS_ON_CPU = 1024  # a still frame with the default atlas takes several seconds on a CPU
+_ATLAS_SIDE_ON_CPU = 1024  # a still frame with the default atlas takes several seconds on a CPU
 
 
 def view(
@@ -93,7 +93,7 @@ def view(
 
 
 def _initial_state(name: str, options: SceneOptions, adapter: str) -> ViewerState:
-    """Return the state of the viewer at its start, for a head or scene file and the options."""
+    """Return the initial state of the viewer for a head or scene file and the command line options."""
     from dermis.apps.viewer.state import initial_state
     from dermis.gpu.adapters import select_adapters
     from dermis.scene.files import head_table, with_absolute_paths
@@ -101,14 +101,14 @@ def _initial_state(name: str, options: SceneOptions, adapter: str) -> ViewerStat
     is_scene = Path(name).suffix.lower() == ".toml"
     scene, settings = assemble_scene(name, options)
     if "atlas" not in options.settings and not is_scene and select_adapters(adapter)[0][0].kind == "CPU":
-        settings = settings.model_copy(update={"atlas": _ATLAS_ON_CPU})
+        settings = settings.model_copy(update={"atlas": _ATLAS_SIDE_ON_CPU})
     table = head_table(Path(name)) if is_scene else with_absolute_paths({"name": name} | options.head, Path())
     rig = "" if is_scene else "none" if "name" in options.environment else "studio"
     return initial_state(scene, settings, table, rig if options.lights is None else options.lights)
 
 
 def _load_motion(file: str | None, fps: float | None, state: ViewerState) -> MotionFile | None:
-    """Load the motion file for the head before the window opens; None without a motion file."""
+    """Load the motion file for the head, before the window opens; return None if no file is named."""
     if file is None:
         return None
     from dermis.apps.viewer.player import MotionFile

@@ -36,7 +36,7 @@ def write_page(path: Path, pictures: Sequence[GalleryPicture], head: str, adapte
 
     pictures : pictures in the order of the page
     head : name of the head in the pictures
-    adapter : name of the adapter that drew them
+    adapter : name of the adapter that drew the pictures
 
     Raises DermisError when the file cannot be written.
     """
@@ -69,7 +69,7 @@ def _section(picture: GalleryPicture) -> str:
 
 
 def _equation_html(text: str) -> str:
-    """Convert an equation in one line to HTML; _ begins a subscript and ^ a superscript."""
+    """Convert a one-line equation to HTML, where _ begins a subscript and ^ begins a superscript."""
     text = re.sub(r"_(\w+)", r"<sub>\1</sub>", html.escape(text))
     return re.sub(r"\^\(([^)]*)\)|\^(\w+)", lambda found: f"<sup>{found[1] or found[2]}</sup>", text)
 
@@ -124,9 +124,9 @@ def _short_number(value: float) -> str:
 
 
 def _deck_rows(pictures: Sequence[GalleryPicture]) -> str:
-    """Return HTML table rows for the slides of the 2007 talk, with links to their pictures.
+    """Return HTML table rows for the slides of the 2007 talk, with links to the pictures of each slide.
 
-    Each row also has a command that draws its pictures.
+    Each row also has a command that draws these pictures.
     """
     rows = csv.DictReader(
         line for line in _read_resource("deck.csv").splitlines() if not line.startswith("#")

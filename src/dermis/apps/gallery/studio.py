@@ -23,7 +23,7 @@ _SCAN_NAME = "lee_perry_smith"
 class Studio:
     """Renderer with the head that gallery pictures show, passed to each script.
 
-    name : name of the head; by default the scan if it is downloaded, else the human
+    name : name of the head; by default the scan lee_perry_smith if it is downloaded, else the human
     side : side of a panel [pixel]
     adapter : "auto", "cpu" or part of the name of an adapter
     settings : fields of `Settings` that override the values chosen by scripts
@@ -51,7 +51,7 @@ class Studio:
         return self._load(name or self.name, subdivide=1, **options)
 
     def coloured_head(self) -> Head:
-        """Return the gallery's head with a colour map; a head that the device paints gets a painted map."""
+        """Return the gallery's head with a colour map, which is painted if the head has procedural maps."""
         head = self.head()
         return with_painted_maps(self.renderer.device, head, 1024) if head.maps.is_painted else head
 
