@@ -230,7 +230,7 @@ def full_body(head: Head) -> Camera:
     Returns
     -------
     Camera
-        Camera at a distance of 1.1 m or, if that is more, of three times the size of the mesh.
+        Camera at a distance of 1.1 m, or of three times the size of the mesh if the mesh is larger.
 
     Examples
     --------
@@ -287,7 +287,7 @@ def camera_preset(name: str, head: Head) -> Camera:
 
 
 def find_preset(name: str) -> Callable[[Head], Camera] | None:
-    """Return the function of a camera preset, or None for another name."""
+    """Return the function of a camera preset, or None for a name that is not a preset."""
     by_name = {key.replace("-", "_"): preset for key, preset in CAMERA_PRESETS.items()}
     return by_name.get(name.replace("-", "_"))
 
@@ -300,7 +300,10 @@ def _camera_at_azimuth(head: Head, degrees: float) -> Camera:
 
 
 def _show_all(head: Head, degrees: float) -> Camera:
-    """Return a camera that shows all of a mesh with a margin, from an azimuth relative to its front."""
+    """Return a camera that shows all of a mesh with a margin, from an azimuth relative to the front.
+
+    degrees : azimuth of the camera, 0 in front of the head [degrees]
+    """
     x, _, z = _azimuth_direction(degrees)
     # rows: to the right, up and towards the camera
     axes = np.array([[z, 0.0, -x], [0.0, 1.0, 0.0], [x, 0.0, z]]) @ head.axes
@@ -310,17 +313,17 @@ def _show_all(head: Head, degrees: float) -> Camera:
     across, towards = np.abs(points - middle)[:, :2].max(axis=1), (points - middle)[:, 2]
     frame_mm = 2.0 * _MARGIN * float((across / (1.0 - towards / distance)).max())
     target, position = (
-        _triple(np.round((middle + np.array([0, 0, far])) @ axes, 3)) for far in (0.0, distance)
+        _vector_tuple(np.round((middle + np.array([0, 0, far])) @ axes, 3)) for far in (0.0, distance)
     )
-    return Camera(position=position, target=target, up=_triple(axes[1]), frame_mm=round(frame_mm, 3))
+    return Camera(position=position, target=target, up=_vector_tuple(axes[1]), frame_mm=round(frame_mm, 3))
 
 
 def _to_scene(head: Head, vector: Vector) -> Vector:
     """Return a vector in the scene from its components to the right, upwards and to the front of a head."""
-    return _triple(np.array(vector) @ head.axes)
+    return _vector_tuple(np.array(vector) @ head.axes)
 
 
-def _triple(vector: Doubles) -> Vector:
+def _vector_tuple(vector: Doubles) -> Vector:
     x, y, z = (float(one) + 0.0 for one in vector)
     return x, y, z
 

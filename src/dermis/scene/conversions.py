@@ -91,10 +91,12 @@ def as_environment(environment: object) -> Environment | None:
 
 
 def as_model(kind: type[P], values: object, part: str, example: str) -> P:
-    """Return settings of a class from an instance or from a mapping of field values by name.
+    """Return settings of a given class.
 
     kind : class of the settings, such as `Skin`
-    part, example : name of the argument, and example of its fields, for the error message
+    values : instance of the class, or a mapping from field names to values
+    part : name of the argument of `Scene`, for the error message
+    example : example of fields with values, for the error message
 
     Raises DermisError for any other object.
     """

@@ -49,7 +49,7 @@ class Reason(str):
 class InvalidFieldsError(DermisError):
     """Error for field values that a settings class rejects.
 
-    messages : expected and actual value of each rejected field, by field name
+    messages : text with the expected and the actual value of each rejected field, by field name
     """
 
     def __init__(self, owner: str, messages: dict[str, str]) -> None:
@@ -70,7 +70,7 @@ class _NotANumber:
 
 @cache
 def numeric_fields(model: type[BaseModel]) -> Mapping[str, bool]:
-    """Return the names of the numeric fields of a model, and whether each also accepts text."""
+    """Return a mapping from each numeric field of a model to whether the field also accepts text."""
     found = {}
     for name, info in model.model_fields.items():
         kinds = set(_leaf_types(info.annotation))
@@ -79,10 +79,10 @@ def numeric_fields(model: type[BaseModel]) -> Mapping[str, bool]:
     return found
 
 
-def python_numbers(value: Any, text: bool = False) -> Any:
+def python_numbers(value: Any, accepts_text: bool = False) -> Any:
     """Convert NumPy scalars and arrays to Python numbers, and wrap booleans and text in `_NotANumber`.
 
-    text : whether text is a valid value of the field
+    accepts_text : whether text is a valid value, which is then not wrapped
     """
     import numpy as np  # importing it takes longer than printing help
 
@@ -92,7 +92,7 @@ def python_numbers(value: Any, text: bool = False) -> Any:
         return [python_numbers(one) for one in value]
     if isinstance(value, Mapping):
         return {name: python_numbers(one) for name, one in value.items()}
-    if isinstance(value, bool | set | frozenset) or (isinstance(value, _TEXT_TYPES) and not text):
+    if isinstance(value, bool | set | frozenset) or (isinstance(value, _TEXT_TYPES) and not accepts_text):
         return _NotANumber(value)
     return value
 
@@ -118,13 +118,13 @@ def messages_by_field(errors: list[ErrorDetails], model: type[BaseModel]) -> dic
 def _format_error(error: ErrorDetails, model: type[BaseModel]) -> str:
     """Return the message "expected ..., but got ..." for one validation error of pydantic."""
     if error["type"] == "extra_forbidden":
-        return _unknown_field(str(error["loc"][-1]), model)
+        return _unknown_field_message(str(error["loc"][-1]), model)
     if error["type"] == "missing":
         return "expected a value, but there is none"
     expected = re.sub("^(Input should be|Tuple should have|Value error,) |, unable to .*", "", error["msg"])
-    expected = expected.replace("a valid tuple", f"a list{_list_length(error, model)}")
+    expected = expected.replace("a valid tuple", f"a list{_length_text(error, model)}")
     if error["type"] in _BOUND_ERRORS | _NUMBER_ERRORS:
-        expected = _number_range(error["loc"], model) or re.sub("^(greater|less)", r"a number \1", expected)
+        expected = _range_text(error["loc"], model) or re.sub("^(greater|less)", r"a number \1", expected)
     if len(error["loc"]) == 1 and (words := field_keywords(model, str(error["loc"][0]))):
         expected = f"{', '.join(words)} or {expected}"
     actual = format_value(error["input"])
@@ -134,8 +134,10 @@ def _format_error(error: ErrorDetails, model: type[BaseModel]) -> str:
     return f"expected {expected}, but got {actual}"
 
 
-def _number_range(location: tuple[int | str, ...], model: type[BaseModel]) -> str:
-    """Return the range of a number and its reason as text, such as "a number from 0 to 1"; "" without bounds.
+def _range_text(location: tuple[int | str, ...], model: type[BaseModel]) -> str:
+    """Return the range of a number as text, such as "a number from 0 to 1"; "" for a number without bounds.
+
+    The reason for the bounds is added in parentheses.
 
     location : path of the number in the model: the field name, then indices
     """
@@ -165,15 +167,15 @@ def _leaf_types(kind: Any) -> Iterator[Any]:
         yield kind
 
 
-def _list_length(error: ErrorDetails, model: type[BaseModel]) -> str:
+def _length_text(error: ErrorDetails, model: type[BaseModel]) -> str:
     """Return " of N numbers" if the error is in a tuple field of fixed length N, otherwise ""."""
     info = model.model_fields.get(str(error["loc"][0])) if len(error["loc"]) == 1 else None
     count = len([part for part in get_args(info.annotation) if part is not Ellipsis]) if info else 0
     return f" of {count} numbers" if count > 1 else ""
 
 
-def _unknown_field(name: str, model: type[Any]) -> str:
-    """Return the message for an unknown field, with a similar name or the class that has the field."""
+def _unknown_field_message(name: str, model: type[Any]) -> str:
+    """Return the message for an unknown field, which suggests a similar name or a class with this field."""
     known, finding = list(model.model_fields), "but this name is unknown"
     plain = name[:_MAX_NAME_LENGTH].lower().replace("-", "_")
     similar = difflib.get_close_matches(plain, known, 1, 0.7)

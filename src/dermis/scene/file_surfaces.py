@@ -21,7 +21,7 @@ _SURFACE_ROLES: tuple[Role, ...] = ("normal", "roughness", "metalness")
 
 
 def with_missing_uv(rigged: RiggedMesh) -> RiggedMesh:
-    """Return a mesh with a new uv layout for its skin groups without uv, and with a note on them."""
+    """Return a mesh with a new uv layout for skin groups without uv, and with a note on these groups."""
     mesh, surface = rigged.mesh, rigged.surface
     bare = np.array(
         [own.kind == "skin" and not has for own, has in zip(mesh.materials, surface.has_uv, strict=True)]
@@ -39,7 +39,7 @@ def with_missing_uv(rigged: RiggedMesh) -> RiggedMesh:
 
 
 def direct_material(rigged: RiggedMesh, materials: Sequence[FileMaterial]) -> FileMaterial | None:
-    """Return the material whose pictures serve unchanged as maps of the skin; None if they must be packed.
+    """Return the material whose pictures serve unchanged as skin maps; None if pictures must be packed.
 
     rigged, materials : mesh and materials of a file
     """
@@ -59,9 +59,11 @@ def direct_material(rigged: RiggedMesh, materials: Sequence[FileMaterial]) -> Fi
 
 
 def with_factors(maps: Maps, material: FileMaterial, user_roles: Collection[str]) -> Maps:
-    """Return the maps of a skin material, multiplied by its factors; roughness is squared.
+    """Return the maps of a skin material, multiplied by the factors of the material in the file.
 
-    user_roles : roles of maps that the user replaces, to which the factors do not apply
+    The product of roughness map and roughness factor is squared, as files store the root of the roughness m.
+
+    user_roles : roles of maps that the user replaces; factors do not apply to the maps of these roles
     """
     changed: dict[str, Any] = {}
     if (
@@ -82,7 +84,7 @@ def with_factors(maps: Maps, material: FileMaterial, user_roles: Collection[str]
 
 
 def _materials_of_kind(mesh: Mesh, kind: str) -> Mask:
-    """Return the mask (m,) of the mesh's materials of a kind."""
+    """Return a mask (m,) of the materials of a mesh that have a kind, such as "skin"."""
     return np.array([material.kind == kind for material in mesh.materials])
 
 
@@ -156,7 +158,10 @@ def _with_uv(mesh: Mesh, packed: PackedTextures) -> Mesh:
 
 
 def _keep_outline(mesh: Mesh, changed: Mesh) -> Mesh:
-    """Return a changed mesh of the same shape with the cached outline of the original."""
+    """Give a changed mesh the outline that is cached for the original mesh, and return the changed mesh.
+
+    changed : mesh with the shape of `mesh`
+    """
     vars(changed)["outline"] = mesh.outline
     return changed
 
@@ -182,7 +187,10 @@ def _emission(values: Floats | None) -> Floats | None:
 
 
 def _with_surface(material: Material, in_file: FileMaterial | None, has_maps: bool) -> Material:
-    """Return an opaque material with the surface properties of its file."""
+    """Return a material with the surface properties that the file states; skin materials are not changed.
+
+    in_file : material in the file; None if the file has no material
+    """
     if material.kind == "skin":
         return material
     if in_file is None:
@@ -204,9 +212,9 @@ def unused_properties(
     user_roles: Collection[str],
     is_packed: bool,
 ) -> str:
-    """Return a note on properties of a file's materials that are not drawn; empty if there are none.
+    """Return a note on properties of a file's materials that are not drawn; empty if all are drawn.
 
-    in_file : (m,) index of the file's material for each material of the mesh, -1 for none
+    in_file : (m,) for each material of the mesh, index of the material in the file, or -1 if there is none
     user_roles : roles of skin maps that the user replaces
     is_packed : whether the pictures of several skin materials are packed
     """

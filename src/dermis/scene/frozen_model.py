@@ -133,7 +133,7 @@ class FrozenModel(BaseModel, metaclass=_Documented):
     def __eq__(self, other: object) -> bool:
         """Return whether another object has the same class and equal fields.
 
-        This is ten times as fast as the comparison of pydantic.
+        This comparison is ten times as fast as pydantic's.
         """
         return type(self) is type(other) and vars(self) == vars(other)
 
@@ -151,12 +151,16 @@ class SliderRange(NamedTuple):
 
 
 def slider(low: float, high: float, *, log: bool = False) -> dict[str, Any]:
-    """Return the `json_schema_extra` that gives a field a narrower slider range than its bounds."""
+    """Return the `json_schema_extra` that gives a field a slider range narrower than the bounds.
+
+    low, high : values at the ends of the slider
+    log : whether the slider is logarithmic
+    """
     return {"slider": SliderRange(low, high, log)}
 
 
 def field_help(model: type[BaseModel], field: str) -> str:
-    """Return the help text of a field on one line, with a summary of each registered name it accepts."""
+    """Return the help text of a field in one line, with a summary of each registered name that it accepts."""
     info = model.model_fields[field]
     text = re.sub(r"\s+", " ", info.description or "")
     summaries = [one for named in _registry_names(info) for one in named.registry.summaries()]
@@ -164,7 +168,7 @@ def field_help(model: type[BaseModel], field: str) -> str:
 
 
 def field_choices(model: type[BaseModel], field: str) -> tuple[str, ...]:
-    """Return the words that a text field accepts; empty if it accepts any text, and for other fields."""
+    """Return the words that a text field accepts; empty for fields of any text or of other types."""
     info = model.model_fields[field]
     for named in _registry_names(info):
         return named.names
@@ -239,7 +243,7 @@ def model_docstring(model: type[BaseModel]) -> str:
 
 
 def accepted_values(model: type[BaseModel], field: str) -> str:
-    """Return the accepted words and bounds of a field as text, such as "auto, 0 to 1"; "" for neither."""
+    """Return the accepted words and bounds of a field, such as "auto, 0 to 1"; "" if it has neither."""
     low, high = field_bounds(model.model_fields[field])
     words = [*field_keywords(model, field), *field_choices(model, field)]
     if low is not None and high is not None and high < _DISPLAYED_BOUND:
@@ -248,7 +252,7 @@ def accepted_values(model: type[BaseModel], field: str) -> str:
 
 
 def format_default(value: Any) -> str:
-    """Return a default value as users type it on the command line; "" for None, booleans and no default."""
+    """Return a default value as typed on the command line; "" for None, booleans and missing defaults."""
     if isinstance(value, tuple):
         return ("x" if all(isinstance(one, int) for one in value) else ",").join(map(format_default, value))
     if value is None or isinstance(value, bool) or value is PydanticUndefined:

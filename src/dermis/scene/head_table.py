@@ -43,7 +43,7 @@ def _eye_limits(name: str) -> Any:
 
 
 class EyeTable(FrozenModel):
-    """Eye settings in a [head] table; fields that are None leave the appearance that the head defines."""
+    """Eye settings in a [head] table; a field that is None keeps the value of the head's eye look."""
 
     eumelanin: Annotated[float | None, _eye_limits("eumelanin")] = None
     """Eumelanin of the iris, from 0 for blue to 1 for the darkest brown."""
@@ -158,7 +158,11 @@ def check_options(**options: Any) -> None:
 
 
 def check_relief(height_mm: float | None, height: object, culprit: str = "height_mm") -> None:
-    """Raise DermisError if height_mm is given without a height map, to which it applies."""
+    """Raise DermisError if height_mm is given without a height map.
+
+    height : file of the height map
+    culprit : name of the option height_mm, for the error message
+    """
     if height_mm is not None and height is None:
         actual = f"got {height_mm} without a height map"
         refuse(culprit, "a height map with it", actual, "Give the map too, or leave height_mm out")
