@@ -29,7 +29,7 @@ _CACHE_FOLDER, _ARRAY_NAME = "machine-code", "code"
 
 
 def compiled(function: Function) -> Function:
-    """Decorate a function to be compiled by numba; its machine code is cached on disk."""
+    """Decorate a function so that numba compiles it and its machine code is cached on disk."""
     dispatcher = numba.njit(nogil=True, error_model="numpy")(function)
     if hasattr(dispatcher, "enable_caching") and function.__closure__ is None:
         dispatcher._cache = _CodeCache(function)
@@ -40,9 +40,9 @@ _embeds_addresses = attrgetter("library.has_dynamic_globals")  # memory addresse
 
 
 class _CodeCache(caching.NullCache):  # type: ignore[misc, name-defined]
-    """Disk cache of compiled functions, which replaces numba's because that unpickles any file in its folder.
+    """Disk cache of compiled functions, in place of numba's cache, which unpickles any file in its folder.
 
-    Cached files are read only from private folders, and their hash is checked before they are unpickled.
+    Cached files are read only from private folders, and the hash of a file is checked before unpickling.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:

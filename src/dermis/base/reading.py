@@ -1,4 +1,4 @@
-"""Safe reading of files that users name, and of files to which these refer.
+"""Safe reading of files that users name, and of further files to which these files refer.
 
 Only regular files are opened, their size is limited, and errors of parsers become messages with the name of
 the file.
@@ -25,7 +25,7 @@ MALFORMED_DATA_ERRORS = (LookupError, TypeError, AttributeError, ArithmeticError
 """Exceptions raised by code that assumes well-formed data; pass them to `parsing`."""
 MAX_TEXT_BYTES = 1 << 20  # largest file with settings: scenes, lights, tables
 _MIN_READ_BYTES = 1 << 16
-_MAX_BITS = 64  # largest size of integers, as in TOML; all can be converted to float
+_MAX_INTEGER_BITS = 64  # largest size of integers, as in TOML; all can be converted to float
 _MAX_KEY_PARTS = 32  # parts of a dotted key: parsing time grows with the square of their number
 _LONG_KEY_PATTERN = re.compile(
     r"""(?<![\w\\-])(?:(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+)"""
@@ -39,7 +39,7 @@ def read_file(path: str | Path, expected: str, max_bytes: int, name: object = No
 
     expected : what the file should be, for error messages
     max_bytes : largest accepted size
-    name : name of the file in error messages; by default its path
+    name : name of the file in error messages; by default the path
 
     Raises DermisError when the file is missing, not regular, too large or unreadable.
     """
@@ -63,7 +63,7 @@ def read_file(path: str | Path, expected: str, max_bytes: int, name: object = No
 
 @contextmanager
 def open_regular_file(path: str | Path, expected: str) -> Iterator[BinaryIO]:
-    """Open a regular file of any size; the caller limits how much it reads at a time.
+    """Open a regular file of any size; callers must limit how much they read at a time.
 
     expected : what the file should be, for error messages
 
@@ -81,7 +81,7 @@ def open_regular_file(path: str | Path, expected: str) -> Iterator[BinaryIO]:
 
 
 def is_file(path: str | Path) -> bool:
-    """Return whether a regular file exists; False for names that no file can have."""
+    """Return whether a regular file exists at a path; False for names that no file can have."""
     try:
         return Path(path).is_file()
     except (OSError, ValueError):  # too long, or with a NUL
@@ -89,7 +89,7 @@ def is_file(path: str | Path) -> bool:
 
 
 def read_text(path: str | Path, expected: str, max_bytes: int = MAX_TEXT_BYTES) -> str:
-    """Return the text of a file of UTF-8 with or without a byte order mark, or of UTF-16 with one.
+    """Return the text of a file in UTF-8, or in UTF-16 with a byte order mark; UTF-8 may also have the mark.
 
     expected : what the file should be, for error messages
 
@@ -130,7 +130,7 @@ def checked_path(name: object, expected: str) -> Path:
 
     expected : what the name should denote, for the error
 
-    Raises DermisError when it is neither text nor a path.
+    Raises DermisError when the name is neither text nor a path.
     """
     if not isinstance(name, str | os.PathLike):
         refuse("file", f"the name of {expected}", f"got a {type(name).__name__}", "Pass its name")
@@ -141,7 +141,7 @@ def checked_path(name: object, expected: str) -> Path:
 def parsing(culprit: object, expected: str, *errors: type[Exception]) -> Iterator[None]:
     """Convert the exceptions of a parser in the block into a DermisError that names the file.
 
-    culprit : the file
+    culprit : name of the file
     expected : what the file should be
     errors : exception types that the parser raises besides ValueError and OverflowError
     """
@@ -177,7 +177,7 @@ def _finite_float(text: str) -> float:
 
 def _bounded_int(text: str) -> int:
     number = int(text)
-    if number.bit_length() > _MAX_BITS:
+    if number.bit_length() > _MAX_INTEGER_BITS:
         raise ValueError(f"{text[:20]}... is too large for a whole number")
     return number
 
@@ -190,8 +190,8 @@ def _check_integers(tables: dict[str, Any]) -> None:
             pending.extend(value.values())
         elif isinstance(value, list):
             pending.extend(value)
-        elif isinstance(value, int) and value.bit_length() > _MAX_BITS:
-            raise ValueError(f"a whole number has {value.bit_length()} bits, more than {_MAX_BITS}")
+        elif isinstance(value, int) and value.bit_length() > _MAX_INTEGER_BITS:
+            raise ValueError(f"a whole number has {value.bit_length()} bits, more than {_MAX_INTEGER_BITS}")
 
 
 def _refuse_constant(text: str) -> NoReturn:

@@ -37,7 +37,9 @@ _MAX_RATE, _MAX_DENOMINATOR = 1000, 1001
 def parse_frame_rate(value: str | float | Fraction, culprit: object = "rate") -> Fraction:
     """Return a frame rate as an exact fraction, because rounded frame times would drift.
 
-    value : 30, 12.5, "24000/1001"; 23.976, 29.97, 59.94 and similar values mean 24000/1001 and so on
+    value : frame rate such as 30, 12.5 or "24000/1001" [1/s]; 23.976 means 24000/1001, and likewise 29.97 and
+        59.94 mean the exact NTSC rates
+    culprit : name of the option or argument, for errors
 
     Raises DermisError for values that are not a rate up to 1000.
     """
@@ -89,7 +91,7 @@ def _check_encoder(path: str | Path) -> None:
 
 
 class MovieWriter:
-    """Writer of H.264 movies, which encodes on another thread and writes the file atomically.
+    """Writer of an H.264 movie, which encodes on another thread and writes the file atomically.
 
     Frame k is shown at exactly k / rate. Levels are stored and tagged with the primaries and matrix of
     BT.709.
@@ -135,7 +137,7 @@ class MovieWriter:
         return self
 
     def __exit__(self, *exception: Any) -> None:
-        """Finish the movie and close the file; after an error no file is left."""
+        """Finish the movie and close the file; after an error, remove the file."""
         self._context.__exit__(*exception)
 
     @contextmanager
@@ -170,7 +172,7 @@ class MovieWriter:
         Parameters
         ----------
         picture : numpy.ndarray
-            (H, W, 3) uint8 sRGB; it must not be changed afterwards.
+            (H, W, 3) uint8 sRGB; the array must not be changed afterwards.
 
         Raises
         ------
