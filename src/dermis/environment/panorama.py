@@ -1,4 +1,4 @@
-"""Latitude-longitude panoramas of distant light, and extraction of their suns."""
+"""Latitude-longitude panoramas of distant light, and extraction of suns from panoramas."""
 
 from __future__ import annotations
 
@@ -140,14 +140,14 @@ class Sun:
 
 
 def split_suns(radiance: Floats) -> tuple[Floats, list[Sun]]:
-    """Split a panorama into suns and the remaining panorama; together they have the light of the original.
+    """Split a panorama into suns and the remaining panorama, which together have the original light.
 
     Suns are sorted by irradiance, the strongest first.
 
     radiance : (h, w, 3)
 
     A sun is the radiance above 32 times the mean, within 8 degrees of the centre of a bright cluster. At most
-    four suns are extracted. Each of them causes at least 5 % of the irradiance that a uniform sky with the
+    four suns are extracted. Each sun causes at least 5 % of the irradiance that a uniform sky with the
     panorama's mean radiance would cause. This is a simplified median cut of light probes [Debevec2005].
     """
     mean = float(luminance(mean_radiance(radiance)))
@@ -187,7 +187,7 @@ def _fit_sun(light: Floats, towards: Floats, weight: Floats) -> Sun:
 
 
 def _bright_clusters(brightness: Floats, towards: Floats, weight: Floats) -> list[NDArray[np.bool_]]:
-    """Group n bright texels into clusters; return the mask (n,) of each, that of the brightest peak first.
+    """Group n bright texels into clusters; return a mask (n,) of each cluster, brightest peak first.
 
     brightness : (n,) luminance
     towards : (n, 3) unit vectors to the texels

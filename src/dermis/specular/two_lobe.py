@@ -39,7 +39,8 @@ def two_lobe(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Float
 def two_lobe_masking(cos_theta: ArrayLike, m: ArrayLike) -> Floats:
     """Return the masking G1 of the two-lobe mixture, the fraction of facets visible from a direction [-].
 
-    Smith's 1 / G1 - 1 is an integral over the slope distribution, so 1 / G1 is mixed like the distributions.
+    Smith's 1 / G1 - 1 is an integral over the slope distribution. Therefore 1 / G1 is mixed with the same
+    weights as the slope distributions.
 
     cos_theta : cosine of the direction from the normal
     m : roughness of the model, from which the roughnesses of the two lobes are computed [-]
