@@ -166,11 +166,11 @@ def _option_name(error: Any) -> str:
     return str((token and token.keyword) or (error.argument and error.argument.name) or "an option")
 
 
-def _type_text(kind: Any) -> str:
+def _type_text(annotation: Any) -> str:
     """Return a type in words, such as "a number", or the choices of a `Literal`."""
-    if get_args(kind):
-        return " or ".join(filter(None, map(_type_text, get_args(kind))))
-    return _TYPE_TEXTS.get(kind, str(kind))
+    if get_args(annotation):
+        return " or ".join(filter(None, map(_type_text, get_args(annotation))))
+    return _TYPE_TEXTS.get(annotation, str(annotation))
 
 
 def reflow(docstring: str | None) -> str:
@@ -191,8 +191,8 @@ def _continues_paragraph(before: str, line: str) -> bool:
     """
     if not before.strip() or not line.strip() or {*before.strip()} == {"-"} or {*line.strip()} == {"-"}:
         return False
-    return _indent(before) == _indent(line)
+    return _indent_width(before) == _indent_width(line)
 
 
-def _indent(line: str) -> int:
+def _indent_width(line: str) -> int:
     return len(line) - len(line.lstrip())

@@ -201,11 +201,15 @@ def _digest_line(head: bytes) -> bytes:
     return hashlib.sha256(head).hexdigest().encode() + b"\n"
 
 
-def _byte_count(kind: np.dtype[Any], shape: Sequence[int]) -> int:
+def _byte_count(dtype: np.dtype[Any], shape: Sequence[int]) -> int:
     """Return the size of an array in bytes, after checking its type and shape before memory is allocated."""
-    if kind.kind not in _PLAIN_KINDS or not kind.itemsize or any(type(n) is not int or n < 0 for n in shape):
-        raise ValueError(f"no array: {kind} {shape}")
-    return math.prod(shape) * kind.itemsize
+    if (
+        dtype.kind not in _PLAIN_KINDS
+        or not dtype.itemsize
+        or any(type(n) is not int or n < 0 for n in shape)
+    ):
+        raise ValueError(f"no array: {dtype} {shape}")
+    return math.prod(shape) * dtype.itemsize
 
 
 def _read_block(path: Path, block: memoryview, offset: int) -> str:

@@ -51,7 +51,7 @@ def run_decoder(module: str, request: Arrays, size: int, culprit: object, expect
         try:
             status = subprocess.run(
                 command,
-                input=_pack(request),
+                input=_pack_arrays(request),
                 stdout=output,
                 stderr=subprocess.DEVNULL,
                 cwd=folder,
@@ -65,7 +65,7 @@ def run_decoder(module: str, request: Arrays, size: int, culprit: object, expect
             actual = f"its decoder stopped ({_stop_reason(status)})"
             refuse(culprit, expected, actual, _DAMAGED_ADVICE)
         output.seek(0)
-        answer = _unpack(output.read())
+        answer = _unpack_arrays(output.read())
     if _REFUSED in answer:
         raise DermisError(shorten(as_text(answer[_REFUSED]), _MAX_MESSAGE_LENGTH))
     if _FAILED in answer:
@@ -83,12 +83,12 @@ def answer_request(decode: Callable[[Arrays], Arrays]) -> None:
     os.dup2(2, 1)  # libraries print messages
     _limit_process(int(sys.argv[1]))
     try:
-        answer = _pack(decode(_unpack(sys.stdin.buffer.read())))
+        answer = _pack_arrays(decode(_unpack_arrays(sys.stdin.buffer.read())))
     except DermisError as error:
-        answer = _pack({_REFUSED: from_text(str(error))})
+        answer = _pack_arrays({_REFUSED: from_text(str(error))})
     except Exception as error:
         text = " ".join(f"{type(error).__name__}: {error}"[:_MAX_MESSAGE_LENGTH].split())
-        answer = _pack({_FAILED: from_text(shorten(text, 200))})
+        answer = _pack_arrays({_FAILED: from_text(shorten(text, 200))})
     with output:
         output.write(answer)
 
@@ -103,12 +103,12 @@ def from_text(text: str) -> Bytes:
     return np.frombuffer(text.encode("utf-8", "replace"), np.uint8)
 
 
-def _pack(arrays: Mapping[str, Bytes]) -> bytes:
+def _pack_arrays(arrays: Mapping[str, Bytes]) -> bytes:
     header = {name: (array.dtype.str, array.shape) for name, array in arrays.items()}
     return b"".join([json.dumps(header).encode(), b"\n", *(array.tobytes() for array in arrays.values())])
 
 
-def _unpack(data: bytes) -> Arrays:
+def _unpack_arrays(data: bytes) -> Arrays:
     line, _, body = data.partition(b"\n")
     arrays, start = Arrays(), 0
     for name, (dtype, shape) in json.loads(line).items():

@@ -56,8 +56,13 @@ def read_file(path: str | Path, expected: str, max_bytes: int, name: object = No
     if data is None:
         refuse(culprit, expected, "nothing can be read from it", "Copy its contents to a file first")
     if size > max_bytes or len(data) > limit:
-        actual = f"it has {_megabytes(size)}" if size > max_bytes else "it grows while it is read"
-        refuse(culprit, f"{expected} of at most {_megabytes(max_bytes)}", actual, "Check its name and size")
+        actual = f"it has {_format_megabytes(size)}" if size > max_bytes else "it grows while it is read"
+        refuse(
+            culprit,
+            f"{expected} of at most {_format_megabytes(max_bytes)}",
+            actual,
+            "Check its name and size",
+        )
     return data
 
 
@@ -121,7 +126,10 @@ def parse_json(text: str | bytes, culprit: object, expected: str) -> Any:
     """
     with parsing(culprit, expected):
         return json.loads(
-            text, parse_constant=_refuse_constant, parse_float=_finite_float, parse_int=_bounded_int
+            text,
+            parse_constant=_refuse_constant,
+            parse_float=_parse_finite_float,
+            parse_int=_parse_bounded_int,
         )
 
 
@@ -168,14 +176,14 @@ def _open_regular(path: str | Path, culprit: object, expected: str) -> int:
     return descriptor
 
 
-def _finite_float(text: str) -> float:
+def _parse_finite_float(text: str) -> float:
     number = float(text)
     if not math.isfinite(number):
         raise ValueError(f"{text[:20]} is too large for a number")
     return number
 
 
-def _bounded_int(text: str) -> int:
+def _parse_bounded_int(text: str) -> int:
     number = int(text)
     if number.bit_length() > _MAX_INTEGER_BITS:
         raise ValueError(f"{text[:20]}... is too large for a whole number")
@@ -198,7 +206,7 @@ def _refuse_constant(text: str) -> NoReturn:
     raise ValueError(f"{text} is not a number")
 
 
-def _megabytes(size: int) -> str:
+def _format_megabytes(size: int) -> str:
     return f"{size / 1e6:,.1f} MB" if size >= 1e5 else f"{size:,} bytes"
 
 

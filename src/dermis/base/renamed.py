@@ -56,7 +56,7 @@ def successor(module: str, name: str) -> str | None:
     old = f"{module}.{name}".removeprefix(f"{_PACKAGE}.")
     if old not in RENAMED_OBJECTS:
         return None
-    _warn(old, RENAMED_OBJECTS[old], stacklevel=4)
+    _warn_renamed(old, RENAMED_OBJECTS[old], stacklevel=4)
     return RENAMED_OBJECTS[old].rpartition(".")[2]
 
 
@@ -113,7 +113,7 @@ class _RenamedModuleFinder:
         new = _new_module_path(old)
         assert new is not None
         sys.modules[old] = import_module(f"{_PACKAGE}.{new}")
-        _warn(old.removeprefix(f"{_PACKAGE}."), new, stacklevel=3)
+        _warn_renamed(old.removeprefix(f"{_PACKAGE}."), new, stacklevel=3)
 
 
 def _new_module_path(fullname: str) -> str | None:
@@ -130,6 +130,6 @@ def _new_module_path(fullname: str) -> str | None:
     return None
 
 
-def _warn(old: str, new: str, stacklevel: int) -> None:
-    text = f"{_PACKAGE}.{old} is now {_PACKAGE}.{new}"
+def _warn_renamed(old_name: str, new_name: str, stacklevel: int) -> None:
+    text = f"{_PACKAGE}.{old_name} is now {_PACKAGE}.{new_name}"
     warnings.warn(f"{text}; {_REMOVAL_NOTICE}", DeprecationWarning, stacklevel)

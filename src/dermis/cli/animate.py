@@ -154,21 +154,21 @@ def animate(
 
 
 def _render_frames(
-    animation: _AnimatedScene, numbers: Sequence[int], target: AnimationOutput, adapter: str
+    animation: _AnimatedScene, frame_numbers: Sequence[int], animation_output: AnimationOutput, adapter: str
 ) -> str:
     """Render and write the frames with the given numbers, and return the name of the adapter."""
     from dermis.frame.renderer import Renderer
 
     renderer, size = Renderer(adapter), animation.settings.size
-    options: Options = {**animation.settings.model_dump(), "linear": target.is_linear}
+    options: Options = {**animation.settings.model_dump(), "linear": animation_output.is_linear}
     options["exposure"] = _common_exposure(animation, renderer)
-    options["alpha"] = target.is_numbered and animation.settings.background == "none"
-    writing, bar = target.open_writer(size, animation.rate), progress_bar("rendering frames")
+    options["alpha"] = animation_output.is_numbered and animation.settings.background == "none"
+    writing, bar = animation_output.open_writer(size, animation.rate), progress_bar("rendering frames")
     with writing as write, bar as report:
-        pictures = renderer.render_many(animation.scenes(numbers), **options)
-        for done, (number, picture) in enumerate(zip(numbers, pictures, strict=True), 1):
+        pictures = renderer.render_many(animation.scenes(frame_numbers), **options)
+        for done, (number, picture) in enumerate(zip(frame_numbers, pictures, strict=True), 1):
             write(number, picture)
-            report(done, len(numbers))
+            report(done, len(frame_numbers))
     return str(renderer.device.adapter.name)
 
 
@@ -198,13 +198,13 @@ def _frame_digest(animation: _AnimatedScene, options: SceneOptions, *files: str)
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 
-def _file_state(name: str) -> str:
+def _file_state(file_name: str) -> str:
     """Return the path, size and modification time of a file as text; for a name without a file, the name."""
-    path = Path(name.partition("#")[0])
+    path = Path(file_name.partition("#")[0])
     if not path.exists():
-        return name
+        return file_name
     state = path.stat()
-    return f"{path.resolve()} {name} {state.st_size} {state.st_mtime_ns}"
+    return f"{path.resolve()} {file_name} {state.st_size} {state.st_mtime_ns}"
 
 
 def _summary_line(report: Options) -> str:

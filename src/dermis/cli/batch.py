@@ -191,13 +191,15 @@ def _parse_adapter_numbers(adapter: str, adapters: str | None) -> tuple[int, ...
     return tuple(map(int, adapters.split(",")))
 
 
-def _dask_cluster(address: str | None, file: Path | None, adapter: str, local_options: Options) -> WorkerPool:
+def _dask_cluster(
+    scheduler_address: str | None, scheduler_file: Path | None, adapter: str, local_options: Options
+) -> WorkerPool:
     from dermis.apps.batch.dask_cluster import DaskCluster
 
-    if address is not None and file is not None:
+    if scheduler_address is not None and scheduler_file is not None:
         refuse("--cluster", "no --scheduler", "both are given", "Remove one of them")
     refuse_options(local_options, None, "with a dask cluster", "Remove it and start more dask workers")
-    return DaskCluster(address, file, adapter)
+    return DaskCluster(scheduler_address, scheduler_file, adapter)
 
 
 def _print_report(report: RunReport, folder: Path, as_json: bool) -> None:

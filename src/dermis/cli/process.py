@@ -117,12 +117,12 @@ class _GuardedStream(io.RawIOBase):
         return self._inner.isatty()
 
 
-def _reserve_descriptor(descriptor: int, mode: int) -> None:
+def _reserve_descriptor(descriptor: int, open_mode: int) -> None:
     """Open the null device at a file descriptor, 0 to 2, unless that descriptor is already open."""
     try:
         os.fstat(descriptor)
     except OSError:
-        null_device = os.open(os.devnull, mode)
+        null_device = os.open(os.devnull, open_mode)
         if null_device != descriptor:
             os.dup2(null_device, descriptor)
             os.close(null_device)

@@ -92,28 +92,32 @@ def view(
     return 0
 
 
-def _initial_state(name: str, options: SceneOptions, adapter: str) -> ViewerState:
+def _initial_state(head_or_scene: str, options: SceneOptions, adapter: str) -> ViewerState:
     """Return the initial state of the viewer for a head or scene file and the command line options."""
     from dermis.apps.viewer.state import initial_state
     from dermis.gpu.adapters import select_adapters
     from dermis.scene.files import head_table, with_absolute_paths
 
-    is_scene = Path(name).suffix.lower() == ".toml"
-    scene, settings = assemble_scene(name, options)
+    is_scene = Path(head_or_scene).suffix.lower() == ".toml"
+    scene, settings = assemble_scene(head_or_scene, options)
     if "atlas" not in options.settings and not is_scene and select_adapters(adapter)[0][0].kind == "CPU":
         settings = settings.model_copy(update={"atlas": _ATLAS_SIDE_ON_CPU})
-    table = head_table(Path(name)) if is_scene else with_absolute_paths({"name": name} | options.head, Path())
+    table = (
+        head_table(Path(head_or_scene))
+        if is_scene
+        else with_absolute_paths({"name": head_or_scene} | options.head, Path())
+    )
     rig = "" if is_scene else "none" if "name" in options.environment else "studio"
     return initial_state(scene, settings, table, rig if options.lights is None else options.lights)
 
 
-def _load_motion(file: str | None, fps: float | None, state: ViewerState) -> MotionFile | None:
+def _load_motion(motion_path: str | None, fps: float | None, state: ViewerState) -> MotionFile | None:
     """Load the motion file for the head, before the window opens; return None if no file is named."""
-    if file is None:
+    if motion_path is None:
         return None
     from dermis.apps.viewer.player import MotionFile
 
-    motion = MotionFile(file, fps)
+    motion = MotionFile(motion_path, fps)
     if text := motion.load_clip(state.scene.head).note:
         note(text)
     return motion

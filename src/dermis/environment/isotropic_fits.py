@@ -96,15 +96,15 @@ def _active_lobes(view_index: int) -> NDArray[np.bool_]:
     return np.array([k < _IN_PLANE_LOBES[view_index] or k >= LOBE_COUNT - 2 for k in range(LOBE_COUNT)])
 
 
-def _parameter_direction(kind: int, *amounts: tuple[int, float]) -> Floats:
+def _parameter_direction(parameter: int, *amounts: tuple[int, float]) -> Floats:
     """Return a direction (20,) in the space of the lobe parameters: a change of one kind in some lobes.
 
-    kind : parameter that changes, such as `_POSITION`
+    parameter : parameter that changes, such as `_POSITION`
     amounts : index of each lobe that changes, and its component of the direction
     """
     change = np.zeros((4, LOBE_COUNT))
     for lobe, amount in amounts:
-        change[kind, lobe] = amount
+        change[parameter, lobe] = amount
     return change.ravel()
 
 
@@ -136,15 +136,15 @@ def _is_elongated(target: LobeTarget) -> bool:
     return target.along_deviation > _MIN_ELONGATION * target.across_deviation
 
 
-def _arrange_pair(start: Floats, target: LobeTarget, view_index: int) -> Floats:
+def _arrange_pair(initial: Floats, target: LobeTarget, view_index: int) -> Floats:
     """Return initial parameters (4, 5) with the pair placed as the specular lobe requires.
 
     For an elongated specular lobe, the pair is in the plane of incidence, else on both sides of this plane.
 
-    start : (4, 5) parameters by kind and lobe
+    initial : (4, 5) parameters by kind and lobe
     view_index : index of the view in LOBE_TABLE_COSINES
     """
-    lobes = start.copy()
+    lobes = initial.copy()
     separation = lobes[_POSITION, -1] - lobes[_POSITION, -2]
     if _is_elongated(target) and abs(separation) < _PAIR_SEPARATION:
         lobes[_POSITION, -2:] = lobes[_POSITION, -2:].mean() + np.array([-0.5, 0.5]) * _PAIR_SEPARATION
@@ -158,24 +158,26 @@ def _arrange_pair(start: Floats, target: LobeTarget, view_index: int) -> Floats:
     return lobes
 
 
-def _fit_parameters(target: LobeTarget, view_index: int, start: Floats, neighbours: Floats) -> Floats:
+def _fit_parameters(target: LobeTarget, view_index: int, initial: Floats, neighbour_mean: Floats) -> Floats:
     """Fit five isotropic lobes to a specular lobe and return their parameters (4, 5).
 
     The four parameters are position in the plane of incidence, distance from this plane, logarithm of the
     width, and logarithm of the weight. Lengths are in standard deviations of the specular lobe.
 
     view_index : index of the view in LOBE_TABLE_COSINES
-    start : initial parameters (4, 5)
-    neighbours : mean parameters (4, 5) of adjacent table nodes, towards which the fit is regularised
+    initial : initial parameters (4, 5)
+    neighbour_mean : mean parameters (4, 5) of adjacent table nodes, towards which the fit is regularised
     """
     from scipy.optimize import least_squares
 
     scale, active = harmonic_terms(target.degree)[2], _active_lobes(view_index)
     free = _free_directions(target, view_index)
     lengths = (free**2).sum(axis=0)
-    start, neighbours = (_arrange_pair(one, target, view_index).ravel() for one in (start, neighbours))
-    first, mean = (free.T @ one / lengths for one in (start, neighbours))
-    fixed = np.where(free.any(axis=1), 0.0, start)
+    initial, neighbour_mean = (
+        _arrange_pair(one, target, view_index).ravel() for one in (initial, neighbour_mean)
+    )
+    first, mean = (free.T @ one / lengths for one in (initial, neighbour_mean))
+    fixed = np.where(free.any(axis=1), 0.0, initial)
     kinds = np.abs(free).argmax(axis=0) // LOBE_COUNT
     low, high = _parameter_bounds(target, kinds)
     regularisation = _REGULARISATION * np.where(kinds == _LOG_WEIGHT, 0.5, 1.0)

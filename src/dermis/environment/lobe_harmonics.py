@@ -139,13 +139,13 @@ def _legendre_from_plane(sine: Floats, degree: int) -> Floats:
 
 
 @cache
-def _legendre_at_nodes(m: float, degree: int) -> Floats:
+def _legendre_at_nodes(roughness: float, degree: int) -> Floats:
     """Return the associated Legendre functions (n, k) at the quadrature nodes across the plane of incidence.
 
-    m : roughness of the lobe, which determines how far the nodes extend
+    roughness : roughness of the lobe, which determines how far the nodes extend
     """
     t = (np.arange(_ACROSS_NODES) + 0.5) / _ACROSS_NODES
-    return _legendre_from_plane(np.sin(min(10.0 * m + 0.05, 0.5 * np.pi) * t**2), degree)
+    return _legendre_from_plane(np.sin(min(10.0 * roughness + 0.05, 0.5 * np.pi) * t**2), degree)
 
 
 @cache

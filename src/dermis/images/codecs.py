@@ -150,8 +150,8 @@ def encode_png(levels: Numbers, effort: int = 6, use_isal: bool = False) -> byte
     )
 
 
-def _png_chunk(kind: bytes, data: bytes) -> bytes:
-    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+def _png_chunk(chunk_type: bytes, data: bytes) -> bytes:
+    return struct.pack(">I", len(data)) + chunk_type + data + struct.pack(">I", zlib.crc32(chunk_type + data))
 
 
 def png_size(data: bytes) -> tuple[int, int]:
@@ -200,10 +200,10 @@ def decode_up_filtered_png(data: bytes) -> Bytes | NDArray[np.uint16] | None:
     return levels.reshape(height, width, channels)
 
 
-def _compressed_pixels(data: bytes) -> bytes | None:
+def _compressed_pixels(png: bytes) -> bytes | None:
     """Return the compressed pixels of a PNG file; None for a file in which a tRNS chunk sets transparency."""
     parts = list[memoryview]()
-    for kind, content in png_chunks(data):
+    for kind, content in png_chunks(png):
         if kind == b"tRNS":
             return None
         if kind == b"IDAT":

@@ -62,8 +62,8 @@ def luminance(linear: ArrayLike) -> NDArray[np.floating]:
 
 
 @lru_cache(maxsize=2)
-def _linear_by_level(count: int) -> Floats:
-    table = decode_srgb(np.arange(count) / (count - 1)).astype(np.float32)
+def _linear_by_level(level_count: int) -> Floats:
+    table = decode_srgb(np.arange(level_count) / (level_count - 1)).astype(np.float32)
     table.flags.writeable = False
     return table
 

@@ -58,11 +58,11 @@ def choose_layer(parts: Sequence[tuple[str, Sequence[str]]]) -> tuple[ExrLayer, 
 
 
 def _picture_layers(
-    index: int, part: str, channels: Sequence[str], several_parts: bool
+    part_index: int, part_name: str, channels: Sequence[str], several_parts: bool
 ) -> Iterator[ExrLayer]:
     """Yield the picture layers of a part: channels R, G, B (any case, or words) with or without A, or Y.
 
-    index, part : index and name of the part
+    part_index, part_name : index and name of the part
     channels : names of the channels of the part
     several_parts : whether the file has several parts; layer names then begin with the name of the part
     """
@@ -76,8 +76,8 @@ def _picture_layers(
         if names == "Y" and {"RY", "BY"} & letters.keys():
             raise UnsupportedError("its colours are stored as luminance and chroma (Y, RY, BY)")
         if names and not is_vector:
-            title = ".".join(filter(None, (part if several_parts else "", layer)))
-            yield ExrLayer(index, title, tuple(letters[name] for name in names))
+            title = ".".join(filter(None, (part_name if several_parts else "", layer)))
+            yield ExrLayer(part_index, title, tuple(letters[name] for name in names))
 
 
 def _sort_key(layer: ExrLayer) -> tuple[bool, int]:
@@ -87,8 +87,8 @@ def _sort_key(layer: ExrLayer) -> tuple[bool, int]:
     return len(layer.channels) == 1, by_name
 
 
-def _display_name(name: str) -> str:
+def _display_name(layer_name: str) -> str:
     return (
-        shorten("".join(one for one in name if one.isprintable()), _MAX_NAME_LENGTH)
+        shorten("".join(one for one in layer_name if one.isprintable()), _MAX_NAME_LENGTH)
         or "the one without a name"
     )

@@ -139,15 +139,15 @@ def _open_exr_header(data: bytes) -> Any:
     return OpenEXR.File(io.BytesIO(data), separate_channels=True, header_only=True)
 
 
-def _checked_layer(file: Any) -> tuple[ExrLayer, str | None]:
+def _checked_layer(exr_file: Any) -> tuple[ExrLayer, str | None]:
     """Check the header of an OpenEXR file; return the layer to decode, and a note if others are not read.
 
     The total size of the channels of all parts is limited, because the library decodes all channels.
 
-    file : OpenEXR.File that was opened with header_only
+    exr_file : OpenEXR.File that was opened with header_only
     """
     samples, channel_count = 0, 0
-    for part in file.parts:
+    for part in exr_file.parts:
         width, height = _window_size(part.header["dataWindow"])
         check_size(width, height)
         if "deep" in str(part.header.get("type", "")).lower():
@@ -157,20 +157,20 @@ def _checked_layer(file: Any) -> tuple[ExrLayer, str | None]:
             check_size(tiles.xSize, tiles.ySize)
         samples += width * height * len(part.header["channels"])
         channel_count += len(part.header["channels"])
-    if not file.parts:
+    if not exr_file.parts:
         raise ValueError("its header is truncated or damaged")
     if samples > _MAX_SAMPLES:
         raise TooLargeError(f"all its channels have {samples / 1e6:.0f} million numbers")
     if channel_count > _MAX_CHANNELS:
         raise UnsupportedError(f"it has {channel_count} channels")
-    channels = [{one.name: one for one in part.header["channels"]} for part in file.parts]
+    channels = [{one.name: one for one in part.header["channels"]} for part in exr_file.parts]
     layer, note = choose_layer(
-        [(part.name() or "", list(names)) for part, names in zip(file.parts, channels, strict=True)]
+        [(part.name() or "", list(names)) for part, names in zip(exr_file.parts, channels, strict=True)]
     )
     chosen = [channels[layer.part][name] for name in layer.channels]
     if any((one.xSampling, one.ySampling) != (1, 1) for one in chosen):
         raise UnsupportedError("its channels have different sizes")
-    check_size(*_window_size(file.parts[layer.part].header["displayWindow"]))
+    check_size(*_window_size(exr_file.parts[layer.part].header["displayWindow"]))
     return layer, note
 
 
@@ -187,8 +187,8 @@ def _windows(header: Any) -> tuple[tuple[int, int], Slices, Slices]:
     return _window_size(header["displayWindow"]), stored, placed
 
 
-def _covers_window(part: Slices, size: tuple[int, int]) -> bool:
-    return tuple((one.start, one.stop) for one in part) == ((0, size[1]), (0, size[0]))
+def _covers_window(slices: Slices, window_size: tuple[int, int]) -> bool:
+    return tuple((one.start, one.stop) for one in slices) == ((0, window_size[1]), (0, window_size[0]))
 
 
 def _window_size(window: Any) -> tuple[int, int]:
@@ -248,7 +248,7 @@ def decode_radiance(data: bytes) -> Floats:
     rows = max(1, _STRIP_PIXELS // width)
     for top in range(0, height, rows):
         strip = radiance[top : top + rows]
-        decode = _decode_runs if compressed else _decode_flat
+        decode = _decode_runs if compressed else _decode_uncompressed
         rgbe, offset = decode(data, offset, len(strip), width)
         # A mantissa byte is in units of 1/256 of 2^(E - 128); E = 0 means black, and 2^-136 is black as well.
         scale = np.ldexp(np.float32(1 / exposure[0]), rgbe[..., 3].astype(np.int32) - 136)
@@ -348,7 +348,7 @@ def _expand_runs(data: Bytes, starts: Index) -> Bytes:
     return np.asarray(data[first + within * np.repeat(code <= _MAX_LITERAL, count)])
 
 
-def _decode_flat(data: bytes, offset: int, height: int, width: int) -> tuple[Bytes, int]:
+def _decode_uncompressed(data: bytes, offset: int, height: int, width: int) -> tuple[Bytes, int]:
     pixels = np.frombuffer(data, np.uint8, height * width * 4, offset).reshape(height, width, 4)
     # (1, 1, 1, n) repeats a pixel in the format of before 1991, which current programs do not write.
     if np.any(np.all(pixels[..., :3] == 1, axis=-1)):

@@ -170,13 +170,13 @@ def read_size(path: str | Path | EmbeddedPicture) -> tuple[int, int]:
 
 
 def _read_header(path: str | Path | EmbeddedPicture, data: bytes) -> PictureHeader:
-    header: PictureHeader = _apply_codec(path, data, exr_header, radiance_header, pillow_header)
+    header: PictureHeader = _apply_format_function(path, data, exr_header, radiance_header, pillow_header)
     return header
 
 
 def _decode_pixels(path: str | Path | EmbeddedPicture, data: bytes, convert_tables: bool) -> Pixels:
     pillow = partial(decode_with_pillow, convert_tables=convert_tables)
-    image: Pixels = _apply_codec(path, data, decode_exr, decode_radiance, pillow)
+    image: Pixels = _apply_format_function(path, data, decode_exr, decode_radiance, pillow)
     return image
 
 
@@ -189,25 +189,26 @@ def _apply_orientation(image: Pixels, orientation: int) -> Pixels:
     return pixels
 
 
-def _apply_codec(
+def _apply_format_function(
     path: str | Path | EmbeddedPicture,
     data: bytes,
-    exr: Callable[[bytes], T],
-    radiance: Callable[[bytes], T],
-    pillow: Callable[[bytes], T],
+    exr_function: Callable[[bytes], T],
+    radiance_function: Callable[[bytes], T],
+    other_function: Callable[[bytes], T],
 ) -> T:
     """Return the result of the function for a picture's format; the first bytes determine the format.
 
     data : bytes of the file
-    exr, radiance, pillow : functions of these bytes, for OpenEXR, for .hdr, and for other formats
+    exr_function, radiance_function, other_function : functions of these bytes, for OpenEXR, for .hdr, and for
+        other formats
 
     Raises DermisError if the format is unknown, or if the function fails.
     """
-    codec = pillow if picture_format(data) else None
-    for start, other in ((EXR_SIGNATURE, exr), (RADIANCE_SIGNATURE, radiance)):
+    codec = other_function if picture_format(data) else None
+    for start, other in ((EXR_SIGNATURE, exr_function), (RADIANCE_SIGNATURE, radiance_function)):
         codec = other if data.startswith(start) else codec
     is_inside = isinstance(path, EmbeddedPicture) and isinstance(path.data, bytes)
-    if codec is None or (codec is exr and is_inside):
+    if codec is None or (codec is exr_function and is_inside):
         known = next((name for start, name in _OTHER_FORMATS.items() if data.startswith(start)), None)
         actual = f"it is {known}" if known else "its first bytes match none of these formats"
         refuse(path, _EXPECTED_PICTURE, actual, "Convert it to PNG")

@@ -143,7 +143,7 @@ class MovieWriter:
     @contextmanager
     def _writing(self) -> Iterator[None]:
         with atomic_file(self.path) as temporary:
-            self._open(temporary)
+            self._open_movie(temporary)
             try:
                 yield
                 self._finish()
@@ -151,7 +151,7 @@ class MovieWriter:
                 self._pool.shutdown(cancel_futures=True)
                 self._container.close()
 
-    def _open(self, path: Path) -> None:
+    def _open_movie(self, path: Path) -> None:
         import av
         from av.video.reformatter import VideoReformatter
 

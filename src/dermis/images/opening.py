@@ -232,8 +232,8 @@ def _colour_space(data: bytes, picture: Image, exif: Exif) -> tuple[ColourSpace,
     return space, None if space.is_default else _conversion_note(space.name)
 
 
-def _conversion_note(name: str) -> str:
-    return f"its colours are converted from {name} to sRGB"
+def _conversion_note(space_name: str) -> str:
+    return f"its colours are converted from {space_name} to sRGB"
 
 
 def _profiled_space(picture: Image, icc: bytes) -> tuple[ColourSpace, str | None]:

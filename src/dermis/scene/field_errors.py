@@ -153,18 +153,18 @@ def _range_text(location: tuple[int | str, ...], model: type[BaseModel]) -> str:
     return f"{kind} from {low:.10g} to {high:.10g}{reason}" if low is not None and high is not None else ""
 
 
-def _leaf_types(kind: Any) -> Iterator[Any]:
+def _leaf_types(annotation: Any) -> Iterator[Any]:
     """Yield the scalar types inside an annotation, such as float for tuple[float, ...] | None."""
-    parts = get_args(kind)
-    if get_origin(kind) is dict:
+    parts = get_args(annotation)
+    if get_origin(annotation) is dict:
         yield from _leaf_types(parts[1])
-    elif get_origin(kind) in (tuple, list, Union, UnionType):
+    elif get_origin(annotation) in (tuple, list, Union, UnionType):
         for part in parts:
             yield from _leaf_types(part)
-    elif hasattr(kind, "__metadata__"):
+    elif hasattr(annotation, "__metadata__"):
         yield from _leaf_types(parts[0])
-    elif kind is not Ellipsis:
-        yield kind
+    elif annotation is not Ellipsis:
+        yield annotation
 
 
 def _length_text(error: ErrorDetails, model: type[BaseModel]) -> str:
@@ -174,24 +174,24 @@ def _length_text(error: ErrorDetails, model: type[BaseModel]) -> str:
     return f" of {count} numbers" if count > 1 else ""
 
 
-def _unknown_field_message(name: str, model: type[Any]) -> str:
+def _unknown_field_message(field_name: str, model: type[Any]) -> str:
     """Return the message for an unknown field, which suggests a similar name or a class with this field."""
     known, finding = list(model.model_fields), "but this name is unknown"
-    plain = name[:_MAX_NAME_LENGTH].lower().replace("-", "_")
+    plain = field_name[:_MAX_NAME_LENGTH].lower().replace("-", "_")
     similar = difflib.get_close_matches(plain, known, 1, 0.7)
     if plain in model.synonyms:
         similar = [model.synonyms[plain]]
     if similar:
         return f"expected {similar[0]}, {finding}"
     base = [one for one in model.__mro__ if "synonyms" in vars(one)][-1]
-    owners = [one.__name__ for one in _subclasses(base) if name in one.model_fields]
+    owners = [one.__name__ for one in _subclasses(base) if field_name in one.model_fields]
     if owners:
         finding += f" here (it is one of {owners[0]})"
     return f"expected one of {', '.join(known)}, {finding}"
 
 
-def _subclasses(kind: type[Any]) -> Iterator[type[BaseModel]]:
-    for one in kind.__subclasses__():
+def _subclasses(base_class: type[Any]) -> Iterator[type[BaseModel]]:
+    for one in base_class.__subclasses__():
         if not one.__name__.startswith("_"):
             yield one
         yield from _subclasses(one)

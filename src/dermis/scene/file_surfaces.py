@@ -121,7 +121,7 @@ def with_file_textures(
     ]
     if maps.parts is not None:
         changed = _with_mean_colours(mesh, changed, maps.parts)
-    return _keep_outline(mesh, replace(mesh, materials=tuple(changed))), maps, tuple(notes)
+    return _with_cached_outline(mesh, replace(mesh, materials=tuple(changed))), maps, tuple(notes)
 
 
 def _with_mean_colours(mesh: Mesh, materials: list[Material], maps: PartMaps) -> list[Material]:
@@ -154,16 +154,16 @@ def _pictured_parts(mesh: Mesh, surface: FileSurface, materials: Sequence[FileMa
 def _with_uv(mesh: Mesh, packed: PackedTextures) -> Mesh:
     uv = mesh.uv.copy()
     uv[packed.vertices] = packed.uv
-    return _keep_outline(mesh, replace(mesh, uv=uv))
+    return _with_cached_outline(mesh, replace(mesh, uv=uv))
 
 
-def _keep_outline(mesh: Mesh, changed: Mesh) -> Mesh:
+def _with_cached_outline(mesh: Mesh, changed_mesh: Mesh) -> Mesh:
     """Give a changed mesh the outline that is cached for the original mesh, and return the changed mesh.
 
-    changed : mesh with the shape of `mesh`
+    changed_mesh : mesh with the shape of `mesh`
     """
-    vars(changed)["outline"] = mesh.outline
-    return changed
+    vars(changed_mesh)["outline"] = mesh.outline
+    return changed_mesh
 
 
 def _skin_maps(packed: PackedTextures) -> Maps:
@@ -179,11 +179,11 @@ def _skin_maps(packed: PackedTextures) -> Maps:
 def _part_maps(packed: PackedTextures) -> PartMaps:
     maps = packed.maps
     surface = np.concatenate([maps[role] for role in _SURFACE_ROLES], axis=2)
-    return PartMaps(maps["colour"], surface, _emission(maps.get("emission")))
+    return PartMaps(maps["colour"], surface, _emission_if_any(maps.get("emission")))
 
 
-def _emission(values: Floats | None) -> Floats | None:
-    return values if values is not None and values.any() else None
+def _emission_if_any(texels: Floats | None) -> Floats | None:
+    return texels if texels is not None and texels.any() else None
 
 
 def _with_surface(material: Material, in_file: FileMaterial | None, has_maps: bool) -> Material:

@@ -255,13 +255,13 @@ def _parse_environment(path: Path, table: Any) -> Environment:
     return environment.model_copy(update={"name": _resolve_file(path.parent, environment.name)})
 
 
-def _resolve_file(folder: Path, name: str) -> str:
+def _resolve_file(folder: Path, file_or_preset: str) -> str:
     """Return the path of a file in a folder, or the name itself if there is no such file.
 
     Names of presets and samples are returned unchanged.
     """
-    file = folder / name
-    return str(file) if is_file(file) else name
+    file = folder / file_or_preset
+    return str(file) if is_file(file) else file_or_preset
 
 
 def _parse_lights(culprit: object, tables: Any) -> tuple[Light, ...]:
@@ -278,20 +278,25 @@ def _parse_light(culprit: object, label: str, table: Any) -> Light:
     return _build_settings(LIGHTS[kind], culprit, label, table)
 
 
-def _build_settings(kind: type[P], culprit: object, part: str, table: Any) -> P:
+def _build_settings(settings_class: type[P], file_name: object, table_name: str, table: Any) -> P:
     """Return settings of a class from a TOML table; errors name the file and the table.
 
-    culprit : name of the file, for error messages
-    part : name of the table, for error messages
+    file_name : name of the file, for error messages
+    table_name : name of the table, for error messages
     """
     if not isinstance(table, dict):
         actual = "there is none" if table is None else f"got {table!r}"
-        refuse(f"{culprit}: {part}", f"a table with {', '.join(kind.model_fields)}", actual, "Add one")
-    with error_context(f"{culprit}: {part}"):
+        refuse(
+            f"{file_name}: {table_name}",
+            f"a table with {', '.join(settings_class.model_fields)}",
+            actual,
+            "Add one",
+        )
+    with error_context(f"{file_name}: {table_name}"):
         try:
-            return kind(**table)
+            return settings_class(**table)
         except InvalidFieldsError as error:
-            raise InvalidFieldsError(f"{culprit}: {part}", error.messages) from None
+            raise InvalidFieldsError(f"{file_name}: {table_name}", error.messages) from None
 
 
 def _read_scene_file(name: str | Path, expected: str) -> dict[str, Any]:

@@ -50,10 +50,10 @@ _MEMBER_TYPES = FunctionType, classmethod, property
 _DOCSTRING_WIDTH = 92
 
 
-def _checked_direction(v: tuple[float, float, float]) -> tuple[float, float, float]:
-    if sum(abs(c) for c in v) < 1e-6:
+def _checked_direction(vector: tuple[float, float, float]) -> tuple[float, float, float]:
+    if sum(abs(c) for c in vector) < 1e-6:
         raise ValueError("a direction other than (0, 0, 0)")
-    return v
+    return vector
 
 
 Coordinate = Annotated[
@@ -215,13 +215,13 @@ def _parameters(model: type[BaseModel], required: list[str]) -> Iterator[Paramet
         yield Parameter(name, kind, default=default, annotation=annotation)
 
 
-def _without_checks(kind: Any) -> Any:
+def _without_checks(annotation: Any) -> Any:
     """Return an annotation without `Annotated` metadata, such as float for a bounded float."""
-    origin, parts = get_origin(kind), get_args(kind)
+    origin, parts = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
         return _without_checks(parts[0])
     if origin in (None, Literal):
-        return kind
+        return annotation
     plain_parts = tuple(map(_without_checks, parts))
     return reduce(or_, plain_parts) if origin in (Union, UnionType) else origin[plain_parts]
 
@@ -286,14 +286,14 @@ def _required_fields(model: type[BaseModel]) -> list[str]:
     return [name for name, info in model.model_fields.items() if info.is_required()]
 
 
-def _positional_field(model: type[BaseModel], value: tuple[Any, ...]) -> str:
+def _positional_field(model: type[BaseModel], arguments: tuple[Any, ...]) -> str:
     """Return the name of the single required field, which a positional argument sets.
 
     Raises DermisError if the model has several required fields or none, or gets several arguments.
     """
     required = _required_fields(model)
-    if len(required) != 1 or len(value) != 1:
+    if len(required) != 1 or len(arguments) != 1:
         names = ", ".join(f"{name}=..." for name in list(model.model_fields)[:3])
-        actual = f"got {format_value(value[0])} without one"
+        actual = f"got {format_value(arguments[0])} without one"
         refuse(model.__name__, f"values by name, such as {names}", actual, "Name it")
     return required[0]

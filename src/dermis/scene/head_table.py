@@ -37,8 +37,8 @@ else:
 _UNIT_LENGTHS_MM = {"mm": 1.0, "cm": 10.0, "dm": 100.0, "m": 1000.0, "inch": 25.4, "in": 25.4, "ft": 304.8}
 
 
-def _eye_limits(name: str) -> Any:
-    low, high = EYE_LOOK_RANGES[name]
+def _eye_limits(field_name: str) -> Any:
+    low, high = EYE_LOOK_RANGES[field_name]
     return Field(ge=low, le=high)
 
 

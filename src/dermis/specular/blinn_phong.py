@@ -54,8 +54,8 @@ def blinn_phong_plain(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick)
     return np.asarray(np.where(angles.is_above, lobe, 0.0))
 
 
-def _power_of_n_h(angles: Cosines, s: Floats) -> Floats:
-    return np.asarray(np.clip(angles.n_h, 0.0, 1.0) ** s)
+def _power_of_n_h(angles: Cosines, exponent: Floats) -> Floats:
+    return np.asarray(np.clip(angles.n_h, 0.0, 1.0) ** exponent)
 
 
 BLINN_PHONG = Model(

@@ -78,18 +78,20 @@ def sampled_camera(
     return _aim_camera(centre, axes, distance, frame, aim(low))
 
 
-def _aim_camera(centre: Doubles, axes: Doubles, distance: float, frame_mm: float, aim: AimOffset) -> Camera:
+def _aim_camera(
+    centre: Doubles, axes: Doubles, distance_mm: float, frame_mm: float, aim: AimOffset
+) -> Camera:
     """Return a camera that looks at a point beside the centre of the face.
 
     centre : (3,) centre of the face [mm]
     axes : (3, 3) rows: directions to the right, upwards, and back towards the camera
-    distance : distance of the camera from the centre of the face [mm]
+    distance_mm : distance of the camera from the centre of the face [mm]
     frame_mm : visible height at the centre of the face, for a camera that looks at this centre [mm]
     aim : offset of the point from the centre of the face, to the right and upwards [mm]
     """
-    scale = math.hypot(distance, *aim) / distance  # keeps the angle of view
+    scale = math.hypot(distance_mm, *aim) / distance_mm  # keeps the angle of view
     return Camera(
-        position=_as_tuple(centre + distance * axes[2]),
+        position=_as_tuple(centre + distance_mm * axes[2]),
         target=_as_tuple(centre + aim[0] * axes[0] + aim[1] * axes[1]),
         up=_as_tuple(axes[1]),
         frame_mm=frame_mm * scale,
@@ -97,27 +99,27 @@ def _aim_camera(centre: Doubles, axes: Doubles, distance: float, frame_mm: float
 
 
 def _max_projected_coordinate(
-    positions: Doubles, distance: float, aim: AimOffset, frame_mm: float, aspect: float
+    positions_mm: Doubles, distance_mm: float, aim: AimOffset, frame_mm: float, aspect: float
 ) -> float:
     """Return the largest coordinate of projected points, 0 at the picture's centre and 1 at an edge.
 
-    positions : (n, 3) positions to the right, upwards and towards the camera, relative to the face's centre
-        [mm]
-    distance : distance of the camera from the face's centre [mm]
+    positions_mm : (n, 3) positions to the right, upwards and towards the camera, relative to the face's
+        centre [mm]
+    distance_mm : distance of the camera from the face's centre [mm]
     aim : offset of the camera's target to the right and upwards [mm]
     frame_mm : visible height at the face's centre [mm]
     aspect : ratio of the picture's width to its height [-]
     """
-    x, y, z = positions.T
-    back = np.array([-aim[0], -aim[1], distance])
+    x, y, z = positions_mm.T
+    back = np.array([-aim[0], -aim[1], distance_mm])
     back /= math.hypot(*back)
     right = np.array([back[2], 0.0, -back[0]]) / math.hypot(back[0], back[2])
     up = back[1] * right[2], back[2] * right[0] - back[0] * right[2], -back[1] * right[0]
-    away = distance - z
+    away = distance_mm - z
     depth = np.maximum(back[2] * away - back[0] * x - back[1] * y, 1e-3)
     projected_x = (right[0] * x - right[2] * away) / (aspect * depth)
     projected_y = (up[0] * x + up[1] * y - up[2] * away) / depth
-    return float(max(np.abs(projected_x).max(), np.abs(projected_y).max()) * 2.0 * distance / frame_mm)
+    return float(max(np.abs(projected_x).max(), np.abs(projected_y).max()) * 2.0 * distance_mm / frame_mm)
 
 
 def _camera_axes(yaw_deg: float, pitch_deg: float, roll_deg: float) -> Doubles:

@@ -182,15 +182,21 @@ def _format_probabilities(probabilities: Mapping[str, float]) -> str:
     )
 
 
-def _chi_square(expected: Mapping[str, float], observed: Counter[str], count: int) -> float:
+def _chi_square(
+    probabilities: Mapping[str, float], observed_counts: Counter[str], sample_count: int
+) -> float:
     """Return the p-value of a chi-square test of counts; texts with few expected samples are pooled.
 
-    expected : probability of each text
-    observed : number of samples of each text
-    count : number of samples of all texts
+    probabilities : probability of each text
+    observed_counts : number of samples of each text
+    sample_count : number of samples of all texts
     """
-    cells = [(observed[text], count * p) for text, p in expected.items() if count * p >= _MIN_EXPECTED_COUNT]
-    pooled = count - sum(one for one, _ in cells), count - sum(mean for _, mean in cells)
+    cells = [
+        (observed_counts[text], sample_count * p)
+        for text, p in probabilities.items()
+        if sample_count * p >= _MIN_EXPECTED_COUNT
+    ]
+    pooled = sample_count - sum(one for one, _ in cells), sample_count - sum(mean for _, mean in cells)
     if pooled[1] > _MIN_EXPECTED_COUNT or pooled[0]:
         cells.append(pooled)
     if len(cells) < 2:

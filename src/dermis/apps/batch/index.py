@@ -91,13 +91,20 @@ def _rows_of_shards(out: Path, spec: Spec) -> Iterator[list[IndexRow]]:
             yield rows
 
 
-def _index_row(key: str, shard: str, record: Record) -> IndexRow:
+def _index_row(image_key: str, shard: str, record: Record) -> IndexRow:
     matrices = {f"camera.{name}": value for name, value in record["camera"].items()}
     matrices |= {"head_pose": record["head_pose"], "gaze": record["gaze"]}
     flat = {name: _flatten_matrix(value) for name, value in matrices.items()}
     tone = {f"skin_tone.{name}": one for name, one in (record.get("skin_tone") or {}).items()}
     tone.pop("skin_tone.statement", None)
-    return {"number": record["number"], "key": key, "shard": shard, **record["parameters"], **tone, **flat}
+    return {
+        "number": record["number"],
+        "key": image_key,
+        "shard": shard,
+        **record["parameters"],
+        **tone,
+        **flat,
+    }
 
 
 def _flatten_matrix(matrix: object) -> object:

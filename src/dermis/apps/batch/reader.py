@@ -278,14 +278,14 @@ def _decode_landmarks(record: LandmarksRecord) -> LandmarkPoints:
     return LandmarkPoints(pixels, _to_array(record["positions_mm"], (len(visible), 3)), visible)
 
 
-def _to_array(values: NestedNumbers, shape: tuple[int, ...]) -> NDArray[np.float64]:
+def _to_array(numbers: NestedNumbers, shape: tuple[int, ...]) -> NDArray[np.float64]:
     """Return nested lists of numbers as an array, with NaN for null."""
-    flat: Sequence[object] = values if isinstance(values, list) else [values]
+    flat: Sequence[object] = numbers if isinstance(numbers, list) else [numbers]
     while flat and isinstance(flat[0], list):
         flat = [one for row in flat if isinstance(row, list) for one in row]
     if any(isinstance(one, str | bool) for one in flat):
         raise ValueError("it has texts in place of numbers")
-    array = np.array(values, np.float64)
+    array = np.array(numbers, np.float64)
     if array.shape != shape and (array.size or 0 not in shape):
         raise ValueError(f"an array has shape {array.shape}, not {shape}")
     return array.reshape(shape)

@@ -52,16 +52,16 @@ def table_numbers(parameters: Mapping[str, float | int | str], table: str) -> di
     return {name: one for name, one in table_values(parameters, table).items() if not isinstance(one, str)}
 
 
-def hashed_uniform(seed: int, number: int, name: str) -> float:
+def hashed_uniform(seed: int, image_or_person: int, parameter: str) -> float:
     """Return a uniform random number in (0, 1) that depends on a seed, an image and a parameter only.
 
     The random number is a BLAKE2b hash of the three arguments as text. Random numbers for different arguments
     are therefore independent.
 
-    number : number of the image, or of the person for parameters of people
-    name : name of the parameter
+    image_or_person : number of the image, or of the person for parameters of people
+    parameter : name of the parameter
     """
-    digest = hashlib.blake2b(f"{seed} {number} {name}".encode(), digest_size=8).digest()
+    digest = hashlib.blake2b(f"{seed} {image_or_person} {parameter}".encode(), digest_size=8).digest()
     step = int.from_bytes(digest, "little") >> (64 - _HASH_BITS)
     return (step + 0.5) / float(1 << _HASH_BITS)
 
@@ -207,20 +207,22 @@ class Sampler:
     def _normal(self, image: int, parameter: str) -> float:
         return float(ndtri(self._uniform(image, parameter)))
 
-    def _target_weights(self, image: int, sampled: Parameters) -> dict[str, float]:
+    def _target_weights(self, image: int, sampled_parameters: Parameters) -> dict[str, float]:
         """Return the weights that all morph targets which the spec can move have in an image.
 
         image : number of the image
-        sampled : parameters of the image that have been sampled so far
+        sampled_parameters : parameters of the image that have been sampled so far
         """
-        name = str(sampled["expression.name"])
+        name = str(sampled_parameters["expression.name"])
         if name == RANDOM_EXPRESSION:
             weights: Weights = random_expression(
                 lambda part: self._uniform(image, f"expression.mixture.{part}")
             )
         else:
             weights = self.expressions[name]
-        intensity, asymmetry, variation = (float(sampled[f"expression.{key}"]) for key in _VARIATION_KEYS)
+        intensity, asymmetry, variation = (
+            float(sampled_parameters[f"expression.{key}"]) for key in _VARIATION_KEYS
+        )
         varied = expression_weights(
             weights,
             intensity,

@@ -243,25 +243,27 @@ def _parse_render(size: object, table: object) -> Settings:
     return _build_model(Settings, "render", {**RENDER_DEFAULTS, **table, "size": size})
 
 
-def _build_model(kind: type[P], title: str, table: object) -> P:
+def _build_model(model_class: type[P], table_name: str, table: object) -> P:
     """Return the model of a spec table, including its subtables.
 
-    kind : pydantic class of the table
-    title : name of the table in error messages
+    model_class : pydantic class of the table
+    table_name : name of the table in error messages
     """
-    if isinstance(table, kind):
+    if isinstance(table, model_class):
         return table
     if not isinstance(table, Mapping):
-        expected = f"a table with {', '.join(kind.model_fields)}"
-        refuse(title, expected, f"got {format_value(table)}", "Correct it")
+        expected = f"a table with {', '.join(model_class.model_fields)}"
+        refuse(table_name, expected, f"got {format_value(table)}", "Correct it")
     values = dict(table)
-    for name, info in kind.model_fields.items():
+    for name, info in model_class.model_fields.items():
         if name in values and isinstance(info.annotation, type) and issubclass(info.annotation, FrozenModel):
-            values[name] = _build_model(info.annotation, f"{title}.{name}" if title else name, values[name])
+            values[name] = _build_model(
+                info.annotation, f"{table_name}.{name}" if table_name else name, values[name]
+            )
     try:
-        return kind(**values)
+        return model_class(**values)
     except InvalidFieldsError as error:
-        raise InvalidFieldsError(title or "spec", error.messages) from None
+        raise InvalidFieldsError(table_name or "spec", error.messages) from None
 
 
 def plain_values(table: FrozenModel) -> dict[str, object]:
@@ -270,14 +272,14 @@ def plain_values(table: FrozenModel) -> dict[str, object]:
     return {name: value for name, value in values.items() if value is not None}
 
 
-def _toml_lines(title: str, values: Mapping[str, object]) -> list[str]:
+def _toml_lines(table_name: str, values: Mapping[str, object]) -> list[str]:
     """Return a table and its subtables as lines of TOML.
 
-    title : dotted name of the table
+    table_name : dotted name of the table
     """
     own_values, sub_lines = dict[str, object](), list[str]()
     for name, value in values.items():
-        path = f"{title}.{key_text(name)}" if title else key_text(name)
+        path = f"{table_name}.{key_text(name)}" if table_name else key_text(name)
         if isinstance(value, FrozenModel | Mapping):
             sub_lines += _toml_lines(path, plain_values(value) if isinstance(value, FrozenModel) else value)
         elif isinstance(value, tuple) and value and isinstance(value[0], FrozenModel):
@@ -286,24 +288,24 @@ def _toml_lines(title: str, values: Mapping[str, object]) -> list[str]:
             own_values[name] = value.spec_value() if isinstance(value, Distribution) else value
     if sub_lines and not own_values:
         return sub_lines
-    return [table_text(f"[{title}]" if title else "", own_values), *sub_lines]
+    return [table_text(f"[{table_name}]" if table_name else "", own_values), *sub_lines]
 
 
-def _expand_patterns(value: object, folder: Path, key: str) -> object:
+def _expand_patterns(spec_value: object, folder: Path, dotted_name: str) -> object:
     """Return a spec value in which a `FileChoice` of sorted files replaces each {files = PATTERN}.
 
-    key : dotted name of the value in error messages
+    dotted_name : dotted name of the value in error messages
 
     Raises DermisError for a pattern that matches no file.
     """
-    if not isinstance(value, Mapping):
-        return value
-    if value.keys() == {"files"} and isinstance(value["files"], str):
-        return _match_files(value["files"], folder, key)
-    return {name: _expand_patterns(one, folder, f"{key}.{name}") for name, one in value.items()}
+    if not isinstance(spec_value, Mapping):
+        return spec_value
+    if spec_value.keys() == {"files"} and isinstance(spec_value["files"], str):
+        return _match_files(spec_value["files"], folder, dotted_name)
+    return {name: _expand_patterns(one, folder, f"{dotted_name}.{name}") for name, one in spec_value.items()}
 
 
-def _match_files(pattern: str, folder: Path, key: str) -> FileChoice:
+def _match_files(pattern: str, folder: Path, dotted_name: str) -> FileChoice:
     names = []
     try:
         for path in folder.glob(pattern):
@@ -313,10 +315,17 @@ def _match_files(pattern: str, folder: Path, key: str) -> FileChoice:
                 break
     except (ValueError, NotImplementedError, OSError, RecursionError) as fault:
         actual = f"got {pattern!r} ({fault or type(fault).__name__})"
-        refuse(key, "a pattern of files below the spec's folder, such as heads/*.json", actual, "Correct it")
+        refuse(
+            dotted_name,
+            "a pattern of files below the spec's folder, such as heads/*.json",
+            actual,
+            "Correct it",
+        )
     if not 0 < len(names) <= _MAX_MATCHING_FILES:
         actual = f"more than {_MAX_MATCHING_FILES:,} match" if names else "none matches"
-        refuse(key, f"files that match {pattern!r} in the spec's folder", actual, "Correct the pattern")
+        refuse(
+            dotted_name, f"files that match {pattern!r} in the spec's folder", actual, "Correct the pattern"
+        )
     return FileChoice(pattern, tuple(sorted(names)))
 
 

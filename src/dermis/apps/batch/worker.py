@@ -179,12 +179,12 @@ class Worker:
     def _image_numbers(
         self,
         tasks: Iterable[Shard],
-        planned: deque[tuple[Part, KeptImages]],
+        unwritten_parts: deque[tuple[Part, KeptImages]],
         send: Callable[[WorkerEvent], None],
     ) -> Iterator[int]:
         """Yield the numbers of the images to render; process at once the tasks that need no rendering.
 
-        planned : queue to which each part to write is appended, with the images to copy into the part
+        unwritten_parts : queue to which each part to write is appended, with the images to copy into the part
         """
         out, spec = self._options.out, self._options.spec
         for task in tasks:
@@ -197,7 +197,7 @@ class Worker:
                 send(WorkerEvent(done=task, missing=self._join_shard(task)))
             else:
                 kept = kept_images(out, task, spec)
-                planned.append((task, kept))
+                unwritten_parts.append((task, kept))
                 yield from range(kept.stop, task.stop)
 
     def _join_shard(self, part: Part) -> tuple[Part, ...]:
@@ -206,18 +206,18 @@ class Worker:
         return join_parts(self._options.out, shard_at(part.index, spec), spec)
 
     def _encoder_jobs(
-        self, numbers: Iterator[int], failed: list[Failure]
+        self, numbers: Iterator[int], failures: list[Failure]
     ) -> Iterator[tuple[int, Observation, Parameters, SkinTone | None]]:
         """Yield number, observation, parameters and tone of each image that can be rendered, in order.
 
         numbers : numbers of the images to render
-        failed : list to which images that cannot be rendered are appended
+        failures : list to which images that cannot be rendered are appended
         """
         groups = deque([numbers])
         while groups:
             numbers, in_flight = groups.popleft(), deque[_PlannedImage]()
             try:
-                for observation in self._render_images(self._plan_images(numbers, in_flight, failed)):
+                for observation in self._render_images(self._plan_images(numbers, in_flight, failures)):
                     done = in_flight.popleft()
                     yield done.number, observation, done.parameters, _head_tone(done.scene.head)
             except DeviceError:
@@ -226,19 +226,19 @@ class Worker:
                 if not self._options.keep_going:
                     raise
                 if len(in_flight) == 1:
-                    failed.append(Failure(in_flight[0].number, str(fault)))
+                    failures.append(Failure(in_flight[0].number, str(fault)))
                     single = []
                 else:  # it is unknown which one failed: render them again one by one
                     single = [iter([plan.number]) for plan in in_flight]
                 groups.extendleft(reversed([*single, numbers]))
 
     def _plan_images(
-        self, numbers: Iterator[int], in_flight: deque[_PlannedImage], failed: list[Failure]
+        self, numbers: Iterator[int], in_flight: deque[_PlannedImage], failures: list[Failure]
     ) -> Iterator[_PlannedImage]:
         """Yield each image that can be rendered, after appending the image to `in_flight`.
 
         numbers : numbers of the images still to plan
-        failed : list to which images that cannot be rendered are appended
+        failures : list to which images that cannot be rendered are appended
         """
         for number in numbers:
             parameters = self._options.spec.parameters(number)
@@ -248,7 +248,7 @@ class Worker:
             except DermisError as fault:
                 if not self._options.keep_going:
                     raise DermisError(f"image {number}: {fault}") from fault
-                failed.append(Failure(number, str(fault)))
+                failures.append(Failure(number, str(fault)))
                 continue
             in_flight.append(plan)
             yield plan

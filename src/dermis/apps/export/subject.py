@@ -172,11 +172,11 @@ def load_subject(
     return Subject(path.name, curve, albedo, used_model, tissue, Scene(loaded, skin=skin))
 
 
-def _load_skin(name: str, model: ModelName | None, head_options: Iterable[str]) -> Subject:
+def _load_skin(skin_name: str, model: ModelName | None, head_options: Iterable[str]) -> Subject:
     for option in head_options:
-        refuse(option, "a head", f"got the skin {name}", "Omit this option, or name a head")
-    curve, used_model, tissue = reference_curve(Skin(profile=name), model)
-    return Subject(Path(name).name, curve, curve.energy, used_model, tissue)
+        refuse(option, "a head", f"got the skin {skin_name}", "Omit this option, or name a head")
+    curve, used_model, tissue = reference_curve(Skin(profile=skin_name), model)
+    return Subject(Path(skin_name).name, curve, curve.energy, used_model, tissue)
 
 
 def reference_curve(

@@ -90,13 +90,13 @@ class _Glb:
         path.write_bytes(glb_bytes(self._tree, self._buffer.data))
         return path
 
-    def _append(self, key: str, **entry: Any) -> int:
+    def _append(self, list_name: str, **entry: Any) -> int:
         """Append an entry to a list of the file's JSON, and return the index of the entry.
 
-        key : name of the list, such as "meshes"
+        list_name : name of the list, such as "meshes"
         """
-        self._tree[key].append(entry)
-        return len(self._tree[key]) - 1
+        self._tree[list_name].append(entry)
+        return len(self._tree[list_name]) - 1
 
 
 def write_avatar(studio: Studio, folder: Path) -> Path:

@@ -73,20 +73,20 @@ class Controls:
         self._pointer_position = event["x"], event["y"]
         self._pinch = _measure_pinch(event)
 
-    def _release(self, event: Event, size: Point) -> None:
+    def _release(self, event: Event, picture_size: Point) -> None:
         """End a drag at the position of the release, which may differ from the position of the last move."""
         if self._pressed_button and not self._pinch and (event["x"], event["y"]) != self._pointer_position:
-            self._drag(event, size)
+            self._drag(event, picture_size)
         self._pressed_button, self._pinch = 0, None
         self.history.end_gesture()
 
-    def _drag(self, event: Event, size: Point) -> None:
+    def _drag(self, event: Event, picture_size: Point) -> None:
         pinch, (x0, y0) = _measure_pinch(event), self._pointer_position
         self._pointer_position = event["x"], event["y"]
         if pinch or self._pinch:
-            self._pan_and_zoom(pinch, size)
+            self._pan_and_zoom(pinch, picture_size)
             return
-        state, side = self.history.state, self._drag_unit(size)
+        state, side = self.history.state, self._drag_unit(picture_size)
         right, down = (event["x"] - x0) / side, (event["y"] - y0) / side
         if state.view == ATLAS_VIEW_NAME or self._pressed_button != _LEFT_BUTTON:
             new_state = _pan(state, right, down)
@@ -96,7 +96,7 @@ class Controls:
             new_state = state.with_camera(orbit(state.scene.camera, -math.pi * right, math.pi * down))
         self.history.change(new_state, f"drag {self._gesture_count}")
 
-    def _pan_and_zoom(self, pinch: tuple[float, float, float] | None, size: Point) -> None:
+    def _pan_and_zoom(self, pinch: tuple[float, float, float] | None, picture_size: Point) -> None:
         """Pan and zoom with two fingers; lifting one finger does not move the picture.
 
         pinch : midpoint (x, y) and distance of the two fingers [logical pixel]; None for fewer than two
@@ -104,13 +104,13 @@ class Controls:
         """
         if pinch and self._pinch:
             (x, y, spread), (x0, y0, spread0) = pinch, self._pinch
-            side = self._drag_unit(size)
+            side = self._drag_unit(picture_size)
             new_state = _pan(self.history.state, (x - x0) / side, (y - y0) / side)
             self.history.change(new_state, f"drag {self._gesture_count}")
-            self._zoom(spread0 / spread, (x, y), size, f"drag {self._gesture_count}")
+            self._zoom(spread0 / spread, (x, y), picture_size, f"drag {self._gesture_count}")
         self._pinch = pinch
 
-    def _zoom(self, factor: float, pointer: Point, size: Point, gesture: str) -> None:
+    def _zoom(self, factor: float, pointer: Point, picture_size: Point, gesture: str) -> None:
         """Move the camera nearer or farther, or scale the atlas around the pointer.
 
         factor : factor by which the visible height is multiplied; a factor below 1 zooms in
@@ -118,21 +118,24 @@ class Controls:
         """
         state = self.history.state
         if state.view == ATLAS_VIEW_NAME:
-            x, y = ((a - 0.5 * b) / self._drag_unit(size) for a, b in zip(pointer, size, strict=True))
+            x, y = (
+                (a - 0.5 * b) / self._drag_unit(picture_size)
+                for a, b in zip(pointer, picture_size, strict=True)
+            )
             new_state = state.with_atlas_view(state.atlas_view.zoomed(factor, x, y))
         else:
             new_state = state.with_camera(dolly(state.scene.camera, factor))
         self.history.change(new_state, gesture)
 
-    def _drag_unit(self, size: Point) -> float:
+    def _drag_unit(self, picture_size: Point) -> float:
         """Return the length by which drags are divided [logical pixel].
 
         The length is the height of the picture, or, in the atlas view, the shorter side of the picture.
         """
-        return max(1.0, min(size) if self.history.state.view == ATLAS_VIEW_NAME else size[1])
+        return max(1.0, min(picture_size) if self.history.state.view == ATLAS_VIEW_NAME else picture_size[1])
 
-    def _focus(self, event: Event, size: Point) -> None:
-        state, (width, height) = self.history.state, size
+    def _focus(self, event: Event, picture_size: Point) -> None:
+        state, (width, height) = self.history.state, picture_size
         if state.view == ATLAS_VIEW_NAME:
             self.history.change(state.with_atlas_view(AtlasView(state.atlas_view.layer)))
             return

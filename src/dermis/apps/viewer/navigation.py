@@ -41,7 +41,7 @@ def orbit(camera: Camera, yaw: float, pitch: float) -> Camera:
     horizontal = _rotation_matrix(up, yaw) @ _normalise(offset - (offset @ up) * up)
     elevation = max(-limit, min(limit, elevation + pitch))
     offset = distance * (math.cos(elevation) * horizontal + math.sin(elevation) * up)
-    return _with_position(camera, np.array(camera.target) + offset, camera.target)
+    return _with_position_and_target(camera, np.array(camera.target) + offset, camera.target)
 
 
 def pan(camera: Camera, right: float, up: float) -> Camera:
@@ -51,7 +51,7 @@ def pan(camera: Camera, right: float, up: float) -> Camera:
     """
     x, y, _ = camera_axes(camera)
     shift = camera.frame_mm * (right * x + up * y)
-    return _with_position(camera, camera.position + shift, camera.target + shift)
+    return _with_position_and_target(camera, camera.position + shift, camera.target + shift)
 
 
 def dolly(camera: Camera, factor: float) -> Camera:
@@ -65,13 +65,13 @@ def dolly(camera: Camera, factor: float) -> Camera:
     requested = old_distance * frame_mm / camera.frame_mm
     distance = max(min(requested, MAX_COORDINATE_MM / 10), min(old_distance, _MIN_DISTANCE_MM))
     position = np.array(camera.target) + offset * (distance / old_distance)
-    return _with_position(camera, position, camera.target, frame_mm=frame_mm)
+    return _with_position_and_target(camera, position, camera.target, frame_mm=frame_mm)
 
 
 def focus(camera: Camera, point: ArrayLike) -> Camera:
     """Shift the camera so that a point becomes the target; direction and distance are unchanged."""
     shift = np.subtract(point, camera.target)
-    return _with_position(camera, np.array(camera.position) + shift, point)
+    return _with_position_and_target(camera, np.array(camera.position) + shift, point)
 
 
 class CameraEasing:
@@ -117,7 +117,7 @@ def interpolate_cameras(a: Camera, b: Camera, t: float) -> Camera:
         frame_mm=frame,
         principal_point=tuple(_interpolate(a.principal_point, b.principal_point, t).tolist()),
     )
-    return b if _nearly_equal(camera, b) else camera
+    return b if _cameras_nearly_equal(camera, b) else camera
 
 
 def pick(scene: Scene, camera: Camera, x: float, y: float, aspect: float) -> Floats | None:
@@ -183,25 +183,27 @@ def orbit_light(light: Light, camera: Camera, right: float, up: float) -> Light:
     return validated_copy(light, position=_clamped_tuple(np.array(light.target) + offset))
 
 
-def _nearly_equal(a: Camera, b: Camera) -> bool:
+def _cameras_nearly_equal(first: Camera, second: Camera) -> bool:
     """Return whether the difference of two cameras is too small to see."""
-    shifts = np.subtract(a.position, b.position), np.subtract(a.target, b.target)
-    principal_shift = np.subtract(a.principal_point, b.principal_point) * b.frame_mm
-    differences = np.concatenate([*shifts, principal_shift, [a.frame_mm - b.frame_mm]])
-    return bool(np.abs(differences).max() < 5e-4 * b.frame_mm)
+    shifts = np.subtract(first.position, second.position), np.subtract(first.target, second.target)
+    principal_shift = np.subtract(first.principal_point, second.principal_point) * second.frame_mm
+    differences = np.concatenate([*shifts, principal_shift, [first.frame_mm - second.frame_mm]])
+    return bool(np.abs(differences).max() < 5e-4 * second.frame_mm)
 
 
-def _with_position(camera: Camera, position: ArrayLike, target: ArrayLike, **fields: float) -> Camera:
+def _with_position_and_target(
+    camera: Camera, position: ArrayLike, target: ArrayLike, **fields: float
+) -> Camera:
     return validated_copy(camera, position=_clamped_tuple(position), target=_clamped_tuple(target), **fields)
 
 
-def _clamped_tuple(v: ArrayLike) -> tuple[float, float, float]:
-    x, y, z = (float(c) for c in np.clip(v, -MAX_COORDINATE_MM, MAX_COORDINATE_MM))
+def _clamped_tuple(vector: ArrayLike) -> tuple[float, float, float]:
+    x, y, z = (float(c) for c in np.clip(vector, -MAX_COORDINATE_MM, MAX_COORDINATE_MM))
     return x, y, z
 
 
-def _interpolate(a: ArrayLike, b: ArrayLike, t: float) -> Floats:
-    return (1.0 - t) * np.array(a, dtype=np.float64) + t * np.array(b, dtype=np.float64)
+def _interpolate(start: ArrayLike, end: ArrayLike, fraction: float) -> Floats:
+    return (1.0 - fraction) * np.array(start, dtype=np.float64) + fraction * np.array(end, dtype=np.float64)
 
 
 def _rotation_matrix(axis: Floats, angle: float) -> Floats:
@@ -214,5 +216,5 @@ def _rotation_matrix(axis: Floats, angle: float) -> Floats:
     return np.asarray(np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * (cross @ cross))
 
 
-def _normalise(v: Floats) -> Floats:
-    return np.asarray(v / np.linalg.norm(v))
+def _normalise(vector: Floats) -> Floats:
+    return np.asarray(vector / np.linalg.norm(vector))

@@ -98,22 +98,26 @@ class HeadLoader:
         return loaded if isinstance(loaded, ViewerState) else _with_head(state, loaded, self._name)
 
 
-def _load_head_or_scene(name: str) -> LoadedHead:
-    return load_state(Path(name)) if Path(name).suffix.lower() == ".toml" else load_head(name)
+def _load_head_or_scene(name_or_path: str) -> LoadedHead:
+    return (
+        load_state(Path(name_or_path))
+        if Path(name_or_path).suffix.lower() == ".toml"
+        else load_head(name_or_path)
+    )
 
 
-def _with_head(state: ViewerState, head: Head, name: str) -> ViewerState:
+def _with_head(state: ViewerState, head: Head, head_name: str) -> ViewerState:
     """Return the state with another head.
 
     The pose is kept if both heads have the same morph targets and bones.
 
-    name : name or path from which the new head was loaded
+    head_name : name or path from which the new head was loaded
     """
     old_head = state.scene.head
     same_names = old_head.targets == head.targets and old_head.bones == head.bones
     pose = state.scene.pose if same_names else None
     reused_pose = pose if pose is None or pose.positions_mm is None else None
-    return replace(state, scene=replace(state.scene, head=head, pose=reused_pose), head={"name": name})
+    return replace(state, scene=replace(state.scene, head=head, pose=reused_pose), head={"name": head_name})
 
 
 @lru_cache(maxsize=1)

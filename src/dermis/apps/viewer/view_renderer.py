@@ -94,12 +94,12 @@ class QualityController:
             self._level = max(self._best_level, min(len(QUALITY_LEVELS) - 1, self._level + step))
             self._streak = 0
 
-    def limited_settings(self, settings: Settings, size: tuple[int, int], moving: bool) -> Settings:
+    def limited_settings(self, settings: Settings, size: tuple[int, int], is_moving: bool) -> Settings:
         """Return the settings of a frame for a window of the given size, with quality limits in motion.
 
-        moving : whether the picture is changing
+        is_moving : whether the picture is changing
         """
-        quality = self.quality if moving else QUALITY_LEVELS[0]
+        quality = self.quality if is_moving else QUALITY_LEVELS[0]
         width, height = (max(1, round(quality.scale * side)) for side in size)
         return validated_copy(
             settings,
@@ -173,32 +173,32 @@ class ViewRenderer:
         frozen_state: ViewerState | None,
         camera: Camera,
         size: tuple[int, int],
-        moving: bool,
+        is_moving: bool,
     ) -> Images:
         """Return the image of the live state, and the image of the frozen state or None.
 
-        moving : whether the picture is changing, which limits its quality
+        is_moving : whether the picture is changing, which limits its quality
 
         Raises DermisError if a state cannot be rendered or the device fails.
         """
         if frozen_state is None:
             self._frozen = None
-            return self.render_image(state, camera, size, moving), None
-        image = self._frozen_image(frozen_state, camera, size, moving)
-        return self.render_image(state, camera, size, moving), image
+            return self.render_image(state, camera, size, is_moving), None
+        image = self._frozen_image(frozen_state, camera, size, is_moving)
+        return self.render_image(state, camera, size, is_moving), image
 
     def render_image(
-        self, state: ViewerState, camera: Camera, size: tuple[int, int], moving: bool
+        self, state: ViewerState, camera: Camera, size: tuple[int, int], is_moving: bool
     ) -> Texture:
         """Return a texture of sRGB bytes for a state; the last texture is reused if nothing has changed.
 
         size : size of the view; in motion the texture may be smaller [pixel]
-        moving : whether the picture is changing, which limits its quality
+        is_moving : whether the picture is changing, which limits its quality
 
         Raises DermisError if the state cannot be rendered or the device fails.
         """
         self._size = size
-        settings = self._settings(state, size, moving)
+        settings = self._settings(state, size, is_moving)
         inputs = self._image_inputs
         is_cached = inputs and inputs[0] is state and inputs[1:] == (camera, settings)
         if is_cached and self.last_image is not None:
@@ -209,16 +209,16 @@ class ViewRenderer:
         if self.rendered and self.rendered is not last_rendered:
             self.stage_times.append(self.rendered.gpu_ms or {})
             stages = self.rendered.gpu_ms or {"shade"}
-            if moving and "shade" in stages:  # times of frames without shading do not predict the next one
+            if is_moving and "shade" in stages:  # times of frames without shading do not predict the next one
                 self.quality_controller.record_frame_time(self.rendered.frame_ms)
         return self.last_image
 
     def _frozen_image(
-        self, frozen_state: ViewerState, camera: Camera, size: tuple[int, int], moving: bool
+        self, frozen_state: ViewerState, camera: Camera, view_size: tuple[int, int], is_moving: bool
     ) -> Texture:
         """Return a copy of the image of the frozen state, rendered again when the camera moves."""
-        settings, frozen = self._settings(frozen_state, size, moving), self._frozen
-        still_settings = self._settings(frozen_state, size, moving=False)
+        settings, frozen = self._settings(frozen_state, view_size, is_moving), self._frozen
+        still_settings = self._settings(frozen_state, view_size, is_moving=False)
         is_cached = frozen and frozen.state is frozen_state and frozen.camera == camera
         if frozen and is_cached and frozen.settings in (settings, still_settings):
             return frozen.image
@@ -228,10 +228,10 @@ class ViewRenderer:
         self._frozen = FrozenImage(frozen_state, camera, settings, image_copy)
         return image_copy
 
-    def _settings(self, state: ViewerState, size: tuple[int, int], moving: bool) -> Settings:
+    def _settings(self, state: ViewerState, view_size: tuple[int, int], is_moving: bool) -> Settings:
         """Return the settings of a frame with quality limits in motion, except for the atlas view."""
         return self.quality_controller.limited_settings(
-            state.settings, size, moving and state.view != ATLAS_VIEW_NAME
+            state.settings, view_size, is_moving and state.view != ATLAS_VIEW_NAME
         )
 
     @property
@@ -240,7 +240,7 @@ class ViewRenderer:
         if not self._image_inputs:
             return False
         state, _, settings = self._image_inputs
-        return self._settings(state, self._size, moving=False) == settings
+        return self._settings(state, self._size, is_moving=False) == settings
 
     def screenshot(self, path: Path, state: ViewerState, size: tuple[int, int]) -> None:
         """Render the view of a state to a file: .png (tone-mapped) or .exr (linear).
@@ -270,26 +270,26 @@ class ViewRenderer:
         """Download an image and return its (h, w, 3) sRGB bytes."""
         return np.ascontiguousarray(download(self.renderer.device, image)[..., :3])
 
-    def _draw(self, state: ViewerState, side: str = "") -> Texture:
+    def _draw(self, state: ViewerState, divider_side: str = "") -> Texture:
         parts = PART_VIEWS.get(state.view, state.settings.parts)
         settings = self.settings = validated_copy(state.settings, parts=parts)
-        if state.view == ATLAS_VIEW_NAME and self._has_atlas_light(state, side):
-            return self._views.draw_atlas(state.scene, settings, state.atlas_view, side)
+        if state.view == ATLAS_VIEW_NAME and self._has_atlas_light(state, divider_side):
+            return self._views.draw_atlas(state.scene, settings, state.atlas_view, divider_side)
         self._atlas_state = None
-        self.rendered = self.renderer.draw(state.scene, settings, view=side)
-        self._atlas_state = state, side
+        self.rendered = self.renderer.draw(state.scene, settings, view=divider_side)
+        self._atlas_state = state, divider_side
         if state.view in (PICTURE_VIEW_NAME, *PART_VIEWS):
             return self.rendered.picture.bytes
         if state.view == ATLAS_VIEW_NAME:
-            return self._views.draw_atlas(state.scene, settings, state.atlas_view, side)
-        return self._views.draw(state.scene, settings, state.view, side)
+            return self._views.draw_atlas(state.scene, settings, state.atlas_view, divider_side)
+        return self._views.draw(state.scene, settings, state.view, divider_side)
 
-    def _has_atlas_light(self, state: ViewerState, side: str) -> bool:
+    def _has_atlas_light(self, state: ViewerState, divider_side: str) -> bool:
         """Return whether the atlas already holds the light of a state, so that no frame must be rendered.
 
-        side : name of the state's side of the divider, empty for the live side
+        divider_side : name of the state's side of the divider, empty for the live side
         """
-        if self._atlas_state is None or self._atlas_state[1] != side:
+        if self._atlas_state is None or self._atlas_state[1] != divider_side:
             return False
         return states_equal(replace(self._atlas_state[0], atlas_view=state.atlas_view), state)
 

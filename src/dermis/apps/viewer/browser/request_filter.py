@@ -202,8 +202,8 @@ class RequestFilter:
         pairs = (cookie.partition("=") for cookie in cookies)
         return any(self._equals_token(value) for name, _, value in pairs if name == self._cookie)
 
-    def _equals_token(self, text: str) -> bool:
-        return hmac.compare_digest(text.encode(), self._token.encode())
+    def _equals_token(self, candidate: str) -> bool:
+        return hmac.compare_digest(candidate.encode(), self._token.encode())
 
     def _add_cookie(self, send: Send) -> Send:
         """Return a `send` function that also sets the token cookie, hidden from scripts and other sites."""
@@ -227,8 +227,8 @@ def is_local(host: str) -> bool:
         return False
 
 
-def _header_values(scope: Message, key: bytes) -> list[str]:
-    return [value.decode("latin-1") for name, value in scope["headers"] if name == key]
+def _header_values(scope: Message, header_name: bytes) -> list[str]:
+    return [value.decode("latin-1") for name, value in scope["headers"] if name == header_name]
 
 
 def _host_name(host: str) -> str:

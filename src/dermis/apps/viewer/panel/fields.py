@@ -86,22 +86,22 @@ def draw_fields(
 
 def _draw_field(
     session: Session,
-    values: FrozenModel,
-    name: str,
+    model: FrozenModel,
+    field_name: str,
     make_state: FieldsToState,
     style: FieldStyle,
     suffix: str,
 ) -> None:
-    kind, value = type(values), getattr(values, name)
-    label = (style.label or _field_label(name)) + suffix
-    value_range = style.value_range or field_slider_range(kind, name) or SliderRange(0.0, 1.0)
+    kind, value = type(model), getattr(model, field_name)
+    label = (style.label or _field_label(field_name)) + suffix
+    value_range = style.value_range or field_slider_range(kind, field_name) or SliderRange(0.0, 1.0)
 
     def with_value(new_value: object) -> ViewerState:
-        return make_state(**{name: new_value})
+        return make_state(**{field_name: new_value})
 
-    if keywords := field_keywords(kind, name):
+    if keywords := field_keywords(kind, field_name):
         _draw_keywords(session, label, value, keywords, with_value, style)
-        draw_tooltip(field_help(kind, name))
+        draw_tooltip(field_help(kind, field_name))
         if isinstance(value, str):
             return
     if isinstance(value, bool):
@@ -110,13 +110,13 @@ def _draw_field(
         draw_combo(session, label, str(value), map(str, style.options), lambda text: with_value(int(text)))
     elif isinstance(value, (int, float)):
         unit, convert = style.unit, round if isinstance(value, int) else float
-        formats = (_UNIT_FORMATS[end] for end in _UNIT_FORMATS if name.endswith(end))
+        formats = (_UNIT_FORMATS[end] for end in _UNIT_FORMATS if field_name.endswith(end))
         number = style.number_format or next(formats, "%.3f")
         displayed = SliderRange(value_range.low / unit, value_range.high / unit, value_range.logarithmic)
         draw_slider(
             session, label, value / unit, lambda new: with_value(convert(unit * new)), displayed, number
         )
-    elif kind.model_fields[name].annotation == _COLOUR_TYPE:
+    elif kind.model_fields[field_name].annotation == _COLOUR_TYPE:
         result = imgui.color_edit3(label, list(value), _HDR_COLOUR_FLAGS)
         edit_value(session, label, result, lambda new: with_value(tuple(max(0.0, c) for c in new)))
     elif isinstance(value, tuple) and value_range.logarithmic:
@@ -124,11 +124,11 @@ def _draw_field(
             label, list(value), value_range.low, value_range.high, "%.3g", _LOG_SLIDER_FLAG
         )
         edit_value(session, label, result, lambda new: with_value(tuple(clamp(c, value_range) for c in new)))
-    elif len(keywords := field_choices(kind, name)) > 1:
+    elif len(keywords := field_choices(kind, field_name)) > 1:
         draw_combo(session, label, str(value), keywords, with_value, style.names)
     else:
         return
-    draw_tooltip(field_help(kind, name))
+    draw_tooltip(field_help(kind, field_name))
 
 
 def _draw_keywords(
@@ -158,11 +158,11 @@ def _draw_keywords(
     )
 
 
-def _field_label(name: str) -> str:
+def _field_label(field_name: str) -> str:
     """Return the label of a field: the field's name with spaces and without the suffix of a unit."""
     for unit in _UNIT_FORMATS:
-        name = name.removesuffix(unit)
-    return name.replace("_", " ")
+        field_name = field_name.removesuffix(unit)
+    return field_name.replace("_", " ")
 
 
 def draw_tooltip(text: str) -> None:

@@ -169,11 +169,11 @@ def feed_key(event: Event, frame: Callable[[], None]) -> None:
     frame()
 
 
-def _change_key(io: imgui.IO, name: str, down: bool) -> None:
-    key = ImguiRenderer.KEY_MAP.get(name)
-    if key is None and len(name) == 1 and name.isascii() and name.isalnum():
-        key = getattr(imgui.Key, f"_{name}" if name.isdigit() else name.lower(), None)
+def _change_key(io: imgui.IO, key_name: str, is_down: bool) -> None:
+    key = ImguiRenderer.KEY_MAP.get(key_name)
+    if key is None and len(key_name) == 1 and key_name.isascii() and key_name.isalnum():
+        key = getattr(imgui.Key, f"_{key_name}" if key_name.isdigit() else key_name.lower(), None)
     if key is not None:
-        io.add_key_event(key, down)
-    if name in ImguiRenderer.KEY_MAP_MOD:
-        io.add_key_event(ImguiRenderer.KEY_MAP_MOD[name], down)
+        io.add_key_event(key, is_down)
+    if key_name in ImguiRenderer.KEY_MAP_MOD:
+        io.add_key_event(ImguiRenderer.KEY_MAP_MOD[key_name], is_down)

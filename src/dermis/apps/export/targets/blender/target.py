@@ -237,12 +237,14 @@ class Blender(Target):
             else (list(_FIRST_SUPPORTED_VERSION), list(_FIRST_MFP_VERSION))
         )
 
-    def _parameters(self, radius: tuple[float, ...], version: str) -> Parameters:
+    def _parameters(self, subsurface_radius: tuple[float, ...], version: str) -> Parameters:
         method = self.variant.replace("-", "_").upper()
         parameters = [
             Parameter("Subsurface Method", method, "-", "of the Principled BSDF"),
             Parameter("Subsurface Weight", 1.0, "-", "fraction of the diffuse light that is scattered"),
-            Parameter(_RADIUS_NAME, radius, "mm, times the scale", self._radius_description(version)),
+            Parameter(
+                _RADIUS_NAME, subsurface_radius, "mm, times the scale", self._radius_description(version)
+            ),
             Parameter(_SCALE_NAME, _METRES_PER_MM, "m", "metres per millimetre"),
             Parameter("IOR", SKIN_ETA, "-", "of the surface, for reflection and the start of random walks"),
         ]

@@ -95,8 +95,8 @@ def scene_files(
         yield f"boundary_{each}.xml", xml.scene_document(_skin_elements(backend, each, appearance, meshes))
     yield from ((f"meshes/{name}.ply", content) for name, content in meshes.items())
     for index, content in appearance.opaque.items():
-        yield _opaque_file(index), content
-    yield from ((_part_file(role), content) for role, content in appearance.pictures.items())
+        yield _opaque_mesh_file(index), content
+    yield from ((_part_picture_file(role), content) for role, content in appearance.pictures.items())
     if appearance.transmittance is not None and appearance.dimming is not None:
         yield "textures/passing.exr", encode_map_exr("passing", appearance.transmittance)
         yield "textures/held_back.exr", encode_map_exr("held_back", appearance.dimming)
@@ -150,7 +150,7 @@ def _lower_surface(has_dimming: bool) -> SceneDict:
     if not has_dimming:
         return {"type": "null", "id": "skin_below"}
     black = {"type": "diffuse", "reflectance": mitsuba_rgb((0.0, 0.0, 0.0))}
-    return {"type": "mask", "opacity": _texture("held_back"), "bsdf": black, "id": "skin_below"}
+    return {"type": "mask", "opacity": _exr_texture("held_back"), "bsdf": black, "id": "skin_below"}
 
 
 def _scene_elements(
@@ -179,12 +179,12 @@ def _scene_elements(
     colour = {"type": "mesh_attribute", "name": "vertex_color"}
     opaque = {"type": "principled", "roughness": _OPAQUE_ROUGHNESS, "eta": SKIN_ETA, "base_color": colour}
     for role in appearance.pictures:
-        texture = {"type": "bitmap", "id": _part_texture(role).name, "filename": _part_file(role)}
+        texture = {"type": "bitmap", "id": _part_texture(role).name, "filename": _part_picture_file(role)}
         parts.append({**texture, "raw": role != "colour", "wrap_mode": "clamp"})
     for index in appearance.opaque:
         roles = appearance.pictured.get(index)
         bsdf = opaque if roles is None else _part_surface(roles)
-        parts.append({"type": "ply", "filename": _opaque_file(index), "bsdf": bsdf})
+        parts.append({"type": "ply", "filename": _opaque_mesh_file(index), "bsdf": bsdf})
     defaults = [xml.default_element(*one) for one in (("boundary", boundary), *sizes)]
     elements = [xml.object_element(part, "", backend) for part in parts]
     return [*defaults, *elements, xml.include_element("boundary_$boundary.xml")]
@@ -197,8 +197,8 @@ def _skin_elements(
 
     meshes : PLY files of the skin's surfaces by shape name
     """
-    roughness = appearance.roughness if isinstance(appearance.roughness, float) else _texture("roughness")
-    transmittance = None if appearance.transmittance is None else _texture("passing")
+    roughness = appearance.roughness if isinstance(appearance.roughness, float) else _exr_texture("roughness")
+    transmittance = None if appearance.transmittance is None else _exr_texture("passing")
     parts = [
         medium_description(appearance.media[boundary]),
         surface_description(boundary, transmittance, roughness),
@@ -232,13 +232,13 @@ def _part_texture(role: PartRole) -> xml.Ref:
     return xml.Ref(f"parts_{role}")
 
 
-def _part_file(role: PartRole) -> str:
+def _part_picture_file(role: PartRole) -> str:
     return f"textures/{_part_texture(role).name}.png"
 
 
-def _opaque_file(index: int) -> str:
-    return f"meshes/material_{index}.ply"
+def _opaque_mesh_file(material_index: int) -> str:
+    return f"meshes/material_{material_index}.ply"
 
 
-def _texture(name: str) -> SceneDict:
-    return {"type": "bitmap", "filename": f"textures/{name}.exr", "raw": True}
+def _exr_texture(file_stem: str) -> SceneDict:
+    return {"type": "bitmap", "filename": f"textures/{file_stem}.exr", "raw": True}

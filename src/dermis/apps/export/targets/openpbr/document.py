@@ -66,17 +66,17 @@ def _add_material(
         material.setAttribute("uiname", definition.name)
 
 
-def _add_map(graph: MaterialX.NodeGraph, role: str, file: str, shader: str) -> MaterialX.Output:
+def _add_map(graph: MaterialX.NodeGraph, role: str, map_path: str, shader: str) -> MaterialX.Output:
     """Add the nodes that read a map file to a graph, and return their output.
 
     role : role of the map, such as "colour", which sets its type and colour space
-    file : path of the map
+    map_path : path of the map
     shader : node category of the surface
     """
     map_type = MAP_TYPES[role]
     output_type = map_type.type
     image = graph.addNode("image", f"{role}_image", map_type.type)
-    filename = image.setInputValue("file", file, "filename")
+    filename = image.setInputValue("file", map_path, "filename")
     if map_type.space:
         filename.setColorSpace(map_type.space)
     last_node = image

@@ -216,13 +216,13 @@ def map_arrays(maps: Maps, skin: Skin, slopes: Floats | None = None) -> dict[str
 def encode_map_files(arrays: Mapping[str, Floats]) -> dict[str, bytes]:
     """Return maps as 8-bit PNG files by role."""
     with ThreadPoolExecutor() as pool:  # compression releases the interpreter lock
-        return dict(zip(arrays, pool.map(_png, arrays, arrays.values()), strict=True))
+        return dict(zip(arrays, pool.map(_encode_map_png, arrays, arrays.values()), strict=True))
 
 
-def _png(role: str, values: Floats) -> bytes:
+def _encode_map_png(role: str, texels: Floats) -> bytes:
     if role in ("colour", "eye"):
-        return encode_png(encode_srgb8(values))
-    levels = np.rint(np.clip(values, 0.0, 1.0) * 255).astype(np.uint8)
+        return encode_png(encode_srgb8(texels))
+    levels = np.rint(np.clip(texels, 0.0, 1.0) * 255).astype(np.uint8)
     return encode_png(levels if levels.ndim == 3 else levels[..., None])
 
 

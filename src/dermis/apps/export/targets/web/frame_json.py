@@ -99,12 +99,12 @@ def _column_packer(byte_runs: ByteRunCollector) -> Callable[[Bytes], int]:
     return lambda data: byte_runs.add_parts(np.split(data, 3) if len(data) % 3 == 0 else [data])
 
 
-def _mip_bytes(capture: FrameCapture, index: int) -> list[Bytes]:
+def _mip_bytes(capture: FrameCapture, resource_index: int) -> list[Bytes]:
     """Return the bytes of each mip level of a texture, with its layers joined; a buffer has one level.
 
-    index : resource index
+    resource_index : resource index
     """
-    parts, layers = capture.read_content(index), capture.resources[index].get("size")
+    parts, layers = capture.read_content(resource_index), capture.resources[resource_index].get("size")
     count = layers[2] if isinstance(layers, list) else 1
     return [np.concatenate(parts[k : k + count]) for k in range(0, len(parts), count)]
 
@@ -152,10 +152,10 @@ def _struct_json(dtype: np.dtype[Any]) -> Json:
     return {"size": dtype.itemsize, "members": members}
 
 
-def _member_json(kind: np.dtype[Any], offset: int) -> list[int] | Json:
-    base = kind.base
+def _member_json(dtype: np.dtype[Any], offset: int) -> list[int] | Json:
+    base = dtype.base
     if base.fields is None:
-        return [offset // 4, kind.itemsize // 4]
+        return [offset // 4, dtype.itemsize // 4]
     return {"offset": offset // 4, "each": base.itemsize // 4, "members": _struct_json(base)["members"]}
 
 
@@ -166,8 +166,8 @@ def _camel_keys(value: object) -> object:
     return value
 
 
-def _camel_case(name: str) -> str:
-    first, *others = name.split("_")
+def _camel_case(snake_case: str) -> str:
+    first, *others = snake_case.split("_")
     return first + "".join(word.title() for word in others)
 
 
@@ -195,12 +195,12 @@ def resources_bound_as(capture: FrameCapture, frames: Frames, names: tuple[str, 
     return found
 
 
-def base_resource(capture: FrameCapture, index: int) -> int:
+def base_resource(capture: FrameCapture, resource_index: int) -> int:
     """Return the resource index of a view's texture; any other resource index is returned unchanged.
 
-    index : resource index
+    resource_index : resource index
     """
-    return int(capture.resources[index].get("of", index))
+    return int(capture.resources[resource_index].get("of", resource_index))
 
 
 def resources_read_by(capture: FrameCapture, captured_pass: CapturedPass) -> Iterator[int]:
@@ -235,9 +235,12 @@ def _bound_entries(capture: FrameCapture, captured_pass: CapturedPass) -> Iterat
         )
 
 
-def _allows_reading(entry: Json) -> bool:
-    return "sampler" not in entry and entry.get("storage_texture", {}).get("access") != "write-only"
+def _allows_reading(layout_entry: Json) -> bool:
+    return (
+        "sampler" not in layout_entry
+        and layout_entry.get("storage_texture", {}).get("access") != "write-only"
+    )
 
 
-def _allows_writing(entry: Json) -> bool:
-    return "storage_texture" in entry or entry.get("buffer") == {"type": "storage"}
+def _allows_writing(layout_entry: Json) -> bool:
+    return "storage_texture" in layout_entry or layout_entry.get("buffer") == {"type": "storage"}

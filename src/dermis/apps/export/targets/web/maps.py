@@ -62,24 +62,24 @@ def encode_picture(texels: Halves, colours: bool) -> Picture:
     return Picture(data, curves.astype(np.float16), decoded.astype(np.float16))
 
 
-def _value_curve(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _value_curve(texels: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the 256 increasing values to which a channel is quantised, with smaller steps near 0.
 
-    values : texels of the channel, whose minimum and maximum are the ends of the curve
+    texels : texels of the channel, whose minimum and maximum are the ends of the curve
     """
-    limits = np.array([values.min(), values.max()])
+    limits = np.array([texels.min(), texels.max()])
     first, last = np.sign(limits) * np.sqrt(np.abs(limits))
     root = np.linspace(first, last, _VALUE_LEVELS)
     return np.asarray(np.sign(root) * root * root)
 
 
-def _nearest_steps(values: Halves, curve: NDArray[np.float64]) -> NDArray[np.uint8]:
+def _nearest_steps(texels: Halves, curve: NDArray[np.float64]) -> NDArray[np.uint8]:
     """Return the index of the curve value nearest to each texel.
 
     curve : increasing values
     """
     midpoints = 0.5 * (curve[1:] + curve[:-1])
-    return np.searchsorted(midpoints, values.astype(np.float64)).astype(np.uint8)
+    return np.searchsorted(midpoints, texels.astype(np.float64)).astype(np.uint8)
 
 
 def _encode_webp(image: NDArray[np.uint8]) -> bytes:
@@ -137,13 +137,15 @@ class MapPictures:
             maps[index] = PictureMap(role, mips, capture_mips(capture, texture) if storable else None)
         return maps
 
-    def _add_pictures(self, capture: FrameCapture, index: int, role: str, mip: int) -> NDArray[np.float16]:
+    def _add_pictures(
+        self, capture: FrameCapture, resource_index: int, role: str, mip: int
+    ) -> NDArray[np.float16]:
         """Add the pictures of a mip level, and return the (l, h, w, c) texels decoded from them.
 
-        index : resource index
+        resource_index : resource index
         mip : mip level
         """
-        layers = read_texels(capture, index, mip)
+        layers = read_texels(capture, resource_index, mip)
         for layer, texels in enumerate(layers):
             if (role, mip, layer) not in self.pictures:
                 self.pictures[role, mip, layer] = encode_picture(texels, role == _COLOUR_ROLE)
@@ -162,9 +164,9 @@ def with_reduced_maps(head: Head, max_side: int) -> Head:
     return replace(head, maps=replace(maps, **reduced))
 
 
-def _reduce_map(values: NDArray[np.float32], max_side: int) -> NDArray[np.float32]:
-    mip = max(0, (max(values.shape[:2]) - 1).bit_length() - (max_side - 1).bit_length())
-    return np.asarray(mip_chain(values)[mip], np.float32)
+def _reduce_map(texels: NDArray[np.float32], max_side: int) -> NDArray[np.float32]:
+    mip = max(0, (max(texels.shape[:2]) - 1).bit_length() - (max_side - 1).bit_length())
+    return np.asarray(mip_chain(texels)[mip], np.float32)
 
 
 def quantise_hairs(renderer: Renderer, capture: FrameCapture, frames: Frames) -> dict[int, tuple[float, ...]]:
@@ -180,14 +182,14 @@ def quantise_hairs(renderer: Renderer, capture: FrameCapture, frames: Frames) ->
     return dict.fromkeys(buffers, _KNOT_STEPS_MM)
 
 
-def read_texels(capture: FrameCapture, index: int, mip: int) -> NDArray[np.float16]:
+def read_texels(capture: FrameCapture, resource_index: int, mip: int) -> NDArray[np.float16]:
     """Return the (l, h, w, c) texels of a mip level of a half-float texture.
 
-    index : resource index
+    resource_index : resource index
     """
-    width, height, layers = capture.resources[index]["size"]
+    width, height, layers = capture.resources[resource_index]["size"]
     sides = max(1, height >> mip), max(1, width >> mip)
-    parts = capture.read_content(index)[mip * layers : (mip + 1) * layers]
+    parts = capture.read_content(resource_index)[mip * layers : (mip + 1) * layers]
     return np.stack([one.view(np.float16).reshape(*sides, -1) for one in parts])
 
 

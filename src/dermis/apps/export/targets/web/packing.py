@@ -44,7 +44,7 @@ class ByteRunCollector:
             the best compression is used
         """
         raw = np.frombuffer(data, np.uint8)
-        return self._add(raw, list(layouts or _possible_layouts(len(raw))), ())
+        return self._add_run(raw, list(layouts or _possible_layouts(len(raw))), ())
 
     def add_parts(self, parts: Iterable[Bytes]) -> int:
         """Add a run that concatenates parts, each encoded with its own layout; return its index in `runs`."""
@@ -60,9 +60,9 @@ class ByteRunCollector:
         """
         words = np.rint(values / np.array(steps)).astype(np.int32)
         layouts = [(4, len(steps), order) for order in _DIFFERENCE_ORDERS]
-        return self._add(words.view(np.uint8).reshape(-1), layouts, steps)
+        return self._add_run(words.view(np.uint8).reshape(-1), layouts, steps)
 
-    def _add(self, raw: Bytes, layouts: list[tuple[int, int, int]], steps: tuple[float, ...]) -> int:
+    def _add_run(self, raw: Bytes, layouts: list[tuple[int, int, int]], steps: tuple[float, ...]) -> int:
         key = hashlib.sha256(raw.tobytes()).digest() + repr(steps).encode()
         if key not in self._run_indices:
             self._run_indices[key] = len(self.runs)
@@ -110,10 +110,10 @@ def byte_planes(raw: Bytes, bytes_per_word: int, words_per_row: int, difference_
     return words.view(np.uint8).reshape(-1, bytes_per_word * words_per_row).T.tobytes()
 
 
-def _possible_layouts(size: int) -> Iterable[tuple[int, int, int]]:
+def _possible_layouts(byte_count: int) -> Iterable[tuple[int, int, int]]:
     yield 1, 1, 0
     for word, row in (
-        (word, row) for word in _WORD_TYPES for row in _ROW_LENGTHS if size % (word * row) == 0
+        (word, row) for word in _WORD_TYPES for row in _ROW_LENGTHS if byte_count % (word * row) == 0
     ):
         yield from ((word, row, order) for order in _DIFFERENCE_ORDERS)
 
