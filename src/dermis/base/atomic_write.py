@@ -134,7 +134,7 @@ def _temporary_name(target: Path) -> Path:
 
 
 def check_folder(folder: Path, json_name: str) -> None:
-    """Create a folder before a long computation and check that it is writable.
+    """Create a folder before a long computation, and check that the folder is writable.
 
     json_name : name of the .json file that will be written into the folder
 

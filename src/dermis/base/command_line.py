@@ -1,4 +1,4 @@
-"""Framework of command-line programs: a command is a function; an error is one line, with exit status 2."""
+"""Framework of command-line programs: commands are functions; errors are one line, with exit status 2."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def make_app(name: str, help_text: str | None) -> App:
 def run_app(app: App, arguments: Sequence[str] | None = None) -> int:
     """Run a command line and return its exit status: 2 for invalid input, with a message on stderr.
 
-    arguments : words after the program's name; by default those of this process
+    arguments : words after the program's name; by default, the arguments of this process
     """
     name = app.name[0]
     try:

@@ -87,7 +87,7 @@ def load_or_make(folder: str, key: str, names: list[str], make: Callable[[], Arr
 
 
 def try_save_arrays(folder: str, key: str, arrays: Arrays) -> None:
-    """Save arrays to the disk cache if it has room; disk errors are ignored."""
+    """Save arrays to the disk cache if the cache has room; disk errors are ignored."""
     path = cache_folder() / folder
     with contextlib.suppress(OSError):
         if _has_room(path, sum(array.nbytes for array in arrays.values())):
@@ -161,7 +161,7 @@ def _has_room(folder: Path, size: int) -> bool:
 
 
 def _folder_files(folder: Path, suffix: str) -> list[tuple[Path, os.stat_result]]:
-    """Return the path and the status of each file in a folder whose name ends with `suffix`.
+    """Return the path and the status of each file with a given suffix in a folder.
 
     Files that another process deletes meanwhile are skipped.
     """
@@ -177,8 +177,8 @@ def _folder_files(folder: Path, suffix: str) -> list[tuple[Path, os.stat_result]
 def _read_arrays(path: Path, key: str) -> Arrays:
     """Return the arrays in a file of the cache.
 
-    Raises OSError or MemoryError when the file cannot be read, and one of `_DAMAGE_ERRORS` when it is damaged
-    or has another key.
+    Raises OSError or MemoryError when the file cannot be read, and one of `_DAMAGE_ERRORS` when the file is
+    damaged or has another key.
     """
     with open_private_file(path) as raw, io.BufferedReader(raw) as file:
         digest, head = file.readline(_MAX_LINE_BYTES), file.readline(_MAX_LINE_BYTES)

@@ -45,7 +45,7 @@ class DermisWarning(UserWarning):
 
 
 def notify(message: str) -> None:
-    """Issue a `DermisWarning`; the command line prints it as a note."""
+    """Issue a `DermisWarning`; the command line prints the warning as a note."""
     warnings.warn(message, DermisWarning, stacklevel=3)
 
 

@@ -28,7 +28,7 @@ _OPTION_NAMES = {"structure": "skin"}
 
 
 def _default_pigments() -> dict[str, str]:
-    """Return the default of each pigment option for the help, and different defaults of named skins."""
+    """Return the default of each pigment option for the help, with the different values of named skins."""
     defaults: dict[str, str] = {"structure": DEFAULT_STRUCTURE}
     for field in Pigments.model_fields.keys() - defaults.keys():
         default = getattr(DEFAULT_SKIN, field)

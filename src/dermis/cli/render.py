@@ -127,7 +127,7 @@ def render(
 
 @contextlib.contextmanager
 def _gc_disabled() -> Iterator[None]:
-    """Disable garbage collection in a with block: for one picture, it takes time and frees little memory."""
+    """Disable garbage collection in a with block; for one picture, collection frees little memory."""
     was_enabled = gc.isenabled()
     gc.disable()
     try:

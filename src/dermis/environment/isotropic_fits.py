@@ -97,10 +97,10 @@ def _active_lobes(view_index: int) -> NDArray[np.bool_]:
 
 
 def _parameter_direction(parameter: int, *amounts: tuple[int, float]) -> Floats:
-    """Return a direction (20,) in the space of the lobe parameters: a change of one kind in some lobes.
+    """Return a direction (20,) in the space of the lobe parameters: a change of one parameter in some lobes.
 
     parameter : parameter that changes, such as `_POSITION`
-    amounts : index of each lobe that changes, and its component of the direction
+    amounts : pairs of the index of a lobe, and the change of the parameter of this lobe
     """
     change = np.zeros((4, LOBE_COUNT))
     for lobe, amount in amounts:

@@ -1,4 +1,4 @@
-"""Choice of the layer of an OpenEXR file, and so of the channels, that is read as the picture."""
+"""Choice of the layer of an OpenEXR file: of the channels that are read as the picture."""
 
 from __future__ import annotations
 

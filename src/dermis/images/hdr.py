@@ -304,9 +304,9 @@ def _scanline_marker(width: int) -> bytes:
 
 
 def _decode_runs(data: bytes, offset: int, height: int, width: int) -> tuple[Bytes, int]:
-    """Decode run-length encoded scanlines to RGBE pixels (H, W, 4); also return the offset of their end.
+    """Decode run-length encoded scanlines to RGBE pixels (H, W, 4); also return the end of the scanlines.
 
-    offset : byte at which the first scanline starts
+    offset : byte at which the first scanline starts; the end is also in bytes
     height : number of scanlines
     """
     starts: list[int] = []

@@ -41,7 +41,7 @@ def parse_frame_rate(value: str | float | Fraction, culprit: object = "rate") ->
         59.94 mean the exact NTSC rates
     culprit : name of the option or argument, for errors
 
-    Raises DermisError for values that are not a rate up to 1000.
+    Raises DermisError for values that are not a frame rate above 0 and up to 1000.
     """
     text = str(value).strip() if isinstance(value, str | float | Fraction) else format_value(value)
     try:

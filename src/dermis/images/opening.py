@@ -101,7 +101,7 @@ def picture_format(data: bytes) -> str | None:
 
 
 def open_picture(data: bytes) -> Image:
-    """Open a picture with Pillow after checking its header and its size; only HEIC is decoded at once.
+    """Open a picture with Pillow after checking header and size; only pixels of HEIC are decoded at once.
 
     Raises ValueError, OSError and other errors for a file that is damaged, too large or not supported, and
     DermisError if a package is missing.

@@ -59,8 +59,8 @@ class SkinTone(NamedTuple):
 def ita_degrees(cielab: ArrayLike) -> Doubles:
     """Return the individual typology angle (...) of CIELAB colours (..., 3) [degrees].
 
-    The angle of the colour around L* = 50, b* = 0, from 90 (light) to -90 (dark). Colours with negative b*,
-    which skin does not have, get 90 or -90.
+    The individual typology angle is the angle of the colour around L* = 50, b* = 0, from 90 (light) to -90
+    (dark). Colours with negative b*, which skin does not have, get 90 or -90.
 
     Source: [Chardon1991].
     """

@@ -142,7 +142,7 @@ class FrameFiles:
                 temporary.write_text(content_key, encoding="utf-8")
 
     def missing(self, numbers: Iterable[int], size: tuple[int, int]) -> list[int]:
-        """Return the frame numbers without a complete picture of this sequence, out of given numbers.
+        """Return the frame numbers whose pictures are missing, incomplete, or of another sequence.
 
         numbers : frame numbers to check
         size : width and height of the pictures [pixel]

@@ -225,7 +225,7 @@ def full_body(head: Head) -> Camera:
     Parameters
     ----------
     head : Head
-        The head, with everything that its file has.
+        The head, with all meshes of the file.
 
     Returns
     -------

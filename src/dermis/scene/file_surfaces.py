@@ -125,7 +125,7 @@ def with_file_textures(
 
 
 def _with_mean_colours(mesh: Mesh, materials: list[Material], maps: PartMaps) -> list[Material]:
-    """Return materials whose colour is the mean of their maps, for programs that do not read the maps."""
+    """Return materials with the mean colour of the maps, for programs that do not read the maps."""
     size = np.array(maps.colour.shape[1::-1])
     coloured = []
     for index, material in enumerate(materials):

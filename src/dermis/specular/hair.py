@@ -36,7 +36,7 @@ class FibreParameters(NamedTuple):
 def fibre_parameters(
     along: float = LONGITUDINAL_ROUGHNESS, around: float = AZIMUTHAL_ROUGHNESS
 ) -> FibreParameters:
-    """Return the lobe widths of a fibre from its perceptual roughness along and around its axis.
+    """Return the lobe widths of a fibre from the perceptual roughness along and around the fibre's axis.
 
     along, around : longitudinal and azimuthal roughness, 0 to 1 [-]
 

@@ -24,7 +24,7 @@ def temporary_path(target: Path) -> Path:
 def atomic_write(target: Path, write: Callable[[Path], object]) -> None:
     """Write a file completely or not at all, through a temporary file that is renamed.
 
-    Another process may remove the temporary file while it cleans up; the file is then written again.
+    Another process may remove the temporary file during a cleanup; the file is then written again.
 
     write : function that writes the content to the path that it receives
 
@@ -49,7 +49,7 @@ def atomic_write(target: Path, write: Callable[[Path], object]) -> None:
 
 
 def move_into_place(temporary: Path, target: Path, replaces_folder: bool = True) -> None:
-    """Rename a temporary file or folder to its final path, replacing a file or folder there.
+    """Rename a temporary file or folder to its final path, and replace a file or folder at this path.
 
     replaces_folder : whether to replace a folder that is not empty; if False, such a folder is kept and
         OSError is raised
@@ -93,7 +93,7 @@ def remove_path(path: Path) -> None:
 
 
 def unfinished_files(folder: Path) -> dict[Path, str]:
-    """Return the names of the final files by temporary path, for the writes interrupted in a folder."""
+    """Return the temporary paths that interrupted writes left in a folder, with the final names."""
     with contextlib.suppress(OSError):
         found = {path: _UNFINISHED.fullmatch(path.name) for path in sorted(folder.iterdir())}
         return {path: match[1] for path, match in found.items() if match}

@@ -23,12 +23,12 @@ _BLAS_THREAD_VARIABLES = "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THR
 
 
 class LostProcessError(DermisError):
-    """Error raised when a child process ended before its work was complete; the work can be repeated."""
+    """Error raised when a child process ended before completing the work; the work can be repeated."""
 
 
 @dataclass(frozen=True)
 class ChildProcess:
-    """Child process, and the parent's end of the pipe to it."""
+    """Child process, and the parent's end of the pipe to the child process."""
 
     process: SpawnProcess
     pipe: Connection

@@ -51,7 +51,7 @@ class _PluginState:
 
 @dataclass
 class PartPlugin(WorkerPlugin):  # type: ignore[misc]
-    """Plugin that runs a rendering process beside a dask worker, from its first task to the end of the run.
+    """Plugin that runs a rendering process beside a dask worker, from the first task to the end of the run.
 
     The process renders as without dask; the dask worker only waits for the process.
 
@@ -123,7 +123,7 @@ class PartPlugin(WorkerPlugin):  # type: ignore[misc]
         return WorkerEvent(refusal="the run: expected to continue, but it has ended. Run the command again.")
 
     def _start(self) -> ChildProcess:
-        """Start the rendering process on the adapter that belongs to this dask worker's rank on its host."""
+        """Start the rendering process on the adapter that belongs to this dask worker's rank on this host."""
         cleanup = self._state.cleanup
         rank = cleanup.enter_context(local_rank())
         adapters = similar_adapters(self.adapter)

@@ -36,7 +36,8 @@ TableRows = Iterable[Sequence[object]]
 def write_datasheet(out: Path, spec: Spec) -> None:
     """Write README.md and dataset.json of a data set from its spec, index and shards.
 
-    Equal shards give equal bytes. Raises DermisError if the index is missing or nothing can be written.
+    Both files depend only on the spec and on the shards. Raises DermisError if the index is missing or
+    nothing can be written.
     """
     existing = [shard for shard in list_shards(spec) if shard_exists(out, shard, spec)]
     text = _readme(out, spec, [read_manifest(shard_path(out, shard, spec)) for shard in existing]).encode()

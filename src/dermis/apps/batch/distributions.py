@@ -75,7 +75,7 @@ class Uniform(Distribution):
     logarithmic: bool = False
 
     def __post_init__(self) -> None:
-        """Check that the limits are ordered, and positive for logarithms."""
+        """Check that the limits are ordered, and that limits of logarithms are positive."""
         require(self.low < self.high, "a lower limit that is less than the upper limit")
         require(self.low > 0 or not self.logarithmic, "limits above 0 for log_uniform")
 

@@ -29,7 +29,7 @@ IndexRow = dict[str, object]
 
 
 def write_index(out: Path, spec: Spec) -> Path:
-    """Write the index of the existing shards, with one row per image, and return its path.
+    """Write the index of the existing shards, with one row per image; return the path of the index.
 
     The columns "number", "key" and "shard" identify the image and its file; "camera.K", "camera.R",
     "camera.t", "head_pose" and "gaze" are flattened matrices; columns that begin with "skin_tone." describe

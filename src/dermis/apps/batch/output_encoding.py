@@ -67,7 +67,7 @@ def encode_output(output_name: str, values: Array, encoding: Encoding) -> bytes:
 
 
 def decode_output(output_name: str, kind: str, data: bytes) -> Array:
-    """Return an output array (h, w) or (h, w, c) from the bytes of its file.
+    """Return an output array (h, w) or (h, w, c) from the bytes of a file.
 
     kind : file format: png, exr or npy
 

@@ -107,7 +107,7 @@ def read_dataset(
 
 
 def decode_image(files: Mapping[str, object], culprit: object = "") -> Image:
-    """Return an image of a data set from its files; the returned keys are those of `read_dataset`.
+    """Return an image of a data set from the files of the image, with the keys that `read_dataset` lists.
 
     Raises DermisError for damaged files.
 

@@ -66,7 +66,7 @@ class RunReport:
     shards : number of shards that became complete during the run
     skipped : number of shards that were complete before the run
     failed : images that could not be rendered, with the reasons
-    is_complete : whether all shards of the data set, its index and its datasheet exist
+    is_complete : whether all shards, the index and the datasheet of the data set exist
     """
 
     images: int

@@ -121,7 +121,7 @@ class SceneBuilder:
         return str(file) if is_file(file) else str(name)
 
     def _pose_weights(self, parameters: Parameters, head: Head) -> dict[str, float]:
-        """Return the sampled weights of morph targets that the head has or that the spec's [pose] names."""
+        """Return the sampled weights of morph targets that the head has or that the [pose] table names."""
         posed = self.spec.pose_targets
         return {
             name: weight
@@ -138,7 +138,7 @@ class SceneBuilder:
 
 
 def sampled_person(parameters: Parameters) -> Human:
-    """Return the random person of the sampled seed, with sampled fields in place of random ones."""
+    """Return the random person of the sampled seed, whose fields are replaced by sampled parameters."""
     fields: dict[str, object] = {}
     appearance: dict[str, dict[str, object]] = {}
     for name, value in table_values(parameters, "person").items():

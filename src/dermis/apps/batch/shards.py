@@ -53,7 +53,7 @@ class Part(Shard):
 
 
 def list_shards(spec: Spec) -> list[Shard]:
-    """Return all shards of a data set in order; the last one may have fewer images."""
+    """Return all shards of a data set in order; the last shard may have fewer images."""
     return [shard_at(index, spec) for index in range(-(-spec.count // spec.shard_size))]
 
 
@@ -89,7 +89,7 @@ def shard_index(path: Path) -> int | None:
 
 
 def image_key(number: int) -> str:
-    """Return the image number as 9 digits; the names of all files of the image begin with it."""
+    """Return the image number as 9 digits; the names of all files of the image begin with these digits."""
     return f"{number:09d}"
 
 
@@ -141,7 +141,7 @@ class ShardWriter:
             self._made_with = {**self._made_with, name: _VALUE_SEPARATOR.join(merged)}
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        """Write the manifest and rename the shard to its final path, or remove it after an error."""
+        """Write the manifest and rename the shard to its final path; after an error, remove the shard."""
         try:
             if kind is None:
                 self._files.finish(self._manifest_bytes())
@@ -211,7 +211,7 @@ def is_intact(out: Path, shard: Shard, spec: Spec) -> bool:
 
 
 def part_files(out: Path) -> dict[int, Path]:
-    """Return the files or folders of the complete parts in a data set, by the number of their first image."""
+    """Return the file or folder of each complete part in a data set, by the part's first image number."""
     found = {path: _PART_NAME.fullmatch(path.name) for path in out.iterdir()}
     return {int(match[1]): path for path, match in found.items() if match}
 

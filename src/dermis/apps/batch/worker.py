@@ -272,7 +272,7 @@ class Worker:
             )
 
     def _previous_scene(self, number: int) -> Scene | None:
-        """Return the scene of the previous image for motion vectors; None if it shows another person."""
+        """Return the previous image's scene for motion vectors; None if that image shows another person."""
         spec = self._options.spec
         if "motion" not in spec.outputs or number % spec.images_per_person == 0:
             return None
@@ -299,7 +299,7 @@ def run_worker(pipe: Connection, slot: WorkerSlot, options: RunOptions) -> None:
 
 
 def available_tasks(pipe: Connection) -> Iterator[Shard]:
-    """Wait for a worker's next task and yield it; then yield the tasks that have arrived in the meantime."""
+    """Wait for the next task of a worker and yield the task, then all tasks that arrived meanwhile."""
     yield pipe.recv()
     while pipe.poll():
         yield pipe.recv()

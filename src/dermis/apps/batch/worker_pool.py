@@ -1,4 +1,4 @@
-"""Worker processes on this machine: each renders one part at a time and is replaced if it dies."""
+"""Worker processes on this machine: each worker renders one part at a time; dead workers are replaced."""
 
 from __future__ import annotations
 

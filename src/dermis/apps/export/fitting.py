@@ -25,7 +25,7 @@ _LOG_BOUND, _LOG_TOLERANCE = 2.0, 1e-4  # search range and tolerance of least sq
 
 
 def burley_curve(d_mm: ArrayLike, energy: ArrayLike) -> CumulativeProfile:
-    """Return the cumulative profile of Burley's R(r) = A (exp(-r/d) + exp(-r/3d)) / (8 pi d r).
+    """Return the cumulative form of Burley's profile R(r) = A (exp(-r/d) + exp(-r/3d)) / (8 pi d r).
 
     d_mm : (3,) width d of each channel [mm]
     energy : (3,) total energy A of each channel: emerging light per incident light [-]

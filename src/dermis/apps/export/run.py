@@ -34,14 +34,14 @@ class ExportReport:
     """Report of one export.
 
     target, title, version, variant : name, title, version and variant of the target program; the variant is
-        empty if the target has none
+        empty if the target has no variants
     subject : name of the exported skin or head
     model : name of the model of the skin's reference profile
     parameters : exported parameters
     naive_parameters : parameters that a user might choose without knowing their meaning in the program
     d_mm : (3,) width of the Burley profile closest to the reference profile [mm]
     error, naive_error : errors of the profile that the program renders with the exported and with the naive
-        parameters, predicted by its own formulas
+        parameters, predicted by the formulas of the program
     limitations : sentences on what the program cannot reproduce
     untested : whether the parameters were never used in the program itself
     files : paths of all written files

@@ -73,7 +73,7 @@ class Subject:
 
     @cached_property
     def head_or_ball(self) -> Head:
-        """Return the head, or a ball of diameter `BALL_MM` if there is none."""
+        """Return the head, or a ball of diameter `BALL_MM` if there is no head."""
         return self.head or Head("ball", uv_sphere(0.5 * BALL_MM), Maps())
 
     @cached_property

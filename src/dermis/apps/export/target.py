@@ -123,7 +123,7 @@ class Target(ABC):
     """Whether the exported files have not been tested in the program."""
 
     def with_variant(self: T, variant: str | None) -> T:
-        """Return this target with a variant selected; None selects the first.
+        """Return a copy of this target with a selected variant; None selects the first of `variants`.
 
         Parameters
         ----------
@@ -255,7 +255,7 @@ class Target(ABC):
 
     @abstractmethod
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the cumulative profile that the program renders, predicted by its own formulas.
+        """Return the cumulative profile that the program renders, predicted by the formulas of the program.
 
         Parameters
         ----------
@@ -296,7 +296,7 @@ class Target(ABC):
 
 
 class JsonTarget(Target):
-    """Base class of targets that write a JSON file of parameters, and were not tried in the program."""
+    """Base class of targets that write a JSON file of parameters; the parameters were not tried."""
 
     suffixes = (".json", "")
     untested = True

@@ -209,7 +209,7 @@ def _interpolate(start: ArrayLike, end: ArrayLike, fraction: float) -> Floats:
 def _rotation_matrix(axis: Floats, angle: float) -> Floats:
     """Return the (3, 3) matrix of a rotation around a unit axis.
 
-    angle : angle [rad]
+    angle : angle of the rotation [rad]
     """
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

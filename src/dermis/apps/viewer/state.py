@@ -98,7 +98,7 @@ class ViewerState:
 
     @property
     def head_table(self) -> Table:
-        """Return the [head] table with the head's subdivision level; empty for a head from memory."""
+        """Return the [head] table with the head's subdivision level; empty for a head created in memory."""
         return self.head and {"subdivide": self.scene.head.levels, **self.head}
 
     def with_skin(self, **fields: object) -> ViewerState:
@@ -139,7 +139,7 @@ class ViewerState:
         return self.with_lights(lights)
 
     def with_environment(self, environment: Environment | None) -> ViewerState:
-        """Return a copy with another environment; None removes it."""
+        """Return a copy with another environment; None removes the environment."""
         return self._with_scene(environment=environment)
 
     def with_view(self, name: str) -> ViewerState:

@@ -151,7 +151,7 @@ class ViewRenderer:
         self._atlas_state: tuple[ViewerState, str] | None = None
 
     def prepare(self, state: ViewerState, on_resources_ready: Callable[[], None] = lambda: None) -> None:
-        """Render small images of a state, in motion and still, so that its resources and shaders exist.
+        """Render small images of a state, in motion and still, to create all resources and shaders.
 
         on_resources_ready : function called when the resources of the head have been created
 

@@ -297,7 +297,7 @@ class Viewer:
         return session.heads.request_frame
 
     def _reopen_device(self, error: DermisError) -> None:
-        """Reopen the device after it was lost or ran out of memory."""
+        """Reopen the device after the device was lost or ran out of memory."""
         import wgpu
 
         self._failures += 1

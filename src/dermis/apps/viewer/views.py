@@ -99,7 +99,7 @@ class IntermediateViews:
         return self._render(self._atlas_shader, {"atlas_view": record, "layer": layer}, settings.size)
 
     def _render(self, shader: ComputeProgram, bindings: Bindings, size: tuple[int, int]) -> Texture:
-        """Run a shader that stores an image to the texture `bytes`, and return that texture."""
+        """Run a shader that writes an image to its binding `bytes`, and return the texture bound there."""
         device = self._renderer.device
         if self._image is None or self._image.size[:2] != size:
             self._image = make_texture(device, size, "rgba8uint")

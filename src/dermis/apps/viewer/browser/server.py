@@ -37,7 +37,7 @@ class LimitedConnection(H11Protocol):  # type: ignore[misc]
         self._deadline: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:
-        """Accept a connection, or drop it if too many are open."""
+        """Accept a connection, or drop the connection if too many others are open."""
         super().connection_made(transport)
         if len(self.connections) > MAX_CONNECTIONS:
             transport.abort()

@@ -62,7 +62,7 @@ class ImguiFrames:
         self._is_new = self._has_layout = False
 
     def open(self, device: Device, target: str) -> None:
-        """Create the context and the resources that draw it.
+        """Create the Dear ImGui context, and the GPU resources that draw the layouts.
 
         target : format of the textures to draw into
         """
@@ -157,7 +157,7 @@ def feed_pointer(event: Event, frame: Callable[[], None]) -> None:
 def feed_key(event: Event, frame: Callable[[], None]) -> None:
     """Pass a key or character to Dear ImGui, and lay out the panel at once.
 
-    Otherwise a press and a release of a key between two frames would cancel out.
+    Without this layout, a press and a release of a key between two frames would cancel out.
 
     frame : function that lays out the panel with the events so far
     """

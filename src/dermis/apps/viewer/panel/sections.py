@@ -331,7 +331,7 @@ def draw_view(session: Session) -> None:
 
 
 def draw_comparison(session: Session) -> None:
-    """Draw the buttons of the before/after comparison: freeze the state, swap the sides, or end it."""
+    """Draw the buttons of the before/after comparison: freeze the state, swap the sides, end."""
     split, state = session.split, session.state
     if draw_button(session, "freeze"):
         split.freeze(session.displayed_state)

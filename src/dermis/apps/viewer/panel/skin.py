@@ -78,7 +78,7 @@ def draw_profile(session: Session) -> None:
 
 
 def draw_surface(session: Session) -> None:
-    """Draw the fields of `Skin` except those of the profile section; new fields appear by default."""
+    """Draw all fields of `Skin` that the profile section does not draw."""
     state, earlier_states = session.state, session.history.states
     for name in fields_under("", type(state.scene.skin)):
         if name == "rho_s":

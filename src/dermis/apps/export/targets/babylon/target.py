@@ -101,8 +101,8 @@ def _parameters(subject: Subject, profile_colour: Floats, meters_per_unit: float
 def spiral_samples(colour: ArrayLike, sample_count: int = SAMPLE_COUNT) -> tuple[Floats, Floats, Floats]:
     """Return radii (n,), angles (n,) [rad] and normalised weights (n, 3) of the shader's samples.
 
-    The radii are for metersPerUnit 1 and without the shader's width error: multiply them by `WIDTH_ERROR` /
-    metersPerUnit to get mm.
+    The radii are for metersPerUnit 1 and without the shader's width error: multiply the radii by
+    `WIDTH_ERROR` / metersPerUnit to get mm.
 
     colour : (3,) diffusion profile as Babylon.js defines it: inverse widths
     """

@@ -22,7 +22,7 @@ EXPORT: dict[str, Any] = {}
 
 
 def main(arguments: list[str]) -> None:
-    """Build the scene of this export, then save and render it as requested."""
+    """Build the scene of this export, then save and render the scene as the arguments request."""
     options = parse_options(arguments)
     check_version()
     if bpy.app.background:
@@ -78,7 +78,7 @@ def set_units(scene: Any) -> None:
 
 
 def place_head() -> None:
-    """Import the head's .glb beside this script and set its skin material, or add a ball if there is none."""
+    """Import the head from the .glb beside this script and set its skin material; otherwise, add a ball."""
     if EXPORT["head"] is None:
         add_ball(EXPORT["ball_m"])
         return
@@ -152,7 +152,7 @@ def set_render(scene: Any) -> None:
 
 
 def save_and_render(options: argparse.Namespace) -> None:
-    """Save and render the scene as requested."""
+    """Save and render the scene as the options request."""
     scene = bpy.context.scene
     if scene.render.engine == "CYCLES":
         cycles = scene.cycles

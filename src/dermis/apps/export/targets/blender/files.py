@@ -142,7 +142,7 @@ def script_text(export: Mapping[str, object]) -> str:
 
     Texts are written as literals, so that a name cannot inject code.
 
-    export : numbers, texts, and nested lists and dictionaries of them
+    export : numbers, texts, and nested lists and dictionaries of numbers and texts
     """
     text = Path(__file__).with_name("blender_script.py").read_text(encoding="utf-8")
     source = (Path(*truths.__path__) / "cycles_script.py").read_text(encoding="utf-8")

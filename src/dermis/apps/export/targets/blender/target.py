@@ -126,7 +126,7 @@ def walk_cdf(radius: ArrayLike, albedo: float, entry: WalkEntry) -> Floats:
 
 @cache
 def _interpolate_walk_table(albedo: float, entry: WalkEntry) -> tuple[Floats, Floats]:
-    """Return radii [mean free paths] and the fraction of light within each [-], for one albedo.
+    """Return radii [mean free paths] and the fraction of light within each radius [-], for one albedo.
 
     The tabulated random walks are interpolated to this albedo, and to radii that are eight times as dense.
     """

@@ -76,7 +76,7 @@ class Mitsuba(Target):
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the medium fitted to the profile and to the lightest skin; textures darken other skin."""
+        """Return the medium fitted to the profile and to the lightest skin; textures darken the other skin."""
         boundary, colours = self._boundary, skin_colours(subject)
         medium = fit_medium(subject.curve, colours, boundary)
         transmittance = colours.transmittance(boundary)

@@ -75,6 +75,7 @@ def input_name(shader: str, name: str) -> str:
     """Return the name that an input of OpenPBR has in a shader.
 
     shader : `OPEN_PBR` or `STANDARD_SURFACE`
+    name : name of the input in OpenPBR
     """
     return name if shader == OPEN_PBR else _STANDARD_SURFACE_NAMES[name]
 
@@ -181,7 +182,7 @@ def eye_material(name: str) -> OpenPbrMaterial:
 
 
 def hair_material(absorption: Floats, radius_mm: float) -> OpenPbrMaterial:
-    """Return the OpenPBR material of hairs: an opaque surface of their mean colour.
+    """Return the OpenPBR material of hairs: an opaque surface with the mean colour of the hairs.
 
     absorption : (n, 3) absorption coefficient inside the hairs [1/mm]
     radius_mm : radius of the hairs [mm]

@@ -38,7 +38,7 @@ _PAGE_FOLDER = Path(__file__).parent
 
 @dataclass(frozen=True)
 class LibraryFile:
-    """JavaScript file of an npm package, with the hash by which it is checked.
+    """JavaScript file of an npm package, with a hash by which the content of the file is checked.
 
     package, version : name and version of the package
     path : path of the file within the package

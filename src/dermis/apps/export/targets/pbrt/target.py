@@ -1,4 +1,4 @@
-"""Export to pbrt: its subsurface material, fitted with pbrt's own table of photon beam diffusion."""
+"""Export to pbrt, whose subsurface material is fitted with pbrt's own table of photon beam diffusion."""
 
 from __future__ import annotations
 
@@ -179,7 +179,7 @@ class Pbrt(Target):
         return _parameters(subject, path, "1 / (sigma_a + sigma_s); a unit is 1 mm")
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the skin's colour as reflectance, and published diffuse mean free paths as mfp."""
+        """Return the skin's colour as reflectance, and published diffuse mean free paths as parameter mfp."""
         return _parameters(subject, published_mean_free_path_mm(subject), "as published, 1 / sigma_tr")
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:

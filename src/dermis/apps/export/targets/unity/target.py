@@ -109,7 +109,7 @@ def _scattering_distances(d_mm: Floats, version: str) -> Parameters:
 
 
 def asset_text(asset_name: str, parameters: Parameters, version: str) -> str:
-    """Return the YAML of the asset; when Unity's editor first opens the asset, it adds the profile's hash."""
+    """Return the YAML of the asset, without the profile's hash, which Unity adds on first opening."""
     values = {one.name: one.value for one in parameters}
     colour, tint = (_rgba(get_numbers(parameters, key)) for key in (_COLOUR_NAME, _TRANSMISSION_NAME))
     low, high = get_numbers(parameters, _THICKNESS_NAME)

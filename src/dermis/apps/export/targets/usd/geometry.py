@@ -57,7 +57,7 @@ def add_mesh(
 ) -> dict[int, UsdGeom.Subset]:
     """Add the mesh in its rest pose to the stage; return the geometry subset of each material index.
 
-    deformable : the head's mesh with all morph targets at 0
+    deformable : the head's mesh with morph targets and bone weights, all morph targets at weight 0
     """
     mesh, polygons = head.mesh, mesh_polygons(head.mesh)
     vertex = point_vertices(mesh)
@@ -129,11 +129,11 @@ def to_metres(positions_mm: NDArray[np.floating]) -> Floats:
 
 
 def add_motion(stage: Usd.Stage, root: Sdf.Path, mesh: Usd.Prim, deformable: DeformableMesh) -> None:
-    """Add blend shapes, a skeleton and a rest animation to the head, so that programs can pose it.
+    """Add blend shapes, a skeleton and a rest animation, with which programs can pose the head.
 
     root : path of the UsdSkelRoot
     mesh : mesh that blend shapes and skeleton deform
-    deformable : the head's mesh with all morph targets at 0
+    deformable : the head's mesh with morph targets and bone weights, all morph targets at weight 0
     """
     path = root.AppendChild("skeleton")
     skeleton = UsdSkel.Skeleton.Define(stage, path)

@@ -102,7 +102,7 @@ def _column_packer(byte_runs: ByteRunCollector) -> Callable[[Bytes], int]:
 def _mip_bytes(capture: FrameCapture, resource_index: int) -> list[Bytes]:
     """Return the bytes of each mip level of a texture, with its layers joined; a buffer has one level.
 
-    resource_index : resource index
+    resource_index : index of the texture or buffer in the capture
     """
     parts, layers = capture.read_content(resource_index), capture.resources[resource_index].get("size")
     count = layers[2] if isinstance(layers, list) else 1
@@ -124,7 +124,7 @@ def _frame_json(frame: NamedFrame, picture: list[int], byte_runs: ByteRunCollect
 
 
 def _view_record(captured: CapturedFrame, stage: str) -> int:
-    """Return the index of the uniform record with a stage's view matrices; -1 if it has none.
+    """Return the index of the uniform record with a stage's view matrices; -1 if there is no such record.
 
     stage : "visibility" or "shadows"
     """
@@ -172,10 +172,10 @@ def _camel_case(snake_case: str) -> str:
 
 
 def resources_read_first(capture: FrameCapture, frames: Frames) -> list[int]:
-    """Return the sorted indices of the resources that a frame reads before it writes them.
+    """Return the sorted indices of the resources that a frame reads before writing.
 
     The page stores the data of these resources. Views are replaced by their textures, so that a texture
-    counts as written if any part of it is.
+    counts as written if any part of the texture is written.
     """
     found: set[int] = set()
     for frame in frames:
@@ -198,7 +198,7 @@ def resources_bound_as(capture: FrameCapture, frames: Frames, names: tuple[str, 
 def base_resource(capture: FrameCapture, resource_index: int) -> int:
     """Return the resource index of a view's texture; any other resource index is returned unchanged.
 
-    resource_index : resource index
+    resource_index : index of the texture or buffer in the capture
     """
     return int(capture.resources[resource_index].get("of", resource_index))
 
@@ -206,7 +206,7 @@ def base_resource(capture: FrameCapture, resource_index: int) -> int:
 def resources_read_by(capture: FrameCapture, captured_pass: CapturedPass) -> Iterator[int]:
     """Yield the indices of the resources that a pass may read.
 
-    captured_pass : pass that reads
+    captured_pass : pass of a captured frame
     """
     yield from (k for k, entry in _bound_entries(capture, captured_pass) if _allows_reading(entry))
     if captured_pass.raster and captured_pass.raster["indices"] >= 0:
@@ -216,7 +216,7 @@ def resources_read_by(capture: FrameCapture, captured_pass: CapturedPass) -> Ite
 def resources_written_by(capture: FrameCapture, captured_pass: CapturedPass) -> Iterator[int]:
     """Yield the indices of the resources that a pass may write.
 
-    captured_pass : pass that writes
+    captured_pass : pass of a captured frame
     """
     if captured_pass.written:
         yield captured_pass.written[0]

@@ -33,7 +33,7 @@ class Picture:
     """One layer of a map, encoded as a WebP picture.
 
     data : WebP file; for a map that is not a colour, a grey picture with the channels below each other
-    curves : (c, 256) value that each of the 256 levels of a channel decodes to
+    curves : (c, 256) decoded value of each of the 256 levels of a channel
     texels : (h, w, c) texels decoded from the picture
     """
 
@@ -142,7 +142,7 @@ class MapPictures:
     ) -> NDArray[np.float16]:
         """Add the pictures of a mip level, and return the (l, h, w, c) texels decoded from them.
 
-        resource_index : resource index
+        resource_index : index of the texture or buffer in the capture
         mip : mip level
         """
         layers = read_texels(capture, resource_index, mip)
@@ -185,7 +185,7 @@ def quantise_hairs(renderer: Renderer, capture: FrameCapture, frames: Frames) ->
 def read_texels(capture: FrameCapture, resource_index: int, mip: int) -> NDArray[np.float16]:
     """Return the (l, h, w, c) texels of a mip level of a half-float texture.
 
-    resource_index : resource index
+    resource_index : index of the texture or buffer in the capture
     """
     width, height, layers = capture.resources[resource_index]["size"]
     sides = max(1, height >> mip), max(1, width >> mip)
