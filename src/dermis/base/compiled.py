@@ -1,6 +1,6 @@
 """Compilation of Python loops to machine code by numba, with a disk cache.
 
-Import this module inside a function, because it loads numba.
+Import this module inside a function, because the import loads numba.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class _CodeCache(caching.NullCache):  # type: ignore[misc, name-defined]
         self._source_key = f"{identity} {_source_hash(file.parent)} {numba.__version__} {sys.version}"
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return the cached machine code for a signature, or None if there is none."""
+        """Return the cached machine code for a signature, or None if there is no cached code."""
         target_context.refresh()
         found = load_arrays(_CACHE_FOLDER, self._key(sig, target_context.codegen()), [_ARRAY_NAME])
         if found is None:

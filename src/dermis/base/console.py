@@ -99,7 +99,7 @@ class _SpinnerText(logging.Handler):
         self._task, self._step, self._began = task, "", 0.0
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Set the current step from the log record of its start or end, see `logged_step`."""
+        """Set the current step from a log record of the start or end of a step, see `logged_step`."""
         begins = record.levelno >= logging.INFO
         self._step, self._began = record.getMessage() if begins else "", time.monotonic()
 

@@ -202,7 +202,7 @@ def _digest_line(head: bytes) -> bytes:
 
 
 def _byte_count(dtype: np.dtype[Any], shape: Sequence[int]) -> int:
-    """Return the size of an array in bytes, after checking its type and shape before memory is allocated."""
+    """Return the size of an array in bytes, after a check of type and shape, before memory is allocated."""
     if (
         dtype.kind not in _PLAIN_KINDS
         or not dtype.itemsize
@@ -213,7 +213,7 @@ def _byte_count(dtype: np.dtype[Any], shape: Sequence[int]) -> int:
 
 
 def _read_block(path: Path, block: memoryview, offset: int) -> str:
-    """Read a block of bytes of a file into memory and return its SHA-256.
+    """Read a block of bytes of a file into memory, and return the SHA-256 of the block.
 
     block : memory to be filled
     offset : position of the block in the file [bytes]

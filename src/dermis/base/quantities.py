@@ -82,7 +82,7 @@ def check_fields(owner: object, ranges: Mapping[str, tuple[float, float]], prefi
 
 
 def _number_in_range(value: object, low: float, high: float) -> int | float | None:
-    """Return a value as a Python number, or None if it is not a number in the range."""
+    """Return a value as a Python number, or None if the value is not a number in the range."""
     found: Any = value
     if type(value) not in (int, float):  # plain numbers need no NumPy
         import numpy as np

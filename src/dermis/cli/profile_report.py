@@ -73,7 +73,7 @@ def additional_fit(radial: RadialProfile, kind: str) -> BurleyFit | SeparableFit
 
 @dataclass(frozen=True)
 class ProfileReport:
-    """Diffusion profile with its fits and their errors, as `dermis profile` prints it.
+    """Diffusion profile with fits and the errors of the fits, as `dermis profile` prints them.
 
     radial : diffusion profile
     tissue : tissue that the profile describes; None for a table of Gaussians

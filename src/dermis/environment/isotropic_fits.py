@@ -141,7 +141,7 @@ def _arrange_pair(initial: Floats, target: LobeTarget, view_index: int) -> Float
 
     For an elongated specular lobe, the pair is in the plane of incidence, else on both sides of this plane.
 
-    initial : (4, 5) parameters by kind and lobe
+    initial : (4, 5) initial parameters; axes: kind of parameter, lobe
     view_index : index of the view in LOBE_TABLE_COSINES
     """
     lobes = initial.copy()
@@ -184,7 +184,10 @@ def _fit_parameters(target: LobeTarget, view_index: int, initial: Floats, neighb
 
     @lru_cache(maxsize=2)
     def reduced_system(vector: bytes) -> Floats:
-        """Return Jacobian and residual at parameters, reduced by QR from about 8,000 to 16 rows."""
+        """Return Jacobian and residual, reduced by QR from about 8,000 to 16 rows.
+
+        vector : parameters along the free directions, as bytes of float64
+        """
         x = np.frombuffer(vector)
         parameters = (fixed + free @ x).reshape(4, LOBE_COUNT)
         total, slopes = isotropic_sum(_to_isotropic_lobes(parameters, target, active), target.degree)

@@ -95,7 +95,7 @@ def harmonic_terms(degree: int) -> tuple[NDArray[np.intp], NDArray[np.intp], Flo
     """Return degree, order and weight (n,) of the harmonics that are symmetric about the plane of incidence.
 
     The sum of the squared, weighted differences of two lobes' coefficients is the expected squared difference
-    of their reflections of a randomly rotated environment.
+    of the two lobes' reflections of a randomly rotated environment.
     """
     pairs = [(l, m) for m in range(degree + 1) for l in range(m, degree + 1, 2)]
     degrees, orders = np.array(pairs, np.intp).T

@@ -13,7 +13,7 @@ class UnsupportedError(ValueError):
 
 @dataclass(frozen=True)
 class PictureHeader:
-    """Size and colour space of a picture file, with notes on its other properties.
+    """Size and colour space of a picture file, with notes on other properties of the file.
 
     size : width and height of the stored picture [pixel]
     colour_space : colour space of the decoded pixels

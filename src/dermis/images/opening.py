@@ -216,7 +216,7 @@ def _exif(picture: Image) -> Exif:
 
 
 def _colour_space(data: bytes, picture: Image, exif: Exif) -> tuple[ColourSpace, str | None]:
-    """Return the colour space of the decoded pixels, and a note if it is not sRGB or not known."""
+    """Return the colour space of the decoded pixels, and a note if this space is not sRGB or is unknown."""
     icc = picture.info.get("icc_profile")
     coded = _code_points(data, picture)
     if icc and not (coded and picture.format == "PNG"):

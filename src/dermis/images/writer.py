@@ -164,7 +164,7 @@ class FrameFiles:
 
 
 def _is_complete(path: Path, size: tuple[int, int], start_ns: int) -> bool:
-    """Return whether a file is a complete picture of a given size, written after the start of its sequence.
+    """Return whether a file is a complete picture of a given size, written after the sequence was started.
 
     start_ns : modification time of the record file [ns]
     """

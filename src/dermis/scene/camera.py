@@ -28,7 +28,7 @@ _Fraction = Annotated[float, Field(ge=-10, le=10), Reason("lenses do not shift f
 
 
 class Window(NamedTuple):
-    """Image rectangle of a camera, in the plane at distance 1 in front of it.
+    """Image rectangle of a camera, in the plane at distance 1 in front of the camera.
 
     The picture coordinates (x, y), each from -1 at the left or bottom to 1 at the right or top, correspond to
     the point ((x + shift[0]) half[0], (y + shift[1]) half[1]) of this plane.

@@ -243,7 +243,7 @@ def model_docstring(model: type[BaseModel]) -> str:
 
 
 def accepted_values(model: type[BaseModel], field: str) -> str:
-    """Return the accepted words and bounds of a field, such as "auto, 0 to 1"; "" without words and bounds."""
+    """Return the accepted words and bounds of a field, such as "auto, 0 to 1"; "" if there are none."""
     low, high = field_bounds(model.model_fields[field])
     words = [*field_keywords(model, field), *field_choices(model, field)]
     if low is not None and high is not None and high < _DISPLAYED_BOUND:

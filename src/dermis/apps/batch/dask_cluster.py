@@ -30,7 +30,7 @@ class DaskCluster:
 
     address : address of the scheduler; None if `file` is given
     file : scheduler file, written by `dask scheduler --scheduler-file`
-    adapter : adapters to use, as in `SlotRequest`; the workers of a host use the matching ones in turn
+    adapter : adapters to use, as in `SlotRequest`; the workers of a host use the matching adapters in turn
     """
 
     address: str | None

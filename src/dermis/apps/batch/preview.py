@@ -76,7 +76,7 @@ def dry_run(spec: Spec, adapter: str = "auto") -> tuple[list[ParameterRow], NDAr
 
 
 def estimate(spec: Spec, adapter: str = "auto") -> Estimate:
-    """Return the size and the duration of a data set, by rendering its first images as a worker does.
+    """Return the size and the duration of a data set, by rendering the first images as a worker does.
 
     The first two images, which fill caches, are not timed.
     """

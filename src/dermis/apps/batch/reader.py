@@ -292,7 +292,10 @@ def _to_array(numbers: NestedNumbers, shape: tuple[int, ...]) -> NDArray[np.floa
 
 
 def _refuse_malformed_record(culprit: object) -> AbstractContextManager[None]:
-    """Return a context that turns errors of a malformed record into a DermisError."""
+    """Return a context manager that turns errors of a malformed record into a DermisError.
+
+    culprit : name of the file in error messages
+    """
     return parsing(culprit, "a record of an image", KeyError, TypeError, AttributeError)
 
 

@@ -78,8 +78,8 @@ def round_significant(value: float) -> float:
 class Movement:
     """Movement of a part of the face in random expressions: a row of mixture.csv.
 
-    probability : probability of this movement within its part of the face [-]
-    max_weight : largest weight of its morph targets [-]
+    probability : probability of this movement among the movements of the same part of the face [-]
+    max_weight : largest weight of the morph targets of the movement [-]
     target_weights : weights of the morph targets relative to each other
     jaw_closing : fraction by which the movement, at full strength, reduces the opening of the jaw [-]
     """
@@ -170,7 +170,7 @@ class Sampler:
     expressions: Mapping[str, Weights]
 
     def parameters(self, k: int) -> Parameters:
-        """Return the sampled parameters of image k by dotted name, which do not depend on other images."""
+        """Return the sampled parameters of image k by dotted name, independently of other images."""
         person = k // self.images_per_person
         sampled: Parameters = {"person.number": person}
         if "person.head" not in self.distributions:
@@ -208,7 +208,7 @@ class Sampler:
         return float(ndtri(self._uniform(image, parameter)))
 
     def _target_weights(self, image: int, sampled_parameters: Parameters) -> dict[str, float]:
-        """Return the weights that all morph targets which the spec can move have in an image.
+        """Return the weights, in an image, of all morph targets that the spec can move.
 
         image : number of the image
         sampled_parameters : parameters of the image that have been sampled so far

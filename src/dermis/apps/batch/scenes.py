@@ -64,7 +64,7 @@ class SceneBuilder:
         self._people: OrderedDict[frozenset[tuple[str, float | str]], _Person] = OrderedDict()
 
     def build(self, parameters: Parameters) -> tuple[Scene, Settings]:
-        """Return the scene and render settings of an image, which depend on its parameters only.
+        """Return the scene and render settings of an image, which depend only on the image's parameters.
 
         parameters : sampled parameters of the image, from `Spec.parameters`
 

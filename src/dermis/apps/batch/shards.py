@@ -119,7 +119,10 @@ class ShardWriter:
         return self
 
     def add(self, number: int, entries: Mapping[str, bytes]) -> None:
-        """Write the files of an image, given by suffix; images must come in the order of their numbers."""
+        """Write the files of an image; images must come in the order of their numbers.
+
+        entries : content of each file, by suffix
+        """
         if not self._next_number <= number < self._shard.stop:
             raise ValueError(f"image {number} was added after {self._next_number - 1}, in {self._shard}")
         self._next_number, self._written = number + 1, self._written + 1

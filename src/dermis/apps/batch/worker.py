@@ -54,7 +54,7 @@ class Failure(NamedTuple):
 
 @dataclass(frozen=True)
 class RunOptions:
-    """Options of a run, shared by all of its workers.
+    """Options of a run, shared by all workers of the run.
 
     spec : spec of the data set
     out : folder of the data set
@@ -73,7 +73,7 @@ class WorkerSlot:
     """Adapter and thread count with which one worker renders.
 
     adapter : name or number of the adapter, as for `Renderer`
-    threads : threads of a software adapter; 0 for its default
+    threads : threads of a software adapter; 0 for the default of the adapter
     """
 
     adapter: str
@@ -137,7 +137,7 @@ class Worker:
         return renderer
 
     def process(self, tasks: Iterable[Shard], send: Callable[[WorkerEvent], None]) -> None:
-        """Render the parts among the tasks, join those of complete shards, and verify the shards.
+        """Render the parts among the tasks, join the parts of complete shards, and verify the shards.
 
         The next task is requested while frames of the previous task are in flight. Without the option
         `keep_going`, a failed image raises DermisError.

@@ -120,7 +120,7 @@ class _PoolState:
             self._send_task(worker)
 
     def receive(self, worker: _WorkerProcess) -> WorkerEvent:
-        """Return the next event of a worker; send the worker its next task, replace it or stop it.
+        """Return the next event of a worker; then send the worker a task, replace the worker, or stop it.
 
         Raises DermisError for a refusal, and for a part that failed `MAX_ATTEMPTS` times.
         """

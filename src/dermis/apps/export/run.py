@@ -251,7 +251,7 @@ def evaluate_export(subject: Subject, target: Target, version: str) -> ExportRep
 
 
 def _checked_output(target: Target, output: str | Path) -> Path:
-    """Return the output path; raise DermisError if the target cannot write its suffix."""
+    """Return the output path; raise DermisError if the target cannot write files with this suffix."""
     path = Path(output)
     if path.suffix.lower() not in target.suffixes:
         allowed = [suffix or "no suffix, for a folder" for suffix in target.suffixes]

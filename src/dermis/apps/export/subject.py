@@ -78,7 +78,7 @@ class Subject:
 
     @cached_property
     def part_pictures(self) -> PartPictures | None:
-        """Return the pictures of the head's parts that are not skin, or None if there are none."""
+        """Return the pictures of the head's parts that are not skin, or None if no part has pictures."""
         return None if self.head is None else PartPictures.of(self.head)
 
     @property

@@ -74,8 +74,9 @@ def write_files(folder: Path, contents: Iterable[tuple[str, bytes]]) -> list[Pat
 class Target(ABC):
     """Export target: a program for which skins and heads are written.
 
-    Subclasses are registered in `dermis.apps.export.registry.TARGETS`. They convert a skin to parameters of
-    the program, predict the profile that the program renders with these parameters, and write the files.
+    Subclasses are registered in `dermis.apps.export.registry.TARGETS`. A subclass converts a skin to
+    parameters of the program, predicts the profile that the program renders with these parameters, and writes
+    the files.
 
     Parameters
     ----------
@@ -155,10 +156,10 @@ class Target(ABC):
         folder : str or Path
             The folder node_modules of npm that contains the library.
 
-            Returns
-            -------
-            Target
-                A copy of the target.
+        Returns
+        -------
+        Target
+            A copy of the target.
 
         Raises
         ------
@@ -238,7 +239,7 @@ class Target(ABC):
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the parameters that a user might choose without knowing their meaning in the program.
 
-        The report shows their errors beside those of the fitted parameters.
+        The report shows the errors with these parameters beside the errors with the fitted parameters.
 
         Parameters
         ----------

@@ -136,7 +136,7 @@ def write_pictures(head: Head, folder: Path) -> Path:
 
 
 def write_vertex_colours(head: Head, folder: Path) -> Path:
-    """Write a head with colours at its vertices and without uv, as a .ply file; return the path."""
+    """Write a head with vertex colours and without uv as a .ply file, and return the path."""
     mesh, colour = head.mesh, _colour_map_srgb(head)
     y, x = (mesh.uv[:, ::-1] * np.array(colour.shape[:2]) - 0.5).clip(0).astype(int).T
     kinds = [f"property float {axis}" for axis in "xyz"]

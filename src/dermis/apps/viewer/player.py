@@ -1,4 +1,4 @@
-"""Playback of a motion over the viewer state; when paused, its pose becomes a step of the undo history."""
+"""Playback of a motion over the viewer state; on pause, the pose becomes a step of the undo history."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from dermis.scene.motion import load_motion
 
 
 class MotionFile:
-    """Motion file, with a cache of the clip that was last loaded from it for a head.
+    """Motion file, with a cache of the clip that was last loaded from the file for a head.
 
     path : file that `load_motion` accepts
     fps : frame rate of files without times [1/s]
@@ -27,7 +27,8 @@ class MotionFile:
     def load_clip(self, head: Head) -> Clip:
         """Return the clip that the file contains for a head; the clip for the last head is cached.
 
-        Raises DermisError if the file cannot be read, or if it moves no morph target or bone of the head.
+        Raises DermisError if the file cannot be read, or if the motion moves no morph target or bone of the
+        head.
         """
         if self._last is None or self._last[0] is not head:
             self._last = head, load_motion(self.path, head, fps=self._fps)
@@ -112,7 +113,8 @@ class MotionPlayer:
     def open(self, motion: MotionFile) -> None:
         """Replace the motion and play it from its beginning.
 
-        Raises DermisError if the file cannot be read, or if it moves no morph target or bone of the head.
+        Raises DermisError if the file cannot be read, or if the motion moves no morph target or bone of the
+        head.
         """
         motion.load_clip(self._history.state.scene.head)
         self.pause()

@@ -103,7 +103,7 @@ def _pose_or_rest(scene: Scene) -> Pose:
 
 
 def _none_if_rest(pose: Pose) -> Pose | None:
-    """Return a pose, or None if it equals the rest pose of the head."""
+    """Return a pose, or None if the pose equals the rest pose of the head."""
     return pose if pose.weights or pose.bones or pose.positions_mm is not None else None
 
 

@@ -182,7 +182,7 @@ class Session:
 
     @property
     def displayed_state(self) -> ViewerState:
-        """Return the state on screen: the current state, with the pose of the motion while it plays."""
+        """Return the state on screen: the current state, posed by the motion while the motion plays."""
         return self.player.displayed_state
 
     def change(self, state: ViewerState, gesture: str = "") -> None:
@@ -243,7 +243,8 @@ class Session:
     def open_motion(self, path: str) -> None:
         """Open a motion file and play it.
 
-        Raises DermisError if the file cannot be read, or if it moves no morph target or bone of the head.
+        Raises DermisError if the file cannot be read, or if the motion moves no morph target or bone of the
+        head.
         """
         self.player.open(MotionFile(path))
         self.message = f"opened {path}"

@@ -267,7 +267,7 @@ class ViewRenderer:
         return self.rendered.exposure if self.rendered else 1.0
 
     def read(self, image: Texture) -> NDArray[np.uint8]:
-        """Download an image and return its (h, w, 3) sRGB bytes."""
+        """Download an image, and return the (h, w, 3) sRGB bytes of the image."""
         return np.ascontiguousarray(download(self.renderer.device, image)[..., :3])
 
     def _draw(self, state: ViewerState, divider_side: str = "") -> Texture:

@@ -132,7 +132,7 @@ class Viewer:
         canvas.request_draw(self.draw)
 
     def draw(self) -> None:
-        """Draw a frame into the canvas; reopen the device if it was lost."""
+        """Draw a frame into the canvas; reopen a device that was lost."""
         try:
             with gpu_failures(self.session.view_renderer.renderer.device):
                 self._draw(self._clock())

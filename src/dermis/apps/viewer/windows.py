@@ -151,7 +151,7 @@ def view(
 
 
 def _notebook_canvas(backend: Any) -> Any:
-    """Return the notebook widget class of rendercanvas with workarounds for two of its bugs."""
+    """Return the notebook widget class of rendercanvas, with workarounds for two bugs of rendercanvas."""
 
     class NotebookCanvas(backend.AnywidgetRenderCanvas):  # type: ignore[misc]
         def _rfb_handle_msg(self, widget: object, content: Event, buffers: list[bytes]) -> None:

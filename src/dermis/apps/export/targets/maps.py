@@ -1,4 +1,4 @@
-"""Export of a head's maps as pictures in its uv layout, with irradiance before and after diffusion."""
+"""Export of a head's maps as pictures in the uv layout, with irradiance before and after diffusion."""
 
 from __future__ import annotations
 
@@ -171,9 +171,9 @@ def _to_uint16(fraction: Floats) -> NDArray[np.uint16]:
 
 
 def check_side(side: object) -> int:
-    """Return the requested side of the maps [texel] if it is supported.
+    """Return the requested side of the maps [texel] after checking that the side is supported.
 
-    Raises DermisError if it is not one of `MAP_SIDES`.
+    Raises DermisError for a side that is not one of `MAP_SIDES`.
     """
     if side not in MAP_SIDES or isinstance(side, bool):
         actual = f"got {side!r}"

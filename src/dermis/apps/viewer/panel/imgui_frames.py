@@ -52,7 +52,7 @@ ReportError = Callable[[Exception], None]
 
 
 class ImguiFrames:
-    """Dear ImGui context, with the GPU resources that draw it.
+    """Dear ImGui context, with the GPU resources that draw the layouts.
 
     report_error : function that receives errors raised during a layout; later frames are still drawn
     """

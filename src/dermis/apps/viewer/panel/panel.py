@@ -158,7 +158,7 @@ class Panel:
         return 0.0 if is_drawer(size) else self._covered_width(size)
 
     def _covered_width(self, window_size: tuple[float, float]) -> float:
-        """Return the width of the window that the panel covers, 0 if it is hidden [logical pixel].
+        """Return the width of the window that the panel covers, 0 for a hidden panel [logical pixel].
 
         window_size : logical size of the window
         """

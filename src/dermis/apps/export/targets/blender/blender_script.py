@@ -120,7 +120,7 @@ def make_skin() -> Any:
 
 
 def set_skin(shader: Any) -> None:
-    """Set the exported inputs of a Principled BSDF node, and convert its roughness from Beckmann to GGX.
+    """Set the exported inputs of a Principled BSDF node, and convert the roughness from Beckmann to GGX.
 
     If a roughness map is connected, the map is multiplied by the factor of this conversion.
 

@@ -53,7 +53,7 @@ def burley_cdf(radius: ArrayLike) -> Floats:
 
 
 def burley_shape_factor(colour: ArrayLike) -> Floats:
-    """Return Burley's factor s(A) (3,); EEVEE divides the radius by it to get the profile's width [-].
+    """Return Burley's factor s(A) (3,); in EEVEE, the profile's width is the radius divided by s(A) [-].
 
     colour : (3,) base colour; A is the colour divided by its brightest channel
 

@@ -107,7 +107,7 @@ def scene_files(
 
 
 def medium_description(medium: IsotropicMedium) -> SceneDict:
-    """Return Mitsuba's description of a homogeneous medium [mm], with the largest extinction as its scale."""
+    """Return Mitsuba's description of a homogeneous medium [mm]; the scale is the largest extinction."""
     extinction = np.asarray(medium.sigma_t)
     return {
         "type": "homogeneous",

@@ -76,7 +76,7 @@ class Mitsuba(Target):
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the medium fitted to the profile and to the lightest skin; textures darken the other skin."""
+        """Return the medium fitted to the profile and to the lightest skin; textures darken other skin."""
         boundary, colours = self._boundary, skin_colours(subject)
         medium = fit_medium(subject.curve, colours, boundary)
         transmittance = colours.transmittance(boundary)
@@ -114,7 +114,7 @@ class Mitsuba(Target):
         return curve.with_energy(factor * energy * transmittance / mean)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
-        """Write the scene with one XML file for each surface model, and its meshes and textures."""
+        """Write the scene with one XML file for each surface model, and with meshes and textures."""
         colours, scene = skin_colours(subject), subject.scene or Scene(subject.head_or_ball)
         media = {each: fit_medium(subject.curve, colours, each) for each in BOUNDARIES}
         pictured = _pictured_parts(subject)
@@ -156,7 +156,7 @@ def _boundary_transmittance(boundary: Boundary) -> float:
 
 
 def _pictured_parts(subject: Subject) -> dict[int, set[PartRole]]:
-    """Return the roles of each part's pictures by material index; eyes with an own geometry are omitted."""
+    """Return the roles of each part's pictures by material index, without the materials of eyeballs."""
     head, pictures = subject.head_or_ball, subject.part_pictures
     if pictures is None:
         return {}

@@ -174,8 +174,8 @@ def lowest_layer(subject: Subject) -> Layer | None:
 def walk_curve(colour: Floats, mfp_mm: Floats, subject: Subject) -> CumulativeProfile:
     """Return the cumulative profile of a random walk whose albedo is derived from the base colour.
 
-    The albedo is given by van de Hulst's formula. The energy is set by `Subject.rescale_energy`, so that it
-    includes the error of this formula.
+    The albedo is given by van de Hulst's formula. `Subject.rescale_energy` sets the energy of the profile,
+    which therefore includes the error of this formula.
 
     colour : (3,) base colour
     mfp_mm : (3,) mean free paths [mm]

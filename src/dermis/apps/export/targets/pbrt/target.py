@@ -154,7 +154,7 @@ def _integrate_spline(x: Floats, values: Floats) -> Floats:
 
 
 class Pbrt(Target):
-    """Export to a pbrt-v4 scene in mm, with meshes and maps in files beside it."""
+    """Export to a pbrt-v4 scene in mm, with meshes and maps in files beside the scene file."""
 
     name = "pbrt"
     title = "pbrt"
@@ -238,7 +238,7 @@ def _ball_scene(ball: Head) -> Scene:
 def _scene_lines(
     subject: Subject, parameters: Parameters, scene: Scene, prefix: str
 ) -> tuple[Lines, dict[str, bytes]]:
-    """Return the directives of the scene, and the contents of its mesh and image files by file name.
+    """Return the directives of the scene, and the contents of the mesh and image files by file name.
 
     prefix : prefix of the names of mesh and image files
     """

@@ -87,7 +87,7 @@ def _add_hairs(stage: Usd.Stage, root: Sdf.Path, head: Head) -> None:
 def _add_material(
     stage: Usd.Stage, prim_path: Sdf.Path, definition: OpenPbrMaterial, prefix: str
 ) -> UsdShade.Material:
-    """Add an OpenPBR material with its preview surface to the stage and return it.
+    """Add an OpenPBR material with a preview surface to the stage, and return the material.
 
     prefix : prefix of the file names of the maps
     """

@@ -133,7 +133,7 @@ def build_content(request: PageRequest, on_renderer: OnRenderer = lambda *_: Non
 def _capture_frames(
     content: PageContent, renderer: Renderer, request: PageRequest, adapter_kind: str
 ) -> Json:
-    """Capture the frames for one kind of adapter, add their data to `content` and return their description.
+    """Capture the frames for one kind of adapter, add the data to `content`, and return the frames' JSON.
 
     adapter_kind : kind of adapter, "gpu" or "software"
     """
@@ -194,7 +194,11 @@ def _mip_entries(content: PageContent, map_: PictureMap) -> list[list[tuple[int,
 
 
 def _colour_maps(content: PageContent, renderer: Renderer, request: PageRequest, maps: PictureMaps) -> Json:
-    """Return the index of the colour map and, by slider, the replacing picture entries at the nodes."""
+    """Return the JSON of the colour maps of slider nodes.
+
+    The JSON has the resource index of the colour map and, by slider name, the picture entry that replaces the
+    colour map at each node.
+    """
     map_index = next((k for k, one in maps.items() if one.role == "colour_map"), None)
     if map_index is None:
         return {}

@@ -59,7 +59,7 @@ def frames_json(
     steps: dict[int, tuple[float, ...]],
     byte_runs: ByteRunCollector,
 ) -> Json:
-    """Return the JSON of frames with their shaders, resources and passes, and collect their data.
+    """Return the JSON of frames with shaders, resources and passes, and collect the data of the resources.
 
     Data that is all zero is not stored, as the page creates resources filled with zeros.
 

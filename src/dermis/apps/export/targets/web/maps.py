@@ -140,7 +140,7 @@ class MapPictures:
     def _add_pictures(
         self, capture: FrameCapture, resource_index: int, role: str, mip: int
     ) -> NDArray[np.float16]:
-        """Add the pictures of a mip level, and return the (l, h, w, c) texels decoded from them.
+        """Add the pictures of a mip level, and return the (l, h, w, c) texels decoded from the pictures.
 
         resource_index : index of the texture or buffer in the capture
         mip : mip level

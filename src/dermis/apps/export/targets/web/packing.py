@@ -38,7 +38,7 @@ class ByteRunCollector:
         self._end = 0
 
     def add(self, data: Bytes | bytes, layouts: Iterable[tuple[int, int, int]] | None = None) -> int:
-        """Add a run of bytes and return its index in `runs`.
+        """Add a run of bytes, and return the run's index in `runs`.
 
         layouts : layouts to try: bytes per word, words per row, and order of the differences; the layout with
             the best compression is used
@@ -47,13 +47,13 @@ class ByteRunCollector:
         return self._add_run(raw, list(layouts or _possible_layouts(len(raw))), ())
 
     def add_parts(self, parts: Iterable[Bytes]) -> int:
-        """Add a run that concatenates parts, each encoded with its own layout; return its index in `runs`."""
+        """Add a run that concatenates separately encoded parts, and return the run's index in `runs`."""
         numbers = tuple(self.add(one) for one in parts)
         self.runs.append((0, sum(self.runs[k][1] for k in numbers), 0, 0, 0, numbers))
         return len(self.runs) - 1
 
     def add_floats(self, values: NDArray[np.float32], steps: tuple[float, ...]) -> int:
-        """Add a run of floats as integer multiples of one step per column; return its index in `runs`.
+        """Add a run of floats as integer multiples of one step per column; return the run's index in `runs`.
 
         values : (n, c) floats that are multiples of the steps
         steps : (c,) steps, powers of two

@@ -30,7 +30,7 @@ PIGMENT_FACTORS = (0.4, 1.0, 3.0)
 
 @dataclass(frozen=True)
 class Slider:
-    """Slider of the web page, which interpolates a frame between values at which it was captured (nodes).
+    """Slider of the web page, which interpolates between frames captured at certain values (nodes).
 
     values : increasing values of the nodes; one of them is `default_value`
     default_value : value with which the page starts

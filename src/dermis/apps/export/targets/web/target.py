@@ -124,7 +124,7 @@ class Web(Target):
         return gaussian_curve(variance, np.stack(weight, axis=1), subject.curve.energy)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
-        """Capture the frames of the scene and write the page with them."""
+        """Capture the frames of the scene, and write the page with these frames."""
         scene = subject.scene
         if scene is None:
             actual = f"got the skin {subject.name}"
