@@ -112,7 +112,7 @@ def _show_warnings_as_notes() -> None:
     """Show each `DermisWarning` once, as a note on stderr, in a with block; show other warnings as usual."""
     default, shown = warnings.showwarning, set[str]()
 
-    def show(message: Warning | str, category: type[Warning], *args: Any, **kwargs: Any) -> None:
+    def show_once(message: Warning | str, category: type[Warning], *args: Any, **kwargs: Any) -> None:
         if not issubclass(category, DermisWarning):
             default(message, category, *args, **kwargs)
         elif str(message) not in shown:
@@ -120,7 +120,7 @@ def _show_warnings_as_notes() -> None:
             sys.stderr.write(f"note: {message}\n")
 
     warnings.simplefilter("always", DermisWarning)
-    warnings.showwarning = show
+    warnings.showwarning = show_once
 
 
 def usage_message(error: CycloptsError, name: str) -> str:

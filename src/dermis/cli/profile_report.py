@@ -244,7 +244,7 @@ class ProfileReport:
 _CHANNEL_COLOURS = ("#c0392b", "#2e8b57", "#2a62b0")
 _LEGEND_ABOVE: dict[str, Any] = {"frameon": False, "loc": "lower left", "bbox_to_anchor": (0, 1)}
 _LAYER_COLOURS = ("#b8860b", "#8e44ad", "#16808a", "#7f8c8d")
-_DASHES = (0, (4, 3))
+_DASH_PATTERN = (0, (4, 3))
 _CHANNEL_NAMES = ("red", "green", "blue")
 _PLOT_FLOOR = 1e-5  # lowest plotted value, relative to the peak of r R(r); smaller values are noise
 _DATELESS_METADATA: dict[str, dict[str, str | None]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
@@ -289,7 +289,7 @@ def _plot_spectra(axes: Axes, report: ProfileReport) -> None:
     right.set(yscale="log", ylabel="µa, µs′ [1/mm]")
     for layer, colour in zip(report.tissue.medium.layers, _LAYER_COLOURS, strict=False):
         right.plot(WAVELENGTHS_NM, layer.sigma_a, color=colour, linewidth=1.0, label=f"µa, {layer.name}")
-        dashed: dict[str, Any] = {"linestyle": _DASHES, "label": f"µs′, {layer.name}"}
+        dashed: dict[str, Any] = {"linestyle": _DASH_PATTERN, "label": f"µs′, {layer.name}"}
         right.plot(WAVELENGTHS_NM, layer.sigma_s_prime, color=colour, linewidth=1.0, **dashed)
     lines = [*axes.get_lines(), *right.get_lines()]
     axes.legend(lines, [str(line.get_label()) for line in lines], ncols=5, fontsize=7, **_LEGEND_ABOVE)
@@ -318,7 +318,9 @@ def _plot_curves(axes: Axes, report: ProfileReport) -> float:
             peak = max(peak, float((r * radial.reflectance[:, channel]).max()))
         terms = len(fit.weight) if report.fit.shared else np.count_nonzero(fit.weight[:, channel])
         label = f"{name}, {terms} Gaussians, error {report.fit.error[channel]:.2%}"
-        axes.plot(r, r * fitted[:, channel], color=colour, linewidth=1.1, linestyle=_DASHES, label=label)
+        axes.plot(
+            r, r * fitted[:, channel], color=colour, linewidth=1.1, linestyle=_DASH_PATTERN, label=label
+        )
         if isinstance(report.other_fit, BurleyFit):
             other = r * report.other_fit.profile.radiant_exitance(r)[:, channel]
             label = f"{name}, Burley, error {report.other_fit.error[channel]:.1%} of rings"

@@ -77,17 +77,17 @@ def view(
         refuse("--motion-fps", "the option --motion", "it is missing", "Add --motion FILE")
     from dermis.apps.viewer.windows import serve, show_window
 
-    def load() -> tuple[ViewerState, MotionFile | None]:
+    def load_state_and_motion() -> tuple[ViewerState, MotionFile | None]:
         state = _initial_state(head, scene, adapter)
         return state, _load_motion(motion, motion_fps, state)
 
     window = scene.settings.get("size", _WINDOW)
     if browser:
         address = host or _HOST, _PORT if port is None else port
-        serve(load, adapter, window, *address, _print_url, require_token=token)
+        serve(load_state_and_motion, adapter, window, *address, _print_url, require_token=token)
     else:
         with spinner("loading"):
-            state, motion_clip = load()
+            state, motion_clip = load_state_and_motion()
         show_window(state, adapter, window, motion=motion_clip)
     return 0
 

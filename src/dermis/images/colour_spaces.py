@@ -32,7 +32,7 @@ _CODED_GAMMAS = {1: None, 2: None, 4: 2.2, 5: 2.8, 6: None, 8: 1.0, 13: None, 14
 programs display as sRGB."""
 _HDR_CURVES = {16: "PQ", 18: "HLG"}
 _CURVE_LEVELS, _MAX_LEVEL = 65536, 65535
-_LEVELS = np.linspace(0.0, 1.0, _CURVE_LEVELS)
+_CURVE_INPUTS = np.linspace(0.0, 1.0, _CURVE_LEVELS)
 _SRGB_TOLERANCE = 5e-3  # a matrix or curve that differs less from that of sRGB is replaced by it
 _D50_XYZ = np.array([0.9642, 1.0, 0.8249])
 _BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
@@ -82,7 +82,9 @@ SRGB = ColourSpace()
 
 def adobe_rgb() -> ColourSpace:
     """Return Adobe RGB (1998), which cameras may state in EXIF without embedding an ICC profile."""
-    return _simplified_space("Adobe RGB", _matrix_to_rec709(_PRIMARIES["Adobe RGB"]), _LEVELS**_ADOBE_GAMMA)
+    return _simplified_space(
+        "Adobe RGB", _matrix_to_rec709(_PRIMARIES["Adobe RGB"]), _CURVE_INPUTS**_ADOBE_GAMMA
+    )
 
 
 def coded_space(primaries: int, transfer: int) -> ColourSpace | None:
@@ -109,7 +111,7 @@ def gamma_space(name: str, gamma: float | None, primaries: Sequence[float] | Non
     Raises ValueError for primaries that are invalid or lie on one line.
     """
     matrix = np.eye(3) if primaries is None else _matrix_to_rec709(primaries)
-    return _simplified_space(name, matrix, None if gamma is None else _LEVELS**gamma)
+    return _simplified_space(name, matrix, None if gamma is None else _CURVE_INPUTS**gamma)
 
 
 def profile_name(icc: bytes) -> str:
@@ -151,7 +153,7 @@ def _simplified_space(name: str, to_rec709: Doubles, curves: Doubles | None) -> 
     to_rec709, curves : see `ColourSpace`; one curve (65536,) is used for all channels
     """
     if curves is not None:
-        same = np.allclose(curves, decode_srgb(_LEVELS), rtol=0.0, atol=_SRGB_TOLERANCE)
+        same = np.allclose(curves, decode_srgb(_CURVE_INPUTS), rtol=0.0, atol=_SRGB_TOLERANCE)
         curves = None if same else np.broadcast_to(curves, (3, _CURVE_LEVELS))
     same = np.allclose(to_rec709, np.eye(3), rtol=0.0, atol=_SRGB_TOLERANCE)
     return ColourSpace(
@@ -187,10 +189,10 @@ def _profile_curve(tag: bytes) -> Doubles:
     kind, (count,) = tag[:4], struct.unpack_from(">I", tag, 8)
     if kind == b"curv" and count < 2:
         gamma = struct.unpack_from(">H", tag, 12)[0] / 256.0 if count else 1.0
-        return np.asarray(_LEVELS**gamma)
+        return np.asarray(_CURVE_INPUTS**gamma)
     if kind == b"curv":
         values = np.frombuffer(tag, ">u2", count, 12) / _MAX_LEVEL
-        return np.asarray(np.interp(_LEVELS, np.linspace(0.0, 1.0, count), values))
+        return np.asarray(np.interp(_CURVE_INPUTS, np.linspace(0.0, 1.0, count), values))
     if kind != b"para" or count >> 16 > 4:
         raise ValueError("a curve is of an unknown kind")
     function = count >> 16
@@ -201,8 +203,8 @@ def _profile_curve(tag: bytes) -> Doubles:
     else:
         g, a, b, c, d, e, f = (*numbers, 0.0, 0.0)[:7]
     with np.errstate(all="ignore"):
-        power = np.maximum(a * _LEVELS + b, 0.0) ** g + e
-    curve = np.where(d <= _LEVELS, power, c * _LEVELS + f)
+        power = np.maximum(a * _CURVE_INPUTS + b, 0.0) ** g + e
+    curve = np.where(d <= _CURVE_INPUTS, power, c * _CURVE_INPUTS + f)
     return np.asarray(np.clip(np.nan_to_num(curve), 0.0, 1.0))
 
 

@@ -91,7 +91,7 @@ def decode_exr(data: bytes) -> Floats:
     if len(parts) <= layer.part:
         raise ValueError("its pixels are truncated or damaged")
     part = parts[layer.part]
-    (width, height), stored, placed = _windows(part.header)
+    (width, height), stored, placed = _overlap_windows(part.header)
     image = np.zeros((height, width, len(layer.channels)), np.float32)
     for index, name in enumerate(layer.channels):
         image[..., index][placed] = part.channels[name].pixels[stored]
@@ -103,7 +103,7 @@ def exr_header(data: bytes) -> PictureHeader:
     file = _open_exr_header(data)
     layer, layer_note = _checked_layer(file)
     header = file.parts[layer.part].header
-    size, stored, placed = _windows(header)
+    size, stored, placed = _overlap_windows(header)
     space, colour_note = _exr_colour_space(header)
     notes = [layer_note] if layer_note else []
     if not _covers_window(placed, size):
@@ -174,7 +174,7 @@ def _checked_layer(exr_file: Any) -> tuple[ExrLayer, str | None]:
     return layer, note
 
 
-def _windows(header: Any) -> tuple[tuple[int, int], Slices, Slices]:
+def _overlap_windows(header: Any) -> tuple[tuple[int, int], Slices, Slices]:
     """Return the size of the display window, and the slices in which display and data window overlap.
 
     The slices (rows, columns) are returned twice: relative to the data window, then to the display window.

@@ -164,7 +164,7 @@ def pillow_header(data: bytes) -> PictureHeader:
     Raises the errors of `open_picture`.
     """
     picture = open_picture(data)
-    exif = _exif(picture)
+    exif = _read_exif(picture)
     orientation = exif.get(_EXIF_ORIENTATION, 1)
     space, colour_note = _colour_space(data, picture, exif)
     orientation = orientation if orientation in range(1, 9) else 1
@@ -204,7 +204,7 @@ def _has_curves(icc: bytes) -> bool:
         return False
 
 
-def _exif(picture: Image) -> Exif:
+def _read_exif(picture: Image) -> Exif:
     import PIL.Image
 
     if picture.format == "PNG" and "exif" not in picture.info:

@@ -20,7 +20,7 @@ from dermis.scene.opencv import OpenCvCamera, extrinsics, from_opencv, intrinsic
 
 _DISTANCE_MM = 1100.0  # as in portrait photography; from closer, the nose looks large
 _RELATIVE_DISTANCE = 3.0  # least distance relative to the size of a mesh that is shown completely
-_MARGIN = 1.08  # size of the frame relative to a mesh that is shown completely
+_FRAME_MARGIN = 1.08  # size of the frame relative to a mesh that is shown completely
 _UP = (0.0, 1.0, 0.0)
 
 
@@ -311,7 +311,7 @@ def _show_all(head: Head, degrees: float) -> Camera:
     low, high = points.min(axis=0), points.max(axis=0)
     middle, distance = 0.5 * (low + high), max(_DISTANCE_MM, _RELATIVE_DISTANCE * float((high - low).max()))
     across, towards = np.abs(points - middle)[:, :2].max(axis=1), (points - middle)[:, 2]
-    frame_mm = 2.0 * _MARGIN * float((across / (1.0 - towards / distance)).max())
+    frame_mm = 2.0 * _FRAME_MARGIN * float((across / (1.0 - towards / distance)).max())
     target, position = (
         _vector_tuple(np.round((middle + np.array([0, 0, far])) @ axes, 3)) for far in (0.0, distance)
     )

@@ -33,11 +33,13 @@ class Keywords:
         """Return a pydantic schema that accepts the words and all values of the annotated type."""
         from pydantic_core import core_schema
 
-        def check(value: Any, numbers: Any) -> Any:
-            return value if isinstance(value, str) and value in self.words else numbers(value)
+        def accept_keyword(value: Any, validate_number: Any) -> Any:
+            return value if isinstance(value, str) and value in self.words else validate_number(value)
 
         unchanged = core_schema.plain_serializer_function_ser_schema(lambda value: value)
-        return core_schema.no_info_wrap_validator_function(check, handler(source), serialization=unchanged)
+        return core_schema.no_info_wrap_validator_function(
+            accept_keyword, handler(source), serialization=unchanged
+        )
 
 
 class Reason(str):

@@ -24,7 +24,7 @@ MAX_GAZE_WEIGHT = 1.3
 """Largest weight of a gaze target, a morph target that turns an eye."""
 _MAX_BONE_DEGREES = 36.0
 _ROTATION_ITERATIONS = 6
-_SIDES = "Left", "Right"
+_EYE_SIDES = "Left", "Right"
 _EYES_ADVICE = "Take the parametric human, or name the groups of the file's eyeballs with --eye-groups"
 
 
@@ -60,7 +60,7 @@ def looking_at(head: Head, target_mm: ArrayLike, pose: Pose | Mapping[str, float
         rotations = [rotation for rotation in rig.bone_rotations if rotation.bone == bone]
         if not rotations:
             bones[bone] = [*np.clip(np.degrees(angles), -_MAX_BONE_DEGREES, _MAX_BONE_DEGREES).tolist(), 0.0]
-            rotations = _eyelid_rotations(rig, _SIDES[k])
+            rotations = _eyelid_rotations(rig, _EYE_SIDES[k])
         weights |= _gaze_weights(rotations, angles)
     return Pose(weights, bones, base.positions_mm)
 

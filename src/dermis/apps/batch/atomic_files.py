@@ -13,7 +13,7 @@ from pathlib import Path
 from dermis.base.atomic_write import refuse_output
 
 _MAX_ATTEMPTS = 5
-_UNFINISHED = re.compile(r"\.(.+)-[0-9a-f]{12}\.unfinished")
+_UNFINISHED_NAME_PATTERN = re.compile(r"\.(.+)-[0-9a-f]{12}\.unfinished")
 
 
 def temporary_path(target: Path) -> Path:
@@ -95,6 +95,6 @@ def remove_path(path: Path) -> None:
 def unfinished_files(folder: Path) -> dict[Path, str]:
     """Return the temporary paths that interrupted writes left in a folder, with the final names."""
     with contextlib.suppress(OSError):
-        found = {path: _UNFINISHED.fullmatch(path.name) for path in sorted(folder.iterdir())}
+        found = {path: _UNFINISHED_NAME_PATTERN.fullmatch(path.name) for path in sorted(folder.iterdir())}
         return {path: match[1] for path, match in found.items() if match}
     return {}

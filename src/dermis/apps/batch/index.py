@@ -41,12 +41,12 @@ def write_index(out: Path, spec: Spec) -> Path:
     parquet, target = import_extra("pyarrow.parquet", "the index of a data set"), out / INDEX_FILE
     schema = _index_schema(out, spec)
 
-    def write(path: Path) -> None:
+    def write_parquet(path: Path) -> None:
         with parquet.ParquetWriter(path, schema, compression="zstd", store_schema=False) as writer:
             for rows in _rows_of_shards(out, spec):
                 writer.write_table(_arrow_table(rows, schema))
 
-    atomic_write(target, write)
+    atomic_write(target, write_parquet)
     return target
 
 

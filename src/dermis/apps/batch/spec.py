@@ -329,10 +329,10 @@ def _match_files(pattern: str, folder: Path, dotted_name: str) -> FileChoice:
     return FileChoice(pattern, tuple(sorted(names)))
 
 
-def _file_hashes(names: Iterable[str], folder: Path) -> dict[str, str]:
+def _file_hashes(file_names: Iterable[str], folder: Path) -> dict[str, str]:
     """Return the SHA-256 of each name that is a file in the spec's folder, sorted by name."""
     found = {}
-    for name in sorted(set(names)):
+    for name in sorted(set(file_names)):
         if is_file(folder / name):
             data = read_file(folder / name, "a file that the spec names", _MAX_HASHED_BYTES)
             found[name] = hashlib.sha256(data).hexdigest()

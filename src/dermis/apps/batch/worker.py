@@ -309,14 +309,14 @@ def _forward_notes(forward: Callable[[str], None]) -> None:
     """Redirect the package's warnings to a function; other warnings are shown as usual."""
     default = warnings.showwarning
 
-    def show(message: Warning | str, category: type[Warning], *more: Any, **named: Any) -> None:
+    def forward_or_show(message: Warning | str, category: type[Warning], *more: Any, **named: Any) -> None:
         if issubclass(category, DermisWarning):
             forward(str(message))
         else:
             default(message, category, *more, **named)
 
     warnings.simplefilter("default", DermisWarning)
-    warnings.showwarning = show
+    warnings.showwarning = forward_or_show
 
 
 def _head_tone(head: Head) -> SkinTone | None:

@@ -43,10 +43,12 @@ def fit_burley_width(curve: CumulativeProfile) -> Floats:
     median = np.array([np.interp(0.5, curve.fraction[:, i], curve.radii_mm) for i in range(3)])
     middle = np.log(median / _BURLEY_MEDIAN_RADIUS)
 
-    def excess(log_d: Floats) -> Floats:
+    def cdf_difference(log_d: Floats) -> Floats:
         return BurleyProfile(np.ones(3), np.exp(-log_d)).energy_within(curve.radii_mm) - curve.fraction
 
-    return _bisect_minimax(excess, middle - _LOG_LENGTH_RANGE, middle + _LOG_LENGTH_RANGE, _BISECTIONS)
+    return _bisect_minimax(
+        cdf_difference, middle - _LOG_LENGTH_RANGE, middle + _LOG_LENGTH_RANGE, _BISECTIONS
+    )
 
 
 def gaussian_curve(variance_mm2: Floats, weight: Floats, energy: Floats) -> CumulativeProfile:
@@ -58,11 +60,11 @@ def gaussian_curve(variance_mm2: Floats, weight: Floats, energy: Floats) -> Cumu
     """
     fraction = weight / weight.sum(axis=0)
 
-    def within(radius_mm: Floats) -> Floats:
+    def fraction_within(radius_mm: Floats) -> Floats:
         with np.errstate(under="ignore"):
             return np.asarray(1.0 - np.exp(-0.5 * radius_mm[:, None] ** 2 / variance_mm2) @ fraction)
 
-    return CumulativeProfile.from_function(within, energy)
+    return CumulativeProfile.from_function(fraction_within, energy)
 
 
 def scale_lengths(unit: CumulativeProfile, scale_mm: ArrayLike) -> CumulativeProfile:
@@ -73,10 +75,10 @@ def scale_lengths(unit: CumulativeProfile, scale_mm: ArrayLike) -> CumulativePro
     """
     scale = np.maximum(np.asarray(scale_mm, np.float64), _MIN_WIDTH_MM)
 
-    def within(radius_mm: Floats) -> Floats:
+    def fraction_within(radius_mm: Floats) -> Floats:
         return np.stack([unit.fraction_within(radius_mm / scale[i])[:, i] for i in range(3)], axis=-1)
 
-    return CumulativeProfile.from_function(within, unit.energy)
+    return CumulativeProfile.from_function(fraction_within, unit.energy)
 
 
 def fit_scale(curve: CumulativeProfile, unit: CumulativeProfile) -> Floats:
@@ -121,13 +123,15 @@ def fit_homogeneous_medium(
 def _fit_scale_in_range(
     curve: CumulativeProfile, unit: CumulativeProfile, middle: Floats, log_range: float, bisections: int
 ) -> Floats:
-    def excess(log_scale: Floats) -> Floats:
+    def cdf_difference(log_scale: Floats) -> Floats:
         return scale_lengths(unit, np.exp(log_scale)).fraction - curve.fraction
 
-    return _bisect_minimax(excess, middle - log_range, middle + log_range, bisections)
+    return _bisect_minimax(cdf_difference, middle - log_range, middle + log_range, bisections)
 
 
-def _bisect_minimax(excess: Callable[[Floats], Floats], low: Floats, high: Floats, bisections: int) -> Floats:
+def _bisect_minimax(
+    cdf_difference: Callable[[Floats], Floats], low: Floats, high: Floats, bisections: int
+) -> Floats:
     """Return the lengths (3,) that scale a cumulative profile closest to a reference profile, per channel.
 
     The largest absolute difference between the cumulative profiles is minimised. A longer length widens the
@@ -135,14 +139,14 @@ def _bisect_minimax(excess: Callable[[Floats], Floats], low: Floats, high: Float
     and the largest deficit increases. The best length is therefore the one at which excess and deficit are
     equal.
 
-    excess : function that takes the logarithms of the lengths (3,) and returns, at n radii, the fraction of
-        light within the radius (n, 3): scaled profile minus reference profile
+    cdf_difference : function that takes the logarithms of the lengths (3,) and returns, at n radii, the
+        fraction of light within the radius (n, 3): scaled profile minus reference profile
     low, high : (3,) bounds of the logarithms of the lengths
     bisections : number of times that the interval is halved
     """
     for _ in range(bisections):
         middle = 0.5 * (low + high)
-        difference = excess(middle)
+        difference = cdf_difference(middle)
         too_narrow = difference.max(axis=0) > -difference.min(axis=0)
         low, high = np.where(too_narrow, middle, low), np.where(too_narrow, high, middle)
     return np.asarray(np.exp(0.5 * (low + high)))
@@ -164,11 +168,13 @@ def fit_length_scale(curve: CumulativeProfile, channel: int, unit_cdf: Callable[
     reference = curve.fraction_within(r)[:, channel]
     middle = np.log(median / float(np.interp(0.5, unit_cdf(_CDF_RADII), _CDF_RADII)))
 
-    def loss(log_length: float) -> float:
+    def squared_error(log_length: float) -> float:
         return float(((unit_cdf(r / np.exp(log_length)) - reference) ** 2).sum())
 
     bounds = middle - _LOG_BOUND, middle + _LOG_BOUND
-    result = minimize_scalar(loss, bounds=bounds, method="bounded", options={"xatol": _LOG_TOLERANCE})
+    result = minimize_scalar(
+        squared_error, bounds=bounds, method="bounded", options={"xatol": _LOG_TOLERANCE}
+    )
     return float(np.exp(result.x))
 
 

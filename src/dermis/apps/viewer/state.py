@@ -180,14 +180,14 @@ class ViewerState:
 def states_equal(a: ViewerState, b: ViewerState) -> bool:
     """Return whether two states are equal; their heads must be the same object."""
 
-    def values(state: ViewerState) -> tuple[object, ...]:
+    def compared_values(state: ViewerState) -> tuple[object, ...]:
         scene = state.scene
         scene_values = tuple(scene.lights), scene.camera, scene.skin, scene.environment
         view_values = state.view, state.rig, state.atlas_view, state.seconds
         return *scene_values, state.settings, state.head_table, *view_values
 
     is_head_same = a.scene.head is b.scene.head and poses_equal(a.scene.pose, b.scene.pose)
-    return is_head_same and values(a) == values(b)
+    return is_head_same and compared_values(a) == compared_values(b)
 
 
 def validated_copy(values: P, **fields: object) -> P:

@@ -363,11 +363,11 @@ def run_in_thread(task: Callable[[], T]) -> Future[T]:
     future: Future[T] = Future()
     future.set_running_or_notify_cancel()
 
-    def run() -> None:
+    def set_result() -> None:
         try:
             future.set_result(task())
         except Exception as error:
             future.set_exception(error)
 
-    threading.Thread(target=run, name="preparing", daemon=True).start()
+    threading.Thread(target=set_result, name="preparing", daemon=True).start()
     return future

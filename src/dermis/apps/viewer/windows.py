@@ -22,7 +22,7 @@ from dermis.mesh.head import Head
 from dermis.scene.model import Scene
 
 Size = tuple[int, int]
-_TITLE = "dermis"
+_WINDOW_TITLE = "dermis"
 _MAX_FPS = 60
 
 
@@ -40,7 +40,7 @@ def show_window(state: ViewerState, adapter: str, size: Size, *, motion: MotionF
         if not backend.glfw.init():
             _raise_no_display("; ".join(str(warning.message) for warning in caught))
     try:
-        canvas = backend.RenderCanvas(size=size, title=_TITLE, max_fps=_MAX_FPS)
+        canvas = backend.RenderCanvas(size=size, title=_WINDOW_TITLE, max_fps=_MAX_FPS)
     except Exception as error:  # glfw has no exception class for a missing display
         _raise_no_display(error)
     viewer = Viewer(state, canvas, adapter, motion=motion)
@@ -90,7 +90,7 @@ def serve(
 
     listener, address = bind(host, port, require_token=require_token)
     with listener, TemporaryDirectory(prefix="dermis-") as folder:
-        canvas = PageCanvas(size=size, title=_TITLE, max_fps=_MAX_FPS)
+        canvas = PageCanvas(size=size, title=_WINDOW_TITLE, max_fps=_MAX_FPS)
         canvas._size_info.set_physical_size(*size, 1.0)
         http_server = make_server(address, canvas, Path(folder))
         # rendercanvas handles Ctrl+C by closing the canvas; the server must stop too.

@@ -222,7 +222,7 @@ def run_server(
     The result is None if the server exits before the coroutine ends. Raises the exceptions of the coroutine.
     """
 
-    async def run() -> T | None:
+    async def serve_and_run() -> T | None:
         task = asyncio.create_task(start())
         await http_server.serve(sockets=[listener])
         if task.done():  # not awaited: after Ctrl+C that would raise another interrupt
@@ -230,4 +230,4 @@ def run_server(
         task.cancel()
         return None
 
-    return asyncio.run(run())
+    return asyncio.run(serve_and_run())

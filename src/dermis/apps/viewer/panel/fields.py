@@ -218,14 +218,14 @@ def clamp(value: float, value_range: SliderRange) -> float:
     return min(value_range.high, max(value_range.low, value))
 
 
-def edit_value(session: Session, label: str, result: tuple[bool, Any], with_value: ToState) -> None:
+def edit_value(session: Session, label: str, change_and_value: tuple[bool, Any], with_value: ToState) -> None:
     """Change the state to the new value of a control; all changes of one drag are undone together.
 
-    result : whether the control has changed, and its value
+    change_and_value : whether the control has changed, and its value
     with_value : function that returns a state, given the new value
     """
     record_position(session, label)
-    is_changed, new_value = result
+    is_changed, new_value = change_and_value
     if is_changed:
         run_action(session, lambda: session.change(with_value(new_value), f"hold {label}"))
     if imgui.is_item_deactivated():

@@ -117,9 +117,9 @@ def walk_cdf(radius: ArrayLike, albedo: float, entry: WalkEntry) -> Floats:
     entry : direction in which light enters: "straight" for RANDOM_WALK, "skin" for RANDOM_WALK_SKIN
     """
     walk_albedo = max(albedo, MIN_ALBEDO)
-    radii, within = _interpolate_walk_table(round(walk_albedo, 7), entry)
+    radii, fraction_within = _interpolate_walk_table(round(walk_albedo, 7), entry)
     r = np.asarray(radius, np.float64)
-    fraction = np.interp(np.log(np.maximum(r, 1e-12)), np.log(radii), within)
+    fraction = np.interp(np.log(np.maximum(r, 1e-12)), np.log(radii), fraction_within)
     near = np.minimum(r / radii[0], 1.0)  # linear in the radius below the first tabulated one
     return np.asarray(albedo / walk_albedo * fraction * near)
 
@@ -132,8 +132,10 @@ def _interpolate_walk_table(albedo: float, entry: WalkEntry) -> tuple[Floats, Fl
     """
     from scipy.interpolate import PchipInterpolator
 
-    roots, radii, within = _load_walk_table()[entry]
-    fraction = PchipInterpolator(roots, within, axis=0)(np.clip(np.sqrt(1.0 - albedo), roots[0], roots[-1]))
+    roots, radii, fraction_within = _load_walk_table()[entry]
+    fraction = PchipInterpolator(roots, fraction_within, axis=0)(
+        np.clip(np.sqrt(1.0 - albedo), roots[0], roots[-1])
+    )
     fine = np.geomspace(radii[0], radii[-1], 8 * len(radii))
     return fine, np.asarray(PchipInterpolator(np.log(radii), fraction)(np.log(fine)))
 
@@ -213,11 +215,11 @@ class Blender(Target):
         lengths = np.maximum(metres / _METRES_PER_MM * self._unit_lengths(subject, version), 1e-9)
         units = self._unit_cdfs(subject, version)
 
-        def within(r: Floats) -> Floats:
+        def fraction_within(r: Floats) -> Floats:
             return np.stack([unit(r / length) for unit, length in zip(units, lengths, strict=True)], axis=-1)
 
         energy = subject.curve.energy * self._energy_ratio(subject, version)
-        return CumulativeProfile.from_function(within, energy)
+        return CumulativeProfile.from_function(fraction_within, energy)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """Write the Python script with the head and maps that it reads, or the .blend that the script saves.

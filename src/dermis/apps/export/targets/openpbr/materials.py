@@ -269,11 +269,11 @@ def mesh_materials(subject: Subject, mfp_mm: Doubles, roles: Iterable[str]) -> d
     colour, known_roles = flat_tuple(subject.clipped_albedo()), list(roles)
     mesh, parts = subject.head_or_ball.mesh, subject.part_pictures
 
-    def definition(material: Material) -> OpenPbrMaterial:
+    def material_definition(material: Material) -> OpenPbrMaterial:
         if parts is not None and material.has_maps:
             return part_material(material, parts)
         if material.kind != "skin":
             return opaque_material(material)
         return skin_material(material.name, subject.skin, (red, green, blue), colour, known_roles)
 
-    return {index: definition(mesh.materials[index]) for index in np.unique(mesh.material).tolist()}
+    return {index: material_definition(mesh.materials[index]) for index in np.unique(mesh.material).tolist()}

@@ -77,8 +77,8 @@ class DiffusionTable(NamedTuple):
         row = np.interp(reflectance, self.reflectance, np.arange(_ALBEDO_COUNT))
         low = int(min(row, _ALBEDO_COUNT - 2))
         first, second = self.reflectance_within[low : low + 2]
-        within = first + (row - low) * (second - first)
-        return np.asarray(np.interp(np.asarray(radius, np.float64), self.radius, within))
+        reflectance_within = first + (row - low) * (second - first)
+        return np.asarray(np.interp(np.asarray(radius, np.float64), self.radius, reflectance_within))
 
 
 @cache
@@ -94,8 +94,8 @@ def diffusion_table(eta: float) -> DiffusionTable:
     albedo = np.expm1(-_ALBEDO_DENSITY * steps) / np.expm1(-_ALBEDO_DENSITY)
     multiple = np.stack([_multiple_scattering(radius, one, eta) for one in albedo])
     profile = 2.0 * np.pi * radius * (multiple + albedo[:, None] * _single_scattering(radius, eta))
-    within = _integrate_spline(radius, profile)
-    return DiffusionTable(albedo, radius, within[:, -1], within)
+    reflectance_within = _integrate_spline(radius, profile)
+    return DiffusionTable(albedo, radius, reflectance_within[:, -1], reflectance_within)
 
 
 def _multiple_scattering(radius: Floats, albedo: float, eta: float) -> Floats:
@@ -203,11 +203,11 @@ def _unit_curve(reflectance: Floats) -> CumulativeProfile:
     table = diffusion_table(SKIN_ETA)
     total = np.array([table.interpolate(table.radius[-1], float(one)) for one in reflectance], np.float64)
 
-    def within(radius: Floats) -> Floats:
+    def fraction_within(radius: Floats) -> Floats:
         columns = [table.interpolate(radius, float(one)) for one in reflectance]
         return np.asarray(np.clip(np.stack(columns, axis=-1) / np.maximum(total, 1e-9), 0.0, 1.0))
 
-    return CumulativeProfile.from_function(within, total)
+    return CumulativeProfile.from_function(fraction_within, total)
 
 
 def _parameters(subject: Subject, mean_free_path_mm: Floats, meaning: str) -> Parameters:

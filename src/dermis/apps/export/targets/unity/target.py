@@ -111,7 +111,7 @@ def _scattering_distances(d_mm: Floats, version: str) -> Parameters:
 def asset_text(asset_name: str, parameters: Parameters, version: str) -> str:
     """Return the YAML of the asset, without the profile's hash, which Unity adds on first opening."""
     values = {one.name: one.value for one in parameters}
-    colour, tint = (_rgba(get_numbers(parameters, key)) for key in (_COLOUR_NAME, _TRANSMISSION_NAME))
+    colour, tint = (_format_rgba(get_numbers(parameters, key)) for key in (_COLOUR_NAME, _TRANSMISSION_NAME))
     low, high = get_numbers(parameters, _THICKNESS_NAME)
     multiplier = (
         f"    {_MULTIPLIER_NAME}: {values[_MULTIPLIER_NAME]:.6g}\n" if _MULTIPLIER_NAME in values else ""
@@ -130,7 +130,7 @@ def asset_text(asset_name: str, parameters: Parameters, version: str) -> str:
     )
 
 
-def _rgba(colour: tuple[float, ...]) -> str:
+def _format_rgba(colour: tuple[float, ...]) -> str:
     r, g, b = colour
     return f"{{r: {r:.6g}, g: {g:.6g}, b: {b:.6g}, a: 1}}"
 

@@ -173,7 +173,7 @@ def _frame_changes(
     """
     capture = FrameCapture(renderer.device)
 
-    def changes(inputs: FrameInputs | None) -> Json | None:
+    def node_json(inputs: FrameInputs | None) -> Json | None:
         if inputs is None:
             return None
         node = reduce_hair(capture_frame(capture, inputs), frame.merged_hairs)
@@ -181,7 +181,7 @@ def _frame_changes(
 
     return {
         slider.name: [
-            *map(changes, node_inputs(slider, lambda one: renderer.prepare(one, settings), default_inputs))
+            *map(node_json, node_inputs(slider, lambda one: renderer.prepare(one, settings), default_inputs))
         ]
         for slider in request.sliders
     }

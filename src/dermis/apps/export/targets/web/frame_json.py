@@ -56,7 +56,7 @@ def frames_json(
     capture: FrameCapture,
     frames: list[NamedFrame],
     picture_maps: PictureMaps,
-    steps: dict[int, tuple[float, ...]],
+    quantisation_steps: dict[int, tuple[float, ...]],
     byte_runs: ByteRunCollector,
 ) -> Json:
     """Return the JSON of frames with shaders, resources and passes, and collect the data of the resources.
@@ -64,16 +64,18 @@ def frames_json(
     Data that is all zero is not stored, as the page creates resources filled with zeros.
 
     picture_maps : maps that are stored as pictures, by resource index
-    steps : quantisation step of each column of a quantised float buffer, by resource index
+    quantisation_steps : quantisation step of each column of a quantised float buffer, by resource index
     byte_runs : collector of the data, to which the JSON refers by byte run
     """
     pictures = [[capture.resource(f.picture.bytes), capture.resource(f.picture.exposed)] for f in frames]
     captured_frames = [frame.captured for frame in frames]
     contents, tables = {}, set(resources_bound_as(capture, captured_frames, _TRIANGLE_TABLES))
     for index in resources_read_first(capture, captured_frames):
-        if index in steps:
-            floats = capture.read_content(index)[0].view(np.float32).reshape(-1, len(steps[index]))
-            contents[index] = [byte_runs.add_floats(floats, steps[index])]
+        if index in quantisation_steps:
+            floats = (
+                capture.read_content(index)[0].view(np.float32).reshape(-1, len(quantisation_steps[index]))
+            )
+            contents[index] = [byte_runs.add_floats(floats, quantisation_steps[index])]
             continue
         _, picture_count, mip_passes = picture_maps.get(index, PictureMap("", 0, None))
         mips = [] if mip_passes else _mip_bytes(capture, index)[picture_count:]
