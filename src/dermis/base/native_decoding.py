@@ -94,12 +94,12 @@ def answer_request(decode: Callable[[Arrays], Arrays]) -> None:
 
 
 def as_text(array: Bytes) -> str:
-    """Decode an array of a request or an answer as text."""
+    """Decode UTF-8 text from an array of a request to a decoder, or of the decoder's answer."""
     return array.tobytes().decode("utf-8", "replace")
 
 
 def from_text(text: str) -> Bytes:
-    """Encode a text as an array of a request or an answer."""
+    """Encode a text as a UTF-8 array for a request to a decoder, or for the decoder's answer."""
     return np.frombuffer(text.encode("utf-8", "replace"), np.uint8)
 
 

@@ -69,7 +69,7 @@ def _package_version(name: str) -> str:
 
 
 def _test_adapter(adapter: str) -> Options:
-    """Open an adapter, render a test frame, and return whether the adapter works and how it was chosen."""
+    """Render a test frame on an adapter; return the JSON entries that say whether and how the adapter works."""
     from dermis.frame.renderer import Renderer
     from dermis.gpu.textures import half_store_rounding
 

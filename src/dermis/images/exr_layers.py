@@ -33,8 +33,8 @@ class ExrLayer:
 def choose_layer(parts: Sequence[tuple[str, Sequence[str]]]) -> tuple[ExrLayer, str | None]:
     """Choose the layer to read from an OpenEXR file; also return a note if several layers have colours.
 
-    A layer with colours is preferred to grey; among these, a layer without a name is preferred to a layer
-    whose name means the whole picture, such as "beauty", and this layer to any other layer.
+    Layers with colours are preferred to grey layers. Among layers with colours, a layer without a name is
+    preferred; the second choice is a layer whose name means the whole picture, such as "beauty".
 
     parts : name and channels of each part
 

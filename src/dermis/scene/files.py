@@ -279,7 +279,7 @@ def _parse_light(culprit: object, label: str, table: Any) -> Light:
 
 
 def _build_settings(settings_class: type[P], file_name: object, table_name: str, table: Any) -> P:
-    """Return settings of a class from a TOML table; errors name the file and the table.
+    """Return an instance of a settings class from a TOML table; errors name the file and the table.
 
     file_name : name of the file, for error messages
     table_name : name of the table, for error messages

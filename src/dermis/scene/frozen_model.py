@@ -209,25 +209,25 @@ def _parameters(model: type[BaseModel], required: list[str]) -> Iterator[Paramet
     for name, info in model.model_fields.items():
         kind = Parameter.POSITIONAL_OR_KEYWORD if required == [name] else Parameter.KEYWORD_ONLY
         default = Parameter.empty if info.is_required() else info.get_default(call_default_factory=True)
-        annotation = _without_checks(info.annotation)
+        annotation = _without_metadata(info.annotation)
         if words := field_keywords(model, name):
             annotation = annotation | Literal[words]
         yield Parameter(name, kind, default=default, annotation=annotation)
 
 
-def _without_checks(annotation: Any) -> Any:
+def _without_metadata(annotation: Any) -> Any:
     """Return an annotation without `Annotated` metadata, such as float for a bounded float."""
     origin, parts = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
-        return _without_checks(parts[0])
+        return _without_metadata(parts[0])
     if origin in (None, Literal):
         return annotation
-    plain_parts = tuple(map(_without_checks, parts))
+    plain_parts = tuple(map(_without_metadata, parts))
     return reduce(or_, plain_parts) if origin in (Union, UnionType) else origin[plain_parts]
 
 
 def model_docstring(model: type[BaseModel]) -> str:
-    """Return the docstring of a model in numpydoc format, with its fields grouped by heading."""
+    """Return the docstring of a model in numpydoc format, with the model's fields grouped by heading."""
     sections: dict[str, list[str]] = {"Parameters": []}
     for parameter in constructor_signature(model).parameters.values():
         lines = sections.setdefault(field_heading(model, parameter.name) or "Parameters", [])

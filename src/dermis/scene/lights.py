@@ -295,7 +295,7 @@ def _place_light(light: Light, head: Head) -> Light:
 
 
 def _keeps_distance(light: Light) -> bool:
-    """Return whether a light keeps its distance for large bodies: a directional light or a narrow spot."""
+    """Return whether a light is not moved away from large bodies: a directional light or a narrow spot."""
     return not isinstance(light, PointLight) or (
         isinstance(light, SpotLight) and light.outer_degrees < _NARROW_SPOT_DEGREES
     )

@@ -1,4 +1,4 @@
-"""Scene of an image, built from its sampled parameters."""
+"""Scenes of a data set's images, built from the sampled parameters of each image."""
 
 from __future__ import annotations
 

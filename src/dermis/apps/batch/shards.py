@@ -34,7 +34,7 @@ class Shard:
     stop: int
 
     def __str__(self) -> str:
-        """Return the name of the shard in messages."""
+        """Return the name by which messages refer to the shard."""
         return f"shard {self.index}"
 
     def __len__(self) -> int:

@@ -114,7 +114,7 @@ class Spec(FrozenModel):
     _digest: str = PrivateAttr("")
 
     def model_post_init(self, context: object) -> None:
-        """Check the distributions across tables and create the sampler."""
+        """Check that the distributions of all tables are consistent, and create the sampler."""
         distributions = _table_distributions("", self)
         expressions = {**EXPRESSIONS, **self.expressions}
         with error_context("outputs"):

@@ -58,7 +58,7 @@ class Studio:
     def render(self, scene: Scene, scale: float = 1.0, **settings: Any) -> NDArray[np.uint8]:
         """Render a scene to 8-bit sRGB, (h, w, 3).
 
-        scale : ratio of the image's side to a panel's [-]
+        scale : side of the image relative to the side of a gallery panel [-]
         settings : fields of `Settings`
         """
         return self._draw(scene, scale, settings).srgb8()
@@ -66,7 +66,7 @@ class Studio:
     def linear(self, scene: Scene, scale: float = 1.0, **settings: Any) -> NDArray[np.float32]:
         """Render a scene to linear Rec. 709, (h, w, 3).
 
-        scale : ratio of the image's side to a panel's [-]
+        scale : side of the image relative to the side of a gallery panel [-]
         settings : fields of `Settings`
         """
         return self._draw(scene, scale, settings).linear()
@@ -75,7 +75,7 @@ class Studio:
         """Render an intermediate result of the frame as the viewer shows it, in 8-bit sRGB, (h, w, 3).
 
         view : name of the view in the viewer, such as "blur 3"
-        scale : ratio of the image's side to a panel's [-]
+        scale : side of the image relative to the side of a gallery panel [-]
         settings : fields of `Settings`
         """
         from dermis.apps.viewer.state import PART_VIEWS
@@ -114,7 +114,7 @@ class Studio:
     def settings(self, scale: float = 1.0, **settings: Any) -> Settings:
         """Return the settings with which a panel is rendered.
 
-        scale : ratio of the image's side to a panel's [-]
+        scale : side of the image relative to the side of a gallery panel [-]
         settings : fields of `Settings` that override the gallery's defaults
         """
         side = round(scale * self.side)

@@ -312,7 +312,7 @@ class UndoHistory:
         self._undone.clear()
 
     def end_gesture(self) -> None:
-        """End the gesture, so that the next change is a new step."""
+        """End the gesture, so that the next change becomes a separate step of the undo history."""
         self._gesture = ""
 
     def undo(self) -> None:

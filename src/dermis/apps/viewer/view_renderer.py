@@ -95,7 +95,7 @@ class QualityController:
             self._streak = 0
 
     def limited_settings(self, settings: Settings, size: tuple[int, int], is_moving: bool) -> Settings:
-        """Return the settings of a frame for a window of the given size, with quality limits in motion.
+        """Return the settings of a frame for a window size, with quality limits while the picture changes.
 
         is_moving : whether the picture is changing
         """
@@ -331,7 +331,7 @@ class HeadPreparation:
         return self._future is not None
 
     def reset(self) -> None:
-        """Forget all preparations, because the renderer has been replaced."""
+        """Discard the prepared meshes and the held image, because the renderer has been replaced."""
         self._ready_mesh = self._future = self._next_mesh = self._held_image = None
 
     def prepare_head(self, view_renderer: ViewRenderer, state: ViewerState) -> Texture | None:

@@ -232,7 +232,7 @@ def _header_values(scope: Message, header_name: bytes) -> list[str]:
 
 
 def _host_name(host: str) -> str:
-    """Return the host of "name:port", "[address]:port" or "name"."""
+    """Return the host name or address in a text such as "name:port", "[address]:port" or "name"."""
     if host.startswith("["):
         return host[1:].partition("]")[0]
     return host.partition(":")[0]

@@ -78,7 +78,7 @@ def set_units(scene: Any) -> None:
 
 
 def place_head() -> None:
-    """Import the head from the .glb beside this script and set its skin material; otherwise, add a ball."""
+    """Import the exported head and set the head's skin material; if no head was exported, add a ball."""
     if EXPORT["head"] is None:
         add_ball(EXPORT["ball_m"])
         return

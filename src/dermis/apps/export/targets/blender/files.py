@@ -60,7 +60,7 @@ _MAIN_GUARD = 'if __name__ == "__main__":'
 def write_scene(
     subject: Subject, parameters: Parameters, output: Path, method: str, versions: VersionRange
 ) -> list[Path]:
-    """Write a subject as a Python script or as a .blend, and return the paths of all written files.
+    """Write a subject as a Python script or a .blend file, and return the paths of all written files.
 
     output : path that `Target.write` receives
     method : subsurface method of the Principled BSDF, or "EEVEE"
@@ -101,7 +101,7 @@ def _describe_skin(
 
 
 def _write_script_files(subject: Subject, skin: SceneDict, script: Path, head_name: str) -> list[Path]:
-    """Write the script, and beside the script the head and panorama that it reads; return all paths.
+    """Write the script, and beside it the files of the head and the panorama; return all written paths.
 
     head_name : name of the file of the head
     """

@@ -66,7 +66,7 @@ class Bitmap:
 
 @dataclass
 class XmlBackend:
-    """Substitute for the module `mitsuba` in functions that describe scenes, so that they need no Mitsuba.
+    """Substitute for the module `mitsuba`, with which functions describe scenes without Mitsuba installed.
 
     bitmaps : images of the elements converted so far, in the order in which the images are written
     """

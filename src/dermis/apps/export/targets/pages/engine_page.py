@@ -115,7 +115,7 @@ class EnginePage(Target):
             script=escape_script(script),
             policy=_TEXTURE_POLICY,
             sources=sources,
-            settings=html_safe_json(self._settings(subject, parameters, version)),
+            settings=html_safe_json(self._page_settings(subject, parameters, version)),
             head=base64.b64encode(encode_glb(subject, {"KHR_materials_ior": {"ior": SKIN_ETA}}, "")).decode(),
             libraries=libraries,
         )
@@ -126,7 +126,7 @@ class EnginePage(Target):
     def library_elements(self, version: str) -> tuple[str, list[str]]:
         """Return the library's HTML elements, and the script sources that the page's policy must allow."""
 
-    def _settings(self, subject: Subject, parameters: Parameters, version: str) -> Json:
+    def _page_settings(self, subject: Subject, parameters: Parameters, version: str) -> Json:
         scene = subject.scene or Scene(subject.head_or_ball)
         centre_mm = scene.head.centre_mm if subject.scene else (0.0, 0.0, 0.0)  # of the ball
         return {

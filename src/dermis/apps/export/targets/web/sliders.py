@@ -82,7 +82,10 @@ def node_changes(base: CapturedFrame, node: CapturedFrame, byte_runs: ByteRunCol
     written = [
         (k, (_written_floats(one), _written_floats(other))) for k, (one, other) in passes if one.written
     ]
-    return {"records": _differences(records, byte_runs), "written": _differences(written, byte_runs)}
+    return {
+        "records": _node_differences(records, byte_runs),
+        "written": _node_differences(written, byte_runs),
+    }
 
 
 def _record_floats(record: UniformRecord) -> Floats:
@@ -106,7 +109,7 @@ def _written_floats(captured_pass: CapturedPass) -> Floats:
     return np.frombuffer(captured_pass.written[1] if captured_pass.written else b"", "<f4")
 
 
-def _differences(
+def _node_differences(
     pairs: list[tuple[int, tuple[Floats, Floats]]], byte_runs: ByteRunCollector
 ) -> list[tuple[int, int, int]]:
     changes = []
