@@ -1,4 +1,4 @@
-"""Light stage: lights in all directions, and weights with which they reproduce an environment."""
+"""Light stage: lights in all directions, and weights with which the lights reproduce an environment."""
 
 from __future__ import annotations
 

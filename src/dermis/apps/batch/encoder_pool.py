@@ -74,7 +74,7 @@ class EncoderPool:
 
 
 class _EncoderProcess:
-    """Encoder process with shared memory through which it receives its jobs.
+    """Encoder process that receives jobs through shared memory.
 
     The pipe only carries the offsets of the jobs in the shared memory. If the pipe carried the jobs, parent
     and child could block, each waiting for the other process to read.

@@ -23,7 +23,7 @@ def target_weight(scene: Scene, target: str) -> float:
 
 
 def with_target_weight(scene: Scene, target: str, weight: float) -> Pose | None:
-    """Return the pose of a scene with a new weight of one morph target; None if this is the rest pose."""
+    """Return the pose of a scene with a new weight of one morph target; None for the rest pose."""
     weights = dict(_pose_or_rest(scene).weights)
     weights.pop(target, None)
     if weight != _rest_weight(scene.head, target):

@@ -1,4 +1,4 @@
-"""Files of an export to Blender: a Python script with the head as .glb beside it, or a .blend.
+"""Files of an export to Blender: a Python script with a .glb file of the head, or a .blend file.
 
 Scenes are in metres with Z up.
 """

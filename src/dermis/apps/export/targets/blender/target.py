@@ -222,7 +222,7 @@ class Blender(Target):
         return CumulativeProfile.from_function(fraction_within, energy)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
-        """Write the Python script with the head and maps that it reads, or the .blend that the script saves.
+        """Write the Python script and its head and maps, or the .blend file that the script saves.
 
         Raises DermisError for a .blend if DERMIS_BLENDER_PYTHON does not name a Python with bpy.
         """

@@ -21,7 +21,7 @@ from dermis.base.errors import refuse
 def build_document(definitions: Sequence[OpenPbrMaterial], shader: str, prefix: str) -> MaterialX.Document:
     """Return a validated MaterialX document of materials; lengths are in metres, colours linear Rec. 709.
 
-    shader : node category of the surfaces, `OPEN_PBR` or `STANDARD_SURFACE`
+    shader : MaterialX node category of the surface shaders, `OPEN_PBR` or `STANDARD_SURFACE`
     prefix : prefix of the file names of the maps beside the document
     """
     document = MaterialX.createDocument()
@@ -69,9 +69,9 @@ def _add_material(
 def _add_map(graph: MaterialX.NodeGraph, role: str, map_path: str, shader: str) -> MaterialX.Output:
     """Add the nodes that read a map file to a graph, and return their output.
 
-    role : role of the map, such as "colour", which sets its type and colour space
+    role : role of the map, such as "colour", which determines the type and colour space of the map's node
     map_path : path of the map
-    shader : node category of the surface
+    shader : MaterialX node category of the surface shaders
     """
     map_type = MAP_TYPES[role]
     output_type = map_type.type
