@@ -57,14 +57,14 @@ EyeOptions = Annotated[
 ]
 
 
-def note_eyes(head: Head, requested: str | None) -> None:
+def note_eyes(head: Head, eyes_option: str | None) -> None:
     """Print a note on stderr if the eyeballs of a mesh file were not replaced by the package's eyes.
 
-    requested : value of the option --eyes
+    eyes_option : value of the option --eyes
     """
     if head.note:
         note(f"note: {head.note}")
-    elif requested == "fitted" and head.eyes is None:
+    elif eyes_option == "fitted" and head.eyes is None:
         note("note: eyes: no group has a name of an eye; name the groups with --eye-groups")
 
 

@@ -90,7 +90,7 @@ def join_parts(out: Path, shard: Shard, spec: Spec) -> tuple[Part, ...]:
         damaged = tuple(part for part in parts if not is_intact(out, part, spec))
         if not shard_exists(out, shard, spec):
             if damaged:
-                _remove_files(parts[part] for part in damaged)
+                _remove_paths(parts[part] for part in damaged)
                 return damaged
             try:
                 with ShardWriter(out, shard, spec) as writer:
@@ -100,11 +100,11 @@ def join_parts(out: Path, shard: Shard, spec: Spec) -> tuple[Part, ...]:
                 if not attempts_left:
                     raise
                 continue
-        _remove_files(parts.values())
+        _remove_paths(parts.values())
         break
     return ()
 
 
-def _remove_files(paths: Iterable[Path]) -> None:
+def _remove_paths(paths: Iterable[Path]) -> None:
     for path in paths:
         remove_path(path)
