@@ -64,8 +64,8 @@ _MELANIN_RANGE, _BLOOD_RANGE = (5e-4, 0.7), (3e-4, 0.08)
 _EPIDERMIS_RANGE_MM = (0.02, 0.2)
 _ITA_STEP = 1.0  # half width of the interval over which the density of an ITA is averaged [degrees]
 _MAX_SCORE = 2.9  # largest absolute normal score of an ITA
-# Numbers of melanin fractions, of bisections between two of them, and of steps that reduce blood:
-_ITA_NODES, _BISECTIONS, _MAX_PALING_STEPS = 257, 40, 15
+# Numbers of melanin fractions, of bisections between two of them, and of changes of the other pigments:
+_ITA_NODES, _BISECTIONS, _MAX_ITA_STEPS = 257, 40, 15
 Weights = Mapping[str, float]
 """Weights of groups, with a sum of 1."""
 
@@ -335,16 +335,22 @@ def with_ita(
 ) -> MeasuredPigments:
     """Return pigments with the melanin fraction that results in a given ITA.
 
-    If none does, as for very light skin with much blood, blood is also reduced and its oxygenation raised.
+    If none does, other pigments change too: very light skin gets less blood with more oxygen, very dark skin
+    a thicker epidermis.
     """
-    for _ in range(_MAX_PALING_STEPS):
+    for _ in range(_MAX_ITA_STEPS):
         table = skin_colour_table(eumelanin, pigments.oxygen, pigments.epidermis_mm)
         melanin = np.geomspace(*_MELANIN_RANGE, _ITA_NODES)
         found = ita_degrees(lab(table.lookup(melanin, np.full(_ITA_NODES, pigments.blood))))
-        if found[0] >= ita:
+        if found[0] < ita:
+            oxygen = pigments.oxygen + 0.2 * (1.0 - pigments.oxygen)
+            pigments = pigments._replace(blood=max(0.8 * pigments.blood, _BLOOD_RANGE[0]), oxygen=oxygen)
+        elif found[-1] > ita:
+            pigments = pigments._replace(
+                epidermis_mm=min(1.3 * pigments.epidermis_mm, _EPIDERMIS_RANGE_MM[1])
+            )
+        else:
             break
-        oxygen = pigments.oxygen + 0.2 * (1.0 - pigments.oxygen)
-        pigments = pigments._replace(blood=max(0.8 * pigments.blood, _BLOOD_RANGE[0]), oxygen=oxygen)
     below = np.flatnonzero(found <= ita)
     index = int(below[0]) if len(below) else _ITA_NODES - 1
     low, high = np.log(melanin[[max(index - 1, 0), index]])
