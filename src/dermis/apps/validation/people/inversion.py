@@ -17,8 +17,8 @@ _HIGH: Final = np.array([-0.3, -1.5, 1.0, np.log2(0.2)])
 _START_MELANIN, _START_BLOOD = 0.04, 0.01
 _PRIOR: Final = np.array([0.7, np.log2(DEFAULT_SKIN.epidermis_mm)])
 _PRIOR_SD: Final = np.array([0.3, 0.2])
-"""Prior of oxygen and of log2 of the thickness. A wide prior of thickness would give people whose skin the model
-cannot match an epidermis as thin as the limit, which melanin cannot darken enough for every tone."""
+"""Prior of oxygen and of log2 of the thickness. With a wide prior of thickness, skin that the model cannot
+match would get an epidermis of the least thickness, which melanin cannot darken enough for every tone."""
 _LAB_SD = 0.3
 """Standard deviation of colours in the fit [CIELAB]; small, so that colours take precedence over spectra."""
 _SPECTRUM_SD = 0.01
