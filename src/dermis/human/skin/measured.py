@@ -22,7 +22,7 @@ from dermis.base.errors import format_value, refuse
 from dermis.base.quantities import checked_number
 from dermis.base.tables import float_columns, read_rows
 from dermis.human.skin.colours import skin_colour_table
-from dermis.images.colour import lab
+from dermis.images.colour import lab, linear_of_lab
 from dermis.images.skin_tone import ita_degrees
 from dermis.optics.pigments.parameters import DEFAULT_SKIN
 
@@ -419,6 +419,47 @@ def measured_cells() -> tuple[MeasuredCell, ...]:
         )
         for row, colour, values in zip(rows, colours, pigments, strict=True)
     )  # fmt: skip
+
+
+class MeasuredTone(NamedTuple):
+    """Colour of a site of the body.
+
+    colour : (3,) diffuse reflectance, linear Rec. 709 [-]
+    note : sentence that says whose skin it is, and names its pigments
+    """
+
+    colour: Doubles
+    note: str
+
+
+def measured_tone(name: str) -> MeasuredTone:
+    """Return the median colour of a site of the body, for one group of people or as the mean of all groups.
+
+    name : one of `SITES`, alone or after one of `SKIN_ANCESTRIES`, such as "palm" or "south asian palm"
+
+    Raises DermisError for other names.
+    """
+    words = " ".join(name.lower().replace("_", " ").split())
+    site = next((one for one in SITES if words == one or words.endswith(f" {one}")), "")
+    group = words[: len(words) - len(site)].strip()
+    if not site or (group and group not in SKIN_ANCESTRIES):
+        expected = f"one of {', '.join(SITES)}, alone or after one of {', '.join(SKIN_ANCESTRIES)}"
+        refuse("skin_site", expected, f"got {format_value(name)}", "Correct it")
+    members = UNIONS.get(group, (group,)) if group else tuple(GROUPS.values())
+    cells = [
+        one
+        for one in measured_cells()
+        if one.group in members and one.site == site and not one.sex + one.age_group
+    ]
+    measured = [one for one in cells if one.people] or cells
+    colour = linear_of_lab(np.mean([one.cielab for one in measured], axis=0))
+    people = sum(one.people for one in measured)
+    source = f"the median of {people:,} measured people" if people else "an estimate from other groups"
+    if len(measured) > 1:
+        source = f"the mean of {len(measured)} groups' medians, {people:,} measured people"
+    melanin, blood = (np.exp(np.mean(np.log([one.pigments[k] for one in measured]))) for k in (0, 1))
+    pigments = f"--melanin {melanin:.2g} --blood {blood:.2g} makes the profile that of such skin"
+    return MeasuredTone(colour, f"its skin is drawn as {words}, {source}; {pigments}")
 
 
 @cache
