@@ -18,8 +18,10 @@ from dermis.apps.inverse.fitting.light_basis import solve_strengths
 from dermis.apps.inverse.fitting.placement import align_to_landmarks
 from dermis.apps.inverse.fitting.result import FitResult, save_fit
 from dermis.apps.inverse.fitting.solve import SYSTEMATIC_SD
+from dermis.apps.inverse.fitting.unknowns import SKIN_UNKNOWNS
 from dermis.apps.inverse.unmixing.unknown_skin import unknown_skin_sd
 from dermis.human.landmarks.points import landmark_points
+from dermis.human.skin.measured import measured_cells
 from dermis.images.colour import encode_srgb8
 from dermis.mesh.geometry import fibonacci_sphere
 from dermis.scene.camera import Camera
@@ -177,3 +179,13 @@ def test_stated_pigments_are_known() -> None:
     skin = Skin(profile="spectral", pigments=Pigments(oxygen=0.9, epidermis_mm=0.06))
     subject = fit_subject(Scene(Human().head(subdivide=0), skin=skin))
     assert subject.known == ("oxygen", "epidermis_mm")
+
+
+def test_priors_of_pigments_are_those_of_measured_people() -> None:
+    """Medians of groups and sites differ less than people: nearly all are within two deviations."""
+    cells = [one for one in measured_cells() if not one.sex + one.age_group and one.people >= 50]
+    for unknown in SKIN_UNKNOWNS[:2]:
+        values = np.log([getattr(one.pigments, unknown.name) for one in cells])
+        score = (values - np.log(unknown.prior_median)) / unknown.prior_sd
+        assert abs(np.median(score)) < 0.5 and np.abs(score).max() < 2.5, unknown.name
+        assert (np.abs(score) < 1.0).mean() > 0.68, unknown.name
