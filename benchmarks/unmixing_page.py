@@ -170,8 +170,10 @@ def _fitting(results: JsonObject) -> str:
     errors = f"relative to the stated standard deviations: {_stated(results['traced'])}"
     text += f"Errors of path-traced faces {errors}.\n"
     if people := results.get("people"):
-        text += f"\nThe same of {len(people)} people with measured pigments, rendered by this package, of whom the "
-        text += f"fit knows neither oxygen nor thickness of the epidermis: {_stated(people)}.\n"
+        text += (
+            f"\nThe same of {len(people)} people with measured pigments, rendered by this package, of whom "
+        )
+        text += f"the fit knows neither oxygen nor thickness of the epidermis: {_stated(people)}.\n"
     return f"{_table(heads, rows)}\n{text}"
 
 
