@@ -227,8 +227,8 @@ def fitted(one: Case, image: NDArray[np.float32], adapter: str) -> JsonObject:
 
 def fitted_stranger(one: Case, image: NDArray[np.float32], adapter: str) -> JsonObject:
     """Return the estimates of a case whose oxygenation and epidermal thickness the fit assumes."""
-    assumed = {"oxygen": DEFAULT_SKIN.oxygen, "epidermis_mm": DEFAULT_SKIN.epidermis_mm}
-    look = replace(one.person.look, **assumed)
+    oxygen, epidermis_mm = DEFAULT_SKIN.oxygen, DEFAULT_SKIN.epidermis_mm
+    look = replace(one.person.look, oxygen=oxygen, epidermis_mm=epidermis_mm)
     scene = replace(one.scene, head=replace(one.scene.head, maps=PaintedMaps(look=look)))
     given = _given(scene, Pigments(eumelanin=look.eumelanin))
     found = fit(image, given, side=_SMALL_SIDE, atlas=2 * _SMALL_SIDE, adapter=adapter)

@@ -157,8 +157,9 @@ def load_head(
         **named,
     }
     others = {"height_mm": height_mm, "normal_y": normal_y, "eyes": eyes, "eye": eye, "regions": regions}
-    others["skin_site"] = skin_site
-    check_options(**mesh_options, **others, subdivide=AUTO if callable(subdivide) else subdivide)
+    check_options(
+        **mesh_options, **others, skin_site=skin_site, subdivide=AUTO if callable(subdivide) else subdivide
+    )
     if is_person_name(name):
         mesh_options |= {"eyes": eyes, "skin_site": skin_site}
         return _with_look(_load_human(name, map_files, height_mm, normal_y, mesh_options, levels), eye)
