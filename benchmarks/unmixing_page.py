@@ -174,6 +174,10 @@ def _fitting(results: JsonObject) -> str:
             f"\nThe same of {len(people)} people with measured pigments, rendered by this package, of whom "
         )
         text += f"the fit knows neither oxygen nor thickness of the epidermis: {_stated(people)}.\n"
+    else:
+        text += (
+            "\nThese figures are of people and of a skin model before the comparison with measured people.\n"
+        )
     return f"{_table(heads, rows)}\n{text}"
 
 
