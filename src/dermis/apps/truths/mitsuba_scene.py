@@ -150,7 +150,7 @@ def _head_shapes(mi: Mitsuba, head: Head, medium: Medium | Lambertian) -> tuple[
         skin_materials = _materials_of_kind(head, "skin")
         skin = {f"skin_{k}": _material_mesh(mi, head, k, bsdf=diffuse) for k in skin_materials}
         return {**skin, **opaque}, ()
-    bodies, notes = _layer_interfaces(mi, head, medium)
+    bodies, notes = layer_interfaces(mi, head, medium)
     return {**bodies, **opaque}, notes
 
 
@@ -187,7 +187,7 @@ def _material_mesh(mi: Mitsuba, head: Head, index: int, **attributes: MitsubaObj
     return mesh_shape(mi, vertices, corners.reshape(-1, 3), mesh.normals[used], **attributes)
 
 
-def _layer_interfaces(mi: Mitsuba, head: Head, medium: Medium) -> tuple[SceneDict, tuple[str, ...]]:
+def layer_interfaces(mi: Mitsuba, head: Head, medium: Medium) -> tuple[SceneDict, tuple[str, ...]]:
     """Return closed surfaces around the skin and between its layers, and notes on changes to the head."""
     skin = closed_skin(head.mesh, head.name)
     skin = replace(skin, positions=(skin.positions - np.array(head.centre_mm)).astype(np.float32))
