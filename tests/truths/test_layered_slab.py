@@ -22,7 +22,7 @@ PATHS, PHOTONS = 120_000, 400_000
 
 
 def cube() -> Mesh:
-    """Return a cube whose faces are fans around their middles, so that its offset faces are parallel to it."""
+    """Return a cube whose faces are fans, so that its faces stay parallel when they are offset."""
     positions, triangles = [], []
     for axis, side in np.ndindex(3, 2):
         sign = 2 * side - 1

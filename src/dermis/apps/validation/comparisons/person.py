@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from dermis.apps.truths.half_space import diffuse_albedo, directional_albedo
 from dermis.apps.truths.metrics import Estimate, energy_ratio, relative_rmse
 from dermis.apps.truths.path_traced import MitsubaVariant, PathTraced
 from dermis.apps.truths.person.medium import pigmented_skin, uniform_skin
@@ -24,6 +26,7 @@ from dermis.human.skin.painted import PaintedMaps, mean_colour
 from dermis.images.colour import encode_srgb
 from dermis.mesh.head import Head
 from dermis.mesh.pose import Pose
+from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import SKIN_ETA, Medium
 from dermis.optics.pigments.parameters import SkinParameters
 from dermis.optics.profiles import write_profile
@@ -124,9 +127,7 @@ def shared_skin(renderer: Renderer, head: Head, truth: TruthName, folder: Path) 
         parameters = SkinParameters(look.melanin, look.eumelanin, look.blood, look.oxygen, look.epidermis_mm)
         medium = pigmented_skin(parameters, colour, eta)
     else:
-        published = renderer.skin_profile(Skin())
-        weight, width = published.weight, np.sqrt(0.5 * np.pi * published.variance_mm2)
-        medium = uniform_skin(colour, (weight * width[:, None]).sum(axis=0) / weight.sum(axis=0), eta)
+        medium = uniform_skin(colour, mean_distance_mm(renderer.skin_profile(Skin())), eta)
     file = folder / f"{truth}.toml"
     write_profile(file, medium_gaussians(medium, "montecarlo"), {"model": "montecarlo"})
     return SharedSkin(medium, file)
@@ -273,6 +274,47 @@ def path_trace_subject(
         use_cache=use_cache,
         progress=progress,
     )
+
+
+def path_trace_view(
+    renderer: Renderer,
+    scene: Scene,
+    textures: SkinTextures,
+    size: tuple[int, int],
+    samples: int,
+    *,
+    variant: MitsubaVariant = "scalar_rgb",
+) -> PathTraced:
+    """Path-trace a person of homogeneous skin that reflects with a strength of 1 and does not refract.
+
+    In the medium, light exits at the same mean distance from its entry as by the profile of the scene's skin.
+
+    textures : maps of the skin as dermis paints them, but with colours under uniform light
+    size : width and height of the picture [pixel]
+    samples : paths per pixel
+    variant : variant of Mitsuba, as in `path_trace`
+    """
+    mean = scene.head.maps.mean_colour
+    assert mean is not None  # painted maps always have one
+    medium = uniform_skin(at_normal_incidence(mean), mean_distance_mm(renderer.skin_profile(scene.skin)), 1.0)
+    colour = at_normal_incidence(textures.colour).astype(np.float32)
+    textures = replace(textures, colour=colour, strength=np.ones((1, 1), np.float32))
+    return path_trace_person(scene, textures, medium, size, samples, variant=variant)
+
+
+def mean_distance_mm(profile: GaussianSum) -> Floats:
+    """Return the mean lateral distance (3,) between entry and exit of light by a profile [mm]."""
+    weight, width = profile.weight, np.sqrt(0.5 * np.pi * profile.variance_mm2)
+    return np.asarray((weight * width[:, None]).sum(axis=0) / weight.sum(axis=0))
+
+
+def at_normal_incidence(colour: ArrayLike) -> Floats:
+    """Return reflectances at normal incidence of half-spaces of index 1, by those for uniform light [-]."""
+    albedo = 1.0 - np.linspace(1.0, 0.01, 48) ** 2
+    uniform, normal = (
+        [float(f(one)) for one in albedo] for f in (diffuse_albedo, partial(directional_albedo, 1.0))
+    )
+    return np.asarray(np.interp(colour, uniform, normal))
 
 
 def person_comparison(name: str, ours: Floats, reference: PathTraced, mask: Mask) -> PersonComparison:
