@@ -35,8 +35,8 @@ _COLOUR_DEPTH_MM = 3.0  # depth to which the medium has the colour of the surfac
 _SAMPLES_PER_VOXEL = 3.0  # samples per area of one voxel face
 _MAX_COLOUR = 0.97
 _MIN_ROOT = 0.02  # smallest tabulated square root of 1 - albedo
-_PHOTONS, _TABLE_PHOTONS = 40_000, 100_000
-_ALBEDO_STEPS = 24
+_PHOTONS, _TABLE_PHOTONS = 40_000, 40_000
+_ALBEDO_STEPS = 20
 """Number of tabulated albedos of the last of several layers."""
 
 

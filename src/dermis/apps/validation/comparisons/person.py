@@ -95,7 +95,7 @@ Cause = Literal["pigments", "relief", "reflection", "hair", "scattering", "bounc
 
 "pigments": variation of the colour. "relief": folds, pores, and variation of gloss. "reflection": specular
 lobe of the skin. "hair": hair, brows and lashes. "scattering": subsurface scattering, so that skin is
-Lambertian. "bounces": subsurface scattering and all light from skin to skin.
+Lambertian. "bounces": all light but direct light on Lambertian skin, so that eyes are black; and hair.
 """
 CAUSES: tuple[Cause, ...] = get_args(Cause)
 
@@ -160,7 +160,7 @@ def without_cause(subject: PersonSubject, cause: Cause) -> PersonSubject:
         textures = replace(textures, height_mm=0.0 * flat, strength=strength, roughness=rough)
     elif cause == "reflection":
         textures = replace(textures, strength=0.0 * flat)
-    elif cause == "hair":
+    elif cause in ("hair", "bounces"):
         head = replace(head, strands=None, hair=None)
     return PersonSubject(scene.replace(head=replace(head, maps=maps)), textures, cause)
 
