@@ -15,7 +15,8 @@ from dermis.mesh.primitives import SKIN
 from dermis.optics.media import media
 
 pytest.importorskip("mitsuba")
-RADII_MM = 0.3, 1.0, 3.0, 8.0
+RADII_MM = 0.6, 1.0, 3.0, 8.0
+DISC_HEIGHT_MM = 0.012  # above the outermost surface, which is 0.005 mm above the skin
 HALF_WIDTH_MM = 60.0
 PATHS, PHOTONS = 120_000, 400_000
 """Standard errors of a total of 0.4: 0.35 % by paths and 0.2 % by photons."""
@@ -44,7 +45,7 @@ def disc_light(radius_mm: float, middle_mm: tuple[float, float, float]) -> dict[
     """Return a disc just above the middle of a face of the slab that emits a radiance of 1 downwards."""
     mi = load_mitsuba()
     x, y, z = middle_mm
-    place = mi.ScalarTransform4f().translate([x, y, z + 0.05])
+    place = mi.ScalarTransform4f().translate([x, y, z + DISC_HEIGHT_MM])
     return {
         "type": "disk",
         "to_world": place.rotate([1.0, 0.0, 0.0], 180.0).scale(radius_mm),

@@ -102,8 +102,9 @@ def person_scene(
 
     medium, max_depth : as in `path_trace_person`
     """
+    notes: tuple[str, ...] = ()
     if medium is None:
-        shapes, notes = diffuse_skin_shapes(mi, person), ()
+        shapes = diffuse_skin_shapes(mi, person)
     else:
         media = skin_media(mi, person, scene.camera, medium)
         shapes, notes = skin_shapes(mi, person, medium, media)
