@@ -215,11 +215,11 @@ def save_panels(view: str, pair: PersonComparison) -> None:
     """Keep the pictures of a view in the cache: frame, path-traced picture, and their signed difference."""
     from scipy.ndimage import uniform_filter
 
-    smooth = (
-        uniform_filter(np.maximum(pair.exposure * image, 0.0), (3, 3, 0))
+    ours, reference = (
+        uniform_filter(np.maximum(pair.exposure * image, 0.0), (3, 3, 1))
         for image in (pair.ours, pair.reference)
     )
-    difference = np.rint(255 * signed_difference(*smooth)).astype(np.uint8)
+    difference = np.rint(255 * signed_difference(ours, reference)).astype(np.uint8)
     pictures = pair.tone_mapped(pair.ours), pair.tone_mapped(pair.reference), difference
     try_save_arrays(_PANEL_FOLDER, _panel_key(view), dict(zip(_PANEL_NAMES, pictures, strict=True)))
 
