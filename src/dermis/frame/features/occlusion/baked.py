@@ -118,6 +118,7 @@ def cached_occlusion_map(
 ) -> Texture:
     """Return a texture of the visible fraction of the sky at texels and vertices, baked or read from disk.
 
+    hair : hair of the head, which dims the sky on the skin below it
     bindings : resources of the lighting; the resources of geometry and lights are replaced
     texels : texture of the surface point of each atlas texel
     """
