@@ -20,7 +20,7 @@ from dermis.scene.resolved_atlas import resolved_atlas
 from dermis.scene.settings import Settings
 
 RADIUS_MM = 100.0
-NOTE = "note: --atlas 512 without a GPU, as the picture resolves no more texels\n"
+NOTE = "note: --atlas 1024 without a GPU, as the picture resolves no more texels\n"
 
 
 def ball(frame_mm: float = 340.0) -> Scene:
@@ -29,10 +29,10 @@ def ball(frame_mm: float = 340.0) -> Scene:
 
 
 def test_side_has_a_texel_for_three_pixels() -> None:
-    # 4 pi 100^2 mm2 in half of the atlas: a side of 1 texel per mm is 501 texels; 3.06 pixels are one mm here
-    assert resolved_atlas(ball(), Settings(size=(700, 1040))) == 512
-    assert resolved_atlas(ball(), Settings(size=(700, 1060))) == 1024
+    # 4 pi 100^2 mm2 in half of the atlas: 501 texels for one per mm; 1024 texels for 6.13 pixels per mm
     assert resolved_atlas(ball(170.0), Settings(size=(700, 1040))) == 1024
+    assert resolved_atlas(ball(170.0), Settings(size=(700, 1060))) == 2048
+    assert resolved_atlas(ball(85.0), Settings(size=(700, 520))) == 1024
 
 
 def test_side_is_at_most_that_of_the_settings() -> None:
@@ -51,23 +51,19 @@ def test_given_sides_are_kept(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_software_adapters_note_the_side(capsys: pytest.CaptureFixture[str]) -> None:
-    assert fit_atlas(ball(), Settings(size=256), "CPU").atlas == 512
+    assert fit_atlas(ball(), Settings(size=256), "CPU").atlas == 1024
     assert (
-        capsys.readouterr().err == "note: --atlas 512 without a GPU, as the picture resolves no more texels\n"
+        capsys.readouterr().err
+        == "note: --atlas 1024 without a GPU, as the picture resolves no more texels\n"
     )
-    assert fit_atlas(ball(), Settings(size=256, technique="none"), "CPU").atlas == 512
+    assert fit_atlas(ball(), Settings(size=256, technique="none"), "CPU").atlas == 1024
     assert capsys.readouterr().err == ""  # this technique has no atlas
 
 
 @pytest.mark.skipif(os.environ.get("DERMIS_TEST_ADAPTER", "cpu") != "cpu", reason="the adapter is a GPU")
 def test_command_reports_the_side(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from dermis.cli.render import render
-
     write_head(tmp_path / "head.obj")
-    from dermis.cli.scene_options import SceneOptions
-
-    options = SceneOptions(
-        settings={"size": (32, 32), "samples": 1, "seams": "alpha", "transmission": "none"}
-    )
-    render(str(tmp_path / "head.obj"), output=tmp_path / "a.png", scene=options, adapter="cpu", as_json=True)
-    assert json.loads(capsys.readouterr().out)["atlas"] == 512
+    small = {"size": (32, 32), "samples": 1, "seams": "alpha", "transmission": "none"}
+    options, picture = SceneOptions(settings=small), tmp_path / "head.png"
+    render(str(tmp_path / "head.obj"), output=picture, scene=options, adapter="cpu", as_json=True)
+    assert json.loads(capsys.readouterr().out)["atlas"] == 1024

@@ -13,13 +13,13 @@ from dermis.scene.settings import Settings
 
 _TEXELS_PER_PIXEL = 1 / 3  # light in skin is smooth; shading reads normals and maps at each pixel
 _FILLED_FRACTION = 0.5  # part of an atlas that shows skin
-_MIN_SIDE = 512
+_MIN_SIDE = 1024  # coarser texels would blur the light of the narrowest profiles
 
 
 def resolved_atlas(scene: Scene, settings: Settings) -> int:
     """Return the side of the smallest atlas with a texel for every three pixels [texel].
 
-    It is a power of two, at least 512 and at most the side in `settings`. Pixels are measured at the target
+    It is a power of two, at least 1024 and at most the side in `settings`. Pixels are measured at the target
     of the camera, and texels by the area of the skin.
     """
     pixels_per_mm = settings.size[1] / scene.camera.frame_mm
