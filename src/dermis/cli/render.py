@@ -103,7 +103,7 @@ def render(
         with spinner("rendering"):
             renderer = future.result()
             settings = fit_atlas(loaded_scene, settings, renderer.device.adapter.kind)
-            rendered = renderer.draw(loaded_scene, settings, outputs=frame_outputs.names)
+            rendered = renderer.draw(loaded_scene, settings, timed=False, outputs=frame_outputs.names)
             values = {name: rendered.output(name) for name in frame_outputs.names}
             setup_ms = rendered.setup_ms
             if as_json:  # time a second frame, because the first one fills the caches
