@@ -24,8 +24,7 @@ def resolved_atlas(scene: Scene, settings: Settings) -> int:
     """
     pixels_per_mm = settings.size[1] / scene.camera.frame_mm
     side = _TEXELS_PER_PIXEL * pixels_per_mm * math.sqrt(_skin_area_mm2(scene.head.mesh) / _FILLED_FRACTION)
-    power = 2 ** math.ceil(math.log2(max(side, _MIN_SIDE)))
-    return min(power, settings.atlas)
+    return min(1 << math.ceil(math.log2(max(side, _MIN_SIDE))), settings.atlas)
 
 
 def _skin_area_mm2(mesh: Mesh) -> float:
