@@ -31,7 +31,8 @@ _MAX_TRACED_TRIANGLES = 300_000  # above this, points closer than _MERGED_LINES 
 _MERGED_LINES = 1.5  # distance below which points are merged, in spacings of adjacent lines
 _MIN_FORM_FACTOR = 1e-3  # smaller form factors are dropped, and the remaining ones of a cell scaled up
 _SEED = 20
-_MAX_THREADS = 8  # each needs memory for the intersections of one bundle
+_MAX_THREADS = 8
+_TRIANGLES_AT_ONCE = 1 << 14  # limits the memory of each thread
 _LINES_PER_ROW = 4096  # stride of line indices: more than the lines along a bundle's side
 
 
@@ -145,8 +146,13 @@ def _trace_lines(
         axes, offset = bundle
         # a matrix product would depend on the number of threads in its last bits
         points = x * axes[:, 0] + y * axes[:, 1] + z * axes[:, 2] + np.append(offset, 0.0)
-        line, depth, outward, triangle, weights = intersect_lines(points[corner])
-        cell = np.where(mapped[triangle], _cell_index(corner_uv[triangle], weights), -1)
+        met = []
+        for first in range(0, max(len(corner), 1), _TRIANGLES_AT_ONCE):
+            part = slice(first, first + _TRIANGLES_AT_ONCE)
+            line, depth, outward, triangle, weights = intersect_lines(points[corner[part]])
+            cell = np.where(mapped[part][triangle], _cell_index(corner_uv[part][triangle], weights), -1)
+            met.append((line, depth, outward, cell))
+        line, depth, outward, cell = (np.concatenate(parts) for parts in zip(*met, strict=True))
         return _facing_cells(line, depth, outward, cell), cell[cell >= 0]
 
     line_counts, facing = np.zeros(CELLS_PER_SIDE * CELLS_PER_SIDE), [np.zeros((0, 2), np.int64)]
