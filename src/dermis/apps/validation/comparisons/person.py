@@ -198,7 +198,7 @@ def frame_of(
 
 def sum_of(images: Iterable[Floats]) -> Floats:
     """Return the sum of images of one shape."""
-    return np.sum(list(images), axis=0)
+    return np.asarray(np.sum(list(images), axis=0))
 
 
 def compare_person(
@@ -314,7 +314,7 @@ def at_normal_incidence(colour: ArrayLike) -> Floats:
     uniform, normal = (
         [float(f(one)) for one in albedo] for f in (diffuse_albedo, partial(directional_albedo, 1.0))
     )
-    return np.asarray(np.interp(colour, uniform, normal))
+    return np.asarray(np.interp(np.asarray(colour, float), uniform, normal))
 
 
 def person_comparison(name: str, ours: Floats, reference: PathTraced, mask: Mask) -> PersonComparison:
