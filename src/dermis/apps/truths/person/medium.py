@@ -8,13 +8,13 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dermis.apps.truths.half_space import directional_albedo
 from dermis.apps.truths.mitsuba_scene import homogeneous_medium
 from dermis.apps.truths.person.person import Person
 from dermis.apps.truths.scene_description import Mitsuba, MitsubaObject
 from dermis.apps.truths.slab_mc import ScatteringLayer, trace_slab
 from dermis.base.errors import refuse
 from dermis.mesh.geometry import triangle_areas
-from dermis.optics.half_space import kind_for_index, tabulated_albedo
 from dermis.optics.media import SKIN_ETA, Layer, Medium
 from dermis.optics.pigments.parameters import SkinParameters
 from dermis.optics.pigments.skin import spectral_medium
@@ -36,6 +36,7 @@ _SAMPLES_PER_VOXEL = 3.0  # samples per area of one voxel face
 _MAX_COLOUR = 0.97
 _MIN_ROOT = 0.02  # smallest tabulated square root of 1 - albedo
 _PHOTONS, _TABLE_PHOTONS = 40_000, 40_000
+_HALF_SPACE_STEPS = 48
 _ALBEDO_STEPS = 20
 """Number of tabulated albedos of the last of several layers."""
 
@@ -129,11 +130,26 @@ def _totals_by_root(layers: tuple[tuple[float, float, float], ...], eta: float) 
 
 
 def _half_space_albedo(colour: ArrayLike, eta: float) -> Doubles:
-    """Return single-scattering albedos of half-spaces that have given colours, by photon counts [-]."""
-    kind = kind_for_index(eta)
-    if kind is None:
+    """Return single-scattering albedos of half-spaces that have given colours [-]."""
+    totals, roots = _half_space_totals(eta)
+    wanted = np.clip(np.asarray(colour, np.float64), 0.0, _MAX_COLOUR)
+    return np.asarray(1.0 - np.interp(wanted, totals, roots) ** 2)
+
+
+@cache
+def _half_space_totals(eta: float) -> tuple[Doubles, Doubles]:
+    """Return reflectances of half-spaces at normal incidence, and sqrt(1 - single-scattering albedo) of each.
+
+    They are exact for an index of refraction of 1, and counted photons for `SKIN_ETA`.
+    """
+    roots = np.linspace(1.0, _MIN_ROOT, _HALF_SPACE_STEPS)
+    if eta == 1.0:
+        return np.array([float(directional_albedo(1.0, float(1.0 - root**2))) for root in roots]), roots
+    if eta != SKIN_ETA:
         refuse("skin", f"an index of refraction of 1 or {SKIN_ETA}", f"got {eta:g}", "Choose one of them")
-    return tabulated_albedo(kind, np.clip(np.asarray(colour, np.float64), 0.0, _MAX_COLOUR))
+    layers = (ScatteringLayer(root**2, 1.0 - root**2, eta=eta) for root in roots.tolist())
+    runs = (trace_slab([layer], _TABLE_PHOTONS).relative_to_entering for layer in layers)
+    return np.maximum.accumulate([run.total_reflectance for run in runs]), roots
 
 
 @cache
