@@ -192,7 +192,7 @@ class Interruption:
         if (loop := _running_loop()) is not None:  # raised inside a task, asyncio would print it
             self._is_raised = True
             loop.call_soon_threadsafe(_raise_keyboard_interrupt)
-        elif _would_be_swallowed(frame):
+        elif _caller_swallows_exceptions(frame):
             self._raise_later()
         else:
             self._is_raised = True
@@ -257,14 +257,17 @@ def _running_loop() -> AbstractEventLoop | None:
     return loop
 
 
-def _would_be_swallowed(frame: FrameType | None) -> bool:
+def _caller_swallows_exceptions(stack_frame: FrameType | None) -> bool:
     """Return whether a library that called the code in a stack frame would swallow an exception.
 
     Examples of such code are callbacks of a graphics driver, and modules during an import.
     """
-    while frame is not None:
-        package, name = str(frame.f_globals.get("__name__")).partition(".")[0], frame.f_code.co_name
+    while stack_frame is not None:
+        package, name = (
+            str(stack_frame.f_globals.get("__name__")).partition(".")[0],
+            stack_frame.f_code.co_name,
+        )
         if package in _UNSAFE_PACKAGES or (package in _DRIVER_PACKAGES and "callback" in name):
             return True
-        frame = frame.f_back
+        stack_frame = stack_frame.f_back
     return False

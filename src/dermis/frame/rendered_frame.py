@@ -70,7 +70,7 @@ class RenderedFrame(ShortRepr):
 
     @property
     def picture(self) -> Picture:
-        """Return the textures of the picture."""
+        """Return the textures of the final picture: radiance, exposed picture, and readback buffers."""
         return self.textures.picture
 
     @property

@@ -117,14 +117,14 @@ def texel_bytes(texture: Texture) -> int:
 
 
 def texture_from_array(
-    device: Device, array: NDArray[np.generic], texel: str, name: str = "texture"
+    device: Device, array: NDArray[np.generic], texel_format: str, name: str = "texture"
 ) -> Texture:
     """Create a texture from an array (h, w) or (h, w, c), for reading in shaders.
 
-    texel : wgpu's name of the texel format, such as "rgba16float"
+    texel_format : wgpu's name of the texel format, such as "rgba16float"
     name : name of the texture, for error messages
     """
-    texture = make_texture(device, (array.shape[1], array.shape[0]), texel, use="map", name=name)
+    texture = make_texture(device, (array.shape[1], array.shape[0]), texel_format, use="map", name=name)
     upload(device, texture, array)
     return texture
 

@@ -45,7 +45,7 @@ class SkinTone(NamedTuple):
     fitzpatrick: str
 
     def as_json(self) -> dict[str, float | int | str]:
-        """Return the description with rounded numbers, and the statement that classes describe colours."""
+        """Return rounded numbers, classes, and a note that the classes describe colours, not people."""
         values = {name: round(one, 2) for name, one in zip(self._fields[:5], self[:5], strict=True)}
         return {**values, "monk": self.monk, "fitzpatrick": self.fitzpatrick, "statement": CLASS_STATEMENT}
 

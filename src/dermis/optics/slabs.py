@@ -318,6 +318,8 @@ def _response_column(eta: float, g: float, total: float) -> Floats:
 
     The first DIRECTION_ROWS elements are `relative_reflectance`, the last two are
     `relative_diffuse_reflectance` and `single_scattering`.
+
+    total : total diffuse reflectance of the half-space [-]
     """
     a, fraction, radiance = half_space_radiance(albedo_for_reflectance(total, eta), eta, DIRECTION_NODES, g)
     reflectance = fraction @ radiance

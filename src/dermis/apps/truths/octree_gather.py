@@ -93,7 +93,7 @@ def _gather_triangle(
         count -= 1
         visit_count += 1
         if _triangle_is_far(point, stack.corners[count], table, bound) or count + 4 > len(stack.area):
-            _add_midpoints(point, count, stack, table, exitance)
+            _add_side_midpoints(point, count, stack, table, exitance)
         else:
             _split_triangle(count, stack)
             count += 4
@@ -117,14 +117,18 @@ def _triangle_is_far(point: Floats, corners: Floats, table: ProfileTable, bound:
 
 
 @compiled
-def _add_midpoints(
-    point: Floats, i: int, stack: TriangleStack, table: ProfileTable, exitance: Floats
+def _add_side_midpoints(
+    point: Floats, i: int, triangle_stack: TriangleStack, table: ProfileTable, exitance: Floats
 ) -> None:
     """Add the light of sub-triangle i of the stack, evaluated at the midpoints of its sides.
 
     This quadrature is exact to second order in the product of irradiance and profile.
     """
-    corners, irradiance, scale = stack.corners[i], stack.irradiance[i], stack.area[i] / 6.0
+    corners, irradiance, scale = (
+        triangle_stack.corners[i],
+        triangle_stack.irradiance[i],
+        triangle_stack.area[i] / 6.0,
+    )
     for a in range(3):
         b = (a + 1) % 3
         x = 0.5 * (corners[a, 0] + corners[b, 0])

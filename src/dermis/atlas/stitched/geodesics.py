@@ -163,10 +163,12 @@ def _exit_fraction(rays: Geodesics) -> Doubles:
     return np.clip(here / np.where(here == there, np.inf, here - there), 0.0, 1.0)
 
 
-def _clipped_weights(a: Complex, b: Complex, c: Complex, point: Complex) -> tuple[Doubles, Doubles]:
-    """Return the barycentric weights of b and c at a point, clipped to the triangle a b c."""
-    area = _cross(b - a, c - a)
-    second = np.clip(_cross(point - a, c - a) / area, 0.0, 1.0)
-    third = np.clip(_cross(b - a, point - a) / area, 0.0, 1.0)
-    total = np.maximum(second + third, 1.0)
-    return second / total, third / total
+def _clipped_weights(
+    first: Complex, second: Complex, third: Complex, point: Complex
+) -> tuple[Doubles, Doubles]:
+    """Return the barycentric weights of the second and third corner at a point, clipped to the triangle."""
+    area = _cross(second - first, third - first)
+    second_weight = np.clip(_cross(point - first, third - first) / area, 0.0, 1.0)
+    third_weight = np.clip(_cross(second - first, point - first) / area, 0.0, 1.0)
+    total = np.maximum(second_weight + third_weight, 1.0)
+    return second_weight / total, third_weight / total

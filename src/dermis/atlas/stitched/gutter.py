@@ -123,14 +123,16 @@ class GutterTexels(NamedTuple):
 
 
 def trace_gutter(
-    surface: FlatSurface, border: Border, packing: Packing, width: GutterWidth, owner: Ints
+    surface: FlatSurface, border: Border, packing: Packing, width: GutterWidth, texel_triangle: Ints
 ) -> GutterTexels:
     """Find the gutter texels of a border, and trace geodesics to the surface points that they show.
 
-    owner : (h, w) index of the triangle that owns each texel of the pieces, -1 outside
+    texel_triangle : (h, w) index of the triangle that covers each texel of the pieces, -1 outside
     """
-    nearest = nearest_border_points(sides := border_sides(surface, border, packing, width), owner >= 0)
-    texels = np.column_stack(np.divmod(nearest.texel, owner.shape[1])[::-1])
+    nearest = nearest_border_points(
+        sides := border_sides(surface, border, packing, width), texel_triangle >= 0
+    )
+    texels = np.column_stack(np.divmod(nearest.texel, texel_triangle.shape[1])[::-1])
     ends, weights = trace_from_border(surface, border, sides, nearest, texels)
     y, x = texels.T[::-1]
     anchor_triangle = border.triangle[nearest.side].astype(np.int32)

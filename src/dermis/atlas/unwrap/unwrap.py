@@ -1,4 +1,4 @@
-"""Unwrapping of a mesh into a uv layout with desired or random charts, and packing of charts."""
+"""Unwrapping of a mesh into a uv layout, with charts that are given or grown from random seeds; packing."""
 
 from __future__ import annotations
 

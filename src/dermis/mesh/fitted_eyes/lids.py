@@ -15,7 +15,7 @@ from dermis.mesh.geometry import cross_2d, expand_runs
 _RAYS_PER_SIDE, _HALF_SIDE_RADII = 49, 0.9
 """Rays along each side of the square before the eye, and half its side in radii of the ball."""
 _IRIS_HALF_WIDTH = 0.25  # half the width of the iris in radii of the ball
-_IRIS_ABOVE_CENTRE = 0.08  # fraction of the opening's height; the upper lid covers part of the iris
+_IRIS_RISE_FRACTION = 0.08  # height of the iris above the middle of the lids, in heights of their opening
 _MAX_OPEN_ENDS = 0.3  # largest fraction of rays at an end of the opening that meet no lid
 _MAX_ANGLE = np.radians(15.0)
 _MAX_PROTRUSION_MM, _MIN_BULGE_MM = 0.3, 0.5
@@ -88,7 +88,7 @@ class Lids:
         gaze, as eyeballs and lids seldom have the same centre.
         """
         angles = []
-        for axis, other, shift in ((0, 1, 0.0), (1, 0, _IRIS_ABOVE_CENTRE)):
+        for axis, other, shift in ((0, 1, 0.0), (1, 0, _IRIS_RISE_FRACTION)):
             column = np.abs(self.ray_positions[:, other]) < _IRIS_HALF_WIDTH * self.ball.radius
             position = self.ray_positions[column, axis]
             is_open = (self.obstacle_front < self.ball_front)[column]

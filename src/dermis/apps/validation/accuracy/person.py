@@ -146,7 +146,7 @@ class Measuring:
         figures = pair_figures(pair)
         if one.truth == "matched":
             regions = picture_regions(self.renderer, subject.scene, self.side)
-            figures["regions"] = {name: list(ratio) for name, ratio in regions.signed_errors(pair).items()}
+            figures["regions"] = {name: list(ratio) for name, ratio in regions.light_ratios(pair).items()}
         if one.truth == "matched" and one.cause is None:
             settings = Settings(size=(self.side, self.side), samples=4)
             shipped = frame_of(self.renderer, subject, None, settings)

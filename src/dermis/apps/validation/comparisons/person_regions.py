@@ -41,8 +41,8 @@ class Regions:
 
     masks: dict[str, Mask]
 
-    def signed_errors(self, pair: PersonComparison) -> dict[str, Estimate]:
-        """Return the ratio of the light by dermis to the reference in each region with enough pixels [-]."""
+    def light_ratios(self, pair: PersonComparison) -> dict[str, Estimate]:
+        """Return the light of the frame divided by that of the reference in each large region [-]."""
         found = {}
         for name, mask in self.masks.items():
             inside = mask & pair.mask

@@ -194,13 +194,13 @@ def _equal_error_costs(renders: PeerRenders, mean: MeanImage, ours: RendererRow,
     return {goal: _cycles_cost(count, levels[-1], ours) for goal, count in sample_counts.items()}
 
 
-def _cycles_cost(paths: float, level: Sequence[CyclesPass], ours: RendererRow) -> dict[str, float]:
+def _cycles_cost(paths: float, passes: Sequence[CyclesPass], ours: RendererRow) -> dict[str, float]:
     """Return the time of Cycles for a number of paths per pixel, and its ratio to a frame of dermis.
 
-    level : measured passes, from whose time per path the cost is extrapolated
+    passes : measured passes, from whose time per path the cost is extrapolated
     """
-    seconds = paths * statistics.mean(one.seconds / one.samples for one in level)
-    core_seconds = paths * statistics.mean(one.core_seconds / one.samples for one in level)
+    seconds = paths * statistics.mean(one.seconds / one.samples for one in passes)
+    core_seconds = paths * statistics.mean(one.core_seconds / one.samples for one in passes)
     assert ours.seconds is not None and ours.core_seconds is not None
     ratios = {"ratio": seconds / ours.seconds, "core_ratio": core_seconds / ours.core_seconds}
     return {"samples": paths, "seconds": seconds, **ratios}

@@ -125,14 +125,14 @@ def walk_cdf(radius: ArrayLike, albedo: float, entry: WalkEntry) -> Floats:
 
 
 @cache
-def _interpolate_walk_table(albedo: float, entry: WalkEntry) -> tuple[Floats, Floats]:
+def _interpolate_walk_table(albedo: float, quantity: WalkEntry) -> tuple[Floats, Floats]:
     """Return radii [mean free paths] and the fraction of light within each radius [-], for one albedo.
 
     The tabulated random walks are interpolated to this albedo, and to radii that are eight times as dense.
     """
     from scipy.interpolate import PchipInterpolator
 
-    roots, radii, fraction_within = _load_walk_table()[entry]
+    roots, radii, fraction_within = _load_walk_table()[quantity]
     fraction = PchipInterpolator(roots, fraction_within, axis=0)(
         np.clip(np.sqrt(1.0 - albedo), roots[0], roots[-1])
     )

@@ -88,7 +88,10 @@ class OpenPbr(Target):
         return surface_parameters(subject, self.shader, published_mean_free_path_mm(subject), meaning)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the cumulative profile of the random walk, or MaterialX's Burley profile, for the radii."""
+        """Return the cumulative profile that the renderer will show for the exported radii.
+
+        It is MaterialX's Burley profile if `is_profile`, otherwise the profile of a random walk.
+        """
         radius = get_radii_mm(parameters, self.shader)
         if self.is_profile:
             return materialx_profile(radius, subject)

@@ -194,7 +194,10 @@ def read_texels(capture: FrameCapture, resource_index: int, mip: int) -> NDArray
 
 
 def _picture_textures(capture: FrameCapture, frames: Frames) -> dict[int, str]:
-    """Return the roles of half-float map textures that are large enough for pictures, by resource index."""
+    """Return the roles of half-float map textures that are stored as image files, by resource index.
+
+    Maps smaller than MIN_PICTURE_SIDE stay raw values. The role of a texture is its name in the shaders.
+    """
     return {
         index: role
         for index, role in resources_bound_as(capture, frames, _MAP_ROLES).items()
