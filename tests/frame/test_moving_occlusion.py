@@ -98,7 +98,7 @@ def errors(renderer: Renderer, head: Head, scene: Scene, points: Floats, side: i
     anew = baked_anew(renderer, head, points, side)[:side]
     own, found = np.isfinite(anew) & away, {}
     for which in ("baked", "rest"):
-        (made,) = open_maps(renderer, scene, atlas=side, occlusion=which)
+        (made,) = open_maps(renderer, scene, atlas=side, occlusion=which, strands=False)
         found[which] = float(np.sqrt(np.mean((made[:side][own] - anew[own]) ** 2)))
     return found
 
