@@ -59,7 +59,7 @@ MAX_DURATION_S = 150.0
 
 
 def run_time_s(words: list[str], longest_s: float = MAX_DURATION_S) -> float:
-    """Return the run time of a program [s], and print what it writes to stderr.
+    """Run a program, forward its standard error, and return its run time [s].
 
     Raises DermisError with its last output if it failed or took too long.
     """

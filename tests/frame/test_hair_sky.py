@@ -6,7 +6,7 @@ import os
 
 import numpy as np
 
-from dermis.apps.validation.comparisons.person import VIEWS, view_scene
+from dermis.apps.validation.comparisons.person_views import VIEWS, view_scene
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
 from dermis.human.person import Human

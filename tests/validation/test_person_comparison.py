@@ -13,20 +13,17 @@ from dermis.apps.truths.path_traced import PathTraced
 from dermis.apps.truths.person import medium
 from dermis.apps.truths.person.person import SkinTextures
 from dermis.apps.validation.comparisons.person import (
-    EYE_FRAME_MM,
-    VIEWS,
     PersonComparison,
     PersonSubject,
-    as_softbox,
     compare_person,
     iris_errors,
     person_comparison,
     render_frame,
     shared_skin,
-    view_scene,
     without_cause,
 )
 from dermis.apps.validation.comparisons.person_textures import person_textures
+from dermis.apps.validation.comparisons.person_views import EYE_FRAME_MM, VIEWS, as_softbox, view_scene
 from dermis.frame.renderer import Renderer
 from dermis.human.person import Human
 from dermis.human.skin.painted import mean_colour

@@ -23,7 +23,7 @@ _MAX_CHOICES = 100_000
 def require(condition: bool, expected: str) -> None:
     """Raise ValueError unless a condition is true.
 
-    expected : description of what was expected, for the message
+    expected : description of the valid values, for the message
     """
     if not condition:
         raise ValueError(expected)
@@ -263,7 +263,7 @@ def parse_distribution(value: object, nested: bool = False) -> Distribution:
     nested : whether the value is an alternative of a choice; an alternative must not itself be a choice or a
         file pattern
 
-    Raises ValueError with a description of what was expected.
+    Raises ValueError with a description of the valid values.
     """
     if isinstance(value, Distribution):
         return value

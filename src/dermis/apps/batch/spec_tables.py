@@ -30,7 +30,7 @@ class DistributionField:
         """Return the distribution that a value describes; None for an omitted field.
 
         Raises ValueError for a value that is not a distribution, and for a distribution out of bounds; the
-        message states what was expected.
+        message states the valid values.
         """
         if value is None:
             return None

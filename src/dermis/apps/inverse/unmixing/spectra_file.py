@@ -31,7 +31,7 @@ from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM
 
 SPECTRAL_SETS = {"none": TWO_UNKNOWNS, "oxygen": THREE_UNKNOWNS, "all": FIVE_UNKNOWNS}
-"""Names of the unknown parameters, by a word for what is found besides melanin and blood."""
+"""Names of the unknown parameters, by the name of those that are fitted besides melanin and blood."""
 _EXPECTED = "a table of reflectance spectra (CSV), a spectrum in each row or in each column"
 _WAVELENGTH = re.compile(r"[^\d.]{0,20}?(\d{3,4}(?:\.\d+)?)\s*(?:nm)?", re.IGNORECASE)
 _MAX_BYTES = 32 << 20

@@ -25,25 +25,22 @@ from dermis.apps.truths.metrics import Estimate, energy_ratio, relative_rmse, si
 from dermis.apps.truths.path_traced import MitsubaVariant, path_trace
 from dermis.apps.validation.comparisons.person import (
     CAUSES,
-    EYE_FRAME_MM,
     TRUTHS,
-    VIEWS,
     Cause,
     PersonComparison,
     PersonSubject,
     SharedSkin,
     TruthName,
-    View,
     compare_person,
     frame_of,
     iris_errors,
     render_frame,
     shared_skin,
-    view_scene,
     without_cause,
 )
 from dermis.apps.validation.comparisons.person_regions import picture_regions
 from dermis.apps.validation.comparisons.person_textures import person_textures
+from dermis.apps.validation.comparisons.person_views import EYE_FRAME_MM, VIEWS, View, view_scene
 from dermis.apps.validation.comparisons.scenes import default_region, medium_scene
 from dermis.apps.validation.pages import DOCS, RESULTS, fill_page, in_checkout, read_results, write_results
 from dermis.base.console import print_lines
@@ -253,7 +250,7 @@ def sheet_bytes(panels: Panels, columns: int) -> bytes:
 def fastest_variant() -> MitsubaVariant:
     """Return the first variant of Mitsuba that works on this machine: CUDA, LLVM, or scalar.
 
-    Each is tried in a process of its own, because LLVM of some versions ends the process.
+    Each variant is probed in a separate process, because some versions of LLVM abort the process.
     """
     for variant in ("cuda_ad_rgb", "llvm_ad_rgb"):
         done = subprocess.run([sys.executable, "-c", _PROBE, variant], capture_output=True, check=False)

@@ -19,20 +19,14 @@ from dermis.apps.truths.person.path_traced import path_trace_person
 from dermis.apps.truths.person.person import SkinTextures
 from dermis.apps.validation.comparisons.references import check_visible
 from dermis.apps.validation.comparisons.scenes import medium_gaussians
-from dermis.environment.panorama import UNIFORM
 from dermis.frame.renderer import Renderer
-from dermis.human.expressions import expression
 from dermis.human.skin.painted import PaintedMaps, mean_colour
 from dermis.images.colour import encode_srgb
 from dermis.mesh.head import Head
-from dermis.mesh.pose import Pose
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import SKIN_ETA, Medium
 from dermis.optics.pigments.parameters import SkinParameters
 from dermis.optics.profiles import write_profile
-from dermis.scene.camera import CAMERA_PRESETS, Camera, cheek, portrait, side, three_quarter
-from dermis.scene.environment import Environment
-from dermis.scene.lights import Light, PointLight, RectangleLight, preset_lights
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 from dermis.scene.skin import DEFAULT_ROUGHNESS, Skin
@@ -336,108 +330,6 @@ def person_comparison(name: str, ours: Floats, reference: PathTraced, mask: Mask
         reference.samples,
         reference.seconds,
     )
-
-
-_SOFTBOX_MM = 500.0
-EYE_FRAME_MM = 30.0
-"""Height of the field of view for pictures of an eye."""
-_LIPS_FRAME_MM, _EAR_FRAME_MM = 72.0, 120.0
-
-
-@dataclass(frozen=True)
-class View:
-    """View of a person in which frame and path tracing are compared.
-
-    camera : function that returns the camera for a head
-    light : name of a light preset or of a panorama
-    pose : name of an expression; None for the rest pose
-    sample_factor : factor by which the number of paths per pixel is multiplied
-    """
-
-    camera: Callable[[Head], Camera]
-    light: str
-    pose: str | None = None
-    sample_factor: float = 1.0
-
-
-def eye_camera(head: Head) -> Camera:
-    """Return a camera in front of the left eye, with a field of view of 30 mm."""
-    x, y, z = _eye_position_mm(head)
-    return Camera(position=(x, y, z + 500.0), target=(x, y, z), frame_mm=EYE_FRAME_MM)
-
-
-def eye_side_camera(head: Head) -> Camera:
-    """Return a camera on the outer side of the left eye."""
-    x, y, z = _eye_position_mm(head)
-    return Camera(position=(x + 380.0, y, z + 330.0), target=(x, y, z), frame_mm=EYE_FRAME_MM)
-
-
-def lips_camera(head: Head) -> Camera:
-    """Return a camera in front of the mouth, a little to its left."""
-    x, y, z = head.frontmost(0.0, _mouth_height_mm(head))
-    return Camera(position=(x + 120.0, y, z + 500.0), target=(x, y - 4.0, z), frame_mm=_LIPS_FRAME_MM)
-
-
-def behind_ear_camera(head: Head) -> Camera:
-    """Return a camera behind the left ear."""
-    preset = CAMERA_PRESETS["ear"](head)
-    x, y, z = preset.target
-    return Camera(position=(x + 430.0, y + 10.0, z - 430.0), target=(x - 8.0, y, z), frame_mm=_EAR_FRAME_MM)
-
-
-def _eye_position_mm(head: Head) -> tuple[float, float, float]:
-    """Return the front of the left cornea, relative to the head's centre [mm]."""
-    if head.eyes is None:
-        return head.frontmost(30.0, 0.0)
-    x, y, z = head.control.positions_mm[head.eyes.apex[0]] - np.array(head.centre_mm)
-    return float(x), float(y), float(z)
-
-
-def _mouth_height_mm(head: Head) -> float:
-    """Return the mean height of the teeth relative to the head's centre [mm]."""
-    names = [material.part for material in head.mesh.materials]
-    teeth = [names.index(part) for part in ("upper teeth", "lower teeth") if part in names]
-    vertices = np.unique(head.mesh.triangles[np.isin(head.mesh.material, teeth)])
-    if not len(vertices):
-        return -60.0
-    return float(head.mesh.positions[vertices, 1].mean() - head.centre_mm[1])
-
-
-VIEWS: dict[str, View] = {
-    "portrait": View(portrait, "studio"),
-    "three-quarter": View(three_quarter, "studio"),
-    "profile": View(side, "studio"),
-    "eye": View(eye_camera, "window", sample_factor=2.0),
-    "eye from its side": View(eye_side_camera, "window", sample_factor=2.0),
-    "lips and teeth": View(lips_camera, "studio", "smile-with-teeth"),
-    "cheek": View(cheek, "studio"),
-    "ear from behind": View(behind_ear_camera, "studio"),
-    "portrait, window": View(portrait, "window"),
-    "portrait, esplanade": View(portrait, "royal_esplanade"),
-    "three-quarter, lebombo": View(three_quarter, "lebombo"),
-}
-PANORAMAS = ("royal_esplanade", "lebombo", UNIFORM)
-
-
-def view_scene(head: Head, view: View) -> Scene:
-    """Return the scene of a view, with softboxes in place of point lights.
-
-    A path that leaves an eye through its cornea cannot hit a point light.
-    """
-    pose = None if view.pose is None else Pose(expression(view.pose))
-    camera = view.camera(head)
-    if view.light in PANORAMAS:
-        return Scene(head, environment=Environment(name=view.light), camera=camera, pose=pose)
-    lights = tuple(as_softbox(light) for light in preset_lights(view.light))
-    return Scene(head, lights=lights, camera=camera, pose=pose)
-
-
-def as_softbox(light: Light) -> Light:
-    """Return a softbox at the position of a point light; return any other light unchanged."""
-    if type(light) is RectangleLight or not isinstance(light, PointLight) or hasattr(light, "radius_mm"):
-        return light
-    shared = light.model_dump(include={"position", "target", "irradiance"})
-    return RectangleLight(**shared, width_mm=_SOFTBOX_MM, height_mm=_SOFTBOX_MM)
 
 
 _PUPIL_RADIUS_MM = 4.0  # around the middle, for the position of the pupil
