@@ -153,10 +153,13 @@ def _hair_transmittance(
     passing = np.exp(-DIFFUSIVITY * absorbed * cover_of_points(mesh, hair))[mesh.point].astype(np.float32)
     rows = ((np.arange(side) + 0.5) * len(texels) / side).astype(int)
     chosen = texels[np.ix_(rows, rows)]
-    b, c = ((chosen[..., 1] >> shift & 0xFFFF).astype(np.float32) / 65535.0 for shift in (0, 16))
-    corners = passing[mesh.triangles[np.maximum(chosen[..., 0].astype(np.int64), 1) - 1]]
-    atlas = corners[..., 0] * (1.0 - b - c) + corners[..., 1] * b + corners[..., 2] * c
-    atlas[chosen[..., 0] == 0] = 1.0
+    corners, triangle = passing[mesh.triangles], chosen[..., 0].astype(np.int64) - 1
+    is_hairy = np.asarray((corners < 1.0).any(axis=1))
+    covered = (triangle >= 0) & is_hairy[triangle]
+    b, c = ((chosen[covered, 1] >> shift & 0xFFFF).astype(np.float32) / 65535.0 for shift in (0, 16))
+    first, second, third = corners[triangle[covered]].T
+    atlas = np.ones(chosen.shape[:2], np.float32)
+    atlas[covered] = first * (1.0 - b - c) + second * b + third * c
     rest = np.ones(-(-len(passing) // side) * side, np.float32)
     rest[: len(passing)] = passing
     return np.vstack([atlas, atlas[-1:], rest.reshape(-1, side)]).astype(np.float32)
