@@ -13,9 +13,7 @@ from dermis.base.reading import parse_json, read_file, read_text, read_toml
 _MOST = 1000
 
 
-@pytest.mark.parametrize(
-    "device", ["/dev/zero", "/dev/stdin", "/proc/kmsg", "/proc/kcore", "/", "a\0b", "a" * 5000]
-)
+@pytest.mark.parametrize("device", ["/dev/zero", "/dev/stdin", "/proc/kcore", "/", "a\0b", "a" * 5000])
 def test_non_regular_file_is_refused_at_once(device: str) -> None:
     with pytest.raises(DermisError, match=r"expected a table"):
         read_file(device, "a table", _MOST)
