@@ -11,6 +11,7 @@ from dermis.base.arrays import Doubles, Floats
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyes import Eyes
 from dermis.mesh.file_vertices import FileVertices
+from dermis.mesh.groom import Groom
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.rig import Rig
@@ -43,6 +44,8 @@ class Head:
     strands, hair : Strands, optional
         Strands of brows and lashes, and of scalp and beard. The latter are in random order, so that the first
         ones are a random sample.
+    groom : Groom, optional
+        Scalp hair and beard that the device grows, instead of `hair`.
     note : str, optional
         Parts of the file that are not used, with reasons; empty for none.
     levels : int, optional
@@ -73,6 +76,7 @@ class Head:
     levels: int = 0
     template: Head | None = None
     file_vertices: FileVertices | None = None
+    groom: Groom | None = None
 
     def __repr__(self) -> str:
         """Return name, size, maps and rig on two lines."""
@@ -80,7 +84,7 @@ class Head:
         parts = [f"maps: {', '.join([*maps, *(['painted'] if self.maps.is_painted else [])]) or 'none'}"]
         counts = {"targets": len(self.targets), "bones": len(self.bones)}
         parts += [f"{count} {name}" for name, count in counts.items() if count]
-        parts += [name for name in ("eyes", "strands", "hair") if getattr(self, name) is not None]
+        parts += [name for name in ("eyes", "strands", "hair", "groom") if getattr(self, name) is not None]
         size = f"{len(self.mesh.triangles):,} triangles at level {self.levels} of subdivision"
         return f"<Head {self.name!r}: {size}\n {'; '.join(parts)}>"
 

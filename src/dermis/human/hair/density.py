@@ -78,9 +78,26 @@ def height_above_hairline(points: Doubles, recession: float = 0.0) -> Doubles:
     points : (n, 3 or more) positions on the average person [mm]
     recession : recession of the hairline, 0 to 1, see `SkinLook`
     """
-    angle = np.degrees(np.arctan2(np.abs(points[:, 0]), points[:, 2] - HEAD_AXIS_Z))
     edge = hairline_heights(recession)
-    return np.asarray(points[:, 1] - np.interp(angle, HAIRLINE_STEP_DEGREES * np.arange(len(edge)), edge))
+    angles = HAIRLINE_STEP_DEGREES * np.arange(len(edge))
+    return np.asarray(points[:, 1] - np.interp(hairline_angle(points), angles, edge))
+
+
+def hairline_angle(points: Doubles) -> Doubles:
+    """Return the angle (n,) of points around the vertical axis of the head, 0 in front, 180 behind [degrees]."""
+    return np.degrees(np.arctan2(np.abs(points[:, 0]), points[:, 2] - HEAD_AXIS_Z))
+
+
+def hairline_waves(points: Doubles) -> Doubles:
+    """Return small displacements (n,) of the hairline, which make it irregular [mm]."""
+    return np.asarray(sum(np.sin(points[:, :3] @ wave) for wave in _HAIRLINE_WAVES))
+
+
+def zone_amounts(name: str, recession: float, points: Doubles) -> Doubles:
+    """Return the change (n,) of an amount, such as that of hair, by all zones that a recession changes."""
+    column = _amount_column(name)
+    receding = zone_table(recession)[:, column] != zone_table()[:, column]
+    return _sum_zones(name, zone_table(recession)[receding], points)
 
 
 def scalp_density(recession: float) -> HairDensity:
@@ -96,7 +113,7 @@ def scalp_density(recession: float) -> HairDensity:
         low, high = _HAIRLINE_FADE_MM
         margin = len(_HAIRLINE_WAVES)
         near = np.flatnonzero((above > low - margin) & (above < high + margin))
-        above[near] += sum(np.sin(points[near, :3] @ wave) for wave in _HAIRLINE_WAVES)
+        above[near] += hairline_waves(points[near])
         fraction = smoothstep(low, high, above) * (points[:, 1] > _SCALP_BOTTOM_Y)
         thinned = _sum_zones("hair", zone_table(recession)[receding], points)
         return np.asarray(fraction * np.clip(1.0 + thinned, 0.0, 1.0))

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from typing import Literal, get_args
-
 import numpy as np
 
 from dermis.base.errors import format_value, refuse
 from dermis.base.quantities import check_fields
+from dermis.human.hair.styles import styles
 from dermis.human.makehuman import OLD_AGE, YOUNG_AGE
 from dermis.human.skin.look import Demographics
 
-Style = Literal["none", "cropped", "short"]
-HAIR_STYLES: tuple[Style, ...] = get_args(Style)
+HAIR_STYLES: tuple[str, ...] = ("none", *styles())
 FIELD_RANGES = {
-    "length_mm": (1.0, 60.0),
+    "length_mm": (1.0, 500.0),
     "beard_mm": (0.0, 30.0),
     "eumelanin": (0.0, 10.0),
     "pheomelanin": (0.0, 10.0),
@@ -70,7 +68,7 @@ class HairLook:
     0.0
     """
 
-    style: Style = "none"
+    style: str = "none"
     length_mm: float = 6.0
     density: float = 0.85
     curl: float = 0.1
@@ -125,7 +123,7 @@ def sample_hair(rng: np.random.Generator, demographics: Demographics, typical: H
     man = demographics.sex > 0.5
     hairless_below, cropped_below = (0.12, 0.5) if man else (0.03, 0.25)
     curl = float(np.clip(typical.curl + 0.12 * n[0], 0.0, 1.0))
-    style: Style = "short"
+    style = "short"
     length = typical.length_mm if typical.style == "short" else _SHORT_LENGTH_MM
     if style_chance < hairless_below:
         style = "none"

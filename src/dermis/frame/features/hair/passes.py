@@ -55,8 +55,18 @@ def pose_strands(graph: Recorder, tables: StrandTables, shape: Shape) -> None:
         "hairs": tables.record,
         "posed": tables.posed,
     }
-    knots = tables.fine.all_knots() + tables.coarse.all_knots()
-    _dispatch(graph, "hair/strands_pose.wgsl", bindings, knots)
+    if tables.groom is None:
+        _dispatch(graph, "hair/strands_pose.wgsl", bindings, tables.fine.all_knots() + tables.coarse.all_knots())
+        return
+    if tables.fine.hairs:
+        _dispatch(graph, "hair/strands_pose.wgsl", bindings, tables.fine.all_knots())
+    groom, style = tables.groom, tables.groom.style
+    guides: Bindings = {"points": bindings["points"], "guides": style.guides, "guide_heights": style.guide_heights}
+    knots = style.guide_heights.size // 4
+    _dispatch(graph, "hair/guides_pose.wgsl", {**guides, "anchors": style.anchors}, knots)
+    tables_of_person: Bindings = {"roots": groom.roots, "parts": groom.parts, "hairline": groom.hairline}
+    grown = {**bindings, **guides, **tables_of_person, "guide_cuts": style.guide_cuts}
+    _dispatch(graph, "hair/strands_grow.wgsl", grown, tables.coarse.all_knots())
 
 
 def _draw_deep_opacity(graph: Recorder, strands: Resources, lighting: Bindings) -> None:

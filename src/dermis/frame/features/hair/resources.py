@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,9 @@ from dermis.base.errors import refuse
 from dermis.frame.features.surface.record import DEFAULT_COLOUR
 from dermis.frame.request import FrameRequest
 from dermis.gpu import Buffer, Constants, Device, Memo, Texture, UniformRecord, make_texture
+from dermis.mesh.groom import GUIDE_ANCHORS, GUIDE_KNOTS, Groom, Guides, StrandRoots
 from dermis.mesh.head import Head
+from dermis.mesh.mesh import Mesh
 from dermis.mesh.strands import Strands, quad_corners, quad_weights
 from dermis.scene.settings import Settings
 from dermis.specular.hair import hair_constants
@@ -38,6 +40,10 @@ WINDOW_KNOTS = 1 << 12
 """Number of knots for which one workgroup of strands_window.wgsl computes bounds."""
 # Row of the table of strands in strands_pose.wgsl.
 _STRAND_DTYPE = np.dtype([("corner", "u4", 4), ("weight", "f4", 4), ("absorption", "f4", 4)])
+# Rows of the tables in guides_pose.wgsl and strands_grow.wgsl.
+_ANCHOR_DTYPE = np.dtype([("corner", "u4", 4), ("local", "f4", 4)])
+_ROOT_MEMBERS = ("corner", "u4", 4), ("weight", "f4", 4), ("guide", "u4", 4), ("guide_weight", "f4", 4)
+_ROOT_DTYPE = np.dtype([*_ROOT_MEMBERS, ("place", "f4", 4), ("clump", "u4"), ("part", "u4"), ("pad", "u4", 2)])
 _COUNT_MEMBERS = "fine", "coarse", "shadow_casters", "fine_knots", "coarse_knots"
 _HAIRS_DTYPE = np.dtype([*((name, "u4") for name in _COUNT_MEMBERS), ("width_scale", "f4")])
 
@@ -97,9 +103,14 @@ def strand_counts(strands: Strands | None) -> StrandCounts:
     return StrandCounts(0, 2) if strands is None else StrandCounts(*strands.radius_mm.shape)
 
 
+def coarse_counts(head: Head) -> StrandCounts:
+    """Return the number of strands on head and chin, grown or given, and the number of knots of each."""
+    return strand_counts(head.hair) if head.groom is None else StrandCounts(len(head.groom), head.groom.knots)
+
+
 def strand_capacity(head: Head) -> StrandCapacity:
     """Return the capacity for the strands of a head, rounded up so that most heads can share buffers."""
-    fine, coarse = map(strand_counts, (head.strands, head.hair))
+    fine, coarse = strand_counts(head.strands), coarse_counts(head)
     knots = fine.all_knots() + coarse.all_knots()
     step = _KNOT_CAPACITY_STEP if coarse.hairs else _FINE_CAPACITY_STEP
     return StrandCapacity(_round_up(fine.hairs, _FINE_CAPACITY_STEP), _round_up(knots, step))
@@ -154,6 +165,26 @@ def _make_buffer(device: Device, words: int) -> Buffer:
 
 
 @dataclass(frozen=True, eq=False)
+class GuideTables:
+    """Guides of a style in buffers, by the names of guides_pose.wgsl and strands_grow.wgsl."""
+
+    anchors: Buffer
+    guide_heights: Buffer
+    guide_cuts: Buffer
+    guides: Buffer
+
+
+@dataclass(frozen=True, eq=False)
+class GroomTables:
+    """Groom of a person in buffers: the tables of the style, and the numbers of the person."""
+
+    style: GuideTables
+    roots: Buffer
+    parts: Buffer
+    hairline: Buffer
+
+
+@dataclass(frozen=True, eq=False)
 class StrandTables:
     """Strands of a head in buffers, with the counts and mean values from which strands are drawn.
 
@@ -166,6 +197,7 @@ class StrandTables:
     centre_mm : (3,) centre of the roots of the coarse strands at rest [mm]
     mean_width_mm : mean width of the coarse strands [mm]
     mean_cover : projected area of hair per area of skin around the root of a coarse strand, on average [-]
+    groom : tables from which coarse strands grow; None if they are given or there are none
     """
 
     strands: Buffer
@@ -179,6 +211,7 @@ class StrandTables:
     centre_mm: NDArray[np.float64]
     mean_width_mm: float
     mean_cover: float
+    groom: GroomTables | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,12 +234,14 @@ def shader_constants() -> dict[str, float]:
     """Return the values that `//#fill` lines insert in the hair shaders, by name."""
     opacity = {"strand_window": DEEP_OPACITY_WIDTH, "strand_layers": DEEP_OPACITY_LAYERS}
     words = {"strand_window_words": DEEP_OPACITY_HEADER_WORDS, "strand_window_knots": WINDOW_KNOTS}
-    return {"strand_tile": TILE_PIXELS, **opacity, **words, **hair_constants()}
+    guides = {"guide_anchors": GUIDE_ANCHORS, "guide_knots": GUIDE_KNOTS}
+    return {"strand_tile": TILE_PIXELS, **opacity, **words, **guides, **hair_constants()}
 
 
 def has_strands(head: Head, settings: Settings) -> bool:
     """Return whether a head has strands, and the settings show them."""
-    return settings.strands and any(part is not None and len(part) > 0 for part in (head.strands, head.hair))
+    parts = head.strands, head.hair, head.groom
+    return settings.strands and any(part is not None and len(part) > 0 for part in parts)
 
 
 def strand_constants(head: Head, settings: Settings) -> Constants:
@@ -226,26 +261,27 @@ def drawn_hair_count(tables: StrandTables, pixel_mm: float) -> int:
     return int(min(tables.coarse.hairs, max(_MIN_DRAWN_STRANDS, total_mm / drawn_mm)))
 
 
-def make_strand_tables(device: Device, head: Head, buffers: StrandBuffers) -> StrandTables:
+def make_strand_tables(
+    device: Device, head: Head, buffers: StrandBuffers, groom: GroomTables | None
+) -> StrandTables:
     """Upload the strands of a head.
 
     buffers : buffers that each frame fills with posed strands and projected knots
+    groom : tables from which coarse strands grow; None if they are given or there are none
 
     Raises DermisError for strands that are rooted in another mesh.
     """
-    both = head.strands, head.hair
-    parts = [part for part in both if part is not None]
-    fine, coarse = map(strand_counts, both)
-    rows = np.zeros(fine.hairs + coarse.hairs, _STRAND_DTYPE)
-    for part, first in zip(parts, (0, len(parts[0])), strict=False):
+    parts = [part for part in (head.strands, head.hair) if part is not None]
+    fine, coarse = strand_counts(head.strands), coarse_counts(head)
+    rows = np.zeros(max(1, sum(map(len, parts))), _STRAND_DTYPE)
+    for part, first in zip(parts, (0, len(parts[0]) if parts else 0), strict=False):
         _fill_rows(rows[first : first + len(part)], head, part)
-    knots = np.concatenate([_knot_rows(part) for part in parts])
+    knots = np.concatenate([_knot_rows(part) for part in parts]) if parts else np.zeros((0, 4), np.float32)
     casters = min(coarse.hairs, _MAX_SHADOW_CASTERS)
     width_scale = coarse.hairs / max(1, casters)
     record = np.array(
         (fine.hairs, coarse.hairs, casters, fine.knots, coarse.knots, width_scale), _HAIRS_DTYPE
     )
-    hair = head.hair
     return StrandTables(
         strands=device.buffer(rows.view(np.uint32), "STORAGE"),
         knots=device.buffer(knots, "STORAGE"),
@@ -255,10 +291,54 @@ def make_strand_tables(device: Device, head: Head, buffers: StrandBuffers) -> St
         fine=fine,
         coarse=coarse,
         shadow_casters=casters,
-        centre_mm=np.zeros(3) if hair is None else hair.root_centre_mm(head.mesh),
-        mean_width_mm=0.0 if hair is None else 2.0 * float(hair.radius_mm[:, 0].mean()),
-        mean_cover=0.0 if hair is None or hair.cover is None else float(hair.cover.mean()),
+        groom=groom,
+        **_mean_values(head),
     )
+
+
+def _mean_values(head: Head) -> dict[str, Any]:
+    """Return the fields of `StrandTables` that are means over the coarse strands."""
+    if head.groom is not None:
+        first = head.groom.parameters[0]
+        width, cover = 2.0 * float(first["radius_mm"]), float(first["cover"])
+        return {"centre_mm": head.groom.centre_mm, "mean_width_mm": width, "mean_cover": cover}
+    hair = head.hair
+    if hair is None:
+        return {"centre_mm": np.zeros(3), "mean_width_mm": 0.0, "mean_cover": 0.0}
+    cover = 0.0 if hair.cover is None else float(hair.cover.mean())
+    width = 2.0 * float(hair.radius_mm[:, 0].mean())
+    return {"centre_mm": hair.root_centre_mm(head.mesh), "mean_width_mm": width, "mean_cover": cover}
+
+
+def make_guide_tables(device: Device, guides: Guides) -> GuideTables:
+    """Upload the guides of a style, and allocate a buffer for the guides in a pose."""
+    anchors = np.empty(guides.weight.shape, _ANCHOR_DTYPE)
+    anchors["corner"] = guides.corner
+    anchors["local"][..., :3], anchors["local"][..., 3] = guides.local_mm, guides.weight
+    posed = _make_buffer(device, 8 * guides.height_mm.size)
+    heights, cuts = (device.buffer(array, "STORAGE") for array in (guides.height_mm, guides.cut))
+    return GuideTables(device.buffer(anchors.view(np.uint32), "STORAGE"), heights, cuts, posed)
+
+
+def make_strand_roots(device: Device, roots: StrandRoots, mesh: Mesh) -> Buffer:
+    """Upload the roots of the possible strands of a style.
+
+    mesh : mesh of quads in which the strands are rooted
+    """
+    rows = np.zeros(len(roots), _ROOT_DTYPE)
+    rows["corner"], rows["weight"] = quad_corners(mesh, roots.roots.quad), quad_weights(roots.roots.position)
+    for name in ("guide", "guide_weight", "place", "clump", "part"):
+        rows[name] = getattr(roots, name)
+    return device.buffer(rows.view(np.uint32), "STORAGE")
+
+
+def make_groom_tables(device: Device, groom: Groom, style: GuideTables, roots: Buffer) -> GroomTables:
+    """Upload the numbers of a person's groom.
+
+    style, roots : tables of the style, which people share
+    """
+    parts = device.buffer(groom.parameters.view(np.float32), "STORAGE")
+    return GroomTables(style, roots, parts, device.buffer(groom.hairline_mm, "STORAGE"))
 
 
 def _fill_rows(rows: NDArray[np.void], head: Head, strands: Strands) -> None:
@@ -294,7 +374,13 @@ def make(memo: Memo, device: Device, request: FrameRequest) -> Resources | None:
     if not has_strands(head, request.settings):
         return None
     capacity = strand_capacity(head)
-    tables = cached(make_strand_tables, device, head.bare, cached(make_strand_buffers, device, capacity))
+    groom = None
+    if head.groom is not None:
+        style = cached(make_guide_tables, device, head.groom.guides)
+        roots = cached(make_strand_roots, device, head.groom.roots, head.topology.mesh)
+        groom = cached(make_groom_tables, device, head.groom, style, roots)
+    buffers = cached(make_strand_buffers, device, capacity)
+    tables = cached(make_strand_tables, device, head.bare, buffers, groom)
     picture = cached(make_strand_picture, device, capacity, request.settings.size)
     shadows = cached(make_deep_opacity, device, layers, owner=f"{layers} {request.view_name}")
     return Resources(tables, picture, shadows, cached(mean_skin_albedo, head))

@@ -1,7 +1,8 @@
 // Layout of strands in buffers: normal of the skin, absorption and the knots from root to tip. Fine strands, brows and lashes,
 // come first, then the coarse ones of head and beard; some passes draw only the first coarse strands, in place of all.
 
-const ROWS_BEFORE: u32 = 2u; // rows of a strand before its knots: normal of the skin; absorption [1/mm] and cover by other hair
+const ROWS_BEFORE: u32 = 2u; // rows of a strand before its knots: normal of the skin, and radius by which light is absorbed,
+// 0 for that of the knots; absorption [1/mm] and cover by other hair
 
 struct Hairs {
     fine: u32, // number of strands

@@ -37,7 +37,7 @@ fn knot_at(hair: u32, k: u32) -> Knot {
     let first = row + ROWS_BEFORE;
     let here = posed[first + k];
     let along = normalize(posed[first + min(k + 1u, knots_of(hair) - 1u)].xyz - posed[first + max(k, 1u) - 1u].xyz);
-    let depth = posed[row + 1u].xyz * here.w;
+    let depth = posed[row + 1u].xyz * select(here.w, posed[row].w, posed[row].w > 0.0);
     let height = dot(here.xyz - posed[first].xyz, posed[row].xyz);
     let cover = posed[row + 1u].w;
     let along_strand = f32(k) / f32(knots_of(hair) - 1u);

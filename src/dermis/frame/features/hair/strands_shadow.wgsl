@@ -69,6 +69,9 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     }
     let hair = hair_of_segment(index);
     let row = row_of_knot(index + hair, hair);
+    if (posed[row].w < 0.0) { // does not grow
+        return;
+    }
     let width_scale = select(1.0, hairs.width_scale, is_coarse(hair));
     for (var i = 0u; i < skin.light_count; i += 1u) {
         if (lights.light[i].layer >= 0) {

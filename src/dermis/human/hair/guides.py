@@ -1,0 +1,323 @@
+"""Guide hairs: curves that are combed over the mean person, bent by gravity, kept outside the skin and cut."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+from dermis.base.arrays import Doubles
+from dermis.human.hair.skin_surface import SkinSurface, tangent_component
+from dermis.human.hair.styles import Style
+from dermis.mesh.groom import GUIDE_ANCHORS, GUIDE_KNOTS, Guides
+from dermis.mesh.mesh import Mesh
+from dermis.mesh.strands import quad_corners
+
+ROW_MM = 14.0
+"""Distance between the middles of cornrows [mm]."""
+_STEP_MM = 5.0  # largest step of the growth of guides
+_MIN_HEIGHT_MM = 0.5  # least height of guides above the skin, away from their roots
+_LAYER_LENGTH_MM = 35.0  # length along which hair rises to the outermost layer
+_WHORL_MM = np.array([9.0, 86.0, -131.0])
+_SKULL_CENTRE_MM = np.array([0.0, 12.0, -66.0])
+_ROUND_RADII_MM = np.array([75.0, 96.0, 92.0])  # semi-axes of the skull
+# Ellipse around the face, out of which combed hair is kept: centre (z), semi-axes along x and z, and the heights
+# between which it begins [mm].
+_FACE_CENTRE_Z, _FACE_RADII_MM, _FACE_TOP_MM = -60.0, (74.0, 118.0), (78.0, 40.0)
+_TIE_RADIUS_MM = 9.0  # radius of gathered hair at its tie
+_BUN_TURN_MM = 6.0  # advance of hair across a bun in each turn
+
+
+class Growth(NamedTuple):
+    """State of growing guides.
+
+    root_mm, root_normal : (g, 3) roots on the mean person, and the normals of the skin there
+    position_mm, direction : (g, 3) ends of the guides and unit directions of growth
+    skin_normal, height_mm : (g, 3) normals of the skin below the ends, and (g,) heights above it
+    length_mm : (g,) length so far
+    tied_mm : (g,) length at which the guide passed its tie, infinite before
+    """
+
+    root_mm: Doubles
+    root_normal: Doubles
+    position_mm: Doubles
+    direction: Doubles
+    skin_normal: Doubles
+    height_mm: Doubles
+    length_mm: Doubles
+    tied_mm: Doubles
+
+
+def smoothstep(low: float, high: float, x: Doubles) -> Doubles:
+    """Return the smooth Hermite transition from 0 at `low` to 1 at `high`."""
+    t = np.clip((x - low) / (high - low), 0.0, 1.0)
+    return np.asarray(t * t * (3.0 - 2.0 * t))
+
+
+def unit(vectors: Doubles) -> Doubles:
+    """Return vectors (n, 3) scaled to length 1; a vector of length 0 stays 0."""
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9))
+
+
+def parting_side(points_mm: Doubles, style: Style) -> Doubles:
+    """Return 1 for points (n, 3) to the left of the parting and -1 for those to its right, as an array (n,).
+
+    The parting runs from the forehead to the whorl and turns to the middle of the head there.
+    """
+    parting = style.parting_mm * smoothstep(-140.0, -95.0, points_mm[:, 2])
+    return np.where(points_mm[:, 0] > parting, 1.0, -1.0)
+
+
+def row_of(points_mm: Doubles) -> Doubles:
+    """Return the position (n,) of points across cornrows, in rows."""
+    x, y = points_mm[:, 0], points_mm[:, 1] - _SKULL_CENTRE_MM[1]
+    return np.arctan2(x, np.maximum(y, -60.0) + 75.0) * 110.0 / ROW_MM
+
+
+def fringe_weight(points_mm: Doubles, style: Style) -> Doubles:
+    """Return how much hair rooted at points (n, 3) belongs to the fringe of a style, 0 to 1, as an array (n,)."""
+    if style.fringe_y_mm is None:
+        return np.zeros(len(points_mm))
+    return smoothstep(-14.0, 2.0, points_mm[:, 2]) * smoothstep(54.0, 42.0, np.abs(points_mm[:, 0]))
+
+
+def _fall(points: Doubles, style: Style) -> Doubles:
+    """Return the directions (n, 3) of hair that falls to both sides of a parting."""
+    x, y, z = points.T
+    side, top = parting_side(points, style), smoothstep(40.0, 85.0, y)
+    ahead = smoothstep(-70.0, 0.0, z)
+    sides = np.stack([side * (0.25 + top), -0.9 * (1.0 - top) - 0.1, -0.22 - 0.5 * ahead], axis=1)
+    behind = np.stack([x / 200.0, np.full(len(x), -1.0), np.zeros(len(x))], axis=1)
+    back, fringe = smoothstep(-110.0, -150.0, z)[:, None], fringe_weight(points, style)[:, None]
+    forward = np.stack([x / 120.0, 0.0 * x, np.ones(len(x))], axis=1)
+    return np.asarray((1.0 - fringe) * ((1.0 - back) * sides + back * behind) + fringe * forward)
+
+
+def _back(points: Doubles, style: Style) -> Doubles:
+    """Return the directions (n, 3) of hair that is combed back, and down at the nape and below the temples."""
+    x, y, z = points.T
+    down = np.maximum(smoothstep(60.0, -10.0, y), smoothstep(-100.0, -150.0, z))
+    return np.stack([x / 400.0, -0.9 * down, -1.0 + 0.75 * smoothstep(-110.0, -150.0, z)], axis=1)
+
+
+def _spiral(points: Doubles, style: Style) -> Doubles:
+    """Return the directions (n, 3) of uncombed hair: away from the whorl, and down at the sides and the nape."""
+    away = points - _WHORL_MM
+    low = 70.0 * smoothstep(40.0, -30.0, points[:, 1])
+    return np.asarray(away + np.stack([0.0 * low, -low, -0.3 * low], axis=1))
+
+
+def _twist(points: Doubles, style: Style) -> Doubles:
+    """Return the directions (n, 3) of ropes that fall to all sides of the head."""
+    away = points - np.array([0.0, 100.0, -70.0])
+    return np.asarray(away * [1.0, 0.6, 0.9])
+
+
+def _beard(points: Doubles, style: Style) -> Doubles:
+    sideways = 0.4 * np.clip(points[:, 0] / 25.0, -1.0, 1.0)
+    return np.stack([sideways, np.full(len(points), -1.0), np.zeros(len(points))], axis=1)
+
+
+def _to_tie(points: Doubles, style: Style) -> Doubles:
+    return np.asarray(np.array(style.tie_mm) - points)
+
+
+def _rows(points: Doubles, style: Style) -> Doubles:
+    """Return the directions (n, 3) of cornrows: to the back along curves of equal `row_of`."""
+    x, y, z = points.T
+    angle = np.arctan2(x, np.maximum(y - _SKULL_CENTRE_MM[1], -60.0) + 75.0)
+    down = smoothstep(-90.0, -150.0, z)
+    ahead = np.stack([0.0 * x, 0.35 * smoothstep(0.0, 30.0, z), -np.ones(len(x))], axis=1)
+    fall = np.stack([0.3 * np.sin(angle), -np.ones(len(x)), 0.1 * np.ones(len(x))], axis=1)
+    return np.asarray((1.0 - down)[:, None] * ahead + down[:, None] * fall)
+
+
+COMBS: dict[str, Callable[[Doubles, Style], Doubles]] = {
+    "up": _spiral,
+    "fall": _fall,
+    "back": _back,
+    "rows": _rows,
+    "gather": _to_tie,
+    "twist": _twist,
+    "beard": _beard,
+}
+"""Directions (n, 3) along which hair is combed at points (n, 3) of the scalp, by the comb of a style."""
+
+
+@cache
+def body_surface() -> SkinSurface:
+    """Return the skin of the mean person, with head, ears, neck and shoulders."""
+    return SkinSurface(mean_mesh(), np.unique(mean_mesh().triangles[mean_mesh().material == 0]))
+
+
+def mean_mesh() -> Mesh:
+    """Return the mesh of the mean person after one subdivision, whose first points are the control points."""
+    from dermis.human.model import template
+
+    return template("own", 1).head.mesh
+
+
+def grow_guides(points: Doubles, style: Style) -> tuple[Doubles, Doubles, Doubles]:
+    """Return the knots (g, k, 3), the skin normals below them (g, k, 3) and their heights (g, k) [mm].
+
+    points : (g, 3) roots on the skin of the mean person [mm]
+    """
+    surface = body_surface()
+    base, normal = surface.project(points)
+    state = Growth(points, normal, points, _first_direction(points, normal, style), normal,
+                   np.zeros(len(points)), np.zeros(len(points)), np.full(len(points), np.inf))  # fmt: skip
+    knots = [(points, normal, state.height_mm)]
+    segment = style.max_length_mm / (GUIDE_KNOTS - 1)
+    substeps = max(1, int(np.ceil(segment / _STEP_MM)))
+    for _ in range(GUIDE_KNOTS - 1):
+        for _ in range(substeps):
+            state = _advance(surface, state, segment / substeps, style)
+        knots.append((state.position_mm, state.skin_normal, state.height_mm))
+    positions, normals, heights = (np.stack(part, axis=1) for part in zip(*knots, strict=True))
+    return positions, normals, heights
+
+
+def _first_direction(points: Doubles, normals: Doubles, style: Style) -> Doubles:
+    combed = unit(tangent_component(COMBS[style.comb](points, style), normals))
+    if style.comb == "up":
+        return unit(normals + style.tilt * combed)
+    return unit(style.lift * normals + combed)
+
+
+def _advance(surface: SkinSurface, state: Growth, step: float, style: Style) -> Growth:
+    """Return the guides after one step of growth [mm]."""
+    direction, length, tied = _steer(state, style), state.length_mm + step, state.tied_mm
+    if style.comb == "gather":
+        near = np.linalg.norm(state.position_mm - style.tie_mm, axis=1) < _TIE_RADIUS_MM + 4.0
+        tied = np.where(near & ~np.isfinite(tied), length, tied)
+    moved = state.position_mm + step * direction
+    base, normal = surface.project(moved)
+    height = ((moved - base) * normal).sum(axis=1)
+    layer = style.volume_mm * (1.0 - np.exp(-length / _LAYER_LENGTH_MM)) * np.minimum(length / 20.0, 1.0)
+    least = np.minimum(length / 6.0, 1.0) * (_MIN_HEIGHT_MM + layer)
+    moved += np.clip(least - height, 0.0, 0.8 * step)[:, None] * normal
+    if style.comb == "fall":
+        loose = fringe_weight(state.root_mm, style)[:, None] < 0.5
+        moved = np.where(loose, _clear_face(moved), moved)
+    if not style.coil_mm:
+        direction = unit(moved - state.position_mm)
+    else:
+        direction = np.where(np.isfinite(tied)[:, None], direction, unit(moved - state.position_mm))
+    base, normal = surface.project(moved)
+    height = ((moved - base) * normal).sum(axis=1)
+    return state._replace(position_mm=moved, direction=direction, skin_normal=normal, height_mm=height,
+                          length_mm=length, tied_mm=tied)  # fmt: skip
+
+
+def _steer(state: Growth, style: Style) -> Doubles:
+    """Return the unit directions (g, 3) of the next step."""
+    free = np.minimum(state.length_mm / 60.0, 1.0)[:, None] + 0.15
+    pull = 4.0 * style.gravity * free * np.array([0.0, -1.0, 0.0])
+    if style.comb in ("gather", "rows"):
+        combed = unit(tangent_component(COMBS[style.comb](state.position_mm, style), state.skin_normal))
+        close = np.exp(-np.maximum(state.height_mm - style.volume_mm, 0.0) / 8.0)[:, None]
+        if style.comb == "gather":
+            to_tie = np.array(style.tie_mm) - state.position_mm
+            distance = np.linalg.norm(to_tie, axis=1, keepdims=True)
+            combed = unit(np.where(distance < 35.0, to_tie, combed))
+            tail = _tail(state, style, pull)
+            return np.where(np.isfinite(state.tied_mm)[:, None], tail, unit(0.5 * state.direction + combed))
+        return unit(0.6 * state.direction + 0.8 * close * combed + 0.3 * (1.0 - close) * pull)
+    return unit(style.stiffness * state.direction + (1.0 - style.stiffness) * pull)
+
+
+def _tail(state: Growth, style: Style, pull: Doubles) -> Doubles:
+    """Return the directions (g, 3) of gathered hair behind its tie: a tail that falls, or a coil around a bun."""
+    outward = unit(np.array(style.tie_mm) - _SKULL_CENTRE_MM)[None]
+    since = np.maximum(state.length_mm - np.where(np.isfinite(state.tied_mm), state.tied_mm, 0.0), 0.0)
+    if not style.coil_mm:
+        first = np.exp(-since / 25.0)[:, None]
+        return unit(0.85 * state.direction + 0.15 * pull + 0.3 * first * outward)
+    centre = np.array(style.tie_mm) + 0.55 * style.coil_mm * outward
+    away = state.position_mm - centre
+    # each hair winds around the bun about an axis of its own, near that of the tie
+    axis = unit(outward + 0.35 * state.root_normal)
+    radial = unit(away)
+    around = unit(np.cross(axis, radial))
+    distance = np.linalg.norm(away, axis=1, keepdims=True)
+    inward = (style.coil_mm - distance) / 6.0
+    return unit(around + np.clip(inward, -1.0, 1.0) * radial + 0.12 * np.sin(since / _BUN_TURN_MM / 3.0)[:, None] * axis)
+
+
+def _clear_face(points: Doubles) -> Doubles:
+    """Return points (g, 3) moved sideways out of an elliptic cylinder around the face."""
+    x, y, z = points.T
+    along = np.clip((z - _FACE_CENTRE_Z) / _FACE_RADII_MM[1], -1.0, 1.0)
+    grown = smoothstep(*_FACE_TOP_MM, y) * smoothstep(-40.0, -5.0, z)
+    least = _FACE_RADII_MM[0] * np.sqrt(1.0 - along**2) * grown
+    inside = np.clip(least - np.abs(x), 0.0, 2.5)
+    return np.asarray(points + np.stack([inside * np.where(x >= 0, 1.0, -1.0), 0.0 * x, 0.0 * x], axis=1))
+
+
+def cut_fractions(knots: Doubles, style: Style) -> Doubles:
+    """Return the fraction (g,) of each guide from its root to where the style cuts it.
+
+    knots : (g, k, 3) knots of the guides on the mean person [mm]
+    """
+    cut = np.ones(len(knots))
+    root = knots[:, 0]
+    if style.cut_y_mm is not None:
+        cut = np.minimum(cut, _first_below(knots, np.full(len(knots), style.cut_y_mm)))
+    if style.fringe_y_mm is not None:
+        fringe = fringe_weight(root, style) > 0.5
+        cut = np.where(fringe, _first_below(knots, np.full(len(knots), style.fringe_y_mm)), cut)
+    if style.round:
+        radius = np.linalg.norm((knots - _SKULL_CENTRE_MM) / _ROUND_RADII_MM, axis=2)
+        limit = 1.0 + style.round * style.max_length_mm / 90.0
+        cut = np.minimum(cut, np.where((radius > limit).any(axis=1), (radius > limit).argmax(axis=1), GUIDE_KNOTS - 1)
+                         / (GUIDE_KNOTS - 1))  # fmt: skip
+    return cut
+
+
+def _first_below(knots: Doubles, level: Doubles) -> Doubles:
+    """Return the fraction (g,) of each curve (g, k, 3) at which it first falls below a height (g,) [mm]."""
+    y = knots[..., 1] - level[:, None]
+    crosses = (y[:, 1:] < 0) & (y[:, :-1] >= 0)
+    first = crosses.argmax(axis=1)
+    row = np.arange(len(y))
+    part = y[row, first] / np.maximum(y[row, first] - y[row, first + 1], 1e-9)
+    return np.where(crosses.any(axis=1), (first + part) / (GUIDE_KNOTS - 1), 1.0)
+
+
+def bind_guides(
+    control_mesh: Mesh, points_mm: Doubles, knots: Doubles, heights: Doubles, cut: Doubles
+) -> Guides:
+    """Return guides whose knots follow the nearest quads of the skin.
+
+    control_mesh, points_mm : control mesh, and its points (p, 3) on the subdivided mean person [mm]
+    knots, heights : (g, k, 3) knots and (g, k) their heights above the skin, see `grow_guides` [mm]
+    cut : (g,) fractions from `cut_fractions`
+    """
+    from scipy.spatial import cKDTree
+
+    skin = np.flatnonzero(control_mesh.material[control_mesh.quads[:, 0]] == 0)
+    corners = quad_corners(control_mesh, skin)
+    around = points_mm[corners]
+    distance, near = cKDTree(around.mean(axis=1)).query(knots, k=GUIDE_ANCHORS)
+    weight = 1.0 / (distance**2 + 40.0)
+    weight /= weight.sum(axis=-1, keepdims=True)
+    origin, axes = quad_frames(around)
+    local = np.einsum("gkaic,gkac->gkai", axes[near], knots[:, :, None] - origin[near])
+    return Guides(
+        corners[near].astype(np.int32),
+        local.astype(np.float32),
+        weight.astype(np.float32),
+        heights.astype(np.float32),
+        cut.astype(np.float32),
+    )
+
+
+def quad_frames(corners_mm: Doubles) -> tuple[Doubles, Doubles]:
+    """Return the middles (q, 3) and frames (q, 3, 3) of quads with corners (q, 4, 3); rows of a frame are axes."""
+    a, b, c, d = corners_mm.swapaxes(0, 1)
+    along = unit((b - a) + (c - d))
+    normal = np.cross(c - a, d - b)
+    normal = unit(normal - (normal * along).sum(axis=1, keepdims=True) * along)
+    return corners_mm.mean(axis=1), np.stack([along, np.cross(normal, along), normal], axis=1)
