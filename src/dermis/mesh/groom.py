@@ -24,14 +24,14 @@ class Guides:
     local_mm : (g, k, a, 3) position of the knot in the frame of each quad: along it, across it, and along its
         normal, from the mean of its corners [mm]
     weight : (g, k, a) weight of each quad, with a sum of 1 [-]
-    height_mm : (g, k) height of the knot above the skin [mm]
+    rest_mm : (g, k, 4) position of the knot on the mean person at rest, and its height above the skin [mm]
     cut : (g,) fraction of each guide from its root to where the style cuts it [-]
     """
 
     corner: Ints
     local_mm: Floats
     weight: Floats
-    height_mm: Floats
+    rest_mm: Floats
     cut: Floats
 
 

@@ -28,7 +28,6 @@ _BEARD_FADE = (0.25, 0.75)  # zone amounts between which the density of the bear
 _HAIRLINE_WAVES = np.array([[0.37, 0.0, 0.23], [0.81, -0.5, 0.0]])  # wave vectors of the hairline [rad/mm]
 
 _SCALP_MARGIN_MM = 25.0  # distance below the hairline down to which quads may have hair
-_HAIR_MARGIN_MM = 25.0  # distance from quads with scalp hair or beard within which it may touch the skin
 _BROW_MARGIN_MM = 8.0  # distance from quads of the brows within which their hairs may touch the skin
 _MIN_BEARD = 0.02  # zone amount above which quads may have a beard
 
@@ -171,23 +170,13 @@ def _sum_zones(name: str, rows: Floats, points: Doubles) -> Doubles:
 
 
 @cache
-def skin_vertices_near_hair(root_finder: RootFinder, bearded: bool) -> Index:
-    """Return the indices of subdivided vertices within reach of hair; `SkinSurface` needs no others.
-
-    bearded : whether the beard is included
-    """
+def skin_vertices_near_hair(root_finder: RootFinder) -> Index:
+    """Return the indices of subdivided vertices within reach of brow hairs; `SkinSurface` needs no others."""
     from scipy.spatial import cKDTree
 
-    mesh = root_finder.mesh
-    corner_points = quad_corners(mesh, _hairy_quads(mesh))
-    near = np.zeros(len(root_finder.subdivided_mesh.positions), bool)
-    hairy = _scalp_candidates() | _beard_candidates() if bearded else _scalp_candidates()
-    brow_points = quad_corners(mesh, root_finder.brow_grid_roots.quad)
-    subsets = corner_points[hairy[corner_points].any(axis=1)], brow_points
-    for subset, reach in zip(subsets, (_HAIR_MARGIN_MM, _BROW_MARGIN_MM), strict=True):
-        tree = cKDTree(root_finder.points_mm[np.unique(subset)])
-        near |= tree.query(root_finder.subdivided_mesh.positions, distance_upper_bound=reach)[0] < reach
-    return np.flatnonzero(near)
+    brow_points = quad_corners(root_finder.mesh, root_finder.brow_grid_roots.quad)
+    tree, positions = cKDTree(root_finder.points_mm[np.unique(brow_points)]), root_finder.subdivided_mesh.positions
+    return np.flatnonzero(tree.query(positions, distance_upper_bound=_BROW_MARGIN_MM)[0] < _BROW_MARGIN_MM)
 
 
 def _amount_column(name: str) -> int:

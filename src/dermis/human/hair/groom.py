@@ -42,7 +42,8 @@ def add_hair(
     hairs : fraction of scalp and beard hairs to generate; the hairs are widened by its inverse to keep
         coverage
     """
-    skin = SkinSurface(head.mesh, skin_vertices_near_hair(root_finder, look.beard_mm > 0.0))
+    near = skin_vertices_near_hair(root_finder)
+    skin = SkinSurface(head.mesh.positions[near], head.mesh.normals[near])
     surface = GrowthSurface(head, control_head.mesh, skin, hairs)
     rngs = [np.random.default_rng((look.seed, int(side > 0))) for side in SIDE_SIGNS]
     left, right = _grow_brows(surface, root_finder, look, rngs)

@@ -26,6 +26,9 @@ _ROUND_RADII_MM = np.array([75.0, 96.0, 92.0])  # semi-axes of the skull
 # Ellipse around the face, out of which combed hair is kept: centre (z), semi-axes along x and z, and the heights
 # between which it begins [mm].
 _FACE_CENTRE_Z, _FACE_RADII_MM, _FACE_TOP_MM = -60.0, (74.0, 118.0), (78.0, 40.0)
+_EAR_CENTRE_MM = np.array([75.0, -22.0, -76.0])
+_EAR_SPREAD_MM = np.array([1.0, 42.0, 34.0])
+_EAR_HEIGHT_MM, _EAR_BEGIN_X = 13.0, 55.0  # height of the ears above the head; x beyond which they begin
 _TIE_RADIUS_MM = 9.0  # radius of gathered hair at its tie
 _BUN_TURN_MM = 6.0  # advance of hair across a bun in each turn
 
@@ -62,12 +65,12 @@ def unit(vectors: Doubles) -> Doubles:
 
 
 def parting_side(points_mm: Doubles, style: Style) -> Doubles:
-    """Return 1 for points (n, 3) to the left of the parting and -1 for those to its right, as an array (n,).
+    """Return the side (n,) of the parting on which points (n, 3) lie: 1 left, -1 right, 0 behind and below it.
 
     The parting runs from the forehead to the whorl and turns to the middle of the head there.
     """
-    parting = style.parting_mm * smoothstep(-140.0, -95.0, points_mm[:, 2])
-    return np.where(points_mm[:, 0] > parting, 1.0, -1.0)
+    x, y, z = points_mm.T
+    return np.where((z < -125.0) | (y < 35.0), 0.0, np.where(x > style.parting_mm * smoothstep(-140.0, -95.0, z), 1.0, -1.0))
 
 
 def row_of(points_mm: Doubles) -> Doubles:
@@ -80,13 +83,13 @@ def fringe_weight(points_mm: Doubles, style: Style) -> Doubles:
     """Return how much hair rooted at points (n, 3) belongs to the fringe of a style, 0 to 1, as an array (n,)."""
     if style.fringe_y_mm is None:
         return np.zeros(len(points_mm))
-    return smoothstep(-14.0, 2.0, points_mm[:, 2]) * smoothstep(54.0, 42.0, np.abs(points_mm[:, 0]))
+    return smoothstep(-48.0, -34.0, points_mm[:, 2]) * smoothstep(56.0, 44.0, np.abs(points_mm[:, 0]))
 
 
 def _fall(points: Doubles, style: Style) -> Doubles:
     """Return the directions (n, 3) of hair that falls to both sides of a parting."""
     x, y, z = points.T
-    side, top = parting_side(points, style), smoothstep(40.0, 85.0, y)
+    side, top = np.where(x > style.parting_mm * smoothstep(-140.0, -95.0, z), 1.0, -1.0), smoothstep(40.0, 85.0, y)
     ahead = smoothstep(-70.0, 0.0, z)
     sides = np.stack([side * (0.25 + top), -0.9 * (1.0 - top) - 0.1, -0.22 - 0.5 * ahead], axis=1)
     behind = np.stack([x / 200.0, np.full(len(x), -1.0), np.zeros(len(x))], axis=1)
@@ -148,8 +151,37 @@ COMBS: dict[str, Callable[[Doubles, Style], Doubles]] = {
 
 @cache
 def body_surface() -> SkinSurface:
-    """Return the skin of the mean person, with head, ears, neck and shoulders."""
-    return SkinSurface(mean_mesh(), np.unique(mean_mesh().triangles[mean_mesh().material == 0]))
+    """Return the skin of the mean person: head, neck and shoulders, with a smooth surface in place of the ears."""
+    mesh = mean_mesh()
+    skin = np.unique(mesh.triangles[mesh.material == 0])
+    points, normals = mesh.positions[skin].astype(np.float64), mesh.normals[skin].astype(np.float64)
+    y, z = np.abs(points[:, 1:] - _EAR_CENTRE_MM[1:]).T
+    ear = (np.abs(points[:, 0]) > _EAR_BEGIN_X) & (y < 36.0) & (z < 28.0)
+    around = ~ear & (points[:, 0] > _EAR_BEGIN_X) & (y < 60.0) & (z < 50.0)
+    fit = np.linalg.lstsq(_quadratic_terms(points[around]), points[around, 0], rcond=None)[0]
+    grid = np.stack(np.meshgrid(0.0, np.arange(-36.0, 37.0, 4.0), np.arange(-28.0, 29.0, 4.0)), axis=-1)
+    filled = grid.reshape(-1, 3) * [0, 1, 1] + _EAR_CENTRE_MM * [0, 1, 1]
+    filled[:, 0] = _quadratic_terms(filled) @ fit
+    dy, dz = filled[:, 1:].T - _EAR_CENTRE_MM[1:, None]
+    slopes = fit[1] + 2 * fit[3] * dy + fit[5] * dz, fit[2] + 2 * fit[4] * dz + fit[5] * dy
+    facing = unit(np.stack([np.ones(len(filled)), -slopes[0], -slopes[1]], axis=1))
+    sides = [1.0, 1.0, 1.0], [-1.0, 1.0, 1.0]
+    return SkinSurface(
+        np.concatenate([points[~ear], *(filled * side for side in sides)]),
+        np.concatenate([normals[~ear], *(facing * side for side in sides)]),
+    )
+
+
+def _quadratic_terms(points: Doubles) -> Doubles:
+    """Return the terms (n, 6) of a quadratic function of y and z around the middle of the ear."""
+    y, z = points[:, 1:].T - _EAR_CENTRE_MM[1:, None]
+    return np.stack([np.ones(len(y)), y, z, y * y, z * z, y * z], axis=1)
+
+
+def ear_weight(points: Doubles) -> Doubles:
+    """Return 1 for points (n, 3) at the middle of an ear, falling smoothly to 0 around it, as an array (n,)."""
+    away = (np.abs(points) * [1, 0, 0] + points * [0, 1, 1] - _EAR_CENTRE_MM) / _EAR_SPREAD_MM
+    return np.exp(-(away[:, 1:] ** 2).sum(axis=1))
 
 
 def mean_mesh() -> Mesh:
@@ -183,7 +215,8 @@ def _first_direction(points: Doubles, normals: Doubles, style: Style) -> Doubles
     combed = unit(tangent_component(COMBS[style.comb](points, style), normals))
     if style.comb == "up":
         return unit(normals + style.tilt * combed)
-    return unit(style.lift * normals + combed)
+    lift = style.lift * (smoothstep(10.0, 70.0, points[:, 1]) if style.comb == "fall" else 1.0)
+    return unit(np.reshape(lift, (-1, 1)) * normals + combed)
 
 
 def _advance(surface: SkinSurface, state: Growth, step: float, style: Style) -> Growth:
@@ -195,16 +228,17 @@ def _advance(surface: SkinSurface, state: Growth, step: float, style: Style) -> 
     moved = state.position_mm + step * direction
     base, normal = surface.project(moved)
     height = ((moved - base) * normal).sum(axis=1)
+    height_of_ears = _EAR_HEIGHT_MM * ear_weight(base) if style.comb in ("fall", "twist") else 0.0
     layer = style.volume_mm * (1.0 - np.exp(-length / _LAYER_LENGTH_MM)) * np.minimum(length / 20.0, 1.0)
-    least = np.minimum(length / 6.0, 1.0) * (_MIN_HEIGHT_MM + layer)
-    moved += np.clip(least - height, 0.0, 0.8 * step)[:, None] * normal
+    least = np.minimum(length / 6.0, 1.0) * (_MIN_HEIGHT_MM + layer + height_of_ears)
+    pushed = np.clip(least - height, 0.0, 0.8 * step)[:, None]
+    moved += pushed * normal
     if style.comb == "fall":
         loose = fringe_weight(state.root_mm, style)[:, None] < 0.5
         moved = np.where(loose, _clear_face(moved), moved)
-    if not style.coil_mm:
-        direction = unit(moved - state.position_mm)
-    else:
-        direction = np.where(np.isfinite(tied)[:, None], direction, unit(moved - state.position_mm))
+    # hair that is held out slides along the obstacle: it loses its inward motion, but gains no outward motion
+    inward = np.minimum((direction * normal).sum(axis=1, keepdims=True), 0.0)
+    direction = np.where((pushed > 0) & ~np.isfinite(tied)[:, None], unit(direction - inward * normal), direction)
     base, normal = surface.project(moved)
     height = ((moved - base) * normal).sum(axis=1)
     return state._replace(position_mm=moved, direction=direction, skin_normal=normal, height_mm=height,
@@ -215,7 +249,7 @@ def _steer(state: Growth, style: Style) -> Doubles:
     """Return the unit directions (g, 3) of the next step."""
     free = np.minimum(state.length_mm / 60.0, 1.0)[:, None] + 0.15
     pull = 4.0 * style.gravity * free * np.array([0.0, -1.0, 0.0])
-    if style.comb in ("gather", "rows"):
+    if style.comb in ("gather", "rows", "back"):
         combed = unit(tangent_component(COMBS[style.comb](state.position_mm, style), state.skin_normal))
         close = np.exp(-np.maximum(state.height_mm - style.volume_mm, 0.0) / 8.0)[:, None]
         if style.comb == "gather":
@@ -309,7 +343,7 @@ def bind_guides(
         corners[near].astype(np.int32),
         local.astype(np.float32),
         weight.astype(np.float32),
-        heights.astype(np.float32),
+        np.concatenate([knots, heights[..., None]], axis=2).astype(np.float32),
         cut.astype(np.float32),
     )
 

@@ -118,7 +118,7 @@ def _part(
         "frizz_mm": frizz_mm * min(1.0, length_mm / 60.0) * (0.3 if rope else 1.0),
         "flyaways": 0.3 * _FLYAWAYS if rope else _FLYAWAYS,
         "radius_mm": radius,
-        "cover": min(cover, 8.0),
+        "cover": min(cover, 4.0),
         "grey": look.grey,
         "hairs_per_strand": hairs_per_strand,
         "dark": tuple(absorption_per_mm(look.eumelanin, look.pheomelanin)),

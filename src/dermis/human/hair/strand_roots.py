@@ -31,10 +31,10 @@ STRANDS_PER_CM2 = 150.0
 """Density of the possible strands of the scalp [1/cm2]."""
 BEARD_STRANDS_PER_CM2 = 60.0
 """Density of the possible strands of beards [1/cm2]."""
-_VERSION = 1  # of this module's algorithm, part of the keys of cached tables
+_VERSION = 3  # of this module's algorithm, part of the keys of cached tables
 _CACHED_STYLES = 8
 _SEED = 20
-_GUIDE_FIELDS = "corner", "local_mm", "weight", "height_mm", "cut"
+_GUIDE_FIELDS = "corner", "local_mm", "weight", "rest_mm", "cut"
 _ROOT_FIELDS = "quad", "position", "guide", "guide_weight", "clump", "place"
 
 
@@ -90,7 +90,7 @@ def _make_part(style: Style) -> Arrays:
     weight = quad_weights(roots.position)
     root_mm = np.einsum("nk,nkc->nc", weight, points_mm[corners])
     if style.comb == "fall":
-        same = parting_side(points_mm[points], style)[guide] == parting_side(root_mm, style)[:, None]
+        same = parting_side(points_mm[points], style)[guide] * parting_side(root_mm, style)[:, None] >= 0
         one_sided = weight * same
         total = one_sided.sum(axis=1, keepdims=True)
         weight = np.where(total > 1e-3, one_sided / np.maximum(total, 1e-9), weight)

@@ -10,8 +10,8 @@ struct Anchor {
 
 @group(0) @binding(0) var<storage, read> points: array<f32>; // x, y, z [mm]
 @group(0) @binding(1) var<storage, read> anchors: array<Anchor>;
-@group(0) @binding(2) var<storage, read> guide_heights: array<f32>; // of the knots above the skin [mm]
-@group(0) @binding(3) var<storage, read_write> guides: array<vec4f>; // of each knot: position and height; normal of the skin
+@group(0) @binding(2) var<storage, read> guide_rest: array<vec4f>; // position of each knot on the mean person, and its height above the skin [mm]
+@group(0) @binding(3) var<storage, read_write> bound_guides: array<vec4f>; // of each knot: position and height; normal of the skin
 
 fn point_at(index: u32) -> vec3f {
     return vec3f(points[3u * index], points[3u * index + 1u], points[3u * index + 2u]);
@@ -20,7 +20,7 @@ fn point_at(index: u32) -> vec3f {
 @compute @workgroup_size(64)
 fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) lane: u32) {
     let index = list_index(group, groups, lane);
-    if (index >= arrayLength(&guide_heights)) {
+    if (index >= arrayLength(&guide_rest)) {
         return;
     }
     var position = vec3f(0.0);
@@ -38,6 +38,6 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
         position += anchor.local.w * knot;
         outward += anchor.local.w * normal;
     }
-    guides[2u * index] = vec4f(position, guide_heights[index]);
-    guides[2u * index + 1u] = vec4f(normalize(outward), 0.0);
+    bound_guides[2u * index] = vec4f(position, guide_rest[index].w);
+    bound_guides[2u * index + 1u] = vec4f(normalize(outward), 0.0);
 }

@@ -61,11 +61,12 @@ def pose_strands(graph: Recorder, tables: StrandTables, shape: Shape) -> None:
     if tables.fine.hairs:
         _dispatch(graph, "hair/strands_pose.wgsl", bindings, tables.fine.all_knots())
     groom, style = tables.groom, tables.groom.style
-    guides: Bindings = {"points": bindings["points"], "guides": style.guides, "guide_heights": style.guide_heights}
-    knots = style.guide_heights.size // 4
-    _dispatch(graph, "hair/guides_pose.wgsl", {**guides, "anchors": style.anchors}, knots)
+    guides: Bindings = {"guide_rest": style.guide_rest, "bound_guides": style.bound_guides}
+    knots, points = style.guide_rest.size // 16, bindings["points"]
+    _dispatch(graph, "hair/guides_pose.wgsl", {**guides, "points": points, "anchors": style.anchors}, knots)
+    _dispatch(graph, "hair/guides_smooth.wgsl", {**guides, "guides": style.guides}, knots)
     tables_of_person: Bindings = {"roots": groom.roots, "parts": groom.parts, "hairline": groom.hairline}
-    grown = {**bindings, **guides, **tables_of_person, "guide_cuts": style.guide_cuts}
+    grown = {**bindings, **tables_of_person, "guides": style.guides, "guide_cuts": style.guide_cuts}
     _dispatch(graph, "hair/strands_grow.wgsl", grown, tables.coarse.all_knots())
 
 

@@ -35,7 +35,7 @@ _FINE_CAPACITY_STEP, _KNOT_CAPACITY_STEP = 1 << 12, 1 << 19
 _MAX_SHADOW_CASTERS = 32_000  # number of coarse strands that cast the shadows of all coarse strands
 _MIN_DRAWN_STRANDS = 5_000
 _DRAWN_WIDTH_PX = 0.45  # width of the drawn coarse strands [pixel]
-_WIDTH_PER_COVER_PX = 0.2  # added width per unit of cover: where hair hides hair, fewer strands suffice
+_WIDTH_PER_COVER_PX, _MAX_DRAWN_COVER = 0.2, 1.0  # added width per unit of cover: where hair hides hair, fewer strands suffice
 WINDOW_KNOTS = 1 << 12
 """Number of knots for which one workgroup of strands_window.wgsl computes bounds."""
 # Row of the table of strands in strands_pose.wgsl.
@@ -169,8 +169,9 @@ class GuideTables:
     """Guides of a style in buffers, by the names of guides_pose.wgsl and strands_grow.wgsl."""
 
     anchors: Buffer
-    guide_heights: Buffer
+    guide_rest: Buffer
     guide_cuts: Buffer
+    bound_guides: Buffer
     guides: Buffer
 
 
@@ -257,7 +258,7 @@ def drawn_hair_count(tables: StrandTables, pixel_mm: float) -> int:
     pixel_mm : side of a pixel at the depth of the strands [mm]
     """
     total_mm = tables.coarse.hairs * tables.mean_width_mm
-    drawn_mm = (_DRAWN_WIDTH_PX + _WIDTH_PER_COVER_PX * tables.mean_cover) * pixel_mm
+    drawn_mm = (_DRAWN_WIDTH_PX + _WIDTH_PER_COVER_PX * min(tables.mean_cover, _MAX_DRAWN_COVER)) * pixel_mm
     return int(min(tables.coarse.hairs, max(_MIN_DRAWN_STRANDS, total_mm / drawn_mm)))
 
 
@@ -315,9 +316,9 @@ def make_guide_tables(device: Device, guides: Guides) -> GuideTables:
     anchors = np.empty(guides.weight.shape, _ANCHOR_DTYPE)
     anchors["corner"] = guides.corner
     anchors["local"][..., :3], anchors["local"][..., 3] = guides.local_mm, guides.weight
-    posed = _make_buffer(device, 8 * guides.height_mm.size)
-    heights, cuts = (device.buffer(array, "STORAGE") for array in (guides.height_mm, guides.cut))
-    return GuideTables(device.buffer(anchors.view(np.uint32), "STORAGE"), heights, cuts, posed)
+    bound, smooth = (_make_buffer(device, 2 * guides.rest_mm.size) for _ in range(2))
+    rest, cuts = (device.buffer(array, "STORAGE") for array in (guides.rest_mm, guides.cut))
+    return GuideTables(device.buffer(anchors.view(np.uint32), "STORAGE"), rest, cuts, bound, smooth)
 
 
 def make_strand_roots(device: Device, roots: StrandRoots, mesh: Mesh) -> Buffer:
