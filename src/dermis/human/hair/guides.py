@@ -29,8 +29,7 @@ _FACE_CENTRE_Z, _FACE_RADII_MM, _FACE_TOP_MM = -60.0, (74.0, 118.0), (78.0, 40.0
 _EAR_CENTRE_MM = np.array([75.0, -22.0, -76.0])
 _EAR_SPREAD_MM = np.array([1.0, 42.0, 34.0])
 _EAR_HEIGHT_MM, _EAR_BEGIN_X = 13.0, 55.0  # height of the ears above the head; x beyond which they begin
-_TIE_RADIUS_MM = 9.0  # radius of gathered hair at its tie
-_BUN_TURN_MM = 6.0  # advance of hair across a bun in each turn
+_TIE_RADIUS_MM, _TIE_REACH_MM = 9.0, 5.0  # radius of gathered hair at its tie; distance at which a guide is in its place
 
 
 class Growth(NamedTuple):
@@ -223,7 +222,7 @@ def _advance(surface: SkinSurface, state: Growth, step: float, style: Style) -> 
     """Return the guides after one step of growth [mm]."""
     direction, length, tied = _steer(state, style), state.length_mm + step, state.tied_mm
     if style.comb == "gather":
-        near = np.linalg.norm(state.position_mm - style.tie_mm, axis=1) < _TIE_RADIUS_MM + 4.0
+        near = np.linalg.norm(state.position_mm - style.tie_mm - _tie_offsets(state, style), axis=1) < _TIE_REACH_MM
         tied = np.where(near & ~np.isfinite(tied), length, tied)
     moved = state.position_mm + step * direction
     base, normal = surface.project(moved)
@@ -236,6 +235,9 @@ def _advance(surface: SkinSurface, state: Growth, step: float, style: Style) -> 
     if style.comb == "fall":
         loose = fringe_weight(state.root_mm, style)[:, None] < 0.5
         moved = np.where(loose, _clear_face(moved), moved)
+    if style.coil_mm:
+        wound = np.clip((length - tied) / 25.0, 0.0, 1.0)[:, None]
+        moved += wound * (_bun(state, length, style) - moved)
     # hair that is held out slides along the obstacle: it loses its inward motion, but gains no outward motion
     inward = np.minimum((direction * normal).sum(axis=1, keepdims=True), 0.0)
     direction = np.where((pushed > 0) & ~np.isfinite(tied)[:, None], unit(direction - inward * normal), direction)
@@ -253,7 +255,7 @@ def _steer(state: Growth, style: Style) -> Doubles:
         combed = unit(tangent_component(COMBS[style.comb](state.position_mm, style), state.skin_normal))
         close = np.exp(-np.maximum(state.height_mm - style.volume_mm, 0.0) / 8.0)[:, None]
         if style.comb == "gather":
-            to_tie = np.array(style.tie_mm) - state.position_mm
+            to_tie = np.array(style.tie_mm) + _tie_offsets(state, style) - state.position_mm
             distance = np.linalg.norm(to_tie, axis=1, keepdims=True)
             combed = unit(np.where(distance < 35.0, to_tie, combed))
             tail = _tail(state, style, pull)
@@ -262,22 +264,38 @@ def _steer(state: Growth, style: Style) -> Doubles:
     return unit(style.stiffness * state.direction + (1.0 - style.stiffness) * pull)
 
 
+def _tie_offsets(state: Growth, style: Style) -> Doubles:
+    """Return the places (g, 3) of guides in the tie, relative to its middle: in the direction of their roots [mm]."""
+    outward = unit(np.array(style.tie_mm) - _SKULL_CENTRE_MM)
+    away = tangent_component(state.root_mm - np.array(style.tie_mm), np.broadcast_to(outward, state.root_mm.shape))
+    reach = np.linalg.norm(away, axis=1, keepdims=True)
+    return np.asarray(_TIE_RADIUS_MM * np.minimum(reach / 60.0, 1.0) * unit(away))
+
+
 def _tail(state: Growth, style: Style, pull: Doubles) -> Doubles:
-    """Return the directions (g, 3) of gathered hair behind its tie: a tail that falls, or a coil around a bun."""
+    """Return the directions (g, 3) of gathered hair behind its tie: outward, then down and slightly apart."""
     outward = unit(np.array(style.tie_mm) - _SKULL_CENTRE_MM)[None]
-    since = np.maximum(state.length_mm - np.where(np.isfinite(state.tied_mm), state.tied_mm, 0.0), 0.0)
-    if not style.coil_mm:
-        first = np.exp(-since / 25.0)[:, None]
-        return unit(0.85 * state.direction + 0.15 * pull + 0.3 * first * outward)
-    centre = np.array(style.tie_mm) + 0.55 * style.coil_mm * outward
-    away = state.position_mm - centre
-    # each hair winds around the bun about an axis of its own, near that of the tie
-    axis = unit(outward + 0.35 * state.root_normal)
-    radial = unit(away)
-    around = unit(np.cross(axis, radial))
-    distance = np.linalg.norm(away, axis=1, keepdims=True)
-    inward = (style.coil_mm - distance) / 6.0
-    return unit(around + np.clip(inward, -1.0, 1.0) * radial + 0.12 * np.sin(since / _BUN_TURN_MM / 3.0)[:, None] * axis)
+    since = np.maximum(state.length_mm - np.where(np.isfinite(state.tied_mm), state.tied_mm, 0.0), 0.0)[:, None]
+    apart = _tie_offsets(state, style) / _TIE_RADIUS_MM
+    spread = 0.12 * np.exp(-since / 60.0) - 0.03 * smoothstep(150.0, 400.0, since)
+    return unit(0.85 * state.direction + 0.15 * pull + 0.3 * np.exp(-since / 25.0) * outward + spread * apart)
+
+
+def _bun(state: Growth, length: Doubles, style: Style) -> Doubles:
+    """Return points (g, 3) of hair that winds around a bun behind its tie, at a given length of each guide [mm]."""
+    outward = unit(np.array(style.tie_mm) - _SKULL_CENTRE_MM)
+    side = unit(np.cross(outward, [0.0, 1.0, 0.0]))
+    up = np.cross(side, outward)
+    offset = _tie_offsets(state, style)
+    turn = np.arctan2(offset @ up, offset @ side)
+    rank = np.linalg.norm(offset, axis=1) / _TIE_RADIUS_MM
+    since = np.maximum(length - np.where(np.isfinite(state.tied_mm), state.tied_mm, length), 0.0)
+    radius = style.coil_mm * (0.7 + 0.3 * rank)
+    tilt = 1.9 - 1.5 * smoothstep(0.0, 260.0, since) + 0.25 * np.sin(3.0 * turn)
+    turn = turn + since / (0.8 * radius)
+    across = (np.sin(tilt) * np.cos(turn))[:, None] * side + (np.sin(tilt) * np.sin(turn))[:, None] * up
+    centre = np.array(style.tie_mm) + 0.6 * style.coil_mm * outward
+    return np.asarray(centre + radius[:, None] * (across + np.cos(tilt)[:, None] * outward))
 
 
 def _clear_face(points: Doubles) -> Doubles:

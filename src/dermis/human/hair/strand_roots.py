@@ -31,7 +31,7 @@ STRANDS_PER_CM2 = 150.0
 """Density of the possible strands of the scalp [1/cm2]."""
 BEARD_STRANDS_PER_CM2 = 60.0
 """Density of the possible strands of beards [1/cm2]."""
-_VERSION = 3  # of this module's algorithm, part of the keys of cached tables
+_VERSION = 4  # of this module's algorithm, part of the keys of cached tables
 _CACHED_STYLES = 8
 _SEED = 20
 _GUIDE_FIELDS = "corner", "local_mm", "weight", "rest_mm", "cut"

@@ -8,6 +8,7 @@ from functools import cache
 from importlib import resources
 from typing import Literal
 
+_NO_TIE = 0.0, 0.0, 0.0
 Comb = Literal["up", "fall", "back", "rows", "gather", "twist", "beard"]
 
 
@@ -53,7 +54,7 @@ class Style:
     clump_mm: float = 9.0
     rope_mm: float = 0.0
     braid: bool = False
-    tie_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    tie_mm: tuple[float, float, float] = _NO_TIE
     coil_mm: float = 0.0
     crown: float = 0.0
     women: float = 0.0
@@ -66,7 +67,8 @@ class Style:
 def styles() -> dict[str, Style]:
     """Return the hair styles by name."""
     text = resources.files(__package__).joinpath("styles.toml").read_text("utf-8")
-    return {name: Style(**row) for name, row in tomllib.loads(text).items()}
+    rows = tomllib.loads(text)
+    return {name: Style(**{**row, "tie_mm": tuple(row.get("tie_mm", _NO_TIE))}) for name, row in rows.items()}
 
 
 BEARD = Style("beard", max_length_mm=150.0, length_mm=10.0, lift=1.0, volume_mm=5.0, gravity=0.35, clump_mm=4.0)

@@ -32,7 +32,7 @@ ShadingInputs = tuple[Bindings, UniformRecord, Constants]
 
 _MAX_ROWS_PER_INVOCATION, _MAX_LOOP_ITERATIONS = 8, 60_000
 _HAIR_EXTENT_MM = 100.0  # side of a square in the picture that holds all hair of a head
-_CROWDING_FACTOR = 6.0  # ratio of the number of segments in a crowded tile to the mean of all tiles
+_CROWDING_FACTOR = 14.0  # ratio of the number of segments in a crowded tile to the mean of all tiles
 _CLEARING_GROUPS = 256
 _RAY_STRIDE = 4  # one of four rays to an area light is traced: pictures change by 0.0002 at most
 

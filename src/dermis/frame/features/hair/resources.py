@@ -34,6 +34,8 @@ _MAX_LINKS = 1 << 22
 _FINE_CAPACITY_STEP, _KNOT_CAPACITY_STEP = 1 << 12, 1 << 19
 _MAX_SHADOW_CASTERS = 32_000  # number of coarse strands that cast the shadows of all coarse strands
 _MIN_DRAWN_STRANDS = 5_000
+_MAX_SOFTWARE_KNOTS = 400_000  # knots of strands that grow on software adapters
+_PROJECTED_KNOT_BYTES = 32
 _DRAWN_WIDTH_PX = 0.45  # width of the drawn coarse strands [pixel]
 _WIDTH_PER_COVER_PX, _MAX_DRAWN_COVER = 0.2, 1.0  # added width per unit of cover: where hair hides hair, fewer strands suffice
 WINDOW_KNOTS = 1 << 12
@@ -103,14 +105,20 @@ def strand_counts(strands: Strands | None) -> StrandCounts:
     return StrandCounts(0, 2) if strands is None else StrandCounts(*strands.radius_mm.shape)
 
 
-def coarse_counts(head: Head) -> StrandCounts:
-    """Return the number of strands on head and chin, grown or given, and the number of knots of each."""
-    return strand_counts(head.hair) if head.groom is None else StrandCounts(len(head.groom), head.groom.knots)
+def coarse_counts(device: Device, head: Head) -> StrandCounts:
+    """Return the number of strands on head and chin, grown or given, and the number of knots of each.
+
+    Fewer strands grow where buffers are small, and on software adapters; they are wider, to keep coverage.
+    """
+    if head.groom is None:
+        return strand_counts(head.hair)
+    limit = device.max_storage_bytes // (_PROJECTED_KNOT_BYTES * head.groom.knots)
+    limit = min(limit, _MAX_SOFTWARE_KNOTS // head.groom.knots) if device.adapter.kind == "CPU" else limit
+    return StrandCounts(min(len(head.groom), limit), head.groom.knots)
 
 
-def strand_capacity(head: Head) -> StrandCapacity:
-    """Return the capacity for the strands of a head, rounded up so that most heads can share buffers."""
-    fine, coarse = strand_counts(head.strands), coarse_counts(head)
+def strand_capacity(fine: StrandCounts, coarse: StrandCounts) -> StrandCapacity:
+    """Return the capacity for fine and coarse strands, rounded up so that most heads can share buffers."""
     knots = fine.all_knots() + coarse.all_knots()
     step = _KNOT_CAPACITY_STEP if coarse.hairs else _FINE_CAPACITY_STEP
     return StrandCapacity(_round_up(fine.hairs, _FINE_CAPACITY_STEP), _round_up(knots, step))
@@ -263,17 +271,18 @@ def drawn_hair_count(tables: StrandTables, pixel_mm: float) -> int:
 
 
 def make_strand_tables(
-    device: Device, head: Head, buffers: StrandBuffers, groom: GroomTables | None
+    device: Device, head: Head, coarse: StrandCounts, buffers: StrandBuffers, groom: GroomTables | None
 ) -> StrandTables:
     """Upload the strands of a head.
 
+    coarse : numbers from `coarse_counts`
     buffers : buffers that each frame fills with posed strands and projected knots
     groom : tables from which coarse strands grow; None if they are given or there are none
 
     Raises DermisError for strands that are rooted in another mesh.
     """
     parts = [part for part in (head.strands, head.hair) if part is not None]
-    fine, coarse = strand_counts(head.strands), coarse_counts(head)
+    fine = strand_counts(head.strands)
     rows = np.zeros(max(1, sum(map(len, parts))), _STRAND_DTYPE)
     for part, first in zip(parts, (0, len(parts[0]) if parts else 0), strict=False):
         _fill_rows(rows[first : first + len(part)], head, part)
@@ -293,15 +302,15 @@ def make_strand_tables(
         coarse=coarse,
         shadow_casters=casters,
         groom=groom,
-        **_mean_values(head),
+        **_mean_values(head, coarse),
     )
 
 
-def _mean_values(head: Head) -> dict[str, Any]:
+def _mean_values(head: Head, coarse: StrandCounts) -> dict[str, Any]:
     """Return the fields of `StrandTables` that are means over the coarse strands."""
     if head.groom is not None:
         first = head.groom.parameters[0]
-        width, cover = 2.0 * float(first["radius_mm"]), float(first["cover"])
+        width, cover = 2.0 * float(first["radius_mm"]) * len(head.groom) / coarse.hairs, float(first["cover"])
         return {"centre_mm": head.groom.centre_mm, "mean_width_mm": width, "mean_cover": cover}
     hair = head.hair
     if hair is None:
@@ -333,12 +342,18 @@ def make_strand_roots(device: Device, roots: StrandRoots, mesh: Mesh) -> Buffer:
     return device.buffer(rows.view(np.uint32), "STORAGE")
 
 
-def make_groom_tables(device: Device, groom: Groom, style: GuideTables, roots: Buffer) -> GroomTables:
+def make_groom_tables(
+    device: Device, groom: Groom, strands: int, style: GuideTables, roots: Buffer
+) -> GroomTables:
     """Upload the numbers of a person's groom.
 
+    strands : number of strands that grow in place of all
     style, roots : tables of the style, which people share
     """
-    parts = device.buffer(groom.parameters.view(np.float32), "STORAGE")
+    parameters = groom.parameters.copy()
+    for name in ("radius_mm", "hairs_per_strand"):
+        parameters[name] *= len(groom) / strands
+    parts = device.buffer(parameters.view(np.float32), "STORAGE")
     return GroomTables(style, roots, parts, device.buffer(groom.hairline_mm, "STORAGE"))
 
 
@@ -374,14 +389,14 @@ def make(memo: Memo, device: Device, request: FrameRequest) -> Resources | None:
     head, cached, layers = request.head, memo.get, request.shadow_layers
     if not has_strands(head, request.settings):
         return None
-    capacity = strand_capacity(head)
-    groom = None
+    coarse, groom = coarse_counts(device, head), None
+    capacity = strand_capacity(strand_counts(head.strands), coarse)
     if head.groom is not None:
         style = cached(make_guide_tables, device, head.groom.guides)
         roots = cached(make_strand_roots, device, head.groom.roots, head.topology.mesh)
-        groom = cached(make_groom_tables, device, head.groom, style, roots)
+        groom = cached(make_groom_tables, device, head.groom, coarse.hairs, style, roots)
     buffers = cached(make_strand_buffers, device, capacity)
-    tables = cached(make_strand_tables, device, head.bare, buffers, groom)
+    tables = cached(make_strand_tables, device, head.bare, coarse, buffers, groom)
     picture = cached(make_strand_picture, device, capacity, request.settings.size)
     shadows = cached(make_deep_opacity, device, layers, owner=f"{layers} {request.view_name}")
     return Resources(tables, picture, shadows, cached(mean_skin_albedo, head))
