@@ -45,6 +45,7 @@ class StrandRoots:
     place : (n, 4) angle from the front [degrees], and height above the midpoint of the eyes [mm], by which
         the hairline decides whether the strand grows; thinning on a receding crown, 0 to 1; and position
         between the nape, 0, and the top of the head, 1
+    along_mm : (n,) position of the clump along its row, by which the braids of a row continue each other [mm]
     part : (n,) index of the part of the groom, such as scalp and beard
     """
 
@@ -53,6 +54,7 @@ class StrandRoots:
     guide_weight: Floats
     clump: Ints
     place: Floats
+    along_mm: Floats
     part: Ints
 
     def __len__(self) -> int:
@@ -66,6 +68,7 @@ class Groom:
 
     guides, roots : tables of the style
     parameters : (p,) structured array, one element for each part of the groom
+    strands : number of strands to grow, the first of `roots`; they are wider, to keep coverage
     knots : number of knots per strand
     hairline_mm : (91,) height of the hairline by angle from the front, every 2 degrees [mm]
     centre_mm : (3,) centre of the roots on the mean person [mm]
@@ -74,10 +77,11 @@ class Groom:
     guides: Guides
     roots: StrandRoots
     parameters: NDArray[np.void]
+    strands: int
     knots: int
     hairline_mm: Floats
     centre_mm: Doubles
 
     def __len__(self) -> int:
-        """Return the number of possible strands."""
-        return len(self.roots)
+        """Return the number of strands, of which the look of the person may leave out some."""
+        return self.strands

@@ -58,41 +58,40 @@ def make_groom(look: HairLook, recession: float, levels: int, hair_fraction: flo
     if scalp is None and not bearded:
         return None
     tables = style_tables(scalp, bearded, levels)
-    parts = [_scalp_part(scalp, look, recession, hair_fraction)] if scalp else []
-    parts += [_beard_part(look, hair_fraction)] if bearded else []
-    parameters = np.array(parts, PART_DTYPE)
-    heights = hairline_heights(max(recession, scalp.crown if scalp else 0.0))
-    return Groom(tables.guides, tables.roots, parameters, _knot_count(parameters), heights, _centre(tables))
+    parts = [_scalp_part(scalp, look, recession)] if scalp else []
+    parts += [_beard_part(look)] if bearded else []
+    parameters, strands = np.array(parts, PART_DTYPE), round(hair_fraction * len(tables.roots))
+    heights, knots = hairline_heights(max(recession, scalp.crown if scalp else 0.0)), _knot_count(parameters)
+    return Groom(tables.guides, tables.roots, parameters, strands, knots, heights, _centre(tables))
 
 
-def _scalp_part(style: Style, look: HairLook, recession: float, hair_fraction: float) -> tuple[object, ...]:
-    strands = STRANDS_PER_CM2 * hair_fraction
-    hairs = MAX_PER_CM2 / strands
-    length = min(look.length_mm, style.max_length_mm)
-    fade = look.fade if style.fade else 0.0
-    return _part(style, look, length, hairs, _HAIR_RADIUS_MM, hair_fraction * look.density, fade, strands,
-                 thinning=max(recession, style.crown), hairline=1.0)  # fmt: skip
+def _scalp_part(style: Style, look: HairLook, recession: float) -> tuple[object, ...]:
+    length, fade = min(look.length_mm, style.max_length_mm), look.fade if style.fade else 0.0
+    densities = STRANDS_PER_CM2, MAX_PER_CM2, look.density
+    return _part(style, look, length, densities, _HAIR_RADIUS_MM, fade, max(recession, style.crown), 1.0)
 
 
-def _beard_part(look: HairLook, hair_fraction: float) -> tuple[object, ...]:
-    strands = BEARD_STRANDS_PER_CM2 * hair_fraction
-    length = min(look.beard_mm, BEARD.max_length_mm)
-    return _part(BEARD, look, length, BEARD_PER_CM2 / strands, _BEARD_RADIUS_MM, hair_fraction, 0.0, strands)
+def _beard_part(look: HairLook) -> tuple[object, ...]:
+    length, densities = min(look.beard_mm, BEARD.max_length_mm), (BEARD_STRANDS_PER_CM2, BEARD_PER_CM2, 1.0)
+    return _part(BEARD, look, length, densities, _BEARD_RADIUS_MM)
 
 
 def _part(
     style: Style,
     look: HairLook,
     length_mm: float,
-    hairs_per_strand: float,
+    densities: tuple[float, float, float],
     hair_radius_mm: float,
-    density: float,
-    fade: float,
-    strands_per_cm2: float,
+    fade: float = 0.0,
     thinning: float = 0.0,
     hairline: float = 0.0,
 ) -> tuple[object, ...]:
-    """Return the numbers of a part of a groom as a row of `PART_DTYPE`."""
+    """Return the numbers of a part of a groom as a row of `PART_DTYPE`.
+
+    densities : possible strands and hairs [1/cm2], and the fraction of the strands that grow
+    """
+    strands_per_cm2, hairs_per_cm2, density = densities
+    hairs_per_strand = hairs_per_cm2 / strands_per_cm2
     curl_mm, pitch_mm, incoherence, frizz_mm = (
         float(np.interp(look.curl, _CURLS, column))
         for column in (_CURL_RADIUS_MM, _CURL_PITCH_MM, _INCOHERENCE, _FRIZZ_MM)

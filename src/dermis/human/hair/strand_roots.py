@@ -31,11 +31,11 @@ STRANDS_PER_CM2 = 150.0
 """Density of the possible strands of the scalp [1/cm2]."""
 BEARD_STRANDS_PER_CM2 = 60.0
 """Density of the possible strands of beards [1/cm2]."""
-_VERSION = 4  # of this module's algorithm, part of the keys of cached tables
+_VERSION = 6  # of this module's algorithm, part of the keys of cached tables
 _CACHED_STYLES = 8
 _SEED = 20
 _GUIDE_FIELDS = "corner", "local_mm", "weight", "rest_mm", "cut"
-_ROOT_FIELDS = "quad", "position", "guide", "guide_weight", "clump", "place"
+_ROOT_FIELDS = "quad", "position", "guide", "guide_weight", "clump", "place", "along_mm"
 
 
 class StyleTables(NamedTuple):
@@ -97,8 +97,8 @@ def _make_part(style: Style) -> Arrays:
     place = _places(weight, average_points()[corners])
     guides = bind_guides(mesh, points_mm, knots, heights, cut_fractions(knots, style))
     clump = _clump_middles(root_mm, style, rng)
-    columns = roots.quad, roots.position, guide, weight, clump, place
-    types = np.int32, np.float32, np.int32, np.float32, np.int32, np.float32
+    columns = roots.quad, roots.position, guide, weight, clump, place, -root_mm[clump, 2]
+    types = np.int32, np.float32, np.int32, np.float32, np.int32, np.float32, np.float32
     found = {name: np.asarray(column, kind) for name, column, kind in zip(_ROOT_FIELDS, columns, types, strict=True)}
     return found | {name: getattr(guides, name) for name in _GUIDE_FIELDS}
 

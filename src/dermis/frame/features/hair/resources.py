@@ -34,7 +34,7 @@ _MAX_LINKS = 1 << 22
 _FINE_CAPACITY_STEP, _KNOT_CAPACITY_STEP = 1 << 12, 1 << 19
 _MAX_SHADOW_CASTERS = 32_000  # number of coarse strands that cast the shadows of all coarse strands
 _MIN_DRAWN_STRANDS = 5_000
-_MAX_SOFTWARE_KNOTS = 400_000  # knots of strands that grow on software adapters
+_MAX_SOFTWARE_KNOTS = 1_200_000  # knots of strands that grow on software adapters
 _PROJECTED_KNOT_BYTES = 32
 _DRAWN_WIDTH_PX = 0.45  # width of the drawn coarse strands [pixel]
 _WIDTH_PER_COVER_PX, _MAX_DRAWN_COVER = 0.2, 1.0  # added width per unit of cover: where hair hides hair, fewer strands suffice
@@ -45,7 +45,7 @@ _STRAND_DTYPE = np.dtype([("corner", "u4", 4), ("weight", "f4", 4), ("absorption
 # Rows of the tables in guides_pose.wgsl and strands_grow.wgsl.
 _ANCHOR_DTYPE = np.dtype([("corner", "u4", 4), ("local", "f4", 4)])
 _ROOT_MEMBERS = ("corner", "u4", 4), ("weight", "f4", 4), ("guide", "u4", 4), ("guide_weight", "f4", 4)
-_ROOT_DTYPE = np.dtype([*_ROOT_MEMBERS, ("place", "f4", 4), ("clump", "u4"), ("part", "u4"), ("pad", "u4", 2)])
+_ROOT_DTYPE = np.dtype([*_ROOT_MEMBERS, ("place", "f4", 4), ("clump", "u4"), ("part", "u4"), ("along_mm", "f4"), ("pad", "u4")])
 _COUNT_MEMBERS = "fine", "coarse", "shadow_casters", "fine_knots", "coarse_knots"
 _HAIRS_DTYPE = np.dtype([*((name, "u4") for name in _COUNT_MEMBERS), ("width_scale", "f4")])
 
@@ -310,7 +310,7 @@ def _mean_values(head: Head, coarse: StrandCounts) -> dict[str, Any]:
     """Return the fields of `StrandTables` that are means over the coarse strands."""
     if head.groom is not None:
         first = head.groom.parameters[0]
-        width, cover = 2.0 * float(first["radius_mm"]) * len(head.groom) / coarse.hairs, float(first["cover"])
+        width, cover = 2.0 * float(first["radius_mm"]) * len(head.groom.roots) / coarse.hairs, float(first["cover"])
         return {"centre_mm": head.groom.centre_mm, "mean_width_mm": width, "mean_cover": cover}
     hair = head.hair
     if hair is None:
@@ -337,7 +337,7 @@ def make_strand_roots(device: Device, roots: StrandRoots, mesh: Mesh) -> Buffer:
     """
     rows = np.zeros(len(roots), _ROOT_DTYPE)
     rows["corner"], rows["weight"] = quad_corners(mesh, roots.roots.quad), quad_weights(roots.roots.position)
-    for name in ("guide", "guide_weight", "place", "clump", "part"):
+    for name in ("guide", "guide_weight", "place", "clump", "part", "along_mm"):
         rows[name] = getattr(roots, name)
     return device.buffer(rows.view(np.uint32), "STORAGE")
 
@@ -352,7 +352,7 @@ def make_groom_tables(
     """
     parameters = groom.parameters.copy()
     for name in ("radius_mm", "hairs_per_strand"):
-        parameters[name] *= len(groom) / strands
+        parameters[name] *= len(groom.roots) / strands
     parts = device.buffer(parameters.view(np.float32), "STORAGE")
     return GroomTables(style, roots, parts, device.buffer(groom.hairline_mm, "STORAGE"))
 

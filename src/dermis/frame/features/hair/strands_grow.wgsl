@@ -22,7 +22,8 @@ struct StrandRoot {
     place: vec4f, // see the field `place` of StrandRoots
     clump: u32, // strand at the middle of its clump
     part: u32,
-    pad: vec2u,
+    along_mm: f32, // position of the clump along its row
+    pad: u32,
 }
 
 // Numbers of a part of a groom, such as scalp or beard; see groom.py.
@@ -214,7 +215,7 @@ fn strand_position(index: u32, seed: u32, strand: StrandRoot, part: GroomPart, r
     let across = axes_across(at);
     var offset = pull * (at.position - own.position);
     if (part.rope_mm > 0.0) {
-        offset += near * rope_offset(index, part, s, across);
+        offset += near * rope_offset(index, part, s + strand.along_mm, across);
     }
     if (part.curl_mm > 0.0 && part.rope_mm == 0.0) {
         offset += curl_offset(index, strand.clump + seed, part, s, across);
