@@ -41,11 +41,10 @@ class Head:
         Morph targets and bones; None for a head that moves only by the positions of all its points.
     eyes : Eyes, optional
         Eyeballs of realistic shape.
-    strands, hair : Strands, optional
-        Strands of brows and lashes, and of scalp and beard. The latter are in random order, so that the first
-        ones are a random sample.
-    groom : Groom, optional
-        Scalp hair and beard that the device grows, instead of `hair`.
+    strands : Strands, optional
+        Strands of brows and lashes.
+    hair : Groom, optional
+        Scalp hair and beard, whose strands the device grows.
     note : str, optional
         Parts of the file that are not used, with reasons; empty for none.
     levels : int, optional
@@ -71,12 +70,11 @@ class Head:
     rig: Rig | None = None
     eyes: Eyes | None = None
     strands: Strands | None = None
-    hair: Strands | None = None
+    hair: Groom | None = None
     note: str = ""
     levels: int = 0
     template: Head | None = None
     file_vertices: FileVertices | None = None
-    groom: Groom | None = None
 
     def __repr__(self) -> str:
         """Return name, size, maps and rig on two lines."""
@@ -84,7 +82,7 @@ class Head:
         parts = [f"maps: {', '.join([*maps, *(['painted'] if self.maps.is_painted else [])]) or 'none'}"]
         counts = {"targets": len(self.targets), "bones": len(self.bones)}
         parts += [f"{count} {name}" for name, count in counts.items() if count]
-        parts += [name for name in ("eyes", "strands", "hair", "groom") if getattr(self, name) is not None]
+        parts += [name for name in ("eyes", "strands", "hair") if getattr(self, name) is not None]
         size = f"{len(self.mesh.triangles):,} triangles at level {self.levels} of subdivision"
         return f"<Head {self.name!r}: {size}\n {'; '.join(parts)}>"
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,12 +32,10 @@ _LINKS_PER_KNOT = 4
 _MAX_LINKS = 1 << 22
 # Steps to which capacities for fine strands and for knots are rounded up, so that most heads share them.
 _FINE_CAPACITY_STEP, _KNOT_CAPACITY_STEP = 1 << 12, 1 << 19
-_MAX_SHADOW_CASTERS = 32_000  # number of coarse strands that cast the shadows of all coarse strands
-_MIN_DRAWN_STRANDS = 5_000
-_MAX_SOFTWARE_KNOTS = 1_200_000  # knots of strands that grow on software adapters
 _PROJECTED_KNOT_BYTES = 32
-_DRAWN_WIDTH_PX = 0.45  # width of the drawn coarse strands [pixel]
+_MIN_DRAWN_STRANDS, _MIN_KNOTS = 5_000, 5
 _WIDTH_PER_COVER_PX, _MAX_DRAWN_COVER = 0.2, 1.0  # added width per unit of cover: where hair hides hair, fewer strands suffice
+_LEVELS_PER_OCTAVE = 4  # levels of detail for each doubling of the size of a pixel
 WINDOW_KNOTS = 1 << 12
 """Number of knots for which one workgroup of strands_window.wgsl computes bounds."""
 # Row of the table of strands in strands_pose.wgsl.
@@ -48,6 +46,24 @@ _ROOT_MEMBERS = ("corner", "u4", 4), ("weight", "f4", 4), ("guide", "u4", 4), ("
 _ROOT_DTYPE = np.dtype([*_ROOT_MEMBERS, ("place", "f4", 4), ("clump", "u4"), ("part", "u4"), ("along_mm", "f4"), ("pad", "u4")])
 _COUNT_MEMBERS = "fine", "coarse", "shadow_casters", "fine_knots", "coarse_knots"
 _HAIRS_DTYPE = np.dtype([*((name, "u4") for name in _COUNT_MEMBERS), ("width_scale", "f4")])
+
+
+class Detail(NamedTuple):
+    """Detail in which coarse strands are grown on a kind of adapter.
+
+    drawn_knots : largest number of knots of all drawn strands
+    casters, caster_knots : largest number of strands that cast the shadows of all, and of their knots
+    width_px, segment_px : width of the drawn strands, and length of their segments, where these are finer [pixel]
+    """
+
+    drawn_knots: int
+    casters: int
+    caster_knots: int
+    width_px: float
+    segment_px: float
+
+
+_GPU_DETAIL, _SOFTWARE_DETAIL = Detail(1 << 23, 32_000, 32, 0.45, 2.0), Detail(1 << 20, 8_000, 12, 0.8, 4.0)
 
 
 class StrandCounts(NamedTuple):
@@ -78,9 +94,10 @@ class StrandCapacity(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class StrandBuffers:
-    """Buffers that each frame fills: posed strands, and their knots projected to the picture."""
+    """Buffers that each frame fills: strands that cast shadows, those that are drawn, and their projected knots."""
 
-    posed: Buffer
+    casters: Buffer
+    drawn: Buffer
     projected: Buffer
 
 
@@ -106,15 +123,23 @@ def strand_counts(strands: Strands | None) -> StrandCounts:
 
 
 def coarse_counts(device: Device, head: Head) -> StrandCounts:
-    """Return the number of strands on head and chin, grown or given, and the number of knots of each.
+    """Return the largest number of strands to draw on head and chin, and the largest number of knots of each."""
+    if head.hair is None:
+        return StrandCounts(0, 2)
+    fitting = device.max_storage_bytes // _PROJECTED_KNOT_BYTES - _KNOT_CAPACITY_STEP
+    limit = min(fitting, adapter_detail(device).drawn_knots) // head.hair.knots
+    return StrandCounts(min(len(head.hair), limit), head.hair.knots)
 
-    Fewer strands grow where buffers are small, and on software adapters; they are wider, to keep coverage.
-    """
-    if head.groom is None:
-        return strand_counts(head.hair)
-    limit = device.max_storage_bytes // (_PROJECTED_KNOT_BYTES * head.groom.knots)
-    limit = min(limit, _MAX_SOFTWARE_KNOTS // head.groom.knots) if device.adapter.kind == "CPU" else limit
-    return StrandCounts(min(len(head.groom), limit), head.groom.knots)
+
+def caster_counts(device: Device, coarse: StrandCounts) -> StrandCounts:
+    """Return the number of coarse strands that cast the shadows of all, and the number of knots of each."""
+    detail = adapter_detail(device)
+    return StrandCounts(min(coarse.hairs, detail.casters), min(coarse.knots, detail.caster_knots))
+
+
+def adapter_detail(device: Device) -> Detail:
+    """Return the detail of hair on a device."""
+    return _SOFTWARE_DETAIL if device.adapter.kind == "CPU" else _GPU_DETAIL
 
 
 def strand_capacity(fine: StrandCounts, coarse: StrandCounts) -> StrandCapacity:
@@ -128,11 +153,10 @@ def _round_up(count: int, step: int) -> int:
     return -(-count // step) * step
 
 
-def make_strand_buffers(device: Device, capacity: StrandCapacity) -> StrandBuffers:
+def make_strand_buffers(device: Device, capacity: StrandCapacity, casters: StrandCapacity) -> StrandBuffers:
     """Allocate the buffers of posed strands and of projected knots."""
-    max_hairs = capacity.knots // 2
-    posed = _make_buffer(device, 4 * (capacity.knots + 2 * max_hairs))
-    return StrandBuffers(posed, _make_buffer(device, 8 * capacity.knots))
+    posed = (_make_buffer(device, 4 * (one.knots + 2 * (one.knots // 2))) for one in (casters, capacity))
+    return StrandBuffers(*posed, _make_buffer(device, 8 * capacity.knots))
 
 
 def make_strand_picture(device: Device, capacity: StrandCapacity, size: tuple[int, int]) -> StrandPicture:
@@ -197,30 +221,38 @@ class GroomTables:
 class StrandTables:
     """Strands of a head in buffers, with the counts and mean values from which strands are drawn.
 
-    strands, knots : tables of strands at rest and of their knots, see strands_pose.wgsl
-    posed, projected : strands in the current pose, and knots projected to the picture
-    record : uniform record of the struct Hairs in strand_knots.wgsl
+    strands, knots : tables of the fine strands at rest and of their knots, see strands_pose.wgsl
+    buffers : buffers that each frame fills
     fine : number of strands and knots of brows and lashes
-    coarse : number of strands and knots of the hair on head and chin
-    shadow_casters : number of coarse strands that cast the shadows of all coarse strands
-    centre_mm : (3,) centre of the roots of the coarse strands at rest [mm]
-    mean_width_mm : mean width of the coarse strands [mm]
-    mean_cover : projected area of hair per area of skin around the root of a coarse strand, on average [-]
-    groom : tables from which coarse strands grow; None if they are given or there are none
+    coarse : largest number of strands and knots of the hair on head and chin
+    casters : number of strands and knots of the hair that cast the shadows of all of it
+    detail : detail in which the hair is drawn
+    groom : tables from which the hair grows; None without any
+    possible : number of strands of which the hair consists
+    centre_mm : (3,) centre of the roots of the hair at rest [mm]
+    length_mm, width_mm : length of the hair, and mean width of a strand [mm]
+    cover : projected area of hair per area of skin around a root [-]
     """
 
     strands: Buffer
     knots: Buffer
-    posed: Buffer
-    projected: Buffer
-    record: UniformRecord
+    buffers: StrandBuffers
     fine: StrandCounts
     coarse: StrandCounts
-    shadow_casters: int
+    casters: StrandCounts
+    detail: Detail
+    groom: GroomTables | None
+    possible: int
     centre_mm: NDArray[np.float64]
-    mean_width_mm: float
-    mean_cover: float
-    groom: GroomTables | None = None
+    length_mm: float
+    width_mm: float
+    cover: float
+
+    def record(self, coarse: StrandCounts) -> UniformRecord:
+        """Return the uniform record of the struct Hairs in strand_knots.wgsl for some of the coarse strands."""
+        width_scale = self.possible / max(1, coarse.hairs)
+        values = self.fine.hairs, coarse.hairs, coarse.hairs, self.fine.knots, coarse.knots, width_scale
+        return np.array(values, _HAIRS_DTYPE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -249,8 +281,7 @@ def shader_constants() -> dict[str, float]:
 
 def has_strands(head: Head, settings: Settings) -> bool:
     """Return whether a head has strands, and the settings show them."""
-    parts = head.strands, head.hair, head.groom
-    return settings.strands and any(part is not None and len(part) > 0 for part in parts)
+    return settings.strands and any(part is not None and len(part) > 0 for part in (head.strands, head.hair))
 
 
 def strand_constants(head: Head, settings: Settings) -> Constants:
@@ -258,66 +289,54 @@ def strand_constants(head: Head, settings: Settings) -> Constants:
     return (("STRANDS", 1),) if has_strands(head, settings) else ()
 
 
-def drawn_hair_count(tables: StrandTables, pixel_mm: float) -> int:
-    """Return the number of coarse strands to draw.
+def drawn_counts(tables: StrandTables, pixel_mm: float) -> StrandCounts:
+    """Return the number of coarse strands to draw, and the number of knots of each.
 
     Where strands are thinner than a pixel, fewer but wider strands are drawn, which cover the same area.
 
     pixel_mm : side of a pixel at the depth of the strands [mm]
     """
-    total_mm = tables.coarse.hairs * tables.mean_width_mm
-    drawn_mm = (_DRAWN_WIDTH_PX + _WIDTH_PER_COVER_PX * min(tables.mean_cover, _MAX_DRAWN_COVER)) * pixel_mm
-    return int(min(tables.coarse.hairs, max(_MIN_DRAWN_STRANDS, total_mm / drawn_mm)))
+    if not tables.coarse.hairs:
+        return tables.coarse
+    pixel_mm = 2.0 ** (np.round(_LEVELS_PER_OCTAVE * np.log2(pixel_mm)) / _LEVELS_PER_OCTAVE)
+    drawn_px = tables.detail.width_px + _WIDTH_PER_COVER_PX * min(tables.cover, _MAX_DRAWN_COVER)
+    hairs = max(_MIN_DRAWN_STRANDS, tables.possible * tables.width_mm / (drawn_px * pixel_mm))
+    knots = max(_MIN_KNOTS, 1 + np.ceil(tables.length_mm / (tables.detail.segment_px * pixel_mm)))
+    return StrandCounts(int(min(tables.coarse.hairs, hairs)), int(min(tables.coarse.knots, knots)))
 
 
 def make_strand_tables(
     device: Device, head: Head, coarse: StrandCounts, buffers: StrandBuffers, groom: GroomTables | None
 ) -> StrandTables:
-    """Upload the strands of a head.
+    """Upload the fine strands of a head, and collect the tables of its hair.
 
     coarse : numbers from `coarse_counts`
-    buffers : buffers that each frame fills with posed strands and projected knots
-    groom : tables from which coarse strands grow; None if they are given or there are none
+    buffers : buffers that each frame fills
+    groom : tables from which the hair grows; None without any
 
     Raises DermisError for strands that are rooted in another mesh.
     """
-    parts = [part for part in (head.strands, head.hair) if part is not None]
-    fine = strand_counts(head.strands)
-    rows = np.zeros(max(1, sum(map(len, parts))), _STRAND_DTYPE)
-    for part, first in zip(parts, (0, len(parts[0]) if parts else 0), strict=False):
-        _fill_rows(rows[first : first + len(part)], head, part)
-    knots = np.concatenate([_knot_rows(part) for part in parts]) if parts else np.zeros((0, 4), np.float32)
-    casters = min(coarse.hairs, _MAX_SHADOW_CASTERS)
-    width_scale = coarse.hairs / max(1, casters)
-    record = np.array(
-        (fine.hairs, coarse.hairs, casters, fine.knots, coarse.knots, width_scale), _HAIRS_DTYPE
-    )
+    fine, hair = head.strands, head.hair
+    rows = np.zeros(0 if fine is None else len(fine), _STRAND_DTYPE)
+    if fine is not None:
+        _fill_rows(rows, head, fine)
+    knots = np.zeros((0, 4), np.float32) if fine is None else _knot_rows(fine)
+    largest = None if hair is None else hair.parameters[hair.parameters["length_mm"].argmax()]
     return StrandTables(
         strands=device.buffer(rows.view(np.uint32), "STORAGE"),
         knots=device.buffer(knots, "STORAGE"),
-        posed=buffers.posed,
-        projected=buffers.projected,
-        record=record,
-        fine=fine,
+        buffers=buffers,
+        fine=strand_counts(fine),
         coarse=coarse,
-        shadow_casters=casters,
+        casters=caster_counts(device, coarse),
+        detail=adapter_detail(device),
         groom=groom,
-        **_mean_values(head, coarse),
+        possible=0 if hair is None else len(hair.roots),
+        centre_mm=np.zeros(3) if hair is None else hair.centre_mm,
+        length_mm=0.0 if largest is None else float(largest["length_mm"]),
+        width_mm=0.0 if largest is None else 2.0 * float(largest["radius_mm"]),
+        cover=0.0 if largest is None else float(largest["cover"]),
     )
-
-
-def _mean_values(head: Head, coarse: StrandCounts) -> dict[str, Any]:
-    """Return the fields of `StrandTables` that are means over the coarse strands."""
-    if head.groom is not None:
-        first = head.groom.parameters[0]
-        width, cover = 2.0 * float(first["radius_mm"]) * len(head.groom.roots) / coarse.hairs, float(first["cover"])
-        return {"centre_mm": head.groom.centre_mm, "mean_width_mm": width, "mean_cover": cover}
-    hair = head.hair
-    if hair is None:
-        return {"centre_mm": np.zeros(3), "mean_width_mm": 0.0, "mean_cover": 0.0}
-    cover = 0.0 if hair.cover is None else float(hair.cover.mean())
-    width = 2.0 * float(hair.radius_mm[:, 0].mean())
-    return {"centre_mm": hair.root_centre_mm(head.mesh), "mean_width_mm": width, "mean_cover": cover}
 
 
 def make_guide_tables(device: Device, guides: Guides) -> GuideTables:
@@ -342,18 +361,12 @@ def make_strand_roots(device: Device, roots: StrandRoots, mesh: Mesh) -> Buffer:
     return device.buffer(rows.view(np.uint32), "STORAGE")
 
 
-def make_groom_tables(
-    device: Device, groom: Groom, strands: int, style: GuideTables, roots: Buffer
-) -> GroomTables:
+def make_groom_tables(device: Device, groom: Groom, style: GuideTables, roots: Buffer) -> GroomTables:
     """Upload the numbers of a person's groom.
 
-    strands : number of strands that grow in place of all
     style, roots : tables of the style, which people share
     """
-    parameters = groom.parameters.copy()
-    for name in ("radius_mm", "hairs_per_strand"):
-        parameters[name] *= len(groom.roots) / strands
-    parts = device.buffer(parameters.view(np.float32), "STORAGE")
+    parts = device.buffer(groom.parameters.view(np.float32), "STORAGE")
     return GroomTables(style, roots, parts, device.buffer(groom.hairline_mm, "STORAGE"))
 
 
@@ -389,13 +402,14 @@ def make(memo: Memo, device: Device, request: FrameRequest) -> Resources | None:
     head, cached, layers = request.head, memo.get, request.shadow_layers
     if not has_strands(head, request.settings):
         return None
-    coarse, groom = coarse_counts(device, head), None
-    capacity = strand_capacity(strand_counts(head.strands), coarse)
-    if head.groom is not None:
-        style = cached(make_guide_tables, device, head.groom.guides)
-        roots = cached(make_strand_roots, device, head.groom.roots, head.topology.mesh)
-        groom = cached(make_groom_tables, device, head.groom, coarse.hairs, style, roots)
-    buffers = cached(make_strand_buffers, device, capacity)
+    fine, coarse = strand_counts(head.strands), coarse_counts(device, head)
+    capacity, casters = (strand_capacity(fine, one) for one in (coarse, caster_counts(device, coarse)))
+    groom = None
+    if head.hair is not None:
+        style = cached(make_guide_tables, device, head.hair.guides)
+        roots = cached(make_strand_roots, device, head.hair.roots, head.topology.mesh)
+        groom = cached(make_groom_tables, device, head.hair, style, roots)
+    buffers = cached(make_strand_buffers, device, capacity, casters)
     tables = cached(make_strand_tables, device, head.bare, coarse, buffers, groom)
     picture = cached(make_strand_picture, device, capacity, request.settings.size)
     shadows = cached(make_deep_opacity, device, layers, owner=f"{layers} {request.view_name}")

@@ -202,7 +202,7 @@ fn absorption_of(index: u32, part: GroomPart) -> vec3f {
     let dark = part.dark * exp(0.12 * random_normal(index, 26u));
     let grey = vec3f((dark.x + dark.y + dark.z) / 3.0);
     let mixed = (1.0 - white) * (1.0 - white) * mix(dark, grey, white);
-    return max(mixed, part.white) / part.hairs_per_strand;
+    return max(mixed, part.white) / (part.hairs_per_strand * hairs.width_scale);
 }
 
 fn strand_position(index: u32, seed: u32, strand: StrandRoot, part: GroomPart, root: Root, u: f32) -> vec3f {
@@ -247,13 +247,13 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
         let u = along * length_of(random_index, strand, part, above);
         let taper = mix(1.0, TIP_WIDTH, smoothstep(1.0 - TIP_FRACTION, 1.0, along));
         let edge = mix(1.0, 0.55 + 0.45 * smoothstep(SHORT_HAIRLINE_MM.x, SHORT_HAIRLINE_MM.y, above), part.hairline);
-        let radius = part.radius_mm * (0.8 + 0.4 * random(random_index, 3u)) * taper * edge;
+        let radius = hairs.width_scale * part.radius_mm * (0.8 + 0.4 * random(random_index, 3u)) * taper * edge;
         at = vec4f(strand_position(random_index, seed, strand, part, root, u), radius);
     }
     posed[row_of_knot(hairs.fine * hairs.fine_knots + knot, hair)] = at;
     if (k == 0u) {
         let row = row_of_hair(hair);
-        posed[row] = vec4f(root.normal, part.radius_mm);
+        posed[row] = vec4f(root.normal, hairs.width_scale * part.radius_mm);
         posed[row + 1u] = vec4f(absorption_of(random_index, part), part.cover);
     }
 }

@@ -155,7 +155,6 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     let hair = hair_of_knot(index);
     let here = posed[row_of_knot(index, hair)];
     var knot = project_knot(here.xyz, here.w);
-    knot.width *= select(1.0, strand_view.width_scale, is_coarse(hair));
     if (is_hidden(hair)) {
         knot.width = -1.0;
     }
