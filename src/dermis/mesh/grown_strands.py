@@ -21,6 +21,7 @@ _HAIRLINE_FADE_MM, _SHORT_HAIRLINE_MM = (-3.0, 11.0), (-2.0, 14.0)
 _HAIRLINE_STEP_DEGREES = 2.0
 _TIP_FRACTION, _TIP_WIDTH = 0.12, 0.35
 _COLOURED_HAIRS = 5
+_HEAD_RADIUS_MM, _LIFTED_MM = 80.0, 20.0
 _CHUNK = 4_000  # strands that are grown at once
 _FALLBACK_AXIS = np.array([0.31, 0.2, 0.93])
 
@@ -173,16 +174,23 @@ def _curves(
     part = (at - first)[..., None]
     height_mm = groom.guides.rest_mm[..., 3]
     position = np.repeat(root_mm[:, None], u.shape[1], axis=1)
-    normal, tangent, height = np.zeros_like(position), np.zeros_like(position), np.zeros(u.shape)
+    normal, tangent, middle = (np.zeros_like(position) for _ in range(3))
+    height, square = np.zeros(u.shape), np.zeros(u.shape)
     for k in range(4):
         guide, weight = groom.roots.guide[index, k][:, None], groom.roots.guide_weight[index, k][:, None, None]
         a, b = knots[guide, first], knots[guide, first + 1]
-        position += weight * ((1.0 - part) * a + part * b - knots[guide, 0])
+        here = (1.0 - part) * a + part * b
+        position += weight * (here - knots[guide, 0])
+        middle += weight * (here - root_mm[:, None])
+        square += weight[..., 0] * ((here - root_mm[:, None]) ** 2).sum(axis=-1)
         normal += weight * ((1.0 - part) * normals[guide, first] + part * normals[guide, first + 1])
         tangent += weight * (b - a)
         heights = (1.0 - part[..., 0]) * height_mm[guide, first] + part[..., 0] * height_mm[guide, first + 1]
         height += weight[..., 0] * heights
     normal = _unit(normal)
+    near = 1.0 / (1.0 + (np.maximum(height, 0.0) / _LIFTED_MM) ** 2)
+    sag = near * np.maximum(square - (middle**2).sum(axis=-1), 0.0) / (2.0 * _HEAD_RADIUS_MM)
+    position += sag[..., None] * normal
     return _Curves(position, height, normal, _unit(tangent + 1e-9 * normal))
 
 

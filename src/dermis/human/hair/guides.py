@@ -26,9 +26,10 @@ _ROUND_RADII_MM = np.array([75.0, 96.0, 92.0])  # semi-axes of the skull
 # Ellipse around the face, out of which combed hair is kept: centre (z), semi-axes along x and z, and the heights
 # between which it begins [mm].
 _FACE_CENTRE_Z, _FACE_RADII_MM, _FACE_TOP_MM = -60.0, (74.0, 118.0), (78.0, 40.0)
+_OVER_EARS = "fall", "twist"  # combs of hair that bulges over the ears
 _EAR_CENTRE_MM = np.array([75.0, -22.0, -76.0])
 _EAR_SPREAD_MM = np.array([1.0, 42.0, 34.0])
-_EAR_HEIGHT_MM, _EAR_BEGIN_X = 13.0, 55.0  # height of the ears above the head; x beyond which they begin
+_EAR_HEIGHT_MM, _EAR_BEGIN_X = 17.0, 55.0  # height of the ears above the head; x beyond which they begin
 _TIE_RADIUS_MM, _TIE_REACH_MM = 9.0, 5.0  # radius of gathered hair at its tie; distance at which a guide is in its place
 
 
@@ -53,7 +54,7 @@ class Growth(NamedTuple):
 
 
 def smoothstep(low: float, high: float, x: Doubles) -> Doubles:
-    """Return the smooth Hermite transition from 0 at `low` to 1 at `high`."""
+    """Return the smooth Hermite transition from 0 at `low` to 1 at `high`, in either order."""
     t = np.clip((x - low) / (high - low), 0.0, 1.0)
     return np.asarray(t * t * (3.0 - 2.0 * t))
 
@@ -149,11 +150,16 @@ COMBS: dict[str, Callable[[Doubles, Style], Doubles]] = {
 
 
 @cache
-def body_surface() -> SkinSurface:
-    """Return the skin of the mean person: head, neck and shoulders, with a smooth surface in place of the ears."""
+def body_surface(ears: bool = True) -> SkinSurface:
+    """Return the skin of the mean person: head, neck and shoulders.
+
+    ears : False puts a smooth surface in place of the ears
+    """
     mesh = mean_mesh()
     skin = np.unique(mesh.triangles[mesh.material == 0])
     points, normals = mesh.positions[skin].astype(np.float64), mesh.normals[skin].astype(np.float64)
+    if ears:
+        return SkinSurface(points, normals)
     y, z = np.abs(points[:, 1:] - _EAR_CENTRE_MM[1:]).T
     ear = (np.abs(points[:, 0]) > _EAR_BEGIN_X) & (y < 36.0) & (z < 28.0)
     around = ~ear & (points[:, 0] > _EAR_BEGIN_X) & (y < 60.0) & (z < 50.0)
@@ -195,7 +201,7 @@ def grow_guides(points: Doubles, style: Style) -> tuple[Doubles, Doubles, Double
 
     points : (g, 3) roots on the skin of the mean person [mm]
     """
-    surface = body_surface()
+    surface = body_surface(ears=style.comb not in _OVER_EARS)
     base, normal = surface.project(points)
     state = Growth(points, normal, points, _first_direction(points, normal, style), normal,
                    np.zeros(len(points)), np.zeros(len(points)), np.full(len(points), np.inf))  # fmt: skip
@@ -227,7 +233,7 @@ def _advance(surface: SkinSurface, state: Growth, step: float, style: Style) -> 
     moved = state.position_mm + step * direction
     base, normal = surface.project(moved)
     height = ((moved - base) * normal).sum(axis=1)
-    height_of_ears = _EAR_HEIGHT_MM * ear_weight(base) if style.comb in ("fall", "twist") else 0.0
+    height_of_ears = _EAR_HEIGHT_MM * ear_weight(base) if style.comb in _OVER_EARS else 0.0
     layer = style.volume_mm * (1.0 - np.exp(-length / _LAYER_LENGTH_MM)) * np.minimum(length / 20.0, 1.0)
     least = np.minimum(length / 6.0, 1.0) * (_MIN_HEIGHT_MM + layer + height_of_ears)
     pushed = np.clip(least - height, 0.0, 0.8 * step)[:, None]

@@ -23,7 +23,7 @@ from dermis.human.hair.guides import (
     smoothstep,
 )
 from dermis.human.hair.styles import BEARD, Style
-from dermis.mesh.groom import Guides, StrandRoots
+from dermis.mesh.groom import GUIDE_KNOTS, Guides, StrandRoots
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.strands import Roots, quad_corners, quad_weights, refine_roots
 
@@ -31,8 +31,9 @@ STRANDS_PER_CM2 = 150.0
 """Density of the possible strands of the scalp [1/cm2]."""
 BEARD_STRANDS_PER_CM2 = 60.0
 """Density of the possible strands of beards [1/cm2]."""
-_VERSION = 6  # of this module's algorithm, part of the keys of cached tables
+_VERSION = 9  # of this module's algorithm, part of the keys of cached tables
 _CACHED_STYLES = 8
+_APART_MM = 25.0, 55.0  # distances between guides from which strands are not interpolated between them
 _SEED = 20
 _GUIDE_FIELDS = "corner", "local_mm", "weight", "rest_mm", "cut"
 _ROOT_FIELDS = "quad", "position", "guide", "guide_weight", "clump", "place", "along_mm"
@@ -94,13 +95,28 @@ def _make_part(style: Style) -> Arrays:
         one_sided = weight * same
         total = one_sided.sum(axis=1, keepdims=True)
         weight = np.where(total > 1e-3, one_sided / np.maximum(total, 1e-9), weight)
+    weight = _agreeing_weights(weight, guide, knots)
     place = _places(weight, average_points()[corners])
     guides = bind_guides(mesh, points_mm, knots, heights, cut_fractions(knots, style))
-    clump = _clump_middles(root_mm, style, rng)
+    clump = _clump_middles(root_mm, np.einsum("nk,nkc->nc", weight, knots[guide, GUIDE_KNOTS // 2]), style, rng)
     columns = roots.quad, roots.position, guide, weight, clump, place, -root_mm[clump, 2]
     types = np.int32, np.float32, np.int32, np.float32, np.int32, np.float32, np.float32
     found = {name: np.asarray(column, kind) for name, column, kind in zip(_ROOT_FIELDS, columns, types, strict=True)}
     return found | {name: getattr(guides, name) for name in _GUIDE_FIELDS}
+
+
+def _agreeing_weights(weight: Doubles, guide: NDArray[np.int64], knots: Doubles) -> Doubles:
+    """Return the weights (n, 4) of guides without those that part from the guide with the largest weight.
+
+    A mean of guides that go to opposite sides of the head would lead through the head.
+
+    knots : (g, k, 3) knots of the guides [mm]
+    """
+    main = np.take_along_axis(guide, weight.argmax(axis=1)[:, None], axis=1)
+    some = knots[:, :: GUIDE_KNOTS // 8]
+    apart = np.linalg.norm(some[guide] - some[main], axis=-1).max(axis=2)
+    agreeing = weight * smoothstep(_APART_MM[1], _APART_MM[0], apart)
+    return np.asarray(agreeing / agreeing.sum(axis=1, keepdims=True))
 
 
 def _places(weight: Doubles, corners: Doubles) -> Doubles:
@@ -113,12 +129,14 @@ def _places(weight: Doubles, corners: Doubles) -> Doubles:
     return np.stack([angle, height, np.clip(thinning, 0.0, 1.0), top], axis=1)
 
 
-def _clump_middles(root_mm: Doubles, style: Style, rng: np.random.Generator) -> NDArray[np.int64]:
+def _clump_middles(
+    root_mm: Doubles, middle_mm: Doubles, style: Style, rng: np.random.Generator
+) -> NDArray[np.int64]:
     """Return the strand (n,) in the middle of each strand's clump.
 
     Clumps of cornrows lie one behind the other along the rows; others are the cells around random strands.
 
-    root_mm : (n, 3) roots on the mean person [mm]
+    root_mm, middle_mm : (n, 3) roots on the mean person and points at half the length of the guides [mm]
     """
     from scipy.spatial import cKDTree
 
@@ -131,8 +149,8 @@ def _clump_middles(root_mm: Doubles, style: Style, rng: np.random.Generator) -> 
         return np.asarray(found, np.int64)
     count = max(1, round(len(root_mm) / (STRANDS_PER_CM2 * (style.clump_mm / 10.0) ** 2)))
     middles = rng.permutation(len(root_mm))[:count]
-    sided = np.column_stack([root_mm, 30.0 * parting_side(root_mm, style)]) if style.comb == "fall" else root_mm
-    return np.asarray(middles[cKDTree(sided[middles]).query(sided)[1]], np.int64)
+    near = np.column_stack([root_mm, 0.5 * middle_mm])  # hairs that part from each other are not in one clump
+    return np.asarray(middles[cKDTree(near[middles]).query(near)[1]], np.int64)
 
 
 def _control_mesh() -> Mesh:

@@ -9,6 +9,8 @@ const RISE_MM: f32 = 4.0; // length from the root along which this height is rea
 const HAIRLINE_FADE_MM: vec2f = vec2f(-3.0, 11.0); // heights above the hairline between which density rises from 0 to 1
 const SHORT_HAIRLINE_MM: vec2f = vec2f(-2.0, 14.0); // heights above it between which hair becomes longer and thicker
 const HAIRLINE_STEP: f32 = 2.0; // angle between heights of the hairline [degrees]
+const HEAD_RADIUS_MM: f32 = 80.0;
+const LIFTED_MM: f32 = 20.0; // height above the skin to which strands between guides are lifted onto the curved head
 const TIP_FRACTION: f32 = 0.12; // part of a strand along which it tapers
 const TIP_WIDTH: f32 = 0.35;
 const COLOURED_HAIRS: u32 = 5u; // hairs whose colours are averaged in a strand
@@ -109,6 +111,8 @@ fn curve_at(strand: StrandRoot, u: f32, root: vec3f) -> CurvePoint {
     let first = min(u32(at), GUIDE_KNOTS - 2u);
     let part = at - f32(first);
     var sum = CurvePoint(root, 0.0, vec3f(0.0), vec3f(0.0));
+    var middle = vec3f(0.0);
+    var square = 0.0;
     for (var k = 0u; k < 4u; k += 1u) {
         let weight = strand.guide_weight[k];
         let begin = 2u * strand.guide[k] * GUIDE_KNOTS;
@@ -118,11 +122,17 @@ fn curve_at(strand: StrandRoot, u: f32, root: vec3f) -> CurvePoint {
         let here = mix(a, b, part);
         sum.position += weight * (here.xyz - guides[begin].xyz);
         sum.height += weight * here.w;
+        let from_root = here.xyz - root;
+        middle += weight * from_root;
+        square += weight * dot(from_root, from_root);
         sum.normal += weight * mix(guides[row + 1u].xyz, guides[row + 3u].xyz, part);
         sum.tangent += weight * (b.xyz - a.xyz);
     }
     sum.normal = normalize(sum.normal);
     sum.tangent = normalize(sum.tangent + 1e-9 * sum.normal);
+    // a mean of points around a head lies below its surface
+    let near = 1.0 / (1.0 + pow(max(sum.height, 0.0) / LIFTED_MM, 2.0));
+    sum.position += near * max(square - dot(middle, middle), 0.0) / (2.0 * HEAD_RADIUS_MM) * sum.normal;
     return sum;
 }
 
