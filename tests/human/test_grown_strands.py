@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from dermis import Human, Renderer, Scene
 from dermis.base.arrays import Doubles, Floats
 from dermis.frame.features.hair import passes

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.arrays import Doubles, Floats, Ints
-from dermis.mesh.strands import Roots
+from dermis.mesh.mesh import Mesh
+from dermis.mesh.strands import Roots, refine_roots
 
 GUIDE_KNOTS = 40
 """Number of knots of each guide."""
@@ -81,6 +82,16 @@ class Groom:
     knots: int
     hairline_mm: Floats
     centre_mm: Doubles
+
+    def refined(self, mesh: Mesh, levels: int) -> Groom:
+        """Return this groom with roots on the Catmull-Clark subdivision of a mesh.
+
+        The guides follow the control points, which the subdivided mesh has too.
+
+        mesh, levels : mesh before subdivision, and number of subdivision steps
+        """
+        roots = replace(self.roots, roots=refine_roots(mesh, self.roots.roots, levels))
+        return replace(self, roots=roots)
 
     def __len__(self) -> int:
         """Return the number of strands, of which the look of the person may leave out some."""

@@ -1,4 +1,4 @@
-"""Strands grown from a groom without a device, for exports and path tracing, by the algorithm of strands_grow.wgsl."""
+"""Strands grown from a groom without a device, for exports and path tracing, as in strands_grow.wgsl."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from dermis.base.arrays import Doubles, Ints
 from dermis.mesh.groom import GUIDE_KNOTS, Groom
+from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
-from dermis.mesh.strands import Roots, Strands, quad_weights, root_frames, to_frames
+from dermis.mesh.strands import Roots, Strands, root_frames, to_frames
 
 Words = NDArray[np.uint32]
 MAX_EXPORTED_STRANDS = 40_000
@@ -40,7 +41,8 @@ def grow_strands(
     roots = Roots(groom.roots.roots.quad[:count], groom.roots.roots.position[:count])
     root_mm, frames = root_frames(mesh, roots, points_mm)
     middle = groom.roots.clump[:count]
-    middle_mm, _ = root_frames(mesh, Roots(*(part.take(middle, axis=0) for part in groom.roots.roots)), points_mm)
+    quad, position = (part.take(middle, axis=0) for part in groom.roots.roots)
+    middle_mm, _ = root_frames(mesh, Roots(quad, position), points_mm)
     grown = _growing(groom, count)
     parts = [
         _grow(groom, guides, index, root_mm[index], frames[index], middle_mm[index])
@@ -54,8 +56,18 @@ def grow_strands(
     )
 
 
+def hair_strands(head: Head, points_mm: NDArray[np.floating] | None = None) -> Strands | None:
+    """Return the strands of a head's hair as exports show it, None for a head without hair.
+
+    points_mm : (p, 3) points of the mesh in a pose; at rest by default [mm]
+    """
+    if head.hair is None:
+        return None
+    return grow_strands(head.hair, head.mesh, head.mesh.points_mm if points_mm is None else points_mm)
+
+
 class _Curves(NamedTuple):
-    """Points of curves between guides: positions, skin normals and tangents (n, k, 3), and heights (n, k) [mm]."""
+    """Points of curves between guides: position, skin normal and tangent (n, k, 3), height (n, k) [mm]."""
 
     position: Doubles
     height: Doubles
@@ -85,9 +97,14 @@ def _posed_guides(groom: Groom, points_mm: NDArray[np.floating]) -> tuple[Double
 
 
 def _grow(
-    groom: Groom, guides: tuple[Doubles, Doubles], index: Ints, root_mm: Doubles, frames: Doubles, middle_mm: Doubles
+    groom: Groom,
+    guides: tuple[Doubles, Doubles],
+    index: Ints,
+    root_mm: Doubles,
+    frames: Doubles,
+    middle_mm: Doubles,
 ) -> tuple[NDArray[np.float32], Doubles, Doubles, Doubles]:
-    """Return knots (n, k, 3) in the root frames and radii (n, k) [mm], absorptions (n, 3) [1/mm] and covers (n,).
+    """Return knots (n, k, 3) in the root frames, radii (n, k), absorptions (n, 3) and covers (n,) of strands.
 
     guides : knots and skin normals of the posed guides
     index : (n,) indices of the strands
@@ -134,7 +151,7 @@ def _random(strand: Words, stream: int) -> Doubles:
 
 
 def _random_normal(strand: Words, stream: int) -> Doubles:
-    return 2.0 * (sum(_random(strand, stream + k) for k in range(3)) - 1.5)
+    return np.asarray(2.0 * (sum(_random(strand, stream + k) for k in range(3)) - 1.5))
 
 
 def _above_hairline(groom: Groom, index: Ints) -> Doubles:
@@ -145,7 +162,7 @@ def _above_hairline(groom: Groom, index: Ints) -> Doubles:
 
 def _growing(groom: Groom, count: int) -> Ints:
     """Return the indices of the strands, of the first `count`, that grow."""
-    index = np.arange(count)
+    index = np.arange(count, dtype=np.int32)
     roots, part = groom.roots, groom.parameters[groom.roots.part[:count]]
     fade = _smoothstep(*_HAIRLINE_FADE_MM, _above_hairline(groom, index))
     density = 1.0 + part["hairline"] * (fade - 1.0)
@@ -177,7 +194,10 @@ def _curves(
     normal, tangent, middle = (np.zeros_like(position) for _ in range(3))
     height, square = np.zeros(u.shape), np.zeros(u.shape)
     for k in range(4):
-        guide, weight = groom.roots.guide[index, k][:, None], groom.roots.guide_weight[index, k][:, None, None]
+        guide, weight = (
+            groom.roots.guide[index, k][:, None],
+            groom.roots.guide_weight[index, k][:, None, None],
+        )
         a, b = knots[guide, first], knots[guide, first + 1]
         here = (1.0 - part) * a + part * b
         position += weight * (here - knots[guide, 0])
@@ -208,9 +228,8 @@ def _rope_offsets(number: Words, part: NDArray[np.void], s: Doubles) -> Doubles:
     radius, turn = rope * np.sqrt(_random(number, 4))[:, None], 2 * np.pi * _random(number, 5)[:, None]
     bundle = np.floor(3.0 * _random(number, 6))[:, None]
     phase = 2 * np.pi * (s / (8.0 * rope) + bundle / 3.0)
-    braided = np.stack([
-        rope * np.sin(phase) + 0.5 * radius * np.cos(turn), 0.45 * rope * np.sin(2 * phase) + 0.5 * radius * np.sin(turn)
-    ])  # fmt: skip
+    middle = rope * np.sin(phase), 0.45 * rope * np.sin(2 * phase)
+    braided = np.stack([middle[0] + 0.5 * radius * np.cos(turn), middle[1] + 0.5 * radius * np.sin(turn)])
     phase = turn + 2 * np.pi * s / (7.0 * rope)
     twisted = np.stack([radius * np.cos(phase), radius * np.sin(phase)])
     return np.where(_column(part, "braid") > 0, braided, twisted)
@@ -232,11 +251,13 @@ def _frizz_offsets(number: Words, part: NDArray[np.void], s: Doubles) -> Doubles
     x, y = (2 * np.pi * _random(number, stream)[:, None] for stream in (12, 13))
     slow, fast = 2 * np.pi * s / 90.0, 2 * np.pi * s / 31.0
     waves = np.sin(slow + x) + 0.4 * np.sin(fast + y), np.cos(slow + y) + 0.4 * np.cos(fast + x)
-    return np.stack([amount * _random_normal(number, k)[:, None] * wave for k, wave in zip((14, 17), waves, strict=True)])
+    return np.stack(
+        [amount * _random_normal(number, k)[:, None] * wave for k, wave in zip((14, 17), waves, strict=True)]
+    )
 
 
 def _absorption(number: Words, part: NDArray[np.void]) -> Doubles:
-    """Return the absorption coefficients (n, 3) of strands that each stand for white and pigmented hairs [1/mm]."""
+    """Return the absorption (n, 3) of strands that each stand for white and pigmented hairs [1/mm]."""
     white = sum(_random(number, 20 + k) < part["grey"] for k in range(_COLOURED_HAIRS)) / _COLOURED_HAIRS
     white = np.asarray(white)[:, None]
     dark = part["dark"] * np.exp(0.12 * _random_normal(number, 26))[:, None]

@@ -83,7 +83,7 @@ def height_above_hairline(points: Doubles, recession: float = 0.0) -> Doubles:
 
 
 def hairline_angle(points: Doubles) -> Doubles:
-    """Return the angle (n,) of points around the vertical axis of the head, 0 in front, 180 behind [degrees]."""
+    """Return the angle (n,) of points around the axis of the head, 0 in front, 180 behind [degrees]."""
     return np.degrees(np.arctan2(np.abs(points[:, 0]), points[:, 2] - HEAD_AXIS_Z))
 
 
@@ -175,7 +175,10 @@ def skin_vertices_near_hair(root_finder: RootFinder) -> Index:
     from scipy.spatial import cKDTree
 
     brow_points = quad_corners(root_finder.mesh, root_finder.brow_grid_roots.quad)
-    tree, positions = cKDTree(root_finder.points_mm[np.unique(brow_points)]), root_finder.subdivided_mesh.positions
+    tree, positions = (
+        cKDTree(root_finder.points_mm[np.unique(brow_points)]),
+        root_finder.subdivided_mesh.positions,
+    )
     return np.flatnonzero(tree.query(positions, distance_upper_bound=_BROW_MARGIN_MM)[0] < _BROW_MARGIN_MM)
 
 

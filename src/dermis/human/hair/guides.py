@@ -1,4 +1,4 @@
-"""Guide hairs: curves that are combed over the mean person, bent by gravity, kept outside the skin and cut."""
+"""Guide hairs: curves combed over the mean person, bent by gravity, kept outside the skin and cut."""
 
 from __future__ import annotations
 
@@ -23,14 +23,18 @@ _LAYER_LENGTH_MM = 35.0  # length along which hair rises to the outermost layer
 _WHORL_MM = np.array([9.0, 86.0, -131.0])
 _SKULL_CENTRE_MM = np.array([0.0, 12.0, -66.0])
 _ROUND_RADII_MM = np.array([75.0, 96.0, 92.0])  # semi-axes of the skull
-# Ellipse around the face, out of which combed hair is kept: centre (z), semi-axes along x and z, and the heights
-# between which it begins [mm].
+# Elliptic cylinder around the face that combed hair avoids: centre (z), semi-axes along x and z, and the
+# heights between which it begins [mm].
 _FACE_CENTRE_Z, _FACE_RADII_MM, _FACE_TOP_MM = -60.0, (74.0, 118.0), (78.0, 40.0)
+_ANCHOR_MM = 6.0  # distance below which the quads that a knot follows have about equal weights
 _OVER_EARS = "fall", "twist"  # combs of hair that bulges over the ears
 _EAR_CENTRE_MM = np.array([75.0, -22.0, -76.0])
 _EAR_SPREAD_MM = np.array([1.0, 42.0, 34.0])
 _EAR_HEIGHT_MM, _EAR_BEGIN_X = 17.0, 55.0  # height of the ears above the head; x beyond which they begin
-_TIE_RADIUS_MM, _TIE_REACH_MM = 9.0, 5.0  # radius of gathered hair at its tie; distance at which a guide is in its place
+_TIE_RADIUS_MM, _TIE_REACH_MM = (
+    9.0,
+    5.0,
+)  # radius of gathered hair at its tie; distance at which a guide is in its place
 
 
 class Growth(NamedTuple):
@@ -65,22 +69,26 @@ def unit(vectors: Doubles) -> Doubles:
 
 
 def parting_side(points_mm: Doubles, style: Style) -> Doubles:
-    """Return the side (n,) of the parting on which points (n, 3) lie: 1 left, -1 right, 0 behind and below it.
+    """Return the side (n,) of the parting of points (n, 3): 1 left, -1 right, 0 behind and below it.
 
     The parting runs from the forehead to the whorl and turns to the middle of the head there.
     """
     x, y, z = points_mm.T
-    return np.where((z < -125.0) | (y < 35.0), 0.0, np.where(x > style.parting_mm * smoothstep(-140.0, -95.0, z), 1.0, -1.0))
+    return np.where(
+        (z < -125.0) | (y < 35.0),
+        0.0,
+        np.where(x > style.parting_mm * smoothstep(-140.0, -95.0, z), 1.0, -1.0),
+    )
 
 
 def row_of(points_mm: Doubles) -> Doubles:
     """Return the position (n,) of points across cornrows, in rows."""
     x, y = points_mm[:, 0], points_mm[:, 1] - _SKULL_CENTRE_MM[1]
-    return np.arctan2(x, np.maximum(y, -60.0) + 75.0) * 110.0 / ROW_MM
+    return np.asarray(np.arctan2(x, np.maximum(y, -60.0) + 75.0) * 110.0 / ROW_MM)
 
 
 def fringe_weight(points_mm: Doubles, style: Style) -> Doubles:
-    """Return how much hair rooted at points (n, 3) belongs to the fringe of a style, 0 to 1, as an array (n,)."""
+    """Return how much hair with roots at points (n, 3) belongs to the fringe, 0 to 1, as an array (n,)."""
     if style.fringe_y_mm is None:
         return np.zeros(len(points_mm))
     return smoothstep(-48.0, -34.0, points_mm[:, 2]) * smoothstep(56.0, 44.0, np.abs(points_mm[:, 0]))
@@ -89,7 +97,10 @@ def fringe_weight(points_mm: Doubles, style: Style) -> Doubles:
 def _fall(points: Doubles, style: Style) -> Doubles:
     """Return the directions (n, 3) of hair that falls to both sides of a parting."""
     x, y, z = points.T
-    side, top = np.where(x > style.parting_mm * smoothstep(-140.0, -95.0, z), 1.0, -1.0), smoothstep(40.0, 85.0, y)
+    side, top = (
+        np.where(x > style.parting_mm * smoothstep(-140.0, -95.0, z), 1.0, -1.0),
+        smoothstep(40.0, 85.0, y),
+    )
     ahead = smoothstep(-70.0, 0.0, z)
     sides = np.stack([side * (0.25 + top), -0.9 * (1.0 - top) - 0.1, -0.22 - 0.5 * ahead], axis=1)
     behind = np.stack([x / 200.0, np.full(len(x), -1.0), np.zeros(len(x))], axis=1)
@@ -99,14 +110,14 @@ def _fall(points: Doubles, style: Style) -> Doubles:
 
 
 def _back(points: Doubles, style: Style) -> Doubles:
-    """Return the directions (n, 3) of hair that is combed back, and down at the nape and below the temples."""
+    """Return the directions (n, 3) of hair combed back, and down at the nape and below the temples."""
     x, y, z = points.T
     down = np.maximum(smoothstep(60.0, -10.0, y), smoothstep(-100.0, -150.0, z))
     return np.stack([x / 400.0, -0.9 * down, -1.0 + 0.75 * smoothstep(-110.0, -150.0, z)], axis=1)
 
 
 def _spiral(points: Doubles, style: Style) -> Doubles:
-    """Return the directions (n, 3) of uncombed hair: away from the whorl, and down at the sides and the nape."""
+    """Return the directions (n, 3) of uncombed hair: away from the whorl, down at sides and nape."""
     away = points - _WHORL_MM
     low = 70.0 * smoothstep(40.0, -30.0, points[:, 1])
     return np.asarray(away + np.stack([0.0 * low, -low, -0.3 * low], axis=1))
@@ -184,9 +195,9 @@ def _quadratic_terms(points: Doubles) -> Doubles:
 
 
 def ear_weight(points: Doubles) -> Doubles:
-    """Return 1 for points (n, 3) at the middle of an ear, falling smoothly to 0 around it, as an array (n,)."""
+    """Return a weight (n,) of points (n, 3): 1 at the middle of an ear, falling smoothly to 0 around it."""
     away = (np.abs(points) * [1, 0, 0] + points * [0, 1, 1] - _EAR_CENTRE_MM) / _EAR_SPREAD_MM
-    return np.exp(-(away[:, 1:] ** 2).sum(axis=1))
+    return np.asarray(np.exp(-(away[:, 1:] ** 2).sum(axis=1)))
 
 
 def mean_mesh() -> Mesh:
@@ -202,7 +213,7 @@ def grow_guides(points: Doubles, style: Style) -> tuple[Doubles, Doubles, Double
     points : (g, 3) roots on the skin of the mean person [mm]
     """
     surface = body_surface(ears=style.comb not in _OVER_EARS)
-    base, normal = surface.project(points)
+    _, normal = surface.project(points)
     state = Growth(points, normal, points, _first_direction(points, normal, style), normal,
                    np.zeros(len(points)), np.zeros(len(points)), np.full(len(points), np.inf))  # fmt: skip
     knots = [(points, normal, state.height_mm)]
@@ -228,7 +239,10 @@ def _advance(surface: SkinSurface, state: Growth, step: float, style: Style) -> 
     """Return the guides after one step of growth [mm]."""
     direction, length, tied = _steer(state, style), state.length_mm + step, state.tied_mm
     if style.comb == "gather":
-        near = np.linalg.norm(state.position_mm - style.tie_mm - _tie_offsets(state, style), axis=1) < _TIE_REACH_MM
+        near = (
+            np.linalg.norm(state.position_mm - style.tie_mm - _tie_offsets(state, style), axis=1)
+            < _TIE_REACH_MM
+        )
         tied = np.where(near & ~np.isfinite(tied), length, tied)
     moved = state.position_mm + step * direction
     base, normal = surface.project(moved)
@@ -246,7 +260,9 @@ def _advance(surface: SkinSurface, state: Growth, step: float, style: Style) -> 
         moved += wound * (_bun(state, length, style) - moved)
     # hair that is held out slides along the obstacle: it loses its inward motion, but gains no outward motion
     inward = np.minimum((direction * normal).sum(axis=1, keepdims=True), 0.0)
-    direction = np.where((pushed > 0) & ~np.isfinite(tied)[:, None], unit(direction - inward * normal), direction)
+    direction = np.where(
+        (pushed > 0) & ~np.isfinite(tied)[:, None], unit(direction - inward * normal), direction
+    )
     base, normal = surface.project(moved)
     height = ((moved - base) * normal).sum(axis=1)
     return state._replace(position_mm=moved, direction=direction, skin_normal=normal, height_mm=height,
@@ -271,31 +287,40 @@ def _steer(state: Growth, style: Style) -> Doubles:
 
 
 def _tie_offsets(state: Growth, style: Style) -> Doubles:
-    """Return the places (g, 3) of guides in the tie, relative to its middle: in the direction of their roots [mm]."""
+    """Return the places (g, 3) of guides in the tie, relative to its middle, towards their roots [mm]."""
     outward = unit(np.array(style.tie_mm) - _SKULL_CENTRE_MM)
-    away = tangent_component(state.root_mm - np.array(style.tie_mm), np.broadcast_to(outward, state.root_mm.shape))
+    away = tangent_component(
+        state.root_mm - np.array(style.tie_mm), np.broadcast_to(outward, state.root_mm.shape)
+    )
     reach = np.linalg.norm(away, axis=1, keepdims=True)
     return np.asarray(_TIE_RADIUS_MM * np.minimum(reach / 60.0, 1.0) * unit(away))
 
 
 def _tail(state: Growth, style: Style, pull: Doubles) -> Doubles:
-    """Return the directions (g, 3) of gathered hair behind its tie: outward, then down and slightly apart."""
+    """Return the directions (g, 3) of hair behind its tie: outward, then down and slightly apart."""
     outward = unit(np.array(style.tie_mm) - _SKULL_CENTRE_MM)[None]
-    since = np.maximum(state.length_mm - np.where(np.isfinite(state.tied_mm), state.tied_mm, 0.0), 0.0)[:, None]
+    since = np.maximum(state.length_mm - np.where(np.isfinite(state.tied_mm), state.tied_mm, 0.0), 0.0)[
+        :, None
+    ]
     apart = _tie_offsets(state, style) / _TIE_RADIUS_MM
     spread = 0.12 * np.exp(-since / 60.0) - 0.03 * smoothstep(150.0, 400.0, since)
     return unit(0.85 * state.direction + 0.15 * pull + 0.3 * np.exp(-since / 25.0) * outward + spread * apart)
 
 
+def _since_tie(state: Growth, length: Doubles) -> Doubles:
+    """Return the length (g,) of guides behind their tie, 0 before it, at a length from the root [mm]."""
+    return np.maximum(length - np.where(np.isfinite(state.tied_mm), state.tied_mm, length), 0.0)
+
+
 def _bun(state: Growth, length: Doubles, style: Style) -> Doubles:
-    """Return points (g, 3) of hair that winds around a bun behind its tie, at a given length of each guide [mm]."""
+    """Return points (g, 3) of hair that winds around a bun behind its tie, at lengths (g,) [mm]."""
     outward = unit(np.array(style.tie_mm) - _SKULL_CENTRE_MM)
     side = unit(np.cross(outward, [0.0, 1.0, 0.0]))
     up = np.cross(side, outward)
     offset = _tie_offsets(state, style)
     turn = np.arctan2(offset @ up, offset @ side)
     rank = np.linalg.norm(offset, axis=1) / _TIE_RADIUS_MM
-    since = np.maximum(length - np.where(np.isfinite(state.tied_mm), state.tied_mm, length), 0.0)
+    since = _since_tie(state, length)
     radius = style.coil_mm * (0.7 + 0.3 * rank)
     tilt = 1.9 - 1.5 * smoothstep(0.0, 260.0, since) + 0.25 * np.sin(3.0 * turn)
     turn = turn + since / (0.8 * radius)
@@ -329,8 +354,9 @@ def cut_fractions(knots: Doubles, style: Style) -> Doubles:
     if style.round:
         radius = np.linalg.norm((knots - _SKULL_CENTRE_MM) / _ROUND_RADII_MM, axis=2)
         limit = 1.0 + style.round * style.max_length_mm / 90.0
-        cut = np.minimum(cut, np.where((radius > limit).any(axis=1), (radius > limit).argmax(axis=1), GUIDE_KNOTS - 1)
-                         / (GUIDE_KNOTS - 1))  # fmt: skip
+        outside = radius > limit
+        first = np.where(outside.any(axis=1), outside.argmax(axis=1), GUIDE_KNOTS - 1)
+        cut = np.minimum(cut, first / (GUIDE_KNOTS - 1))
     return cut
 
 
@@ -359,7 +385,7 @@ def bind_guides(
     corners = quad_corners(control_mesh, skin)
     around = points_mm[corners]
     distance, near = cKDTree(around.mean(axis=1)).query(knots, k=GUIDE_ANCHORS)
-    weight = 1.0 / (distance**2 + 40.0)
+    weight = np.asarray(1.0 / (distance**2 + _ANCHOR_MM**2))
     weight /= weight.sum(axis=-1, keepdims=True)
     origin, axes = quad_frames(around)
     local = np.einsum("gkaic,gkac->gkai", axes[near], knots[:, :, None] - origin[near])
@@ -373,7 +399,7 @@ def bind_guides(
 
 
 def quad_frames(corners_mm: Doubles) -> tuple[Doubles, Doubles]:
-    """Return the middles (q, 3) and frames (q, 3, 3) of quads with corners (q, 4, 3); rows of a frame are axes."""
+    """Return the middles (q, 3) and frames (q, 3, 3) of quads (q, 4, 3); rows of a frame are its axes."""
     a, b, c, d = corners_mm.swapaxes(0, 1)
     along = unit((b - a) + (c - d))
     normal = np.cross(c - a, d - b)

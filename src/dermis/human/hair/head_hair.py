@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.arrays import Doubles
+from dermis.human.hair.guides import mean_mesh
 from dermis.human.hair.look import HairLook
 from dermis.human.hair.strand_roots import BEARD_STRANDS_PER_CM2, STRANDS_PER_CM2, StyleTables, style_tables
-from dermis.human.hair.guides import mean_mesh
 from dermis.human.hair.styles import BEARD, Style, styles
 from dermis.human.skin.face import hairline_heights
 from dermis.mesh.groom import Groom
@@ -35,12 +35,18 @@ _KNOTS_PER_TURN = 7.0
 _KNOT_MM = 14.0  # length of the segments of straight hair
 _MIN_KNOTS, _MAX_KNOTS = 5, 64
 _FLOATS = (
-    "density", "hairline", "thinning", "length_mm", "guide_mm", "fade", "layers", "clump", "clump_start_mm", "rope_mm",
-    "braid", "curl_mm", "pitch_mm", "incoherence", "frizz_mm", "flyaways", "radius_mm", "cover", "grey",
-    "hairs_per_strand",
+    "density", "hairline", "thinning", "length_mm", "guide_mm", "fade", "layers", "clump", "clump_start_mm",
+    "rope_mm", "braid", "curl_mm", "pitch_mm", "incoherence", "frizz_mm", "flyaways", "radius_mm", "cover",
+    "grey", "hairs_per_strand",
 )  # fmt: skip
 PART_DTYPE = np.dtype(
-    [*((name, "f4") for name in _FLOATS), ("dark", "f4", 3), ("seed", "f4"), ("white", "f4", 3), ("pad", "f4")]
+    [
+        *((name, "f4") for name in _FLOATS),
+        ("dark", "f4", 3),
+        ("seed", "f4"),
+        ("white", "f4", 3),
+        ("pad", "f4"),
+    ]
 )
 """Numbers of a part of a groom, the struct GroomPart in strands_grow.wgsl."""
 
@@ -130,7 +136,9 @@ def _part(
 
 def _knot_count(parameters: NDArray[np.void]) -> int:
     """Return the number of knots with which all strands of a groom show their length and their curls."""
-    lengths, pitches, curls, ropes = (parameters[name] for name in ("length_mm", "pitch_mm", "curl_mm", "rope_mm"))
+    lengths, pitches, curls, ropes = (
+        parameters[name] for name in ("length_mm", "pitch_mm", "curl_mm", "rope_mm")
+    )
     straight = lengths / _KNOT_MM + _MIN_KNOTS
     curled = np.where((curls > 1.0) & (ropes == 0.0), _KNOTS_PER_TURN * lengths / pitches, 0.0)
     roped = np.where(ropes > 0.0, _KNOTS_PER_TURN * lengths / (7.0 * np.maximum(ropes, 1.0)), 0.0)

@@ -98,10 +98,15 @@ def _make_part(style: Style) -> Arrays:
     weight = _agreeing_weights(weight, guide, knots)
     place = _places(weight, average_points()[corners])
     guides = bind_guides(mesh, points_mm, knots, heights, cut_fractions(knots, style))
-    clump = _clump_middles(root_mm, np.einsum("nk,nkc->nc", weight, knots[guide, GUIDE_KNOTS // 2]), style, rng)
+    clump = _clump_middles(
+        root_mm, np.einsum("nk,nkc->nc", weight, knots[guide, GUIDE_KNOTS // 2]), style, rng
+    )
     columns = roots.quad, roots.position, guide, weight, clump, place, -root_mm[clump, 2]
     types = np.int32, np.float32, np.int32, np.float32, np.int32, np.float32, np.float32
-    found = {name: np.asarray(column, kind) for name, column, kind in zip(_ROOT_FIELDS, columns, types, strict=True)}
+    found = {
+        name: np.asarray(column, kind)
+        for name, column, kind in zip(_ROOT_FIELDS, columns, types, strict=True)
+    }
     return found | {name: getattr(guides, name) for name in _GUIDE_FIELDS}
 
 
@@ -120,7 +125,10 @@ def _agreeing_weights(weight: Doubles, guide: NDArray[np.int64], knots: Doubles)
 
 
 def _places(weight: Doubles, corners: Doubles) -> Doubles:
-    """Return the field `place` of `StrandRoots`, from the corners (n, 4, 4) of the quads on the average person."""
+    """Return the field `place` of `StrandRoots`.
+
+    weight, corners : (n, 4) weights of the corners of quads, and (n, 4, 4) their `average_points`
+    """
     points = np.einsum("nk,nkc->nc", weight, corners)
     angle = density.hairline_angle(points)
     height = points[:, 1] + density.hairline_waves(points)
@@ -130,13 +138,13 @@ def _places(weight: Doubles, corners: Doubles) -> Doubles:
 
 
 def _clump_middles(
-    root_mm: Doubles, middle_mm: Doubles, style: Style, rng: np.random.Generator
+    root_mm: Doubles, half_mm: Doubles, style: Style, rng: np.random.Generator
 ) -> NDArray[np.int64]:
     """Return the strand (n,) in the middle of each strand's clump.
 
     Clumps of cornrows lie one behind the other along the rows; others are the cells around random strands.
 
-    root_mm, middle_mm : (n, 3) roots on the mean person and points at half the length of the guides [mm]
+    root_mm, half_mm : (n, 3) roots on the mean person and points at half the length of the guides [mm]
     """
     from scipy.spatial import cKDTree
 
@@ -149,7 +157,7 @@ def _clump_middles(
         return np.asarray(found, np.int64)
     count = max(1, round(len(root_mm) / (STRANDS_PER_CM2 * (style.clump_mm / 10.0) ** 2)))
     middles = rng.permutation(len(root_mm))[:count]
-    near = np.column_stack([root_mm, 0.5 * middle_mm])  # hairs that part from each other are not in one clump
+    near = np.column_stack([root_mm, 0.5 * half_mm])  # hairs that part from each other are not in one clump
     return np.asarray(middles[cKDTree(near[middles]).query(near)[1]], np.int64)
 
 
@@ -157,5 +165,3 @@ def _control_mesh() -> Mesh:
     from dermis.human.model import template
 
     return template("own", 0).head.mesh
-
-

@@ -71,5 +71,7 @@ def styles() -> dict[str, Style]:
     return {name: Style(**{**row, "tie_mm": tuple(row.get("tie_mm", _NO_TIE))}) for name, row in rows.items()}
 
 
-BEARD = Style("beard", max_length_mm=150.0, length_mm=10.0, lift=1.0, volume_mm=5.0, gravity=0.35, clump_mm=4.0)
+BEARD = Style(
+    "beard", max_length_mm=150.0, length_mm=10.0, lift=1.0, volume_mm=5.0, gravity=0.35, clump_mm=4.0
+)
 """Style of beards, which are combed down."""

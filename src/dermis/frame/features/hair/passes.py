@@ -97,20 +97,22 @@ def _draw_deep_opacity(graph: Recorder, strands: Resources, shape: Shape, lighti
 def draw(
     graph: Recorder,
     strands: Resources,
-    shape: Shape,
+    geometry: tuple[Shape, HeadGeometry],
     shading: ShadingInputs,
-    head: HeadGeometry,
     visibility: Texture,
     radiance: Texture,
     labels: Bindings | None = None,
 ) -> Texture:
     """Declare the passes that shade the strands and draw them over the picture; return the new picture.
 
+    geometry : shape of the head, and its vertices and triangles
+    shading : resources of the lighting, uniform record of the shading pass, and constants of the lights
     visibility : texture of the triangle at each sample
     radiance : texture of the picture without hair
     labels : resources with which the pass labels pixels of hair, None without label outputs
     """
     tables, picture, (lighting, view, light_constants) = strands.tables, strands.picture, shading
+    shape, head = geometry
     width, height = picture.result.size[:2]
     pixel_mm = _pixel_mm(view, tables, height)
     coarse, posed = drawn_counts(tables, pixel_mm), tables.buffers.drawn

@@ -34,7 +34,10 @@ _MAX_LINKS = 1 << 22
 _FINE_CAPACITY_STEP, _KNOT_CAPACITY_STEP = 1 << 12, 1 << 19
 _PROJECTED_KNOT_BYTES = 32
 _MIN_DRAWN_STRANDS, _MIN_KNOTS = 5_000, 5
-_WIDTH_PER_COVER_PX, _MAX_DRAWN_COVER = 0.2, 1.0  # added width per unit of cover: where hair hides hair, fewer strands suffice
+_WIDTH_PER_COVER_PX, _MAX_DRAWN_COVER = (
+    0.2,
+    1.0,
+)  # added width per unit of cover: where hair hides hair, fewer strands suffice
 _LEVELS_PER_OCTAVE = 4  # levels of detail for each doubling of the size of a pixel
 WINDOW_KNOTS = 1 << 12
 """Number of knots for which one workgroup of strands_window.wgsl computes bounds."""
@@ -43,7 +46,9 @@ _STRAND_DTYPE = np.dtype([("corner", "u4", 4), ("weight", "f4", 4), ("absorption
 # Rows of the tables in guides_pose.wgsl and strands_grow.wgsl.
 _ANCHOR_DTYPE = np.dtype([("corner", "u4", 4), ("local", "f4", 4)])
 _ROOT_MEMBERS = ("corner", "u4", 4), ("weight", "f4", 4), ("guide", "u4", 4), ("guide_weight", "f4", 4)
-_ROOT_DTYPE = np.dtype([*_ROOT_MEMBERS, ("place", "f4", 4), ("clump", "u4"), ("part", "u4"), ("along_mm", "f4"), ("pad", "u4")])
+_ROOT_DTYPE = np.dtype(
+    [*_ROOT_MEMBERS, ("place", "f4", 4), ("clump", "u4"), ("part", "u4"), ("along_mm", "f4"), ("pad", "u4")]
+)
 _COUNT_MEMBERS = "fine", "coarse", "shadow_casters", "fine_knots", "coarse_knots"
 _HAIRS_DTYPE = np.dtype([*((name, "u4") for name in _COUNT_MEMBERS), ("width_scale", "f4")])
 
@@ -53,7 +58,7 @@ class Detail(NamedTuple):
 
     drawn_knots : largest number of knots of all drawn strands
     casters, caster_knots : largest number of strands that cast the shadows of all, and of their knots
-    width_px, segment_px : width of the drawn strands, and length of their segments, where these are finer [pixel]
+    width_px, segment_px : least width of the drawn strands, and least length of their segments [pixel]
     """
 
     drawn_knots: int
@@ -94,7 +99,7 @@ class StrandCapacity(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class StrandBuffers:
-    """Buffers that each frame fills: strands that cast shadows, those that are drawn, and their projected knots."""
+    """Buffers that each frame fills: strands that cast shadows, drawn strands, and projected knots."""
 
     casters: Buffer
     drawn: Buffer
@@ -123,7 +128,7 @@ def strand_counts(strands: Strands | None) -> StrandCounts:
 
 
 def coarse_counts(device: Device, head: Head) -> StrandCounts:
-    """Return the largest number of strands to draw on head and chin, and the largest number of knots of each."""
+    """Return the largest number of coarse strands to draw, and the largest number of knots of each."""
     if head.hair is None:
         return StrandCounts(0, 2)
     fitting = device.max_storage_bytes // _PROJECTED_KNOT_BYTES - _KNOT_CAPACITY_STEP
@@ -155,8 +160,10 @@ def _round_up(count: int, step: int) -> int:
 
 def make_strand_buffers(device: Device, capacity: StrandCapacity, casters: StrandCapacity) -> StrandBuffers:
     """Allocate the buffers of posed strands and of projected knots."""
-    posed = (_make_buffer(device, 4 * (one.knots + 2 * (one.knots // 2))) for one in (casters, capacity))
-    return StrandBuffers(*posed, _make_buffer(device, 8 * capacity.knots))
+    first, second = (
+        _make_buffer(device, 4 * (one.knots + 2 * (one.knots // 2))) for one in (casters, capacity)
+    )
+    return StrandBuffers(first, second, _make_buffer(device, 8 * capacity.knots))
 
 
 def make_strand_picture(device: Device, capacity: StrandCapacity, size: tuple[int, int]) -> StrandPicture:
@@ -249,7 +256,7 @@ class StrandTables:
     cover: float
 
     def record(self, coarse: StrandCounts) -> UniformRecord:
-        """Return the uniform record of the struct Hairs in strand_knots.wgsl for some of the coarse strands."""
+        """Return the uniform record of the struct Hairs in strand_knots.wgsl for some coarse strands."""
         width_scale = self.possible / max(1, coarse.hairs)
         values = self.fine.hairs, coarse.hairs, coarse.hairs, self.fine.knots, coarse.knots, width_scale
         return np.array(values, _HAIRS_DTYPE)
