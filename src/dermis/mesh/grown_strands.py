@@ -41,8 +41,9 @@ def grow_strands(
     roots = Roots(groom.roots.roots.quad[:count], groom.roots.roots.position[:count])
     root_mm, frames = root_frames(mesh, roots, points_mm)
     middle = groom.roots.clump[:count]
-    quad, position = (part.take(middle, axis=0) for part in groom.roots.roots)
-    middle_mm, _ = root_frames(mesh, Roots(quad, position), points_mm)
+    every = groom.roots.roots
+    middles = Roots(every.quad.take(middle), every.position.take(middle, axis=0))
+    middle_mm, _ = root_frames(mesh, middles, points_mm)
     grown = _growing(groom, count)
     parts = [
         _grow(groom, guides, index, root_mm[index], frames[index], middle_mm[index])
