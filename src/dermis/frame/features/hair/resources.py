@@ -324,10 +324,10 @@ def make_strand_tables(
     Raises DermisError for strands that are rooted in another mesh.
     """
     fine, hair = head.strands, head.hair
-    rows = np.zeros(0 if fine is None else len(fine), _STRAND_DTYPE)
-    if fine is not None:
+    rows, knots = np.zeros(1, _STRAND_DTYPE), np.zeros((1, 4), np.float32)
+    if fine is not None and len(fine):
+        rows, knots = np.zeros(len(fine), _STRAND_DTYPE), _knot_rows(fine)
         _fill_rows(rows, head, fine)
-    knots = np.zeros((0, 4), np.float32) if fine is None else _knot_rows(fine)
     largest = None if hair is None else hair.parameters[hair.parameters["length_mm"].argmax()]
     return StrandTables(
         strands=device.buffer(rows.view(np.uint32), "STORAGE"),
