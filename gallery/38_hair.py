@@ -1,7 +1,7 @@
 """Hair styles, straight to coiled.
 
-Tens of thousands of hairs grow on any person between combed guides, cut, gathered, twisted or braided. They cast
-shadows on each other and scatter light between them.
+Tens of thousands of hairs grow on any person between combed guides, cut, gathered, twisted or braided. They
+cast shadows on each other and scatter light between them.
 
 Deck: +
 Equation: T = exp(-n (1 - a_f))
