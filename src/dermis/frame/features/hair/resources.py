@@ -68,7 +68,7 @@ class Detail(NamedTuple):
     segment_px: float
 
 
-_GPU_DETAIL, _SOFTWARE_DETAIL = Detail(1 << 23, 32_000, 32, 0.45, 2.0), Detail(1 << 20, 8_000, 12, 0.8, 4.0)
+_GPU_DETAIL, _SOFTWARE_DETAIL = Detail(1 << 23, 10_000, 24, 0.6, 2.0), Detail(1 << 20, 5_000, 10, 0.9, 4.0)
 
 
 class StrandCounts(NamedTuple):
