@@ -93,7 +93,7 @@ class Motion:
 class ConstantQuality(QualityController):
     """Quality controller that always keeps the quality of the settings."""
 
-    def limited_settings(self, wanted: Settings, size: tuple[int, int], moving: bool) -> Settings:
+    def limited_settings(self, wanted: Settings, size: tuple[int, int], is_moving: bool) -> Settings:
         """Return the settings at the size of the window."""
         return validated_copy(wanted, size=size)
 

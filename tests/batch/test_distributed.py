@@ -96,7 +96,7 @@ def test_a_worker_without_the_shared_disk_is_refused(tmp_path: Path) -> None:
 def test_a_missing_scheduler_is_reported(
     small_spec: Spec, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "_TIMEOUT_S", 0.5)
+    monkeypatch.setattr(module, "_CONNECTION_TIMEOUT_S", 0.5)
     with pytest.raises(DermisError, match=r"a scheduler of dask\.distributed"):
         run(RunOptions(small_spec, tmp_path), DaskCluster("tcp://127.0.0.1:9", None))
     with pytest.raises(DermisError, match=r"cluster\.json: expected the file that dask's scheduler wrote"):

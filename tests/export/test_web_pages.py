@@ -179,4 +179,4 @@ def test_camera_is_that_of_the_scene() -> None:
     )
     babylon = TARGETS["babylon"].with_variant(None)
     rows = babylon.parameters(human, babylon.versions[-1])
-    assert babylon._settings(human, rows, babylon.versions[-1])["camera"] == exported  # type: ignore[attr-defined]
+    assert babylon._page_settings(human, rows, babylon.versions[-1])["camera"] == exported  # type: ignore[attr-defined]

@@ -56,6 +56,6 @@ def test_stalled_decoder_is_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_an_answer_that_is_too_large_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(native_decoding, "_ANSWER_BYTES", 100)
+    monkeypatch.setattr(native_decoding, "_MAX_ANSWER_BYTES", 100)
     with pytest.raises(DermisError, match=r"its decoder stopped .its answer is too large"):
         answer_to("sound")

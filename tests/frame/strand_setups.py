@@ -56,7 +56,7 @@ def hairy(
 def woolly(
     begins: NDArray[np.float64], ends: NDArray[np.float64], radius_mm: float, absorption: float, cover: float
 ) -> Head:
-    """Return a white sheet with straight coarse strands between (n, 3) points [mm], each along its own guide."""
+    """Return a white sheet with straight coarse strands between (n, 3) points, each along a guide [mm]."""
     mesh, count = sheet(), len(begins)
     points_mm = mesh.points_mm
     t = np.linspace(0.0, 1.0, GUIDE_KNOTS)[None, :, None]

@@ -190,7 +190,9 @@ def test_grey_hair_is_grey_and_fair_hair_is_not() -> None:
     assert warmth[0] < 1.9 < 2.4 < warmth[1]
 
 
-@pytest.mark.parametrize("bad", [{"style": "mullet"}, {"style": "short", "length_mm": 100.0}, {"density": -1.0}, {"seed": 0.5}])
+@pytest.mark.parametrize(
+    "bad", [{"style": "mullet"}, {"style": "short", "length_mm": 100.0}, {"density": -1.0}, {"seed": 0.5}]
+)
 def test_invalid_hair_is_refused(bad: dict[str, object]) -> None:
     with pytest.raises(DermisError):
         HairLook(**bad)  # type: ignore[arg-type]

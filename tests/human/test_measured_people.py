@@ -19,7 +19,7 @@ from dermis.human.skin.measured import (
     SITES,
     measured_table,
     pigment_ancestry,
-    square_root,
+    symmetric_square_root,
 )
 from dermis.human.skin.painted import mean_colour
 from dermis.images.colour import lab
@@ -47,7 +47,7 @@ def ita(person: Human) -> float:
 def test_medians_of_all_sites_of_the_head_are_those_of_the_archive(group: str, cells: Rows) -> None:
     """Sample the distribution of each group for adults of all ages, half of them women."""
     table, rng, weights = measured_table(), np.random.default_rng(5), {group: 1.0}
-    scores = rng.standard_normal((PEOPLE, 4)) @ square_root(table.groups[group].correlation[:4, :4])
+    scores = rng.standard_normal((PEOPLE, 4)) @ symmetric_square_root(table.groups[group].correlation[:4, :4])
     ages, sexes = 25.0 + 65.0 * rng.beta(1.2, 2.2, PEOPLE), rng.integers(0, 2, PEOPLE)
     y = table.variables(weights, sexes, ages, scores)
     differences = table.site_variables(weights, y, rng.standard_normal((PEOPLE, len(SITES), 2)))

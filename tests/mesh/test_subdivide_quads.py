@@ -69,7 +69,7 @@ def test_new_points_of_a_cube_follow_the_published_rules() -> None:
     assert {tuple(p) for p in np.round(points[20:], 9)} == {
         tuple(p) for p in np.vstack([np.eye(3), -np.eye(3)])
     }
-    assert len(finer.sides) == 24 and (finer.sides == 4).all()
+    assert len(finer.corner_count) == 24 and (finer.corner_count == 4).all()
 
 
 def test_corners_of_a_cube_are_at_their_limit_from_the_first_level_on() -> None:

@@ -25,7 +25,7 @@ def test_samples_have_the_moments_of_the_prior() -> None:
 
 
 def test_known_pigments_narrow_the_prior() -> None:
-    given = skin_prior().given(0.06, 0.008)
+    given = skin_prior().conditioned_on(0.06, 0.008)
     mean, sd = given.moments("melanin")
     assert (mean, sd) == pytest.approx((np.log(0.06), 0.0), abs=1e-3)
     assert given.moments("epidermis_mm")[1] < 0.8 * skin_prior().moments("epidermis_mm")[1]

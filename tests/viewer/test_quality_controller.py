@@ -16,18 +16,18 @@ def noted(quality_controller: QualityController, *frames_ms: float) -> QualityCo
 
 def test_still_frame_has_full_quality() -> None:
     found = noted(QualityController(software=True), *[900.0] * 20).limited_settings(
-        WANTED, (640, 480), moving=False
+        WANTED, (640, 480), is_moving=False
     )
     assert (found.size, found.atlas, found.samples, found.shadow_size) == ((640, 480), 2048, 4, 2048)
 
 
 def test_a_software_adapter_begins_with_one_sample_and_a_small_atlas() -> None:
-    found = QualityController(software=True).limited_settings(WANTED, (640, 480), moving=True)
+    found = QualityController(software=True).limited_settings(WANTED, (640, 480), is_moving=True)
     assert (found.size, found.atlas, found.samples) == ((640, 480), 512, 1)
 
 
 def test_gpu_begins_with_full_quality() -> None:
-    assert QualityController(software=False).limited_settings(WANTED, (640, 480), moving=True).samples == 4
+    assert QualityController(software=False).limited_settings(WANTED, (640, 480), is_moving=True).samples == 4
 
 
 def test_slow_frames_lower_the_effort_and_fast_ones_raise_it_again() -> None:
@@ -49,12 +49,12 @@ def test_quality_is_stable_within_the_budget() -> None:
 
 def test_quality_is_never_above_the_request() -> None:
     small = Settings(atlas=128, samples=1, shadow_size=64)
-    found = QualityController(software=False).limited_settings(small, (8, 8), moving=True)
+    found = QualityController(software=False).limited_settings(small, (8, 8), is_moving=True)
     assert (found.atlas, found.samples, found.shadow_size) == (128, 1, 64)
 
 
 def test_a_huge_window_takes_fewer_samples() -> None:
     found = QualityController(software=False).limited_settings(
-        Settings(samples=64), (8192, 4096), moving=False
+        Settings(samples=64), (8192, 4096), is_moving=False
     )
     assert found.size == (8192, 4096) and found.samples == 4

@@ -21,8 +21,8 @@ MAX_SHEAR = 0.9  # largest shear that the blur takes into account; larger values
 class Atlas:
     """Map from the texels of a uv layout to the surface; row 0 is the top of the map (v = 0).
 
-    triangle : (n, n) int32 index of the triangle at the texel's centre, -1 for none; in gutters the nearest
-        triangle of the chart or, in a stitched layout, the triangle across the seam
+    triangle : (n, n) int32 index of the triangle at the texel's centre, -1 if there is none; in a gutter the
+        nearest triangle of the chart or, in a stitched layout, the triangle across the seam
     barycentric : (n, n, 2) uint16 weights of the triangle's second and third corner [1/65535]
     stretch : (n, n, 2) float16 texels per mm along u and v; outside a chart, the stretch at the chart's
         nearest edge [1/mm]
@@ -39,7 +39,7 @@ class Atlas:
     border_weights : (r, 2) uint16 weights of that triangle's second and third corner at the nearest point
         [1/65535]
     texels_per_uv : (f,) float32 texels per unit of the mesh's own uv in each triangle
-    mapped : (f,) mask of triangles that own texels; light on the other triangles (opaque, collapsed,
+    mapped : (f,) mask of triangles that own texels; light on the remaining triangles (opaque, collapsed,
         overlapped in uv) is not diffused
     """
 

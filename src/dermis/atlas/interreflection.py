@@ -89,7 +89,8 @@ def compute_form_factors(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> FormFac
     """Compute form factors of skin from bundles of random parallel lines [Sbert1993].
 
     The lines are distributed uniformly over all directions and positions. The form factor from one patch to
-    another is the fraction of the lines leaving the first patch that meet the second one next.
+    another is the fraction of the lines leaving the first patch that meet the second patch before any other
+    surface.
 
     corner_uv : (f, 3, 2) uv of the triangles' corners in the atlas
     mapped : (f,) mask of triangles that have texels; other triangles block light and emit none, but triangles
@@ -139,7 +140,7 @@ def intersect_lines(points: Doubles) -> tuple[Index, Doubles, Mask, Index, Doubl
     """Intersect triangles with all lines parallel to z whose x and y are integers.
 
     Returns, for each of n intersections, the line index, z, whether the surface faces +z, the triangle index,
-    and the barycentric weights (n, 3) of its corners.
+    and the barycentric weights (n, 3) of the triangle's corners.
 
     points : (f, 3, 3) corners of the triangles
     """
@@ -162,7 +163,7 @@ def intersect_lines(points: Doubles) -> tuple[Index, Doubles, Mask, Index, Doubl
 
 
 def _integer_range(corner: Doubles) -> tuple[Doubles, Index]:
-    """Return the lowest integer within each triangle's extent along one axis (f,), and how many there are.
+    """Return the lowest integer in each triangle's extent along one axis, and the number of integers in it.
 
     corner : (3, f) coordinate of the triangles' corners along this axis
     """
@@ -200,9 +201,9 @@ def _hemisphere_directions(count: int) -> Doubles:
 
 
 def _line_axes(direction: Doubles, angle: float) -> Doubles:
-    """Return the right, up and forward axes (3, 3): forward is `direction`, the others are rolled about it.
+    """Return the right, up and forward axes (3, 3) of a bundle of lines; forward is `direction`.
 
-    angle : angle of the roll [rad]
+    angle : angle by which right and up are rolled about `direction` [rad]
     """
     right = np.cross(direction, np.eye(3)[np.abs(direction).argmin()])
     right /= np.linalg.norm(right)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from dermis.atlas.atlas import GUTTER_TEXELS, MAX_SHEAR, Atlas
 from dermis.base.arrays import Doubles, Index, Ints, Mask
-from dermis.mesh.geometry import MIN_UV_CROSS, components, cross_2d, edges, expand_runs, uv_cross, weld
+from dermis.mesh.geometry import MIN_UV_CROSS, cross_2d, edges, expand_runs, label_components, uv_cross, weld
 from dermis.mesh.mesh import Mesh
 
 _EDGE_TOLERANCE = 1e-6  # texel centres this far outside an edge still count as covered [texel]
@@ -17,7 +17,7 @@ _MIN_CHART_TEXELS = 4.0  # area of the smallest chart in which light can be blur
 
 
 def find_charts(mesh: Mesh) -> Ints:
-    """Return the chart index of each triangle (f,), numbered from 0.
+    """Return the index of the chart of each triangle (f,); charts are numbered from 0.
 
     A chart is a set of triangles connected by edges that are shared both in space and in uv.
     """
@@ -28,7 +28,7 @@ def find_charts(mesh: Mesh) -> Ints:
     order = np.argsort(edge_of_side, kind="stable")
     shared = edge_of_side[order][1:] == edge_of_side[order][:-1]
     a, b = faces[order][:-1][shared], faces[order][1:][shared]
-    return components(len(mesh.triangles), a, b).astype(np.int32)
+    return label_components(len(mesh.triangles), a, b).astype(np.int32)
 
 
 def triangle_uv_area(mesh: Mesh) -> Doubles:
@@ -47,7 +47,8 @@ def chart_uv_area(mesh: Mesh, chart: Ints) -> Doubles:
 def usable_triangles(mesh: Mesh, size: int, min_texels: float = _MIN_CHART_TEXELS) -> Mask:
     """Return the mask (f,) of triangles large enough in uv for the diffusion of light in texture space.
 
-    It excludes triangles without uv area and all triangles of charts with less than `min_texels` texels.
+    The mask excludes triangles without uv area and all triangles of charts with less than `min_texels`
+    texels.
 
     size : texels along each side of the map
     min_texels : smallest uv area of a chart [texel]
@@ -76,20 +77,20 @@ def rasterise(mesh: Mesh, size: int, triangle: NDArray[np.integer]) -> tuple[Ind
 
 
 def covered_texels(
-    p: Doubles, shape: tuple[int, int], margin: float = -_EDGE_TOLERANCE
+    corners: Doubles, shape: tuple[int, int], margin: float = -_EDGE_TOLERANCE
 ) -> tuple[Index, Index]:
-    """Return the flat index of each texel whose centre is in a triangle, and the row of that triangle in `p`.
+    """Return the flat index of each texel centre in a triangle, and the row of that triangle in `corners`.
 
-    p : (t, 3, 2) corners of the triangles [texel], integers at texel centres
+    corners : (t, 3, 2) corners of the triangles [texel], integers at texel centres
     shape : height and width of the grid of texels
     margin : smallest distance of a covered centre from the edges, along rows and columns; if negative,
         centres just outside count as covered [texel]
     """
     height, width = shape
-    low, high = p[..., 1].min(axis=1), p[..., 1].max(axis=1)
+    low, high = corners[..., 1].min(axis=1), corners[..., 1].max(axis=1)
     top, bottom = _integers_between(low, high, height, margin)
     which, y = expand_runs(top, np.maximum(bottom - top + 1, 0))
-    left, right = _integers_between(*_row_interval(p, which, y), width, margin)
+    left, right = _integers_between(*_row_interval(corners, which, y), width, margin)
     span, x = expand_runs(left, np.maximum(right - left + 1, 0))
     return y[span] * width + x, which[span]
 
@@ -100,20 +101,22 @@ def _integers_between(low: Doubles, high: Doubles, size: int, margin: float) -> 
     return first, np.clip(np.floor(high - margin), -1, size - 1).astype(np.int64)
 
 
-def _row_interval(p: Doubles, triangle: Index, y: Index) -> tuple[Doubles, Doubles]:
+def _row_interval(corners: Doubles, triangle: Index, y: Index) -> tuple[Doubles, Doubles]:
     """Return the lowest and highest x at which each row y of texels intersects its triangle.
 
-    p : (t, 3, 2) corners of the triangles [texel]
+    corners : (t, 3, 2) corners of the triangles [texel]
     triangle : (n,) triangle index of each row
     y : (n,) row index
     """
     lowest = np.full(len(y), -np.inf)
     highest = np.full(len(y), np.inf)
-    sign = np.where(cross_2d(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]) >= 0, 1.0, -1.0)[:, None]
-    edge = np.roll(p, -1, axis=1) - p
+    sign = np.where(cross_2d(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) >= 0, 1.0, -1.0)[
+        :, None
+    ]
+    edge = np.roll(corners, -1, axis=1) - corners
     # inside: cross(edge, q - a) * sign >= 0, linear in q.x with slope -edge.y * sign
     slopes, across = -edge[..., 1] * sign, edge[..., 0] * sign
-    offsets = edge[..., 1] * p[..., 0] * sign - across * p[..., 1]
+    offsets = edge[..., 1] * corners[..., 0] * sign - across * corners[..., 1]
     for k in range(3):
         slope, offset = slopes[triangle, k], offsets[triangle, k] + across[triangle, k] * y
         crossing = -offset / np.where(slope == 0, 1.0, slope)
@@ -124,7 +127,7 @@ def _row_interval(p: Doubles, triangle: Index, y: Index) -> tuple[Doubles, Doubl
 
 
 def build_mesh_layout(mesh: Mesh, size: int) -> Atlas:
-    """Build the atlas of a mesh in the mesh's own uv layout, in which the mesh's maps are drawn too."""
+    """Build the atlas of a mesh in the mesh's own uv layout, the layout of the mesh's texture maps."""
     chart = find_charts(mesh)
     skin = np.array([material.kind == "skin" for material in mesh.materials])
     usable = usable_triangles(mesh, size) & skin[mesh.material]
@@ -175,7 +178,7 @@ def _overlapped_charts(chart: NDArray[np.integer], texel: Index, triangle: Index
 def _assign_texels(mesh: Mesh, mapped: Mask, texel: Index, triangle: Index, size: int) -> tuple[Ints, Mask]:
     """Return the triangle that owns each texel, and the mask (f,) of triangles that own few of their texels.
 
-    Where two halves of a chart are folded onto each other, the half that is not mirrored in uv wins.
+    Where a chart is folded onto itself, the triangles that are not mirrored in uv own the texels.
 
     texel, triangle : (k,) flat texel index and triangle index of each covered texel centre
     """
@@ -246,7 +249,7 @@ def _texel_metric(
 ) -> tuple[NDArray[np.float16], NDArray[np.float16]]:
     """Return each texel's stretch (n, n, 2) along u and v [1/mm], and shear (n, n), as defined in `Atlas`.
 
-    They are interpolated from the derivatives dp/du and dp/dv at the vertices.
+    Both are interpolated from the derivatives dp/du and dp/dv at the vertices.
     """
     y, x = np.nonzero(owner >= 0)
     corners = mesh.triangles[owner[y, x]]
@@ -264,7 +267,7 @@ def _texel_metric(
 
 
 def _edge_distance(chart: Ints) -> NDArray[np.uint16]:
-    """Return the number of texels (n, n, 4) to the left, right, up and down before the chart changes."""
+    """Return the distances (n, n, 4) to the left, right, top and bottom edge of the chart [texel]."""
     left, right = run_lengths(np.pad(chart[:, 1:] == chart[:, :-1], ((0, 0), (1, 0))))
     up, down = run_lengths(np.pad(chart.T[:, 1:] == chart.T[:, :-1], ((0, 0), (1, 0))))
     return np.stack((left, right, up.T, down.T), axis=-1).astype(np.uint16)

@@ -1,4 +1,4 @@
-"""Common maps of several materials, baked from their pictures, factors and vertex colours."""
+"""Texture maps shared by several materials, baked from their pictures, factors and vertex colours."""
 
 from __future__ import annotations
 
@@ -31,10 +31,11 @@ _ROLE_DEFAULTS: Mapping[Role, tuple[float, ...]] = {
 
 @dataclass(frozen=True, eq=False)
 class PackedTextures:
-    """Common layout and maps of several materials.
+    """Uv layout and texture maps that several materials share.
 
-    vertices, uv : (n,) vertex indices in the mesh, and (n, 2) their uv in the common maps
-    maps : by role, such as colour or roughness, the map (side, side, k), multiplied by the materials' factors
+    vertices, uv : (n,) vertex indices in the mesh, and (n, 2) uv of these vertices in the shared maps
+    maps : shared map (side, side, k) of each role, such as colour or roughness, multiplied by the materials'
+        factors
     notes : sentences for users about lost detail
     """
 
@@ -51,11 +52,11 @@ def pack_textures(
     members: Mask,
     required: Sequence[Role] = ("colour",),
 ) -> PackedTextures:
-    """Return the common layout and maps of selected materials of a mesh.
+    """Bake one uv layout and one set of texture maps for selected materials of a mesh.
 
     surface, materials : surface data and materials of the mesh's file
     members : (m,) mask of the mesh's materials that share the maps
-    required : roles that have a map even if no material has a picture for them
+    required : roles for which a map is baked even if no material has a picture for the role
     """
     tiles, side, scale = lay_out_tiles(mesh, surface, materials, members)
     baker = _Baker(mesh, surface, materials, tiles, side)
@@ -70,7 +71,7 @@ def pack_textures(
 
 @dataclass(frozen=True, eq=False)
 class _Baker:
-    """Baker of maps for a layout of tiles."""
+    """Baker of texture maps for a layout of tiles."""
 
     mesh: Mesh
     surface: FileSurface
@@ -78,13 +79,13 @@ class _Baker:
     tiles: list[Tile]
     side: int
 
-    def roles(self, required: Sequence[Role]) -> list[Role]:
-        """Return the required roles and those for which a material has a picture."""
-        used = {role for tile in self.tiles for role in self._material(tile).textures}
-        return [role for role in _ROLE_DEFAULTS if role in used or role in required]
+    def roles(self, required_roles: Sequence[Role]) -> list[Role]:
+        """Return the required roles, and the roles for which a material has a picture."""
+        used = {role for tile in self.tiles for role in self._tile_material(tile).textures}
+        return [role for role in _ROLE_DEFAULTS if role in used or role in required_roles]
 
     def bake(self, role: Role) -> Floats:
-        """Return the common map (side, side, k) of a role."""
+        """Return the shared map (side, side, k) of a role."""
         default = np.array(_ROLE_DEFAULTS[role], np.float32)
         channels = len(default) + (role == "colour")  # opacity
         baked = np.zeros((self.side, self.side, channels), np.float32)
@@ -95,12 +96,12 @@ class _Baker:
             baked[y : y + padded.shape[0], x : x + padded.shape[1]] = padded
         return baked
 
-    def _material(self, tile: Tile) -> FileMaterial:
+    def _tile_material(self, tile: Tile) -> FileMaterial:
         return self.materials[tile.material] if tile.material >= 0 else FileMaterial()
 
     def _tile_values(self, tile: Tile, role: Role) -> Floats:
         """Return the values (h, w, k) of a role on a tile's texels, multiplied by the material's factors."""
-        material, (width, height) = self._material(tile), tile.size
+        material, (width, height) = self._tile_material(tile), tile.size
         texture = material.textures.get(role)
         factor = _material_factor(material, role, self.surface.colours is not None)
         if texture is None:
@@ -115,7 +116,7 @@ class _Baker:
 
     def _finish_colours(self, tile: Tile, values: Floats) -> None:
         """Multiply colours and opacity (h, w, 4) by vertex colours and the opacity picture, in place."""
-        material = self._material(tile)
+        material = self._tile_material(tile)
         if "opacity" in material.textures:
             values[..., 3:] *= self._sample_picture(tile, material.textures["opacity"], "opacity")
         is_opaque = material.alpha_mode == "opaque"
@@ -126,7 +127,7 @@ class _Baker:
     def _sample_picture(self, tile: Tile, texture: Texture, role: Role) -> Floats:
         """Return a picture resampled to the texels of a tile, (h, w, k)."""
         picture = read_role(texture, role)
-        base = base_texture(self._material(tile))
+        base = base_texture(self._tile_material(tile))
         if base is not None and base.mapping == texture.mapping:
             (width, height), span = tile.size, tile.high - tile.low
             u = tile.low[0] + (np.arange(width) + 0.5) / width * span[0]
@@ -148,7 +149,7 @@ class _Baker:
         place = (tile.layout_uv(self.side) * self.side - tile.corner)[corner] - 0.5
         texel, which = covered_texels(place, (height, width))
         y, x = np.divmod(texel, width)
-        weights = _barycentric(place[which], np.stack([x, y], axis=1).astype(np.float64))
+        weights = _barycentric_coordinates(place[which], np.stack([x, y], axis=1).astype(np.float64))
         baked = np.zeros((height * width, values.shape[1]), np.float32)
         baked[texel] = np.einsum("nk,nkc->nc", weights, np.asarray(values, np.float64)[corner[which]])
         if len(texel) == 0:
@@ -161,7 +162,7 @@ class _Baker:
         return np.asarray(baked.reshape(height, width, -1)[tuple(near)])
 
 
-def _barycentric(corners: Doubles, points: Doubles) -> Doubles:
+def _barycentric_coordinates(corners: Doubles, points: Doubles) -> Doubles:
     """Return the barycentric coordinates (n, 3) of points (n, 2) in triangles (n, 3, 2)."""
     a, b, c = corners.transpose(1, 0, 2)
     (bx, by), (cx, cy), (px, py) = (b - a).T, (c - a).T, (points - a).T
@@ -216,8 +217,8 @@ def sample_grid(picture: Floats, u: Doubles, v: Doubles, wrap: tuple[Wrap, Wrap]
         max(abs(float(v[-1] - v[0])) / max(len(v) - 1, 1), 1e-9),
     )
     picture = _matching_mip(picture, min(step[0] * picture.shape[1], step[1] * picture.shape[0]))
-    left, right, across = _neighbours(u, picture.shape[1], wrap[0])
-    top, bottom, down = _neighbours(v, picture.shape[0], wrap[1])
+    left, right, across = _neighbour_texels(u, picture.shape[1], wrap[0])
+    top, bottom, down = _neighbour_texels(v, picture.shape[0], wrap[1])
     if not across.any() and not down.any():
         return np.asarray(picture[top[:, None], left[None, :]])
     sampled = np.empty((len(v), len(u), picture.shape[2]), np.float32)
@@ -236,8 +237,8 @@ def sample_grid(picture: Floats, u: Doubles, v: Doubles, wrap: tuple[Wrap, Wrap]
 
 def sample_points(picture: Floats, position: Floats, wrap: tuple[Wrap, Wrap]) -> Floats:
     """Return bilinear samples (..., k) of a picture at positions (..., 2) in [0, 1]."""
-    left, right, across = _neighbours(position[..., 0].astype(np.float64), picture.shape[1], wrap[0])
-    top, bottom, down = _neighbours(position[..., 1].astype(np.float64), picture.shape[0], wrap[1])
+    left, right, across = _neighbour_texels(position[..., 0].astype(np.float64), picture.shape[1], wrap[0])
+    top, bottom, down = _neighbour_texels(position[..., 1].astype(np.float64), picture.shape[0], wrap[1])
     x, y = across[..., None].astype(np.float32), down[..., None].astype(np.float32)
     upper = picture[top, left] * (1 - x) + picture[top, right] * x
     lower = picture[bottom, left] * (1 - x) + picture[bottom, right] * x
@@ -250,7 +251,7 @@ def _matching_mip(picture: Floats, texels_per_sample: float) -> Floats:
     return mip_chain(picture)[level] if level else picture
 
 
-def _neighbours(position: Doubles, size: int, wrap: Wrap) -> tuple[Numbers, Numbers, Doubles]:
+def _neighbour_texels(position: Doubles, size: int, wrap: Wrap) -> tuple[Numbers, Numbers, Doubles]:
     """Return the two texels around each position in [0, 1] along one axis, and the weight of the second."""
     texel = position * size - 0.5
     texel = np.where(np.abs(texel - np.rint(texel)) < 1e-6 * size, np.rint(texel), texel)

@@ -1,4 +1,4 @@
-"""One uv layout for several materials: tiles of a common map, one for each material."""
+"""One uv layout for several materials: a shared map is divided into tiles, one for each material."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from dermis.formats.load import FileSurface
 from dermis.formats.maps import MAX_SIDE
 from dermis.formats.materials import FileMaterial, Texture
 from dermis.images.io import read_size
-from dermis.mesh.geometry import components, triangle_areas
+from dermis.mesh.geometry import label_components, triangle_areas
 from dermis.mesh.mesh import Mesh
 
 UV_TOLERANCE = 2e-2
@@ -22,14 +22,14 @@ PADDING = 8
 """Texels around each tile that continue its border, so that mip levels do not mix materials."""
 _PLAIN_SIDE = 16  # side of a tile without pictures that is not skin [texel]
 _MIN_SKIN_SIDE = 256  # smallest side of a tile of skin without pictures [texel]
-_GROWTH = 1.02  # step by which the side of the map grows until all tiles fit
+_SIDE_GROWTH = 1.02  # step by which the side of the map grows until all tiles fit
 
 
 @dataclass(frozen=True, eq=False)
 class Tile:
-    """Rectangle of the common map that shows one material of the mesh.
+    """Rectangle of the shared map that shows one material of the mesh.
 
-    material : index of the file's material, -1 for none
+    material : index of the file's material, -1 if there is none
     vertices, triangles : indices of vertices and triangles in the mesh
     uv : (n, 2) positions of the vertices in the material's pictures, v down
     low, high : (2,) lowest and highest position in the pictures that the tile shows
@@ -47,13 +47,16 @@ class Tile:
     corner: tuple[int, int] = (0, 0)
 
     def layout_uv(self, side: int) -> Doubles:
-        """Return the uv of the vertices in the common map (n, 2)."""
+        """Return the uv (n, 2) of the tile's vertices in the shared map.
+
+        side : side of the map [texel]
+        """
         fraction = (self.uv - self.low) / np.maximum(self.high - self.low, 1e-12)
         return np.asarray((np.array(self.corner) + fraction * self.size) / side)
 
 
 def base_texture(material: FileMaterial) -> Texture | None:
-    """Return the texture whose mapping determines a material's layout: its colour, or else its first one."""
+    """Return the texture whose mapping determines a material's layout: colour, or else the first texture."""
     return material.textures.get("colour") or next(iter(material.textures.values()), None)
 
 
@@ -66,9 +69,10 @@ def file_uv(mesh: Mesh, surface: FileSurface, uv_set: int, vertices: NDArray[np.
 def lay_out_tiles(
     mesh: Mesh, surface: FileSurface, materials: Sequence[FileMaterial], members: Mask
 ) -> tuple[list[Tile], int, float]:
-    """Return the tiles of selected materials, and the side of their common map.
+    """Return the tiles of selected materials, and the side of the map that they share [texel].
 
-    The third result is the factor, at most 1, by which their pictures are reduced to fit into the map.
+    The third result is the factor, at most 1, by which the materials' pictures are reduced to fit into the
+    map.
 
     surface : surface data of the file that the mesh comes from
     members : (m,) mask of the mesh's materials that share the map
@@ -84,7 +88,7 @@ def lay_out_tiles(
             )
         )
     tiles = _set_plain_sizes(mesh, tiles, materials)
-    return _pack(tiles)
+    return _pack_tiles(tiles)
 
 
 def _unplaced_tile(
@@ -104,7 +108,7 @@ def _unplaced_tile(
 
 
 def _picture_size(material: FileMaterial) -> tuple[int, int]:
-    """Return the largest width and height of the pictures of a material; 0 for none."""
+    """Return the largest width and height of a material's pictures; 0 for a material without pictures."""
     sizes = [read_size(texture.picture) for texture in material.textures.values()]
     return max((width for width, _ in sizes), default=0), max((height for _, height in sizes), default=0)
 
@@ -116,7 +120,7 @@ def _move_charts(
     if uv.min() > -UV_TOLERANCE and uv.max() < 1.0 + UV_TOLERANCE:
         return uv
     corner = np.searchsorted(vertices, mesh.triangles[triangles])
-    chart = components(len(vertices), corner[:, :2].ravel(), corner[:, 1:].ravel())
+    chart = label_components(len(vertices), corner[:, :2].ravel(), corner[:, 1:].ravel())
     count = int(chart.max()) + 1
     low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
     np.minimum.at(low, chart, uv)
@@ -127,24 +131,26 @@ def _move_charts(
 
 
 def _set_plain_sizes(mesh: Mesh, tiles: list[Tile], materials: Sequence[FileMaterial]) -> list[Tile]:
-    """Return the tiles with sizes for those without pictures: skin gets the others' median texel density."""
+    """Set the sizes of tiles without pictures; skin gets the median texel density of the other tiles."""
     areas = [float(triangle_areas(mesh.positions[mesh.triangles[tile.triangles]]).sum()) for tile in tiles]
     density = [tile.size[0] * tile.size[1] / max(mm2, 1e-9) for tile, mm2 in zip(tiles, areas, strict=True)]
-    usual = float(np.median([value for value in density if value > 0] or [0.0]))
-    sized = []
+    median_density = float(np.median([value for value in density if value > 0] or [0.0]))
+    sized_tiles = []
     for tile, mm2 in zip(tiles, areas, strict=True):
         if tile.size == (0, 0):
             is_skin = mesh.materials[int(mesh.material[tile.triangles[0]])].kind == "skin"
-            side = max(_MIN_SKIN_SIDE, round(float(np.sqrt(usual * mm2)))) if is_skin else _PLAIN_SIDE
+            side = (
+                max(_MIN_SKIN_SIDE, round(float(np.sqrt(median_density * mm2)))) if is_skin else _PLAIN_SIDE
+            )
             tile = Tile(
                 tile.material, tile.vertices, tile.triangles, tile.uv, tile.low, tile.high, (side, side)
             )
-        sized.append(tile)
-    return sized
+        sized_tiles.append(tile)
+    return sized_tiles
 
 
-def _pack(tiles: list[Tile]) -> tuple[list[Tile], int, float]:
-    """Pack the tiles; return them with positions, the side of the map, and the scale at which they fit."""
+def _pack_tiles(tiles: list[Tile]) -> tuple[list[Tile], int, float]:
+    """Pack tiles; return the tiles with positions, the side of the map, and the scale at which they fit."""
     scale = 1.0
     while True:
         sizes = [tuple(max(1, round(scale * length)) for length in tile.size) for tile in tiles]
@@ -174,4 +180,4 @@ def _pack_in_rows(sizes: Sequence[tuple[int, ...]]) -> tuple[int, list[tuple[int
             x, shelf = x + width, max(shelf, height)
         if y + shelf <= side:
             return int(np.ceil(side)), [(int(x) + PADDING, int(y) + PADDING) for x, y in corners]
-        side *= _GROWTH
+        side *= _SIDE_GROWTH

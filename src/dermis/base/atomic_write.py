@@ -17,9 +17,9 @@ def check_output(path: str | Path, suffixes: Sequence[str], advice: str = "Choos
     """Check before a long computation that a file can be written to a path, and return the path.
 
     suffixes : allowed suffixes of the name, such as ".png"
-    advice : what to do about another suffix; last sentence of the error
+    advice : what to do about a suffix that is not allowed; last sentence of the error
 
-    Raises DermisError for another suffix, and when the folder is missing or not writable.
+    Raises DermisError for a suffix that is not allowed, and when the folder is missing or not writable.
     """
     if not isinstance(path, str | os.PathLike):
         refuse("output", "the name of a file", f"got {format_value(path)}", "Pass its name")
@@ -44,7 +44,7 @@ def check_output(path: str | Path, suffixes: Sequence[str], advice: str = "Choos
 
 @contextmanager
 def atomic_file(path: str | Path) -> Iterator[Path]:
-    """Yield a temporary path; the file there replaces `path` on success and is deleted after an error."""
+    """Yield a temporary path; the file written there replaces `path` on success, or is deleted on error."""
     try:
         target = Path(os.path.realpath(path))
     except ValueError as fault:  # a NUL in the name
@@ -84,7 +84,7 @@ def atomic_folder(path: str | Path, marker: str) -> Iterator[Path]:
 
 @contextmanager
 def temporary_folder(target: Path) -> Iterator[Path]:
-    """Yield a new empty folder next to `target`; it is deleted with its content at the end of the block.
+    """Yield a new empty folder next to `target`; the folder is deleted at the end of the with block.
 
     Raises DermisError when the folder cannot be created, or when writing into it fails.
     """
@@ -104,7 +104,7 @@ def _is_empty(folder: Path) -> bool:
 
 
 def _move_folder(source: Path, target: Path) -> None:
-    """Move a folder to a path; an existing folder there is deleted once the move has succeeded."""
+    """Move a folder to a path; an existing folder at the path is deleted once the move has succeeded."""
     if not target.exists():
         source.replace(target)
         return
@@ -121,7 +121,7 @@ def _move_folder(source: Path, target: Path) -> None:
 def refuse_output(path: str | Path, fault: Exception) -> NoReturn:
     """Raise the `DermisError` for a file or folder that cannot be written.
 
-    fault : error of the system
+    fault : error of the operating system
     """
     raise DermisError(
         f"{path}: expected a writable path, but it cannot be written ({error_text(fault)}). "
@@ -134,9 +134,9 @@ def _temporary_name(target: Path) -> Path:
 
 
 def check_folder(folder: Path, json_name: str) -> None:
-    """Create a folder before a long computation and check that it is writable.
+    """Create a folder before a long computation, and check that the folder is writable.
 
-    json_name : name of the .json file that will be written into it
+    json_name : name of the .json file that will be written into the folder
 
     Raises DermisError when the folder cannot be created or is not writable.
     """

@@ -41,7 +41,7 @@ def bibtex(keys: Iterable[str]) -> str:
 
 
 def parse_bibtex(text: str, source: str = "base/references.bib") -> dict[str, str]:
-    """Return the text of each entry of a BibTeX file, unchanged, by its key.
+    """Return the unchanged text of each entry of a BibTeX file, by the key of the entry.
 
     source : name of the file, for error messages
 
@@ -64,7 +64,7 @@ def _references() -> dict[str, str]:
 
 
 def _bibtex_entries(text: str, source: str) -> Iterator[str]:
-    """Yield the text of each BibTeX entry, from its `@` to its closing brace.
+    """Yield the text of each BibTeX entry, from the `@` to the closing brace.
 
     Text between entries is a comment.
     """

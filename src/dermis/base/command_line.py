@@ -1,4 +1,4 @@
-"""Framework of command-line programs: a command is a function; an error is one line, with exit status 2."""
+"""Framework of command-line programs: commands are functions; errors are one line, with exit status 2."""
 
 from __future__ import annotations
 
@@ -46,12 +46,12 @@ def make_app(name: str, help_text: str | None) -> App:
 def run_app(app: App, arguments: Sequence[str] | None = None) -> int:
     """Run a command line and return its exit status: 2 for invalid input, with a message on stderr.
 
-    arguments : words after the program's name; by default those of this process
+    arguments : words after the program's name; by default, the arguments of this process
     """
     name = app.name[0]
     try:
         with warnings.catch_warnings():
-            _show_notes()
+            _show_warnings_as_notes()
             tokens = sys.argv[1:] if arguments is None else arguments
             return int(app(tokens, exit_on_error=False, print_error=False) or 0)
     except DermisError as error:
@@ -67,7 +67,8 @@ def run_app(app: App, arguments: Sequence[str] | None = None) -> int:
 def run_script(run: Callable[..., int | None] | Mapping[str, str], name: str | None = None) -> NoReturn:
     """Run a script as a command-line program, with its docstring as help, and exit.
 
-    run : function of the program; or for several commands, their summaries by "module:function"
+    run : function of the program; or, for a program with several commands, the summary of each command by
+        "module:function"
     name : name of the program; by default the name of the script's file
     """
     name, help_text = name or Path(sys.argv[0]).name, reflow(sys.modules["__main__"].__doc__)
@@ -87,9 +88,10 @@ def run_script(run: Callable[..., int | None] | Mapping[str, str], name: str | N
 
 
 def add_command(app: App, name: str, target: str, summary: str) -> None:
-    """Add a command to an app; its module is imported only when the user runs this command.
+    """Add a command to an app; the module of the command is imported only when a user runs the command.
 
-    target : function of the command, "module:function"
+    name : name of the command
+    target : function of the command, as "module:function"
     summary : text in the list of commands
     """
     chosen = sys.argv[1:2] == [name]
@@ -106,11 +108,11 @@ def print_failure(name: str, message: str) -> int:
     return 2
 
 
-def _show_notes() -> None:
-    """Show each `DermisWarning` once, as a note on stderr; other warnings are shown as usual."""
+def _show_warnings_as_notes() -> None:
+    """Show each `DermisWarning` once, as a note on stderr, in a with block; show other warnings as usual."""
     default, shown = warnings.showwarning, set[str]()
 
-    def show(message: Warning | str, category: type[Warning], *args: Any, **kwargs: Any) -> None:
+    def show_once(message: Warning | str, category: type[Warning], *args: Any, **kwargs: Any) -> None:
         if not issubclass(category, DermisWarning):
             default(message, category, *args, **kwargs)
         elif str(message) not in shown:
@@ -118,11 +120,11 @@ def _show_notes() -> None:
             sys.stderr.write(f"note: {message}\n")
 
     warnings.simplefilter("always", DermisWarning)
-    warnings.showwarning = show
+    warnings.showwarning = show_once
 
 
 def usage_message(error: CycloptsError, name: str) -> str:
-    """Return the error message for an invalid command line: what was expected, what was given, where help is.
+    """Return the error message for an invalid command line: what was expected and given, and where help is.
 
     name : name of the program
     """
@@ -159,16 +161,16 @@ def _describe_error(error: CycloptsError, command: str) -> tuple[str, str, str]:
 
 
 def _option_name(error: Any) -> str:
-    """Return the option of an error as the user wrote it, or the name of the positional argument."""
+    """Return the option at fault as the user wrote it, or the name of the positional argument at fault."""
     token = getattr(error, "token", None)
     return str((token and token.keyword) or (error.argument and error.argument.name) or "an option")
 
 
-def _type_text(kind: Any) -> str:
+def _type_text(annotation: Any) -> str:
     """Return a type in words, such as "a number", or the choices of a `Literal`."""
-    if get_args(kind):
-        return " or ".join(filter(None, map(_type_text, get_args(kind))))
-    return _TYPE_TEXTS.get(kind, str(kind))
+    if get_args(annotation):
+        return " or ".join(filter(None, map(_type_text, get_args(annotation))))
+    return _TYPE_TEXTS.get(annotation, str(annotation))
 
 
 def reflow(docstring: str | None) -> str:
@@ -189,8 +191,8 @@ def _continues_paragraph(before: str, line: str) -> bool:
     """
     if not before.strip() or not line.strip() or {*before.strip()} == {"-"} or {*line.strip()} == {"-"}:
         return False
-    return _indent(before) == _indent(line)
+    return _indent_width(before) == _indent_width(line)
 
 
-def _indent(line: str) -> int:
+def _indent_width(line: str) -> int:
     return len(line) - len(line.lstrip())

@@ -1,6 +1,6 @@
 """Compilation of Python loops to machine code by numba, with a disk cache.
 
-Import this module inside a function, because it loads numba.
+Import this module inside a function, because the import loads numba.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _CACHE_FOLDER, _ARRAY_NAME = "machine-code", "code"
 
 
 def compiled(function: Function) -> Function:
-    """Decorate a function to be compiled by numba; its machine code is cached on disk."""
+    """Decorate a function so that numba compiles it and its machine code is cached on disk."""
     dispatcher = numba.njit(nogil=True, error_model="numpy")(function)
     if hasattr(dispatcher, "enable_caching") and function.__closure__ is None:
         dispatcher._cache = _CodeCache(function)
@@ -40,9 +40,9 @@ _embeds_addresses = attrgetter("library.has_dynamic_globals")  # memory addresse
 
 
 class _CodeCache(caching.NullCache):  # type: ignore[misc, name-defined]
-    """Disk cache of compiled functions, which replaces numba's because that unpickles any file in its folder.
+    """Disk cache of compiled functions, in place of numba's cache, which unpickles any file in its folder.
 
-    Cached files are read only from private folders, and their hash is checked before they are unpickled.
+    Cached files are read only from private folders, and the hash of a file is checked before unpickling.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
@@ -52,7 +52,7 @@ class _CodeCache(caching.NullCache):  # type: ignore[misc, name-defined]
         self._source_key = f"{identity} {_source_hash(file.parent)} {numba.__version__} {sys.version}"
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return the cached machine code for a signature, or None if there is none."""
+        """Return the cached machine code for a signature, or None if there is no cached code."""
         target_context.refresh()
         found = load_arrays(_CACHE_FOLDER, self._key(sig, target_context.codegen()), [_ARRAY_NAME])
         if found is None:

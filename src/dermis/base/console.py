@@ -54,7 +54,7 @@ def note(text: str) -> None:
 
 @contextmanager
 def progress_bar(task: str) -> Iterator[Callable[[int, int], None]]:
-    """Show a progress bar on stderr if it is a terminal, and yield a function that updates it.
+    """Show a progress bar on stderr if stderr is a terminal, and yield a function that updates the bar.
 
     The function takes the number of finished steps and the number of all steps.
     """
@@ -71,7 +71,7 @@ def progress_bar(task: str) -> Iterator[Callable[[int, int], None]]:
 
 @contextmanager
 def spinner(task: str) -> Iterator[None]:
-    """Show a spinner on stderr if it is a terminal, with the current preparation step after the task."""
+    """Show a spinner on stderr if stderr is a terminal, with the task and the current preparation step."""
     if not sys.stderr.isatty():
         yield
         return
@@ -91,7 +91,7 @@ def spinner(task: str) -> Iterator[None]:
 class _SpinnerText(logging.Handler):
     """Log handler that provides the text of a spinner: the task, and its current step.
 
-    A step is shown once it has taken two seconds.
+    A step is shown once the step has taken two seconds.
     """
 
     def __init__(self, task: str) -> None:
@@ -99,7 +99,7 @@ class _SpinnerText(logging.Handler):
         self._task, self._step, self._began = task, "", 0.0
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Set the current step from the log record of its start or end, see `logged_step`."""
+        """Set the current step from a log record of the start or end of a step, see `logged_step`."""
         begins = record.levelno >= logging.INFO
         self._step, self._began = record.getMessage() if begins else "", time.monotonic()
 

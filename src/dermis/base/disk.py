@@ -1,8 +1,8 @@
 """Disk cache of arrays; the key of an entry is a hash of the inputs from which the arrays are computed.
 
-The first line of a file is the SHA-256 of the second. The second line is JSON with the file's key, the types
-and shapes of its arrays, and the SHA-256 of each block of the bytes that follow. Files that do not match are
-deleted. Only folders that no other user can write to are used.
+The first line of a file is the SHA-256 of the second line. The second line is JSON with the key of the entry,
+the types and shapes of the arrays, and the SHA-256 of each block of the bytes that follow. Files that do not
+match these hashes are deleted. Only folders that no other user can write to are used.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ _MAX_THREADS = 4
 
 
 def cached_array(sources: Array | Sequence[Array], parameters: str, make: Callable[[], Array]) -> Array:
-    """Return the array that `make` computes from `sources`; if the disk cache has it, it is read from there.
+    """Return the array that `make` computes from `sources`, from the disk cache if the cache has the array.
 
-    parameters : text with everything else that the result depends on, part of the key
+    parameters : text with everything besides `sources` on which the result depends; part of the cache key
     """
     return cached_arrays(sources, parameters, ["array"], lambda: {"array": make()})["array"]
 
@@ -51,9 +51,9 @@ def cached_array(sources: Array | Sequence[Array], parameters: str, make: Callab
 def cached_arrays(
     sources: Array | Sequence[Array], parameters: str, names: list[str], make: Callable[[], Arrays]
 ) -> Arrays:
-    """Return the arrays that `make` computes from `sources`; if the disk cache has them, they are read there.
+    """Return the arrays that `make` computes from `sources`, from the disk cache if the cache has the arrays.
 
-    parameters : text with everything else that the result depends on, part of the key
+    parameters : text with everything besides `sources` on which the result depends; part of the cache key
     names : names of the arrays in the result
     """
     sources = [sources] if isinstance(sources, np.ndarray) else sources
@@ -63,7 +63,8 @@ def cached_arrays(
 def array_key(sources: Sequence[Array], parameters: str) -> str:
     """Return the cache key of a result that is computed from arrays.
 
-    parameters : text with everything else that the result depends on
+    sources : arrays from which the result is computed
+    parameters : text with everything else on which the result depends
     """
     digest = hashlib.sha256(parameters.encode())
     for source in sources:
@@ -73,7 +74,7 @@ def array_key(sources: Sequence[Array], parameters: str) -> str:
 
 
 def load_or_make(folder: str, key: str, names: list[str], make: Callable[[], Arrays]) -> Arrays:
-    """Return arrays from the disk cache; without a valid entry, compute them with `make` and cache them.
+    """Return arrays from the disk cache; if there is no valid entry, compute the arrays and cache them.
 
     folder : name of a folder of the cache
     names : names of the arrays in the result
@@ -86,7 +87,7 @@ def load_or_make(folder: str, key: str, names: list[str], make: Callable[[], Arr
 
 
 def try_save_arrays(folder: str, key: str, arrays: Arrays) -> None:
-    """Save arrays to the disk cache if it has room; disk errors are ignored."""
+    """Save arrays to the disk cache if the cache has room; disk errors are ignored."""
     path = cache_folder() / folder
     with contextlib.suppress(OSError):
         if _has_room(path, sum(array.nbytes for array in arrays.values())):
@@ -133,7 +134,7 @@ def save_arrays(folder: str, key: str, arrays: Arrays) -> None:
 
 
 def _is_trusted(folder: Path) -> bool:
-    """Return whether no other user can write to a folder; if one can, print a note once."""
+    """Return whether no other user can write to a folder; if another user can, print a note once."""
     if reason := other_writers(folder):
         advice = "make it private, or name another in DERMIS_CACHE"
         _notify_once(f"{cache_folder()} is not used, because {reason}: {advice}")
@@ -148,7 +149,7 @@ def _notify_once(message: str) -> None:
 def _has_room(folder: Path, size: int) -> bool:
     """Return whether a file of `size` bytes fits into a folder beside all files used in the last minutes.
 
-    Without this check, files that one process needs together would evict each other.
+    Without this check, files that a process needs at the same time would evict each other.
     """
     now = time.time()
     used = sum(
@@ -160,7 +161,7 @@ def _has_room(folder: Path, size: int) -> bool:
 
 
 def _folder_files(folder: Path, suffix: str) -> list[tuple[Path, os.stat_result]]:
-    """Return the path and the status of each file in a folder whose name ends with `suffix`.
+    """Return the path and the status of each file with a given suffix in a folder.
 
     Files that another process deletes meanwhile are skipped.
     """
@@ -176,8 +177,8 @@ def _folder_files(folder: Path, suffix: str) -> list[tuple[Path, os.stat_result]
 def _read_arrays(path: Path, key: str) -> Arrays:
     """Return the arrays in a file of the cache.
 
-    Raises OSError or MemoryError when the file cannot be read, and one of `_DAMAGE_ERRORS` when it is damaged
-    or has another key.
+    Raises OSError or MemoryError when the file cannot be read, and one of `_DAMAGE_ERRORS` when the file is
+    damaged or has another key.
     """
     with open_private_file(path) as raw, io.BufferedReader(raw) as file:
         digest, head = file.readline(_MAX_LINE_BYTES), file.readline(_MAX_LINE_BYTES)
@@ -200,15 +201,19 @@ def _digest_line(head: bytes) -> bytes:
     return hashlib.sha256(head).hexdigest().encode() + b"\n"
 
 
-def _byte_count(kind: np.dtype[Any], shape: Sequence[int]) -> int:
-    """Return the size of an array in bytes, after checking its type and shape before memory is allocated."""
-    if kind.kind not in _PLAIN_KINDS or not kind.itemsize or any(type(n) is not int or n < 0 for n in shape):
-        raise ValueError(f"no array: {kind} {shape}")
-    return math.prod(shape) * kind.itemsize
+def _byte_count(dtype: np.dtype[Any], shape: Sequence[int]) -> int:
+    """Return the size of an array in bytes, after a check of type and shape, before memory is allocated."""
+    if (
+        dtype.kind not in _PLAIN_KINDS
+        or not dtype.itemsize
+        or any(type(n) is not int or n < 0 for n in shape)
+    ):
+        raise ValueError(f"no array: {dtype} {shape}")
+    return math.prod(shape) * dtype.itemsize
 
 
 def _read_block(path: Path, block: memoryview, offset: int) -> str:
-    """Read a block of bytes of a file into memory and return its SHA-256.
+    """Read a block of bytes of a file into memory, and return the SHA-256 of the block.
 
     block : memory to be filled
     offset : position of the block in the file [bytes]
@@ -221,7 +226,7 @@ def _read_block(path: Path, block: memoryview, offset: int) -> str:
 
 
 def _byte_blocks(arrays: Iterable[Array]) -> list[memoryview]:
-    """Return views of at most 2 MiB that together cover the bytes of all arrays, in their order."""
+    """Return views of at most 2 MiB that together cover the bytes of all arrays, in the same order."""
     buffers = [array.reshape(-1, order="A").view(np.uint8).data for array in arrays]
     return [
         data[start : start + _BLOCK_BYTES] for data in buffers for start in range(0, len(data), _BLOCK_BYTES)
@@ -229,7 +234,7 @@ def _byte_blocks(arrays: Iterable[Array]) -> list[memoryview]:
 
 
 def _map_threaded(function: Callable[..., str], blocks: list[memoryview], *more: Sequence[int]) -> list[str]:
-    """Apply a function to each block and return its results; large data are divided among threads.
+    """Apply a function to each block, and return the results; large data are divided among threads.
 
     more : sequences of further arguments, one value for each block
     """
@@ -254,7 +259,7 @@ def _temporary_file(path: Path) -> Iterator[BinaryIO]:
 
 
 def _prune_folder(folder: Path) -> None:
-    """Delete the least recently used files beyond the folder's size limit, and old unfinished files."""
+    """Delete the least recently used files beyond the size limit of the folder, and old unfinished files."""
     newest_first = sorted(_folder_files(folder, _SUFFIX), key=lambda entry: entry[1].st_mtime, reverse=True)
     total, now = 0, time.time()
     for path, status in newest_first:

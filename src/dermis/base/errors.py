@@ -28,7 +28,7 @@ class DermisError(Exception):
 
 @contextmanager
 def error_context(culprit: object) -> Iterator[None]:
-    """Put the name of a file, option or object before the message of errors raised in the block.
+    """Put the name of a file, option or object before the messages of errors raised in a with block.
 
     Messages that already contain the name are unchanged.
     """
@@ -45,7 +45,7 @@ class DermisWarning(UserWarning):
 
 
 def notify(message: str) -> None:
-    """Issue a `DermisWarning`; the command line prints it as a note."""
+    """Issue a `DermisWarning`; the command line prints the warning as a note."""
     warnings.warn(message, DermisWarning, stacklevel=3)
 
 
@@ -65,7 +65,7 @@ def refuse(culprit: object, expected: str, actual: str, advice: str) -> NoReturn
 
 
 def format_value(value: object, max_length: int = 60) -> str:
-    """Return a value for an error message: its repr, shortened or replaced by its type if it is too long.
+    """Return the repr of a value for an error message, shortened or replaced by the type if it is too long.
 
     max_length : longest repr [characters]
     """
@@ -82,12 +82,12 @@ def format_value(value: object, max_length: int = 60) -> str:
 
 
 def error_text(error: Exception) -> str:
-    """Return the first line of an error's message; that of an OSError lacks the path, which callers add."""
+    """Return the first line of an error's message; for an OSError, without the path, which callers add."""
     text = getattr(error, "strerror", None) or str(error) or type(error).__name__
     return text.splitlines()[0].rstrip(".")
 
 
 def shorten(text: str, max_length: int) -> str:
-    """Return a text for a message; if it is longer than `max_length`, its middle is left out."""
+    """Return a text for a message; the middle of a text longer than `max_length` is left out."""
     half = (max_length - 5) // 2
     return text if len(text) <= max_length else f"{text[:half]} ... {text[-half:]}"

@@ -29,7 +29,7 @@ _DISTRIBUTIONS = {"pxr": "usd-core"}  # distributions with other names than thei
 def import_extra(module: str, task: str) -> Any:
     """Import a module of an optional dependency listed in `EXTRAS` and return it.
 
-    task : noun phrase for what needs the module, for the error
+    task : noun phrase for the purpose that needs the module, for the error
 
     Raises DermisError when the dependency is not installed.
     """

@@ -1,4 +1,4 @@
-"""Declarations of file properties and what the readers do with them; docs/formats.md is built from these."""
+"""Declarations of how readers treat the properties of files; docs/formats.md is built from them."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ Treatment = Literal["drawn", "drawn with a note", "noted", "refused", "no effect
 
 @dataclass(frozen=True)
 class FileProperty:
-    """Property of a file, and what the reader does with it.
+    """Property of a file, and what the reader does with this property.
 
     treatment : "drawn" if the scene follows the property; "noted" if the property is ignored and a note says
-        so; "no effect" if it is ignored without a note; "refused" if it raises an error
+        so; "no effect" if the property is ignored without a note; "refused" if the reader raises an error
     name : property as the documentation shows it, in Markdown
-    detail : how it is drawn, or why it is not, in Markdown
+    detail : how the property is drawn, or why it is not drawn, in Markdown
     keys : words by which the reader recognises the property, such as statements or extensions
-    other_parts : treatment in materials of parts that are not skin; None if it is the same as for skin
+    other_parts : treatment in materials of parts that are not skin; None for the treatment in skin
     """
 
     treatment: Treatment
@@ -29,7 +29,7 @@ class FileProperty:
     other_parts: Treatment | None = None
 
     def cells(self, is_material: bool) -> list[str]:
-        """Return the cells of this property's row in the documentation.
+        """Return the cells of the row for this property in a table of the documentation.
 
         is_material : whether the table has separate columns for the treatment in skin and in other parts
         """
@@ -40,7 +40,7 @@ class FileProperty:
 def _property(
     treatment: Treatment, name: str, detail: str = "", *keys: str, other_parts: Treatment | None = None
 ) -> FileProperty:
-    """Return a property; `drawn`, `noted` and so on are this function with a fixed treatment."""
+    """Return a file property; `drawn`, `noted` and so on are this function with a fixed treatment."""
     return FileProperty(treatment, name, detail, keys, other_parts)
 
 

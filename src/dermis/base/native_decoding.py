@@ -1,8 +1,8 @@
 """Decoding of untrusted data by native libraries, in a separate process with limits.
 
 A decoder is a module of this package that calls `answer_request` when it is run as a program. Request and
-answer are arrays by name: a line of JSON with their types and shapes, followed by their bytes. A crash, a
-hang, or the use of too much memory ends the process and becomes a `DermisError`.
+answer are arrays by name: a line of JSON with the types and shapes of the arrays, followed by the bytes of
+the arrays. A crash, a hang, or the use of too much memory ends the process and becomes a `DermisError`.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from dermis.base.errors import DermisError, refuse, shorten
 _CPU_S, _SMALL_BYTES = 8.0, 64 << 20
 """Limit of CPU time [s] for files of up to `_SMALL_BYTES`; for larger files it grows with their size."""
 _MAX_WAIT = 3.0  # limit of elapsed time, as a multiple of the limit of CPU time: the machine may be busy
-_MEMORY_BYTES = 2 << 30  # limit of the address space; the libraries of USD use a third of it
-_ANSWER_BYTES = 1 << 30  # limit of the answer, and of each temporary file
+_MAX_MEMORY_BYTES = 2 << 30  # limit of the address space; the libraries of USD use a third of it
+_MAX_ANSWER_BYTES = 1 << 30  # limit of the answer, and of each temporary file
 _REFUSED, _FAILED = "refused", "failed"
-_MAX_MESSAGE = 2000  # characters
+_MAX_MESSAGE_LENGTH = 2000  # characters
 _DAMAGED_ADVICE = "The file is damaged: export it again"
-_VARIABLES = {"OPENBLAS_NUM_THREADS": "1", "PXR_WORK_THREAD_LIMIT": "1"}
+_SET_VARIABLES = {"OPENBLAS_NUM_THREADS": "1", "PXR_WORK_THREAD_LIMIT": "1"}
 _REMOVED_VARIABLES = ("PXR_AR_DEFAULT_SEARCH_PATH", "PXR_PLUGINPATH_NAME", "PYTHONSTARTUP")
 
 
@@ -39,7 +39,8 @@ def run_decoder(module: str, request: Arrays, size: int, culprit: object, expect
     module : module of the decoder, which runs in an empty temporary folder
     request : numeric arrays by name
     size : size of the data to decode, which determines the time limit [bytes]
-    culprit, expected : the file, and what it should be, for errors
+    culprit : name of the file, for errors
+    expected : what the file should be, for errors
 
     Raises DermisError when the decoder refuses the data, fails, or exceeds a limit.
     """
@@ -50,30 +51,30 @@ def run_decoder(module: str, request: Arrays, size: int, culprit: object, expect
         try:
             status = subprocess.run(
                 command,
-                input=_pack(request),
+                input=_pack_arrays(request),
                 stdout=output,
                 stderr=subprocess.DEVNULL,
                 cwd=folder,
-                env=kept | _VARIABLES,
+                env=kept | _SET_VARIABLES,
                 timeout=_MAX_WAIT * cpu_s,
                 check=False,
             ).returncode
         except subprocess.TimeoutExpired:
             refuse(culprit, expected, f"its decoder takes more than {cpu_s:.0f} s", _DAMAGED_ADVICE)
-        if status != 0 or output.seek(0, os.SEEK_END) > _ANSWER_BYTES:
+        if status != 0 or output.seek(0, os.SEEK_END) > _MAX_ANSWER_BYTES:
             actual = f"its decoder stopped ({_stop_reason(status)})"
             refuse(culprit, expected, actual, _DAMAGED_ADVICE)
         output.seek(0)
-        answer = _unpack(output.read())
+        answer = _unpack_arrays(output.read())
     if _REFUSED in answer:
-        raise DermisError(shorten(as_text(answer[_REFUSED]), _MAX_MESSAGE))
+        raise DermisError(shorten(as_text(answer[_REFUSED]), _MAX_MESSAGE_LENGTH))
     if _FAILED in answer:
         refuse(culprit, expected, f"it cannot be decoded ({as_text(answer[_FAILED])})", _DAMAGED_ADVICE)
     return answer
 
 
 def answer_request(decode: Callable[[Arrays], Arrays]) -> None:
-    """Read a request from standard input, and write its answer to standard output; main function of decoders.
+    """Read a request from stdin, and write the answer to stdout; called by decoders run as programs.
 
     decode : function that returns the answer; it raises DermisError to refuse the data, and any other
         exception if the data are damaged
@@ -82,32 +83,32 @@ def answer_request(decode: Callable[[Arrays], Arrays]) -> None:
     os.dup2(2, 1)  # libraries print messages
     _limit_process(int(sys.argv[1]))
     try:
-        answer = _pack(decode(_unpack(sys.stdin.buffer.read())))
+        answer = _pack_arrays(decode(_unpack_arrays(sys.stdin.buffer.read())))
     except DermisError as error:
-        answer = _pack({_REFUSED: from_text(str(error))})
+        answer = _pack_arrays({_REFUSED: from_text(str(error))})
     except Exception as error:
-        text = " ".join(f"{type(error).__name__}: {error}"[:_MAX_MESSAGE].split())
-        answer = _pack({_FAILED: from_text(shorten(text, 200))})
+        text = " ".join(f"{type(error).__name__}: {error}"[:_MAX_MESSAGE_LENGTH].split())
+        answer = _pack_arrays({_FAILED: from_text(shorten(text, 200))})
     with output:
         output.write(answer)
 
 
 def as_text(array: Bytes) -> str:
-    """Decode an array of a request or an answer as text."""
+    """Decode UTF-8 text from an array of a request to a decoder, or of the decoder's answer."""
     return array.tobytes().decode("utf-8", "replace")
 
 
 def from_text(text: str) -> Bytes:
-    """Encode a text as an array of a request or an answer."""
+    """Encode a text as a UTF-8 array for a request to a decoder, or for the decoder's answer."""
     return np.frombuffer(text.encode("utf-8", "replace"), np.uint8)
 
 
-def _pack(arrays: Mapping[str, Bytes]) -> bytes:
+def _pack_arrays(arrays: Mapping[str, Bytes]) -> bytes:
     header = {name: (array.dtype.str, array.shape) for name, array in arrays.items()}
     return b"".join([json.dumps(header).encode(), b"\n", *(array.tobytes() for array in arrays.values())])
 
 
-def _unpack(data: bytes) -> Arrays:
+def _unpack_arrays(data: bytes) -> Arrays:
     line, _, body = data.partition(b"\n")
     arrays, start = Arrays(), 0
     for name, (dtype, shape) in json.loads(line).items():
@@ -117,15 +118,18 @@ def _unpack(data: bytes) -> Arrays:
 
 
 def _limit_process(cpu_s: int) -> None:
-    """Limit memory, CPU time and files of this process, where the system can."""
+    """Limit memory, CPU time and files of this process, where the operating system supports it.
+
+    cpu_s : largest CPU time [s]
+    """
     try:
         import resource
     except ImportError:  # Windows, where only the elapsed time is limited
         return
     limits = {
-        resource.RLIMIT_AS: _MEMORY_BYTES,
+        resource.RLIMIT_AS: _MAX_MEMORY_BYTES,
         resource.RLIMIT_CPU: cpu_s,
-        resource.RLIMIT_FSIZE: _ANSWER_BYTES,
+        resource.RLIMIT_FSIZE: _MAX_ANSWER_BYTES,
         resource.RLIMIT_CORE: 0,
     }
     for kind, value in limits.items():

@@ -20,7 +20,7 @@ _WRITABLE_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 def cache_folder() -> Path:
     """Return the folder of the disk cache: DERMIS_CACHE, or the user's cache folder.
 
-    For a user without a home folder it is a path at which nothing can be stored.
+    For a user without a home folder, this is a path at which nothing can be stored.
     """
     import platformdirs
 
@@ -33,7 +33,7 @@ def cache_folder() -> Path:
 def make_private_folder(folder: Path) -> None:
     """Create a folder and its missing parents, accessible to this user only.
 
-    Raises OSError where that is not possible.
+    Raises OSError if the folder cannot be created or made private.
     """
     missing = [path for path in (folder, *folder.parents) if not path.exists()]
     for path in reversed(missing):
@@ -43,7 +43,7 @@ def make_private_folder(folder: Path) -> None:
 
 
 def other_writers(folder: Path) -> str:
-    """Return a clause that says how other users can write to a folder; empty if they cannot.
+    """Return a clause that says how other users can write to a folder; empty if no other user can.
 
     Folders above the user's home and folders that only root can write to count as safe.
     """
@@ -69,9 +69,9 @@ def other_writers(folder: Path) -> str:
 
 
 def open_private_file(path: Path) -> io.FileIO:
-    """Open a regular file for unbuffered reading, but no link, pipe or device.
+    """Open a regular file, and no link, pipe or device, for unbuffered reading.
 
-    Raises OSError when it cannot be read, ValueError when other users may have written it.
+    Raises OSError when the file cannot be read, and ValueError when other users may have written the file.
     """
     descriptor = os.open(path, _READ_FLAGS)
     status = os.fstat(descriptor)

@@ -1,4 +1,4 @@
-"""Log records of slow preparation steps, on the logger "dermis"."""
+"""Logging of slow preparation steps to the logger "dermis"."""
 
 from __future__ import annotations
 

@@ -16,8 +16,8 @@ def checked_number(culprit: object, value: object, low: float, high: float, reas
     """Return a value as a float after checking that it lies in a range.
 
     culprit : option or field with the value, for errors
-    low, high : limits, both included
-    reason : why these are the limits, or the unit, for errors
+    low, high : limits of the range, both included
+    reason : reason for the limits, or the unit, for errors
 
     Raises DermisError for text, booleans, arrays, NaN, infinity and numbers outside the range.
     """
@@ -41,12 +41,12 @@ def checked_integer(culprit: object, value: object, low: float, high: float, rea
 def checked_array(
     culprit: object, values: object, shape: tuple[int, ...], low: float, high: float, reason: str = ""
 ) -> NDArray[np.float64]:
-    """Return values as a float64 array after checking its shape and the range of all elements.
+    """Return values as a float64 array after checking the shape and the range of all elements.
 
     culprit : option or field with the values, for errors
     shape : expected shape, with 0 for an axis of any length
-    low, high : limits, both included
-    reason : why these are the limits, or the unit, for errors
+    low, high : limits of the range, both included
+    reason : reason for the limits, or the unit, for errors
 
     Raises DermisError for another shape, and when an element is not a number in the range.
     """
@@ -68,10 +68,11 @@ def checked_array(
 
 
 def check_fields(owner: object, ranges: Mapping[str, tuple[float, float]], prefix: str = "") -> None:
-    """Check that attributes of an object lie in their ranges.
+    """Check that the values of an object's attributes lie in given ranges.
 
-    ranges : lowest and highest value by attribute; if both are ints, the value must be a whole number
-    prefix : text before the attribute in errors
+    ranges : lowest and highest value by name of the attribute; if both are ints, the value must be a whole
+        number
+    prefix : text before the name of the attribute in errors
 
     Raises DermisError as `checked_number` does.
     """
@@ -81,7 +82,7 @@ def check_fields(owner: object, ranges: Mapping[str, tuple[float, float]], prefi
 
 
 def _number_in_range(value: object, low: float, high: float) -> int | float | None:
-    """Return a value as a Python number, or None if it is not a number in the range."""
+    """Return a value as a Python number, or None if the value is not a number in the range."""
     found: Any = value
     if type(value) not in (int, float):  # plain numbers need no NumPy
         import numpy as np

@@ -1,4 +1,4 @@
-"""Safe reading of files that users name, and of files to which these refer.
+"""Safe reading of files that users name, and of further files to which these files refer.
 
 Only regular files are opened, their size is limited, and errors of parsers become messages with the name of
 the file.
@@ -25,7 +25,7 @@ MALFORMED_DATA_ERRORS = (LookupError, TypeError, AttributeError, ArithmeticError
 """Exceptions raised by code that assumes well-formed data; pass them to `parsing`."""
 MAX_TEXT_BYTES = 1 << 20  # largest file with settings: scenes, lights, tables
 _MIN_READ_BYTES = 1 << 16
-_MAX_BITS = 64  # largest size of integers, as in TOML; all can be converted to float
+_MAX_INTEGER_BITS = 64  # largest size of integers, as in TOML; all can be converted to float
 _MAX_KEY_PARTS = 32  # parts of a dotted key: parsing time grows with the square of their number
 _LONG_KEY_PATTERN = re.compile(
     r"""(?<![\w\\-])(?:(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+)"""
@@ -39,7 +39,7 @@ def read_file(path: str | Path, expected: str, max_bytes: int, name: object = No
 
     expected : what the file should be, for error messages
     max_bytes : largest accepted size
-    name : name of the file in error messages; by default its path
+    name : name of the file in error messages; by default the path
 
     Raises DermisError when the file is missing, not regular, too large or unreadable.
     """
@@ -56,14 +56,19 @@ def read_file(path: str | Path, expected: str, max_bytes: int, name: object = No
     if data is None:
         refuse(culprit, expected, "nothing can be read from it", "Copy its contents to a file first")
     if size > max_bytes or len(data) > limit:
-        actual = f"it has {_megabytes(size)}" if size > max_bytes else "it grows while it is read"
-        refuse(culprit, f"{expected} of at most {_megabytes(max_bytes)}", actual, "Check its name and size")
+        actual = f"it has {_format_megabytes(size)}" if size > max_bytes else "it grows while it is read"
+        refuse(
+            culprit,
+            f"{expected} of at most {_format_megabytes(max_bytes)}",
+            actual,
+            "Check its name and size",
+        )
     return data
 
 
 @contextmanager
 def open_regular_file(path: str | Path, expected: str) -> Iterator[BinaryIO]:
-    """Open a regular file of any size; the caller limits how much it reads at a time.
+    """Open a regular file of any size; callers must limit how much they read at a time.
 
     expected : what the file should be, for error messages
 
@@ -81,7 +86,7 @@ def open_regular_file(path: str | Path, expected: str) -> Iterator[BinaryIO]:
 
 
 def is_file(path: str | Path) -> bool:
-    """Return whether a regular file exists; False for names that no file can have."""
+    """Return whether a regular file exists at a path; False for names that no file can have."""
     try:
         return Path(path).is_file()
     except (OSError, ValueError):  # too long, or with a NUL
@@ -89,7 +94,7 @@ def is_file(path: str | Path) -> bool:
 
 
 def read_text(path: str | Path, expected: str, max_bytes: int = MAX_TEXT_BYTES) -> str:
-    """Return the text of a file of UTF-8 with or without a byte order mark, or of UTF-16 with one.
+    """Return the text of a file in UTF-8, or in UTF-16 with a byte order mark; UTF-8 may also have the mark.
 
     expected : what the file should be, for error messages
 
@@ -121,7 +126,10 @@ def parse_json(text: str | bytes, culprit: object, expected: str) -> Any:
     """
     with parsing(culprit, expected):
         return json.loads(
-            text, parse_constant=_refuse_constant, parse_float=_finite_float, parse_int=_bounded_int
+            text,
+            parse_constant=_refuse_constant,
+            parse_float=_parse_finite_float,
+            parse_int=_parse_bounded_int,
         )
 
 
@@ -130,7 +138,7 @@ def checked_path(name: object, expected: str) -> Path:
 
     expected : what the name should denote, for the error
 
-    Raises DermisError when it is neither text nor a path.
+    Raises DermisError when the name is neither text nor a path.
     """
     if not isinstance(name, str | os.PathLike):
         refuse("file", f"the name of {expected}", f"got a {type(name).__name__}", "Pass its name")
@@ -141,7 +149,7 @@ def checked_path(name: object, expected: str) -> Path:
 def parsing(culprit: object, expected: str, *errors: type[Exception]) -> Iterator[None]:
     """Convert the exceptions of a parser in the block into a DermisError that names the file.
 
-    culprit : the file
+    culprit : name of the file
     expected : what the file should be
     errors : exception types that the parser raises besides ValueError and OverflowError
     """
@@ -168,16 +176,16 @@ def _open_regular(path: str | Path, culprit: object, expected: str) -> int:
     return descriptor
 
 
-def _finite_float(text: str) -> float:
+def _parse_finite_float(text: str) -> float:
     number = float(text)
     if not math.isfinite(number):
         raise ValueError(f"{text[:20]} is too large for a number")
     return number
 
 
-def _bounded_int(text: str) -> int:
+def _parse_bounded_int(text: str) -> int:
     number = int(text)
-    if number.bit_length() > _MAX_BITS:
+    if number.bit_length() > _MAX_INTEGER_BITS:
         raise ValueError(f"{text[:20]}... is too large for a whole number")
     return number
 
@@ -190,15 +198,15 @@ def _check_integers(tables: dict[str, Any]) -> None:
             pending.extend(value.values())
         elif isinstance(value, list):
             pending.extend(value)
-        elif isinstance(value, int) and value.bit_length() > _MAX_BITS:
-            raise ValueError(f"a whole number has {value.bit_length()} bits, more than {_MAX_BITS}")
+        elif isinstance(value, int) and value.bit_length() > _MAX_INTEGER_BITS:
+            raise ValueError(f"a whole number has {value.bit_length()} bits, more than {_MAX_INTEGER_BITS}")
 
 
 def _refuse_constant(text: str) -> NoReturn:
     raise ValueError(f"{text} is not a number")
 
 
-def _megabytes(size: int) -> str:
+def _format_megabytes(size: int) -> str:
     return f"{size / 1e6:,.1f} MB" if size >= 1e5 else f"{size:,} bytes"
 
 

@@ -15,7 +15,7 @@ T = TypeVar("T")
 class Registry(Mapping[str, T], Generic[T]):
     """Mapping from names to objects of one kind, in the order of registration.
 
-    An entry is the object itself, or "module:attribute", which is imported on first use.
+    An entry is the object itself, or a text "module:attribute"; the object is then imported on first use.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class Registry(Mapping[str, T], Generic[T]):
         self._summaries: dict[str, str] = {}
 
     def register(self, name: str, entry: T | str, summary: str = "") -> None:
-        """Add an entry; packages outside this one may do so as well.
+        """Add an entry; other packages may also add entries.
 
         Parameters
         ----------
@@ -81,7 +81,7 @@ class Registry(Mapping[str, T], Generic[T]):
             self.remove(name)
 
     def remove(self, name: str) -> None:
-        """Remove an entry if it is registered."""
+        """Remove the entry with a name; do nothing if the name is not registered."""
         self._entries.pop(name, None)
         self._summaries.pop(name, None)
         self.changes += 1
@@ -96,7 +96,7 @@ class Registry(Mapping[str, T], Generic[T]):
         return [f"{name}: {summary}" for name, summary in self._summaries.items()]
 
     def __getitem__(self, name: str) -> T:
-        """Return an entry, importing it if necessary.
+        """Return the object of an entry; it is imported on first use.
 
         Raises DermisError for a name that is not registered.
         """
@@ -109,7 +109,7 @@ class Registry(Mapping[str, T], Generic[T]):
         return entry
 
     def __contains__(self, name: object) -> bool:
-        """Return whether a name is registered, without importing its entry."""
+        """Return whether a name is registered, without importing the object."""
         return name in self._entries
 
     def __iter__(self) -> Iterator[str]:
@@ -137,7 +137,7 @@ class RegisteredName:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Return all accepted names: those in the registry, then the additional words."""
+        """Return all accepted names: the names in the registry, then the additional words."""
         return (*self.registry, *self.words)
 
     def check(self, name: str) -> str:

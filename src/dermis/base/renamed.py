@@ -1,4 +1,4 @@
-"""Renamed objects and modules: their old names keep working for one release, with a warning.
+"""Renamed objects and modules, whose old names keep working for one release, with a warning.
 
 To rename a public name or a module, add it to `RENAMED_OBJECTS` or `RENAMED_MODULES`; remove the entry one
 release later.
@@ -44,18 +44,19 @@ RENAMED_MODULES: Mapping[str, str] = {
 P = ParamSpec("P")
 R = TypeVar("R")
 _PACKAGE = __name__.partition(".")[0]
-_REMOVAL = "the old name will be removed in the next release"
+_REMOVAL_NOTICE = "the old name will be removed in the next release"
 
 
 def successor(module: str, name: str) -> str | None:
-    """Return the new name of a renamed object and issue a DeprecationWarning; None if it was not renamed.
+    """Return the new name of a renamed object and issue a DeprecationWarning; None for any other name.
 
-    module, name : module of the object, and its old name
+    module : module of the object
+    name : old name of the object
     """
     old = f"{module}.{name}".removeprefix(f"{_PACKAGE}.")
     if old not in RENAMED_OBJECTS:
         return None
-    _warn(old, RENAMED_OBJECTS[old], stacklevel=4)
+    _warn_renamed(old, RENAMED_OBJECTS[old], stacklevel=4)
     return RENAMED_OBJECTS[old].rpartition(".")[2]
 
 
@@ -71,7 +72,7 @@ def renamed_keywords(**new_names: str) -> Callable[[Callable[P, R]], Callable[P,
             for old, new in new_names.items():
                 if old in kwargs:
                     text = f"{function.__qualname__}: {old} is now {new}"
-                    warnings.warn(f"{text}; {_REMOVAL}", DeprecationWarning, stacklevel=2)
+                    warnings.warn(f"{text}; {_REMOVAL_NOTICE}", DeprecationWarning, stacklevel=2)
                     kwargs[new] = kwargs.pop(old)
             return function(*args, **kwargs)
 
@@ -81,11 +82,11 @@ def renamed_keywords(**new_names: str) -> Callable[[Callable[P, R]], Callable[P,
 
 
 def renamed_attribute(old: str, new: str) -> property:
-    """Return a property for the old name of an attribute, which warns and returns the new attribute."""
+    """Return a property for the old name of an attribute; it warns and returns the renamed attribute."""
 
     def get(instance: Any) -> Any:
         text = f"{type(instance).__name__}.{old} is now {new}"
-        warnings.warn(f"{text}; {_REMOVAL}", DeprecationWarning, stacklevel=2)
+        warnings.warn(f"{text}; {_REMOVAL_NOTICE}", DeprecationWarning, stacklevel=2)
         return getattr(instance, new)
 
     return property(get)
@@ -97,7 +98,7 @@ def find_renamed_modules() -> None:
 
 
 class _RenamedModuleFinder:
-    """Import hook for the old path of a renamed module: it imports the new module and aliases it."""
+    """Import hook for the old path of a renamed module; it imports the module from the new path."""
 
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
@@ -105,18 +106,18 @@ class _RenamedModuleFinder:
         return ModuleSpec(fullname, cast(Any, self)) if _new_module_path(fullname) else None
 
     def create_module(self, spec: ModuleSpec) -> None:
-        """Leave the creation of the module to the import system; `exec_module` replaces it."""
+        """Let the import system create the module; `exec_module` then replaces it by the renamed module."""
 
     def exec_module(self, module: ModuleType) -> None:
         old = module.__name__
         new = _new_module_path(old)
         assert new is not None
         sys.modules[old] = import_module(f"{_PACKAGE}.{new}")
-        _warn(old.removeprefix(f"{_PACKAGE}."), new, stacklevel=3)
+        _warn_renamed(old.removeprefix(f"{_PACKAGE}."), new, stacklevel=3)
 
 
 def _new_module_path(fullname: str) -> str | None:
-    """Return the new path of a renamed module, without the package's name; None if it was not renamed.
+    """Return the new path of a renamed module, without the package's name; None for other modules.
 
     fullname : old path with the package's name
     """
@@ -129,6 +130,6 @@ def _new_module_path(fullname: str) -> str | None:
     return None
 
 
-def _warn(old: str, new: str, stacklevel: int) -> None:
-    text = f"{_PACKAGE}.{old} is now {_PACKAGE}.{new}"
-    warnings.warn(f"{text}; {_REMOVAL}", DeprecationWarning, stacklevel)
+def _warn_renamed(old_name: str, new_name: str, stacklevel: int) -> None:
+    text = f"{_PACKAGE}.{old_name} is now {_PACKAGE}.{new_name}"
+    warnings.warn(f"{text}; {_REMOVAL_NOTICE}", DeprecationWarning, stacklevel)

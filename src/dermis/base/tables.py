@@ -32,7 +32,7 @@ def parse_rows(text: str) -> Rows:
 
 
 def column_separator(line: str) -> str:
-    """Return the separator of a line of a table: a tab if it has one, else a semicolon, else a comma.
+    """Return the separator of a line of a table: a tab if the line has one, else a semicolon, else a comma.
 
     In lines with tabs or semicolons, commas are decimal signs.
     """
@@ -48,6 +48,7 @@ def plain_key(key: str) -> str:
 def float_columns(rows: Sequence[Mapping[str, str]], columns: str) -> NDArray[np.float64]:
     """Return selected columns of a table as floats, (rows, columns).
 
+    rows : rows of the table, by column name
     columns : names of the columns, separated by spaces
     """
     return np.array([[float(row[name]) for name in columns.split()] for row in rows])

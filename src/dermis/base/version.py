@@ -10,7 +10,7 @@ _PROJECT = Path(__file__).parents[3] / "pyproject.toml"
 
 
 def version() -> str:
-    """Return the version of the installed package, or that in pyproject.toml if it is not installed."""
+    """Return the version of the installed package, or the version in pyproject.toml in a checkout."""
     try:
         return metadata.version("dermis")
     except metadata.PackageNotFoundError:

@@ -34,8 +34,8 @@ class _AnimatedScene:
 
     scene, settings : scene without the motion, and settings of all frames
     clip : motion of the head
-    rate : frame rate [1/s]
-    first : number of the first frame, at which automatic exposure is metered
+    rate : frame rate of the animation [1/s]
+    first : number of the first frame; automatic exposure is metered at this frame
     """
 
     scene: Scene
@@ -45,7 +45,7 @@ class _AnimatedScene:
     first: int
 
     def scenes(self, numbers: Iterable[int]) -> Iterator[Scene]:
-        """Yield the scene at each frame; targets and bones that the clip does not move keep the scene's pose.
+        """Yield the scene at each frame; morph targets and bones that the clip does not move keep their pose.
 
         numbers : numbers of the frames
         """
@@ -118,7 +118,7 @@ def animate(
         Print one JSON object with the number of frames and the timings.
     """
     if names:
-        return _print_names(head, scene, as_json)
+        return _print_animatable_names(head, scene, as_json)
     started = time.perf_counter()
     span, target = parse_time_span(begin, end, fps, motion_fps), AnimationOutput(output, crf, overwrite)
     target.check(scene.settings.get("size", (2, 2)))
@@ -154,26 +154,26 @@ def animate(
 
 
 def _render_frames(
-    animation: _AnimatedScene, numbers: Sequence[int], target: AnimationOutput, adapter: str
+    animation: _AnimatedScene, frame_numbers: Sequence[int], animation_output: AnimationOutput, adapter: str
 ) -> str:
     """Render and write the frames with the given numbers, and return the name of the adapter."""
     from dermis.frame.renderer import Renderer
 
     renderer, size = Renderer(adapter), animation.settings.size
-    options: Options = {**animation.settings.model_dump(), "linear": target.is_linear}
+    options: Options = {**animation.settings.model_dump(), "linear": animation_output.is_linear}
     options["exposure"] = _common_exposure(animation, renderer)
-    options["alpha"] = target.is_numbered and animation.settings.background == "none"
-    writing, bar = target.open_writer(size, animation.rate), progress_bar("rendering frames")
+    options["alpha"] = animation_output.is_numbered and animation.settings.background == "none"
+    writing, bar = animation_output.open_writer(size, animation.rate), progress_bar("rendering frames")
     with writing as write, bar as report:
-        pictures = renderer.render_many(animation.scenes(numbers), **options)
-        for done, (number, picture) in enumerate(zip(numbers, pictures, strict=True), 1):
+        pictures = renderer.render_many(animation.scenes(frame_numbers), **options)
+        for done, (number, picture) in enumerate(zip(frame_numbers, pictures, strict=True), 1):
             write(number, picture)
-            report(done, len(numbers))
+            report(done, len(frame_numbers))
     return str(renderer.device.adapter.name)
 
 
 def _common_exposure(animation: _AnimatedScene, renderer: Renderer) -> float:
-    """Return one exposure for all frames: the --exposure value, or the one metered at the first frame."""
+    """Return the exposure of all frames: the value of --exposure, or else metered at the first frame."""
     if animation.settings.exposure != "auto":
         return animation.settings.exposure
     (scene,) = animation.scenes([animation.first])
@@ -183,10 +183,10 @@ def _common_exposure(animation: _AnimatedScene, renderer: Renderer) -> float:
 
 
 def _frame_digest(animation: _AnimatedScene, options: SceneOptions, *files: str) -> str:
-    """Return a hash of everything that determines the frames; images of earlier runs with it are reused.
+    """Return a hash of everything that determines the frames; images from runs with an equal hash are reused.
 
-    files : head and motion as named on the command line; if a file has the name, its size and modification
-        time are hashed too
+    files : head and motion as named on the command line; the size and modification time of files are part of
+        the hash
     """
     scene = animation.scene
     names = [*files, scene.head.name, *map(str, options.head.values()), animation.clip.name]
@@ -198,13 +198,13 @@ def _frame_digest(animation: _AnimatedScene, options: SceneOptions, *files: str)
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 
-def _file_state(name: str) -> str:
-    """Return the path, size and modification time of a file as text; the name itself if it is not a file."""
-    path = Path(name.partition("#")[0])
+def _file_state(file_name: str) -> str:
+    """Return the path, size and modification time of a file as text; for a name without a file, the name."""
+    path = Path(file_name.partition("#")[0])
     if not path.exists():
-        return name
+        return file_name
     state = path.stat()
-    return f"{path.resolve()} {name} {state.st_size} {state.st_mtime_ns}"
+    return f"{path.resolve()} {file_name} {state.st_size} {state.st_mtime_ns}"
 
 
 def _summary_line(report: Options) -> str:
@@ -215,7 +215,7 @@ def _summary_line(report: Options) -> str:
     return f"{report['file']}  {frames}{reused} at {report['fps']:g}/s  {report['seconds']:.1f} s{device}"
 
 
-def _print_names(name: str, options: SceneOptions, as_json: bool) -> int:
+def _print_animatable_names(name: str, options: SceneOptions, as_json: bool) -> int:
     with spinner("loading"):
         names = animatable_names(name, assemble_scene(name, options)[0].head)
     lines = (f"{kind}: {', '.join(each) or 'none'}" for kind, each in names.items())
@@ -283,7 +283,7 @@ def parse_time_span(
 
 
 def motion_file(name: str, motion: str | None) -> str:
-    """Return the name of the motion file: the --motion value, or the head's own file if it is glTF.
+    """Return the name of the motion file: the value of --motion, or the head's file if that file is glTF.
 
     name : head or scene file as named on the command line
     """
@@ -304,9 +304,10 @@ def load_clip(
     """Load the clip that animates a head from a motion file.
 
     name : head or scene file as named on the command line
-    motion, clip : motion file, and name of one of its clips
-    head_options : options of the head, of which `unit_mm`, `up` and `front` also apply to mesh sequences
-    span : time span, whose frame rates are used
+    motion : motion file
+    clip : name of a clip in the motion file; None for the only clip
+    head_options : options of the head; `unit_mm`, `up` and `front` also apply to mesh sequences
+    span : time span; only the frame rates are used
     """
     from dermis.formats.motion.sequence import is_sequence
     from dermis.scene.motion import load_motion
@@ -320,7 +321,7 @@ def load_clip(
 
 
 def animatable_names(name: str, head: Head) -> dict[str, tuple[str, ...]]:
-    """Return the names of the head's morph targets and bones, and of the clips in its file, by kind."""
+    """Return the names of morph targets, bones and clips, by kind; the clips are those in the head's file."""
     from dermis.formats.gltf.animations import clip_names
     from dermis.formats.parts import is_gltf
 

@@ -57,9 +57,9 @@ def batch(
 ) -> int:
     """Render a data set with ground truth: people, expressions, lights and cameras drawn from distributions.
 
-    An interrupted command can be repeated to continue it: complete parts of 16 to 31 images are kept. With a
-    larger --count it adds images to the data set. The same spec gives the same bytes on the same kind of
-    adapter, independent of the number and location of the workers.
+    An interrupted command can be repeated to continue it: complete parts of 16 to 32 images are kept. With a
+    larger --count, the command adds images to the data set. The same spec gives the same bytes on the same
+    kind of adapter, independent of the number and location of the workers.
 
     Examples:
 
@@ -80,7 +80,8 @@ def batch(
     output:
         Folder of the data set, created if necessary; with --dry-run the contact sheet (.png).
     count:
-        Number of images; more than an existing data set has add to it. [default: from the spec]
+        Number of images; a larger number than that of an existing data set adds images. [default: from the
+        spec]
     size:
         Width and height of the images, WIDTHxHEIGHT [pixel]. [default: from the spec]
     seed:
@@ -137,7 +138,7 @@ def batch(
     if scheduler is not None or cluster is not None:
         local_options = drop_none(adapters=adapters, workers=workers, workers_per_gpu=workers_per_gpu)
         pool: WorkerPool = _dask_cluster(scheduler, cluster, adapter, local_options)
-        encoder_count = _checked_count("--encoders", encoders, 0)
+        encoder_count = _check_count("--encoders", encoders, 0)
     else:
         pool, encoder_count = _local_processes(adapter, adapters, workers, workers_per_gpu, encoders)
     work = RunOptions(loaded_spec, output, encoder_count or 0, keep_going)
@@ -148,14 +149,14 @@ def batch(
 
 
 def _parse_fraction(option: str, text: str) -> tuple[int, int]:
-    """Return the integers I and N of the value "I/N" of an option."""
+    """Return the integers I and N of an option's value "I/N"."""
     match = re.fullmatch(r"(\d{1,9})/(\d{1,9})", text)
     if not match or int(match[1]) >= int(match[2]):
         refuse(option, "I/N with I from 0 to N - 1, such as 3/16", f"got {text!r}", "Correct it")
     return int(match[1]), int(match[2])
 
 
-def _checked_count(option: str, value: int | None, minimum: int) -> int | None:
+def _check_count(option: str, value: int | None, minimum: int) -> int | None:
     if value is not None and not minimum <= value <= _MAX_PROCESSES:
         refuse(option, f"{minimum} to {_MAX_PROCESSES}", f"got {value}", "Correct it")
     return value
@@ -172,9 +173,9 @@ def _local_processes(
     request = SlotRequest(
         adapter,
         _parse_adapter_numbers(adapter, adapters),
-        _checked_count("--workers", workers, 1),
-        _checked_count("--workers-per-gpu", workers_per_gpu, 1) or 1,
-        _checked_count("--encoders", encoders, 0),
+        _check_count("--workers", workers, 1),
+        _check_count("--workers-per-gpu", workers_per_gpu, 1) or 1,
+        _check_count("--encoders", encoders, 0),
     )
     slots, encoder_count = request.slots()
     return ProcessPool(slots), encoder_count
@@ -190,13 +191,15 @@ def _parse_adapter_numbers(adapter: str, adapters: str | None) -> tuple[int, ...
     return tuple(map(int, adapters.split(",")))
 
 
-def _dask_cluster(address: str | None, file: Path | None, adapter: str, local_options: Options) -> WorkerPool:
+def _dask_cluster(
+    scheduler_address: str | None, scheduler_file: Path | None, adapter: str, local_options: Options
+) -> WorkerPool:
     from dermis.apps.batch.dask_cluster import DaskCluster
 
-    if address is not None and file is not None:
+    if scheduler_address is not None and scheduler_file is not None:
         refuse("--cluster", "no --scheduler", "both are given", "Remove one of them")
     refuse_options(local_options, None, "with a dask cluster", "Remove it and start more dask workers")
-    return DaskCluster(address, file, adapter)
+    return DaskCluster(scheduler_address, scheduler_file, adapter)
 
 
 def _print_report(report: RunReport, folder: Path, as_json: bool) -> None:
@@ -238,9 +241,9 @@ _RATE_WINDOW_S = 60.0  # over which the rate is averaged
 
 @contextmanager
 def image_progress() -> Iterator[Callable[[Progress], None]]:
-    """Yield a function that shows the progress of a run: its images, and then the verification of shards.
+    """Yield a function that shows the progress of a run: first rendered images, then verified shards.
 
-    It updates a progress bar in a terminal, and otherwise logs lines.
+    The function updates a progress bar in a terminal, and logs lines if stderr is not a terminal.
     """
     if not sys.stderr.isatty():
         yield ProgressLog(note).report

@@ -46,7 +46,7 @@ def cite(
     scene:
         Scene file whose skin, lights and settings are cited. [default: the default picture]
     against:
-        Reference solution of `dermis compare`: cite it, the error measures and the techniques.
+        Reference solution of `dermis compare`; cite this solution, the error measures and the techniques.
     """
     from dermis.base.citations import bibtex
 

@@ -144,8 +144,9 @@ def _refuse_unused_options(subject: str, options: Options) -> None:
 
 
 def _comparison_arguments(options: Options, sizes: Options) -> Options:
-    """Return the keyword arguments of `dermis.apps.validation.comparisons.compare` for the options.
+    """Return the keyword arguments of `dermis.apps.validation.comparisons.compare` for the command line.
 
+    options : options given on the command line, by name
     sizes : picture and atlas sizes given on the command line
     """
     from dermis.apps.validation.comparisons.scenes import default_region
@@ -266,21 +267,24 @@ def _specular_report(adapter: str) -> Options:
     }
 
 
-def _specular_lines(report: Options, m: float) -> list[str]:
+def _specular_lines(report: Options, roughness: float) -> list[str]:
     from dermis.specular.comparison import normal_incidence_peak
 
     cosine = np.cos(np.radians(_ALBEDO_DEGREES))
     angles = "".join(f"{f'{angle}°':>8}" for angle in _ALBEDO_DEGREES)
     lines = [
-        f"roughness {m:g}, rho_s 1, Schlick's Fresnel term; cost per evaluation on {report['adapter']}",
+        f"roughness {roughness:g}, rho_s 1, Schlick's Fresnel term; "
+        f"cost per evaluation on {report['adapter']}",
         "",
         f"{'model':24}{'peak':>8}{angles}{'reciprocity':>13}{'cost':>10}{'exact':>10}",
         f"{'':24}{'1/sr':>8}{'directional albedo':>40}{'error':>13}{'ns':>10}{'ns':>10}",
     ]
     for name, values in report["models"].items():
-        albedos = "".join(f"{value:8.4f}" for value in directional_albedo(cosine, m, MODELS[name].lobe))
+        albedos = "".join(
+            f"{value:8.4f}" for value in directional_albedo(cosine, roughness, MODELS[name].lobe)
+        )
         costs = "".join(f"{values[key]:10.3g}" for key in ("gpu_ns", "gpu_ns_exact_fresnel"))
-        peak, error = normal_incidence_peak(name, m), values["reciprocity_error"]
+        peak, error = normal_incidence_peak(name, roughness), values["reciprocity_error"]
         lines.append(f"{name:24}{peak:8.4f}{albedos}{error:13.0e}{costs}")
     notes = [(name, values["note"]) for name, values in report["models"].items() if not values["reciprocal"]]
     fresnel = report["hemispherical_fresnel"]
@@ -293,32 +297,32 @@ def _specular_lines(report: Options, m: float) -> list[str]:
     ]
 
 
-def _draw_lobes_and_albedo(folder: Path, m: float) -> None:
+def _draw_lobes_and_albedo(folder: Path, roughness: float) -> None:
     """Plot lobes and directional albedos of the specular models to lobes.png and albedo.png in a folder."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as fault:
         refuse_output(folder, fault)
-    _save_figure(_lobe_figure(m), folder / "lobes.png")
-    _save_figure(_albedo_figure(m), folder / "albedo.png")
+    _save_figure(_lobe_figure(roughness), folder / "lobes.png")
+    _save_figure(_albedo_figure(roughness), folder / "albedo.png")
 
 
 def _distinct_models() -> list[str]:
-    """Return the names of the specular models, without "kelemen-direct", which has the lobe of "kelemen"."""
+    """Return the names of the specular models except "kelemen-direct", which has the lobe of "kelemen"."""
     return [name for name in MODELS if name != _DUPLICATE_MODEL]
 
 
-def _lobe_figure(m: float) -> Figure:
+def _lobe_figure(roughness: float) -> Figure:
     """Return polar plots of reflected intensity in the plane of incidence, one plot per specular model.
 
-    m : Beckmann roughness [-]
+    roughness : Beckmann roughness [-]
     """
-    peak = _lobe_intensity("kelemen", m).max(axis=1, keepdims=True)
-    curves_by_model = {name: np.sqrt(_lobe_intensity(name, m) / peak) for name in _distinct_models()}
+    peak = _lobe_intensity("kelemen", roughness).max(axis=1, keepdims=True)
+    curves_by_model = {name: np.sqrt(_lobe_intensity(name, roughness) / peak) for name in _distinct_models()}
     radius = max(_PLOT_RADIUS, 1.05 * float(np.max(list(curves_by_model.values()))))
     rows = -(-len(curves_by_model) // _PLOT_COLUMNS)
     figure = _empty_figure(3.0 * _PLOT_COLUMNS, 2.4 * rows)
-    figure.suptitle(f"Intensity relative to the peak of kelemen, square root scale; m = {m:g}")
+    figure.suptitle(f"Intensity relative to the peak of kelemen, square root scale; m = {roughness:g}")
     panels = figure.subplots(rows, _PLOT_COLUMNS, subplot_kw={"projection": "polar"}).ravel()
     for axes in panels[len(curves_by_model) :]:
         axes.remove()
@@ -334,10 +338,14 @@ def _lobe_figure(m: float) -> Figure:
     return figure
 
 
-def _lobe_intensity(name: str, m: float) -> Doubles:
+def _lobe_intensity(model_name: str, roughness: float) -> Doubles:
     """Return the reflected intensity f cos(theta_i) cos(theta_o), (3, n), for the BRDF f of a model [1/sr].
 
-    The rows are the angles of incidence `_INCIDENT_COLOURS`, the columns the angles `_view_angles`.
+    The rows are for the angles of incidence in `_INCIDENT_COLOURS`, the columns for the angles of
+    `_view_angles`.
+
+    model_name : name of the specular model
+    roughness : Beckmann roughness [-]
     """
     angle = _view_angles()
     view = np.stack([np.sin(angle), 0.0 * angle, np.cos(angle)], axis=-1)
@@ -345,7 +353,9 @@ def _lobe_intensity(name: str, m: float) -> Doubles:
     for degrees in _INCIDENT_COLOURS:
         theta = np.radians(degrees)
         light = np.broadcast_to([-np.sin(theta), 0.0, np.cos(theta)], view.shape)
-        rows.append(MODELS[name].lobe(cosines(_NORMAL, light, view), m) * np.cos(theta) * np.cos(angle))
+        rows.append(
+            MODELS[model_name].lobe(cosines(_NORMAL, light, view), roughness) * np.cos(theta) * np.cos(angle)
+        )
     return np.stack(rows)
 
 
@@ -353,28 +363,28 @@ def _view_angles() -> Doubles:
     return np.radians(np.linspace(-89.9, 89.9, 1200))
 
 
-def _albedo_figure(m: float) -> Figure:
+def _albedo_figure(roughness: float) -> Figure:
     """Return a plot of the directional albedo of each specular model by angle of incidence.
 
-    m : Beckmann roughness [-]
+    roughness : Beckmann roughness [-]
     """
     figure = _empty_figure(7.2, 4.6)
     axes = figure.subplots()
     degrees = np.linspace(0.0, 89.0, 180)
     for name in _distinct_models():
-        rho = directional_albedo(np.cos(np.radians(degrees)), m, MODELS[name].lobe)
+        rho = directional_albedo(np.cos(np.radians(degrees)), roughness, MODELS[name].lobe)
         axes.plot(degrees, rho, linewidth=1.4, label=name)
     axes.set(xlabel="angle from the normal [°]", ylabel="directional albedo, ρ_s = 1", xlim=(0, 90))
-    axes.set(yscale="log", title=f"Directional albedo, m = {m:g}")
+    axes.set(yscale="log", title=f"Directional albedo, m = {roughness:g}")
     axes.grid(which="major", alpha=0.25, linewidth=0.6)
     axes.legend(frameon=False, fontsize=8)
     return figure
 
 
-def _empty_figure(width: float, height: float) -> Figure:
+def _empty_figure(width_inch: float, height_inch: float) -> Figure:
     """Return an empty matplotlib figure of a given width and height [inch]."""
     figure_class: type[Figure] = import_extra("matplotlib.figure", "plots").Figure
-    return figure_class(figsize=(width, height), dpi=130, layout="constrained")
+    return figure_class(figsize=(width_inch, height_inch), dpi=130, layout="constrained")
 
 
 def _save_figure(figure: Figure, path: Path) -> None:

@@ -69,7 +69,7 @@ def _package_version(name: str) -> str:
 
 
 def _test_adapter(adapter: str) -> Options:
-    """Open an adapter, render a test frame, and return whether the adapter works and how it was chosen."""
+    """Render a test frame on an adapter; return whether the adapter works, as entries of the JSON report."""
     from dermis.frame.renderer import Renderer
     from dermis.gpu.textures import half_store_rounding
 
@@ -90,7 +90,7 @@ def _test_adapter(adapter: str) -> Options:
 
 
 def _render_test_frame(renderer: Renderer) -> Options:
-    """Render a white sphere lit from the camera, and return whether its brightness is right.
+    """Render a white sphere lit from the camera, and return whether the sphere's brightness is right.
 
     The centre must have radiance 1, which is the irradiance over pi, and no pixel may be brighter.
     """

@@ -67,7 +67,8 @@ def export(
         person (.json), a sample or a mesh file).
     output:
         File to write, or a folder, created if necessary, if the name has no suffix. A table of the
-        parameters, their meaning and the errors is written beside it as Markdown and JSON.
+        parameters, their meaning and the errors is written beside the file or into the folder, as Markdown
+        and JSON.
     version:
         Version of the program. [default: newest supported]
     variant:

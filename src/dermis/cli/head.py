@@ -92,9 +92,11 @@ def head(
     output:
         File to write: .glb, or .json with only the parameters of the person, for `dermis render`.
     seed:
-        Seed of a random person; the options below override its values. [default: the average person]
+        Seed of a random person; the options below override values of this person. [default: the average
+        person]
     african:
-        Proportion of this ancestry, 0 to 1; the three are normalised to a sum of 1. [default: 1/3]
+        Proportion of this ancestry, 0 to 1; the three proportions are normalised to a sum of 1. [default:
+        1/3]
     asian:
         Proportion of this ancestry, 0 to 1. [default: 1/3]
     caucasian:
@@ -140,7 +142,7 @@ def head(
     layout:
         uv layout: own (most texels for the face) or hm08 (of MakeHuman, for its skin textures).
     subdivide:
-        Levels of subdivision, 0 to 3; each makes the file four times larger. [default: 1]
+        Levels of subdivision, 0 to 3; each level makes the file four times larger. [default: 1]
     list_targets:
         Print the names of the MakeHuman shape targets and exit.
     as_json:
@@ -187,7 +189,7 @@ def head(
 
 
 def _build_person(seed: int | None, numbers: Options, tone: Options, targets: dict[str, float]) -> Human:
-    """Return the average person, or a random one for a seed, with given parameters and shape targets.
+    """Return the average person, or a random person for a seed, with given parameters and shape targets.
 
     numbers : fields of `Human` by name
     tone : skin ancestry and ITA, for which the skin of a random person is sampled
@@ -217,7 +219,7 @@ def _with_values(look: Look, option_values: list[str] | None, option: str) -> Lo
 
 
 def _with_hair_values(look: HairLook, option_values: list[str] | None) -> HairLook:
-    """Return a copy of a hair look with the fields set by --hair, of which only the style is a word."""
+    """Return a copy of a hair look with the fields set by --hair: a style, and numbers for other fields."""
     pairs = [pair for pair in ",".join(option_values or []).split(",") if pair]
     styles = [pair.removeprefix("style=") for pair in pairs if pair.startswith("style=")]
     numbers = [pair for pair in pairs if not pair.startswith("style=")]

@@ -57,14 +57,14 @@ EyeOptions = Annotated[
 ]
 
 
-def note_eyes(head: Head, requested: str | None) -> None:
+def note_eyes(head: Head, eyes_option: str | None) -> None:
     """Print a note on stderr if the eyeballs of a mesh file were not replaced by the package's eyes.
 
-    requested : value of the option --eyes
+    eyes_option : value of the option --eyes
     """
     if head.note:
         note(f"note: {head.note}")
-    elif requested == "fitted" and head.eyes is None:
+    elif eyes_option == "fitted" and head.eyes is None:
         note("note: eyes: no group has a name of an eye; name the groups with --eye-groups")
 
 
@@ -117,8 +117,9 @@ def _parse_pairs(
 ) -> Iterator[tuple[str, list[float]]]:
     """Yield the name and the numbers of each option value "NAME=NUMBER,...".
 
-    count : number of numbers that each value must have
-    option, expected : name of the option and its format, for error messages
+    count : how many numbers each value must have
+    option : name of the option, for error messages
+    expected : expected format of the values, for error messages
     """
     for item in texts:
         name, _, text = item.rpartition("=")
@@ -133,7 +134,8 @@ def pose_from_options(
 ) -> Pose:
     """Return the pose of the options --pose and --bone.
 
-    weights, bone_angles : morph target weights, and three angles per bone [degrees], by name
+    weights : morph target weights by name of the target [-]
+    bone_angles : rotation about x, y and z by name of the bone [degrees]
     name : head as named on the command line, for error messages
 
     Raises DermisError for targets and bones that the head does not have.
@@ -166,7 +168,7 @@ def pose_with_gaze(option_value: str, scene: Scene) -> Pose:
 
 
 def _parse_numbers(text: str) -> list[float] | None:
-    """Return the numbers of a comma-separated text; None if one is not a number or exceeds 1e10."""
+    """Return the numbers of a comma-separated text; None if a part is not a number or exceeds 1e10."""
     try:
         numbers = [float(part) for part in text.split(",")]
     except ValueError:

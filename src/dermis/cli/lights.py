@@ -42,7 +42,10 @@ def lights(name: str = "", /, *, as_json: JsonOption = False) -> int:
     return 0
 
 
-def _first_sentence(text: str) -> str:
-    """Return the first sentence of the comment at the top of a TOML file, which describes a light preset."""
-    comment = " ".join(line.lstrip("# ") for line in text.split("\n\n")[0].splitlines())
+def _first_sentence(preset_toml: str) -> str:
+    """Return the first sentence of the comment at the top of a light preset: its summary.
+
+    preset_toml : TOML of the preset
+    """
+    comment = " ".join(line.lstrip("# ") for line in preset_toml.split("\n\n")[0].splitlines())
     return comment.split(". ")[0].rstrip(".") + "."

@@ -25,7 +25,7 @@ def _to_int(_: type, tokens: Sequence[Token]) -> int:
 
 
 def _to_choice(model: type[FrozenModel], field: str, kind: object, tokens: Sequence[Token]) -> str:
-    """Return the choice that was typed; it is checked only now, as plug-ins may have registered more."""
+    """Return the choice that was typed, after a check against all choices, including those of plug-ins."""
     from dermis.scene.frozen_model import field_choices
 
     if (word := tokens[0].value) in (choices := field_choices(model, field)):
@@ -77,12 +77,14 @@ def model_options(
 ) -> Any:
     """Return a parameter type for cyclopts that has one option per field of a settings model.
 
-    Each option has the type, choices, bounds and help of its field; fields that hold other models have no
-    option. The parameter's value is a dictionary of the given options by field name.
+    An option has the type, choices, bounds and help of the field; fields that hold other models have no
+    option. The value of the parameter is a dictionary from field names to the options given on the command
+    line.
 
-    only, without : names of the fields to include (all by default) and to exclude
-    names : option names by field, where they differ from the name of the field
-    defaults : defaults by field, which the help shows instead of the model's
+    only : names of the fields to include; all fields by default
+    without : names of the fields to exclude
+    names : option names that differ from the field name, by field name
+    defaults : defaults that the help shows in place of the model's defaults, by field name
     """
     from dermis.scene.frozen_model import field_heading
 
@@ -106,13 +108,13 @@ def drop_none(**options: object) -> Options:
 def option_name(field: str, names: Mapping[str, str] | None = None) -> str:
     """Return the command line option for a field, such as --rho-s for rho_s.
 
-    names : option names of fields, where they differ from the name of the field
+    names : option names that differ from the field name, by field name
     """
     return "--" + (names or {}).get(field, field).replace("_", "-")
 
 
 def is_option(model: type[FrozenModel], field: str) -> bool:
-    """Return whether a field gets an option: it holds words, numbers or tuples of them, not other models."""
+    """Return whether a field gets an option: a field of words, numbers or tuples, but not of models."""
     return _option_type(model, field)[0] is not None
 
 
@@ -164,9 +166,9 @@ def _option_help(model: type[FrozenModel], field: str, defaults: Mapping[str, ob
 
 
 def check_fields(model: type[M], values: Mapping[str, object], names: Mapping[str, str] | None = None) -> M:
-    """Return a model with given field values; its errors name the option instead of the field.
+    """Return a model with given field values; error messages name the option instead of the field.
 
-    names : option names by field, where they differ from the name of the field
+    names : option names that differ from the field name, by field name
 
     Raises DermisError for invalid values.
     """
@@ -181,10 +183,12 @@ def check_fields(model: type[M], values: Mapping[str, object], names: Mapping[st
 
 
 def refuse_options(fields: Iterable[str], names: Mapping[str, str] | None, context: str, advice: str) -> None:
-    """Raise DermisError if any option is given where it would have no effect.
+    """Raise DermisError if any option is given in a context in which it would have no effect.
 
     fields : field names of the given options
-    context, advice : end of the message, such as "with a dask cluster", and advice to the user
+    names : option names that differ from the field name, by field name
+    context : description of the context for the message, such as "with a dask cluster"
+    advice : advice to the user
     """
     for field in fields:
         refuse(option_name(field, names), f"no such option {context}", "it is given", advice)

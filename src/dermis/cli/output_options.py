@@ -41,7 +41,7 @@ OutputsFormatOption = Annotated[
 
 
 class FrameOutputs:
-    """Outputs of a frame requested with --outputs, such as depth, and the files they are written to.
+    """Outputs of a frame requested with --outputs, such as depth, and the files to which they are written.
 
     Raises DermisError for unknown outputs and for files that cannot be written.
     """
@@ -72,7 +72,8 @@ class FrameOutputs:
     def write(self, picture: Floats | None, values: Mapping[str, PlaneArray]) -> None:
         """Write the outputs to their files.
 
-        picture : linear image, which shares one EXR file with the outputs; None for separate files
+        picture : linear image that shares one EXR file with the outputs; None if the outputs have separate
+            files
         values : pixel arrays by output name
         """
         from dermis.frame.output_files import write_multipart, write_output
@@ -104,7 +105,7 @@ LandmarksOption = Annotated[
 
 
 class FrameLandmarks:
-    """Landmark sets requested with --landmarks, and the JSON file they are written to.
+    """Landmark sets requested with --landmarks, and the JSON file to which they are written.
 
     Raises DermisError for unknown sets and for a file that cannot be written.
     """
@@ -162,7 +163,7 @@ class AnimationOutput:
     """Output of `dermis animate`: a movie file or numbered images.
 
     path : movie file, or image files with a number format such as %05d
-    crf : constant rate factor of the movie, which sets its quality; None for the default
+    crf : constant rate factor, the quality of the movie; None for the default quality
     overwrite : whether existing numbered images are rendered again
     """
 
@@ -198,7 +199,7 @@ class AnimationOutput:
         check_movie(self.path, size, DEFAULT_CRF if self.crf is None else self.crf)
 
     def frames_to_render(self, numbers: range, size: tuple[int, int], digest: str) -> Sequence[int]:
-        """Return the numbers of the frames to render: those without a complete image of an earlier run.
+        """Return the numbers of the frames to render: frames without a complete image of an earlier run.
 
         digest : hash of everything that determines the frames; images with another hash are rendered again
         """
@@ -212,7 +213,10 @@ class AnimationOutput:
 
     @contextmanager
     def open_writer(self, size: tuple[int, int], rate: Fraction) -> Iterator[WriteFrame]:
-        """Yield a function that queues a frame for writing; the context ends when all frames are written."""
+        """Yield a function that queues a frame for writing; the with block ends when all frames are written.
+
+        rate : frame rate of a movie [1/s]
+        """
         from dermis.images.movie import DEFAULT_CRF, MovieWriter
         from dermis.images.writer import FrameFiles, ImageWriter
 

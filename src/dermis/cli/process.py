@@ -31,8 +31,9 @@ _OPEN_MODES = os.O_RDONLY, os.O_RDONLY, os.O_WRONLY  # for null devices that rep
 class StandardStreams:
     """Context manager that replaces stdout and stderr by streams whose write methods never raise.
 
-    A stream that is closed from the start is treated as one that cannot be written to. Its file descriptor is
-    reserved, because otherwise the next opened file would get it and libraries would print into that file.
+    A stream that is closed at the start is treated as a stream to which all writes fail. The file descriptor
+    of such a stream is reserved; otherwise the next opened file would get it, and libraries would print into
+    that file.
     """
 
     def __enter__(self) -> Self:
@@ -42,9 +43,9 @@ class StandardStreams:
         self._original = sys.stdout, sys.stderr
         self._raw: list[_GuardedStream] = []
         if sys.stdout is sys.__stdout__:
-            sys.stdout = self._guarded(sys.stdout, 1)
+            sys.stdout = self._guarded_stream(sys.stdout, 1)
         if sys.stderr is sys.__stderr__:
-            sys.stderr = self._guarded(sys.stderr, 2)
+            sys.stderr = self._guarded_stream(sys.stderr, 2)
         return self
 
     def __exit__(
@@ -63,12 +64,12 @@ class StandardStreams:
         return next((fault for fault in faults if not isinstance(fault, BrokenPipeError)), None)
 
     def discard_stdout(self) -> None:
-        """Discard the buffered output to stdout after an interruption, as its reader may be blocked."""
+        """Discard the buffered output to stdout after an interruption, as a reader of it may be blocked."""
         for raw in self._raw:
             if raw.descriptor == 1:
                 raw.fault = raw.fault or BrokenPipeError()
 
-    def _guarded(self, original: TextIO | None, descriptor: int) -> TextIO:
+    def _guarded_stream(self, original: TextIO | None, descriptor: int) -> TextIO:
         inner: Any = original.buffer if original else io.FileIO(descriptor, "w", closefd=False)
         raw = _GuardedStream(getattr(inner, "raw", inner), descriptor)
         self._raw.append(raw)
@@ -84,7 +85,7 @@ class _GuardedStream(io.RawIOBase):
     """Raw output stream that discards all data after the first failed write.
 
     inner : raw stream that receives the data
-    descriptor : file descriptor
+    descriptor : file descriptor of the stream
     fault : error of the first failed write; None until then
     """
 
@@ -116,12 +117,12 @@ class _GuardedStream(io.RawIOBase):
         return self._inner.isatty()
 
 
-def _reserve_descriptor(descriptor: int, mode: int) -> None:
+def _reserve_descriptor(descriptor: int, open_mode: int) -> None:
     """Open the null device at a file descriptor, 0 to 2, unless that descriptor is already open."""
     try:
         os.fstat(descriptor)
     except OSError:
-        null_device = os.open(os.devnull, mode)
+        null_device = os.open(os.devnull, open_mode)
         if null_device != descriptor:
             os.dup2(null_device, descriptor)
             os.close(null_device)
@@ -154,7 +155,7 @@ class Interruption:
         self._resent = 0  # signals that this object sent again
 
     def __enter__(self) -> Self:
-        """Install the signal handlers; no effect outside the main thread."""
+        """Install the signal handlers; do nothing outside the main thread."""
         if threading.current_thread() is not threading.main_thread():
             return self
         for signal_number in _SIGNALS:
@@ -190,12 +191,12 @@ class Interruption:
             return
         if (loop := _running_loop()) is not None:  # raised inside a task, asyncio would print it
             self._is_raised = True
-            loop.call_soon_threadsafe(_interrupt)
+            loop.call_soon_threadsafe(_raise_keyboard_interrupt)
         elif _would_be_swallowed(frame):
             self._raise_later()
         else:
             self._is_raised = True
-            _interrupt()
+            _raise_keyboard_interrupt()
 
     def _raise_later(self) -> None:
         self._is_raised, self._is_postponed = False, True
@@ -209,7 +210,7 @@ class Interruption:
             self._original_hook(error)
 
     def _watch(self) -> None:
-        """Wait for signals in a thread: end the process after a second one, repeat a postponed one.
+        """Wait for signals in a thread: end the process after a second signal, and repeat a postponed signal.
 
         The main thread handles signals only between Python instructions, not inside a library.
         """
@@ -241,7 +242,7 @@ class Interruption:
             signal.raise_signal(signal_number)
 
 
-def _interrupt() -> None:
+def _raise_keyboard_interrupt() -> None:
     raise KeyboardInterrupt
 
 
@@ -257,9 +258,9 @@ def _running_loop() -> AbstractEventLoop | None:
 
 
 def _would_be_swallowed(frame: FrameType | None) -> bool:
-    """Return whether an exception in this frame would be swallowed by a library that called it.
+    """Return whether a library that called the code in a stack frame would swallow an exception.
 
-    Examples are callbacks of a graphics driver and modules during their import.
+    Examples of such code are callbacks of a graphics driver, and modules during an import.
     """
     while frame is not None:
         package, name = str(frame.f_globals.get("__name__")).partition(".")[0], frame.f_code.co_name

@@ -28,7 +28,7 @@ _OPTION_NAMES = {"structure": "skin"}
 
 
 def _default_pigments() -> dict[str, str]:
-    """Return the default of each pigment option for the help, with the values of named skins that differ."""
+    """Return the default of each pigment option for the help, with the different values of named skins."""
     defaults: dict[str, str] = {"structure": DEFAULT_STRUCTURE}
     for field in Pigments.model_fields.keys() - defaults.keys():
         default = getattr(DEFAULT_SKIN, field)
@@ -50,7 +50,7 @@ else:
 Clamp = Literal["layer", "none"]
 Model = Literal["counted", "dipole", "better-dipole", "multipole", "layered", "layered-point", "montecarlo"]
 
-_TERMS, _PHOTONS, _MAX_PHOTONS = 6, 1_000_000, 10**10
+_DEFAULT_TERM_COUNT, _DEFAULT_PHOTON_COUNT, _MAX_PHOTON_COUNT = 6, 1_000_000, 10**10
 
 
 def profile(
@@ -154,7 +154,7 @@ def profile(
             model_error = error_against_photons(radial, monte_carlo)
         spectrum = _reflectance_spectrum(tissue, model, clamp)
     conserve = keep_energy or radial.model == COUNTED_MODEL
-    table_fit, terms = (table, _TERMS) if fit is None else (None, fit)
+    table_fit, terms = (table, _DEFAULT_TERM_COUNT) if fit is None else (None, fit)
     fitted = gaussian_fit(radial, table_fit, terms, shared=variances == "shared", keep_energy=conserve)
     report = ProfileReport(
         radial, tissue, fitted, additional_fit(radial, fit_kind), thicknesses, model_error, spectrum
@@ -186,14 +186,16 @@ def _check_outputs(output: Path | None, plot: Path | None, check: bool) -> None:
 def _tracing_options(photons: int | None, seed: int | None, anisotropy: float, is_traced: bool) -> Options:
     """Return the keyword arguments of the Monte Carlo simulation.
 
-    Prints a note if any of them is given although no simulation will run.
+    Prints a note if an option of the simulation is given although no simulation will run.
 
     is_traced : whether a simulation will run
     """
     if not is_traced and (photons, seed, anisotropy) != (None, None, 0.0):
         note("note: --photons, --seed and --anisotropy have no effect without --model montecarlo or --check")
     return {
-        "photons": checked_integer("--photons", _PHOTONS if photons is None else photons, 1, _MAX_PHOTONS),
+        "photons": checked_integer(
+            "--photons", _DEFAULT_PHOTON_COUNT if photons is None else photons, 1, _MAX_PHOTON_COUNT
+        ),
         "seed": checked_integer("--seed", seed or 0, 0, 2**63 - 1),
         "g": checked_number("--anisotropy", anisotropy, -1.0, 1.0, "a mean cosine"),
     }

@@ -62,7 +62,10 @@ def gaussian_fit(
 
 
 def additional_fit(radial: RadialProfile, kind: str) -> BurleyFit | SeparableFit | None:
-    """Return the fit named by --fit-kind, "burley" or "separable"; None for "gaussian"."""
+    """Return the fit that --fit-kind requests in addition to Gaussians; None for "gaussian".
+
+    kind : "burley", "separable" or "gaussian"
+    """
     if kind == "burley":
         return fit_burley(radial.rings())
     return fit_separable(radial.rings()) if kind == "separable" else None
@@ -70,14 +73,14 @@ def additional_fit(radial: RadialProfile, kind: str) -> BurleyFit | SeparableFit
 
 @dataclass(frozen=True)
 class ProfileReport:
-    """Diffusion profile with its fits and their errors, as `dermis profile` prints it.
+    """Diffusion profile with fits and the errors of the fits, as `dermis profile` prints them.
 
     radial : diffusion profile
     tissue : tissue that the profile describes; None for a table of Gaussians
     fit : fitted Gaussians and their error
     other_fit : Burley or separable fit; None if not requested
     through_mm : thicknesses at which the transmitted colour is reported [mm]
-    model_error : error of the diffusion model relative to Monte Carlo, None if unknown
+    model_error : error of the diffusion model relative to Monte Carlo; None if this error is unknown
     spectrum : (31,) total reflectance by wavelength; None for tissue given by RGB coefficients [-]
     """
 
@@ -241,7 +244,7 @@ class ProfileReport:
 _CHANNEL_COLOURS = ("#c0392b", "#2e8b57", "#2a62b0")
 _LEGEND_ABOVE: dict[str, Any] = {"frameon": False, "loc": "lower left", "bbox_to_anchor": (0, 1)}
 _LAYER_COLOURS = ("#b8860b", "#8e44ad", "#16808a", "#7f8c8d")
-_DASHES = (0, (4, 3))
+_DASH_PATTERN = (0, (4, 3))
 _CHANNEL_NAMES = ("red", "green", "blue")
 _PLOT_FLOOR = 1e-5  # lowest plotted value, relative to the peak of r R(r); smaller values are noise
 _DATELESS_METADATA: dict[str, dict[str, str | None]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
@@ -286,7 +289,7 @@ def _plot_spectra(axes: Axes, report: ProfileReport) -> None:
     right.set(yscale="log", ylabel="µa, µs′ [1/mm]")
     for layer, colour in zip(report.tissue.medium.layers, _LAYER_COLOURS, strict=False):
         right.plot(WAVELENGTHS_NM, layer.sigma_a, color=colour, linewidth=1.0, label=f"µa, {layer.name}")
-        dashed: dict[str, Any] = {"linestyle": _DASHES, "label": f"µs′, {layer.name}"}
+        dashed: dict[str, Any] = {"linestyle": _DASH_PATTERN, "label": f"µs′, {layer.name}"}
         right.plot(WAVELENGTHS_NM, layer.sigma_s_prime, color=colour, linewidth=1.0, **dashed)
     lines = [*axes.get_lines(), *right.get_lines()]
     axes.legend(lines, [str(line.get_label()) for line in lines], ncols=5, fontsize=7, **_LEGEND_ABOVE)
@@ -301,7 +304,7 @@ def _add_legend(figure: Figure, axes: Axes) -> None:
 
 
 def _plot_curves(axes: Axes, report: ProfileReport) -> float:
-    """Plot r R(r) of a profile and of its fits per colour channel; return the peak."""
+    """Plot r R(r) of a diffusion profile and of its fits per colour channel; return the maximum [1/mm]."""
     radial, fit = report.radial, report.fit.profile
     r = radial.radius_mm
     fitted = fit.radiant_exitance(r)
@@ -315,7 +318,9 @@ def _plot_curves(axes: Axes, report: ProfileReport) -> float:
             peak = max(peak, float((r * radial.reflectance[:, channel]).max()))
         terms = len(fit.weight) if report.fit.shared else np.count_nonzero(fit.weight[:, channel])
         label = f"{name}, {terms} Gaussians, error {report.fit.error[channel]:.2%}"
-        axes.plot(r, r * fitted[:, channel], color=colour, linewidth=1.1, linestyle=_DASHES, label=label)
+        axes.plot(
+            r, r * fitted[:, channel], color=colour, linewidth=1.1, linestyle=_DASH_PATTERN, label=label
+        )
         if isinstance(report.other_fit, BurleyFit):
             other = r * report.other_fit.profile.radiant_exitance(r)[:, channel]
             label = f"{name}, Burley, error {report.other_fit.error[channel]:.1%} of rings"
@@ -324,7 +329,7 @@ def _plot_curves(axes: Axes, report: ProfileReport) -> float:
 
 
 def _plot_photons(axes: Axes, profile: RadialProfile) -> float:
-    """Plot r R(r) of a Monte Carlo profile as points with error bars; return the peak."""
+    """Plot r R(r) of a Monte Carlo profile as points with error bars; return the maximum [1/mm]."""
     r, peak = profile.radius_mm, 0.0
     error: Floats = profile.standard_error if profile.standard_error is not None else np.zeros((len(r), 3))
     for channel, colour in enumerate(_CHANNEL_COLOURS):

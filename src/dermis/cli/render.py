@@ -127,7 +127,7 @@ def render(
 
 @contextlib.contextmanager
 def _gc_disabled() -> Iterator[None]:
-    """Disable garbage collection in a context: for one picture, it takes time and frees little memory."""
+    """Disable garbage collection in a with block; for one picture, collection frees little memory."""
     was_enabled = gc.isenabled()
     gc.disable()
     try:
@@ -160,8 +160,8 @@ def _write_images(
 def _note_light(scene: Scene, settings: Settings, rendered: RenderedFrame) -> None:
     """Print notes on stderr about lighting that may surprise users.
 
-    There is one each for skin triangles lit without scattering, for sun-like peaks of the environment, and
-    for the setting gamma "wrong".
+    There is one note for skin triangles that are lit without scattering, one for sun-like peaks of the
+    environment, and one for the setting gamma "wrong".
     """
     technique, suns = TECHNIQUES[settings.technique], rendered.suns
     if technique.uses_atlas and technique.stitches_seams and rendered.unscattered_fraction > _MAX_UNSCATTERED:

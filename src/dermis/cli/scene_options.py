@@ -147,14 +147,14 @@ def note_subdivision(name: str, options: SceneOptions, head: Head) -> None:
         note(f"note: --subdivide {head.levels} for a smooth outline in this picture: {count}")
 
 
-def _check_values(name: str, options: SceneOptions) -> None:
-    """Validate all options before the head is loaded, which takes longer."""
+def _check_values(head_or_scene: str, options: SceneOptions) -> None:
+    """Validate all options before the head is loaded, as loading takes longer than the validation."""
     from dermis.environment.panorama import panorama_file
     from dermis.optics.profiles import load_profile
 
     eye_values = options.head.get("eye", {})
     check_fields(EyeTable, eye_values, {field_: f"eye {field_}" for field_ in eye_values})
-    check_head(name, options.head)
+    check_head(head_or_scene, options.head)
     check_fields(Skin, options.skin)
     check_fields(Settings, options.settings)
     check_fields(Environment, {"name": "uniform"} | options.environment, ENVIRONMENT_OPTION_NAMES)
@@ -172,17 +172,17 @@ def _note_profile_map(skin: Skin, settings: Settings) -> None:
         note(f"note: {settings.technique} uses only the first profile; texture-space mixes them by the map")
 
 
-def _base_scene(name: str, options: SceneOptions) -> tuple[Scene, Settings]:
+def _base_scene(head_or_scene: str, options: SceneOptions) -> tuple[Scene, Settings]:
     """Return the scene of a scene file, or a default scene of a head, before options are applied."""
     from dermis.scene import Scene, load_camera, load_scene
     from dermis.scene.files import head_and_skin
     from dermis.scene.smoothness import SmoothIn
 
-    if Path(name).suffix.lower() == ".toml":
+    if Path(head_or_scene).suffix.lower() == ".toml":
         refuse_options(options.head, HEAD_OPTION_NAMES, "with a scene file", "Set it in the file's [head]")
-        return load_scene(Path(name), camera=options.camera, size=options.settings.get("size"))
+        return load_scene(Path(head_or_scene), camera=options.camera, size=options.settings.get("size"))
     region_options = {"regions": NO_REGIONS} if options.surface == "deck-2007" else {}
-    table = HeadTable(**{"name": name, **region_options, **options.head})
+    table = HeadTable(**{"name": head_or_scene, **region_options, **options.head})
     if has_region_table(vars(table)) and "rho_s" in options.skin:
         actual = "it is given with --regions, which sets it for each region"
         refuse(option_name("rho_s"), "only one of the two", actual, "Remove one, or use --oiliness")
@@ -202,17 +202,21 @@ def _merge_environment(scene_environment: Environment | None, options: Options) 
 
 
 def _select_lights(
-    scene: Scene, name: str | None, environment: Environment | None, *, replaces_environment: bool
+    scene: Scene, rig_or_file: str | None, environment: Environment | None, *, replaces_environment: bool
 ) -> tuple[Light, ...]:
-    """Return the lights of --lights; none if only --env is given; otherwise those of the scene.
+    """Return the lights of --lights; without --lights, no lights if --env is given, else the scene's lights.
 
+    rig_or_file : value of --lights: name of a lighting rig, or path of a file; None if the option is not
+        given
     replaces_environment : whether --env replaces the environment
     """
     from dermis.scene import load_lights
 
-    if name is None:
+    if rig_or_file is None:
         return () if replaces_environment else tuple(scene.lights)
-    lights = load_lights(name, scene.head)
+    lights = load_lights(rig_or_file, scene.head)
     if not lights and environment is None:
-        refuse("--lights", "at least one light", f"{name!r} has none", "Add --env, or choose another rig")
+        refuse(
+            "--lights", "at least one light", f"{rig_or_file!r} has none", "Add --env, or choose another rig"
+        )
     return lights

@@ -160,7 +160,7 @@ def _unmix_spectra(
 def _parse_change(
     melanin: str | None, blood: str | None, oxygen: float | None, eumelanin: float | None
 ) -> PigmentChange | None:
-    """Return the change of pigments that the recolouring options request; None without such options."""
+    """Return the change of pigments that the recolouring options request; None if no option is given."""
     from dermis.apps.inverse.unmixing.unmix import PigmentChange, parse_fraction_change
     from dermis.base.quantities import checked_number
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from dermis.apps.viewer.state import ViewerState
 
 _HOST, _PORT, _WINDOW = "127.0.0.1", 8765, (1280, 800)
-_ATLAS_ON_CPU = 1024  # a still frame with the default atlas takes several seconds on a CPU
+_ATLAS_SIDE_ON_CPU = 1024  # a still frame with the default atlas takes several seconds on a CPU
 
 
 def view(
@@ -77,43 +77,47 @@ def view(
         refuse("--motion-fps", "the option --motion", "it is missing", "Add --motion FILE")
     from dermis.apps.viewer.windows import serve, show_window
 
-    def load() -> tuple[ViewerState, MotionFile | None]:
+    def load_state_and_motion() -> tuple[ViewerState, MotionFile | None]:
         state = _initial_state(head, scene, adapter)
         return state, _load_motion(motion, motion_fps, state)
 
     window = scene.settings.get("size", _WINDOW)
     if browser:
         address = host or _HOST, _PORT if port is None else port
-        serve(load, adapter, window, *address, _print_url, require_token=token)
+        serve(load_state_and_motion, adapter, window, *address, _print_url, require_token=token)
     else:
         with spinner("loading"):
-            state, motion_clip = load()
+            state, motion_clip = load_state_and_motion()
         show_window(state, adapter, window, motion=motion_clip)
     return 0
 
 
-def _initial_state(name: str, options: SceneOptions, adapter: str) -> ViewerState:
-    """Return the state of the viewer at its start, for a head or scene file and the options."""
+def _initial_state(head_or_scene: str, options: SceneOptions, adapter: str) -> ViewerState:
+    """Return the initial state of the viewer for a head or scene file and the command line options."""
     from dermis.apps.viewer.state import initial_state
     from dermis.gpu.adapters import select_adapters
     from dermis.scene.files import head_table, with_absolute_paths
 
-    is_scene = Path(name).suffix.lower() == ".toml"
-    scene, settings = assemble_scene(name, options)
+    is_scene = Path(head_or_scene).suffix.lower() == ".toml"
+    scene, settings = assemble_scene(head_or_scene, options)
     if "atlas" not in options.settings and not is_scene and select_adapters(adapter)[0][0].kind == "CPU":
-        settings = settings.model_copy(update={"atlas": _ATLAS_ON_CPU})
-    table = head_table(Path(name)) if is_scene else with_absolute_paths({"name": name} | options.head, Path())
+        settings = settings.model_copy(update={"atlas": _ATLAS_SIDE_ON_CPU})
+    table = (
+        head_table(Path(head_or_scene))
+        if is_scene
+        else with_absolute_paths({"name": head_or_scene} | options.head, Path())
+    )
     rig = "" if is_scene else "none" if "name" in options.environment else "studio"
     return initial_state(scene, settings, table, rig if options.lights is None else options.lights)
 
 
-def _load_motion(file: str | None, fps: float | None, state: ViewerState) -> MotionFile | None:
-    """Load the motion file for the head before the window opens; None without a motion file."""
-    if file is None:
+def _load_motion(motion_path: str | None, fps: float | None, state: ViewerState) -> MotionFile | None:
+    """Load the motion file for the head, before the window opens; return None if no file is named."""
+    if motion_path is None:
         return None
     from dermis.apps.viewer.player import MotionFile
 
-    motion = MotionFile(file, fps)
+    motion = MotionFile(motion_path, fps)
     if text := motion.load_clip(state.scene.head).note:
         note(text)
     return motion

@@ -13,34 +13,36 @@ Complex = NDArray[np.complex128]
 _KERNEL_NODES = 4096
 
 
-def legendre_functions(cosine: Floats, degree: int, orders: int) -> list[Floats]:
-    """Return the associated Legendre functions up to `degree`, an array for each order m < `orders`.
+def legendre_functions(cosine: Floats, degree: int, order_count: int) -> list[Floats]:
+    """Return the associated Legendre functions up to `degree`, as one array for each order m.
 
-    The array of order m is (degree + 1 - m, n). Functions are fully normalised: times exp(i m phi), the
-    integral of the squared modulus over the sphere is 1. They are computed by recurrence in the degree
-    [HolmesFeatherstone2002].
+    The array of order m has the shape (degree + 1 - m, n). The functions are fully normalised: a function
+    times exp(i m phi) has a squared modulus with integral 1 over the sphere. The functions are computed by
+    recurrence in the degree [HolmesFeatherstone2002].
 
     cosine : (n,) cosines of the polar angle
+    order_count : number of orders m, from 0
     """
     sine = np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
-    table = np.zeros((orders, degree + 1, *cosine.shape))
+    table = np.zeros((order_count, degree + 1, *cosine.shape))
     table[0, 0] = np.sqrt(0.25 / np.pi)
-    for m in range(1, orders):
+    for m in range(1, order_count):
         table[m, m] = np.sqrt((2.0 * m + 1.0) / (2.0 * m)) * sine * table[m - 1, m - 1]
     for l in range(1, degree + 1):
-        if l <= orders:
+        if l <= order_count:
             table[l - 1, l] = np.sqrt(2.0 * l + 1.0) * cosine * table[l - 1, l - 1]
-        order = np.arange(min(l - 1, orders), dtype=np.float64)[:, None]
+        order = np.arange(min(l - 1, order_count), dtype=np.float64)[:, None]
         a = np.sqrt((4.0 * l * l - 1.0) / (l * l - order**2))
         b = np.sqrt(((l - 1.0) ** 2 - order**2) / (4.0 * (l - 1.0) ** 2 - 1.0))
         table[: len(order), l] = a * (cosine * table[: len(order), l - 1] - b * table[: len(order), l - 2])
-    return [table[m, m:] for m in range(orders)]
+    return [table[m, m:] for m in range(order_count)]
 
 
 def analyse_panorama(radiance: Floats, degree: int) -> list[Complex]:
     """Return the spherical harmonic coefficients of a panorama, an array for each order m from 0 to `degree`.
 
-    The array of order m is (degree + 1 - m, c); as the panorama is real, negative orders are redundant.
+    The array of order m has the shape (degree + 1 - m, c). As radiance is real, negative orders are
+    redundant.
 
     radiance : (h, w, c) radiance of the panorama
     """
@@ -73,7 +75,7 @@ def synthesise_panoramas(coefficients: list[Complex], factors: Floats, height: i
     """Return k panoramas (k, height, 2 height, c) from one set of coefficients, scaled by k sets of factors.
 
     coefficients : coefficients of the spherical harmonics, see `analyse_panorama`
-    factors : (k, degree + 1) factor of each panorama for each degree, such as those of `zonal_factors`
+    factors : (k, degree + 1) factor of each panorama for each degree, such as k results of `zonal_factors`
     """
     width, channels = 2 * height, coefficients[0].shape[1]
     count, degree = factors.shape[0], factors.shape[1] - 1
@@ -87,7 +89,7 @@ def synthesise_panoramas(coefficients: list[Complex], factors: Floats, height: i
 
 
 def _complex_product(matrix: Floats, values: Complex) -> Complex:
-    """Return the product of a real and a complex matrix, without converting the real one to complex."""
+    """Return the product of a real and a complex matrix, without converting the real matrix to complex."""
     return (matrix @ np.ascontiguousarray(values).view(np.float64)).view(np.complex128)
 
 
@@ -100,7 +102,7 @@ def _legendre_table(height: int, degree: int) -> list[Floats]:
 @lru_cache(maxsize=1)
 def _kernel_polynomials(degree: int) -> Floats:
     """Return the Legendre polynomials (degree + 1, n) at the angles over which kernels are integrated."""
-    (functions,) = legendre_functions(np.cos(_kernel_angles()), degree, orders=1)
+    (functions,) = legendre_functions(np.cos(_kernel_angles()), degree, order_count=1)
     return np.asarray(functions * np.sqrt(4.0 * np.pi / (2.0 * np.arange(degree + 1) + 1.0))[:, None])
 
 

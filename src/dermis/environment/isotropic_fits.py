@@ -1,7 +1,8 @@
 """Least-squares fits of sums of isotropic lobes to specular lobes.
 
 At each node of a table over roughness and view angle, five isotropic lobes approximate the specular lobe.
-Each of them has four parameters, relative to the mean direction and standard deviations of the specular lobe.
+Each isotropic lobe has four parameters, relative to the mean direction and standard deviations of the
+specular lobe.
 """
 
 from __future__ import annotations
@@ -52,16 +53,19 @@ _INITIAL_LOBES = np.array(
 def fit_isotropic_lobes(lobe: Lobe) -> Floats:
     """Return a table (12, 16, 5, 4) of the five isotropic lobes that approximate a specular lobe.
 
-    Axes are roughness (LOBE_TABLE_ROUGHNESSES), view (LOBE_TABLE_COSINES), lobe, and parameter: angle from
-    the normal away from the viewer [rad], angle from the plane of incidence [rad], roughness, weight.
+    The axes of the table are roughness (LOBE_TABLE_ROUGHNESSES), view (LOBE_TABLE_COSINES), lobe, and
+    parameter: angle from the normal away from the viewer [rad], angle from the plane of incidence [rad],
+    roughness, weight.
 
-    Three lobes are in the plane of incidence; for views near the normal only two or one of them have weight.
-    The other two are a pair: on both sides of the plane, or in it where the specular lobe is elongated. The
-    fit minimises the expected difference between what the specular lobe and the sum of the isotropic lobes
-    reflect. The expectation is over random environments whose power falls with the harmonic degree, and which
-    have light below the horizon too. Fits proceed from rough surfaces and grazing views to smooth surfaces
-    and views along the normal. Each starts at the mean of its neighbours, so that lobes vary smoothly over
-    the table.
+    Three lobes are in the plane of incidence; for views near the normal, only one or two of these lobes have
+    weight. The other two lobes are a pair: on both sides of the plane of incidence or, where the specular
+    lobe is elongated, in the plane.
+
+    The fit minimises the expected difference between the reflections of a random environment by the specular
+    lobe and by the sum of the isotropic lobes. The power of the environment falls with the harmonic degree,
+    and light also comes from below the horizon. Fits proceed from rough surfaces and grazing views to smooth
+    surfaces and views along the normal. A fit starts at the mean of adjacent table nodes that are already
+    fitted, so that lobes vary smoothly over the table.
     """
     found: dict[TableNode, Floats] = {}
     cosines, roughnesses = LOBE_TABLE_COSINES.tolist(), LOBE_TABLE_ROUGHNESSES.tolist()
@@ -92,23 +96,23 @@ def _active_lobes(view_index: int) -> NDArray[np.bool_]:
     return np.array([k < _IN_PLANE_LOBES[view_index] or k >= LOBE_COUNT - 2 for k in range(LOBE_COUNT)])
 
 
-def _parameter_direction(kind: int, *amounts: tuple[int, float]) -> Floats:
-    """Return a direction (20,) in the space of the lobe parameters: a change of one kind in some lobes.
+def _parameter_direction(parameter: int, *amounts: tuple[int, float]) -> Floats:
+    """Return a direction (20,) in the space of the lobe parameters: a change of one parameter in some lobes.
 
-    kind : parameter that changes, such as `_POSITION`
-    amounts : index of each lobe that changes, and its component of the direction
+    parameter : parameter that changes, such as `_POSITION`
+    amounts : pairs of the index of a lobe, and the change of the parameter of this lobe
     """
     change = np.zeros((4, LOBE_COUNT))
     for lobe, amount in amounts:
-        change[kind, lobe] = amount
+        change[parameter, lobe] = amount
     return change.ravel()
 
 
 def _free_directions(target: LobeTarget, view_index: int) -> Floats:
     """Return the directions (20, k) in parameter space along which a fit moves the lobes.
 
-    Directions of lobes in the plane come first, then those of the pair, which is symmetric unless it is in
-    the plane.
+    Directions of the lobes in the plane of incidence come first, then directions of the pair. The pair stays
+    symmetric about the plane unless both lobes of the pair are in the plane.
 
     view_index : index of the view in LOBE_TABLE_COSINES
     """
@@ -132,15 +136,15 @@ def _is_elongated(target: LobeTarget) -> bool:
     return target.along_deviation > _MIN_ELONGATION * target.across_deviation
 
 
-def _arrange_pair(start: Floats, target: LobeTarget, view_index: int) -> Floats:
+def _arrange_pair(initial: Floats, target: LobeTarget, view_index: int) -> Floats:
     """Return initial parameters (4, 5) with the pair placed as the specular lobe requires.
 
-    It is in the plane of incidence for an elongated lobe, else on both sides of it.
+    For an elongated specular lobe, the pair is in the plane of incidence, else on both sides of this plane.
 
-    start : (4, 5) parameters by kind and lobe
+    initial : (4, 5) initial parameters; axes: kind of parameter, lobe
     view_index : index of the view in LOBE_TABLE_COSINES
     """
-    lobes = start.copy()
+    lobes = initial.copy()
     separation = lobes[_POSITION, -1] - lobes[_POSITION, -2]
     if _is_elongated(target) and abs(separation) < _PAIR_SEPARATION:
         lobes[_POSITION, -2:] = lobes[_POSITION, -2:].mean() + np.array([-0.5, 0.5]) * _PAIR_SEPARATION
@@ -154,31 +158,36 @@ def _arrange_pair(start: Floats, target: LobeTarget, view_index: int) -> Floats:
     return lobes
 
 
-def _fit_parameters(target: LobeTarget, view_index: int, start: Floats, neighbours: Floats) -> Floats:
+def _fit_parameters(target: LobeTarget, view_index: int, initial: Floats, neighbour_mean: Floats) -> Floats:
     """Fit five isotropic lobes to a specular lobe and return their parameters (4, 5).
 
-    The four parameters are position in the plane of incidence, distance from it, logarithm of the width, and
-    logarithm of the weight. Lengths are in standard deviations of the specular lobe.
+    The four parameters are position in the plane of incidence, distance from this plane, logarithm of the
+    width, and logarithm of the weight. Lengths are in standard deviations of the specular lobe.
 
     view_index : index of the view in LOBE_TABLE_COSINES
-    start : initial parameters (4, 5)
-    neighbours : mean parameters (4, 5) of adjacent table nodes, towards which the fit is regularised
+    initial : initial parameters (4, 5)
+    neighbour_mean : mean parameters (4, 5) of adjacent table nodes, towards which the fit is regularised
     """
     from scipy.optimize import least_squares
 
     scale, active = harmonic_terms(target.degree)[2], _active_lobes(view_index)
     free = _free_directions(target, view_index)
     lengths = (free**2).sum(axis=0)
-    start, neighbours = (_arrange_pair(one, target, view_index).ravel() for one in (start, neighbours))
-    first, mean = (free.T @ one / lengths for one in (start, neighbours))
-    fixed = np.where(free.any(axis=1), 0.0, start)
+    initial, neighbour_mean = (
+        _arrange_pair(one, target, view_index).ravel() for one in (initial, neighbour_mean)
+    )
+    first, mean = (free.T @ one / lengths for one in (initial, neighbour_mean))
+    fixed = np.where(free.any(axis=1), 0.0, initial)
     kinds = np.abs(free).argmax(axis=0) // LOBE_COUNT
     low, high = _parameter_bounds(target, kinds)
     regularisation = _REGULARISATION * np.where(kinds == _LOG_WEIGHT, 0.5, 1.0)
 
     @lru_cache(maxsize=2)
     def reduced_system(vector: bytes) -> Floats:
-        """Return Jacobian and residual at parameters, reduced by QR from about 8,000 to 16 rows."""
+        """Return Jacobian and residual, reduced by QR from about 8,000 to 16 rows.
+
+        vector : parameters along the free directions, as bytes of float64
+        """
         x = np.frombuffer(vector)
         parameters = (fixed + free @ x).reshape(4, LOBE_COUNT)
         total, slopes = isotropic_sum(_to_isotropic_lobes(parameters, target, active), target.degree)

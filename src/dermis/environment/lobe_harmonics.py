@@ -1,6 +1,6 @@
 """Spherical harmonics of specular and isotropic lobes, with the normal of the plane of incidence as pole.
 
-Lobes are symmetric about that plane, so half of the harmonics vanish. n is the number of those that remain.
+Lobes are symmetric about this plane, so half of the harmonics vanish; n is the number of the other harmonics.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ _TABLE_STEP = np.radians(0.25)  # step of the tabulated angles from the plane
 class LobeTarget(NamedTuple):
     """Specular lobe of unit integral for one roughness and view angle, to which isotropic lobes are fitted.
 
-    degree : highest degree of its spherical harmonics
+    degree : highest degree of the spherical harmonics
     coefficients : (n,) coefficients of the harmonics that `harmonic_terms` lists
-    mean_angle : angle between its mean direction and the surface normal [rad]
+    mean_angle : angle between the mean direction of the lobe and the surface normal [rad]
     along_deviation : standard deviation of the angle in the plane of incidence [rad]
     across_deviation : standard deviation of the sine of the angle from the plane of incidence [-]
     """
@@ -65,7 +65,7 @@ def lobe_target(lobe: Lobe, cosine: float, m: float) -> LobeTarget:
     cosine : cosine of the angle between view and surface normal
     m : roughness [-]
 
-    The quadrature covers one side of the plane of incidence, as the lobe is symmetric about it.
+    The quadrature covers one side of the plane of incidence, as the lobe is symmetric about this plane.
     """
     t = (np.arange(_ACROSS_NODES) + 0.5) / _ACROSS_NODES
     widest = min(10.0 * m + 0.05, 0.5 * np.pi)
@@ -95,7 +95,7 @@ def harmonic_terms(degree: int) -> tuple[NDArray[np.intp], NDArray[np.intp], Flo
     """Return degree, order and weight (n,) of the harmonics that are symmetric about the plane of incidence.
 
     The sum of the squared, weighted differences of two lobes' coefficients is the expected squared difference
-    of their reflections of a randomly rotated environment.
+    of the two lobes' reflections of a randomly rotated environment.
     """
     pairs = [(l, m) for m in range(degree + 1) for l in range(m, degree + 1, 2)]
     degrees, orders = np.array(pairs, np.intp).T
@@ -107,9 +107,9 @@ def harmonic_terms(degree: int) -> tuple[NDArray[np.intp], NDArray[np.intp], Flo
 def isotropic_sum(lobes: IsotropicLobes, degree: int) -> tuple[Complex, Complex]:
     """Return the harmonic coefficients (n,) of a sum of isotropic lobes, and their derivatives (n, 4, 5).
 
-    Each lobe is averaged with its mirror image in the plane of incidence. The four derivatives of each lobe
-    are with respect to its angle, out-of-plane angle, log roughness, and log weight (the sum of all weights
-    is constant).
+    Each lobe is averaged with the mirror image of the lobe in the plane of incidence. The four derivatives
+    for each lobe are with respect to the lobe's angle, out-of-plane angle, log roughness, and log weight
+    (while the sum of all weights is constant).
     """
     order = harmonic_terms(degree)[1]
     azimuthal = np.exp(-1j * np.outer(np.arange(degree + 1), lobes.angle))[order]
@@ -139,13 +139,13 @@ def _legendre_from_plane(sine: Floats, degree: int) -> Floats:
 
 
 @cache
-def _legendre_at_nodes(m: float, degree: int) -> Floats:
+def _legendre_at_nodes(roughness: float, degree: int) -> Floats:
     """Return the associated Legendre functions (n, k) at the quadrature nodes across the plane of incidence.
 
-    m : roughness of the lobe, which determines how far the nodes extend
+    roughness : roughness of the lobe, which determines how far the nodes extend
     """
     t = (np.arange(_ACROSS_NODES) + 0.5) / _ACROSS_NODES
-    return _legendre_from_plane(np.sin(min(10.0 * m + 0.05, 0.5 * np.pi) * t**2), degree)
+    return _legendre_from_plane(np.sin(min(10.0 * roughness + 0.05, 0.5 * np.pi) * t**2), degree)
 
 
 @cache
@@ -171,9 +171,10 @@ def _interpolate_legendre(degree: int, out_of_plane: Floats) -> tuple[Floats, Fl
 def _layer_convolution_factors(log_roughness: float, degree: int) -> Floats:
     """Return the convolution factors of a prefiltered lobe for each harmonic, and their derivatives, (2, n).
 
-    The factors are interpolated between two prefiltered layers, as the shader does.
+    The factors are interpolated between two prefiltered layers, as in the shader. Derivatives are with
+    respect to the logarithm of the roughness.
 
-    log_roughness : logarithm of the roughness, with respect to which the derivatives are taken
+    log_roughness : logarithm of the roughness
     """
     layers, degrees = np.log(ROUGHNESSES), harmonic_terms(degree)[0]
     step = layers[1] - layers[0]
@@ -187,7 +188,7 @@ def _layer_convolution_factors(log_roughness: float, degree: int) -> Floats:
 def _layer_factor_table() -> Floats:
     """Return the convolution factors (layers, degrees) of each prefiltered layer for each degree.
 
-    They are 0 above the highest degree of the layers.
+    Factors for degrees above the highest degree of the layers are 0.
     """
     kernels = np.stack([isotropic_kernel(float(m)) for m in ROUGHNESSES])
     return np.pad(kernels, ((0, 0), (0, max(_FIT_DEGREES[-1] + 1 - kernels.shape[1], 0))))

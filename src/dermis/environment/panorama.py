@@ -1,4 +1,4 @@
-"""Latitude-longitude panoramas of distant light, and extraction of their suns."""
+"""Latitude-longitude panoramas of distant light, and extraction of suns from panoramas."""
 
 from __future__ import annotations
 
@@ -140,14 +140,14 @@ class Sun:
 
 
 def split_suns(radiance: Floats) -> tuple[Floats, list[Sun]]:
-    """Split a panorama into suns and the remaining panorama; together they have the light of the original.
+    """Split a panorama into suns and the remaining panorama, which together have the original light.
 
     Suns are sorted by irradiance, the strongest first.
 
     radiance : (h, w, 3)
 
     A sun is the radiance above 32 times the mean, within 8 degrees of the centre of a bright cluster. At most
-    four suns are extracted. Each of them causes at least 5 % of the irradiance that a uniform sky with the
+    four suns are extracted. Each sun causes at least 5 % of the irradiance that a uniform sky with the
     panorama's mean radiance would cause. This is a simplified median cut of light probes [Debevec2005].
     """
     mean = float(luminance(mean_radiance(radiance)))
@@ -173,34 +173,36 @@ def _luminance_sum(light: Floats) -> float:
     return float(luminance(light.sum(axis=0)))
 
 
-def _fit_sun(light: Floats, towards: Floats, weight: Floats) -> Sun:
+def _fit_sun(irradiances: Floats, unit_vectors: Floats, solid_angles: Floats) -> Sun:
     """Return the sun for a cluster of n texels: a uniform disc with the same light and mean square radiance.
 
-    light : (n, 3) radiance of each texel times its solid angle
-    towards : (n, 3) unit vectors to the texels
-    weight : (n,) solid angles [sr]
+    irradiances : (n, 3) radiance of each texel times the solid angle of the texel
+    unit_vectors : (n, 3) unit vectors to the texels
+    solid_angles : (n,) solid angles [sr]
     """
-    grey = np.asarray(luminance(light), np.float64)
-    centre = grey @ towards
-    solid_angle = grey.sum() ** 2 / (grey**2 / weight).sum()
-    return Sun(centre / np.linalg.norm(centre), light.sum(axis=0), float(np.sqrt(solid_angle / np.pi)))
+    grey = np.asarray(luminance(irradiances), np.float64)
+    centre = grey @ unit_vectors
+    solid_angle = grey.sum() ** 2 / (grey**2 / solid_angles).sum()
+    return Sun(centre / np.linalg.norm(centre), irradiances.sum(axis=0), float(np.sqrt(solid_angle / np.pi)))
 
 
-def _bright_clusters(brightness: Floats, towards: Floats, weight: Floats) -> list[NDArray[np.bool_]]:
-    """Group n bright texels into clusters; return the mask (n,) of each, that of the brightest peak first.
+def _bright_clusters(
+    brightness: Floats, unit_vectors: Floats, solid_angles: Floats
+) -> list[NDArray[np.bool_]]:
+    """Group n bright texels into clusters; return a mask (n,) of each cluster, brightest peak first.
 
     brightness : (n,) luminance
-    towards : (n, 3) unit vectors to the texels
-    weight : (n,) solid angles [sr]
+    unit_vectors : (n, 3) unit vectors to the texels
+    solid_angles : (n,) solid angles [sr]
     """
     near = np.cos(np.radians(_CLUSTER_DEGREES))
     remaining = np.ones(len(brightness), bool)
     clusters = []
     while remaining.any():
         peak = np.where(remaining, brightness, 0.0).argmax()
-        around = remaining & (towards @ towards[peak] > near)
-        centre = weight[around] @ towards[around]
-        inside = remaining & (towards @ centre > near * np.linalg.norm(centre))
+        around = remaining & (unit_vectors @ unit_vectors[peak] > near)
+        centre = solid_angles[around] @ unit_vectors[around]
+        inside = remaining & (unit_vectors @ centre > near * np.linalg.norm(centre))
         inside[peak] = True
         remaining &= ~inside
         clusters.append(inside)

@@ -26,8 +26,8 @@ def isotropic_lobe(theta: Floats, m: float) -> Floats:
     theta : angle from the mirror direction [rad], 0 to pi / 2
     m : roughness [-]
 
-    This is the Kelemen lobe for equal normal, view and mirror direction [Karis2013], up to a constant factor:
-    the angle of the half vector h is theta / 2, and h.h is 4 cos^2(theta / 2) before normalisation.
+    The weight is the Kelemen lobe for equal normal, view and mirror direction [Karis2013], up to a constant
+    factor: the angle of the half vector h is theta / 2, and h.h is 4 cos^2(theta / 2) before normalisation.
     """
     half = np.cos(0.5 * theta)
     with np.errstate(under="ignore"):

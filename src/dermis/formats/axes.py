@@ -15,11 +15,11 @@ Front = Literal["auto", "x", "y", "z", "-x", "-y", "-z"]
 
 
 class Axes(NamedTuple):
-    """Axes of a file.
+    """Axes of a file that point upwards and to the front.
 
-    up : axis that points upwards; None if the file does not state it, which means Y
-    front : axis along which the face looks, perpendicular to `up`; "auto" if it is not stated, which means -Y
-        if Z is up, as in Blender, and Z otherwise
+    up : axis that points upwards; None if it is not known, and Y is assumed
+    front : axis along which the face looks, perpendicular to `up`; "auto" if it is not known, and -Y is
+        assumed if Z is up, as in Blender, else Z
     """
 
     up: Axis | None = None
@@ -27,26 +27,26 @@ class Axes(NamedTuple):
 
     @property
     def top(self) -> Axis:
-        """Return the axis that points upwards."""
+        """Return the axis that points upwards, Y if it is not known."""
         return self.up or "y"
 
     @property
     def face(self) -> Axis:
-        """Return the axis along which the face looks."""
+        """Return the axis along which the face looks, or the assumed axis if it is not known."""
         if self.front != "auto":
             return self.front
         return "-y" if self.up in ("z", "-z") else "z"
 
-    def or_stated(self, stated: Axes) -> Axes:
-        """Return these axes, which the user chose; those that are not set are taken from the file.
+    def or_stated(self, stated_axes: Axes) -> Axes:
+        """Return the axes that the user chose (these axes), completed by the axes that the file states.
 
-        stated : axes that the file states
+        stated_axes : axes that the file states
 
-        The file's front is used only if the resulting up axis is the file's as well.
+        The front that the file states is used only if the file also has the resulting up axis.
         """
-        chosen = self._replace(up=self.up or stated.up)
-        same = chosen.front == "auto" and chosen.top == stated.top
-        return chosen._replace(front=stated.front) if same else chosen
+        chosen = self._replace(up=self.up or stated_axes.up)
+        same = chosen.front == "auto" and chosen.top == stated_axes.top
+        return chosen._replace(front=stated_axes.front) if same else chosen
 
 
 DEFAULT_AXES = Axes()
@@ -58,7 +58,7 @@ def to_y_up(vectors: Doubles, axes: Axes) -> Doubles:
 
     if (axes.top, axes.face) == ("y", "z"):
         return vectors
-    (up, up_sign), (front, front_sign) = _split(axes.top), _split(axes.face)
+    (up, up_sign), (front, front_sign) = _index_and_sign(axes.top), _index_and_sign(axes.face)
     side = 3 - up - front
     side_sign = up_sign * front_sign * (1 if (up + 1) % 3 == front else -1)
     columns = (side, side_sign), (up, up_sign), (front, front_sign)
@@ -73,12 +73,12 @@ def file_axis(direction: Axis, axes: Axes) -> Axis:
     """
     import numpy as np
 
-    index, sign = _split(direction)
+    index, sign = _index_and_sign(direction)
     along = sign * to_y_up(np.eye(3), axes)[:, index]
     names: tuple[Axis, ...] = ("x", "y", "z", "-x", "-y", "-z")
     return names[int(np.concatenate((along, -along)).argmax())]
 
 
-def _split(axis: Axis) -> tuple[int, int]:
+def _index_and_sign(axis: Axis) -> tuple[int, int]:
     """Return the index of an axis, 0 to 2, and its sign."""
     return "xyz".index(axis[-1]), -1 if axis[0] == "-" else 1

@@ -74,7 +74,7 @@ class DeformableMesh:
         displacement = np.zeros((len(self.rig.positions_mm), 3))
         for number, weight in enumerate(rest.tolist()):
             displacement += weight * self._control_displacements(number)
-        return (mesh.positions - self._refine(displacement)[mesh.point]).astype(np.float32)
+        return (mesh.positions - self._refine_vectors(displacement)[mesh.point]).astype(np.float32)
 
     @cached_property
     def normals(self) -> Floats:
@@ -90,7 +90,7 @@ class DeformableMesh:
         """Yield the morph targets in the order of the rig."""
         mesh = self.head.mesh
         for number in range(len(self.rig.targets.names)):
-            delta = self._refine(self._control_displacements(number))
+            delta = self._refine_vectors(self._control_displacements(number))
             delta[np.abs(delta).max(axis=1) < _MIN_DISPLACEMENT_MM] = 0.0
             delta_mm = delta[mesh.point].astype(np.float32)
             normal = self._normal_changes(delta_mm)
@@ -98,7 +98,10 @@ class DeformableMesh:
             yield VertexTarget(vertex, delta_mm[vertex], normal[vertex])
 
     def _normal_changes(self, delta_mm: Floats) -> Floats:
-        """Return the changes of unit normals (v, 3) when vertices are displaced by `delta_mm` (v, 3) [mm]."""
+        """Return the changes (v, 3) of the unit normals that result from displacements of the vertices.
+
+        delta_mm : (v, 3) displacements [mm]
+        """
         mesh, change = self.head.mesh, np.zeros_like(delta_mm)
         moves = np.asarray(delta_mm.any(axis=1))
         changed = moves[mesh.triangles].any(axis=1)
@@ -130,7 +133,7 @@ class DeformableMesh:
         displacement[targets.point[part]] = targets.delta_mm[part]
         return displacement
 
-    def _refine(self, values: Doubles) -> Doubles:
+    def _refine_vectors(self, values: Doubles) -> Doubles:
         """Interpolate vectors at control points (p, 3) to the points of the subdivided mesh, (q, 3)."""
         return values if self.refinement is None else np.asarray(self.refinement @ values)
 
@@ -175,7 +178,7 @@ def _fit_weights(
     """
     weights = np.asarray(refinement @ control_weights)
     weights[weights < _MIN_WEIGHT] = 0.0
-    descendants = _descendants(skeleton)
+    descendants = _descendant_matrix(skeleton)
     patterns, pattern = np.unique(weights > 0, axis=0, return_inverse=True)
     order = np.argsort(pattern.reshape(-1), kind="stable")
     ends = np.cumsum(np.bincount(pattern.reshape(-1), minlength=len(patterns)))
@@ -199,7 +202,7 @@ def _fit_weights(
     return weights
 
 
-def _descendants(skeleton: Skeleton) -> Doubles:
+def _descendant_matrix(skeleton: Skeleton) -> Doubles:
     """Return a matrix (b, b): element (i, j) is 1 where bone j is bone i or a descendant of it, else 0."""
     descendants = np.eye(len(skeleton.names))
     for bone, parent in enumerate(skeleton.parent.tolist()):

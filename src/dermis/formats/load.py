@@ -28,7 +28,7 @@ from dermis.formats.read import Origin, join_parts, read_mesh_file, select_verti
 from dermis.formats.rig_from_file import build_rig, split_points
 from dermis.formats.size_limits import MAX_FILE_BYTES
 from dermis.formats.skin_groups import choose_skin, describe_choice
-from dermis.formats.text_files import listed
+from dermis.formats.text_files import list_names
 from dermis.mesh.face_direction import face_direction
 from dermis.mesh.file_vertices import FileVertices
 from dermis.mesh.geometry import compact_vertices, weld
@@ -76,8 +76,8 @@ def load_rigged(
 ) -> RiggedMesh:
     """Load the mesh and the rig of a file in one of `MESH_FORMATS`, in millimetres, with Y up and v down.
 
-    `choose_skin` finds the groups (materials, glTF meshes or OBJ `g`) that are skin; others are opaque.
-    The mesh is checked by `check_mesh`; its size is not checked.
+    `choose_skin` finds the groups (materials, glTF meshes or OBJ `g`) that are skin; all other groups are
+    opaque. The mesh is checked by `check_mesh`; its size is not checked.
 
     unit_mm : length of the file's unit [mm]; None for the unit stated by the file or its format
         (`default_unit_mm`)
@@ -87,7 +87,7 @@ def load_rigged(
         the up axis that the file states, and the front that `face_direction` finds
     skin_groups : names of the groups that are skin; empty to detect them
     opaque : names of groups that are not skin
-    eye_groups : names of groups that contain eyeballs, besides those found by `is_eye_name`
+    eye_groups : names of groups that contain eyeballs, besides the groups found by `is_eye_name`
 
     Raises `DermisError` when the file is missing, damaged or not a mesh, or fails `check_mesh`.
     """
@@ -121,7 +121,7 @@ def _load_uncached(
         counts = [len(part.triangles) for part in mesh_file.parts]
         material = np.repeat(np.array(assigned.of_part, np.int32), counts)
         axes, turned = _find_front(
-            _settled_axes(axes, mesh_file.axes, source), mesh_file, part, assigned.skin[material]
+            _resolve_axes(axes, mesh_file.axes, source), mesh_file, part, assigned.skin[material]
         )
         assert part.uv is not None and part.normals is not None
         to_head[:3, :3] = to_y_up(unit * np.eye(3), axes).T
@@ -137,7 +137,7 @@ def _load_uncached(
         arrays = positions[used], normals[used], uv[used], point, corners, material, part.quads, vertices
         in_file = [mesh_file.materials[index] if index >= 0 else None for index in assigned.in_file]
         raw, repairs = repair_mesh(RawMesh(*arrays, np.arange(len(used))), in_file, assigned.skin)
-        raw, assigned, emptied = _without_empty(raw, assigned)
+        raw, assigned, emptied = _without_empty_materials(raw, assigned)
         mesh, vertices, point = raw.build(assigned.materials), raw.vertices, raw.point
         has_pictures = any(one.textures for one in mesh_file.materials)
         check_mesh(mesh, source, has_pictures=has_pictures)
@@ -154,12 +154,12 @@ def _load_uncached(
     return RiggedMesh(mesh, rig, notes, surface, mesh_file.materials, stated_mm, file_vertices)
 
 
-def _settled_axes(chosen: Axes, stated: Axes, source: Path) -> Axes:
-    """Return the axes that the user chose; those that are not set are taken from the file.
+def _resolve_axes(user_axes: Axes, file_axes: Axes, source: Path) -> Axes:
+    """Return the axes that the user chose, completed by the axes that the file states.
 
     Raises DermisError if the front is parallel to the up axis.
     """
-    axes = chosen.or_stated(stated)
+    axes = user_axes.or_stated(file_axes)
     if axes.face[-1] == axes.top[-1]:
         actual = f"front is {axes.front}, and up is {axes.top} in the file"
         refuse(source, "a front across the up axis of the file", actual, "Choose another front")
@@ -167,7 +167,7 @@ def _settled_axes(chosen: Axes, stated: Axes, source: Path) -> Axes:
 
 
 def _find_front(axes: Axes, mesh_file: MeshFile, part: MeshPart, skin: Mask) -> tuple[Axes, str]:
-    """Detect the front from the shape; return the axes with it, and a note if it is not the default front.
+    """Detect the front from the shape; return axes with this front, and a note if it is not the default.
 
     A front that is already set is kept, and so is the default front of files that this package wrote.
 
@@ -260,14 +260,14 @@ def _assign_materials(mesh_file: MeshFile, names: GroupNames, source: Path) -> t
     )
 
 
-def _without_empty(
+def _without_empty_materials(
     mesh: RawMesh, assigned: _AssignedMaterials
 ) -> tuple[RawMesh, _AssignedMaterials, tuple[str, ...]]:
-    """Remove the materials that have no triangles left; return mesh, materials and a note if any were."""
+    """Remove materials without triangles; return mesh, materials, and a note if any were removed."""
     kept = np.bincount(mesh.material, minlength=len(assigned.materials)) > 0
     if kept.all() or not kept[assigned.skin].any():
         return mesh, assigned, ()
-    names = listed([one.name for one in compress(assigned.materials, ~kept)])
+    names = list_names([one.name for one in compress(assigned.materials, ~kept)])
     assigned = assigned._replace(
         materials=tuple(compress(assigned.materials, kept)),
         in_file=tuple(compress(assigned.in_file, kept)),
@@ -302,9 +302,9 @@ class GroupNames(NamedTuple):
 
 
 class FileSurface(NamedTuple):
-    """Data of a mesh file that are needed, besides the mesh, to apply the file's materials and pictures.
+    """Data of a mesh file with which the file's materials and pictures are applied to the mesh.
 
-    in_file : (m,) index of the file's material for each material of the mesh, -1 for none
+    in_file : (m,) for each material of the mesh, the index of its material in the file, -1 if there is none
     has_uv : (m,) mask of materials whose triangles have uv in the file
     colours : (v, 3) linear colours of vertices, or None
     other_uv : additional uv sets (v, 2), by their index in the file
@@ -335,7 +335,7 @@ class RiggedMesh(NamedTuple):
 
 
 def cached_rigged(data: bytes, options: str, load: Callable[[], RiggedMesh]) -> RiggedMesh:
-    """Return mesh and rig of a file from the disk cache; without an entry, load and cache them.
+    """Return mesh and rig of a file from the disk cache; load and cache both if the cache lacks them.
 
     data : bytes of the file; the mesh must not depend on other files
     options : text with all options that influence the result, part of the cache key

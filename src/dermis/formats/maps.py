@@ -61,7 +61,7 @@ def _convert_in_strips(image: Pixels, shape: tuple[int, ...], convert: Callable[
 def colour_map(path: PathLike, upright: bool = False) -> Floats:
     """Read a colour map (H, W, 3), linear Rec. 709; grey is repeated in all channels.
 
-    upright : turn the picture as its EXIF says, as for photographs
+    upright : whether to rotate the picture as its EXIF orientation states, as for photographs
     """
     _check_side(path, "a colour map")
     image, space = read_colours(path, upright)
@@ -86,8 +86,8 @@ def height_map(path: PathLike, relief_mm: np.float32) -> Floats:
 def mixture_map(path: PathLike) -> Floats:
     """Read a map (H, W, 2) of the fractions of two additional diffusion profiles, which sum to at most 1.
 
-    A colour picture gives the fractions in red and green; a grey picture gives the first, and the second is
-    0.
+    A colour picture holds the fractions in red and green. A grey picture holds the first fraction, and the
+    second is 0.
     """
     role = "a map of profiles"
     image = _to_unit_range(_read_picture(path, role))
@@ -141,7 +141,7 @@ def slope_map(path: PathLike, normal_y: str) -> Floats:
 
 
 def _normal_statistics(normals: Floats) -> Doubles:
-    """Return (4,): number of texels, number of outward unit normals, and the sums of z over both sets."""
+    """Return (4,): numbers of all texels and of outward unit normals, then the sum of z over either set."""
     length = np.sqrt(np.einsum("hwc,hwc->hw", normals, normals))
     z = normals[..., 2]
     outward = (np.abs(length - 1) < 0.15) & (z > 0)
@@ -221,9 +221,9 @@ def load_maps(
     height_mm : height difference of 1/255 of the full scale, one grey level of an 8-bit map [mm]
     specular, roughness : grey, linear values without sRGB conversion
     region : 8-bit grey labels
-    normal_y : "up" if green points to row 0 (OpenGL, Blender), "down" if away from it (DirectX)
+    normal_y : "up" if green points towards row 0 (OpenGL, Blender), "down" if away from row 0 (DirectX)
 
-    Raises DermisError for a file that does not fit its role; the message names it.
+    Raises DermisError for a file that does not fit its role; the message names the file.
     """
     relief_mm = np.float32(255 * (height_mm or 0.0))
     if height is not None and not (np.isfinite(relief_mm) and relief_mm > 0):

@@ -56,8 +56,8 @@ class Texture:
 class FileMaterial:
     """Material of a mesh file, described by the parameters of glTF's metallic-roughness model.
 
-    name : name of the material, empty for none
-    textures : pictures by role; factors multiply them
+    name : name of the material, empty if there is none
+    textures : pictures by role; the factors below multiply the values of the pictures
     colour, alpha : linear base colour and opacity [-]
     roughness : perceptual roughness, the square root of the width alpha of GGX [-]; None if not stated
     stated_metalness : factor of the metalness [-]; None where the file leaves it to the default of glTF, 1

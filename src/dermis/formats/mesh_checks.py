@@ -85,7 +85,7 @@ def check_rig(rig: Rig, culprit: object) -> None:
             _check_finite(f"bones ({name})", getattr(rig.skeleton, name), culprit, "of them")
 
 
-def check_counts(parts: Sequence[MeshPart], culprit: object) -> None:
+def check_mesh_counts(parts: Sequence[MeshPart], culprit: object) -> None:
     """Refuse mesh parts with too many triangles or vertices in total, before they are joined."""
     triangles = sum(len(part.triangles) for part in parts)
     limits.check_limit(culprit, triangles, limits.MAX_TRIANGLES, "triangles", limits.DECIMATE_ADVICE)

@@ -27,8 +27,8 @@ class MeshFormat:
 
     suffixes : file name suffixes in lower case, with the dot
     read : function that reads a file; it may raise any exception for a damaged one
-    properties : properties of the files, except those of materials, and what the reader does with them
-    materials : properties of materials, and what the reader does with them
+    properties : properties of the files, except properties of materials, and what the reader does with each
+    materials : properties of materials, and what the reader does with each
     """
 
     suffixes: tuple[str, ...]
@@ -51,7 +51,7 @@ MESH_FORMATS = Registry[MeshFormat](
 
 
 def find_format(path: str | Path) -> MeshFormat | None:
-    """Return the format of a mesh file by its suffix, or None."""
+    """Return the format of a mesh file by its suffix; None for an unknown suffix."""
     suffix = Path(path).suffix.lower()
     return next((one for one in MESH_FORMATS.values() if suffix in one.suffixes), None)
 

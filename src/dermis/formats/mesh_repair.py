@@ -92,12 +92,10 @@ class RawMesh:
         """Return the sides of the triangles, grouped by edge."""
         return _group_sides(self.corners)
 
-    def with_triangles(self, selected: Mask) -> RawMesh:
+    def with_triangles(self, mask: Mask) -> RawMesh:
         """Return the mesh with the triangles that a mask (f,) selects."""
-        quads = (np.cumsum(selected) - 1)[self.quads[selected[self.quads].all(axis=1)]]
-        return replace(
-            self, triangles=self.triangles[selected], material=self.material[selected], quads=quads
-        )
+        quads = (np.cumsum(mask) - 1)[self.quads[mask[self.quads].all(axis=1)]]
+        return replace(self, triangles=self.triangles[mask], material=self.material[mask], quads=quads)
 
     def with_corners(self, corners: Index) -> RawMesh:
         """Return the mesh with new points at corners (f, 3); vertices at several points are duplicated."""
@@ -107,7 +105,7 @@ class RawMesh:
         triangles[moved] = len(self.point) + number.reshape(-1)
         source = np.concatenate((np.arange(len(self.point)), copies // stride))
         point = np.concatenate((self.point, copies % stride)).astype(np.int32)
-        return replace(self._select(source), point=point, triangles=triangles)
+        return replace(self._select_vertices(source), point=point, triangles=triangles)
 
     def compact(self) -> RawMesh:
         """Return the mesh without unused vertices and points, and without quads whose halves were parted."""
@@ -115,9 +113,9 @@ class RawMesh:
         point = np.unique(self.point[used], return_inverse=True)[1].reshape(-1).astype(np.int32)
         first, second = triangles[self.quads[:, 0]], triangles[self.quads[:, 1]]
         whole = (first[:, [0, 2]] == second[:, [2, 0]]).all(axis=1)
-        return replace(self._select(used), point=point, triangles=triangles, quads=self.quads[whole])
+        return replace(self._select_vertices(used), point=point, triangles=triangles, quads=self.quads[whole])
 
-    def _select(self, source: Index) -> RawMesh:
+    def _select_vertices(self, source: Index) -> RawMesh:
         """Return the mesh with the vertices at the given indices (n,); points and triangles are unchanged."""
         return replace(
             self,
@@ -139,7 +137,8 @@ def repair_mesh(
     inward normals are turned outwards. uv slightly outside [0, 1] are clamped, and charts in other tiles are
     moved by whole tiles. A mesh without faults is returned unchanged.
 
-    materials : the file's description of each material of the mesh; None if it has none
+    materials : for each material of the mesh, its description in the file; None for a material without
+        description
     is_skin : (m,) mask of the materials that are skin
     """
     notes: list[str] = []
@@ -150,7 +149,7 @@ def repair_mesh(
     return _move_uv(repaired if repaired is mesh else repaired.compact(), materials, notes), tuple(notes)
 
 
-def _counted(count: int, noun: str) -> str:
+def _count_with_noun(count: int, noun: str) -> str:
     return f"{count:,} {noun}{'' if count == 1 else 's'}"
 
 
@@ -161,7 +160,7 @@ def _drop_triangles(mesh: RawMesh, flat: Mask, is_skin: Mask, notes: list[str]) 
     exactly the same triangles, skin is kept, else the first one.
     """
     if flat.any():
-        notes.append(f"left out {_counted(int(flat.sum()), 'triangle')} without area")
+        notes.append(f"left out {_count_with_noun(int(flat.sum()), 'triangle')} without area")
         mesh = mesh.with_triangles(~flat)
     key = triangle_keys(mesh.corners, int(mesh.point.max()) + 1)
     ordered = np.sort(key)
@@ -172,7 +171,7 @@ def _drop_triangles(mesh: RawMesh, flat: Mask, is_skin: Mask, notes: list[str]) 
         kept[order[1:][again]] = False
         kept &= ~_duplicate_materials(key[kept], mesh.material[kept], is_skin)[mesh.material]
         if not kept.all():
-            notes.append(f"left out {_counted(int((~kept).sum()), 'triangle')} that repeat others")
+            notes.append(f"left out {_count_with_noun(int((~kept).sum()), 'triangle')} that repeat others")
             mesh = mesh.with_triangles(kept)
     return mesh
 
@@ -241,7 +240,9 @@ def _separate_sheets(mesh: RawMesh, notes: list[str]) -> RawMesh:
     count = int((mesh.sides.counts > 2).sum())
     if not 0 < count <= _MAX_NON_MANIFOLD_EDGES:
         return mesh
-    notes.append(f"separated the sheets that meet at {_counted(count, 'edge')} of more than two triangles")
+    notes.append(
+        f"separated the sheets that meet at {_count_with_noun(count, 'edge')} of more than two triangles"
+    )
     links = np.vstack((mesh.sides.pairs, _continue_sheets(mesh)))
     mesh = mesh.with_corners(_split_points(mesh, links))
     sides = mesh.sides
@@ -304,8 +305,8 @@ def _directions_from_sides(mesh: RawMesh, sides: Index) -> Floats:
 def _split_points(mesh: RawMesh, links: Index) -> Index:
     """Return the point index at each corner (f, 3) after points at non-manifold edges were split.
 
-    Corners at a point still share it if `links` connect their triangles around it. The largest group of
-    corners keeps the point, other groups get new points.
+    Corners at a point still share the point if `links` connect their triangles around it. The largest group
+    of such corners keeps the point, other groups get new points.
 
     links : (n, 2) pairs of sides across which sheets continue
     """
@@ -346,17 +347,17 @@ def _turn_outwards(mesh: RawMesh, notes: list[str]) -> RawMesh:
         agreement < _MAX_OPPOSITE_COSINE
     )
     if doubtful.any():
-        turned = _inside_out(surface, doubtful, agreement)
+        turned = _inside_out_pieces(surface, doubtful, agreement)
         reverse ^= turned[piece]
         agreement[turned] *= -1
     if reverse.any():
-        count = _counted(int(reverse.sum()), "triangle")
+        count = _count_with_noun(int(reverse.sum()), "triangle")
         notes.append(f"reversed {count} of {len(reverse):,} that are wound inside out")
         triangles = np.where(reverse[:, None], mesh.triangles[:, ::-1], mesh.triangles)
         mesh = replace(mesh, triangles=triangles)
     inwards = np.unique(mesh.triangles[(agreement < _MAX_OPPOSITE_COSINE)[piece]])
     if len(inwards):
-        notes.append(f"turned {_counted(len(inwards), 'normal')} outwards")
+        notes.append(f"turned {_count_with_noun(len(inwards), 'normal')} outwards")
         normals = mesh.normals.copy()
         normals[inwards] *= -1
         mesh = replace(mesh, normals=normals)
@@ -366,8 +367,8 @@ def _turn_outwards(mesh: RawMesh, notes: list[str]) -> RawMesh:
 def _find_pieces(mesh: RawMesh) -> tuple[Index, Mask]:
     """Return each triangle's connected component (f,), and the mask (f,) of triangles to reverse.
 
-    Their reversal makes the winding of each component consistent, in the sense that most of its area already
-    has. A component that cannot be wound consistently, such as a Moebius strip, is unchanged.
+    After reversal of these triangles, the winding of each component is consistent, and the same as before on
+    most of its area. A component that cannot be wound consistently, such as a Moebius strip, is unchanged.
     """
     count, pairs = len(mesh.triangles), mesh.sides.pairs
     forward = mesh.sides.start < mesh.sides.end
@@ -398,49 +399,53 @@ class _Surface:
     """Triangles, and the connected component ("piece") of each.
 
     piece : (f,) index of each triangle's component
-    area : (3, f) normals with twice the triangle's area as their length [mm²]
+    area_normals : (3, f) normals with twice the triangle's area as their length [mm²]
     corners : (3, 3, f) positions of the three corners, as columns [mm]
     """
 
     piece: Index
-    area: Doubles
+    area_normals: Doubles
     corners: Doubles
 
     @cached_property
-    def size(self) -> Doubles:
+    def double_area(self) -> Doubles:
         """Return twice the area of each triangle (f,) [mm²]."""
-        return np.sqrt(dot_columns(self.area, self.area))
+        return np.sqrt(dot_columns(self.area_normals, self.area_normals))
 
     def outward_directions(self) -> Doubles:
         """Return the vector from the component's centroid to each triangle, as columns (3, f)."""
         centre = self.corners.mean(axis=0)
-        total = np.maximum(np.bincount(self.piece, self.size), np.finfo(np.float64).tiny)
+        total = np.maximum(np.bincount(self.piece, self.double_area), np.finfo(np.float64).tiny)
         for axis in centre:
-            axis -= (np.bincount(self.piece, axis * self.size) / total)[self.piece]
-        centre[np.abs(centre) < 1e-6 * np.sqrt(self.size)] = 0  # rounding errors of single triangles
+            axis -= (np.bincount(self.piece, axis * self.double_area) / total)[self.piece]
+        centre[np.abs(centre) < 1e-6 * np.sqrt(self.double_area)] = 0  # rounding errors of single triangles
         return np.asarray(centre)
 
     def mean_cosine(self, direction: Doubles) -> Doubles:
         """Return the mean cosine of normals and directions (3, f) for each component; 0 for null vectors."""
-        length = np.bincount(self.piece, self.size * np.sqrt(dot_columns(direction, direction)))
-        total = np.bincount(self.piece, dot_columns(self.area, direction))
+        length = np.bincount(self.piece, self.double_area * np.sqrt(dot_columns(direction, direction)))
+        total = np.bincount(self.piece, dot_columns(self.area_normals, direction))
         return total / np.where(length > 0, length, 1)
 
     def visible_balance(self, doubtful: Mask) -> tuple[Doubles, bool]:
         """Return how much of each component's front and back is visible, and whether backs prevail.
 
         The visible balance of a component is 1 if only its front is visible from outside, -1 if only its back
-        is, and 0 if hardly any of it is. Backs prevail if they are two thirds of all visible samples.
+        is visible, and 0 if hardly any part of it is visible. Backs prevail if they are two thirds of all
+        visible samples.
 
         doubtful : mask of components that get additional samples, so that small components have enough
         """
-        size = np.bincount(self.piece, self.size)
-        more = _DOUBTFUL_FRACTION * doubtful / (size * doubtful.sum())
+        component_area = np.bincount(self.piece, self.double_area)
+        more = _DOUBTFUL_FRACTION * doubtful / (component_area * doubtful.sum())
         triangle, sample = self._draw_samples(
-            self.size * ((1 - _DOUBTFUL_FRACTION) / size.sum() + more[self.piece])
+            self.double_area * ((1 - _DOUBTFUL_FRACTION) / component_area.sum() + more[self.piece])
         )
-        normal, piece = self.area[:, triangle] / self.size[triangle], self.piece[triangle]
-        radius, seen = float(np.sqrt(dot_columns(sample, sample).max())), np.zeros((2, len(size)), np.int64)
+        normal, piece = self.area_normals[:, triangle] / self.double_area[triangle], self.piece[triangle]
+        radius, seen = (
+            float(np.sqrt(dot_columns(sample, sample).max())),
+            np.zeros((2, len(component_area)), np.int64),
+        )
         for view in fibonacci_sphere(_VIEWS):
             across = np.linalg.svd(view[None])[2][1:]
             cell = ((across @ sample / radius + 1) * (_VIEW_CELLS / 2)).astype(np.int64)
@@ -450,9 +455,11 @@ class _Surface:
             cosine = view @ normal[:, visible]
             facings = cosine > _MIN_VIEW_COSINE, cosine < -_MIN_VIEW_COSINE
             for side, facing in zip(seen, facings, strict=True):
-                side += np.bincount(piece[visible[facing]], minlength=len(size))
-        cells = size / 8 * (_VIEW_CELLS / 2 / radius) ** 2  # that a convex component would cover alone
-        alone = _VIEWS * np.minimum(cells, np.bincount(piece, minlength=len(size)) / 2)
+                side += np.bincount(piece[visible[facing]], minlength=len(component_area))
+        cells = (
+            component_area / 8 * (_VIEW_CELLS / 2 / radius) ** 2
+        )  # that a convex component would cover alone
+        alone = _VIEWS * np.minimum(cells, np.bincount(piece, minlength=len(component_area)) / 2)
         front, back = seen
         is_seen = front + back >= np.maximum(_MIN_VISIBLE_FRACTION * alone, _MIN_VISIBLE_SAMPLES)
         balance = np.where(is_seen, (front - back) / np.maximum(front + back, 1), 0)
@@ -472,14 +479,14 @@ class _Surface:
         return triangle, points - self.corners.mean(axis=(0, 2))[:, None]
 
 
-def _inside_out(surface: _Surface, doubtful: Mask, agreement: Doubles) -> Mask:
+def _inside_out_pieces(surface: _Surface, doubtful: Mask, agreement: Doubles) -> Mask:
     """Return the mask of connected components that are wound inside out.
 
     A component is judged by the side that is visible from outside. If both sides are equally visible, the
     normals of the file decide. A hidden component is inside out if the backs of the whole mesh prevail.
 
     doubtful : mask of components that may be inside out
-    agreement : mean cosine between the file's normals and the triangles' normals, by component
+    agreement : mean cosine between the file's normals and the triangles' normals, for each component
     """
     balance, backs_prevail = surface.visible_balance(doubtful)
     opposed = (agreement < _MAX_OPPOSITE_COSINE) & (balance <= _MIN_BALANCE)
@@ -487,7 +494,7 @@ def _inside_out(surface: _Surface, doubtful: Mask, agreement: Doubles) -> Mask:
 
 
 def _move_uv(mesh: RawMesh, materials: Sequence[FileMaterial | None], notes: list[str]) -> RawMesh:
-    """Return the mesh with uv charts moved by whole tiles and clamped, if they then fit into [0, 1]."""
+    """Return the mesh with uv charts moved by whole tiles and clamped, where this puts them into [0, 1]."""
     if mesh.uv.min() >= -UV_TOLERANCE and mesh.uv.max() <= 1 + UV_TOLERANCE:
         return mesh
     place = weld(np.column_stack((mesh.point, mesh.uv)))
@@ -508,7 +515,9 @@ def _move_uv(mesh: RawMesh, materials: Sequence[FileMaterial | None], notes: lis
     clamped = np.where(fits[chart], np.clip(moved, 0, 1), moved)
     count, excess = int(shift.any(axis=1).sum()), float(np.abs(clamped - moved).max())
     if count:
-        notes.append(f"moved {count:,} of {_counted(len(shift), 'uv chart')} by whole tiles into [0, 1]")
+        notes.append(
+            f"moved {count:,} of {_count_with_noun(len(shift), 'uv chart')} by whole tiles into [0, 1]"
+        )
     if excess > UV_TOLERANCE:
         notes.append(f"clamped uv that are up to {excess:.2g} outside the tile")
     return replace(mesh, uv=clamped.astype(np.float32))

@@ -29,7 +29,7 @@ _GREY_TEST_SAMPLES = 256  # compared texels along a side
 def read_obj_text(path: Path) -> str:
     """Return the text of a .obj file, with line feeds as its only line ends.
 
-    Raises DermisError when it cannot be read or is too large.
+    Raises DermisError when the file cannot be read or is too large.
     """
     data = read_file(path, "an OBJ file", limits.MAX_FILE_BYTES)
     with parsing(path, "an OBJ file"):
@@ -39,7 +39,7 @@ def read_obj_text(path: Path) -> str:
 def read_obj(path: Path) -> MeshFile:
     """Read a .obj file, one mesh part per pair of `usemtl` and `g`.
 
-    Colours are Kd of its .mtl, taken as linear.
+    The colour of a part is Kd of its material in the .mtl file, taken as linear.
     """
     return parse_obj(path, read_obj_text(path))
 
@@ -70,14 +70,14 @@ def obj_maps(
     height_mm: float | None = None,
     normal_y: Literal["up", "down"] = "up",
 ) -> tuple[Maps, list[str]]:
-    """Return the maps of skin with a single material and untransformed pictures, and notes on omitted maps.
+    """Return the maps of a skin with one material and untransformed pictures, and notes on omitted maps.
 
     The statements map_Kd, norm, map_Bump or bump, map_Ks and map_Pr are read. A bump map may contain normals,
-    as many programs write it, or heights, which require `height_mm`; -bm scales both. map_Pr is the square
+    as many programs write them, or heights, which require `height_mm`; -bm scales both. map_Pr is the square
     root of the roughness m.
 
     material : name of the material in the .mtl files
-    overridden : roles of maps that the caller sets by other means, and which are not read from the file
+    overridden : roles of the maps that the caller sets by other means; these maps are not read from the file
     height_mm, normal_y : see `load_maps`
     """
     textures = read_library(path, read_obj_text(path)).materials[material].textures

@@ -24,7 +24,7 @@ from dermis.formats.polygons import (
     refuse_without_faces,
     without_small_polygons,
 )
-from dermis.formats.text_files import listed, parse_numbers, run_starts
+from dermis.formats.text_files import list_names, parse_numbers, run_starts
 from dermis.formats.vertex_colours import linear_colours
 
 _MAX_LINES = 12_000_000
@@ -36,17 +36,17 @@ _LINE_FEED, _SPACE, _SLASH = b"\n /"
 _VERTEX_KINDS = ("v", "vt", "vn")
 _FEWEST_NUMBERS = {"v": 3, "vt": 1, "vn": 3}
 _USED_NUMBERS, _MOST_NUMBERS = 6, 16  # numbers in a statement that are used (position, colour) and allowed
-_POLYPAINT = "#MRGB"
-_CURVES = "cstype deg bmat step curv curv2 surf con vp parm trim hole scrv sp end"
-_LEFT_OUT = {"lines": ("l",), "points": ("p",), "curves": tuple(_CURVES.split())}
+_POLYPAINT_MARK = "#MRGB"
+_CURVE_STATEMENTS = "cstype deg bmat step curv curv2 surf con vp parm trim hole scrv sp end"
+_LEFT_OUT = {"lines": ("l",), "points": ("p",), "curves": tuple(_CURVE_STATEMENTS.split())}
 OBJ_PROPERTIES = (
     drawn("`v x y z`", "position", "v"),
     drawn_with_note("`v x y z w`", "position divided by w (no note if w is 1)"),
     drawn("`v x y z r g b`", "sRGB colour from 0 to 1; vertices without one are white"),
     drawn_with_note("`v x y z r g b` above 1", "sRGB colour from 0 to 255"),
     noted("further numbers in `v`"),
-    drawn(f"`{_POLYPAINT}` (polypaint of ZBrush)", "sRGB colours of the vertices", _POLYPAINT),
-    noted(f"`{_POLYPAINT}` beside colours in `v`, or for another number of vertices"),
+    drawn(f"`{_POLYPAINT_MARK}` (polypaint of ZBrush)", "sRGB colours of the vertices", _POLYPAINT_MARK),
+    noted(f"`{_POLYPAINT_MARK}` beside colours in `v`, or for another number of vertices"),
     drawn("`vt u v`", "uv", "vt"),
     noted("`vt u v w`", "u and v are drawn, w is left out (no note if it is 0)"),
     drawn("`vn`", "normals; missing ones are computed", "vn"),
@@ -115,18 +115,21 @@ def parse_geometry(path: Path, text: str) -> ObjGeometry:
     """
     limits.check_limit(path, text.count("\n"), _MAX_LINES, "lines", limits.DECIMATE_ADVICE)
     rows, others, unread = _split_statements(path, _plain_text(text))
-    positions, colours, notes = _vertices(path, rows["v"])
-    uv, normals = _table(path, rows["vt"], "vt")[0], _table(path, rows["vn"], "vn")[0]
+    positions, colours, notes = _parse_vertices(path, rows["v"])
+    uv, normals = (
+        _parse_number_table(path, rows["vt"], "vt")[0],
+        _parse_number_table(path, rows["vn"], "vn")[0],
+    )
     if np.nan_to_num(uv[:, 2]).any():
         notes.append("the third coordinate of uv (vt) is left out")
-    paint = "".join(value for _, key, value in others if key == _POLYPAINT)
+    paint = "".join(value for _, key, value in others if key == _POLYPAINT_MARK)
     if paint and colours is not None:
-        notes.append(f"the polypaint ({_POLYPAINT}) is left out: vertices have colours of their own")
+        notes.append(f"the polypaint ({_POLYPAINT_MARK}) is left out: vertices have colours of their own")
     elif paint:
-        colours, faults = _polypaint(paint, len(positions))
+        colours, faults = _parse_polypaint(paint, len(positions))
         notes += faults
-    counts, corners = _faces(path, rows)
-    pairs, pair = _groups(path, others, rows["f"].line)
+    counts, corners = _parse_faces(path, rows)
+    pairs, pair = _face_groups(path, others, rows["f"].line)
     counts, corners, kept, faults = without_small_polygons(counts, corners)
     if not len(counts):
         refuse_without_faces(path, len(positions))
@@ -203,12 +206,12 @@ def _refuse_line(path: Path, rows: _Rows, index: int, expected: str, actual: str
     refuse(path, expected, f"in line {rows.line[index] + 1} {said}", limits.DAMAGED_ADVICE)
 
 
-def _vertices(path: Path, rows: _Rows) -> tuple[Doubles, Doubles | None, list[str]]:
+def _parse_vertices(path: Path, rows: _Rows) -> tuple[Doubles, Doubles | None, list[str]]:
     """Return positions (n, 3), linear colours (n, 3) or None, and notes.
 
-    One number after the position is a weight, by which the position is divided; three are a colour.
+    One number after the position is a weight, by which the position is divided; three numbers are a colour.
     """
-    table, counts = _table(path, rows, "v")
+    table, counts = _parse_number_table(path, rows, "v")
     positions, notes = table[:, :3], list[str]()
     if (counts == 5).any() or (counts > _USED_NUMBERS).any():
         notes.append("further numbers after the position or colour of vertices (v) are left out")
@@ -223,7 +226,7 @@ def _vertices(path: Path, rows: _Rows) -> tuple[Doubles, Doubles | None, list[st
     return positions, colours, notes + faults
 
 
-def _polypaint(digits: str, count: int) -> tuple[Doubles | None, list[str]]:
+def _parse_polypaint(digits: str, count: int) -> tuple[Doubles | None, list[str]]:
     """Return the linear colours (n, 3) of the polypaint of ZBrush, or None and a note.
 
     digits : hexadecimal mask, red, green and blue of each vertex
@@ -232,12 +235,12 @@ def _polypaint(digits: str, count: int) -> tuple[Doubles | None, list[str]]:
     try:
         levels = np.frombuffer(bytes.fromhex(digits), np.uint8).reshape(count, 4)
     except ValueError:
-        return None, [f"the polypaint ({_POLYPAINT}) does not fit the vertices and is left out"]
+        return None, [f"the polypaint ({_POLYPAINT_MARK}) does not fit the vertices and is left out"]
     return linear_colours(levels[:, 1:])
 
 
-def _table(path: Path, rows: _Rows, kind: str) -> tuple[Doubles, Index]:
-    """Return each statement's first six numbers, padded with NaN, (n, 6), and how many it has (n,)."""
+def _parse_number_table(path: Path, rows: _Rows, kind: str) -> tuple[Doubles, Index]:
+    """Return the first six numbers (n, 6) of each statement, padded with NaN, and their true count (n,)."""
     words = run_starts(rows.text > _SPACE)
     first = np.searchsorted(words, rows.start)
     counts = np.diff(first, append=len(words))
@@ -266,8 +269,11 @@ def _first_non_numeric(rows: _Rows, dtype: type[np.float64] | type[np.int64]) ->
     return 0
 
 
-def _faces(path: Path, rows: Mapping[str, _Rows]) -> tuple[Index, Index]:
-    """Return each face's number of corners, and indices of position, uv, normal (c, 3) per corner or -1."""
+def _parse_faces(path: Path, rows: Mapping[str, _Rows]) -> tuple[Index, Index]:
+    """Return the number of corners of each face, and position, uv and normal index of each corner (c, 3).
+
+    The index is -1 for a corner without uv or normal.
+    """
     faces = rows["f"]
     slash = faces.text == _SLASH
     spaced = replace(faces, text=np.where(slash, np.uint8(_SPACE), faces.text))
@@ -301,7 +307,7 @@ def _faces(path: Path, rows: Mapping[str, _Rows]) -> tuple[Index, Index]:
     return counts, corners - 1
 
 
-def _groups(
+def _face_groups(
     path: Path, statements: Sequence[_Statement], face_line: Index
 ) -> tuple[list[tuple[str, str]], Index]:
     """Return the combinations of `usemtl` and `g` names, and the index of each face's combination.
@@ -331,7 +337,7 @@ def _unread_notes(keys: Collection[str], statements: Sequence[_Statement], has_n
     """
     kinds = {key: _KINDS_LEFT_OUT.get(key) for key in keys if key not in _WITHOUT_EFFECT}
     names = [f"{key} ({kind})" if kind else key for key, kind in kinds.items()]
-    notes = [f"statements are left out: {listed(names)}"] if names else []
+    notes = [f"statements are left out: {list_names(names)}"] if names else []
     smoothing = {value for _, key, value in statements if key == "s"}
     if not has_normals and (len(smoothing) > 1 or smoothing & {"0", "off"}):
         notes.append("smoothing groups (s) are left out: the surface is smooth everywhere")

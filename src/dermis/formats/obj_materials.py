@@ -77,7 +77,7 @@ _PART_ROLES: Mapping[str, Role] = {
     "normal": "normal",
 }
 _NUMBER = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
-_OPTION = re.compile(
+_OPTION_PATTERN = re.compile(
     rf"-(?:bm\s+(?P<factor>{_NUMBER})"
     rf"|(?P<transform>[ost])(?P<numbers>(?:\s+{_NUMBER}(?=\s)){{1,3}})"
     r"|clamp\s+(?P<clamp>\S+)"
@@ -87,7 +87,7 @@ _OPTION = re.compile(
 )
 _NEUTRAL_OPTIONS = ("mm 0 1", "blendu on", "blendv on", "boost 0", "cc off")
 _NUMBER_PATTERN = re.compile(_NUMBER)
-_UDIM = re.compile(r"<udim>|%\(udim\)d", re.IGNORECASE)
+_UDIM_PATTERN = re.compile(r"<udim>|%\(udim\)d", re.IGNORECASE)
 _MISSING_ADVICE = "Put it there, or set maps by options (--colour, --normal, ...)"
 _USUAL_KD = (0.0, 0.588, 0.64, 0.8, 1.0)  # default values of programs, which accompany a colour map
 _MAX_LINE = 4096  # characters
@@ -99,7 +99,7 @@ _UDIM_COLUMNS, _FIRST_UDIM, _MAX_UDIM = 10, 1001, 1100
 class MtlTexture:
     """Picture that a material of an .mtl file references.
 
-    key : statement that references it, such as map_Kd
+    key : statement that references the picture, such as map_Kd
     name : file name as written
     factor : option -bm, by which the map is multiplied [-]
     scale, offset : options -s and -o along u and v, where v points up
@@ -191,7 +191,7 @@ def _parse_mtl(text: str) -> dict[str, MtlMaterial]:
             current = materials.setdefault(value.strip(), MtlMaterial())
         elif key in TEXTURE_ROLES and value.strip():
             current.textures[TEXTURE_ROLES[key]] = _parse_texture(word, value.strip())
-        elif key in NUMERIC_STATEMENTS and len(numbers := _numbers(value)) >= NUMERIC_STATEMENTS[key]:
+        elif key in NUMERIC_STATEMENTS and len(numbers := _parse_numbers(value)) >= NUMERIC_STATEMENTS[key]:
             current.numbers[key] = numbers
         elif key not in _WITHOUT_EFFECT:
             current.unread.append(word)
@@ -200,10 +200,10 @@ def _parse_mtl(text: str) -> dict[str, MtlMaterial]:
 
 def picture_name(texture: MtlTexture, udim: int = _FIRST_UDIM) -> str:
     """Return the file name of a texture's picture; for UDIM tiles, the file name of the tile `udim`."""
-    return _UDIM.sub(str(udim), texture.name)
+    return _UDIM_PATTERN.sub(str(udim), texture.name)
 
 
-def _numbers(value: str) -> list[float]:
+def _parse_numbers(value: str) -> list[float]:
     words = value.split()
     return [float(word) for word in words] if all(map(_NUMBER_PATTERN.fullmatch, words)) else []
 
@@ -215,7 +215,7 @@ def _parse_texture(key: str, statement: str) -> MtlTexture:
     statement : text after the key, options first
     """
     texture, start = MtlTexture(key, ""), 0
-    while option := _OPTION.match(statement, start):
+    while option := _OPTION_PATTERN.match(statement, start):
         texture, start = _with_option(texture, option), option.end()
     name, factor = statement[start:], texture.factor
     match name.rsplit(maxsplit=2):
@@ -248,7 +248,8 @@ def with_materials(
     Parts whose pictures are a sequence of UDIM tiles are divided into one part for each tile.
 
     path : path of the OBJ file
-    parts : mesh parts; the first name of a part's group is the name of its material, if that has one
+    parts : mesh parts; if a part has a material, the first name of the part's group is the name of the
+        material
     """
     materials: list[FileMaterial] = []
     notes = [f"mtllib: {name} is not in its folder. {_MISSING_ADVICE}" for name in library.missing]
@@ -260,8 +261,8 @@ def with_materials(
             assigned.append(part)
             continue
         own = library.materials[name]
-        has_tiles = any(_UDIM.search(texture.name) for texture in own.textures.values())
-        for udim, piece in _tiles(part) if has_tiles else ((_FIRST_UDIM, part),):
+        has_tiles = any(_UDIM_PATTERN.search(texture.name) for texture in own.textures.values())
+        for udim, piece in _udim_tiles(part) if has_tiles else ((_FIRST_UDIM, part),):
             if (name, udim) not in index:
                 index[name, udim] = len(materials)
                 materials.append(_file_material(path, name, own, udim))
@@ -270,7 +271,7 @@ def with_materials(
     return assigned, tuple(materials), notes
 
 
-def _tiles(part: MeshPart) -> list[tuple[int, MeshPart]]:
+def _udim_tiles(part: MeshPart) -> list[tuple[int, MeshPart]]:
     """Divide a part into the UDIM tiles of its triangles; return the number and the part of each tile."""
     if part.uv is None or not len(part.triangles):
         return [(_FIRST_UDIM, part)]

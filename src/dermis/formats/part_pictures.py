@@ -28,14 +28,14 @@ its maximum."""
 
 @dataclass(frozen=True, eq=False)
 class PartPictures:
-    """Pictures of the parts of a mesh that are not skin, in their common uv layout."""
+    """Pictures of the parts of a mesh that are not skin, in the uv layout that these parts share."""
 
     mesh: Mesh
     maps: PartMaps
 
     @classmethod
     def of(cls, head: Head) -> PartPictures | None:
-        """Return the pictures of a head's parts, or None if it has no maps of parts."""
+        """Return the pictures of a head's parts that are not skin; None for a head without maps of parts."""
         return None if head.maps.parts is None else cls(head.mesh, head.maps.parts)
 
     def roles(self, material: Material) -> set[PartRole]:
@@ -64,7 +64,7 @@ class PartPictures:
             return dict(zip(levels, pool.map(encode_png, levels.values()), strict=True))
 
     def emission(self, material: Material) -> tuple[float, tuple[float, ...]]:
-        """Return the largest radiance that a part emits, and the colour by which its picture is multiplied.
+        """Return the largest radiance that a part emits, and the colour that multiplies its emission picture.
 
         A part without a picture of its emission emits this colour.
         """
@@ -90,27 +90,29 @@ def linear_levels(values: Numbers) -> Bytes:
     return np.asarray(np.rint(np.clip(values, 0, 1) * 255), np.uint8)
 
 
-def _colours(maps: PartMaps) -> Bytes:
+def _colour_levels(maps: PartMaps) -> Bytes:
     return encode_srgb8(maps.colour[..., :3])
 
 
-def _surface(maps: PartMaps) -> Bytes:
+def _surface_levels(maps: PartMaps) -> Bytes:
     return np.pad(linear_levels(maps.surface[..., 2:]), ((0, 0), (0, 0), (1, 0)))
 
 
-def _emission(maps: PartMaps) -> Bytes:
+def _emission_levels(maps: PartMaps) -> Bytes:
     assert maps.emission is not None
     return encode_srgb8(maps.emission / maps.emission.max())
 
 
 _LEVELS: Mapping[PartRole, Callable[[PartMaps], Bytes]] = {
-    "colour": _colours,
-    "cutout": lambda maps: np.concatenate([_colours(maps), linear_levels(maps.colour[..., 3:])], axis=2),
+    "colour": _colour_levels,
+    "cutout": lambda maps: np.concatenate(
+        [_colour_levels(maps), linear_levels(maps.colour[..., 3:])], axis=2
+    ),
     "opacity": lambda maps: np.uint8(255) * (maps.colour[..., 3:] >= 0.5),
     "roughness": lambda maps: linear_levels(maps.surface[..., 2:3]),
     "alpha": lambda maps: linear_levels(maps.surface[..., 2:3] ** 2),
     "metalness": lambda maps: linear_levels(maps.surface[..., 3:]),
-    "surface": _surface,
+    "surface": _surface_levels,
     "normal": lambda maps: normal_levels(maps.surface[..., :2]),
-    "emission": _emission,
+    "emission": _emission_levels,
 }

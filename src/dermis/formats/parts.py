@@ -43,9 +43,9 @@ def default_unit_mm(path: str | Path) -> float:
 class MaterialGroup:
     """Names and colour of a group of triangles.
 
-    names : name of the material if it has one, then name of the mesh or OBJ group
+    names : name of the group's material if it has a name, then name of the mesh or OBJ group
     colour : diffuse reflectance, linear [-]
-    material : index of the file's material, -1 for none
+    material : index of the file's material, -1 if there is none
     """
 
     names: tuple[str, ...]

@@ -26,16 +26,16 @@ from dermis.formats.polygons import (
     without_small_polygons,
 )
 from dermis.formats.referenced_files import find_referenced_file
-from dermis.formats.text_files import decode_text, listed, parse_numbers, run_starts
+from dermis.formats.text_files import decode_text, list_names, parse_numbers, run_starts
 from dermis.formats.vertex_colours import linear_colours
 from dermis.mesh.geometry import expand_runs, weld
 
 _MAX_HEADER_BYTES = 1 << 16  # bytes
 _MAX_ELEMENTS = {"vertex": limits.MAX_VERTICES, "face": limits.MAX_TRIANGLES}
 _MAX_PROPERTIES, _MAX_LISTS = 256, 8
-_FORMATS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
-_SPACE = 32
-_TYPES = {
+_BYTE_ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
+_SPACE_CODE = 32
+_NUMPY_TYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),
     **dict.fromkeys(("uchar", "uint8"), "u1"),
     **dict.fromkeys(("short", "int16"), "i2"),
@@ -88,11 +88,11 @@ PLY_PROPERTIES = (
 """Elements and properties of PLY files."""
 _WITHOUT_EFFECT = keys_of(PLY_PROPERTIES, "no effect")
 _HEADER_END = re.compile(rb"[\r\n]end_header[ \t]*(\r\n|\r|\n)")
-_STRUCT_CODES = dict(zip(dict.fromkeys(_TYPES.values()), "bBhHiIfdqQe", strict=True))
+_STRUCT_CODES = dict(zip(dict.fromkeys(_NUMPY_TYPES.values()), "bBhHiIfdqQe", strict=True))
 
 
 class _Property(NamedTuple):
-    """Property of an element; a list if `length_dtype` is not ""."""
+    """Property of an element: a list if `length_dtype`, the type of the list's length, is not ""."""
 
     name: str
     dtype: str
@@ -116,7 +116,7 @@ class _List(NamedTuple):
 class _Header(NamedTuple):
     """Header of a PLY file.
 
-    order : byte order, "=" for text
+    order : byte order as in NumPy types, "=" for text
     size : size of the header in bytes
     pictures : file names of pictures, in comments
     """
@@ -143,11 +143,11 @@ class _Columns(dict[str, "Numbers | _List"]):
         return np.column_stack(columns)
 
     def take_first(self, choices: Sequence[Sequence[str]]) -> Numbers | None:
-        """Return the first existing set of properties as an array (n, k)."""
+        """Return the first set of properties that exists as an array (n, k); None if there is none."""
         return next((one for names in choices if (one := self.take(names)) is not None), None)
 
     def take_list(self, names: Sequence[str]) -> _List | None:
-        """Return the first existing list property among some names."""
+        """Return the first existing list property among some names; None if none exists."""
         for name in names:
             if isinstance(column := self.get(name), _List):
                 self.used.add(name)
@@ -166,18 +166,18 @@ def read_ply(path: Path) -> MeshFile:
     vertices, faces, strips = (tables.get(name, _Columns()) for name in ("vertex", "face", "tristrips"))
     positions = vertices.take("xyz")
     if positions is None:
-        refuse(path, "vertices with x, y and z", f"they have {listed(vertices)}", limits.DAMAGED_ADVICE)
-    counts, index = _polygons(path, faces, strips, len(positions))
-    uv, uv_index = _uv(path, vertices, faces, counts, index)
+        refuse(path, "vertices with x, y and z", f"they have {list_names(vertices)}", limits.DAMAGED_ADVICE)
+    counts, index = _polygon_corners(path, faces, strips, len(positions))
+    uv, uv_index = _corner_uv(path, vertices, faces, counts, index)
     normals = vertices.take(("nx", "ny", "nz"))
-    colours, notes = _colours(vertices)
+    colours, notes = _vertex_colours(vertices)
     corners = np.column_stack((index, uv_index, np.full_like(index, -1) if normals is None else index))
     counts, corners, _, faults = without_small_polygons(counts, corners)
     if not len(counts):
         refuse_without_faces(path, len(positions))
     directions = np.empty((0, 3)) if normals is None else to_floats(normals)
     polygons = Polygons(counts, corners, np.asarray(positions, np.float64), uv, directions, colours)
-    picture, unused = _picture(header.pictures, faces.take(("texnumber",)))
+    picture, unused = _main_picture(header.pictures, faces.take(("texnumber",)))
     notes += [*faults, *missing_uv(polygons), *unused, *_unread_notes(tables)]
     materials: tuple[FileMaterial, ...] = ()
     if picture is not None and (file := find_referenced_file(path, picture)) is not None:
@@ -207,8 +207,8 @@ def _read_header(path: Path, data: bytes) -> _Header:
     header = _Header("", size, [], [])
     for line, text in zip(words, lines, strict=True):
         match line:
-            case ["format", name, *_] if name in _FORMATS:
-                header = header._replace(order=_FORMATS[name])
+            case ["format", name, *_] if name in _BYTE_ORDERS:
+                header = header._replace(order=_BYTE_ORDERS[name])
             case ["element", *declared]:
                 header.elements.append(_declared_element(path, declared, len(data) - size))
             case ["property", *declared] if header.elements:
@@ -216,7 +216,9 @@ def _read_header(path: Path, data: bytes) -> _Header:
             case ["comment", key, _, *_] if key.lower() == "texturefile":
                 header.pictures.append(text.split(None, 2)[2].strip())
     if not header.order:
-        refuse(path, f"a PLY file of format {', '.join(_FORMATS)}", "it has another", limits.DAMAGED_ADVICE)
+        refuse(
+            path, f"a PLY file of format {', '.join(_BYTE_ORDERS)}", "it has another", limits.DAMAGED_ADVICE
+        )
     return header
 
 
@@ -241,10 +243,10 @@ def _declared_property(path: Path, words: Sequence[str]) -> _Property:
     """
     is_list = words[:1] == ["list"]
     kinds = words[is_list:-1]
-    if len(kinds) != 1 + is_list or not all(kind in _TYPES for kind in kinds):
+    if len(kinds) != 1 + is_list or not all(kind in _NUMPY_TYPES for kind in kinds):
         actual = f"got {' '.join(words)[:80]!r}"
         refuse(path, "properties with a name and known types", actual, limits.DAMAGED_ADVICE)
-    return _Property(words[-1], *(_TYPES[kind] for kind in reversed(kinds)))
+    return _Property(words[-1], *(_NUMPY_TYPES[kind] for kind in reversed(kinds)))
 
 
 def _read_elements(path: Path, header: _Header, data: Bytes) -> dict[str, _Columns]:
@@ -252,15 +254,15 @@ def _read_elements(path: Path, header: _Header, data: Bytes) -> dict[str, _Colum
 
     data : bytes after the header
     """
-    is_text = header.order == _FORMATS["ascii"]
+    is_text = header.order == _BYTE_ORDERS["ascii"]
     if is_text:
-        data = parse_numbers(data, len(run_starts(data > _SPACE)), np.float64).view(np.uint8)
+        data = parse_numbers(data, len(run_starts(data > _SPACE_CODE)), np.float64).view(np.uint8)
     tables, position = dict[str, _Columns](), 0
     for element in header.elements:
         if element.count:
             reader = _ElementReader(path, element, header.order, is_text, data)
             tables[element.name], position = reader.read(position)
-    if position < len(data) and (is_text or (data[position:] > _SPACE).any()):
+    if position < len(data) and (is_text or (data[position:] > _SPACE_CODE).any()):
         left, unit = (
             (len(data) - position, "bytes") if not is_text else ((len(data) - position) // 8, "numbers")
         )
@@ -291,7 +293,7 @@ class _ElementReader:
         columns, properties = _Columns(), self.element.properties
         lists = [one for one in properties if one.length_dtype]
         limits.check_limit(self.path, len(lists), _MAX_LISTS, "lists of an element", limits.DAMAGED_ADVICE)
-        lengths = dict(zip(lists, self._lengths(position), strict=True))
+        lengths = dict(zip(lists, self._list_lengths(position), strict=True))
         size = np.full(self.element.count, self._fixed_size(properties), np.int64)
         for one, length in lengths.items():
             size += length * self._dtype(one.dtype).itemsize
@@ -301,7 +303,7 @@ class _ElementReader:
         for one in properties:
             count = lengths.get(one, np.ones_like(start))
             start = start + (self._dtype(one.length_dtype).itemsize if one.length_dtype else 0)
-            values = self._gather(start, count, one.dtype, size)
+            values = self._gather_values(start, count, one.dtype, size)
             columns[one.name] = _List(count, values) if one.length_dtype else values
             start = start + count * self._dtype(one.dtype).itemsize
         return columns, end
@@ -318,7 +320,7 @@ class _ElementReader:
             actual = f"it ends within its elements named {self.element.name!r}"
             refuse(self.path, "as much data as the header states", actual, limits.DAMAGED_ADVICE)
 
-    def _gather(self, start: Index, count: Index, dtype: str, row_size: Index) -> Numbers:
+    def _gather_values(self, start: Index, count: Index, dtype: str, row_size: Index) -> Numbers:
         """Return the values of a property in all rows, concatenated.
 
         start, count : (n,) position of each row's first value [bytes], and number of its values
@@ -334,7 +336,7 @@ class _ElementReader:
             values = self.data[first[:, None] + np.arange(stored.itemsize)].view(stored).reshape(-1)
         return np.asarray(values.astype(dtype))
 
-    def _lengths(self, position: int) -> list[Index]:
+    def _list_lengths(self, position: int) -> list[Index]:
         """Return the lengths of each list property, (n,) each."""
         steps, skipped = list[_ListStep](), list[_Property]()
         for one in self.element.properties:
@@ -395,21 +397,21 @@ class _ElementReader:
 
 
 class _ListStep(NamedTuple):
-    """List in a row: bytes between the previous list and this one, type of its length, size of an item."""
+    """List in a row: bytes after the previous list, type of the list's length, and size of an item [byte]."""
 
     skip: int
     length: np.dtype[Any]
     item_size: int
 
 
-def _polygons(path: Path, faces: _Columns, strips: _Columns, points: int) -> tuple[Index, Index]:
+def _polygon_corners(path: Path, faces: _Columns, strips: _Columns, vertex_count: int) -> tuple[Index, Index]:
     """Return the number of corners of each face and strip triangle, and the vertex of each corner.
 
-    points : number of vertices in the file
+    vertex_count : number of vertices in the file
     """
     own, counts, index = faces.take_list(_FACE_NAMES), np.empty(0, np.int64), np.empty(0, np.int64)
     if faces and own is None:
-        refuse(path, f"faces with {_FACE_NAMES[0]}", f"they have {listed(faces)}", limits.DAMAGED_ADVICE)
+        refuse(path, f"faces with {_FACE_NAMES[0]}", f"they have {list_names(faces)}", limits.DAMAGED_ADVICE)
     if own is not None:
         counts, index = own.lengths, own.items.astype(np.int64)
     if (strip := strips.take_list(_FACE_NAMES)) is not None:
@@ -417,9 +419,9 @@ def _polygons(path: Path, faces: _Columns, strips: _Columns, points: int) -> tup
         counts = np.concatenate([counts, np.full(len(triangles), 3)])
         index = np.concatenate([index, triangles.ravel()])
     check_polygon_sizes(path, counts)
-    if len(index) and (index.min() < 0 or index.max() >= points):
+    if len(index) and (index.min() < 0 or index.max() >= vertex_count):
         actual = f"they run from {index.min()} to {index.max()}"
-        refuse(path, f"triangle indices from 0 to {points - 1}", actual, limits.DAMAGED_ADVICE)
+        refuse(path, f"triangle indices from 0 to {vertex_count - 1}", actual, limits.DAMAGED_ADVICE)
     return counts, index
 
 
@@ -435,10 +437,10 @@ def _strip_triangles(strips: _List) -> Index:
     return np.asarray(triangles[(triangles.min(axis=1) >= 0) & (a != b) & (b != c) & (c != a)])
 
 
-def _uv(
+def _corner_uv(
     path: Path, vertices: _Columns, faces: _Columns, counts: Index, index: Index
 ) -> tuple[Doubles, Index]:
-    """Return uv coordinates (t, 2), and the index of each corner's uv, -1 for none.
+    """Return uv coordinates (t, 2), and the index of each corner's uv, -1 if there is none.
 
     counts, index : number of corners of each polygon, and the vertex of each corner
     """
@@ -459,7 +461,7 @@ def _uv(
     return unique, uv_index
 
 
-def _colours(vertices: _Columns) -> tuple[Doubles | None, list[str]]:
+def _vertex_colours(vertices: _Columns) -> tuple[Doubles | None, list[str]]:
     """Return the linear colours (n, 3) of vertices or None, and notes."""
     values, alpha = vertices.take_first(COLOUR_NAMES), vertices.take_first(_ALPHA_NAMES)
     notes = []
@@ -471,7 +473,7 @@ def _colours(vertices: _Columns) -> tuple[Doubles | None, list[str]]:
     return colours, notes + faults
 
 
-def _picture(names: Sequence[str], picture_index: Numbers | None) -> tuple[str | None, list[str]]:
+def _main_picture(names: Sequence[str], picture_index: Numbers | None) -> tuple[str | None, list[str]]:
     """Return the picture that most faces use, and a note on the other pictures.
 
     names : names of the pictures
@@ -484,7 +486,7 @@ def _picture(names: Sequence[str], picture_index: Numbers | None) -> tuple[str |
     )
     chosen = names[int(used[counts.argmax()])]
     others = [name for name in dict.fromkeys(names) if name != chosen]
-    return chosen, [f"of several pictures {chosen} is used; left out: {listed(others)}"] if others else []
+    return chosen, [f"of several pictures {chosen} is used; left out: {list_names(others)}"] if others else []
 
 
 def _unread_notes(tables: Mapping[str, _Columns]) -> list[str]:
@@ -498,4 +500,4 @@ def _unread_notes(tables: Mapping[str, _Columns]) -> list[str]:
         and name not in (*columns.used, *_WITHOUT_EFFECT)
         and not name.startswith(_SCALAR_PREFIX)
     ]
-    return [f"these are left out: {listed(ignored)}"] if ignored else []
+    return [f"these are left out: {list_names(ignored)}"] if ignored else []

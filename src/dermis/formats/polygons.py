@@ -23,7 +23,7 @@ class Polygons:
     """Polygons of a file.
 
     counts : (n,) number of corners of each polygon, at least 3
-    corners : (c, 3) indices of position, uv and normal of each corner, -1 for none
+    corners : (c, 3) indices of position, uv and normal of each corner, -1 if there is none
     positions : (p, 3)
     uv : (t, 2)
     normals : (m, 3)
@@ -42,9 +42,9 @@ class Polygons:
         return np.minimum.reduceat(self.corners[:, 1], np.cumsum(self.counts) - self.counts) >= 0
 
     def parts(self, groups: Sequence[MaterialGroup], group: Index, order: TriangleOrder) -> list[MeshPart]:
-        """Return a mesh part for each group with polygons, in the order of its first polygon.
+        """Return a mesh part for each group that has polygons, in the order of the groups' first polygons.
 
-        groups, group : groups, and (n,) group index of each polygon
+        groups, group : all groups, and (n,) index in `groups` for each polygon
         order : order of the triangles, see `triangulate`
 
         Polygons without uv become separate parts, whose uv is None.
@@ -58,9 +58,11 @@ class Polygons:
         ends = np.cumsum(np.bincount(rank))[:-1]
         pieces = np.split(counts, ends), np.split(corners, np.cumsum(counts)[ends - 1])
         chosen = [groups[one] for one in keys[by_first] // 2]
-        return [self._part(*piece, order) for piece in zip(chosen, *pieces, strict=True)]
+        return [self._build_part(*piece, order) for piece in zip(chosen, *pieces, strict=True)]
 
-    def _part(self, group: MaterialGroup, counts: Index, corners: Index, order: TriangleOrder) -> MeshPart:
+    def _build_part(
+        self, group: MaterialGroup, counts: Index, corners: Index, order: TriangleOrder
+    ) -> MeshPart:
         """Return selected polygons as a part with one vertex per combination of position, normal and uv."""
         vertex, uv, normal = corners.T + np.array([[0], [1], [1]])
         if not uv.all():
@@ -87,7 +89,7 @@ class Polygons:
 
 
 def missing_uv(polygons: Polygons) -> list[str]:
-    """Return a note if some of the polygons have uv and others have none."""
+    """Return a list with a note if some polygons have uv and others have none, else an empty list."""
     has_uv = polygons.has_uv()
     missing = np.count_nonzero(~has_uv)
     return [f"{missing:,} of {len(has_uv):,} faces have no uv"] if 0 < missing < len(has_uv) else []
@@ -104,8 +106,8 @@ def check_polygon_sizes(path: Path, counts: Index) -> None:
 def without_small_polygons(counts: Index, corners: Index) -> tuple[Index, Index, Mask, list[str]]:
     """Remove polygons of fewer than three corners.
 
-    Returns `counts` and `corners` of the remaining polygons, the mask (n,) that selects them, and a list with
-    a note if any were removed.
+    Returns `counts` and `corners` of the remaining polygons, the mask (n,) that selects these polygons, and a
+    list with a note if any polygons were removed.
     """
     kept = counts >= 3
     if kept.all():
@@ -114,14 +116,16 @@ def without_small_polygons(counts: Index, corners: Index) -> tuple[Index, Index,
     return counts[kept], corners[np.repeat(kept, counts)], kept, [note]
 
 
-def refuse_without_faces(path: Path, points: int) -> NoReturn:
+def refuse_without_faces(path: Path, point_count: int) -> NoReturn:
     """Refuse a file without faces.
 
-    points : number of points in the file
+    point_count : number of points in the file
     """
-    actual = "it is a cloud of points without faces" if points else "it has none"
+    actual = "it is a cloud of points without faces" if point_count else "it has none"
     advice = "Make a mesh of the points first (in MeshLab: Filters > Remeshing)"
-    refuse(path, "a mesh of triangles", actual, advice if points else "Export the head as a polygon mesh")
+    refuse(
+        path, "a mesh of triangles", actual, advice if point_count else "Export the head as a polygon mesh"
+    )
 
 
 def triangulate(counts: Index, order: TriangleOrder) -> tuple[Index, Index]:

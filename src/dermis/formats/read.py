@@ -13,7 +13,7 @@ from dermis.base.arrays import Doubles, Index
 from dermis.base.errors import refuse
 from dermis.base.reading import is_file, parsing
 from dermis.formats import size_limits as limits
-from dermis.formats.mesh_checks import check_arrays, check_counts
+from dermis.formats.mesh_checks import check_arrays, check_mesh_counts
 from dermis.formats.mesh_formats import find_format, mesh_suffixes
 from dermis.formats.parts import MeshFile, MeshPart
 from dermis.mesh.geometry import compact_vertices, expand_runs
@@ -34,7 +34,7 @@ _SUFFIX_ADVICE = {
 
 
 def join_parts(parts: list[MeshPart], source: Path) -> MeshPart:
-    """Join mesh parts into one; the normals of vertices that have none become NaN."""
+    """Join mesh parts into one mesh part; the normals of vertices without a normal become NaN."""
     uv = [_part_uv(part, source) for part in parts]
     for part, part_uv in zip(parts, uv, strict=True):
         check_arrays(part.positions, part_uv, part.triangles, source)
@@ -76,28 +76,28 @@ def _joined_uv(parts: list[MeshPart], index: int) -> Doubles:
     return np.vstack([p.other_uv.get(index, np.zeros((len(p.positions), 2))) for p in parts])
 
 
-def select_vertices(part: MeshPart, used: Index) -> MeshPart:
+def select_vertices(part: MeshPart, vertices: Index) -> MeshPart:
     """Return a mesh part with the selected vertices, their morph targets and bones.
 
-    used : (n,) indices of the vertices; they may repeat
+    vertices : (n,) indices of the vertices; they may repeat
 
     Triangles, uv and normals still refer to the vertices of `part`.
     """
-    order, count = np.argsort(used, kind="stable"), np.bincount(used, minlength=len(part.positions))
+    order, count = np.argsort(vertices, kind="stable"), np.bincount(vertices, minlength=len(part.positions))
     first, targets = np.cumsum(count) - count, {}
     for name, (vertex, delta) in part.targets.items():
         row, copy = expand_runs(first[vertex], count[vertex])
         targets[name] = order[copy], delta[row]
-    bone = None if part.bone is None else part.bone[used]
-    weight = None if part.weight is None else part.weight[used]
+    bone = None if part.bone is None else part.bone[vertices]
+    weight = None if part.weight is None else part.weight[vertices]
     return replace(
         part,
-        positions=part.positions[used],
+        positions=part.positions[vertices],
         targets=targets,
         bone=bone,
         weight=weight,
-        colours=None if part.colours is None else part.colours[used],
-        other_uv={index: uv[used] for index, uv in part.other_uv.items()},
+        colours=None if part.colours is None else part.colours[vertices],
+        other_uv={index: uv[vertices] for index, uv in part.other_uv.items()},
     )
 
 
@@ -115,7 +115,7 @@ def _part_normals(part: MeshPart) -> Doubles:
 
 
 def _stack_padded(arrays: list[NDArray[S] | None]) -> NDArray[S] | None:
-    """Stack arrays (n, k) vertically, padded with 0 to the largest k; None if one of them is None."""
+    """Stack arrays (n, k) vertically, padded with 0 to the largest k; None if one of the arrays is None."""
     present = [array for array in arrays if array is not None]
     if len(present) < len(arrays):
         return None
@@ -158,7 +158,7 @@ def read_mesh_file(source: Path) -> MeshFile:
     if skins and not any(len(part.triangles) for part in skins):
         actual = f"skin group {skins[0].group.names[0]!r} has no triangles"
         refuse(source, "a group of triangles that is skin", actual, "Assign its faces to it, or rename it")
-    check_counts(parts, source)
+    check_mesh_counts(parts, source)
     lengths = [np.linalg.norm(part.normals, axis=1) for part in parts if part.normals is not None]
     lost = sum(int(np.count_nonzero(~((length > 0) & np.isfinite(length)))) for length in lengths)
     notes = (f"computed {lost:,} normals that are NaN or have no length",) if lost else ()

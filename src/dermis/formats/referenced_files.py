@@ -1,4 +1,4 @@
-"""Files referenced by a mesh file; only those in the folder of the mesh file or below it are read."""
+"""Files referenced by a mesh file; files outside the folder of the mesh file are not read."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _MAX_PATH_LENGTH = 4096  # characters; some systems are slow to refuse longer pa
 
 
 def find_referenced_file(path: Path, name: str) -> Path | None:
-    """Return the existing file that a mesh file references by name, or None.
+    """Return the path of an existing file that a mesh file references by name; None if it does not exist.
 
     path : path of the mesh file
     name : name relative to the folder of the mesh file; Windows separators are accepted
@@ -41,7 +41,7 @@ def resolve_uri(path: Path, uri: str) -> Path:
 
 
 def _resolve_below(folder: Path, name: PureWindowsPath) -> Path | None:
-    """Return the resolved path of a name relative to a folder, or None if it is invalid or leads outside."""
+    """Return the resolved path of a name relative to a folder; None for a path outside the folder."""
     if len(str(name)) > _MAX_PATH_LENGTH:
         return None
     try:

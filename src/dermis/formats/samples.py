@@ -55,10 +55,10 @@ class Sample:
 
 def _load_registry() -> Mapping[str, Sample]:
     text = resources.files(__package__).joinpath("samples.toml").read_text("utf-8")
-    return MappingProxyType({name: _sample(name, entry) for name, entry in tomllib.loads(text).items()})
+    return MappingProxyType({name: _parse_sample(name, entry) for name, entry in tomllib.loads(text).items()})
 
 
-def _sample(name: str, entry: dict[str, Any]) -> Sample:
+def _parse_sample(name: str, entry: dict[str, Any]) -> Sample:
     home, listed = entry.pop("home"), entry.pop("files")
     files = {role: SampleFile(**file, url=home + file["name"]) for role, file in listed.items()}
     return Sample(name=name, files=MappingProxyType(files), **entry)
@@ -72,17 +72,17 @@ def fetch_sample(name: str) -> dict[str, Path]:
 
     name : a key of `SAMPLES`
 
-    If DERMIS_DATA is set, that folder must contain the files and nothing is downloaded.
+    If DERMIS_DATA is set, the folder that it names must contain the files, and nothing is downloaded.
 
     Raises DermisError for an unknown sample, without a network, and for files with unexpected hashes.
     """
     sample = _find_sample(name)
     paths = {role: _sample_folder(sample) / file.name for role, file in sample.files.items()}
-    missing = [role for role, file in sample.files.items() if not _has_known_hash(paths[role], file)]
+    missing = [role for role, file in sample.files.items() if not _has_expected_hash(paths[role], file)]
     if missing and _data_folder():
         _refuse_data(paths[missing[0]])
     if missing:
-        _download(sample, missing)
+        _download_files(sample, missing)
     return paths
 
 
@@ -93,7 +93,7 @@ def is_available(name: str) -> bool:
     """
     sample = _find_sample(name)
     folder = _sample_folder(sample)
-    return all(_has_known_hash(folder / file.name, file) for file in sample.files.values())
+    return all(_has_expected_hash(folder / file.name, file) for file in sample.files.values())
 
 
 def _find_sample(name: str) -> Sample:
@@ -111,25 +111,25 @@ def _sample_folder(sample: Sample) -> Path:
     return Path(base) / sample.folder
 
 
-def _has_known_hash(path: Path, file: SampleFile) -> bool:
-    """Return whether a file exists and has the SHA-256 of the sample."""
+def _has_expected_hash(path: Path, file: SampleFile) -> bool:
+    """Return whether a file exists and has the expected SHA-256."""
     try:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):  # a pipe would block the reader
             return False
-        return _sha256(path, status.st_size, status.st_mtime_ns) == file.sha256
+        return _file_sha256(path, status.st_size, status.st_mtime_ns) == file.sha256
     except OSError:
         return False
 
 
 @lru_cache(maxsize=256)
-def _sha256(path: Path, size: int, mtime_ns: int) -> str:
+def _file_sha256(path: Path, size: int, mtime_ns: int) -> str:
     """Return the SHA-256 of a file; the result is cached for its size and modification time."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _download(sample: Sample, roles: list[str]) -> None:
+def _download_files(sample: Sample, roles: list[str]) -> None:
     import pooch
 
     folder = _sample_folder(sample)

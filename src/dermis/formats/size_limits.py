@@ -38,7 +38,7 @@ MAX_LIBRARIES = 64
 
 
 def check_limit(culprit: object, count: int, limit: int, items: str, advice: str) -> None:
-    """Raise the error for a file with more than `limit` objects of one kind.
+    """Raise an error for a file with more than `limit` objects of one kind.
 
     culprit : the file, for the error
     count, items : number of the objects, and a plural noun for them

@@ -69,9 +69,9 @@ def choose_skin(
     least a tenth of the head and have no word of `OTHER_WORDS`. If no rule applies, all parts are skin.
 
     groups : names of the parts
-    scatters : whether the file states that light scatters below the surface, for each part
+    scatters : for each part, whether the file states that light scatters below its surface
     """
-    words = [_words(group) for group in groups]
+    words = [_group_words(group) for group in groups]
     is_other = [bool(own & set(OTHER_WORDS)) for own in words]
     named = [_has_skin_word(own) for own in words]
     body = [bool(own & set(BODY_WORDS)) and not other for own, other in zip(words, is_other, strict=True)]
@@ -82,7 +82,7 @@ def choose_skin(
     return covering if any(covering) else [True] * len(parts)
 
 
-def _words(group: MaterialGroup) -> set[str]:
+def _group_words(group: MaterialGroup) -> set[str]:
     return {word.casefold() for name in group.names for word in _WORD_PATTERN.findall(name)}
 
 
@@ -105,15 +105,17 @@ def _covers_head(parts: Sequence[MeshPart], is_other: Sequence[bool]) -> list[bo
 
 
 def describe_choice(groups: Sequence[MaterialGroup], is_skin: Sequence[bool]) -> str:
-    """Return a note on the groups treated as skin, and how to change this; empty for a single group."""
+    """Return a note on which groups are skin, and on the option to change this; empty for a single group."""
     names = [group.names[0] for group in groups]
     skin = list(dict.fromkeys(name for name, own in zip(names, is_skin, strict=True) if own))
     other = [name for name in dict.fromkeys(names) if name not in skin]
     if not other:
         return ""
-    return f"skin is {_listed(skin)}; not skin: {_listed(other)}. --skin-groups NAME,... chooses others"
+    return (
+        f"skin is {_list_names(skin)}; not skin: {_list_names(other)}. --skin-groups NAME,... chooses others"
+    )
 
 
-def _listed(names: Sequence[str], max_count: int = 6) -> str:
+def _list_names(names: Sequence[str], max_count: int = 6) -> str:
     shown = ", ".join(repr(name) for name in names[:max_count])
     return f"{shown} and {len(names) - max_count} more" if len(names) > max_count else shown

@@ -16,7 +16,7 @@ from dermis.formats.parts import MaterialGroup, MeshFile, MeshPart
 from dermis.formats.text_files import parse_numbers
 
 _HEADER_BYTES = 84
-_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+_RECORD_DTYPE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _CORNER_LINE = re.compile(rb"^[ \t]*vertex[ \t]+([^\r\n]*)", re.MULTILINE | re.IGNORECASE)
 
 STL_PROPERTIES = (
@@ -32,7 +32,7 @@ def read_stl(path: Path) -> MeshFile:
     """Read a .stl file; corners at the same position become one vertex."""
     data = read_file(path, "an STL file", limits.MAX_FILE_BYTES)
     count = int.from_bytes(data[_HEADER_BYTES - 4 : _HEADER_BYTES], "little")
-    is_binary = len(data) >= _HEADER_BYTES and len(data) == _HEADER_BYTES + count * _RECORD.itemsize
+    is_binary = len(data) >= _HEADER_BYTES and len(data) == _HEADER_BYTES + count * _RECORD_DTYPE.itemsize
     if is_binary or data.lstrip()[:5].lower() != b"solid":
         corners, notes = _binary_corners(path, data, count)
     else:
@@ -48,10 +48,10 @@ def _binary_corners(path: Path, data: bytes, count: int) -> tuple[Doubles, tuple
     count : number of triangles that the header states
     """
     _check_count(path, count)
-    if len(data) < _HEADER_BYTES + count * _RECORD.itemsize:
+    if len(data) < _HEADER_BYTES + count * _RECORD_DTYPE.itemsize:
         actual = f"{len(data):,} bytes are too few for its {count:,} triangles"
         refuse(path, "a whole STL file", actual, limits.DAMAGED_ADVICE)
-    records = np.frombuffer(data, _RECORD, count, _HEADER_BYTES)
+    records = np.frombuffer(data, _RECORD_DTYPE, count, _HEADER_BYTES)
     notes = ("colours of triangles are left out",) if records["attribute"].any() else ()
     return records["corners"].reshape(-1, 3).astype(np.float64), notes
 

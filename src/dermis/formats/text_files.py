@@ -45,7 +45,7 @@ def _decode_line(line: bytes) -> str:
         return line.decode("latin-1")
 
 
-def listed(names: Collection[str]) -> str:
+def list_names(names: Collection[str]) -> str:
     """Return the first eight names as text for a message, with the number of further names."""
     first, more = islice(names, _MAX_LISTED), len(names) - _MAX_LISTED
     shown = [name if _PLAIN_NAME.fullmatch(name) else format_value(name, _MAX_NAME) for name in first]

@@ -21,8 +21,8 @@ UNITS_MM = (1.0, 10.0, 25.4, 100.0, 1000.0)
 _SIZE_MM = (1.0, 3000.0)  # smallest and largest accepted size
 _SIZE_IN_MM = (100.0, 1000.0)  # sizes in units of the file for which the unit is assumed to be the millimetre
 _FIGURE_MM, _HEAD_MM, _PIECE_MM = 1700.0, 270.0, 150.0  # typical sizes
-_FLATNESS = 0.25  # thickness relative to length below which a mesh is a patch of skin or a hand
-_INCH = 25.4
+_MAX_FLATNESS = 0.25  # thickness relative to length below which a mesh is a patch of skin or a hand
+_INCH_MM = 25.4
 _INCH_PENALTY = {_FIGURE_MM: 0.4, _HEAD_MM: 0.4, _PIECE_MM: 9.0}  # added to the error of log(size)
 _EXPORTED_UNITS_MM = (1.0, 10.0)  # units that programs write although the format requires metres
 _ADVISED_MM = {True: (1200.0, 2200.0), False: (150.0, 500.0)}  # usual sizes: standing figures, other meshes
@@ -47,19 +47,19 @@ def with_settled_unit(rigged: RiggedMesh, path: Path, unit_mm: float | None, cul
     if not _SIZE_MM[0] <= size <= _SIZE_MM[1]:
         _refuse_size(mesh, unit, culprit)
     if guessed and not (unit == 1.0 and _is_in_mm(mesh.positions)):
-        made = f"1 unit = {unit:g} mm makes it {_described(mesh.size_mm)}"
+        made = f"1 unit = {unit:g} mm makes it {_size_text(mesh.size_mm)}"
         note = f"its unit is not stated; {made}; --unit-mm sets another"
     elif size > _SIZE_IN_MM[1] and mesh.skull_mm is None and not (rigged.rig and rigged.rig.skeleton):
-        note = f"it is {_described(mesh.size_mm)} at {unit:g} mm per unit; --unit-mm sets another"
+        note = f"it is {_size_text(mesh.size_mm)} at {unit:g} mm per unit; --unit-mm sets another"
     return rigged._replace(mesh=mesh, notes=(note, *rigged.notes) if note else rigged.notes)
 
 
 def guess_unit_mm(positions: Floats, triangles: Ints) -> float:
     """Return the likely unit of a mesh whose file states none [mm].
 
-    It is the millimetre if the mesh is then 100 to 1000 mm large and not a standing figure. Else it is the
-    unit of `UNITS_MM` for which the size is closest to that of an adult or a head, or of a hand if the mesh
-    is flat or slender.
+    The guess is the millimetre if the mesh is then 100 to 1000 mm large and not a standing figure. Otherwise
+    the guess is the unit of `UNITS_MM` with which the mesh is closest in size to an adult or a head, or to a
+    hand if the mesh is flat or slender.
 
     positions : (v, 3) vertices in the unit of the file, Y up
     triangles : (f, 3) vertex indices
@@ -69,20 +69,20 @@ def guess_unit_mm(positions: Floats, triangles: Ints) -> float:
         thickness, width, length = principal_sizes(positions)
         if size == 0 or _is_in_mm(positions):
             return 1.0
-        is_piece = length > MAX_ELONGATION * width or thickness < _FLATNESS * length
+        is_piece = length > MAX_ELONGATION * width or thickness < _MAX_FLATNESS * length
         typical = _PIECE_MM if is_piece else _HEAD_MM
     penalty = _INCH_PENALTY[typical]
-    return min(UNITS_MM, key=lambda unit: abs(log(size * unit / typical)) + penalty * (unit == _INCH))
+    return min(UNITS_MM, key=lambda unit: abs(log(size * unit / typical)) + penalty * (unit == _INCH_MM))
 
 
 def _is_in_mm(positions: Floats) -> bool:
-    """Return whether height or longest side of vertices (v, 3) suggest that they are in millimetres."""
+    """Return whether height or longest side of vertices (v, 3) suggest that their unit is the millimetre."""
     sizes, (low, high) = np.ptp(positions, axis=0), _SIZE_IN_MM
     return any(low <= size <= high for size in (sizes[1], sizes.max()))
 
 
-def _described(sizes: Floats) -> str:
-    """Return the height of a mesh, or the length of a lying one, as text with a unit.
+def _size_text(sizes: Floats) -> str:
+    """Return the height of an upright mesh, or the length of a lying mesh, as text with a unit.
 
     sizes : (3,) sides of the bounding box [mm]
     """
@@ -102,6 +102,6 @@ def _refuse_size(mesh: Mesh, unit: float, culprit: object) -> None:
         sizes = mesh.size_mm * (other / unit)
         if low <= sizes.max() <= high:
             program = "millimetres" if other == 1.0 else "centimetres"
-            advice += f": {other:g}, for a program that writes {program}, makes it {_described(sizes)}"
-    actual = f"it is {_described(mesh.size_mm)} at {unit:g} mm per unit (a forgotten unit?)"
+            advice += f": {other:g}, for a program that writes {program}, makes it {_size_text(sizes)}"
+    actual = f"it is {_size_text(mesh.size_mm)} at {unit:g} mm per unit (a forgotten unit?)"
     refuse(culprit, f"skin {_SIZE_MM[0]:g} to {_SIZE_MM[1]:g} mm large", actual, advice)

@@ -1,4 +1,4 @@
-"""Allocation of those resources of a frame that depend on neither the camera nor the lights' positions."""
+"""Allocation of the resources of a frame that depend neither on the camera nor on positions of lights."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ def _shade_record(
 ) -> UniformRecord:
     """Return the uniform record of the shading pass, without the members that the camera determines.
 
-    resources : tables and textures of the technique; None if it has none
+    resources : tables and textures of the technique; None if the technique needs none
     """
     program = shade_program(device)
     view = view_record(program, request.head, request.settings, request.split)

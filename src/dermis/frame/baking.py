@@ -40,7 +40,8 @@ _CONDITIONAL_OUTPUTS = {
 class BakedMaps:
     """Maps of the skin of a head in its uv layout, row 0 at the top.
 
-    covered : (n, n) mask of texels whose centre is on skin; all other texels copy the nearest one in the mask
+    covered : (n, n) mask of texels whose centre is on skin; all other texels copy the nearest texel in the
+        mask
     maps : (n, n) or (n, n, c) maps by the names of `features.shading.bake.BAKED_CHANNELS`
     absent : reason why a map is missing, by the name of the map
     """
@@ -91,8 +92,8 @@ def bake_albedo(
 def layout_points(mesh: Mesh, side: int) -> tuple[NDArray[np.int64], NDArray[np.uint32]]:
     """Return the indices of texels whose centres are on skin, and their surface points packed for bake.wgsl.
 
-    Where triangles overlap in uv, one that is not mirrored wins over a mirrored one, and later triangles win
-    over earlier ones.
+    Where triangles overlap in uv, a triangle that is not mirrored takes precedence over a mirrored triangle,
+    and a later triangle over an earlier triangle.
     """
     skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
     texel, triangle = rasterise(mesh, side, np.flatnonzero(skin))
@@ -162,7 +163,7 @@ def _bake_points(
 
 
 def _bake_bindings(renderer: Renderer, inputs: FrameInputs, scene: Scene) -> MutableBindings:
-    """Return the shader resources of bake.wgsl: those of a rendered frame, plus curvature and thickness."""
+    """Return the resources of bake.wgsl: resources of a rendered frame, plus curvature and thickness."""
     resources, device = inputs.resources, renderer.device
     skin_curvature = make_curvature(device, scene.head.topology.mesh)
     frame = CommandList(device, timed=False)

@@ -21,9 +21,10 @@ ADAPTER_KINDS = {"gpu": "DiscreteGPU", "software": "CPU"}
 
 
 def capture_renderer(device_kind: str, adapter: str) -> Renderer:
-    """Return a renderer that records passes for GPUs or for software adapters, whichever adapter it runs on.
+    """Return a renderer that records passes for GPUs or for software adapters.
 
     device_kind : adapter on which the passes will be replayed, "gpu" or "software"
+    adapter : selector of the adapter on which the renderer itself runs; it may be of another kind
     """
     renderer = Renderer(adapter, cache_size=_CACHE_SIZE, cache_ttl=1000)
     if renderer.device.adapter.kind != ADAPTER_KINDS[device_kind]:
@@ -42,7 +43,7 @@ def capture_frame(capture: FrameCapture, inputs: FrameInputs) -> CapturedFrame:
 def reduce_hair(frame: CapturedFrame, factor: int) -> CapturedFrame:
     """Return a captured frame that draws one in `factor` coarse hairs, widened to cover the same area.
 
-    factor : divisor of the number of hairs; 0 keeps all
+    factor : divisor of the number of hairs; 0 keeps all hairs
     """
     for _, record in (one for one in frame.records if one[0] == "StrandView" and factor > 1):
         count = int(record["coarse"]) // factor

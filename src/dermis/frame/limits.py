@@ -109,7 +109,7 @@ def _mixing_bytes(request: FrameRequest) -> float:
 
 
 def _halved_settings(settings: Settings, option: str) -> Settings | None:
-    """Return settings with half the value of a size option, None if that is too small.
+    """Return settings with half the value of a size option, None if half the value is too small.
 
     For "size", the samples per pixel are halved first.
     """
@@ -131,7 +131,7 @@ def _command_line_options(settings: Settings, option: str) -> dict[str, str]:
 def atlas_texel_bytes(technique: TechniqueTraits, blur_count: int, layouts: int) -> float:
     """Return the memory per atlas texel on a software adapter [bytes].
 
-    It covers geometry, pyramid levels, temporary textures of light, and the sum of the levels.
+    The memory covers geometry, pyramid levels, temporary textures of light, and the sum of the levels.
 
     blur_count : number of Gaussians that blur light
     layouts : number of atlas layouts

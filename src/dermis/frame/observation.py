@@ -83,7 +83,7 @@ def observation_jobs(
     previous: Scene | Iterable[Scene | None] | None,
     settings: Iterable[Settings],
 ) -> Iterator[tuple[Callable[[], Readback], Callable[[Readback], Observation]]]:
-    """Yield two functions for each scene: one submits its frame, the other reads back its observation.
+    """Yield two functions for each scene: the first submits a frame, the second reads back the observation.
 
     submit : function that submits a frame, given a scene, the previous scene and `settings`
     previous : previous scenes for motion vectors, see `pair_with_previous`

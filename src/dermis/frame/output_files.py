@@ -72,7 +72,8 @@ def write_multipart(path: Path, picture: PlaneArray, values: Mapping[str, PlaneA
 def quantise(name: str, values: PlaneArray) -> NDArray[np.uint8 | np.uint16]:
     """Return an output as integers for a PNG file, (h, w) or (h, w, 3).
 
-    Outputs with two channels get a third one of zeros, because PNG has no format with two colour channels.
+    Outputs with two channels get a third channel of zeros, because PNG has no format with two colour
+    channels.
     """
     if values.dtype == np.uint8:
         return values

@@ -197,7 +197,7 @@ class Preparation:
 
 
 def interreflection_constants(resources: Resources) -> Constants:
-    """Return the pipeline constant that enables interreflection, if the head has any."""
+    """Return the pipeline constant that enables interreflection, () if no layout has interreflection."""
     return (("INTERREFLECTION", 1),) if resources.layouts[0].interreflection else ()
 
 
@@ -210,7 +210,7 @@ def _motion_bytes(head: Head, motion: Motion, at_rest: MotionBytes) -> MotionByt
 
 
 def _rest_positions_mm(scene: Scene) -> NDArray[np.float32] | None:
-    """Return the (p, 3) control points of the person at rest [mm], None if they are those of the topology."""
+    """Return the (p, 3) control points of the person at rest [mm], None if the topology has the same."""
     motion = scene.motion or scene.head.control.rest
     positions_mm = motion.positions_mm
     return None if positions_mm is scene.head.topology.control.positions_mm else positions_mm

@@ -117,7 +117,7 @@ def shader_options(source: str, store: str, labels: bool, constants: Constants =
 def program_constants(
     device: Device, path: Path, folders: Sequence[Folder], constants: Constants = ()
 ) -> dict[str, float]:
-    """Return the values of `constants`, and of those `device_constants` that the shader declares, by name."""
+    """Return the values of `constants`, and of the `device_constants` that the shader declares, by name."""
     return used_constants(path, folders, device_constants(device)) | dict(constants)
 
 
@@ -134,7 +134,7 @@ def workgroup_grid(count: int, workgroup: int = WORKGROUP_SIZE) -> tuple[int, in
 def registry_version() -> int:
     """Return a number that changes whenever a light, a lobe or an output is registered or removed.
 
-    Shaders that list these are then compiled again.
+    Shaders that list lights, lobes or outputs are then compiled again.
     """
     return KINDS.changes + MODELS.changes + OUTPUTS.changes
 

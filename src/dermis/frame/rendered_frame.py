@@ -28,8 +28,8 @@ _WHITE = 255  # largest byte of a picture
 class FrameTextures:
     """Device, textures and buffers of a frame; all are replaced if the frame is drawn again on a new device.
 
-    meter : exposure meter, None for a given exposure
-    outputs : resources of the outputs besides the picture, None without any
+    meter : exposure meter, None for a fixed exposure
+    outputs : resources of the outputs besides the picture, None if none are requested
     """
 
     device: Device

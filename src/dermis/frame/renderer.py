@@ -137,7 +137,7 @@ class Renderer:
         self._opening_ms = 1e3 * (time.perf_counter() - self._opening_began)
 
     def clear_cache(self) -> None:
-        """Release all cached resources; the next frame creates them again."""
+        """Release all cached resources; the next frame creates its resources again."""
         self.memo.clear()
         self.graph.invalidate()
 
@@ -148,7 +148,7 @@ class Renderer:
         force: bool,
         read_back: Callable[[Graph, Picture], T] | None = None,
     ) -> tuple[CommandList, T | None]:
-        """Declare the passes of a frame, run the stale ones, and start a readback in the same submission.
+        """Declare the passes of a frame, run the stale passes, and start a readback in the same submission.
 
         force : whether to run all passes
         read_back : function that starts the readback of the picture, None for no readback
@@ -405,8 +405,8 @@ class Renderer:
         linear : bool
             True returns float32 linear Rec. 709 instead of sRGB bytes.
         previous : Scene or iterable of Scene, optional
-            Scene before the first one, for motion vectors between consecutive scenes of the same head; or the
-            previous scene of each scene.
+            Scene before the first scene, for motion vectors between consecutive scenes of the same head; or
+            the previous scene of each scene.
         landmarks : iterable of str
             Landmark sets (keys of `dermis.human.landmarks.sets.LANDMARK_SETS`), or files of rows name,vertex.
 

@@ -24,14 +24,15 @@ from dermis.scene.skin import Skin
 class FrameRequest:
     """Everything on which the cached resources of a frame depend.
 
-    profile : diffusion profile of the skin, the first one if a map blends several
-    rest_positions_mm : (p, 3) control points of the person at rest [mm], None if they are the topology's
+    profile : diffusion profile of the skin, the first profile if a map blends several profiles
+    rest_positions_mm : (p, 3) control points of the person at rest [mm], None if they equal those of the
+        topology
     environment_map : prefiltered map of `environment`
     light_part_counts : number of parts into which each light is divided, suns of the environment last
     shadow_layers : number of shadow maps
     posed : whether the scene has a pose
     view_name : cache key of the scene, for callers that draw several scenes in turn
-    other_profiles : profiles that a map blends with `profile`; they have the same Gaussians
+    other_profiles : profiles that a map blends with `profile`; all have the same Gaussians
     blend_weights : (h, w, 2) map of the weights of the other profiles [-], None for a single profile
     outputs, landmarks : names of the outputs and landmark sets that are requested besides the picture
     """

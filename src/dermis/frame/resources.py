@@ -1,4 +1,4 @@
-"""Resources of a frame: those of all features, and the atlas layouts."""
+"""Resources of a frame: the resources of all features, and the atlas layouts."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from dermis.gpu import Constants, Texture, UniformRecord
 class AtlasLayout(LitAtlas):
     """Layout of the atlas in which light is diffused, with its resources.
 
-    translucency : resources of the light through thin parts, None without it
+    translucency : resources of the light through thin parts, None if no light crosses thin parts
     occlusion : resources that update the occlusion map, None where occlusion does not follow the shape
-    interreflection : resources of interreflection, None without it
+    interreflection : resources of interreflection, None if there is no interreflection
     """
 
     translucency: Translucency | None = None
@@ -38,16 +38,17 @@ class Resources:
     expression_maps : painted maps that expressions change, None if no map changes
     layouts : atlas layouts in which light is diffused; the picture is shaded from the first
     scattered : texture of the exitance of light that scattered below the surface
-    technique : tables and textures of the technique; None if it has none
-    output_layers : textures in which the technique diffuses the light of outputs; None if it has none
+    technique : tables and textures of the technique; None if the technique needs none
+    output_layers : textures in which the technique diffuses the light of outputs; None if the technique needs
+        none
     sky : visible fraction of the sky at the vertices, None where occlusion does not follow the shape
-    hair : resources of the hair, None without it
+    hair : resources of the hair, None if no hair is drawn
     visibility : triangle at each sample of the picture
     view, constants : uniform record of the shading pass without the camera, and its pipeline constants
-    outputs : resources of the outputs besides the picture, None without any
+    outputs : resources of the outputs besides the picture, None if none are requested
     suns : number of lights that the environment adds
     gaussians : number of Gaussians of the profile
-    unscattered_fraction : fraction of the skin's triangles outside the atlas, where no light scatters [-]
+    unscattered_fraction : fraction of the skin's triangles outside the atlas, on which no light scatters [-]
     """
 
     shape: shape.Resources

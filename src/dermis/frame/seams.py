@@ -39,7 +39,7 @@ SEAM_METHODS = {
 
 
 def seam_method(name: str, can_stitch: bool) -> SeamMethod:
-    """Return the seam method of a name; "clear-colour" replaces "stitch" for techniques that cannot stitch.
+    """Return the seam method with a name; "clear-colour" replaces "stitch" for techniques that cannot stitch.
 
     can_stitch : whether the technique can carry light across seams
     """
@@ -47,7 +47,7 @@ def seam_method(name: str, can_stitch: bool) -> SeamMethod:
 
 
 class AtlasPlan(NamedTuple):
-    """Atlases of a frame: the names of their layouts, and the side of each [texels]."""
+    """Atlases of a frame: the names of their layouts, and the side of each atlas [texels]."""
 
     layouts: tuple[str, ...]
     side: int

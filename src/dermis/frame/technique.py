@@ -24,7 +24,7 @@ class ProfileSplit:
     relit : (3,) weights of the relit Gaussian [-]
     total : (3,) sums of the weights of all Gaussians [-]
     blurred_mm2, weight : (k,) variances [mm2] and (k, 3) weights [-] of the Gaussians that blur
-    others : splits of the profiles that a map blends with this one; they have the same Gaussians
+    others : splits of the other profiles that a map blends with this profile; all have the same Gaussians
     fine : members of the shader's struct Fine, for light that varies within a texel; empty if it is ignored
     """
 
@@ -37,17 +37,17 @@ class ProfileSplit:
 
     @property
     def relit_changes(self) -> Floats:
-        """Return the relit Gaussian's weights in the o other profiles minus those in this one, (o, 3) [-]."""
+        """Return the relit Gaussian's weights in the o other profiles minus its weights here, (o, 3) [-]."""
         return np.array([one.relit - self.relit for one in self.others]).reshape(-1, 3)
 
     @property
     def weight_changes(self) -> tuple[Floats, ...]:
-        """Return, for each other profile, the (k, 3) weights of its blurs minus those of this profile [-]."""
+        """Return, for each other profile, the (k, 3) weights of its blurs minus the weights here [-]."""
         return tuple(one.weight - self.weight for one in self.others)
 
 
 class TechniqueResources:
-    """Tables and textures of a technique; this base class has none."""
+    """Tables and textures of a technique; this base class has no fields."""
 
 
 class TechniqueTraits:
@@ -95,5 +95,5 @@ class TechniqueTraits:
 
 
 def channel_weights(profile: GaussianSum, normalise: bool) -> Floats:
-    """Return the (k, 3) weights of the Gaussians; `normalise` scales them to a sum of 1 per channel [-]."""
+    """Return the (k, 3) weights of the Gaussians, scaled to a sum of 1 per channel by `normalise` [-]."""
     return profile.weight / profile.albedo if normalise else profile.weight

@@ -88,14 +88,16 @@ def register_types(ffi: Any) -> int:
     return len(types)
 
 
-def _named_types(declared: Any) -> Iterator[tuple[str, Any]]:
+def _named_types(declarations: Any) -> Iterator[tuple[str, Any]]:
     """Yield the C type names of pointers and arrays as wgpu spells them, with their cffi models.
 
-    declared : declarations that cffi parsed from wgpu's header, by name
+    declarations : declarations that cffi parsed from wgpu's header, by name
     """
     from cffi import model  # type: ignore[import-untyped]
 
-    named = {name.removeprefix(_TYPEDEF): kind for name, (kind, _) in declared.items() if _TYPEDEF in name}
+    named = {
+        name.removeprefix(_TYPEDEF): kind for name, (kind, _) in declarations.items() if _TYPEDEF in name
+    }
     for name, kind in named.items():
         if isinstance(kind, model.StructType | model.PrimitiveType):
             yield from ((f"{name} *{space}", model.PointerType(kind)) for space in ("", " "))
@@ -107,14 +109,16 @@ def _named_types(declared: Any) -> Iterator[tuple[str, Any]]:
         yield f"{name} []", model.ArrayType(model.PrimitiveType(name), None)
 
 
-def _callback_types(declared: Any) -> Iterator[tuple[str, Any]]:
+def _callback_types(declarations: Any) -> Iterator[tuple[str, Any]]:
     """Yield the C signatures of callbacks as wgpu spells them, with their cffi models.
 
-    declared : declarations that cffi parsed from wgpu's header, by name
+    declarations : declarations that cffi parsed from wgpu's header, by name
     """
     from cffi import model
 
-    named = {name.removeprefix(_TYPEDEF): kind for name, (kind, _) in declared.items() if _TYPEDEF in name}
+    named = {
+        name.removeprefix(_TYPEDEF): kind for name, (kind, _) in declarations.items() if _TYPEDEF in name
+    }
     handles = {kind.get_c_name(): name for name, kind in named.items() if isinstance(kind, model.PointerType)}
     for name, kind in named.items():
         if name.endswith("Callback"):
@@ -148,7 +152,7 @@ class Adapter:
 def list_adapters() -> list[Adapter]:
     """Return all adapters, best first: GPUs before software, then by the number of supported features.
 
-    Raises DermisError if drivers fail, or would fail for lack of address space.
+    Raises DermisError if drivers fail, or if the address space is too small for them.
     """
     check_driver_address_space()
     try:
@@ -198,7 +202,8 @@ def select_adapters(selector: str) -> tuple[list[Adapter], str]:
 def similar_adapters(selector: str) -> list[Adapter]:
     """Return the best adapter for a selector, then all other matching GPUs of the same kind and backend.
 
-    As all use one backend, no GPU is listed twice. A software adapter is returned alone.
+    Because all returned adapters use one backend, no GPU is listed twice. A software adapter is returned
+    alone.
 
     Raises DermisError if no adapter matches.
     """
@@ -208,30 +213,30 @@ def similar_adapters(selector: str) -> list[Adapter]:
     return [best, *(one for one in others if (one.kind, one.backend) == (best.kind, best.backend))]
 
 
-def check_limits(adapter: str, offered: Mapping[str, int]) -> None:
+def check_limits(adapter: str, adapter_limits: Mapping[str, int]) -> None:
     """Raise DermisError for an adapter whose limits are too low for the shaders of a frame.
 
-    adapter, offered : name of the adapter, and its limits by name
+    adapter, adapter_limits : name of the adapter, and its limits by name
     """
     for name in _REQUIRED_LIMITS:
         minimum = DEFAULT_LIMITS[name]
-        if offered.get(name, minimum) < minimum:
+        if adapter_limits.get(name, minimum) < minimum:
             expected = f"{name} of at least {minimum}, as WebGPU promises"
             advice = "Choose another adapter, which dermis doctor lists, or update its driver"
-            refuse(f"adapter {adapter}", expected, f"it has {offered[name]}", advice)
+            refuse(f"adapter {adapter}", expected, f"it has {adapter_limits[name]}", advice)
 
 
-def device_limits(offered: Mapping[str, int], raised: Sequence[str]) -> dict[str, int]:
+def device_limits(adapter_limits: Mapping[str, int], full_limits: Sequence[str]) -> dict[str, int]:
     """Return the limits to request for a device: WebGPU's defaults, or less where the adapter offers less.
 
-    offered : limits of the adapter by name
-    raised : names of the limits that are requested at the full value that the adapter offers
+    adapter_limits : limits of the adapter by name
+    full_limits : names of the limits that are requested at the full value that the adapter offers
     """
     limits = {
-        name: (max if name.startswith("min-") else min)(default, offered.get(name, default))
+        name: (max if name.startswith("min-") else min)(default, adapter_limits.get(name, default))
         for name, default in DEFAULT_LIMITS.items()
     }
-    return limits | {name: offered[name] for name in raised}
+    return limits | {name: adapter_limits[name] for name in full_limits}
 
 
 def _describe_adapter(handle: Untyped) -> Adapter:

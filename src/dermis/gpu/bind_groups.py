@@ -69,8 +69,8 @@ def make_bind_group(
 class ResourceCache(Generic[T]):
     """Cache keyed by the identity of resources; an entry is dropped when one of its resources is released.
 
-    A bind group keeps the memory of its resources allocated, so it must be dropped as soon as one of them is
-    no longer used elsewhere.
+    A bind group keeps the memory of its resources allocated. It must therefore be dropped as soon as nothing
+    else uses one of its resources.
     """
 
     def __init__(self) -> None:
@@ -88,7 +88,7 @@ class ResourceCache(Generic[T]):
         return len(self._keys)
 
     def find(self, key: ResourceKey) -> T | None:
-        """Return the cached entry for a key of `resource_key`, or None."""
+        """Return the cached entry for a key of `resource_key`, or None without an entry."""
         return self._entries.get(key)
 
     def add(self, key: ResourceKey, resources: Sequence[object], entry: T) -> None:
@@ -106,12 +106,12 @@ class ResourceCache(Generic[T]):
             def on_release(_: object) -> None:
                 cache = this()
                 if cache is not None:
-                    cache._drop(identity)
+                    cache._drop_entries(identity)
 
             self._keys[identity] = weakref.ref(resource, on_release), set()
         return self._keys[identity][1]
 
-    def _drop(self, identity: int) -> None:
+    def _drop_entries(self, identity: int) -> None:
         _, keys = self._keys.pop(identity)
         for key in keys:
             self._entries.pop(key, None)

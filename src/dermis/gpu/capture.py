@@ -44,8 +44,8 @@ class CapturedPass:
     """Pass of a captured frame.
 
     stage : name of the stage
-    program, bound : index of the program, and index of the resource or record at each of its bindings; None
-        and empty for a write from the host
+    program, bound : index of the program, and for each of its bindings the index of the resource or uniform
+        record; None and empty for a write from the host
     groups : workgroups along each axis, number of vertices of a render pass, or number of bytes written by
         the host
     completes : index of the resource that the pass extends in place (see `Recorder.dispatch`); -1 if none
@@ -79,7 +79,7 @@ class CapturedFrame:
     def add(self, captured_pass: CapturedPass, unit: int | None) -> None:
         """Append a pass.
 
-        unit : index of the recording to which it belongs; None for a pass that is a unit by itself
+        unit : index of the recording to which the pass belongs; None for a pass that is a unit by itself
         """
         last = self.passes[-1].unit if self.passes else -1
         captured_pass.unit = last + 1 if unit is None else unit
@@ -94,7 +94,7 @@ class CapturedFrame:
 
 
 class FrameCapture(Graph):
-    """Recorder that captures declared frames as data instead of running them.
+    """Recorder that captures the passes of a declared frame as data instead of running the passes.
 
     shaders : WGSL texts of the shaders
     programs : for each program its shader, constants, bindings and, for render programs, depth test and
@@ -241,7 +241,8 @@ class FrameCapture(Graph):
 def describe_resource(device: Device, value: Bindable) -> PlainData:
     """Return the parameters with which a resource can be created again, as plain data for JSON.
 
-    For a texture or buffer they are its sizes, format and usage flags, for a sampler its options.
+    The parameters of a texture or buffer are sizes, format and usage flags; the parameters of a sampler are
+    its options.
     """
     if is_texture(value):
         size, mips = list(value.size), value.mip_level_count

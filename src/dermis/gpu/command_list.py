@@ -60,8 +60,9 @@ class CommandList(Recorder):
     ) -> None:
         """Add a dispatch of a compute program, see `Recorder.dispatch`.
 
-        in_place : ignored, as it only matters for finding stale passes
-        access : `Access` of the program to these resources; it caches the native dispatch for later frames
+        in_place : ignored, as only the search for stale passes needs it
+        access : `Access` of the program to these resources, in which the native dispatch is cached for later
+            frames
         """
         key = stage, groups, program.record_positions(resources, self._uniforms)
         known = access.dispatches if access else {}
@@ -105,7 +106,7 @@ class CommandList(Recorder):
         )
 
     def read_back(self, buffers: Sequence[Buffer], readback: BufferReadback) -> None:
-        """Add copies of buffers into a readback, one after the other; it is mapped after submission."""
+        """Add copies of buffers into a readback, one after another; mapping starts after submission."""
         self._end_pass()
         start = 0
         for buffer in buffers:
@@ -202,7 +203,7 @@ class CommandList(Recorder):
         return self._open_encoder
 
     def _compute_pass(self, stage: str) -> ComputePass:
-        """Return the open compute pass, or begin one; a stage that is timed gets a pass of its own."""
+        """Return the open compute pass, or begin one; a stage that is timed gets a separate pass."""
         if self._splits_stages and self._pass and stage != self._stage:
             self._end_pass()
         if not self._pass:
@@ -302,9 +303,9 @@ class ComputePass:
 
 
 class Timestamps:
-    """GPU timestamps at the start of each pass; a pass lasts until the next one begins, so stages add up.
+    """GPU timestamps at the start of each pass; a pass lasts until the next pass, so that stages add up.
 
-    frame_only : whether to take only the first and the last timestamp, as each one costs time itself
+    frame_only : whether to take only the first and the last timestamp, because each timestamp costs time
     """
 
     def __init__(self, device: Device, *, frame_only: bool = False) -> None:
@@ -317,16 +318,16 @@ class Timestamps:
         is_full = len(self._stages) >= self._queries.count - 1  # the last one is for the end
         if is_full or (self._frame_only and self._stages):
             return None
-        return self._add(stage)
+        return self._add_timestamp(stage)
 
-    def _add(self, stage: str) -> TimestampWrites:
+    def _add_timestamp(self, stage: str) -> TimestampWrites:
         self._stages.append(stage)
         return {"query_set": self._queries, "beginning_of_pass_write_index": len(self._stages) - 1}
 
     def end(self, encoder: Untyped) -> None:
         """Encode the final timestamp and the copy of all timestamps to a buffer."""
         if self._stages:
-            encoder.begin_compute_pass(label="end", timestamp_writes=self._add("end")).end()
+            encoder.begin_compute_pass(label="end", timestamp_writes=self._add_timestamp("end")).end()
             encoder.resolve_query_set(self._queries, 0, len(self._stages), self._resolved, 0)
 
     def stage_ms(self) -> dict[str, float]:

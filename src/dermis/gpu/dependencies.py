@@ -40,7 +40,7 @@ class ResourceState:
     scratch: bool = False
 
     def overlapping(self, written: Container[ResourceState]) -> list[ResourceState]:
-        """Return the states in `written` whose content overlaps this one: itself, its views, its texture."""
+        """Return the states in `written` with overlapping content: this state, its views, or its texture."""
         found = [view for view in self.views if view in written]
         if self in written:
             found.append(self)
@@ -62,7 +62,7 @@ class Access:
     """Resources that a program reads and writes with one set of bindings.
 
     id : unique number of the combination of program and resources
-    reads, writes : states of the resources; those that are read and written are in both
+    reads, writes : states of the resources; a resource that is read and written is in both
     dispatches : native dispatches of earlier frames with their bind groups, by stage, workgroups and
         positions of the uniform records
     """
@@ -79,7 +79,7 @@ def unique_id() -> int:
 
 
 def mark_scratch(device: Device, resource: R) -> R:
-    """Mark a texture or buffer as scratch, so that no pass runs only to update it, and return it."""
+    """Mark a texture or buffer as scratch and return it; no pass runs only to update a scratch resource."""
     resource_state(device, resource).scratch = True
     return resource
 
@@ -102,10 +102,10 @@ PassAccess = tuple[int, tuple[ResourceState, ...], tuple[ResourceState, ...]]
 
 
 class Dependencies:
-    """Dependencies between the passes of a frame, which tell stale passes from passes to skip.
+    """Dependencies between the passes of a frame, from which stale passes are found.
 
     The version that a pass writes is a hash of its key and of the versions that it reads. A pass is skipped
-    if its outputs already have that version, or if no pass that runs needs them.
+    if its outputs already have that version, or if no pass that runs reads these outputs.
 
     passes : for each pass, in order, its access id and the resources that it reads and writes
     """
@@ -139,26 +139,26 @@ class Dependencies:
         return versions
 
     def stale(self, versions: Sequence[int]) -> list[bool]:
-        """Return for each pass whether it has to run to bring all resources to the given versions."""
+        """Return for each pass whether it must run so that all resources get the versions `versions`."""
         current = [state.version == versions[last] for state, last in self._last_writer.items()]
         return self._cached_stale(tuple(current))
 
-    def _find_stale(self, current: tuple[bool, ...]) -> list[bool]:
+    def _find_stale(self, is_current: tuple[bool, ...]) -> list[bool]:
         """Return for each pass whether it is stale.
 
-        current : for each written resource, in order of `_last_writer`, whether it already has its final
-            version
+        is_current : for each written resource, in the order of `_last_writer`, whether it already has its
+            final version
         """
-        valid = {state for state, now in zip(self._last_writer, current, strict=True) if now}
+        valid = {state for state, now in zip(self._last_writer, is_current, strict=True) if now}
         while True:
-            stale = self._stale_given(valid)
+            stale = self._find_stale_unless(valid)
             running = [writes for (*_, writes), now in zip(self.passes, stale, strict=True) if now]
             overwritten = {one for writes in running for one in writes if not stale[self._last_writer[one]]}
             if not overwritten & valid:
                 return stale
             valid -= overwritten
 
-    def _stale_given(self, valid: set[ResourceState]) -> list[bool]:
+    def _find_stale_unless(self, valid: set[ResourceState]) -> list[bool]:
         """Return for each pass whether it writes a needed output that is not in `valid`.
 
         An output is needed if it is the final content of a resource that is not scratch, or the input of a

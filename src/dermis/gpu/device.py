@@ -33,7 +33,7 @@ _RAISED_LIMITS = ("max-texture-dimension-2d", "max-storage-buffer-binding-size",
 
 
 def open_device(adapter: str = "auto", *, bare: bool = False) -> Device:
-    """Open an adapter as a device; if the best matching one fails to open, try the next.
+    """Open an adapter as a device; if the best matching adapter does not open, try the next adapter.
 
     adapter : "auto" (the best), "cpu" (software), part of an adapter's name, or "#1" for its number
     bare : whether to request only the limits that WebGPU guarantees everywhere, and no optional feature
@@ -50,12 +50,12 @@ def open_device(adapter: str = "auto", *, bare: bool = False) -> Device:
 class Device:
     """Logical device with its queue, on which all resources and programs of a renderer live.
 
-    It has WebGPU's default limits, so that a program that needs more fails on every machine alike; only the
-    largest sizes of textures and buffers are the adapter's own. It has the features in `OPTIONAL_FEATURES`
-    that the adapter supports.
+    The device has WebGPU's default limits, so that a program that needs more fails on every machine alike;
+    only the largest sizes of textures and buffers are those of the adapter. The device has the features in
+    `OPTIONAL_FEATURES` that the adapter supports.
 
     adapter, reason : adapter, and why it was chosen, for users
-    bare : whether the largest sizes are WebGPU's defaults too, and no feature is requested
+    bare : whether the largest sizes are also WebGPU's defaults, and no optional feature is requested
     executor : threads for work outside Python (compiling, reading, copying); jobs that have not started are
         cancelled when the device is dropped
     ffi, lib, checked : native library of wgpu, called directly in each frame to save the overhead of wgpu's
@@ -135,9 +135,9 @@ class Device:
         return int(self.checked.wgpuQueueSubmitForIndex(self.handle.queue._internal, 1, command_list))
 
     def wait(self, submitted: int | None = None) -> None:
-        """Wait until a submission and all earlier ones have finished.
+        """Wait until a submission and all earlier submissions have finished.
 
-        submitted : number of the submission, from `submit`; None for the latest
+        submitted : number of the submission, from `submit`; None for the latest submission
         """
         number = self.ffi.NULL if submitted is None else self.ffi.new("WGPUSubmissionIndex *", submitted)
         self.checked.wgpuDevicePoll(self.handle._internal, True, number)
@@ -176,7 +176,7 @@ class Device:
         return self.buffer(np.zeros(size, np.uint8), "UNIFORM")
 
     def acquire_staging(self, size: int) -> Buffer:
-        """Return a mappable buffer of at least `size` bytes for a readback, a released one if possible."""
+        """Return a mappable buffer of at least `size` bytes for a readback, if possible a released buffer."""
         size = -(-size // _STAGING_STEP_BYTES) * _STAGING_STEP_BYTES
         spare = self._staging.get(size)
         if spare:
@@ -215,7 +215,7 @@ class Device:
             return create(usage=flags)
 
     def sampler(self, **options: str) -> Sampler:
-        """Return a sampler with the given wgpu options; samplers are cached."""
+        """Return a sampler with options of wgpu, such as its filters; samplers are cached."""
         key = tuple(sorted(options.items()))
         if key not in self._samplers:
             self._samplers[key] = self.handle.create_sampler(**options)

@@ -58,7 +58,7 @@ def gpu_failures(device: Device) -> Iterator[None]:
 
 
 class ReopeningDevice:
-    """Device that is opened again when it is lost, and on which the interrupted work is then repeated.
+    """Device that is opened again when it is lost; the interrupted work is then repeated.
 
     open_device : function that opens a device
     on_open : function that creates the resources of the caller on each opened device
@@ -79,17 +79,17 @@ class ReopeningDevice:
         Raises DermisError if both devices are lost, and DeviceError for other errors of the driver.
         """
         try:
-            return self._run(job)
+            return self._run_job(job)
         except DeviceLostError as lost:
             if not self._reopens:
                 raise
             notify(f"{lost.name} was lost by its driver; it is opened again, and the frame is restarted")
         try:
-            return self._run(job)
+            return self._run_job(job)
         except DeviceLostError as lost:
             raise lost.lost_twice() from lost
 
-    def _run(self, job: Callable[[], T]) -> T:
+    def _run_job(self, job: Callable[[], T]) -> T:
         device = self._device or self._open_device()
         try:
             with gpu_failures(device):
@@ -116,7 +116,8 @@ class LazyDevice:
     def run(self, job: Callable[[Device], T]) -> T:
         """Return the result of `job(device)`, opening or reopening the device as needed.
 
-        Raises DermisError if no device opens, if it is lost twice, and for other errors of the driver.
+        Raises DermisError if no device opens, if the device is lost twice, and for other errors of the
+        driver.
         """
         if self._reopening is None:
             self._reopening = ReopeningDevice(partial(open_device, self._adapter), self._on_open)
@@ -127,10 +128,10 @@ class LazyDevice:
 
 
 def run_on_device(adapter: str, job: Callable[[Device], T]) -> T:
-    """Return the result of `job(device)` on a device opened for it, and reopened if lost.
+    """Return the result of `job(device)` on a device that is opened for this job, and reopened if lost.
 
     adapter : selector of the adapter, see `open_device`
 
-    Raises DermisError if no device opens, if it is lost twice, and for other errors of the driver.
+    Raises DermisError if no device opens, if the device is lost twice, and for other errors of the driver.
     """
     return LazyDevice(adapter).run(job)

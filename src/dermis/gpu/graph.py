@@ -1,4 +1,4 @@
-"""Frame graph: passes are declared in order, and only those with stale output run."""
+"""Frame graph: passes are declared in order, and only the passes with stale output run."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ class ListedPass:
     stage : name of the stage
     shader : name of the shader file
     constants : pipeline constants by name
-    bindings : by name in the shader: index of a resource, "sampler", or "record 128" for a record of 128
-        bytes
+    bindings : for each name in the shader, the index of a resource in the listing, "sampler", or "record 128"
+        for a record of 128 bytes
     groups : workgroups along each axis, number of vertices of a render pass, or number of bytes written by
         the host
-    recorded : whether the pass belongs to a recording, whose uniform records do not change
+    recorded : whether the pass belongs to a recording and its uniform records never change
     ran : whether the pass ran in that frame
     """
 
@@ -70,8 +70,9 @@ class FrameListing:
     ) -> None:
         """Append a pass to the listing.
 
-        index : index of the declared pass to which it belongs, which may be a recording of several passes
-        recorded : whether it belongs to a recording
+        index : index of the declared pass to which the pass belongs, which may be a recording of several
+            passes
+        recorded : whether the pass belongs to a recording
         """
         bindings = {one.name: self._describe_binding(resources[one.name]) for one in program.bindings}
         listed = ListedPass(stage, program.name, dict(program.constants), bindings, tuple(groups), recorded)
@@ -89,7 +90,7 @@ class FrameListing:
         self._pass_index.append(index)
 
     def finish(self, ran: Sequence[bool]) -> None:
-        """Set `ran` of all listed passes.
+        """Set `ran` of all listed passes after the frame.
 
         ran : for each declared pass whether it ran
         """
@@ -111,7 +112,7 @@ class FrameListing:
 class ListingRecorder(Recorder):
     """Recorder that lists the passes of a recording instead of recording them.
 
-    listing : listing to which they are added
+    listing : listing to which the passes are added
     index : index of the recording among the declared passes
     """
 
@@ -138,10 +139,10 @@ def _describe_resource(value: Bindable) -> str:
 class DeclaredPass:
     """Pass declared on a graph, or all passes of a recording, which run as a whole.
 
-    stages : names of its stages
+    stages : names of the stages of the pass or passes
     run : function that adds the pass to a command list
-    key : everything that its output depends on besides the resources that it reads
-    access : access id, and states of the resources that it reads and writes
+    key : everything that the output depends on besides the resources that are read
+    access : access id, and states of the resources that are read and written
     """
 
     stages: tuple[str, ...]
@@ -151,12 +152,12 @@ class DeclaredPass:
 
 
 class Graph(Recorder):
-    """Frame graph: a recorder that runs only those declared passes whose output is stale.
+    """Frame graph: a recorder that runs only the declared passes whose output is stale.
 
     The resources that a pass reads and writes follow from the bindings of its shader. The version of its
     output is a hash of the program, the resources and their versions, the workgroups, and the uniforms that
     the shader reads. A pass is skipped if its outputs already have that version, or if no pass that runs
-    needs them.
+    reads these outputs.
 
     recordings : cache of the recordings of `repeat`
     executed_stages : stages of the passes that ran in the last frame, in order
@@ -197,7 +198,7 @@ class Graph(Recorder):
         def run(frame: CommandList) -> None:
             frame.dispatch(stage, program, resources, groups, access=access)
 
-        self._add(stage, program, resources, groups, access, writes, run)
+        self._declare_pass(stage, program, resources, groups, access, writes, run)
 
     def write(self, stage: str, buffer: Buffer, data: bytes) -> None:
         """Declare a write of bytes from the host to a buffer, see `Recorder.write`."""
@@ -231,7 +232,7 @@ class Graph(Recorder):
         access = program.access(resources)
         index_state = None if indices is None else resource_state(self.device, indices)
         more_keys = layer, target.clear_depth, index_state
-        self._add(stage, program, resources, (vertices,), access, writes, run, more_keys)
+        self._declare_pass(stage, program, resources, (vertices,), access, writes, run, more_keys)
 
     def fill(
         self, stage: str, program: RenderProgram, resources: Bindings, targets: Sequence[TextureOrView]
@@ -242,12 +243,12 @@ class Graph(Recorder):
         def run(frame: CommandList) -> None:
             frame.fill(stage, program, resources, targets)
 
-        self._add(stage, program, resources, (3,), program.access(resources), writes, run)
+        self._declare_pass(stage, program, resources, (3,), program.access(resources), writes, run)
 
     def repeat(self, record: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
         """Declare the compute passes that `record(recorder, *args)` adds, recorded once per set of arguments.
 
-        All passes of the recording run or none. Replaying them takes almost no time in Python.
+        Either all passes of the recording run, or none. Replaying a recording takes almost no time in Python.
         """
         recording, result = self.recordings.get(self.device, record, args)
         if self.listing is not None:
@@ -258,7 +259,7 @@ class Graph(Recorder):
         return result
 
     def read_back(self, *buffers: Buffer) -> BufferReadback:
-        """Return a readback of the concatenated buffers as they are after the frame."""
+        """Return a readback of the concatenated content that buffers have after the frame."""
         readback = BufferReadback(self.device, sum(buffer.size for buffer in buffers))
         self._readbacks.append((buffers, readback))
         return readback
@@ -297,7 +298,7 @@ class Graph(Recorder):
         self._dependencies = [Dependencies(passes), *self._dependencies][:_CACHED_DEPENDENCIES]
         return self._dependencies[0]
 
-    def _add(
+    def _declare_pass(
         self,
         stage: str,
         program: Program,

@@ -21,9 +21,10 @@ FunctionKey = tuple[Callable[..., object], str]
 class CachedResult:
     """Cached result of a function call.
 
-    args : arguments of the call, compared with later ones
+    args : arguments of the call, which are compared with the arguments of later calls
     value : return value
-    parts : results that the function itself took from the cache; they count as used whenever this one is used
+    parts : results that the function itself took from the cache; the parts count as used whenever this result
+        is used
     keys : keys of this result and of all its parts
     """
 
@@ -67,8 +68,8 @@ class Memo:
         """Return `function(*args, *untracked)`, or the cached result of a call with equal `args`.
 
         untracked : further arguments that do not affect the result and are not compared
-        owner : name of the caller that the result is for, such as a feature, if several callers use the same
-            function
+        owner : name of the caller, such as a feature, if several callers use the same function; their results
+            are cached separately
         """
         key = function, owner
         results = self._results.setdefault(key, [])
@@ -79,7 +80,7 @@ class Memo:
         else:
             self._mark_hits_used(key)
             results[:] = results[: self._cache_size - 1]  # before the call, which may need the space
-            found = self._call(function, args, untracked)
+            found = self._call_function(function, args, untracked)
             found.keys.add(key)
             self._mark_used(key, found)
         if self._pending:
@@ -95,7 +96,7 @@ class Memo:
         self, executor: Executor, function: Callable[[*Ts], T], *args: *Ts, owner: str = ""
     ) -> Future[T]:
         """Return a future of `function(*args)`, run on a thread of `executor`, or the cached future."""
-        return self.get(_submit, executor, function, args, owner=owner)
+        return self.get(_submit_to_executor, executor, function, args, owner=owner)
 
     def result(self, future: Future[T]) -> T:
         """Wait for a future of `submit` and return its result; if it failed, the cache is cleared."""
@@ -121,7 +122,7 @@ class Memo:
         self._results.clear()
         self._hits.clear()
 
-    def _call(
+    def _call_function(
         self, function: Callable[..., object], args: tuple[object, ...], untracked: tuple[object, ...]
     ) -> CachedResult:
         result = CachedResult(args)
@@ -148,7 +149,7 @@ class Memo:
             self._mark_used(*part)
 
 
-def _submit(executor: Executor, function: Callable[[*Ts], T], args: tuple[*Ts]) -> Future[T]:
+def _submit_to_executor(executor: Executor, function: Callable[[*Ts], T], args: tuple[*Ts]) -> Future[T]:
     return executor.submit(function, *args)
 
 

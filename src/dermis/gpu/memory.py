@@ -44,7 +44,8 @@ _SMALLER_FRAME = (
 class OutOfMemoryError(DermisError):
     """Error for a resource that does not fit into the memory of a device.
 
-    expected, actual : halves of the message, without a full stop, for callers that have better advice
+    expected, actual : the two parts of the message, without advice and full stop, for callers that add other
+        advice
     size : size of the resource [byte]
     """
 
@@ -123,19 +124,21 @@ def probe_memory(device: Device, limit: float) -> float:
 def check_driver_address_space() -> None:
     """Raise DermisError if the address space limit (ulimit -v) is too low to load the graphics drivers."""
     if _address_space_limit() < math.inf and not _has_drivers():
-        _check_address_space(_per_threads(_DRIVER_LOADING_BYTES), _per_threads(_SOFTWARE_RENDERING_BYTES))
+        _check_address_space(
+            _bytes_for_threads(_DRIVER_LOADING_BYTES), _bytes_for_threads(_SOFTWARE_RENDERING_BYTES)
+        )
 
 
 def check_software_address_space() -> None:
     """Raise DermisError if the address space limit (ulimit -v) is too low to render in software."""
     if _address_space_limit() < math.inf:
-        _check_address_space(_per_threads(_SOFTWARE_RENDERING_BYTES))
+        _check_address_space(_bytes_for_threads(_SOFTWARE_RENDERING_BYTES))
 
 
 def available_memory() -> float:
     """Return the memory that this process can still allocate [byte].
 
-    It is limited by address space, by the memory of the machine and by the control group.
+    The memory is limited by the address space, by the memory of the machine and by the control group.
     """
     return min(_address_space_limit() - _address_space_used(), main_memory())
 
@@ -143,7 +146,7 @@ def available_memory() -> float:
 def main_memory() -> float:
     """Return the memory of the machine, or the limit of the process's control group if lower [byte].
 
-    Infinite if unknown.
+    The result is infinite if neither is known.
     """
     known = [math.inf]
     with contextlib.suppress(AttributeError, ValueError):  # on Windows
@@ -189,8 +192,8 @@ def _has_drivers() -> bool:
         return False
 
 
-def _per_threads(needed: tuple[float, float]) -> float:
-    return needed[0] + needed[1] * _software_threads()
+def _bytes_for_threads(fixed_and_per_thread: tuple[float, float]) -> float:
+    return fixed_and_per_thread[0] + fixed_and_per_thread[1] * _software_threads()
 
 
 def _address_space_limit() -> float:

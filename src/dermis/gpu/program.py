@@ -58,7 +58,7 @@ class Program:
         self.constants = dict(constants or {})
         self.source = shader_source(path, folders)
         self.bindings: tuple[Binding, ...] = shader_bindings(self.source.text)
-        self._module = self._compile(path)
+        self._module = self._compile_shader(path)
         self._uniforms = [b for b in self.bindings if _is_uniform(b)]
         self._resource_bindings = [b for b in self.bindings if not _is_uniform(b)]
         self._get_resources = _binding_getter([b.name for b in self._resource_bindings])
@@ -69,7 +69,7 @@ class Program:
         self._layout = device.handle.create_pipeline_layout(bind_group_layouts=[self._group_layout])
 
     def record(self, struct: str, **values: object) -> UniformRecord:
-        """Return a uniform record for a struct of the shader: zeros, except for the given members."""
+        """Return a uniform record for a struct of the shader; members without a value are 0."""
         return make_record(self.source.text, struct, **values)
 
     def record_positions(self, resources: Bindings, uniforms: Uniforms) -> tuple[int, ...]:
@@ -113,7 +113,7 @@ class Program:
     def uniform_values(self, resources: Bindings, uniforms: Uniforms) -> tuple[Hashable, ...]:
         """Return the bytes of the uniform records that the shader reads, as part of a pass's key.
 
-        Large records are returned whole, as several passes share their hash.
+        Large records are returned as a whole, because several passes share the hash of a record.
         """
         found: list[Hashable] = []
         records: UniformRecords = resources  # type: ignore[assignment]  # no cast, which costs time
@@ -143,7 +143,7 @@ class Program:
             self.device, self._group_layout, (*self._resource_bindings, *self._uniforms), bound, sizes
         )
 
-    def _compile(self, path: Path) -> Untyped:
+    def _compile_shader(self, path: Path) -> Untyped:
         try:
             return self.device.handle.create_shader_module(code=self.source.text, label=path.name)
         except Exception as error:
@@ -199,7 +199,8 @@ class RenderProgram(Program):
 
     targets : texture formats of the colour targets; empty to draw only depth
     depth_compare : wgpu's name of the depth test, such as "less"; None for no depth attachment
-    has_fragment : whether `fragment` runs, which may discard pixels of a depth pass; by default with targets
+    has_fragment : whether `fragment` runs, which may discard pixels of a depth pass; by default only if there
+        are targets
     raster : depth test and format of the first target, for players of captured frames
     """
 
@@ -247,7 +248,7 @@ def cached_program(device: Device, shader: Hashable, constants: Constants, make:
 
 
 def used_constants(path: Path, folders: Sequence[Folder], constants: Constants) -> dict[str, float]:
-    """Return the pipeline constants that a shader declares, by name; others would be an error in WebGPU."""
+    """Return the pipeline constants that a shader declares, by name; WebGPU refuses all other constants."""
     text = shader_source(path, folders).text
     return {name: value for name, value in constants if f"override {name}:" in text}
 

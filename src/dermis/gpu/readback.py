@@ -52,9 +52,9 @@ class BufferReadback:
         Raises DeviceLostError if the device is lost, and DermisError for other failures.
         """
         ffi, checked = self.device.ffi, self.device.checked
-        self._check()
+        self._check_device()
         self.device.wait(self._submitted)
-        self._check()
+        self._check_device()
         if self._status != self.device.lib.WGPUMapAsyncStatus_Success:
             name = self.device.adapter.name
             raise DermisError(f"{name}: expected to read its results, but its driver refuses. Try again.")
@@ -64,7 +64,7 @@ class BufferReadback:
         self.device.release_staging(self.buffer)
         return copied
 
-    def _check(self) -> None:
+    def _check_device(self) -> None:
         """Raise DeviceLostError if the device is lost, as touching its buffers would abort the process."""
         if self.device.is_lost:
             raise DeviceLostError(self.device)

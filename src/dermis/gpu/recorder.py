@@ -20,7 +20,7 @@ class DrawTarget(NamedTuple):
     """Attachments of a render pass, which the pass clears first.
 
     depth : view of the depth attachment
-    clear_depth : depth to which it is cleared
+    clear_depth : depth to which the depth attachment is cleared
     colour : colour attachment; None to draw only depth
     """
 
@@ -46,8 +46,8 @@ class Recorder(ABC):
         stage : name of the stage, under which the pass is timed
         resources : resources and uniform records by their names in the shader
         groups : number of workgroups along each axis
-        in_place : name of a resource that the pass only completes from the resource's own content, such as a
-            map whose gutters it fills; the version of that resource does not change
+        in_place : name of a resource that the pass completes from the resource's own content, such as a map
+            whose gutters are filled; the version of this resource does not change
         """
 
     def compute(

@@ -95,7 +95,7 @@ def _uniform_chunk(device: Device, chunks: list[Buffer], index: int) -> Buffer:
 
 
 class RecordingCache:
-    """Cache of the most recent recordings per function, for callers that alternate between arguments."""
+    """Cache of the most recent recordings of each function, for callers that alternate between arguments."""
 
     def __init__(self) -> None:
         self._recordings: dict[Callable[..., object], list[tuple[object, Recording, Any]]] = {}
@@ -154,7 +154,7 @@ def _is_weak(copy: object) -> bool:
 
 
 def _matches_copy(copy: object, value: object) -> bool:
-    """Return whether an argument equals the one from which `_weak_copy` made a copy."""
+    """Return whether an argument equals the argument from which `_weak_copy` made a copy."""
     if isinstance(copy, weakref.ref):
         return copy() is value
     if isinstance(copy, tuple):

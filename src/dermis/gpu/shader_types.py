@@ -1,7 +1,7 @@
 """Parser of WGSL declarations: structs as NumPy dtypes, and resource bindings by name.
 
-Structs and bindings are declared only in shaders, from which Python reads them, so that the two cannot
-differ. Alignment rules: WGSL specification, section "Memory Layout".
+Structs and bindings are declared only in shaders. Python reads the declarations from the shaders, so that the
+data of both sides cannot differ. Alignment rules: WGSL specification, section "Memory Layout".
 """
 
 from __future__ import annotations
@@ -75,16 +75,17 @@ class Binding:
 def struct_dtype(text: str, name: str) -> np.dtype[np.void]:
     """Return the NumPy dtype of a WGSL struct, with the member offsets of the shader.
 
-    A mat4x4f is stored as its transpose, as WGSL stores columns; arrays of structs nest.
+    A mat4x4f is stored as its transpose, because WGSL stores columns; a member may be an array of another
+    struct.
 
-    text : text of the shader
+    text, name : text of the shader, and name of the struct
     """
     dtype, _ = _parse_struct(dict(_STRUCT.findall(_COMMENT.sub("", text))), name)
     return dtype
 
 
 def make_record(text: str, struct: str, **values: object) -> UniformRecord:
-    """Return a uniform record for a struct in a shader's text: zeros, except for the given members."""
+    """Return a uniform record for a struct in a shader's text; members without a value are 0."""
     record = np.zeros((), dtype=struct_dtype(text, struct))
     for member, value in values.items():
         record[member] = value
@@ -101,10 +102,10 @@ def uniform_type(text: str, name: str) -> str:
 
 
 def used_members(text: str, name: str) -> Callable[[bytes], Hashable]:
-    """Return a function that selects, from the bytes of a uniform record, those that the shader reads.
+    """Return a function that selects, from the bytes of a uniform record, the bytes that the shader reads.
 
-    It selects all bytes if the shader passes the record to a function, or if the type of the variable is not
-    a struct.
+    The function selects all bytes if the shader passes the record to a function, or if the type of the
+    variable is not a struct.
 
     text, name : text of the shader, and name of the uniform variable
     """
@@ -167,7 +168,7 @@ def shader_bindings(text: str) -> tuple[Binding, ...]:
     """Return the resource bindings that a shader declares, ordered by index; all are in group 0.
 
     Float textures are unfilterable unless `// filtered` follows their declaration; samplers filter unless `//
-    non-filtering` follows theirs.
+    non-filtering` follows their declaration.
 
     text : text of the shader
     """

@@ -58,7 +58,7 @@ def make_texture(
     texel : wgpu's name of the texel format, such as "rgba16float"
     mips : number of mip levels
     use : how the texture gets its content: "compute" (storage texture), "raster" (render target) or "map"
-        (upload); shaders can read it in any case
+        (upload); shaders can read every texture
     name : name of the texture, for error messages
 
     Raises DermisError for sizes over the device's limit, and OutOfMemoryError if the device's memory is full.

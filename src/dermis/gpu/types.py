@@ -40,7 +40,7 @@ class Texture(Protocol):
         base_mip_level: int = 0,
         mip_level_count: int | None = None,
     ) -> TextureView:
-        """Return a view of a range of layers and mip levels; of all by default."""
+        """Return a view of a range of layers and mip levels; by default of all layers and levels."""
 
     def destroy(self) -> None:
         """Free the memory of the texture at once."""
@@ -102,7 +102,7 @@ MutableBindings = dict[str, Bindable]
 
 
 def is_texture(value: Bindable) -> TypeGuard[Texture]:
-    """Return whether a bound object is a texture, not a view of one."""
+    """Return whether a bound object is a texture, as opposed to a texture view."""
     return hasattr(value, "mip_level_count")
 
 

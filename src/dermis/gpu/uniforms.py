@@ -47,7 +47,7 @@ class Uniforms:
         """
         found = self._positions.get(id(record))
         if found is None:
-            found = self._positions[id(record)] = self._add(self.bytes_of(record))
+            found = self._positions[id(record)] = self._add_record(self.bytes_of(record))
         return found
 
     def locate(self, position: int) -> tuple[Buffer, int]:
@@ -72,7 +72,7 @@ class Uniforms:
         self._bytes.clear()
         self._positions.clear()
 
-    def _add(self, record: bytes) -> int:
+    def _add_record(self, record: bytes) -> int:
         size = len(record)
         if self._end + size > CHUNK_BYTES:
             spare = self._device.spare_chunks

@@ -35,7 +35,7 @@ class ShaderListMember(NamedTuple):
     """Member of a list that `//#include <list>` and `//#each list` expand, such as one light type.
 
     name : name in scene files; in shaders, {name} has underscores for hyphens and {NAME} is in capitals
-    file : shader file to include; None if the member has none
+    file : shader file to include; None for a member without a file
     words : replacements for further {words} in `//#each` lines
     """
 
@@ -149,9 +149,9 @@ class _Composer:
             elif directive is None:
                 self.lines.append((line, (path.name, number)))
             elif name := directive["file"]:
-                self.insert(self._find(name, path))
+                self.insert(self._find_file(name, path))
             elif name := directive["files"]:
-                for member in self._members(name, path):
+                for member in self._list_members(name, path):
                     if member.file is not None:
                         self.insert(member.file)
             else:
@@ -175,17 +175,17 @@ class _Composer:
         """Return the lines to which a directive `//#each` or `//#fill` expands."""
         if text := directive["filled"]:
             return [directive["indent"] + _substitute_words(text, self._numbers, file)]
-        members = enumerate(self._members(directive["list"], file))
+        members = enumerate(self._list_members(directive["list"], file))
         each = [_member_words(member, number) for number, member in members]
         return [directive["indent"] + _substitute_words(directive["text"], words, file) for words in each]
 
-    def _find(self, name: str, file: Path) -> Path:
+    def _find_file(self, name: str, file: Path) -> Path:
         for folder in (file.parent, *self._folders):
             if (folder / name).is_file():
                 return folder / name
         raise DermisError(f'{file.name}: expected to find the include "{name}", but no shader folder has it.')
 
-    def _members(self, name: str, file: Path) -> Sequence[ShaderListMember]:
+    def _list_members(self, name: str, file: Path) -> Sequence[ShaderListMember]:
         if name not in self._lists:
             raise DermisError(
                 f"{file.name}: expected to find the list <{name}>, but no shader folder has it."
@@ -193,9 +193,9 @@ class _Composer:
         return self._lists[name]
 
 
-def _member_words(member: ShaderListMember, number: int) -> dict[str, str]:
+def _member_words(member: ShaderListMember, member_number: int) -> dict[str, str]:
     name = member.name.replace("-", "_")
-    return {"name": name, "NAME": name.upper(), "number": f"{number}u", **dict(member.words)}
+    return {"name": name, "NAME": name.upper(), "number": f"{member_number}u", **dict(member.words)}
 
 
 def _substitute_words(text: str, words: Mapping[str, str], file: Path) -> str:

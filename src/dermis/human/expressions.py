@@ -35,7 +35,7 @@ def expand_targets(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def expand_sides(name: str) -> tuple[str, ...]:
-    """Return the left and the right target for a name without side, or the name itself if it has no sides."""
+    """Return the left and the right target for a name without side; only the name if none exist."""
     return tuple(f"{name}{side}" for side in TARGET_SIDES) if f"{name}Left" in _arkit_names() else (name,)
 
 

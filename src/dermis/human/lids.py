@@ -68,9 +68,10 @@ class LidSide(NamedTuple):
 
     rings : (r,) indices of the lid points, row by row of lid_rings.csv
     point : (n,) indices of the lid points and of the surrounding skin
-    weights : (n, r) weights with which the points in `point` follow the displacements of those in `rings`
+    weights : (n, r) weights with which the points in `point` follow the displacements of the points in
+        `rings`
     contact, clearances_mm : (c,) indices of the points that slide over the eye, and their minimum distances
-        from it [mm]
+        from the eye [mm]
     """
 
     rings: Index
@@ -80,7 +81,7 @@ class LidSide(NamedTuple):
     clearances_mm: Points
 
     def reindexed(self, point: Index) -> LidSide:
-        """Return a copy with indices into `point`, a sorted array that contains all points of the lids."""
+        """Return a copy whose indices are positions in `point`, a sorted array with all points of lids."""
         names = "rings", "point", "contact"
         return self._replace(**{name: np.searchsorted(point, getattr(self, name)) for name in names})
 
@@ -125,10 +126,10 @@ def _project_lids(points: Points, side: LidSide, eye: EyeSocket, closed: bool | 
 
 
 def lid_contact(first: int, eyeball_size: int, apex: int, back: int) -> LidContact:
-    """Return the lid points that slide over the eyeballs, with their minimum distances from them.
+    """Return the lid points that slide over the eyeballs, with minimum distances from the eyeballs.
 
     first : index of the first point of the left eyeball
-    eyeball_size : number of points of an eyeball; the right one follows the left one
+    eyeball_size : number of points of an eyeball; the points of the right eyeball follow those of the left
     apex, back : indices of the front and rear poles within an eyeball's points
     """
     both = lid_sides()
@@ -252,10 +253,11 @@ def fit_lid_targets(points_mm: Points, sockets: tuple[EyeSocket, EyeSocket]) -> 
 class _LidTargets(NamedTuple):
     """Index tables of the morph targets that move the lids, equal for all people.
 
-    closed, axis : (t,) whether a target closes the lids, and (t, 1, 3) viewing direction of the eyes in it
+    closed, axis : (t,) whether a target closes the lids, and (t, 1, 3) viewing direction of the eyes when the
+        target is active
     point : (n,) indices of the points around both eyes
-    lid_sides, target_index : for the left and the right eye, its lid points as indices into `point`, and the
-        indices of the targets that move them
+    lid_sides, target_index : for the left and the right eye, the lid points as indices into `point`, and the
+        indices of the targets that move these points
     row, target, point_index : (m,) rows of `MorphTargets.delta_mm` that displace points around the eyes, the
         index of the target of each row, and the index of its point in `point`
     """

@@ -69,7 +69,7 @@ def _target_indices() -> Mapping[str, int]:
 
 
 def check_targets(names: Iterable[str]) -> None:
-    """Raise DermisError, suggesting similar names, if a name is not that of a published morph target."""
+    """Raise an error if there is no published morph target of a name; the message suggests similar names."""
     for name in names:
         if name not in _target_indices():
             known = target_deltas().names

@@ -129,7 +129,7 @@ def _layout_faces(layout: Layout) -> _LayoutFaces:
 
 
 def _combined_quads(layout: Layout) -> tuple[Points, Index, Index, Index]:
-    """Return the quads of a uv layout with anatomical eyeballs instead of the published ones.
+    """Return the quads of a uv layout, with anatomical eyeballs in place of the published eyeballs.
 
     The arrays are uv (u, 2), control point indices (q, 4), uv indices (q, 4) and material indices (q,).
     """
@@ -159,7 +159,7 @@ def _combined_quads(layout: Layout) -> tuple[Points, Index, Index, Index]:
 
 @dataclass(frozen=True, eq=False)
 class Template:
-    """Data that people with the same uv layout and subdivision level share.
+    """Data shared by all people with the same uv layout and subdivision level.
 
     head : bare head of the mean person, at this level
     root_finder : finder of brow and lash roots on the mean person

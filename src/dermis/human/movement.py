@@ -46,7 +46,7 @@ def gaze_rotations() -> tuple[BoneRotation, ...]:
 
 @cache
 def expression_targets() -> MorphTargets:
-    """Return the ARKit blend shapes of skin, teeth and tongue; eyeballs have none, as bones rotate them."""
+    """Return the ARKit blend shapes of skin, teeth and tongue; eyeballs are rotated by bones instead."""
     targets, names, rows = target_deltas(), list[str](), list[NDArray[np.intp]]()
     for index, name in enumerate(targets.names):
         if name.startswith(EXPRESSION_PREFIX):

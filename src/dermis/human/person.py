@@ -1,4 +1,4 @@
-"""Parametric people, with given parameters or sampled at random."""
+"""Parametric people, with parameters set by the user or sampled at random."""
 
 from __future__ import annotations
 
@@ -94,20 +94,22 @@ _TARGET_RANGE = -2.0, 2.0
 _NO_TARGETS: Mapping[str, float] = MappingProxyType({})
 
 
-def sample_fields(seed: int, given: Mapping[str, Any]) -> dict[str, Any]:
+def sample_fields(seed: int, fixed_fields: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields of a random `Human` by name, for `Human.drawn`.
 
-    given : fields that are not sampled
+    fixed_fields : values of fields that are not sampled
     """
     excluded = *_NESTED_FIELDS, *_OPTIONAL_FIELDS
-    macro = {name: float(value) for name, value in given.items() if name not in excluded}
+    fixed_numbers = {name: float(value) for name, value in fixed_fields.items() if name not in excluded}
     rng = np.random.default_rng(checked_integer("seed", seed, 0, _MAX_SEED))
     sampled = rng.dirichlet((_ANCESTRY_CONCENTRATION,) * 3)
-    ancestry, groups = _sample_ancestry(np.random.default_rng((int(seed), 3)), macro, sampled, given)
+    ancestry, groups = _sample_ancestry(
+        np.random.default_rng((int(seed), 3)), fixed_numbers, sampled, fixed_fields
+    )
     sex = min(abs(rng.normal(0.0, _SEX_DEVIATION)), 0.3)
-    sex = macro.get("sex", 1.0 - sex if rng.random() < 0.5 else sex)
+    sex = fixed_numbers.get("sex", 1.0 - sex if rng.random() < 0.5 else sex)
     old = rng.beta(1.2, 2.2)
-    old = (macro["age"] - YOUNG_AGE) / (OLD_AGE - YOUNG_AGE) if "age" in macro else old
+    old = (fixed_numbers["age"] - YOUNG_AGE) / (OLD_AGE - YOUNG_AGE) if "age" in fixed_numbers else old
     weight = rng.normal(0.3 * old - 0.1, 0.25)
     muscle = rng.normal(0.2 * sex - 0.1 - 0.3 * old, 0.2)
     fields: dict[str, Any] = {
@@ -115,30 +117,36 @@ def sample_fields(seed: int, given: Mapping[str, Any]) -> dict[str, Any]:
         "age": float(YOUNG_AGE + (OLD_AGE - YOUNG_AGE) * old),
         "weight": float(np.clip(weight, -0.7, 0.8)),
         "muscle": float(np.clip(muscle, -0.6, 0.6)),
-        "targets": {**dict(_sample_targets(rng)), **given.get("targets", {})},
+        "targets": {**dict(_sample_targets(rng)), **fixed_fields.get("targets", {})},
     }
-    fields |= dict(zip(_ANCESTRIES, map(float, ancestry), strict=True)) | macro
+    fields |= dict(zip(_ANCESTRIES, map(float, ancestry), strict=True)) | fixed_numbers
     african, asian, caucasian = ancestry
     demographics = Demographics(
-        african, asian, caucasian, fields["sex"], fields["age"], groups, given.get("ita")
+        african, asian, caucasian, fields["sex"], fields["age"], groups, fixed_fields.get("ita")
     )
     skin = sample_skin(rng, np.random.default_rng((int(seed), 4)), demographics)
     eyes = sample_eyes(rng, demographics)
     hair_ancestry = np.array(pigment_ancestry(groups))
     brown, red = _sample_hair_pigments(np.random.default_rng((int(seed), 1)), hair_ancestry)
-    colour = {"hair_eumelanin": brown, "hair_pheomelanin": red} | macro
-    fields |= colour | {"eyes": replace(eyes, **given.get("eyes", {}))}
-    fields |= {name: given[name] for name in _OPTIONAL_FIELDS if given.get(name) is not None}
+    colour = {"hair_eumelanin": brown, "hair_pheomelanin": red} | fixed_numbers
+    fields |= colour | {"eyes": replace(eyes, **fixed_fields.get("eyes", {}))}
+    fields |= {name: fixed_fields[name] for name in _OPTIONAL_FIELDS if fixed_fields.get(name) is not None}
     typical = typical_hair(demographics, colour["hair_eumelanin"], colour["hair_pheomelanin"])
     hair_rng = np.random.default_rng((int(seed), 2))
-    return fields | _sample_hair_and_skin(hair_rng, demographics, typical, skin, given)
+    return fields | _sample_hair_and_skin(hair_rng, demographics, typical, skin, fixed_fields)
 
 
-def _ancestry_fractions(given: Mapping[str, float], sampled: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return ancestry fractions (3,): the given weights divided by their sum, or the sampled fractions."""
-    if not any(name in given for name in _ANCESTRIES):
-        return sampled
-    weights = np.array([given.get(name, 0.0) for name in _ANCESTRIES])
+def _ancestry_fractions(
+    fixed_fields: Mapping[str, float], sampled_fractions: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return ancestry fractions (3,): fixed weights divided by their sum, or else the sampled fractions.
+
+    fixed_fields : values of fields that are not sampled; may contain weights of ancestries
+    sampled_fractions : (3,) sampled ancestry fractions
+    """
+    if not any(name in fixed_fields for name in _ANCESTRIES):
+        return sampled_fractions
+    weights = np.array([fixed_fields.get(name, 0.0) for name in _ANCESTRIES])
     if not weights.sum() > 0:
         refuse("ancestry", "a weight of african, asian or caucasian above 0", "all given are 0", "Raise one")
     return np.asarray(weights / weights.sum())
@@ -146,26 +154,29 @@ def _ancestry_fractions(given: Mapping[str, float], sampled: NDArray[np.float64]
 
 def _sample_ancestry(
     rng: np.random.Generator,
-    macro: Mapping[str, float],
-    sampled: NDArray[np.float64],
-    given: Mapping[str, Any],
+    fixed_numbers: Mapping[str, float],
+    sampled_fractions: NDArray[np.float64],
+    fixed_fields: Mapping[str, Any],
 ) -> tuple[NDArray[np.float64], dict[str, float]]:
     """Return ancestry fractions of the shape (3,), and the weights of the measured groups of the skin.
 
-    If the ancestry of the shape is given, the skin follows it. If only a skin ancestry or an ITA is given,
-    the shape follows the skin. Otherwise some people of Caucasian shape have South Asian or Middle Eastern
-    skin.
+    If the ancestry of the shape is fixed, the skin follows the shape. If only a skin ancestry or an ITA is
+    fixed, the shape follows the skin. Otherwise some people of Caucasian shape have South Asian or Middle
+    Eastern skin.
 
-    macro : numeric fields that are not sampled
-    given : all fields that are not sampled
-    sampled : (3,) sampled fractions of the shape
+    fixed_numbers : values of numeric fields that are not sampled
+    fixed_fields : values of all fields that are not sampled
+    sampled_fractions : (3,) sampled ancestry fractions of the shape
     """
     picks, chance = rng.random(3), rng.random()
-    ancestry, shape_given = _ancestry_fractions(macro, sampled), any(name in macro for name in _ANCESTRIES)
-    name = str(given.get("skin_ancestry") or "")
-    if name or (given.get("ita") is not None and not shape_given):
+    ancestry, shape_given = (
+        _ancestry_fractions(fixed_numbers, sampled_fractions),
+        any(name in fixed_numbers for name in _ANCESTRIES),
+    )
+    name = str(fixed_fields.get("skin_ancestry") or "")
+    if name or (fixed_fields.get("ita") is not None and not shape_given):
         group = _pick_name(
-            group_weights(0, 0, 0, name) if name else likely_groups(float(given["ita"])), picks[0]
+            group_weights(0, 0, 0, name) if name else likely_groups(float(fixed_fields["ita"])), picks[0]
         )
         shape = ancestry if shape_given else rng.dirichlet(_SHAPE_OF_SKIN[group])
         return shape, {group: 1.0}
@@ -186,21 +197,22 @@ def _pick_name(weights: Mapping[str, float], chance: float) -> str:
 def _sample_hair_and_skin(
     rng: np.random.Generator,
     person: Demographics,
-    typical: HairLook,
+    typical_look: HairLook,
     skin: SkinLook,
-    given: Mapping[str, Any],
+    fixed_fields: Mapping[str, Any],
 ) -> dict[str, Any]:
     """Return the fields "hair" and "skin": a random hair look, and the skin with its stubble and recession.
 
-    person, typical : demographics and typical hair of the person
+    person, typical_look : demographics and typical hair look of the person
     skin : sampled skin look, whose shadow of shaved hair is adjusted to the hair
+    fixed_fields : values of fields that are not sampled
     """
-    hair, recession = sample_hair(rng, person, typical), sample_recession(rng, person)
-    hair = replace(hair, **given.get("hair", {}))
+    hair, recession = sample_hair(rng, person, typical_look), sample_recession(rng, person)
+    hair = replace(hair, **fixed_fields.get("hair", {}))
     visibility = stubble_visibility(hair)
     beard = visibility * max(skin.beard, _MIN_BEARD_SHADOW if hair.beard_mm else 0.0)
     skin = replace(skin, stubble=visibility * skin.stubble, beard=beard, recession=recession)
-    return {"hair": hair, "skin": replace(skin, **given.get("skin", {}))}
+    return {"hair": hair, "skin": replace(skin, **fixed_fields.get("skin", {}))}
 
 
 def _sample_hair_pigments(rng: np.random.Generator, ancestry: NDArray[np.float64]) -> tuple[float, float]:
@@ -297,7 +309,7 @@ class Human:
         "south asian"; "" for the colours of the shape's ancestries.
     ita : float, optional
         Individual typology angle of the cheek if `skin` is not given, -65 (darkest) to 70 (lightest)
-        [degrees]; the other properties of the skin are those of measured people with this angle.
+        [degrees]; the skin is otherwise typical of measured people with this angle.
 
     Raises
     ------
@@ -398,9 +410,9 @@ class Human:
         layout : {"own", "hm08"}
             Uv layout: "own" gives the face most space; "hm08" is the layout of MakeHuman, for its skins.
         subdivide : int or callable
-            Levels of Catmull-Clark subdivision, 0 to 3, or a function of the head that returns them.
+            Levels of Catmull-Clark subdivision, 0 to 3, or a function that returns the levels for a head.
         hairs : float
-            Fraction of the scalp and beard hairs to create, 0.05 to 1; they are wider, to keep coverage.
+            Fraction of scalp and beard hairs to create, 0.05 to 1; fewer hairs are wider, to keep coverage.
 
         Returns
         -------
@@ -456,7 +468,7 @@ class Human:
 
     @property
     def look(self) -> SkinLook:
-        """Return the given skin look, or the typical one for the person's ancestry, sex and age."""
+        """Return the skin look `skin`, or the typical skin look for the person's ancestry, sex and age."""
         if self.skin is not None:
             return self.skin
         typical, visibility = typical_skin(self._demographics), stubble_visibility(self.hairdo)
@@ -464,12 +476,12 @@ class Human:
 
     @property
     def iris(self) -> EyeLook:
-        """Return the given eye look, or the typical one for the person's ancestry."""
+        """Return the eye look `eyes`, or the typical eye look for the person's ancestry."""
         return typical_eyes(self._demographics) if self.eyes is None else self.eyes
 
     @property
     def hairdo(self) -> HairLook:
-        """Return the given hair look, or the typical one for the person's ancestry, sex and age."""
+        """Return the hair look `hair`, or the typical hair look for the person's ancestry, sex and age."""
         if self.hair is not None:
             return self.hair
         return typical_hair(self._demographics, self.hair_eumelanin, self.hair_pheomelanin)

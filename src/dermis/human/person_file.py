@@ -45,7 +45,7 @@ def write_person_json(path: Path, person: Human) -> int:
 
 
 def read_person(path: Path) -> Human:
-    """Read a person from a JSON file of `write_person_json`; missing parameters have their defaults.
+    """Read a person from a JSON file written by `write_person_json`; missing parameters get their defaults.
 
     Raises DermisError for other files and for invalid values.
     """
@@ -108,7 +108,7 @@ def write_person_glb(
 def relief_slopes(head: Head) -> NDArray[np.float32] | None:
     """Return the slopes (n, n, 2) of a head's height map along +u and upwards, for normal maps [-].
 
-    None for heads that already have a normal map or have no square height map.
+    The result is None for heads that have a normal map already, or that have no square height map.
     """
     height = head.maps.height
     if head.maps.normal is not None or height is None:

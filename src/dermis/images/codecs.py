@@ -50,7 +50,7 @@ _TIFF_BITS, _TIFF_PHOTOMETRIC, _TIFF_RGB = 258, 262, 2
 
 
 def decode_with_pillow(data: bytes, convert_tables: bool = False) -> Pixels:
-    """Decode a picture at full bit depth to an array (H, W, C), in the colour space of its header.
+    """Decode a picture at full bit depth to an array (H, W, C), in the colour space that its header states.
 
     C is 1, 3 or 4; the type is uint8, uint16, or float32 for a float TIFF. CMYK becomes sRGB.
 
@@ -86,7 +86,7 @@ def decode_with_pillow(data: bytes, convert_tables: bool = False) -> Pixels:
 def strips(image: Numbers) -> Iterator[slice]:
     """Yield slices that divide the rows of an array into strips of about a million pixels.
 
-    Such strips are large enough for fast array operations and need little memory.
+    Strips of this size are large enough for fast array operations, and need little memory.
     """
     rows = max(1, _STRIP_PIXELS // max(1, image.shape[1]))
     for top in range(0, len(image), rows):
@@ -94,9 +94,9 @@ def strips(image: Numbers) -> Iterator[slice]:
 
 
 def _format_of_16_bit(data: bytes, picture: Image) -> str | None:
-    """Return FFmpeg's name for the pixel format of a 16-bit colour picture; None for others.
+    """Return FFmpeg's name for the pixel format of a 16-bit colour picture; None for other pictures.
 
-    Pillow would reduce such a picture to 8 bits, so FFmpeg decodes it.
+    Pillow would reduce 16-bit colours to 8 bits, so FFmpeg decodes these pictures.
     """
     if data.startswith(PNG_SIGNATURE):
         depth, kind = data[24], data[25]
@@ -133,8 +133,8 @@ def encode_png(levels: Numbers, effort: int = 6, use_isal: bool = False) -> byte
     use_isal : compress with ISA-L of the extra "batch", four times as fast as zlib at level 1 for rendered
         pictures
 
-    Every row uses PNG's "up" filter: it is stored as its difference from the row above. For rendered pictures
-    the files are as small as with the best filter for every row, in half of the time.
+    PNG's "up" filter is used: each row is stored as the difference from the row above. For rendered pictures,
+    the files are as small as with the best filter for each row, and encoding takes half of the time.
     """
     height, width, channels = levels.shape
     bits = 8 * levels.itemsize
@@ -145,11 +145,13 @@ def encode_png(levels: Numbers, effort: int = 6, use_isal: bool = False) -> byte
     header = struct.pack(">IIBBBBB", width, height, bits, _PNG_COLOUR_TYPES[channels], 0, 0, 0)
     library, level = (import_extra("isal.isal_zlib", "a data set"), 1) if use_isal else (zlib, effort)
     pixels = library.compress(filtered.data, level)  # releases the GIL
-    return PNG_SIGNATURE + _chunk(b"IHDR", header) + _chunk(b"IDAT", pixels) + _chunk(b"IEND", b"")
+    return (
+        PNG_SIGNATURE + _png_chunk(b"IHDR", header) + _png_chunk(b"IDAT", pixels) + _png_chunk(b"IEND", b"")
+    )
 
 
-def _chunk(kind: bytes, data: bytes) -> bytes:
-    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+def _png_chunk(chunk_type: bytes, data: bytes) -> bytes:
+    return struct.pack(">I", len(data)) + chunk_type + data + struct.pack(">I", zlib.crc32(chunk_type + data))
 
 
 def png_size(data: bytes) -> tuple[int, int]:
@@ -166,9 +168,9 @@ def png_size(data: bytes) -> tuple[int, int]:
 
 
 def decode_up_filtered_png(data: bytes) -> Bytes | NDArray[np.uint16] | None:
-    """Decode a PNG file whose rows all use the "up" filter, as in files that `encode_png` writes.
+    """Decode a PNG file in which all rows use the "up" filter, as in files that `encode_png` writes.
 
-    The result is (H, W, 1, 3 or 4) uint8 or uint16, or None for any other file.
+    The result is an array (H, W, 1, 3 or 4) of uint8 or uint16, or None for a file with other filters.
 
     Raises ValueError when the file is damaged or too large.
     """
@@ -198,10 +200,10 @@ def decode_up_filtered_png(data: bytes) -> Bytes | NDArray[np.uint16] | None:
     return levels.reshape(height, width, channels)
 
 
-def _compressed_pixels(data: bytes) -> bytes | None:
+def _compressed_pixels(png: bytes) -> bytes | None:
     """Return the compressed pixels of a PNG file; None for a file in which a tRNS chunk sets transparency."""
     parts = list[memoryview]()
-    for kind, content in png_chunks(data):
+    for kind, content in png_chunks(png):
         if kind == b"tRNS":
             return None
         if kind == b"IDAT":

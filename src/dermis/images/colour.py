@@ -29,7 +29,7 @@ def encode_srgb(linear: ArrayLike) -> NDArray[np.floating]:
 
 
 def decode_srgb(encoded: ArrayLike) -> NDArray[np.floating]:
-    """Convert sRGB values to linear ones by the exact piecewise curve, not clipped [-].
+    """Convert sRGB values to linear values by the exact piecewise curve, not clipped [-].
 
     encoded : any shape; float32 stays float32, all other types become float64
     """
@@ -55,15 +55,15 @@ def decode_srgb_levels(levels: Bytes | NDArray[np.uint16]) -> Floats:
 def luminance(linear: ArrayLike) -> NDArray[np.floating]:
     """Return the relative luminance Y (...) of linear Rec. 709 colours [-].
 
-    linear : (..., 3) or (..., 4), whose alpha is ignored
+    linear : (..., 3) or, with alpha, which is ignored, (..., 4)
     """
     colour = _as_float(linear)[..., :3]
     return colour @ np.asarray(REC709_LUMINANCE, colour.dtype)
 
 
 @lru_cache(maxsize=2)
-def _linear_by_level(count: int) -> Floats:
-    table = decode_srgb(np.arange(count) / (count - 1)).astype(np.float32)
+def _linear_by_level(level_count: int) -> Floats:
+    table = decode_srgb(np.arange(level_count) / (level_count - 1)).astype(np.float32)
     table.flags.writeable = False
     return table
 
@@ -82,18 +82,19 @@ def lab(linear: ArrayLike) -> Doubles:
 
 
 def linear_of_xyz(xyz_over_white: ArrayLike) -> Doubles:
-    """Return the linear Rec. 709 colours (..., 3) that look under D65 as given colours do under their light.
+    """Return the linear Rec. 709 colours (..., 3) that look under D65 like given colours under another light.
 
-    Both have the same L*a*b*.
+    The returned colours under D65 and the given colours under the other light have equal L*a*b*.
 
-    xyz_over_white : (..., 3) X, Y and Z of the given colours, divided by X, Y and Z of white in their light
+    xyz_over_white : (..., 3) X, Y and Z of the given colours, divided by X, Y and Z of white, under the other
+        light
     """
     xyz = np.asarray(xyz_over_white, np.float64) * _WHITE_XYZ
     return np.asarray(xyz @ np.linalg.inv(_XYZ_OF_REC709).T)
 
 
 def linear_of_lab(colour: ArrayLike) -> Doubles:
-    """Return linear Rec. 709 colours (..., 3) of CIE L*a*b* under D65 (..., 3), not clipped."""
+    """Convert CIE L*a*b* colours (..., 3) with the white point D65 to linear Rec. 709, not clipped."""
     L, a, b = np.moveaxis(np.asarray(colour, np.float64), -1, 0)
     y = (L + 16.0) / 116.0
     f = np.stack([y + a / 500.0, y, y - b / 200.0], axis=-1)
@@ -104,7 +105,7 @@ def linear_of_lab(colour: ArrayLike) -> Doubles:
 def delta_e_2000(first: ArrayLike, second: ArrayLike) -> Doubles:
     """Return the CIEDE2000 colour difference (...) of two arrays of linear Rec. 709 colours (..., 3).
 
-    A difference of 1 is just noticeable.
+    A colour difference of 1 is just noticeable.
 
     Source: [Sharma2005].
     """

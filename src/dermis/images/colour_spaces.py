@@ -1,4 +1,4 @@
-"""Colour spaces that picture files state, and conversion of their pixels to linear Rec. 709."""
+"""Colour spaces that picture files state, and conversion of pixels from these to linear Rec. 709."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ _CODED_GAMMAS = {1: None, 2: None, 4: 2.2, 5: 2.8, 6: None, 8: 1.0, 13: None, 14
 programs display as sRGB."""
 _HDR_CURVES = {16: "PQ", 18: "HLG"}
 _CURVE_LEVELS, _MAX_LEVEL = 65536, 65535
-_LEVELS = np.linspace(0.0, 1.0, _CURVE_LEVELS)
+_CURVE_INPUTS = np.linspace(0.0, 1.0, _CURVE_LEVELS)
 _SRGB_TOLERANCE = 5e-3  # a matrix or curve that differs less from that of sRGB is replaced by it
 _D50_XYZ = np.array([0.9642, 1.0, 0.8249])
 _BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
 _ICC_HEADER, _MAX_ICC_TAGS = 128, 200
-_MAX_NAME = 60  # characters
+_MAX_NAME_LENGTH = 60  # characters
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,7 @@ class ColourSpace:
     def linear(self, pixels: Numbers) -> Floats:
         """Convert pixels (..., 1, 3 or 4) to linear Rec. 709 (..., 3); grey is repeated, alpha is dropped.
 
-        Converted colours outside Rec. 709 are clipped: levels to 0 to 1, floats to 0 and above.
+        Colours outside Rec. 709 are clipped: colours from integer levels to 0 to 1, floats to 0 and above.
         """
         rgb = pixels[..., :3] if pixels.shape[-1] >= 3 else np.repeat(pixels, 3, axis=-1)
         if rgb.dtype.kind == "f":
@@ -82,11 +82,15 @@ SRGB = ColourSpace()
 
 def adobe_rgb() -> ColourSpace:
     """Return Adobe RGB (1998), which cameras may state in EXIF without embedding an ICC profile."""
-    return _space("Adobe RGB", _to_rec709(_PRIMARIES["Adobe RGB"]), _LEVELS**_ADOBE_GAMMA)
+    return _simplified_space(
+        "Adobe RGB", _matrix_to_rec709(_PRIMARIES["Adobe RGB"]), _CURVE_INPUTS**_ADOBE_GAMMA
+    )
 
 
 def coded_space(primaries: int, transfer: int) -> ColourSpace | None:
-    """Return the colour space of ITU-T H.273 code points, as in AVIF, HEIC and PNG; None for unknown codes.
+    """Return the colour space for ITU-T H.273 code points, as in AVIF, HEIC and PNG; None for unknown codes.
+
+    primaries, transfer : code points of the primaries and of the transfer function
 
     Raises ValueError for the transfer functions of HDR displays.
     """
@@ -106,25 +110,26 @@ def gamma_space(name: str, gamma: float | None, primaries: Sequence[float] | Non
 
     Raises ValueError for primaries that are invalid or lie on one line.
     """
-    matrix = np.eye(3) if primaries is None else _to_rec709(primaries)
-    return _space(name, matrix, None if gamma is None else _LEVELS**gamma)
+    matrix = np.eye(3) if primaries is None else _matrix_to_rec709(primaries)
+    return _simplified_space(name, matrix, None if gamma is None else _CURVE_INPUTS**gamma)
 
 
 def profile_name(icc: bytes) -> str:
-    """Return the printable name of an ICC profile; empty if it cannot be read."""
+    """Return the printable name of an ICC profile; empty if the name cannot be read."""
     from PIL import ImageCms
 
     try:
         name = ImageCms.getProfileDescription(ImageCms.ImageCmsProfile(io.BytesIO(icc)))
     except (OSError, ImageCms.PyCMSError):
         return ""
-    return shorten("".join(one for one in name.strip() if one.isprintable()), _MAX_NAME)
+    return shorten("".join(one for one in name.strip() if one.isprintable()), _MAX_NAME_LENGTH)
 
 
 def profile_space(icc: bytes) -> ColourSpace | None:
-    """Return the colour space of an ICC profile with primaries and curves; None for one with lookup tables.
+    """Return the colour space of an ICC profile with primaries and curves; None for lookup tables.
 
-    Primaries and curves are applied here at the picture's full bit depth; Pillow's LittleCMS has only 8 bits.
+    `ColourSpace.linear` applies primaries and curves at the full bit depth of a picture; LittleCMS in Pillow
+    supports only 8 bits.
 
     Raises ValueError, ArithmeticError and struct.error for a damaged profile.
     """
@@ -135,20 +140,20 @@ def profile_space(icc: bytes) -> ColourSpace | None:
     if b"A2B0" in tags or {b"RGB ": b"rTRC", b"GRAY": b"kTRC"}.get(kind, b"") not in tags:
         return None
     if kind == b"GRAY":
-        return _space(profile_name(icc), np.eye(3), _profile_curve(tags[b"kTRC"]))
+        return _simplified_space(profile_name(icc), np.eye(3), _profile_curve(tags[b"kTRC"]))
     columns = [_fixed_point_numbers(tags[b"%cXYZ" % one], 3) for one in channels]
     curves = [_profile_curve(tags[b"%cTRC" % one]) for one in channels]
-    to_rec709 = np.linalg.inv(_xyz_of(_PRIMARIES["Rec. 709"])) @ np.array(columns).T
-    return _space(profile_name(icc), to_rec709, np.array(curves))
+    to_rec709 = np.linalg.inv(_matrix_to_xyz(_PRIMARIES["Rec. 709"])) @ np.array(columns).T
+    return _simplified_space(profile_name(icc), to_rec709, np.array(curves))
 
 
-def _space(name: str, to_rec709: Doubles, curves: Doubles | None) -> ColourSpace:
+def _simplified_space(name: str, to_rec709: Doubles, curves: Doubles | None) -> ColourSpace:
     """Return a colour space; a matrix or curves equal to those of sRGB become None.
 
     to_rec709, curves : see `ColourSpace`; one curve (65536,) is used for all channels
     """
     if curves is not None:
-        same = np.allclose(curves, decode_srgb(_LEVELS), rtol=0.0, atol=_SRGB_TOLERANCE)
+        same = np.allclose(curves, decode_srgb(_CURVE_INPUTS), rtol=0.0, atol=_SRGB_TOLERANCE)
         curves = None if same else np.broadcast_to(curves, (3, _CURVE_LEVELS))
     same = np.allclose(to_rec709, np.eye(3), rtol=0.0, atol=_SRGB_TOLERANCE)
     return ColourSpace(
@@ -156,12 +161,15 @@ def _space(name: str, to_rec709: Doubles, curves: Doubles | None) -> ColourSpace
     )
 
 
-def _to_rec709(primaries: Sequence[float]) -> Doubles:
-    """Return the matrix (3, 3) from linear RGB of other primaries to linear Rec. 709; white stays white."""
-    return np.asarray(np.linalg.inv(_xyz_of(_PRIMARIES["Rec. 709"])) @ _xyz_of(primaries))
+def _matrix_to_rec709(primaries: Sequence[float]) -> Doubles:
+    """Return the matrix (3, 3) from linear RGB of given primaries to linear Rec. 709; white stays white.
+
+    primaries : chromaticities x, y of red, green, blue and white
+    """
+    return np.asarray(np.linalg.inv(_matrix_to_xyz(_PRIMARIES["Rec. 709"])) @ _matrix_to_xyz(primaries))
 
 
-def _xyz_of(primaries: Sequence[float]) -> Doubles:
+def _matrix_to_xyz(primaries: Sequence[float]) -> Doubles:
     """Return the matrix (3, 3) from linear RGB to CIE XYZ, adapted to D50, the white point of ICC profiles.
 
     primaries : chromaticities x, y of red, green, blue and white
@@ -181,10 +189,10 @@ def _profile_curve(tag: bytes) -> Doubles:
     kind, (count,) = tag[:4], struct.unpack_from(">I", tag, 8)
     if kind == b"curv" and count < 2:
         gamma = struct.unpack_from(">H", tag, 12)[0] / 256.0 if count else 1.0
-        return np.asarray(_LEVELS**gamma)
+        return np.asarray(_CURVE_INPUTS**gamma)
     if kind == b"curv":
         values = np.frombuffer(tag, ">u2", count, 12) / _MAX_LEVEL
-        return np.asarray(np.interp(_LEVELS, np.linspace(0.0, 1.0, count), values))
+        return np.asarray(np.interp(_CURVE_INPUTS, np.linspace(0.0, 1.0, count), values))
     if kind != b"para" or count >> 16 > 4:
         raise ValueError("a curve is of an unknown kind")
     function = count >> 16
@@ -195,8 +203,8 @@ def _profile_curve(tag: bytes) -> Doubles:
     else:
         g, a, b, c, d, e, f = (*numbers, 0.0, 0.0)[:7]
     with np.errstate(all="ignore"):
-        power = np.maximum(a * _LEVELS + b, 0.0) ** g + e
-    curve = np.where(d <= _LEVELS, power, c * _LEVELS + f)
+        power = np.maximum(a * _CURVE_INPUTS + b, 0.0) ** g + e
+    curve = np.where(d <= _CURVE_INPUTS, power, c * _CURVE_INPUTS + f)
     return np.asarray(np.clip(np.nan_to_num(curve), 0.0, 1.0))
 
 

@@ -1,4 +1,4 @@
-"""Layers of OpenEXR files: which channels of which part are the picture."""
+"""Choice of the layer of an OpenEXR file: of the channels that are read as the picture."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from dermis.images.header import UnsupportedError
 _CHANNEL_LETTERS = {"red": "R", "green": "G", "blue": "B", "alpha": "A"}
 _READABLE_CHANNELS = ("RGBA", "RGB", "Y")
 _MAIN_LAYERS = ("beauty", "combined", "composite", "image", "rgba", "rgb", "color", "colour", "c", "main")
-_MAX_NAME = 60  # characters
-_MAX_LISTED = 6
+_MAX_NAME_LENGTH = 60  # characters
+_MAX_LISTED_LAYERS = 6
 
 
 @dataclass(frozen=True)
@@ -20,9 +20,9 @@ class ExrLayer:
     """Layer of an OpenEXR file with the channels of a picture.
 
     part : index of the part that contains the layer
-    name : name of the layer, in files of several parts preceded by the name of the part; empty for plain R,
-        G, B
-    channels : names of the channels of red, green, blue and, if there is one, alpha; or of grey
+    name : name of the layer, preceded by the name of the part in files of several parts; empty if the
+        channels are just named R, G, B
+    channels : names of the channels for red, green, blue and, if the layer has it, alpha; or for grey
     """
 
     part: int
@@ -33,19 +33,22 @@ class ExrLayer:
 def choose_layer(parts: Sequence[tuple[str, Sequence[str]]]) -> tuple[ExrLayer, str | None]:
     """Choose the layer to read from an OpenEXR file; also return a note if several layers have colours.
 
-    Colours are preferred to grey; then a layer without a name, then one whose name means the whole picture.
+    Layers with colours are preferred to grey layers. Among layers with colours, a layer without a name is
+    preferred; the second choice is a layer whose name means the whole picture, such as "beauty".
 
     parts : name and channels of each part
 
     Raises UnsupportedError if no layer has R, G and B or Y, unless the file has a single channel.
     """
-    found = [layer for index, part in enumerate(parts) for layer in _layers(index, *part, len(parts) > 1)]
+    found = [
+        layer for index, part in enumerate(parts) for layer in _picture_layers(index, *part, len(parts) > 1)
+    ]
     if found:
-        chosen = min(found, key=_rank)
+        chosen = min(found, key=_sort_key)
         colours = [_display_name(layer.name) for layer in found if len(layer.channels) > 1]
         if len(colours) < 2:
             return chosen, None
-        listed = ", ".join(colours[:_MAX_LISTED]) + ", ..." * (len(colours) > _MAX_LISTED)
+        listed = ", ".join(colours[:_MAX_LISTED_LAYERS]) + ", ..." * (len(colours) > _MAX_LISTED_LAYERS)
         return chosen, f"of its layers, {listed}, only {_display_name(chosen.name)} is read"
     names = [name for _, channels in parts for name in channels]
     if len(names) == 1:
@@ -54,11 +57,14 @@ def choose_layer(parts: Sequence[tuple[str, Sequence[str]]]) -> tuple[ExrLayer, 
     raise UnsupportedError(f"it has channels {listed}, and no layer with R, G and B or Y")
 
 
-def _layers(index: int, part: str, channels: Sequence[str], several_parts: bool) -> Iterator[ExrLayer]:
+def _picture_layers(
+    part_index: int, part_name: str, channels: Sequence[str], several_parts: bool
+) -> Iterator[ExrLayer]:
     """Yield the picture layers of a part: channels R, G, B (any case, or words) with or without A, or Y.
 
-    index, part : index and name of the part
-    several_parts : whether the file has several parts; the name of the part then precedes that of the layer
+    part_index, part_name : index and name of the part
+    channels : names of the channels of the part
+    several_parts : whether the file has several parts; layer names then begin with the name of the part
     """
     groups: dict[str, dict[str, str]] = {}
     for channel in channels:
@@ -70,16 +76,19 @@ def _layers(index: int, part: str, channels: Sequence[str], several_parts: bool)
         if names == "Y" and {"RY", "BY"} & letters.keys():
             raise UnsupportedError("its colours are stored as luminance and chroma (Y, RY, BY)")
         if names and not is_vector:
-            title = ".".join(filter(None, (part if several_parts else "", layer)))
-            yield ExrLayer(index, title, tuple(letters[name] for name in names))
+            title = ".".join(filter(None, (part_name if several_parts else "", layer)))
+            yield ExrLayer(part_index, title, tuple(letters[name] for name in names))
 
 
-def _rank(layer: ExrLayer) -> tuple[bool, int]:
-    """Return a sort key: layers with colours before grey ones, then the whole picture before components."""
+def _sort_key(layer: ExrLayer) -> tuple[bool, int]:
+    """Return a sort key: layers with colours before grey layers, then whole pictures before components."""
     last = layer.name.rpartition(".")[2].lower()
     by_name = 0 if not layer.name else 1 if last in _MAIN_LAYERS else 2
     return len(layer.channels) == 1, by_name
 
 
-def _display_name(name: str) -> str:
-    return shorten("".join(one for one in name if one.isprintable()), _MAX_NAME) or "the one without a name"
+def _display_name(layer_name: str) -> str:
+    return (
+        shorten("".join(one for one in layer_name if one.isprintable()), _MAX_NAME_LENGTH)
+        or "the one without a name"
+    )

@@ -40,11 +40,11 @@ def _halve_axis(image: Floats, axis: int) -> Floats:
 
 
 def smooth_quantisation(height: NDArray[np.floating]) -> Floats:
-    """Smooth a height map by 1.2 texels to remove 8-bit quantisation, whose steps look like contour lines.
+    """Smooth a height map to remove the steps of 8-bit quantisation, which would look like contour lines.
 
-    height : (H, W) in any unit
+    The filter is binomial over seven texels along each axis, with a standard deviation of 1.2 texels.
 
-    The filter is binomial over seven texels along each axis.
+    height : (H, W) heights in any unit
     """
     plain = np.asarray(height, np.float32)
     padded, smooth = np.pad(plain, 3, "edge"), np.empty_like(plain)

@@ -24,7 +24,7 @@ _CHANNELS_BY_COUNT = {1: "Y", 3: "RGB"}  # names of the channels by their number
 _MAX_SAMPLES = 3 * MAX_PIXELS  # total of all channels and parts, because the library decodes all of them
 _MAX_CHANNELS = 1024
 _ASPECT_TOLERANCE = 1e-3
-_MAX_NAME = 60  # characters
+_MAX_NAME_LENGTH = 60  # characters
 Slices = tuple[slice, ...]
 RADIANCE_SIGNATURE = b"#?"
 _XYZ_FORMAT = b"FORMAT=32-bit_rle_xyze"
@@ -38,7 +38,7 @@ _RADIANCE_VALUES = {
     "PIXASPECT": [1.0],
 }
 """Names of numbers in a header, with their defaults; primaries of 0 are unknown."""
-_UNUSED_VALUES = ("GAMMA", "PIXASPECT")  # named in a note if they are not 1
+_UNUSED_VALUE_NAMES = ("GAMMA", "PIXASPECT")  # named in a note if they are not 1
 EXR_PROPERTIES = (
     drawn("half, float, 32-bit integers; all kinds of compression; scan lines, tiles"),
     refused("deep pixels"),
@@ -65,12 +65,12 @@ RADIANCE_PROPERTIES = (
     drawn("size: `-Y`, `+Y`, `-X`, `+X`, rows or columns first", "upright"),
     drawn("`EXPOSURE`, `COLORCORR`, also several", "pixels are divided by them"),
     drawn_with_note("`PRIMARIES`", "converted to Rec. 709; zeros, as Photoshop writes them, are not used"),
-    noted(in_code(_UNUSED_VALUES), "no note if they are 1"),
+    noted(in_code(_UNUSED_VALUE_NAMES), "no note if they are 1"),
     refused("run-length coding of before 1991"),
     no_effect("`VIEW`, `SOFTWARE`, comments"),
 )
 """Properties of Radiance files (.hdr)."""
-_MAX_HEADER = 1 << 16
+_MAX_HEADER_BYTES = 1 << 16
 _STRIP_PIXELS = 1 << 18  # pixels decoded at a time
 _MAX_LITERAL = 128  # codes up to this count literal bytes, larger codes are runs
 _DECODED_BYTES = [k if k <= _MAX_LITERAL else k - _MAX_LITERAL for k in range(256)]
@@ -82,7 +82,7 @@ _CODE_BYTES = [k + 1 if k <= _MAX_LITERAL else 2 for k in range(256)]
 def decode_exr(data: bytes) -> Floats:
     """Decode the picture in an OpenEXR file to an array (H, W, 1, 3 or 4), 0 outside its data window.
 
-    Raises ValueError for a file without a layer of R, G, B or Y, and for one that is too large or damaged.
+    Raises ValueError for a file without a layer of R, G, B or Y, and for a file that is too large or damaged.
     """
     import OpenEXR
 
@@ -91,7 +91,7 @@ def decode_exr(data: bytes) -> Floats:
     if len(parts) <= layer.part:
         raise ValueError("its pixels are truncated or damaged")
     part = parts[layer.part]
-    (width, height), stored, placed = _windows(part.header)
+    (width, height), stored, placed = _overlap_windows(part.header)
     image = np.zeros((height, width, len(layer.channels)), np.float32)
     for index, name in enumerate(layer.channels):
         image[..., index][placed] = part.channels[name].pixels[stored]
@@ -103,12 +103,12 @@ def exr_header(data: bytes) -> PictureHeader:
     file = _open_exr_header(data)
     layer, layer_note = _checked_layer(file)
     header = file.parts[layer.part].header
-    size, stored, placed = _windows(header)
+    size, stored, placed = _overlap_windows(header)
     space, colour_note = _exr_colour_space(header)
     notes = [layer_note] if layer_note else []
-    if not _covers(placed, size):
+    if not _covers_window(placed, size):
         notes.append("its data window is a part of its display window, and the rest is black")
-    if not _covers(stored, _window_size(header["dataWindow"])):
+    if not _covers_window(stored, _window_size(header["dataWindow"])):
         notes.append("its pixels outside its display window are left out")
     if abs((aspect := header.get("pixelAspectRatio", 1.0)) - 1.0) > _ASPECT_TOLERANCE:
         notes.append(f"its pixel aspect of {aspect:g} is not used")
@@ -124,7 +124,7 @@ def _exr_colour_space(header: Any) -> tuple[ColourSpace, str | None]:
     if primaries is None and name not in ("", "data", "unknown"):
         primaries = OpenEXR.colorInteropIDToChromaticities(name)
         if primaries is None:
-            shown = shorten("".join(one for one in name if one.isprintable()), _MAX_NAME)
+            shown = shorten("".join(one for one in name if one.isprintable()), _MAX_NAME_LENGTH)
             return (
                 SRGB,
                 f"its colour space, {shown}, is unknown, and its colours are taken as linear Rec. 709",
@@ -139,15 +139,15 @@ def _open_exr_header(data: bytes) -> Any:
     return OpenEXR.File(io.BytesIO(data), separate_channels=True, header_only=True)
 
 
-def _checked_layer(file: Any) -> tuple[ExrLayer, str | None]:
-    """Check the header of an OpenEXR file, and return the layer to decode, with a note if there are several.
+def _checked_layer(exr_file: Any) -> tuple[ExrLayer, str | None]:
+    """Check the header of an OpenEXR file; return the layer to decode, and a note if others are not read.
 
-    The size of all channels of all parts is limited, because the library decodes all of them.
+    The total size of the channels of all parts is limited, because the library decodes all channels.
 
-    file : OpenEXR.File that was opened with header_only
+    exr_file : OpenEXR.File that was opened with header_only
     """
     samples, channel_count = 0, 0
-    for part in file.parts:
+    for part in exr_file.parts:
         width, height = _window_size(part.header["dataWindow"])
         check_size(width, height)
         if "deep" in str(part.header.get("type", "")).lower():
@@ -157,27 +157,27 @@ def _checked_layer(file: Any) -> tuple[ExrLayer, str | None]:
             check_size(tiles.xSize, tiles.ySize)
         samples += width * height * len(part.header["channels"])
         channel_count += len(part.header["channels"])
-    if not file.parts:
+    if not exr_file.parts:
         raise ValueError("its header is truncated or damaged")
     if samples > _MAX_SAMPLES:
         raise TooLargeError(f"all its channels have {samples / 1e6:.0f} million numbers")
     if channel_count > _MAX_CHANNELS:
         raise UnsupportedError(f"it has {channel_count} channels")
-    channels = [{one.name: one for one in part.header["channels"]} for part in file.parts]
+    channels = [{one.name: one for one in part.header["channels"]} for part in exr_file.parts]
     layer, note = choose_layer(
-        [(part.name() or "", list(names)) for part, names in zip(file.parts, channels, strict=True)]
+        [(part.name() or "", list(names)) for part, names in zip(exr_file.parts, channels, strict=True)]
     )
     chosen = [channels[layer.part][name] for name in layer.channels]
     if any((one.xSampling, one.ySampling) != (1, 1) for one in chosen):
         raise UnsupportedError("its channels have different sizes")
-    check_size(*_window_size(file.parts[layer.part].header["displayWindow"]))
+    check_size(*_window_size(exr_file.parts[layer.part].header["displayWindow"]))
     return layer, note
 
 
-def _windows(header: Any) -> tuple[tuple[int, int], Slices, Slices]:
-    """Return the size of the display window, and slices for the part of the data window that is inside it.
+def _overlap_windows(header: Any) -> tuple[tuple[int, int], Slices, Slices]:
+    """Return the size of the display window, and the slices in which display and data window overlap.
 
-    The slices (rows, columns) are given twice: relative to the data window, and to the display window.
+    The slices (rows, columns) are returned twice: relative to the data window, then to the display window.
     """
     data, shown = (np.array(header[name], np.int64)[:, ::-1] for name in ("dataWindow", "displayWindow"))
     low, high = np.maximum(data[0], shown[0]), np.minimum(data[1], shown[1]) + 1
@@ -187,8 +187,8 @@ def _windows(header: Any) -> tuple[tuple[int, int], Slices, Slices]:
     return _window_size(header["displayWindow"]), stored, placed
 
 
-def _covers(part: Slices, size: tuple[int, int]) -> bool:
-    return tuple((one.start, one.stop) for one in part) == ((0, size[1]), (0, size[0]))
+def _covers_window(slices: Slices, window_size: tuple[int, int]) -> bool:
+    return tuple((one.start, one.stop) for one in slices) == ((0, window_size[1]), (0, window_size[0]))
 
 
 def _window_size(window: Any) -> tuple[int, int]:
@@ -199,7 +199,8 @@ def _window_size(window: Any) -> tuple[int, int]:
 def encode_exr(picture: NDArray[np.floating]) -> bytes:
     """Encode a picture (H, W, 1 or 3) of float16 or float32 as an OpenEXR file with channels Y or R, G, B.
 
-    The compression is run-length encoding: for noisy pictures other methods are slower and no smaller.
+    The compression is run-length encoding. For noisy pictures, other methods are slower without smaller
+    files.
     """
     import OpenEXR
 
@@ -215,9 +216,10 @@ def encode_exr(picture: NDArray[np.floating]) -> bytes:
 class _RadianceHeader:
     """Header of a Radiance .hdr file.
 
-    axes : directions of the scanlines and of the pixels in them, such as "-Y" and "+X"
-    lengths : number of scanlines, and of pixels in each
-    values : numbers by name, such as EXPOSURE; if a name occurs on several lines, the product of its numbers
+    axes : direction in which scanlines follow each other, and direction of the pixels of a scanline, such as
+        "-Y" and "+X"
+    lengths : number of scanlines, and number of pixels per scanline
+    values : numbers by name, such as EXPOSURE; for a name on several lines, the product of the lines' numbers
     is_xyz : whether the colours are CIE XYZ
     offset : byte at which the pixels start
     """
@@ -230,9 +232,9 @@ class _RadianceHeader:
 
 
 def decode_radiance(data: bytes) -> Floats:
-    """Decode a Radiance .hdr file to linear radiance (H, W, 3), divided by the exposures in its header.
+    """Decode a Radiance .hdr file to linear radiance (H, W, 3), divided by the exposures in the header.
 
-    FFmpeg is not used because it accepts truncated files.
+    FFmpeg is not used, because FFmpeg accepts truncated files.
 
     Raises ValueError for a file that is truncated or damaged.
     """
@@ -246,7 +248,7 @@ def decode_radiance(data: bytes) -> Floats:
     rows = max(1, _STRIP_PIXELS // width)
     for top in range(0, height, rows):
         strip = radiance[top : top + rows]
-        decode = _decode_runs if compressed else _decode_flat
+        decode = _decode_runs if compressed else _decode_uncompressed
         rgbe, offset = decode(data, offset, len(strip), width)
         # A mantissa byte is in units of 1/256 of 2^(E - 128); E = 0 means black, and 2^-136 is black as well.
         scale = np.ldexp(np.float32(1 / exposure[0]), rgbe[..., 3].astype(np.int32) - 136)
@@ -266,7 +268,7 @@ def radiance_header(data: bytes) -> PictureHeader:
     space = gamma_space("", None, [float(one) for one in primaries]) if np.any(primaries) else SRGB
     notes = [
         f"its {name} of {float(header.values[name][0]):g} is not used"
-        for name in _UNUSED_VALUES
+        for name in _UNUSED_VALUE_NAMES
         if header.values[name][0] != 1.0
     ]
     colour_note = None if space.is_default else "its colours are converted from its primaries to Rec. 709"
@@ -274,7 +276,7 @@ def radiance_header(data: bytes) -> PictureHeader:
 
 
 def _radiance_header(data: bytes) -> _RadianceHeader:
-    found = re.search(rb"\n\n([-+][XY]) (\d{1,9}) ([-+][XY]) (\d{1,9})\n", data[:_MAX_HEADER])
+    found = re.search(rb"\n\n([-+][XY]) (\d{1,9}) ([-+][XY]) (\d{1,9})\n", data[:_MAX_HEADER_BYTES])
     if not found or found[1][1:] == found[3][1:]:
         raise ValueError("its header has no size of the form -Y height +X width")
     lines = data[: found.start()].splitlines()
@@ -302,9 +304,9 @@ def _scanline_marker(width: int) -> bytes:
 
 
 def _decode_runs(data: bytes, offset: int, height: int, width: int) -> tuple[Bytes, int]:
-    """Decode run-length encoded scanlines to RGBE pixels (H, W, 4); also return the offset where they end.
+    """Decode run-length encoded scanlines to RGBE pixels (H, W, 4); also return the end of the scanlines.
 
-    offset : byte at which the first scanline starts
+    offset : byte at which the first scanline starts; the end is also in bytes
     height : number of scanlines
     """
     starts: list[int] = []
@@ -332,7 +334,7 @@ def _decode_runs(data: bytes, offset: int, height: int, width: int) -> tuple[Byt
 
 
 def _expand_runs(data: Bytes, starts: Index) -> Bytes:
-    """Return the decoded bytes of run-length codes.
+    """Return the bytes to which run-length codes expand.
 
     data : bytes of the file
     starts : (n,) offset of each code in `data`
@@ -346,7 +348,7 @@ def _expand_runs(data: Bytes, starts: Index) -> Bytes:
     return np.asarray(data[first + within * np.repeat(code <= _MAX_LITERAL, count)])
 
 
-def _decode_flat(data: bytes, offset: int, height: int, width: int) -> tuple[Bytes, int]:
+def _decode_uncompressed(data: bytes, offset: int, height: int, width: int) -> tuple[Bytes, int]:
     pixels = np.frombuffer(data, np.uint8, height * width * 4, offset).reshape(height, width, 4)
     # (1, 1, 1, n) repeats a pixel in the format of before 1991, which current programs do not write.
     if np.any(np.all(pixels[..., :3] == 1, axis=-1)):

@@ -13,13 +13,14 @@ class UnsupportedError(ValueError):
 
 @dataclass(frozen=True)
 class PictureHeader:
-    """Size and colour space of a picture file, with notes on its other properties.
+    """Size and colour space of a picture file, with notes on other properties of the file.
 
     size : width and height of the stored picture [pixel]
     colour_space : colour space of the decoded pixels
-    orientation : EXIF orientation from 1 (upright) to 8: rotation or reflection that turns it upright
+    orientation : EXIF orientation from 1 (upright) to 8: the rotation or reflection that makes the picture
+        upright
     notes : sentences about properties that are converted or not used
-    colour_note : sentence about the conversion of colours; it does not apply if pixels are read as numbers
+    colour_note : sentence about the conversion of colours, for pictures that are read as colours
     is_grey : whether the pixels have one colour channel
     """
 

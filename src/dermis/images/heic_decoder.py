@@ -12,10 +12,13 @@ from dermis.images.sizes import MAX_PIXELS
 
 
 def decode(request: Arrays) -> Arrays:
-    """Return a picture's size, ICC profile and three properties, and its pixels unless there are too many.
+    """Decode a HEIC picture, as the function of a decoder, see `answer_request`.
 
-    The properties are the bits per channel in the file, whether the picture was turned upright, and
-    whether the file has more pictures.
+    The answer has the size, the ICC profile, three properties, and, unless there are too many, the pixels.
+    The properties are the bits per channel in the file, whether the picture was turned upright, and whether
+    the file has more pictures.
+
+    request : arrays with the bytes of the file
     """
     import pi_heif
 

@@ -64,7 +64,7 @@ ODD_PIXELS = (
 
 @dataclass(frozen=True)
 class EmbeddedPicture:
-    """Picture file of a glTF file or of a USD package, whose colours are sRGB whatever profile it has.
+    """Picture file of a glTF file or USD package; its colours are sRGB, even if it has another profile.
 
     name : name of the picture in error messages
     data : bytes of the picture file, in any format but OpenEXR, or path of a file beside the glTF file
@@ -74,12 +74,12 @@ class EmbeddedPicture:
     data: bytes | Path = field(repr=False)
 
     def __str__(self) -> str:
-        """Return the name, which error messages show where they show the path of other pictures."""
+        """Return the name of the picture, which error messages show in place of a path."""
         return self.name
 
 
 def read_image(path: str | Path | EmbeddedPicture) -> Pixels:
-    """Return the pixels (H, W, C) of a picture file with numeric data, row 0 at the top, as stored.
+    """Return the stored pixels (H, W, C) of a picture file with numeric data, with row 0 at the top.
 
     C is 1 (grey), 3 (RGB) or 4 (RGBA); grey with alpha becomes RGBA, CMYK becomes RGB. Colour profiles and
     camera orientation are not used. Notes name other properties that are not used.
@@ -90,36 +90,40 @@ def read_image(path: str | Path | EmbeddedPicture) -> Pixels:
     Raises DermisError when the file is missing, not a picture, truncated, or has unsupported pixels.
     """
     data = read_bytes(path)
-    _note(path, _header(path, data), colours=False, upright=False)
-    return _pixels(path, data, convert_tables=False)
+    _issue_note(path, _read_header(path, data), colours=False, upright=False)
+    return _decode_pixels(path, data, convert_tables=False)
 
 
 def read_colours(path: str | Path | EmbeddedPicture, upright: bool = False) -> tuple[Pixels, ColourSpace]:
-    """Return the pixels (H, W, C) of a picture of colours, read as by `read_image`, and their colour space.
+    """Return the pixels (H, W, C) of a picture of colours, as `read_image` reads them, and the colour space.
 
     The colour space is given by the file's profile or primaries; pictures of glTF files are sRGB or linear
     Rec. 709, as glTF requires.
 
-    upright : turn the picture as its EXIF says, as for photographs
+    upright : whether to rotate the picture by its EXIF orientation, as for photographs
 
     Raises DermisError as `read_image` does.
     """
     data, embedded = read_bytes(path), isinstance(path, EmbeddedPicture)
-    header = _header(path, data)
-    _note(path, header, colours=True, upright=upright)
-    image = _pixels(path, data, convert_tables=not embedded)
-    return _oriented(image, header.orientation if upright else 1), SRGB if embedded else header.colour_space
+    header = _read_header(path, data)
+    _issue_note(path, header, colours=True, upright=upright)
+    image = _decode_pixels(path, data, convert_tables=not embedded)
+    return _apply_orientation(
+        image, header.orientation if upright else 1
+    ), SRGB if embedded else header.colour_space
 
 
 def note_properties(path: str | Path | EmbeddedPicture, colours: bool) -> None:
-    """Issue the note that `read_image` or `read_colours` would issue, for a picture taken from a cache.
+    """Issue the note that reading a picture would issue, for a picture that is taken from a cache.
 
-    colours : whether the pixels are colours, to which colour profiles apply
+    colours : whether the picture is read as colours by `read_colours`, not as numbers by `read_image`
     """
-    _note(path, _header(path, read_bytes(path)), colours, upright=False)
+    _issue_note(path, _read_header(path, read_bytes(path)), colours, upright=False)
 
 
-def _note(path: str | Path | EmbeddedPicture, header: PictureHeader, colours: bool, upright: bool) -> None:
+def _issue_note(
+    path: str | Path | EmbeddedPicture, header: PictureHeader, colours: bool, upright: bool
+) -> None:
     notes = [*header.notes, *["it is grey, without colours"] * (colours and header.is_grey)]
     if colours and header.colour_note:
         embedded = isinstance(path, EmbeddedPicture)
@@ -162,21 +166,21 @@ def read_size(path: str | Path | EmbeddedPicture) -> tuple[int, int]:
 
     Raises DermisError when the file is missing, not a picture or too large.
     """
-    return _header(path, read_bytes(path)).size
+    return _read_header(path, read_bytes(path)).size
 
 
-def _header(path: str | Path | EmbeddedPicture, data: bytes) -> PictureHeader:
-    header: PictureHeader = _apply_codec(path, data, exr_header, radiance_header, pillow_header)
+def _read_header(path: str | Path | EmbeddedPicture, data: bytes) -> PictureHeader:
+    header: PictureHeader = _apply_format_function(path, data, exr_header, radiance_header, pillow_header)
     return header
 
 
-def _pixels(path: str | Path | EmbeddedPicture, data: bytes, convert_tables: bool) -> Pixels:
+def _decode_pixels(path: str | Path | EmbeddedPicture, data: bytes, convert_tables: bool) -> Pixels:
     pillow = partial(decode_with_pillow, convert_tables=convert_tables)
-    image: Pixels = _apply_codec(path, data, decode_exr, decode_radiance, pillow)
+    image: Pixels = _apply_format_function(path, data, decode_exr, decode_radiance, pillow)
     return image
 
 
-def _oriented(image: Pixels, orientation: int) -> Pixels:
+def _apply_orientation(image: Pixels, orientation: int) -> Pixels:
     """Return a picture (H, W, C) rotated and mirrored according to its EXIF orientation, 1 to 8."""
     upright = image.swapaxes(0, 1) if orientation >= 5 else image
     upright = upright[::-1] if orientation in (3, 4, 7, 8) else upright
@@ -185,24 +189,26 @@ def _oriented(image: Pixels, orientation: int) -> Pixels:
     return pixels
 
 
-def _apply_codec(
+def _apply_format_function(
     path: str | Path | EmbeddedPicture,
     data: bytes,
-    exr: Callable[[bytes], T],
-    radiance: Callable[[bytes], T],
-    pillow: Callable[[bytes], T],
+    exr_function: Callable[[bytes], T],
+    radiance_function: Callable[[bytes], T],
+    other_function: Callable[[bytes], T],
 ) -> T:
-    """Call the function for the format of a picture file, which its first bytes determine.
+    """Return the result of the function for a picture's format; the first bytes determine the format.
 
-    exr, radiance, pillow : functions of the file's bytes, for OpenEXR, for .hdr, and for other formats
+    data : bytes of the file
+    exr_function, radiance_function, other_function : functions of these bytes, for OpenEXR, for .hdr, and for
+        other formats
 
     Raises DermisError if the format is unknown, or if the function fails.
     """
-    codec = pillow if picture_format(data) else None
-    for start, other in ((EXR_SIGNATURE, exr), (RADIANCE_SIGNATURE, radiance)):
+    codec = other_function if picture_format(data) else None
+    for start, other in ((EXR_SIGNATURE, exr_function), (RADIANCE_SIGNATURE, radiance_function)):
         codec = other if data.startswith(start) else codec
     is_inside = isinstance(path, EmbeddedPicture) and isinstance(path.data, bytes)
-    if codec is None or (codec is exr and is_inside):
+    if codec is None or (codec is exr_function and is_inside):
         known = next((name for start, name in _OTHER_FORMATS.items() if data.startswith(start)), None)
         actual = f"it is {known}" if known else "its first bytes match none of these formats"
         refuse(path, _EXPECTED_PICTURE, actual, "Convert it to PNG")
@@ -278,7 +284,7 @@ def write_image(path: str | Path, linear: NDArray[np.floating]) -> None:
 
 
 def write_png(path: str | Path, levels: Numbers, effort: int = 6) -> None:
-    """Write integer levels unchanged to a PNG file of 8 or 16 bits, as given by their type.
+    """Write integer levels unchanged to a PNG file of 8 bits (uint8) or 16 bits (uint16).
 
     levels : (H, W), or (H, W, C) with C of 1, 3 or 4; uint8 or uint16
     effort : compression level of zlib, from 1 (fast) to 9 (small files)
@@ -310,7 +316,8 @@ def write_exr(path: str | Path, linear: NDArray[np.floating], fast: bool = False
 def encode_exr_parts(parts: Mapping[str, Mapping[str, Numbers]], fast: bool = False) -> bytes:
     """Encode several pictures as the parts of one float32 OpenEXR file with lossless compression.
 
-    parts : channels (H, W) by name, for each part by name; most programs show only the first part
+    parts : nested dictionaries of the channels (H, W): part name, then channel name; most programs show only
+        the first part
     fast : use run-length encoding instead of ZIP, see `write_exr`
     """
     import OpenEXR
@@ -334,7 +341,7 @@ def _exr_header(fast: bool) -> dict[str, Any]:
 def read_bytes(path: str | Path | EmbeddedPicture) -> bytes:
     """Return the bytes of a picture file.
 
-    Raises DermisError when it cannot be read.
+    Raises DermisError when the file cannot be read.
     """
     source = path.data if isinstance(path, EmbeddedPicture) else path
     return source if isinstance(source, bytes) else read_file(source, _EXPECTED_PICTURE, MAX_FILE_BYTES)

@@ -37,9 +37,11 @@ _MAX_RATE, _MAX_DENOMINATOR = 1000, 1001
 def parse_frame_rate(value: str | float | Fraction, culprit: object = "rate") -> Fraction:
     """Return a frame rate as an exact fraction, because rounded frame times would drift.
 
-    value : 30, 12.5, "24000/1001"; 23.976, 29.97, 59.94 and similar values mean 24000/1001 and so on
+    value : frame rate such as 30, 12.5 or "24000/1001" [1/s]; 23.976 means 24000/1001, and likewise 29.97 and
+        59.94 mean the exact NTSC rates
+    culprit : name of the option or argument, for errors
 
-    Raises DermisError for values that are not a rate up to 1000.
+    Raises DermisError for values that are not a frame rate above 0 and up to 1000.
     """
     text = str(value).strip() if isinstance(value, str | float | Fraction) else format_value(value)
     try:
@@ -89,7 +91,7 @@ def _check_encoder(path: str | Path) -> None:
 
 
 class MovieWriter:
-    """Writer of H.264 movies, which encodes on another thread and writes the file atomically.
+    """Writer of an H.264 movie, which encodes on another thread and writes the file atomically.
 
     Frame k is shown at exactly k / rate. Levels are stored and tagged with the primaries and matrix of
     BT.709.
@@ -135,13 +137,13 @@ class MovieWriter:
         return self
 
     def __exit__(self, *exception: Any) -> None:
-        """Finish the movie and close the file; after an error no file is left."""
+        """Finish the movie and close the file; after an error, remove the file."""
         self._context.__exit__(*exception)
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
         with atomic_file(self.path) as temporary:
-            self._open(temporary)
+            self._open_movie(temporary)
             try:
                 yield
                 self._finish()
@@ -149,7 +151,7 @@ class MovieWriter:
                 self._pool.shutdown(cancel_futures=True)
                 self._container.close()
 
-    def _open(self, path: Path) -> None:
+    def _open_movie(self, path: Path) -> None:
         import av
         from av.video.reformatter import VideoReformatter
 
@@ -170,7 +172,7 @@ class MovieWriter:
         Parameters
         ----------
         picture : numpy.ndarray
-            (H, W, 3) uint8 sRGB; it must not be changed afterwards.
+            (H, W, 3) uint8 sRGB; the array must not be changed afterwards.
 
         Raises
         ------

@@ -90,7 +90,7 @@ _SRGB_GAMMA, _GAMMA_TOLERANCE = 1 / 2.2, 0.01  # gamma by which PNG files state 
 
 
 def picture_format(data: bytes) -> str | None:
-    """Return the name of a picture's format by its first bytes; None if this module does not read it."""
+    """Return the name of a picture's format, recognised by the first bytes; None for other formats."""
     if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
         return "WEBP"
     if data[4:8] == b"ftyp":
@@ -101,7 +101,7 @@ def picture_format(data: bytes) -> str | None:
 
 
 def open_picture(data: bytes) -> Image:
-    """Open a picture with Pillow after checking its header and its size; only HEIC is decoded at once.
+    """Open a picture with Pillow after checking header and size; only pixels of HEIC are decoded at once.
 
     Raises ValueError, OSError and other errors for a file that is damaged, too large or not supported, and
     DermisError if a package is missing.
@@ -143,7 +143,7 @@ def _open_heic(data: bytes) -> Image:
     import PIL.Image
 
     import_extra("pi_heif", "a HEIC picture")
-    answer = _decoded_heic(data)
+    answer = _decode_heic(data)
     check_size(*answer["size"].tolist())
     bits, turned, several = answer["facts"].tolist()
     picture = PIL.Image.fromarray(answer["pixels"])
@@ -153,7 +153,7 @@ def _open_heic(data: bytes) -> Image:
 
 
 @lru_cache(maxsize=1)  # cached, as header and pixels of a picture are read one after the other
-def _decoded_heic(data: bytes) -> Arrays:
+def _decode_heic(data: bytes) -> Arrays:
     request = Arrays(data=np.frombuffer(data, np.uint8))
     return run_decoder(_HEIC_DECODER, request, len(data), "a HEIC picture", "pixels")
 
@@ -164,11 +164,11 @@ def pillow_header(data: bytes) -> PictureHeader:
     Raises the errors of `open_picture`.
     """
     picture = open_picture(data)
-    exif = _exif(picture)
+    exif = _read_exif(picture)
     orientation = exif.get(_EXIF_ORIENTATION, 1)
     space, colour_note = _colour_space(data, picture, exif)
     orientation = orientation if orientation in range(1, 9) else 1
-    notes = tuple(_notes(data, picture))
+    notes = tuple(_header_notes(data, picture))
     is_grey = picture.mode in (*_GREY_MODES, "F")
     return PictureHeader((picture.width, picture.height), space, orientation, notes, colour_note, is_grey)
 
@@ -176,8 +176,8 @@ def pillow_header(data: bytes) -> PictureHeader:
 def table_transform(picture: Image) -> ImageCmsTransform | None:
     """Return the conversion of a picture to 8-bit sRGB if its ICC profile has lookup tables, else None.
 
-    CMYK files and files of some scanners have such profiles. The rendering intent is relative colorimetric,
-    with black point compensation.
+    CMYK files and files of some scanners have profiles with lookup tables. The rendering intent is relative
+    colorimetric, with black point compensation.
     """
     from PIL import ImageCms
 
@@ -204,7 +204,7 @@ def _has_curves(icc: bytes) -> bool:
         return False
 
 
-def _exif(picture: Image) -> Exif:
+def _read_exif(picture: Image) -> Exif:
     import PIL.Image
 
     if picture.format == "PNG" and "exif" not in picture.info:
@@ -216,7 +216,7 @@ def _exif(picture: Image) -> Exif:
 
 
 def _colour_space(data: bytes, picture: Image, exif: Exif) -> tuple[ColourSpace, str | None]:
-    """Return the colour space of the decoded pixels, and a note if it is not sRGB or not known."""
+    """Return the colour space of the decoded pixels, and a note if this space is not sRGB or is unknown."""
     icc = picture.info.get("icc_profile")
     coded = _code_points(data, picture)
     if icc and not (coded and picture.format == "PNG"):
@@ -232,8 +232,8 @@ def _colour_space(data: bytes, picture: Image, exif: Exif) -> tuple[ColourSpace,
     return space, None if space.is_default else _conversion_note(space.name)
 
 
-def _conversion_note(name: str) -> str:
-    return f"its colours are converted from {name} to sRGB"
+def _conversion_note(space_name: str) -> str:
+    return f"its colours are converted from {space_name} to sRGB"
 
 
 def _profiled_space(picture: Image, icc: bytes) -> tuple[ColourSpace, str | None]:
@@ -253,7 +253,7 @@ def _profiled_space(picture: Image, icc: bytes) -> tuple[ColourSpace, str | None
 
 
 def _code_points(data: bytes, picture: Image) -> tuple[int, int] | None:
-    """Return the numbers of primaries and transfer function that a PNG, AVIF or HEIC file states, or None."""
+    """Return the code points of primaries and transfer function in a PNG, AVIF or HEIC file, or None."""
     if picture.format == "PNG" and (start := data.find(b"cICP", 0, data.find(b"IDAT"))) > 0:
         return data[start + 4], data[start + 5]
     if picture.format in ("AVIF", _HEIC) and (start := data.find(b"colrnclx")) > 0:
@@ -263,7 +263,7 @@ def _code_points(data: bytes, picture: Image) -> tuple[int, int] | None:
 
 
 def _is_adobe_rgb(exif: Exif) -> bool:
-    """Return whether EXIF states Adobe RGB; most cameras state it there without embedding a profile."""
+    """Return whether EXIF states Adobe RGB; most cameras state Adobe RGB only in EXIF, without a profile."""
     try:
         file_kind = str(exif.get_ifd(_INTEROPERABILITY_IFD).get(1, "")).strip("\0 ")
         return (
@@ -274,7 +274,7 @@ def _is_adobe_rgb(exif: Exif) -> bool:
 
 
 def _png_space(picture: Image) -> ColourSpace:
-    """Return the colour space given by a PNG file's gamma and chromaticities; sRGB for other files."""
+    """Return the colour space that a PNG file states by gamma and chromaticities; sRGB for other files."""
     gamma, corners = picture.info.get("gamma"), picture.info.get("chromaticity")
     if picture.format != "PNG" or "srgb" in picture.info or not gamma:
         return SRGB
@@ -283,13 +283,13 @@ def _png_space(picture: Image) -> ColourSpace:
     return gamma_space(f"gamma {gamma:.3g}", None if is_srgb else 1.0 / gamma, primaries)
 
 
-def _notes(data: bytes, picture: Image) -> Iterator[str]:
+def _header_notes(data: bytes, picture: Image) -> Iterator[str]:
     """Yield sentences about properties that are converted or not used."""
     if picture.mode == "CMYK":
         profile = profile_name(picture.info.get("icc_profile", b"")) if table_transform(picture) else ""
         how = f"by its profile, {profile}" if profile else "without a profile, so that its colours are rough"
         yield f"its CMYK is converted to sRGB {how}"
-    if (bits := _bits(data, picture)) > 8:
+    if (bits := _stored_bits(data, picture)) > 8:
         yield f"its {bits} bits a channel are reduced to 8"
     if picture.info.get("turned"):
         yield "it is turned upright as its EXIF says"
@@ -297,7 +297,7 @@ def _notes(data: bytes, picture: Image) -> Iterator[str]:
         yield "it has several pictures, and only the first is read"
 
 
-def _bits(data: bytes, picture: Image) -> int:
+def _stored_bits(data: bytes, picture: Image) -> int:
     """Return the stored bits per channel of AVIF and HEIC, and of TIFF in CMYK; 8 for other files."""
     if picture.format == "AVIF" and (start := data.find(b"av1C")) > 0 and data[start + 6] & 0x40:
         return 12 if data[start + 6] & 0x20 else 10

@@ -17,7 +17,7 @@ class TooLargeError(ValueError):
 def check_size(width: int, height: int) -> tuple[int, int]:
     """Return the width and height of a picture after checking that they are positive and not too large.
 
-    Raises ValueError if there are no pixels, TooLargeError if there are too many.
+    Raises ValueError if there are no pixels, and TooLargeError if there are too many pixels.
     """
     if width < 1 or height < 1:
         raise ValueError(f"it has {width} x {height} pixels")

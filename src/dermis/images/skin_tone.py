@@ -30,10 +30,10 @@ class SkinTone(NamedTuple):
     hue_degrees : hue angle, arctan(b / a) [degrees]
     ita_degrees : individual typology angle, arctan((L - 50) / b) [degrees]
     monk : nearest class of the Monk Skin Tone Scale by CIEDE2000, 1 (lightest) to 10
-    fitzpatrick : Fitzpatrick type, I to VI, whose range of ITA the colour is in
+    fitzpatrick : Fitzpatrick type, I to VI, whose range of ITA contains the ITA of the colour
 
-    Source: [Chardon1991] for the ITA and its ranges, [DelBino2013] for their correspondence to types,
-    [Monk2019] for the scale.
+    Source: [Chardon1991] for the ITA and ranges of ITA, [DelBino2013] for the type of each range, [Monk2019]
+    for the Monk Skin Tone Scale.
     """
 
     L: float
@@ -59,8 +59,8 @@ class SkinTone(NamedTuple):
 def ita_degrees(cielab: ArrayLike) -> Doubles:
     """Return the individual typology angle (...) of CIELAB colours (..., 3) [degrees].
 
-    It is the angle of the colour around L* = 50, b* = 0, from 90 (light) to -90 (dark); colours with negative
-    b*, which are none of skin, do not wrap around.
+    The individual typology angle is the angle of the colour around L* = 50, b* = 0, from 90 (light) to -90
+    (dark). Colours with negative b*, which skin does not have, get 90 or -90.
 
     Source: [Chardon1991].
     """
@@ -75,7 +75,10 @@ def hue_degrees(cielab: ArrayLike) -> Doubles:
 
 
 def skin_tone(linear: ArrayLike) -> SkinTone:
-    """Return the description of a colour (3,), diffuse reflectance in linear Rec. 709 [-]."""
+    """Return the description of a skin colour.
+
+    linear : (3,) diffuse reflectance, linear Rec. 709 [-]
+    """
     colour = np.asarray(linear, np.float64)
     L, a, b = (float(one) for one in lab(colour))
     ita = float(ita_degrees((L, a, b)))

@@ -29,9 +29,9 @@ _NUMBER_PLACEHOLDER = re.compile(r"%(?:0(\d+))?d")
 
 
 class ImageWriter:
-    """Context manager that encodes and writes pictures on other threads; on exit it waits for all of them.
+    """Context manager that encodes and writes pictures on other threads; on exit, it waits for all pictures.
 
-    threads : number of threads, by default one per core
+    threads : number of threads; by default, one thread per processor core
 
     with ImageWriter() as writer:
         for number, image in enumerate(renderer.render_many(scenes)):
@@ -48,7 +48,7 @@ class ImageWriter:
     def write(self, path: str | Path, picture: NDArray[np.generic]) -> None:
         """Queue a picture to be written atomically; the call blocks only while the queue is full.
 
-        picture : (H, W, 3 or 4) uint8 sRGB for .png, or linear floats for .exr; it must not be changed
+        picture : (H, W, 3 or 4) uint8 sRGB for .png, or linear floats for .exr; the array must not be changed
             afterwards
 
         Raises DermisError for a path that is not writable, and when an earlier picture could not be written.
@@ -106,7 +106,10 @@ class FrameFiles:
     pattern: Path
 
     def path(self, number: int) -> Path:
-        """Return the path of the picture of the frame with a number."""
+        """Return the path of the picture of a frame.
+
+        number : number of the frame
+        """
         name = _NUMBER_PLACEHOLDER.sub(lambda found: f"{number:0{found[1] or 1}d}", self.pattern.name)
         return self.pattern.with_name(name)
 
@@ -129,19 +132,20 @@ class FrameFiles:
         check_output(self.path(0))
 
     def start(self, content_key: str, *, force: bool = False) -> None:
-        """Start or continue a sequence; existing pictures are kept if the record file has its content key.
+        """Start or continue a sequence; existing pictures are kept if the record file has this content key.
 
         content_key : text that is equal for sequences with equal frames
-        force : discard existing pictures in any case
+        force : whether to discard existing pictures even if the content keys are equal
         """
         if force or not self._record_matches(content_key):
             with atomic_file(self._record_path) as temporary:
                 temporary.write_text(content_key, encoding="utf-8")
 
     def missing(self, numbers: Iterable[int], size: tuple[int, int]) -> list[int]:
-        """Return those of the frame numbers for which there is no complete picture of this sequence.
+        """Return the frame numbers whose pictures are missing, incomplete, or of another sequence.
 
-        size : width and height of the pictures
+        numbers : frame numbers to check
+        size : width and height of the pictures [pixel]
         """
         start_ns = self._record_path.stat().st_mtime_ns
         return [number for number in numbers if not _is_complete(self.path(number), size, start_ns)]
@@ -160,7 +164,7 @@ class FrameFiles:
 
 
 def _is_complete(path: Path, size: tuple[int, int], start_ns: int) -> bool:
-    """Return whether a file is a complete picture of a size, written after the start of its sequence.
+    """Return whether a file is a complete picture of a given size, written after the sequence was started.
 
     start_ns : modification time of the record file [ns]
     """

@@ -14,7 +14,7 @@ _MAX_NAMES = 8  # largest number of names in a note
 MAX_DURATION_S = 86_400.0
 _MAX_TIME_S = 1e9
 _MIN_RATE, _MAX_RATE = 0.001, 1000.0
-_ROUNDING = 1e-6  # fraction of a frame by which rounding may put the last frame behind the end
+_ROUNDING_TOLERANCE = 1e-6  # fraction of a frame by which rounding may put the last frame behind the end
 
 
 def check_rate(culprit: object, rate: object) -> float:
@@ -33,11 +33,11 @@ class Clip(ShortRepr):
     duration_s : float
         Time of the last frame [s].
     rate : float or None
-        Frame rate of the file [1/s], if it has one.
+        Frame rate that the file states [1/s]; None if it states none.
     targets, bones : tuple of str
         Names of the morph targets and bones that the clip moves.
     left_out : tuple of str
-        Names in the file that the head does not have.
+        Names of targets and bones in the file that the head does not have.
     sample : callable
         Function that returns the pose at a time from 0 to the duration [s].
 
@@ -89,7 +89,7 @@ class Clip(ShortRepr):
         Parameters
         ----------
         rate : float
-            Frame rate [1/s]; frame k is at the time k / rate, and the last one is not after the end.
+            Frame rate [1/s]; frame k is at the time k / rate, and no frame is after the end of the clip.
 
         Returns
         -------
@@ -101,7 +101,7 @@ class Clip(ShortRepr):
         DermisError
             For an invalid rate.
         """
-        return math.floor(self.duration_s * check_rate(f"{self.name}: rate", rate) + _ROUNDING) + 1
+        return math.floor(self.duration_s * check_rate(f"{self.name}: rate", rate) + _ROUNDING_TOLERANCE) + 1
 
     def __post_init__(self) -> None:
         """Refuse an invalid duration."""
@@ -110,7 +110,7 @@ class Clip(ShortRepr):
 
     @property
     def note(self) -> str:
-        """Return a sentence about names of the file that the head lacks; empty if it has all of them."""
+        """Return a sentence about names of the file that the head lacks; empty if the head lacks none."""
         if not self.left_out:
             return ""
         names = ", ".join(self.left_out[:_MAX_NAMES])

@@ -19,7 +19,7 @@ SCLERA_MM, CORNEA_MM, LIMBUS_MM = 12.0, 7.8, 5.85
 """Radii of the ball, of the front of the cornea, and of the circle where both meet, in adults [mm]."""
 IRIS_BEHIND_MM = 3.0
 """Depth of the plane of the iris behind the cornea's apex [mm]."""
-SIDE = 10
+QUADS_PER_EDGE = 10
 """Quads along each edge of the cube that becomes a ball; even, so that a point is on the axis."""
 UV_RIM = 0.49
 """Distance of the back of the eye from the centre of the uv layout [-]."""
@@ -62,10 +62,12 @@ def profile_mm(angle: Doubles) -> Doubles:
 
 
 def radial_distances_mm(points: Doubles, axis: Doubles) -> tuple[Doubles, Doubles]:
-    """Return distances (...) of points from the ball's centre, and of the surface in these directions [mm].
+    """Return the distances (...) of points and of the eyeball's surface from the ball's centre [mm].
 
     points : (..., 3) positions relative to the ball's centre [mm]
     axis : (..., 3) unit vectors of the eyes' axes
+
+    The distance of the surface is measured along the ray from the centre through the point.
     """
     distance = np.linalg.norm(points, axis=-1)
     cosine = (points * axis).sum(axis=-1) / np.maximum(distance, 1e-9)
@@ -74,7 +76,7 @@ def radial_distances_mm(points: Doubles, axis: Doubles) -> tuple[Doubles, Double
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LidContact(ShortRepr):
-    """Collision of eyelids with eyeballs: control points of the lids are kept outside in any pose.
+    """Collision of eyelids with eyeballs, which keeps control points of the lids outside the eyeballs.
 
     point : (n,) control points of the lids
     ball : (n,) index of the eyeball over which each lid point slides
@@ -91,7 +93,7 @@ class LidContact(ShortRepr):
     edge: Ints
 
     def push_out(self, points_mm: Doubles) -> Doubles:
-        """Return control points (p, 3) in which the lids' points are moved out of the eyeballs [mm].
+        """Return the control points (p, 3) after moving points of the lids out of the eyeballs [mm].
 
         points_mm : (p, 3) control points of a posed head
         """
@@ -108,16 +110,17 @@ class LidContact(ShortRepr):
 
 
 @cache
-def build_eyeball(side: int = SIDE, scale: float = 1.0) -> tuple[Doubles, Index]:
+def build_eyeball(quads_per_edge: int = QUADS_PER_EDGE, scale: float = 1.0) -> tuple[Doubles, Index]:
     """Return the points (n, 3) of an eyeball that looks along +Z [mm], and its quads (q, 4).
 
-    side : number of quads along each edge of the cube that is projected to the ball
-    scale : factor of the points; above 1 for control points, as their subdivision surface shrinks
+    quads_per_edge : number of quads along each edge of the cube that is projected to the ball
+    scale : factor of the positions; control points need a factor above 1, as their subdivision surface is
+        smaller
     """
     points, quads = list[Doubles](), list[Index]()
-    grid = np.tan(np.linspace(-np.pi / 4, np.pi / 4, side + 1))  # evenly spaced in angle
+    grid = np.tan(np.linspace(-np.pi / 4, np.pi / 4, quads_per_edge + 1))  # evenly spaced in angle
     u, v = (part.ravel() for part in np.meshgrid(grid, grid))
-    corner = np.arange((side + 1) ** 2).reshape(side + 1, side + 1)
+    corner = np.arange((quads_per_edge + 1) ** 2).reshape(quads_per_edge + 1, quads_per_edge + 1)
     around = corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]
     face = np.stack(around, axis=-1).reshape(-1, 4)
     ones = np.ones_like(u)
@@ -133,29 +136,31 @@ def build_eyeball(side: int = SIDE, scale: float = 1.0) -> tuple[Doubles, Index]
 
 
 @cache
-def eyeball_uv(side: int = SIDE) -> Doubles:
-    """Return the uv (n, 2) of an eyeball's points: polar coordinates about its axis, the back at the rim.
+def eyeball_uv(quads_per_edge: int = QUADS_PER_EDGE) -> Doubles:
+    """Return the uv (n, 2) of an eyeball's points: polar coordinates about its axis.
 
-    side : number of quads along a cube edge, see `build_eyeball`
+    The apex of the cornea is in the middle, the back of the ball at the rim.
+
+    quads_per_edge : number of quads along a cube edge, see `build_eyeball`
     """
-    x, y, z = _directions(side).T
+    x, y, z = _point_directions(quads_per_edge).T
     angle, azimuth = np.arccos(np.clip(z, -1.0, 1.0)), np.arctan2(y, x)
     radius = UV_RIM * angle / np.pi
     return 0.5 + np.stack([radius * np.cos(azimuth), -radius * np.sin(azimuth)], axis=-1)
 
 
-def axis_points(side: int = SIDE) -> tuple[int, int, int]:
+def axis_points(quads_per_edge: int = QUADS_PER_EDGE) -> tuple[int, int, int]:
     """Return three point indices: the cornea's apex, the back of the ball, and its equator towards +X.
 
-    side : number of quads along a cube edge, see `build_eyeball`
+    quads_per_edge : number of quads along a cube edge, see `build_eyeball`
     """
-    directions, axes = _directions(side), ((0, 0, 1), (0, 0, -1), (1, 0, 0))
+    directions, axes = _point_directions(quads_per_edge), ((0, 0, 1), (0, 0, -1), (1, 0, 0))
     apex, back, right = (int(np.argmax(directions @ np.array(axis))) for axis in axes)
     return apex, back, right
 
 
-def _directions(side: int) -> Doubles:
-    points, _ = build_eyeball(side)
+def _point_directions(quads_per_edge: int) -> Doubles:
+    points, _ = build_eyeball(quads_per_edge)
     return np.asarray(points / np.linalg.norm(points, axis=1, keepdims=True))
 
 

@@ -23,7 +23,8 @@ class Eyes(ShortRepr):
     look : appearance of both eyes
     radius_mm : (k,) radius of the ball when the eye is scaled to a cornea of adult size [mm]
     centre_offset_mm : (k,) shift of the ball's centre along the axis, relative to an adult eye [mm]
-    gaze : (k, 3) unit direction of gaze in eye coordinates: the axis, or a direction inferred from the lids
+    gaze : (k, 3) unit direction of gaze in eye coordinates: the axis of the eye, or a direction inferred from
+        the lids
     """
 
     apex: Ints
@@ -38,8 +39,8 @@ class Eyes(ShortRepr):
     def frames(self, rig: Rig, motion: Motion) -> Doubles:
         """Return the matrices (k, 4, 4) from head coordinates [mm] to the coordinates of each eye.
 
-        Eye coordinates are scaled to an eye with a cornea of adult size [mm], with z along its axis. In them
-        the cornea has the same position for every size of the ball.
+        Eye coordinates are scaled to an eye with a cornea of adult size [mm], with z along the axis of the
+        eye. The position of the cornea in eye coordinates does not depend on the size of the ball.
         """
         count = len(self.apex)
         points = rig.pose_points(np.concatenate([self.apex, self.back, self.side]), motion)

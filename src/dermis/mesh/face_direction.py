@@ -15,16 +15,16 @@ _MAX_TRIANGLES, _SAMPLES, _MIRRORED = 40_000, 6_000, 800
 # Limits for the eyes, relative to the width of both together:
 _MAX_EYE_DEPTH, _MAX_EYE_HEIGHT = 0.67, 0.6  # largest extent from back to front, and upwards
 _MIN_GAP = 0.1  # smallest gap between the eyes
-_REACH = 3.0  # horizontal radius around the eyes within which vertices count as the head
+_HEAD_REACH = 3.0  # horizontal radius around the eyes within which vertices count as the head
 _MIN_AHEAD, _MAX_ASIDE = 0.25, 0.25  # offset of the eyes from the middle of the head: forwards, and to a side
 # Limits for the head, relative to its height:
 _HEAD_WIDTH = 0.68  # largest width of the head without shoulders
-_DEPTHS = 0.5, 1.6  # smallest and largest depth
+_DEPTH_RANGE = 0.5, 1.6  # smallest and largest depth
 _MAX_ASYMMETRY = 0.03  # largest root mean square distance of mirrored points from the surface
 _MIN_NOSE = 0.04  # smallest protrusion of the middle of the face
-_MIN_RELIEF = 0.03  # smallest variation of normals, see `_relief`
-_CELL = 0.08  # side of the cells in `_relief`
-# Height of the rows in `_ridge`, largest distance of the ridge from the middle, and distances of its sides:
+_MIN_RELIEF = 0.03  # smallest variation of normals, see `_normal_variation`
+_VARIATION_CELL = 0.08  # side of the cells in `_normal_variation`
+# Height of the rows in `_ridge_height`, largest distance of the ridge from the middle, distance of its sides:
 _ROW, _RIDGE, _SIDES = 0.05, 0.03, (0.07, 0.12)
 # Smallest ratio of the larger to the smaller asymmetry about the horizontal axes, and of relief and of nose
 # at the front to those at the back:
@@ -38,8 +38,8 @@ def face_direction(positions: Doubles, triangles: Index, eyes: Doubles) -> Direc
     triangles : (f, 3) vertex indices
     eyes : (n, 3) vertices of eyeballs, or joints of the eyes; empty if they are not known
 
-    Eyes lie in front of the middle of the head. Without them, the head must be symmetric about a vertical
-    plane, and the front is the side of more relief with a ridge in its middle, the nose.
+    Eyes lie in front of the middle of the head. If no eyes are known, the head must be symmetric about a
+    vertical plane, and its front is the side with more relief and with a ridge in the middle, the nose.
     """
     if not len(triangles):
         return None
@@ -56,50 +56,59 @@ def _direction_from_eyes(points: Doubles, eyes: Doubles) -> Direction | None:
     if (2 * np.abs(eyes - middle)[:, 2 - front]).min() < _MIN_GAP * width:
         return None  # the vertices are those of one eye
     offset = np.abs(points - middle)
-    near = points[(offset[:, 1] < width / 2) & (np.hypot(offset[:, 0], offset[:, 2]) < _REACH * width)]
+    near = points[(offset[:, 1] < width / 2) & (np.hypot(offset[:, 0], offset[:, 2]) < _HEAD_REACH * width)]
     if spread[front] > _MAX_EYE_DEPTH * width or spread[1] > _MAX_EYE_HEIGHT * width or not len(near):
         return None
     shift = middle - (near.min(axis=0) + near.max(axis=0)) / 2
     if abs(shift[front]) < _MIN_AHEAD * width or abs(shift[2 - front]) > _MAX_ASIDE * width:
         return None
-    return _direction(front, shift[front])
+    return _axis_name(front, shift[front])
 
 
 def _direction_from_shape(corners: Doubles) -> Direction | None:
     """Return the direction of the face of a head or of a standing figure from its triangles (f, 3, 3)."""
     top, height = float(corners[..., 1].max()), _head_height(corners[:, 0])
     head = corners[corners[..., 1].max(axis=1) >= top - height]
-    normals = _normals(head)
+    normals = _area_normals(head)
     if height <= 0 or not normals.any():
         return None
-    points, normals = _sample(head, normals)
+    points, normals = _sample_surface(head, normals)
     points = (points - [0.0, top, 0.0]) / height
     points[:, ::2] -= (points[:, ::2].min(axis=0) + points[:, ::2].max(axis=0)) / 2
     asymmetry = _asymmetry(points, 0), _asymmetry(points, 2)
     front = 2 if asymmetry[0] < asymmetry[1] else 0
     low, high = sorted(asymmetry)
     depths = np.ptp(points[:, front])
-    if low > _MAX_ASYMMETRY or high < _MIN_ASYMMETRY_RATIO * low or not _DEPTHS[0] < depths < _DEPTHS[1]:
+    if (
+        low > _MAX_ASYMMETRY
+        or high < _MIN_ASYMMETRY_RATIO * low
+        or not _DEPTH_RANGE[0] < depths < _DEPTH_RANGE[1]
+    ):
         return None
     sides = points[:, front] > 0, points[:, front] < 0
-    reliefs = [_relief(points[side], normals[side]) for side in sides]
-    noses = [_ridge(points[side], front) for side in sides]
+    reliefs = [_normal_variation(points[side], normals[side]) for side in sides]
+    noses = [_ridge_height(points[side], front) for side in sides]
     first = int(noses[1] > noses[0])
     has_nose = noses[first] > max(_MIN_NOSE, _MIN_NOSE_RATIO * noses[1 - first])
     has_relief = reliefs[first] > max(_MIN_RELIEF, _MIN_RELIEF_RATIO * reliefs[1 - first])
     if not (has_nose and has_relief):
         return None
-    return _direction(front, 1 - 2 * first)
+    return _axis_name(front, 1 - 2 * first)
 
 
-def _direction(axis: int, sign: float) -> Direction:
+def _axis_name(axis: int, sign: float) -> Direction:
     if axis == 0:
         return "x" if sign > 0 else "-x"
     return "z" if sign > 0 else "-z"
 
 
 def _head_height(points: Doubles) -> float:
-    """Return the height of the head at the top of points (n, 3), down to where shoulders exceed its width."""
+    """Return the height of the head of a figure.
+
+    It extends from the top down to where the figure becomes wider than a head, at the shoulders.
+
+    points : (n, 3) points of the figure, Y up
+    """
     ordered = points[np.argsort(-points[:, 1])]
     depth, across = ordered[0, 1] - ordered[:, 1], ordered[:, ::2]
     widths = np.maximum.accumulate(across) - np.minimum.accumulate(across)
@@ -107,13 +116,13 @@ def _head_height(points: Doubles) -> float:
     return float(depth[fits[0]] if len(fits) else depth[-1])
 
 
-def _normals(corners: Doubles) -> Doubles:
+def _area_normals(corners: Doubles) -> Doubles:
     """Return the normals of triangles (f, 3, 3) with twice the area as their length, as columns (3, f)."""
     a, b, c = np.moveaxis(corners, 0, -1)
     return cross_columns(b - a, c - a)
 
 
-def _sample(corners: Doubles, normals: Doubles) -> tuple[Doubles, Doubles]:
+def _sample_surface(corners: Doubles, normals: Doubles) -> tuple[Doubles, Doubles]:
     """Return points (n, 3) that are spread evenly over triangles (f, 3, 3), and their unit normals.
 
     normals : normals of the triangles with twice the area as their length, as columns (3, f)
@@ -139,16 +148,16 @@ def _asymmetry(points: Doubles, axis: int) -> float:
     return float(np.sqrt(np.maximum(nearest, 0).mean()))
 
 
-def _relief(points: Doubles, normals: Doubles) -> float:
+def _normal_variation(points: Doubles, normals: Doubles) -> float:
     """Return the variation of normals (n, 3) at points (n, 3) within small cells, 0 to 1 [-]."""
-    keys = np.floor(points / _CELL).astype(np.int64) @ [1, 1 << 20, 1 << 40]
+    keys = np.floor(points / _VARIATION_CELL).astype(np.int64) @ [1, 1 << 20, 1 << 40]
     cells = np.unique(keys, return_inverse=True)[1].reshape(-1)
     sums: Doubles = np.stack([np.bincount(cells, one) for one in normals.T])
     return 1 - float(np.sqrt(dot_columns(sums, sums)).sum()) / max(len(points), 1)
 
 
-def _ridge(points: Doubles, front: int) -> float:
-    """Return how far the middle of a face protrudes beyond both sides, at the height where it does most.
+def _ridge_height(points: Doubles, front: int) -> float:
+    """Return the largest distance at any height by which the middle of a face protrudes beyond its sides.
 
     points : (n, 3) points of the front or back of a head
     front : index of the coordinate along which the face may look
@@ -160,5 +169,5 @@ def _ridge(points: Doubles, front: int) -> float:
     middle, left, right = reach = np.zeros((3, row.max(initial=0) + 1))
     for deepest, band in zip(reach, bands, strict=True):
         np.maximum.at(deepest, row[band], depth[band])
-    known = (middle > 0) & (left > 0) & (right > 0)
-    return float((middle - np.maximum(left, right))[known].max(initial=0.0))
+    has_points = (middle > 0) & (left > 0) & (right > 0)
+    return float((middle - np.maximum(left, right))[has_points].max(initial=0.0))

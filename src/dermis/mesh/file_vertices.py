@@ -12,12 +12,13 @@ from dermis.base.summary import ShortRepr
 class FileVertices(ShortRepr):
     """Vertices of a mesh file from which the points of a head come, for mesh sequences.
 
-    A vertex of the file may be at several points, where sheets of the surface were separated, or at none.
+    A vertex of the file may belong to several points, where coincident sheets of the surface were separated,
+    or to no point.
 
     count : number of vertices that the triangles of the file use
     vertex, point : (n,) vertex indices in the file, and the head's point at each of these vertices
     triangles : (f, 3) triangles of the head before any subdivision, as indices in `vertex`
-    to_head : (3, 3) rotation from the axes of the file to those of the head
+    to_head : (3, 3) rotation from the axes of the file to the axes of the head
     """
 
     count: int

@@ -102,7 +102,7 @@ def vertex_normals(positions: Floats, point: Ints, triangles: Ints) -> Floats:
     """Return vertex normals (v, 3): normalised sums of face normals, weighted by the corner angles.
 
     Vertices of one point share a normal, so that there is no crease at a uv seam. The normal is +Z where the
-    sum is 0. Weights by angle, unlike those by area, do not depend on how the surface is triangulated.
+    sum is 0. Weights by angle, unlike weights by area, do not depend on how the surface is triangulated.
 
     positions : (v, 3) [mm]
     point : (v,) index of the point of each vertex
@@ -125,7 +125,7 @@ def vertex_normals(positions: Floats, point: Ints, triangles: Ints) -> Floats:
 
 
 def sum_by_index(index: NDArray[np.integer], values: Doubles, count: int) -> Doubles:
-    """Sum the rows of `values` (n, k) by `index` (n,): row i of the result (count, k) is for index i."""
+    """Sum rows of `values` (n, k) of equal `index` (n,); row i of the sums (count, k) is for index i."""
     columns = [np.bincount(index, weights=column, minlength=count) for column in values.T]
     return np.column_stack(columns)
 
@@ -154,8 +154,8 @@ def uv_cross(corners: NDArray[np.floating]) -> Doubles:
     return cross_2d(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
 
 
-def unit(vectors: Doubles, fallback: Doubles) -> Doubles:
-    """Normalise vectors (n, 3); those of length 0 are replaced by `fallback` (n, 3)."""
+def normalise_vectors(vectors: Doubles, fallback: Doubles) -> Doubles:
+    """Normalise vectors (n, 3); vectors of length 0 are replaced by `fallback` (n, 3)."""
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     usable = length > 0
     return np.where(usable, vectors / np.where(usable, length, 1), fallback)
@@ -164,8 +164,9 @@ def unit(vectors: Doubles, fallback: Doubles) -> Doubles:
 def tangents(positions: Floats, uv: Floats, normals: Floats, triangles: Ints) -> tuple[Floats, Floats]:
     """Return the derivatives of the position by u and by v at each vertex, (v, 3) each [mm per unit of uv].
 
-    They are means over the triangles of a vertex, weighted by area; triangles without uv area are ignored. A
-    vertex with no other triangles gets two orthogonal unit vectors, to avoid divisions by 0.
+    The derivatives are means over the triangles of a vertex, weighted by area; triangles without uv area are
+    ignored. A vertex whose triangles all lack uv area gets two orthogonal unit vectors, to avoid divisions by
+    0.
 
     positions, normals : (v, 3) [mm], and unit vectors
     uv : (v, 2)
@@ -192,7 +193,7 @@ def _nonzero_tangents(dpdu: Doubles, dpdv: Doubles, normals: Doubles) -> tuple[F
     """
     # the axis that is least parallel to the normal
     axis = np.eye(3)[np.abs(normals).argmin(axis=1)]
-    across = unit(np.cross(axis, normals), axis)
+    across = normalise_vectors(np.cross(axis, normals), axis)
     short = np.minimum(np.linalg.norm(dpdu, axis=1), np.linalg.norm(dpdv, axis=1)) < 1e-6
     u = np.where(short[:, None], across, dpdu)
     v = np.where(short[:, None], np.cross(across, normals), dpdv)
@@ -220,8 +221,10 @@ def cross_columns(a: NDArray[T], b: NDArray[T]) -> NDArray[T]:
     return result
 
 
-def components(count: int, a: NDArray[np.integer], b: NDArray[np.integer]) -> Index:
-    """Return the connected component of each node of a graph, (n,), numbered as they first appear.
+def label_components(count: int, a: NDArray[np.integer], b: NDArray[np.integer]) -> Index:
+    """Return for each node of a graph the number of its connected component, (n,).
+
+    Components are numbered in the order in which they first appear.
 
     count : n, number of nodes
     a, b : (l,) nodes at the two ends of each link
@@ -238,7 +241,7 @@ def components(count: int, a: NDArray[np.integer], b: NDArray[np.integer]) -> In
 
 
 def expand_runs(first: Index, count: Index) -> tuple[Index, Index]:
-    """Expand runs of consecutive integers; return the run index of each integer, and the integers.
+    """Return the integers of r runs of consecutive integers, preceded by the index of each integer's run.
 
     first, count : (r,) first integer and length of each run
     """

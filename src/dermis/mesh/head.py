@@ -36,9 +36,9 @@ class Head:
     maps : Maps
         Colour, relief and other maps.
     attribution : str, optional
-        Credit that pictures of the head require, empty for none.
+        Credit that pictures of the head require, empty if there is none.
     rig : Rig, optional
-        Morph targets and bones; None for a head that moves only by the positions of all its points.
+        Morph targets and bones; None for a head whose poses state the positions of all its points.
     eyes : Eyes, optional
         Eyeballs of realistic shape.
     strands : Strands, optional
@@ -46,11 +46,11 @@ class Head:
     hair : Groom, optional
         Scalp hair and beard, whose strands the device grows.
     note : str, optional
-        Parts of the file that are not used, with reasons; empty for none.
+        Parts of the file that are not used, with reasons; empty if there is none.
     levels : int, optional
         Levels of subdivision of the mesh.
     template : Head, optional
-        Head of the same topology and uv layout whose atlas and tables serve this one too.
+        Head of the same topology and uv layout, whose atlas and tables this head uses.
     file_vertices : FileVertices, optional
         Vertices of the mesh file from which the points come, for mesh sequences.
 
@@ -88,7 +88,7 @@ class Head:
 
     @cached_property
     def control(self) -> Rig:
-        """Return the rig; for a head without one, a rig of its points without targets or bones."""
+        """Return the rig; for a head without a rig, a rig of its points without targets or bones."""
         if self.rig is not None:
             return self.rig
         return Rig(self.mesh.points_mm.astype(np.float32))
@@ -103,7 +103,7 @@ class Head:
 
     @property
     def topology(self) -> Head:
-        """Return the head whose atlas and tables this head uses: its template if it fits, else `bare`."""
+        """Return the head whose atlas and tables this head uses: its template if that fits, else `bare`."""
         template = self.template
         if template is None or self.rig is None or self.rig.template is not template.rig:
             return self.bare
@@ -133,7 +133,7 @@ class Head:
     def skull_mm(self) -> Point | None:
         """Return the centre of the skull, without neck and shoulders; None for a mesh without a head [mm].
 
-        The skull of a body is at its head bone, if it has one.
+        The skull of a body is at its head bone, if the skeleton has such a bone.
         """
         skeleton = None if self.mesh.is_head_sized or self.rig is None else self.rig.skeleton
         bone = None if skeleton is None else head_bone(skeleton.names)
@@ -152,8 +152,8 @@ class Head:
     def axes(self) -> Doubles:
         """Return the directions to the right, upwards and to the front, as rows (3, 3).
 
-        They are x, y and z for a head; the front of a flat patch of skin is the side to which its normals
-        point.
+        For a head the directions are x, y and z. The front of a flat patch of skin is the side to which its
+        normals point.
         """
         return np.eye(3) if self.skull_mm is not None else facing_axes(self.mesh.positions, self.mesh.normals)
 
@@ -170,9 +170,9 @@ class Head:
         return float(np.linalg.norm(corners, axis=1).max())
 
     def frontmost(self, x_mm: float, y_mm: float) -> tuple[float, float, float]:
-        """Return the frontmost vertex near (x_mm, y_mm), both measured from the head's centre [mm].
+        """Return the frontmost vertex near a position, relative to the head's centre (x, y, z) [mm].
 
-        The position of the vertex is measured from the centre, too.
+        x_mm, y_mm : position to the right and upwards, relative to the head's centre [mm]
         """
         p = self.seen_positions_mm
         distance = np.hypot(p[:, 0] - x_mm, p[:, 1] - y_mm)

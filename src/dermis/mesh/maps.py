@@ -16,11 +16,11 @@ _MEAN_SAMPLES, _MAX_STRIDE = 64, 16  # samples of means along each side, and lar
 
 @dataclass(frozen=True, repr=False)
 class PartMaps(ShortRepr):
-    """Common texture maps of the groups that are not skin, whose uv refer to these maps.
+    """Texture maps that all groups of triangles other than skin share; the uv of these groups refer to them.
 
     colour : (H, W, 4) base colour, linear Rec. 709, and opacity; surfaces are cut out below 0.5 [-]
     surface : (H, W, 4) slopes as in `Maps.normal`, perceptual roughness and metalness [-]
-    emission : (H, W, 3) emitted radiance, or None
+    emission : (H, W, 3) emitted radiance; None if no group emits light
     """
 
     colour: Floats
@@ -40,7 +40,7 @@ class Maps(ShortRepr):
     specular : (H, W) grey 0..1, which the renderer scales to a mean over the skin [-]
     roughness : (H, W) grey 0..1 [-]
     region : (H, W) uint8 index of the facial region
-    parts : maps of the groups that are not skin
+    parts : maps of the groups of triangles that are not skin
     """
 
     colour: Floats | None = None

@@ -29,11 +29,12 @@ class Material:
     colour : diffuse albedo where there is no colour map, linear Rec. 709 [-]
     part : part of the mouth, which selects a colour in mouth.wgsl; None for other surfaces
     eye : whether the file declares the group to be an eyeball
-    has_maps : whether `Maps.parts` contains colour and surface of an opaque group, with its factors applied
+    has_maps : whether `Maps.parts` contains the colour and surface of an opaque group, already multiplied by
+        the factors of the file's material
     roughness : perceptual roughness of an opaque group, see glTF [-]; None for wet eyes and teeth
     metalness : 1 for metal [-]
     emission : radiance that the group emits, linear Rec. 709
-    opacity_cutoff : opacity below which the group is cut out; 0 for none
+    opacity_cutoff : opacity below which the group is cut out; 0 to cut out nothing
     """
 
     name: str
@@ -61,7 +62,8 @@ class Mesh(ShortRepr):
     point : (v,) index of the unique position
     triangles : (f, 3) vertex indices
     material : (f,) index into `materials`
-    quads : (q, 2) pairs of triangles (a, b, c) and (c, d, a) that are a quad abcd; no rows for none
+    quads : (q, 2) pairs of triangles (a, b, c) and (c, d, a) that form a quad abcd; no rows if the mesh has
+        no quads
     """
 
     positions: Floats
@@ -82,7 +84,7 @@ class Mesh(ShortRepr):
 
     @property
     def cut_out(self) -> Mask:
-        """Return the mask (f,) of triangles of which an opacity map cuts out parts, such as hair cards."""
+        """Return the mask (f,) of triangles that an opacity map cuts out in part, such as hair cards."""
         return np.array([one.has_maps and one.opacity_cutoff > 0 for one in self.materials])[self.material]
 
     @property
@@ -110,7 +112,7 @@ class Mesh(ShortRepr):
 
     @cached_property
     def topology_key(self) -> bytes:
-        """Return a digest that is equal for meshes which differ only in the positions of their points."""
+        """Return a digest that is the same for all meshes that differ only in positions of points."""
         digest = hashlib.blake2b(digest_size=16)
         for part in (self.uv, self.point, self.triangles, self.material):
             digest.update(np.ascontiguousarray(part).tobytes())
@@ -133,7 +135,10 @@ class Mesh(ShortRepr):
 
 
 def _valid_normals(normals: Floats, computed: Floats) -> Floats:
-    """Return given normals where they are finite and nearly unit vectors, else computed ones, (v, 3)."""
+    """Return the file's normals (v, 3), replaced by computed normals where not finite or not of unit length.
+
+    normals, computed : (v, 3) normals of the file, and normals computed from the triangles
+    """
     finite = np.isfinite(normals)
     length = np.linalg.norm(np.where(finite, normals, 0).astype(np.float64), axis=1, keepdims=True)
     valid = finite.all(axis=1, keepdims=True) & (np.abs(length - 1) < 0.05)
@@ -150,7 +155,7 @@ def build_mesh(
     point: ArrayLike | None = None,
     quads: ArrayLike = (),
 ) -> Mesh:
-    """Build a `Mesh` from arrays; points are welded and normals computed unless they are given.
+    """Build a `Mesh` from arrays; points are welded and normals are computed if these arguments are None.
 
     positions : (v, 3) finite [mm]
     uv : (v, 2) v down

@@ -39,7 +39,7 @@ class MorphTargets(ShortRepr):
         return np.argsort(self.point, kind="stable")
 
     def rows(self, target: int) -> slice:
-        """Return the slice of `point` and `delta_mm` that belongs to a target."""
+        """Return the slice of the rows of `point` and `delta_mm` that belong to a target."""
         return slice(int(self.first[target]), int(self.first[target + 1]))
 
     def dense(self, points: Intp, count: int) -> Floats:

@@ -1,7 +1,7 @@
 """Outlines: a few points of a shape that bound it in every direction.
 
-Shadow maps and depth ranges are fitted to them. For a rig they are selected once, from the rest pose, every
-morph target and random poses; posing them gives the bounds of the head in any pose.
+Shadow maps and depth ranges are fitted to outlines. The outline points of a rig are selected once, from the
+rest pose, every morph target and random poses; posing these points gives the bounds of the head in any pose.
 """
 
 from __future__ import annotations
@@ -36,7 +36,8 @@ class Outline(ShortRepr):
     """Points that bound a shape in every direction.
 
     points_mm : (n, 3) positions
-    margin_mm : largest distance by which the shape exceeds the bounds of these points; depth ranges add it
+    margin_mm : largest distance by which the shape exceeds the bounds of these points; depth ranges are
+        extended by this distance
     """
 
     points_mm: NDArray[np.floating]
@@ -153,10 +154,10 @@ def find_outline_points(positions: Floats, targets: MorphTargets, skeleton: Skel
 
 
 def _select_extreme(chosen: Mask, positions: Floats, count: int = _DIRECTIONS) -> None:
-    """Select points that exceed the bounds of the points selected before in one of `count` directions.
+    """Select points that exceed the bounds of the points selected before, in one of `count` directions.
 
     chosen : (p,) mask of the selected points, which this function extends
-    positions : (p, 3)
+    positions : (p, 3) positions of all points
     """
     for height in _project_on_directions(positions, count):
         top = height.argmax(axis=1)
@@ -169,8 +170,8 @@ def _project_on_directions(positions: Floats, count: int) -> Iterator[Floats]:
 
     count : number of all directions
 
-    A block is so small that NumPy multiplies it on one thread; several would wait for each other on busy
-    cores.
+    A block is so small that NumPy multiplies it on one thread; several threads would wait for each other on
+    busy cores.
     """
     block = max(1, _BLOCK_NUMBERS // len(positions))
     for start in range(0, count, block):

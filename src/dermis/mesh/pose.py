@@ -36,8 +36,8 @@ class Pose(ShortRepr):
         Weights of morph targets by name, mostly 0 to 1; targets that are left out keep their weight at rest.
     bones : mapping of str to array_like, optional
         Bones by name: either three angles [degrees] about the head's own axes (x: nod, y: turn, z: tilt)
-        relative to the rest pose, applied about z first, then x, then y; or a (4, 4) matrix from the bone's
-        space to its parent's, in the units of the file, as animations have it.
+        relative to the rest pose, applied about z first, then x, then y; or a (4, 4) matrix from the space of
+        the bone to that of its parent, in the units of the file, as in animations.
     positions_mm : (n, 3) array, optional
         Rest positions of all points of the control mesh, in the order of `Head.positions_mm` [mm]: another
         person of the same topology, or a motion from another program.
@@ -96,10 +96,12 @@ class Pose(ShortRepr):
             For names that the rig does not have, and for invalid numbers and shapes.
         """
         return Motion(
-            self._weights(rig, culprit), self._matrices(rig, culprit), self._positions(rig, culprit)
+            self._target_weights(rig, culprit),
+            self._bone_matrices(rig, culprit),
+            self._rest_positions(rig, culprit),
         )
 
-    def _weights(self, rig: Rig, culprit: object) -> Floats:
+    def _target_weights(self, rig: Rig, culprit: object) -> Floats:
         weights = np.zeros(len(rig.targets.names), np.float32)
         if not self.weights:
             return weights
@@ -112,7 +114,7 @@ class Pose(ShortRepr):
         weights[targets] = values if rig.targets.rest is None else values - rig.targets.rest[targets]
         return weights
 
-    def _matrices(self, rig: Rig, culprit: object) -> Floats:
+    def _bone_matrices(self, rig: Rig, culprit: object) -> Floats:
         bone_values = self._all_bones(rig)
         if not bone_values:
             return rig.rest.matrices
@@ -129,9 +131,9 @@ class Pose(ShortRepr):
         )
 
     def _all_bones(self, rig: Rig) -> Mapping[str, ArrayLike]:
-        """Return the bones of the pose, rotated in addition by the active morph targets.
+        """Return the bones of the pose, with the rotations that active morph targets add to them.
 
-        Bones that are given by a matrix are not changed.
+        Bones whose pose is a matrix are not changed.
         """
         rotations = [one for one in rig.bone_rotations if self.weights.get(one.target)]
         if not rotations:
@@ -143,7 +145,7 @@ class Pose(ShortRepr):
                 bones[bone] = [a + self.weights[target] * b for a, b in zip(before, degrees, strict=True)]
         return bones
 
-    def _positions(self, rig: Rig, culprit: object) -> Floats:
+    def _rest_positions(self, rig: Rig, culprit: object) -> Floats:
         if self.positions_mm is None:
             return rig.positions_mm
         try:
@@ -166,7 +168,7 @@ class Pose(ShortRepr):
 
 
 def merge_poses(pose: Pose, base: Pose | Mapping[str, float] | None) -> Pose:
-    """Return a pose with weights, bones and positions of a base wherever `pose` does not set them."""
+    """Fill what a pose does not set, among weights, bones and positions, from a base pose."""
     base = Pose.coerce(base) or Pose()
     positions = base.positions_mm if pose.positions_mm is None else pose.positions_mm
     return Pose({**base.weights, **pose.weights}, {**base.bones, **pose.bones}, positions)
@@ -175,7 +177,7 @@ def merge_poses(pose: Pose, base: Pose | Mapping[str, float] | None) -> Pose:
 def _bone_transforms(
     skeleton: Skeleton, ordered: list[tuple[int, str]], values: Mapping[str, Any], culprit: object
 ) -> Doubles:
-    """Return the head-space transforms (n, 4, 4) by which bones leave their rest pose [mm].
+    """Return the transforms (n, 4, 4) in head space that move bones from the rest pose to the pose [mm].
 
     ordered : (n,) index and name of each bone, parents before children
     values : angles or matrix of each bone by name, see `Pose`
@@ -234,12 +236,12 @@ def _refuse_weights(weights: Mapping[str, object], names: tuple[str, ...], culpr
     refuse(f"{culprit}: weights", "a number for each target", "got something else", "Correct it")
 
 
-def _refuse_name(culprit: str, name: object, known: Iterable[str], kind: str) -> NoReturn:
+def _refuse_name(culprit: str, name: object, known_names: Iterable[str], kind: str) -> NoReturn:
     """Raise DermisError for an unknown name, and propose similar known names.
 
     kind : "bone" or "morph target"
     """
-    names = list(known)
+    names = list(known_names)
     if not names:
         actual = f"got {format_value(name)} and it has none"
         refuse(culprit, f"a {kind} of the head", actual, f"Load a glTF file with {kind}s, or leave it out")

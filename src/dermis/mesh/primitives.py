@@ -55,8 +55,9 @@ def plane(size_mm: float, segments: int = 1, uv_scale: float = 1.0) -> Mesh:
 def uv_sphere(radius_mm: float, segments: int = 64, rings: int = 32) -> Mesh:
     """Return a sphere about the origin with latitude-longitude uv; v is 0 at +Y, the north pole.
 
-    u goes around +Y from -Z via -X. The seam is at -Z, so u = 0.5 faces +Z. Each triangle at a pole has an
-    apex vertex of its own, with u at the middle of its base, so that none is degenerate.
+    u goes around +Y from -Z via -X. The seam is at -Z, so u = 0.5 faces +Z. Each triangle at a pole has a
+    separate apex vertex, with u at the middle of the triangle's base, so that no triangle is degenerate in
+    uv.
 
     radius_mm : radius [mm]
     segments, rings : number of cells around the axis, and from pole to pole, at least 3 and 2

@@ -77,10 +77,10 @@ class BoneRotation(NamedTuple):
 
 
 class RigidFollowers(NamedTuple):
-    """Points that follow other points as one rigid body, such as a fitted eyeball that follows the file's.
+    """Points that follow other points as one rigid body, such as those of a fitted eyeball.
 
-    leaders : (n,) indices of points of the file
-    points : (m,) indices of the points that follow them
+    leaders : (n,) indices of the points to follow, which are in the file
+    points : (m,) indices of the points that follow the leaders
     """
 
     leaders: Ints
@@ -122,7 +122,7 @@ class Rig(ShortRepr):
         return len(self.positions_mm) - sum(len(one.points) for one in self.rigid_followers)
 
     def complete_positions(self, file_positions_mm: Floats) -> Floats:
-        """Return the rest positions of all control points (p, 3), given those of the file's points [mm].
+        """Return the rest positions of all control points (p, 3) from those of the file's points [mm].
 
         Rigid followers, such as fitted eyeballs, move with the file's points that they follow.
         """
@@ -146,16 +146,16 @@ class Rig(ShortRepr):
     def outline_mm(self, motion: Motion) -> Floats:
         """Return points (s, 3) that bound the head in a pose in every direction, to about a millimetre [mm].
 
-        If `motion` has other rest positions than the rig, the extreme points of these are added.
+        If `motion` has other rest positions than the rig, the extreme points of those positions are added.
         """
         if motion.positions_mm is self.positions_mm:
             return self.outline.pose(motion.weights, motion.matrices)
         return self._outline_for(motion.positions_mm).pose(motion.weights, motion.matrices)
 
     def _outline_for(self, rest_positions: Floats) -> RigOutline:
-        """Return the outline of this rig if its control points had other rest positions.
+        """Return the outline of this rig for other rest positions of its control points.
 
-        The last result is cached; it is returned again if the outline points have the same positions.
+        The last result is cached, and returned again while the outline points have the same positions.
 
         rest_positions : (p, 3) rest positions of all control points [mm]
         """
@@ -201,10 +201,10 @@ class Rig(ShortRepr):
 
     @cached_property
     def _lid_edges(self) -> tuple[Intp, Doubles, RigOutline]:
-        """Return the control points, the weights and the outline from which the lid edges are computed.
+        """Return what `lid_edges_mm` computes the points of the lid edges from.
 
-        The second result is the weights (e, n) of the n control points in the points of the edges, the third
-        is an outline that poses the control points.
+        Returns the indices (n,) of control points; their weights (e, n) in the e points of the edges; and an
+        outline that poses the control points.
         """
         assert self.contact is not None
         edge = self.contact.edge.ravel().astype(np.intp)
@@ -218,7 +218,7 @@ class Rig(ShortRepr):
         return points, weights, rig_outline(self.positions_mm, self.targets, self.skeleton, points)
 
     def pose_points(self, points: Ints, motion: Motion) -> Doubles:
-        """Return only the given control points in a pose, (n, 3) [mm].
+        """Return selected control points in a pose, (n, 3) [mm].
 
         points : (n,) indices of the control points
         """

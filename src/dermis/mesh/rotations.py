@@ -17,7 +17,7 @@ from dermis.base.arrays import Doubles
 def quaternion_matrix(q: Doubles) -> Doubles:
     """Return the matrices (..., 4, 4) of quaternions (..., 4) x, y, z, w.
 
-    Quaternions need not be normalised; those of length 0 give the identity.
+    Quaternions need not be normalised; quaternions of length 0 give the identity.
     """
     x, y, z, w = np.moveaxis(np.asarray(q, np.float64), -1, 0)
     squared = x * x + y * y + z * z + w * w

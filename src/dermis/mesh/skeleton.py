@@ -74,7 +74,7 @@ class Skeleton(ShortRepr):
         return [a, b, c, p, d, e, f, q, g, h, i, r, 0.0, 0.0, 0.0, 1.0]
 
     def head_space_transforms(self, bones: Sequence[int], local: Doubles) -> Doubles:
-        """Return the head-space transforms (n, 4, 4) by which n bones leave their rest pose [mm].
+        """Return the transforms (n, 4, 4) in head space that move n bones from their rest pose [mm].
 
         bones : (n,) indices of the bones
         local : (n, 4, 4) new transforms from the space of each bone to its parent's
@@ -151,7 +151,7 @@ class Skeleton(ShortRepr):
 
     @cached_property
     def _descendants(self) -> list[Intp]:
-        """Return for each bone the indices of itself and of its descendants."""
+        """Return for each bone the indices of the bone and of its descendants."""
         descendants: list[list[int]] = [[] for _ in self.names]
         for bone in range(len(self.names)):
             ancestor = bone

@@ -44,9 +44,9 @@ def principal_sizes(positions: Floats) -> Doubles:
 
 
 def is_standing_figure(positions: Floats, triangles: Ints) -> bool:
-    """Return whether a mesh, of any unit, has a small head above a narrow neck and wide shoulders.
+    """Return whether a mesh has a small head above a narrow neck and wide shoulders, like a standing person.
 
-    positions : (v, 3) vertices, Y up
+    positions : (v, 3) vertices of any unit, Y up
     triangles : (f, 3) vertex indices
     """
     width, height, depth = (float(one) for one in np.ptp(positions, axis=0))
@@ -56,7 +56,7 @@ def is_standing_figure(positions: Floats, triangles: Ints) -> bool:
     low, high = ends.min(axis=1), ends.max(axis=1)
     levels = (_HEAD_SECTION, *_NECK_SECTIONS, *_SHOULDER_SECTIONS)
     heights = [float(points[:, 1].min()) + level * height for level in levels]
-    head, *others = (_section(points, triangles[(low <= y) & (high > y)], y) for y in heights)
+    head, *others = (_horizontal_section(points, triangles[(low <= y) & (high > y)], y) for y in heights)
     neck = min(others[: len(_NECK_SECTIONS)], key=lambda one: one.width)
     shoulders = max(others[len(_NECK_SECTIONS) :], key=lambda one: one.width)
     return (
@@ -69,7 +69,11 @@ def is_standing_figure(positions: Floats, triangles: Ints) -> bool:
 
 
 def skull_below(positions: NDArray[np.floating], top: float) -> Point:
-    """Return the centre of a skull from the vertices of a head (v, 3) and the height of its crown [mm]."""
+    """Return the centre of a skull below its crown [mm].
+
+    positions : (v, 3) vertices of a head [mm]
+    top : height of the crown [mm]
+    """
     x, y, z = positions.T
     skull = y > top - 2 * _CROWN_TO_CENTRE_MM
     centre_x, centre_z = (float(c.min() + c.max()) / 2 for c in (x[skull], z[skull]))
@@ -83,7 +87,8 @@ def body_skull(positions: Floats, triangles: Ints, eyes: Floats) -> Point | None
     triangles : (f, 3) vertex indices
     eyes : (n, 3) vertices of eyeballs [mm]
 
-    The result is None for a mesh without eyes that does not stand, and for one smaller than a body.
+    The result is None for a mesh without eyes that is not a standing figure, and for a mesh smaller than a
+    body.
     """
     if np.ptp(positions[:, 1]) < _MIN_BODY_HEIGHT_MM:
         return None
@@ -97,7 +102,7 @@ def body_skull(positions: Floats, triangles: Ints, eyes: Floats) -> Point | None
 
 
 def head_bone(names: tuple[str, ...]) -> int | None:
-    """Return the index of the bone of the head, such as "head" or "mixamorig:Head"; None without one."""
+    """Return the index of the bone of the head, such as "head" or "mixamorig:Head"; None if there is none."""
     last_words = ([word.casefold() for word in _WORD_PATTERN.findall(name)[-1:]] for name in names)
     return next((k for k, word in enumerate(last_words) if word == ["head"]), None)
 
@@ -111,7 +116,8 @@ def centre_of_box(positions: Floats) -> Point:
 def facing_axes(positions: Floats, normals: Floats) -> Doubles:
     """Return the directions (3, 3) to the right, upwards and to the front of a mesh without a head, in rows.
 
-    They are x, y and z, unless the mesh is flat: then its front is the side to which its normals point.
+    The directions are x, y and z, unless the mesh is flat: the front of a flat mesh is the side to which its
+    normals point.
 
     positions, normals : (v, 3) vertices, Y up [mm], and their normals
     """
@@ -137,7 +143,7 @@ class _Section(NamedTuple):
     middle: float
 
 
-def _section(positions: Doubles, cut: Ints, height: float) -> _Section:
+def _horizontal_section(positions: Doubles, cut: Ints, height: float) -> _Section:
     """Return the section of a mesh with the horizontal plane at a height.
 
     cut : (n, 3) vertex indices of the triangles that the plane cuts

@@ -145,11 +145,12 @@ def interpolate_quads(position: NDArray[np.floating], corners: Doubles) -> Doubl
 
 
 def refine_roots(mesh: Mesh, roots: Roots, levels: int) -> Roots:
-    """Return the same surface points as quads and coordinates of the mesh after Catmull-Clark subdivision.
+    """Convert roots to the quads and bilinear coordinates of the mesh after Catmull-Clark subdivision.
 
-    The first corner of each finer quad is a corner of the coarser face.
+    The surface points stay the same. The first corner of each finer quad is a corner of the coarser face.
 
     mesh : mesh before subdivision
+    levels : number of subdivision steps
     """
     loose_triangles = len(mesh.triangles) - 2 * len(mesh.quads)
     quad, position = roots.quad.astype(np.int64), roots.position.astype(np.float64)

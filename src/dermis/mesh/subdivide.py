@@ -30,7 +30,7 @@ Corners = NDArray[np.integer]
 
 
 class SubdividedMesh(NamedTuple):
-    """Subdivided mesh with the stencils of its points, which are None at level 0."""
+    """Subdivided mesh with the stencils of its points; the stencils are None at level 0."""
 
     mesh: Mesh
     stencils: Stencils | None
@@ -80,7 +80,7 @@ def subdivide_head(head: Head, levels: int | Callable[[Head], int]) -> Head:
 def resolve_levels(head: Head, levels: int | Callable[[Head], int]) -> int:
     """Return the number of subdivision levels for a head, given as a number or as a function of the head.
 
-    Raises DermisError for other numbers than 0 to 3.
+    Raises DermisError if the number is not 0, 1, 2 or 3.
     """
     return _check_levels(levels(head) if callable(levels) else levels)
 
@@ -109,7 +109,7 @@ def subdivide(mesh: Mesh, levels: int) -> SubdividedMesh:
 
 
 def refinement(mesh: Mesh, levels: int) -> Refinement:
-    """Return the subdivision of all meshes with this mesh's topology; for its rules see `subdivide`.
+    """Return the subdivision of all meshes with this mesh's topology; `subdivide` states its rules.
 
     levels : 1 to 3
     """
@@ -189,10 +189,10 @@ def polygons(mesh: Mesh) -> tuple[Index, Index, Ints]:
 def coarse_triangles(head: Head, min_faces: int, tolerance_mm: float) -> Ints:
     """Return triangles (t, 3) that cover a subdivided head with fewer levels of subdivision in flat regions.
 
-    The vertices are those of the subdivided mesh. Triangles with an opacity map are left out.
+    The indices refer to the vertices of the subdivided mesh. Triangles with an opacity map are left out.
 
     min_faces : smallest number of faces of the coarsest level
-    tolerance_mm : largest distance of a left out vertex from the coarse edge that replaces it
+    tolerance_mm : largest distance of a vertex that is left out from the coarse edge that replaces it
     """
     mesh, levels = head.mesh, head.levels
     by_quads = len(mesh.quads) > 0

@@ -21,14 +21,14 @@ class Cage(NamedTuple):
     uv : (v, 2) uv of each vertex
     point : (v,) point of each vertex
     corner : (n,) vertices at the corners, face by face
-    sides : (f,) number of corners of each face
+    corner_count : (f,) number of corners of each face
     material : (f,) material of each face
     """
 
     uv: Doubles
     point: Index
     corner: Index
-    sides: Index
+    corner_count: Index
     material: Ints
 
 
@@ -36,18 +36,18 @@ class Cage(NamedTuple):
 class _Sides:
     """Half-edges of all faces, called sides, from each corner to the next, and the edges that they are on.
 
-    points : number of points
+    point_count : number of points
     start : (n,) point where each side starts
     previous : (n,) preceding side of the same face
     face : (n,) face of each side
     ends : (e, 2) points at the ends of each edge
     edge : (n,) edge of each side
     border : (e,) mask of edges whose number of sides is not two
-    seam_edges, seam_edge : edges as pairs of vertices, and the index of each side's edge; an edge on a uv
-        seam counts twice
+    seam_edges, seam_edge : edges as pairs of vertices, and the index of each side's edge in these pairs; an
+        edge on a uv seam occurs twice, once for each chart
     """
 
-    points: int
+    point_count: int
     start: Index
     previous: Index
     face: Index
@@ -60,33 +60,33 @@ class _Sides:
     @cached_property
     def valence(self) -> Index:
         """Return the number of edges at each point (p,)."""
-        return np.bincount(self.ends.ravel(), minlength=self.points)
+        return np.bincount(self.ends.ravel(), minlength=self.point_count)
 
     @cached_property
     def border_valence(self) -> Index:
         """Return the number of border edges at each point (p,)."""
-        return np.bincount(self.ends[self.border].ravel(), minlength=self.points)
+        return np.bincount(self.ends[self.border].ravel(), minlength=self.point_count)
 
 
 def _find_sides(cage: Cage) -> _Sides:
-    last = np.cumsum(cage.sides) - 1
-    first = last + 1 - cage.sides
+    last = np.cumsum(cage.corner_count) - 1
+    first = last + 1 - cage.corner_count
     index = np.arange(len(cage.corner))
     following, previous = index + 1, index - 1
     following[last], previous[first] = first, last
     seam_edges, seam_edge, _ = unique_sides(np.column_stack((cage.corner, cage.corner[following])))
     start = cage.point[cage.corner]
     ends, edge, counts = unique_sides(np.column_stack((start, start[following])))
-    face = np.repeat(np.arange(len(cage.sides)), cage.sides)
-    points, border = int(cage.point.max()) + 1, counts != 2
-    return _Sides(points, start, previous, face, ends, edge, border, seam_edges, seam_edge)
+    face = np.repeat(np.arange(len(cage.corner_count)), cage.corner_count)
+    point_count, border = int(cage.point.max()) + 1, counts != 2
+    return _Sides(point_count, start, previous, face, ends, edge, border, seam_edges, seam_edge)
 
 
 def refine_loop(cage: Cage) -> tuple[csr_array, Cage]:
-    """Return the weights (q, p) of old points in the new ones, and four triangles for each triangle.
+    """Return the weights (q, p) of old points in the new points, and four triangles for each triangle.
 
-    Three of them are at its corners and one in the middle. Old points come first, then one point on each
-    edge. Borders become cubic B-splines.
+    Of the four triangles, three are at the corners of the old triangle and one is in its middle. Old points
+    come first, then one point on each edge. Borders become cubic B-splines.
 
     Source: [Loop1987], with Warren's weights of the old points.
     """
@@ -105,12 +105,12 @@ def refine_loop(cage: Cage) -> tuple[csr_array, Cage]:
     a, b, c = cage.corner.reshape(-1, 3).T
     ab, bc, ca = (len(cage.uv) + sides.seam_edge).reshape(-1, 3).T
     four = np.array([[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]])
-    corner, count = four.transpose(2, 0, 1).ravel(), np.repeat(cage.sides, 4)
+    corner, count = four.transpose(2, 0, 1).ravel(), np.repeat(cage.corner_count, 4)
     return vstack((old, new), "csr"), Cage(uv, point, corner, count, np.repeat(cage.material, 4))
 
 
 def refine_catmull_clark(cage: Cage) -> tuple[csr_array, Cage]:
-    """Return the weights (q, p) of old points in the new ones, and a quad for each corner of each face.
+    """Return the weights (q, p) of old points in the new points, and a quad for each corner of each face.
 
     Old points come first, then one point on each edge, then one in each face. The first corner of a quad is
     an old point, the third is the centre of the face. Borders become cubic B-splines.
@@ -120,23 +120,28 @@ def refine_catmull_clark(cage: Cage) -> tuple[csr_array, Cage]:
     from scipy.sparse import vstack
 
     sides = _find_sides(cage)
-    n, count = np.maximum(sides.valence, 1), len(cage.sides)
-    centres = _sparse_matrix(sides.face, sides.start, 1 / cage.sides[sides.face], (count, sides.points))
+    n, count = np.maximum(sides.valence, 1), len(cage.corner_count)
+    centres = _sparse_matrix(
+        sides.face, sides.start, 1 / cage.corner_count[sides.face], (count, sides.point_count)
+    )
     new = _edge_end_weights(sides, np.where(sides.border, 1 / 2, 1 / 4))
     weights = _inner_edge_weights(sides, 1 / 4)
     new += _sparse_matrix(sides.edge, sides.face, weights, (len(sides.ends), count)) @ centres
     old = _old_point_weights(sides, (n - 2) / n, 1 / n**2, border_weight=1 / 8)
     weights = _inner_point_weights(sides, 1 / n**2)
-    old += _sparse_matrix(sides.start, sides.face, weights, (sides.points, count)) @ centres
+    old += _sparse_matrix(sides.start, sides.face, weights, (sides.point_count, count)) @ centres
     uv, point = _add_edge_vertices(cage, sides)
-    centre = np.add.reduceat(cage.uv[cage.corner], np.cumsum(cage.sides) - cage.sides) / cage.sides[:, None]
+    centre = (
+        np.add.reduceat(cage.uv[cage.corner], np.cumsum(cage.corner_count) - cage.corner_count)
+        / cage.corner_count[:, None]
+    )
     edge, face = len(cage.uv) + sides.seam_edge, len(uv) + sides.face
     finer = Cage(
         np.vstack((uv, centre)),
-        np.concatenate((point, sides.points + len(sides.ends) + np.arange(count))),
+        np.concatenate((point, sides.point_count + len(sides.ends) + np.arange(count))),
         np.column_stack((cage.corner, edge, face, edge[sides.previous])).ravel(),
         np.full(len(cage.corner), 4),
-        np.repeat(cage.material, cage.sides),
+        np.repeat(cage.material, cage.corner_count),
     )
     return vstack((old, new, centres), "csr"), finer
 
@@ -171,12 +176,14 @@ def _inner_point_weights(sides: _Sides, weight: Doubles) -> Doubles:
 
 
 def _edge_end_weights(sides: _Sides, weight: Doubles) -> csr_array:
-    """Return the matrix (e, p) whose entries for both end points of an edge are the edge's weight.
+    """Return the matrix (e, p) that has the weight of each edge at both end points of the edge.
 
     weight : (e,) weight of each edge
     """
     rows = np.repeat(np.arange(len(sides.ends)), 2)
-    return _sparse_matrix(rows, sides.ends.ravel(), np.repeat(weight, 2), (len(sides.ends), sides.points))
+    return _sparse_matrix(
+        rows, sides.ends.ravel(), np.repeat(weight, 2), (len(sides.ends), sides.point_count)
+    )
 
 
 def _old_point_weights(
@@ -193,9 +200,9 @@ def _old_point_weights(
     edge_weights[np.tile(sides.border, 2) & is_border[both]] = border_weight
     # points where borders meet, or where the surface is not manifold, do not move
     own_weights = np.where(is_inner, inner_weight, np.where(is_border, 1 - 2 * border_weight, 1))
-    index, weights = np.arange(sides.points), np.concatenate((own_weights, edge_weights))
+    index, weights = np.arange(sides.point_count), np.concatenate((own_weights, edge_weights))
     rows, columns = np.concatenate((index, both)), np.concatenate((index, other))
-    return _sparse_matrix(rows, columns, weights, (sides.points, sides.points))
+    return _sparse_matrix(rows, columns, weights, (sides.point_count, sides.point_count))
 
 
 def _add_edge_vertices(cage: Cage, sides: _Sides) -> tuple[Doubles, Index]:
@@ -203,11 +210,11 @@ def _add_edge_vertices(cage: Cage, sides: _Sides) -> tuple[Doubles, Index]:
     edge_of_cut = np.empty(len(sides.seam_edges), dtype=np.int64)
     edge_of_cut[sides.seam_edge] = sides.edge
     uv = np.vstack((cage.uv, cage.uv[sides.seam_edges].mean(axis=1)))
-    return uv, np.concatenate((cage.point, sides.points + edge_of_cut))
+    return uv, np.concatenate((cage.point, sides.point_count + edge_of_cut))
 
 
 def _sparse_matrix(rows: Index, columns: Index, weights: Doubles, shape: tuple[int, int]) -> csr_array:
-    """Return a sparse matrix of nonzero weights; those with equal row and column are summed."""
+    """Return a sparse matrix of nonzero weights; weights with equal row and column are summed."""
     from scipy.sparse import coo_array
 
     used = weights != 0

@@ -21,10 +21,11 @@ CACHE_SIZE = 256
 
 
 def interpolate_table(column: Callable[[float], Floats], position: float) -> Floats:
-    """Interpolate linearly between the two table columns nearest to a position in [0, 1].
+    """Interpolate a table over [0, 1] linearly at one position, between the two nearest columns.
 
-    column : function that computes the table's column, an array, at a multiple of 1 / TABLE_STEPS; it should
+    column : function that returns the column, an array, at a multiple of 1 / TABLE_STEPS; the function should
         cache its results
+    position : position in the table; values outside [0, 1] are clamped
     """
     scaled = min(max(position, 0.0), 1.0) * TABLE_STEPS
     low = min(int(scaled), TABLE_STEPS - 1)
@@ -33,9 +34,9 @@ def interpolate_table(column: Callable[[float], Floats], position: float) -> Flo
 
 
 def interpolate_columns(column: Callable[[float], Floats], positions: ArrayLike) -> Floats:
-    """Interpolate a table at c positions in [0, 1]; the last axis of the result has one entry per position.
+    """Interpolate a table over [0, 1] at c positions; the last axis of the result has one entry per position.
 
-    column : function that returns a column of the table, see `interpolate_table`
+    column : function that returns the column at a multiple of 1 / TABLE_STEPS, see `interpolate_table`
     """
     values = np.atleast_1d(np.asarray(positions, np.float64)).tolist()
     return np.stack([interpolate_table(column, value) for value in values], axis=-1)
@@ -45,10 +46,11 @@ def interpolate_columns(column: Callable[[float], Floats], positions: ArrayLike)
 class AngularResponse:
     """Directional factors of the reflectance of a half-space, by which a shader scales diffuse light.
 
-    The reflectance for light from a direction is `relative_reflectance` times that at normal incidence. The
-    light emerges uniformly in all directions, except for light that scattered once: it adds
-    `single_scattering` times 1/(a + b), minus the mean of this kernel over exit directions, where a and b are
-    the cosines of the incident and the exit direction below the surface.
+    The reflectance for an incident direction is `relative_reflectance` times the reflectance at normal
+    incidence. Light that scattered several times emerges uniformly in all directions. Light that scattered
+    once adds `single_scattering` times the difference between the kernel 1/(a + b) and the mean of this
+    kernel over exit directions, where a and b are the cosines of the incident and the exit direction below
+    the surface.
 
     eta : index of refraction relative to air [-]
     relative_reflectance : (DIRECTION_ROWS, c) reflectance relative to normal incidence, at incident cosines
@@ -118,7 +120,7 @@ def refracted_cosine(cosine: ArrayLike, eta: float) -> Floats:
 class _HalfSpace:
     """Isotropically scattering half-space below a smooth surface, at discrete directions.
 
-    The medium reflects light by an operator R, and the surface reflects it back inside by an operator r. The
+    The operator R describes reflection by the medium, the operator r internal reflection by the surface. The
     series of multiple reflections R + R r R + ... is summed by solving one linear system.
     """
 
@@ -161,8 +163,8 @@ class _HalfSpace:
 def _response_column(eta: float, total: float) -> Floats:
     """Return the fields of `AngularResponse` for one channel as a column of a table, (DIRECTION_ROWS + 2,).
 
-    The first DIRECTION_ROWS elements are the relative reflectance, the last two the relative diffuse
-    reflectance and the factor of single scattering.
+    The first DIRECTION_ROWS elements are `relative_reflectance`, the last two are
+    `relative_diffuse_reflectance` and `single_scattering`.
     """
     albedo = albedo_for_reflectance(total, eta)
     space = _HalfSpace(albedo, eta)
@@ -185,6 +187,9 @@ def albedo_for_reflectance(total: float, eta: float) -> float:
     """Return the single-scattering albedo of the half-space with a given reflectance at normal incidence [-].
 
     The reflectance of an isotropically scattering half-space is inverted numerically.
+
+    total : reflectance for light at normal incidence [-]
+    eta : index of refraction relative to air [-]
     """
     from scipy.optimize import brentq
 

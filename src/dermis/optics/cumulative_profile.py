@@ -11,13 +11,13 @@ from numpy.typing import ArrayLike
 from dermis.optics.media import Floats
 from dermis.optics.radial import SMALLEST_FLOAT, RadialProfile
 
-_MIN_RADIUS_MM, _MAX_RADIUS_MM, _RADII = 1e-4, 1000.0, 800
+_MIN_RADIUS_MM, _MAX_RADIUS_MM, _RADIUS_COUNT = 1e-4, 1000.0, 800
 _EDGE_RESPONSE_ANGLES = 256  # samples of the integral in `edge_response`
 
 
 def radii() -> Floats:
     """Return the radii at which every cumulative profile is sampled, (n,) [mm]: 0, then log-spaced."""
-    return np.concatenate([[0.0], np.geomspace(_MIN_RADIUS_MM, _MAX_RADIUS_MM, _RADII)])
+    return np.concatenate([[0.0], np.geomspace(_MIN_RADIUS_MM, _MAX_RADIUS_MM, _RADIUS_COUNT)])
 
 
 @dataclass(frozen=True)
@@ -34,21 +34,24 @@ class CumulativeProfile:
     energy: Floats
 
     @classmethod
-    def from_function(cls, within: Callable[[Floats], Floats], energy: ArrayLike) -> CumulativeProfile:
+    def from_function(
+        cls, fraction_within: Callable[[Floats], Floats], energy: ArrayLike
+    ) -> CumulativeProfile:
         """Sample a function of radius as a cumulative profile.
 
-        within : function from radii (n,) [mm] to the fraction of the emerging light within each, (n, 3) [-]
+        fraction_within : function from radii (n,) [mm] to the fraction of the emerging light within each,
+            (n, 3) [-]
         energy : (3,) all emerging light, divided by the light that enters [-]
         """
         grid = radii()
-        return cls(grid, np.asarray(within(grid), np.float64), np.asarray(energy, np.float64))
+        return cls(grid, np.asarray(fraction_within(grid), np.float64), np.asarray(energy, np.float64))
 
     @classmethod
     def from_radial_profile(cls, profile: RadialProfile, entering_fraction: float = 1.0) -> CumulativeProfile:
         """Accumulate the ring energies of a three-channel radial profile into a cumulative profile.
 
         entering_fraction : fraction of the incident light that enters, if the profile is per incident power;
-            the total is divided by it [-]
+            `energy` is the profile's total divided by this fraction [-]
         """
         total = profile.total
         energy_within = np.concatenate([np.zeros((1, 3)), np.cumsum(profile.ring_energy, axis=0)])
@@ -80,7 +83,7 @@ class CumulativeProfile:
         return np.array([np.interp(fraction, self.fraction[:, i], self.radii_mm) for i in range(3)])
 
     def with_energy(self, energy: ArrayLike) -> CumulativeProfile:
-        """Return a profile with the same fractions and another total reflectance.
+        """Return a profile with the same fractions of light within radii and another total reflectance.
 
         energy : (3,) new total reflectance [-]
         """

@@ -1,4 +1,4 @@
-"""Homogeneous medium equivalent to a diffusion profile, and the lateral offset of oblique light in it."""
+"""Homogeneous medium equivalent to a diffusion profile, and its lateral offset of oblique light."""
 
 from __future__ import annotations
 
@@ -24,12 +24,13 @@ _ABSORPTION_WEIGHT = 0.35  # of absorption in the published formula of the offse
 
 
 def equivalent_medium(profile: GaussianSum, total: Floats, eta: float) -> Medium:
-    """Return the homogeneous half-space with a given reflectance and the width of a profile, per channel.
+    """Return the half-space whose reflectance is `total` and which spreads light as widely as a profile.
 
-    The width is the inverse of the frequency at which the Hankel transform has fallen to half of its value at
-    0.
+    The width is the inverse of the frequency at which the Hankel transform of R(r) has fallen to half of its
+    value at 0.
 
-    total : (c,) reflectance for light at normal incidence [-]
+    profile : diffusion profile
+    total : (c,) reflectance of the half-space for light at normal incidence [-]
     eta : index of refraction relative to air [-]
     """
     albedo, extinction = np.empty(len(total)), np.empty(len(total))
@@ -45,7 +46,7 @@ def equivalent_medium(profile: GaussianSum, total: Floats, eta: float) -> Medium
 
 @lru_cache(maxsize=CACHE_SIZE)
 def _half_space_column(eta: float, from_photons: bool, total: float) -> Floats:
-    """Return albedo and inverse width of the half-space with a given reflectance, as a table column (2,).
+    """Return albedo and inverse width of the half-space with the reflectance `total`, as a table column (2,).
 
     The first element is the square root of 1 minus the single-scattering albedo [-], the second the frequency
     at which the Hankel transform of R(r) has fallen to half of its value at 0 [1/mean free path]. If
@@ -125,12 +126,12 @@ def _half_frequency(transform: Callable[[float], float]) -> float:
 
 
 def oblique_offset_mm(medium: Medium) -> float:
-    """Return the lateral offset of the mean exit point for grazing light, averaged over channels [mm].
+    """Return the distance from entry point to mean exit point of grazing light, averaged over channels [mm].
 
-    medium : medium of one layer
+    medium : medium with one layer
 
-    At an angle t from the normal the offset is sin t times this length, in the direction of propagation along
-    the surface.
+    For light at an angle t from the normal, the mean exit point is sin t times this distance further along
+    the surface, in the direction in which the light travels.
 
     Source: [WangJacques1995].
     """

@@ -28,8 +28,8 @@ _SCALAR_COLUMNS = ("kind", "albedo", "total")
 CountedModel = Literal["counted"]
 COUNTED_MODEL: CountedModel = "counted"
 """Name of the profile model that uses tabulated photon counts."""
-_MIN_STEP, _MAX_STEP = 0.05, 0.4  # step of log r for derivatives: larger where few photons leave
-_STEP = 0.02  # step of log r, divided by the square root of mean free path / r
+_MIN_LOG_STEP, _MAX_LOG_STEP = 0.05, 0.4  # step of log r for derivatives: larger where few photons leave
+_RELATIVE_LOG_STEP = 0.02  # step of log r, divided by the square root of mean free path / r
 
 
 class _PhotonTable(NamedTuple):
@@ -72,8 +72,9 @@ def half_space(kind: HalfSpaceKind, albedo: ArrayLike, mean_free_path_mm: ArrayL
 def fractions_within(
     kind: HalfSpaceKind, albedo: ArrayLike, mean_free_path_mm: ArrayLike
 ) -> Callable[[Floats], Floats]:
-    """Return a function from radii (n,) [mm] to the fraction of emerging light within each, (n, 3).
+    """Return a function from radii (n,) [mm] to the fraction of the emerging light within each, (n, 3) [-].
 
+    kind : surface and illumination of the half-space
     albedo : (3,) single-scattering albedo, clamped to the range of the table [-]
     mean_free_path_mm : (3,) mean free path [mm]
     """
@@ -128,9 +129,9 @@ def _photon_table(kind: HalfSpaceKind) -> _PhotonTable:
 
 
 def has_photon_table(medium: Medium) -> bool:
-    """Return whether a photon-count table covers a medium: a half-space with three channels.
+    """Return whether a photon-count table covers a medium.
 
-    Its index of refraction and its reduced albedos must be in the tables.
+    Covered are half-spaces with three channels whose index of refraction and reduced albedos are in a table.
     """
     layer = medium.layers[0]
     single = len(medium.layers) == 1 and medium.semi_infinite and medium.channels == 3
@@ -161,7 +162,7 @@ def tabulated_profile(medium: Medium) -> RadialProfile | None:
     mean_free_path, edges, radius = layer.mean_free_path_mm, ring_edges(), radius_grid()
     within = fractions_within(kind, layer.alpha_prime, mean_free_path)
     rings = np.diff(within(edges), axis=0) * cumulative.energy
-    step = np.clip(_STEP * np.sqrt(mean_free_path.min() / radius), _MIN_STEP, _MAX_STEP)
+    step = np.clip(_RELATIVE_LOG_STEP * np.sqrt(mean_free_path.min() / radius), _MIN_LOG_STEP, _MAX_LOG_STEP)
     rate = (within(radius * np.exp(step)) - within(radius * np.exp(-step))) / (2.0 * step)[:, None]
     return RadialProfile(
         name=medium.name,

@@ -127,7 +127,7 @@ class Medium:
         return replace(self, layers=layers)
 
 
-def _check_layer(culprit: str, layer: Layer, last: bool) -> None:
+def _check_layer(culprit: str, layer: Layer, is_last: bool) -> None:
     a, s = layer.sigma_a, layer.sigma_s_prime
     if a.ndim != 1 or a.shape != s.shape or len(a) == 0:
         actual = f"got shapes {a.shape} and {s.shape}"
@@ -136,7 +136,7 @@ def _check_layer(culprit: str, layer: Layer, last: bool) -> None:
         actual = f"got absorption {a.tolist()} and scattering {s.tolist()}"
         expected = f"absorption from 0 and scattering from {_MIN_SCATTERING:g} to {_MAX_COEFFICIENT:g} /mm"
         refuse(culprit, expected, actual, "Correct them")
-    semi_infinite = np.isinf(layer.thickness_mm) and layer.thickness_mm > 0 and last
+    semi_infinite = np.isinf(layer.thickness_mm) and layer.thickness_mm > 0 and is_last
     if not semi_infinite and not _MIN_THICKNESS_MM <= layer.thickness_mm <= _MAX_THICKNESS_MM:
         limits = f"{_MIN_THICKNESS_MM:g} to {_MAX_THICKNESS_MM:g} mm"
         expected = f"a thickness from {limits}, infinite in the last layer only"

@@ -46,8 +46,9 @@ def load_profile(
 ) -> GaussianSum:
     """Return the diffusion profile of a preset or a file as a sum of Gaussians.
 
-    Tissue has no table of Gaussians and is fitted with six: half-spaces of one medium from tables of photon
-    counts, all other tissue by layered diffusion.
+    For tissue, whose files contain no Gaussians, six Gaussians are fitted to its diffusion profile. The
+    profile comes from tables of photon counts if the tissue is a homogeneous half-space, otherwise from
+    layered diffusion.
 
     Parameters
     ----------
@@ -55,9 +56,9 @@ def load_profile(
         Preset ("gpu-gems-3", "dj3", "spectral" ...), or a file: .csv, or .toml as written by
         ``dermis profile``.
     pigments : Mapping of str to float, optional
-        Fields of `SkinParameters` that replace those of a skin made of pigments.
+        Values that replace fields of the `SkinParameters` of a skin made of pigments.
     initial : GaussianSum, optional
-        Fit of a similar skin from which the new fit starts, which is several times faster.
+        Fit of a similar skin, from which the new fit starts; this is several times faster.
 
     Returns
     -------
@@ -92,7 +93,7 @@ def load_profile(
 
 
 def find_gaussians(name: str | Path) -> GaussianSum | None:
-    """Return the Gaussians stored in a preset or file, or None for tissue, which has to be fitted.
+    """Return the Gaussians stored in a preset or file, or None for tissue, to which Gaussians must be fitted.
 
     Raises DermisError for an unknown name, and for Gaussians that are not a valid profile.
     """
@@ -112,7 +113,7 @@ def find_gaussians(name: str | Path) -> GaussianSum | None:
 
 @lru_cache(_CACHED_FILES)
 def _read_gaussians(path: Path, state: tuple[int, ...]) -> GaussianSum | None:
-    """Return the Gaussians of a file, cached because each frame requests them; None for tissue.
+    """Return the Gaussians of a file, or None for tissue; results are cached, as each frame requests them.
 
     state : state of the file as returned by `_file_state`, so that a changed file is read again
     """
@@ -166,10 +167,10 @@ def _fit_preset(name: str) -> GaussianSum:
 def fit_profile(tissue: Tissue, name: str | Path, initial: GaussianSum | None = None) -> GaussianSum:
     """Fit six Gaussians to the diffusion profile of a tissue, computed by the tissue's default model.
 
-    Fits to photon counts keep the total reflectance: their profiles are steeper than those of diffusion, and
-    a free fit would lose up to 2 % of the light.
+    Fits to photon counts keep the total reflectance: counted profiles are steeper than profiles of diffusion
+    models, and an unconstrained fit would lose up to 2 % of the light.
 
-    initial : fit of a similar tissue from which the new fit starts, several times faster
+    initial : fit of a similar tissue, from which the new fit starts; this is several times faster
 
     Raises DermisError when the fit is not a valid profile.
     """
@@ -180,7 +181,7 @@ def fit_radial(radial: RadialProfile, name: str, initial: GaussianSum | None = N
     """Fit six Gaussians to a radial profile; fits to photon counts keep the total reflectance.
 
     name : name of the fitted profile
-    initial : fit of a similar profile from which the new fit starts, several times faster
+    initial : fit of a similar profile, from which the new fit starts; this is several times faster
     """
     return _fit_rings(radial.rings(), radial.model, name, initial)
 

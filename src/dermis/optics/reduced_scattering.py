@@ -18,9 +18,10 @@ _MAX_THICKNESS_MM = 1e4  # thicker layers of MCML files stand for semi-infinite 
 
 
 def check_reduced(culprit: str, table: Mapping[str, object]) -> None:
-    """Raise an error for a layer that states an anisotropy, as its scattering may not be reduced.
+    """Raise an error for a layer that states an anisotropy: its scattering is probably not reduced.
 
-    table : layer with "scattering_per_mm"
+    culprit : file or layer, for the message
+    table : entries of the layer, with "scattering_per_mm"
     """
     key = next((key for key in _ANISOTROPY_KEYS if key in table), None)
     if key is None:
@@ -45,7 +46,7 @@ def refuse_mcml(path: Path) -> NoReturn:
     expected = "a .toml file with [[layers]] in 1/mm for red, green and blue"
     with open_regular_file(path, expected) as file:
         lines = file.read(_HEAD_BYTES).decode("latin-1").splitlines()
-    rows = [_numbers(line.partition("#")[0].split()) for line in lines]
+    rows = [_parse_numbers(line.partition("#")[0].split()) for line in lines]
     layers = list(takewhile(lambda row: len(row) == 5, dropwhile(lambda row: len(row) != 5, rows)))
     values = [
         f"layer {k}: {_layer_entries(*layer)}" for k, layer in enumerate(layers[:_MAX_LISTED_LAYERS], 1)
@@ -55,7 +56,7 @@ def refuse_mcml(path: Path) -> NoReturn:
     refuse(path, expected, actual, "; ".join([advice, *values]))
 
 
-def _layer_entries(n: float, mu_a: float, mu_s: float, g: float, thickness_cm: float) -> str:
+def _layer_entries(eta: float, mu_a: float, mu_s: float, g: float, thickness_cm: float) -> str:
     """Convert a layer of MCML to the keys and values of the TOML files of this package."""
     thickness = (
         f"thickness_mm {10 * thickness_cm:.4g}"
@@ -65,14 +66,14 @@ def _layer_entries(n: float, mu_a: float, mu_s: float, g: float, thickness_cm: f
     coefficients = (
         f"absorption_per_mm {mu_a / 10:.4g}, scattering_per_mm {_reduced_scattering(mu_s, g) / 10:.4g}"
     )
-    return f"{coefficients}, {thickness}, eta {n:.4g}"
+    return f"{coefficients}, {thickness}, eta {eta:.4g}"
 
 
 def _reduced_scattering(mu_s: float, g: float) -> float:
     return mu_s * (1.0 - g)
 
 
-def _numbers(cells: list[str]) -> list[float]:
+def _parse_numbers(cells: list[str]) -> list[float]:
     """Return the numbers in cells of text; an empty list if any cell is not a number."""
     try:
         return [float(cell) for cell in cells]

@@ -22,7 +22,7 @@ _COEFFICIENT_FIELDS = ("sigma_a", "sigma_s_prime")
 
 @dataclass(frozen=True)
 class ColourTable:
-    """Table of diffuse reflectance over melanin (first axis) and blood (second axis).
+    """Table of the diffuse reflectance of skins, over melanin (first axis) and blood (second axis).
 
     colours : (n, n, 3) diffuse reflectance per incident light, linear Rec. 709, at fractions of melanin and
         blood whose square roots are evenly spaced from 0 to 1 [-]
@@ -65,9 +65,9 @@ def colour_table(parameters: SkinParameters, nodes: int = _TABLE_NODES) -> Colou
 
 
 def spectral_table(parameters: SkinParameters, nodes: int = _TABLE_NODES) -> Floats:
-    """Return the diffuse reflectance (n, n, 31) over melanin and blood at `WAVELENGTHS_NM` [-].
+    """Return the diffuse reflectance of skins over melanin and blood at `WAVELENGTHS_NM`, (n, n, 31) [-].
 
-    parameters, nodes : as in `colour_table`, which has the same fractions along its axes
+    parameters, nodes : as in `colour_table`; the fractions along the axes are the same
     """
     epidermis, dermis = dj2006_layers(parameters, np.linspace(0.0, 1.0, nodes) ** 2)
     blood = np.arange(nodes)

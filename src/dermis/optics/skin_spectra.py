@@ -1,4 +1,4 @@
-"""Diffuse reflectance spectra of many skins at once, each with its own pigments."""
+"""Diffuse reflectance spectra of many skins at once; the pigments differ between the skins."""
 
 from __future__ import annotations
 
@@ -41,14 +41,14 @@ def skin_reflectance(
     baseline : absorption of bloodless tissue relative to [Jacques1998] [-]
     scattering : scattering of both layers relative to [DonnerJensen2006] [-]
     """
-    m, b, ox, eu = map(_column, (melanin, blood_fraction, oxygen, eumelanin_fraction))
-    bloodless = _column(baseline) * baseline_absorption(WAVELENGTHS_NM)
+    m, b, ox, eu = map(_as_column, (melanin, blood_fraction, oxygen, eumelanin_fraction))
+    bloodless = _as_column(baseline) * baseline_absorption(WAVELENGTHS_NM)
     pigment = eu * eumelanin(WAVELENGTHS_NM) + (1.0 - eu) * pheomelanin(WAVELENGTHS_NM)
     vessels = ox * blood(WAVELENGTHS_NM, 1.0) + (1.0 - ox) * blood(WAVELENGTHS_NM, 0.0)
-    sigma_s_prime = _column(scattering) * donner_jensen_2006(WAVELENGTHS_NM)
+    sigma_s_prime = _as_column(scattering) * donner_jensen_2006(WAVELENGTHS_NM)
     epidermis = m * pigment + (1.0 - m) * bloodless
     return two_layer_reflectance(
-        epidermis, b * vessels + (1.0 - b) * bloodless, sigma_s_prime, _column(epidermis_mm)
+        epidermis, b * vessels + (1.0 - b) * bloodless, sigma_s_prime, _as_column(epidermis_mm)
     )
 
 
@@ -71,6 +71,6 @@ def two_layer_reflectance(
     return (1.0 - normal_reflectance(SKIN_ETA)) * solve_two_layers(upper, epidermis_mm, lower, A)
 
 
-def _column(value: ArrayLike) -> Floats:
-    """Return an (n,) array as (n, 1), and a number as it is."""
+def _as_column(value: ArrayLike) -> Floats:
+    """Return an (n,) array as (n, 1), and a number unchanged."""
     return np.asarray(value, np.float64)[..., None]

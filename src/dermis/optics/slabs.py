@@ -45,8 +45,8 @@ class PhaseMatrices:
         [-]
     unscaled_extinction : extinction coefficient of the true medium relative to the reduced extinction
         coefficient [-]
-    backward, forward : (m, m) phase function between two cosines, for scattering that reverses the direction
-        of travel along the normal, and for scattering that keeps it; 1 for isotropic scattering [-]
+    backward, forward : (m, m) phase function between two cosines, for scattering that reverses the sign of
+        the travel along the normal (backward) or keeps the sign (forward); 1 for isotropic scattering [-]
     """
 
     albedo: float
@@ -127,12 +127,12 @@ def solve_doubled_slabs(
     nodes: int = DIRECTION_NODES,
     g: float = 0.0,
 ) -> Slabs:
-    """Compute slabs of given thicknesses and all their doublings, as fast as the thickest slabs alone.
+    """Solve slabs and all their successive doublings, in the time that the thickest slabs alone would take.
 
     albedo, eta, nodes, g : arguments of `solve_slabs`
     smallest_depth : (n,) optical depths of similar size [-]
-    doublings : number d of doublings; the n (d + 1) slabs are ordered by the number of doublings, then by
-        `smallest_depth`
+    doublings : number d of doublings; the result has n (d + 1) slabs, ordered by the number of doublings,
+        then by `smallest_depth`
     """
     transport = _Transport.create(albedo, eta, nodes, g)
     initial_doublings = transport.doublings(float(np.max(smallest_depth)))
@@ -143,11 +143,12 @@ def solve_doubled_slabs(
 
 
 def half_space_radiance(albedo: float, eta: float, nodes: int, g: float) -> tuple[Floats, Floats, Floats]:
-    """Return discrete directions, their fractions of uniform light, and emerging radiance of a half-space.
+    """Return discrete directions in a half-space, their shares of uniform light, and the emerging radiance.
 
-    The directions are cosines (m,) below the surface. A fraction (m,) tells how much of the light that enters
-    from a uniform sky has this direction. The radiance (m, m), by exit and entry direction, is scaled so
-    that its mean over exit directions, weighted by the fractions, is the reflectance.
+    Returns cosines (m,) of the directions below the surface; the fraction (m,) of the light entering from a
+    uniform sky that travels in each direction; and the emerging radiance (m, m) by exit and entry direction.
+    The radiance is scaled so that the mean over exit directions, weighted by the fractions, is the
+    reflectance.
     """
     transport = _Transport.create(albedo, eta, nodes, g)
     doublings = transport.doublings(DEEP_OPTICAL_DEPTH)
@@ -166,7 +167,7 @@ class _Transport:
     mu : (m,) cosines from the normal [-]
     flux : (m,) fraction of uniform light inside the medium at each cosine [-]
     internal : (m,) reflectance of the faces from inside [-]
-    escapes : (m,) mask of the cosines that are not totally reflected at a face
+    escapes : (m,) mask of the directions that are not totally reflected at a face
     phase : phase function between the cosines
     """
 
@@ -178,7 +179,7 @@ class _Transport:
 
     @classmethod
     def create(cls, albedo: float, eta: float, nodes: int, g: float) -> _Transport:
-        mu, weight = _quadrature(eta, nodes)
+        mu, weight = _direction_quadrature(eta, nodes)
         internal, escapes = internal_reflectance(mu, eta), mu > critical_cosine(eta)
         return cls(mu, 2.0 * weight * mu, internal, escapes, phase_matrices(albedo, g, mu, nodes))
 
@@ -220,8 +221,11 @@ def _unscattered_exit(unscattered: Floats, internal: Floats) -> tuple[Floats, Fl
     return down * unscattered * internal, down
 
 
-def _quadrature(eta: float, nodes: int) -> tuple[Floats, Floats]:
-    """Return nodes and weights over cosines in a medium: escaping directions, then totally reflected ones."""
+def _direction_quadrature(eta: float, nodes: int) -> tuple[Floats, Floats]:
+    """Return nodes and weights over cosines in a medium: directions that escape, then all other directions.
+
+    A direction escapes if it is not totally reflected at the face.
+    """
     critical = critical_cosine(eta)
     spans = [(critical, 1.0), (0.0, critical)] if critical > 0.0 else [(0.0, 1.0)]
     parts = [gauss_legendre(low, high, nodes) for low, high in spans]
@@ -285,8 +289,8 @@ def _add_faces(
 def anisotropic_response(total: ArrayLike, eta: float, g: float) -> AngularResponse:
     """Return the angular response of half-spaces with anisotropic scattering.
 
-    Their reduced absorption and scattering coefficients are equal to those of isotropically scattering
-    half-spaces with the reflectances `total`.
+    The reduced absorption and scattering coefficients equal those of isotropically scattering half-spaces
+    with the reflectances `total`.
 
     total : (c,) reflectance of the isotropic half-spaces for light at normal incidence [-]
     eta : index of refraction relative to air, at least 1 [-]
@@ -312,15 +316,17 @@ def anisotropic_response(total: ArrayLike, eta: float, g: float) -> AngularRespo
 def _response_column(eta: float, g: float, total: float) -> Floats:
     """Return the fields of `AngularResponse` for one channel as a column of a table, (DIRECTION_ROWS + 2,).
 
-    The first DIRECTION_ROWS elements are the relative reflectance, the last two the relative diffuse
-    reflectance and the factor of single scattering.
+    The first DIRECTION_ROWS elements are `relative_reflectance`, the last two are
+    `relative_diffuse_reflectance` and `single_scattering`.
     """
     a, fraction, radiance = half_space_radiance(albedo_for_reflectance(total, eta), eta, DIRECTION_NODES, g)
     reflectance = fraction @ radiance
-    normal = float(_interpolate(a, reflectance, np.ones(1))[0])
+    normal = float(_interpolate_over_cosines(a, reflectance, np.ones(1))[0])
     if normal <= _MIN_REFLECTANCE:
         return np.append(np.ones(DIRECTION_ROWS + 1), 0.0)
-    table = _interpolate(a, reflectance, refracted_cosine(np.linspace(0.0, 1.0, DIRECTION_ROWS) ** 2, eta))
+    table = _interpolate_over_cosines(
+        a, reflectance, refracted_cosine(np.linspace(0.0, 1.0, DIRECTION_ROWS) ** 2, eta)
+    )
     air = np.sqrt(np.maximum(1.0 - eta**2 * (1.0 - a**2), 0.0))
     kernel = 1.0 / (a[:, None] + a) - mean_single_scattering_kernel(air, eta)
     deviation = radiance - reflectance
@@ -329,18 +335,18 @@ def _response_column(eta: float, g: float, total: float) -> Floats:
     return np.concatenate([table, [fraction @ reflectance, single_scattering]]) / normal
 
 
-def _interpolate(known: Floats, values: Floats, cosine: Floats) -> Floats:
+def _interpolate_over_cosines(sample_cosine: Floats, values: Floats, cosine: Floats) -> Floats:
     """Interpolate samples over cosines linearly, and extrapolate beyond them by a polynomial.
 
-    known : (m,) cosines of the samples
+    sample_cosine : (m,) cosines of the samples
     values : (m,) samples
     cosine : cosines of the result
     """
-    order = np.argsort(known)
-    x, y = known[order], values[order]
-    found = np.interp(cosine, x, y)
+    order = np.argsort(sample_cosine)
+    x, y = sample_cosine[order], values[order]
+    interpolated = np.interp(cosine, x, y)
     first, last = slice(_EXTRAPOLATION_POINTS), slice(-_EXTRAPOLATION_POINTS, None)
     for end, outside in ((first, cosine < x[0]), (last, cosine > x[-1])):
         polynomial = np.polyfit(x[end], y[end], _EXTRAPOLATION_POINTS - 1)
-        found = np.where(outside, np.polyval(polynomial, cosine), found)
-    return np.asarray(found)
+        interpolated = np.where(outside, np.polyval(polynomial, cosine), interpolated)
+    return np.asarray(interpolated)

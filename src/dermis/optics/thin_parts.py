@@ -35,7 +35,9 @@ _UNIFORM_NODES = 8  # number of discrete directions for uniform light
 _MIN_OPTICAL_DEPTHS, _DOUBLING_COUNT = 1e-4 * np.array([1.0, 2.0**0.5]), 25
 _OPTICAL_DEPTHS = (_MIN_OPTICAL_DEPTHS * 2.0 ** np.arange(_DOUBLING_COUNT + 1)[:, None]).ravel()
 _MIN_TRANSMITTANCE = 1e-300  # replaces the transmittance 0 of thick black slabs in divisions
-_FREQUENCIES = np.geomspace(0.02, 5.0, 24)  # at which Gaussians are fitted to a profile [1/mean free path]
+_FIT_FREQUENCIES = np.geomspace(
+    0.02, 5.0, 24
+)  # at which Gaussians are fitted to a profile [1/mean free path]
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,12 +47,12 @@ class ThinParts:
     The thicknesses are evenly spaced in the square root. The weights are those of k Gaussians in 3 channels,
     and relative to the reflectance of a half-space of the medium.
 
-    max_thickness_mm : thickness at the last index; at index 0 it is 0 [mm]
+    max_thickness_mm : thickness at the last index; the thickness at index 0 is 0 [mm]
     transmitted : (THICKNESS_ROWS, k, 3) weights of the light that leaves on the far side [-]
-    lost : (THICKNESS_ROWS, k, 3) weights of the light that a half-space would reflect, but the thin part does
-        not; it is spread like transmitted light [-]
-    directionality : (THICKNESS_ROWS,) strength with which transmittance depends on the incident direction,
-        -1 to 1: 1 as in deep slabs, see `oblique_transmittance`; 0 not at all; reversed below 0 [-]
+    lost : (THICKNESS_ROWS, k, 3) weights of the light that a half-space would reflect and the thin part does
+        not; lost light is spread like transmitted light [-]
+    directionality : (THICKNESS_ROWS,) how strongly transmittance depends on the incident direction, from 1
+        (as in deep slabs, see `oblique_transmittance`) over 0 (not at all) to -1 (in the opposite sense) [-]
     """
 
     max_thickness_mm: float
@@ -90,9 +92,9 @@ def solve_thin_parts(
 def oblique_transmittance(total: Floats, eta: float, from_photons: bool = False, g: float = 0.0) -> Floats:
     """Return the relative transmittance of deep slabs by incident direction, (DIRECTION_ROWS, c) [-].
 
-    The transmittance for a direction, relative to that for uniform light, is divided by the half-space's
-    reflectance for this direction, also relative to that for uniform light. The square roots of
-    the incident cosines in air are evenly spaced from 0 to 1.
+    The relative transmittance for a direction is t / r: t is the slab's transmittance for the direction
+    divided by its transmittance for uniform light, and r is the same quotient for the reflectance of a
+    half-space. The square roots of the incident cosines in air are evenly spaced from 0 to 1.
 
     total : (c,) reflectance of the half-space for light at normal incidence [-]
     eta : index of refraction relative to air [-]
@@ -134,7 +136,8 @@ class _SlabTotals(NamedTuple):
     transmittance : transmitted power, divided by incident power [-]
     relative_transmittance : transmittance divided by the reflectance of the half-space [-]
     lost : reflectance lost by the finite thickness, divided by the reflectance of the half-space [-]
-    directionality : strength of the dependence on incident direction, 1 in deep slabs, 0 for none [-]
+    directionality : how strongly transmittance depends on the incident direction: 1 as in deep slabs, 0 not
+        at all [-]
     """
 
     transmittance: Floats
@@ -156,12 +159,12 @@ def _slab_totals(layer: Layer, thickness_mm: Floats, eta: float, g: float) -> It
 
 
 @lru_cache(maxsize=CACHE_SIZE)
-def _totals_column(eta: float, g: float, root: float) -> Floats:
+def _totals_column(eta: float, g: float, root_absorption: float) -> Floats:
     """Return the four fields of `_SlabTotals` at `_OPTICAL_DEPTHS`, (n, 4), for one albedo.
 
-    root : square root of 1 minus the reduced albedo, in which the totals are tabulated [-]
+    root_absorption : square root of 1 minus the reduced albedo, in which the totals are tabulated [-]
     """
-    albedo = min(max(1.0 - root**2, MIN_ALBEDO), MAX_ALBEDO)
+    albedo = min(max(1.0 - root_absorption**2, MIN_ALBEDO), MAX_ALBEDO)
     slabs = solve_doubled_slabs(albedo, _MIN_OPTICAL_DEPTHS, _DOUBLING_COUNT, eta, _UNIFORM_NODES, g)
     half_space, deep = _deep_transmittance(albedo, eta, _UNIFORM_NODES, g)
     reflectance, deep_change = half_space.reflected @ half_space.flux, deep - 1.0
@@ -181,7 +184,7 @@ def _spread_weights(medium: Medium, thickness_mm: Floats, variance_mm2: Floats) 
     from scipy.optimize import nnls
 
     layer, A, stiffness = medium.layers[0], boundary_mismatch(medium.eta, "exact"), 100.0
-    s = _FREQUENCIES * float(layer.sigma_t_prime[0])
+    s = _FIT_FREQUENCIES * float(layer.sigma_t_prime[0])
     frequency = np.concatenate([hankel.ZERO_FREQUENCY, s])
     transform = solve_thicknesses(frequency, layer, thickness_mm, A)[1][..., 0]
     # the last row makes the weights sum to 1

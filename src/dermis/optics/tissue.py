@@ -1,4 +1,4 @@
-"""Tissue by name or file: media in three colour channels, and skins made of pigments by wavelength."""
+"""Tissue by name or file: media whose channels are colours, and skins made of pigments by wavelength."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Tissue:
     medium : Medium
         Layers with three channels, or with one channel for each wavelength.
     rgb : numpy.ndarray, optional
-        (3, c) weights of the wavelengths [-]; None if the channels are colours.
+        (3, c) weights from the wavelengths to red, green and blue [-]; None if the channels are colours.
     parameters : SkinParameters, optional
         Parameters of a skin made of pigments.
 
@@ -108,7 +108,7 @@ class Tissue:
     def profile(self, model: ProfileModel | None = None, clamp: Clamp = "layer") -> RadialProfile:
         """Return the diffusion profile R(r) of the tissue in linear Rec. 709.
 
-        R(r) is per power that enters the tissue; for a skin made of pigments it is per incident power.
+        R(r) is per power that enters the tissue; for a skin made of pigments, per incident power.
 
         model : model that computes the profile; by default `default_model`
         clamp : position of the multipole's source in layers thinner than a mean free path
@@ -126,7 +126,7 @@ class Tissue:
         return profile
 
     def rings(self) -> RingTarget:
-        """Return the energy of the default profile in concentric rings, a target for fits."""
+        """Return the light through concentric rings, from the default model, as the target of a fit."""
         model = self.default_model
         if model == COUNTED_MODEL:
             return self.profile().rings()
@@ -135,7 +135,7 @@ class Tissue:
     def transmittance(self, thickness_mm: ArrayLike) -> Floats:
         """Return the transmittance of slabs of the tissue, (n, 3) [-].
 
-        It is per power that enters the slab; for a skin made of pigments it is per incident power.
+        The transmittance is per power that enters the slab; for a skin made of pigments, per incident power.
 
         thickness_mm : (n,) thicknesses of the slabs [mm]
         """
@@ -160,9 +160,9 @@ def load_tissue(
     name : str or Path
         Preset ("skin1", "dj3", "spectral" ...), or a .toml file.
     structure : {"dj2006", "donner2008", "biospec"}, optional
-        Layers of a skin made of pigments; by default those of the file, or "dj2006".
+        Layer structure of a skin made of pigments; by default the one stated in the file, or "dj2006".
     pigments : Mapping of str to float, optional
-        Fields of `SkinParameters` that replace those of the preset or file.
+        Values that replace fields of the `SkinParameters` of the preset or file.
 
     Returns
     -------
@@ -172,7 +172,7 @@ def load_tissue(
     Raises
     ------
     DermisError
-        There is no such preset or file, or pigments are given for a medium without pigments.
+        There is no such preset or file, or `pigments` is passed for a medium without pigments.
 
     References
     ----------

@@ -20,7 +20,7 @@ from dermis.scene.opencv import OpenCvCamera, extrinsics, from_opencv, intrinsic
 
 _DISTANCE_MM = 1100.0  # as in portrait photography; from closer, the nose looks large
 _RELATIVE_DISTANCE = 3.0  # least distance relative to the size of a mesh that is shown completely
-_MARGIN = 1.08  # size of the frame relative to a mesh that is shown completely
+_FRAME_MARGIN = 1.08  # size of the frame relative to a mesh that is shown completely
 _UP = (0.0, 1.0, 0.0)
 
 
@@ -28,7 +28,7 @@ _Fraction = Annotated[float, Field(ge=-10, le=10), Reason("lenses do not shift f
 
 
 class Window(NamedTuple):
-    """Image rectangle of a camera, in the plane at distance 1 in front of it.
+    """Image rectangle of a camera, in the plane at distance 1 in front of the camera.
 
     The picture coordinates (x, y), each from -1 at the left or bottom to 1 at the right or top, correspond to
     the point ((x + shift[0]) half[0], (y + shift[1]) half[1]) of this plane.
@@ -225,12 +225,12 @@ def full_body(head: Head) -> Camera:
     Parameters
     ----------
     head : Head
-        The head, with everything that its file has.
+        The head, with all meshes of the file.
 
     Returns
     -------
     Camera
-        Camera at a distance of 1.1 m or, if that is more, of three times the size of the mesh.
+        Camera at a distance of 1.1 m, or of three times the size of the mesh if the mesh is larger.
 
     Examples
     --------
@@ -287,7 +287,7 @@ def camera_preset(name: str, head: Head) -> Camera:
 
 
 def find_preset(name: str) -> Callable[[Head], Camera] | None:
-    """Return the function of a camera preset, or None for another name."""
+    """Return the function of a camera preset, or None for a name that is not a preset."""
     by_name = {key.replace("-", "_"): preset for key, preset in CAMERA_PRESETS.items()}
     return by_name.get(name.replace("-", "_"))
 
@@ -300,7 +300,10 @@ def _camera_at_azimuth(head: Head, degrees: float) -> Camera:
 
 
 def _show_all(head: Head, degrees: float) -> Camera:
-    """Return a camera that shows all of a mesh with a margin, from an azimuth relative to its front."""
+    """Return a camera that shows all of a mesh with a margin, from an azimuth relative to the front.
+
+    degrees : azimuth of the camera, 0 in front of the head [degrees]
+    """
     x, _, z = _azimuth_direction(degrees)
     # rows: to the right, up and towards the camera
     axes = np.array([[z, 0.0, -x], [0.0, 1.0, 0.0], [x, 0.0, z]]) @ head.axes
@@ -308,19 +311,19 @@ def _show_all(head: Head, degrees: float) -> Camera:
     low, high = points.min(axis=0), points.max(axis=0)
     middle, distance = 0.5 * (low + high), max(_DISTANCE_MM, _RELATIVE_DISTANCE * float((high - low).max()))
     across, towards = np.abs(points - middle)[:, :2].max(axis=1), (points - middle)[:, 2]
-    frame_mm = 2.0 * _MARGIN * float((across / (1.0 - towards / distance)).max())
+    frame_mm = 2.0 * _FRAME_MARGIN * float((across / (1.0 - towards / distance)).max())
     target, position = (
-        _triple(np.round((middle + np.array([0, 0, far])) @ axes, 3)) for far in (0.0, distance)
+        _vector_tuple(np.round((middle + np.array([0, 0, far])) @ axes, 3)) for far in (0.0, distance)
     )
-    return Camera(position=position, target=target, up=_triple(axes[1]), frame_mm=round(frame_mm, 3))
+    return Camera(position=position, target=target, up=_vector_tuple(axes[1]), frame_mm=round(frame_mm, 3))
 
 
 def _to_scene(head: Head, vector: Vector) -> Vector:
     """Return a vector in the scene from its components to the right, upwards and to the front of a head."""
-    return _triple(np.array(vector) @ head.axes)
+    return _vector_tuple(np.array(vector) @ head.axes)
 
 
-def _triple(vector: Doubles) -> Vector:
+def _vector_tuple(vector: Doubles) -> Vector:
     x, y, z = (float(one) + 0.0 for one in vector)
     return x, y, z
 

@@ -90,20 +90,25 @@ def as_environment(environment: object) -> Environment | None:
     return Environment(name=str(environment))
 
 
-def as_model(kind: type[P], values: object, part: str, example: str) -> P:
-    """Return settings of a class from an instance or from a mapping of field values by name.
+def as_model(settings_class: type[P], values: object, argument: str, example: str) -> P:
+    """Return settings of a given class.
 
-    kind : class of the settings, such as `Skin`
-    part, example : name of the argument, and example of its fields, for the error message
+    settings_class : class of the settings, such as `Skin`
+    values : instance of the class, or a mapping from field names to values
+    argument : name of the argument of `Scene`, for the error message
+    example : example of fields with values, for the error message
 
     Raises DermisError for any other object.
     """
-    if isinstance(values, kind):
+    if isinstance(values, settings_class):
         return values
     if not isinstance(values, Mapping):
-        actual, advice = f"got {format_value(values)}", f"Write {part}=dermis.{kind.__name__}({example})"
-        refuse(part, f"a {kind.__name__}", actual, advice)
-    return kind(**values)
+        actual, advice = (
+            f"got {format_value(values)}",
+            f"Write {argument}=dermis.{settings_class.__name__}({example})",
+        )
+        refuse(argument, f"a {settings_class.__name__}", actual, advice)
+    return settings_class(**values)
 
 
 def _check_positions(lights: Sequence[Light]) -> Sequence[Light]:

@@ -33,11 +33,13 @@ class Keywords:
         """Return a pydantic schema that accepts the words and all values of the annotated type."""
         from pydantic_core import core_schema
 
-        def check(value: Any, numbers: Any) -> Any:
-            return value if isinstance(value, str) and value in self.words else numbers(value)
+        def accept_keyword(value: Any, validate_number: Any) -> Any:
+            return value if isinstance(value, str) and value in self.words else validate_number(value)
 
         unchanged = core_schema.plain_serializer_function_ser_schema(lambda value: value)
-        return core_schema.no_info_wrap_validator_function(check, handler(source), serialization=unchanged)
+        return core_schema.no_info_wrap_validator_function(
+            accept_keyword, handler(source), serialization=unchanged
+        )
 
 
 class Reason(str):
@@ -49,7 +51,7 @@ class Reason(str):
 class InvalidFieldsError(DermisError):
     """Error for field values that a settings class rejects.
 
-    messages : expected and actual value of each rejected field, by field name
+    messages : text with the expected and the actual value of each rejected field, by field name
     """
 
     def __init__(self, owner: str, messages: dict[str, str]) -> None:
@@ -70,7 +72,7 @@ class _NotANumber:
 
 @cache
 def numeric_fields(model: type[BaseModel]) -> Mapping[str, bool]:
-    """Return the names of the numeric fields of a model, and whether each also accepts text."""
+    """Return a mapping from each numeric field of a model to whether the field also accepts text."""
     found = {}
     for name, info in model.model_fields.items():
         kinds = set(_leaf_types(info.annotation))
@@ -79,10 +81,10 @@ def numeric_fields(model: type[BaseModel]) -> Mapping[str, bool]:
     return found
 
 
-def python_numbers(value: Any, text: bool = False) -> Any:
+def python_numbers(value: Any, accepts_text: bool = False) -> Any:
     """Convert NumPy scalars and arrays to Python numbers, and wrap booleans and text in `_NotANumber`.
 
-    text : whether text is a valid value of the field
+    accepts_text : whether text is a valid value, which is then not wrapped
     """
     import numpy as np  # importing it takes longer than printing help
 
@@ -92,7 +94,7 @@ def python_numbers(value: Any, text: bool = False) -> Any:
         return [python_numbers(one) for one in value]
     if isinstance(value, Mapping):
         return {name: python_numbers(one) for name, one in value.items()}
-    if isinstance(value, bool | set | frozenset) or (isinstance(value, _TEXT_TYPES) and not text):
+    if isinstance(value, bool | set | frozenset) or (isinstance(value, _TEXT_TYPES) and not accepts_text):
         return _NotANumber(value)
     return value
 
@@ -118,13 +120,13 @@ def messages_by_field(errors: list[ErrorDetails], model: type[BaseModel]) -> dic
 def _format_error(error: ErrorDetails, model: type[BaseModel]) -> str:
     """Return the message "expected ..., but got ..." for one validation error of pydantic."""
     if error["type"] == "extra_forbidden":
-        return _unknown_field(str(error["loc"][-1]), model)
+        return _unknown_field_message(str(error["loc"][-1]), model)
     if error["type"] == "missing":
         return "expected a value, but there is none"
     expected = re.sub("^(Input should be|Tuple should have|Value error,) |, unable to .*", "", error["msg"])
-    expected = expected.replace("a valid tuple", f"a list{_list_length(error, model)}")
+    expected = expected.replace("a valid tuple", f"a list{_length_text(error, model)}")
     if error["type"] in _BOUND_ERRORS | _NUMBER_ERRORS:
-        expected = _number_range(error["loc"], model) or re.sub("^(greater|less)", r"a number \1", expected)
+        expected = _range_text(error["loc"], model) or re.sub("^(greater|less)", r"a number \1", expected)
     if len(error["loc"]) == 1 and (words := field_keywords(model, str(error["loc"][0]))):
         expected = f"{', '.join(words)} or {expected}"
     actual = format_value(error["input"])
@@ -134,8 +136,10 @@ def _format_error(error: ErrorDetails, model: type[BaseModel]) -> str:
     return f"expected {expected}, but got {actual}"
 
 
-def _number_range(location: tuple[int | str, ...], model: type[BaseModel]) -> str:
-    """Return the range of a number and its reason as text, such as "a number from 0 to 1"; "" without bounds.
+def _range_text(location: tuple[int | str, ...], model: type[BaseModel]) -> str:
+    """Return the range of a number as text, such as "a number from 0 to 1"; "" for a number without bounds.
+
+    The reason for the bounds is added in parentheses.
 
     location : path of the number in the model: the field name, then indices
     """
@@ -151,45 +155,45 @@ def _number_range(location: tuple[int | str, ...], model: type[BaseModel]) -> st
     return f"{kind} from {low:.10g} to {high:.10g}{reason}" if low is not None and high is not None else ""
 
 
-def _leaf_types(kind: Any) -> Iterator[Any]:
+def _leaf_types(annotation: Any) -> Iterator[Any]:
     """Yield the scalar types inside an annotation, such as float for tuple[float, ...] | None."""
-    parts = get_args(kind)
-    if get_origin(kind) is dict:
+    parts = get_args(annotation)
+    if get_origin(annotation) is dict:
         yield from _leaf_types(parts[1])
-    elif get_origin(kind) in (tuple, list, Union, UnionType):
+    elif get_origin(annotation) in (tuple, list, Union, UnionType):
         for part in parts:
             yield from _leaf_types(part)
-    elif hasattr(kind, "__metadata__"):
+    elif hasattr(annotation, "__metadata__"):
         yield from _leaf_types(parts[0])
-    elif kind is not Ellipsis:
-        yield kind
+    elif annotation is not Ellipsis:
+        yield annotation
 
 
-def _list_length(error: ErrorDetails, model: type[BaseModel]) -> str:
+def _length_text(error: ErrorDetails, model: type[BaseModel]) -> str:
     """Return " of N numbers" if the error is in a tuple field of fixed length N, otherwise ""."""
     info = model.model_fields.get(str(error["loc"][0])) if len(error["loc"]) == 1 else None
     count = len([part for part in get_args(info.annotation) if part is not Ellipsis]) if info else 0
     return f" of {count} numbers" if count > 1 else ""
 
 
-def _unknown_field(name: str, model: type[Any]) -> str:
-    """Return the message for an unknown field, with a similar name or the class that has the field."""
+def _unknown_field_message(field_name: str, model: type[Any]) -> str:
+    """Return the message for an unknown field, which suggests a similar name or a class with this field."""
     known, finding = list(model.model_fields), "but this name is unknown"
-    plain = name[:_MAX_NAME_LENGTH].lower().replace("-", "_")
+    plain = field_name[:_MAX_NAME_LENGTH].lower().replace("-", "_")
     similar = difflib.get_close_matches(plain, known, 1, 0.7)
     if plain in model.synonyms:
         similar = [model.synonyms[plain]]
     if similar:
         return f"expected {similar[0]}, {finding}"
     base = [one for one in model.__mro__ if "synonyms" in vars(one)][-1]
-    owners = [one.__name__ for one in _subclasses(base) if name in one.model_fields]
+    owners = [one.__name__ for one in _subclasses(base) if field_name in one.model_fields]
     if owners:
         finding += f" here (it is one of {owners[0]})"
     return f"expected one of {', '.join(known)}, {finding}"
 
 
-def _subclasses(kind: type[Any]) -> Iterator[type[BaseModel]]:
-    for one in kind.__subclasses__():
+def _subclasses(base_class: type[Any]) -> Iterator[type[BaseModel]]:
+    for one in base_class.__subclasses__():
         if not one.__name__.startswith("_"):
             yield one
         yield from _subclasses(one)

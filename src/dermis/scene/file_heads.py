@@ -40,7 +40,7 @@ MapFile = str | os.PathLike[str] | None
 class MapOptions:
     """Maps that users choose for the skin.
 
-    files : picture files by role, which replace the mesh file's pictures; None keeps the mesh file's picture
+    files : picture files by role, in place of pictures of the mesh file; None keeps the mesh file's picture
     height_mm, normal_y : see `load_maps`
     """
 
@@ -62,7 +62,8 @@ class MapOptions:
     def load(self, files: Mapping[str, Any]) -> Maps:
         """Load the user's files and, for all other roles, the pictures of the mesh.
 
-        files : pictures of the mesh by role, and under "height_mm" the relief of its height map
+        files : pictures of the mesh by role, and under "height_mm" the height of one grey level of the height
+            map
         """
         chosen: dict[str, Any] = {
             role: files.get(role) if file is None else file for role, file in self.files.items()
@@ -72,7 +73,10 @@ class MapOptions:
         return load_maps(**used, height_mm=self.relief_mm(files), normal_y=self.normal_y)
 
     def relief_mm(self, files: Mapping[str, Any]) -> float | None:
-        """Return the relief of one grey level of the height map [mm]."""
+        """Return the height of one grey level of the height map, from the user or from the mesh file [mm].
+
+        files : pictures and "height_mm" of the mesh, as for `load`
+        """
         mesh_relief_mm = files.get("height_mm") if self.files["height"] is None else None
         return mesh_relief_mm if self.height_mm is None else self.height_mm
 
@@ -127,7 +131,7 @@ def _load_sample(sample: Sample, mesh_options: dict[str, Any], options: MapOptio
 def _with_materials(
     rigged: RiggedMesh, materials: Sequence[FileMaterial], path: Path, options: MapOptions
 ) -> tuple[Mesh, Maps, list[str]]:
-    """Return mesh and maps of a file with materials, and notes on properties that are not drawn."""
+    """Return the mesh and the maps of a file with materials, and notes on properties that are not drawn."""
     direct = direct_material(rigged, materials)
     pack_skin = direct is None and not options.user_files
     mesh, packed, notes = with_file_textures(rigged, materials, pack_skin)

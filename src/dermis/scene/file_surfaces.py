@@ -21,7 +21,7 @@ _SURFACE_ROLES: tuple[Role, ...] = ("normal", "roughness", "metalness")
 
 
 def with_missing_uv(rigged: RiggedMesh) -> RiggedMesh:
-    """Return a mesh with a new uv layout for its skin groups without uv, and with a note on them."""
+    """Return a mesh with a new uv layout for skin groups without uv, and with a note on these groups."""
     mesh, surface = rigged.mesh, rigged.surface
     bare = np.array(
         [own.kind == "skin" and not has for own, has in zip(mesh.materials, surface.has_uv, strict=True)]
@@ -39,7 +39,7 @@ def with_missing_uv(rigged: RiggedMesh) -> RiggedMesh:
 
 
 def direct_material(rigged: RiggedMesh, materials: Sequence[FileMaterial]) -> FileMaterial | None:
-    """Return the material whose pictures serve unchanged as maps of the skin; None if they must be packed.
+    """Return the material whose pictures serve unchanged as skin maps; None if pictures must be packed.
 
     rigged, materials : mesh and materials of a file
     """
@@ -59,9 +59,11 @@ def direct_material(rigged: RiggedMesh, materials: Sequence[FileMaterial]) -> Fi
 
 
 def with_factors(maps: Maps, material: FileMaterial, user_roles: Collection[str]) -> Maps:
-    """Return the maps of a skin material, multiplied by its factors; roughness is squared.
+    """Return the maps of a skin material, multiplied by the factors of the material in the file.
 
-    user_roles : roles of maps that the user replaces, to which the factors do not apply
+    The product of roughness map and roughness factor is squared, as files store the root of the roughness m.
+
+    user_roles : roles of maps that the user replaces; factors do not apply to the maps of these roles
     """
     changed: dict[str, Any] = {}
     if (
@@ -82,7 +84,7 @@ def with_factors(maps: Maps, material: FileMaterial, user_roles: Collection[str]
 
 
 def _materials_of_kind(mesh: Mesh, kind: str) -> Mask:
-    """Return the mask (m,) of the mesh's materials of a kind."""
+    """Return a mask (m,) of the materials of a mesh that have a kind, such as "skin"."""
     return np.array([material.kind == kind for material in mesh.materials])
 
 
@@ -119,11 +121,11 @@ def with_file_textures(
     ]
     if maps.parts is not None:
         changed = _with_mean_colours(mesh, changed, maps.parts)
-    return _keep_outline(mesh, replace(mesh, materials=tuple(changed))), maps, tuple(notes)
+    return _with_cached_outline(mesh, replace(mesh, materials=tuple(changed))), maps, tuple(notes)
 
 
 def _with_mean_colours(mesh: Mesh, materials: list[Material], maps: PartMaps) -> list[Material]:
-    """Return materials whose colour is the mean of their maps, for programs that do not read the maps."""
+    """Return materials with the mean colour of the maps, for programs that do not read the maps."""
     size = np.array(maps.colour.shape[1::-1])
     coloured = []
     for index, material in enumerate(materials):
@@ -152,13 +154,16 @@ def _pictured_parts(mesh: Mesh, surface: FileSurface, materials: Sequence[FileMa
 def _with_uv(mesh: Mesh, packed: PackedTextures) -> Mesh:
     uv = mesh.uv.copy()
     uv[packed.vertices] = packed.uv
-    return _keep_outline(mesh, replace(mesh, uv=uv))
+    return _with_cached_outline(mesh, replace(mesh, uv=uv))
 
 
-def _keep_outline(mesh: Mesh, changed: Mesh) -> Mesh:
-    """Return a changed mesh of the same shape with the cached outline of the original."""
-    vars(changed)["outline"] = mesh.outline
-    return changed
+def _with_cached_outline(mesh: Mesh, changed_mesh: Mesh) -> Mesh:
+    """Give a changed mesh the outline that is cached for the original mesh, and return the changed mesh.
+
+    changed_mesh : mesh with the shape of `mesh`
+    """
+    vars(changed_mesh)["outline"] = mesh.outline
+    return changed_mesh
 
 
 def _skin_maps(packed: PackedTextures) -> Maps:
@@ -174,15 +179,18 @@ def _skin_maps(packed: PackedTextures) -> Maps:
 def _part_maps(packed: PackedTextures) -> PartMaps:
     maps = packed.maps
     surface = np.concatenate([maps[role] for role in _SURFACE_ROLES], axis=2)
-    return PartMaps(maps["colour"], surface, _emission(maps.get("emission")))
+    return PartMaps(maps["colour"], surface, _emission_if_any(maps.get("emission")))
 
 
-def _emission(values: Floats | None) -> Floats | None:
-    return values if values is not None and values.any() else None
+def _emission_if_any(texels: Floats | None) -> Floats | None:
+    return texels if texels is not None and texels.any() else None
 
 
 def _with_surface(material: Material, in_file: FileMaterial | None, has_maps: bool) -> Material:
-    """Return an opaque material with the surface properties of its file."""
+    """Return a material with the surface properties that the file states; skin materials are not changed.
+
+    in_file : material in the file; None if the file has no material
+    """
     if material.kind == "skin":
         return material
     if in_file is None:
@@ -204,9 +212,9 @@ def unused_properties(
     user_roles: Collection[str],
     is_packed: bool,
 ) -> str:
-    """Return a note on properties of a file's materials that are not drawn; empty if there are none.
+    """Return a note on properties of a file's materials that are not drawn; empty if all are drawn.
 
-    in_file : (m,) index of the file's material for each material of the mesh, -1 for none
+    in_file : (m,) for each material of the mesh, index of the material in the file, or -1 if there is none
     user_roles : roles of skin maps that the user replaces
     is_packed : whether the pictures of several skin materials are packed
     """

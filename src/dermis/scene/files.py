@@ -103,7 +103,7 @@ def load_scene(
         Name of the camera for which the subdivision levels of the head are chosen, instead of the file's
         camera.
     size : (int, int), optional
-        Picture size for which these levels are chosen, instead of the file's size [pixel].
+        Picture size for which the subdivision levels are chosen, instead of the file's size [pixel].
 
     Returns
     -------
@@ -170,7 +170,7 @@ def head_table(path: Path) -> dict[str, Any]:
 def with_absolute_paths(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """Return a [head] table with absolute names of its files.
 
-    folder : folder that relative file names refer to
+    folder : folder to which file names are relative
     """
     named = {role: folder / table[role] for role in ("name", "regions", *_MAP_ROLES) if role in table}
     return {**table} | {role: str(file.resolve()) for role, file in named.items() if is_file(file)}
@@ -179,10 +179,13 @@ def with_absolute_paths(table: Mapping[str, Any], folder: Path) -> dict[str, Any
 def head_and_skin(
     table: HeadTable, skin: Skin, folder: Path, picture: SmoothIn | None = None
 ) -> tuple[Head, Skin]:
-    """Return the head of a [head] table, and the skin, whose rho_s is set if the table has face regions.
+    """Return the head of a [head] table, and the skin settings of the head.
 
-    folder : folder that relative file names refer to
-    picture : camera and size that determine the subdivision levels if the table leaves them out
+    If the [head] table names a table of face regions, the returned skin has the mean rho_s of the regions.
+
+    skin : skin settings of the scene file
+    folder : folder to which file names are relative
+    picture : camera and size for which subdivision levels are chosen if the table does not state them
 
     Raises DermisError for files that cannot be used.
     """
@@ -214,7 +217,7 @@ def _parse_skin(path: Path, entry: Any) -> Skin:
 
 
 def _resolve_skin_files(folder: Path, skin: Skin) -> Skin:
-    """Return the skin with the names of its profile files resolved relative to a folder."""
+    """Return a skin in which names of profile files are resolved relative to a folder."""
     others = tuple(_resolve_file(folder, name) for name in skin.other_profiles)
     mixture_map = skin.profile_map and _resolve_file(folder, skin.profile_map)
     names = {
@@ -252,13 +255,13 @@ def _parse_environment(path: Path, table: Any) -> Environment:
     return environment.model_copy(update={"name": _resolve_file(path.parent, environment.name)})
 
 
-def _resolve_file(folder: Path, name: str) -> str:
+def _resolve_file(folder: Path, file_or_preset: str) -> str:
     """Return the path of a file in a folder, or the name itself if there is no such file.
 
-    Names of presets and samples are thus unchanged.
+    Names of presets and samples are returned unchanged.
     """
-    file = folder / name
-    return str(file) if is_file(file) else name
+    file = folder / file_or_preset
+    return str(file) if is_file(file) else file_or_preset
 
 
 def _parse_lights(culprit: object, tables: Any) -> tuple[Light, ...]:
@@ -275,19 +278,25 @@ def _parse_light(culprit: object, label: str, table: Any) -> Light:
     return _build_settings(LIGHTS[kind], culprit, label, table)
 
 
-def _build_settings(kind: type[P], culprit: object, part: str, table: Any) -> P:
-    """Return settings of a class from a TOML table; errors name the file and the table.
+def _build_settings(settings_class: type[P], file_name: object, table_name: str, table: Any) -> P:
+    """Return an instance of a settings class from a TOML table; errors name the file and the table.
 
-    culprit, part : file and table, for error messages
+    file_name : name of the file, for error messages
+    table_name : name of the table, for error messages
     """
     if not isinstance(table, dict):
         actual = "there is none" if table is None else f"got {table!r}"
-        refuse(f"{culprit}: {part}", f"a table with {', '.join(kind.model_fields)}", actual, "Add one")
-    with error_context(f"{culprit}: {part}"):
+        refuse(
+            f"{file_name}: {table_name}",
+            f"a table with {', '.join(settings_class.model_fields)}",
+            actual,
+            "Add one",
+        )
+    with error_context(f"{file_name}: {table_name}"):
         try:
-            return kind(**table)
+            return settings_class(**table)
         except InvalidFieldsError as error:
-            raise InvalidFieldsError(f"{culprit}: {part}", error.messages) from None
+            raise InvalidFieldsError(f"{file_name}: {table_name}", error.messages) from None
 
 
 def _read_scene_file(name: str | Path, expected: str) -> dict[str, Any]:

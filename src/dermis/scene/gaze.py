@@ -24,18 +24,18 @@ MAX_GAZE_WEIGHT = 1.3
 """Largest weight of a gaze target, a morph target that turns an eye."""
 _MAX_BONE_DEGREES = 36.0
 _ROTATION_ITERATIONS = 6
-_SIDES = "Left", "Right"
+_EYE_SIDES = "Left", "Right"
 _EYES_ADVICE = "Take the parametric human, or name the groups of the file's eyeballs with --eye-groups"
 
 
 def looking_at(head: Head, target_mm: ArrayLike, pose: Pose | Mapping[str, float] | None = None) -> Pose:
     """Return a pose in which both eyes look at a point and the lids follow.
 
-    The eyes are turned by gaze targets (morph targets such as ARKit's eyeLook...) if the head has them,
-    otherwise by their bones.
+    Gaze targets (morph targets such as ARKit's eyeLook...) turn the eyes if the head has gaze targets,
+    otherwise the bones of the eyes do.
 
     target_mm : (3,) point to look at, relative to the head's centre [mm]
-    pose : pose of the rest of the head, whose gaze is replaced
+    pose : pose of the head in which the gaze is replaced; None for the rest pose
 
     Raises DermisError for heads without anatomical eyes and for invalid points.
     """
@@ -60,15 +60,15 @@ def looking_at(head: Head, target_mm: ArrayLike, pose: Pose | Mapping[str, float
         rotations = [rotation for rotation in rig.bone_rotations if rotation.bone == bone]
         if not rotations:
             bones[bone] = [*np.clip(np.degrees(angles), -_MAX_BONE_DEGREES, _MAX_BONE_DEGREES).tolist(), 0.0]
-            rotations = _eyelid_rotations(rig, _SIDES[k])
+            rotations = _eyelid_rotations(rig, _EYE_SIDES[k])
         weights |= _gaze_weights(rotations, angles)
     return Pose(weights, bones, base.positions_mm)
 
 
 def _eyelid_rotations(rig: Rig, side: str) -> list[BoneRotation]:
-    """Return the targets by which the lids of an eye follow its gaze, for a head whose bones turn the eye.
+    """Return the morph targets with which the lids of an eye follow the gaze, if a bone turns the eye.
 
-    Each is paired with the rotation by which the same target turns the eye of the parametric human.
+    Each morph target comes with the rotation by which it turns the eye of the parametric human.
 
     side : "Left" or "Right"
     """

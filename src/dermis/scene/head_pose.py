@@ -16,8 +16,8 @@ _HEAD_BONE = "head"
 def head_pose(scene: Scene) -> Doubles:
     """Return the transform (R | t), (3, 4), from the head in rest pose to the camera: X_cam = R X + t [mm].
 
-    X is a point of the rigid head relative to its centre in rest pose: x to the head's left, y up, z to the
-    front. The rigid motion is that of the bone "head"; without such a bone the head does not move.
+    X is a point of the rigid head, relative to the centre of the head in rest pose: x to the head's left, y
+    up, z to the front. The head moves with the bone "head"; without such a bone, the head does not move.
     """
     rotation, shift = _camera_extrinsics(scene)
     head_rotation, head_shift = _rigid_motion(scene)

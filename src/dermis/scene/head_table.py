@@ -37,13 +37,13 @@ else:
 _UNIT_LENGTHS_MM = {"mm": 1.0, "cm": 10.0, "dm": 100.0, "m": 1000.0, "inch": 25.4, "in": 25.4, "ft": 304.8}
 
 
-def _eye_limits(name: str) -> Any:
-    low, high = EYE_LOOK_RANGES[name]
+def _eye_limits(field_name: str) -> Any:
+    low, high = EYE_LOOK_RANGES[field_name]
     return Field(ge=low, le=high)
 
 
 class EyeTable(FrozenModel):
-    """Eye settings in a [head] table; fields that are None leave the appearance that the head defines."""
+    """Eye settings in a [head] table; a field that is None keeps the value of the head's eye look."""
 
     eumelanin: Annotated[float | None, _eye_limits("eumelanin")] = None
     """Eumelanin of the iris, from 0 for blue to 1 for the darkest brown."""
@@ -158,7 +158,11 @@ def check_options(**options: Any) -> None:
 
 
 def check_relief(height_mm: float | None, height: object, culprit: str = "height_mm") -> None:
-    """Raise DermisError if height_mm is given without a height map, to which it applies."""
+    """Raise DermisError if height_mm is given without a height map.
+
+    height : file of the height map
+    culprit : name of the option height_mm, for the error message
+    """
     if height_mm is not None and height is None:
         actual = f"got {height_mm} without a height map"
         refuse(culprit, "a height map with it", actual, "Give the map too, or leave height_mm out")

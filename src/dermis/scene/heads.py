@@ -173,7 +173,7 @@ def is_person_name(name: str) -> bool:
 def _with_look(head: Head, look: Mapping[str, float] | None) -> Head:
     """Return the head with some fields of its eye look replaced.
 
-    look : fields of `EyeLook` by name
+    look : new values of fields of `EyeLook`, by field name; None to change nothing
 
     Raises DermisError for a head without anatomical eyes, and for unknown or invalid fields.
     """
@@ -228,7 +228,9 @@ def _load_human(
 
 
 def load_person(name: str) -> Human:
-    """Return the person for a head name: the default person, one drawn by seed, or the one in a .json file.
+    """Return the person that a head name denotes.
+
+    name : "human" for the average person, "human:SEED" for a random person, or a person's .json file
 
     Raises DermisError for an invalid seed or file.
     """

@@ -1,4 +1,4 @@
-"""Light stage: lights in all directions, and weights with which they reproduce an environment."""
+"""Light stage: lights in all directions, and weights with which the lights reproduce an environment."""
 
 from __future__ import annotations
 
@@ -27,10 +27,11 @@ def light_stage(count: int) -> list[DirectionalLight]:
 
 
 def light_stage_weights(lights: Sequence[DirectionalLight], environment: Environment) -> NDArray[np.float64]:
-    """Return weights (n, 3) of the lights of a light stage that reproduce an environment, linear Rec. 709.
+    """Return weights (n, 3) with which the lights of a light stage reproduce an environment, linear Rec. 709.
 
-    The weight of a light is the irradiance from all directions to which no other light is nearer. The sum of
-    the pictures under each light, times these weights, is the picture under the environment.
+    The weight of a light is the irradiance from all directions to which this light is the nearest. The
+    picture under the environment is the sum of the pictures under the single lights, multiplied by the
+    weights.
 
     Raises DermisError when the panorama cannot be read.
     """

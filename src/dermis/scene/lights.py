@@ -249,9 +249,9 @@ reference; exports write a registered light as the class that it derives from.""
 
 # Reach of a typical head, and largest reach for which the lights of presets are not moved away.
 _HEAD_REACH_MM, _MAX_HEAD_REACH_MM = 400.0, 1000.0
-_NARROW_DEGREES = 10.0
-_SIZES = "width_mm", "height_mm", "radius_mm"
-_VECTORS = "position", "target", "direction", "up"
+_NARROW_SPOT_DEGREES = 10.0
+_SIZE_FIELDS = "width_mm", "height_mm", "radius_mm"
+_VECTOR_FIELDS = "position", "target", "direction", "up"
 NO_LIGHTS = "none"
 """Name of the preset without lights, for an environment alone."""
 
@@ -265,25 +265,27 @@ def light_presets() -> list[str]:
 def preset_lights(name: str, head: Head | None = None) -> tuple[Light, ...]:
     """Return the lights of a light preset, placed for a head.
 
-    head : subject of the lights; None for a head of ordinary size that faces +Z
+    head : head that is lit; None for a head of ordinary size that faces +Z
 
-    For a body larger than a metre, the lights are farther away and larger in proportion; for a flat piece of
-    skin, they are on the side that it faces. Narrow spots keep their distance, as they are aimed at a part of
-    the head.
+    For a body larger than a metre, the lights are farther away and larger in proportion. For a flat piece of
+    skin, the lights are on the side to which the skin faces. Narrow spots keep their distance, as they are
+    aimed at a part of the head.
     """
     if name == NO_LIGHTS:
         return ()
     lights = tuple(LIGHTS[table["kind"]](**table) for table in tomllib.loads(preset_toml(name))["lights"])
-    return lights if head is None else tuple(_placed(light, head) for light in lights)
+    return lights if head is None else tuple(_place_light(light, head) for light in lights)
 
 
-def _placed(light: Light, head: Head) -> Light:
+def _place_light(light: Light, head: Head) -> Light:
     reach = head.reach_mm
-    factor = reach / _HEAD_REACH_MM if reach > _MAX_HEAD_REACH_MM and not _is_narrow(light) else 1.0
+    factor = reach / _HEAD_REACH_MM if reach > _MAX_HEAD_REACH_MM and not _keeps_distance(light) else 1.0
     if factor == 1.0 and np.array_equal(head.axes, np.eye(3)):
         return light
-    values: dict[str, Any] = {name: factor * getattr(light, name) for name in _SIZES if hasattr(light, name)}
-    for name in _VECTORS:
+    values: dict[str, Any] = {
+        name: factor * getattr(light, name) for name in _SIZE_FIELDS if hasattr(light, name)
+    }
+    for name in _VECTOR_FIELDS:
         if hasattr(light, name):
             values[name] = tuple((np.array(getattr(light, name)) @ head.axes).tolist())
     if isinstance(light, PointLight):
@@ -292,10 +294,10 @@ def _placed(light: Light, head: Head) -> Light:
     return light.replace(**values)
 
 
-def _is_narrow(light: Light) -> bool:
-    """Return whether a light is aimed at a part of a head."""
+def _keeps_distance(light: Light) -> bool:
+    """Return whether a light is not moved away from large bodies: a directional light or a narrow spot."""
     return not isinstance(light, PointLight) or (
-        isinstance(light, SpotLight) and light.outer_degrees < _NARROW_DEGREES
+        isinstance(light, SpotLight) and light.outer_degrees < _NARROW_SPOT_DEGREES
     )
 
 

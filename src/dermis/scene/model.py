@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, init=False)
 class Scene:
-    """A head, its skin, the lights and the environment around it, and the camera.
+    """A head with skin and pose, lights, environment and camera.
 
     Scenes are immutable; `scene.replace(skin=...)` returns a changed copy.
 

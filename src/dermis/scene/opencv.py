@@ -14,7 +14,7 @@ Doubles = NDArray[np.float64]
 _PIXEL_CENTRE = 0.5  # OpenCV's origin is the centre of the first pixel, not the corner of the picture [pixel]
 _TOLERANCE = 1e-4  # tolerance for rotations and skews that were rounded in files
 _MIN_DISTANCE_MM = 1.0
-_MAX_VALUE = 1e9
+_MAX_MATRIX_VALUE = 1e9
 _MAX_PIXELS = 1e6  # largest number of pixels along a side
 
 
@@ -109,9 +109,9 @@ def _checked_matrix(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Dou
         refuse(name, f"numbers of shape {shape}", f"got {format_value(values, 40)}", "Correct it")
     if shape == (3,) and found.shape in ((3, 1), (1, 3)):  # as OpenCV returns them
         found = found.reshape(3)
-    if found.shape != shape or not (np.abs(found) <= _MAX_VALUE).all():
+    if found.shape != shape or not (np.abs(found) <= _MAX_MATRIX_VALUE).all():
         actual = f"got shape {found.shape}" if found.shape != shape else "got larger numbers"
-        refuse(name, f"numbers of shape {shape} up to {_MAX_VALUE:g}", actual, "Correct it")
+        refuse(name, f"numbers of shape {shape} up to {_MAX_MATRIX_VALUE:g}", actual, "Correct it")
     return found
 
 

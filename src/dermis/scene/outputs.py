@@ -37,8 +37,8 @@ class Output:
     name : str
         Name of the output, as in `--outputs`.
     stage : str
-        Name of the shader features/outputs/STAGE.wgsl that writes the output. It calls `fn NAME_output`,
-        which returns a scalar or a vector.
+        Name of the shader features/outputs/STAGE.wgsl that writes the output. The shader calls `fn
+        NAME_output`, which returns a scalar or a vector.
     channel_names : str
         One letter for each channel, used in EXR files; empty for an output with one channel for each light.
     kind : str
@@ -83,10 +83,14 @@ class Output:
 
 
 _FLOAT: Kind = "float32"
-_SIGNED = 1 << 15  # level of the value 0 of signed outputs
-_LENGTH, _SIGNED_LENGTH, _THICKNESS = Quantisation(0.1), Quantisation(0.1, _SIGNED), Quantisation(0.001)
-_FRACTION, _UNIT = Quantisation(1 / 65535), Quantisation(1 / 32767, _SIGNED)
-_MOTION, _RADIANCE = Quantisation(1 / 64, _SIGNED), Quantisation(1 / 4096)
+_SIGNED_ZERO_LEVEL = 1 << 15  # level of the value 0 of signed outputs
+_LENGTH, _SIGNED_LENGTH, _THICKNESS = (
+    Quantisation(0.1),
+    Quantisation(0.1, _SIGNED_ZERO_LEVEL),
+    Quantisation(0.001),
+)
+_FRACTION, _UNIT = Quantisation(1 / 65535), Quantisation(1 / 32767, _SIGNED_ZERO_LEVEL)
+_MOTION, _RADIANCE = Quantisation(1 / 64, _SIGNED_ZERO_LEVEL), Quantisation(1 / 4096)
 _OUTPUTS = (
     Output("depth", "geometry", "Z", _FLOAT, "mm", "distance along the optical axis", 0.0, _LENGTH),
     Output("position", "geometry", "XYZ", _FLOAT, "mm", "position in world space", 0.0, _SIGNED_LENGTH),

@@ -10,10 +10,10 @@ from dermis.scene.skin import Pigments, Skin
 def skin_of(person: Human, base: Skin | None = None) -> Skin:
     """Return skin settings whose subsurface scattering matches the pigments of a person.
 
-    Darker skin scatters light less far. The colour of the skin does not change: it is that of the person's
-    painted maps.
+    In darker skin, light scatters less far. The settings do not change the colour of the skin, as the painted
+    maps of the person determine this colour.
 
-    base : settings to start from; the default skin if None
+    base : skin settings whose other fields are kept; None for the default skin
     """
     look = person.look
     pigments = Pigments(

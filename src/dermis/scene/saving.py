@@ -19,7 +19,7 @@ from dermis.scene.settings import Settings
 from dermis.scene.toml_text import table_text
 
 _HEADER = "# A scene of dermis: lengths in mm from the head's centre, colours linear Rec. 709."
-_SET_BY_REGIONS = {"rho_s"}  # fields of skins that a table of face regions sets
+_FIELDS_SET_BY_REGIONS = {"rho_s"}  # fields of skins that a table of face regions sets
 # fields of skins and environments that are file names, unless they name presets
 _PATH_FIELDS = {"profile", "profile_map", "other_profiles", "name"}
 
@@ -42,7 +42,7 @@ def scene_text(scene: Scene, settings: Settings, head: Mapping[str, Any]) -> str
 
     Raises DermisError for a pose with positions of points, which do not fit into a scene file.
     """
-    excluded = _SET_BY_REGIONS if has_region_table(head) else set()
+    excluded = _FIELDS_SET_BY_REGIONS if has_region_table(head) else set()
     parts = [] if scene.lights else ['lights = "none"\n']
     parts += [table_text("[head]", head), *_pose_tables(scene.pose)]
     parts.append(_model_table("[skin]", scene.skin, excluded | {"pigments", "layers"}))
@@ -78,7 +78,7 @@ def _model_table(title: str, values: FrozenModel, exclude: set[str] | None = Non
 
 
 def _absolute_path(name: Any) -> Any:
-    """Return a file name, or each of a tuple of names, as an absolute path; keep names of presets."""
+    """Return a file name, or a tuple of file names, as absolute paths; names of presets are kept."""
     if isinstance(name, tuple):
         return tuple(map(_absolute_path, name))
     return str(Path(name).resolve()) if is_file(name) else name

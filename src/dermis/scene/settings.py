@@ -18,14 +18,14 @@ from dermis.scene.techniques import TECHNIQUES
 _Side = Annotated[int, Field(ge=1, le=16384), Reason("pixels: what the largest GPUs hold")]
 _MAX_SAMPLES = 64
 MAX_SAMPLE_COUNT = 2**27
-_HEX = re.compile(r"#[0-9a-fA-F]{6}")
+_HEX_COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
 
 
 def _parse_colour(value: Any) -> Any:
     """Convert "#rrggbb" or "red,green,blue" to linear Rec. 709; return other values unchanged."""
     if not isinstance(value, str):
         return value
-    if not _HEX.fullmatch(value):
+    if not _HEX_COLOUR.fullmatch(value):
         try:
             red, green, blue = map(float, value.split(","))
         except ValueError:

@@ -60,7 +60,7 @@ class Pigments(FrozenModel):
     """Absorption of tissue without blood and melanin, relative to that of [Jacques1998]."""
 
     def overrides(self) -> dict[str, float]:
-        """Return the overriding pigment fractions and thicknesses by name, without fields that are None."""
+        """Return the values that override pigments of the profile, by field name: all fields except None."""
         return self.model_dump(exclude={"structure"}, exclude_none=True)
 
 
@@ -173,7 +173,7 @@ class Skin(FrozenModel):
 
     @property
     def overrides_tissue(self) -> bool:
-        """Return whether `pigments` or `layers` override those of the skin profile."""
+        """Return whether `pigments` or `layers` override the tissue of the skin profile."""
         return self.pigments is not None or bool(self.layers)
 
     @property

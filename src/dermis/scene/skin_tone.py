@@ -29,10 +29,10 @@ def default_skin_colour() -> Doubles:
 
 
 def with_skin_tone(mesh: Mesh, maps: Maps) -> tuple[Maps, str]:
-    """Return maps with a colour, from the skin's materials if there is no colour map, and a note or "".
+    """Return maps in which a uniform colour replaces a missing colour map, and a note for the user or "".
 
-    White and the default grey of Blender's materials are not skin colours; groups with these colours get the
-    colour of the default skin. The colour of several groups is averaged.
+    The colour is the mean colour of the skin's materials. A material with no colour, white, or the default
+    grey of Blender counts with the colour of the default skin. Maps with a colour map are returned unchanged.
     """
     if maps.colour is not None and maps.colour.shape[:2] != (1, 1):
         return maps, ""

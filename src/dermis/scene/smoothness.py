@@ -26,7 +26,9 @@ MAX_SMOOTH_TRIANGLES = 300_000
 """Largest number of triangles that `SmoothIn` subdivides to."""
 MAX_DEVIATION_PX = 0.6
 """Largest deviation of a silhouette from its smooth curve that the pixel filter hides."""
-_SMOOTH_FRACTION = 0.9  # fraction of the silhouette that must be smooth; the rest is mostly hidden or creases
+_TYPICAL_QUANTILE = (
+    0.9  # fraction of the silhouette that must be smooth; the rest is mostly hidden or creases
+)
 _NEAR_PLANE_MM = 1.0
 
 
@@ -34,8 +36,8 @@ _NEAR_PLANE_MM = 1.0
 class SmoothIn:
     """Choice of the subdivision levels with which the outline of a head looks smooth in a picture.
 
-    It is a function of the head that `load_head` accepts as `subdivide`. The result depends only on the
-    camera, the size and the head in rest pose.
+    An instance is a function of the head, which `load_head` accepts as `subdivide`. The result depends only
+    on the camera, the size and the head in rest pose.
 
     camera : function that returns a camera for the head before subdivision
     size : width and height of the picture [pixel]
@@ -55,7 +57,9 @@ class SmoothIn:
 
 
 def resolve_levels(subdivide: Subdivide) -> SubdivisionLevels:
-    """Return subdivision levels, or the function that computes them, which is `SmoothIn()` for "auto".
+    """Return subdivision levels, or a function of the head that returns the levels.
+
+    subdivide : levels or function, which are returned unchanged, or "auto" for `SmoothIn()`
 
     Raises DermisError for other text.
     """
@@ -83,17 +87,17 @@ class Silhouette(NamedTuple):
             return 0.0
         order = np.argsort(self.deviation_px)
         cumulative_length = np.cumsum(self.length_px[order])
-        index = np.searchsorted(cumulative_length, _SMOOTH_FRACTION * cumulative_length[-1])
+        index = np.searchsorted(cumulative_length, _TYPICAL_QUANTILE * cumulative_length[-1])
         return float(self.deviation_px[order][index])
 
 
 def silhouette(mesh: Mesh, K: Doubles, R: Doubles, t: Doubles, size: tuple[int, int]) -> Silhouette:
-    """Return the visible silhouette edges of a mesh, without eyeballs and without regard to occlusion.
+    """Return the silhouette edges of a mesh that lie in the picture, including occluded edges.
 
-    The smooth curve between two points with unit normals n0 and n1 deviates from its chord d by |(n1 - n0) .
-    d| / 8.
+    Edges of eyeballs are omitted. A smooth curve through two points with unit normals n0 and n1 deviates from
+    the chord d by |(n1 - n0) . d| / 8.
 
-    K, R, t : OpenCV matrices of the camera, for positions of the mesh [mm]
+    K, R, t : matrices of the camera in OpenCV's convention, for positions of the mesh [mm]
     size : width and height of the picture [pixel]
     """
     camera_points = mesh.points_mm @ R.T + t
@@ -116,15 +120,14 @@ def silhouette(mesh: Mesh, K: Doubles, R: Doubles, t: Doubles, size: tuple[int, 
     return Silhouette(np.linalg.norm(pixels[a] - pixels[b], axis=1), np.abs(bend_mm) * scale)
 
 
-def smooth_levels(typical_deviation_px: float, triangles: int) -> int:
+def smooth_levels(typical_deviation_px: float, triangle_count: int) -> int:
     """Return the smallest number of subdivision levels with which a silhouette looks smooth.
 
-    typical_deviation_px : deviation of the silhouette before subdivision, which each level divides by 4
-        [pixel]
-    triangles : number of triangles before subdivision, which each level multiplies by 4
+    typical_deviation_px : deviation of the silhouette before subdivision; each level divides it by 4 [pixel]
+    triangle_count : number of triangles before subdivision; each level multiplies it by 4
     """
     needed = math.ceil(math.log(max(typical_deviation_px / MAX_DEVIATION_PX, 1.0), 4))
-    affordable = math.floor(math.log(max(MAX_SMOOTH_TRIANGLES / triangles, 1.0), 4))
+    affordable = math.floor(math.log(max(MAX_SMOOTH_TRIANGLES / triangle_count, 1.0), 4))
     return min(needed, affordable, MAX_LEVELS)
 
 

@@ -1,7 +1,7 @@
 """Settings that reproduce faults and historical methods of the 2007 talk, for comparison.
 
-They are fields of `Skin` and `Settings` because the gallery draws them; help texts and the viewer list them
-last, under a heading of their own.
+The settings are fields of `Skin` and `Settings` because the gallery draws pictures with them. Help texts and
+the viewer list these fields last, under a separate heading.
 
 Source: [dEonLuebke2007].
 """

@@ -12,7 +12,7 @@ from dermis.scene.skin import Pigments, Skin, TissueLayer
 
 
 def skin_tissue(skin: Skin) -> Tissue:
-    """Return the tissue of a skin: its profile's tissue, with the skin's pigments or layers as overrides.
+    """Return the tissue of a skin: the profile's tissue, overridden by pigments or layers of the skin.
 
     Raises DermisError for a profile that is not a tissue, and for pigments or layers that the tissue does not
     have.
@@ -24,7 +24,7 @@ def skin_tissue(skin: Skin) -> Tissue:
 
 
 def tissue_layers(skin: Skin) -> tuple[TissueLayer, ...]:
-    """Return the layers of a skin's tissue; empty if spectra, and not RGB coefficients, describe the tissue.
+    """Return the layers of a skin's tissue; empty for a tissue described by spectra, not RGB coefficients.
 
     Raises DermisError for a profile that is not a tissue.
     """

@@ -14,7 +14,7 @@ _TABLE_EXPONENT = 0.1
 def beckmann(cos_h: ArrayLike, m: ArrayLike) -> NDArray[np.float64]:
     """Return the Beckmann distribution exp(-tan^2 / m^2) / (m^2 cos^4) without its factor 1/pi [-].
 
-    cos_h : cosine between normal and half vector; the tangent is that of the same angle
+    cos_h : cosine between normal and half vector; the tangent in the formula is of the same angle
     m : roughness, the root mean square slope [-]
 
     Source: [Beckmann1963], in the form of [dEonLuebke2007] section 14.3.

@@ -11,7 +11,9 @@ from dermis.specular.models import Model
 
 
 def blinn_phong_exponent(m: ArrayLike) -> Floats:
-    """Return the Blinn-Phong exponent s = 2 / m^2 - 2 of the lobe as wide as Beckmann's of roughness m [-].
+    """Return the exponent s = 2 / m^2 - 2 of the Blinn-Phong lobe that is as wide as a Beckmann lobe [-].
+
+    m : roughness of the Beckmann lobe [-]
 
     Source: [Walter2007] section 5.2.
     """
@@ -39,8 +41,8 @@ def blinn_phong_plain(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick)
 
     m : roughness, from which `blinn_phong_exponent` yields s; broadcast against the angles [-]
 
-    The original highlight has no factor n.l, so the BRDF is not reciprocal. Early renderers added it to a
-    diffuse term without 1/pi; here both terms are divided by pi.
+    The original highlight has no factor n.l, so the BRDF is not reciprocal. Early renderers added the
+    highlight to a diffuse term without 1/pi; here both terms are divided by pi.
 
     Source: [Blinn1977].
     """
@@ -52,8 +54,8 @@ def blinn_phong_plain(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick)
     return np.asarray(np.where(angles.is_above, lobe, 0.0))
 
 
-def _power_of_n_h(angles: Cosines, s: Floats) -> Floats:
-    return np.asarray(np.clip(angles.n_h, 0.0, 1.0) ** s)
+def _power_of_n_h(angles: Cosines, exponent: Floats) -> Floats:
+    return np.asarray(np.clip(angles.n_h, 0.0, 1.0) ** exponent)
 
 
 BLINN_PHONG = Model(

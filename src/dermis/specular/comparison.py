@@ -24,7 +24,7 @@ def normal_incidence_peak(model: str, m: float) -> float:
 
 
 def reciprocity_error(model: str) -> float:
-    """Return the largest change of a BRDF when light and view are exchanged, relative to its maximum [-].
+    """Return a BRDF's largest change when light and view are exchanged, relative to the BRDF's maximum [-].
 
     Light and view are random directions up to 85 degrees from the normal. All compared roughnesses are tried.
     """

@@ -38,7 +38,7 @@ def dielectric(cos_theta: ArrayLike, eta: float = SKIN_ETA) -> Floats:
     cos_theta : cosine between view and half vector
     eta : index of refraction of the dielectric, 1 or more [-]
 
-    Source: [CookTorrance1982], in their form for unpolarised light.
+    Source: [CookTorrance1982], in the form for unpolarised light.
     """
     c = np.clip(np.asarray(cos_theta, dtype=np.float64), 0.0, 1.0)
     g = np.sqrt(eta**2 - 1.0 + c**2)
@@ -71,8 +71,8 @@ class EnergyScheme:
     times the mean albedo if `returns_internal_light` is true, otherwise 1.
 
     loss : factor of the reflected light: 0 for no conservation, 1 for the light of the lobe, pi as published
-    returns_internal_light : whether light that the surface reflects back into the skin leaves it later;
-        otherwise it is lost
+    returns_internal_light : whether light that the surface reflects back into the skin leaves the skin later;
+        if False, this light is lost
     """
 
     loss: float
@@ -86,28 +86,28 @@ class EnergyScheme:
         """
         return np.maximum(0.0, 1.0 - self.loss * rho_s * np.asarray(albedo, float))
 
-    def exitance_factor(self, albedo: ArrayLike, mean: ArrayLike, rho_s: float) -> Floats:
+    def exitance_factor(self, albedo: ArrayLike, mean_albedo: ArrayLike, rho_s: float) -> Floats:
         """Return the factor by which the surface scales diffuse radiance towards a viewer [-].
 
         albedo : directional albedo of the lobe for the direction to the viewer [-]
-        mean : mean albedo of the lobe, cosine-weighted over the hemisphere [-]
+        mean_albedo : mean albedo of the lobe, cosine-weighted over the hemisphere [-]
         rho_s : specular strength [-]
         """
-        lost = self.loss * rho_s * np.asarray(mean, float) if self.returns_internal_light else 0.0
+        lost = self.loss * rho_s * np.asarray(mean_albedo, float) if self.returns_internal_light else 0.0
         return np.asarray(self.entering_fraction(albedo, rho_s) / np.maximum(1.0 - lost, 0.5))
 
-    def furnace_radiance(self, albedo: ArrayLike, mean: ArrayLike, rho_s: float) -> Floats:
+    def furnace_radiance(self, albedo: ArrayLike, mean_albedo: ArrayLike, rho_s: float) -> Floats:
         """Return the radiance of white skin under uniform incident radiance of 1 [-].
 
         The result is 1 if the scheme conserves energy (white furnace test).
 
         albedo : directional albedo of the lobe for the direction to the viewer [-]
-        mean : mean albedo of the lobe [-]
+        mean_albedo : mean albedo of the lobe [-]
         rho_s : specular strength [-]
         """
-        inside = 1.0 - self.loss * rho_s * np.asarray(mean, float)
+        inside = 1.0 - self.loss * rho_s * np.asarray(mean_albedo, float)
         return np.asarray(
-            rho_s * np.asarray(albedo, float) + inside * self.exitance_factor(albedo, mean, rho_s)
+            rho_s * np.asarray(albedo, float) + inside * self.exitance_factor(albedo, mean_albedo, rho_s)
         )
 
 

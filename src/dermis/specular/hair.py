@@ -36,7 +36,7 @@ class FibreParameters(NamedTuple):
 def fibre_parameters(
     along: float = LONGITUDINAL_ROUGHNESS, around: float = AZIMUTHAL_ROUGHNESS
 ) -> FibreParameters:
-    """Return the lobe widths of a fibre from its perceptual roughness along and around its axis.
+    """Return the lobe widths of a fibre from the perceptual roughness along and around the fibre's axis.
 
     along, around : longitudinal and azimuthal roughness, 0 to 1 [-]
 
@@ -112,11 +112,12 @@ def fresnel(cosine: ArrayLike) -> Floats:
 def lobe_fractions(sin_o: ArrayLike, depth: ArrayLike, h: ArrayLike) -> list[Floats]:
     """Return the fractions (..., 3) of light in the lobes R, TT and TRT, and in all further lobes together.
 
-    R is reflected, TT transmitted, and TRT reflected once inside. Without absorption the fractions sum to 1.
+    R is reflected light, TT transmitted light, and TRT light that is reflected once inside the fibre. Without
+    absorption, the fractions sum to 1.
 
     sin_o : sine of the inclination of the view
     depth : (..., 3) absorption coefficient times the radius of the fibre [-]
-    h : offset of the incident ray from the fibre's axis, in units of its radius, -1 to 1 [-]
+    h : offset of the incident ray from the fibre's axis, in units of the fibre's radius, -1 to 1 [-]
 
     Source: [Chiang2016] section 4.
     """
@@ -142,8 +143,8 @@ def fibre_scattering(
     depth : (3,) absorption coefficient times the radius of the fibre [-]
     parameters : widths of the lobes
 
-    The irradiance is that of a plane that faces the light. The cosine of incidence on the fibre is included:
-    without absorption the integral over all light directions is 1.
+    Irradiance refers to a plane that faces the light. The cosine of incidence on the fibre is included:
+    without absorption, the integral of the result over all light directions is 1.
 
     Source: [Marschner2003], with the terms of [dEon2011, Chiang2016].
     """

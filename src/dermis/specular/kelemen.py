@@ -19,8 +19,8 @@ def kelemen(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats
     m : roughness of the Beckmann distribution D; broadcast against the angles [-]
     fresnel : function that returns F from the cosine v.h
 
-    The denominator is pi |l + v|^2. The published lobe omits the 1/pi of the Beckmann distribution, as its
-    diffuse term omits 1/pi; here both have it, so the ratio of the two terms is the published one.
+    The denominator equals pi |l + v|^2. The published shader omits 1/pi in the Beckmann distribution and in
+    the diffuse term; here both terms have the factor 1/pi, so the ratio of the two terms is as published.
 
     Source: [Kelemen2001]; [dEonLuebke2007] section 14.3.
     """

@@ -41,7 +41,7 @@ class Model:
     lobe : Lobe
         BRDF in NumPy.
     note : str
-        Short description; for a lobe that is not reciprocal, also the reason for this.
+        Short description; for a lobe that is not reciprocal, with the reason why the lobe is not reciprocal.
     reciprocal : bool
         Whether the BRDF is unchanged when light and view are exchanged.
     sources : tuple of str

@@ -41,10 +41,10 @@ def phong_plain(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Fl
     return np.asarray(np.where(angles.is_above, lobe, 0.0))
 
 
-def _power_of_r_v(angles: Cosines, s: Floats) -> Floats:
-    """Return (r.v)^s, where r is the light direction mirrored at the normal."""
+def _power_of_r_v(angles: Cosines, exponent: Floats) -> Floats:
+    """Return (r.v)^exponent, where r is the light direction mirrored at the normal."""
     r_v = 2.0 * angles.n_l * angles.n_v - (2.0 * angles.v_h**2 - 1.0)
-    return np.asarray(np.clip(r_v, 0.0, 1.0) ** s)
+    return np.asarray(np.clip(r_v, 0.0, 1.0) ** exponent)
 
 
 PHONG = Model(

@@ -40,16 +40,16 @@ def torrance_sparrow_smith(angles: Cosines, m: ArrayLike, fresnel: Fresnel = sch
 
 
 def masked_lobe(
-    angles: Cosines, slopes: Floats, fresnel: Fresnel, masking: Callable[[Floats], Floats]
+    angles: Cosines, distribution_times_pi: Floats, fresnel: Fresnel, masking: Callable[[Floats], Floats]
 ) -> Floats:
     """Return the BRDF D F G1(l) G1(v) / (4 n.l n.v) for any distribution D and masking G1 [1/sr].
 
-    slopes : values of pi D
+    distribution_times_pi : values of pi D, as `beckmann` returns
     fresnel : function that returns F from the cosine v.h
     masking : function that returns G1 from the cosine n.l or n.v
     """
     n_l, n_v = _clamped_cosines(angles)
-    return _microfacet_brdf(angles, slopes, fresnel, masking(n_l) * masking(n_v))
+    return _microfacet_brdf(angles, distribution_times_pi, fresnel, masking(n_l) * masking(n_v))
 
 
 def smith_masking(cos_theta: ArrayLike, m: ArrayLike) -> Floats:
@@ -72,9 +72,11 @@ def _clamped_cosines(angles: Cosines) -> tuple[Floats, Floats]:
     return np.maximum(angles.n_l, _MIN_COSINE), np.maximum(angles.n_v, _MIN_COSINE)
 
 
-def _microfacet_brdf(angles: Cosines, slopes: Floats, fresnel: Fresnel, masking: Floats) -> Floats:
+def _microfacet_brdf(
+    angles: Cosines, distribution_times_pi: Floats, fresnel: Fresnel, masking: Floats
+) -> Floats:
     n_l, n_v = _clamped_cosines(angles)
-    lobe = slopes / np.pi * fresnel(angles.v_h) * masking / (4.0 * n_l * n_v)
+    lobe = distribution_times_pi / np.pi * fresnel(angles.v_h) * masking / (4.0 * n_l * n_v)
     return np.where(angles.is_above, lobe, 0.0)
 
 

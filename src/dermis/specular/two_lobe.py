@@ -39,7 +39,8 @@ def two_lobe(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Float
 def two_lobe_masking(cos_theta: ArrayLike, m: ArrayLike) -> Floats:
     """Return the masking G1 of the two-lobe mixture, the fraction of facets visible from a direction [-].
 
-    Smith's 1 / G1 - 1 is an integral over the slope distribution, so 1 / G1 is mixed like the distributions.
+    Smith's 1 / G1 - 1 is an integral over the slope distribution. Therefore 1 / G1 is mixed with the same
+    weights as the slope distributions.
 
     cos_theta : cosine of the direction from the normal
     m : roughness of the model, from which the roughnesses of the two lobes are computed [-]
@@ -47,14 +48,16 @@ def two_lobe_masking(cos_theta: ArrayLike, m: ArrayLike) -> Floats:
     return np.asarray(1.0 / _mix_lobes(lambda rough: 1.0 / smith_masking(cos_theta, rough), m))
 
 
-def _mix_lobes(quantity: Callable[[Floats], Floats], m: ArrayLike) -> Floats:
+def _mix_lobes(quantity: Callable[[Floats], Floats], roughness: ArrayLike) -> Floats:
     """Return the mean of a quantity over the narrow and the wide lobe, with the weights of the lobes.
 
     quantity : function of the roughness of a lobe
-    m : roughness of the model [-]
+    roughness : roughness of the model [-]
     """
     factors = NARROW_FACTOR, WIDE_FACTOR
-    narrow, wide = (np.clip(factor * np.asarray(m), MIN_ROUGHNESS, MAX_ROUGHNESS) for factor in factors)
+    narrow, wide = (
+        np.clip(factor * np.asarray(roughness), MIN_ROUGHNESS, MAX_ROUGHNESS) for factor in factors
+    )
     return np.asarray(NARROW_WEIGHT * quantity(narrow) + (1.0 - NARROW_WEIGHT) * quantity(wide))
 
 

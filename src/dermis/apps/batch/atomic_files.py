@@ -13,18 +13,18 @@ from pathlib import Path
 from dermis.base.atomic_write import refuse_output
 
 _MAX_ATTEMPTS = 5
-_UNFINISHED = re.compile(r"\.(.+)-[0-9a-f]{12}\.unfinished")
+_UNFINISHED_NAME_PATTERN = re.compile(r"\.(.+)-[0-9a-f]{12}\.unfinished")
 
 
 def temporary_path(target: Path) -> Path:
-    """Return an unused hidden path beside `target`, for a file or folder that will be renamed to it."""
+    """Return an unused hidden path beside `target`, for a file or folder that will be renamed to `target`."""
     return target.with_name(f".{target.name}-{secrets.token_hex(6)}.unfinished")
 
 
 def atomic_write(target: Path, write: Callable[[Path], object]) -> None:
     """Write a file completely or not at all, through a temporary file that is renamed.
 
-    Another process may remove the temporary file while it cleans up; the file is then written again.
+    Another process may remove the temporary file during a cleanup; the file is then written again.
 
     write : function that writes the content to the path that it receives
 
@@ -49,9 +49,10 @@ def atomic_write(target: Path, write: Callable[[Path], object]) -> None:
 
 
 def move_into_place(temporary: Path, target: Path, replaces_folder: bool = True) -> None:
-    """Rename a temporary file or folder to its final path, replacing a file or folder there.
+    """Rename a temporary file or folder to its final path, and replace a file or folder at this path.
 
-    replaces_folder : whether to replace a folder with content; if False, it is kept and OSError is raised
+    replaces_folder : whether to replace a folder that is not empty; if False, such a folder is kept and
+        OSError is raised
 
     Raises OSError if the file or folder cannot be renamed.
     """
@@ -83,7 +84,7 @@ def flush_to_disk(path: Path) -> None:
 
 
 def remove_path(path: Path) -> None:
-    """Remove a file, or a folder with its content; do nothing if it does not exist."""
+    """Remove a file, or a folder with all content; do nothing if the path does not exist."""
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path, ignore_errors=True)
         return
@@ -92,8 +93,8 @@ def remove_path(path: Path) -> None:
 
 
 def unfinished_files(folder: Path) -> dict[Path, str]:
-    """Return the temporary files of interrupted writes in a folder, each with the name of its target."""
+    """Return the temporary paths that interrupted writes left in a folder, with the final names."""
     with contextlib.suppress(OSError):
-        found = {path: _UNFINISHED.fullmatch(path.name) for path in sorted(folder.iterdir())}
+        found = {path: _UNFINISHED_NAME_PATTERN.fullmatch(path.name) for path in sorted(folder.iterdir())}
         return {path: match[1] for path, match in found.items() if match}
     return {}

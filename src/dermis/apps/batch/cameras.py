@@ -23,21 +23,21 @@ Doubles = NDArray[np.float64]
 AimOffset = tuple[float, float]
 
 
-def face_points(head: Head, count: int = 64) -> NDArray[np.int32]:
+def face_points(head: Head, direction_count: int = 64) -> NDArray[np.int32]:
     """Return the indices (n,) of control points on the convex hull of the face.
 
-    The camera keeps these points, and so the face, in the picture.
+    A camera that shows all these points shows the whole face.
 
-    count : number of directions in which an extreme point is searched
+    direction_count : number of directions; the farthest point in each direction is on the hull
     """
     positions = head.control.positions_mm - np.array(head.centre_mm, np.float32)
     low, high = np.array(_FACE_BOX_MM, np.float32)
     inside = np.flatnonzero(((positions > low) & (positions < high)).all(axis=1))
     if not len(inside):
         inside = np.arange(len(positions))
-    return np.unique(inside[(_sphere_directions(count) @ positions[inside].T).argmax(axis=1)]).astype(
-        np.int32
-    )
+    return np.unique(
+        inside[(_sphere_directions(direction_count) @ positions[inside].T).argmax(axis=1)]
+    ).astype(np.int32)
 
 
 def sampled_camera(
@@ -45,7 +45,8 @@ def sampled_camera(
 ) -> Camera:
     """Return the camera with an image's sampled parameters, moved so that the whole face is in the picture.
 
-    The frame is enlarged, and the offset of the face reduced, if the face would be cut off.
+    If the picture would cut off the face, the visible frame is enlarged and the offset of the face is
+    reduced.
 
     points : control points of the face, from `face_points`
     motion : displacement of the control points by the pose
@@ -59,64 +60,72 @@ def sampled_camera(
     axes = _camera_axes(values["yaw_deg"], values["pitch_deg"], values["roll_deg"])
     in_view = (face - centre) @ axes.T  # right, up and towards the camera, relative to the face's centre
     offset = values["offset_x"] * aspect, values["offset_y"]
-    frame *= max(_max_extent(in_view, distance, (0.0, 0.0), frame, aspect) / _MAX_FACE_EXTENT, 1.0)
+    frame *= max(
+        _max_projected_coordinate(in_view, distance, (0.0, 0.0), frame, aspect) / _MAX_FACE_EXTENT, 1.0
+    )
 
     def aim(fraction: float) -> AimOffset:
-        """Return the camera's aim offset for a fraction of the shift of the face that is sampled."""
+        """Return the aim offset of the camera for a fraction of the sampled offset of the face."""
         return -0.5 * frame * fraction * offset[0], -0.5 * frame * fraction * offset[1]
 
     fraction, low, high = 1.0, 0.0, 1.0
     for _ in range(_BISECTIONS):  # the first step tries the full offset
-        inside = _max_extent(in_view, distance, aim(fraction), frame, aspect) <= _MAX_FACE_EXTENT
+        inside = (
+            _max_projected_coordinate(in_view, distance, aim(fraction), frame, aspect) <= _MAX_FACE_EXTENT
+        )
         low, high = (fraction, high) if inside else (low, fraction)
         fraction = 0.5 * (low + high)
     return _aim_camera(centre, axes, distance, frame, aim(low))
 
 
-def _aim_camera(centre: Doubles, axes: Doubles, distance: float, frame_mm: float, aim: AimOffset) -> Camera:
+def _aim_camera(
+    centre: Doubles, axes: Doubles, distance_mm: float, frame_mm: float, aim: AimOffset
+) -> Camera:
     """Return a camera that looks at a point beside the centre of the face.
 
     centre : (3,) centre of the face [mm]
     axes : (3, 3) rows: directions to the right, upwards, and back towards the camera
-    distance : distance of the camera from the centre of the face [mm]
-    frame_mm : visible height at the centre of the face, for a camera that looks at it [mm]
+    distance_mm : distance of the camera from the centre of the face [mm]
+    frame_mm : visible height at the centre of the face, for a camera that looks at this centre [mm]
     aim : offset of the point from the centre of the face, to the right and upwards [mm]
     """
-    scale = math.hypot(distance, *aim) / distance  # keeps the angle of view
+    scale = math.hypot(distance_mm, *aim) / distance_mm  # keeps the angle of view
     return Camera(
-        position=_triple(centre + distance * axes[2]),
-        target=_triple(centre + aim[0] * axes[0] + aim[1] * axes[1]),
-        up=_triple(axes[1]),
+        position=_as_tuple(centre + distance_mm * axes[2]),
+        target=_as_tuple(centre + aim[0] * axes[0] + aim[1] * axes[1]),
+        up=_as_tuple(axes[1]),
         frame_mm=frame_mm * scale,
     )
 
 
-def _max_extent(in_view: Doubles, distance: float, aim: AimOffset, frame_mm: float, aspect: float) -> float:
-    """Return the largest distance of projected points from the centre of the picture, where 1 is its edge.
+def _max_projected_coordinate(
+    positions_mm: Doubles, distance_mm: float, aim: AimOffset, frame_mm: float, aspect: float
+) -> float:
+    """Return the largest coordinate of projected points, 0 at the picture's centre and 1 at an edge.
 
-    in_view : (n, 3) positions to the right, upwards and towards the camera, relative to the face's centre
-        [mm]
-    distance : distance of the camera from the face's centre [mm]
+    positions_mm : (n, 3) positions to the right, upwards and towards the camera, relative to the face's
+        centre [mm]
+    distance_mm : distance of the camera from the face's centre [mm]
     aim : offset of the camera's target to the right and upwards [mm]
     frame_mm : visible height at the face's centre [mm]
     aspect : ratio of the picture's width to its height [-]
     """
-    x, y, z = in_view.T
-    back = np.array([-aim[0], -aim[1], distance])
+    x, y, z = positions_mm.T
+    back = np.array([-aim[0], -aim[1], distance_mm])
     back /= math.hypot(*back)
     right = np.array([back[2], 0.0, -back[0]]) / math.hypot(back[0], back[2])
     up = back[1] * right[2], back[2] * right[0] - back[0] * right[2], -back[1] * right[0]
-    away = distance - z
+    away = distance_mm - z
     depth = np.maximum(back[2] * away - back[0] * x - back[1] * y, 1e-3)
     projected_x = (right[0] * x - right[2] * away) / (aspect * depth)
     projected_y = (up[0] * x + up[1] * y - up[2] * away) / depth
-    return float(max(np.abs(projected_x).max(), np.abs(projected_y).max()) * 2.0 * distance / frame_mm)
+    return float(max(np.abs(projected_x).max(), np.abs(projected_y).max()) * 2.0 * distance_mm / frame_mm)
 
 
 def _camera_axes(yaw_deg: float, pitch_deg: float, roll_deg: float) -> Doubles:
     """Return the axes of a camera as rows (3, 3): right, up, and back, from the face to the camera.
 
-    The roll turns right and up clockwise about back.
+    The roll turns the axes right and up clockwise, as seen by the camera.
     """
     back = np.array(direction_from_angles(yaw_deg, pitch_deg))
     yaw, roll = math.radians(yaw_deg), math.radians(roll_deg)
@@ -127,7 +136,7 @@ def _camera_axes(yaw_deg: float, pitch_deg: float, roll_deg: float) -> Doubles:
     return np.stack([cosine * right - sine * up, cosine * up + sine * right, back])
 
 
-def _triple(vector: Doubles) -> tuple[float, float, float]:
+def _as_tuple(vector: Doubles) -> tuple[float, float, float]:
     x, y, z = map(float, vector)
     return x, y, z
 

@@ -23,12 +23,12 @@ _BLAS_THREAD_VARIABLES = "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THR
 
 
 class LostProcessError(DermisError):
-    """Error raised when a child process ended before its work was complete; the work can be repeated."""
+    """Error raised when a child process ended before completing the work; the work can be repeated."""
 
 
 @dataclass(frozen=True)
 class ChildProcess:
-    """Child process, and the parent's end of the pipe to it."""
+    """Child process, and the parent's end of the pipe to the child process."""
 
     process: SpawnProcess
     pipe: Connection
@@ -52,7 +52,7 @@ class ChildProcess:
 
 
 def start_process(target: Callable[..., None], *args: object) -> ChildProcess:
-    """Start `target(pipe, *args)` in a child process, which exits when this process does.
+    """Start `target(pipe, *args)` in a child process that exits when this process exits.
 
     The child ignores Ctrl-C, which a terminal sends to all processes, and uses one thread for linear algebra.
     """
@@ -65,7 +65,10 @@ def start_process(target: Callable[..., None], *args: object) -> ChildProcess:
 
 
 def shared_bytes(size: int) -> ctypes.Array[ctypes.c_ubyte]:
-    """Return memory that a process started by `start_process` shares; it is freed with the processes."""
+    """Return memory to share with a process from `start_process`, freed when both processes have exited.
+
+    size : size of the memory [bytes]
+    """
     return _SPAWN_CONTEXT.RawArray(ctypes.c_ubyte, size)
 
 
@@ -118,7 +121,7 @@ def _single_threaded_blas() -> Iterator[None]:
 
 @contextmanager
 def _sigint_blocked() -> Iterator[None]:
-    """Block SIGINT (Ctrl-C) in this process, and permanently in children started in the block."""
+    """Block SIGINT (Ctrl-C) within a with block; children started in the block ignore SIGINT permanently."""
     if not _CAN_BLOCK_SIGNALS:
         yield
         return

@@ -19,9 +19,9 @@ from dermis.base.extras import import_extra
 if TYPE_CHECKING:
     from distributed import Client
 
-_RETRIES = 2  # of a part whose worker reports a lost process; dask itself counts workers that die
-_TASKS_IN_FLIGHT = 1000  # submitted to the scheduler; far more than there are workers
-_TIMEOUT_S = 60.0  # for the scheduler, and for its first worker
+_MAX_RETRIES = 2  # of a part whose worker reports a lost process; dask itself counts workers that die
+_MAX_TASKS_IN_FLIGHT = 1000  # submitted to the scheduler; far more than there are workers
+_CONNECTION_TIMEOUT_S = 60.0  # for the scheduler, and for its first worker
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class DaskCluster:
 
     address : address of the scheduler; None if `file` is given
     file : scheduler file, written by `dask scheduler --scheduler-file`
-    adapter : adapters to use, as in `SlotRequest`; the workers of a host use the matching ones in turn
+    adapter : adapters to use, as in `SlotRequest`; the workers of a host use the matching adapters in turn
     """
 
     address: str | None
@@ -38,7 +38,9 @@ class DaskCluster:
     adapter: str = "auto"
 
     def render(self, options: RunOptions, tasks: Sequence[Shard]) -> Iterator[WorkerEvent]:
-        """Process the tasks, each as a dask task, and yield an event per completed task.
+        """Process the tasks as dask tasks, and yield an event for each completed task.
+
+        tasks : parts to render and shards to verify
 
         Raises DermisError if no worker can be reached, if a worker does not share the disk, and for errors
         that another attempt cannot solve.
@@ -66,12 +68,12 @@ class DaskCluster:
         scheduler = {"address": self.address} if self.file is None else {"scheduler_file": str(self.file)}
         culprit = self.address or self.file
         try:
-            client = Client(**scheduler, timeout=_TIMEOUT_S, set_as_default=False)
+            client = Client(**scheduler, timeout=_CONNECTION_TIMEOUT_S, set_as_default=False)
         except (OSError, ValueError) as fault:
             refuse(culprit, "a scheduler of dask.distributed", f"none answers ({fault})", "Start it first")
         with client:
             try:
-                client.wait_for_workers(1, timeout=_TIMEOUT_S)
+                client.wait_for_workers(1, timeout=_CONNECTION_TIMEOUT_S)
             except TimeoutError:
                 refuse(culprit, "a scheduler with workers", "it has none", "Start them with dask worker")
             yield client
@@ -92,7 +94,7 @@ def _shared_marker(out: Path) -> Iterator[Path]:
 
 
 def _check_shared_disk(client: Client, marker: Path) -> None:
-    """Refuse an output folder if some dask workers do not see the marker file in it."""
+    """Raise DermisError if some dask workers do not see the marker file in the output folder."""
     from dermis.apps.batch.dask_worker import path_exists
 
     failing = [address for address, found in client.run(path_exists, str(marker)).items() if not found]
@@ -101,10 +103,10 @@ def _check_shared_disk(client: Client, marker: Path) -> None:
         refuse(marker.parent, "a folder on a disk that all workers share", actual, "Choose another one")
 
 
-def _submit_tasks(client: Client, name: str, tasks: Sequence[Shard]) -> Iterator[WorkerEvent]:
-    """Submit parts to render and shards to verify as dask tasks, and yield the completion event of each one.
+def _submit_tasks(client: Client, plugin_name: str, tasks: Sequence[Shard]) -> Iterator[WorkerEvent]:
+    """Submit parts to render and shards to verify as dask tasks, and yield each task's completion event.
 
-    name : name of the `PartPlugin` that processes them
+    plugin_name : name of the `PartPlugin` that processes the tasks
     """
     from distributed import Future, as_completed
 
@@ -114,9 +116,11 @@ def _submit_tasks(client: Client, name: str, tasks: Sequence[Shard]) -> Iterator
     keys, completed = itertools.count(), as_completed(loop=client.loop)
 
     def submit() -> None:
-        while queue and len(submitted) < _TASKS_IN_FLIGHT:
+        while queue and len(submitted) < _MAX_TASKS_IN_FLIGHT:
             task = queue.popleft()
-            future = client.submit(process_task, name, task, key=f"{name}-{next(keys)}", retries=_RETRIES)
+            future = client.submit(
+                process_task, plugin_name, task, key=f"{plugin_name}-{next(keys)}", retries=_MAX_RETRIES
+            )
             submitted[future] = task
             completed.add(future)
 

@@ -51,9 +51,9 @@ class _PluginState:
 
 @dataclass
 class PartPlugin(WorkerPlugin):  # type: ignore[misc]
-    """Plugin that runs a rendering process beside a dask worker, from its first task to the end of the run.
+    """Plugin that runs a rendering process beside a dask worker, from the first task to the end of the run.
 
-    The process renders as it does without dask; the dask worker only waits for it.
+    The process renders as without dask; the dask worker only waits for the process.
 
     spec_toml : spec as TOML, with the hashes of the files that it names
     folder : folder to which file names in the spec are relative
@@ -123,7 +123,7 @@ class PartPlugin(WorkerPlugin):  # type: ignore[misc]
         return WorkerEvent(refusal="the run: expected to continue, but it has ended. Run the command again.")
 
     def _start(self) -> ChildProcess:
-        """Start the rendering process on the adapter that belongs to this dask worker's rank on its host."""
+        """Start the rendering process on the adapter that belongs to this dask worker's rank on this host."""
         cleanup = self._state.cleanup
         rank = cleanup.enter_context(local_rank())
         adapters = similar_adapters(self.adapter)
@@ -136,7 +136,10 @@ class PartPlugin(WorkerPlugin):  # type: ignore[misc]
 
 
 def process_task(plugin_name: str, task: Shard) -> WorkerEvent:
-    """Process a task with the plugin `plugin_name`; dask runs this function as its task."""
+    """Process a task with a plugin of the dask worker that runs this function.
+
+    plugin_name : name of the `PartPlugin`
+    """
     event: WorkerEvent = get_worker().plugins[plugin_name].process(task)
     return event
 
@@ -150,8 +153,8 @@ def path_exists(path: str) -> bool:
 def local_rank() -> Iterator[int]:
     """Yield the smallest rank, from 0, that no other process of this user holds on this host.
 
-    Dask workers use it to choose different adapters. A rank is held by a lock on a file, which the system
-    releases when the process exits. Where such locks are not available, the rank is 0.
+    Dask workers on one host choose different adapters by rank. A process holds a rank by locking a file; the
+    system releases the lock when the process exits. Where file locks are not available, the rank is 0.
     """
     folder = cache_folder() / "ranks"
     try:

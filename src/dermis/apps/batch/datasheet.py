@@ -26,7 +26,7 @@ from dermis.human.model import MAKEHUMAN_CREDIT
 from dermis.scene.outputs import OUTPUTS
 
 README_FILE, DESCRIPTION_FILE = "README.md", "dataset.json"
-_MAX_LISTED = 50
+_MAX_LISTED_FAILURES = 50
 _LABEL_OUTPUTS = "label", "label_face_synthetics"
 _NAMES_WITHOUT_FILES = {"none", "uniform", "human"}
 
@@ -36,7 +36,8 @@ TableRows = Iterable[Sequence[object]]
 def write_datasheet(out: Path, spec: Spec) -> None:
     """Write README.md and dataset.json of a data set from its spec, index and shards.
 
-    Equal shards give equal bytes. Raises DermisError if the index is missing or nothing can be written.
+    Both files depend only on the spec and on the shards. Raises DermisError if the index is missing or
+    nothing can be written.
     """
     existing = [shard for shard in list_shards(spec) if shard_exists(out, shard, spec)]
     text = _readme(out, spec, [read_manifest(shard_path(out, shard, spec)) for shard in existing]).encode()
@@ -67,15 +68,17 @@ def _readme(out: Path, spec: Spec, manifests: Sequence[ShardManifest]) -> str:
     failed = f"\n## Left out\n\n{len(left_out):,} images could not be rendered.\n\n"
     template = resources.files(__package__).joinpath("datasheet.md").read_text("utf-8").removesuffix("\n")
     return Template(template).substitute(
-        facts=_table(("", ""), facts),
+        facts=_markdown_table(("", ""), facts),
         files=_files_table(spec),
         landmarks=_landmarks_section(spec),
         labels=_labels_section(spec),
-        parameters=_table(("parameter", "images", "values"), parameter_summaries(out)),
+        parameters=_markdown_table(("parameter", "images", "values"), parameter_summaries(out)),
         tests=_tests_table(fit_tests(out, spec)),
-        licences=_table(("part", "by", "licence"), licences(spec)),
+        licences=_markdown_table(("part", "by", "licence"), licences(spec)),
         made_with=_software_table(manifests),
-        left_out=failed + _table(("image", "reason"), left_out[:_MAX_LISTED]) if left_out else "",
+        left_out=failed + _markdown_table(("image", "reason"), left_out[:_MAX_LISTED_FAILURES])
+        if left_out
+        else "",
     )
 
 
@@ -90,7 +93,7 @@ def _files_table(spec: Spec) -> str:
         *outputs,
         ("json", "parameters, camera, head_pose, gaze, landmarks", "", "", ""),
     ]
-    return _table(("file", "content", "unit", "stored as", "background value"), rows)
+    return _markdown_table(("file", "content", "unit", "stored as", "background value"), rows)
 
 
 def _tests_table(tests: Iterable[FitTest]) -> str:
@@ -99,7 +102,7 @@ def _tests_table(tests: Iterable[FitTest]) -> str:
         for one in tests
     ]
     columns = "parameter", "samples", "spec", "sampled", "distance", "expected distance", "p-value", ""
-    return _table(columns, rows)
+    return _markdown_table(columns, rows)
 
 
 def _landmarks_section(spec: Spec) -> str:
@@ -107,12 +110,12 @@ def _landmarks_section(spec: Spec) -> str:
         return ""
     rows = [(name, len(landmark_names(name, spec))) for name in spec.landmarks]
     title = "## Landmarks\n\n`dataset.json` lists their names in the order of the records.\n\n"
-    return title + _table(("set", "points"), rows)
+    return title + _markdown_table(("set", "points"), rows)
 
 
 def _labels_section(spec: Spec) -> str:
     return "\n".join(
-        f"## Classes of {name}\n\n{_table(('level', 'classes'), names.items())}"
+        f"## Classes of {name}\n\n{_markdown_table(('level', 'classes'), names.items())}"
         for name, names in label_names(spec).items()
     )
 
@@ -123,11 +126,11 @@ def _software_table(manifests: Sequence[ShardManifest]) -> str:
         (count, ", ".join(f"{name} {value}" for name, value in versions))
         for versions, count in sorted(counts.items())
     ]
-    return _table(("shards", "rendered with"), rows)
+    return _markdown_table(("shards", "rendered with"), rows)
 
 
-def _table(columns: Sequence[str], rows: TableRows) -> str:
-    lines = [columns, ["---"] * len(columns), *rows]
+def _markdown_table(column_names: Sequence[str], rows: TableRows) -> str:
+    lines = [column_names, ["---"] * len(column_names), *rows]
     cells = [[str(cell).replace("|", "\\|").replace("\n", " ") for cell in line] for line in lines]
     return "".join(f"| {' | '.join(line)} |\n" for line in cells)
 

@@ -20,9 +20,12 @@ _MIN_PROBABILITY = 1e-6  # smallest probability of the untruncated normal betwee
 _MAX_CHOICES = 100_000
 
 
-def require(holds: bool, expected: str) -> None:
-    """Raise ValueError with a description of what was expected, unless a condition holds."""
-    if not holds:
+def require(condition: bool, expected: str) -> None:
+    """Raise ValueError unless a condition is true.
+
+    expected : description of what was expected, for the message
+    """
+    if not condition:
         raise ValueError(expected)
 
 
@@ -72,7 +75,7 @@ class Uniform(Distribution):
     logarithmic: bool = False
 
     def __post_init__(self) -> None:
-        """Check that the limits are ordered, and positive for logarithms."""
+        """Check that the limits are ordered, and that limits of logarithms are positive."""
         require(self.low < self.high, "a lower limit that is less than the upper limit")
         require(self.low > 0 or not self.logarithmic, "limits above 0 for log_uniform")
 
@@ -120,7 +123,7 @@ class Normal(Distribution):
 
 @dataclass(frozen=True)
 class TruncatedNormal(Distribution):
-    """Normal distribution restricted to an interval and rescaled: numbers outside have probability 0."""
+    """Normal distribution restricted to an interval and rescaled, so that only numbers inside occur."""
 
     mean: float
     sd: float
@@ -139,10 +142,11 @@ class TruncatedNormal(Distribution):
 
     @property
     def _limit_probabilities(self) -> tuple[float, float]:
-        """Return the cumulative probabilities of the untruncated normal at both limits.
+        """Return the cumulative probabilities of the untruncated normal distribution at both limits.
 
-        If both limits exceed the mean, they are mirrored about it first: the probabilities are then the upper
-        tails. Near 1, differences of cumulative probabilities would cancel.
+        If both limits exceed the mean, both are first mirrored about the mean, and the mirrored limits swap
+        places. The probabilities are then below 0.5; the difference of two probabilities near 1 would lose
+        precision.
         """
         low, high = (self.low - self.mean) / self.sd, (self.high - self.mean) / self.sd
         return (float(ndtr(-high)), float(ndtr(-low))) if low > 0 else (float(ndtr(low)), float(ndtr(high)))
@@ -256,7 +260,8 @@ _NUMERIC_FORMS: Mapping[str, tuple[int, Callable[..., Distribution]]] = {
 def parse_distribution(value: object, nested: bool = False) -> Distribution:
     """Return the distribution that a TOML value of a spec describes.
 
-    nested : whether the value is an alternative of a choice, which must not be a choice or files itself
+    nested : whether the value is an alternative of a choice; an alternative must not itself be a choice or a
+        file pattern
 
     Raises ValueError with a description of what was expected.
     """
@@ -287,7 +292,7 @@ def parse_distribution(value: object, nested: bool = False) -> Distribution:
 def _number_list(values: object, expected: str, count: int | None = None) -> list[float]:
     """Return a list of numbers as floats; raise ValueError with `expected` for other values.
 
-    count : required length of the list; None for any
+    count : required length of the list; None for any length
     """
     if not isinstance(values, list | tuple) or count not in (None, len(values)):
         raise ValueError(expected)

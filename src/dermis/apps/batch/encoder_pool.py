@@ -19,7 +19,7 @@ _SIZE_MARGIN = 1 << 18  # spare bytes, so that slightly larger jobs do not resta
 
 
 class EncoderPool:
-    """Pool of processes to which images are assigned in turn, to be encoded as files.
+    """Pool of processes that encode images as files; the images are assigned to the processes in turn.
 
     process_count : number of processes; with 0, the calling process encodes
     encode : picklable function that takes the arguments in a job and returns the number and the files of an
@@ -74,10 +74,10 @@ class EncoderPool:
 
 
 class _EncoderProcess:
-    """Encoder process with shared memory through which it receives its jobs.
+    """Encoder process that receives jobs through shared memory.
 
-    The pipe only carries the offsets of the jobs in that memory. If it carried the jobs, parent and child
-    could block while waiting for each other to read.
+    The pipe only carries the offsets of the jobs in the shared memory. If the pipe carried the jobs, parent
+    and child could block, each waiting for the other process to read.
 
     size : largest size of a job [bytes]
     """
@@ -113,7 +113,7 @@ class _EncoderProcess:
 
 
 def _job_buffers(job: EncoderJob) -> list[memoryview]:
-    """Return a job as buffers for shared memory: its pickle without arrays, then the bytes of each array."""
+    """Return a job as buffers for shared memory: a pickle without arrays, then the bytes of each array."""
     arrays: list[pickle.PickleBuffer] = []
     pickled = pickle.dumps(job, protocol=5, buffer_callback=arrays.append)
     return [memoryview(pickled), *(array.raw() for array in arrays)]
@@ -126,7 +126,7 @@ def _page_aligned(size: int) -> int:
 def _run_encoder(
     pipe: Connection, memory: ctypes.Array[ctypes.c_ubyte], encode: Callable[..., EncodedImage]
 ) -> None:
-    """Encode the jobs whose offsets arrive through the pipe; this runs in an encoder process.
+    """Encode the jobs whose offsets arrive through the pipe; an encoder process runs this function.
 
     memory : shared memory that holds the jobs
     """

@@ -25,7 +25,7 @@ MIN_P_VALUE = 1e-6
 _MEAN_SCALED_DISTANCE = sqrt(np.pi / 2) * np.log(2)  # mean of the Kolmogorov distribution
 _QUANTILE_COUNT = 10_000  # quantiles from which the moments of a distribution are computed
 _ROUNDING_ERROR = 5e-6  # largest relative error of rounding to six digits
-_MAX_LISTED = 12  # largest number of texts per distribution in the table
+_MAX_LISTED_TEXTS = 12  # largest number of texts per distribution in the table
 _MIN_EXPECTED_COUNT = 5.0  # expected samples in a cell of the chi-square test; smaller cells are pooled
 
 Array = NDArray[np.float64]
@@ -40,8 +40,8 @@ class FitTest(NamedTuple):
     expected, observed : mean and standard deviation of numbers, or probabilities of texts, in the
         distribution and in the samples
     distance : Kolmogorov-Smirnov distance, or largest difference of two probabilities [-]
-    expected_distance : mean distance of equally many random samples of the distribution; 0 for a single text
-        [-]
+    expected_distance : mean distance for `sample_count` random samples of the distribution; 0 for a single
+        text [-]
     p_value : p-value of the distance, or of a chi-square test of the probabilities [-]
     """
 
@@ -62,7 +62,9 @@ class FitTest(NamedTuple):
 def fit_tests(out: Path, spec: Spec) -> Iterator[FitTest]:
     """Yield a goodness-of-fit test of each parameter with a varying distribution, from a data set's index.
 
-    A person counts once, regardless of the number of images. Raises DermisError if there is no index.
+    A parameter of a person counts once per person, regardless of the number of that person's images.
+
+    Raises DermisError if there is no index.
     """
     with open_index(out, "the statistics of a data set") as file:
         names = set(file.schema_arrow.names)
@@ -90,7 +92,9 @@ def fit_test(parameter: str, distribution: Distribution, values: Samples) -> Fit
 def cumulative_probability(distribution: Distribution, x: Array, *, closed: bool) -> Array:
     """Return the cumulative probability of a numeric distribution at each x.
 
-    closed : whether to include x itself, which matters at constants: P(X <= x) instead of P(X < x)
+    x : (n,) numbers
+    closed : whether to return P(X <= x) instead of P(X < x); the two differ where x is a constant of the
+        distribution
     """
     match distribution:
         case Constant(value):
@@ -173,18 +177,26 @@ def _text_test(parameter: str, expected: Mapping[str, float], values: Sequence[s
 
 
 def _format_probabilities(probabilities: Mapping[str, float]) -> str:
-    return ", ".join(f"{text} {probabilities[text]:.3g}" for text in sorted(probabilities)[:_MAX_LISTED])
+    return ", ".join(
+        f"{text} {probabilities[text]:.3g}" for text in sorted(probabilities)[:_MAX_LISTED_TEXTS]
+    )
 
 
-def _chi_square(expected: Mapping[str, float], observed: Counter[str], count: int) -> float:
+def _chi_square(
+    probabilities: Mapping[str, float], observed_counts: Counter[str], sample_count: int
+) -> float:
     """Return the p-value of a chi-square test of counts; texts with few expected samples are pooled.
 
-    expected : probability of each text
-    observed : number of samples of each text
-    count : number of all samples
+    probabilities : probability of each text
+    observed_counts : number of samples of each text
+    sample_count : number of samples of all texts
     """
-    cells = [(observed[text], count * p) for text, p in expected.items() if count * p >= _MIN_EXPECTED_COUNT]
-    pooled = count - sum(one for one, _ in cells), count - sum(mean for _, mean in cells)
+    cells = [
+        (observed_counts[text], sample_count * p)
+        for text, p in probabilities.items()
+        if sample_count * p >= _MIN_EXPECTED_COUNT
+    ]
+    pooled = sample_count - sum(one for one, _ in cells), sample_count - sum(mean for _, mean in cells)
     if pooled[1] > _MIN_EXPECTED_COUNT or pooled[0]:
         cells.append(pooled)
     if len(cells) < 2:
@@ -200,7 +212,7 @@ def _format_moments(values: Array) -> str:
 def _index_column(parameter: str) -> str:
     """Return the name of the index column that holds a parameter's samples.
 
-    A parameter that sets a left and a right morph target has two equal columns, of which this is the first.
+    A parameter that sets a left and a right morph target has two equal columns; the first is returned.
     """
     start, _, target = parameter.partition(".")
     return f"pose.{expand_targets([target])[0]}" if start == "pose" else parameter

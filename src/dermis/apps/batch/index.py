@@ -23,37 +23,37 @@ INDEX_FILE = "index.parquet"
 MATRIX_COLUMNS = {"camera.K": 9, "camera.R": 9, "camera.t": 3, "head_pose": 12, "gaze": 6}
 """Columns of flattened matrices (row by row), with the number of elements."""
 _IDENTIFIERS = "number", "key", "shard"
-_MAX_LISTED = 12
+_MAX_LISTED_TEXTS = 12
 
 IndexRow = dict[str, object]
 
 
 def write_index(out: Path, spec: Spec) -> Path:
-    """Write the index of the existing shards, with one row per image, and return its path.
+    """Write the index of the existing shards, with one row per image; return the path of the index.
 
     The columns "number", "key" and "shard" identify the image and its file; "camera.K", "camera.R",
-    "camera.t", "head_pose" and "gaze" are flattened matrices; "skin_tone.ita_degrees" and others describe the
-    colour of the skin; all others are parameters, null where an image has none.
+    "camera.t", "head_pose" and "gaze" are flattened matrices; columns that begin with "skin_tone." describe
+    the colour of the skin; all other columns are parameters, with null for images without the parameter.
 
     Equal shards give equal bytes. Raises DermisError if a shard is damaged, if pyarrow is missing, or if the
     file cannot be written.
     """
     parquet, target = import_extra("pyarrow.parquet", "the index of a data set"), out / INDEX_FILE
-    schema = _schema(out, spec)
+    schema = _index_schema(out, spec)
 
-    def write(path: Path) -> None:
+    def write_parquet(path: Path) -> None:
         with parquet.ParquetWriter(path, schema, compression="zstd", store_schema=False) as writer:
             for rows in _rows_of_shards(out, spec):
-                writer.write_table(_table(rows, schema))
+                writer.write_table(_arrow_table(rows, schema))
 
-    atomic_write(target, write)
+    atomic_write(target, write_parquet)
     return target
 
 
 def open_index(out: Path, purpose: str) -> pyarrow.parquet.ParquetFile:
     """Return the Parquet file of a data set's index, opened for reading by columns.
 
-    purpose : what pyarrow is needed for, for the message if it is missing
+    purpose : what pyarrow is needed for, for the message if pyarrow is missing
 
     Raises DermisError if there is no index.
     """
@@ -83,7 +83,7 @@ def _rows_of_shards(out: Path, spec: Spec) -> Iterator[list[IndexRow]]:
             continue
         with shard_files(path) as images:
             rows = [
-                _row(key, path.name, read_record(files[RECORD_SUFFIX](), path / key))
+                _index_row(key, path.name, read_record(files[RECORD_SUFFIX](), path / key))
                 for key, files in images.items()
                 if RECORD_SUFFIX in files
             ]
@@ -91,13 +91,20 @@ def _rows_of_shards(out: Path, spec: Spec) -> Iterator[list[IndexRow]]:
             yield rows
 
 
-def _row(key: str, shard: str, record: Record) -> IndexRow:
+def _index_row(image_key: str, shard: str, record: Record) -> IndexRow:
     matrices = {f"camera.{name}": value for name, value in record["camera"].items()}
     matrices |= {"head_pose": record["head_pose"], "gaze": record["gaze"]}
     flat = {name: _flatten_matrix(value) for name, value in matrices.items()}
     tone = {f"skin_tone.{name}": one for name, one in (record.get("skin_tone") or {}).items()}
     tone.pop("skin_tone.statement", None)
-    return {"number": record["number"], "key": key, "shard": shard, **record["parameters"], **tone, **flat}
+    return {
+        "number": record["number"],
+        "key": image_key,
+        "shard": shard,
+        **record["parameters"],
+        **tone,
+        **flat,
+    }
 
 
 def _flatten_matrix(matrix: object) -> object:
@@ -106,7 +113,7 @@ def _flatten_matrix(matrix: object) -> object:
     return [one for row in matrix for one in row]
 
 
-def _schema(out: Path, spec: Spec) -> pyarrow.Schema:
+def _index_schema(out: Path, spec: Spec) -> pyarrow.Schema:
     """Return names and types of the index columns; columns of parameters are sorted by name."""
     arrow = import_extra("pyarrow", "the index of a data set")
     kinds: dict[str, set[type]] = {}
@@ -133,7 +140,7 @@ def _column_type(kinds: set[type]) -> pyarrow.DataType:
     return arrow.list_(arrow.float64()) if kinds <= {list} else arrow.string()
 
 
-def _table(rows: list[IndexRow], schema: pyarrow.Schema) -> pyarrow.Table:
+def _arrow_table(rows: list[IndexRow], schema: pyarrow.Schema) -> pyarrow.Table:
     arrow = import_extra("pyarrow", "the index of a data set")
     columns = []
     for field in schema:
@@ -151,7 +158,7 @@ def _column_summary(column: pyarrow.ChunkedArray) -> str:
         counts = {one["values"]: one["counts"] for one in compute.value_counts(column).to_pylist()}
         counts.pop(None, None)
         sorted_counts = sorted(counts.items(), key=lambda one: (-one[1], str(one[0])))
-        listed = [f"{value} ({count:,})" for value, count in sorted_counts[:_MAX_LISTED]]
+        listed = [f"{value} ({count:,})" for value, count in sorted_counts[:_MAX_LISTED_TEXTS]]
         more = len(sorted_counts) - len(listed)
         return ", ".join(listed) + (f" and {more:,} more" if more else "")
     if arrow.types.is_list(column.type):

@@ -57,7 +57,7 @@ def _area_lamp(lamp: Mapping[str, float], turn_deg: float, strength: float) -> L
 
     lamp : sampled parameters of the lamp, by key of `LampTable`
     turn_deg : rotation of the rig about the upward axis [degrees]
-    strength : factor of the irradiance of all lamps [-]
+    strength : factor of the irradiance, common to all lamps [-]
     """
     x, y, z = direction_from_angles(lamp["yaw_deg"] + turn_deg, lamp["pitch_deg"])
     distance, size, irradiance = lamp["distance_mm"], lamp["size_mm"], pi * strength * lamp["strength"]

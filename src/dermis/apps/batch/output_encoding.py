@@ -67,7 +67,7 @@ def encode_output(output_name: str, values: Array, encoding: Encoding) -> bytes:
 
 
 def decode_output(output_name: str, kind: str, data: bytes) -> Array:
-    """Return an output array (h, w) or (h, w, c) from the bytes of its file.
+    """Return an output array (h, w) or (h, w, c) from the bytes of a file.
 
     kind : file format: png, exr or npy
 
@@ -106,7 +106,7 @@ def _stored_dtype(output: Output, encoding: Encoding) -> np.dtype[Any]:
 
 
 def _decode_npy(data: bytes) -> Array:
-    """Return the array in a NumPy file, whose shape is checked before memory is allocated."""
+    """Return the array in a NumPy file; the array's shape is checked before memory is allocated."""
     if not data.startswith(_NPY_MAGIC):
         raise ValueError("it is not a NumPy array file of version 1.0")
     file = io.BytesIO(data[len(_NPY_MAGIC) :])

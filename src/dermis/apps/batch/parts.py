@@ -1,4 +1,4 @@
-"""Joining of complete parts to their shard, and images kept from a data set that had fewer images."""
+"""Joining of complete parts to a shard, and reuse of images that were rendered before a data set grew."""
 
 from __future__ import annotations
 
@@ -29,9 +29,10 @@ _MAX_ATTEMPTS = 3
 
 
 class KeptImages(NamedTuple):
-    """Images at the beginning of a part that need not be rendered again, from `part.first` to before `stop`.
+    """Images at the beginning of a part that were rendered before the data set grew.
 
-    path : shard or part with fewer images that contains them; None if there are none
+    path : shard or part that contains these images; None if there are no such images
+    stop : number after the last of these images; the first is the first image of the part
     """
 
     path: Path | None
@@ -39,7 +40,7 @@ class KeptImages(NamedTuple):
 
 
 def kept_images(out: Path, part: Part, spec: Spec) -> KeptImages:
-    """Return the images of a part that the data set had before it grew."""
+    """Return those images of a part that exist because they were rendered before the data set grew."""
     for piece in (part, shard_at(part.index, spec)):
         path = shard_path(out, piece, spec)
         with suppress(DermisError):
@@ -56,7 +57,9 @@ def _matches_sha256(path: Path, sha256: str) -> bool:
 
 
 def copy_images(writer: ShardWriter, path: Path, first: int, stop: int) -> None:
-    """Copy a range of images from a shard or part, with the reasons for images that were left out.
+    """Copy a range of images from a shard or part, and the reasons for images that were left out there.
+
+    first, stop : first image number, and the number after the last image
 
     Raises DermisError if the shard or part cannot be read.
     """
@@ -72,10 +75,11 @@ def copy_images(writer: ShardWriter, path: Path, first: int, stop: int) -> None:
 
 
 def join_parts(out: Path, shard: Shard, spec: Spec) -> tuple[Part, ...]:
-    """Join the parts of a shard if all of them exist, then remove them; return the damaged parts.
+    """Join the parts of a shard if all parts exist, then remove the parts; return the damaged parts.
 
-    If there are damaged parts, only these are removed, and must be rendered again. Several processes may join
-    the same parts at once: they write equal bytes, and parts are only removed when the shard exists.
+    If there are damaged parts, nothing is joined: the damaged parts are removed, and must be rendered again.
+    Several processes may join the same parts at once: all write equal bytes, and parts are only removed when
+    the shard exists.
 
     Raises DermisError if the shard cannot be written.
     """
@@ -86,7 +90,7 @@ def join_parts(out: Path, shard: Shard, spec: Spec) -> tuple[Part, ...]:
         damaged = tuple(part for part in parts if not is_intact(out, part, spec))
         if not shard_exists(out, shard, spec):
             if damaged:
-                _remove(parts[part] for part in damaged)
+                _remove_paths(parts[part] for part in damaged)
                 return damaged
             try:
                 with ShardWriter(out, shard, spec) as writer:
@@ -96,11 +100,11 @@ def join_parts(out: Path, shard: Shard, spec: Spec) -> tuple[Part, ...]:
                 if not attempts_left:
                     raise
                 continue
-        _remove(parts.values())
+        _remove_paths(parts.values())
         break
     return ()
 
 
-def _remove(paths: Iterable[Path]) -> None:
+def _remove_paths(paths: Iterable[Path]) -> None:
     for path in paths:
         remove_path(path)

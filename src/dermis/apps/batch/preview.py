@@ -24,24 +24,24 @@ from dermis.scene.toml_text import value_text
 
 SHEET_IMAGES = 16
 """Number of images on the contact sheet."""
-MAX_COUNTED = 20_000
+MAX_COUNTED_IMAGES = 20_000
 """Largest number of images from which the statistics of the parameter table are computed."""
 _COLUMN_COUNT, _IMAGE_SIDE, _GAP = 4, 192, 4  # of the contact sheet; lengths in pixels
 _MAX_SIDES = {"atlas": 512, "shadow_size": 1024}  # upper limits of settings for the contact sheet
 _MAX_COLUMN_WIDTH = 60  # characters
 _MEASURED_IMAGES, _UNTIMED_IMAGES = 6, 2  # images of an estimate; the first of them are not timed
 _PERSON_IDS = "person.number", "person.seed"
-_MAX_VALUES = 12  # largest number of listed values of a text parameter
+_MAX_LISTED_TEXTS = 12  # largest number of listed values of a text parameter
 
 
 class ParameterRow(TypedDict):
     """Row of the parameter table: a parameter with its distribution and statistics of its samples.
 
     drawn : distribution as TOML
-    first : samples for the first 16 images; None for images without this parameter
-    images : number of images with this parameter, among the first 20,000
+    first : samples of the first 16 images; None for an image without this parameter
+    images : number of images with this parameter, among the first 20,000 images
     min, mean, max : statistics of numeric samples
-    counts : number of images with each text
+    counts : for text samples, number of images with each text
     """
 
     parameter: str
@@ -76,7 +76,7 @@ def dry_run(spec: Spec, adapter: str = "auto") -> tuple[list[ParameterRow], NDAr
 
 
 def estimate(spec: Spec, adapter: str = "auto") -> Estimate:
-    """Return the size and the duration of a data set, by rendering its first images as a worker does.
+    """Return the size and the duration of a data set, by rendering the first images as a worker does.
 
     The first two images, which fill caches, are not timed.
     """
@@ -100,15 +100,15 @@ def estimate_line(estimate: Estimate) -> str:
 
 def parameter_rows(spec: Spec) -> list[ParameterRow]:
     """Return a row of the parameter table for each parameter that varies."""
-    samples = [spec.parameters(k) for k in range(min(spec.count, MAX_COUNTED))]
+    samples = [spec.parameters(k) for k in range(min(spec.count, MAX_COUNTED_IMAGES))]
     names = dict.fromkeys(name for sample in samples for name in sample)
     varying = [name for name in names if not isinstance(spec.distributions.get(name), Constant)]
-    return [_row(spec, name, samples) for name in varying if name not in _PERSON_IDS]
+    return [_parameter_row(spec, name, samples) for name in varying if name not in _PERSON_IDS]
 
 
 def table_lines(rows: Sequence[ParameterRow]) -> list[str]:
     """Return the parameter table as aligned lines of text."""
-    cells = [("parameter", "distribution", "images", "min", "mean", "max"), *map(_cells, rows)]
+    cells = [("parameter", "distribution", "images", "min", "mean", "max"), *map(_table_cells, rows)]
     widths = [max(len(row[k]) for row in cells if len(row) > 4 or k < 3) for k in range(3)]
     lines = []
     for row in cells:
@@ -140,7 +140,7 @@ def contact_sheet(spec: Spec, adapter: str = "auto") -> NDArray[np.uint8]:
     return np.array(sheet)
 
 
-def _row(spec: Spec, parameter: str, samples: Sequence[Parameters]) -> ParameterRow:
+def _parameter_row(spec: Spec, parameter: str, samples: Sequence[Parameters]) -> ParameterRow:
     values = [sample[parameter] for sample in samples if parameter in sample]
     distribution = spec.distributions.get(parameter)
     text = "" if distribution is None else value_text(distribution.spec_value())
@@ -152,7 +152,7 @@ def _row(spec: Spec, parameter: str, samples: Sequence[Parameters]) -> Parameter
     return {**row, "min": min(numbers), "mean": float(np.mean(numbers)), "max": max(numbers)}
 
 
-def _cells(row: ParameterRow) -> tuple[str, ...]:
+def _table_cells(row: ParameterRow) -> tuple[str, ...]:
     text = row["drawn"]
     if len(text) > _MAX_COLUMN_WIDTH:
         text = f"{text[: _MAX_COLUMN_WIDTH - 4]} ..."
@@ -160,5 +160,5 @@ def _cells(row: ParameterRow) -> tuple[str, ...]:
     if "counts" not in row:
         return *fields, *(f"{number:.4g}" for number in (row["min"], row["mean"], row["max"]))
     counts = [f"{name} {count}" for name, count in row["counts"].items()]
-    more = f", and {len(counts) - _MAX_VALUES} more" if len(counts) > _MAX_VALUES else ""
-    return *fields, ", ".join(counts[:_MAX_VALUES]) + more
+    more = f", and {len(counts) - _MAX_LISTED_TEXTS} more" if len(counts) > _MAX_LISTED_TEXTS else ""
+    return *fields, ", ".join(counts[:_MAX_LISTED_TEXTS]) + more

@@ -1,4 +1,4 @@
-"""Reader of data sets; their files are treated as untrusted."""
+"""Reader of data sets, whose files are treated as untrusted input."""
 
 from __future__ import annotations
 
@@ -107,12 +107,12 @@ def read_dataset(
 
 
 def decode_image(files: Mapping[str, object], culprit: object = "") -> Image:
-    """Return an image of a data set from its files; the returned keys are those of `read_dataset`.
+    """Return an image of a data set from the files of the image, with the keys that `read_dataset` lists.
 
     Raises DermisError for damaged files.
 
     files : content of each file as bytes, by suffix, as the library webdataset provides them
-    culprit : name of the image in error messages; by default its key
+    culprit : name of the image in error messages; by default the image's key
     """
     source = culprit or files.get("__key__", "an image")
     data = {suffix: content for suffix, content in files.items() if not suffix.startswith("__")}
@@ -134,7 +134,7 @@ def decode_image(files: Mapping[str, object], culprit: object = "") -> Image:
 
 
 def read_record(data: bytes, culprit: object) -> Record:
-    """Return the record of an image from the bytes of its JSON file; its landmarks are not checked.
+    """Return the record of an image from the bytes of its JSON file, without a check of the landmarks.
 
     culprit : name of the file in error messages
 
@@ -156,9 +156,10 @@ def read_record(data: bytes, culprit: object) -> Record:
 
 @contextmanager
 def shard_files(path: Path) -> Iterator[dict[str, FileReaders]]:
-    """Yield a reader for each file of a shard, grouped by image key and by suffix.
+    """Yield functions that read the files of a shard, as nested dictionaries: image key, then file suffix.
 
-    The files can be read inside the context. Raises DermisError if the shard is truncated or not a shard.
+    The functions can be called inside the with block. Raises DermisError if the shard is truncated, or if the
+    path is not a shard.
     """
     if path.is_dir():
         names = sorted(one.name for one in path.iterdir())
@@ -202,9 +203,9 @@ def _read_tar_member(path: Path, file: BinaryIO, member: TarMember) -> bytes:
 
 
 def _select_shards(path: Path, shards: Iterable[int] | None) -> list[Path]:
-    """Return the paths of the shards with given numbers in a data set, or the path if it is a shard.
+    """Return the paths of shards to read: shards of a data set, or `path` alone if it is a shard.
 
-    shards : shard numbers; all shards of the data set if None
+    shards : numbers of the shards; None for all shards of the data set
     """
     if shard_index(path) is not None or path.suffix == ".tar":
         return [path]
@@ -277,21 +278,24 @@ def _decode_landmarks(record: LandmarksRecord) -> LandmarkPoints:
     return LandmarkPoints(pixels, _to_array(record["positions_mm"], (len(visible), 3)), visible)
 
 
-def _to_array(values: NestedNumbers, shape: tuple[int, ...]) -> NDArray[np.float64]:
+def _to_array(numbers: NestedNumbers, shape: tuple[int, ...]) -> NDArray[np.float64]:
     """Return nested lists of numbers as an array, with NaN for null."""
-    flat: Sequence[object] = values if isinstance(values, list) else [values]
+    flat: Sequence[object] = numbers if isinstance(numbers, list) else [numbers]
     while flat and isinstance(flat[0], list):
         flat = [one for row in flat if isinstance(row, list) for one in row]
     if any(isinstance(one, str | bool) for one in flat):
         raise ValueError("it has texts in place of numbers")
-    array = np.array(values, np.float64)
+    array = np.array(numbers, np.float64)
     if array.shape != shape and (array.size or 0 not in shape):
         raise ValueError(f"an array has shape {array.shape}, not {shape}")
     return array.reshape(shape)
 
 
 def _refuse_malformed_record(culprit: object) -> AbstractContextManager[None]:
-    """Return a context that turns errors of a malformed record into a DermisError."""
+    """Return a context manager that turns errors of a malformed record into a DermisError.
+
+    culprit : name of the file in error messages
+    """
     return parsing(culprit, "a record of an image", KeyError, TypeError, AttributeError)
 
 

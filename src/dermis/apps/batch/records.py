@@ -63,22 +63,23 @@ def encode_record(
 
     observation : sRGB picture and output arrays of the image
     parameters : sampled parameters of the image
-    tone : description of the colour of the skin, None if it is unknown
+    tone : description of the colour of the skin; None if this colour is unknown
 
-    The suffixes are "png" for the picture, with alpha if it has no background; "NAME.png", "NAME.exr" or
-    "NAME.npy" for each output, see `output_encoding.storage_description`; and "json" for the `Record`.
+    The suffixes are "png" for the picture, with an alpha channel if the picture has no background;
+    "NAME.png", "NAME.exr" or "NAME.npy" for each output, see `output_encoding.storage_description`; and
+    "json" for the `Record`.
     """
     files = {PICTURE_SUFFIX: encode_png(observation.picture, use_isal=True)}
     for name in spec.outputs:
         suffix = f"{name}.{file_format(name, spec.encoding)}"
         files[suffix] = encode_output(name, observation.outputs[name], spec.encoding)
-    record = _record(number, observation, parameters, spec, tone)
+    record = _make_record(number, observation, parameters, spec, tone)
     text = json.dumps(record, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     files[RECORD_SUFFIX] = f"{text}\n".encode()
     return files
 
 
-def _record(
+def _make_record(
     image_number: int, observation: Observation, parameters: Parameters, spec: Spec, tone: SkinTone | None
 ) -> Record:
     camera, gaze = observation.camera, observation.gaze

@@ -45,10 +45,10 @@ class WorkerPool(Protocol):
 class Progress:
     """Progress of a run, reported to `on_progress`.
 
-    images : number of images of the missing parts that are rendered, or were found on the disk
-    total : number of images in the missing parts
-    verified : number of complete shards that were read and compared with their hash
+    total : number of images in the parts that were missing at the start
+    images : how many of these images were rendered so far, or were found on the disk
     to_verify : number of shards that were complete at the start
+    verified : how many of these shards were read and compared with their hash so far
     """
 
     images: int = 0
@@ -66,7 +66,7 @@ class RunReport:
     shards : number of shards that became complete during the run
     skipped : number of shards that were complete before the run
     failed : images that could not be rendered, with the reasons
-    is_complete : whether all shards of the data set, its index and its datasheet exist
+    is_complete : whether all shards, the index and the datasheet of the data set exist
     """
 
     images: int
@@ -84,11 +84,11 @@ def run(
     parts: tuple[int, int] = (0, 1),
     on_progress: Callable[[Progress], None] = lambda progress: None,
 ) -> RunReport:
-    """Render missing parts of a data set; if this completes it, write index and datasheet.
+    """Render missing parts of a data set; if the data set is then complete, write index and datasheet.
 
     pool : workers that render the parts
-    shards : (i, n) selects every n-th shard, starting with the i-th (from 0), so that n runs share a data set
-    parts : (i, n) selects every n-th part of these shards
+    shards : (i, n) selects every n-th shard from shard i, so that n runs can share a data set
+    parts : (i, n) selects every n-th part of these shards, from part i
     on_progress : function called whenever images were rendered or a shard was verified
 
     Raises DermisError for errors of the spec, the disk or the machine; complete parts are kept.
@@ -104,13 +104,15 @@ def run(
     share = [part for shard in selected for part in list_parts(shard, spec)][parts[0] :: parts[1]]
     missing = [part for part in share if shard_at(part.index, spec) not in existing]
     verified = [shard for shard in selected if shard in existing][parts[0] :: parts[1]]
-    own_names = {shard_path(out, one, spec).name for one in (*missing, *(selected if parts[1] == 1 else ()))}
-    remove_unfinished(out, own_names)
+    removable_names = {
+        shard_path(out, one, spec).name for one in (*missing, *(selected if parts[1] == 1 else ()))
+    }
+    remove_unfinished(out, removable_names)
     _remove_joined_parts(out, spec, existing)
     try:
         images, damaged, failed = _process(pool, options, [*missing, *verified], on_progress)
     finally:
-        remove_unfinished(out, own_names)
+        remove_unfinished(out, removable_names)
     complete_shards = {shard for shard in all_shards if shard_exists(out, shard, spec)}
     complete = len(complete_shards) == len(all_shards)
     if complete:  # concurrent runs that reach this point write the same bytes
@@ -125,7 +127,7 @@ def run(
 def claim_folder(out: Path, spec: Spec) -> None:
     """Create the folder of a data set, or check that an existing folder holds the data set of this spec.
 
-    The data set may have fewer images; the spec in the folder is then replaced.
+    The existing data set may have fewer images than this spec; the spec in the folder is then replaced.
 
     Raises DermisError if the folder belongs to another data set or cannot be written.
     """
@@ -140,22 +142,22 @@ def claim_folder(out: Path, spec: Spec) -> None:
     atomic_write(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
 
 
-def _must_grow(known_text: str, spec: Spec, out: Path) -> bool:
+def _must_grow(existing_toml: str, spec: Spec, out: Path) -> bool:
     """Return whether the spec in a data set's folder differs from this spec only by having fewer images.
 
-    known_text : text of the spec in the folder
+    existing_toml : text of the spec in the folder
 
-    Raises DermisError if there is any other difference.
+    Raises DermisError if the specs differ in anything else.
     """
-    if known_text == spec.to_toml():
+    if existing_toml == spec.to_toml():
         return False
-    other_folder, count = "Choose another folder", COUNT_LINE.search(known_text)
-    generator = GENERATOR_LINE.search(known_text)
+    other_folder, count = "Choose another folder", COUNT_LINE.search(existing_toml)
+    generator = GENERATOR_LINE.search(existing_toml)
     number = int(generator[1]) if generator else 1  # earlier versions wrote none
     if number != GENERATOR:
         actual = f"it was made with number {number}, by another version of dermis"
         refuse(out, f"a data set of generator number {GENERATOR}", actual, f"{other_folder}, or that version")
-    if not count or COUNT_LINE.sub("", known_text, count=1) != COUNT_LINE.sub("", spec.to_toml(), count=1):
+    if not count or COUNT_LINE.sub("", existing_toml, count=1) != COUNT_LINE.sub("", spec.to_toml(), count=1):
         advice = f"{other_folder}, or use the spec that the folder was created with"
         refuse(out, "a folder for this data set", f"its {SPEC_FILE} differs from this spec", advice)
     if int(count[1]) > spec.count:
@@ -165,7 +167,7 @@ def _must_grow(known_text: str, spec: Spec, out: Path) -> bool:
 
 
 def _remove_joined_parts(out: Path, spec: Spec, complete: Iterable[Shard]) -> None:
-    """Remove parts that an interrupted run has joined into their shard without removing them."""
+    """Remove parts whose shard exists, because a run was interrupted after it had joined the parts."""
     if files := part_files(out):
         complete = set(complete)
         for number, path in files.items():

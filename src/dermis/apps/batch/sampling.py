@@ -52,15 +52,16 @@ def table_numbers(parameters: Mapping[str, float | int | str], table: str) -> di
     return {name: one for name, one in table_values(parameters, table).items() if not isinstance(one, str)}
 
 
-def hashed_uniform(seed: int, number: int, name: str) -> float:
+def hashed_uniform(seed: int, image_or_person: int, parameter: str) -> float:
     """Return a uniform random number in (0, 1) that depends on a seed, an image and a parameter only.
 
-    It is a BLAKE2b hash of the three arguments as text. Each number is therefore independent of all others.
+    The random number is a BLAKE2b hash of the three arguments as text. Random numbers for different arguments
+    are therefore independent.
 
-    number : number of the image, or of the person for parameters of people
-    name : name of the parameter
+    image_or_person : number of the image, or of the person for parameters of people
+    parameter : name of the parameter
     """
-    digest = hashlib.blake2b(f"{seed} {number} {name}".encode(), digest_size=8).digest()
+    digest = hashlib.blake2b(f"{seed} {image_or_person} {parameter}".encode(), digest_size=8).digest()
     step = int.from_bytes(digest, "little") >> (64 - _HASH_BITS)
     return (step + 0.5) / float(1 << _HASH_BITS)
 
@@ -77,8 +78,8 @@ def round_significant(value: float) -> float:
 class Movement:
     """Movement of a part of the face in random expressions: a row of mixture.csv.
 
-    probability : probability of this movement within its part of the face [-]
-    max_weight : largest weight of its morph targets [-]
+    probability : probability of this movement among the movements of the same part of the face [-]
+    max_weight : largest weight of the morph targets of the movement [-]
     target_weights : weights of the morph targets relative to each other
     jaw_closing : fraction by which the movement, at full strength, reduces the opening of the jaw [-]
     """
@@ -126,7 +127,8 @@ def expression_weights(
 ) -> dict[str, float]:
     """Return the morph target weights (0 to 1) of a named expression, varied at random for one image.
 
-    weights : weights of the expression, where a name without a side moves both sides
+    weights : weights of the expression by name of the morph target; a name without Left or Right moves both
+        sides
     intensity : factor of all weights [-]
     asymmetry : relative increase of weights on the left and decrease on the right [-]
     variation : standard deviation of the logarithm of each weight [-]
@@ -144,7 +146,7 @@ def expression_weights(
 def _is_one_sided(name: str) -> bool:
     """Return whether a morph target acts on one side of the face and has a mirrored counterpart.
 
-    Targets such as mouthLeft and jawRight move the middle of the face sideways.
+    False for targets such as mouthLeft and jawRight, which move the middle of the face sideways.
     """
     return name.endswith(TARGET_SIDES) and not name.startswith(("jaw", "mouthLeft", "mouthRight"))
 
@@ -168,7 +170,7 @@ class Sampler:
     expressions: Mapping[str, Weights]
 
     def parameters(self, k: int) -> Parameters:
-        """Return the sampled parameters of image k by dotted name; they do not depend on other images."""
+        """Return the sampled parameters of image k by dotted name, independently of other images."""
         person = k // self.images_per_person
         sampled: Parameters = {"person.number": person}
         if "person.head" not in self.distributions:
@@ -183,17 +185,20 @@ class Sampler:
                 sampled = {name: value for name, value in sampled.items() if not name.startswith(prefixes)}
         return sampled | {f"pose.{name}": weight for name, weight in self._target_weights(k, sampled).items()}
 
-    def _sample(self, k: int, parameter: str, distribution: Distribution) -> float | str:
+    def _sample(self, image: int, parameter: str, distribution: Distribution) -> float | str:
         is_constant = isinstance(distribution, Constant)
-        value = distribution.quantile(0.5 if is_constant else self._probability(k, parameter))
+        value = distribution.quantile(0.5 if is_constant else self._probability(image, parameter))
         return value if isinstance(value, str) else round_significant(value)
 
-    def _probability(self, k: int, parameter: str) -> float:
-        """Return the random cumulative probability in (0, 1) at which image k samples a parameter."""
+    def _probability(self, image: int, parameter: str) -> float:
+        """Return the random cumulative probability in (0, 1) at which a parameter is sampled.
+
+        image : number of the image
+        """
         weights = self.cholesky_rows.get(parameter)
         if weights is None:
-            return self._uniform(k, parameter)
-        return float(ndtr(sum(weight * self._normal(k, other) for other, weight in weights.items())))
+            return self._uniform(image, parameter)
+        return float(ndtr(sum(weight * self._normal(image, other) for other, weight in weights.items())))
 
     def _uniform(self, image: int, parameter: str) -> float:
         number = image // self.images_per_person if parameter.startswith(_PERSON_PREFIX) else image
@@ -202,27 +207,32 @@ class Sampler:
     def _normal(self, image: int, parameter: str) -> float:
         return float(ndtri(self._uniform(image, parameter)))
 
-    def _target_weights(self, k: int, sampled: Parameters) -> dict[str, float]:
-        """Return the weights of all morph targets that the spec can move, for image k.
+    def _target_weights(self, image: int, sampled_parameters: Parameters) -> dict[str, float]:
+        """Return the weights, in an image, of all morph targets that the spec can move.
 
-        sampled : parameters of the image that have been sampled so far
+        image : number of the image
+        sampled_parameters : parameters of the image that have been sampled so far
         """
-        name = str(sampled["expression.name"])
+        name = str(sampled_parameters["expression.name"])
         if name == RANDOM_EXPRESSION:
-            weights: Weights = random_expression(lambda part: self._uniform(k, f"expression.mixture.{part}"))
+            weights: Weights = random_expression(
+                lambda part: self._uniform(image, f"expression.mixture.{part}")
+            )
         else:
             weights = self.expressions[name]
-        intensity, asymmetry, variation = (float(sampled[f"expression.{key}"]) for key in _VARIATION_KEYS)
+        intensity, asymmetry, variation = (
+            float(sampled_parameters[f"expression.{key}"]) for key in _VARIATION_KEYS
+        )
         varied = expression_weights(
             weights,
             intensity,
             asymmetry,
             variation,
-            lambda name: self._normal(k, f"expression.variation.{name}"),
+            lambda name: self._normal(image, f"expression.variation.{name}"),
         )
         target_weights: dict[str, float | str] = {**varied}
         for target, distribution in table_values(self.distributions, "pose").items():
-            weight = self._sample(k, f"pose.{target}", distribution)
+            weight = self._sample(image, f"pose.{target}", distribution)
             target_weights |= dict.fromkeys(expand_targets([target]), weight)
         return {target: round_significant(float(target_weights.get(target, 0.0))) for target in self.targets}
 

@@ -1,4 +1,4 @@
-"""Scene of an image, built from its sampled parameters."""
+"""Scenes of a data set's images, built from the sampled parameters of each image."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class SceneBuilder:
         self._people: OrderedDict[frozenset[tuple[str, float | str]], _Person] = OrderedDict()
 
     def build(self, parameters: Parameters) -> tuple[Scene, Settings]:
-        """Return the scene and render settings of an image, which depend on its parameters only.
+        """Return the scene and render settings of an image, which depend only on the image's parameters.
 
         parameters : sampled parameters of the image, from `Spec.parameters`
 
@@ -121,7 +121,7 @@ class SceneBuilder:
         return str(file) if is_file(file) else str(name)
 
     def _pose_weights(self, parameters: Parameters, head: Head) -> dict[str, float]:
-        """Return the sampled weights of morph targets that the head has or that the spec's [pose] names."""
+        """Return the sampled weights of morph targets that the head has or that the [pose] table names."""
         posed = self.spec.pose_targets
         return {
             name: weight
@@ -138,7 +138,7 @@ class SceneBuilder:
 
 
 def sampled_person(parameters: Parameters) -> Human:
-    """Return the random person of the sampled seed, with sampled fields in place of random ones."""
+    """Return the random person of the sampled seed, whose fields are replaced by sampled parameters."""
     fields: dict[str, object] = {}
     appearance: dict[str, dict[str, object]] = {}
     for name, value in table_values(parameters, "person").items():
@@ -152,15 +152,18 @@ def sampled_person(parameters: Parameters) -> Human:
 
 @cache
 def _subdivision_levels(size: tuple[int, int]) -> int:
-    """Return the number of subdivisions that suits a picture size [pixel].
+    """Return the number of times that heads are subdivided for a picture size [pixel].
 
-    It is equal for all sampled people, so that their heads share one topology.
+    The number is equal for all sampled people, so that all their heads have the same topology.
     """
     return max(MIN_HUMAN_LEVELS, SmoothIn(size=size)(Human().head(subdivide=0)))
 
 
 def _hair_fraction(size: tuple[int, int]) -> float:
-    """Return the fraction of all hairs to generate: those that a picture of this size [pixel] can resolve."""
+    """Return the fraction of the hairs to generate, which is smaller for small pictures.
+
+    size : width and height of the picture [pixel]
+    """
     return min(1.0, max(_MIN_HAIR_FRACTION, max(size) / _FULL_HAIR_SIDE))
 
 

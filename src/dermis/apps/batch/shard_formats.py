@@ -1,4 +1,4 @@
-"""File formats of shards: tar files, and folders, each of which ends with a manifest."""
+"""File formats of shards: tar files and folders, into which a manifest is written last."""
 
 from __future__ import annotations
 
@@ -30,6 +30,7 @@ class ShardManifest:
     """Manifest that is written last into a shard, and so proves that the shard is complete.
 
     spec : SHA-256 of the spec
+    index : number of the shard
     first, stop : first image number, and the number after the last image
     left_out : numbers of the images that could not be rendered, with the reasons
     sha256 : SHA-256 of all bytes before the manifest
@@ -45,7 +46,7 @@ class ShardManifest:
     made_with: dict[str, str] = field(default_factory=dict)
 
     def to_bytes(self) -> bytes:
-        """Return the manifest as JSON, with a hash of its other entries at the end."""
+        """Return the manifest as JSON, with a hash of all other entries at the end."""
         values = asdict(self)
         check = hashlib.sha256(json.dumps(values).encode()).hexdigest()
         return (json.dumps({**values, "check": check}, indent=1) + "\n").encode()
@@ -56,7 +57,7 @@ def parse_manifest(data: bytes, culprit: object) -> ShardManifest:
 
     culprit : name of the shard in error messages
 
-    Raises DermisError if the bytes are not a manifest, or differ from the hash in it.
+    Raises DermisError if the bytes are not a manifest, or do not match the hash in the manifest.
     """
     values = parse_json(data, culprit, _MANIFEST_DESCRIPTION)
     with parsing(culprit, _MANIFEST_DESCRIPTION, KeyError, TypeError, AttributeError):
@@ -127,7 +128,7 @@ class TarMember(NamedTuple):
 def tar_members(file: BinaryIO) -> Iterator[TarMember]:
     """Yield the entries of a tar archive, without reading their content.
 
-    Raises ValueError if it is damaged or truncated, or contains anything but regular files.
+    Raises ValueError if the archive is damaged or truncated, or contains anything but regular files.
     """
     length, offset = file.seek(0, os.SEEK_END), 0
     while True:
@@ -143,9 +144,9 @@ def tar_members(file: BinaryIO) -> Iterator[TarMember]:
 
 
 def read_tar_manifest(file: BinaryIO) -> tuple[int, bytes]:
-    """Return the offset and the bytes of the manifest, which is searched from the end of a tar file.
+    """Return the offset and the bytes of the manifest at the end of a tar file.
 
-    Raises ValueError if there is no manifest, or if other bytes follow it.
+    Raises ValueError if there is no manifest, or if other bytes follow the manifest.
     """
     length = file.seek(0, os.SEEK_END)
     start = max(0, length - MAX_MANIFEST_BYTES - 3 * _TAR_BLOCK_BYTES)
@@ -162,7 +163,10 @@ def read_tar_manifest(file: BinaryIO) -> tuple[int, bytes]:
 
 
 def tar_sha256(file: BinaryIO, stop: int) -> str:
-    """Return the SHA-256 of a tar file up to an offset, where its manifest starts."""
+    """Return the SHA-256 of the first bytes of a tar file.
+
+    stop : offset at which the manifest starts [bytes]
+    """
     digest = hashlib.sha256()
     file.seek(0)
     while stop > 0 and (piece := file.read(min(_CHUNK_BYTES, stop))):
@@ -199,14 +203,14 @@ class FolderWriter:
         """Write a file into the folder; raises OSError if the disk is full."""
         with (self._path / name).open("xb") as file:
             file.write(data)
-        self._hash.update(_hash_input(name, data))
+        self._hash.update(_file_hash_input(name, data))
 
     def sha256(self) -> str:
         """Return the SHA-256 of all names and contents written so far."""
         return self._hash.hexdigest()
 
     def finish(self, manifest: bytes) -> None:
-        """Write the manifest; its hash reveals files that are lost in a power failure."""
+        """Write the manifest; the hash in the manifest reveals files that are lost in a power failure."""
         self.add(MANIFEST_NAME, manifest)
         flush_to_disk(self._path / MANIFEST_NAME)
         flush_to_disk(self._path)
@@ -222,10 +226,10 @@ def folder_sha256(path: Path, names: Iterable[str]) -> str:
     """
     digest = hashlib.sha256()
     for name in names:
-        digest.update(_hash_input(name, read_file(path / name, "a file of a shard", MAX_FILE_BYTES)))
+        digest.update(_file_hash_input(name, read_file(path / name, "a file of a shard", MAX_FILE_BYTES)))
     return digest.hexdigest()
 
 
-def _hash_input(name: str, data: bytes) -> bytes:
+def _file_hash_input(name: str, data: bytes) -> bytes:
     """Return the bytes with which a file contributes to the SHA-256 of its folder."""
     return f"{name} {len(data)}\n".encode() + data

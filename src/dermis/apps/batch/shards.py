@@ -1,4 +1,4 @@
-"""Shards: the files or folders of consecutive images of a data set; and parts, in which they are rendered."""
+"""Shards and parts of a data set: a shard is a file or folder of images, and is rendered in parts."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ _MIN_PART_IMAGES, _MAX_PART_IMAGES = 16, 32
 
 @dataclass(frozen=True, order=True, slots=True)
 class Shard:
-    """Number of a shard, and its range of image numbers, from `first` up to but excluding `stop`."""
+    """Number of a shard, and the shard's range of image numbers, from `first` up to but excluding `stop`."""
 
     index: int
     first: int
     stop: int
 
     def __str__(self) -> str:
-        """Return the name of the shard in messages."""
+        """Return the name by which messages refer to the shard."""
         return f"shard {self.index}"
 
     def __len__(self) -> int:
@@ -43,7 +43,7 @@ class Shard:
 
 
 class Part(Shard):
-    """Part of a shard, the unit of work: the number of its shard, and its own range of image numbers."""
+    """Part of a shard, the unit of work: number of the shard, and range of image numbers of the part."""
 
     __slots__ = ()
 
@@ -53,7 +53,7 @@ class Part(Shard):
 
 
 def list_shards(spec: Spec) -> list[Shard]:
-    """Return all shards of a data set in order; the last one may have fewer images."""
+    """Return all shards of a data set in order; the last shard may have fewer images."""
     return [shard_at(index, spec) for index in range(-(-spec.count // spec.shard_size))]
 
 
@@ -64,10 +64,11 @@ def shard_at(index: int, spec: Spec) -> Shard:
 
 
 def list_parts(shard: Shard, spec: Spec) -> list[Part]:
-    """Return the parts of a shard in order: 16 images each, or up to 31 to keep people whole.
+    """Return the parts of a shard in order: 16 images each, or up to 32 so that parts contain whole people.
 
-    They begin at multiples of their size in the data set, at which people begin too. People with more than 32
-    images are split between parts; the first and the last part of a shard may be smaller.
+    The number of a part's first image is a multiple of the part size, except for the first part of a shard.
+    The first and the last part of a shard may be smaller. People with more than 32 images are split between
+    parts.
     """
     group = spec.images_per_person
     size = -(-_MIN_PART_IMAGES // group) * group if group <= _MAX_PART_IMAGES else _MIN_PART_IMAGES
@@ -88,16 +89,16 @@ def shard_index(path: Path) -> int | None:
 
 
 def image_key(number: int) -> str:
-    """Return the image number as 9 digits; the names of all files of the image begin with it."""
+    """Return the image number as 9 digits; the names of all files of the image begin with these digits."""
     return f"{number:09d}"
 
 
 class ShardWriter:
     """Context manager that writes a shard or a part, which is renamed to its final path on a normal exit.
 
-    adapter : name of the adapter that renders the images, for the manifest; none if all images are copied
+    adapter : name of the adapter that renders the images, for the manifest; "" if all images are copied
 
-    Raises DermisError if the shard cannot be written; nothing of it is then left on the disk.
+    Raises DermisError if the shard cannot be written; the temporary file is then removed.
     """
 
     def __init__(self, out: Path, shard: Shard, spec: Spec, adapter: str = "") -> None:
@@ -118,7 +119,10 @@ class ShardWriter:
         return self
 
     def add(self, number: int, entries: Mapping[str, bytes]) -> None:
-        """Write the files of an image, given by suffix; images must come in the order of their numbers."""
+        """Write the files of an image; images must come in the order of their numbers.
+
+        entries : content of each file, by suffix
+        """
         if not self._next_number <= number < self._shard.stop:
             raise ValueError(f"image {number} was added after {self._next_number - 1}, in {self._shard}")
         self._next_number, self._written = number + 1, self._written + 1
@@ -140,7 +144,7 @@ class ShardWriter:
             self._made_with = {**self._made_with, name: _VALUE_SEPARATOR.join(merged)}
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        """Write the manifest and rename the shard to its final path, or remove it after an error."""
+        """Write the manifest and rename the shard to its final path; after an error, remove the shard."""
         try:
             if kind is None:
                 self._files.finish(self._manifest_bytes())
@@ -181,8 +185,8 @@ def read_manifest(path: Path) -> ShardManifest:
 def shard_exists(out: Path, shard: Shard, spec: Spec) -> bool:
     """Return whether a complete shard or part exists at its final path.
 
-    A shard that has fewer images, from before the data set grew, is not complete. Raises DermisError for a
-    shard of another data set.
+    A shard that was written before the data set grew, and has fewer images, is not complete. Raises
+    DermisError for a shard of another data set.
     """
     path = shard_path(out, shard, spec)
     try:
@@ -197,7 +201,7 @@ def shard_exists(out: Path, shard: Shard, spec: Spec) -> bool:
 
 
 def is_intact(out: Path, shard: Shard, spec: Spec) -> bool:
-    """Return whether a shard or part exists and matches its SHA-256, by reading all of it.
+    """Read a shard or part completely, and return whether it exists and matches its SHA-256.
 
     Raises DermisError for a shard of another data set.
     """
@@ -210,19 +214,20 @@ def is_intact(out: Path, shard: Shard, spec: Spec) -> bool:
 
 
 def part_files(out: Path) -> dict[int, Path]:
-    """Return the files or folders of the complete parts in a data set, by the number of their first image."""
+    """Return the file or folder of each complete part in a data set, by the part's first image number."""
     found = {path: _PART_NAME.fullmatch(path.name) for path in out.iterdir()}
     return {int(match[1]): path for path, match in found.items() if match}
 
 
-def remove_unfinished(out: Path, own_names: Collection[str] | None = None) -> None:
+def remove_unfinished(out: Path, removable_names: Collection[str] | None = None) -> None:
     """Remove the temporary files that interrupted runs have left in a data set.
 
-    own_names : names of the shards and parts that no other run is writing; None if there is no other run
+    removable_names : names of shards and parts that no other run is writing; temporary files of other shards
+        and parts are kept. None if there is no other run
     """
     for path, name in unfinished_files(out).items():
         is_images = _SHARD_NAME.fullmatch(name) or _PART_NAME.fullmatch(name)
-        if own_names is None or name in own_names or not is_images:
+        if removable_names is None or name in removable_names or not is_images:
             remove_path(path)
 
 

@@ -114,7 +114,7 @@ class Spec(FrozenModel):
     _digest: str = PrivateAttr("")
 
     def model_post_init(self, context: object) -> None:
-        """Check the distributions across tables and create the sampler."""
+        """Check that the distributions of all tables are consistent, and create the sampler."""
         distributions = _table_distributions("", self)
         expressions = {**EXPRESSIONS, **self.expressions}
         with error_context("outputs"):
@@ -137,19 +137,20 @@ class Spec(FrozenModel):
 
     @property
     def landmark_tables(self) -> Mapping[str, str]:
-        """Return each landmark set by name: the name of a preset set, or the path of a landmark table."""
+        """Return the source of each landmark set by name: a preset set's name, or a landmark table's path."""
         return {name: name if name in LANDMARK_SETS else str(self.folder / name) for name in self.landmarks}
 
     @property
     def pose_targets(self) -> frozenset[str]:
-        """Return the morph targets that [pose] names, singly or as a left and right pair."""
+        """Return the morph targets that the [pose] table names, directly or as a pair of left and right."""
         return frozenset(expand_targets(self.pose))
 
     def parameters(self, k: int) -> Parameters:
         """Return the sampled parameters of image k by name: texts, and numbers with six significant digits.
 
-        They are equal on every machine and in any order, and changing or adding a distribution changes no
-        other parameter. Parameters that an image does not use, such as those of unused lamps, are omitted.
+        The parameters are equal on every machine and in any order of images. Changing or adding a
+        distribution changes no other parameter. Parameters that an image does not use, such as those of
+        unused lamps, are omitted.
 
         Raises DermisError if k is not the number of an image.
         """
@@ -164,7 +165,7 @@ class Spec(FrozenModel):
         return "\n".join([_TOML_HEADER, *_toml_lines("", values)])
 
     def digest(self) -> str:
-        """Return the SHA-256 of the canonical TOML without `count`, which identifies the data set."""
+        """Return the SHA-256 of the canonical TOML without `count`; this hash identifies the data set."""
         if not self._digest:
             text = COUNT_LINE.sub("", self.to_toml(), count=1)
             digest = hashlib.sha256(text.encode()).hexdigest()
@@ -172,26 +173,26 @@ class Spec(FrozenModel):
         return self._digest
 
 
-def _table_distributions(name: str, value: object) -> dict[str, Distribution]:
-    """Return the distributions in a TOML table and its subtables, by dotted name.
+def _table_distributions(table_name: str, value: object) -> dict[str, Distribution]:
+    """Return the distributions in a TOML table and in the table's subtables, by dotted name.
 
-    name : name of the table
+    table_name : name of the table
     """
     if isinstance(value, Distribution):
-        return {name: value}
+        return {table_name: value}
     parts = plain_values(value) if isinstance(value, FrozenModel) else value
     if not isinstance(parts, Mapping):
         return {}
     found: dict[str, Distribution] = {}
     for key, part in parts.items():
-        found |= _table_distributions(f"{name}.{key}" if name else key, part)
+        found |= _table_distributions(f"{table_name}.{key}" if table_name else key, part)
     return found
 
 
 def load_spec(path: str | Path, **values: object) -> Spec:
-    """Return the spec in a TOML file; paths in it are relative to its folder.
+    """Return the spec in a TOML file; paths in the file are relative to the folder of the file.
 
-    values : `count`, `seed`, `size` or `format` that replace those of the file
+    values : `count`, `seed`, `size` or `format`, in place of the values in the file
 
     Raises DermisError with table and key for values that cannot be rendered, and for missing files.
     """
@@ -242,25 +243,27 @@ def _parse_render(size: object, table: object) -> Settings:
     return _build_model(Settings, "render", {**RENDER_DEFAULTS, **table, "size": size})
 
 
-def _build_model(kind: type[P], title: str, table: object) -> P:
+def _build_model(model_class: type[P], table_name: str, table: object) -> P:
     """Return the model of a spec table, including its subtables.
 
-    kind : pydantic class of the table
-    title : name of the table in error messages
+    model_class : pydantic class of the table
+    table_name : name of the table in error messages
     """
-    if isinstance(table, kind):
+    if isinstance(table, model_class):
         return table
     if not isinstance(table, Mapping):
-        expected = f"a table with {', '.join(kind.model_fields)}"
-        refuse(title, expected, f"got {format_value(table)}", "Correct it")
+        expected = f"a table with {', '.join(model_class.model_fields)}"
+        refuse(table_name, expected, f"got {format_value(table)}", "Correct it")
     values = dict(table)
-    for name, info in kind.model_fields.items():
+    for name, info in model_class.model_fields.items():
         if name in values and isinstance(info.annotation, type) and issubclass(info.annotation, FrozenModel):
-            values[name] = _build_model(info.annotation, f"{title}.{name}" if title else name, values[name])
+            values[name] = _build_model(
+                info.annotation, f"{table_name}.{name}" if table_name else name, values[name]
+            )
     try:
-        return kind(**values)
+        return model_class(**values)
     except InvalidFieldsError as error:
-        raise InvalidFieldsError(title or "spec", error.messages) from None
+        raise InvalidFieldsError(table_name or "spec", error.messages) from None
 
 
 def plain_values(table: FrozenModel) -> dict[str, object]:
@@ -269,14 +272,14 @@ def plain_values(table: FrozenModel) -> dict[str, object]:
     return {name: value for name, value in values.items() if value is not None}
 
 
-def _toml_lines(title: str, values: Mapping[str, object]) -> list[str]:
+def _toml_lines(table_name: str, values: Mapping[str, object]) -> list[str]:
     """Return a table and its subtables as lines of TOML.
 
-    title : dotted name of the table
+    table_name : dotted name of the table
     """
     own_values, sub_lines = dict[str, object](), list[str]()
     for name, value in values.items():
-        path = f"{title}.{key_text(name)}" if title else key_text(name)
+        path = f"{table_name}.{key_text(name)}" if table_name else key_text(name)
         if isinstance(value, FrozenModel | Mapping):
             sub_lines += _toml_lines(path, plain_values(value) if isinstance(value, FrozenModel) else value)
         elif isinstance(value, tuple) and value and isinstance(value[0], FrozenModel):
@@ -285,24 +288,24 @@ def _toml_lines(title: str, values: Mapping[str, object]) -> list[str]:
             own_values[name] = value.spec_value() if isinstance(value, Distribution) else value
     if sub_lines and not own_values:
         return sub_lines
-    return [table_text(f"[{title}]" if title else "", own_values), *sub_lines]
+    return [table_text(f"[{table_name}]" if table_name else "", own_values), *sub_lines]
 
 
-def _expand_patterns(value: object, folder: Path, key: str) -> object:
-    """Return a spec value with each {files = PATTERN} in it replaced by a `FileChoice` of sorted files.
+def _expand_patterns(spec_value: object, folder: Path, dotted_name: str) -> object:
+    """Return a spec value in which a `FileChoice` of sorted files replaces each {files = PATTERN}.
 
-    key : dotted name of the value in error messages
+    dotted_name : dotted name of the value in error messages
 
     Raises DermisError for a pattern that matches no file.
     """
-    if not isinstance(value, Mapping):
-        return value
-    if value.keys() == {"files"} and isinstance(value["files"], str):
-        return _match_files(value["files"], folder, key)
-    return {name: _expand_patterns(one, folder, f"{key}.{name}") for name, one in value.items()}
+    if not isinstance(spec_value, Mapping):
+        return spec_value
+    if spec_value.keys() == {"files"} and isinstance(spec_value["files"], str):
+        return _match_files(spec_value["files"], folder, dotted_name)
+    return {name: _expand_patterns(one, folder, f"{dotted_name}.{name}") for name, one in spec_value.items()}
 
 
-def _match_files(pattern: str, folder: Path, key: str) -> FileChoice:
+def _match_files(pattern: str, folder: Path, dotted_name: str) -> FileChoice:
     names = []
     try:
         for path in folder.glob(pattern):
@@ -312,17 +315,24 @@ def _match_files(pattern: str, folder: Path, key: str) -> FileChoice:
                 break
     except (ValueError, NotImplementedError, OSError, RecursionError) as fault:
         actual = f"got {pattern!r} ({fault or type(fault).__name__})"
-        refuse(key, "a pattern of files below the spec's folder, such as heads/*.json", actual, "Correct it")
+        refuse(
+            dotted_name,
+            "a pattern of files below the spec's folder, such as heads/*.json",
+            actual,
+            "Correct it",
+        )
     if not 0 < len(names) <= _MAX_MATCHING_FILES:
         actual = f"more than {_MAX_MATCHING_FILES:,} match" if names else "none matches"
-        refuse(key, f"files that match {pattern!r} in the spec's folder", actual, "Correct the pattern")
+        refuse(
+            dotted_name, f"files that match {pattern!r} in the spec's folder", actual, "Correct the pattern"
+        )
     return FileChoice(pattern, tuple(sorted(names)))
 
 
-def _file_hashes(names: Iterable[str], folder: Path) -> dict[str, str]:
+def _file_hashes(file_names: Iterable[str], folder: Path) -> dict[str, str]:
     """Return the SHA-256 of each name that is a file in the spec's folder, sorted by name."""
     found = {}
-    for name in sorted(set(names)):
+    for name in sorted(set(file_names)):
         if is_file(folder / name):
             data = read_file(folder / name, "a file that the spec names", _MAX_HASHED_BYTES)
             found[name] = hashlib.sha256(data).hexdigest()
@@ -330,10 +340,10 @@ def _file_hashes(names: Iterable[str], folder: Path) -> dict[str, str]:
 
 
 def _check_hashes(expected: Mapping[str, str], actual: Mapping[str, str]) -> None:
-    """Refuse files that have changed since the spec was written.
+    """Raise DermisError if files have changed since the spec was written.
 
     expected : SHA-256 by file name, as stored in the spec
-    actual : SHA-256 by file name now
+    actual : SHA-256 of the present files, by file name
     """
     for name in sorted(expected.keys() | actual.keys()):
         if expected.get(name) != actual.get(name):

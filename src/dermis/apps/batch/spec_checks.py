@@ -1,4 +1,4 @@
-"""Checks of a spec across its tables, and of names and values against the models that they refer to."""
+"""Checks of a spec: consistency between tables, and whether names exist and models accept the values."""
 
 from __future__ import annotations
 
@@ -35,28 +35,28 @@ _MAX_NAME_LENGTH = 100  # characters
 
 
 def check_spec(
-    sampled: Mapping[str, Distribution],
+    distributions: Mapping[str, Distribution],
     expressions: Mapping[str, Weights],
     groups: Sequence[CorrelationGroup],
     folder: Path,
 ) -> None:
-    """Refuse distributions whose samples cannot be rendered; errors state table and key.
+    """Raise DermisError for distributions whose samples cannot be rendered; the message states table and key.
 
-    sampled : distribution of each parameter by its dotted name
+    distributions : distribution of each parameter by its dotted name
     expressions : weights of morph targets by name of the expression
     groups : groups of correlated parameters
     folder : folder to which file names in the spec are relative
     """
-    _check_looks(sampled)
-    _check_person(sampled)
-    _check_expression(sampled["expression.name"], expressions)
-    _check_correlations(groups, sampled)
-    _check_light(sampled)
-    _check_names(sampled, folder)
+    _check_looks(distributions)
+    _check_person(distributions)
+    _check_expression(distributions["expression.name"], expressions)
+    _check_correlations(groups, distributions)
+    _check_light(distributions)
+    _check_names(distributions, folder)
 
 
 def check_landmarks(names: Sequence[str], folder: Path) -> None:
-    """Refuse names that are neither a preset landmark set nor a readable landmark table."""
+    """Raise DermisError for names that are neither a preset landmark set nor a readable landmark table."""
     for name in names:
         if name in LANDMARK_SETS:
             continue
@@ -68,16 +68,16 @@ def check_landmarks(names: Sequence[str], folder: Path) -> None:
         read_landmark_table(str(folder / name))
 
 
-def _check_person(sampled: Mapping[str, Distribution]) -> None:
-    person_keys = [name for name in sampled if name.startswith("person.") and name != _HEAD_PARAMETER]
-    if _HEAD_PARAMETER in sampled and person_keys:
+def _check_person(distributions: Mapping[str, Distribution]) -> None:
+    person_keys = [name for name in distributions if name.startswith("person.") and name != _HEAD_PARAMETER]
+    if _HEAD_PARAMETER in distributions and person_keys:
         refuse(
             person_keys[0], "sampled people", f"{_HEAD_PARAMETER} names heads", "Remove one of the two keys"
         )
-    if _ITA_PARAMETER in sampled and _MELANIN_PARAMETER in sampled:
+    if _ITA_PARAMETER in distributions and _MELANIN_PARAMETER in distributions:
         advice = "Remove one of the two keys"
         refuse("person: ita", "an ITA or the melanin of the skin", "the spec has both", advice)
-    ancestries = [sampled[name] for name in _ANCESTRY_PARAMETERS if name in sampled]
+    ancestries = [distributions[name] for name in _ANCESTRY_PARAMETERS if name in distributions]
     if ancestries and not any(min(one.support) > 0 for one in ancestries):  # type: ignore[operator]
         actual = "all of them can be 0 at once"
         advice = "Raise the lower limit of one"
@@ -92,12 +92,14 @@ def _check_expression(names: Distribution, expressions: Mapping[str, Weights]) -
             refuse("expression: name", f"one of {', '.join(known)}", f"got {value!r}", advice)
 
 
-def _check_correlations(groups: Sequence[CorrelationGroup], sampled: Mapping[str, Distribution]) -> None:
+def _check_correlations(
+    groups: Sequence[CorrelationGroup], distributions: Mapping[str, Distribution]
+) -> None:
     seen: set[str] = set()
     for group in groups:
         people = [name.startswith("person.") for name in group.of]
         for name in group.of:
-            if name not in sampled:
+            if name not in distributions:
                 expected = "names of parameters that the spec samples, such as camera.yaw_deg"
                 refuse("correlated: of", expected, f"got {name!r}", "Correct it")
             if name in seen:
@@ -108,16 +110,22 @@ def _check_correlations(groups: Sequence[CorrelationGroup], sampled: Mapping[str
         seen |= set(group.of)
 
 
-def _check_light(sampled: Mapping[str, Distribution]) -> None:
-    lamps = NO_LIGHTS not in sampled["light.kind"].support and 0.0 not in sampled["light.strength"].support
-    name, strength = sampled["environment.name"].support, sampled["environment.strength"].support
+def _check_light(distributions: Mapping[str, Distribution]) -> None:
+    lamps = (
+        NO_LIGHTS not in distributions["light.kind"].support
+        and 0.0 not in distributions["light.strength"].support
+    )
+    name, strength = distributions["environment.name"].support, distributions["environment.strength"].support
     if not lamps and (NO_ENVIRONMENT in name or 0.0 in strength):
         actual = "an image can have neither lamps nor an environment"
         refuse("light", "light in each image", actual, 'Exclude "none" and 0 from lights or environment')
 
 
-def _check_names(sampled: Mapping[str, Distribution], folder: Path) -> None:
-    """Refuse heads and environments that are neither part of the package nor files in the folder."""
+def _check_names(distributions: Mapping[str, Distribution], folder: Path) -> None:
+    """Raise DermisError for heads and environments that are neither part of the package nor in the folder.
+
+    folder : folder to which file names in the spec are relative
+    """
     heads = [HUMAN, *(name for name, sample in SAMPLES.items() if sample.kind == "head")]
     maps = [
         NO_ENVIRONMENT,
@@ -125,22 +133,22 @@ def _check_names(sampled: Mapping[str, Distribution], folder: Path) -> None:
         *(name for name, sample in SAMPLES.items() if sample.kind == "environment"),
     ]
     for parameter, known in ((_HEAD_PARAMETER, heads), ("environment.name", maps)):
-        for name in map(str, sampled[parameter].support if parameter in sampled else ()):
+        for name in map(str, distributions[parameter].support if parameter in distributions else ()):
             is_person = parameter == _HEAD_PARAMETER and name.startswith(f"{HUMAN}:")
             if name not in known and not is_person and not is_file(folder / name):
                 expected = f"a file in the spec's folder, or one of {', '.join(known)}"
                 refuse(parameter.replace(".", ": "), expected, f"{name!r} is neither", "Check the name")
 
 
-def _check_looks(sampled: Mapping[str, Distribution]) -> None:
-    """Refuse parameters of people, skins and morph targets with unknown names or invalid values."""
+def _check_looks(distributions: Mapping[str, Distribution]) -> None:
+    """Raise DermisError for unknown names or invalid values of people, skins and morph targets."""
     for part, kind in _LOOK_MODELS.items():
         known = [one.name for one in fields(kind) if one.name not in (_SEED_FIELD, SITES_FIELD)]
-        _check_table(f"person.{part}", sampled, known, kind)
-    _check_table("person.targets", sampled, human_targets(), lambda **values: Human(targets=values))
+        _check_table(f"person.{part}", distributions, known, kind)
+    _check_table("person.targets", distributions, human_targets(), lambda **values: Human(targets=values))
     known = [name for name in Skin.model_fields if name not in _UNSAMPLED_SKIN_FIELDS]
-    _check_table("skin", sampled, known, Skin)
-    for name, distribution in table_values(sampled, "pose").items():
+    _check_table("skin", distributions, known, Skin)
+    for name, distribution in table_values(distributions, "pose").items():
         if any(isinstance(bound, str) or abs(bound) > MAX_WEIGHT for bound in distribution.support):
             expected = f"numbers from {-MAX_WEIGHT:g} to {MAX_WEIGHT:g}"
             refuse(f"pose: {name}", expected, f"got {distribution.spec_value()}", "Correct it")
@@ -148,21 +156,23 @@ def _check_looks(sampled: Mapping[str, Distribution]) -> None:
 
 def _check_table(
     table: str,
-    sampled: Mapping[str, Distribution],
-    known: Sequence[str],
-    make: Callable[..., object],
+    distributions: Mapping[str, Distribution],
+    allowed_keys: Sequence[str],
+    make_model: Callable[..., object],
 ) -> None:
-    """Refuse unknown keys of a spec table, and distributions whose limits a model rejects.
+    """Raise DermisError for unknown keys of a spec table, and for distributions whose limits a model rejects.
 
-    known : allowed keys of the table
-    make : class or function that makes the model, called with each limit of a distribution
+    allowed_keys : allowed keys of the table
+    make_model : class or function that makes the model; called with each limit of a distribution
     """
-    for name, distribution in table_values(sampled, table).items():
-        if name not in known:
-            listed = ", ".join(known) if len(known) < 40 else "those of dermis head --list-targets"
+    for name, distribution in table_values(distributions, table).items():
+        if name not in allowed_keys:
+            listed = (
+                ", ".join(allowed_keys) if len(allowed_keys) < 40 else "those of dermis head --list-targets"
+            )
             refuse(f"{table}: {name}", f"one of {listed}", "this name is unknown", "Correct it")
         for bound in distribution.support:
             try:
-                make(**{name: bound})
+                make_model(**{name: bound})
             except DermisError as error:
                 raise DermisError(f"{table}: {error}") from None

@@ -29,8 +29,8 @@ class DistributionField:
     def check(self, value: object) -> Distribution | None:
         """Return the distribution that a value describes; None for an omitted field.
 
-        Raises ValueError with a text of what was expected for other values and for distributions out of
-        bounds.
+        Raises ValueError for a value that is not a distribution, and for a distribution out of bounds; the
+        message states what was expected.
         """
         if value is None:
             return None
@@ -70,14 +70,17 @@ class NumberField(DistributionField):
 
 
 class NameField(DistributionField):
-    """Annotation of a field that samples names: those of a list, or without one any names or files."""
+    """Annotation of a field whose samples are names from a list, or any names or files if there is no list.
 
-    def __init__(self, known: Callable[[], Iterable[str]] | None = None) -> None:
-        self.known = known
+    allowed_names : function that returns the list; None if there is no list
+    """
+
+    def __init__(self, allowed_names: Callable[[], Iterable[str]] | None = None) -> None:
+        self.allowed_names = allowed_names
 
     def check_support(self, distribution: Distribution) -> None:
-        """Raise ValueError if the distribution can give numbers or unknown names."""
-        names = list(self.known()) if self.known else []
+        """Raise ValueError if the distribution can give numbers, or names that are not in the list."""
+        names = list(self.allowed_names()) if self.allowed_names else []
         for value in distribution.support:
             if not isinstance(value, str) or (names and value not in names):
                 raise ValueError(f"one of {', '.join(names)}" if names else "a name, or a choice of names")
@@ -92,9 +95,9 @@ _Coefficient = Annotated[float, Field(ge=-1, le=1)]
 class CorrelationGroup(FrozenModel):
     """Correlated parameters: a Gaussian copula, which preserves the distribution of each parameter.
 
-    Each parameter gets a standard normal number; these numbers are correlated. The sample is the parameter's
-    quantile at the cumulative probability of its number, so a larger number gives a larger sample, or a later
-    alternative of a choice.
+    For each parameter, a standard normal number is drawn; the numbers of different parameters are correlated.
+    The parameter's sample is the quantile at the cumulative probability of this number. A larger number
+    therefore gives a larger sample, or a later alternative of a choice.
     """
 
     of: tuple[str, ...]
@@ -129,8 +132,9 @@ class CorrelationGroup(FrozenModel):
     def cholesky_rows(self) -> dict[str, dict[str, float]]:
         """Return the row of the correlation matrix's Cholesky factor for each parameter.
 
-        A row holds weights by parameter name. The weighted sum of the independent normal numbers of these
-        parameters is the correlated normal number of the row's parameter.
+        A row is a dictionary of weights by parameter name. Each parameter has an independent normal number;
+        the sum of these numbers with the weights of a row is the correlated normal number of the row's
+        parameter.
         """
         lower = np.linalg.cholesky(self.matrix)
         return {
@@ -143,8 +147,9 @@ T = TypeVar("T")
 
 
 def table_values(values: Mapping[str, T], table: str) -> dict[str, T]:
-    """Return the entries of a spec table by key, from entries by dotted name.
+    """Return the entries of one spec table, by key without the name of the table.
 
+    values : entries of all tables by dotted name, such as "light.key.size_mm"
     table : dotted name of the table, such as "light.key"
     """
     start = f"{table}."
@@ -203,7 +208,7 @@ class PersonTable(FrozenModel):
 
 
 class ExpressionTable(FrozenModel):
-    """Spec table of the facial expression: a named one, or random movements."""
+    """Spec table of the facial expression: a named expression, or random movements."""
 
     name: Annotated[Distribution, NameField()] = Constant("neutral")
     """Name of an expression of the package or of [expressions.NAME], or "mixture": at most one random

@@ -54,7 +54,7 @@ class Failure(NamedTuple):
 
 @dataclass(frozen=True)
 class RunOptions:
-    """Options of a run, shared by all of its workers.
+    """Options of a run, shared by all workers of the run.
 
     spec : spec of the data set
     out : folder of the data set
@@ -73,7 +73,7 @@ class WorkerSlot:
     """Adapter and thread count with which one worker renders.
 
     adapter : name or number of the adapter, as for `Renderer`
-    threads : threads of a software adapter; 0 for its default
+    threads : threads of a software adapter; 0 for the default of the adapter
     """
 
     adapter: str
@@ -86,11 +86,11 @@ class WorkerEvent:
 
     images : number of images rendered since the last event
     done : part that is complete, or shard that was verified
-    rendered : number of images of that part that were rendered, and not found on the disk
-    failed : images of that part that could not be rendered
-    missing : damaged parts that must be rendered again; all parts of a damaged shard
+    rendered : number of images of the part `done` that were rendered, and not found on the disk
+    failed : images of the part `done` that could not be rendered
+    missing : damaged parts that must be rendered again; for a damaged shard, all parts of the shard
     note : warning for the user
-    retry : reason for which the worker exits and another one must continue its tasks
+    retry : reason for which the worker exits; another worker must continue the tasks of this worker
     refusal : reason for which the run ends
     """
 
@@ -118,7 +118,7 @@ class _PlannedImage(NamedTuple):
 
 
 class Worker:
-    """Renderer of parts on one device; each image depends on the spec and its number only.
+    """Renderer of parts on one device; an image depends only on the spec and on the image's number.
 
     The device is opened when the first image is rendered.
 
@@ -137,9 +137,9 @@ class Worker:
         return renderer
 
     def process(self, tasks: Iterable[Shard], send: Callable[[WorkerEvent], None]) -> None:
-        """Render the parts among the tasks, join those of complete shards, and verify the shards.
+        """Render the parts among the tasks, join the parts of complete shards, and verify the shards.
 
-        The next task is requested while frames of the previous one are in flight. Without the option
+        The next task is requested while frames of the previous task are in flight. Without the option
         `keep_going`, a failed image raises DermisError.
 
         send : function called with each event
@@ -166,7 +166,11 @@ class Worker:
                 part_failures = tuple(sorted(one for one in failed if part.first <= one.number < part.stop))
                 for failure in part_failures:
                     writer.leave_out(*failure)
-            send(WorkerEvent(done=part, rendered=rendered, failed=part_failures, missing=self._join(part)))
+            send(
+                WorkerEvent(
+                    done=part, rendered=rendered, failed=part_failures, missing=self._join_shard(part)
+                )
+            )
 
     def close(self) -> None:
         """Kill the encoder processes."""
@@ -175,12 +179,12 @@ class Worker:
     def _image_numbers(
         self,
         tasks: Iterable[Shard],
-        planned: deque[tuple[Part, KeptImages]],
+        unwritten_parts: deque[tuple[Part, KeptImages]],
         send: Callable[[WorkerEvent], None],
     ) -> Iterator[int]:
         """Yield the numbers of the images to render; process at once the tasks that need no rendering.
 
-        planned : queue to which each part to write is appended, with the images that are copied
+        unwritten_parts : queue to which each part to write is appended, with the images to copy into the part
         """
         out, spec = self._options.out, self._options.spec
         for task in tasks:
@@ -190,30 +194,30 @@ class Worker:
                     remove_path(shard_path(out, task, spec))
                 send(WorkerEvent(done=task, missing=() if intact else tuple(list_parts(task, spec))))
             elif is_intact(out, task, spec) or shard_exists(out, shard_at(task.index, spec), spec):
-                send(WorkerEvent(done=task, missing=self._join(task)))
+                send(WorkerEvent(done=task, missing=self._join_shard(task)))
             else:
                 kept = kept_images(out, task, spec)
-                planned.append((task, kept))
+                unwritten_parts.append((task, kept))
                 yield from range(kept.stop, task.stop)
 
-    def _join(self, part: Part) -> tuple[Part, ...]:
-        """Join the parts of a part's shard if all of them exist; return the damaged parts."""
+    def _join_shard(self, part: Part) -> tuple[Part, ...]:
+        """Join all parts of the shard that contains `part`, if all exist; return the damaged parts."""
         spec = self._options.spec
         return join_parts(self._options.out, shard_at(part.index, spec), spec)
 
     def _encoder_jobs(
-        self, numbers: Iterator[int], failed: list[Failure]
+        self, numbers: Iterator[int], failures: list[Failure]
     ) -> Iterator[tuple[int, Observation, Parameters, SkinTone | None]]:
         """Yield number, observation, parameters and tone of each image that can be rendered, in order.
 
         numbers : numbers of the images to render
-        failed : list to which images that cannot be rendered are appended
+        failures : list to which images that cannot be rendered are appended
         """
         groups = deque([numbers])
         while groups:
             numbers, in_flight = groups.popleft(), deque[_PlannedImage]()
             try:
-                for observation in self._render_images(self._plan_images(numbers, in_flight, failed)):
+                for observation in self._render_images(self._plan_images(numbers, in_flight, failures)):
                     done = in_flight.popleft()
                     yield done.number, observation, done.parameters, _head_tone(done.scene.head)
             except DeviceError:
@@ -222,19 +226,19 @@ class Worker:
                 if not self._options.keep_going:
                     raise
                 if len(in_flight) == 1:
-                    failed.append(Failure(in_flight[0].number, str(fault)))
+                    failures.append(Failure(in_flight[0].number, str(fault)))
                     single = []
                 else:  # it is unknown which one failed: render them again one by one
                     single = [iter([plan.number]) for plan in in_flight]
                 groups.extendleft(reversed([*single, numbers]))
 
     def _plan_images(
-        self, numbers: Iterator[int], in_flight: deque[_PlannedImage], failed: list[Failure]
+        self, numbers: Iterator[int], in_flight: deque[_PlannedImage], failures: list[Failure]
     ) -> Iterator[_PlannedImage]:
-        """Yield the next image that can be rendered, and append it to `in_flight`.
+        """Yield each image that can be rendered, after appending the image to `in_flight`.
 
         numbers : numbers of the images still to plan
-        failed : list to which images that cannot be rendered are appended
+        failures : list to which images that cannot be rendered are appended
         """
         for number in numbers:
             parameters = self._options.spec.parameters(number)
@@ -244,7 +248,7 @@ class Worker:
             except DermisError as fault:
                 if not self._options.keep_going:
                     raise DermisError(f"image {number}: {fault}") from fault
-                failed.append(Failure(number, str(fault)))
+                failures.append(Failure(number, str(fault)))
                 continue
             in_flight.append(plan)
             yield plan
@@ -268,7 +272,7 @@ class Worker:
             )
 
     def _previous_scene(self, number: int) -> Scene | None:
-        """Return the previous image's scene, for motion vectors, if it shows the same person; else None."""
+        """Return the previous image's scene for motion vectors; None if that image shows another person."""
         spec = self._options.spec
         if "motion" not in spec.outputs or number % spec.images_per_person == 0:
             return None
@@ -279,7 +283,7 @@ class Worker:
 
 
 def run_worker(pipe: Connection, slot: WorkerSlot, options: RunOptions) -> None:
-    """Process the tasks that arrive through a pipe and send events back; this runs in a worker process."""
+    """Process the tasks that arrive through a pipe and send events back; called in a worker process."""
     if slot.threads:
         os.environ["LP_NUM_THREADS"] = str(slot.threads)  # read when the driver is loaded
     with warnings.catch_warnings():
@@ -295,7 +299,7 @@ def run_worker(pipe: Connection, slot: WorkerSlot, options: RunOptions) -> None:
 
 
 def available_tasks(pipe: Connection) -> Iterator[Shard]:
-    """Wait for a worker's next task and yield it; then yield the tasks that have arrived in the meantime."""
+    """Wait for the next task of a worker and yield the task, then all tasks that arrived meanwhile."""
     yield pipe.recv()
     while pipe.poll():
         yield pipe.recv()
@@ -305,18 +309,18 @@ def _forward_notes(forward: Callable[[str], None]) -> None:
     """Redirect the package's warnings to a function; other warnings are shown as usual."""
     default = warnings.showwarning
 
-    def show(message: Warning | str, category: type[Warning], *more: Any, **named: Any) -> None:
+    def forward_or_show(message: Warning | str, category: type[Warning], *more: Any, **named: Any) -> None:
         if issubclass(category, DermisWarning):
             forward(str(message))
         else:
             default(message, category, *more, **named)
 
     warnings.simplefilter("default", DermisWarning)
-    warnings.showwarning = show
+    warnings.showwarning = forward_or_show
 
 
 def _head_tone(head: Head) -> SkinTone | None:
-    """Return the description of the mean colour of a head's skin, None without a colour."""
+    """Return the description of the mean colour of a head's skin; None for a head without a skin colour."""
     colour = head.maps.mean_colour
     return None if colour is None else skin_tone(colour)
 

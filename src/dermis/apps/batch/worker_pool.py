@@ -1,4 +1,4 @@
-"""Worker processes on this machine: each renders one part at a time and is replaced if it dies."""
+"""Worker processes on this machine: each worker renders one part at a time; dead workers are replaced."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ _MAX_ENCODERS_PER_WORKER = 8  # per worker: more would wait for the renderer
 class SlotRequest:
     """Requested number and adapters of the workers; None selects a default for this machine.
 
-    adapter : "auto", "cpu", a number such as "#1", or a part of a name, which selects all adapters of the
-        same kind
-    numbers : numbers of the adapters, in place of `adapter`
+    adapter : "auto", "cpu", a number such as "#1", or a part of an adapter's name; of the matching adapters,
+        those of the same kind as the best adapter are used
+    numbers : numbers of the adapters to use, in place of `adapter`
     workers : total number of workers
     workers_per_gpu : workers on each adapter, if `workers` is None
     encoders : number of encoder processes per worker
@@ -41,7 +41,7 @@ class SlotRequest:
     def adapters(self) -> list[Adapter]:
         """Return the adapters that match the request.
 
-        Raises DermisError if one of them does not exist.
+        Raises DermisError if a requested adapter does not exist.
         """
         if not self.numbers:
             return similar_adapters(self.adapter)
@@ -50,9 +50,9 @@ class SlotRequest:
     def slots(self) -> tuple[list[WorkerSlot], int]:
         """Return one slot per worker, with adapters in turn, and the number of encoder processes per worker.
 
-        A software adapter shares the processor cores with Python and the encoders. By default it gets one
-        worker for every two cores, the workers share all cores as threads, and each encodes its images
-        itself.
+        A software adapter shares the processor cores with Python and the encoders. By default there is one
+        worker for every two cores, the threads of all workers together use all cores, and each worker encodes
+        its images itself.
         """
         adapters, cores = self.adapters(), available_cores()
         software = adapters[0].kind == "CPU"
@@ -78,7 +78,7 @@ class ProcessPool:
     slots: Sequence[WorkerSlot]
 
     def render(self, options: RunOptions, tasks: Sequence[Shard]) -> Iterator[WorkerEvent]:
-        """Process the tasks on all slots and yield events as they happen.
+        """Process the tasks on all slots, and yield the events of the workers as they arrive.
 
         Raises DermisError for errors that another attempt cannot solve, after all workers have been stopped.
         """
@@ -96,7 +96,7 @@ class ProcessPool:
 
 @dataclass
 class _WorkerProcess:
-    """Worker process with its slot, and its tasks: the one in progress, and at most one to continue with."""
+    """Worker process with its slot and its tasks: the task in progress, and at most one task to do next."""
 
     slot: WorkerSlot
     child: ChildProcess
@@ -120,7 +120,7 @@ class _PoolState:
             self._send_task(worker)
 
     def receive(self, worker: _WorkerProcess) -> WorkerEvent:
-        """Return the next event of a worker; send the worker its next task, replace it or stop it.
+        """Return the next event of a worker; then send the worker a task, replace the worker, or stop it.
 
         Raises DermisError for a refusal, and for a part that failed `MAX_ATTEMPTS` times.
         """
@@ -144,10 +144,10 @@ class _PoolState:
         return event
 
     def _gets_another_task(self, worker: _WorkerProcess) -> bool:
-        """Return whether a worker gets a task: if it has none, or if its only one is in its first attempt.
+        """Return whether to send a worker another task.
 
-        A second task lets the worker keep frames in flight between the two. None is given when fewer tasks
-        than workers are left.
+        A worker without tasks gets one. A worker with one task, in its first attempt, gets a second task, so
+        that frames stay in flight between the tasks, unless the queue has fewer tasks than there are workers.
         """
         if not worker.tasks:
             return bool(self._queue)

@@ -15,7 +15,7 @@ from dermis.optics.media import Floats
 from dermis.optics.radial import SMALLEST_FLOAT
 
 _BURLEY_MEDIAN_RADIUS = 1.58  # radius within which half of the light leaves, in units of Burley's width d
-_LOG_RANGE = np.log(30.0)  # search range of lengths, around the length that gives equal median radii
+_LOG_LENGTH_RANGE = np.log(30.0)  # search range of lengths, around the length that gives equal median radii
 _BISECTIONS, _MEDIUM_BISECTIONS = 40, 30
 _MIN_WIDTH_MM = 1e-9
 _MAX_EDGE_DISTANCE, _EDGE_SAMPLES = 12.0, 97  # largest distance from a shadow edge, in median radii
@@ -25,7 +25,7 @@ _LOG_BOUND, _LOG_TOLERANCE = 2.0, 1e-4  # search range and tolerance of least sq
 
 
 def burley_curve(d_mm: ArrayLike, energy: ArrayLike) -> CumulativeProfile:
-    """Return the cumulative profile of Burley's R(r) = A (exp(-r/d) + exp(-r/3d)) / (8 pi d r).
+    """Return the cumulative form of Burley's profile R(r) = A (exp(-r/d) + exp(-r/3d)) / (8 pi d r).
 
     d_mm : (3,) width d of each channel [mm]
     energy : (3,) total energy A of each channel: emerging light per incident light [-]
@@ -37,16 +37,18 @@ def burley_curve(d_mm: ArrayLike, energy: ArrayLike) -> CumulativeProfile:
 def fit_burley_width(curve: CumulativeProfile) -> Floats:
     """Return the widths d (3,) of the Burley profiles closest to a cumulative profile [mm].
 
-    The largest difference of the cumulative profiles is minimised; least squares would depend on the spacing
-    of the radii.
+    For each channel, the largest difference between the two cumulative profiles is minimised. A sum of
+    squared differences would depend on the spacing of the radii.
     """
     median = np.array([np.interp(0.5, curve.fraction[:, i], curve.radii_mm) for i in range(3)])
     middle = np.log(median / _BURLEY_MEDIAN_RADIUS)
 
-    def excess(log_d: Floats) -> Floats:
+    def cdf_difference(log_d: Floats) -> Floats:
         return BurleyProfile(np.ones(3), np.exp(-log_d)).energy_within(curve.radii_mm) - curve.fraction
 
-    return _bisect_minimax(excess, middle - _LOG_RANGE, middle + _LOG_RANGE, _BISECTIONS)
+    return _bisect_minimax(
+        cdf_difference, middle - _LOG_LENGTH_RANGE, middle + _LOG_LENGTH_RANGE, _BISECTIONS
+    )
 
 
 def gaussian_curve(variance_mm2: Floats, weight: Floats, energy: Floats) -> CumulativeProfile:
@@ -58,34 +60,34 @@ def gaussian_curve(variance_mm2: Floats, weight: Floats, energy: Floats) -> Cumu
     """
     fraction = weight / weight.sum(axis=0)
 
-    def within(radius_mm: Floats) -> Floats:
+    def fraction_within(radius_mm: Floats) -> Floats:
         with np.errstate(under="ignore"):
             return np.asarray(1.0 - np.exp(-0.5 * radius_mm[:, None] ** 2 / variance_mm2) @ fraction)
 
-    return CumulativeProfile.from_function(within, energy)
+    return CumulativeProfile.from_function(fraction_within, energy)
 
 
 def scale_lengths(unit: CumulativeProfile, scale_mm: ArrayLike) -> CumulativeProfile:
-    """Return a cumulative profile whose radii are multiplied by a length, separately in each channel.
+    """Return the cumulative profile `unit` with the radii of each channel multiplied by a length.
 
-    unit : profile with radii in units of these lengths
-    scale_mm : (3,) length of each channel [mm]
+    unit : cumulative profile whose radii are in units of `scale_mm`
+    scale_mm : (3,) length by which the radii of each channel are multiplied [mm]
     """
     scale = np.maximum(np.asarray(scale_mm, np.float64), _MIN_WIDTH_MM)
 
-    def within(radius_mm: Floats) -> Floats:
+    def fraction_within(radius_mm: Floats) -> Floats:
         return np.stack([unit.fraction_within(radius_mm / scale[i])[:, i] for i in range(3)], axis=-1)
 
-    return CumulativeProfile.from_function(within, unit.energy)
+    return CumulativeProfile.from_function(fraction_within, unit.energy)
 
 
 def fit_scale(curve: CumulativeProfile, unit: CumulativeProfile) -> Floats:
     """Return the lengths (3,) by which the radii of `unit` are multiplied to match `curve` [mm].
 
-    The largest difference of the two cumulative profiles is minimised in each channel.
+    In each channel, the largest difference between the two cumulative profiles is minimised.
     """
     middle = np.log(curve.radius_at_fraction(0.5) / unit.radius_at_fraction(0.5))
-    return _fit_scale_near(curve, unit, middle, _LOG_RANGE, _BISECTIONS - 1)
+    return _fit_scale_in_range(curve, unit, middle, _LOG_LENGTH_RANGE, _BISECTIONS - 1)
 
 
 @dataclass(frozen=True)
@@ -108,39 +110,43 @@ def fit_homogeneous_medium(
     """Return the homogeneous medium whose cumulative profile is closest to a reference profile.
 
     curve : reference profile
-    energy : (3,) light that leaves the medium per incident light, by default the energy of `curve` [-]
+    energy : (3,) emerging light per incident light of the medium, by default the energy of `curve` [-]
     kind : surface and illumination of the half-space, see `half_space`
     """
     albedo = tabulated_albedo(kind, curve.energy if energy is None else energy)
     unit = half_space(kind, albedo, np.ones(3))
     middle = np.log(fit_burley_width(curve) / fit_burley_width(unit))  # ratio of Burley widths
-    mfp = _fit_scale_near(curve, unit, middle, 2.0, _MEDIUM_BISECTIONS)
+    mfp = _fit_scale_in_range(curve, unit, middle, 2.0, _MEDIUM_BISECTIONS)
     return HomogeneousMedium(albedo, mfp, half_space(kind, albedo, mfp))
 
 
-def _fit_scale_near(
+def _fit_scale_in_range(
     curve: CumulativeProfile, unit: CumulativeProfile, middle: Floats, log_range: float, bisections: int
 ) -> Floats:
-    def excess(log_scale: Floats) -> Floats:
+    def cdf_difference(log_scale: Floats) -> Floats:
         return scale_lengths(unit, np.exp(log_scale)).fraction - curve.fraction
 
-    return _bisect_minimax(excess, middle - log_range, middle + log_range, bisections)
+    return _bisect_minimax(cdf_difference, middle - log_range, middle + log_range, bisections)
 
 
-def _bisect_minimax(excess: Callable[[Floats], Floats], low: Floats, high: Floats, bisections: int) -> Floats:
-    """Return the lengths (3,) for which a scaled cumulative profile is closest to a reference profile.
+def _bisect_minimax(
+    cdf_difference: Callable[[Floats], Floats], low: Floats, high: Floats, bisections: int
+) -> Floats:
+    """Return the lengths (3,) that scale a cumulative profile closest to a reference profile, per channel.
 
-    A wider profile has less light within each radius. With increasing length, the largest excess over the
-    reference therefore decreases, and the largest deficit increases. The larger of these two differences is
-    smallest where they are equal.
+    The largest absolute difference between the cumulative profiles is minimised. A longer length widens the
+    scaled profile, so less light lies within each radius: the largest excess over the reference decreases,
+    and the largest deficit increases. The best length is therefore the one at which excess and deficit are
+    equal.
 
-    excess : function that takes log lengths (3,) and returns the difference (n, 3) at each radius: the
-        fraction of light within the radius, scaled profile minus reference
-    low, high : (3,) bounds of the log lengths
+    cdf_difference : function that takes the logarithms of the lengths (3,) and returns, at n radii, the
+        fraction of light within the radius (n, 3): scaled profile minus reference profile
+    low, high : (3,) bounds of the logarithms of the lengths
+    bisections : number of times that the interval is halved
     """
     for _ in range(bisections):
         middle = 0.5 * (low + high)
-        difference = excess(middle)
+        difference = cdf_difference(middle)
         too_narrow = difference.max(axis=0) > -difference.min(axis=0)
         low, high = np.where(too_narrow, middle, low), np.where(too_narrow, high, middle)
     return np.asarray(np.exp(0.5 * (low + high)))
@@ -151,9 +157,9 @@ def fit_length_scale(curve: CumulativeProfile, channel: int, unit_cdf: Callable[
 
     The sum of squared differences is minimised, at radii spaced evenly in log r.
 
-    channel : index of the channel, 0 for red
-    unit_cdf : the profile for a length of 1: a function that takes radii (n,) and returns the fraction of
-        light within each
+    channel : index of the channel of `curve`, 0 for red
+    unit_cdf : cumulative profile for a length of 1: a function that takes radii (n,) and returns the fraction
+        of light (n,) within each radius
     """
     from scipy.optimize import minimize_scalar
 
@@ -162,20 +168,22 @@ def fit_length_scale(curve: CumulativeProfile, channel: int, unit_cdf: Callable[
     reference = curve.fraction_within(r)[:, channel]
     middle = np.log(median / float(np.interp(0.5, unit_cdf(_CDF_RADII), _CDF_RADII)))
 
-    def loss(log_length: float) -> float:
+    def squared_error(log_length: float) -> float:
         return float(((unit_cdf(r / np.exp(log_length)) - reference) ** 2).sum())
 
     bounds = middle - _LOG_BOUND, middle + _LOG_BOUND
-    result = minimize_scalar(loss, bounds=bounds, method="bounded", options={"xatol": _LOG_TOLERANCE})
+    result = minimize_scalar(
+        squared_error, bounds=bounds, method="bounded", options={"xatol": _LOG_TOLERANCE}
+    )
     return float(np.exp(result.x))
 
 
 @dataclass(frozen=True)
 class CurveError:
-    """Errors of the profile that a program renders, relative to the reference profile; red, green and blue.
+    """Errors of the profile that a program renders, relative to the reference profile, per colour channel.
 
-    cdf : (3,) largest difference of the fraction of light within a radius [-]
-    edge : (3,) largest difference of the diffused light beside a straight edge, such as a shadow edge [-]
+    cdf : (3,) largest difference between the fractions of light within a radius [-]
+    edge : (3,) largest difference between the diffused light near a straight edge, such as a shadow edge [-]
     energy : (3,) relative error of the total energy [-]
     """
 

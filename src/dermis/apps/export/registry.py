@@ -1,4 +1,4 @@
-"""Registry of export targets, by name; the module of each target defines its instance `TARGET`."""
+"""Registry of export targets by name; each target's module defines an instance of the target as `TARGET`."""
 
 from __future__ import annotations
 

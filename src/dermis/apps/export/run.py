@@ -34,13 +34,14 @@ class ExportReport:
     """Report of one export.
 
     target, title, version, variant : name, title, version and variant of the target program; the variant is
-        empty if the target has none
-    subject, model : name of the skin or head, and the model of its reference profile
+        empty if the target has no variants
+    subject : name of the exported skin or head
+    model : name of the model of the skin's reference profile
     parameters : exported parameters
     naive_parameters : parameters that a user might choose without knowing their meaning in the program
     d_mm : (3,) width of the Burley profile closest to the reference profile [mm]
     error, naive_error : errors of the profile that the program renders with the exported and with the naive
-        parameters, predicted by its own formulas
+        parameters, predicted by the formulas of the program
     limitations : sentences on what the program cannot reproduce
     untested : whether the parameters were never used in the program itself
     files : paths of all written files
@@ -113,8 +114,8 @@ class ExportReport:
 
     def markdown(self) -> str:
         """Return the report as a Markdown page."""
-        lines = [f"# {_single_line(self.subject)} for {self.title} {self.version}".rstrip(), ""]
-        lines += [f"```\n{chr(10).join(map(_single_line, self.lines(naive=True)))}\n```", ""]
+        lines = [f"# {_as_single_line(self.subject)} for {self.title} {self.version}".rstrip(), ""]
+        lines += [f"```\n{chr(10).join(map(_as_single_line, self.lines(naive=True)))}\n```", ""]
         return "\n".join(lines)
 
 
@@ -135,7 +136,7 @@ def _format_channels(values: Floats) -> str:
     return "".join(f"{x:9.4f}" for x in values)
 
 
-def _single_line(text: str) -> str:
+def _as_single_line(text: str) -> str:
     """Return a text without backticks and line breaks, which would end a line or a code block of Markdown."""
     return text.replace("`", "'").replace("\n", " ").replace("\r", " ")
 
@@ -250,7 +251,7 @@ def evaluate_export(subject: Subject, target: Target, version: str) -> ExportRep
 
 
 def _checked_output(target: Target, output: str | Path) -> Path:
-    """Return the output path; raise DermisError if the target cannot write its suffix."""
+    """Return the output path; raise DermisError if the target cannot write files with this suffix."""
     path = Path(output)
     if path.suffix.lower() not in target.suffixes:
         allowed = [suffix or "no suffix, for a folder" for suffix in target.suffixes]
@@ -283,7 +284,7 @@ def _move_into_place(source: Path, target: Path) -> None:
 
 
 def _write_report(report: ExportReport, output: Path) -> list[Path]:
-    """Write the report as Markdown and JSON beside the output file or into the folder; return both paths."""
+    """Write the report as two files, beside the output file or into the output folder; return their paths."""
     single = bool(output.suffix)
     page = output.with_name(f"{output.name}.md") if single else output / _REPORT_PAGE
     data_file = output.with_name(f"{output.name}.json") if single else output / REPORT_FILE

@@ -13,15 +13,17 @@ from dermis.scene.lights import Light
 
 
 def supported_lights(lights: Iterable[Light], supported: Container[str], program: str) -> list[Light]:
-    """Return the lights; replace unsupported ones by point or directional lights, with a warning.
+    """Replace lights that a program does not support by point or directional lights, with a warning.
 
-    supported : kinds of light that the program supports, including point and directional
-    program : name of the program for the warnings
+    supported : kinds of light that the program supports, at least "point" and "directional"
+    program : name of the program, for the warnings
     """
-    return [_nearest_kind(light, supported, f"light {k}: {program}") for k, light in enumerate(lights, 1)]
+    return [
+        _as_supported_light(light, supported, f"light {k}: {program}") for k, light in enumerate(lights, 1)
+    ]
 
 
-def _nearest_kind(light: Light, supported: Container[str], message_start: str) -> Light:
+def _as_supported_light(light: Light, supported: Container[str], message_start: str) -> Light:
     if light.kind in supported:
         return light
     bases = (one for one in type(light).__mro__ if issubclass(one, Light))
@@ -36,7 +38,7 @@ def mesh_ply(mesh: Mesh, faces: NDArray[np.bool_], centre_mm: Sequence[float], *
 
     faces : (t,) mask of the selected triangles
     centre_mm : (3,) point that becomes the origin of the file [mm]
-    v_up : whether v points upwards
+    v_up : whether v points upwards in the file; in the mesh, v points downwards
     """
     vertex, corner = np.unique(mesh.triangles[faces], return_inverse=True)
     u, v = mesh.uv[vertex].astype("<f4").T

@@ -51,7 +51,7 @@ class Subject:
     """Skin to export, optionally with a head.
 
     name : name given by the user; must be escaped wherever it is written
-    curve : cumulative reference profile, per incident light
+    curve : cumulative reference profile; energy is emerging light per incident light
     albedo : (3,) base colour: mean of the head's colour map, or the energy of the profile; linear Rec. 709
         [-]
     model : model of the profile, such as "montecarlo" or "layered"; "table" for a table of Gaussians
@@ -73,17 +73,17 @@ class Subject:
 
     @cached_property
     def head_or_ball(self) -> Head:
-        """Return the head, or a ball of diameter `BALL_MM` if there is none."""
+        """Return the head, or a ball of diameter `BALL_MM` if there is no head."""
         return self.head or Head("ball", uv_sphere(0.5 * BALL_MM), Maps())
 
     @cached_property
     def part_pictures(self) -> PartPictures | None:
-        """Return the pictures of the head's parts that are not skin, or None if there are none."""
+        """Return the pictures of the head's parts that are not skin, or None if no part has pictures."""
         return None if self.head is None else PartPictures.of(self.head)
 
     @property
     def identifier(self) -> str:
-        """Return the name as ASCII letters, digits and underscores, for names of files and materials."""
+        """Return the name in ASCII letters, digits and underscores, for names of files and materials."""
         name = re.sub(r"[^A-Za-z0-9]+", "_", Path(self.name).stem or self.name).strip("_")[:_MAX_NAME_LENGTH]
         return f"skin_{name}" if not name or name[0].isdigit() else name
 
@@ -97,12 +97,13 @@ class Subject:
         return np.clip(self.albedo, low, 1.0)
 
     def rescale_energy(self, curve: CumulativeProfile) -> CumulativeProfile:
-        """Return a program's profile with its energy rescaled for comparison with the reference profile.
+        """Return `curve` with an energy that can be compared with the energy of the reference profile.
 
-        A program may return more or less light than the albedo that it is given. The
-        returned energy is the reference's, multiplied by the ratio of the program's light to the albedo.
+        The albedo of a subject can differ from the energy of the reference profile, and a program may return
+        more or less light than this albedo. The new energy is (energy of `curve`) / albedo * (energy of the
+        reference profile).
 
-        curve : profile that the program renders, with the energy that it returns for the subject's albedo
+        curve : cumulative profile that the program renders for the subject's albedo
         """
         return curve.with_energy(self.curve.energy * curve.energy / np.maximum(self.albedo, _MIN_ALBEDO))
 
@@ -150,11 +151,12 @@ def load_subject(
 
     source : a profile by name ("skin1", "dj3", "light", "gpu-gems-3") or file (.toml, .csv), or a head:
         "human", "human:7", a person's .json, a sample, or a mesh (.glb, .obj, .usdz, ...)
-    profile : skin of a head; by default skin with a parametric person's own pigments, or the default skin
+    profile : profile of a head's skin, by name or file; by default, a parametric person has skin with that
+        person's pigments, and other heads have the default skin
     model : model of the reference profile, see `reference_curve`
     head : options of `load_head`
 
-    Raises DermisError for an unknown name, and for an option that does not apply.
+    Raises DermisError for an unknown name, and for options of heads if `source` is a skin.
     """
     path = checked_path(source, "a skin or a head")
     name = str(source)
@@ -170,11 +172,11 @@ def load_subject(
     return Subject(path.name, curve, albedo, used_model, tissue, Scene(loaded, skin=skin))
 
 
-def _load_skin(name: str, model: ModelName | None, head_options: Iterable[str]) -> Subject:
+def _load_skin(skin_name: str, model: ModelName | None, head_options: Iterable[str]) -> Subject:
     for option in head_options:
-        refuse(option, "a head", f"got the skin {name}", "Omit this option, or name a head")
-    curve, used_model, tissue = reference_curve(Skin(profile=name), model)
-    return Subject(Path(name).name, curve, curve.energy, used_model, tissue)
+        refuse(option, "a head", f"got the skin {skin_name}", "Omit this option, or name a head")
+    curve, used_model, tissue = reference_curve(Skin(profile=skin_name), model)
+    return Subject(Path(skin_name).name, curve, curve.energy, used_model, tissue)
 
 
 def reference_curve(

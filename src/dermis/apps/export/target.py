@@ -51,7 +51,7 @@ def get_numbers(parameters: Parameters, name: str) -> tuple[float, ...]:
 
 
 def replace_values(parameters: Parameters, values: Mapping[str, ParameterValue]) -> Parameters:
-    """Return the parameters with new values for those that are named in `values`."""
+    """Return a copy of `parameters` with new values, given by parameter name in `values`."""
     return tuple(replace(one, value=values.get(one.name, one.value)) for one in parameters)
 
 
@@ -74,13 +74,14 @@ def write_files(folder: Path, contents: Iterable[tuple[str, bytes]]) -> list[Pat
 class Target(ABC):
     """Export target: a program for which skins and heads are written.
 
-    Subclasses are registered in `dermis.apps.export.registry.TARGETS`. They convert a skin to parameters of
-    the program, predict the profile that the program renders with these parameters, and write the files.
+    Subclasses are registered in `dermis.apps.export.registry.TARGETS`. A subclass converts a skin to
+    parameters of the program, predicts the profile that the program renders with these parameters, and writes
+    the files.
 
     Parameters
     ----------
     variant : str
-        One of `variants`, or "" if there are none.
+        One of `variants`, or "" if the target has no variants.
     side : int
         Side of generated maps [texel].
     adapter : str
@@ -94,7 +95,7 @@ class Target(ABC):
     ('Unity HDRP', '17')
     >>> from dermis.apps.export.subject import load_subject
     >>> parameters = unity.parameters(load_subject("skin1"), "17")
-    >>> [one.name for one in parameters][:2]
+    >>> [parameter.name for parameter in parameters][:2]
     ['scatteringDistance', 'scatteringDistanceMultiplier']
     """
 
@@ -123,7 +124,7 @@ class Target(ABC):
     """Whether the exported files have not been tested in the program."""
 
     def with_variant(self: T, variant: str | None) -> T:
-        """Return this target with a variant selected; None selects the first.
+        """Return a copy of this target with a selected variant; None selects the first of `variants`.
 
         Parameters
         ----------
@@ -148,12 +149,12 @@ class Target(ABC):
         return replace(self, variant=variant)
 
     def with_library(self, folder: str | Path) -> Target:
-        """Return the target with an installed library to embed in its page.
+        """Return a copy of the target that embeds an installed JavaScript library in the page.
 
         Parameters
         ----------
         folder : str or Path
-            The folder node_modules of npm.
+            The folder node_modules of npm that contains the library.
 
         Returns
         -------
@@ -198,14 +199,14 @@ class Target(ABC):
         return version
 
     def main_file(self, output: Path, subject: Subject, suffix: str = "") -> Path:
-        """Return the path of the main file: the output itself, or a file in it if it is a folder.
+        """Return the path of the main file: `output`, or a file inside `output` if `output` is a folder.
 
         Parameters
         ----------
         output : Path
             Path that `write` receives.
         subject : Subject
-            Skin to export, after which a file in a folder is named.
+            Skin or head to export; the file in a folder is named after it.
         suffix : str
             Suffix of a file in a folder; by default the first of `suffixes`.
 
@@ -238,7 +239,7 @@ class Target(ABC):
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the parameters that a user might choose without knowing their meaning in the program.
 
-        The report shows their errors beside those of the fitted parameters.
+        The report shows the errors with these parameters beside the errors with the fitted parameters.
 
         Parameters
         ----------
@@ -255,7 +256,7 @@ class Target(ABC):
 
     @abstractmethod
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the cumulative profile that the program renders, predicted by its own formulas.
+        """Return the cumulative profile that the program renders, predicted by the formulas of the program.
 
         Parameters
         ----------
@@ -283,8 +284,8 @@ class Target(ABC):
         parameters : tuple of Parameter
             Parameters from `parameters`.
         output : Path
-            Empty folder if the name has no suffix; otherwise a file in an empty folder, beside which others
-            may be written. All are moved to the final output afterwards.
+            Empty folder if the name has no suffix. Otherwise a file in an empty folder; further files may be
+            written into this folder. The caller moves all files to the final output.
         version : str
             Version of the program.
 
@@ -296,7 +297,7 @@ class Target(ABC):
 
 
 class JsonTarget(Target):
-    """Base class of targets that only write a JSON file of parameters, which was not tried in the program."""
+    """Base class of targets that write a JSON file of parameters; the parameters were not tried."""
 
     suffixes = (".json", "")
     untested = True

@@ -26,13 +26,17 @@ from dermis.mesh.strands import Roots, root_frames
 
 _MESHES = Path(__file__).parent / "meshes"
 _STRIPE_MM, _STITCH_MM = 22.0, 2.6  # period of the sweater's stripes, and size of its stitches
-_HAIR_CARDS, _HAIR_KNOTS, _HAIR_MM = 2600, 20, 230.0  # cards, points along each, and length
+_HAIR_CARD_COUNT, _HAIR_KNOT_COUNT, _HAIR_MM = 2600, 20, 230.0  # cards, points along each, and length
 _PARTING_MM, _EAR_MM, _NEIGHBOURS = 15.0, 70.0, 40
-_COLUMNS = 8  # number of cards side by side in a picture of hairs
+_CARD_COLUMNS = 8  # number of cards side by side in a picture of hairs
 
 
 class _Surface(NamedTuple):
-    """Mesh of a part: vertices, unit normals, uv, and triangles (f, 3)."""
+    """Part of an avatar as a mesh.
+
+    points_mm, normals, uv : (v, 3) positions [mm], (v, 3) unit normals and (v, 2) uv of the vertices
+    triangles : (f, 3) vertex indices
+    """
 
     points_mm: Numbers
     normals: Numbers
@@ -41,7 +45,7 @@ class _Surface(NamedTuple):
 
 
 class _Glb:
-    """A .glb file to which meshes with pictures are added.
+    """Contents of a .glb file to which meshes with pictures are added.
 
     data : content of an existing file; empty for a new file
     """
@@ -61,7 +65,7 @@ class _Glb:
         self._buffer = BufferBuilder(bytearray(data[28 + length :]), views, accessors)
 
     def add(self, name: str, surface: _Surface, picture: Bytes, roughness: float) -> None:
-        """Add a mesh with a picture (h, w, 4), whose alpha determines which parts of the mesh are visible."""
+        """Add a mesh with a picture (h, w, 4), which hides parts of the mesh where alpha is low."""
         add_rows = self._buffer.add_accessor
         attributes = {
             "POSITION": add_rows((surface.points_mm / 1000.0).astype("<f4"), bounded=True),
@@ -87,30 +91,34 @@ class _Glb:
         path.write_bytes(glb_bytes(self._tree, self._buffer.data))
         return path
 
-    def _append(self, key: str, **entry: Any) -> int:
-        """Append an entry to a list of the file and return its index."""
-        self._tree[key].append(entry)
-        return len(self._tree[key]) - 1
+    def _append(self, list_name: str, **entry: Any) -> int:
+        """Append an entry to a list of the file's JSON, and return the index of the entry.
+
+        list_name : name of the list, such as "meshes"
+        """
+        self._tree[list_name].append(entry)
+        return len(self._tree[list_name]) - 1
 
 
 def write_avatar(studio: Studio, folder: Path) -> Path:
-    """Write an avatar with a sweater, and ribbons with pictures of hairs (cards) as hair, brows and lashes.
+    """Write an avatar with a sweater and hair cards as .glb; return the path of the file.
 
-    Return the path of the file."""
+    Hair, brows and lashes are hair cards: ribbons with pictures of several hairs.
+    """
     plain = Human(sex=0.1, age=26).head()
     painted, eyes = paint_head(studio.renderer.device, plain, 1024)
     file = _Glb(encode_head(replace(painted, strands=None, hair=None), roughness=0.3, eyes=eyes))
-    hair = _strands_picture((0.045, 0.022, 0.012), 26, (512, 1024), seed=1)
-    file.add("hair", _cards(*_hair_paths(plain), width_mm=7.0), hair, roughness=0.9)
-    fringe = _strands_picture((0.02, 0.01, 0.006), 4, (128, 256), seed=2, taper=0.7)
-    file.add("lashes", _cards(*_fringe_paths(plain), width_mm=0.5), fringe, roughness=0.6)
+    hair = _hair_card_picture((0.045, 0.022, 0.012), 26, (512, 1024), seed=1)
+    file.add("hair", _hair_cards(*_scalp_hair_paths(plain), width_mm=7.0), hair, roughness=0.9)
+    fringe = _hair_card_picture((0.02, 0.01, 0.006), 4, (128, 256), seed=2, taper=0.7)
+    file.add("lashes", _hair_cards(*_brow_and_lash_paths(plain), width_mm=0.5), fringe, roughness=0.6)
     file.add("sweater", _sweater(plain), _sweater_picture(), roughness=0.9)
     return file.write(folder / "avatar.glb")
 
 
 def write_pictures(head: Head, folder: Path) -> Path:
     """Write a head's skin as three meshes, each with a picture cut from the colour map; return the path."""
-    mesh, colour = head.mesh, _colours(head)
+    mesh, colour = head.mesh, _colour_map_srgb(head)
     file = _Glb()
     corner = mesh.triangles[_is_skin(head)]
     middle = mesh.positions[corner].mean(axis=1)
@@ -129,8 +137,8 @@ def write_pictures(head: Head, folder: Path) -> Path:
 
 
 def write_vertex_colours(head: Head, folder: Path) -> Path:
-    """Write a head with colours at its vertices and without uv, as a .ply file; return the path."""
-    mesh, colour = head.mesh, _colours(head)
+    """Write a head with vertex colours and without uv as a .ply file, and return the path."""
+    mesh, colour = head.mesh, _colour_map_srgb(head)
     y, x = (mesh.uv[:, ::-1] * np.array(colour.shape[:2]) - 0.5).clip(0).astype(int).T
     kinds = [f"property float {axis}" for axis in "xyz"]
     kinds += [f"property uchar {channel}" for channel in ("red", "green", "blue")]
@@ -159,25 +167,25 @@ def _is_skin(head: Head) -> Mask:
     return np.array([one.kind == "skin" for one in head.mesh.materials])[head.mesh.material]
 
 
-def _colours(head: Head) -> Bytes:
+def _colour_map_srgb(head: Head) -> Bytes:
     """Return the colour map of a head in 8-bit sRGB."""
     assert head.maps.colour is not None
     return encode_srgb8(head.maps.colour)
 
 
-def _cards(paths: Doubles, facing: Doubles, width_mm: float) -> _Surface:
-    """Return ribbons along paths, each with one of the cards of `_strands_picture`.
+def _hair_cards(paths: Doubles, outward: Doubles, width_mm: float) -> _Surface:
+    """Return hair cards: ribbons along paths, each with a random column of `_hair_card_picture`.
 
-    paths : (n, k, 3) points from root to tip
-    facing : (n, k, 3) outward directions
+    paths : (n, k, 3) points of each path from root to tip [mm]
+    outward : (n, k, 3) outward directions at these points
     """
     count, knots = paths.shape[:2]
     along = np.gradient(paths, axis=1)
-    side = _unit(np.cross(along, facing))
-    normals = _unit(np.cross(side, along))
+    side = _normalise(np.cross(along, outward))
+    normals = _normalise(np.cross(side, along))
     edges = np.stack([paths - 0.5 * width_mm * side, paths + 0.5 * width_mm * side], axis=2)
-    column = np.random.default_rng(0).integers(_COLUMNS, size=(count, 1))
-    u = (column + np.array([0.02, 0.98])) / _COLUMNS
+    column = np.random.default_rng(0).integers(_CARD_COLUMNS, size=(count, 1))
+    u = (column + np.array([0.02, 0.98])) / _CARD_COLUMNS
     uv = np.stack(np.broadcast_arrays(u[:, None, :], np.linspace(0.01, 0.99, knots)[None, :, None]), axis=3)
     first = (np.arange(count)[:, None] * knots + np.arange(knots - 1)) * 2
     corners = [first, first + 1, first + 2, first + 2, first + 1, first + 3]
@@ -187,29 +195,29 @@ def _cards(paths: Doubles, facing: Doubles, width_mm: float) -> _Surface:
     )
 
 
-def _unit(vectors: Doubles) -> Doubles:
+def _normalise(vectors: Doubles) -> Doubles:
     return np.asarray(vectors / (np.linalg.norm(vectors, axis=-1, keepdims=True) + 1e-9))
 
 
-def _strands_picture(
-    colour: tuple[float, float, float], hairs: int, size: tuple[int, int], seed: int, taper: float = 0.15
+def _hair_card_picture(
+    colour: tuple[float, float, float], hair_count: int, size: tuple[int, int], seed: int, taper: float = 0.15
 ) -> Bytes:
-    """Return a picture (h, w, 4) of cards side by side, with hairs that end at different lengths.
+    """Return a picture (h, w, 4) of hair cards side by side, with hairs that end at different lengths.
 
     colour : mean colour of the hairs, linear Rec. 709
-    hairs : number of hairs in each card
+    hair_count : number of hairs in each hair card
     size : height and width of the picture [pixel]
-    taper : part of the picture height over which hairs become thinner towards their tips [-]
+    taper : part of the picture height over which a hair becomes thinner towards the tip [-]
     """
     rng, (height, width) = np.random.default_rng(seed), size
     picture = np.zeros((height, width, 4), np.uint8)
     picture[..., :3] = encode_srgb8(colour)
-    card, y = width // _COLUMNS, np.linspace(0.0, 1.0, height)
+    card, y = width // _CARD_COLUMNS, np.linspace(0.0, 1.0, height)
     x = np.arange(card)
-    for column in range(_COLUMNS):
-        for _ in range(hairs):
+    for column in range(_CARD_COLUMNS):
+        for _ in range(hair_count):
             middle, length = rng.uniform(0.06, 0.94) * card, rng.uniform(0.6, 1.0)
-            bend, thickness = rng.normal(0.0, 0.05) * card, rng.uniform(0.7, 1.3) * card / hairs
+            bend, thickness = rng.normal(0.0, 0.05) * card, rng.uniform(0.7, 1.3) * card / hair_count
             tone = encode_srgb8(np.array(colour) * rng.lognormal(0.0, 0.25))
             half = 0.5 * thickness * np.clip((length - y) / taper, 0.0, 1.0)
             drawn = np.abs(x - middle - bend * np.sin(3.0 * y)[:, None]) < half[:, None]
@@ -223,49 +231,49 @@ def _covers_face(points_mm: Doubles) -> Mask:
     return np.asarray((np.abs(x) < 72.0) & (y < 60.0) & (y > -130.0) & (z > -45.0))
 
 
-def _hair_paths(head: Head) -> tuple[Doubles, Doubles]:
-    """Return the paths (n, k, 3) and outward directions of hair that falls to the shoulders from a parting.
+def _scalp_hair_paths(head: Head) -> tuple[Doubles, Doubles]:
+    """Return paths (n, k, 3) and outward directions (n, k, 3) of long hair that falls from a parting.
 
-    Each step follows the surface below, at a random clearance for each path, and turns downwards.
+    Each path follows the surface of the head at a random distance, and turns downwards step by step.
     """
     assert head.hair is not None
     rng, mesh = np.random.default_rng(3), head.mesh
     roots = head.hair.roots.roots
-    some = rng.permutation(len(roots.quad))[:_HAIR_CARDS]
+    some = rng.permutation(len(roots.quad))[:_HAIR_CARD_COUNT]
     point = root_frames(mesh, Roots(roots.quad[some], roots.position[some]), mesh.points_mm)[0]
     skin = np.unique(mesh.triangles[mesh.material == 0])
     is_ear = (np.abs(mesh.positions[skin, 0]) > _EAR_MM) & (mesh.positions[skin, 1] > -100.0)
     skin = skin[~is_ear][::4]
-    tree, step_mm = cKDTree(mesh.positions[skin]), _HAIR_MM / (_HAIR_KNOTS - 1)
+    tree, step_mm = cKDTree(mesh.positions[skin]), _HAIR_MM / (_HAIR_KNOT_COUNT - 1)
     clearance_mm = rng.uniform(2.0, 11.0, len(point))
     side = np.where(point[:, 0] < _PARTING_MM, -1.0, 1.0)
     front = np.clip((point[:, 2] + 90.0) / 90.0, 0.0, 1.0)
     course = np.column_stack([side, 0.1 + 0 * side, 0.25 - 1.1 * front]) + rng.normal(0.0, 0.06, point.shape)
     away = np.column_stack([side, 0 * side, -1.5 + 0 * side])
     paths, facings = [], []
-    for knot in range(_HAIR_KNOTS):
+    for knot in range(_HAIR_KNOT_COUNT):
         attachment = min(1.0, knot / 3.0)
         for neighbours in (_NEIGHBOURS, 1):  # a smooth surface that spans the ears; on top the skin itself
             nearest = skin[tree.query(point, np.arange(1, neighbours + 1))[1]]
-            normal = _unit(mesh.normals[nearest].mean(axis=1))
+            normal = _normalise(mesh.normals[nearest].mean(axis=1))
             height_mm = np.einsum("nc,nc->n", point - mesh.positions[nearest].mean(axis=1), normal)
             is_raised = (neighbours > 1) | (point[:, 1] > 35.0)
             lift_mm = np.where(is_raised, np.maximum(clearance_mm * attachment - height_mm, 0.0), 0.0)
             point = point + normal * lift_mm[:, None]
         paths.append(point)
         facings.append(normal)
-        course = 0.7 * _unit(course) + 0.3 * np.array([0.0, -1.0, 0.0])
+        course = 0.7 * _normalise(course) + 0.3 * np.array([0.0, -1.0, 0.0])
         course += np.where(_covers_face(point), 0.25, 0.0)[:, None] * away
         outwards = np.einsum("nc,nc->n", course, normal)[:, None] * normal
-        point = point + step_mm * _unit(course - attachment * outwards)
+        point = point + step_mm * _normalise(course - attachment * outwards)
     line, facing = np.stack(paths, axis=1), np.stack(facings, axis=1)
-    smooth = np.clip(np.arange(_HAIR_KNOTS) / 4.0, 0.0, 1.0)[:, None]
+    smooth = np.clip(np.arange(_HAIR_KNOT_COUNT) / 4.0, 0.0, 1.0)[:, None]
     line += smooth * (gaussian_filter1d(line, 2.0, axis=1) - line)
     return line, gaussian_filter1d(facing, 2.0, axis=1)
 
 
-def _fringe_paths(head: Head) -> tuple[Doubles, Doubles]:
-    """Return the paths (n, k, 3) and outward directions of every third hair of brows and lashes."""
+def _brow_and_lash_paths(head: Head) -> tuple[Doubles, Doubles]:
+    """Return paths (n, k, 3) and outward directions (n, k, 3) for every third hair of brows and lashes."""
     assert head.strands is not None
     paths = head.strands.knot_positions_mm(head.mesh, head.mesh.points_mm)[::3].astype(float)
     facing = paths[:, -1:] - paths[:, :1] + np.array([0.0, 0.0, 6.0])
@@ -273,7 +281,7 @@ def _fringe_paths(head: Head) -> tuple[Doubles, Doubles]:
 
 
 def _sweater(head: Head) -> _Surface:
-    """Return the surface of the shoulders and the neck, moved outwards."""
+    """Return the sweater: the surface of the shoulders and the neck, moved outwards."""
     mesh = head.mesh
     corner = mesh.triangles[mesh.material == 0]
     low = mesh.positions[corner][..., 1].max(axis=1) < -95.0

@@ -36,7 +36,7 @@ def write_page(path: Path, pictures: Sequence[GalleryPicture], head: str, adapte
 
     pictures : pictures in the order of the page
     head : name of the head in the pictures
-    adapter : name of the adapter that drew them
+    adapter : name of the adapter that drew the pictures
 
     Raises DermisError when the file cannot be written.
     """
@@ -45,50 +45,50 @@ def write_page(path: Path, pictures: Sequence[GalleryPicture], head: str, adapte
         script=_read_resource("page.js"),
         head=html.escape(head),
         adapter=html.escape(adapter),
-        contents="".join(_contents_entry(picture) for picture in pictures),
-        pictures="\n".join(_section(picture) for picture in pictures),
+        contents="".join(_contents_entry_html(picture) for picture in pictures),
+        pictures="\n".join(_section_html(picture) for picture in pictures),
         deck=_deck_rows(pictures),
-        works=_bibliography(pictures),
+        works=_bibliography_html(pictures),
     )
     with atomic_file(path) as file:
         file.write_text(page, encoding="utf-8")
 
 
-def _contents_entry(picture: GalleryPicture) -> str:
+def _contents_entry_html(picture: GalleryPicture) -> str:
     return f'<li><a href="#{picture.script.name}">{html.escape(picture.script.title)}</a></li>'
 
 
-def _section(picture: GalleryPicture) -> str:
+def _section_html(picture: GalleryPicture) -> str:
     script = picture.script
     equation = f'<p class="equation">{_equation_html(script.equation)}</p>' if script.equation else ""
     return (
         f'<section id="{script.name}"><h2>{html.escape(script.title)}</h2>'
-        f"<p>{html.escape(script.caption)}</p>{equation}{_panels(picture)}"
+        f"<p>{html.escape(script.caption)}</p>{equation}{_panels_html(picture)}"
         f'<p class="facts">{_picture_facts(picture)}</p></section>'
     )
 
 
 def _equation_html(text: str) -> str:
-    """Convert an equation in one line to HTML; _ begins a subscript and ^ a superscript."""
+    """Convert a one-line equation to HTML, where _ begins a subscript and ^ begins a superscript."""
     text = re.sub(r"_(\w+)", r"<sub>\1</sub>", html.escape(text))
     return re.sub(r"\^\(([^)]*)\)|\^(\w+)", lambda found: f"<sup>{found[1] or found[2]}</sup>", text)
 
 
-def _panels(picture: GalleryPicture) -> str:
+def _panels_html(picture: GalleryPicture) -> str:
     if picture.fault:
         return f'<p class="fault">Not drawn: {html.escape(picture.fault)}</p>'
     slider, panels = picture.script.slider, dict(picture.panels)
-    comparison = _slider(slider, [panels.pop(name) for name in slider]) if slider else ""
+    comparison = _slider_html(slider, [panels.pop(name) for name in slider]) if slider else ""
     if not panels:
         return comparison
     columns = picture.script.columns or min(len(panels), 4)
-    figures = "".join(_figure(caption, file) for caption, file in panels.items())
+    figures = "".join(_figure_html(caption, file) for caption, file in panels.items())
     return f'{comparison}<div class="panels" style="--columns: {columns}">{figures}</div>'
 
 
-def _slider(captions: tuple[str, str], files: Sequence[bytes]) -> str:
+def _slider_html(captions: tuple[str, str], webps: Sequence[bytes]) -> str:
     before, after = (html.escape(caption) for caption in captions)
-    below, above = (_data_url(file) for file in files)
+    below, above = (_data_url(file) for file in webps)
     label = f"{before} on the left, {after} on the right"
     return (
         f'<figure class="slider"><img src="{above}" alt="{after}">'
@@ -98,13 +98,13 @@ def _slider(captions: tuple[str, str], files: Sequence[bytes]) -> str:
     )
 
 
-def _figure(caption: str, file: bytes) -> str:
+def _figure_html(caption: str, webp: bytes) -> str:
     text = html.escape(caption)
-    return f'<figure><img src="{_data_url(file)}" alt="{text}"><figcaption>{text}</figcaption></figure>'
+    return f'<figure><img src="{_data_url(webp)}" alt="{text}"><figcaption>{text}</figcaption></figure>'
 
 
-def _data_url(file: bytes) -> str:
-    return "data:image/webp;base64," + base64.b64encode(file).decode("ascii")
+def _data_url(webp: bytes) -> str:
+    return "data:image/webp;base64," + base64.b64encode(webp).decode("ascii")
 
 
 def _picture_facts(picture: GalleryPicture) -> str:
@@ -112,21 +112,21 @@ def _picture_facts(picture: GalleryPicture) -> str:
     width, height = picture.size
     facts = [f"<code>dermis gallery --only {script.name}</code>"]
     facts += [f"{width}×{height}"] if width else []
-    facts += [f"{_short_number(picture.frame_ms)} ms per frame"] if picture.frame_ms else []
+    facts += [f"{_format_number(picture.frame_ms)} ms per frame"] if picture.frame_ms else []
     facts += [f"{picture.seconds:.0f} s in total"]
     facts += [f'<a href="#{row}" title="row {row[1:]} of the talk, below">{row}</a>' for row in script.deck]
     facts += [f'<a href="#{key}">{key}</a>' for key in script.sources]
     return " · ".join(facts)
 
 
-def _short_number(value: float) -> str:
+def _format_number(value: float) -> str:
     return f"{value:.0f}" if value >= 100 else f"{value:.3g}"
 
 
 def _deck_rows(pictures: Sequence[GalleryPicture]) -> str:
-    """Return HTML table rows for the slides of the 2007 talk, with links to their pictures.
+    """Return HTML table rows for the slides of the 2007 talk, with links to the pictures of each slide.
 
-    Each row also has a command that draws its pictures.
+    Each row also has a command that draws these pictures.
     """
     rows = csv.DictReader(
         line for line in _read_resource("deck.csv").splitlines() if not line.startswith("#")
@@ -134,17 +134,17 @@ def _deck_rows(pictures: Sequence[GalleryPicture]) -> str:
     return "".join(_deck_row(row, pictures) for row in rows)
 
 
-def _deck_row(row: dict[str, str], pictures: Sequence[GalleryPicture]) -> str:
-    scripts = [picture.script for picture in pictures if row["row"] in picture.script.deck]
+def _deck_row(slide: dict[str, str], pictures: Sequence[GalleryPicture]) -> str:
+    scripts = [picture.script for picture in pictures if slide["row"] in picture.script.deck]
     links = ", ".join(f'<a href="#{script.name}">{html.escape(script.title)}</a>' for script in scripts)
-    command = row["command"] or " ".join(["dermis gallery", *(f"--only {one.name}" for one in scripts)])
+    command = slide["command"] or " ".join(["dermis gallery", *(f"--only {one.name}" for one in scripts)])
     return (
-        f'<tr id="{row["row"]}"><td>{row["row"]}</td><td>{html.escape(row["shows"])}</td><td>{links}</td>'
-        f"<td><code>{html.escape(command)}</code></td></tr>"
+        f'<tr id="{slide["row"]}"><td>{slide["row"]}</td><td>{html.escape(slide["shows"])}</td>'
+        f"<td>{links}</td><td><code>{html.escape(command)}</code></td></tr>"
     )
 
 
-def _bibliography(pictures: Sequence[GalleryPicture]) -> str:
+def _bibliography_html(pictures: Sequence[GalleryPicture]) -> str:
     keys = sorted({key for picture in pictures for key in picture.script.sources})
     return "".join(f'<dt id="{key}">{key}</dt><dd>{html.escape(format_reference(key))}</dd>' for key in keys)
 
@@ -165,23 +165,23 @@ def format_reference(key: str) -> str:
     return ". ".join(known)
 
 
-def _bibtex_fields(entry: str) -> Iterator[tuple[str, str]]:
+def _bibtex_fields(bibtex_entry: str) -> Iterator[tuple[str, str]]:
     """Yield the name and the text of each field of a BibTeX entry.
 
     Texts may span lines and contain braces.
     """
     at = 0
-    while found := _BIBTEX_FIELD.search(entry, at):
+    while found := _BIBTEX_FIELD.search(bibtex_entry, at):
         at, depth = found.end(), 1
         while depth:
-            depth += {"{": 1, "}": -1}.get(entry[at], 0)
+            depth += {"{": 1, "}": -1}.get(bibtex_entry[at], 0)
             at += 1
-        yield found[1].lower(), entry[found.end() : at - 1]
+        yield found[1].lower(), bibtex_entry[found.end() : at - 1]
 
 
-def _without_tex(value: str) -> str:
+def _without_tex(tex: str) -> str:
     """Convert TeX accents and symbols to Unicode, and remove braces."""
-    text = value.replace("{", "").replace("}", "")
+    text = tex.replace("{", "").replace("}", "")
     for markup, character in _TEX_SYMBOLS.items():
         text = text.replace(markup, character)
     text = _TEX_ACCENT.sub(lambda found: found[2] + _COMBINING_ACCENTS[found[1]], text)

@@ -43,7 +43,7 @@ def panel_sheet(panels: Panels, columns: int = 0) -> SrgbImage:
     step = columns or len(cells)
     rows = [_panel_row(cells[start : start + step]) for start in range(0, len(cells), step)]
     width = max(row.shape[1] for row in rows)
-    return np.vstack([_pad(row, row.shape[0], width) for row in rows])
+    return np.vstack([_pad_image(row, row.shape[0], width) for row in rows])
 
 
 def plot_panel(plot: Callable[[Any], Any], side: int = 448) -> SrgbImage:
@@ -77,10 +77,10 @@ def _captioned_panel(image: SrgbImage, caption: str) -> SrgbImage:
 
 def _panel_row(cells: Sequence[SrgbImage]) -> SrgbImage:
     height = max(cell.shape[0] for cell in cells)
-    return np.hstack([_pad(cell, height, cell.shape[1]) for cell in cells])
+    return np.hstack([_pad_image(cell, height, cell.shape[1]) for cell in cells])
 
 
-def _pad(image: SrgbImage, height: int, width: int) -> SrgbImage:
+def _pad_image(image: SrgbImage, height: int, width: int) -> SrgbImage:
     padded: SrgbImage = np.full((height, width, 3), _BACKGROUND, np.uint8)
     padded[: image.shape[0], : image.shape[1]] = image
     return padded
@@ -104,13 +104,13 @@ def draw_landmarks(picture: NDArray[np.uint8], landmarks: Landmarks) -> NDArray[
 _LIGHT_FACTORS = {"albedo": 1.0, "irradiance": 1 / np.pi, "diffuse": 1.0, "specular": 1.0, "translucent": 4.0}
 """Factor by which each output that is light is multiplied for display."""
 _LABEL_COLOUR_COUNT = 8192
-_SHOWN_QUANTILES = 0.02, 0.98  # quantiles of non-zero values that are shown as black and white
+_DISPLAY_QUANTILES = 0.02, 0.98  # quantiles of non-zero values that are shown as black and white
 
 
 def output_image(name: str, values: NDArray[Any]) -> NDArray[np.uint8]:
     """Convert a render output to an image (h, w, 3): light to sRGB, labels to random colours.
 
-    Other outputs, such as depth, are scaled from black at a low quantile to white at a high one.
+    Other outputs, such as depth, are scaled from black at a low quantile to white at a high quantile.
 
     name : name of the output
     values : (h, w) or (h, w, c) array of the output
@@ -123,7 +123,7 @@ def output_image(name: str, values: NDArray[Any]) -> NDArray[np.uint8]:
         return np.where((values != OUTPUTS[name].background)[..., None], colours, np.uint8(0))
     channels = values.reshape(*values.shape[:2], -1)[..., :3]
     nonzero = (channels != 0).any(axis=-1)
-    low, high = np.quantile(channels[nonzero], _SHOWN_QUANTILES, axis=0)
+    low, high = np.quantile(channels[nonzero], _DISPLAY_QUANTILES, axis=0)
     levels = np.clip((channels - low) / np.maximum(high - low, 1e-6), 0.0, 1.0) * nonzero[..., None]
     if levels.shape[2] == 1:
         levels = levels.repeat(3, axis=2)

@@ -29,11 +29,12 @@ class Script:
     """Gallery script, described by its docstring.
 
     path : file of the script
-    title, caption : first line of the docstring, and the explanation below it
-    deck : slides of the 2007 talk that the picture shows, by their row in the table of slides, such as "S11"
-    equation : equation of the technique, or ""
+    title : first line of the docstring
+    caption : explanation below the first line of the docstring
+    deck : slides of the 2007 talk that the picture shows, by row in the table of slides, such as "S11"
+    equation : equation of the technique; "" for a script without an equation
     sources : keys of the bibliography
-    slider : captions of two panels that are compared with a slider, or None
+    slider : captions of two panels that the page compares with a slider; None without a slider
     columns : number of panels in a row; 0 lets the page choose
     """
 
@@ -48,11 +49,11 @@ class Script:
 
     @property
     def name(self) -> str:
-        """Return the name of the script, its file name without suffix."""
+        """Return the name of the script: the file name without suffix."""
         return self.path.stem
 
     def draw(self, studio: Studio) -> Panels:
-        """Run the script and return its panels by caption.
+        """Run the script, and return the panels of the picture by caption.
 
         Raises DermisError when a package or file that the script needs is missing.
         """
@@ -96,11 +97,11 @@ def find_scripts(only: Sequence[str] = ()) -> list[Script]:
     ]
 
 
-def _matches_selection(script: Script, wanted: str) -> bool:
-    """Return whether a script has a given number, or a name that contains a given text."""
-    if wanted.isdecimal():
-        return int(wanted) == int(script.name.partition("_")[0])
-    return wanted != "" and wanted in script.name
+def _matches_selection(script: Script, number_or_text: str) -> bool:
+    """Return whether a script has the selected number, or a name that contains the selected text."""
+    if number_or_text.isdecimal():
+        return int(number_or_text) == int(script.name.partition("_")[0])
+    return number_or_text != "" and number_or_text in script.name
 
 
 def draw_script(draw: Callable[[Studio], Panels]) -> None:
@@ -133,14 +134,14 @@ _WEBP_QUALITY, _FRAME_MS = 86, 80
 
 @dataclass(frozen=True)
 class GalleryPicture:
-    """Picture that a gallery script has drawn, as WebP files, or the reason why there is none.
+    """Picture that a gallery script has drawn, as WebP files, or the reason why the script drew no picture.
 
     script : gallery script
     panels : WebP file of each panel, by caption
     size : width and height of the first panel [pixel]
     seconds : run time of the script [s]
-    frame_ms : median time of the frames that it rendered; None without frames [ms]
-    fault : reason for a missing picture, or ""
+    frame_ms : median time of the frames that the script rendered; None if it rendered no frame [ms]
+    fault : reason for a missing picture; "" if there is a picture
     """
 
     script: Script
@@ -152,7 +153,7 @@ class GalleryPicture:
 
 
 def draw_pictures(scripts: Sequence[Script], studio: Studio) -> Iterator[GalleryPicture]:
-    """Run the scripts and yield their pictures; a script that fails yields a picture with the reason."""
+    """Run the scripts and yield a picture for each; if a script fails, its picture has only the reason."""
     for script in scripts:
         started, studio.frames_ms = time.perf_counter(), []
         try:

@@ -23,7 +23,7 @@ _SCAN_NAME = "lee_perry_smith"
 class Studio:
     """Renderer with the head that gallery pictures show, passed to each script.
 
-    name : name of the head; by default the scan if it is downloaded, else the human
+    name : name of the head; by default the scan lee_perry_smith if it is downloaded, else the human
     side : side of a panel [pixel]
     adapter : "auto", "cpu" or part of the name of an adapter
     settings : fields of `Settings` that override the values chosen by scripts
@@ -51,14 +51,14 @@ class Studio:
         return self._load(name or self.name, subdivide=1, **options)
 
     def coloured_head(self) -> Head:
-        """Return the gallery's head with a colour map; a head that the device paints gets a painted map."""
+        """Return the gallery's head with a colour map, which is painted if the head has procedural maps."""
         head = self.head()
         return with_painted_maps(self.renderer.device, head, 1024) if head.maps.is_painted else head
 
     def render(self, scene: Scene, scale: float = 1.0, **settings: Any) -> NDArray[np.uint8]:
         """Render a scene to 8-bit sRGB, (h, w, 3).
 
-        scale : ratio of the image's side to a panel's [-]
+        scale : side of the image relative to the side of a gallery panel [-]
         settings : fields of `Settings`
         """
         return self._draw(scene, scale, settings).srgb8()
@@ -66,7 +66,7 @@ class Studio:
     def linear(self, scene: Scene, scale: float = 1.0, **settings: Any) -> NDArray[np.float32]:
         """Render a scene to linear Rec. 709, (h, w, 3).
 
-        scale : ratio of the image's side to a panel's [-]
+        scale : side of the image relative to the side of a gallery panel [-]
         settings : fields of `Settings`
         """
         return self._draw(scene, scale, settings).linear()
@@ -75,7 +75,7 @@ class Studio:
         """Render an intermediate result of the frame as the viewer shows it, in 8-bit sRGB, (h, w, 3).
 
         view : name of the view in the viewer, such as "blur 3"
-        scale : ratio of the image's side to a panel's [-]
+        scale : side of the image relative to the side of a gallery panel [-]
         settings : fields of `Settings`
         """
         from dermis.apps.viewer.state import PART_VIEWS
@@ -114,7 +114,7 @@ class Studio:
     def settings(self, scale: float = 1.0, **settings: Any) -> Settings:
         """Return the settings with which a panel is rendered.
 
-        scale : ratio of the image's side to a panel's [-]
+        scale : side of the image relative to the side of a gallery panel [-]
         settings : fields of `Settings` that override the gallery's defaults
         """
         side = round(scale * self.side)

@@ -24,8 +24,8 @@ _GRAB_RADIUS_PX = 8.0  # distance from the divider within which a pointer grabs 
 class Controls:
     """Conversion of input events to steps of the undo history.
 
-    displayed_state : function that returns the state on screen, which differs from the history during
-        playback
+    displayed_state : function that returns the state on screen; during playback, it differs from the state
+        of the history
     light : index of the light that Shift-drag moves; an index after the last light means the environment
     """
 
@@ -73,20 +73,20 @@ class Controls:
         self._pointer_position = event["x"], event["y"]
         self._pinch = _measure_pinch(event)
 
-    def _release(self, event: Event, size: Point) -> None:
-        """End a drag at the position of the release, which may differ from that of the last move."""
+    def _release(self, event: Event, picture_size: Point) -> None:
+        """End a drag at the position of the release, which may differ from the position of the last move."""
         if self._pressed_button and not self._pinch and (event["x"], event["y"]) != self._pointer_position:
-            self._drag(event, size)
+            self._drag(event, picture_size)
         self._pressed_button, self._pinch = 0, None
         self.history.end_gesture()
 
-    def _drag(self, event: Event, size: Point) -> None:
+    def _drag(self, event: Event, picture_size: Point) -> None:
         pinch, (x0, y0) = _measure_pinch(event), self._pointer_position
         self._pointer_position = event["x"], event["y"]
         if pinch or self._pinch:
-            self._pan_and_zoom(pinch, size)
+            self._pan_and_zoom(pinch, picture_size)
             return
-        state, side = self.history.state, self._drag_unit(size)
+        state, side = self.history.state, self._drag_unit(picture_size)
         right, down = (event["x"] - x0) / side, (event["y"] - y0) / side
         if state.view == ATLAS_VIEW_NAME or self._pressed_button != _LEFT_BUTTON:
             new_state = _pan(state, right, down)
@@ -96,39 +96,46 @@ class Controls:
             new_state = state.with_camera(orbit(state.scene.camera, -math.pi * right, math.pi * down))
         self.history.change(new_state, f"drag {self._gesture_count}")
 
-    def _pan_and_zoom(self, pinch: tuple[float, float, float] | None, size: Point) -> None:
-        """Pan and zoom with two fingers; lifting one of them does not move the picture.
+    def _pan_and_zoom(self, pinch: tuple[float, float, float] | None, picture_size: Point) -> None:
+        """Pan and zoom with two fingers; lifting one finger does not move the picture.
 
-        pinch : midpoint (x, y) and distance of the fingers, None for fewer than two
+        pinch : midpoint (x, y) and distance of the two fingers [logical pixel]; None for fewer than two
+            fingers
         """
         if pinch and self._pinch:
             (x, y, spread), (x0, y0, spread0) = pinch, self._pinch
-            side = self._drag_unit(size)
+            side = self._drag_unit(picture_size)
             new_state = _pan(self.history.state, (x - x0) / side, (y - y0) / side)
             self.history.change(new_state, f"drag {self._gesture_count}")
-            self._zoom(spread0 / spread, (x, y), size, f"drag {self._gesture_count}")
+            self._zoom(spread0 / spread, (x, y), picture_size, f"drag {self._gesture_count}")
         self._pinch = pinch
 
-    def _zoom(self, factor: float, pointer: Point, size: Point, gesture: str) -> None:
+    def _zoom(self, factor: float, pointer: Point, picture_size: Point, gesture: str) -> None:
         """Move the camera nearer or farther, or scale the atlas around the pointer.
 
-        factor : factor of the visible height; below 1 zooms in
+        factor : factor by which the visible height is multiplied; a factor below 1 zooms in
         gesture : name of the gesture, which is undone in one step
         """
         state = self.history.state
         if state.view == ATLAS_VIEW_NAME:
-            x, y = ((a - 0.5 * b) / self._drag_unit(size) for a, b in zip(pointer, size, strict=True))
+            x, y = (
+                (a - 0.5 * b) / self._drag_unit(picture_size)
+                for a, b in zip(pointer, picture_size, strict=True)
+            )
             new_state = state.with_atlas_view(state.atlas_view.zoomed(factor, x, y))
         else:
             new_state = state.with_camera(dolly(state.scene.camera, factor))
         self.history.change(new_state, gesture)
 
-    def _drag_unit(self, size: Point) -> float:
-        """Return the length that drags are divided by: image height, or shorter side for the atlas view."""
-        return max(1.0, min(size) if self.history.state.view == ATLAS_VIEW_NAME else size[1])
+    def _drag_unit(self, picture_size: Point) -> float:
+        """Return the length by which drags are divided [logical pixel].
 
-    def _focus(self, event: Event, size: Point) -> None:
-        state, (width, height) = self.history.state, size
+        The length is the height of the picture, or, in the atlas view, the shorter side of the picture.
+        """
+        return max(1.0, min(picture_size) if self.history.state.view == ATLAS_VIEW_NAME else picture_size[1])
+
+    def _focus(self, event: Event, picture_size: Point) -> None:
+        state, (width, height) = self.history.state, picture_size
         if state.view == ATLAS_VIEW_NAME:
             self.history.change(state.with_atlas_view(AtlasView(state.atlas_view.layer)))
             return
@@ -148,7 +155,7 @@ class Controls:
 
 
 class SplitView:
-    """Before/after comparison: a frozen state left of a divider, the live state right of it.
+    """Before/after comparison: a frozen state left of a divider, and the live state right of the divider.
 
     frozen_state : state on the left, rendered with the live camera; None without a divider
     divider_position : fraction of the picture width left of the divider
@@ -161,7 +168,7 @@ class SplitView:
         self.is_dragged = False
 
     def freeze(self, state: ViewerState) -> None:
-        """Show a divider, with the given state left of it."""
+        """Show a divider, with the given state left of the divider."""
         self.frozen_state = state
 
     def release(self) -> None:
@@ -169,7 +176,7 @@ class SplitView:
         self.frozen_state, self.is_dragged = None, False
 
     def handle(self, event: Event, width: float) -> bool:
-        """Process a pointer event; return whether it drags the divider.
+        """Process a pointer event; return whether the event drags the divider.
 
         width : logical width of the picture
         """
@@ -205,7 +212,7 @@ def _pan(state: ViewerState, right: float, down: float) -> ViewerState:
 
 
 def _measure_pinch(event: Event) -> tuple[float, float, float] | None:
-    """Return the midpoint (x, y) and the distance of two fingers; None for fewer than two."""
+    """Return the midpoint (x, y) and the distance of two fingers; None for fewer than two fingers."""
     touches = list((event.get("touches") or {}).values())
     if len(touches) < 2:
         return None

@@ -23,25 +23,25 @@ _EASING_TIME_S = 0.05  # time constant with which the displayed camera approache
 
 def camera_axes(camera: Camera) -> tuple[Floats, Floats, Floats]:
     """Return the unit vectors of a camera: right and up in the image plane, and forward."""
-    forward = _unit(np.subtract(camera.target, camera.position))
-    right = _unit(np.cross(forward, camera.up))
+    forward = _normalise(np.subtract(camera.target, camera.position))
+    right = _normalise(np.cross(forward, camera.up))
     return right, np.cross(right, forward), forward
 
 
 def orbit(camera: Camera, yaw: float, pitch: float) -> Camera:
     """Orbit the camera around its target, without passing over the top or bottom.
 
-    yaw, pitch : angles to the right and up [rad]
+    yaw, pitch : angles by which the camera moves to the right and up [rad]
     """
-    up = _unit(np.array(camera.up, dtype=np.float64))
+    up = _normalise(np.array(camera.up, dtype=np.float64))
     offset = np.subtract(camera.position, camera.target)
     distance = float(np.linalg.norm(offset))
     elevation = math.asin(max(-1.0, min(1.0, float(offset @ up) / distance)))
     limit = max(_MAX_ELEVATION, abs(elevation))
-    horizontal = _rotation(up, yaw) @ _unit(offset - (offset @ up) * up)
+    horizontal = _rotation_matrix(up, yaw) @ _normalise(offset - (offset @ up) * up)
     elevation = max(-limit, min(limit, elevation + pitch))
     offset = distance * (math.cos(elevation) * horizontal + math.sin(elevation) * up)
-    return _with_position(camera, np.array(camera.target) + offset, camera.target)
+    return _with_position_and_target(camera, np.array(camera.target) + offset, camera.target)
 
 
 def pan(camera: Camera, right: float, up: float) -> Camera:
@@ -51,13 +51,13 @@ def pan(camera: Camera, right: float, up: float) -> Camera:
     """
     x, y, _ = camera_axes(camera)
     shift = camera.frame_mm * (right * x + up * y)
-    return _with_position(camera, camera.position + shift, camera.target + shift)
+    return _with_position_and_target(camera, camera.position + shift, camera.target + shift)
 
 
 def dolly(camera: Camera, factor: float) -> Camera:
     """Move the camera nearer (factor below 1) or farther; closer than 90 mm, zoom the lens instead.
 
-    factor : factor of the visible height at the target [-]
+    factor : factor by which the visible height at the target is multiplied [-]
     """
     frame_mm = max(_FRAME_RANGE_MM[0], min(_FRAME_RANGE_MM[1], factor * camera.frame_mm))
     offset = np.subtract(camera.position, camera.target)
@@ -65,13 +65,13 @@ def dolly(camera: Camera, factor: float) -> Camera:
     requested = old_distance * frame_mm / camera.frame_mm
     distance = max(min(requested, MAX_COORDINATE_MM / 10), min(old_distance, _MIN_DISTANCE_MM))
     position = np.array(camera.target) + offset * (distance / old_distance)
-    return _with_position(camera, position, camera.target, frame_mm=frame_mm)
+    return _with_position_and_target(camera, position, camera.target, frame_mm=frame_mm)
 
 
 def focus(camera: Camera, point: ArrayLike) -> Camera:
-    """Shift the camera so that a point becomes its target; direction and distance are unchanged."""
+    """Shift the camera so that a point becomes the target; direction and distance are unchanged."""
     shift = np.subtract(point, camera.target)
-    return _with_position(camera, np.array(camera.position) + shift, point)
+    return _with_position_and_target(camera, np.array(camera.position) + shift, point)
 
 
 class CameraEasing:
@@ -81,7 +81,7 @@ class CameraEasing:
         self.camera = camera
 
     def advance(self, target: Camera, seconds: float) -> Camera:
-        """Move the displayed camera towards a target for some time, and return it.
+        """Move the displayed camera towards another camera, and return the displayed camera.
 
         target : camera to approach
         seconds : time since the last call [s]
@@ -111,13 +111,13 @@ def interpolate_cameras(a: Camera, b: Camera, t: float) -> Camera:
     frame = a.frame_mm * (b.frame_mm / a.frame_mm) ** t
     camera = validated_copy(
         b,
-        position=_clamped_tuple(target + distance * _unit(direction)),
+        position=_clamped_tuple(target + distance * _normalise(direction)),
         target=_clamped_tuple(target),
         up=_clamped_tuple(up) if np.linalg.norm(np.cross(up, direction)) > 1e-3 else b.up,
         frame_mm=frame,
         principal_point=tuple(_interpolate(a.principal_point, b.principal_point, t).tolist()),
     )
-    return b if _nearly_equal(camera, b) else camera
+    return b if _cameras_nearly_equal(camera, b) else camera
 
 
 def pick(scene: Scene, camera: Camera, x: float, y: float, aspect: float) -> Floats | None:
@@ -153,8 +153,8 @@ def pick(scene: Scene, camera: Camera, x: float, y: float, aspect: float) -> Flo
 def drag_light(state: ViewerState, index: int, right: float, up: float) -> ViewerState:
     """Orbit a light around its target in the direction of a drag, or rotate the environment.
 
-    index : index of the light; any other index means the environment
-    right, up : angles [rad]
+    index : index of the light; an index after the last light means the environment
+    right, up : angles of the drag, to the right and up on screen [rad]
     """
     if index < len(state.scene.lights):
         lights = list(state.scene.lights)
@@ -172,46 +172,49 @@ def orbit_light(light: Light, camera: Camera, right: float, up: float) -> Light:
 
     The rotation changes the direction of a directional light, and the position of any other light.
 
-    right, up : angles [rad]; positive ones move a light in front of its target to the right and up on screen
+    right, up : angles [rad]; positive angles move a light between target and camera to the right and up on
+        screen
     """
     x, y, _ = camera_axes(camera)
-    rotation = _rotation(y, right) @ _rotation(x, -up)
+    rotation = _rotation_matrix(y, right) @ _rotation_matrix(x, -up)
     if isinstance(light, DirectionalLight):
         return validated_copy(light, direction=_clamped_tuple(rotation @ np.array(light.direction)))
     offset = rotation @ np.subtract(light.position, light.target)
     return validated_copy(light, position=_clamped_tuple(np.array(light.target) + offset))
 
 
-def _nearly_equal(a: Camera, b: Camera) -> bool:
+def _cameras_nearly_equal(first: Camera, second: Camera) -> bool:
     """Return whether the difference of two cameras is too small to see."""
-    shifts = np.subtract(a.position, b.position), np.subtract(a.target, b.target)
-    principal_shift = np.subtract(a.principal_point, b.principal_point) * b.frame_mm
-    differences = np.concatenate([*shifts, principal_shift, [a.frame_mm - b.frame_mm]])
-    return bool(np.abs(differences).max() < 5e-4 * b.frame_mm)
+    shifts = np.subtract(first.position, second.position), np.subtract(first.target, second.target)
+    principal_shift = np.subtract(first.principal_point, second.principal_point) * second.frame_mm
+    differences = np.concatenate([*shifts, principal_shift, [first.frame_mm - second.frame_mm]])
+    return bool(np.abs(differences).max() < 5e-4 * second.frame_mm)
 
 
-def _with_position(camera: Camera, position: ArrayLike, target: ArrayLike, **fields: float) -> Camera:
+def _with_position_and_target(
+    camera: Camera, position: ArrayLike, target: ArrayLike, **fields: float
+) -> Camera:
     return validated_copy(camera, position=_clamped_tuple(position), target=_clamped_tuple(target), **fields)
 
 
-def _clamped_tuple(v: ArrayLike) -> tuple[float, float, float]:
-    x, y, z = (float(c) for c in np.clip(v, -MAX_COORDINATE_MM, MAX_COORDINATE_MM))
+def _clamped_tuple(vector: ArrayLike) -> tuple[float, float, float]:
+    x, y, z = (float(c) for c in np.clip(vector, -MAX_COORDINATE_MM, MAX_COORDINATE_MM))
     return x, y, z
 
 
-def _interpolate(a: ArrayLike, b: ArrayLike, t: float) -> Floats:
-    return (1.0 - t) * np.array(a, dtype=np.float64) + t * np.array(b, dtype=np.float64)
+def _interpolate(start: ArrayLike, end: ArrayLike, fraction: float) -> Floats:
+    return (1.0 - fraction) * np.array(start, dtype=np.float64) + fraction * np.array(end, dtype=np.float64)
 
 
-def _rotation(axis: Floats, angle: float) -> Floats:
+def _rotation_matrix(axis: Floats, angle: float) -> Floats:
     """Return the (3, 3) matrix of a rotation around a unit axis.
 
-    angle : angle [rad]
+    angle : angle of the rotation [rad]
     """
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.asarray(np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * (cross @ cross))
 
 
-def _unit(v: Floats) -> Floats:
-    return np.asarray(v / np.linalg.norm(v))
+def _normalise(vector: Floats) -> Floats:
+    return np.asarray(vector / np.linalg.norm(vector))

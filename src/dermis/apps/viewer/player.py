@@ -1,4 +1,4 @@
-"""Playback of a motion over the viewer state; when paused, its pose becomes a step of the undo history."""
+"""Playback of a motion over the viewer state; on pause, the pose becomes a step of the undo history."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from dermis.scene.motion import load_motion
 
 
 class MotionFile:
-    """Motion file, with a cache of the clip that was last loaded from it for a head.
+    """Motion file, with a cache of the clip that was last loaded from the file for a head.
 
     path : file that `load_motion` accepts
     fps : frame rate of files without times [1/s]
@@ -25,9 +25,10 @@ class MotionFile:
         self._last: tuple[Head, Clip] | None = None
 
     def load_clip(self, head: Head) -> Clip:
-        """Return the clip of the file for a head, cached for the last head.
+        """Return the clip that the file contains for a head; the clip for the last head is cached.
 
-        Raises DermisError if the file cannot be read, or if it moves no morph target or bone of the head.
+        Raises DermisError if the file cannot be read, or if the motion moves no morph target or bone of the
+        head.
         """
         if self._last is None or self._last[0] is not head:
             self._last = head, load_motion(self.path, head, fps=self._fps)
@@ -37,15 +38,16 @@ class MotionFile:
 class MotionPlayer:
     """Player of a motion, with its current time and the displayed state.
 
-    While the motion plays, its current pose is displayed instead of the state's pose; other controls can
-    still change the state. When it pauses or ends, that pose becomes a step of the undo history.
+    While the motion plays, the current pose of the motion replaces the pose of the state on screen; other
+    controls can still change the state. When the motion pauses or ends, the current pose becomes a step of
+    the undo history.
 
-    motion : motion to play, None for none
+    motion : motion to play; None if there is no motion
     clock : function that returns the time [s]
 
     is_playing : whether the motion plays
     loops : whether the motion restarts at its end
-    note : names in the motion that the head lacks, or the reason why it cannot be played
+    note : names in the motion that the head lacks, or the reason why the motion cannot be played
     """
 
     def __init__(
@@ -72,7 +74,7 @@ class MotionPlayer:
 
     @property
     def clip(self) -> Clip | None:
-        """Return the clip for the current head; None without a motion or if the head cannot use it."""
+        """Return the motion's clip for the current head; None if there is no motion for this head."""
         head = self._history.state.scene.head
         if self._motion is not None and self._head is not head:
             self._head, self._clip = head, None
@@ -90,7 +92,7 @@ class MotionPlayer:
 
     @property
     def displayed_state(self) -> ViewerState:
-        """Return the current state, with the current pose of the motion while it plays."""
+        """Return the current state; while the motion plays, the state has the current pose of the motion."""
         state = self._history.state
         clip = self.clip if self.is_playing else None
         if clip is None:
@@ -111,7 +113,8 @@ class MotionPlayer:
     def open(self, motion: MotionFile) -> None:
         """Replace the motion and play it from its beginning.
 
-        Raises DermisError if the file cannot be read, or if it moves no morph target or bone of the head.
+        Raises DermisError if the file cannot be read, or if the motion moves no morph target or bone of the
+        head.
         """
         motion.load_clip(self._history.state.scene.head)
         self.pause()
@@ -119,9 +122,9 @@ class MotionPlayer:
         self.play(0.0)
 
     def play(self, seconds: float | None = None) -> None:
-        """Play the motion; at its end, start again from the beginning.
+        """Play the motion from a given time; at the end of the motion, start from the beginning.
 
-        seconds : time to start from, None for the current time [s]
+        seconds : time to start from; None for the current time [s]
         """
         if self.clip is None:
             return
@@ -130,11 +133,11 @@ class MotionPlayer:
         self.is_playing, self._starting, self._start_time = True, True, None
 
     def stop(self) -> None:
-        """Stop, and return to the pose from before playing."""
+        """Stop playing, and display the pose of the state again."""
         self.is_playing, self._cached_display = False, None
 
     def pause(self) -> None:
-        """Stop, and add the current pose to the undo history as one step."""
+        """Stop playing, and add the current pose to the undo history as one step."""
         if self.is_playing:
             displayed = self.displayed_state
             self.stop()

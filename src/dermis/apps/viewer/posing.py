@@ -18,25 +18,25 @@ REST_POSE = Pose()
 
 
 def target_weight(scene: Scene, target: str) -> float:
-    """Return the weight of a morph target in the pose of a scene; its rest weight if the pose sets none."""
-    return float(_pose(scene).weights.get(target, _rest_weight(scene.head, target)))
+    """Return the weight of a morph target in a scene: the weight in the pose, or else the rest weight."""
+    return float(_pose_or_rest(scene).weights.get(target, _rest_weight(scene.head, target)))
 
 
 def with_target_weight(scene: Scene, target: str, weight: float) -> Pose | None:
     """Return the pose of a scene with a new weight of one morph target; None for the rest pose."""
-    weights = dict(_pose(scene).weights)
+    weights = dict(_pose_or_rest(scene).weights)
     weights.pop(target, None)
     if weight != _rest_weight(scene.head, target):
         weights[target] = weight
-    return _none_if_rest(replace(_pose(scene), weights=weights))
+    return _none_if_rest(replace(_pose_or_rest(scene), weights=weights))
 
 
 def bone_angles(scene: Scene, bone: str) -> Angles:
-    """Return the rotation of a bone about the head's x, y and z axes [degrees].
+    """Return the angles by which a bone is rotated about the head's x, y and z axes [degrees].
 
     A rotation that the pose stores as a matrix is converted.
     """
-    rotation, skeleton = _pose(scene).bones.get(bone), scene.head.control.skeleton
+    rotation, skeleton = _pose_or_rest(scene).bones.get(bone), scene.head.control.skeleton
     if rotation is None or skeleton is None:
         return 0.0, 0.0, 0.0
     values = np.asarray(rotation, np.float64)
@@ -48,23 +48,23 @@ def bone_angles(scene: Scene, bone: str) -> Angles:
 
 
 def with_bone_angles(scene: Scene, bone: str, degrees: Angles) -> Pose | None:
-    """Return the pose of a scene with new angles of one bone; None for the rest pose.
+    """Return the pose of a scene with new angles of one bone; None if this is the rest pose.
 
     degrees : rotation about the head's x, y and z axes [degrees]
     """
-    bones = dict(_pose(scene).bones)
+    bones = dict(_pose_or_rest(scene).bones)
     bones.pop(bone, None)
     if any(degrees):
         bones[bone] = degrees
-    return _none_if_rest(replace(_pose(scene), bones=bones))
+    return _none_if_rest(replace(_pose_or_rest(scene), bones=bones))
 
 
 def rest_pose(scene: Scene) -> Pose | None:
-    """Return the pose of a scene without morph weights and bone rotations.
+    """Return the pose of a scene without morph target weights and bone rotations.
 
-    Vertex positions of a person are kept; None is the rest pose of the head itself.
+    The vertex positions that the pose of a person may contain are kept. None is the rest pose of the head.
     """
-    return _none_if_rest(replace(_pose(scene), weights={}, bones={}))
+    return _none_if_rest(replace(_pose_or_rest(scene), weights={}, bones={}))
 
 
 def poses_equal(a: Pose | Mapping[str, float] | None, b: Pose | Mapping[str, float] | None) -> bool:
@@ -98,12 +98,12 @@ def filter_names(names: Sequence[str], text: str) -> list[str]:
     return [name for name in names if query in name.casefold()]
 
 
-def _pose(scene: Scene) -> Pose:
+def _pose_or_rest(scene: Scene) -> Pose:
     return scene.pose or REST_POSE
 
 
 def _none_if_rest(pose: Pose) -> Pose | None:
-    """Return a pose, or None if it equals the rest pose of the head."""
+    """Return a pose, or None if the pose equals the rest pose of the head."""
     return pose if pose.weights or pose.bones or pose.positions_mm is not None else None
 
 

@@ -54,7 +54,7 @@ class HeadLoader:
 
     @property
     def note(self) -> str:
-        """Return a message that names the head being loaded, empty if none is."""
+        """Return a message that names the head being loaded; empty if no head is being loaded."""
         return f"opening {self.display_name(self._name)} ..." if self._future else ""
 
     def display_name(self, name: str) -> str:
@@ -80,7 +80,7 @@ class HeadLoader:
         self._future.add_done_callback(lambda _: self.request_frame())
 
     def take_loaded(self, state: ViewerState) -> ViewerState | None:
-        """Return the state with the loaded head, once after each load; None if no load has ended since.
+        """Return the state with a newly loaded head; None if no load has ended since the last call.
 
         state : current state, in which the head is replaced
 
@@ -98,22 +98,26 @@ class HeadLoader:
         return loaded if isinstance(loaded, ViewerState) else _with_head(state, loaded, self._name)
 
 
-def _load_head_or_scene(name: str) -> LoadedHead:
-    return load_state(Path(name)) if Path(name).suffix.lower() == ".toml" else load_head(name)
+def _load_head_or_scene(name_or_path: str) -> LoadedHead:
+    return (
+        load_state(Path(name_or_path))
+        if Path(name_or_path).suffix.lower() == ".toml"
+        else load_head(name_or_path)
+    )
 
 
-def _with_head(state: ViewerState, head: Head, name: str) -> ViewerState:
+def _with_head(state: ViewerState, head: Head, head_name: str) -> ViewerState:
     """Return the state with another head.
 
-    The pose is kept if the heads have the same morph targets and bones.
+    The pose is kept if both heads have the same morph targets and bones.
 
-    name : name or path that the head was loaded from
+    head_name : name or path from which the new head was loaded
     """
     old_head = state.scene.head
     same_names = old_head.targets == head.targets and old_head.bones == head.bones
     pose = state.scene.pose if same_names else None
     reused_pose = pose if pose is None or pose.positions_mm is None else None
-    return replace(state, scene=replace(state.scene, head=head, pose=reused_pose), head={"name": name})
+    return replace(state, scene=replace(state.scene, head=head, pose=reused_pose), head={"name": head_name})
 
 
 @lru_cache(maxsize=1)
@@ -128,9 +132,9 @@ _log = logging.getLogger(__name__)
 
 
 class Session:
-    """Viewing session: undo history, the controls and player that change it, and the renderer of its state.
+    """Viewing session: undo history, controls and player that change the state, and renderer of the state.
 
-    motion : motion to play, None for none
+    motion : motion to play; None if there is no motion
     clock : function that returns the time [s]
 
     split : before/after comparison
@@ -140,8 +144,10 @@ class Session:
     view_size : size of the view [pixel]
     heads : loader of heads in the background
     head_file : file name of a head typed in the panel
-    request_file : function that asks a web page for a file; None where the panel has a field for its path
-    offer_download : function that sends name and bytes of a file to a page; None where files are written
+    request_file : function that asks a web page to upload a file; None if the panel has a field for the path
+        of a file instead
+    offer_download : function that sends the name and bytes of a file to a web page; None if files are written
+        to paths instead
     motion_file : file name of a motion typed in the panel
     search : text by which morph targets and bones are filtered
     positions : positions of the panel's controls in the window, by label
@@ -176,7 +182,7 @@ class Session:
 
     @property
     def displayed_state(self) -> ViewerState:
-        """Return the state on screen: the current state, with the pose of the motion while it plays."""
+        """Return the state on screen: the current state, posed by the motion while the motion plays."""
         return self.player.displayed_state
 
     def change(self, state: ViewerState, gesture: str = "") -> None:
@@ -201,7 +207,7 @@ class Session:
     def save(self, path: Path) -> None:
         """Write the displayed state to a scene file, or offer the file as a download.
 
-        Raises DermisError if that is not possible.
+        Raises DermisError if the state cannot be saved.
         """
         state = self.displayed_state
         if "name" in state.head:  # the scene refers to an uploaded file by its original name
@@ -221,7 +227,7 @@ class Session:
         self.message = f"loaded {path}"
 
     def take_head(self) -> None:
-        """Show the head that was loaded in the background, or a message why it cannot be loaded."""
+        """Show the head that was loaded in the background, or the reason why the head cannot be loaded."""
         try:
             state = self.heads.take_loaded(self.state)
         except DermisError as error:
@@ -237,17 +243,18 @@ class Session:
     def open_motion(self, path: str) -> None:
         """Open a motion file and play it.
 
-        Raises DermisError if the file cannot be read, or if it moves no morph target or bone of the head.
+        Raises DermisError if the file cannot be read, or if the motion moves no morph target or bone of the
+        head.
         """
         self.player.open(MotionFile(path))
         self.message = f"opened {path}"
 
     def screenshot(self, path: Path, size: tuple[int, int]) -> None:
-        """Write the displayed view as .png (tone-mapped) or .exr (linear), or offer it as a download.
+        """Write the displayed view as .png (tone-mapped) or .exr (linear), or offer the file as a download.
 
-        size : width and height [pixel]
+        size : width and height of the picture [pixel]
 
-        Raises DermisError if that is not possible.
+        Raises DermisError if the picture cannot be rendered or written.
         """
         suffix, view = path.suffix.lower(), self.displayed_state.view
         if suffix not in (".png", ".exr"):
@@ -278,7 +285,7 @@ def apply_regions(state: ViewerState, name: str, known_states: Iterable[ViewerSt
     """Return the state with roughness and specular maps from a table of face regions, or without such maps.
 
     name : name of the table, "auto" or "none"
-    known_states : states whose heads are reused if they already have these maps
+    known_states : states whose heads are reused if the heads already have these maps
 
     Raises DermisError for heads without known regions and for heads created in memory.
     """

@@ -38,7 +38,7 @@ class AtlasView:
 
     layer : map to show, one of `views.ATLAS_LAYERS`
     centre : uv at the centre of the picture, u to the right and v down [-]
-    span : part of the atlas along the picture's shorter side, 1 for the whole side of the atlas [-]
+    span : length in the atlas that the picture's shorter side shows; 1 is the side of the atlas [-]
     """
 
     layer: str = "irradiance"
@@ -56,8 +56,9 @@ class AtlasView:
     def zoomed(self, factor: float, x: float, y: float) -> AtlasView:
         """Return the view zoomed around the cursor.
 
-        factor : factor of the visible extent; below 1 zooms in
-        x, y : cursor relative to the centre of the picture, right and down, in fractions of its shorter side
+        factor : factor by which the visible extent is multiplied; a factor below 1 zooms in
+        x, y : cursor relative to the centre of the picture, right and down, in fractions of the picture's
+            shorter side
         """
         span = min(_MAX_SPAN, max(_MIN_SPAN, factor * self.span))
         (u, v), reduction = self.centre, self.span - span
@@ -97,7 +98,7 @@ class ViewerState:
 
     @property
     def head_table(self) -> Table:
-        """Return the [head] table with the head's subdivision level; empty for a head from memory."""
+        """Return the [head] table with the head's subdivision level; empty for a head created in memory."""
         return self.head and {"subdivide": self.scene.head.levels, **self.head}
 
     def with_skin(self, **fields: object) -> ViewerState:
@@ -138,11 +139,11 @@ class ViewerState:
         return self.with_lights(lights)
 
     def with_environment(self, environment: Environment | None) -> ViewerState:
-        """Return a copy with another environment; None removes it."""
+        """Return a copy with another environment; None removes the environment."""
         return self._with_scene(environment=environment)
 
     def with_view(self, name: str) -> ViewerState:
-        """Return a copy that shows another of `views.VIEW_NAMES`."""
+        """Return a copy that shows another view, one of `views.VIEW_NAMES`."""
         return replace(self, view=name)
 
     def with_atlas_view(self, atlas_view: AtlasView) -> ViewerState:
@@ -154,7 +155,7 @@ class ViewerState:
         return self._with_scene(pose=pose)
 
     def with_motion(self, clip: Clip, seconds: float) -> ViewerState:
-        """Return a copy with the pose of a motion; morph targets and bones that it does not move are kept.
+        """Return a copy posed by a motion; morph targets and bones that the motion does not move are kept.
 
         seconds : time in the motion [s]
 
@@ -179,14 +180,14 @@ class ViewerState:
 def states_equal(a: ViewerState, b: ViewerState) -> bool:
     """Return whether two states are equal; their heads must be the same object."""
 
-    def values(state: ViewerState) -> tuple[object, ...]:
+    def compared_values(state: ViewerState) -> tuple[object, ...]:
         scene = state.scene
         scene_values = tuple(scene.lights), scene.camera, scene.skin, scene.environment
         view_values = state.view, state.rig, state.atlas_view, state.seconds
         return *scene_values, state.settings, state.head_table, *view_values
 
     is_head_same = a.scene.head is b.scene.head and poses_equal(a.scene.pose, b.scene.pose)
-    return is_head_same and values(a) == values(b)
+    return is_head_same and compared_values(a) == compared_values(b)
 
 
 def validated_copy(values: P, **fields: object) -> P:
@@ -215,11 +216,11 @@ def _load_named_state(name: str) -> ViewerState:
 
 
 def make_state(subject: Head | Human | Scene | ViewerState | str | os.PathLike[str]) -> ViewerState:
-    """Return the initial state of a viewer for a head, person or scene, or for the name of one.
+    """Return the initial state of a viewer for a head, person or scene.
 
-    A state is returned unchanged.
+    subject : head, person, scene, or the name or file of one of these; a viewer state is returned unchanged
 
-    Raises DermisError for anything else.
+    Raises DermisError for a subject of another type, and if a named subject cannot be loaded.
     """
     if isinstance(subject, ViewerState):
         return subject
@@ -287,7 +288,7 @@ class UndoHistory:
 
     @property
     def can_undo(self) -> bool:
-        """Return whether there is an earlier state."""
+        """Return whether there is a state before the current state."""
         return len(self._past) > 1
 
     @property
@@ -296,7 +297,7 @@ class UndoHistory:
         return bool(self._undone)
 
     def change(self, state: ViewerState, gesture: str = "") -> None:
-        """Add a state; within one gesture it replaces the last state.
+        """Add a state; within one gesture, the new state replaces the last state.
 
         gesture : name of the gesture, empty for a change that is undone separately
         """
@@ -311,7 +312,7 @@ class UndoHistory:
         self._undone.clear()
 
     def end_gesture(self) -> None:
-        """End the gesture, so that the next change is a new step."""
+        """End the gesture, so that the next change becomes a separate step of the undo history."""
         self._gesture = ""
 
     def undo(self) -> None:

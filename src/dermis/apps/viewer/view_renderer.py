@@ -31,7 +31,7 @@ from dermis.mesh.mesh import Mesh
 from dermis.scene.camera import Camera
 from dermis.scene.settings import MAX_SAMPLE_COUNT, Settings
 
-_BUDGET_MS = {True: 100.0, False: 33.0}  # time of a frame in motion on a software adapter and on a GPU
+_FRAME_BUDGET_MS = {True: 100.0, False: 33.0}  # time of a frame in motion on a software adapter and on a GPU
 _SLOW_RATIO, _FAST_RATIO = 1.25, 0.45  # ratios of frame time to budget at which the quality changes
 _STREAK_LENGTH = 2  # consecutive slow or fast frames before a change; a single one may have relit the atlas
 
@@ -41,7 +41,7 @@ class Quality:
     """Upper limits of the render settings in motion; still frames are rendered without limits.
 
     scale : factor of the image size [-]
-    samples, atlas, shadow_size : maximum values of these settings
+    samples, atlas, shadow_size : maximum values of the fields of `Settings` with these names
     """
 
     scale: float
@@ -70,7 +70,7 @@ class QualityController:
 
     def __init__(self, software: bool) -> None:
         self.software = software
-        self._budget_ms = _BUDGET_MS[software]
+        self._budget_ms = _FRAME_BUDGET_MS[software]
         self._level = self._best_level = _BEST_LEVEL_ON_CPU if software else 0
         self._streak = 0
 
@@ -94,12 +94,12 @@ class QualityController:
             self._level = max(self._best_level, min(len(QUALITY_LEVELS) - 1, self._level + step))
             self._streak = 0
 
-    def limited_settings(self, settings: Settings, size: tuple[int, int], moving: bool) -> Settings:
-        """Return the settings of a frame for a window of the given size, with quality limits in motion.
+    def limited_settings(self, settings: Settings, size: tuple[int, int], is_moving: bool) -> Settings:
+        """Return the settings of a frame for a window size, with quality limits while the picture changes.
 
-        moving : whether the picture is changing
+        is_moving : whether the picture is changing
         """
-        quality = self.quality if moving else QUALITY_LEVELS[0]
+        quality = self.quality if is_moving else QUALITY_LEVELS[0]
         width, height = (max(1, round(quality.scale * side)) for side in size)
         return validated_copy(
             settings,
@@ -151,7 +151,7 @@ class ViewRenderer:
         self._atlas_state: tuple[ViewerState, str] | None = None
 
     def prepare(self, state: ViewerState, on_resources_ready: Callable[[], None] = lambda: None) -> None:
-        """Render small images of a state, in motion and still, so that its resources and shaders exist.
+        """Render small images of a state, in motion and still, to create all resources and shaders.
 
         on_resources_ready : function called when the resources of the head have been created
 
@@ -173,32 +173,32 @@ class ViewRenderer:
         frozen_state: ViewerState | None,
         camera: Camera,
         size: tuple[int, int],
-        moving: bool,
+        is_moving: bool,
     ) -> Images:
-        """Return the images of the live and the frozen state; the second is None if no state is frozen.
+        """Return the image of the live state, and the image of the frozen state or None.
 
-        moving : whether the picture is changing, which limits its quality
+        is_moving : whether the picture is changing, which limits its quality
 
         Raises DermisError if a state cannot be rendered or the device fails.
         """
         if frozen_state is None:
             self._frozen = None
-            return self.render_image(state, camera, size, moving), None
-        image = self._frozen_image(frozen_state, camera, size, moving)
-        return self.render_image(state, camera, size, moving), image
+            return self.render_image(state, camera, size, is_moving), None
+        image = self._frozen_image(frozen_state, camera, size, is_moving)
+        return self.render_image(state, camera, size, is_moving), image
 
     def render_image(
-        self, state: ViewerState, camera: Camera, size: tuple[int, int], moving: bool
+        self, state: ViewerState, camera: Camera, size: tuple[int, int], is_moving: bool
     ) -> Texture:
-        """Return a texture of sRGB bytes for a state; cached if nothing has changed.
+        """Return a texture of sRGB bytes for a state; the last texture is reused if nothing has changed.
 
         size : size of the view; in motion the texture may be smaller [pixel]
-        moving : whether the picture is changing, which limits its quality
+        is_moving : whether the picture is changing, which limits its quality
 
         Raises DermisError if the state cannot be rendered or the device fails.
         """
         self._size = size
-        settings = self._settings(state, size, moving)
+        settings = self._settings(state, size, is_moving)
         inputs = self._image_inputs
         is_cached = inputs and inputs[0] is state and inputs[1:] == (camera, settings)
         if is_cached and self.last_image is not None:
@@ -209,16 +209,16 @@ class ViewRenderer:
         if self.rendered and self.rendered is not last_rendered:
             self.stage_times.append(self.rendered.gpu_ms or {})
             stages = self.rendered.gpu_ms or {"shade"}
-            if moving and "shade" in stages:  # times of frames without shading do not predict the next one
+            if is_moving and "shade" in stages:  # times of frames without shading do not predict the next one
                 self.quality_controller.record_frame_time(self.rendered.frame_ms)
         return self.last_image
 
     def _frozen_image(
-        self, frozen_state: ViewerState, camera: Camera, size: tuple[int, int], moving: bool
+        self, frozen_state: ViewerState, camera: Camera, view_size: tuple[int, int], is_moving: bool
     ) -> Texture:
         """Return a copy of the image of the frozen state, rendered again when the camera moves."""
-        settings, frozen = self._settings(frozen_state, size, moving), self._frozen
-        still_settings = self._settings(frozen_state, size, moving=False)
+        settings, frozen = self._settings(frozen_state, view_size, is_moving), self._frozen
+        still_settings = self._settings(frozen_state, view_size, is_moving=False)
         is_cached = frozen and frozen.state is frozen_state and frozen.camera == camera
         if frozen and is_cached and frozen.settings in (settings, still_settings):
             return frozen.image
@@ -228,10 +228,10 @@ class ViewRenderer:
         self._frozen = FrozenImage(frozen_state, camera, settings, image_copy)
         return image_copy
 
-    def _settings(self, state: ViewerState, size: tuple[int, int], moving: bool) -> Settings:
+    def _settings(self, state: ViewerState, view_size: tuple[int, int], is_moving: bool) -> Settings:
         """Return the settings of a frame with quality limits in motion, except for the atlas view."""
         return self.quality_controller.limited_settings(
-            state.settings, size, moving and state.view != ATLAS_VIEW_NAME
+            state.settings, view_size, is_moving and state.view != ATLAS_VIEW_NAME
         )
 
     @property
@@ -240,14 +240,14 @@ class ViewRenderer:
         if not self._image_inputs:
             return False
         state, _, settings = self._image_inputs
-        return self._settings(state, self._size, moving=False) == settings
+        return self._settings(state, self._size, is_moving=False) == settings
 
     def screenshot(self, path: Path, state: ViewerState, size: tuple[int, int]) -> None:
         """Render the view of a state to a file: .png (tone-mapped) or .exr (linear).
 
-        size : width and height [pixel]
+        size : width and height of the picture [pixel]
 
-        Raises DermisError if that is not possible.
+        Raises DermisError if the picture cannot be rendered or written.
         """
         if self.is_preparing:
             refuse("picture", "a head that is ready", "it is being prepared", "Try again in a moment")
@@ -267,29 +267,29 @@ class ViewRenderer:
         return self.rendered.exposure if self.rendered else 1.0
 
     def read(self, image: Texture) -> NDArray[np.uint8]:
-        """Download an image and return its (h, w, 3) sRGB bytes."""
+        """Download an image, and return the (h, w, 3) sRGB bytes of the image."""
         return np.ascontiguousarray(download(self.renderer.device, image)[..., :3])
 
-    def _draw(self, state: ViewerState, side: str = "") -> Texture:
+    def _draw(self, state: ViewerState, divider_side: str = "") -> Texture:
         parts = PART_VIEWS.get(state.view, state.settings.parts)
         settings = self.settings = validated_copy(state.settings, parts=parts)
-        if state.view == ATLAS_VIEW_NAME and self._has_atlas_light(state, side):
-            return self._views.draw_atlas(state.scene, settings, state.atlas_view, side)
+        if state.view == ATLAS_VIEW_NAME and self._has_atlas_light(state, divider_side):
+            return self._views.draw_atlas(state.scene, settings, state.atlas_view, divider_side)
         self._atlas_state = None
-        self.rendered = self.renderer.draw(state.scene, settings, view=side)
-        self._atlas_state = state, side
+        self.rendered = self.renderer.draw(state.scene, settings, view=divider_side)
+        self._atlas_state = state, divider_side
         if state.view in (PICTURE_VIEW_NAME, *PART_VIEWS):
             return self.rendered.picture.bytes
         if state.view == ATLAS_VIEW_NAME:
-            return self._views.draw_atlas(state.scene, settings, state.atlas_view, side)
-        return self._views.draw(state.scene, settings, state.view, side)
+            return self._views.draw_atlas(state.scene, settings, state.atlas_view, divider_side)
+        return self._views.draw(state.scene, settings, state.view, divider_side)
 
-    def _has_atlas_light(self, state: ViewerState, side: str) -> bool:
+    def _has_atlas_light(self, state: ViewerState, divider_side: str) -> bool:
         """Return whether the atlas already holds the light of a state, so that no frame must be rendered.
 
-        side : name of the state's side of the divider, empty for the live side
+        divider_side : name of the state's side of the divider, empty for the live side
         """
-        if self._atlas_state is None or self._atlas_state[1] != side:
+        if self._atlas_state is None or self._atlas_state[1] != divider_side:
             return False
         return states_equal(replace(self._atlas_state[0], atlas_view=state.atlas_view), state)
 
@@ -313,7 +313,7 @@ T = TypeVar("T")
 class HeadPreparation:
     """Preparation of new heads for rendering, in a thread that handles one head at a time.
 
-    Nothing else is drawn while it runs.
+    Nothing else is drawn while a head is being prepared.
 
     request_frame : function that requests a frame, called from another thread when a preparation ends
     """
@@ -327,17 +327,19 @@ class HeadPreparation:
 
     @property
     def is_running(self) -> bool:
-        """Return whether a head is being prepared, or has been prepared and is not yet drawn."""
+        """Return whether a head is being prepared, or has been prepared but has not yet been drawn."""
         return self._future is not None
 
     def reset(self) -> None:
-        """Forget all preparations, because the renderer has been replaced."""
+        """Discard the prepared meshes and the held image, because the renderer has been replaced."""
         self._ready_mesh = self._future = self._next_mesh = self._held_image = None
 
     def prepare_head(self, view_renderer: ViewRenderer, state: ViewerState) -> Texture | None:
-        """Start to prepare the head of `state` if it is new; return the last image until it is ready.
+        """Start to prepare a new head; return the last image until the preparation has ended.
 
-        Returns None once the state can be drawn. Raises the exception that stopped the preparation, once.
+        state : state with the head
+
+        Returns None once `state` can be drawn. Raises the exception that stopped a preparation, once.
         """
         if self._future is not None:
             if not self._future.done():
@@ -361,11 +363,11 @@ def run_in_thread(task: Callable[[], T]) -> Future[T]:
     future: Future[T] = Future()
     future.set_running_or_notify_cancel()
 
-    def run() -> None:
+    def set_result() -> None:
         try:
             future.set_result(task())
         except Exception as error:
             future.set_exception(error)
 
-    threading.Thread(target=run, name="preparing", daemon=True).start()
+    threading.Thread(target=set_result, name="preparing", daemon=True).start()
     return future

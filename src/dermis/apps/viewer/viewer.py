@@ -94,7 +94,7 @@ class Viewer:
     adapter : "auto", "cpu" or part of an adapter's name
     clock : function that returns the time [s]
     motion : motion to play
-    view_renderer : renderer that has already prepared the state, None to create one
+    view_renderer : renderer that has already prepared the state; None to create a renderer
 
     `failure` is the error that closed the canvas because the device failed twice or could not be reopened.
 
@@ -132,7 +132,7 @@ class Viewer:
         canvas.request_draw(self.draw)
 
     def draw(self) -> None:
-        """Draw a frame into the canvas; reopen the device if it was lost."""
+        """Draw a frame into the canvas; reopen a device that was lost."""
         try:
             with gpu_failures(self.session.view_renderer.renderer.device):
                 self._draw(self._clock())
@@ -167,7 +167,7 @@ class Viewer:
             self._last_change, self._last_state, self._last_size = now, state, size
         self._last_draw, session.view_size = now, size
         images = self._render_images(state, camera, size, self._is_moving(now))
-        session.status = self._status(size)
+        session.status = self._status_text(size)
         target = self._context.get_current_texture().create_view()
         self._blit.draw(self._patches(*images, size), target)
         self.panel.draw(target, self.canvas.get_logical_size(), self.canvas.get_pixel_ratio())
@@ -182,26 +182,28 @@ class Viewer:
         width, height = self.canvas.get_physical_size()
         return max(1, width - self._panel_width()), max(1, height)
 
-    def _patches(self, image: Texture, frozen: Texture | None, size: tuple[int, int]) -> list[Patch]:
+    def _patches(
+        self, live_image: Texture, frozen_image: Texture | None, size: tuple[int, int]
+    ) -> list[Patch]:
         """Return patches that show the live image, and the frozen image left of the divider.
 
         size : width and height of the picture [pixel]
         """
         left, (width, height) = self._panel_width(), size
         viewport = left, 0, width, height
-        if frozen is None:
-            return [Patch(image, viewport, viewport)]
+        if frozen_image is None:
+            return [Patch(live_image, viewport, viewport)]
         divider = round(self.session.split.divider_position * width)
         patches = (
-            Patch(frozen, viewport, (left, 0, divider, height)),
-            Patch(image, viewport, (left + divider, 0, width - divider, height)),
+            Patch(frozen_image, viewport, (left, 0, divider, height)),
+            Patch(live_image, viewport, (left + divider, 0, width - divider, height)),
         )
         return [patch for patch in patches if patch.scissor[2]]
 
     def _render_images(
-        self, state: ViewerState, camera: Camera, size: tuple[int, int], moving: bool
+        self, state: ViewerState, camera: Camera, size: tuple[int, int], is_moving: bool
     ) -> Images:
-        """Return the live and the frozen image; if `state` cannot be rendered, the last image and None."""
+        """Return the live and frozen images, or the last image and None if `state` cannot be rendered."""
         import wgpu
 
         session = self.session
@@ -210,7 +212,7 @@ class Viewer:
                 if held_image := self._preparation.prepare_head(session.view_renderer, state):
                     return held_image, None
                 frozen_state = session.split.frozen_state
-                images = session.view_renderer.render_images(state, frozen_state, camera, size, moving)
+                images = session.view_renderer.render_images(state, frozen_state, camera, size, is_moving)
                 if self._rejected_state:
                     self._rejected_state, session.message = None, ""
                 return images
@@ -235,7 +237,7 @@ class Viewer:
     def _is_moving(self, now: float) -> bool:
         return self.session.player.is_playing or now - self._last_change < _STILL_AFTER_S
 
-    def _status(self, size: tuple[int, int]) -> str:
+    def _status_text(self, picture_size: tuple[int, int]) -> str:
         view_renderer = self.session.view_renderer
         settings = view_renderer.settings
         if self._preparation.is_running:
@@ -245,7 +247,7 @@ class Viewer:
             return ""
         width, height = settings.size
         text = f"software adapter, no GPU: {width} x {height}"
-        if view_renderer.is_current and settings.size == size:
+        if view_renderer.is_current and settings.size == picture_size:
             return text
         return f"{text}, atlas {settings.atlas} while moving, refined when still"
 
@@ -295,7 +297,7 @@ class Viewer:
         return session.heads.request_frame
 
     def _reopen_device(self, error: DermisError) -> None:
-        """Reopen the device after it was lost or ran out of memory."""
+        """Reopen the device after the device was lost or ran out of memory."""
         import wgpu
 
         self._failures += 1

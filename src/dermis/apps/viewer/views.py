@@ -63,10 +63,10 @@ class IntermediateViews:
     def draw(self, scene: Scene, settings: Settings, view: str, side: str = "") -> Texture:
         """Return an image of sRGB bytes that shows an intermediate result of the last frame on the head.
 
-        view : name of the view
+        view : name of the view, one of `VIEW_NAMES`
         side : name of the side of the divider, empty for the live side
 
-        Raises DermisError if the technique does not compute it.
+        Raises DermisError if the technique does not compute the intermediate result.
         """
         inputs = self._renderer.prepare(scene, settings, side)
         unused = ("ENVIRONMENT", "HALF_SPACE", "INTERREFLECTION", "STRANDS")  # not declared by the shader
@@ -89,7 +89,7 @@ class IntermediateViews:
 
         side : name of the side of the divider, empty for the live side
 
-        Raises DermisError if the technique does not compute it.
+        Raises DermisError if the technique does not compute the displayed map.
         """
         inputs = self._renderer.prepare(scene, settings, side)
         layer, scale = self._atlas_layer(inputs, atlas_view.layer, settings)
@@ -99,7 +99,7 @@ class IntermediateViews:
         return self._render(self._atlas_shader, {"atlas_view": record, "layer": layer}, settings.size)
 
     def _render(self, shader: ComputeProgram, bindings: Bindings, size: tuple[int, int]) -> Texture:
-        """Run a shader that stores an image to the texture `bytes`, and return that texture."""
+        """Run a shader that writes an image to its binding `bytes`, and return the texture bound there."""
         device = self._renderer.device
         if self._image is None or self._image.size[:2] != size:
             self._image = make_texture(device, size, "rgba8uint")
@@ -110,7 +110,7 @@ class IntermediateViews:
         return self._image
 
     def _atlas_layer(self, inputs: FrameInputs, view: str, settings: Settings) -> tuple[TextureOrView, float]:
-        """Return the atlas texture that a view shows, and a scale for its display.
+        """Return the atlas texture that a view shows, and a scale for the display of the texture.
 
         For light, the scale is the factor by which texels are multiplied for display. For stretch, it is the
         mean number of texels per mm, and for thickness 1.
@@ -155,10 +155,10 @@ class IntermediateViews:
 
 
 def draw_thickness(device: Device, translucency: Translucency, target: Texture) -> Texture:
-    """Compute the least tissue thickness below each cell of the coarse atlas, and return the texture [mm].
+    """Compute the least tissue thickness below each cell of the coarse atlas; return it in a texture [mm].
 
-    The thickness is the least depth of a cell below the tangent planes of its source cells. It is at most the
-    radius within which source cells are searched.
+    The thickness is the least depth of a cell below the tangent planes of the cell's source cells, and at
+    most the radius within which source cells are searched.
 
     target : texture to fill, with one texel per cell; cells without pairs are unchanged
     """

@@ -22,7 +22,7 @@ from dermis.mesh.head import Head
 from dermis.scene.model import Scene
 
 Size = tuple[int, int]
-_TITLE = "dermis"
+_WINDOW_TITLE = "dermis"
 _MAX_FPS = 60
 
 
@@ -38,11 +38,11 @@ def show_window(state: ViewerState, adapter: str, size: Size, *, motion: MotionF
     with warnings.catch_warnings(record=True) as caught:  # without a display glfw only warns
         warnings.simplefilter("always")
         if not backend.glfw.init():
-            _refuse_display("; ".join(str(warning.message) for warning in caught))
+            _raise_no_display("; ".join(str(warning.message) for warning in caught))
     try:
-        canvas = backend.RenderCanvas(size=size, title=_TITLE, max_fps=_MAX_FPS)
+        canvas = backend.RenderCanvas(size=size, title=_WINDOW_TITLE, max_fps=_MAX_FPS)
     except Exception as error:  # glfw has no exception class for a missing display
-        _refuse_display(error)
+        _raise_no_display(error)
     viewer = Viewer(state, canvas, adapter, motion=motion)
     with _without_signal_handlers():
         backend.loop.run()
@@ -75,9 +75,9 @@ def serve(
     Pages show the progress of the preparation until the first picture.
 
     load : function that loads the initial state and motion, called in a thread
-    size : size of the canvas until a page reports its own
+    size : width and height of the canvas until a page reports the size of its window [logical pixel]
     port : port number, 0 for any free port
-    announce : function called first, with the URL and whether other machines can reach it
+    announce : function called first, with the URL and whether other machines can reach the URL
     require_token : whether the URL has a token even if only this machine can reach it
 
     Raises every exception of `load`, and DermisError if the address cannot be used, without a device or
@@ -90,7 +90,7 @@ def serve(
 
     listener, address = bind(host, port, require_token=require_token)
     with listener, TemporaryDirectory(prefix="dermis-") as folder:
-        canvas = PageCanvas(size=size, title=_TITLE, max_fps=_MAX_FPS)
+        canvas = PageCanvas(size=size, title=_WINDOW_TITLE, max_fps=_MAX_FPS)
         canvas._size_info.set_physical_size(*size, 1.0)
         http_server = make_server(address, canvas, Path(folder))
         # rendercanvas handles Ctrl+C by closing the canvas; the server must stop too.
@@ -151,7 +151,7 @@ def view(
 
 
 def _notebook_canvas(backend: Any) -> Any:
-    """Return the notebook widget class of rendercanvas with workarounds for two of its bugs."""
+    """Return the notebook widget class of rendercanvas, with workarounds for two bugs of rendercanvas."""
 
     class NotebookCanvas(backend.AnywidgetRenderCanvas):  # type: ignore[misc]
         def _rfb_handle_msg(self, widget: object, content: Event, buffers: list[bytes]) -> None:
@@ -168,13 +168,13 @@ def _notebook_canvas(backend: Any) -> Any:
     return NotebookCanvas
 
 
-def _load_backend(name: str, needed: tuple[str, ...], extra: str) -> Any:
+def _load_backend(name: str, required_packages: tuple[str, ...], extra: str) -> Any:
     """Import and return a module of rendercanvas; raise DermisError if packages are missing.
 
-    needed : names of the packages that the module needs
+    required_packages : import names of the packages that the module needs
     extra : extra of dermis that installs these packages
     """
-    for package in (*needed, "imgui_bundle", "rendercanvas"):
+    for package in (*required_packages, "imgui_bundle", "rendercanvas"):
         try:
             importlib.import_module(package)
         except ImportError:
@@ -183,7 +183,7 @@ def _load_backend(name: str, needed: tuple[str, ...], extra: str) -> Any:
     return importlib.import_module(f"rendercanvas.{name}")
 
 
-def _refuse_display(reason: object) -> NoReturn:
+def _raise_no_display(reason: object) -> NoReturn:
     refuse("window", "a display", f"none can be opened ({reason})", "Set DISPLAY, or use --browser")
 
 

@@ -26,14 +26,14 @@ from dermis.base.arrays import Floats, Index, Ints, Mask
 class Coverage:
     """Surface points that the texels of an (h, w) grid show.
 
-    The anchor of a texel is the nearest point of the piece to which the texel belongs: inside the piece it is
-    the point that the texel shows, in the gutter a point on the border.
+    The anchor of a texel is the nearest point of the piece to which the texel belongs: inside the piece the
+    anchor is the point that the texel shows, in the gutter a point on the border.
 
-    triangle : (h, w) index of the triangle that the texel shows, -1 for none
+    triangle : (h, w) index of the triangle that the texel shows, -1 if there is none
     weights : (h, w, 2) barycentric weights of that triangle's second and third corner
-    anchor_triangle : (h, w) index of the anchor's triangle, -1 for none
+    anchor_triangle : (h, w) index of the anchor's triangle, -1 if there is none
     anchor_weights : (h, w, 2) barycentric weights of the anchor
-    piece : (h, w) piece to which the texel or gutter belongs, -1 for none
+    piece : (h, w) piece to which the texel or gutter belongs, -1 if there is none
     gutter : (h, w) mask of gutter texels, which copy light
     distance_mm : (h, w) distance from the piece on the surface [mm]
     """
@@ -58,7 +58,7 @@ def compute_coverage(
 ) -> Coverage:
     """Compute the surface points that the texels of packed pieces and their gutters show.
 
-    piece : (f,) piece of each triangle, -1 for none
+    piece : (f,) piece of each triangle, -1 if there is none
     members : (t,) indices of the triangles to rasterise
     border : border of the pieces, see `find_border`
     shape : height and width of the grid of texels
@@ -109,7 +109,7 @@ def hidden_triangles(surface: FlatSurface, piece: Index, packing: Packing, size:
 def _drawing_order(surface: FlatSurface, piece: Index, members: Index) -> Index:
     """Return triangle indices sorted so that triangles mirrored within their piece come first.
 
-    They are then overwritten by the other triangles.
+    Texels that mirrored triangles share with other triangles are thus owned by the other triangles.
 
     members : (t,) indices of the triangles
     """
@@ -131,7 +131,7 @@ def _repeat_edge(coverage: Coverage, piece: Index, beyond_end: Mask, y: Index, x
     A blur along the edge then reads the same light from a gutter as from the rim of a piece.
 
     beyond_end : (h, w) mask of texels beyond the end of the surface
-    y, x : (n,) row and column of the gutter texels among them
+    y, x : (n,) row and column of the gutter texels in this mask
     """
     last = np.array(beyond_end.shape) - 1
     piece_of_texel, from_y, from_x = piece[coverage.anchor_triangle[y, x]], y.copy(), x.copy()

@@ -45,9 +45,9 @@ class Geodesics(NamedTuple):
     direction: Complex
     orientation: Doubles
 
-    def select(self, selected: Mask) -> Geodesics:
-        """Return the geodesics for which a mask is true."""
-        return Geodesics._make(part[selected] for part in self)
+    def select(self, mask: Mask) -> Geodesics:
+        """Return the geodesics that a mask selects."""
+        return Geodesics._make(part[mask] for part in self)
 
 
 class GeodesicEnds(NamedTuple):
@@ -67,7 +67,7 @@ class GeodesicEnds(NamedTuple):
 
         rays : geodesics that end in their current triangle
         first : corner (0, 1, 2) of the triangle with the weight 1 - b - c
-        b, c : weights of the two corners that follow it
+        b, c : weights of the two corners that follow corner `first`
         complete : whether the geodesics reached their target
         """
         weights = np.column_stack((1.0 - b - c, b, c))
@@ -102,7 +102,7 @@ def trace_geodesics(
 def _leave_first_triangle(
     adjacency: Adjacency, triangle: Index, start: Complex, target: Complex, ends: GeodesicEnds
 ) -> Geodesics:
-    """Return the geodesics that leave their first triangle, and store the ends of those that do not."""
+    """Return the geodesics that leave their first triangle, and store the ends of all other geodesics."""
     corners = _as_complex(adjacency.planar_corners[triangle])
     start = start + START_SHIFT * (corners @ np.array(INNER_POINT_WEIGHTS) - start)
     corners, direction = corners - start[:, None], target - start
@@ -120,7 +120,7 @@ def _leave_first_triangle(
 
 
 def _cross_edge(adjacency: Adjacency, rays: Geodesics, ends: GeodesicEnds) -> Geodesics:
-    """Continue geodesics into the next triangle; store the ends of those that do not leave it."""
+    """Continue geodesics into the next triangle, and store the ends of the geodesics that end there."""
     neighbour = adjacency.neighbour[rays.triangle, rays.side]
     ended = (neighbour < 0) | ~adjacency.passable[neighbour]
     if ended.any():

@@ -56,7 +56,7 @@ class GutterWidth(NamedTuple):
 def find_border(surface: FlatSurface, piece: Index, members: Index) -> Border:
     """Return the triangle sides at which pieces of charts end.
 
-    piece : (f,) piece of each triangle, -1 for none
+    piece : (f,) piece of each triangle, -1 if there is none
     members : (t,) indices of the triangles whose sides are examined, each in a piece
     """
     neighbour = surface.uv_neighbour[members]
@@ -104,9 +104,10 @@ class GutterTexels(NamedTuple):
     y, x : row and column
     rim : mask of texels that bilinear interpolation within the piece reads
     distance_mm : distance from the piece on the surface [mm]
-    anchor_triangle, anchor_weights : nearest point on the border: triangle index, and weights of its second
-        and third corner
-    triangle, weights : end of the geodesic from the anchor to the texel: triangle index, and weights
+    anchor_triangle, anchor_weights : nearest point on the border: triangle index, and barycentric weights of
+        this triangle's second and third corner
+    triangle, weights : end of the geodesic from the anchor to the texel: triangle index and barycentric
+        weights
     complete : mask of texels that the geodesic reached before the surface ended
     """
 
@@ -166,7 +167,7 @@ def border_points(sides: BorderSides, nearest: NearestPoints) -> Doubles:
 
 
 def border_steps(sides: BorderSides, nearest: NearestPoints) -> Doubles:
-    """Return the surface vectors (n, 2, 2) of a texel step to the right and down at border points [mm]."""
+    """Return the surface vectors (n, 2, 2) of one-texel steps to the right and down at border points [mm]."""
     first, second = np.moveaxis(sides.steps[nearest.side], 1, 0)
     return _lerp(first, second, nearest.fraction[:, None, None])
 

@@ -28,7 +28,7 @@ from dermis.atlas.stitched.texels import (
 )
 from dermis.atlas.unwrap.charts import connected_pieces
 from dermis.base.arrays import Doubles, Index, Ints, Mask
-from dermis.mesh.geometry import components
+from dermis.mesh.geometry import label_components
 
 _MIN_TEXEL_MM = 0.9  # smallest texel of the grids on which overlaps are searched
 _MAX_TEXELS = 100_000  # largest number of texels of a piece on such a grid
@@ -72,7 +72,7 @@ class _PieceGrid(NamedTuple):
     """Texel grid with one piece and its gutters.
 
     owner : (h, w) triangle that owns the texel, -1 in gutters, -2 elsewhere
-    row : (h, w) index of each texel in `anchored`, where the texels of the piece precede those of the gutters
+    row : (h, w) index of each texel in `anchored`, where the texels of the piece precede the gutter texels
     anchored : texels of piece and gutters with their anchors
     packing, border, sides : position, border and border sides of the piece on the grid
     nearest : nearest border points of the gutter texels
@@ -88,7 +88,7 @@ class _PieceGrid(NamedTuple):
 
 
 def find_conflicts(surface: FlatSurface, mapped: Mask, members: Index, gutter_mm: float) -> Conflicts:
-    """Find where gutters of one chart piece meet, by drawing the piece on a texel grid of its own.
+    """Find where gutters of one chart piece meet, by drawing the piece on a separate texel grid.
 
     mapped : (f,) mask of triangles that belong to any piece
     members : (t,) indices of the triangles of this piece
@@ -151,14 +151,14 @@ def _gap_pairs(surface: FlatSurface, mapped: Mask, grid: _PieceGrid) -> tuple[In
     return first[gap], second[gap]
 
 
-def _texel_points(surface: FlatSurface, mapped: Mask, grid: _PieceGrid, chosen: Index) -> Doubles:
-    """Return the surface point of each texel of the grid (n, 3), or NaN where it is not computed [mm].
+def _texel_points(surface: FlatSurface, mapped: Mask, grid: _PieceGrid, chosen_texels: Index) -> Doubles:
+    """Return the surface points (n, 3) of all texels of the grid, NaN for points that are not computed [mm].
 
-    It is computed for the texels in `chosen`, except for those beyond the end of the surface.
+    Points are computed for the texels in `chosen_texels`, except for texels beyond the end of the surface.
     """
     owner, texels = grid.owner[grid.owner >= 0], grid.anchored.texels
     points, is_chosen = np.full((len(texels), 3), np.nan), np.zeros(len(texels), np.bool_)
-    is_chosen[chosen] = True
+    is_chosen[chosen_texels] = True
     members, beyond = np.flatnonzero(is_chosen[: len(owner)]), np.flatnonzero(is_chosen[len(owner) :])
     f = owner[members]
     points[members] = surface.points(f, barycentric_weights(grid.packing.corners[f], texels[members]))
@@ -172,7 +172,7 @@ def _texel_points(surface: FlatSurface, mapped: Mask, grid: _PieceGrid, chosen: 
 def cut_overlaps(surface: FlatSurface, piece: Index, gutter_mm: float) -> Index:
     """Cut charts along straight lines until few of their gutters overlap; return piece indices (f,).
 
-    piece : (f,) piece of each triangle before the cuts, -1 for none
+    piece : (f,) piece of each triangle before the cuts, -1 if there is none
     gutter_mm : width of the gutters [mm]
     """
     done, count = np.full(len(piece), -1, np.int64), 0
@@ -206,7 +206,7 @@ def _cut_length_mm(surface: FlatSurface, members: Index, part: Index) -> float:
 
 
 def _cut_piece(surface: FlatSurface, mapped: Mask, members: Index, gutter_mm: float) -> Index | None:
-    """Cut a chart piece where its gutters meet; return the part of each triangle (t,), or None without cuts.
+    """Cut a chart piece where its gutters meet; return the part of each triangle (t,), or None if uncut.
 
     members : (t,) indices of the piece's triangles
     """
@@ -237,12 +237,12 @@ def _conflict_clusters(conflicts: Conflicts, reach: float) -> list[Index]:
     cells = np.floor((conflicts.first + conflicts.second) / 2 / (_CLUSTER_CELL * reach)).astype(np.int64)
     cells, cell_of = np.unique(cells, axis=0, return_inverse=True)
     adjacent = np.abs(cells[:, None] - cells).max(axis=2) <= 1
-    label = components(len(cells), *np.nonzero(adjacent))[cell_of.reshape(-1)]
+    label = label_components(len(cells), *np.nonzero(adjacent))[cell_of.reshape(-1)]
     return [np.flatnonzero(label == k) for k in range(label.max(initial=-1) + 1)]
 
 
 def _within_reach(points: Doubles, others: Doubles, reach: float) -> Mask:
-    """Return the mask of points (..., 2) within about `reach` of any of the other points (n, 2)."""
+    """Return the mask (...) of `points` (..., 2) within about `reach` of any point in `others` (n, 2)."""
     cell = reach / _CELLS_PER_GUTTER
     low = np.floor(others.min(axis=0) / cell) - _CELLS_PER_GUTTER - 1
     disc = np.argwhere(
@@ -259,9 +259,9 @@ def _within_reach(points: Doubles, others: Doubles, reach: float) -> Mask:
 def _conflict_strip(
     surface: FlatSurface, members: Index, overlap: Conflicts, half: Mask, reach: float
 ) -> Mask:
-    """Return the mask (t,) of the triangles near meeting gutters on one side of a line.
+    """Return the mask (t,) of triangles near meeting gutters, on one side of a line through the piece.
 
-    It is the side on which these triangles have the smaller area.
+    The chosen side is where the triangles near meeting gutters have the smaller area.
 
     half : (t,) mask of triangles on one side of the line
     reach : gutter width [texel]
@@ -276,9 +276,9 @@ def _conflict_strip(
 
 
 def _best_line(overlap: Conflicts, reach: float) -> tuple[Doubles, float, int]:
-    """Return the line that separates most conflicts per length.
+    """Return the line that separates the most conflicts per length of the cut along it.
 
-    Returns its normal and offset, and the number of conflicts that it separates.
+    Returns normal and offset of the line, and the number of conflicts that the line separates.
     """
     close = overlap.inside[
         _within_reach(overlap.inside, np.concatenate((overlap.first, overlap.second)), reach)
@@ -300,7 +300,7 @@ def _best_line(overlap: Conflicts, reach: float) -> tuple[Doubles, float, int]:
 
 
 def _connected_parts(surface: FlatSurface, members: Index, part: Index, gutter_mm: float) -> Index | None:
-    """Divide the parts of a cut chart into connected ones, and merge small ones into their largest neighbour.
+    """Divide the parts of a cut chart into connected parts; merge small parts into their largest neighbour.
 
     Returns the part of each triangle (t,), or None if only one part remains.
     """

@@ -15,8 +15,8 @@ from dermis.base.arrays import Doubles, Index, Mask
 Span = tuple[int, int, int]
 """Run of cells in a row: row, first and last column."""
 _MAX_CELLS = 512  # largest number of cells along each side of the square
-_COARSENING = 4  # side of a coarse cell, with which the best order is searched [cell]
-_BISECTIONS = 8  # number of trials in the search for the scale
+_COARSE_CELL_SIDE = 4  # side of a coarse cell, with which the best order is searched [cell]
+_BISECTION_COUNT = 8  # number of trials in the search for the scale
 _FINE_BISECTIONS, _FINE_GAIN = 4, 1.12  # trials with fine cells, and the largest factor of scale to gain
 _ORDER_COUNT = 6  # number of packing orders: by area, height and width, each by rows and by columns
 _MIN_SCALE_GAIN = 1.003  # gain of scale for which the search is repeated with another order
@@ -25,35 +25,35 @@ _MASK_RATIO = 0.65  # masks are computed again if the ratio of the found scale t
 _MASK_EXCESS = 1.15  # ratio of the scale of the next masks to the found scale
 
 
-def place_shapes(shapes: Sequence[Sequence[Span]], n: int) -> list[tuple[int, int]] | None:
-    """Return the column and row of each shape on n x n cells, or None if they do not all fit.
+def place_shapes(shapes: Sequence[Sequence[Span]], cells_per_side: int) -> list[tuple[int, int]] | None:
+    """Return the column and row at which each shape is placed on n x n cells, or None if not all shapes fit.
 
     Each shape is placed at the first free position, searched row by row.
 
-    shapes : cells of each shape as runs, from row and column 0
+    shapes : cells of each shape as runs (row, first and last column), counted from row and column 0
     """
     occupied, corners = 0, []
     for spans in shapes:
-        free = _free_positions(occupied, spans, n)
+        free = _free_positions(occupied, spans, cells_per_side)
         if not free:
             return None
         position = (free & -free).bit_length() - 1
         cells = 0
         for row, first, last in spans:
-            cells |= ((2 << last - first) - 1) << row * n + first
+            cells |= ((2 << last - first) - 1) << row * cells_per_side + first
         occupied |= cells << position
-        corners.append((position % n, position // n))
+        corners.append((position % cells_per_side, position // cells_per_side))
     return corners
 
 
-def _free_positions(occupied: int, spans: Sequence[Span], n: int) -> int:
+def _free_positions(occupied: int, spans: Sequence[Span], cells_per_side: int) -> int:
     """Return the free positions for the upper left cell of a shape, as a bit mask of n x n cells.
 
     occupied : bit mask of the occupied cells
     """
     height = 1 + max(row for row, _, _ in spans)
     width = 1 + max(last for _, _, last in spans)
-    if max(height, width) > n:
+    if max(height, width) > cells_per_side:
         return 0
     blocked, ahead = 0, [occupied]  # ahead: cells from which one of the next 1, 2, 4, ... cells is occupied
     for row, first, last in spans:
@@ -61,15 +61,15 @@ def _free_positions(occupied: int, spans: Sequence[Span], n: int) -> int:
         step = length.bit_length() - 1
         while len(ahead) <= step:
             ahead.append(ahead[-1] | ahead[-1] >> (1 << len(ahead) - 1))
-        blocked |= (ahead[step] | ahead[step] >> length - (1 << step)) >> row * n + first
-    rows = _row_starts(n) & ((1 << n * (n - height + 1)) - 1)
-    return rows * ((2 << n - width) - 1) & ~blocked
+        blocked |= (ahead[step] | ahead[step] >> length - (1 << step)) >> row * cells_per_side + first
+    rows = _row_starts(cells_per_side) & ((1 << cells_per_side * (cells_per_side - height + 1)) - 1)
+    return rows * ((2 << cells_per_side - width) - 1) & ~blocked
 
 
 @cache
-def _row_starts(n: int) -> int:
+def _row_starts(cells_per_side: int) -> int:
     """Return a bit mask of n x n cells in which the first cell of each row is set."""
-    return ((1 << n * n) - 1) // ((1 << n) - 1)
+    return ((1 << cells_per_side * cells_per_side) - 1) // ((1 << cells_per_side) - 1)
 
 
 class _Piece(NamedTuple):
@@ -160,14 +160,14 @@ def _find_layout(pieces: list[_Piece], cells: int, width: GutterWidth) -> _Layou
     area = sum(float(np.abs(one.surface.area_uv).sum()) * one.scale**2 for one in pieces)
     top = cells / float(np.sqrt(area))
     for _ in range(_MAX_MASK_ATTEMPTS):
-        found = _largest_scale([_piece_mask(one, top, width) for one in pieces], cells, top)
+        found = _find_largest_scale([_piece_mask(one, top, width) for one in pieces], cells, top)
         if found is None or found.scale > _MASK_RATIO * top:
             return found
         top = _MASK_EXCESS * found.scale
     return None
 
 
-def _largest_scale(masks: list[_PieceMask], cells: int, top: float) -> _Layout | None:
+def _find_largest_scale(masks: list[_PieceMask], cells: int, top: float) -> _Layout | None:
     """Return the layout with the largest scale below `top`, for the best of several orders of the pieces.
 
     The best order is searched with coarse cells.
@@ -175,12 +175,16 @@ def _largest_scale(masks: list[_PieceMask], cells: int, top: float) -> _Layout |
     coarse, best = None, 0
     for order in range(_ORDER_COUNT):
         lower = coarse.scale if coarse else 0.0
-        if order == 0 or (coarse and _try_scale(masks, lower * _MIN_SCALE_GAIN, cells // _COARSENING, order)):
-            found = _bisect_scale(masks, (lower, top / _COARSENING), cells // _COARSENING, order, _BISECTIONS)
+        if order == 0 or (
+            coarse and _try_scale(masks, lower * _MIN_SCALE_GAIN, cells // _COARSE_CELL_SIDE, order)
+        ):
+            found = _bisect_scale(
+                masks, (lower, top / _COARSE_CELL_SIDE), cells // _COARSE_CELL_SIDE, order, _BISECTION_COUNT
+            )
             coarse, best = (found, order) if found else (coarse, best)
     if coarse is None:
-        return _bisect_scale(masks, (0.0, top), cells, 0, _BISECTIONS)
-    same = _Layout(_COARSENING * coarse.scale, _COARSENING * coarse.origins)
+        return _bisect_scale(masks, (0.0, top), cells, 0, _BISECTION_COUNT)
+    same = _Layout(_COARSE_CELL_SIDE * coarse.scale, _COARSE_CELL_SIDE * coarse.origins)
     return _bisect_scale(masks, (same.scale, same.scale * _FINE_GAIN), cells, best, _FINE_BISECTIONS) or same
 
 
@@ -213,7 +217,7 @@ def _try_scale(masks: list[_PieceMask], scale: float, cells: int, order: int) ->
     if sum(area for area, _, _ in size) > cells**2:
         return None
     first = np.argsort([-one[order // 2] for one in size], kind="stable")
-    found = place_shapes([_spans(shapes[k]).tolist() for k in first], cells)
+    found = place_shapes([_row_spans(shapes[k]).tolist() for k in first], cells)
     if found is None:
         return None
     corners = np.empty((len(masks), 2))
@@ -222,7 +226,7 @@ def _try_scale(masks: list[_PieceMask], scale: float, cells: int, order: int) ->
 
 
 def _scaled_mask(mask: _PieceMask, scale: float) -> tuple[Mask, Doubles]:
-    """Return the mask (h, w) of all cells that a piece touches at another scale, and its margin there."""
+    """Return the mask (h, w) of all cells that a piece touches at another scale, and its scaled margin."""
     row, first, last = (mask.spans.T - mask.margin[[1, 0, 0], None]) * scale
     top, bottom = np.floor(row).astype(int), np.ceil(row + scale).astype(int) - 1
     left, right = np.floor(first).astype(int), np.ceil(last + scale).astype(int) - 1
@@ -236,7 +240,7 @@ def _scaled_mask(mask: _PieceMask, scale: float) -> tuple[Mask, Doubles]:
 
 
 def _piece_mask(piece: _Piece, scale: float, width: GutterWidth) -> _PieceMask:
-    """Return the cells in which a piece with its gutter may need a texel, at one scale."""
+    """Return the cells in which a piece and its gutter may need a texel, at a scale of the packing."""
     margin = np.ceil(_gutter_extent(piece, scale, width)) + 2
     columns, rows = np.ceil(piece.extent * scale + 2 * margin).astype(int) + 1
     ones = np.ones(len(piece.uv))
@@ -250,10 +254,10 @@ def _piece_mask(piece: _Piece, scale: float, width: GutterWidth) -> _PieceMask:
     mask[:-1] |= mask[1:].copy()
     mask[:, 1:] |= mask[:, :-1].copy()
     mask[:, :-1] |= mask[:, 1:].copy()
-    return _PieceMask(_spans(mask), margin, scale)
+    return _PieceMask(_row_spans(mask), margin, scale)
 
 
-def _spans(mask: Mask) -> Index:
+def _row_spans(mask: Mask) -> Index:
     """Return the runs of true cells of a mask, (m, 3): row, first and last column."""
     step = np.diff(np.pad(mask, ((0, 0), (1, 1))).astype(np.int8), axis=1)
     row, begin = np.nonzero(step > 0)

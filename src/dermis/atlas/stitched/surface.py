@@ -20,7 +20,7 @@ class Adjacency(NamedTuple):
     """Adjacency of triangles, by which geodesics cross edges; sides are 01, 12 and 20 of each triangle.
 
     planar_corners : (f, 3, 2) corners in the triangle's own plane, counter-clockwise from outside [mm]
-    neighbour : (f, 3) index of the triangle across each side, -1 for none
+    neighbour : (f, 3) index of the triangle across each side, -1 if there is none
     neighbour_side : (f, 3) side of the neighbour at the shared edge
     flipped : (f, 3) mask of neighbours that face the opposite way
     apex : (f, 3, 2) third corner relative to each side: coordinates along the side and to its left, as
@@ -50,7 +50,8 @@ class FlatSurface:
     uv_neighbour : (f, 3) index of the triangle across each side in uv; the triangle itself at a seam
     uv_steps : (f, 3, 2, 2) surface vectors per unit of u and of v at each corner, in the triangle's plane
         [mm]
-    uv_metric : (f, 3, 3) lengths of these two vectors [mm], and the cosine of the angle between them [-]
+    uv_metric : (f, 3, 3) lengths of the two vectors in `uv_steps` [mm], and the cosine of the angle between
+        these vectors [-]
     """
 
     corners: Doubles
@@ -65,7 +66,7 @@ class FlatSurface:
     uv_metric: Doubles
 
     def points(self, triangle: NDArray[np.integer], weights: NDArray[np.floating]) -> Doubles:
-        """Return the surface points (n, 3) with given barycentric weights [mm].
+        """Return the surface points (n, 3) at barycentric weights in triangles [mm].
 
         triangle : (n,) triangle indices
         weights : (n, 2) barycentric weights of the second and third corner
@@ -73,7 +74,7 @@ class FlatSurface:
         return interpolate_corners(self.corners, triangle, weights.astype(np.float64))
 
     def subset(self, members: Index) -> FlatSurface:
-        """Return the triangles with the given indices; their adjacency is not valid for geodesics."""
+        """Return the surface with only some of its triangles; its adjacency is not valid for geodesics."""
         names = [field.name for field in fields(self) if field.name != "adjacency"]
         return replace(self, **{name: getattr(self, name)[members] for name in names})
 
@@ -170,7 +171,7 @@ def _uv_steps(
 ) -> tuple[Doubles, Doubles]:
     """Return the fields `uv_steps` and `uv_metric` of `FlatSurface`.
 
-    They are averaged over the triangles around a vertex that have the same orientation in uv.
+    Both are averages over the triangles around a vertex that have the same orientation in uv.
 
     flat, axes : planar corners and axes from `_planar_corners`
     """

@@ -16,7 +16,7 @@ _INNER_MARGIN = 1e-3  # texel centres this far inside an edge are not in the tri
 
 
 def rasterise_owners(corners: Doubles, triangles: Index, shape: tuple[int, int]) -> Ints:
-    """Draw triangles; return the index of the last one that covers each texel centre (h, w), -1 for none.
+    """Draw triangles; return for each texel centre (h, w) the last triangle that covers it, -1 without any.
 
     corners : (f, 3, 2) corners of all triangles [texel]
     triangles : (t,) indices in drawing order
@@ -44,7 +44,7 @@ def centre_weights(corners: Doubles, owner: Ints) -> Floats:
     """Return the barycentric weights (h, w, 2) of the second and third corner at each texel centre.
 
     corners : (f, 3, 2) corners of all triangles [texel]
-    owner : (h, w) triangle that owns each texel, -1 for none
+    owner : (h, w) triangle that owns each texel, -1 if there is none
     """
     y, x = np.nonzero(owner >= 0)
     weights = np.zeros((*owner.shape, 2), np.float32)
@@ -64,9 +64,9 @@ class AnchoredTexels(NamedTuple):
     anchors: Doubles
     step_mm: Doubles
 
-    def select(self, selected: Index) -> AnchoredTexels:
-        """Return the texels at the given indices."""
-        return AnchoredTexels._make(part[selected] for part in self)
+    def select(self, indices: Index) -> AnchoredTexels:
+        """Return the texels at some indices."""
+        return AnchoredTexels._make(part[indices] for part in self)
 
 
 def unconnected_pairs(surface: FlatSurface, owner: Ints, axis: int) -> tuple[Index, Index]:

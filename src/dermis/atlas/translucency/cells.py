@@ -142,29 +142,33 @@ def _dilate_cells(cells: Mask) -> Mask:
     return np.asarray(rows[:, :-2] | rows[:, 1:-1] | rows[:, 2:])
 
 
-def _sort_by_tile(tile: NDArray[np.integer], tiles: int) -> tuple[Index, Index]:
+def _sort_by_tile(tile: NDArray[np.integer], tiles_per_side: int) -> tuple[Index, Index]:
     """Return the order that sorts array entries by tile, and the start of each tile's entries (t + 1,)."""
     order = np.argsort(tile, kind="stable")
-    return order, np.concatenate([[0], np.cumsum(np.bincount(tile, minlength=tiles * tiles))])
+    return order, np.concatenate(
+        [[0], np.cumsum(np.bincount(tile, minlength=tiles_per_side * tiles_per_side))]
+    )
 
 
-def _source_cells(lit: Mask, tiles: int) -> tuple[Index, Index]:
+def _source_cells(lit: Mask, tiles_per_side: int) -> tuple[Index, Index]:
     """Return the indices of the lit cells sorted by tile, and the start of each tile's entries."""
     y, x = np.nonzero(lit)
-    order, first = _sort_by_tile((y // TILE_CELLS * tiles + x // TILE_CELLS).astype(np.int32), tiles)
+    order, first = _sort_by_tile(
+        (y // TILE_CELLS * tiles_per_side + x // TILE_CELLS).astype(np.int32), tiles_per_side
+    )
     return (y * len(lit) + x)[order], first
 
 
-def _tile_of(atlas: Atlas, points: Words, side: int, tiles: int) -> Ints:
+def _tile_of(atlas: Atlas, points: Words, side: int, tiles_per_side: int) -> Ints:
     """Return the index (m,) of the tile in which each surface point lies in the atlas.
 
-    A point that a gutter texel shows is in the tile of the texel that the gutter copies.
+    A point that a gutter texel shows is in the tile of the texel whose light the gutter texel copies.
 
     points : (m, 2) triangle index, and packed barycentric weights
     """
     uv = np.stack(_atlas_uv(atlas, points[:, 0], points[:, 1]))
     column, row = np.clip(uv * np.float32(side), 0, side - 1).astype(np.int32) // TILE_CELLS
-    return np.asarray(row * tiles + column, np.int32)
+    return np.asarray(row * tiles_per_side + column, np.int32)
 
 
 def _pack_words(low: NDArray[np.integer], high: NDArray[np.integer]) -> Words:
@@ -172,16 +176,18 @@ def _pack_words(low: NDArray[np.integer], high: NDArray[np.integer]) -> Words:
     return np.asarray(low.astype(np.uint32) | (high.astype(np.uint32) << 16), np.uint32)
 
 
-def _tile_triangles(atlas: Atlas, side: int, tiles: int) -> tuple[Words, Words]:
+def _tile_triangles(atlas: Atlas, side: int, tiles_per_side: int) -> tuple[Words, Words]:
     """Return the start of each tile's entries, and the triangles whose uv bounding boxes overlap the tile."""
     index = np.flatnonzero(atlas.mapped)
     uv, margin = atlas.corner_uv[index].astype(np.float64), TILE_MARGIN_TEXELS / atlas.size
     low, high = uv.min(axis=1) - margin, uv.max(axis=1) + margin
-    first, last = (np.clip((uv * side).astype(np.int64) // TILE_CELLS, 0, tiles - 1) for uv in (low, high))
+    first, last = (
+        np.clip((uv * side).astype(np.int64) // TILE_CELLS, 0, tiles_per_side - 1) for uv in (low, high)
+    )
     width, height = (last - first + 1).T
     which, tile_in_box = expand_runs(np.zeros_like(width), width * height)
     x, y = first[which].T + np.stack([tile_in_box % width[which], tile_in_box // width[which]])
-    order, begin = _sort_by_tile(y * tiles + x, tiles)
+    order, begin = _sort_by_tile(y * tiles_per_side + x, tiles_per_side)
     return begin.astype(np.uint32), index[which[order]].astype(np.uint32)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dermis.base.arrays import Doubles, Index, Mask
-from dermis.mesh.geometry import components, edges, sum_by_index, triangle_areas
+from dermis.mesh.geometry import edges, label_components, sum_by_index, triangle_areas
 
 _SMOOTHING_STEPS = 4
 _BEND_PENALTY = 3.0  # extra length that a step across a right angle counts, relative to the step's length
@@ -14,8 +14,8 @@ _BEND_PENALTY = 3.0  # extra length that a step across a right angle counts, rel
 def opposite_sides(triangles: Index) -> Index:
     """Return for each triangle side the index of the neighbour's side at the same edge, (3 f,).
 
-    Sides are numbered as in `geometry.edges`: all 01, then all 12, then all 20. A side without exactly one
-    neighbour has its own index.
+    Sides are numbered as in `geometry.edges`: all 01, then all 12, then all 20. For a side without exactly
+    one neighbour, the result is the index of the side itself.
     """
     _, of_side, counts = edges(triangles)
     side = np.argsort(of_side, kind="stable")
@@ -29,7 +29,7 @@ def opposite_sides(triangles: Index) -> Index:
 def neighbours(triangles: Index) -> Index:
     """Return the index of the triangle across each side 01, 12 and 20, (f, 3).
 
-    Across a side without exactly one neighbour, it is the triangle itself.
+    Across a side without exactly one neighbour, the index is that of the triangle itself.
     """
     return (opposite_sides(triangles) % len(triangles)).reshape(3, -1).T
 
@@ -68,14 +68,14 @@ def _smooth_borders(chart: Index, triangles: Index) -> Index:
 
 
 def connected_pieces(chart: Index, adjacent: Index) -> Index:
-    """Return the index of each triangle's connected piece (f,), where a piece is part of one chart.
+    """Return the index (f,) of the connected piece of each triangle; every piece belongs to one chart.
 
     chart : (f,) chart of each triangle
     adjacent : (f, 3) neighbours of each triangle, from `neighbours`
     """
     here, there = np.repeat(np.arange(len(chart)), 3), adjacent.ravel()
     same = (chart[here] == chart[there]) & (here < there)
-    return components(len(chart), here[same], there[same])
+    return label_components(len(chart), here[same], there[same])
 
 
 def _stray_triangles(chart: Index, adjacent: Index) -> Mask:

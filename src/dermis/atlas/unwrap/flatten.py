@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.arrays import Doubles, Index, Mask
-from dermis.mesh.geometry import components, edges, uv_cross
+from dermis.mesh.geometry import edges, label_components, uv_cross
 
 Complexes = NDArray[np.complex128]
 _MAX_RINGS = 5  # number of rings of triangles around mirrored ones whose points may move
@@ -32,7 +32,7 @@ def planar_triangles(corners: NDArray[np.floating]) -> Complexes:
 def affine_coefficients(shapes: Complexes, positions: Complexes) -> tuple[Complexes, Complexes]:
     """Return a and b (f,) of the maps z -> a z + b conj(z) + c from `shapes` to `positions`.
 
-    The singular values of a map are |a| + |b| and |a| - |b|, the latter negative where it mirrors the
+    The singular values of a map are |a| + |b| and |a| - |b|; the second is negative where the map mirrors the
     triangle. The nearest rotation is a / |a|.
 
     shapes, positions : (f, 3) corners of the triangles as complex numbers, before and after the map
@@ -112,8 +112,8 @@ def flatten(points: Doubles, triangles: Index, density: Doubles, weight: Doubles
     density : (f,) desired ratio of length in the plane to length on the surface [-]
     weight : (f,) importance of each triangle's stretch [-]
 
-    The initial map is a least squares conformal map [Levy2002] in the Hermitian form of [Mullen2008]. It is
-    then made as rigid as possible [Liu2008], with higher weights for strongly compressed triangles as in
+    The initial map is a least squares conformal map [Levy2002] in the Hermitian form of [Mullen2008]. The map
+    is then made as rigid as possible [Liu2008], with higher weights for strongly compressed triangles as in
     [Rabinovich2017].
     """
     shapes = planar_triangles(points[triangles])
@@ -122,13 +122,13 @@ def flatten(points: Doubles, triangles: Index, density: Doubles, weight: Doubles
     scaled = shapes * density[:, None]
     for _ in range(_REWEIGHTINGS):
         a, b = affine_coefficients(scaled, z[triangles])
-        z = _rigid_step(z, triangles, component, scaled, weight / density**2 * _stiffness(a, b))
+        z = _rigid_step(z, triangles, component, scaled, weight / density**2 * _stiffness_weights(a, b))
     return untangle(np.column_stack((z.real, z.imag)), triangles)
 
 
-def vertex_components(triangles: Index, n: int) -> Index:
+def vertex_components(triangles: Index, vertex_count: int) -> Index:
     """Return the index of each vertex's connected component (n,)."""
-    return components(n, triangles.ravel(), np.roll(triangles, -1, axis=1).ravel())
+    return label_components(vertex_count, triangles.ravel(), np.roll(triangles, -1, axis=1).ravel())
 
 
 def _cotangents(shapes: Complexes) -> Doubles:
@@ -138,14 +138,14 @@ def _cotangents(shapes: Complexes) -> Doubles:
     return np.asarray(product.real / np.maximum(np.abs(product.imag), 1e-9 * np.abs(product)))
 
 
-def _laplacian(triangles: Index, weights: Doubles, n: int) -> Any:
+def _laplacian(triangles: Index, weights: Doubles, vertex_count: int) -> Any:
     """Return the sparse (n, n) Laplacian of a mesh with weights (f, 3) on the triangle sides."""
     from scipy.sparse import coo_array
 
     start, end, weight = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel(), weights.ravel()
     rows, columns = np.concatenate((start, end, start, end)), np.concatenate((start, end, end, start))
     values = np.concatenate((weight, weight, -weight, -weight))
-    return coo_array((values, (rows, columns)), shape=(n, n)).tocsc()
+    return coo_array((values, (rows, columns)), shape=(vertex_count, vertex_count)).tocsc()
 
 
 def _conformal_map(points: Doubles, triangles: Index, component: Index, shapes: Complexes) -> Complexes:
@@ -190,8 +190,8 @@ def _factorise(matrix: Any) -> Any:
     return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=symmetric).solve
 
 
-def _stiffness(a: Complexes, b: Complexes) -> Doubles:
-    """Return weights (f,) that are 1 for unstretched triangles, larger for compressed and mirrored ones.
+def _stiffness_weights(a: Complexes, b: Complexes) -> Doubles:
+    """Return weights (f,): 1 for unstretched triangles, larger for compressed and mirrored triangles.
 
     a, b : (f,) coefficients of the affine maps, from `affine_coefficients`
     """

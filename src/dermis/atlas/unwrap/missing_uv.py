@@ -18,19 +18,19 @@ _CACHE_VERSION = 1  # increment when `unwrap_mesh` returns other layouts
 
 
 def with_layout(mesh: Mesh, unwrapped: Mask) -> tuple[Mesh, Index]:
-    """Return a mesh with a new uv layout for some triangles, and the old vertex of each of its vertices.
+    """Unwrap some triangles of a mesh; return the new mesh, and the old vertex of each new vertex.
 
     The order of the triangles is unchanged; vertices on the new seams are duplicated. The layout is cached on
     disk.
 
     unwrapped : (f,) mask of the triangles that need a layout
     """
-    used, corners = compact_vertices(mesh.triangles[unwrapped])
-    point = np.unique(mesh.point[used], return_inverse=True)[1]
+    used_vertices, corners = compact_vertices(mesh.triangles[unwrapped])
+    point = np.unique(mesh.point[used_vertices], return_inverse=True)[1]
     part = Mesh(
-        mesh.positions[used],
-        mesh.normals[used],
-        np.zeros((len(used), 2), np.float32),
+        mesh.positions[used_vertices],
+        mesh.normals[used_vertices],
+        np.zeros((len(used_vertices), 2), np.float32),
         point.reshape(-1).astype(np.int32),
         corners.astype(np.int32),
         mesh.material[unwrapped],
@@ -41,7 +41,7 @@ def with_layout(mesh: Mesh, unwrapped: Mask) -> tuple[Mesh, Index]:
     source = np.empty(len(arrays["uv"]), np.int64)
     source[arrays["triangles"].ravel()] = mesh.triangles[unwrapped].ravel()
     remaining = mesh.triangles[~unwrapped]
-    kept, others = compact_vertices(remaining) if len(remaining) else (used[:0], corners[:0])
+    kept, others = compact_vertices(remaining) if len(remaining) else (used_vertices[:0], corners[:0])
     triangles = np.empty_like(mesh.triangles)
     triangles[~unwrapped] = others
     triangles[unwrapped] = arrays["triangles"] + len(kept)
@@ -59,7 +59,7 @@ def with_layout(mesh: Mesh, unwrapped: Mask) -> tuple[Mesh, Index]:
 
 
 def _cached_layout(part: Mesh) -> Arrays:
-    """Return uv (v, 2) and triangles (f, 3) of an unwrapped mesh, from the disk cache if they are in it."""
+    """Unwrap a mesh; return uv (v, 2) and triangles (f, 3), from the cache on disk if possible."""
     digest = hashlib.sha256(f"{_CACHE_VERSION}".encode())
     for array in (part.positions, part.point, part.triangles):
         digest.update(np.ascontiguousarray(array).tobytes())
@@ -67,7 +67,7 @@ def _cached_layout(part: Mesh) -> Arrays:
     @logged_step("unwrapping the mesh")
     def make() -> Arrays:
         laid_out = unwrap_mesh(part)
-        used, triangles = compact_vertices(laid_out.triangles)
-        return {"uv": laid_out.uv[used], "triangles": triangles.astype(np.int32)}
+        used_vertices, triangles = compact_vertices(laid_out.triangles)
+        return {"uv": laid_out.uv[used_vertices], "triangles": triangles.astype(np.int32)}
 
     return load_or_make("layouts", digest.hexdigest()[:40], ["uv", "triangles"], make)

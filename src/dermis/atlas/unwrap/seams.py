@@ -9,7 +9,7 @@ import numpy as np
 from dermis.atlas.unwrap.charts import grow_charts, merge_strays, neighbours, opposite_sides
 from dermis.atlas.unwrap.flatten import flatten, vertex_components
 from dermis.base.arrays import Doubles, Index, Mask
-from dermis.mesh.geometry import components, cross_2d, uv_cross
+from dermis.mesh.geometry import cross_2d, label_components, uv_cross
 
 _EDGES_PER_BLOCK = 256  # number of edges that are compared with all other edges at a time
 _MAX_REASSIGNMENTS = 6  # number of moves of faulty triangles to adjacent charts before charts are split
@@ -23,7 +23,7 @@ def border_edges(corners: Index) -> tuple[Index, Index]:
 
 
 def split_at_seams(triangles: Index, chart: Index) -> tuple[Index, Index]:
-    """Split vertices at seams; return each triangle's new vertices (f, 3), and the old vertex of each (v,).
+    """Split vertices at seams; return triangles of new vertices (f, 3), and the old vertex of each (v,).
 
     Two triangles share the vertices of their common edge only if they belong to one chart.
 
@@ -38,7 +38,7 @@ def split_at_seams(triangles: Index, chart: Index) -> tuple[Index, Index]:
     here, there = np.flatnonzero(joined), other[joined]
     after = (side + f) % (3 * f)  # index of the corner at the end of a side
     one, two = np.concatenate((here, after[here])), np.concatenate((after[there], there))
-    vertex = components(3 * f, one, two)
+    vertex = label_components(3 * f, one, two)
     point = np.empty(int(vertex.max(initial=-1)) + 1, dtype=np.int64)
     point[vertex] = start
     return vertex.reshape(3, f).T, point
@@ -118,13 +118,13 @@ class ChartMesh(NamedTuple):
         uv_mm = flatten(self.positions[point], corners, ones, ones)
         return FlatCharts(corners, point, uv_mm, piece, faulty_triangles(uv_mm, corners, piece))
 
-    def subset(self, chosen: Mask) -> ChartMesh:
-        """Return the triangles for which a mask is true."""
-        return ChartMesh(self.positions, self.triangles[chosen])
+    def subset(self, mask: Mask) -> ChartMesh:
+        """Return the mesh of the triangles that a mask selects."""
+        return ChartMesh(self.positions, self.triangles[mask])
 
 
 def flatten_charts(mesh: ChartMesh, chart: Index) -> FlatCharts:
-    """Flatten charts (f,) without faulty triangles, changing the charts where necessary."""
+    """Flatten charts (f,) so that no triangle is faulty; charts are changed where necessary."""
     flat = mesh.flatten(chart)
     while flat.faulty.any():
         flat = mesh.flatten(_repair_charts(mesh, flat, 0))

@@ -1,4 +1,4 @@
-"""Unwrapping of a mesh into a uv layout with given or random charts, and packing of charts."""
+"""Unwrapping of a mesh into a uv layout with desired or random charts, and packing of charts."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from dermis.mesh.mesh import Mesh, build_mesh
 
 _GRID_CELLS = 512  # number of cells along each side of the map
 _MAX_PLACEMENTS = 1000  # largest number of charts that are placed, in all orders together
-_BISECTIONS = 9  # number of trials in the search for the scale
+_BISECTION_COUNT = 9  # number of trials in the search for the scale
 _MIN_SCALE_GAIN = 1.004  # gain of scale for which the search is repeated with another order
 CHART_PADDING = 1 / 128
 """Empty space between charts as a fraction of the map's side: 8 texels at 1024."""
@@ -30,10 +30,10 @@ _MIN_CHART_AREA_MM2 = 1e-6
 
 
 def pack_charts(outlines: list[Doubles], padding: float) -> tuple[float, Doubles]:
-    """Pack charts into the unit square; return their common scale and the offset (c, 2) of each.
+    """Pack charts into the unit square; return the scale of all charts and the offset (c, 2) of each chart.
 
-    Each chart is dropped onto those below at the column where it gets lowest [Levy2002]; the best of several
-    orders is returned.
+    Each chart is dropped onto the charts below, at the column where it comes to rest lowest [Levy2002]; the
+    best of several orders is returned.
 
     outlines : edges (k, 2, 2) of each chart's border, counter-clockwise
     padding : width of the empty space between charts as a fraction of the square's side; half as much is left
@@ -51,7 +51,7 @@ def pack_charts(outlines: list[Doubles], padding: float) -> tuple[float, Doubles
         low, high = best, bound
         if cells is not None and _drop_charts(shifted, order, best * _MIN_SCALE_GAIN, padding) is None:
             continue
-        for _ in range(_BISECTIONS):
+        for _ in range(_BISECTION_COUNT):
             scale = (low + high) / 2
             found = _drop_charts(shifted, order, scale, padding)
             if found is None:
@@ -64,7 +64,7 @@ def pack_charts(outlines: list[Doubles], padding: float) -> tuple[float, Doubles
 
 
 def _packing_orders(size: Doubles) -> Iterator[Index]:
-    """Yield orders in which charts are dropped: by height, by width, and random ones.
+    """Yield orders in which charts are dropped: by height, by width, and random orders.
 
     size : (c, 2) width and height of each chart
     """
@@ -139,7 +139,7 @@ def unwrap(
     upright: ArrayLike = DEFAULT_UP_DIRECTION,
     padding: float = CHART_PADDING,
 ) -> UvLayout:
-    """Unwrap a mesh into a uv layout in which no triangle is mirrored and none overlaps another.
+    """Unwrap a mesh into a uv layout in which no triangle is mirrored and no two triangles overlap.
 
     Where the border of a flattened chart crosses itself, triangles are moved to an adjacent chart; a chart
     that does not flatten even then is split.

@@ -49,7 +49,7 @@ class _Keyframes(NamedTuple):
 
 
 def clip_names(path: Path) -> tuple[str, ...]:
-    """Return the names of a file's animation clips; a clip without a name gets one by its index: "clip 0"."""
+    """Return the names of a file's animation clips; "clip 0", by its index, for a clip without a name."""
     return _document_clip_names(read_document(path))
 
 
@@ -115,7 +115,7 @@ def _weight_track(
     """Return the track of the morph target weights of a node.
 
     culprit : clip and channel, named in errors
-    mesh_targets : names of morph targets by mesh index; this function adds those of the node's mesh
+    mesh_targets : names of morph targets by mesh index; this function adds the names of the node's mesh
     """
     mesh = document.items("nodes")[node].get("mesh")
     if mesh is not None and mesh not in mesh_targets:
@@ -130,6 +130,11 @@ def _weight_track(
 
 
 def _merge_tracks(path: str, members: list[tuple[str, _Keyframes]]) -> AnimationTrack:
+    """Merge animated nodes or targets with equal key times into one track.
+
+    path : animated property, see `AnimationTrack`
+    members : name and keyframes of each node or target
+    """
     keys = members[0][1]
     values = np.stack([own.values for _, own in members], axis=-2)
     curve = AnimationCurve(keys.times_s, values, keys.kind, is_rotation=path == "rotation")
@@ -181,23 +186,25 @@ class AnimationCurve:
         index = int(np.searchsorted(self.times_s, seconds, side="right")) - 1
         keys = self.values[:, _VALUE] if self.kind == "CUBICSPLINE" else self.values
         if index < 0 or index + 1 >= len(self.times_s):
-            return self._unit(keys[max(index, 0)])
+            return self._normalise_rotations(keys[max(index, 0)])
         if self.kind == "STEP":
-            return self._unit(keys[index])
+            return self._normalise_rotations(keys[index])
         step = float(self.times_s[index + 1] - self.times_s[index])
         fraction = (seconds - float(self.times_s[index])) / step
         if self.kind == "CUBICSPLINE":
-            return self._unit(self._spline(index, fraction, step))
+            return self._normalise_rotations(self._cubic_spline_value(index, fraction, step))
         if self.is_rotation:
-            return slerp(self._unit(keys[index]), self._unit(keys[index + 1]), fraction)
+            return slerp(
+                self._normalise_rotations(keys[index]), self._normalise_rotations(keys[index + 1]), fraction
+            )
         return np.asarray((1 - fraction) * keys[index] + fraction * keys[index + 1])
 
-    def _spline(self, index: int, s: float, step: float) -> Doubles:
+    def _cubic_spline_value(self, index: int, s: float, step: float) -> Doubles:
         before, after = self.values[index], self.values[index + 1]
         value = (2 * s**3 - 3 * s**2 + 1) * before[_VALUE] + (3 * s**2 - 2 * s**3) * after[_VALUE]
         value += step * (s**3 - 2 * s**2 + s) * before[_TANGENT_OUT]
         value += step * (s**3 - s**2) * after[_TANGENT_IN]
         return np.asarray(value)
 
-    def _unit(self, values: Doubles) -> Doubles:
+    def _normalise_rotations(self, values: Doubles) -> Doubles:
         return values / np.linalg.norm(values, axis=-1, keepdims=True) if self.is_rotation else values

@@ -34,7 +34,7 @@ class BufferBuilder:
     def add_view(self, data: bytes, target: int | None = None) -> int:
         """Append bytes to the buffer and return the index of their buffer view.
 
-        target : `VERTICES` or `INDICES`; None for data that is neither
+        target : `VERTICES` or `INDICES`; None for other data
         """
         self.data += b"\0" * (-len(self.data) % 4)
         entry = {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(data)}
@@ -46,28 +46,28 @@ class BufferBuilder:
         """Append n elements of k components, (n, k), and return the index of their accessor.
 
         rows : float32 or unsigned integers
-        target : `VERTICES` or `INDICES`; None for data that is neither
+        target : `VERTICES` or `INDICES`; None for other data
         bounded : whether to store each component's minimum and maximum, which glTF requires for positions
         """
-        values = _little_endian(rows)
-        bounds = _bounds(values) if bounded else {}
+        values = _to_little_endian(rows)
+        bounds = _component_bounds(values) if bounded else {}
         view = self.add_view(values.tobytes(), target)
         return self._append_accessor(values, {"bufferView": view} | bounds)
 
     def add_triangles(self, index: Numbers, count: int) -> int:
         """Append the vertex indices of triangles, (f, 3), and return the index of their accessor.
 
-        count : number of vertices of the primitive, which decides the integer type
+        count : number of vertices of the primitive, by which the smallest sufficient integer type is chosen
         """
         return self.add_accessor(index.reshape(-1, 1).astype(_index_dtype(count)), INDICES)
 
     def add_displacements(self, row: Numbers, columns: Sequence[Numbers], count: int) -> list[int]:
         """Append arrays (count, 3) that are mostly 0, and return the indices of their accessors.
 
-        They are stored as sparse accessors, or densely if that is smaller.
+        The arrays are stored as sparse accessors, or as dense accessors if these are smaller.
 
         row : (m,) indices of the rows that are not 0, in increasing order, the same for all arrays
-        columns : for each array, the values of these rows (m, 3)
+        columns : for each array, the values (m, 3) of the rows in `row`
         count : number of vertices
         """
         if not len(row):
@@ -75,11 +75,11 @@ class BufferBuilder:
         index = row.astype(_index_dtype(count))
         if len(row) * (12 + index.itemsize) >= 12 * count:
             return [self._dense_accessor(row, values, count) for values in columns]
-        indices = {"bufferView": self.add_view(_little_endian(index).tobytes())}
-        indices["componentType"] = _COMPONENT_TYPES[_little_endian(index).dtype.str]
+        indices = {"bufferView": self.add_view(_to_little_endian(index).tobytes())}
+        indices["componentType"] = _COMPONENT_TYPES[_to_little_endian(index).dtype.str]
         accessors = []
         for values in columns:
-            stored = _little_endian(values)
+            stored = _to_little_endian(values)
             view = {"bufferView": self.add_view(stored.tobytes())}
             sparse = {"count": len(row), "indices": dict(indices), "values": view}
             low, high = np.minimum(stored.min(axis=0), 0), np.maximum(stored.max(axis=0), 0)
@@ -109,12 +109,12 @@ class BufferBuilder:
         return len(self.accessors) - 1
 
 
-def _little_endian(rows: Numbers) -> Numbers:
+def _to_little_endian(rows: Numbers) -> Numbers:
     """Return a contiguous array in little-endian byte order, which glTF requires."""
     return np.ascontiguousarray(rows, rows.dtype.newbyteorder("<"))
 
 
-def _bounds(values: Numbers) -> dict[str, list[float]]:
+def _component_bounds(values: Numbers) -> dict[str, list[float]]:
     return {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
 
 

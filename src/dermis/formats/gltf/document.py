@@ -194,7 +194,7 @@ def _checked_size(value: object) -> int:
 def read_document(path: Path) -> Document:
     """Read a .glb, .vrm or .gltf file.
 
-    Raises DermisError when it is not glTF, truncated, or too large.
+    Raises DermisError when the file is not glTF, truncated, or too large.
     """
     data = read_file(path, "a glTF file", MAX_FILE_BYTES)
     with parsing(path, "a glTF file", *MALFORMED_DATA_ERRORS):

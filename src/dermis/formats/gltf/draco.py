@@ -15,9 +15,9 @@ from dermis.formats import size_limits as limits
 from dermis.formats.gltf.document import Document, Tree
 
 EXTENSION = "KHR_draco_mesh_compression"
-_TRIANGLES = 4
-_DECODER = "dermis.formats.gltf.draco_decoder"
-_ADVICE = "Decimate it, or export without compression"
+_TRIANGLES_MODE = 4
+_DECODER_MODULE = "dermis.formats.gltf.draco_decoder"
+_SIZE_ADVICE = "Decimate it, or export without compression"
 
 
 class _Primitive(NamedTuple):
@@ -33,9 +33,13 @@ def decompress(document: Document) -> None:
     Primitives that are also stored without compression are left as they are.
 
     Raises DermisError if the package DracoPy is missing, for damaged data, and for data whose size differs
-    from the one that its accessors state.
+    from the size that its accessors state.
     """
-    found = [_compressed(document, one) for mesh in document.items("meshes") for one in mesh["primitives"]]
+    found = [
+        _compressed_primitive(document, one)
+        for mesh in document.items("meshes")
+        for one in mesh["primitives"]
+    ]
     primitives = [one for one in found if one is not None]
     if not primitives:
         return
@@ -44,12 +48,12 @@ def decompress(document: Document) -> None:
     views = [document.read_view(one.extension["bufferView"]) for one in primitives]
     request = {str(number): np.frombuffer(view, np.uint8) for number, view in enumerate(views)}
     size = sum(map(len, views))
-    answer = run_decoder(_DECODER, request, size, document.path, "valid geometry compressed by Draco")
+    answer = run_decoder(_DECODER_MODULE, request, size, document.path, "valid geometry compressed by Draco")
     for number, primitive in enumerate(primitives):
-        _store(document, primitive, answer, str(number))
+        _store_attributes(document, primitive, answer, str(number))
 
 
-def _compressed(document: Document, primitive: Tree) -> _Primitive | None:
+def _compressed_primitive(document: Document, primitive: Tree) -> _Primitive | None:
     """Return the compressed form of a primitive; None if the primitive is also stored without compression."""
     extension = (primitive.get("extensions") or {}).get(EXTENSION)
     positions = document.item("accessors", primitive["attributes"]["POSITION"])
@@ -62,21 +66,23 @@ def _check_sizes(document: Document, primitives: list[Tree]) -> None:
     """Refuse more vertices or triangles than allowed, by the sizes that accessors state."""
     vertices = [document.item("accessors", one["attributes"]["POSITION"])["count"] for one in primitives]
     corners = [document.item("accessors", one["indices"])["count"] for one in primitives if "indices" in one]
-    limits.check_limit(document.path, sum(vertices), limits.MAX_VERTICES, "vertices", _ADVICE)
-    limits.check_limit(document.path, sum(corners) // 3, limits.MAX_TRIANGLES, "triangles", _ADVICE)
+    limits.check_limit(document.path, sum(vertices), limits.MAX_VERTICES, "vertices", _SIZE_ADVICE)
+    limits.check_limit(document.path, sum(corners) // 3, limits.MAX_TRIANGLES, "triangles", _SIZE_ADVICE)
 
 
-def _store(document: Document, primitive: _Primitive, answer: Arrays, mesh_name: str) -> None:
+def _store_attributes(document: Document, primitive: _Primitive, answer: Arrays, mesh_name: str) -> None:
     tree, compressed = primitive
     for attribute, identifier in compressed["attributes"].items():
-        _replace(document, tree["attributes"][attribute], answer[f"{mesh_name}/{identifier}"], attribute)
+        _replace_accessor(
+            document, tree["attributes"][attribute], answer[f"{mesh_name}/{identifier}"], attribute
+        )
     if "indices" in tree:
         triangles = answer[f"{mesh_name}/triangles"]
-        _replace(document, tree["indices"], triangles.reshape(-1, 1), "indices of triangles")
-        tree["mode"] = _TRIANGLES
+        _replace_accessor(document, tree["indices"], triangles.reshape(-1, 1), "indices of triangles")
+        tree["mode"] = _TRIANGLES_MODE
 
 
-def _replace(document: Document, accessor: int, values: Numbers, items: str) -> None:
+def _replace_accessor(document: Document, accessor: int, values: Numbers, items: str) -> None:
     shape = document.accessor_shape(accessor)
     if values.shape != shape:
         actual = f"its compressed {items} are {' x '.join(map(str, values.shape))} numbers"

@@ -1,4 +1,4 @@
-"""Materials of exported glTF heads: standard ones for other programs, with all dermis maps in the extras."""
+"""Materials of exported glTF heads: plain glTF materials, with all maps of this package in the extras."""
 
 from __future__ import annotations
 
@@ -32,9 +32,10 @@ _DEFAULT_ROUGHNESS = 0.8
 class SkinAdditions:
     """Properties that an export adds to the glTF material of skin.
 
-    surface : members for `pbrMetallicRoughness`; if there are any, they replace the base colour texture
+    surface : members for `pbrMetallicRoughness`, which replace the base colour texture; empty to keep this
+        texture
     extensions, extras : members for the material's `extensions` and `extras`, by name
-    pictures : PNG files by name; textures reference them as {"index": name}
+    pictures : PNG files by name; textures reference a picture as {"index": name}
     """
 
     surface: FrozenTree = field(default_factory=dict)
@@ -98,7 +99,7 @@ def surface_material(
 ) -> Tree:
     """Return the glTF material of skin or of another opaque surface.
 
-    Its textures reference pictures by name, as {"index": name}.
+    The textures of the material reference pictures by name, as {"index": name}.
 
     roles : entries of the extras of skin, see `skin_pictures`
     roughness : Beckmann's m of skin without a roughness map [-]
@@ -122,7 +123,7 @@ def surface_material(
 
 
 def part_pictures(parts: PartPictures) -> dict[str, bytes]:
-    """Return the PNG files of parts that are not skin, by name; the colour has alpha where parts need it."""
+    """Return the PNG files of parts that are not skin, by name; the colour has alpha if a part needs it."""
     found = parts.encode(("cutout", "surface", "normal", "emission"))
     if "cutout" not in found:
         found |= parts.encode(("colour",))
@@ -133,7 +134,7 @@ def part_pictures(parts: PartPictures) -> dict[str, bytes]:
 def part_material(material: Material, parts: PartPictures) -> Tree:
     """Return the glTF material of a part with the pictures that `part_pictures` returns.
 
-    Its textures reference pictures by name, as {"index": name}.
+    The textures of the material reference pictures by name, as {"index": name}.
     """
     roles = parts.roles(material)
     surface: Tree = {
@@ -173,8 +174,8 @@ def eye_pictures(eyes: EyeTextures) -> dict[str, bytes]:
 def eye_material(material: Material) -> Tree:
     """Return the glTF material of a textured eyeball, whose tear film is a clear coat.
 
-    The normal map applies to the surface below the coat. Programs that support clear coat show highlights
-    only on the coat; other programs show them on that surface.
+    The normal map applies to the surface below the clear coat. Programs that support clear coat show
+    highlights only on the coat; other programs show highlights on the surface below.
     """
     surface = _base_material(material, _TEAR_FILM_ROUGHNESS) | {"baseColorTexture": {"index": EYE_PICTURE}}
     del surface["baseColorFactor"]

@@ -20,7 +20,8 @@ class Nodes:
     names : (n,) unique names
     parent : (n,) index of each node's parent, -1 for a root
     order : (n,) node indices, parents before children
-    local, world : (n, 4, 4) transforms at rest from a node's space to its parent's, and to the scene's
+    local, world : (n, 4, 4) transforms at rest from a node's space to the space of its parent, and to scene
+        space
     scene_nodes : indices of the nodes of the scene, in the order in which meshes are read; None if the file
         has no scenes
     """
@@ -43,7 +44,7 @@ class Nodes:
 def read_nodes(document: Document) -> Nodes:
     """Read the nodes of a file.
 
-    Raises DermisError when they form a cycle, or are too many or too deep.
+    Raises DermisError when the nodes form a cycle, are too many, or are nested too deeply.
     """
     nodes = document.items("nodes")
     check_limit(document.path, len(nodes), MAX_NODES, "nodes", "Export the head alone")
@@ -61,7 +62,7 @@ def read_nodes(document: Document) -> Nodes:
 
 
 def node_names(nodes: list[Tree]) -> tuple[str, ...]:
-    """Return unique names of nodes: those of the file, with a number appended to repeated ones."""
+    """Return unique names of nodes: the names in the file, with a number appended to repeated names."""
     names: dict[str, None] = {}
     counts: dict[str, int] = {}
     for index, node in enumerate(nodes):

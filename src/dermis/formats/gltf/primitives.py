@@ -65,8 +65,8 @@ class SurfacePrimitive:
     def primitive(self, binary: BufferBuilder) -> Tree:
         """Append vertices and triangles to the buffer; return the primitive without material and targets.
 
-        Its extras record whether triangles form quads, and whether points are not shared with other
-        primitives.
+        The extras of the primitive record whether its triangles form quads, and whether no other primitive
+        shares its points.
         """
         used, mesh = self.vertices, self._head.mesh
         index = binary.add_triangles(np.searchsorted(used, mesh.triangles[self.faces]), len(used))
@@ -111,7 +111,7 @@ class SurfacePrimitive:
 
 @dataclass(frozen=True, eq=False)
 class HairPrimitive:
-    """Hairs as tubes; their colours are the texels of a picture with one row."""
+    """Hairs as tubes; the colours of the hairs are the texels of a picture with one row."""
 
     deformable: DeformableMesh
     fibres: FibreTubes
@@ -123,7 +123,7 @@ class HairPrimitive:
     def primitive(self, binary: BufferBuilder) -> Tree:
         """Append vertices and triangles to the buffer; return the primitive without material and targets.
 
-        Its extras mark it as hair, which `read_gltf` skips.
+        The extras of the primitive mark it as hair, so that `read_gltf` skips it.
         """
         positions, normals = self.fibres.pose_vertices(self._rest_points)
         _, uv = self.fibres.colours()
@@ -161,7 +161,7 @@ def _vertex_attributes(
 def _bone_attributes(
     binary: BufferBuilder, deformable: DeformableMesh, vertex: NDArray[np.integer]
 ) -> dict[str, int]:
-    """Append joints and weights of vertices to the buffer, and return their accessors; {} without a skeleton.
+    """Append joints and weights of vertices to the buffer; return their accessors, {} without a skeleton.
 
     vertex : (v,) indices of the vertices in the mesh
     """
@@ -188,7 +188,7 @@ class FibreTubes:
     def from_strands(cls, strands: Strands, mesh: Mesh, max_hairs: int, knots: int) -> FibreTubes:
         """Return tubes for at most `max_hairs` hairs with `knots` knots each.
 
-        They are widened to cover as much area as all hairs of `strands`, and their absorption is reduced
+        The tubes are widened to cover as much area as all hairs of `strands`, and their absorption is reduced
         accordingly.
         """
         count = min(len(strands), max_hairs)
@@ -206,13 +206,13 @@ class FibreTubes:
         return cls(reduced, mesh)
 
     @property
-    def _knots(self) -> int:
+    def _knot_count(self) -> int:
         return int(self.strands.knots_mm.shape[1])
 
     @property
     def vertices_per_hair(self) -> int:
         """Return the number of vertices of a hair: a ring at each knot, and a single vertex at the tip."""
-        return _TUBE_SIDES * (self._knots - 1) + 1
+        return _TUBE_SIDES * (self._knot_count - 1) + 1
 
     @property
     def vertex_count(self) -> int:
@@ -228,7 +228,7 @@ class FibreTubes:
         return np.asarray(corners[np.arange(len(corners)), nearest], np.intp)
 
     @cached_property
-    def _rings(self) -> tuple[Doubles, Doubles]:
+    def _tube_rings(self) -> tuple[Doubles, Doubles]:
         """Return tube vertices relative to the roots [mm] and normals, (n, m, 3) each, in root frames."""
         knots = self.strands.knots_mm.astype(np.float64)
         tangent = np.gradient(knots, axis=1)
@@ -236,7 +236,7 @@ class FibreTubes:
         angle = 2.0 * np.pi * np.arange(_TUBE_SIDES) / _TUBE_SIDES
         side = np.eye(3)[np.abs(tangent[:, 0]).argmin(axis=1)]
         positions, normals = list[Doubles](), list[Doubles]()
-        for k in range(self._knots - 1):
+        for k in range(self._knot_count - 1):
             side = side - (side * tangent[:, k]).sum(axis=1, keepdims=True) * tangent[:, k]
             side = side / np.maximum(np.linalg.norm(side, axis=1, keepdims=True), _TINY)
             basis = np.stack([side, np.cross(tangent[:, k], side)], axis=1)
@@ -253,20 +253,20 @@ class FibreTubes:
         points_mm : (p, 3) points of the posed mesh
         """
         root, frame = root_frames(self.mesh, self.strands.roots, points_mm)
-        offsets, normals = (np.einsum("nic,nki->nkc", frame, part) for part in self._rings)
+        offsets, normals = (np.einsum("nic,nki->nkc", frame, part) for part in self._tube_rings)
         return (root[:, None] + offsets).reshape(-1, 3), normals.reshape(-1, 3)
 
     def displacements_at(self, points_mm: Doubles, delta_mm: Doubles) -> tuple[Index, Doubles]:
         """Return the tube vertices that move when the skin is displaced.
 
-        They are vertex indices (k,) and displacements (k, 3) [mm].
+        Returns vertex indices (k,) and displacements (k, 3) [mm].
 
         points_mm, delta_mm : (p, 3) points of the mesh at rest, and their displacements
         """
         first, second = self.mesh.quads[self.strands.roots.quad].T
         corners = self.mesh.point[np.column_stack([self.mesh.triangles[first], self.mesh.triangles[second]])]
         hair = np.flatnonzero((np.abs(delta_mm).max(axis=1) > 0)[corners].any(axis=1))
-        roots, offsets = self.strands.roots, self._rings[0][hair]
+        roots, offsets = self.strands.roots, self._tube_rings[0][hair]
         roots = Roots(roots.quad[hair], roots.position[hair])
         (before, rest), (after, frame) = (
             root_frames(self.mesh, roots, points) for points in (points_mm, points_mm + delta_mm)
@@ -280,20 +280,20 @@ class FibreTubes:
         """Return the vertex indices of the tubes' triangles, (f, 3)."""
         side, following = np.arange(_TUBE_SIDES), (np.arange(_TUBE_SIDES) + 1) % _TUBE_SIDES
         faces = list[Index]()
-        for k in range(self._knots - 2):
+        for k in range(self._knot_count - 2):
             a, b = _TUBE_SIDES * k + side, _TUBE_SIDES * k + following
             faces += [
                 np.stack([a, b, b + _TUBE_SIDES], axis=1),
                 np.stack([a, b + _TUBE_SIDES, a + _TUBE_SIDES], axis=1),
             ]
-        last = _TUBE_SIDES * (self._knots - 2)
+        last = _TUBE_SIDES * (self._knot_count - 2)
         tip = np.full(_TUBE_SIDES, self.vertices_per_hair - 1)
         faces.append(np.stack([last + side, last + following, tip], axis=1))
         start = self.vertices_per_hair * np.arange(len(self.strands))
         return np.asarray((start[:, None, None] + np.concatenate(faces)).reshape(-1, 3), np.int64)
 
     def colours(self) -> tuple[Floats, Floats]:
-        """Return a palette of c linear hair colours (1, c, 3), and uv of the tube vertices in it (n m, 2)."""
+        """Return a palette of c linear hair colours (1, c, 3), and uv (n m, 2) of the tube vertices in it."""
         absorbance = self.strands.absorption * self.strands.radius_mm.max(axis=1, keepdims=True)
         albedo = np.exp(-_ALBEDO_EXPONENT * np.sqrt(absorbance.astype(np.float64)))
         order = np.argsort(albedo.sum(axis=1), kind="stable")

@@ -19,16 +19,16 @@ from dermis.images.io import EmbeddedPicture
 EMBEDDED_ROLES = ("normal", "height", "specular", "roughness", "region")
 """Maps besides the colour that files of this package store in the extras of the skin's material."""
 _WRAPS: Mapping[int, Wrap] = {10497: "repeat", 33648: "mirror", 33071: "clamp"}
-_NEAREST = 9728
+_NEAREST_FILTER = 9728
 _SOURCE_EXTENSIONS = ("EXT_texture_webp", "EXT_texture_avif")
 _ALPHA_MODES: Mapping[str, AlphaMode] = {"OPAQUE": "opaque", "MASK": "mask", "BLEND": "blend"}
-_SCATTERING = (
+_SCATTERING_EXTENSIONS = (
     "KHR_materials_volume_scatter",
     "KHR_materials_scatter",
     "KHR_materials_diffuse_transmission",
     "KHR_materials_subsurface",
 )
-_GLOSS, _UNLIT, _STRENGTH = (
+_GLOSS_EXTENSION, _UNLIT_EXTENSION, _STRENGTH_EXTENSION = (
     "KHR_materials_pbrSpecularGlossiness",
     "KHR_materials_unlit",
     "KHR_materials_emissive_strength",
@@ -47,7 +47,7 @@ _NOT_DRAWN = {
     "KHR_materials_volume": "absorbing volume",
     "VRMC_materials_mtoon": "cartoon shading (shade colour, outline, rim light)",
 }
-_BASISU = "KHR_texture_basisu"
+_BASISU_EXTENSION = "KHR_texture_basisu"
 GLTF_MATERIALS = (
     drawn("`baseColorFactor`, `baseColorTexture`"),
     drawn("`normalTexture` with `scale`"),
@@ -59,9 +59,9 @@ GLTF_MATERIALS = (
     noted("`roughnessFactor`", "skin has a measured roughness", other_parts="drawn"),
     noted("`metallicFactor`", other_parts="drawn"),
     noted("`emissiveFactor`, `emissiveTexture`", other_parts="drawn"),
-    noted(f"`{_STRENGTH}`", "factor of the emission", _STRENGTH, other_parts="drawn"),
+    noted(f"`{_STRENGTH_EXTENSION}`", "factor of the emission", _STRENGTH_EXTENSION, other_parts="drawn"),
     drawn_with_note("emission without a base colour", "taken for the reflectance, as in scans"),
-    noted(f"`{_UNLIT}`", "the colour is taken for the reflectance", _UNLIT),
+    noted(f"`{_UNLIT_EXTENSION}`", "the colour is taken for the reflectance", _UNLIT_EXTENSION),
     noted("`alphaMode`, `alphaCutoff`", "cut out, also in shadows; `BLEND` at 0.5", other_parts="drawn"),
     noted("`occlusionTexture`", "computed from the shape"),
     no_effect("`doubleSided`", "back faces are always drawn"),
@@ -70,9 +70,9 @@ GLTF_MATERIALS = (
     noted("`magFilter`", "always interpolated (no note if it is linear)"),
     no_effect("`minFilter`", "maps always have mip levels"),
     drawn("pictures in PNG, JPEG, WebP, AVIF", in_code(_SOURCE_EXTENSIONS), *_SOURCE_EXTENSIONS),
-    refused(f"`{_BASISU}` without another picture", "KTX2"),
-    drawn_with_note(in_code(_SCATTERING), "the material is skin", *_SCATTERING),
-    drawn_with_note(f"`{_GLOSS}`", "without the specular colour", _GLOSS),
+    refused(f"`{_BASISU_EXTENSION}` without another picture", "KTX2"),
+    drawn_with_note(in_code(_SCATTERING_EXTENSIONS), "the material is skin", *_SCATTERING_EXTENSIONS),
+    drawn_with_note(f"`{_GLOSS_EXTENSION}`", "without the specular colour", _GLOSS_EXTENSION),
     *(noted(f"`{name}`", text, name) for name, text in _NOT_DRAWN.items()),
     noted("other extensions of materials"),
 )
@@ -87,7 +87,7 @@ def read_materials(document: Document) -> tuple[FileMaterial, ...]:
 
 
 class _Reader:
-    """Reader of one material; properties without effect are collected for its note."""
+    """Reader of one material; it collects the properties without effect, which a note lists."""
 
     def __init__(self, document: Document, material: Tree) -> None:
         self.document, self.material = document, material
@@ -98,12 +98,12 @@ class _Reader:
         """Return the material."""
         own_extras = (self.material.get("extras") or {}).get("dermis")
         pbr: Tree = self.material.get("pbrMetallicRoughness") or {}
-        if _GLOSS in self.extensions:
-            pbr = self._from_glossiness(self.extensions[_GLOSS])
-        textures = self._textures(pbr)
+        if _GLOSS_EXTENSION in self.extensions:
+            pbr = self._from_glossiness(self.extensions[_GLOSS_EXTENSION])
+        textures = self._read_textures(pbr)
         factor = pbr.get("baseColorFactor")
-        emission = self._emission()
-        is_unlit = _UNLIT in self.extensions
+        emission = self._emitted_radiance()
+        is_unlit = _UNLIT_EXTENSION in self.extensions
         if "emission" in textures and "colour" not in textures and (factor is None or max(factor[:3]) == 0):
             textures["colour"], factor, is_unlit = textures.pop("emission"), [*emission, 1.0], True
             emission = (0.0, 0.0, 0.0)
@@ -124,19 +124,19 @@ class _Reader:
             stated_metalness=float(pbr["metallicFactor"]) if "metallicFactor" in pbr else None,
             emission=emission,
             normal_scale=float((self.material.get("normalTexture") or {}).get("scale", 1.0)),
-            scatters=any(name in self.extensions for name in _SCATTERING),
-            maps=self._own_maps(own_extras) if isinstance(own_extras, dict) else None,
+            scatters=any(name in self.extensions for name in _SCATTERING_EXTENSIONS),
+            maps=self._maps_from_extras(own_extras) if isinstance(own_extras, dict) else None,
             unused=tuple(self.unused),
         )
 
-    def _own_maps(self, extras: Tree) -> dict[str, object]:
-        """Return keyword arguments of `load_maps` from the extras of a file that this package wrote."""
+    def _maps_from_extras(self, extras: Tree) -> dict[str, object]:
+        """Return keyword arguments of `load_maps` from the extras that this package writes to its files."""
         colour = extras.get("colour") or (self.material.get("pbrMetallicRoughness") or {}).get(
             "baseColorTexture"
         )
         references = {"colour": colour, **{role: extras.get(role) for role in EMBEDDED_ROLES}}
         pictures = {
-            role: self._picture(self.document.item("textures", reference["index"]))
+            role: self._read_texture_picture(self.document.item("textures", reference["index"]))
             for role, reference in references.items()
             if reference is not None
         }
@@ -159,7 +159,7 @@ class _Reader:
             self.unused.append("picture of specular colour and glossiness")
         return pbr
 
-    def _textures(self, pbr: Tree) -> dict[Role, Texture]:
+    def _read_textures(self, pbr: Tree) -> dict[Role, Texture]:
         gloss = pbr.get("metallicRoughnessTexture")
         references: dict[Role, tuple[Tree | None, int | None]] = {
             "colour": (pbr.get("baseColorTexture"), None),
@@ -168,41 +168,43 @@ class _Reader:
             "metalness": (gloss, _METALNESS_CHANNEL),
             "emission": (self.material.get("emissiveTexture"), None),
         }
-        found = {role: self._texture(reference, channel) for role, (reference, channel) in references.items()}
+        found = {
+            role: self._read_texture(reference, channel) for role, (reference, channel) in references.items()
+        }
         return {role: texture for role, texture in found.items() if texture is not None}
 
-    def _emission(self) -> Colour:
-        strength = float((self.extensions.get(_STRENGTH) or {}).get("emissiveStrength", 1.0))
+    def _emitted_radiance(self) -> Colour:
+        strength = float((self.extensions.get(_STRENGTH_EXTENSION) or {}).get("emissiveStrength", 1.0))
         r, g, b = (strength * float(value) for value in self.material.get("emissiveFactor", (0.0, 0.0, 0.0)))
         return r, g, b
 
-    def _texture(self, reference: Tree | None, channel: int | None) -> Texture | None:
-        """Return the texture that a material references; None without a reference or a readable picture.
+    def _read_texture(self, reference: Tree | None, channel: int | None) -> Texture | None:
+        """Return the texture that a material references; None without reference or readable picture.
 
         channel : see `Texture`
         """
         if reference is None:
             return None
         entry = self.document.item("textures", reference["index"])
-        picture = self._picture(entry)
+        picture = self._read_texture_picture(entry)
         if picture is None:
             return None
         extension = (reference.get("extensions") or {}).get("KHR_texture_transform") or {}
         uv_set = extension["texCoord"] if "texCoord" in extension else reference.get("texCoord", 0)
         sampler = self.document.item("samplers", entry["sampler"]) if "sampler" in entry else {}
-        if sampler.get("magFilter") == _NEAREST:
+        if sampler.get("magFilter") == _NEAREST_FILTER:
             self.unused.append("magnification without interpolation")
         wrap = _WRAPS[sampler.get("wrapS", 10497)], _WRAPS[sampler.get("wrapT", 10497)]
-        return Texture(picture, uv_set, _transform(extension), wrap, channel)
+        return Texture(picture, uv_set, _uv_transform(extension), wrap, channel)
 
-    def _picture(self, entry: Tree) -> EmbeddedPicture | None:
+    def _read_texture_picture(self, entry: Tree) -> EmbeddedPicture | None:
         extensions = entry.get("extensions") or {}
         sources = [extensions[name].get("source") for name in _SOURCE_EXTENSIONS if name in extensions]
         sources.append(entry.get("source"))
         source = next((one for one in sources if one is not None), None)
         if source is None:
-            if _BASISU in extensions:
-                actual = f"a texture has only a KTX2 picture ({_BASISU})"
+            if _BASISU_EXTENSION in extensions:
+                actual = f"a texture has only a KTX2 picture ({_BASISU_EXTENSION})"
                 refuse(
                     self.document.path, "PNG, JPEG, WebP or AVIF", actual, "Export with one of these formats"
                 )
@@ -211,9 +213,11 @@ class _Reader:
 
 
 def read_picture(document: Document, source: Any) -> EmbeddedPicture:
-    """Return the image with an index in a document; its format is detected from its content.
+    """Return an image of a document, selected by index; its format is detected from its content.
 
-    Raises DermisError for a file outside the folder.
+    source : index of the image
+
+    Raises DermisError for an image file outside the folder of the document.
     """
     image = document.item("images", source)
     name = f"{document.path}, image {image.get('name', source)}"
@@ -236,7 +240,7 @@ def _checked_relief(height_mm: object) -> float | None:
     return float(number)
 
 
-def _transform(extension: Tree) -> UvTransform:
+def _uv_transform(extension: Tree) -> UvTransform:
     """Return the uv transform that KHR_texture_transform states: first scale, then rotation, then offset."""
     if not extension:
         return IDENTITY

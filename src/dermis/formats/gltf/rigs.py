@@ -36,7 +36,8 @@ class Armature:
     """Bones of a glTF scene: joints of skins, and animated nodes.
 
     bone_of_node : bone index by node index
-    static_bone : index of the added root bone for meshes that no bone moves; None without such meshes
+    static_bone : index of the root bone that was added for meshes that no bone moves; None if it was not
+        needed
     """
 
     bones: Bones
@@ -46,14 +47,15 @@ class Armature:
     def bone_for_node(self, nodes: Nodes, node: int) -> int | None:
         """Return the bone that moves the mesh of a node without a skin; None if there is none.
 
-        It is the bone of the node, else of the nearest ancestor that is a bone, else the static bone.
+        The bone is that of the node itself, else that of the nearest ancestor with a bone, else
+        `static_bone`.
         """
         bones = (self.bone_of_node[k] for k in nodes.ancestors(node) if k in self.bone_of_node)
         return next(bones, self.static_bone)
 
 
 def read_armature(document: Document, nodes: Nodes) -> Armature | None:
-    """Return the bones of a scene, or None if nothing in it can move.
+    """Return the bones of a scene, or None if no mesh in the scene can move.
 
     Bones are joints of skins, animated nodes that carry meshes, and the ancestors of both.
     """
@@ -179,8 +181,8 @@ class VertexDisplacements(NamedTuple):
 def target_names(mesh: Tree) -> tuple[str, ...]:
     """Return the names of a mesh's morph targets.
 
-    They are "targetNames" of its extras, which most programs write; a target without a name gets one by its
-    index, such as "target 0".
+    Most programs write the names as "targetNames" in the mesh's extras; a target without a name is called
+    "target 0", by its index.
     """
     counts = [len(primitive.get("targets", [])) for primitive in mesh["primitives"]]
     extras = mesh.get("extras")
@@ -221,8 +223,8 @@ def read_targets(
 def default_weights(document: Document, nodes: Nodes) -> dict[str, float]:
     """Return the default weights of the scene's morph targets by name; weights of 0 are omitted.
 
-    Weights of a node override those of its mesh. Targets with the same name in several meshes are one target;
-    the first weight is used.
+    Weights of a node override the weights of its mesh. Targets with the same name in several meshes are one
+    target; the first weight is used.
     """
     defaults: dict[str, float] = {}
     names: dict[int, tuple[str, ...]] = {}
@@ -244,7 +246,7 @@ def apply_targets(
 ) -> Doubles:
     """Return positions (v, 3) displaced by morph targets.
 
-    weights : weights by target name; missing ones are 0
+    weights : weights by target name; missing weights are 0
     """
     result = positions
     for name, target in targets.items():

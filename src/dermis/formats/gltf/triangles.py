@@ -30,7 +30,7 @@ from dermis.formats.gltf.rigs import (
 from dermis.formats.gltf.unread import LIGHTS, note_unread
 from dermis.formats.materials import FileMaterial
 from dermis.formats.parts import GREY, MaterialGroup, MeshFile, MeshPart, find_quads
-from dermis.formats.text_files import listed
+from dermis.formats.text_files import list_names
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 _MAX_COUNTS = {
@@ -39,15 +39,15 @@ _MAX_COUNTS = {
     "vertices": limits.MAX_VERTICES,
     "displacements by targets": limits.MAX_DISPLACEMENTS,
 }
-_MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
-_QUANTISED = "KHR_mesh_quantization"
+_MESHOPT_EXTENSIONS = ("EXT_meshopt_compression", "KHR_meshopt_compression")
+_QUANTISATION_EXTENSION = "KHR_mesh_quantization"
 GLTF_PROPERTIES = (
     drawn("triangles, strips, fans"),
     noted("points and lines"),
     drawn("`indices`, `NORMAL`, `TEXCOORD_0`, `TEXCOORD_1`, ...", "missing normals are computed"),
     drawn("`COLOR_0`", "linear; multiplies the base colour"),
     noted("alpha of `COLOR_0`", "no note if it is 1"),
-    drawn(f"sparse accessors, normalised integers, `{_QUANTISED}`", "", _QUANTISED),
+    drawn(f"sparse accessors, normalised integers, `{_QUANTISATION_EXTENSION}`", "", _QUANTISATION_EXTENSION),
     drawn(
         f"`{draco.EXTENSION}`",
         'with `pip install "dermis[formats]"` ([DracoPy](https://github.com/seung-lab/DracoPy)): positions, '
@@ -56,7 +56,7 @@ GLTF_PROPERTIES = (
         draco.EXTENSION,
     ),
     refused(
-        f"{in_code(_MESHOPT)}, if required",
+        f"{in_code(_MESHOPT_EXTENSIONS)}, if required",
         "its Python package has no wheels; write the file without it: `gltfpack` without `-c` and `-cc`, or "
         "`gltf-transform copy`",
     ),
@@ -79,7 +79,7 @@ _READ_EXTENSIONS = {*KNOWN_EXTENSIONS, *keys_of((*GLTF_PROPERTIES, *vrm.VRM_PROP
 _COMPRESSION_ADVICE = (
     "Export without this compression: gltfpack without -c and -cc, or gltf-transform copy IN.glb OUT.glb"
 )
-_ADVICE = dict.fromkeys(_MESHOPT, _COMPRESSION_ADVICE)
+_EXTENSION_ADVICE = dict.fromkeys(_MESHOPT_EXTENSIONS, _COMPRESSION_ADVICE)
 _OTHER_ADVICE = "Export without it"
 
 
@@ -87,7 +87,7 @@ def read_gltf(path: Path) -> MeshFile:
     """Read the scene of a .glb or .gltf file in its rest pose.
 
     Joints have the transforms of their nodes, and morph targets their default weights. A mesh with a skin is
-    transformed by its joints, independently of its own node.
+    transformed by its joints; the transform of its node has no effect.
     """
     document = read_document(path)
     _refuse_extensions(document)
@@ -106,8 +106,10 @@ def _refuse_extensions(document: Document) -> None:
     required = map(str, document.items("extensionsRequired"))
     unsupported = [name for name in required if name not in _READ_EXTENSIONS]
     if unsupported:
-        advice = next((_ADVICE[name] for name in unsupported if name in _ADVICE), _OTHER_ADVICE)
-        refuse(document.path, "plain glTF", f"the file requires {listed(unsupported)}", advice)
+        advice = next(
+            (_EXTENSION_ADVICE[name] for name in unsupported if name in _EXTENSION_ADVICE), _OTHER_ADVICE
+        )
+        refuse(document.path, "plain glTF", f"the file requires {list_names(unsupported)}", advice)
 
 
 @dataclass
@@ -115,7 +117,7 @@ class _SceneReader:
     """Reader of the primitives of a glTF scene as mesh parts.
 
     weights : default weights of morph targets by name
-    notes : notes on content that was not read
+    notes : notes on content that was not read, as keys
     """
 
     document: Document
@@ -158,7 +160,7 @@ class _SceneReader:
         names = target_names(mesh)
         for primitive in mesh["primitives"]:
             has_triangles = primitive.get("mode", _TRIANGLES) in (_TRIANGLES, _STRIP, _FAN)
-            if has_triangles and _own_extras(primitive).get("hair") is not True:
+            if has_triangles and _dermis_extras(primitive).get("hair") is not True:
                 yield self._scene_part(mesh, names, primitive, node)
 
     def _scene_part(self, mesh: Tree, names: tuple[str, ...], primitive: Tree, node: int | None) -> MeshPart:
@@ -198,8 +200,8 @@ class _SceneReader:
             normals = None  # the normals of the file belong to the undisplaced shape
         if colours is not None and colours.shape[1] > 3 and colours[:, 3].min() < 1.0:
             self.notes["the transparency of vertices (alpha of COLOR_0) is left out"] = None
-        triangles = self._triangles(primitive, len(positions))
-        extras = _own_extras(primitive)
+        triangles = self._read_triangles(primitive, len(positions))
+        extras = _dermis_extras(primitive)
         corner_counts = np.full(len(triangles) // 2 if extras.get("quads") is True else 0, 4)
         return MeshPart(
             group,
@@ -210,10 +212,10 @@ class _SceneReader:
             quads=find_quads(corner_counts, triangles),
             separate=extras.get("alone") is True,
             colours=None if colours is None else np.clip(colours[:, :3], 0.0, 1.0),
-            other_uv=self._other_uv(group, attributes, len(positions)),
+            other_uv=self._read_other_uv(group, attributes, len(positions)),
         ), targets
 
-    def _other_uv(self, group: MaterialGroup, attributes: Tree, count: int) -> dict[int, Doubles]:
+    def _read_other_uv(self, group: MaterialGroup, attributes: Tree, count: int) -> dict[int, Doubles]:
         """Return the additional uv sets (count, 2) that textures of a material use, by index of the set."""
         material = self.materials[group.material] if group.material >= 0 else FileMaterial()
         found = {}
@@ -224,7 +226,7 @@ class _SceneReader:
             found[index] = self.document.read_floats(attributes[f"TEXCOORD_{index}"]).reshape(count, 2)
         return found
 
-    def _triangles(self, primitive: Tree, count: int) -> Index:
+    def _read_triangles(self, primitive: Tree, count: int) -> Index:
         """Return the vertex indices of a primitive's triangles, (f, 3); strips and fans are expanded.
 
         count : number of vertices of the primitive
@@ -253,8 +255,8 @@ class _SceneReader:
         return MaterialGroup(names, colour or GREY, index)
 
 
-def _own_extras(primitive: Tree) -> Tree:
-    """Return the "dermis" entry of a primitive's extras, which exports of this package write, else {}."""
+def _dermis_extras(primitive: Tree) -> Tree:
+    """Return the "dermis" entry of a primitive's extras, which this package writes; {} in other files."""
     extras = primitive.get("extras")
     own = extras.get("dermis") if isinstance(extras, dict) else None
     return own if isinstance(own, dict) else {}
@@ -263,7 +265,7 @@ def _own_extras(primitive: Tree) -> Tree:
 def _transform_part(part: MeshPart, targets: dict[str, VertexDisplacements], matrix: Doubles) -> MeshPart:
     """Return a mesh part and its morph targets transformed by `matrix` (4, 4).
 
-    Reflections reverse the vertex order of triangles, so that they still face outwards.
+    Reflections reverse the vertex order of triangles, so that triangles still face outwards.
     """
     linear = matrix[:3, :3]
     return replace(
@@ -276,9 +278,10 @@ def _transform_part(part: MeshPart, targets: dict[str, VertexDisplacements], mat
 
 
 def _nearest_rigid(matrix: Doubles) -> Doubles:
-    """Return the rigid transform that a matrix (4, 4) equals except for rounding errors.
+    """Return the rigid transform that a matrix (4, 4) approximates up to rounding errors.
 
-    Other matrices are returned unchanged. The errors come from exporters, which write scales like 1.0000001.
+    Matrices that are not nearly rigid are returned unchanged. The rounding errors come from exporters, which
+    write scales like 1.0000001.
     """
     deviation = np.abs(matrix[:3, :3] @ matrix[:3, :3].T - np.eye(3)).max()
     if not 1e-13 < deviation < 1e-5:
@@ -319,8 +322,8 @@ def _skin_part(
 def _normal_matrix(linear: Doubles) -> Doubles:
     """Return the matrices (..., 3, 3) that transform normals for linear transforms (..., 3, 3).
 
-    They are scaled so that a uniform scale preserves the length of normals. Cofactors are used because they
-    are also valid for singular transforms.
+    The matrices are scaled so that a uniform scale preserves the length of normals. Cofactors are used
+    because cofactors exist for singular transforms, too.
     """
     rows = [linear[..., k, :] for k in range(3)]
     cofactors = np.stack([np.cross(rows[(i + 1) % 3], rows[(i + 2) % 3]) for i in range(3)], axis=-2)

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator
 
 from dermis.formats.gltf.document import Document
 from dermis.formats.gltf.nodes import Nodes
-from dermis.formats.text_files import listed
+from dermis.formats.text_files import list_names
 
 LIGHTS = "KHR_lights_punctual"
 _POINTS_AND_LINES = range(4)  # modes of primitives
@@ -33,4 +33,4 @@ def note_unread(document: Document, nodes: Nodes, read_extensions: Collection[st
         yield f"one of its {len(document.items('scenes'))} scenes is read"
     unread = [name for name in map(str, document.items("extensionsUsed")) if name not in read_extensions]
     if unread:
-        yield f"these extensions are left out: {listed(unread)}"
+        yield f"these extensions are left out: {list_names(unread)}"

@@ -13,11 +13,11 @@ from dermis.formats.axes import DEFAULT_AXES, Axes
 from dermis.formats.gltf.document import Document, Tree
 from dermis.formats.gltf.rigs import VertexDisplacements
 from dermis.formats.size_limits import MAX_DISPLACEMENTS, MAX_TARGETS, check_limit
-from dermis.formats.text_files import listed
+from dermis.formats.text_files import list_names
 
 VRM_0, VRM_1 = "VRM", "VRMC_vrm"
 """Extensions of VRM 0.x, whose avatars look along -Z, and of VRM 1.0, whose avatars look along +Z."""
-_TOON = "VRMC_materials_mtoon"
+_TOON_EXTENSION = "VRMC_materials_mtoon"
 _NOT_READ = {
     "springs of hair and cloth": ("secondaryAnimation", "VRMC_springBone"),
     "constraints of bones": ("VRMC_node_constraint",),
@@ -36,7 +36,9 @@ VRM_PROPERTIES = (
         "a target of the file keeps its name",
     ),
     noted("changes of materials by expressions"),
-    noted(f"MToon (`{_TOON}`, in VRM 0 `VRM/MToon`)", "only the base colour is drawn", _TOON),
+    noted(
+        f"MToon (`{_TOON_EXTENSION}`, in VRM 0 `VRM/MToon`)", "only the base colour is drawn", _TOON_EXTENSION
+    ),
     *(noted(text, "", *keys) for text, keys in _NOT_READ.items()),
 )
 """Properties of VRM files in addition to those of glTF."""
@@ -50,7 +52,8 @@ _MAX_WEIGHT = 100.0
 class Avatar:
     """Properties that a VRM file adds to glTF; the defaults describe glTF files without VRM.
 
-    expressions : weights by mesh (Python's `id` of its JSON tree), expression name and morph target index
+    expressions : for each mesh (Python's `id` of its JSON tree), the expressions by name; an expression maps
+        the index of a morph target to its weight
     """
 
     axes: Axes = DEFAULT_AXES
@@ -60,10 +63,10 @@ class Avatar:
     def with_expressions(
         self, mesh: Tree, names: Sequence[str], targets: dict[str, VertexDisplacements]
     ) -> dict[str, VertexDisplacements]:
-        """Return the morph targets of a primitive, with its expressions added as further morph targets.
+        """Return the morph targets of a primitive, with the expressions added as further morph targets.
 
         names : names of the morph targets of the mesh
-        targets : targets of the primitive, by name
+        targets : morph targets of the primitive, by name
 
         An expression with the name of a morph target is omitted.
 
@@ -95,7 +98,7 @@ def read_avatar(document: Document) -> Avatar:
         names.add(name)
         check_limit(document.path, len(names), MAX_TARGETS, "expressions", "Export it with fewer")
     axes = Axes(front="-z" if is_vrm_0 else "z")
-    return Avatar(axes, expressions, tuple(_notes(extensions, avatar, is_vrm_0)))
+    return Avatar(axes, expressions, tuple(_avatar_notes(extensions, avatar, is_vrm_0)))
 
 
 class _Bind(NamedTuple):
@@ -121,7 +124,7 @@ def _vrm_0_binds(document: Document, avatar: Tree) -> Iterator[_Bind]:
         name = str(group.get("name", "")) if preset in _CUSTOM_PRESETS else preset
         for bind in group.get("binds") or () if name else ():
             mesh = document.item("meshes", bind["mesh"])
-            yield _Bind(name, mesh, int(bind["index"]), _PERCENT * _weight(bind))
+            yield _Bind(name, mesh, int(bind["index"]), _PERCENT * _bind_weight(bind))
 
 
 def _vrm_1_binds(document: Document, avatar: Tree) -> Iterator[_Bind]:
@@ -129,15 +132,15 @@ def _vrm_1_binds(document: Document, avatar: Tree) -> Iterator[_Bind]:
 
     avatar : VRM extension of the file
     """
-    for name, expression in _expressions(avatar).items():
+    for name, expression in _expression_trees(avatar).items():
         for bind in expression.get("morphTargetBinds") or ():
             node = document.item("nodes", bind["node"])
             if "mesh" in node:
                 mesh = document.item("meshes", node["mesh"])
-                yield _Bind(name, mesh, int(bind["index"]), _weight(bind))
+                yield _Bind(name, mesh, int(bind["index"]), _bind_weight(bind))
 
 
-def _weight(bind: Tree) -> float:
+def _bind_weight(bind: Tree) -> float:
     weight = float(bind["weight"])
     if not abs(weight) <= _MAX_WEIGHT:
         raise ValueError(f"the weight of an expression is {weight:g}")
@@ -149,13 +152,13 @@ def _expression_groups(avatar: Tree) -> list[Tree]:
     return groups
 
 
-def _expressions(avatar: Tree) -> Tree:
+def _expression_trees(avatar: Tree) -> Tree:
     expressions: Tree = avatar.get("expressions") or {}
     return {**(expressions.get("preset") or {}), **(expressions.get("custom") or {})}
 
 
-def _notes(extensions: Tree, avatar: Tree, is_vrm_0: bool) -> Iterator[str]:
-    expressions = _expression_groups(avatar) if is_vrm_0 else list(_expressions(avatar).values())
+def _avatar_notes(extensions: Tree, avatar: Tree, is_vrm_0: bool) -> Iterator[str]:
+    expressions = _expression_groups(avatar) if is_vrm_0 else list(_expression_trees(avatar).values())
     if any(one.get(key) for one in expressions for key in _MATERIAL_BINDS):
         yield "changes of materials by expressions are left out"
     present = {*avatar, *extensions}
@@ -165,7 +168,7 @@ def _notes(extensions: Tree, avatar: Tree, is_vrm_0: bool) -> Iterator[str]:
     materials = avatar.get("materialProperties") or ()
     toon = [str(one.get("name")) for one in materials if "MToon" in str(one.get("shader"))]
     if toon:
-        yield f"cartoon shading (shade colour, outline, rim light) is not drawn: {listed(toon)}"
+        yield f"cartoon shading (shade colour, outline, rim light) is not drawn: {list_names(toon)}"
 
 
 def _sum_displacements(sources: Sequence[tuple[VertexDisplacements, float]]) -> VertexDisplacements:

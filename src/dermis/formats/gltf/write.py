@@ -51,9 +51,9 @@ def encode_head(
     Hairs become thin tubes, which this package does not read back. Equal heads give identical bytes.
 
     roughness : Beckmann's m of skin without a roughness map [-]
-    weights : default weights of morph targets by name, which override those of the rest pose
+    weights : default weights of morph targets by name, which override the weights of the rest pose
     slopes : (n, n, 2) slopes of the relief, written as normal map for programs that read no height map
-    notes : extras of the file's asset
+    notes : entries for the extras of the file's "asset"
     eyes : maps of the eyeballs; None for eyes in a uniform colour
     additions : properties to add to the material of skin
     """
@@ -98,7 +98,7 @@ def _primitive_sources(
     roughness: float,
     eyes: EyeTextures | None,
 ) -> tuple[list[PrimitiveSource], list[Tree]]:
-    """Return the geometry of each glTF primitive and the material of each, in the same order.
+    """Return the geometry and the material of each glTF primitive, as two lists in the same order.
 
     pictures : PNG files by name; this function adds the pictures of eyes, hairs and parts that are not skin
     roles : entries of the extras of skin, see `skin_pictures`

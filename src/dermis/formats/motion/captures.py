@@ -60,7 +60,7 @@ class CaptureSamples:
     names : (n,) names of the blend shapes
     weights : (k, n) weights of the blend shapes
     angles : Euler angles (k, 3) of bones of the head, by bone name [degrees]
-    unused_names : columns of angles for which the head has no bone
+    unused_names : names of the file's columns of angles for which the head has no bone
     """
 
     times_s: Doubles
@@ -125,8 +125,8 @@ def frame_rate(times: Doubles) -> float | None:
 def to_seconds(culprit: object, times: Doubles, unit: float | None) -> Doubles:
     """Return times (k,) in seconds.
 
-    unit : unit of the times [s]; None to assume the largest unit in which frames are at most 2 s apart, which
-        a note states
+    unit : unit of the times [s]; None to assume the largest unit in which frames are at most 2 s apart, and
+        to issue a note on this unit
     """
     if unit is None:
         steps = np.diff(times)
@@ -137,7 +137,7 @@ def to_seconds(culprit: object, times: Doubles, unit: float | None) -> Doubles:
 
 
 def assumed_rate(culprit: object, fps: float | None, default: float) -> float:
-    """Return the frame rate of a capture without times: `fps` if given, else `default`, with a note."""
+    """Return the frame rate of a capture without times: `fps`, or else `default` with a note about it."""
     if fps is None:
         assumed = f"{default:g} frames per second are assumed"
         notify(f"{culprit}: it has no times; {assumed}, which fps (--motion-fps) changes")
@@ -145,7 +145,10 @@ def assumed_rate(culprit: object, fps: float | None, default: float) -> float:
 
 
 def note_lost_frames(culprit: object, count: int, total: int) -> None:
-    """Issue a note that a number of frames show no face, if there are any."""
+    """Issue a note on the number of frames that show no face, unless it is 0.
+
+    count, total : number of frames without a face, and of all frames
+    """
     if count:
         notify(f"{culprit}: {count} of {total} frames show no face; their pose is interpolated")
 
@@ -162,7 +165,7 @@ def fill_gaps(times_s: Doubles, values: Doubles) -> Doubles:
 
 
 def to_fractions(culprit: object, weights: Doubles) -> Doubles:
-    """Return blend shape weights (k, n) as fractions; those in percent are divided by 100, with a note."""
+    """Return blend shape weights (k, n) as fractions; weights in percent are divided by 100, with a note."""
     largest = float(np.nanmax(np.abs(weights), initial=0.0))
     if _PERCENT_RANGE[0] < largest <= _PERCENT_RANGE[1]:
         notify(f"{culprit}: weights of up to {largest:g} are taken as percent")
@@ -185,14 +188,14 @@ def check_weights(culprits: Sequence[object], names: Sequence[str], values: Doub
         refuse(culprits[row], expected, actual, "Correct or remove the line")
 
 
-def check_size(culprit: object, frames: int, names: int) -> None:
+def check_size(culprit: object, frame_count: int, column_count: int) -> None:
     """Refuse a capture with too many frames or too many columns.
 
-    frames, names : numbers of frames and of columns read so far
+    frame_count, column_count : numbers of frames and of columns read so far
     """
-    if frames > MAX_FRAMES or names > MAX_NAMES:
+    if frame_count > MAX_FRAMES or column_count > MAX_NAMES:
         expected = f"at most {MAX_FRAMES:,} frames of {MAX_NAMES} numbers"
-        actual = f"it has more ({frames:,} of {names:,} so far)"
+        actual = f"it has more ({frame_count:,} of {column_count:,} so far)"
         refuse(culprit, expected, actual, "Shorten it, or remove columns that heads do not have")
 
 
@@ -219,7 +222,10 @@ def match_targets(names: Iterable[str], targets: Sequence[str]) -> dict[str, str
 
 
 def _plain_name(name: str) -> str:
-    """Return a blend shape name for comparison: lower case, no prefix, and "left" or "right" for L or R."""
+    """Return a blend shape name in a form for comparison.
+
+    The form has lower case, no prefix, and "left" or "right" for L or R.
+    """
     last = name.rpartition(".")[2]
     side = re.fullmatch(r"(.+)[_\-. ]([lrLR])", last)
     name_with_side = f"{side[1]}{_SIDE_LETTERS[side[2].lower()]}" if side else last
@@ -228,7 +234,7 @@ def _plain_name(name: str) -> str:
 
 @dataclass(frozen=True)
 class RotationBones:
-    """Bones of a skeleton to which rotations of a capture's head and eyes are applied.
+    """Bones of a skeleton that perform the rotations of head and eyes in a capture.
 
     head : fraction of the head's rotation by bone name; empty if there is neither a head nor a neck bone
     eyes : name of the eye bone for "left" and "right"
@@ -243,7 +249,8 @@ def find_rotation_bones(skeleton: Skeleton | None) -> RotationBones:
 
     Head, mixamorig:Head and CC_Base_Head are heads; neck, Neck1 and DEF-neck.002 are necks if they are
     ancestors of the head; LeftEye and eye.L are eyes. The head bone gets half of the head's rotation and the
-    neck bones share the other half; if there is only a head bone, or only neck bones, they get all of it.
+    neck bones share the other half. If there is only a head bone, or only neck bones, these bones get the
+    whole rotation.
     """
     if skeleton is None:
         return RotationBones({}, {})
@@ -252,7 +259,7 @@ def find_rotation_bones(skeleton: Skeleton | None) -> RotationBones:
     head = heads[0] if heads else None
     necks = [bone for bone, (kind, side) in enumerate(words) if kind in _NECK_WORDS and not side]
     if head is not None:
-        ancestors = _ancestors(skeleton, head)
+        ancestors = _bone_ancestors(skeleton, head)
         necks = [bone for bone in necks if bone in ancestors]
     eyes: dict[str, str] = {}
     for bone, (kind, side) in enumerate(words):
@@ -297,7 +304,7 @@ def _euler_angles(rotations: Doubles) -> Doubles:
     return unwrap_degrees(np.array([matrix_angles(matrix) for matrix in matrices]))
 
 
-def _ancestors(skeleton: Skeleton, bone: int) -> set[int]:
+def _bone_ancestors(skeleton: Skeleton, bone: int) -> set[int]:
     ancestors = set()
     while (bone := int(skeleton.parent[bone])) >= 0:
         ancestors.add(bone)

@@ -31,7 +31,8 @@ class _UsedTrack(NamedTuple):
 
     path : "translation", "rotation", "scale" or "weights"
     columns : indices in the track of the bones or morph targets that the head has
-    indices : for each of them, its index among all animated bones or morph targets of the head
+    indices : for each of these columns, the index of its bone or morph target among all animated bones or
+        morph targets of the head
     """
 
     path: str
@@ -41,7 +42,7 @@ class _UsedTrack(NamedTuple):
 
 
 def load_gltf_clip(path: Path, head: Head, name: str | None) -> Clip:
-    """Load a clip of a .glb or .gltf file; bones and morph targets are matched with the head's by name.
+    """Load a clip of a .glb or .gltf file; its bones and morph targets are matched to the head's by name.
 
     Translations, rotations and scales of bones that the clip does not animate keep their rest values.
 
@@ -80,9 +81,11 @@ def load_gltf_clip(path: Path, head: Head, name: str | None) -> Clip:
     return Clip(clip.name, end, rate, tuple(targets), tuple(bones), unused, sample)
 
 
-def _used_names(tracks: list[AnimationTrack], known: tuple[str, ...]) -> list[str]:
-    """Return the animated names of tracks that are in `known`, the bones or morph targets of the head."""
-    return [name for name in dict.fromkeys(name for track in tracks for name in track.names) if name in known]
+def _used_names(tracks: list[AnimationTrack], head_names: tuple[str, ...]) -> list[str]:
+    """Return the names of animated bones or morph targets that the head has."""
+    return [
+        name for name in dict.fromkeys(name for track in tracks for name in track.names) if name in head_names
+    ]
 
 
 def _used_track(track: AnimationTrack, names: list[str]) -> _UsedTrack:

@@ -46,7 +46,7 @@ _TIME_COLUMNS: Mapping[str, float | None] = {"timecode": None, **TIME_UNITS}
 _OTHER_COLUMNS = (*_TIME_COLUMNS, *FRAME_KEYS, _COUNT_COLUMN, plain_key(NEUTRAL_SCORE), "")
 _ROTATED_OBJECTS = ("head", "lefteye", "righteye")
 _ANGLE_COLUMNS = [f"{part}{angle}" for part in _ROTATED_OBJECTS for angle in ("pitch", "yaw", "roll")]
-_TIMECODE = re.compile(
+_TIMECODE_PATTERN = re.compile(
     r"(\d{1,3}):(\d{1,2}):(\d{1,2}(?:\.\d{1,12})?)(?:[:;](\d{1,4}(?:\.\d{1,12})?))?", re.ASCII
 )
 _TIMECODE_RATES = (24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 100.0, 120.0, 240.0)
@@ -74,9 +74,9 @@ def load_live_link(path: Path, head: Head, fps: float | None = None) -> Clip:
     """Load a CSV file of Live Link Face as a clip for a head.
 
     Columns are identified by name, in any order: Timecode or another time, blend shapes, and angles [rad]
-    HeadPitch, HeadYaw and HeadRoll about the head's x, y and z axes, likewise for LeftEye and RightEye.
-    They rotate the bones found by `find_rotation_bones`. Columns are separated by commas, semicolons or tabs.
-    Empty cells and frames without a face are interpolated, weights in percent and angles in degrees are
+    HeadPitch, HeadYaw and HeadRoll about the head's x, y and z axes, likewise for LeftEye and RightEye. The
+    angles rotate the bones found by `find_rotation_bones`. Columns are separated by commas, semicolons or
+    tabs. Empty cells and frames without a face are interpolated, weights in percent and angles in degrees are
     converted, each with a note.
 
     fps : frame rate of the timecode; by default estimated from its largest frame number
@@ -195,8 +195,8 @@ def _complete_table(path: Path, lines: list[str], table: _CaptureTable, states_s
 def _rows_without_face(values: Doubles, is_angle: Mask, states_shapes: Mask) -> Mask:
     """Return the mask (k,) of rows without a face: empty rows, and rows of zeros that no face would have.
 
-    Rows of zeros show no face if most other rows have a rotated head, or if these rows state no number of
-    blend shapes and others do.
+    Rows of zeros show no face if most other rows have a rotated head, or if the rows of zeros state no number
+    of blend shapes and other rows do.
     """
     numbers = np.nan_to_num(values)
     zero = np.asarray(~numbers.any(axis=1))
@@ -217,13 +217,13 @@ def _row_times(path: Path, lines: list[str], cells: list[str], key: str | None, 
     if key is None:
         return np.arange(len(lines)) / assumed_rate(path, fps, _APP_RATE)
     if any(":" in cell for cell in cells):
-        codes = [_timecode(line, cell) for line, cell in zip(lines, cells, strict=True)]
+        codes = [_parse_timecode(line, cell) for line, cell in zip(lines, cells, strict=True)]
         rate = fps or _timecode_rate(codes)
         times = np.array([code.seconds + code.frames / rate for code in codes])
         days = np.cumsum(np.diff(times, prepend=times[0]) < -_MIDNIGHT_S)
         times += _DAY_S * days
     else:
-        times = np.array([_plain_time(line, cell) for line, cell in zip(lines, cells, strict=True)])
+        times = np.array([_parse_time(line, cell) for line, cell in zip(lines, cells, strict=True)])
         if key in FRAME_KEYS:
             times = times / assumed_rate(path, fps, _APP_RATE)
         else:
@@ -236,15 +236,15 @@ def _row_times(path: Path, lines: list[str], cells: list[str], key: str | None, 
     return times
 
 
-def _timecode(culprit: str, cell: str) -> _Timecode:
-    match = _TIMECODE.fullmatch(cell)
+def _parse_timecode(culprit: str, cell: str) -> _Timecode:
+    match = _TIMECODE_PATTERN.fullmatch(cell)
     if match is None:
         refuse(culprit, "a Timecode as HH:MM:SS:FF.fff", f"got {cell!r}", "Correct or remove the line")
     hours, minutes, seconds, frames = match.groups(default="0")
     return _Timecode(3600 * int(hours) + 60 * int(minutes) + float(seconds), float(frames))
 
 
-def _plain_time(culprit: str, cell: str) -> float:
+def _parse_time(culprit: str, cell: str) -> float:
     try:
         return checked_number(culprit, float(cell), -MAX_TIME, MAX_TIME)
     except ValueError:

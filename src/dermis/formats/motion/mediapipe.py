@@ -54,7 +54,7 @@ _SCORE_KEYS = ("score", "value", "weight")
 _RATE_KEYS = ("fps", "framerate")
 _DEFAULT_RATE = 30.0
 _MAX_MATRIX_VALUE = 1e6
-_EXPECTED = "results of MediaPipe in JSON"
+_EXPECTED_CONTENT = "results of MediaPipe in JSON"
 _LINE_ADVICE = "Correct or remove the line"
 _RECORD_ADVICE = "Record with output_face_blendshapes (JavaScript: outputFaceBlendshapes) set to true"
 
@@ -84,12 +84,12 @@ class _CapturedFrame(NamedTuple):
 def load_mediapipe(path: Path, head: Head, fps: float | None = None) -> Clip:
     """Load results of MediaPipe's face landmarker as a clip for a head.
 
-    The file has one result per line, a list of them, or an object with such a list. Keys may be spelled as in
-    any of MediaPipe's APIs, such as face_blendshapes and faceBlendshapes. Blend shapes are {name: score}, or
-    a list of names and scores for each face; facial transformations (4, 4) are nested or flat lists or
-    objects with data, and rotate the bones found by `find_rotation_bones`; "time" [s], "timestamp_ms" and
-    others are times. Only the first face is used. Frames without a face are interpolated. Assumptions are
-    noted.
+    The file has one result per line, a list of results, or an object that contains such a list. Keys may be
+    spelled as in any of MediaPipe's APIs, such as face_blendshapes and faceBlendshapes. Blend shapes are
+    {name: score}, or a list of names and scores for each face; facial transformations (4, 4) are nested or
+    flat lists or objects with data, and rotate the bones found by `find_rotation_bones`; "time" [s],
+    "timestamp_ms" and similar keys are times. Only the first face is used. Frames without a face are
+    interpolated. Notes state all assumptions.
 
     fps : frame rate if the frames have no time; by default the rate that the file states, or 30
 
@@ -106,7 +106,7 @@ def load_mediapipe(path: Path, head: Head, fps: float | None = None) -> Clip:
     if lost == len(frames):
         found = ", ".join(record) if isinstance(record, dict) and record else "nothing"
         actual = f"no frame has any (the last one has {found})"
-        refuse(path, f"{_EXPECTED} with blendshapes", actual, _RECORD_ADVICE)
+        refuse(path, f"{_EXPECTED_CONTENT} with blendshapes", actual, _RECORD_ADVICE)
     note_lost_frames(path, lost, len(frames))
     if several:
         notify(f"{path}: {several} of {len(frames)} frames show several faces; the first one is used")
@@ -125,20 +125,22 @@ def load_mediapipe(path: Path, head: Head, fps: float | None = None) -> Clip:
 
 def _read_records(path: Path) -> tuple[float | None, Iterator[tuple[str, object]]]:
     """Return the frame rate that a file states, and its frames, each with its name for errors."""
-    text = read_text(path, _EXPECTED, MAX_CLIP_BYTES)
+    text = read_text(path, _EXPECTED_CONTENT, MAX_CLIP_BYTES)
     lines = ((f"{path}, line {k}", line) for k, line in enumerate(io.StringIO(text), 1) if line.strip())
     first, second = next(lines, None), next(lines, None)
     if first is None:
-        refuse(path, _EXPECTED, "it is empty", "Record it again")
+        refuse(path, _EXPECTED_CONTENT, "it is empty", "Record it again")
     try:
-        document = parse_json(first[1], first[0], _EXPECTED)
+        document = parse_json(first[1], first[0], _EXPECTED_CONTENT)
     except DermisError:
         if second is None:
             raise
-        document = parse_json(text, path, _EXPECTED)  # an object over several lines
+        document = parse_json(text, path, _EXPECTED_CONTENT)  # an object over several lines
     else:
         if second is not None:
-            rest = ((name, parse_json(line, name, _EXPECTED)) for name, line in chain([second], lines))
+            rest = (
+                (name, parse_json(line, name, _EXPECTED_CONTENT)) for name, line in chain([second], lines)
+            )
             return None, chain([(first[0], document)], rest)
     fields = _plain_fields(document)
     rate = next((check_rate(f"{path}: {key}", fields[key]) for key in _RATE_KEYS if key in fields), None)
@@ -200,7 +202,7 @@ def _parse_frame(culprit: str, index: int, record: object, columns: dict[str, in
 
 
 def _first_face(value: object) -> tuple[object, int]:
-    """Return the blend shapes of the first face, None for no face, and the number of faces.
+    """Return the blend shapes of the first face, or None if there is no face, and the number of faces.
 
     value : blend shapes of one face, an object around their list, or a list of such values, one for each face
     """
@@ -245,7 +247,8 @@ def _facial_transformation(culprit: str, value: object) -> Doubles | None:
     The translation is in the last column of the result. A flat list without a translation is taken to be in
     column-major order, as MediaPipe's APIs return it.
 
-    value : matrix as a nested or flat list, an object with it, or a list of either
+    value : matrix as a nested or flat list, an object that contains the matrix, or a list of matrices or such
+        objects
     """
     by_columns = False
     while isinstance(value, dict) or (isinstance(value, list) and value and not _is_row(value[0])):
@@ -270,7 +273,7 @@ def _facial_transformation(culprit: str, value: object) -> Doubles | None:
 
 
 def _is_row(value: object) -> bool:
-    """Return whether the first entry of a list is a row or a number of a matrix, not a whole matrix."""
+    """Return whether the first entry of a list is a row or a number of one matrix, not a whole matrix."""
     is_nested = isinstance(value, list) and (len(value) != 4 or isinstance(value[0], list))
     return not is_nested and not isinstance(value, dict)
 

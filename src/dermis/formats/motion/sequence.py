@@ -39,15 +39,15 @@ _NORMAL_LINE = re.compile(rb"^[ \t]*vn[ \t][^\n]*\n?", re.MULTILINE)
 
 
 def is_sequence(path: Path) -> bool:
-    """Return whether a path is a folder, a pattern (face_%05d.obj) or a mesh file, which could be a frame."""
+    """Return whether a path may be a mesh sequence: a folder, a pattern (face_%05d.obj), or a mesh file."""
     is_pattern = bool(_NUMBER_FIELD.search(path.name)) or "*" in path.name
     return is_pattern or _is_folder(path) or path.suffix.lower() in FRAME_SUFFIXES
 
 
 def frame_files(path: Path) -> list[Path]:
-    """Return the mesh files in a folder, or those that match a pattern, sorted by the number in their names.
+    """Return the mesh files in a folder or with names that match a pattern, sorted by number.
 
-    path : folder, or pattern such as face_%05d.obj or face_*.obj
+    path : folder, or pattern such as face_%05d.obj or face_*.obj; the number is the last in the name
 
     Raises DermisError when there are no files, or files of several formats.
     """
@@ -90,10 +90,11 @@ def load_sequence(
 
     fps : frame rate, by default 30
     unit_mm : unit of the files [mm]; by default a unit in which the first mesh is about as large as the head
-    up, front : axes of the files, see `load_head`; by default the axes of the head's file
+    up, front : axes of the files that point upwards and along which the face looks; by default the axes of
+        the head's file
 
     Raises DermisError for files that are not frames of that head; the first, the middle and the last file are
-    read immediately, the others on demand.
+    read immediately, all other files on demand.
     """
     files, rate = frame_files(path), DEFAULT_FRAME_RATE if fps is None else fps
     axes, source = Axes(up, front), head.file_vertices
@@ -177,7 +178,7 @@ class _FrameCache:
 def _unit_of_head(file: Path, head: Head, reader: FrameReader) -> float:
     """Return the unit with which the mesh in a file is about as large as a head [mm].
 
-    It is the unit of the file's format if this fits; otherwise a note states the unit.
+    The unit of the file's format is preferred; if another unit is chosen, a note states it.
     """
     read_mm, head_mm = (
         np.linalg.norm(np.ptp(one, axis=0)) for one in (reader.read(file).positions_mm, head.positions_mm)
@@ -238,11 +239,11 @@ class _ObjPattern(NamedTuple):
 class FrameReader:
     """Reader of the mesh files of a sequence, which have the same topology.
 
-    If an OBJ file differs from the first one only in positions, only its positions are parsed, which is 20
+    If an OBJ file differs from the first file only in positions, only its positions are parsed, which is 20
     times as fast.
 
     unit_mm : length of the files' unit [mm]; None for the default of the format
-    to_head : (3, 3) rotation from the axes of the files to those of the head
+    to_head : (3, 3) rotation from the axes of the files to the axes of the head
     """
 
     unit_mm: float | None = None
@@ -253,7 +254,7 @@ class FrameReader:
     def read(self, path: Path) -> FrameVertices:
         """Return the vertices of a mesh file.
 
-        Raises `DermisError` when it is missing, damaged or not a mesh, or has no uv.
+        Raises `DermisError` when the file is missing, damaged or not a mesh, or has no uv.
         """
         unit = default_unit_mm(path) if self.unit_mm is None else float(self.unit_mm)
         if self._pattern is not None and self._first is not None and is_file(path):
@@ -278,7 +279,7 @@ class FrameReader:
         return FrameVertices(positions[used], corners.astype(np.int32), part.uv[used].astype(np.float32))
 
     def _read_pattern(self, path: Path, unit: float) -> _ObjPattern | None:
-        """Return the pattern of the first file; None if its positions are not those in its `v` lines."""
+        """Return the pattern of the first file; None if its `v` lines are not the positions of the mesh."""
         assert self._first is not None
         data = read_obj_text(path).encode()
         pattern = _find_pattern(path, data)
@@ -317,9 +318,10 @@ def _find_pattern(path: Path, data: bytes) -> _ObjPattern:
 
 
 def _parse_positions(data: bytes, pattern: _ObjPattern) -> Doubles | None:
-    """Return the vertex positions (v, 3) of an OBJ file in its units, or None if it does not fit the pattern.
+    """Return the vertex positions (v, 3) of an OBJ file in its units; None for a file without the pattern.
 
     data : bytes of the file
+    pattern : pattern of the first file of the sequence
     """
     rows, digest = _split_vertex_lines(data)
     if len(rows) != pattern.line_count or digest != pattern.digest:

@@ -23,7 +23,7 @@ from dermis.mesh.geometry import expand_runs
 if TYPE_CHECKING:
     from pxr import Usd, UsdGeom, UsdShade
 
-_MM = 1000.0
+_MM_PER_METRE = 1000.0
 _UV_NAMES = ("st", "UVMap", "map1", "st0", "st_0", "uv")
 _TYPES_WITHOUT_NOTE = ("", "Xform", "Scope", "Mesh", "GeomSubset", "Material", "Shader", "NodeGraph")
 _HIDDEN_PURPOSES = ("guide", "proxy")
@@ -83,14 +83,14 @@ class _SceneReader:
         self.vertices = self.triangles = 0
 
     def read(self) -> Arrays:
-        """Return the arrays of all meshes, whose names begin with the mesh's number, and the JSON "scene"."""
+        """Return the arrays of all meshes by name, mesh number first, and the scene as JSON, "scene"."""
         meshes, unread = list[Tree](), Counter[str]()
         for count, prim in enumerate(self._prims()):
             limits.check_limit(self.path, count, limits.MAX_NODES, "prims", "Export the head alone")
             if prim.IsA(self.geom.Mesh):
                 if self._is_visible(prim):
                     limits.check_limit(self.path, len(meshes), limits.MAX_GROUPS, "meshes", "Join some")
-                    meshes.append(self._mesh(self.geom.Mesh(prim), str(len(meshes))))
+                    meshes.append(self._add_mesh(self.geom.Mesh(prim), str(len(meshes))))
             elif prim.GetTypeName() not in _TYPES_WITHOUT_NOTE:
                 unread[str(prim.GetTypeName())] += 1
         if unread:
@@ -112,9 +112,9 @@ class _SceneReader:
     def _unit_mm(self) -> float:
         if not self.geom.StageHasAuthoredMetersPerUnit(self.stage):
             self.notes["its unit is not stated: USD's default is 10 mm; --unit-mm sets another"] = None
-        unit_mm = _MM * float(self.geom.GetStageMetersPerUnit(self.stage))
+        unit_mm = _MM_PER_METRE * float(self.geom.GetStageMetersPerUnit(self.stage))
         if not 0 < unit_mm < np.inf:
-            actual = f"it is {unit_mm / _MM:g}"
+            actual = f"it is {unit_mm / _MM_PER_METRE:g}"
             refuse(self.path, "metersPerUnit above 0", actual, "Correct it, or export again")
         return unit_mm
 
@@ -123,14 +123,14 @@ class _SceneReader:
         is_hidden = shown.ComputePurpose() in _HIDDEN_PURPOSES
         return not is_hidden and shown.ComputeVisibility(self.time) != "invisible"
 
-    def _mesh(self, mesh: UsdGeom.Mesh, mesh_number: str) -> Tree:
+    def _add_mesh(self, mesh: UsdGeom.Mesh, mesh_number: str) -> Tree:
         """Add the arrays of a mesh to the answer, and return its names and materials."""
         prim, matrix = mesh.GetPrim(), np.array(self.transform_cache.GetLocalToWorldTransform(mesh.GetPrim()))
-        points, faces = self._geometry(mesh)
+        points, faces = self._points_and_faces(mesh)
         materials, group = self._material_groups(prim, len(faces.counts))
-        uv = self._uv(prim, faces, materials)
-        normals = self._normals(mesh, faces)
-        colour, colours = self._colours(prim, faces, materials, len(points))
+        uv = self._find_uv(prim, faces, materials)
+        normals = self._read_normals(mesh, faces)
+        colour, colours = self._read_colours(prim, faces, materials, len(points))
         arrays: dict[str, Numbers] = {"points": points @ matrix[:3, :3] + matrix[3, :3]}
         arrays |= {"counts": faces.counts, "group": group}
         order = self._corner_order(mesh, faces, matrix)
@@ -139,7 +139,7 @@ class _SceneReader:
             if primvar is not None:
                 arrays |= {name: primvar.values, f"{name} index": primvar.corner_index[order]}
         if normals is not None and np.linalg.det(matrix[:3, :3]) != 0:
-            arrays["normals"] = _normalised(normals.values @ np.linalg.inv(matrix[:3, :3]).T)
+            arrays["normals"] = _normalise(normals.values @ np.linalg.inv(matrix[:3, :3]).T)
         if colours is not None:
             arrays["colours"] = colours
         self.arrays |= {
@@ -147,7 +147,7 @@ class _SceneReader:
         }
         return {"name": prim.GetName(), "materials": materials, "colour": colour}
 
-    def _geometry(self, mesh: UsdGeom.Mesh) -> tuple[Doubles, _Faces]:
+    def _points_and_faces(self, mesh: UsdGeom.Mesh) -> tuple[Doubles, _Faces]:
         """Return points (v, 3) and polygons of a mesh, after checks of their number and indices."""
         attributes = mesh.GetPointsAttr(), mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr()
         given = [attribute.Get(self.time) for attribute in attributes]
@@ -172,17 +172,17 @@ class _SceneReader:
         return np.arange(len(faces.vertex))
 
     def _material_groups(self, prim: Usd.Prim, count: int) -> tuple[list[int], Index]:
-        """Return the list of a mesh's materials, -1 for none, and each face's index in this list (count,).
+        """Return the list of a mesh's materials (-1: none), and each face's index in this list (count,).
 
         Faces that are holes have the index -1.
         """
         binding = self.shade.MaterialBindingAPI(prim)
-        materials, group = [self._material(binding)], np.zeros(count, np.int64)
+        materials, group = [self._bound_material_index(binding)], np.zeros(count, np.int64)
         for subset in binding.GetMaterialBindSubsets():
             faces = np.array(subset.GetIndicesAttr().Get(self.time) or [], np.int64)
             self._check_face_indices(faces, count, subset.GetPath())
             group[faces] = len(materials)
-            materials.append(self._material(self.shade.MaterialBindingAPI(subset.GetPrim())))
+            materials.append(self._bound_material_index(self.shade.MaterialBindingAPI(subset.GetPrim())))
         holes = np.array(self.geom.Mesh(prim).GetHoleIndicesAttr().Get(self.time) or [], np.int64)
         self._check_face_indices(holes, count, prim.GetPath())
         group[holes] = -1
@@ -193,7 +193,7 @@ class _SceneReader:
             actual = f"{prim_path} has some from {faces.min()} to {faces.max()}"
             refuse(self.path, f"indices of faces from 0 to {face_count - 1}", actual, limits.DAMAGED_ADVICE)
 
-    def _material(self, binding: UsdShade.MaterialBindingAPI) -> int:
+    def _bound_material_index(self, binding: UsdShade.MaterialBindingAPI) -> int:
         material = binding.ComputeBoundMaterial()[0]
         if not material:
             return -1
@@ -203,19 +203,19 @@ class _SceneReader:
             self.materials.append(self.material_reader.read(material))
         return self.material_index[key]
 
-    def _uv(self, prim: Usd.Prim, faces: _Faces, materials: list[int]) -> _Primvar | None:
-        """Return the uv that the mesh's materials name, else uv with a usual name; None without any."""
+    def _find_uv(self, prim: Usd.Prim, faces: _Faces, materials: list[int]) -> _Primvar | None:
+        """Return the uv that the mesh's materials name, else the uv with a usual name; None without uv."""
         named = dict.fromkeys(one for k in materials if k >= 0 and (one := self.materials[k].get("uv")))
         if len(named) > 1:
             self.notes[_SEVERAL_UV_NOTE] = None
         primvars = self.geom.PrimvarsAPI(prim)
         typed = [one for one in primvars.GetPrimvars() if "texCoord2" in str(one.GetTypeName())]
         names = (*named, *_UV_NAMES, *(str(one.GetPrimvarName()) for one in typed))
-        found = (self._primvar(primvars.FindPrimvarWithInheritance(name), faces, 2) for name in names)
+        found = (self._read_primvar(primvars.FindPrimvarWithInheritance(name), faces, 2) for name in names)
         return next((one for one in found if one is not None), None)
 
-    def _primvar(self, primvar: UsdGeom.Primvar, faces: _Faces, width: int) -> _Primvar | None:
-        """Return a primvar if its elements have `width` numbers, else None."""
+    def _read_primvar(self, primvar: UsdGeom.Primvar, faces: _Faces, width: int) -> _Primvar | None:
+        """Convert a primvar of the file; return None unless its elements have `width` numbers."""
         if not primvar or not primvar.HasValue():
             return None
         values = np.array(primvar.Get(self.time), np.float64)
@@ -232,19 +232,19 @@ class _SceneReader:
             refuse(self.path, "a value for each vertex or corner", actual, limits.DAMAGED_ADVICE)
         return _Primvar(values, element)
 
-    def _normals(self, mesh: UsdGeom.Mesh, faces: _Faces) -> _Primvar | None:
-        """Return the normals of a mesh; None if it has none, or is a subdivision surface."""
+    def _read_normals(self, mesh: UsdGeom.Mesh, faces: _Faces) -> _Primvar | None:
+        """Return the normals of a mesh; None for a mesh without normals or a subdivision surface."""
         if mesh.GetSubdivisionSchemeAttr().Get(self.time) != "none":
             return None
         primvars = self.geom.PrimvarsAPI(mesh.GetPrim())
-        found = self._primvar(primvars.GetPrimvar("normals"), faces, 3)
+        found = self._read_primvar(primvars.GetPrimvar("normals"), faces, 3)
         given = mesh.GetNormalsAttr().Get(self.time)
         if found is not None or not given:
             return found
         element = faces.corner_elements(str(mesh.GetNormalsInterpolation()))
         return self._checked_primvar(np.array(given, np.float64), element, mesh.GetPath())
 
-    def _colours(
+    def _read_colours(
         self, prim: Usd.Prim, faces: _Faces, materials: list[int], count: int
     ) -> tuple[list[float] | None, Doubles | None]:
         """Return one colour for a whole mesh, or linear colours (count, 3) of its vertices, or neither."""
@@ -253,7 +253,7 @@ class _SceneReader:
             return None, None
         primvars = self.geom.PrimvarsAPI(prim)
         primvar = primvars.FindPrimvarWithInheritance(named[0] if named else "displayColor")
-        found = self._primvar(primvar, faces, 3)
+        found = self._read_primvar(primvar, faces, 3)
         if found is None or not len(faces.vertex):
             return None, None
         if primvar.GetInterpolation() == "constant" and not named:
@@ -263,7 +263,7 @@ class _SceneReader:
         return None, np.clip(np.column_stack(sums) / weight[:, None], 0.0, 1.0)
 
 
-def _normalised(vectors: Doubles) -> Doubles:
+def _normalise(vectors: Doubles) -> Doubles:
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     return np.asarray(vectors / np.where(length > 0, length, 1.0))
 

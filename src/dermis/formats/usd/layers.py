@@ -19,11 +19,11 @@ LAYER_SUFFIXES = (".usd", ".usda", ".usdc")
 _LOCATED_FAULT = re.compile(r"/([^/\s]+:\d+:\d+: .*)")
 """Pattern of an error message with the position of the error in a text layer."""
 _MAX_LAYERS, _MAX_ENTRIES = 256, 4096
-_ADVICE = "Flatten it into one file (usdcat --flatten), or export a .usdz"
+_LAYER_ADVICE = "Flatten it into one file (usdcat --flatten), or export a .usdz"
 
 
 class OpenedStage(NamedTuple):
-    """Stage of a USD file, and the folder of its layers; the layers of a package were copied there."""
+    """Stage of a USD file, and the folder of its layers, to which the layers of a package are copied."""
 
     stage: Usd.Stage
     folder: Path
@@ -85,11 +85,11 @@ def _check_layers(path: Path, root: Path, folder: Path) -> None:
         for name in _layer_names(path, layer):
             found = _layer_file(file, name, folder)
             if found is None:
-                refuse(path, "layers in its own folder or below", f"it references {name!r}", _ADVICE)
+                refuse(path, "layers in its own folder or below", f"it references {name!r}", _LAYER_ADVICE)
             if found not in known:
                 known.add(found)
                 pending.append(found)
-                check_limit(path, len(known), _MAX_LAYERS, "layers", _ADVICE)
+                check_limit(path, len(known), _MAX_LAYERS, "layers", _LAYER_ADVICE)
 
 
 def _layer_names(path: Path, layer: Sdf.Layer) -> Iterator[str]:
@@ -107,11 +107,16 @@ def _layer_names(path: Path, layer: Sdf.Layer) -> Iterator[str]:
 
     layer.Traverse("/", visit)
     if clips:
-        refuse(path, "a scene without value clips", f"{clips[0]} has some", _ADVICE)
+        refuse(path, "a scene without value clips", f"{clips[0]} has some", _LAYER_ADVICE)
 
 
 def _layer_file(layer: Path, name: str, folder: Path) -> Path | None:
-    """Return the file of a layer that another layer references; None if it is not a layer in the folder."""
+    """Return the file of a layer that another layer references; None for a file outside the folder.
+
+    layer : file of the referencing layer
+    name : name by which it references the other layer
+    folder : folder that must contain all layers
+    """
     if any(mark in name for mark in ":[`\0"):  # names with schemes, packages or expressions
         return None
     file = (layer.parent / name).resolve()

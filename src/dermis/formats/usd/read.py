@@ -27,8 +27,8 @@ from dermis.images.io import EmbeddedPicture
 from dermis.mesh.geometry import expand_runs
 
 USD_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
-_DECODER = "dermis.formats.usd.decoder"
-_PACKAGE = ".usdz"
+_DECODER_MODULE = "dermis.formats.usd.decoder"
+_PACKAGE_SUFFIX = ".usdz"
 Tree = dict[str, Any]
 USD_PROPERTIES = (
     drawn("`metersPerUnit`", "unless `--unit-mm` is given"),
@@ -67,21 +67,21 @@ def read_usd(path: Path) -> MeshFile:
     """
     data = read_file(path, "a USD file", MAX_FILE_BYTES)
     request = {"file": from_text(str(path.resolve())), "path": from_text(str(path))}
-    answer = run_decoder(_DECODER, request, len(data), path, "a valid USD file")
+    answer = run_decoder(_DECODER_MODULE, request, len(data), path, "a valid USD file")
     scene: Tree = parse_json(as_text(answer["scene"]), path, "a valid USD file")
     pictures = _Pictures(path, data)
     materials = tuple(pictures.material(tree) for tree in scene["materials"])
     check_pictures(path, materials)
     parts, notes = list[MeshPart](), dict.fromkeys(scene["notes"])
     for number, mesh in enumerate(scene["meshes"]):
-        mesh_parts, mesh_notes = _parts(path, answer, f"{number} ", _groups(mesh, materials))
+        mesh_parts, mesh_notes = _mesh_parts(path, answer, f"{number} ", _material_groups(mesh, materials))
         parts += mesh_parts
         notes |= dict.fromkeys(mesh_notes)
     axes = Axes(cast(Axis, scene["up"]))
     return MeshFile(parts, materials=materials, notes=tuple(notes), unit_mm=scene["unit_mm"], axes=axes)
 
 
-def _groups(mesh: Tree, materials: Sequence[FileMaterial]) -> list[MaterialGroup]:
+def _material_groups(mesh: Tree, materials: Sequence[FileMaterial]) -> list[MaterialGroup]:
     """Return the groups of a mesh: one for each of its materials."""
     groups = []
     for index in mesh["materials"]:
@@ -91,7 +91,7 @@ def _groups(mesh: Tree, materials: Sequence[FileMaterial]) -> list[MaterialGroup
     return groups
 
 
-def _parts(
+def _mesh_parts(
     path: Path, answer: Arrays, prefix: str, groups: list[MaterialGroup]
 ) -> tuple[list[MeshPart], list[str]]:
     """Return the parts of a mesh, one for each group, and notes.
@@ -134,7 +134,7 @@ class _Pictures:
 
     def __init__(self, path: Path, data: bytes) -> None:
         self.path, self.package = path, None
-        if path.suffix.lower() == _PACKAGE:
+        if path.suffix.lower() == _PACKAGE_SUFFIX:
             self.package = zipfile.ZipFile(io.BytesIO(data))
             self.sizes = {one.filename: one.file_size for one in self.package.infolist()}
 
@@ -162,7 +162,7 @@ class _Pictures:
         return "folder of the file" if self.package is None else "package"
 
     def _find_picture(self, name: str) -> PathLike | None:
-        """Return the picture with a name relative to the layers, or None."""
+        """Return the picture with a name relative to the layers; None if it does not exist."""
         if self.package is None:
             return find_referenced_file(self.path, name) if name else None
         if name not in self.sizes:

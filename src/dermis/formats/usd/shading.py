@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from pxr import Usd, UsdShade
 
 Tree = dict[str, Any]
-_ROLES = {
+_ROLE_OF_INPUT = {
     "diffuseColor": "colour",
     "normal": "normal",
     "roughness": "roughness",
@@ -87,11 +87,11 @@ class MaterialReader:
         if kind != "UsdPreviewSurface":
             tree["unused"].append(f"surface {kind}" if kind else "material without a UsdPreviewSurface")
             return tree
-        values = {name: self._value(surface, name, default) for name, default in _DEFAULTS.items()}
+        values = {name: self._constant_value(surface, name, default) for name, default in _DEFAULTS.items()}
         tree["colour"], tree["emission"] = list(values["diffuseColor"]), list(values["emissiveColor"])
         tree |= {"roughness": values["roughness"], "stated_metalness": values["metallic"]}
-        for name, role in _ROLES.items():
-            if (source := self._source(surface, name)) is not None:
+        for name, role in _ROLE_OF_INPUT.items():
+            if (source := self._connected_source(surface, name)) is not None:
                 self._add_source(tree, name, role, source)
         self._add_opacity(tree, surface, values)
         self._list_unused_inputs(tree, surface)
@@ -101,11 +101,11 @@ class MaterialReader:
         """Add the texture or the vertex colours to which an input is connected."""
         kind = str(source.shader.GetIdAttr().Get())
         if kind.startswith("UsdPrimvarReader_float") and role == "colour":
-            tree |= {"vertex_colours": self._text(source.shader, "varname"), "colour": [1.0, 1.0, 1.0]}
+            tree |= {"vertex_colours": self._text_value(source.shader, "varname"), "colour": [1.0, 1.0, 1.0]}
         elif kind != "UsdUVTexture":
             tree["unused"].append(f"{input_name} from {kind}")
         else:
-            texture = self._texture(source, tree)
+            texture = self._texture_tree(source, tree)
             tree["textures"][role] = texture
             factor, bias = texture.pop("scale"), texture.pop("bias")
             if role == "normal":
@@ -118,33 +118,33 @@ class MaterialReader:
                 key = "stated_metalness" if role == "metalness" else role
                 tree[key] = factor[texture["channel"] or 0]
 
-    def _texture(self, source: _Source, tree: Tree) -> Tree:
+    def _texture_tree(self, source: _Source, tree: Tree) -> Tree:
         shader = source.shader
-        wraps = [self._text(shader, f"wrap{axis}") for axis in "ST"]
+        wraps = [self._text_value(shader, f"wrap{axis}") for axis in "ST"]
         if "black" in wraps:
             tree["unused"].append("black beyond the edges of pictures")
-        if self._text(shader, "sourceColorSpace") == "raw" and source.output == "rgb":
+        if self._text_value(shader, "sourceColorSpace") == "raw" and source.output == "rgb":
             tree["unused"].append("colour space raw of pictures, except for that of normals")
-        coordinates, transform = self._source(shader, "st"), [1.0, 0.0, 0.0, 0.0, 1.0, 0.0]
+        coordinates, transform = self._connected_source(shader, "st"), [1.0, 0.0, 0.0, 0.0, 1.0, 0.0]
         if coordinates is not None and coordinates.shader.GetIdAttr().Get() == "UsdTransform2d":
-            transform = self._transform(coordinates.shader)
-            coordinates = self._source(coordinates.shader, "in")
+            transform = self._uv_transform(coordinates.shader)
+            coordinates = self._connected_source(coordinates.shader, "in")
         if coordinates is not None:
-            tree.setdefault("uv", self._text(coordinates.shader, "varname"))
+            tree.setdefault("uv", self._text_value(coordinates.shader, "varname"))
         return {
-            "file": self._file(shader),
+            "file": self._picture_name(shader),
             "transform": transform,
             "wrap": [_WRAPS.get(one, "clamp") for one in wraps],
             "channel": _CHANNELS.get(source.output),
-            "scale": list(self._value(shader, "scale", (1.0, 1.0, 1.0, 1.0))),
-            "bias": list(self._value(shader, "bias", (0.0, 0.0, 0.0, 0.0))),
+            "scale": list(self._constant_value(shader, "scale", (1.0, 1.0, 1.0, 1.0))),
+            "bias": list(self._constant_value(shader, "bias", (0.0, 0.0, 0.0, 0.0))),
         }
 
-    def _transform(self, shader: UsdShade.Shader) -> list[float]:
+    def _uv_transform(self, shader: UsdShade.Shader) -> list[float]:
         """Convert the shader's transform, which has v up, to a transform of uv with v down, see `Texture`."""
-        angle = math.radians(self._value(shader, "rotation", 0.0))
+        angle = math.radians(self._constant_value(shader, "rotation", 0.0))
         (x, y), (scale_x, scale_y) = (
-            self._value(shader, name, default)
+            self._constant_value(shader, name, default)
             for name, default in (("translation", (0.0, 0.0)), ("scale", (1.0, 1.0)))
         )
         cos, sin = math.cos(angle), math.sin(angle)
@@ -153,10 +153,14 @@ class MaterialReader:
 
     def _add_opacity(self, tree: Tree, surface: UsdShade.Shader, values: Mapping[str, Any]) -> None:
         """Add the opacity; a picture is only supported if it is the alpha channel of the colour's picture."""
-        source, cutoff = self._source(surface, "opacity"), values["opacityThreshold"]
+        source, cutoff = self._connected_source(surface, "opacity"), values["opacityThreshold"]
         colour = tree["textures"].get("colour")
         if source is not None:
-            file = self._file(source.shader) if source.shader.GetIdAttr().Get() == "UsdUVTexture" else None
+            file = (
+                self._picture_name(source.shader)
+                if source.shader.GetIdAttr().Get() == "UsdUVTexture"
+                else None
+            )
             if colour is None or source.output != "a" or colour["file"] != file:
                 tree["unused"].append("picture of the opacity")
                 return
@@ -167,36 +171,36 @@ class MaterialReader:
 
     def _list_unused_inputs(self, tree: Tree, surface: UsdShade.Shader) -> None:
         for name, (text, neutral) in _WITHOUT_EFFECT.items():
-            value = self._value(surface, name, neutral)
-            if value != neutral or self._source(surface, name) is not None:
+            value = self._constant_value(surface, name, neutral)
+            if value != neutral or self._connected_source(surface, name) is not None:
                 tree["unused"].append(text)
 
-    def _file(self, texture: UsdShade.Shader) -> str:
+    def _picture_name(self, texture: UsdShade.Shader) -> str:
         """Return a picture's name relative to the folder of the layers, or unchanged if it is outside."""
-        for attribute in self._attributes(texture, "file"):
+        for attribute in self._value_attributes(texture, "file"):
             layer, asset = attribute.GetPropertyStack(self.time)[0].layer, attribute.Get(self.time)
             name = str(asset.path) if asset else ""
             file = (Path(layer.realPath).parent / name).resolve()
             return file.relative_to(self.folder).as_posix() if file.is_relative_to(self.folder) else name
         return ""
 
-    def _attributes(self, shader: UsdShade.Shader, input_name: str) -> list[Usd.Attribute]:
+    def _value_attributes(self, shader: UsdShade.Shader, input_name: str) -> list[Usd.Attribute]:
         """Return the attributes from which an input gets its value, found through its connections."""
         entry = shader.GetInput(input_name)
         found: list[Usd.Attribute] = list(entry.GetValueProducingAttributes()) if entry else []
         return found
 
-    def _source(self, shader: UsdShade.Shader, input_name: str) -> _Source | None:
-        """Return the output to which an input of a shader is connected, or None."""
-        for attribute in self._attributes(shader, input_name):
+    def _connected_source(self, shader: UsdShade.Shader, input_name: str) -> _Source | None:
+        """Return the shader output to which an input of a shader is connected; None without a connection."""
+        for attribute in self._value_attributes(shader, input_name):
             kind, output = str(attribute.GetName()).split(":", 1)
             if kind == "outputs":
                 return _Source(self.shade.Shader(attribute.GetPrim()), output)
         return None
 
-    def _value(self, shader: UsdShade.Shader, input_name: str, default: Any) -> Any:
+    def _constant_value(self, shader: UsdShade.Shader, input_name: str, default: Any) -> Any:
         """Return the constant value of an input as numbers, or the default."""
-        for attribute in self._attributes(shader, input_name):
+        for attribute in self._value_attributes(shader, input_name):
             if attribute.GetName().startswith("inputs:") and (value := attribute.Get(self.time)) is not None:
                 numbers = tuple(map(float, value)) if isinstance(default, tuple) else float(value)
                 if not all(map(math.isfinite, numbers if isinstance(numbers, tuple) else (numbers,))):
@@ -205,8 +209,8 @@ class MaterialReader:
                 return numbers
         return default
 
-    def _text(self, shader: UsdShade.Shader, input_name: str) -> str:
-        values = [attribute.Get(self.time) for attribute in self._attributes(shader, input_name)]
+    def _text_value(self, shader: UsdShade.Shader, input_name: str) -> str:
+        values = [attribute.Get(self.time) for attribute in self._value_attributes(shader, input_name)]
         return str(next((value for value in values if value is not None), ""))
 
 

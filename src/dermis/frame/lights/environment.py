@@ -37,7 +37,7 @@ class EnvironmentMap:
 
 
 def load_environment_map(device: Device, name: str | None) -> EnvironmentMap:
-    """Return the prefiltered panorama of an environment, or a black one for the name None.
+    """Return the prefiltered panorama of an environment, or a black panorama for the name None.
 
     Raises DermisError when there is no such environment.
     """
@@ -85,7 +85,7 @@ def add_suns(memo: Memo, scene: Scene, environment_map: EnvironmentMap) -> Scene
 
 
 def peak_irradiance(scene: Scene, environment_map: EnvironmentMap) -> float:
-    """Return an upper bound of the irradiance: that of a surface facing all lights and the brightest sky [-].
+    """Return an upper bound of the irradiance: a surface that faces all lights and the brightest sky [-].
 
     scene : scene that has the suns of its environment among its lights
     """

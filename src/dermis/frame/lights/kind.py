@@ -20,7 +20,7 @@ L = TypeVar("L", bound=Light)
 
 
 class Kind(Generic[L]):
-    """Kind of light in the frame; this base class is a punctual light without shader members of its own.
+    """Kind of light in the frame; this base class is a punctual light that sets no further shader members.
 
     The shader has the name of the module with the suffix .wgsl. With NAME as in scene files, but with
     underscores for hyphens, it defines
@@ -30,7 +30,7 @@ class Kind(Generic[L]):
     Attributes
     ----------
     always : bool
-        Whether all shaders include this kind of light; others are compiled only for scenes that use them.
+        Whether all shaders include this kind of light; other kinds are compiled only for scenes with them.
     punctual : bool
         Whether all light comes from one position or from one direction; False for area lights.
     round : bool
@@ -66,7 +66,7 @@ class Kind(Generic[L]):
         return not self.punctual
 
     def parts(self, light: L) -> list[Light]:
-        """Divide a light into parts that together equal it, each with its own shadow map.
+        """Divide a light into parts that together equal the light; each part has a shadow map.
 
         Parameters
         ----------

@@ -75,7 +75,7 @@ def light_constants(scene: Scene) -> tuple[tuple[str, int], ...]:
 
 
 def oblique_constants(constants: Constants) -> Constants:
-    """Return `constants`; if they set HALF_SPACE, add the pipeline constant that enables oblique incidence.
+    """Return `constants`, plus the constant that enables oblique incidence if HALF_SPACE is among them.
 
     Only passes that know the shape of the surface around a point may use the result.
     """
@@ -93,7 +93,8 @@ def light_shadow_views(scene: Scene, outline: Outline, size: int) -> list[Shadow
     outline : outline of the head's shape
     size : side of the shadow maps [texels]
 
-    Raises DermisError for more lights than the shader supports, and for one inside the bounds of the head.
+    Raises DermisError for more lights than the shader supports, and for a light inside the bounds of the
+    head.
     """
     numbered = [
         (f"light {number}", part)
@@ -150,7 +151,7 @@ def light_sample_points() -> Floats:
 
 
 def _light_members(light: Light, centre: Triple, view: ShadowView | None, siblings: int) -> Members:
-    """Return the members of the shader struct `Light`; those that are left out are 0.
+    """Return the members of the shader struct `Light`; members that are left out are 0.
 
     siblings : number of parts into which the light is divided, this part included
     """

@@ -1,6 +1,6 @@
 """Texture-space diffusion of GPU Gems 3 (2007), as a baseline.
 
-It blurs with seven taps and half floats, and blurs the stretch map together with the light.
+The technique blurs with seven taps and half floats, and blurs the stretch map together with the light.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class StretchedLevels(PyramidLevels):
 
 
 class GpuGems3(AtlasTechnique):
-    """Texture-space diffusion as published in 2007: two blur passes for each Gaussian, twelve for six."""
+    """Texture-space diffusion as published in 2007, with two blur passes for each Gaussian."""
 
     sources = ("dEonLuebke2007",)
     stitches_seams = False
@@ -60,7 +60,7 @@ class GpuGems3(AtlasTechnique):
         return float(FORMAT_BYTES[HALF_FORMAT] * (levels + 4))
 
     def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
-        """Return how often the resolution of each level is halved: 0, as all have the full resolution."""
+        """Return how often the resolution of each level is halved: never, all levels have full resolution."""
         return (0,) * (len(split.blurred_mm2) + 1)
 
     def blur_levels(self, graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blur) -> None:

@@ -38,9 +38,10 @@ _ENTRY_COUNT = 256
 
 @dataclass(frozen=True, eq=False)
 class SubsurfaceLayers(TechniqueResources):
-    """Textures of the light below the skin in the picture, and those needed to diffuse it.
+    """Textures of the light below the skin in the picture, and textures needed to diffuse this light.
 
-    layers : light below the skin with its depth [mm], and the fraction of it that leaves towards the camera
+    layers : light below the skin with its depth [mm], and the fraction of this light that leaves towards the
+        camera
     subsurface, transmittance : views of these two layers
     scratch : light that is diffused along rows but not yet along columns
     result : finished picture, None for outputs, which need only the light below the skin
@@ -84,7 +85,7 @@ class ScreenSpace(Technique):
         return memo.get(make_subsurface_layers, device, settings.size, False, owner="outputs")
 
     def subsurface_layers(self, resources: TechniqueResources | None) -> Texture | None:
-        """Return texture layers: light below the skin, and the fraction of it that leaves to the camera."""
+        """Return texture layers: light below the skin, and its fraction that leaves towards the camera."""
         return resources.layers if isinstance(resources, SubsurfaceLayers) else None
 
     def finish(self, graph: Graph, inputs: FrameInputs, radiance: Texture) -> Texture:
@@ -98,7 +99,7 @@ class ScreenSpace(Technique):
     ) -> tuple[TextureOrView, TextureOrView]:
         """Declare the passes that diffuse the light of outputs.
 
-        The result is texture views of the diffused light, and of the fraction of it that leaves towards the
+        Returns texture views of the diffused light, and of the fraction of this light that leaves towards the
         camera.
         """
         layers, picture_layers = inputs.resources.output_layers, inputs.resources.technique

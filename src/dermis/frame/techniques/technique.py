@@ -79,7 +79,7 @@ class Technique(TechniqueTraits):
     def make(
         self, memo: Memo, device: Device, settings: Settings, profile: GaussianSum
     ) -> TechniqueResources | None:
-        """Return the tables and textures of the technique, cached by the memo; None if it needs none."""
+        """Return the tables and textures of the technique, cached by the memo; None if there are none."""
         return None
 
     def make_subsurface_layers(
@@ -98,13 +98,14 @@ class Technique(TechniqueTraits):
         """
 
     def subsurface_layers(self, resources: TechniqueResources | None) -> Texture | None:
-        """Return the texture to which shading writes light below the skin, None to add it to the picture."""
+        """Return the texture to which shading writes light below the skin, None if it goes to the picture."""
         return None
 
     def scatter(self, graph: Graph, inputs: FrameInputs) -> Texture:
         """Declare the passes before shading, and return the texture that shading reads as `scattered`.
 
-        It holds the exitance of scattered light over the atlas, unless the technique stores other data there.
+        The texture holds the exitance of scattered light over the atlas, unless the technique stores other
+        data in it.
         """
         return inputs.resources.scattered
 
@@ -117,7 +118,7 @@ class Technique(TechniqueTraits):
     ) -> tuple[TextureOrView, TextureOrView]:
         """Declare the passes that diffuse the light in the textures of `make_subsurface_layers`.
 
-        The result is textures of the diffused light, and of the fraction of it that leaves towards the
+        Returns textures of the diffused light, and of the fraction of this light that leaves towards the
         camera.
         """
         raise NotImplementedError
@@ -125,7 +126,8 @@ class Technique(TechniqueTraits):
     def sum_translucency(self, graph: Graph, inputs: FrameInputs, into: tuple[Texture, ...]) -> Texture:
         """Sum only the light through thin parts, for outputs; return the texture that combines all layouts.
 
-        into : textures of the atlas, one per layout and, for several layouts, one of their blend
+        into : textures of the atlas, one for each layout and, if there are several layouts, one for their
+            blend
         """
         raise NotImplementedError
 
@@ -136,7 +138,7 @@ class AtlasTechnique(Technique):
     uses_atlas = True
 
     def gaussians(self, profile: GaussianSum) -> GaussianSum:
-        """Return the Gaussians by which the technique approximates a profile; here those of the profile."""
+        """Return the Gaussians by which the technique approximates a profile; here the profile itself."""
         return profile
 
     def relights_narrowest(self, profile: GaussianSum) -> bool:
@@ -219,7 +221,7 @@ class AtlasTechnique(Technique):
     ) -> None:
         """Declare the passes that sum the blurred levels as exitance, light through thin parts included.
 
-        thin : resources of the light through thin parts, None without it
+        thin : resources of the light through thin parts, None if no light crosses thin parts
         into : texture for the exitance
         """
         through = translucency.draw(graph, levels, blur, thin) if thin else None

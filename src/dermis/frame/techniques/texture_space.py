@@ -25,7 +25,7 @@ class TextureSpace(AtlasTechnique):
     mixes_profiles = True
 
     def split(self, profile: GaussianSum, normalise: bool) -> ProfileSplit:
-        """Split a profile into relit and blurred Gaussians; `fine` serves light that varies within a texel.
+        """Split a profile into relit and blurred Gaussians; `fine` corrects light that varies within a texel.
 
         normalise : whether the weights of each channel sum to 1, so that only the colour map sets the albedo
         """

@@ -74,8 +74,8 @@ def _grid_axes() -> tuple[Doubles, Doubles]:
 class BrowSurface:
     """Skin around the brows of a person as a height field, which hairs follow as they grow.
 
-    node_mm, normal : (2 n, 3) nodes of `grid_points` projected onto the skin [mm], and the skin normals
-        there; first all nodes of the left brow, then those of the right one, mirrored in x
+    node_mm, normal : (2 n, 3) nodes of `grid_points` projected onto the skin [mm], and the skin normals at
+        these nodes; first all nodes of the left brow, then all nodes of the right brow, mirrored in x
     """
 
     def __init__(self, node_mm: Doubles, normal: Doubles) -> None:

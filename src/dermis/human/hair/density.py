@@ -37,7 +37,8 @@ class HairDensity(NamedTuple):
 
     relative : function that returns the relative density (n,), 0 to 1, at points (n, 4): position on the
         average person, and distance inside the border of the lips [mm]
-    candidates : (p,) mask of control points; quads without any of them are skipped, as no hair grows there
+    candidates : (p,) mask of control points near hair; quads without such a point are skipped, as no hair
+        grows there
     """
 
     relative: Callable[[Doubles], Doubles]

@@ -39,8 +39,8 @@ def add_hair(
     root_finder : root finder of the template person, on whom brows and lashes are defined
     look : length, density, curl and colour of the hair
     recession : recession of the hairline, 0 to 1, see `SkinLook`
-    hairs : fraction of scalp and beard hairs to generate; the hairs are widened by its inverse to keep
-        coverage
+    hairs : fraction of scalp and beard hairs to generate; the hairs are widened by the inverse of this
+        fraction, so that coverage stays the same
     """
     near = skin_vertices_near_hair(root_finder)
     skin = SkinSurface(head.mesh.positions[near], head.mesh.normals[near])
@@ -115,7 +115,7 @@ def _hair_group(
 def _join_groups(groups: list[HairGroup], absorption: Doubles) -> Strands:
     """Return the strands of several hair groups as one object.
 
-    absorption : (n, 3) absorption coefficients of single hairs [1/mm]; lower in strands that are wider
+    absorption : (n, 3) absorption coefficients of single hairs [1/mm]; wider strands get lower coefficients
     """
     roots = _concatenate(group.roots for group in groups)
     knots, radius = (np.concatenate([group[k] for group in groups]) for k in (1, 2))

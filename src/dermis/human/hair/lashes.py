@@ -60,7 +60,7 @@ LOWER_LASHES = LashRow(
 def sample_positions(row: LashRow, rng: np.random.Generator) -> tuple[Doubles, Doubles]:
     """Return random root positions of lashes: along the edge of the lid and from the edge into the skin.
 
-    Both (n,) are coordinates for `RootFinder.lid_edge_roots`, 0 to 1.
+    Both arrays (n,) are coordinates for `RootFinder.lid_edge_roots`, 0 to 1.
     """
     u = (np.arange(row.hairs) + rng.uniform(-0.3, 1.3, row.hairs)) / row.hairs
     across = 0.04 + 0.12 * rng.integers(0, 3, row.hairs)
@@ -116,7 +116,7 @@ def grow_lashes(root_mm: Doubles, eye_mm: Doubles, side: Doubles, shape: Doubles
 def _clump_tips(knots: Doubles, clump: NDArray[np.int64], strength: Doubles, t: Doubles) -> Doubles:
     """Return knots (n, k, 3) with the tips of the lashes in each clump pulled towards their mean tip.
 
-    clump, strength : (n,) index of the clump of each lash, and attraction to it, 0 to 1
+    clump, strength : (n,) index of the clump of each lash, and attraction of the lash to the clump, 0 to 1
     t : (k,) position along the lash, 0 at the root, 1 at the tip
     """
     count = np.maximum(np.bincount(clump), 1)

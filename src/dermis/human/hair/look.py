@@ -55,7 +55,7 @@ class HairLook:
     beard_mm : float
         Length of the beard, 0 to 150; 0 for none [mm].
     bushy : float
-        Brows, from sparse and short, 0, to dense and long, 1 [-].
+        Bushiness of the brows, from 0, sparse and short, to 1, dense and long [-].
     grey : float
         Fraction of hairs without pigment, 0 to 1 [-].
     eumelanin, pheomelanin : float
@@ -131,7 +131,7 @@ def typical_hair(demographics: Demographics, eumelanin: float, pheomelanin: floa
 
 
 def sample_hair(rng: np.random.Generator, demographics: Demographics, typical: HairLook) -> HairLook:
-    """Return a random hair look around the typical one of a person.
+    """Return a random hair look around the typical hair look of a person.
 
     Styles have the chances of styles.toml, which are chosen, not measured; only men have beards. The order of
     random draws does not depend on the person.

@@ -47,8 +47,8 @@ class _LidEdge(NamedTuple):
 
     lengths_mm : (m,) arc length from the first point to each point [mm]
     quad : (m - 1,) index of the adjacent quad of each segment
-    frame : (m - 1, 4, 2) corners of this quad in its own (0, 1) coordinates: first the two ends of the
-        segment, then the corners opposite to them
+    frame : (m - 1, 4, 2) corners of this quad in its own coordinates, 0 to 1: first the two ends of the
+        segment, then the two opposite corners
     """
 
     lengths_mm: Doubles

@@ -49,11 +49,11 @@ def tangent_component(vectors: Doubles, normals: Doubles) -> Doubles:
 
 
 class RootFrames:
-    """Hair roots on the subdivided mesh with a coordinate frame at each, in which knots are stored.
+    """Hair roots on the subdivided mesh, each with the coordinate frame in which knots are stored.
 
     roots : roots on quads of the subdivided mesh
     positions_mm : (n, 3) positions of the roots [mm]
-    frame : (n, 3, 3) coordinate frames whose rows are the axes; the last is the normal
+    frame : (n, 3, 3) coordinate frames, whose rows are the axes; the last axis is the normal
     """
 
     def __init__(self, roots: Roots, positions_mm: Doubles, frame: Doubles) -> None:
@@ -70,7 +70,8 @@ class GrowthSurface:
 
     head, control_mesh : subdivided head, and its mesh before subdivision, on whose quads roots are defined
     skin : smooth surface over which hairs lie
-    hair_fraction : fraction of hairs to generate; the hairs are widened by its inverse to keep coverage
+    hair_fraction : fraction of hairs to generate; the hairs are widened by the inverse of this fraction, so
+        that coverage stays the same
     """
 
     def __init__(self, head: Head, control_mesh: Mesh, skin: SkinSurface, hair_fraction: float = 1.0) -> None:

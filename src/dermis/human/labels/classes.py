@@ -12,8 +12,8 @@ class LabelClass(NamedTuple):
     """Class of the surface that a pixel shows.
 
     number : pixel value in the output `label`
-    face_synthetics : pixel value in the output `label_face_synthetics`, numbered as in the data set
-        FaceSynthetics
+    face_synthetics : pixel value in the output `label_face_synthetics`: the number of the class in the data
+        set FaceSynthetics
     """
 
     number: int

@@ -110,7 +110,7 @@ def hair_classes(head: Head) -> NDArray[np.uint8]:
 
 @cache
 def _quad_hair_classes() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """Return the classes (q,) of brow or lash hairs on control quads, and those of scalp or beard hairs."""
+    """Return the classes (q,) of brow or lash hairs, and of scalp or beard hairs, on each control quad."""
     mesh = average_head().mesh
     around = quad_corners(mesh, np.arange(len(mesh.quads)))
     middle = average_head().positions_mm.astype(np.float64)[around].mean(axis=1)
@@ -125,7 +125,7 @@ def _quad_hair_classes() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
 def _ear_field() -> Doubles:
     """Return a field (p,) over control points whose zero crossing is the border of the ears, positive inside.
 
-    It is the fraction of the adjacent quads that belong to an ear, minus 0.5.
+    The field is the fraction of the adjacent quads that belong to an ear, minus 0.5.
     """
     mesh = average_head().mesh
     around = quad_corners(mesh, np.arange(len(mesh.quads)))
@@ -168,7 +168,7 @@ class MeshLabels(NamedTuple):
 
 
 def mesh_labels(head: Head) -> MeshLabels:
-    """Return the label classes of a head; those of parametric humans are cached by mesh topology."""
+    """Return the label classes of a head; the result for parametric humans is cached by mesh topology."""
     if not is_human(head):
         return _build_labels(head)
     digest = hashlib.blake2b(head.mesh.triangles.tobytes(), digest_size=16).digest()
@@ -243,7 +243,7 @@ def _skin_fields(head: Head) -> dict[str, Doubles]:
 def _warped_fields(head: Head, landmarks: Mapping[str, tuple[float, float, float]]) -> dict[str, Doubles]:
     """Return the label fields of a head of another topology, mapped from the average human by landmarks.
 
-    Each point takes the field of the nearest point of the average human after a landmark warp.
+    Each point is warped onto the average human by the landmarks, and takes the fields of the nearest point.
     """
     from scipy.spatial import cKDTree
 

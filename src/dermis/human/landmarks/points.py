@@ -20,7 +20,7 @@ from dermis.mesh.head import Head
 from dermis.mesh.strands import Roots, quad_corners, quad_weights, refine_roots
 
 _MAX_LANDMARKS = 10_000
-_EXPECTED = "landmarks in CSV: rows of name,vertex"
+_EXPECTED_CONTENT = "landmarks in CSV: rows of name,vertex"
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,8 +29,8 @@ class LandmarkPoints:
 
     names : names of the n landmarks in the order of the set
     point, weight : (n, 4) indices of the mesh points and their weights
-    material : (n,) index of the material that must be visible at the landmark for it to count as visible;
-        -1 for any material
+    material : (n,) a landmark counts as visible only where the material with this index is seen; -1 for any
+        material
     """
 
     names: tuple[str, ...]
@@ -59,7 +59,7 @@ def landmark_points(head: Head, name: str) -> LandmarkPoints:
 def check_landmarks(name: object) -> str:
     """Validate the name of a landmark set or the path of a landmark table, and return it.
 
-    Raises DermisError if it is neither.
+    Raises DermisError if it is neither a published set nor a .csv file.
     """
     text = str(checked_path(name, "a set of landmarks or its table"))
     if text not in LANDMARK_SETS and not text.endswith(".csv"):
@@ -73,8 +73,8 @@ def read_landmark_table(name: str) -> list[tuple[str, int]]:
 
     Raises DermisError for tables that cannot be read.
     """
-    text = read_text(check_landmarks(name), _EXPECTED)
-    with parsing(name, _EXPECTED, KeyError, TypeError, csv.Error):
+    text = read_text(check_landmarks(name), _EXPECTED_CONTENT)
+    with parsing(name, _EXPECTED_CONTENT, KeyError, TypeError, csv.Error):
         found = [(str(row["name"]), int(row["vertex"])) for row in parse_rows(text)]
     if not 0 < len(found) <= _MAX_LANDMARKS:
         refuse(name, f"1 to {_MAX_LANDMARKS} landmarks", f"got {len(found)}", "Correct the table")

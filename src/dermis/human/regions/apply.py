@@ -117,7 +117,7 @@ def _region_map(
 
 
 def _texel_image(atlas: Atlas, values: NDArray[np.float64]) -> Floats:
-    """Return values (n,) of covered atlas texels as an image; other texels copy the nearest covered one."""
+    """Return values (n,) of covered atlas texels as an image; other texels copy the nearest covered texel."""
     from scipy.ndimage import distance_transform_edt
 
     image = np.zeros(atlas.coverage.shape, np.float32)

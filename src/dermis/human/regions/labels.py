@@ -36,7 +36,7 @@ _MIN_LANDMARKS = 10
 _MIN_DEPTH_MM = 2.0  # RMS distance from the best plane; the warp needs landmarks in three dimensions
 _MAX_SKIN_DISTANCE_MM = 15.0  # eye centres are this deep; farther landmarks belong to another head
 _MAX_COORDINATE_MM = 1e6
-_SMOOTHING = 1.0  # for landmarks picked by hand; 0 would interpolate them exactly
+_WARP_SMOOTHING = 1.0  # for landmarks picked by hand; 0 would interpolate them exactly
 
 
 def load_landmarks(path: Path) -> Landmarks:
@@ -82,7 +82,7 @@ def warp_to_average(head: Head, landmarks: Landmarks, points: Doubles) -> Double
     average = average_landmarks()
     _check_landmarks(head, landmarks, average)
     source, target = np.array(list(landmarks.values())), np.array([average[name] for name in landmarks])
-    warp = RBFInterpolator(source, target, kernel="linear", degree=1, smoothing=_SMOOTHING)
+    warp = RBFInterpolator(source, target, kernel="linear", degree=1, smoothing=_WARP_SMOOTHING)
     return np.asarray(warp(points - np.array(head.centre_mm)))
 
 
@@ -121,7 +121,7 @@ def label_texels(head: Head, atlas: Atlas, table: RegionTable) -> NDArray[np.uin
     """Return the region (n,) of each covered atlas texel in row order, as indices into `REGIONS`.
 
     The first of these sources that exists is used: label map or landmarks of the table, label map of the
-    head, landmarks known to the package. Raises DermisError for a head without any of them.
+    head, landmarks known to the package. Raises DermisError for a head without any of these sources.
     """
     if table.labels is not None:
         return _labels_from_map(load_labels(table.labels), atlas, str(table.labels))

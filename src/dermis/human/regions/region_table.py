@@ -53,7 +53,7 @@ _FILE_KEYS = ("landmarks", "labels")
 
 
 def nose_distance_mm(points: Doubles) -> Doubles:
-    """Return the signed distance (n,) of points to the outline of the nose, positive inside it [mm].
+    """Return the signed distance (n,) of points to the outline of the nose, positive on the nose [mm].
 
     points : (n, 3) positions on the average human [mm]
     """
@@ -66,7 +66,7 @@ def nose_distance_mm(points: Doubles) -> Doubles:
 def neck_distance_mm(points: Doubles) -> Doubles:
     """Return the vertical distance (n,) of each point below the line from jaw to skull [mm].
 
-    It is positive on the neck and negative on the head.
+    The distance is positive on the neck and negative on the head.
 
     points : (n, 3) positions on the average human [mm]
     """

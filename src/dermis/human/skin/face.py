@@ -89,7 +89,7 @@ def zone_table(recession: float = 0.0, sites: SiteDifferences | None = None) -> 
 
 @cache
 def _site_amounts() -> NDArray[np.float64]:
-    """Return the amounts (k, 7) of the k zones that paint a difference of 1 at one site and 0 at the others.
+    """Return the amounts (k, 7) of k zones that paint a difference of 1 at one site and of 0 at other sites.
 
     Each column is for one site: the cheek and `FACE_SITES`. The zones of a site share its difference. As
     zones overlap, the shares are adjusted so that the sum of all zones is exact at the places of the sites.
@@ -124,7 +124,8 @@ class Folds(NamedTuple):
 
     knots : (k, 4) points of all polylines [mm], and their position along the fold, 0 to 1
     curves : (c, 8) for each fold: centre and radius of a bounding sphere [mm]; width of the fold, and its
-        depth in a young and in an old face [mm]; index plus 1 of the movement that deepens it, or 0 for none
+        depth in a young and in an old face [mm]; index plus 1 of the movement that deepens the fold, 0 if no
+        movement does
     first : (c + 1,) index of the first knot of each fold, followed by the number of knots
     """
 
@@ -153,7 +154,7 @@ def fold_curves() -> Folds:
 def table_sizes() -> dict[str, int]:
     """Return the sizes of the tables of zones, folds, knots and hairline, without computing their splines.
 
-    The shaders need them as constants, and SciPy would be slow to import.
+    The shaders need these sizes as constants, and an import of SciPy, which computes the splines, is slow.
     """
     lengths = Counter(row["fold"] for row in read_rows(__package__, "folds")).values()
     knots = sum(map(_sample_count, lengths))

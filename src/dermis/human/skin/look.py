@@ -37,8 +37,8 @@ _MAX_AGE_FOLDS = 1.0  # `SkinLook.age` of people of 90 years
 class SkinLook:
     """Pigments and texture of the skin.
 
-    The pigments are those of the cheek; `sites` tells how they differ on other parts of the head. `Human`
-    uses the medians of measured people by default.
+    The pigments are those of the cheek; `sites` states how the pigments of other parts of the head differ. By
+    default, `Human` uses the medians of measured people.
 
     Parameters
     ----------
@@ -77,8 +77,8 @@ class SkinLook:
     seed : int
         Seed of the pattern of spots and lines, 0 to 2**32 - 1.
     sites : SiteDifferences or mapping
-        Differences in pigments between other sites of the head and the cheek; by default those of measured
-        people.
+        Differences in pigments between other sites of the head and the cheek; by default the medians of
+        measured people.
 
     Raises
     ------
@@ -136,7 +136,7 @@ class Demographics(NamedTuple):
     sex : from 0, female, to 1, male [-]
     age : age [years]
     skin_groups : weights of the measured groups that the skin follows, see `measured.group_weights`
-    ita : requested individual typology angle of the cheek, or None [degrees]
+    ita : desired individual typology angle (ITA) of the cheek, or None [degrees]
     """
 
     african: float
@@ -152,7 +152,7 @@ class Demographics(NamedTuple):
         return _weighted_mean((self.african, self.asian, self.caucasian), values)
 
     def pigmented_mean(self, values: dict[str, float]) -> float:
-        """Return the mean of one value per ancestry, weighted by the ancestry of the skin."""
+        """Return the mean of one value per ancestry, weighted by the ancestry fractions of the skin."""
         return _weighted_mean(pigment_ancestry(self.skin_groups), values)
 
 
@@ -170,7 +170,7 @@ def typical_skin(demographics: Demographics) -> SkinLook:
 
 
 def _typical_look(demographics: Demographics, pigments: MeasuredPigments, sites: SiteDifferences) -> SkinLook:
-    """Return the typical look of a person with given pigments."""
+    """Return the typical look of a person with measured pigments."""
     old = (demographics.age - YOUNG_AGE) / (OLD_AGE - YOUNG_AGE)
     spot_progress = max(demographics.age - _AGE_SPOTS_FROM, 0.0) / (OLD_AGE - _AGE_SPOTS_FROM)
     return SkinLook(
@@ -197,7 +197,7 @@ def typical_eyes(demographics: Demographics) -> EyeLook:
 
 
 def sample_eyes(rng: np.random.Generator, demographics: Demographics) -> EyeLook:
-    """Return a random eye look around the typical one; European ancestry gives irises of all colours."""
+    """Return a random eye look around the typical look; European ancestry gives irises of all colours."""
     typical = typical_eyes(demographics)
     spread = 0.08 + 0.28 * pigment_ancestry(demographics.skin_groups)[2]
     eumelanin = _clamp(typical.eumelanin + spread * rng.normal(), 0.0, 1.0)

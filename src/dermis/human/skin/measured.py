@@ -87,12 +87,12 @@ class MeasuredPigments(NamedTuple):
 
 @dataclass(frozen=True)
 class SiteDifferences:
-    """Differences of the pigments of sites of the head from those of the cheek.
+    """Differences between the pigments at sites of the head and the pigments at the cheek.
 
     Parameters
     ----------
     cheekbone, forehead, chin, nose_tip, ear_lobe, neck : tuple of float
-        Difference of melanin and of blood [doublings], and of the oxygen saturation [-].
+        Difference in melanin and in blood [doublings], and in oxygen saturation [-], site minus cheek.
 
     Examples
     --------
@@ -151,8 +151,8 @@ class MeasuredTable(NamedTuple):
     groups : distribution by name of the group
     sex, age : (4,) differences of the variables: male minus female, and old minus young
     mean_age_term : mean of `age_term` over the ages that `Human.drawn` samples
-    site_slope : (12, 2) change of a site's difference of melanin and of blood per deviation of the cheek from
-        its median [-]
+    site_slope : (12, 2) change of a site's difference in melanin and in blood, divided by the deviation of
+        the cheek from its median [-]
     site_spread : (12, 2) standard deviation of these differences around their mean [doublings]
     """
 
@@ -164,16 +164,23 @@ class MeasuredTable(NamedTuple):
     site_slope: Doubles
     site_spread: Doubles
 
-    def mixture(self, name: str, weights: Weights) -> Doubles:
-        """Return the field `name` of `_Group`, averaged over a mixture of groups."""
-        parts = [weight * np.asarray(getattr(self.groups[one], name)) for one, weight in weights.items()]
+    def mixture(self, field_name: str, weights: Weights) -> Doubles:
+        """Return a field of `_Group`, averaged over a mixture of groups.
+
+        field_name : name of the field
+        weights : weight of each group in the mixture
+        """
+        parts = [
+            weight * np.asarray(getattr(self.groups[one], field_name)) for one, weight in weights.items()
+        ]
         return np.asarray(np.sum(parts, axis=0))
 
     def variables(self, weights: Weights, sex: ArrayLike, age: ArrayLike, scores: Doubles) -> Doubles:
         """Return the four variables (n, 4) of n people from a mixture of groups.
 
+        weights : weight of each group in the mixture
         sex, age : (n,) or one number
-        scores : (n, 4) standard normal scores, correlated as in the archive
+        scores : (n, 4) standard normal scores of the people, correlated as in the archive
         """
         from scipy.special import ndtri
 
@@ -203,7 +210,7 @@ def measured_table() -> MeasuredTable:
 
 
 def parse_table(document: Mapping[str, Any]) -> MeasuredTable:
-    """Return a table from its JSON object."""
+    """Return the table of measured people from its JSON object."""
     groups = {
         name: _Group(*(np.array(one[field], np.float64) for field in _Group._fields))
         for name, one in document["groups"].items()
@@ -263,7 +270,7 @@ def likely_groups(ita: float) -> dict[str, float]:
 def typical_pigments(
     weights: Weights, sex: float, age: float, ita: float | None = None
 ) -> tuple[MeasuredPigments, SiteDifferences]:
-    """Return the median pigments of people of a mixture of groups, a sex, an age and, optionally, an ITA."""
+    """Return the median pigments of people of a mixture of groups, by sex, age and, optionally, ITA."""
     return _pigments_and_sites(weights, sex, age, ita, np.zeros(4), None)
 
 
@@ -290,7 +297,7 @@ def _pigments_and_sites(
     """Return the pigments of a person and their differences between sites.
 
     normals : (4,) independent samples of the standard normal distribution, zeros for a typical person
-    site_normals : (12, 2) independent samples of it; None for a typical person
+    site_normals : (12, 2) independent samples of the standard normal distribution; None for a typical person
     """
     table = measured_table()
     correlation = table.mixture("correlation", weights)
@@ -298,7 +305,7 @@ def _pigments_and_sites(
     if ita is not None:
         slope = correlation[:4, 4]
         mean, covariance = slope * _ita_score(ita, weights), covariance - np.outer(slope, slope)
-    scores = mean + square_root(covariance) @ normals
+    scores = mean + symmetric_square_root(covariance) @ normals
     variables = table.variables(weights, sex, age, scores[None])
     pigments = _clipped_pigments(variables[0])
     if ita is not None:
@@ -306,7 +313,7 @@ def _pigments_and_sites(
         variables[0, 0] = np.log2(pigments.melanin)
     typical = site_normals is None
     normals_or_zeros = np.zeros((1, len(SITES), 2)) if site_normals is None else site_normals[None]
-    middle = variables if not typical or ita is not None else np.tile(_median(weights), (1, 1))
+    middle = variables if not typical or ita is not None else np.tile(_median_variables(weights), (1, 1))
     sites = table.site_variables(weights, middle, normals_or_zeros)[0]
     oxygen = variables[0, 2] + sites[:, 2]  # may exceed 1, where skin is redder than the model allows
     sites[:, 2] = np.clip(oxygen, 0.0, 1.0) - pigments.oxygen
@@ -315,7 +322,7 @@ def _pigments_and_sites(
     return pigments, SiteDifferences(**rows)
 
 
-def _median(weights: Weights) -> Doubles:
+def _median_variables(weights: Weights) -> Doubles:
     table = measured_table()
     return table.mixture("quantiles", weights)[:, len(table.probabilities) // 2]
 
@@ -335,7 +342,8 @@ def with_ita(
 ) -> MeasuredPigments:
     """Return pigments with the melanin fraction that results in a given ITA.
 
-    If none does, as for very light skin with much blood, blood is also reduced and its oxygenation raised.
+    If no melanin fraction does, as for very light skin with much blood, blood is also reduced and its
+    oxygenation raised.
     """
     for _ in range(_MAX_PALING_STEPS):
         table = skin_colour_table(eumelanin, pigments.oxygen, pigments.epidermis_mm)
@@ -371,8 +379,8 @@ def _ita_scores(ita: Doubles, quantiles: Doubles) -> Doubles:
     return np.asarray(np.interp(ita, quantiles, nodes) + slope * beyond)
 
 
-def square_root(covariance: Doubles) -> Doubles:
-    """Return the symmetric square root of a covariance matrix, whose negative eigenvalues are taken as 0."""
+def symmetric_square_root(covariance: Doubles) -> Doubles:
+    """Return the symmetric square root of a covariance matrix; negative eigenvalues are replaced by 0."""
     values, vectors = np.linalg.eigh(covariance)
     return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
 
@@ -383,7 +391,8 @@ class MeasuredCell(NamedTuple):
     group, site : as in `GROUPS` and `SITES`
     sex : "F" or "M", "" for both
     age_group : "1" (under 20), "2" (20 to 29) ... "6" (over 60), "" for all
-    people : number of people; 0 for a cell that is filled from the pooled model
+    people : number of measured people; 0 for a cell with too few people, whose medians are estimated from all
+        groups
     cielab : (3,) colour under D65, without surface reflection
     pigments : pigments by the package's model
     """

@@ -39,7 +39,7 @@ def oxygen_range(look: SkinLook) -> tuple[float, float]:
 def painted_colour_tables(look: SkinLook) -> NDArray[np.float32]:
     """Return three colour tables (3, n, n, 3) by pigment fractions, as in `ColourTable`.
 
-    The first two are for skin at the two ends of `oxygen_range`, the third is for lips.
+    The first two tables are for skin at the two ends of `oxygen_range`, the third table is for lips.
     """
     lips = look.oxygen, LIP_THICKNESS_RATIO * look.epidermis_mm
     kinds = *((oxygen, look.epidermis_mm) for oxygen in oxygen_range(look)), lips
@@ -48,7 +48,7 @@ def painted_colour_tables(look: SkinLook) -> NDArray[np.float32]:
 
 @dataclass(frozen=True, repr=False)
 class PaintedMaps(Maps):
-    """Skin maps that the device paints from a skin look, except for maps that are given.
+    """Skin maps that the device paints from a skin look; a map that is not None replaces the painted map.
 
     look : pigments and texture of the skin
     """
@@ -58,10 +58,13 @@ class PaintedMaps(Maps):
 
     @property
     def has_roughness(self) -> bool:
-        """Return whether there is a roughness map; True, because one is painted if none is given."""
+        """Return whether there is a roughness map; always True, because a missing map is painted."""
         return True
 
     @cached_property
     def mean_colour(self) -> NDArray[np.float64] | None:
-        """Return the mean colour (3,) of the colour map, or else of the look, linear Rec. 709 [-]."""
+        """Return the mean colour (3,) of the colour map, or of the skin look if there is no map [-].
+
+        Colours are linear Rec. 709.
+        """
         return super().mean_colour if self.colour is not None else mean_colour(self.look)

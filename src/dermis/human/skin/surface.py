@@ -81,7 +81,7 @@ class PaintedSurface:
 
 
 def painted_surface(mesh: Mesh, stencils: Stencils | None) -> PaintedSurface:
-    """Return the skin triangles of a human's mesh; they are equal for all people and cached by topology.
+    """Return the skin triangles of a human's mesh, which are equal for all people and cached by topology.
 
     stencils : subdivision stencils that give the points of the mesh; None without subdivision
     """

@@ -38,12 +38,12 @@ class Noise(NamedTuple):
     """Fractal gradient noise, with values from about -1 to 1, that the paint shader evaluates.
 
     name : name of the noise in the shader
-    feature_mm : size of its features along the three axes of its space [mm]
-    space : coordinates in which it is evaluated, one of `NOISE_SPACES`
+    feature_mm : size of the features of the noise along the three axes of `space` [mm]
+    space : coordinates in which the noise is evaluated, one of `NOISE_SPACES`
     gain : ratio of the amplitudes of consecutive octaves
     octaves : number of octaves
     antialiased : whether octaves finer than a texel are left out
-    region : part of the skin where it is evaluated, one of `NOISE_REGIONS`; elsewhere it is 0
+    region : part of the skin where the noise is evaluated, one of `NOISE_REGIONS`; the noise is 0 elsewhere
     """
 
     name: str
@@ -129,8 +129,9 @@ def noise_table() -> NDArray[np.float32]:
 
     Columns 0 to 11 are three rows of four: the 3x3 matrix from the noise's space to its lattice [1/mm], each
     row followed by one scalar. The scalars are the feature size [mm] below which texels do not resolve the
-    octave (0 if it is not antialiased), the amplitude of the octave, and its seed. Columns 12 to 14 are the
-    indices of noise, space and region. Seed and indices are stored as the bits of uint32.
+    octave (0 if the noise is not antialiased), the amplitude of the octave, and the seed of the octave.
+    Columns 12 to 14 are the indices of noise, space and region. Seed and indices are stored as the bits of
+    uint32.
     """
     rows = list(_octave_rows())
     table = np.zeros((len(rows), 16), np.float32)
@@ -176,7 +177,8 @@ def detail_heights_mm() -> tuple[NDArray[np.float32], NDArray[np.float32]]:
 def detail_slopes() -> NDArray[np.float32]:
     """Return the slopes (TILE_SIDE, TILE_SIDE, 4) of the periodic tiles of pores and of furrows [-].
 
-    The channels are the slopes of the pores along +u and down, then those of the furrows.
+    The channels are the slopes of the pores along +u and down, then the slopes of the furrows along +u and
+    down.
     """
     heights = np.stack(detail_heights_mm(), axis=-1)
     per_mm = np.float32(TILE_SIDE / TILE_LENGTH_MM / 2)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dermis.base.arrays import Doubles, Index
-from dermis.mesh.geometry import components, triangle_areas
+from dermis.mesh.geometry import label_components, triangle_areas
 from dermis.mesh.mesh import Mesh
 
 RADIUS_RANGE_MM = 8.0, 20.0
@@ -56,7 +56,7 @@ class _EyePiece:
 
     @property
     def fault(self) -> str:
-        """Return why this component is not an eyeball, as a phrase such as "is a ..."; empty if it is one."""
+        """Return why this component is not an eyeball, such as "is a ball of ..."; empty for an eyeball."""
         (low, high), (_, radius, deviation) = RADIUS_RANGE_MM, self.sphere
         if len(self.points) < _MIN_POINTS:
             return f"has only {len(self.points)} points"
@@ -71,7 +71,8 @@ class _EyePiece:
 def find_eyeballs(mesh: Mesh) -> tuple[tuple[DetectedEyeball, DetectedEyeball] | None, str]:
     """Find the left and the right eyeball of a mesh.
 
-    If there are not two, the result is None with the reason, which is empty if the file declares no eyes.
+    Returns both eyeballs and an empty text, or None and the reason why there are not two. The reason is empty
+    if the file declares no eyes.
     """
     eye_triangles = np.flatnonzero(np.array([material.eye for material in mesh.materials])[mesh.material])
     if not len(eye_triangles):
@@ -98,7 +99,7 @@ def _eye_pieces(mesh: Mesh, eye_triangles: Index) -> list[_EyePiece]:
     corners = mesh.point[mesh.triangles[eye_triangles]].astype(np.int64)
     points, triangles = np.unique(corners, return_inverse=True)
     triangles = triangles.reshape(-1, 3)
-    label = components(len(points), triangles[:, [0, 1]].ravel(), triangles[:, [1, 2]].ravel())
+    label = label_components(len(points), triangles[:, [0, 1]].ravel(), triangles[:, [1, 2]].ravel())
     thirds = np.repeat(triangle_areas(mesh.positions[mesh.triangles[eye_triangles]]) / 3, 3)
     area = np.bincount(triangles.ravel(), thirds, minlength=len(points))
     positions = mesh.points_mm[points]
@@ -121,7 +122,7 @@ def _add_gaze(
     """Return the left and the right eyeball, with their gaze and the points of cornea and iris.
 
     left, right : connected components that are the scleras
-    pieces : all connected components of the eyes; those inside a sclera belong to its eyeball
+    pieces : all connected components of the eyes; components inside a sclera belong to the same eyeball
     """
     positions = mesh.points_mm
     centre = (left.sphere.centre + right.sphere.centre) / 2
@@ -142,7 +143,7 @@ class Sphere(NamedTuple):
     """Sphere fitted to points.
 
     centre, radius : (3,) centre and radius of the sphere [mm]
-    deviation : 85th percentile by area of the points' distance from the sphere, divided by the radius [-]
+    deviation : distance from the sphere that 85 % of the surface does not exceed, divided by the radius [-]
     """
 
     centre: Doubles

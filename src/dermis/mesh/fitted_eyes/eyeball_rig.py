@@ -32,9 +32,9 @@ class FittedEyeball(NamedTuple):
 
 
 def with_eyeballs(rig: Rig, eyeballs: Sequence[FittedEyeball]) -> Rig:
-    """Return a rig with fitted eyeballs, which follow bones and targets like the eyeballs of the file.
+    """Add fitted eyeballs to a rig; they follow the bones and targets that move the file's eyeballs.
 
-    The control points of the fitted eyeballs come after all others.
+    The control points of the fitted eyeballs come after all other control points.
     """
     skeleton, bones = _with_eye_bones(rig, eyeballs)
     first = len(rig.positions_mm) + np.cumsum([0, *(len(one.points) for one in eyeballs)])
@@ -58,9 +58,9 @@ def with_eyeballs(rig: Rig, eyeballs: Sequence[FittedEyeball]) -> Rig:
 
 
 def _with_eye_bones(rig: Rig, eyeballs: Sequence[FittedEyeball]) -> tuple[Skeleton, list[int]]:
-    """Return a skeleton that moves the fitted eyeballs, and the index of the bone of each.
+    """Return a skeleton that moves the fitted eyeballs, and the index of the bone of each eyeball.
 
-    An eyeball without a bone of its own in the file gets a new one.
+    A new bone is added for an eyeball that shares its bone in the file with other points.
     """
     skeleton = rig.skeleton or _single_bone(len(rig.positions_mm))
     bones = _eye_bones(skeleton, eyeballs)
@@ -96,7 +96,7 @@ def _single_bone(count: int) -> Skeleton:
 
 
 def _eye_bones(skeleton: Skeleton, eyeballs: Sequence[FittedEyeball]) -> list[int]:
-    """Return the index of the bone that moves only the eyeball, for each eyeball; -1 if there is none."""
+    """Return for each eyeball the index of the bone that moves only this eyeball; -1 if there is none."""
     count, bones = len(skeleton.names), list[int]()
     total = np.bincount(skeleton.bone.ravel(), skeleton.weight.ravel(), minlength=count)
     for eyeball in eyeballs:
@@ -108,16 +108,16 @@ def _eye_bones(skeleton: Skeleton, eyeballs: Sequence[FittedEyeball]) -> list[in
 
 
 def _follower_counts(skeleton: Skeleton, eyeball: FittedEyeball) -> Doubles:
-    """Return the number of points of the file's eyeball that follow each bone, weighted, (b,)."""
+    """Return the sum (b,) of the weights with which points of the file's eyeball follow each bone."""
     bone, weight = skeleton.bone[eyeball.replaced_points], skeleton.weight[eyeball.replaced_points]
     return np.bincount(bone.ravel(), weight.ravel(), len(skeleton.names)).astype(np.float64)
 
 
 def _with_bone(skeleton: Skeleton, name: str, parent: int, origin_mm: Doubles) -> Skeleton:
-    """Return a skeleton with an additional bone.
+    """Return a skeleton with an additional bone, which no points follow yet.
 
-    parent : index of its parent
-    origin_mm : (3,) position of its joint in head space [mm]
+    parent : index of the parent of the new bone
+    origin_mm : (3,) position of the joint of the new bone in head space [mm]
     """
     to_head = np.eye(4)
     to_head[:3, 3] = origin_mm
@@ -134,9 +134,10 @@ def _with_bone(skeleton: Skeleton, name: str, parent: int, origin_mm: Doubles) -
 def _rigid_targets(
     rig: Rig, eyeball: FittedEyeball, bone: str, origin_mm: Doubles
 ) -> tuple[list[BoneRotation], dict[int, Doubles]]:
-    """Return the rigid motions that best fit how morph targets move the file's eyeball.
+    """Return the rotation and translation that best fit how each morph target moves the file's eyeball.
 
-    They are rotations of the eyeball's bone, and translations (3,) by the index of the target [mm].
+    Rotations are rotations of the eyeball's bone. Translations (3,) [mm] are keyed by the index of the
+    target. Targets that do not move the eyeball are left out.
 
     bone : name of the eyeball's bone
     origin_mm : (3,) position of the bone's joint [mm]

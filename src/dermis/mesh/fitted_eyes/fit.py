@@ -28,7 +28,9 @@ from dermis.mesh.head import Head
 from dermis.mesh.mesh import Material, Mesh, build_mesh
 from dermis.mesh.rig import Stencils
 
-_GRID_SIDE = 2 * eyeball.SIDE  # quads along a cube edge, as many as the human has after one subdivision
+_GRID_SIDE = (
+    2 * eyeball.QUADS_PER_EDGE
+)  # quads along a cube edge, as many as the human has after one subdivision
 _MATERIAL_NAMES = "left eye", "right eye"
 _INWARD_ANGLE = np.radians(2.5)  # the iris is closer to the nose than the centre of the eye's opening
 
@@ -36,8 +38,8 @@ _INWARD_ANGLE = np.radians(2.5)  # the iris is closer to the nose than the centr
 class _EyeShape(NamedTuple):
     """Shape of a fitted eye.
 
-    Corneas and irises hardly differ between people: larger balls get a cornea of adult size, smaller eyes are
-    scaled as a whole.
+    The size of cornea and iris hardly differs between adults: a ball larger than an adult's keeps a cornea of
+    adult size, and an eye smaller than an adult's is scaled as a whole.
 
     axis : (3,) unit vector from the centre to the cornea
     radius_mm, centre_offset_mm : ball of the eye before scaling, see `Eyes` [mm]

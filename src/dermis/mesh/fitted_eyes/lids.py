@@ -44,14 +44,14 @@ class Lids:
 
     @cached_property
     def ball_front(self) -> Doubles:
-        """Return how far in front of the ball's centre rays hit the ball (n,) [mm]; 0 for misses."""
+        """Return how far in front of the ball's centre each ray hits the ball, (n,) [mm]; 0 for a miss."""
         return np.asarray(np.sqrt(np.maximum(self.ball.radius**2 - (self.ray_positions**2).sum(axis=1), 0.0)))
 
     @cached_property
     def obstacle_front(self) -> Doubles:
-        """Return how far in front of the ball's centre rays first meet lids or other skin (n,) [mm].
+        """Return how far in front of the ball's centre each ray first meets lids or other skin, (n,) [mm].
 
-        The distance is -inf for rays that meet none.
+        The distance is -inf for rays that meet no skin.
         """
         corners = self.corners[self.corners[:, :, 2].max(axis=1) > 0]
         triangle, ray = self._candidate_pairs(corners)
@@ -67,7 +67,7 @@ class Lids:
         return front
 
     def _candidate_pairs(self, corners: Doubles) -> tuple[Index, Index]:
-        """Return pairs of triangles and rays, where the ray is within the triangle's bounding box.
+        """Return triangles and rays, as pairs in which the ray is within the triangle's bounding box.
 
         corners : (f, 3, 3) corners of the triangles [mm]
         """
@@ -84,8 +84,8 @@ class Lids:
     def opening_angles(self) -> tuple[float, float]:
         """Return the angles (side, up) at which an eye looks through the middle of the lids' opening [rad].
 
-        They are 0 if there are no lids on some side. In files, the lids are the best indication of the gaze,
-        as eyeballs and lids seldom have the same centre.
+        The angles are 0 if lids are missing on some side. In files, the lids are the best indication of the
+        gaze, as eyeballs and lids seldom have the same centre.
         """
         angles = []
         for axis, other, shift in ((0, 1, 0.0), (1, 0, _IRIS_ABOVE_CENTRE)):
@@ -123,7 +123,7 @@ class Lids:
 def lids_in_front(corners_mm: Doubles, ball: Sphere, ahead: Doubles) -> Lids:
     """Return the surfaces in front of an eyeball, mostly its lids.
 
-    corners_mm : (f, 3, 3) corners of all triangles except those of eyeballs, in head space
+    corners_mm : (f, 3, 3) corners of all triangles except the triangles of eyeballs, in head space
     ball : sphere of the eyeball
     ahead : (3,) unit vector of the direction of gaze
     """

@@ -50,7 +50,7 @@ def reflectance(radius_mm: ArrayLike, layer: Layer, A: float) -> Floats:
 def reflectance_hankel(frequency: ArrayLike, layer: Layer, A: float) -> Floats:
     """Return the Hankel transform of the dipole's R(r) at frequencies s [1/mm], (n, c) [-].
 
-    It is the integral of 2 pi r R(r) J0(s r) over r, with the Bessel function J0.
+    The transform is the integral of 2 pi r R(r) J0(s r) over r, with the Bessel function J0.
     """
     z_r, z_v = source_depths(layer, A)
     q = np.sqrt(layer.sigma_tr**2 + np.asarray(frequency, dtype=np.float64)[..., None] ** 2)

@@ -11,7 +11,7 @@ from dermis.optics.media import Floats
 SAMPLE_COUNT = 2048
 _FREQUENCY_DECADES = 16.0
 _CENTRE_FREQUENCY_PER_MM = 10.0  # skin scatters over tenths of a millimetre
-_STEP = _FREQUENCY_DECADES * np.log(10.0) / SAMPLE_COUNT
+_LOG_STEP = _FREQUENCY_DECADES * np.log(10.0) / SAMPLE_COUNT
 
 ZERO_FREQUENCY = np.array([1e-8])
 """Frequency so low that a Hankel transform equals the total reflectance there, (1,) [1/mm]."""
@@ -21,14 +21,14 @@ ZERO_FREQUENCY = np.array([1e-8])
 def frequencies() -> Floats:
     """Return the log-spaced frequencies s of the input of `inverse_transform`, (SAMPLE_COUNT,) [1/mm]."""
     return np.asarray(
-        _CENTRE_FREQUENCY_PER_MM * np.exp(_STEP * (np.arange(SAMPLE_COUNT) - (SAMPLE_COUNT - 1) / 2.0))
+        _CENTRE_FREQUENCY_PER_MM * np.exp(_LOG_STEP * (np.arange(SAMPLE_COUNT) - (SAMPLE_COUNT - 1) / 2.0))
     )
 
 
 @cache
 def radii() -> Floats:
     """Return the radii r at which `inverse_transform` returns R(r), (SAMPLE_COUNT,) log-spaced [mm]."""
-    return np.asarray(np.exp(_offset()) / frequencies()[::-1])
+    return np.asarray(np.exp(_log_radius_offset()) / frequencies()[::-1])
 
 
 def inverse_transform(transform: Floats) -> Floats:
@@ -44,12 +44,12 @@ def inverse_transform(transform: Floats) -> Floats:
     from scipy.fft import fht
 
     weighted = transform * frequencies()[:, None] / (2.0 * np.pi)
-    scaled = fht(np.ascontiguousarray(weighted.T), _STEP, mu=0.0, offset=_offset())
+    scaled = fht(np.ascontiguousarray(weighted.T), _LOG_STEP, mu=0.0, offset=_log_radius_offset())
     return np.asarray(scaled.T / radii()[:, None])
 
 
 @cache
-def _offset() -> float:
+def _log_radius_offset() -> float:
     from scipy.fft import fhtoffset
 
-    return float(fhtoffset(_STEP, mu=0.0))
+    return float(fhtoffset(_LOG_STEP, mu=0.0))

@@ -30,7 +30,7 @@ class _Sublayer(NamedTuple):
 
 
 class _Face(NamedTuple):
-    """Boundary condition D phi' = W - Z phi for the fluence phi at a face."""
+    """Boundary condition D phi' = W - Z phi for the fluence phi at a face; lower layers set Z and W."""
 
     Z: Floats
     W: Floats
@@ -39,7 +39,8 @@ class _Face(NamedTuple):
 class _DownwardTransfer(NamedTuple):
     """Coefficients that yield the fluence at the lower face of a sublayer from the fluence at its upper face.
 
-    All are 0 for a semi-infinite sublayer, which can only be the last one.
+    All coefficients are 0 for a semi-infinite sublayer. Only the last sublayer of a medium can be
+    semi-infinite.
     """
 
     E: Floats | float = 0.0
@@ -61,7 +62,7 @@ def solve(frequency: ArrayLike, medium: Medium, A: float, source: Source = "beam
     frequency : (n,) frequencies s > 0 [1/mm]
     A : boundary mismatch with air; internal interfaces are index-matched [-]
     source : "beam" distributes first scattering along the beam, so that R(r) diverges logarithmically at r =
-        0; "point" places it one mean free path deep, so that R(r) is finite
+        0; "point" places first scattering one mean free path deep, so that R(r) is finite
 
     Source: [Haskell1994] for the boundary, [Kienle1998] for layers, [Farrell1992] for the beam.
     """
@@ -97,10 +98,10 @@ def solve_two_layers(upper: Layer, thickness_mm: ArrayLike, lower: Layer, A: flo
 def solve_thicknesses(
     frequency: ArrayLike, layer: Layer, thickness_mm: Floats, A: float
 ) -> tuple[Floats, Floats]:
-    """Return the Hankel transforms of R(r) and T(r) of slabs of one layer, by thickness, (n, m, c) each [-].
+    """Return the Hankel transforms of R(r) and T(r) of n slabs of one material, (n, m, c) each [-].
 
     frequency : (m,) frequencies s > 0 [1/mm]
-    layer : absorption and scattering of the slabs; its own thickness is ignored
+    layer : absorption and scattering of the slabs; its field `thickness_mm` is ignored
     thickness_mm : (n,) thicknesses of the slabs [mm]
     A : boundary mismatch with air [-]
     """
@@ -139,7 +140,8 @@ def _propagate_up(s: Floats, sublayer: _Sublayer, below: _Face) -> tuple[_Face, 
     s : frequencies [1/mm]
     below : boundary condition at the lower face
 
-    Returns the condition at the upper face, and the transfer of fluence back down.
+    Returns the boundary condition at the upper face, and the transfer of the fluence from the upper to the
+    lower face.
     """
     layer, d = sublayer.layer, sublayer.thickness_mm
     D, sigma_t = layer.D, layer.sigma_t_prime
@@ -174,9 +176,10 @@ def _beam_sublayers(medium: Medium) -> Iterator[_Sublayer]:
 
 
 def _point_sublayers(medium: Medium) -> Iterator[_Sublayer]:
-    """Yield two sublayers per layer; the layer of the point source is divided at the source.
+    """Yield two sublayers per layer; the layer that contains the point source is divided at its depth.
 
-    The source is at the depth where the optical depth reaches 1.
+    The source is at the depth where the optical depth reaches 1. A layer without the source is divided in the
+    middle.
     """
     depth = np.zeros(medium.channels)
     zero = np.zeros(medium.channels)

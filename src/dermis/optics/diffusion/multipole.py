@@ -21,8 +21,8 @@ class Slab:
 
     layer : absorption, scattering and thickness; the thickness may be infinite
     A_top, A_bottom : boundary mismatch of the upper and the lower face; 1 at index-matched faces [-]
-    clamp : "none" puts the source one mean free path deep as published, even below the slab; "layer" keeps it
-        inside
+    clamp : "none" puts the source one mean free path deep as published, even below the slab; "layer" keeps
+        the source inside the slab
 
     Source: [DonnerJensen2005] section 3.1; boundaries after [Contini1997].
     """
@@ -40,7 +40,7 @@ class Slab:
 
     @property
     def z_b(self) -> tuple[Floats, Floats]:
-        """Return how far above and below the slab the extrapolated fluence is zero, (c,) each [mm]."""
+        """Return the distances above and below the slab where fluence extrapolates to 0, (c,) each [mm]."""
         return 2.0 * self.A_top * self.layer.D, 2.0 * self.A_bottom * self.layer.D
 
     @property
@@ -104,19 +104,19 @@ def _image_sum(frequency: ArrayLike, slab: Slab, real: Floats, image: Floats) ->
     """Return the Hankel transform of R(r) or T(r) of two periodic series of point sources.
 
     With the depth z of a source, the period P and q^2 = sigma_tr^2 + s^2, each series is half the albedo
-    times the sum over i of sign(z + i P) exp(-|z + i P| q). The series of images is subtracted from that of
-    real sources.
+    times the sum over i of sign(z + i P) exp(-|z + i P| q). The result is the series of real sources minus
+    the series of their images.
 
-    real, image : (c,) distance of one source of each series from the face [mm]
+    real, image : (c,) signed distances from the face to one real source and to one image [mm]
     """
     q = np.sqrt(slab.layer.sigma_tr**2 + np.asarray(frequency, dtype=np.float64)[..., None] ** 2)
     P = slab.period_mm
 
-    def images(z: Floats) -> Floats:
+    def image_sources(z: Floats) -> Floats:
         z0 = np.mod(z, P)  # the series is odd and periodic: the sum of two geometric series
         return np.asarray((np.exp(-z0 * q) - np.exp(-(P - z0) * q)) / -np.expm1(-P * q))
 
-    return np.asarray(0.5 * slab.layer.alpha_prime * (images(real) - images(image)))
+    return np.asarray(0.5 * slab.layer.alpha_prime * (image_sources(real) - image_sources(image)))
 
 
 def _image_series(
@@ -134,8 +134,9 @@ def image_pairs_needed(slab: Slab, tolerance: float, max_pairs: int = 2000) -> i
     """Return the number of image pairs on each side of a slab that keeps the omitted light below `tolerance`.
 
     An image at depth z contributes exp(-|z| sigma_tr) / 2, so the omitted light is at most a geometric
-    series. Without absorption the series does not converge so fast, but opposite images cancel: their flux
-    falls with the inverse cube of the distance, and after `max_pairs` it is 1e-7 of the first.
+    series. Without absorption the geometric series does not converge, but opposite images cancel: the flux of
+    a pair falls with the inverse cube of its distance, and after `max_pairs` pairs it is 1e-7 of the flux of
+    the first pair.
     """
     decay = float((slab.period_mm * slab.layer.sigma_tr).min())
     if decay <= 0.0:

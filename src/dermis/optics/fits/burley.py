@@ -44,7 +44,7 @@ class BurleyProfile:
     def hankel(self, frequency: ArrayLike) -> Floats:
         """Return the Hankel transform of R(r) at frequencies k [1/mm], (..., c) [-].
 
-        It is the integral of 2 pi r R(r) J0(k r) over r, with the Bessel function J0.
+        The transform is the integral of 2 pi r R(r) J0(k r) over r, with the Bessel function J0.
         """
         k = np.asarray(frequency, dtype=np.float64)[..., None]
         s = self.shape
@@ -59,7 +59,7 @@ class BurleyProfile:
 
 
 def shape_factor(albedo: ArrayLike) -> Floats:
-    """Return s times the mean free path, for the shape s of Burley's profile at normal incidence [-].
+    """Return Burley's shape s times the mean free path, for a narrow beam at normal incidence [-].
 
     albedo : total reflectance A [-]
 
@@ -70,7 +70,7 @@ def shape_factor(albedo: ArrayLike) -> Floats:
 
 
 def shape_factor_diffuse(albedo: ArrayLike) -> Floats:
-    """Return s times the diffuse mean free path 1 / sigma_tr, for the shape s of Burley's profile [-].
+    """Return Burley's shape s times the diffuse mean free path 1 / sigma_tr [-].
 
     albedo : total reflectance A [-]
 
@@ -95,7 +95,7 @@ class BurleyFit:
 
 
 def fit_burley(target: RingTarget) -> BurleyFit:
-    """Fit Burley's profile to ring energies with the smallest error, keeping each channel's total."""
+    """Fit Burley's profile to ring energies with the smallest error; each channel keeps its total."""
     shape = np.array([_fit_shape(target.channel(i)) for i in range(len(target.total))])
     profile = BurleyProfile(target.total, shape)
     return BurleyFit(
@@ -124,8 +124,8 @@ def _fit_shape(target: RingTarget) -> float:
 class UnityParameters:
     """Diffusion profile settings of Unity's HDRP at world scale 1.
 
-    scattering_colour : scattering distance 1 / s of each channel, divided by the largest of them, linear
-        Rec. 709 [-]
+    scattering_colour : scattering distance 1 / s of each channel, divided by the largest of the three
+        distances, linear Rec. 709 [-]
     multiplier_mm : largest scattering distance 1 / s [mm]
     max_radius_mm : radius within which 99.7 % of the light of the widest channel leaves; displayed in the
         editor [mm]
@@ -158,8 +158,8 @@ class UnrealParameters:
     surface_albedo : diffuse albedo, linear Rec. 709 [-]
     mean_free_path_colour : mean free path of each channel divided by `mean_free_path_distance_cm`, linear
         Rec. 709 [-]
-    mean_free_path_distance_cm : largest mean free path of a channel, or the smallest that the engine accepts
-        [cm]
+    mean_free_path_distance_cm : largest mean free path of the three channels, but at least the smallest value
+        that the engine accepts [cm]
     world_unit_scale : scale of the scene; 1 is life-size [-]
     """
 

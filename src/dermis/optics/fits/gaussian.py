@@ -65,9 +65,11 @@ def fit_gaussians(
     target : R(r) at points, or light through rings
     terms : number of Gaussians in each channel, 1 to 8
     shared : whether all channels use the same variances, chosen for the root mean square of the channels'
-        errors; otherwise each channel has its own variances and a weight of 0 at those of the other channels
-    keep_energy : make the weights sum to the target's total
-    initial : fit of a similar profile to start from: several times faster, but not always the best fit
+        errors; otherwise each channel has its own variances and the weight 0 at the variances of the other
+        channels
+    keep_energy : whether the weights must sum to the target's total reflectance
+    initial : fit of a similar profile, from whose variances the search starts; this is several times faster,
+        but the best fit may be missed
     name : name of the fitted profile
 
     Raises DermisError for an invalid number of terms, and for profiles that Gaussians cannot fit.
@@ -124,7 +126,10 @@ def _initial_variances(target: FitTarget, terms: int) -> list[Floats]:
 
 
 def _log_variance_bounds(target: FitTarget) -> tuple[float, float]:
-    """Return bounds of the log variances: standard deviations from half the first to the last radius."""
+    """Return the smallest and largest log variance of a fit.
+
+    The standard deviations range from half the first radius of the target to its last radius.
+    """
     radius = target.radius_mm if isinstance(target, PointTarget) else target.edges_mm[1:]
     return float(2.0 * np.log(radius[0] / 2.0)), float(np.log(min(radius[-1] ** 2, MAX_VARIANCE_MM2)))
 
@@ -146,8 +151,11 @@ def _with_energy_equation(target: FitTarget) -> tuple[DesignFunction, Floats]:
 
 
 def _variances_of_fit(initial: GaussianSum | None, channel: int | None, terms: int) -> Floats | None:
-    """Return the start variances from a similar fit, or None if it has another number of Gaussians.
+    """Return the variances of a similar fit, from which a new fit starts.
 
+    The result is None without a similar fit, or if its number of Gaussians is not `terms`.
+
+    initial : similar fit, or None
     channel : index of the channel whose Gaussians are used; None to use the Gaussians of all channels
     terms : number of Gaussians of the new fit
     """
@@ -158,7 +166,7 @@ def _variances_of_fit(initial: GaussianSum | None, channel: int | None, terms: i
 
 
 def _combine_fits(fits: list[tuple[Floats, Floats]], name: str) -> GaussianSum:
-    """Combine fits of separate channels into one sum, with one Gaussian for equal variances.
+    """Combine fits of separate channels into one sum of Gaussians, in which channels share equal variances.
 
     fits : variances (k,) and weights (k, c) of each fit
     """
@@ -176,7 +184,8 @@ def _combine_fits(fits: list[tuple[Floats, Floats]], name: str) -> GaussianSum:
 def single_gaussian(profile: GaussianSum) -> GaussianSum:
     """Fit one Gaussian to a profile, keeping each channel's total, by least squares over the plane.
 
-    It reproduces early skin shading, in which light maps were blurred once [Borshukov2003; Green2004].
+    The result reproduces early skin shading, in which light maps were blurred once [Borshukov2003;
+    Green2004].
     """
     from scipy.optimize import minimize_scalar
 
@@ -193,7 +202,7 @@ def single_gaussian(profile: GaussianSum) -> GaussianSum:
 
 
 def shared_gaussians(profiles: Sequence[GaussianSum], terms: int = SHARED_TERMS) -> tuple[GaussianSum, ...]:
-    """Fit several profiles with one set of variances, so that one series of blurs serves all of them.
+    """Fit several profiles with one set of variances, so that one series of blurs serves all profiles.
 
     The total reflectances are preserved. Profiles that already share their variances are returned unchanged.
     """

@@ -43,7 +43,8 @@ class SeparableKernel:
     def sector_energy(self, edges_mm: Floats) -> Floats:
         """Return the light through equal sectors of each ring, (n, SECTOR_COUNT, c) [-].
 
-        The four quarters of the plane are added.
+        A ring is divided into SECTOR_COUNT sectors in each quadrant; the light of the four quadrants is
+        added.
 
         edges_mm : (n + 1,) radii of the ring edges [mm]
         """
@@ -69,7 +70,7 @@ class SeparableFit:
 def preintegrated_kernel(profile: GaussianSum) -> SeparableKernel:
     """Return the kernel whose a(x) is the profile R integrated over y, normalised to unit integral.
 
-    It is exact where light varies along x or y alone.
+    The kernel is exact where light varies along x or y alone.
 
     Source: [Jimenez2015].
     """

@@ -72,7 +72,7 @@ class PointTarget:
         return _radii_at_fractions(fractions, self.radius_mm, rate)
 
     def channel(self, index: int) -> PointTarget:
-        """Return the target of one channel, which is fitted on its own."""
+        """Return the part of the target with only one channel, to fit this channel separately."""
         channel = slice(index, index + 1)
         return PointTarget(self.radius_mm, self.reflectance[:, channel], self.total[channel])
 
@@ -81,7 +81,7 @@ class PointTarget:
 class RingTarget:
     """Light that emerges through a disc and the rings around it, as the target of a fit.
 
-    It is also valid for profiles that are infinite at r = 0.
+    A ring target is also valid for profiles that are infinite at r = 0.
 
     edges_mm : (n + 1,) radii of the ring edges, increasing, preferably 0 and then log-spaced [mm]
     energy : (n, c) light through each ring in c channels [-]
@@ -126,7 +126,7 @@ class RingTarget:
         return _radii_at_fractions(fractions, self.edges_mm[1:], np.abs(self.energy))
 
     def channel(self, index: int) -> RingTarget:
-        """Return the target of one channel, which is fitted on its own."""
+        """Return the part of the target with only one channel, to fit this channel separately."""
         channel = slice(index, index + 1)
         return RingTarget(self.edges_mm, self.energy[:, channel], self.total[channel])
 

@@ -1,7 +1,7 @@
 """Nonlinear least squares over the variances of Gaussians, with optimal weights at each step.
 
-Source: [GolubPereyra1973] with the slopes of [Kaufman1975], steps after [Marquardt1963], extrapolated as in
-[Anderson1965].
+Sources: [GolubPereyra1973] for the method, [Kaufman1975] for its derivatives, [Marquardt1963] for the steps,
+[Anderson1965] for their extrapolation.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def minimise(
     bounds: tuple[float, float],
     tolerance: float = TOLERANCE,
 ) -> WeightedFit:
-    """Descend from start variances to a local minimum of the squared residuals.
+    """Return the fit at a local minimum of the squared residuals, reached by descent from start variances.
 
     design : function from variances to the samples of unit Gaussians (n, k), and their derivatives by log
         variance
@@ -86,7 +86,7 @@ def _anderson_step(position: Floats, step: Floats, last_position: Floats, last_s
     """Return the step of Anderson acceleration, extrapolated from the last two steps [Anderson1965].
 
     Plain steps neglect the curvature of the residuals and converge linearly; one extrapolated step replaces a
-    dozen of them.
+    dozen plain steps.
     """
     change = step - last_step
     size = float(change @ change)
@@ -112,13 +112,13 @@ def _optimal_weights(design: DesignFunction, samples: Floats, log_variance: Floa
     return WeightedFit(log_variance, weight / size[:, None], cost, gradient, curvature)
 
 
-def qr_factor(tall: Floats) -> Floats:
+def qr_factor(matrix: Floats) -> Floats:
     """Return the upper triangular factor R of the QR factorisation of a tall matrix.
 
     Blocks of rows are factorised separately, because BLAS would start threads for the whole matrix that cost
     more than they save.
     """
-    blocks = np.array_split(tall, -(-len(tall) // _ROWS_PER_BLOCK))
+    blocks = np.array_split(matrix, -(-len(matrix) // _ROWS_PER_BLOCK))
     factors = [np.asarray(np.linalg.qr(block, mode="r")) for block in blocks]
     return factors[0] if len(factors) == 1 else np.asarray(np.linalg.qr(np.vstack(factors), mode="r"))
 

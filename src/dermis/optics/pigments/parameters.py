@@ -1,4 +1,4 @@
-"""Parameters of skins made of pigments: the default skin, and skins with a name.
+"""Parameters of skins made of pigments: the default skin, and the named skins of the presets.
 
 All defaults of `SkinParameters` are here. NumPy is not imported, so that help texts appear quickly.
 """
@@ -60,8 +60,8 @@ class SkinParameters:
             refuse(both, "at most 1 together", actual, "Lower one")
 
 
-def _option_name(name: str) -> str:
-    return f"--{name.replace('_', '-')}"
+def _option_name(field_name: str) -> str:
+    return f"--{field_name.replace('_', '-')}"
 
 
 def _donner_jensen_skin(melanin: float, eumelanin: float, blood: float) -> SkinParameters:

@@ -14,8 +14,8 @@ PRIOR_NAMES = ("melanin", "blood", "oxygen", "epidermis_mm")
 """Parameters of the prior; all but oxygen are distributed by their logarithms."""
 _OXYGEN_INDEX = PRIOR_NAMES.index("oxygen")
 _SMALLEST_FRACTION = 1e-4
-_COVARIANCE = [f"{a}_{b}" for i, a in enumerate(PRIOR_NAMES) for b in PRIOR_NAMES[: i + 1]]
-PRIOR_COLUMNS = ("weight", *PRIOR_NAMES, *_COVARIANCE)
+_COVARIANCE_COLUMNS = [f"{a}_{b}" for i, a in enumerate(PRIOR_NAMES) for b in PRIOR_NAMES[: i + 1]]
+PRIOR_COLUMNS = ("weight", *PRIOR_NAMES, *_COVARIANCE_COLUMNS)
 """Columns of the table: weight, mean and lower triangle of the covariance of each component."""
 
 
@@ -23,7 +23,7 @@ PRIOR_COLUMNS = ("weight", *PRIOR_NAMES, *_COVARIANCE)
 class SkinPrior:
     """Mixture of k normal distributions of the logarithms of the parameters `PRIOR_NAMES`.
 
-    Oxygen is distributed by its value, not by its logarithm.
+    For oxygen, the value itself is normally distributed, not its logarithm.
 
     weight : (k,) weights, with a sum of 1
     mean : (k, 4) means
@@ -34,20 +34,20 @@ class SkinPrior:
     mean: Floats
     covariance: Floats
 
-    def moments(self, name: str) -> tuple[float, float]:
+    def moments(self, parameter_name: str) -> tuple[float, float]:
         """Return mean and standard deviation of the logarithm of a parameter, or of oxygen itself."""
-        i = PRIOR_NAMES.index(name)
+        i = PRIOR_NAMES.index(parameter_name)
         mean = float(self.weight @ self.mean[:, i])
         second = float(self.weight @ (self.covariance[:, i, i] + self.mean[:, i] ** 2))
         return mean, float(np.sqrt(second - mean**2))
 
-    def given(self, melanin: float, blood: float) -> SkinPrior:
-        """Return the prior of skins with given melanin and blood fractions."""
-        known = np.log(np.maximum([melanin, blood], _SMALLEST_FRACTION))
+    def conditioned_on(self, melanin: float, blood: float) -> SkinPrior:
+        """Return the distribution of skins whose melanin and blood fractions are known [-]."""
+        log_fractions = np.log(np.maximum([melanin, blood], _SMALLEST_FRACTION))
         weight, mean, covariance = [], [], []
         for w, m, C in zip(self.weight, self.mean, self.covariance, strict=True):
             gain = C[:, :2] @ np.linalg.inv(C[:2, :2])
-            offset = known - m[:2]
+            offset = log_fractions - m[:2]
             density = np.exp(-0.5 * offset @ np.linalg.solve(C[:2, :2], offset))
             weight.append(w * density / np.sqrt(np.linalg.det(C[:2, :2])))
             mean.append(m + gain @ offset)
@@ -56,7 +56,7 @@ class SkinPrior:
         return SkinPrior(weights / weights.sum(), np.array(mean), np.array(covariance))
 
     def sample(self, count: int, seed: int = 0) -> dict[str, Floats]:
-        """Return random parameters (count,) of skins, by name; oxygen is clipped to 0 to 1."""
+        """Draw `count` random skins: (count,) values of each of `PRIOR_NAMES`, oxygen clipped to 0 to 1."""
         rng = np.random.default_rng(seed)
         component = rng.choice(len(self.weight), size=count, p=self.weight)
         values, vectors = np.linalg.eigh(self.covariance)
@@ -76,7 +76,7 @@ def skin_prior() -> SkinPrior:
     """
     rows = read_rows("dermis.optics", "data/skin_priors")
     count = len(PRIOR_NAMES)
-    lower = float_columns(rows, " ".join(_COVARIANCE))
+    lower = float_columns(rows, " ".join(_COVARIANCE_COLUMNS))
     covariance = np.zeros((len(rows), count, count))
     i, j = np.tril_indices(count)
     covariance[:, i, j] = covariance[:, j, i] = lower
@@ -85,7 +85,11 @@ def skin_prior() -> SkinPrior:
 
 
 def prior_points(values: dict[str, Floats]) -> Floats:
-    """Convert parameters (n,) by name to points (n, 4) in the coordinates of `SkinPrior`."""
+    """Convert the parameters of n skins to points (n, 4) in the coordinates of `SkinPrior`.
+
+    values : (n,) values of each of `PRIOR_NAMES`; points contain the logarithms of these values, but oxygen
+        itself
+    """
     columns = [np.log(np.maximum(values[name], _SMALLEST_FRACTION)) for name in PRIOR_NAMES]
     columns[_OXYGEN_INDEX] = values["oxygen"]
     return np.stack(columns, axis=-1)

@@ -69,72 +69,90 @@ def spectral_medium(
     return Medium(structure, stack, SKIN_ETA, notes, sources)
 
 
-def _dj2006(p: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats) -> tuple[Layer, ...]:
+def _build_dj2006(
+    parameters: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats
+) -> tuple[Layer, ...]:
     """Return epidermis and dermis after [DonnerJensen2006]."""
-    return _epidermis(p, wavelength_nm, sigma_s_prime), _dermis(p, wavelength_nm, sigma_s_prime)
+    return _epidermis_layer(parameters, wavelength_nm, sigma_s_prime), _dermis_layer(
+        parameters, wavelength_nm, sigma_s_prime
+    )
 
 
-def _donner2008(p: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats) -> tuple[Layer, ...]:
+def _build_donner2008(
+    parameters: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats
+) -> tuple[Layer, ...]:
     """Return epidermis, melanin sheet and dermis after equations 11 and 12 of [Donner2008]."""
-    melanin = p.melanin * melanosome(wavelength_nm, p.eumelanin)
-    sheet_sigma_a = LEAKED_MELANIN * melanin * p.epidermis_mm / _MELANIN_SHEET_MM
+    melanin = parameters.melanin * melanosome(wavelength_nm, parameters.eumelanin)
+    sheet_sigma_a = LEAKED_MELANIN * melanin * parameters.epidermis_mm / _MELANIN_SHEET_MM
     return (
-        _epidermis(p, wavelength_nm, sigma_s_prime, p.epidermal_blood),
+        _epidermis_layer(parameters, wavelength_nm, sigma_s_prime, parameters.epidermal_blood),
         # Diffusion needs scattering everywhere; in so thin a sheet it has no visible effect.
         Layer(sheet_sigma_a, sigma_s_prime, _MELANIN_SHEET_MM, "melanin sheet"),
-        _dermis(p, wavelength_nm, sigma_s_prime),
+        _dermis_layer(parameters, wavelength_nm, sigma_s_prime),
     )
 
 
-def _biospec(p: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats) -> tuple[Layer, ...]:
+def _build_biospec(
+    parameters: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats
+) -> tuple[Layer, ...]:
     """Return four skin layers after [KrishnaswamyBaranoski2004], with constants of its author's code."""
-    reticular = replace(p, blood=_RETICULAR_BLOOD_RATIO * p.blood)
+    reticular = replace(parameters, blood=_RETICULAR_BLOOD_RATIO * parameters.blood)
     return (
-        Layer(_bloodless(p, wavelength_nm), sigma_s_prime, _STRATUM_CORNEUM_MM, "stratum corneum"),
-        _epidermis(p, wavelength_nm, sigma_s_prime),
-        replace(
-            _dermis(p, wavelength_nm, sigma_s_prime, "papillary dermis"), thickness_mm=_PAPILLARY_DERMIS_MM
+        Layer(
+            _bloodless_absorption(parameters, wavelength_nm),
+            sigma_s_prime,
+            _STRATUM_CORNEUM_MM,
+            "stratum corneum",
         ),
-        _dermis(reticular, wavelength_nm, sigma_s_prime, "reticular dermis"),
+        _epidermis_layer(parameters, wavelength_nm, sigma_s_prime),
+        replace(
+            _dermis_layer(parameters, wavelength_nm, sigma_s_prime, "papillary dermis"),
+            thickness_mm=_PAPILLARY_DERMIS_MM,
+        ),
+        _dermis_layer(reticular, wavelength_nm, sigma_s_prime, "reticular dermis"),
     )
 
 
-def _epidermis(
-    p: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats, blood_fraction: float = 0.0
+def _epidermis_layer(
+    parameters: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats, blood_fraction: float = 0.0
 ) -> Layer:
     """Return the epidermis, a mixture of melanosomes, a given fraction of blood, and bloodless tissue."""
-    sigma_a = _epidermal_absorption(p, p.melanin, wavelength_nm, blood_fraction)
-    return Layer(sigma_a, sigma_s_prime, p.epidermis_mm, "epidermis")
+    sigma_a = _epidermal_absorption(parameters, parameters.melanin, wavelength_nm, blood_fraction)
+    return Layer(sigma_a, sigma_s_prime, parameters.epidermis_mm, "epidermis")
 
 
 def _epidermal_absorption(
-    p: SkinParameters, melanin: float | Floats, wavelength_nm: Floats, blood_fraction: float = 0.0
+    parameters: SkinParameters, melanin: float | Floats, wavelength_nm: Floats, blood_fraction: float = 0.0
 ) -> Floats:
-    tissue = (1.0 - melanin - blood_fraction) * _bloodless(p, wavelength_nm)
-    pigment = melanin * melanosome(wavelength_nm, p.eumelanin)
-    return np.asarray(pigment + blood_fraction * blood(wavelength_nm, p.oxygen) + tissue)
+    tissue = (1.0 - melanin - blood_fraction) * _bloodless_absorption(parameters, wavelength_nm)
+    pigment = melanin * melanosome(wavelength_nm, parameters.eumelanin)
+    return np.asarray(pigment + blood_fraction * blood(wavelength_nm, parameters.oxygen) + tissue)
 
 
-def _dermis(p: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats, name: str = "dermis") -> Layer:
+def _dermis_layer(
+    parameters: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats, name: str = "dermis"
+) -> Layer:
     """Return a semi-infinite dermis, a mixture of blood and bloodless tissue."""
-    sigma_a = _dermal_absorption(p, p.blood, wavelength_nm)
+    sigma_a = _dermal_absorption(parameters, parameters.blood, wavelength_nm)
     return Layer(sigma_a, DERMIS_SCATTERING_RATIO * sigma_s_prime, name=name)
 
 
-def _dermal_absorption(p: SkinParameters, blood_fraction: float | Floats, wavelength_nm: Floats) -> Floats:
-    vessels = blood_fraction * blood(wavelength_nm, p.oxygen)
-    return np.asarray(vessels + (1.0 - blood_fraction) * _bloodless(p, wavelength_nm))
+def _dermal_absorption(
+    parameters: SkinParameters, blood_fraction: float | Floats, wavelength_nm: Floats
+) -> Floats:
+    vessels = blood_fraction * blood(wavelength_nm, parameters.oxygen)
+    return np.asarray(vessels + (1.0 - blood_fraction) * _bloodless_absorption(parameters, wavelength_nm))
 
 
-def _bloodless(p: SkinParameters, wavelength_nm: Floats) -> Floats:
+def _bloodless_absorption(parameters: SkinParameters, wavelength_nm: Floats) -> Floats:
     """Return the absorption of tissue without blood and melanin [1/mm]."""
-    return p.baseline * baseline_absorption(wavelength_nm)
+    return parameters.baseline * baseline_absorption(wavelength_nm)
 
 
 def dj2006_layers(parameters: SkinParameters, fractions: Floats) -> tuple[Layer, Layer]:
     """Return epidermis and dermis of "dj2006" for n pigment fractions, with coefficients (n, 31).
 
-    parameters : parameters of the skins; their own melanin and blood are ignored
+    parameters : the other parameters of the skins; its fields `melanin` and `blood` are ignored
     fractions : (n,) melanin fractions of the epidermis, which are also the blood fractions of the dermis [-]
     """
     column, scattering = fractions[:, None], donner_jensen_2006(WAVELENGTHS_NM)
@@ -148,18 +166,18 @@ def dj2006_layers(parameters: SkinParameters, fractions: Floats) -> tuple[Layer,
 
 _STRUCTURES: dict[str, tuple[_LayerBuilder, str, tuple[str, ...]]] = {
     "dj2006": (
-        _dj2006,
+        _build_dj2006,
         "formulae as quoted by public code; the thickness of the epidermis is not known to be the paper's",
         ("DonnerJensen2006", "Jacques1998", "Prahl1999"),
     ),
     "donner2008": (
-        _donner2008,
+        _build_donner2008,
         f"the sheet adds {LEAKED_MELANIN:.1%} of what the melanin above it absorbs, as public code reads the "
         f"paper; carotene is left out; {_THIN_NOTE}",
         ("Donner2008", "DonnerJensen2006", "Jacques1998", "Prahl1999"),
     ),
     "biospec": (
-        _biospec,
+        _build_biospec,
         "BioSpec traces rays and has no reduced scattering: the law of dj2006 is used instead; its epidermis "
         "is 0.1 mm thick, its reticular dermis 1.8 mm on a mirror, but semi-infinite here; carotene and "
         f"bilirubin are left out; {_THIN_NOTE}",

@@ -185,8 +185,8 @@ def donner_jensen_2006(wavelength_nm: ArrayLike) -> Floats:
 def jacques_1998(wavelength_nm: ArrayLike) -> Floats:
     """Return the reduced scattering coefficient of skin after [Jacques1998] [1/mm].
 
-    It is the sum of Mie scattering by large and Rayleigh scattering by small fibres, equal in epidermis and
-    dermis.
+    The law is the sum of Mie scattering by large and Rayleigh scattering by small fibres, equal in epidermis
+    and dermis.
     """
     wavelength = visible_wavelengths(wavelength_nm)
     return np.asarray(2e4 * wavelength**-1.5 + 2e11 * wavelength**-4.0)

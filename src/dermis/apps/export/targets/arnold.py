@@ -1,7 +1,8 @@
 """Export to Arnold's standard_surface as a JSON file of parameters, following the published documentation.
 
 The mean free path of a channel is the parameter subsurface_radius times subsurface_scale, in scene units. The
-colour is converted to a single-scattering albedo by tabulated random walks in an index-matched medium.
+parameter subsurface_color is converted to a single-scattering albedo by tabulated random walks in an
+index-matched medium.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ class Arnold(JsonTarget):
         return _parameters(colour, fit_homogeneous_medium(subject.curve, colour, "walk").mfp_mm)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the width of a fitted Burley profile as the radius; Arnold expects a mean free path."""
+        """Return Burley widths as the radius, where Arnold expects mean free paths."""
         return _parameters(subject.clipped_albedo(_MIN_ALBEDO), fit_burley_width(subject.curve))
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
@@ -51,12 +52,12 @@ class Arnold(JsonTarget):
         return curve.with_energy(curve.energy / subject.clipped_albedo(_MIN_ALBEDO) * subject.curve.energy)
 
 
-def _parameters(colour: Floats, path_mm: Floats) -> Parameters:
+def _parameters(colour: Floats, mean_free_path_mm: Floats) -> Parameters:
     return (
         Parameter("subsurface", 1.0, "-", "all diffuse light is scattered below the surface"),
         Parameter("subsurface_type", "randomwalk", "-", "not diffusion, whose profile differs"),
         Parameter(_COLOUR_NAME, flat_tuple(colour), "-", "diffuse reflectance"),
-        Parameter(_RADIUS_NAME, flat_tuple(path_mm / _MM_PER_CM), "cm", "mean free path"),
+        Parameter(_RADIUS_NAME, flat_tuple(mean_free_path_mm / _MM_PER_CM), "cm", "mean free path"),
         Parameter(_SCALE_NAME, 1.0, "-", "scene units per cm: 0.01 for a scene in metres"),
         Parameter("subsurface_anisotropy", 0.0, "-", "isotropic scattering"),
     )

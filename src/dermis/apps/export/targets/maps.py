@@ -1,4 +1,4 @@
-"""Export of a head's maps as pictures in its uv layout, with irradiance before and after diffusion."""
+"""Export of a head's maps as pictures in the uv layout, with irradiance before and after diffusion."""
 
 from __future__ import annotations
 
@@ -50,8 +50,8 @@ _MAX_ATLAS_SIDE = 2048  # of the map in which light is diffused [texel]
 class MapInfo:
     """Properties of an exported map.
 
-    unit : unit of the texels in OpenEXR; "" for none
-    png_encoding : encoding as PNG
+    unit : unit of the texels in the OpenEXR file; "" for texels without a unit
+    png_encoding : encoding of the texels in the PNG file
     description : meaning of the texels, for the JSON file
     """
 
@@ -94,7 +94,7 @@ class MapFolder(Target):
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the size of the maps, the direction of green, and whether to display the diffused light."""
+        """Return the maps' size, the direction of green in normals, and whether to show diffused light."""
         return (
             Parameter("size", self.side, "texel", "side of the maps"),
             Parameter(
@@ -157,7 +157,7 @@ def quantise_map(values: Floats, encoding: PngEncoding) -> tuple[NDArray[np.uint
 
 
 def orient_green(normal: Floats, normal_y: NormalY) -> Floats:
-    """Return normals whose y, the green channel, points towards row 0 of the map or away from it.
+    """Return normals whose y, the green channel, points towards row 0 of the map or away from row 0.
 
     normal_y : "up" for row 0, as in OpenGL, or "down" for the opposite, as in DirectX
     """
@@ -171,9 +171,9 @@ def _to_uint16(fraction: Floats) -> NDArray[np.uint16]:
 
 
 def check_side(side: object) -> int:
-    """Return the requested side of the maps [texel] if it is supported.
+    """Return the requested side of the maps [texel] after checking that the side is supported.
 
-    Raises DermisError if it is not one of `MAP_SIDES`.
+    Raises DermisError for a side that is not one of `MAP_SIDES`.
     """
     if side not in MAP_SIDES or isinstance(side, bool):
         actual = f"got {side!r}"
@@ -227,11 +227,11 @@ def map_files(baked: BakedMaps, scene: Scene, normal_y: NormalY) -> Iterator[tup
 
 
 def _maps_description(
-    baked: BakedMaps, scene: Scene, normal_y: NormalY, described: dict[str, Ranges]
+    baked: BakedMaps, scene: Scene, normal_y: NormalY, map_entries: dict[str, Ranges]
 ) -> dict[str, object]:
     """Return the description of all maps for maps.json: layout, lights, units and ranges.
 
-    described : unit, meaning, range and PNG encoding of each map, by name
+    map_entries : unit, meaning, range and PNG encoding of each map, by name of the map
     """
     return {
         "format": "dermis maps 1",
@@ -247,7 +247,7 @@ def _maps_description(
         "lights": [light.model_dump(mode="json") for light in scene.lights],
         "environment": scene.environment and scene.environment.model_dump(mode="json"),
         "profile": scene.skin.profile,
-        "maps": described,
+        "maps": map_entries,
         "absent": baked.absent,
     }
 

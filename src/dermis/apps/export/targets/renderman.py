@@ -50,14 +50,17 @@ class RenderMan(JsonTarget):
         return burley_curve(path * path_colour * unit / shape_factor_diffuse(colour), subject.curve.energy)
 
 
-def _parameters(albedo: Floats, path_mm: Floats) -> Parameters:
-    longest = float(path_mm.max())
+def _parameters(albedo: Floats, diffuse_mean_free_path_mm: Floats) -> Parameters:
+    longest = float(diffuse_mean_free_path_mm.max())
     return (
         Parameter("subsurfaceGain", 1.0, "-", "all diffuse light is scattered below the surface"),
         Parameter(_COLOUR_NAME, flat_tuple(albedo), "-", "diffuse reflectance A"),
         Parameter(_DMFP_NAME, longest, "mm", "largest diffuse mean free path, s(A) d, of the channels"),
         Parameter(
-            _DMFP_COLOUR_NAME, flat_tuple(path_mm / longest), "-", "each channel's relative to that, no gamma"
+            _DMFP_COLOUR_NAME,
+            flat_tuple(diffuse_mean_free_path_mm / longest),
+            "-",
+            "each channel's relative to that, no gamma",
         ),
         Parameter(_UNIT_NAME, 1.0, "-", "scene units per mm: 0.1 for a scene in cm"),
     )

@@ -31,7 +31,7 @@ from dermis.human.skin.measured import (
     MeasuredTable,
     age_term,
     parse_table,
-    square_root,
+    symmetric_square_root,
 )
 from dermis.images.skin_tone import ita_degrees
 
@@ -259,7 +259,7 @@ def _calibrate_group(document: dict[str, Any], name: str, own: Archive, people: 
 def _drawn_cheeks(document: dict[str, Any], group: str, people: _Population) -> tuple[MeasuredTable, Doubles]:
     """Return the table as it is now, and the variables (n, 4) of the cheeks of drawn people of a group."""
     found, weights = parse_table(document), {group: 1.0}
-    scores = people.normals @ square_root(found.mixture("correlation", weights)[:4, :4])
+    scores = people.normals @ symmetric_square_root(found.mixture("correlation", weights)[:4, :4])
     return found, found.variables(weights, people.sexes, people.ages, scores)
 
 

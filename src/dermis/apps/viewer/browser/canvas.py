@@ -25,7 +25,7 @@ _MAX_ENCODERS = 2  # frames encoded at the same time while the next one is rende
 
 
 class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
-    """Canvas that web pages display; a slow page skips frames and receives the newest when it is ready."""
+    """Canvas that web pages display; a slow page skips frames, and later receives the newest frame."""
 
     def __init__(self, **kwargs: object) -> None:
         self._encoders = ThreadPoolExecutor(_MAX_ENCODERS, "encoder")
@@ -38,14 +38,14 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
         self._startup_message: dict[str, object] | None = None  # shown by pages before the first frame
         super().__init__(**kwargs)
 
-    def send_stage(self, text: str, number: int, total: int) -> None:
+    def send_stage(self, text: str, stage_number: int, stage_count: int) -> None:
         """Send the progress of the preparation to all pages, which display it until the first picture.
 
         text : name of the stage, such as "compiling shaders"
-        number : position of the stage in the order of stages, from 1
-        total : number of all stages
+        stage_number : position of the stage in the order of stages, from 1
+        stage_count : number of all stages
         """
-        self._broadcast({"type": "stage", "text": text, "number": number, "total": total})
+        self._broadcast({"type": "stage", "text": text, "number": stage_number, "total": stage_count})
 
     def send_failure(self, text: str) -> None:
         """Send an error message to all pages, which display it instead of a picture."""
@@ -110,14 +110,14 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
         future.add_done_callback(partial(self._send_frame, self._drawn_number, is_lossless_redraw))
 
     def _cancel_lossless_draw(self) -> None:
-        """Cancel the lossless frame that follows a still picture, even if it is already being encoded."""
+        """Cancel the lossless frame that follows a still picture, even if its encoding has begun."""
         self._lossless_number = 0
         super()._cancel_lossless_draw()
 
-    def _send_frame(self, number: int, lossless: bool, future: asyncio.Future[bytes]) -> None:
+    def _send_frame(self, frame_number: int, lossless: bool, future: asyncio.Future[bytes]) -> None:
         """Send an encoded frame to all pages, unless a newer frame has been sent.
 
-        number : number of the frame, in the order of drawing
+        frame_number : number of the frame, in the order of drawing
         lossless : whether the frame is encoded as PNG
         future : result of `encode_image`
         """
@@ -126,9 +126,9 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
             return
         self._schedule_maybe_draw()
         data = future.result()
-        if number < self._sent_number or (lossless and number != self._lossless_number):
+        if frame_number < self._sent_number or (lossless and frame_number != self._lossless_number):
             return
-        self._sent_number = number
+        self._sent_number = frame_number
         message = {
             "type": "framebufferdata",
             "nbuffers": 1,

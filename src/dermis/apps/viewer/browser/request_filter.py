@@ -121,7 +121,7 @@ _MESSAGE_PARSER: TypeAdapter[Any] = TypeAdapter(
 
 
 def checked_message(text: object) -> str | None:
-    """Return a message of a page reduced to its known fields, or None if it is invalid.
+    """Return a page's message without unknown fields, or None if the message is invalid.
 
     text : untrusted message of any type
     """
@@ -156,7 +156,7 @@ class RequestFilter:
     """ASGI middleware that rejects requests without the token or from other web sites.
 
     app : ASGI application of rendercanvas
-    token : secret in the query of the URL and later in a cookie; empty if none is required
+    token : secret in the query of the URL and later in a cookie; empty if no secret is required
     cookie : name of the cookie, different for each port because browsers share cookies between ports
     """
 
@@ -169,7 +169,7 @@ class RequestFilter:
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
         elif refusal := self._refusal_reason(scope):
-            await _reject(refusal, scope, receive, send)
+            await _send_rejection(refusal, scope, receive, send)
         elif scope["type"] == "websocket":
             self._pages += 1
             try:
@@ -182,12 +182,12 @@ class RequestFilter:
             await self._app(scope, receive, send)
 
     def _refusal_reason(self, scope: Message) -> str:
-        """Return the reason for which a request is rejected, or an empty string if it is accepted."""
-        host = next(iter(_headers(scope, b"host")), "")
+        """Return the reason for which a request is rejected, or an empty string for an accepted request."""
+        host = next(iter(_header_values(scope, b"host")), "")
         if not self._token and not is_local(_host_name(host)):
             return _WRONG_HOST_REASON  # DNS rebinding: the name of another site resolves to this machine
         scheme = _HTTP_SCHEMES.get(scope["scheme"], scope["scheme"])
-        if any(origin != f"{scheme}://{host}" for origin in _headers(scope, b"origin")):
+        if any(origin != f"{scheme}://{host}" for origin in _header_values(scope, b"origin")):
             return _OTHER_SITE_REASON
         if self._token and not self._has_query_token(scope) and not self._has_cookie_token(scope):
             return _NO_TOKEN_REASON
@@ -195,15 +195,15 @@ class RequestFilter:
 
     def _has_query_token(self, scope: Message) -> bool:
         tokens = parse_qs(scope.get("query_string", b"").decode("latin-1")).get("token", [])
-        return bool(self._token) and any(map(self._is_token, tokens))
+        return bool(self._token) and any(map(self._equals_token, tokens))
 
     def _has_cookie_token(self, scope: Message) -> bool:
-        cookies = (cookie.strip() for line in _headers(scope, b"cookie") for cookie in line.split(";"))
+        cookies = (cookie.strip() for line in _header_values(scope, b"cookie") for cookie in line.split(";"))
         pairs = (cookie.partition("=") for cookie in cookies)
-        return any(self._is_token(value) for name, _, value in pairs if name == self._cookie)
+        return any(self._equals_token(value) for name, _, value in pairs if name == self._cookie)
 
-    def _is_token(self, text: str) -> bool:
-        return hmac.compare_digest(text.encode(), self._token.encode())
+    def _equals_token(self, candidate: str) -> bool:
+        return hmac.compare_digest(candidate.encode(), self._token.encode())
 
     def _add_cookie(self, send: Send) -> Send:
         """Return a `send` function that also sets the token cookie, hidden from scripts and other sites."""
@@ -227,19 +227,19 @@ def is_local(host: str) -> bool:
         return False
 
 
-def _headers(scope: Message, key: bytes) -> list[str]:
-    return [value.decode("latin-1") for name, value in scope["headers"] if name == key]
+def _header_values(scope: Message, header_name: bytes) -> list[str]:
+    return [value.decode("latin-1") for name, value in scope["headers"] if name == header_name]
 
 
 def _host_name(host: str) -> str:
-    """Return the host of "name:port", "[address]:port" or "name"."""
+    """Return the host name or address in a text such as "name:port", "[address]:port" or "name"."""
     if host.startswith("["):
         return host[1:].partition("]")[0]
     return host.partition(":")[0]
 
 
 def _drop_invalid_messages(receive: Receive) -> Receive:
-    """Return a `receive` function that drops invalid messages of the page."""
+    """Return a `receive` function that skips invalid messages of the page."""
 
     async def next_message() -> Message:
         while True:
@@ -252,7 +252,7 @@ def _drop_invalid_messages(receive: Receive) -> Receive:
     return next_message
 
 
-async def _reject(reason: str, scope: Message, receive: Receive, send: Send) -> None:
+async def _send_rejection(reason: str, scope: Message, receive: Receive, send: Send) -> None:
     if scope["type"] == "websocket":
         await receive()
         await send({"type": "websocket.close", "code": 1008})

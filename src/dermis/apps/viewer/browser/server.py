@@ -37,7 +37,7 @@ class LimitedConnection(H11Protocol):  # type: ignore[misc]
         self._deadline: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:
-        """Accept a connection, or drop it if too many are open."""
+        """Accept a connection, or drop the connection if too many others are open."""
         super().connection_made(transport)
         if len(self.connections) > MAX_CONNECTIONS:
             transport.abort()
@@ -94,7 +94,7 @@ async def prepare_viewer(
 ) -> Viewer:
     """Prepare the first frame in a thread and return the viewer; pages display the progress.
 
-    If that fails, pages show the reason and the server stops.
+    If the preparation fails, pages show the reason and the server stops.
 
     http_server : running server of the pages
     load : function that loads the initial state and motion, called in a thread
@@ -150,7 +150,7 @@ _ALL_INTERFACES = "0.0.0.0", "::"
 class Address(NamedTuple):
     """Address at which the page is served.
 
-    token : secret part of the URL, empty for none
+    token : secret part of the URL, empty for a URL without a secret
     """
 
     host: str
@@ -219,10 +219,10 @@ def run_server(
 
     start : function that returns the coroutine
 
-    The result is None if the coroutine has not ended. Raises the exceptions of the coroutine.
+    The result is None if the server exits before the coroutine ends. Raises the exceptions of the coroutine.
     """
 
-    async def run() -> T | None:
+    async def serve_and_run() -> T | None:
         task = asyncio.create_task(start())
         await http_server.serve(sockets=[listener])
         if task.done():  # not awaited: after Ctrl+C that would raise another interrupt
@@ -230,4 +230,4 @@ def run_server(
         task.cancel()
         return None
 
-    return asyncio.run(run())
+    return asyncio.run(serve_and_run())

@@ -36,7 +36,8 @@ class Uploads:
 
     app : application that handles all other requests
     canvas : `PageCanvas` whose ticket the page must send, and which receives the path and name of each file
-    folder : folder of the files, which are numbered; the name given by the page is only displayed
+    folder : folder for the received files; files are named by numbers, and the name given by the page is only
+        displayed
     """
 
     def __init__(self, app: App, canvas: PageCanvas, folder: Path) -> None:
@@ -50,61 +51,69 @@ class Uploads:
         if scope["type"] != "http" or scope["method"] != "POST" or _UPLOAD_PATH not in parts[-2:-1]:
             await self._app(scope, receive, send)
             return
-        headers, name = dict(scope["headers"]), _printable(parts[-1])
+        headers, name = dict(scope["headers"]), _printable_name(parts[-1])
         status, answer = 200, ""
         response_headers = [(b"content-type", b"text/plain; charset=utf-8")]
         try:
-            suffix, on_file = self._accept(name, headers)
-            on_file(await self._store(name, suffix, receive), name)
+            suffix, on_file = self._accept_upload(name, headers)
+            on_file(await self._store_upload(name, suffix, receive), name)
         except DermisError as error:
             status, answer = 400, str(error)
             response_headers.append((b"connection", b"close"))  # reject the rest of the file
         await send({"type": "http.response.start", "status": status, "headers": response_headers})
         await send({"type": "http.response.body", "body": answer.encode()})
 
-    def _accept(self, name: str, headers: dict[bytes, bytes]) -> tuple[str, Callable[[Path, str], None]]:
-        """Return the suffix of an upload, one of `HEAD_FILE_SUFFIXES`, and the function that opens it.
+    def _accept_upload(
+        self, file_name: str, headers: dict[bytes, bytes]
+    ) -> tuple[str, Callable[[Path, str], None]]:
+        """Return the suffix of an upload, one of `HEAD_FILE_SUFFIXES`, and the function that opens the file.
 
         Raises DermisError for an upload that is not permitted.
         """
         ticket = headers.get(TICKET_HEADER, b"")
         if not self._canvas.ticket or not hmac.compare_digest(ticket, self._canvas.ticket.encode()):
             refuse("upload", "the page that has control", "another page sent it", "Close that page")
-        suffix = next((one for one in HEAD_FILE_SUFFIXES if name.lower().endswith(one)), None)
+        suffix = next((one for one in HEAD_FILE_SUFFIXES if file_name.lower().endswith(one)), None)
         if suffix is None:
             suffixes = ", ".join(HEAD_FILE_SUFFIXES)
-            refuse(name, f"a mesh, a person or a scene ({suffixes})", "it has another suffix", "Convert it")
+            refuse(
+                file_name, f"a mesh, a person or a scene ({suffixes})", "it has another suffix", "Convert it"
+            )
         if (on_file := self._canvas.on_file) is None:
-            refuse(name, "a viewer that is ready", "it is still being prepared", "Send the file again later")
+            refuse(
+                file_name, "a viewer that is ready", "it is still being prepared", "Send the file again later"
+            )
         if self._is_busy:
-            refuse(name, "one file at a time", "another upload is in progress", "Wait until it has finished")
+            refuse(
+                file_name, "one file at a time", "another upload is in progress", "Wait until it has finished"
+            )
         if self._count >= MAX_FILES:
-            refuse(name, f"at most {MAX_FILES} files", "this is one more", "Restart the viewer")
+            refuse(file_name, f"at most {MAX_FILES} files", "this is one more", "Restart the viewer")
         length = headers.get(b"content-length", b"0")
-        self._check_size(name, int(length) if length.isdigit() and len(length) < 16 else 0)
+        self._check_size(file_name, int(length) if length.isdigit() and len(length) < 16 else 0)
         return suffix, on_file
 
-    def _check_size(self, name: str, size: int) -> None:
-        if size > MAX_FILE_BYTES:
-            refuse(name, f"at most {MAX_FILE_BYTES >> 20} MB", "it is larger", "Make it smaller")
-        if self._bytes + size > MAX_TOTAL_BYTES:
+    def _check_size(self, file_name: str, byte_count: int) -> None:
+        if byte_count > MAX_FILE_BYTES:
+            refuse(file_name, f"at most {MAX_FILE_BYTES >> 20} MB", "it is larger", "Make it smaller")
+        if self._bytes + byte_count > MAX_TOTAL_BYTES:
             limit = f"at most {MAX_TOTAL_BYTES >> 20} MB of files in total"
-            refuse(name, limit, "this file would exceed it", "Restart the viewer")
+            refuse(file_name, limit, "this file would exceed it", "Restart the viewer")
 
-    async def _store(self, name: str, suffix: str, receive: Receive) -> Path:
+    async def _store_upload(self, file_name: str, suffix: str, receive: Receive) -> Path:
         """Receive a file and return its path; a rejected file is deleted.
 
-        name : name given by the page, for messages
-        suffix : suffix of the file
+        file_name : name given by the page, for error messages
+        suffix : suffix of the stored file
         """
         self._count += 1
         folder = self._folder / str(self._count)  # separate folders: a scene may refer to files beside it
         path = folder / f"upload{suffix}"
-        with self._upload_in_progress(name):
+        with self._upload_in_progress(file_name):
             folder.mkdir(mode=0o700)
             try:
                 with path.open("xb") as file:
-                    await self._copy(name, receive, file)
+                    await self._copy_body(file_name, receive, file)
             except BaseException:
                 path.unlink(missing_ok=True)
                 folder.rmdir()
@@ -113,30 +122,34 @@ class Uploads:
         return path
 
     @contextmanager
-    def _upload_in_progress(self, name: str) -> Iterator[None]:
+    def _upload_in_progress(self, file_name: str) -> Iterator[None]:
         self._is_busy = True
         try:
             yield
         except OSError as fault:
-            refuse(name, "space on the server", f"it cannot be stored ({fault.strerror})", "Free some space")
+            refuse(
+                file_name, "space on the server", f"it cannot be stored ({fault.strerror})", "Free some space"
+            )
         finally:
             self._is_busy = False
 
-    async def _copy(self, name: str, receive: Receive, file: BinaryIO) -> None:
+    async def _copy_body(self, file_name: str, receive: Receive, file: BinaryIO) -> None:
         more, size = True, 0
         while more:
             try:
                 message = await asyncio.wait_for(receive(), IDLE_TIMEOUT_S)
             except TimeoutError:
-                refuse(name, "a complete file", f"got no data for {IDLE_TIMEOUT_S:g} s", "Send it again")
+                refuse(file_name, "a complete file", f"got no data for {IDLE_TIMEOUT_S:g} s", "Send it again")
             if message["type"] != "http.request":
-                refuse(name, "a complete file", "the connection was closed", "Send it again")
+                refuse(file_name, "a complete file", "the connection was closed", "Send it again")
             size += len(message.get("body", b""))
-            self._check_size(name, size)
+            self._check_size(file_name, size)
             file.write(message.get("body", b""))
             more = message.get("more_body", False)
 
 
-def _printable(name: str) -> str:
+def _printable_name(file_name: str) -> str:
     """Return a file name with printable characters only, shortened for messages."""
-    return "".join(character if character.isprintable() else "_" for character in name)[-_MAX_CHARACTERS:]
+    return "".join(character if character.isprintable() else "_" for character in file_name)[
+        -_MAX_CHARACTERS:
+    ]

@@ -41,13 +41,15 @@ _MAX_VISIBLE_ROWS = 14
 class FieldStyle:
     """Presentation of a field in the panel, where it differs from the defaults that follow from the model.
 
-    label : label to show; in "shown###name" the name identifies the control in positions and undo
-    value_range : range of the slider, None for the range that the model declares
-    unit : size of one displayed unit, in units of the field; 0.01 displays a fraction in percent
+    label : label to show; of "text###key", only the text is shown, and the key identifies the control in
+        `Session.positions` and in the undo history
+    value_range : range of the slider; None for the range that the model declares for the field
+    unit : displayed unit, in units of the field; 0.01 displays a fraction in percent
     number_format : printf format of the number
     options : integers to choose from in a drop-down list
-    names : text to show for each keyword of the field
-    custom_value : function that returns the initial custom value of a field that may also be a keyword
+    names : text to show for each keyword that the field accepts
+    custom_value : for a field whose value may be a keyword or custom: function that returns the value with
+        which a custom value starts
     """
 
     label: str = ""
@@ -84,22 +86,22 @@ def draw_fields(
 
 def _draw_field(
     session: Session,
-    values: FrozenModel,
-    name: str,
+    model: FrozenModel,
+    field_name: str,
     make_state: FieldsToState,
     style: FieldStyle,
     suffix: str,
 ) -> None:
-    kind, value = type(values), getattr(values, name)
-    label = (style.label or _field_label(name)) + suffix
-    value_range = style.value_range or field_slider_range(kind, name) or SliderRange(0.0, 1.0)
+    kind, value = type(model), getattr(model, field_name)
+    label = (style.label or _field_label(field_name)) + suffix
+    value_range = style.value_range or field_slider_range(kind, field_name) or SliderRange(0.0, 1.0)
 
     def with_value(new_value: object) -> ViewerState:
-        return make_state(**{name: new_value})
+        return make_state(**{field_name: new_value})
 
-    if keywords := field_keywords(kind, name):
+    if keywords := field_keywords(kind, field_name):
         _draw_keywords(session, label, value, keywords, with_value, style)
-        draw_tooltip(field_help(kind, name))
+        draw_tooltip(field_help(kind, field_name))
         if isinstance(value, str):
             return
     if isinstance(value, bool):
@@ -108,13 +110,13 @@ def _draw_field(
         draw_combo(session, label, str(value), map(str, style.options), lambda text: with_value(int(text)))
     elif isinstance(value, (int, float)):
         unit, convert = style.unit, round if isinstance(value, int) else float
-        formats = (_UNIT_FORMATS[end] for end in _UNIT_FORMATS if name.endswith(end))
+        formats = (_UNIT_FORMATS[end] for end in _UNIT_FORMATS if field_name.endswith(end))
         number = style.number_format or next(formats, "%.3f")
         displayed = SliderRange(value_range.low / unit, value_range.high / unit, value_range.logarithmic)
         draw_slider(
             session, label, value / unit, lambda new: with_value(convert(unit * new)), displayed, number
         )
-    elif kind.model_fields[name].annotation == _COLOUR_TYPE:
+    elif kind.model_fields[field_name].annotation == _COLOUR_TYPE:
         result = imgui.color_edit3(label, list(value), _HDR_COLOUR_FLAGS)
         edit_value(session, label, result, lambda new: with_value(tuple(max(0.0, c) for c in new)))
     elif isinstance(value, tuple) and value_range.logarithmic:
@@ -122,11 +124,11 @@ def _draw_field(
             label, list(value), value_range.low, value_range.high, "%.3g", _LOG_SLIDER_FLAG
         )
         edit_value(session, label, result, lambda new: with_value(tuple(clamp(c, value_range) for c in new)))
-    elif len(keywords := field_choices(kind, name)) > 1:
+    elif len(keywords := field_choices(kind, field_name)) > 1:
         draw_combo(session, label, str(value), keywords, with_value, style.names)
     else:
         return
-    draw_tooltip(field_help(kind, name))
+    draw_tooltip(field_help(kind, field_name))
 
 
 def _draw_keywords(
@@ -156,11 +158,11 @@ def _draw_keywords(
     )
 
 
-def _field_label(name: str) -> str:
-    """Return the label of a field: its name with spaces and without the suffix of its unit."""
+def _field_label(field_name: str) -> str:
+    """Return the label of a field: the field's name with spaces and without the suffix of a unit."""
     for unit in _UNIT_FORMATS:
-        name = name.removesuffix(unit)
-    return name.replace("_", " ")
+        field_name = field_name.removesuffix(unit)
+    return field_name.replace("_", " ")
 
 
 def draw_tooltip(text: str) -> None:
@@ -200,8 +202,9 @@ def draw_slider(
     value_range: SliderRange,
     number_format: str,
 ) -> None:
-    """Draw a slider for a number.
+    """Draw a slider that changes a number of the state.
 
+    value : displayed number
     with_value : function that returns a state, given the new number
     number_format : printf format of the number
     """
@@ -211,18 +214,18 @@ def draw_slider(
 
 
 def clamp(value: float, value_range: SliderRange) -> float:
-    """Clamp a value to a range, as typed values and rounding to single precision can exceed it."""
+    """Clamp a value to a range that typed or rounded values may exceed."""
     return min(value_range.high, max(value_range.low, value))
 
 
-def edit_value(session: Session, label: str, result: tuple[bool, Any], with_value: ToState) -> None:
+def edit_value(session: Session, label: str, change_and_value: tuple[bool, Any], with_value: ToState) -> None:
     """Change the state to the new value of a control; all changes of one drag are undone together.
 
-    result : whether the control has changed, and its value
+    change_and_value : whether the control has changed, and its value
     with_value : function that returns a state, given the new value
     """
     record_position(session, label)
-    is_changed, new_value = result
+    is_changed, new_value = change_and_value
     if is_changed:
         run_action(session, lambda: session.change(with_value(new_value), f"hold {label}"))
     if imgui.is_item_deactivated():
@@ -241,7 +244,7 @@ def draw_combo(
 
     names : choices; "" is a separator
     with_value : function that returns a state, given the chosen name
-    display_names : text to show for each name, where it differs
+    display_names : text to show for each name whose text differs from the name
     """
     chosen = choose_name(session, label, current, names, display_names)
     if chosen is not None:
@@ -251,11 +254,11 @@ def draw_combo(
 def choose_name(
     session: Session, label: str, current: str, names: Iterable[str], display_names: Mapping[str, str]
 ) -> str | None:
-    """Draw a drop-down list and return the name that was clicked, None without a click.
+    """Draw a drop-down list; return the name that was clicked, or None if no name was clicked.
 
     current : name that is selected now
     names : choices; "" is a separator
-    display_names : text to show for each name, where it differs
+    display_names : text to show for each name whose text differs from the name
     """
     chosen = None
     if not imgui.begin_combo(label, display_names.get(current, current), _TALL_LIST_FLAG):
@@ -274,29 +277,31 @@ def choose_name(
 
 
 def draw_button(session: Session, label: str) -> bool:
-    """Draw a button; return whether it was pressed."""
+    """Draw a button; return whether the button was pressed."""
     pressed = imgui.button(label)
     record_position(session, label)
     return bool(pressed)
 
 
-def begin_plot(label: str, axes: tuple[str, str], x_range: tuple[float, float], highest: float) -> bool:
-    """Begin a plot whose vertical axis ends slightly above `highest`; return whether it is visible.
+def begin_plot(label: str, axes: tuple[str, str], x_range: tuple[float, float], highest_value: float) -> bool:
+    """Begin a plot; return whether the plot is visible.
 
     axes : labels of the horizontal and of the vertical axis
+    x_range : ends of the horizontal axis
+    highest_value : value slightly above which the vertical axis ends
     """
     if not implot.begin_plot(f"##{label}", imgui.ImVec2(-1.0, _PLOT_HEIGHT), _PLOT_FLAGS):
         return False
     hidden = int(implot.AxisFlags_.no_tick_labels) if axes[0] == "frames" else 0
     implot.setup_axes(*axes, hidden, 0)
-    implot.setup_axes_limits(*x_range, 0.0, 1.1 * highest, int(imgui.Cond_.always))
+    implot.setup_axes_limits(*x_range, 0.0, 1.1 * highest_value, int(imgui.Cond_.always))
     return True
 
 
 def record_position(session: Session, label: str) -> None:
     """Record the position of the last control in the window, so that scripts can click on it.
 
-    The position is in the left part of the control, because the right part may be its label.
+    The position is in the left part of the control, because the right part may be the label of the control.
 
     label : label whose part after "###", if any, is the key of the position
     """

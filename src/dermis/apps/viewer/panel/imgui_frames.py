@@ -52,7 +52,7 @@ ReportError = Callable[[Exception], None]
 
 
 class ImguiFrames:
-    """Dear ImGui context, with the GPU resources that draw it.
+    """Dear ImGui context, with the GPU resources that draw the layouts.
 
     report_error : function that receives errors raised during a layout; later frames are still drawn
     """
@@ -62,7 +62,7 @@ class ImguiFrames:
         self._is_new = self._has_layout = False
 
     def open(self, device: Device, target: str) -> None:
-        """Create the context and the resources that draw it.
+        """Create the Dear ImGui context, and the GPU resources that draw the layouts.
 
         target : format of the textures to draw into
         """
@@ -81,7 +81,7 @@ class ImguiFrames:
         implot.set_current_context(self._plot_context)
 
     def lay_out(self, size: tuple[float, float], draw: Callable[[], None]) -> None:
-        """Process pending input and lay out the next frame, which `render` then draws.
+        """Process pending input and lay out the next frame; `render` draws this frame.
 
         size : logical size of the window
         draw : function that declares the windows and controls
@@ -100,7 +100,7 @@ class ImguiFrames:
             self._recreate_context()
 
     def render(self, target: TextureView) -> None:
-        """Draw the last layout over the target; nothing if that layout failed."""
+        """Draw the last layout over the target; draw nothing if that layout failed."""
         if not self._has_layout:
             return
         encoder = self._device.handle.create_command_encoder()
@@ -157,7 +157,7 @@ def feed_pointer(event: Event, frame: Callable[[], None]) -> None:
 def feed_key(event: Event, frame: Callable[[], None]) -> None:
     """Pass a key or character to Dear ImGui, and lay out the panel at once.
 
-    Otherwise a press and a release of a key between two frames would cancel out.
+    Without this layout, a press and a release of a key between two frames would cancel out.
 
     frame : function that lays out the panel with the events so far
     """
@@ -169,11 +169,11 @@ def feed_key(event: Event, frame: Callable[[], None]) -> None:
     frame()
 
 
-def _change_key(io: imgui.IO, name: str, down: bool) -> None:
-    key = ImguiRenderer.KEY_MAP.get(name)
-    if key is None and len(name) == 1 and name.isascii() and name.isalnum():
-        key = getattr(imgui.Key, f"_{name}" if name.isdigit() else name.lower(), None)
+def _change_key(io: imgui.IO, key_name: str, is_down: bool) -> None:
+    key = ImguiRenderer.KEY_MAP.get(key_name)
+    if key is None and len(key_name) == 1 and key_name.isascii() and key_name.isalnum():
+        key = getattr(imgui.Key, f"_{key_name}" if key_name.isdigit() else key_name.lower(), None)
     if key is not None:
-        io.add_key_event(key, down)
-    if name in ImguiRenderer.KEY_MAP_MOD:
-        io.add_key_event(ImguiRenderer.KEY_MAP_MOD[name], down)
+        io.add_key_event(key, is_down)
+    if key_name in ImguiRenderer.KEY_MAP_MOD:
+        io.add_key_event(ImguiRenderer.KEY_MAP_MOD[key_name], is_down)

@@ -91,7 +91,7 @@ def draw_messages(lines: Sequence[str], left: float, size: tuple[float, float]) 
 
 
 def draw_help(left: float, size: tuple[float, float]) -> None:
-    """Draw the list of shortcuts in the centre of the picture; pointers pass through it.
+    """Draw the list of shortcuts in the centre of the picture; pointer events pass through the list.
 
     left : left edge of the picture
     size : logical size of the window
@@ -126,7 +126,9 @@ _BUTTON_MARGIN, _BUTTON_ALPHA = 8.0, 0.6  # of the button that opens the panel
 
 
 class Panel:
-    """Control panel with its sections; it decides which events are for the panel, not the picture.
+    """Control panel with its sections.
+
+    The panel decides which input events are for the panel, and which events are for the picture.
 
     is_visible : whether the panel is shown in a wide window
     is_drawer_open : whether the panel is shown in a narrow window, as a drawer over the picture
@@ -155,15 +157,15 @@ class Panel:
         """
         return 0.0 if is_drawer(size) else self._covered_width(size)
 
-    def _covered_width(self, size: tuple[float, float]) -> float:
-        """Return the width of the window that the panel covers, 0 if it is hidden [logical pixel].
+    def _covered_width(self, window_size: tuple[float, float]) -> float:
+        """Return the width of the window that the panel covers, 0 for a hidden panel [logical pixel].
 
-        size : logical size of the window
+        window_size : logical size of the window
         """
         fraction, is_shown = _MAX_WIDTH_FRACTION, self.is_visible
-        if is_drawer(size):
+        if is_drawer(window_size):
             fraction, is_shown = _DRAWER_FRACTION, self.is_drawer_open
-        return round(min(_PANEL_WIDTH, fraction * size[0])) if is_shown else 0.0
+        return round(min(_PANEL_WIDTH, fraction * window_size[0])) if is_shown else 0.0
 
     def toggle(self) -> None:
         """Show or hide the panel."""
@@ -173,7 +175,7 @@ class Panel:
             self.is_visible = not self.is_visible
 
     def handle_event(self, event: Event, size: tuple[float, float]) -> bool:
-        """Process an event if it is for the panel and not for the picture; return whether it is.
+        """Process an input event of the panel; return False for an event that is for the picture.
 
         size : logical size of the window
         """
@@ -188,12 +190,12 @@ class Panel:
             is_on_panel = self._is_over_panel(
                 event["x"], event["y"], size
             )  # evaluated before a press closes a list
-            feed_pointer(event, lambda: self._frame(size))
+            feed_pointer(event, lambda: self._lay_out_frame(size))
             return is_on_panel
         if kind == "pointer_leave":
             io.add_mouse_pos_event(-1e6, -1e6)
             return False
-        feed_key(event, lambda: self._frame(size))
+        feed_key(event, lambda: self._lay_out_frame(size))
         return bool(imgui.get_io().want_text_input)  # of the current context, which the frame may replace
 
     def draw(self, target: TextureView, size: tuple[float, float], pixel_ratio: float) -> None:
@@ -203,15 +205,15 @@ class Panel:
         """
         self._frames.enter()
         imgui.get_io().display_framebuffer_scale = imgui.ImVec2(pixel_ratio, pixel_ratio)
-        self._frame(size)
+        self._lay_out_frame(size)
         self._frames.render(target)
 
-    def _frame(self, size: tuple[float, float]) -> None:
-        self._size = size
-        self._frames.lay_out(size, lambda: self._draw_windows(size))
+    def _lay_out_frame(self, window_size: tuple[float, float]) -> None:
+        self._size = window_size
+        self._frames.lay_out(window_size, lambda: self._draw_windows(window_size))
 
     def _run_shortcut(self, event: Event) -> bool:
-        """Run the shortcut of a key, if it has one; return whether it has."""
+        """Run the shortcut of a pressed key; return False if the key has no shortcut."""
         key, session = str(event["key"]), self._session
         if {"Control", "Meta"} & set(event.get("modifiers", ())):
             if key.lower() != "s":
@@ -230,7 +232,7 @@ class Panel:
         return True
 
     def _close_topmost(self) -> bool:
-        """Close the topmost popup, help or search; return whether there was one."""
+        """Close the popup, the help or the search, whichever is on top; return False if nothing is open."""
         if self._has_popup:
             imgui.internal.close_popup_to_level(0, False)
             self._has_popup = False
@@ -242,32 +244,34 @@ class Panel:
             return False
         return True
 
-    def _is_over_panel(self, x: float, y: float, size: tuple[float, float]) -> bool:
-        """Return whether a position is over the panel; Dear ImGui would know this only one frame later.
+    def _is_over_panel(self, x: float, y: float, window_size: tuple[float, float]) -> bool:
+        """Return whether a position is over the panel; Dear ImGui could answer this only one frame later.
 
         x, y : position of the pointer in the window
-        size : logical size of the window
+        window_size : logical size of the window
         """
-        width = self._covered_width(size)
+        width = self._covered_width(window_size)
         on_button = not width and x < self._button_end[0] and y < self._button_end[1]
         return x < width or on_button or self._has_popup or bool(imgui.is_any_item_active())
 
-    def _draw_windows(self, size: tuple[float, float]) -> None:
+    def _draw_windows(self, window_size: tuple[float, float]) -> None:
         """Draw the panel, or the button that opens it, and the overlays."""
-        vertical_padding = _TOUCH_PADDING if is_drawer(size) else imgui.get_style().frame_padding.y
+        vertical_padding = _TOUCH_PADDING if is_drawer(window_size) else imgui.get_style().frame_padding.y
         padding = imgui.ImVec2(imgui.get_style().frame_padding.x, vertical_padding)
         imgui.push_style_var(int(imgui.StyleVar_.frame_padding), padding)
-        if self._covered_width(size):
-            self._draw_panel(size)
+        if self._covered_width(window_size):
+            self._draw_panel(window_size)
         else:
             self._draw_panel_button()
         imgui.pop_style_var()
-        left, session = self.width(size), self._session
+        left, session = self.width(window_size), self._session
         if self.shows_help:
-            draw_help(left, size)
-        draw_divider(session.split, left, size)
-        status = "" if self._covered_width(size) > left else session.status
-        draw_messages([line for line in (session.message, session.heads.note, status) if line], left, size)
+            draw_help(left, window_size)
+        draw_divider(session.split, left, window_size)
+        status = "" if self._covered_width(window_size) > left else session.status
+        draw_messages(
+            [line for line in (session.message, session.heads.note, status) if line], left, window_size
+        )
 
     def _draw_panel_button(self) -> None:
         """Draw the button that opens the panel in the corner of the picture."""
@@ -283,11 +287,11 @@ class Panel:
         imgui.end()
         imgui.pop_style_var()
 
-    def _draw_panel(self, size: tuple[float, float]) -> None:
-        session, width = self._session, self._covered_width(size)
+    def _draw_panel(self, window_size: tuple[float, float]) -> None:
+        session, width = self._session, self._covered_width(window_size)
         imgui.get_style().font_scale_main = max(_MIN_TEXT_SCALE, min(1.0, width / _PANEL_WIDTH))
         imgui.set_next_window_pos(imgui.ImVec2(0.0, 0.0))
-        imgui.set_next_window_size(imgui.ImVec2(width, size[1]))
+        imgui.set_next_window_size(imgui.ImVec2(width, window_size[1]))
         fixed = imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_resize | imgui.WindowFlags_.no_collapse
         imgui.begin("dermis", None, int(fixed | imgui.WindowFlags_.no_title_bar))
         self._draw_toolbar()

@@ -70,7 +70,7 @@ _SETTING_STYLES = {
     "background": FieldStyle(custom_value=lambda session: (0.2, 0.2, 0.2)),
 }
 _PICTURE_SETTINGS = ("exposure", "tone", "bloom", "background", "background_blur")
-_DETERMINED_SETTINGS = ("size", "parts")  # determined by the window and by the view
+_SETTINGS_SET_ELSEWHERE = ("size", "parts")  # determined by the window and by the view
 
 
 def draw_lights(session: Session) -> None:
@@ -84,19 +84,19 @@ def draw_lights(session: Session) -> None:
     _draw_environment(session)
 
 
-def _add_light(session: Session, kind: str) -> ViewerState:
+def _add_light(session: Session, light_kind: str) -> ViewerState:
     """Return the state with a new light of the given kind, and select that light."""
     values: dict[str, Any] = {"position": _NEW_LIGHT_MM, "direction": tuple(-x for x in _NEW_LIGHT_MM)}
-    fields = LIGHTS[kind].model_fields
+    fields = LIGHTS[light_kind].model_fields
     required = {name: values[name] for name in values.keys() & fields.keys() if fields[name].is_required()}
     lights = session.state.scene.lights
-    state = session.state.with_lights([*lights, LIGHTS[kind](**required)])
+    state = session.state.with_lights([*lights, LIGHTS[light_kind](**required)])
     session.controls.light = len(lights)
     return state
 
 
 def _draw_light_selector(session: Session) -> None:
-    """Draw a radio button for each light and one for the environment."""
+    """Draw a radio button for each light, and another radio button for the environment."""
     lights, controls = session.state.scene.lights, session.controls
     for index, light in enumerate(lights):
         if imgui.radio_button(f"{index + 1}##{light.kind}", controls.light == index):
@@ -106,12 +106,12 @@ def _draw_light_selector(session: Session) -> None:
         controls.light = len(lights)
 
 
-def _draw_light(session: Session, index: int, light: Light) -> None:
+def _draw_light(session: Session, light_index: int, light: Light) -> None:
     """Draw the fields of a light, except its position, which is changed by Shift-drag."""
     strength = max(*light.irradiance, 1e-6)
 
     def make_state(**fields: object) -> ViewerState:
-        return session.state.with_light(index, **fields)
+        return session.state.with_light(light_index, **fields)
 
     def with_stops(stops: float) -> ViewerState:
         factor = 2.0**stops * math.pi / strength
@@ -127,12 +127,12 @@ def _draw_light(session: Session, index: int, light: Light) -> None:
     imgui.same_line()
     if draw_button(session, "remove"):
         lights = session.state.scene.lights
-        session.change(session.state.with_lights([*lights[:index], *lights[index + 1 :]]))
-        session.controls.light = max(0, index - 1)
+        session.change(session.state.with_lights([*lights[:light_index], *lights[light_index + 1 :]]))
+        session.controls.light = max(0, light_index - 1)
 
 
 def _cone_styles(light: Light) -> dict[str, FieldStyle]:
-    """Return slider ranges of a spotlight, whose outer cone is wider than its inner cone."""
+    """Return slider ranges with which a spotlight's outer cone stays wider than the inner cone."""
     if not isinstance(light, SpotLight):
         return {}
     inner = SliderRange(0.5, light.outer_degrees - _MIN_FADE_DEGREES)
@@ -185,7 +185,7 @@ def draw_expressions(session: Session) -> None:
     bones = posing.filter_names(head.bones, session.search)
     animated = _animated_names(session)
     if targets:
-        draw_rows("targets", len(targets), lambda row: _draw_weight(session, targets[row], animated))
+        draw_rows("targets", len(targets), lambda row: _draw_target_weight(session, targets[row], animated))
     if not (targets or bones):
         imgui.text_disabled("no name matches")
     if bones:
@@ -193,7 +193,7 @@ def draw_expressions(session: Session) -> None:
         record_position(session, "bones")
         if is_open:
             imgui.text_disabled("nod, turn, tilt [degrees]")
-            draw_rows("turns", len(bones), lambda row: _draw_angles(session, bones[row], animated))
+            draw_rows("turns", len(bones), lambda row: _draw_bone_angles(session, bones[row], animated))
             imgui.tree_pop()
 
 
@@ -223,38 +223,38 @@ def _animated_names(session: Session) -> frozenset[str]:
     return frozenset() if clip is None else frozenset((*clip.targets, *clip.bones))
 
 
-def _draw_weight(session: Session, name: str, animated: frozenset[str]) -> None:
+def _draw_target_weight(session: Session, target_name: str, animated_names: frozenset[str]) -> None:
     def with_value(weight: float) -> ViewerState:
-        return session.state.with_pose(posing.with_target_weight(session.state.scene, name, weight))
+        return session.state.with_pose(posing.with_target_weight(session.state.scene, target_name, weight))
 
-    weight = posing.target_weight(session.displayed_state.scene, name)
-    imgui.begin_disabled(name in animated)
-    draw_slider(session, f"{name}##target", weight, with_value, _WEIGHT_RANGE, "%.2f")
+    weight = posing.target_weight(session.displayed_state.scene, target_name)
+    imgui.begin_disabled(target_name in animated_names)
+    draw_slider(session, f"{target_name}##target", weight, with_value, _WEIGHT_RANGE, "%.2f")
     imgui.end_disabled()
-    if len(name) > _MAX_LABEL_LENGTH:
-        draw_tooltip(name)
+    if len(target_name) > _MAX_LABEL_LENGTH:
+        draw_tooltip(target_name)
 
 
-def _draw_angles(session: Session, name: str, animated: frozenset[str]) -> None:
-    """Draw a slider for each of the three angles of a bone, and change only the one that is moved.
+def _draw_bone_angles(session: Session, bone_name: str, animated_names: frozenset[str]) -> None:
+    """Draw a slider for each of the three angles of a bone; a drag changes only the angle of one slider.
 
-    animated : names of morph targets and bones that the playing motion moves
+    animated_names : names of morph targets and bones that the playing motion moves
     """
-    angles = posing.bone_angles(session.displayed_state.scene, name)
+    angles = posing.bone_angles(session.displayed_state.scene, bone_name)
 
     def with_value(new_angles: list[float]) -> ViewerState:
         axis = max(range(3), key=lambda k: abs(new_angles[k] - angles[k]))
         degrees = [*angles]
         degrees[axis] = clamp(new_angles[axis], _ANGLE_RANGE)
         x, y, z = degrees
-        return session.state.with_pose(posing.with_bone_angles(session.state.scene, name, (x, y, z)))
+        return session.state.with_pose(posing.with_bone_angles(session.state.scene, bone_name, (x, y, z)))
 
-    imgui.begin_disabled(name in animated)
-    result = imgui.slider_float3(f"{name}##bone", [*angles], _ANGLE_RANGE.low, _ANGLE_RANGE.high, "%.0f")
+    imgui.begin_disabled(bone_name in animated_names)
+    result = imgui.slider_float3(f"{bone_name}##bone", [*angles], _ANGLE_RANGE.low, _ANGLE_RANGE.high, "%.0f")
     imgui.end_disabled()
-    edit_value(session, f"{name}##bone", result, with_value)
-    if len(name) > _MAX_LABEL_LENGTH:
-        draw_tooltip(name)
+    edit_value(session, f"{bone_name}##bone", result, with_value)
+    if len(bone_name) > _MAX_LABEL_LENGTH:
+        draw_tooltip(bone_name)
 
 
 def draw_head(session: Session) -> None:
@@ -295,7 +295,7 @@ def _draw_head_list(session: Session) -> None:
 
 
 def _person_seed(session: Session) -> int:
-    """Return the seed of the displayed person, 0 for another head."""
+    """Return the seed of the displayed random person; 0 if the head is not a random person."""
     seed = str(session.state.head.get("name", "")).removeprefix(f"{HUMAN}:")
     return int(seed) if seed.isdecimal() else 0
 
@@ -331,7 +331,7 @@ def draw_view(session: Session) -> None:
 
 
 def draw_comparison(session: Session) -> None:
-    """Draw the buttons of the before/after comparison: freeze the state, swap the sides, or end it."""
+    """Draw the buttons of the before/after comparison: freeze the state, swap the sides, end."""
     split, state = session.split, session.state
     if draw_button(session, "freeze"):
         split.freeze(session.displayed_state)
@@ -351,10 +351,10 @@ def draw_comparison(session: Session) -> None:
 def draw_technique(session: Session) -> None:
     """Draw the settings that no other section shows, drop-down lists first.
 
-    New settings appear here by default.
+    A new field of `Settings` appears in this section unless another section shows it.
     """
     settings = session.state.settings
-    kind, excluded = type(settings), {*_PICTURE_SETTINGS, *_DETERMINED_SETTINGS}
+    kind, excluded = type(settings), {*_PICTURE_SETTINGS, *_SETTINGS_SET_ELSEWHERE}
     names = sorted(
         (name for name in fields_under("", kind) if name not in excluded),
         key=lambda name: not field_choices(kind, name),
@@ -402,14 +402,14 @@ def draw_files(session: Session) -> None:
 
 
 def draw_timing(session: Session) -> None:
-    """Plot the device times of the stages over the last frames, and list those of the last frame."""
+    """Plot the device times of the stages over the last frames, and list the times of the last frame."""
     series = stage_series(list(session.view_renderer.stage_times))
     if not series:
         imgui.text_disabled("this adapter reports no times")
         return
     total = np.sum(list(series.values()), axis=0)
     colours = [colorsys.hls_to_rgb((_HUE_STEP * k) % 1.0, 0.6, 0.5) for k in range(len(series))]
-    _plot_stacked(series, colours, total)
+    _plot_stacked_areas(series, colours, total)
     for (name, values), colour in zip(series.items(), colours, strict=True):
         imgui.text_colored(imgui.ImVec4(*colour, 1.0), f"{values[-1]:8.2f} ms")
         imgui.same_line()
@@ -418,25 +418,30 @@ def draw_timing(session: Session) -> None:
 
 
 def stage_series(frames: Sequence[dict[str, float]]) -> dict[str, Floats]:
-    """Return the times of each stage in n frames, (n,) by stage; 0 if a frame lacks the stage [ms]."""
+    """Return the times (n,) of each stage in n frames, by stage name [ms].
+
+    The time is 0 in frames without the stage.
+
+    frames : times of the stages of each frame, by stage name [ms]
+    """
     names = dict.fromkeys(name for frame in frames for name in frame if name != _TOTAL_LABEL)
     return {name: np.array([frame.get(name, 0.0) for frame in frames], np.float64) for name in names}
 
 
-def _plot_stacked(
-    series: dict[str, Floats], colours: Sequence[tuple[float, float, float]], total: Floats
+def _plot_stacked_areas(
+    times_ms: dict[str, Floats], colours: Sequence[tuple[float, float, float]], total_ms: Floats
 ) -> None:
     """Plot the times of stages as stacked areas, with the last frame at the right edge.
 
-    series : (n,) times of each stage [ms]
+    times_ms : (n,) times of each stage, by stage name [ms]
     colours : colour of each stage
-    total : (n,) total times of the frames [ms]
+    total_ms : (n,) total times of the frames [ms]
     """
-    last = max(1.0, len(total) - 1.0)
-    if not begin_plot("stages", ("frames", "ms"), (0.0, last), max(float(total.max()), 1e-3)):
+    last = max(1.0, len(total_ms) - 1.0)
+    if not begin_plot("stages", ("frames", "ms"), (0.0, last), max(float(total_ms.max()), 1e-3)):
         return
-    x, below = np.arange(len(total), dtype=np.float64), np.zeros(len(total))
-    for (name, values), colour in zip(series.items(), colours, strict=True):
+    x, below = np.arange(len(total_ms), dtype=np.float64), np.zeros(len(total_ms))
+    for (name, values), colour in zip(times_ms.items(), colours, strict=True):
         spec = implot.Spec()
         spec.fill_color = imgui.ImVec4(*colour, 1.0)
         implot.plot_shaded(name, x, below, below + values, spec)

@@ -78,7 +78,7 @@ def draw_profile(session: Session) -> None:
 
 
 def draw_surface(session: Session) -> None:
-    """Draw the skin fields that do not belong to the profile; new fields appear here by default."""
+    """Draw all fields of `Skin` that the profile section does not draw."""
     state, earlier_states = session.state, session.history.states
     for name in fields_under("", type(state.scene.skin)):
         if name == "rho_s":
@@ -147,7 +147,7 @@ def _plot_profile(session: Session) -> None:
 
 @lru_cache(maxsize=16)
 def _profile_layers(profile: str) -> tuple[TissueLayer, ...]:
-    """Return the tissue layers of a named profile, () if it is a sum of Gaussians; results are cached."""
+    """Return the tissue layers of a named profile, or () for a sum of Gaussians; the results are cached."""
     try:
         return tissue_layers(Skin(profile=profile))
     except (
@@ -167,23 +167,25 @@ def _draw_layers(session: Session, layers: Layers) -> None:
             imgui.tree_pop()
 
 
-def _draw_layer(session: Session, layers: Layers, index: int) -> None:
-    layer, label_suffix = layers[index], f"##{index + 1}"
+def _draw_layer(session: Session, layers: Layers, layer_index: int) -> None:
+    layer, label_suffix = layers[layer_index], f"##{layer_index + 1}"
 
     def make_state(**fields: object) -> ViewerState:
-        return _replace_layer(session, layers, index, validated_copy(layer, **fields))
+        return _replace_layer(session, layers, layer_index, validated_copy(layer, **fields))
 
     draw_fields(session, layer, make_state, LAYER_STYLES, suffix=label_suffix)
     imgui.text_disabled("red, green, blue [1/mm]")
     if len(layers) < MAX_LAYERS and draw_button(session, f"add above{label_suffix}"):
         copy = validated_copy(layer, thickness_mm=layer.thickness_mm or _NEW_LAYER_MM)
-        run_action(session, lambda: session.change(_replace_layer(session, layers, index, copy, layer)))
+        run_action(session, lambda: session.change(_replace_layer(session, layers, layer_index, copy, layer)))
     imgui.same_line()
     if len(layers) > 1 and draw_button(session, f"remove{label_suffix}"):
-        run_action(session, lambda: session.change(_replace_layer(session, layers, index)))
+        run_action(session, lambda: session.change(_replace_layer(session, layers, layer_index)))
 
 
-def _replace_layer(session: Session, layers: Layers, index: int, *new_layers: TissueLayer) -> ViewerState:
-    """Return the state in which one tissue layer is replaced by zero or more others."""
-    all_layers = (*layers[:index], *new_layers, *layers[index + 1 :])
+def _replace_layer(
+    session: Session, layers: Layers, layer_index: int, *new_layers: TissueLayer
+) -> ViewerState:
+    """Return the state in which one tissue layer is replaced by zero or more new layers."""
+    all_layers = (*layers[:layer_index], *new_layers, *layers[layer_index + 1 :])
     return session.state.with_skin(layers=[layer.model_dump() for layer in all_layers])

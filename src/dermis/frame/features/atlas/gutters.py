@@ -31,7 +31,7 @@ class GutterTracing:
     starts : buffer of the start of each path, for gutter_trace.wgsl
     sides : buffer of the triangle across each edge of each triangle, for gutter_trace.wgsl
     halvings : for each coarser resolution of the atlas, the buffers of gutter_halve.wgsl by name: they list
-        the finer gutter texels that each coarser one averages
+        the finer gutter texels that each coarser gutter texel averages
     """
 
     starts: Buffer
@@ -86,7 +86,7 @@ def _side_words(mesh: Mesh) -> Words:
 
 
 def _halving_buffers(device: Device, finer: AtlasTextures, coarser: AtlasTextures) -> Bindings:
-    """Upload, for each texel of the coarser gutter, the texels of the finer gutter that it averages."""
+    """Upload for each texel of the coarser gutter the list of finer gutter texels that it averages."""
     width = int(finer.gutter_texels.max()) + 1
 
     def texel_index(texels: NDArray[np.integer]) -> NDArray[np.int64]:

@@ -64,7 +64,7 @@ def draw_gutters(graph: Recorder, stage: str, atlas: AtlasTextures, light: Textu
 
 
 def draw_blend(graph: Recorder, first: LitAtlas, second: LitAtlas, target: Texture) -> None:
-    """Declare the pass that fades from the light of the first layout to that of the second near seams.
+    """Declare the pass that fades from the light of the first layout to the light of the second near seams.
 
     first, second : layouts with different seams; the second is shown only near the seams of the first
     target : texture for the result, as large as the atlas of the first layout

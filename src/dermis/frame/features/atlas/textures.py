@@ -48,9 +48,9 @@ class AtlasTextures:
         reach_map
     sheared : whether blurs account for an angle between the u and v directions that is not a right angle
     stretch_constants : pipeline constants of the stretch passes
-    stretch_sources : buffer of gutter texels and the surface points whose stretch they copy, None without
-        gutters
-    gutter, gutter_light : buffers of the gutter texels and of their light, None without gutters
+    stretch_sources : buffer of gutter texels and the surface points whose stretch they copy, None if there
+        are no gutters
+    gutter, gutter_light : buffers of the gutter texels and of their light, None if there are no gutters
     gutter_texels : (a, 2) gutter texels, x and y
     coarser : the atlas at half, a quarter, ... of the resolution; only for stitched layouts
     median_texels_per_mm : median over texels of the smaller density, along u or v, at rest [texels/mm]
@@ -112,10 +112,10 @@ def _rms_density(stretch: NDArray[np.float16]) -> float:
 def _median_density(stretch: NDArray[np.float16], inside: NDArray[np.bool_]) -> float:
     """Return the median over texels of the smaller of the densities along u and v [texels/mm].
 
-    inside : mask of the texels to count: those inside charts, gutters excluded
+    inside : mask of the texels to count: texels inside charts, gutters excluded
 
-    Non-negative half floats are ordered like their 16-bit patterns, so a histogram of these is faster than
-    sorting.
+    Non-negative half floats are ordered like their 16-bit patterns, and a histogram of the patterns is faster
+    than sorting.
     """
     words = stretch.view(np.uint16)
     counts = np.bincount(np.minimum(words[..., 0], words[..., 1])[inside], minlength=1 << 16)
@@ -148,7 +148,7 @@ def _upload_mip(
 
 
 def _stretch_sources(atlas: Atlas) -> NDArray[np.uint32]:
-    """Return (r, 3) words for stretch_beyond.wgsl: each gutter texel, and the surface point it copies.
+    """Return (r, 3) words for stretch_beyond.wgsl: gutter texels, and the surface points that they copy.
 
     The words are the packed texel, the triangle, and two packed barycentric weights.
     """
@@ -237,7 +237,7 @@ def _square_texels(image: NDArray[np.generic]) -> NDArray[np.generic]:
 def _halved_reach(reach: NDArray[np.uint16], measured: NDArray[np.bool_]) -> NDArray[np.uint16]:
     """Return the reach of each 2 x 2 square of texels, (n/2, n/2, 4) [squares].
 
-    It is the smallest reach of the texels of the square that are in a mask.
+    The reach of a square is the smallest reach of those of its texels that are in `measured`.
 
     reach : (n, n, 4) reach of each texel, see `AtlasMip` [texels]
     measured : (4, n/2, n/2) mask of texels, as split by `_square_texels`

@@ -53,8 +53,8 @@ def kernel_table() -> NDArray[np.float32]:
     w(n) is the weight of the tap n steps from the centre, so q = w(1) / w(0). Rows are variances in steps of
     1/64 step^2, columns are numbers of taps on each side of the centre.
 
-    Sampling and truncation reduce the variance of a Gaussian, most of all that of a narrow one. So q is
-    solved for each number of taps such that the kernel has the requested variance.
+    Sampling and truncation reduce the variance of a Gaussian, especially of a narrow Gaussian. Therefore q is
+    solved, for each number of taps, such that the kernel has the desired variance.
     """
     variance = np.arange(MAX_TABLE_VARIANCE * ROWS_PER_UNIT + 2)[:, None] / ROWS_PER_UNIT
     n = np.arange(_MAX_TAPS + 1)

@@ -129,7 +129,7 @@ def draw_entering(
 
     levels : pyramid whose level 0 holds all light that enters
     index : index of the atlas layout
-    profile_index : index of the profile among those besides the first
+    profile_index : index of the profile among all profiles but the first
     """
     entering, device, texel = mixture.entering[profile_index], graph.device, levels.texel
     shader = program(device, "diffusion/profile_entering.wgsl", (("OTHER", profile_index),), texel, texel)

@@ -24,8 +24,8 @@ class SkinProfiles:
     """Cache of the diffusion profiles of the last few skins.
 
     A fit that starts from a similar profile is several times faster. Skin described by pigments alone starts
-    from the published profile, so that results do not depend on the people rendered before. Skin with layers
-    or a structure of its own starts from the last fit of skin with as many layers.
+    from the published profile, so that results do not depend on the people rendered before. Skin that defines
+    its layers or its structure starts from the last fit of skin with as many layers.
     """
 
     def __init__(self) -> None:
@@ -33,11 +33,11 @@ class SkinProfiles:
         self._current: tuple[Skin, GaussianSum] | None = None
 
     def profile(self, skin: Skin) -> GaussianSum:
-        """Return the diffusion profile of a skin, or the first of those that a map blends.
+        """Return the diffusion profile of a skin, or the first of the profiles that a map blends.
 
         Profile files are read again when the skin changes, not for each frame of the same skin.
 
-        Raises DermisError if the skin has pigments or layers, but its profile is not one that can be computed
+        Raises DermisError if the skin has pigments or layers, but names a profile that cannot be computed
         from them.
         """
         if self._current is None or self._current[0] is not skin:

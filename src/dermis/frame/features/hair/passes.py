@@ -169,7 +169,8 @@ def _pixel_mm(view: UniformRecord, tables: StrandTables, height: int) -> float:
 def _max_segments_in_tile(tables: StrandTables, segments: int, pixel_mm: float) -> int:
     """Estimate the number of strand segments in a crowded tile of the picture.
 
-    The tile is assumed to hold all fine segments, and several times the mean number of coarse ones per tile.
+    The tile is assumed to hold all fine segments, and several times the mean number of coarse segments per
+    tile.
 
     segments : number of segments of all strands that are drawn
     pixel_mm : side of a pixel at the depth of the strands [mm]
@@ -185,8 +186,8 @@ def rows_per_invocation(device: Device, segments: int) -> int:
     segments : estimate of the largest number of segments in a tile
 
     On software adapters, an invocation without hair costs as much as one with hair, unless a loop skips its
-    pixels. They also end all loops of a shader after 65,535 iterations in total, which limits the rows.
-    Powers of two limit the number of shader variants.
+    pixels. Software adapters also end all loops of a shader after 65,535 iterations in total, which limits
+    the rows. Powers of two limit the number of shader variants.
     """
     if device.adapter.kind != "CPU":
         return 1

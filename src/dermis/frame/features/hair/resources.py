@@ -72,7 +72,7 @@ _GPU_DETAIL, _SOFTWARE_DETAIL = Detail(1 << 23, 10_000, 24, 0.6, 2.0), Detail(1 
 
 
 class StrandCounts(NamedTuple):
-    """Number of strands of one group, fine or coarse, and of the knots of each strand."""
+    """Number of strands of one group (fine or coarse), and number of knots of each strand."""
 
     hairs: int
     knots: int
@@ -82,7 +82,7 @@ class StrandCounts(NamedTuple):
         return (self.hairs if hairs is None else hairs) * self.knots
 
     def all_segments(self, hairs: int | None = None) -> int:
-        """Return the total number of segments between knots of the first `hairs` strands, or of all."""
+        """Return the number of segments between knots of the first `hairs` strands, or of all strands."""
         return (self.hairs if hairs is None else hairs) * (self.knots - 1)
 
 
@@ -180,7 +180,7 @@ def make_strand_picture(device: Device, capacity: StrandCapacity, size: tuple[in
 def chains_per_tile(device: Device, tiles: int) -> int:
     """Return the number of linked lists of segments per tile of the picture.
 
-    It is 1 on software adapters, and where a buffer cannot hold more.
+    The number is 1 on software adapters, and where a buffer cannot hold more lists.
 
     tiles : number of tiles of the picture
     """
@@ -396,7 +396,7 @@ def _knot_rows(strands: Strands) -> NDArray[np.float32]:
 
 
 def mean_skin_albedo(head: Head) -> tuple[float, ...]:
-    """Return the mean (3,) albedo of the colour map, or a default without one [-]."""
+    """Return the mean (3,) albedo of the colour map, or a default albedo if there is no map [-]."""
     colour = head.maps.mean_colour
     return (DEFAULT_COLOUR,) * 3 if colour is None else tuple(colour.tolist())
 

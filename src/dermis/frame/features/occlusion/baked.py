@@ -43,7 +43,7 @@ def bake_occlusion(
     Depth maps are drawn from directions all around. A point sums the directions in which it is visible. The
     first `side` rows are texels of the atlas, the other rows hold the vertices of the mesh.
 
-    bindings : resources of the lighting; those of the geometry and of the lights are replaced
+    bindings : resources of the lighting; the resources of geometry and lights are replaced
     texels : texture of the surface point of each atlas texel
     side : side of the atlas in the result [texels]
     directions : number of depth maps
@@ -104,7 +104,7 @@ def cached_occlusion_map(
 ) -> Texture:
     """Return a texture of the visible fraction of the sky at texels and vertices, baked or read from disk.
 
-    bindings : resources of the lighting; those of the geometry and of the lights are replaced
+    bindings : resources of the lighting; the resources of geometry and lights are replaced
     texels : texture of the surface point of each atlas texel
     """
     side = min(atlas.size, _MAX_SIDE)

@@ -44,7 +44,7 @@ class SkyViews(NamedTuple):
     views : matrices from world to clip space
     to_map : (k, 3, 4) matrices from points to column [texel], row [texel] and depth
     to_sky : (k, 3) unit vectors from the head to the viewpoint
-    steps_mm : (k, 2, 3) vectors from a texel to the next one on its right and to the one above [mm]
+    steps_mm : (k, 2, 3) vectors from a texel to the next texel on its right, and to the next texel above [mm]
     """
 
     views: Views
@@ -70,7 +70,7 @@ class RotationAnchors:
 def sky_views(outline: Outline, rotation: Floats) -> SkyViews:
     """Return orthographic views from directions all around, each as narrow as the shape allows.
 
-    rotation : (3, 3) rotation of the head, by which the view directions turn too
+    rotation : (3, 3) rotation of the head, which also rotates the view directions
     """
     axes = _view_axes() @ rotation.T
     local = (axes.reshape(-1, 3).astype(np.float32) @ outline.homogeneous[:3]).reshape(*axes.shape[:2], -1)
@@ -98,7 +98,7 @@ def _view_axes() -> Floats:
 
 
 def make_anchors(head: Head) -> RotationAnchors:
-    """Return anchors of a head, weighted by a Gaussian about its centre so that shoulders count little."""
+    """Return the anchors of a head, with Gaussian weights about its centre: shoulders count little."""
     rig = head.control
     points = np.unique(np.linspace(0, len(rig.positions_mm) - 1, _MAX_ANCHORS).astype(np.intp))
     positions = rig.positions_mm[points].astype(np.float64)
@@ -240,7 +240,7 @@ def _draw_vertices(
     """Declare the passes that compute the visible fraction of the sky at the vertices of a shape.
 
     record : uniform record of the views, from `sky_record`
-    resting : whether the shape is at rest, and the fractions are stored as those of the rest shape
+    resting : whether the shape is at rest, so that the fractions are stored as the fractions at rest
     """
     draw_layers(graph, "occlusion", sky.layers, views.views, sky.occluders.with_vertices_of(head))
     bindings: Bindings = {

@@ -39,7 +39,7 @@ _MAX_LIGHTS = 64  # as in visibility.wgsl
 
 @dataclass(frozen=True, eq=False)
 class LightOutputs:
-    """Resources for outputs of light and skin that are computed from data besides their `Planes`.
+    """Resources for outputs of light and skin, apart from the planes into which they are written.
 
     light_part_counts : number of parts into which the shader divides each light
     transmitted : textures of the light through thin parts: one per layout, and the blend of several layouts
@@ -160,7 +160,7 @@ def _shading_bindings(shader: ComputeProgram, inputs: StageInputs) -> MutableBin
 def _translucent_pairs(
     request: FrameRequest, translucency: Sequence[Translucency | None]
 ) -> PairBuffers | None:
-    """Return the translucent pairs of the first layout, None if no requested output depends on them."""
+    """Return the translucent pairs of the first layout, None if no requested output depends on pairs."""
     culprit = next((name for name in request.outputs if name in _TRANSLUCENCY_OUTPUTS), None)
     if culprit is None:
         return None

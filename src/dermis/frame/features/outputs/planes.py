@@ -83,7 +83,7 @@ def make_planes(
     stage : name of the shader that fills the planes
     channels : (name, number of channels) of each output
 
-    Raises DermisError if they do not fit in one buffer of the device.
+    Raises DermisError if the planes do not fit in one buffer of the device.
     """
     pixels, count = size[0] * size[1], max(1, sum(number for _, number in channels))
     if _WORD_BYTES * count * pixels > device.max_storage_bytes:
@@ -107,6 +107,6 @@ def stage_program(device: Device, planes: Planes, constants: Constants = ()) -> 
 def draw_planes(graph: Recorder, planes: Planes, shader: ComputeProgram, bindings: Bindings) -> None:
     """Declare the pass that computes the outputs of a stage for each pixel.
 
-    bindings : resources of the shader, apart from the planes themselves
+    bindings : resources of the shader, apart from the planes
     """
     graph.compute("outputs", shader, {**bindings, "planes": planes.buffer}, planes.size)

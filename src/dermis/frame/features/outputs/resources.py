@@ -23,7 +23,7 @@ class Resources:
 
     names : names of the outputs in the order of the request
     planes : buffers of the outputs, one for each stage
-    centres : triangle at the centre of each pixel; None where the only sample of a pixel is at its centre
+    centres : triangle at the centre of each pixel; None if the only sample of a pixel is at its centre
     previous : shape of the head in the previous scene, None without motion vectors
     light : resources for outputs of light and skin
     labels, landmarks : buffers of labels and landmarks, None if they are not requested

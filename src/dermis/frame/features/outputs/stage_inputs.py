@@ -41,7 +41,7 @@ class PictureDiffusion:
 
     layers : texture in which the shading stores the light below the skin
     diffuse : function that declares the passes; it returns textures of the diffused light and of the fraction
-        of it that leaves towards the camera
+        of this light that leaves towards the camera
     """
 
     layers: Texture

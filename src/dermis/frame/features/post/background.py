@@ -18,8 +18,8 @@ class Backdrop:
     """Textures of the background.
 
     result : texture of the picture with its background
-    panorama : unfiltered panorama for a sharp background, None to show the prefiltered one that lights the
-        skin
+    panorama : unfiltered panorama for a sharp background, None to show the prefiltered panorama that lights
+        the skin
     """
 
     result: Texture

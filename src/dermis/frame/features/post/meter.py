@@ -69,7 +69,7 @@ def draw(
 def exposure_input(device: Device, settings: Settings, meter: Meter | None) -> tuple[float, Buffer]:
     """Return the fixed exposure and the buffer of the metered exposure, the inputs of exposure.wgsl.
 
-    The fixed exposure is 0 where the metered one is used.
+    The fixed exposure is 0 if the metered exposure is used.
     """
     if settings.exposure == "auto":
         assert meter is not None

@@ -21,7 +21,7 @@ class Resources:
     """Resources of post-processing.
 
     meter : exposure meter, None for a fixed exposure
-    backdrop : textures of the background, None for a black or transparent one
+    backdrop : textures of the background, None for a black or transparent background
     bloom : textures of the bloom, None without bloom
     """
 
@@ -34,7 +34,7 @@ class Resources:
 def make(memo: Memo, device: Device, request: FrameRequest) -> Resources:
     """Return the resources of the requested post-processing.
 
-    Raises DermisError for a background that shows the environment of a scene without one.
+    Raises DermisError if the background shows the environment, but the scene has no environment.
     """
     settings, cached = request.settings, memo.get
     return Resources(
@@ -74,7 +74,7 @@ def draw(
 
 
 def _backdrop(memo: Memo, device: Device, request: FrameRequest) -> Backdrop | None:
-    """Return the textures of the background, None without one.
+    """Return the textures of the background, None for a black or transparent background.
 
     A sharp environment needs its unfiltered panorama.
     """

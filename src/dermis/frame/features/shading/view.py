@@ -53,7 +53,7 @@ class Pinhole(NamedTuple):
 class EyePoses(NamedTuple):
     """Poses of the modelled eyes of a head.
 
-    frames : (2, 4, 4) matrices from the space of the head to that of each eye
+    frames : (2, 4, 4) matrices from the space of the head to the space of each eye
     edges_mm : (2, r, 3) points along the edges of the lids around each eye [mm]; None where they are unknown,
         as for heads from files
     """

@@ -36,7 +36,7 @@ class ShadowMaps:
 def make_shadow_maps(device: Device, layers: int, size: int) -> ShadowMaps:
     """Allocate `layers` empty shadow maps of size x size texels.
 
-    Raises DermisError when they do not fit into memory.
+    Raises DermisError when the maps do not fit into memory.
     """
     needed = SHADOW_TEXEL_BYTES * layers * size**2
     check_memory(device, needed, "shadow_size", f"{layers} maps of {size} texels")

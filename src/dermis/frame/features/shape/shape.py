@@ -1,4 +1,4 @@
-"""Shape of a head on the device: control points, their motion, and the surface through them."""
+"""Shape of a head on the device: control points, their motion, and the surface through these points."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class ShapeTables:
     surface : vertices and triangles by their names in shape_vertices.wgsl
     control, points, vertices : numbers of control points, of points after subdivision, and of vertices
     targets, bones : numbers of morph targets and of bones
-    has_contacts : whether some points, such as those of the lids, are kept outside the eyeballs
+    has_contacts : whether some points, such as points of the lids, are kept outside the eyeballs
     """
 
     morphs: dict[str, Buffer]
@@ -99,7 +99,7 @@ def make_shape(device: Device, tables: ShapeTables, *, moves: bool = True) -> Sh
     """Create the buffers of a shape.
 
     tables : constant buffers of the head, from `shape_tables`
-    moves : False for a shape at rest, without the pass of morph targets and bones
+    moves : whether morph targets and bones move the shape; False for a shape at rest
     """
     rest, morphs, stencils = _point_buffer(device, tables.control), dict[str, Buffer](), dict[str, Buffer]()
     weights, matrices = (
@@ -182,8 +182,8 @@ def _bone_influences(skeleton: Skeleton | None, count: int) -> Words:
 def _contact_words(contact: LidContact | None, count: int) -> Words:
     """Return (p, 3) words that keep points outside the eyeballs, zeros for points without contact.
 
-    The words are the indices of the front and back point of the eyeball, and the least distance from it as
-    float bits [mm].
+    The words are the indices of the front and back point of the eyeball, and the least distance from the
+    eyeball as float bits [mm].
     """
     if contact is None:
         return np.zeros((1, 3), np.uint32)

@@ -77,7 +77,7 @@ def detail_bindings(device: Device, has_fine_relief: bool) -> MutableBindings:
 def _paint_maps(
     device: Device, head: Head, maps: PaintedMaps, use_colour: bool, paint_options: tuple[int, bool]
 ) -> tuple[MutableBindings, ExpressionMaps | None]:
-    """Paint the maps for which the head has no file; return them, and the maps that expressions change.
+    """Paint the maps for which the head has no file; return bindings, and the maps that expressions change.
 
     paint_options : side [texels], and whether expressions change the maps
     """
@@ -94,7 +94,7 @@ def _paint_maps(
 
 
 def _painted_surface(head: Head) -> PaintedSurface:
-    """Return the mesh over which skin is painted: the template's, which all its people share."""
+    """Return the mesh over which skin is painted: that of the template, which all its people share."""
     return painted_surface(head.topology.mesh, head.topology.control.stencils)
 
 

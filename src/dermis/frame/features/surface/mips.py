@@ -71,7 +71,7 @@ def upload_slopes(device: Device, image: Floats | None) -> Texture:
 def upload_detail(device: Device, slopes: Floats) -> Texture:
     """Upload the slopes of two tiling reliefs as one layer, and their squared lengths as a second layer.
 
-    slopes : (h, w, 4) slopes along u and v of the first relief, then of the second
+    slopes : (h, w, 4) slopes along u and v of the first relief, then of the second relief
     """
     squares = slopes * slopes
     sums = np.stack([squares[..., 0] + squares[..., 1], squares[..., 2] + squares[..., 3]], axis=-1)
@@ -170,7 +170,7 @@ def with_mip_views(texture: Texture) -> MippedTexture:
 
 
 def fill_mips(recorder: Recorder, mipped: MippedTexture, first: int = 1) -> None:
-    """Declare the passes that compute each mip level from the next finer one.
+    """Declare the passes that compute each mip level from the next finer mip level.
 
     first : index of the first level to compute
     """

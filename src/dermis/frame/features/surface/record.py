@@ -64,7 +64,7 @@ def fill_eye(record: UniformRecord, look: EyeLook) -> None:
 
 
 def surface_constants(skin: Skin) -> tuple[tuple[str, int], ...]:
-    """Return those pipeline constants of lobe.wgsl for a skin that differ from their default of 0."""
+    """Return the pipeline constants of lobe.wgsl for a skin, without constants that have the default 0."""
     numbers = {"MODEL": MODELS.names.index(lobe_name(skin)), "EXACT_FRESNEL": int(skin.fresnel == "exact")}
     return tuple((name, number) for name, number in numbers.items() if number)
 
@@ -74,7 +74,7 @@ def skin_record(
 ) -> UniformRecord:
     """Return the uniform record of the shader struct `Skin`.
 
-    Members with the name of a field or property of `Skin` are copied from it, the others are derived.
+    Members with the name of a field or property of `Skin` are copied from it, all other members are derived.
 
     light_count : number of lights, where each part of a divided light counts
     """
@@ -130,7 +130,7 @@ def _direction_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str
 
 
 def _relief_band(maps: Maps) -> float:
-    """Return the mip level of the height map that has the size of the normal map; -1 if there is none.
+    """Return the mip level of the height map that has the size of the normal map; -1 without such a level.
 
     Only relief finer than that level is taken from the height map and added to the normal map. With -1, all
     relief of the height map is added.

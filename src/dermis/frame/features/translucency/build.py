@@ -126,7 +126,7 @@ class PairCache:
         self._cache: dict[Cells, PairBuffers] = {}
 
     def find(self, cells: Cells) -> PairBuffers:
-        """Return the pairs for a division into cells; they are searched unless they are in the cache."""
+        """Return the pairs for a division into cells, from the cache or by a new search."""
         pairs = self._cache.pop(cells, None)
         if pairs is None:
             while len(self._cache) >= _CACHE_SIZE:

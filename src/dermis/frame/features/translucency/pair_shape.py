@@ -30,7 +30,7 @@ class StrainGauge:
         self._rest_lengths = self._lengths(self._rest_mm, self._pairs)
 
     def strain(self, positions_mm: Floats) -> float:
-        """Return the relative change that nine in ten lengths do not exceed [-].
+        """Return the relative change of length that nine in ten lengths do not exceed [-].
 
         positions_mm : (p, 3) control points of another shape [mm]
         """
@@ -44,11 +44,11 @@ class StrainGauge:
 
 
 def pair_positions_mm(memo: Memo, request: FrameRequest) -> Floats | None:
-    """Return the control points in which pairs are searched, None for those of the topology at rest [mm].
+    """Return the control points of the shape in which pairs are searched [mm], None for the head at rest.
 
     Pairs of the topology follow other shapes, such as the frames of a mesh sequence: only their weights
-    change. A shape that strains the surface by more than `MAX_STRAIN` has pairs of its own. People of one
-    template always share its pairs.
+    change. Pairs are searched separately for a shape that strains the surface by more than `MAX_STRAIN`.
+    People of one template always share the pairs of the template.
     """
     positions = request.rest_positions_mm
     if positions is None or request.is_shared:

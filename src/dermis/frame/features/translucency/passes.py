@@ -31,7 +31,7 @@ _MIN_SMOOTHNESS = 0.45  # least ratio of the deviation of the light that sources
 
 
 def make_buffer(device: Device, count: int, size: int = 4) -> Buffer:
-    """Allocate a buffer for `count` elements of `size` bytes, or for one, as a buffer cannot be empty."""
+    """Allocate a buffer for `count` elements of `size` bytes, but for at least one element."""
     return device.storage_buffer(size * max(1, count))
 
 
@@ -46,7 +46,7 @@ def draw_points(
 ) -> None:
     """Declare the pass that writes the current positions and normals of receivers or sources.
 
-    It also writes the area of sources, or the metric of receivers, which maps offsets in the atlas to
+    The pass also writes the area of sources, or the metric of receivers, which maps offsets in the atlas to
     lengths.
 
     role : "receiver" or "source"
@@ -65,7 +65,7 @@ def draw_points(
 def draw(
     graph: Recorder, levels: PyramidLevels, blur: Blur, thin_parts: Translucency, constants: Constants = ()
 ) -> Texture:
-    """Declare the passes that sum the light from all sources at each receiver; return its texture.
+    """Declare the passes that sum the light from all sources at each receiver; return the sums.
 
     levels, blur : blurred light over the atlas, which enters at the sources
     constants : pipeline constants that replace the defaults of translucency.wgsl
@@ -148,7 +148,7 @@ def sum_pairs(
 def draw_weights(graph: Recorder, thin_parts: Translucency) -> None:
     """Declare the passes that compute the weights of all pairs for the current shape.
 
-    They also sum the fraction of the blurred light that each receiver loses because its tissue is thin.
+    The passes also sum the fraction of the blurred light that each receiver loses because its tissue is thin.
     """
     pairs, cells = thin_parts.pairs, thin_parts.pairs.cells
     draw_points(graph, "receiver", thin_parts.surface, cells, pairs.receivers, thin_parts.receiver_points)

@@ -70,7 +70,7 @@ class ViewLayers:
 def make_layers(
     device: Device, size: tuple[int, int], count: int, *, triangles: bool, compute: bool | None = None
 ) -> ViewLayers:
-    """Allocate `count` layers of size (width, height); those too large for a buffer are rasterised.
+    """Allocate `count` layers of size (width, height); layers too large for a buffer are rasterised.
 
     triangles : whether the layers store triangle indices instead of depth
     compute : whether to use the compute pass instead of the rasteriser; None to choose by the adapter

@@ -1,9 +1,9 @@
 """Export to a web page with Babylon.js, which diffuses light in screen space.
 
-The formulas follow the shader subSurfaceScattering of babylonjs 9.28.0 and 9.34.0. A diffusion profile is
-set as a colour c. The samples lie on a spiral, with radii distributed by a Burley profile of width max(c).
-They are weighted by Burley's profile with S = c, whose width is 1/c in each channel. The shader confuses half
-a pixel with a pixel, so all widths are twice as large as metersPerUnit specifies.
+The formulas follow the shader subSurfaceScattering of babylonjs 9.28.0 and 9.34.0. A diffusion profile is set
+as a colour c. The samples lie on a spiral, with radii distributed by a Burley profile of width max(c). The
+samples are weighted by Burley's profile with S = c, whose width is 1/c in each channel. The shader confuses
+half a pixel with a pixel, so all widths are twice as large as metersPerUnit specifies.
 """
 
 from __future__ import annotations
@@ -55,18 +55,18 @@ class Babylon(EnginePage):
     }
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return a colour proportional to 1/d, and a scale that fits the sample positions.
+        """Return the profile's colour c and metersPerUnit for the fitted Burley widths d [mm].
 
-        The width of a channel is 1/c, and the sample positions follow a profile of width max(c), both times
-        2/metersPerUnit mm. With k = sqrt(d_min d_max), the colour k/d and metersPerUnit 2/k give each channel
-        its width d, and the sample positions the largest width.
+        The shader gives a channel the width 1/c, and distributes the samples by a profile of width max(c),
+        both in units of 2/metersPerUnit mm. With k = sqrt(d_min d_max), c = k/d and metersPerUnit = 2/k, each
+        channel has the width d, and the samples are distributed by the largest width.
         """
         d = fit_burley_width(subject.curve)
         k = float(np.sqrt(d.min() * d.max()))
         return _parameters(subject, k / d, WIDTH_ERROR / k)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the Burley widths in mm as the colour, and metersPerUnit 1 for the scene in metres."""
+        """Return the Burley widths [mm] as the colour, and metersPerUnit 1, as the scene is in metres."""
         return _parameters(subject, fit_burley_width(subject.curve), 1.0)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
@@ -75,7 +75,7 @@ class Babylon(EnginePage):
         return spiral_curve(profile, metres, subject.curve.energy)
 
     def library_elements(self, version: str) -> tuple[str, list[str]]:
-        """Return the library's script elements, and the sources that the page's policy must allow."""
+        """Return the library's script elements, and the script sources that the page's policy must allow."""
         files = self.library_files[version]
         if self.library_folder is None:
             return "\n".join(file.element for file in files), [file.url for file in files]
@@ -83,27 +83,32 @@ class Babylon(EnginePage):
         return "\n".join(f"<script>{text}</script>" for text in texts), [csp_hash(text) for text in texts]
 
 
-def _parameters(subject: Subject, profile: Floats, metres: float) -> Parameters:
+def _parameters(subject: Subject, profile_colour: Floats, meters_per_unit: float) -> Parameters:
     return (
-        Parameter(_PROFILE_NAME, flat_tuple(profile), "-", "inverse widths: smaller numbers diffuse farther"),
         Parameter(
-            _SCALE_NAME, metres, "m", "widths are 2 mm / (metersPerUnit colour), not a length of the scene"
+            _PROFILE_NAME, flat_tuple(profile_colour), "-", "inverse widths: smaller numbers diffuse farther"
+        ),
+        Parameter(
+            _SCALE_NAME,
+            meters_per_unit,
+            "m",
+            "widths are 2 mm / (metersPerUnit colour), not a length of the scene",
         ),
         *material_parameters(subject),
     )
 
 
-def spiral_samples(colour: ArrayLike, samples: int = SAMPLE_COUNT) -> tuple[Floats, Floats, Floats]:
+def spiral_samples(colour: ArrayLike, sample_count: int = SAMPLE_COUNT) -> tuple[Floats, Floats, Floats]:
     """Return radii (n,), angles (n,) [rad] and normalised weights (n, 3) of the shader's samples.
 
-    The radii are for metersPerUnit 1 and without the shader's width error: multiply them by `WIDTH_ERROR` /
-    metersPerUnit to get mm.
+    The radii are for metersPerUnit 1 and without the shader's width error: multiply the radii by
+    `WIDTH_ERROR` / metersPerUnit to get mm.
 
     colour : (3,) diffusion profile as Babylon.js defines it: inverse widths
     """
     s = np.asarray(colour, np.float64)
-    i = np.arange(samples)
-    radius, area = burley_radii((i + 0.5) / samples)
+    i = np.arange(sample_count)
+    radius, area = burley_radii((i + 0.5) / sample_count)
     width = float(s.max())
     r = width * radius[:, None]
     weight = s * (np.exp(-r * s / 3.0) + np.exp(-r * s)) * (area * width)[:, None]
@@ -111,9 +116,9 @@ def spiral_samples(colour: ArrayLike, samples: int = SAMPLE_COUNT) -> tuple[Floa
 
 
 def burley_radii(fraction: ArrayLike) -> tuple[Floats, Floats]:
-    """Return radii r within which given fractions of a Burley profile of width 1 lie, and 1 / (r p(r)).
+    """Return the radii r within which given fractions of a Burley profile of width 1 lie, and 1 / (r p(r)).
 
-    p(r) is the density of the light per radius; 1 / (r p(r)) is a factor of the weights of samples at r.
+    p(r) is the density of the light per radius. The weight of a sample at r is proportional to 1/(r p(r)).
     """
     u = 1.0 - np.asarray(fraction, np.float64)
     g = 1.0 + 4.0 * u * (2.0 * u + np.sqrt(1.0 + 4.0 * u * u))
@@ -122,15 +127,15 @@ def burley_radii(fraction: ArrayLike) -> tuple[Floats, Floats]:
     return 3.0 * np.log(c / (4.0 * u)), c**3 / (4.0 * u * (c * c + 16.0 * u * u))
 
 
-def spiral_curve(colour: ArrayLike, metres: float, energy: ArrayLike) -> CumulativeProfile:
+def spiral_curve(colour: ArrayLike, meters_per_unit: float, energy: ArrayLike) -> CumulativeProfile:
     """Return the cumulative profile of the shader's samples, averaged over all rotations of their spiral.
 
     colour : (3,) diffusion profile as Babylon.js defines it: inverse widths
-    metres : value of metersPerUnit
+    meters_per_unit : value of metersPerUnit
     energy : (3,) total energy of the profile [-]
     """
     radii, _, weight = spiral_samples(colour)
-    radii_mm = WIDTH_ERROR * radii / metres
+    radii_mm = WIDTH_ERROR * radii / meters_per_unit
     return CumulativeProfile.from_function(lambda r: (r[:, None] >= radii_mm).astype(float) @ weight, energy)
 
 

@@ -22,7 +22,7 @@ EXPORT: dict[str, Any] = {}
 
 
 def main(arguments: list[str]) -> None:
-    """Build the scene of this export, then save and render it as requested."""
+    """Build the scene of this export, then save and render the scene as the arguments request."""
     options = parse_options(arguments)
     check_version()
     if bpy.app.background:
@@ -51,7 +51,7 @@ def parse_options(arguments: list[str]) -> argparse.Namespace:
 
 
 def check_version() -> None:
-    """Stop if the parameters have another meaning in this version of Blender."""
+    """Exit with an error if the parameters have another meaning in the running version of Blender."""
     (first, end), version = EXPORT["versions"], bpy.app.version[:2]
     if version < tuple(first) or (end is not None and version >= tuple(end)):
         until = "" if end is None else f" and before {end[0]}.{end[1]}"
@@ -63,7 +63,7 @@ def check_version() -> None:
 
 
 def data_folder() -> Path:
-    """Return the folder of the files beside this script; Blender's text editor runs a copy without a path."""
+    """Return the folder of the head and panorama files, also if Blender's text editor runs the script."""
     texts = [Path(bpy.path.abspath(text.filepath)) for text in bpy.data.texts if text.filepath]
     folders = [Path(__file__).resolve().parent, *(file.parent for file in texts)]
     name = EXPORT["head"] or EXPORT["world"].get("panorama")
@@ -71,14 +71,14 @@ def data_folder() -> Path:
 
 
 def set_units(scene: Any) -> None:
-    """Set the scene's name and its unit, the metre."""
+    """Set the name of the scene, and its unit of length to the metre."""
     scene.name = EXPORT["name"]
     scene.unit_settings.system = "METRIC"
     scene.unit_settings.scale_length = 1.0
 
 
 def place_head() -> None:
-    """Import the head's .glb beside this script and set its skin material, or add a ball if there is none."""
+    """Import the exported head and set the head's skin material; if no head was exported, add a ball."""
     if EXPORT["head"] is None:
         add_ball(EXPORT["ball_m"])
         return
@@ -120,7 +120,12 @@ def make_skin() -> Any:
 
 
 def set_skin(shader: Any) -> None:
-    """Set subsurface scattering and specular strength, and convert the roughness to GGX; maps are kept."""
+    """Set the exported inputs of a Principled BSDF node, and convert the roughness from Beckmann to GGX.
+
+    If a roughness map is connected, the map is multiplied by the factor of this conversion.
+
+    shader : Principled BSDF node
+    """
     if EXPORT["method"] != "EEVEE":
         shader.subsurface_method = EXPORT["method"]
     for name, value in EXPORT["inputs"].items():
@@ -147,7 +152,7 @@ def set_render(scene: Any) -> None:
 
 
 def save_and_render(options: argparse.Namespace) -> None:
-    """Save and render the scene as requested."""
+    """Save and render the scene as the options request."""
     scene = bpy.context.scene
     if scene.render.engine == "CYCLES":
         cycles = scene.cycles

@@ -1,4 +1,4 @@
-"""Files of an export to Blender: a Python script with the head as .glb beside it, or a .blend.
+"""Files of an export to Blender: a Python script with a .glb file of the head, or a .blend file.
 
 Scenes are in metres with Z up.
 """
@@ -32,7 +32,7 @@ from dermis.scene.settings import Settings
 
 Floats = NDArray[np.float64]
 VersionRange = tuple[list[int], list[int] | None]
-"""First version for which the parameters are valid, and first later one for which they are not, or None."""
+"""First version of Blender with valid parameters, and first later version with invalid parameters or None."""
 SCRIPT_FILE, HEAD_FILE, PANORAMA_FILE = "skin.py", "head.glb", "panorama.npy"
 """Names of the files in an output folder."""
 METRES_PER_MM = 1e-3
@@ -60,8 +60,9 @@ _MAIN_GUARD = 'if __name__ == "__main__":'
 def write_scene(
     subject: Subject, parameters: Parameters, output: Path, method: str, versions: VersionRange
 ) -> list[Path]:
-    """Write a subject as a script or .blend, as `Target.write` does, and return the paths of all files.
+    """Write a subject as a Python script or a .blend file, and return the paths of all written files.
 
+    output : path that `Target.write` receives
     method : subsurface method of the Principled BSDF, or "EEVEE"
     versions : versions of Blender for which the parameters are valid, see `VersionRange`
     """
@@ -99,15 +100,18 @@ def _describe_skin(
     }
 
 
-def _write_script_files(subject: Subject, skin: SceneDict, script: Path, head: str) -> list[Path]:
-    """Write the script, and the head and panorama that it reads beside it; return all paths."""
+def _write_script_files(subject: Subject, skin: SceneDict, script: Path, head_name: str) -> list[Path]:
+    """Write the script, and beside it the files of the head and the panorama; return all written paths.
+
+    head_name : name of the file of the head
+    """
     files, scene = [script], subject.scene
     if scene is None:
         scene_dict, panorama = describe_scene(_ball_scene(subject.head_or_ball), np.zeros(3))
     else:
         scene_dict, panorama = describe_scene(scene, scene.head.centre_mm)
-        scene_dict["head"] = head
-        files.append(script.with_name(head))
+        scene_dict["head"] = head_name
+        files.append(script.with_name(head_name))
         files[-1].write_bytes(_encode_head(subject, scene))
     if panorama is not None:
         files.append(script.with_name(PANORAMA_FILE))
@@ -128,7 +132,7 @@ def _encode_head(subject: Subject, scene: Scene) -> bytes:
 
 
 def skin_slots(head: Head) -> list[int]:
-    """Return the indices of skin materials in the .glb, which omits materials that no triangle uses."""
+    """Return the indices of the skin materials in the .glb, where materials without triangles are omitted."""
     used = np.unique(head.mesh.material)
     return [slot for slot, kind in enumerate(used) if head.mesh.materials[kind].kind == "skin"]
 
@@ -138,7 +142,7 @@ def script_text(export: Mapping[str, object]) -> str:
 
     Texts are written as literals, so that a name cannot inject code.
 
-    export : numbers, texts, and nested lists and dictionaries of them
+    export : numbers, texts, and nested lists and dictionaries of numbers and texts
     """
     text = Path(__file__).with_name("blender_script.py").read_text(encoding="utf-8")
     source = (Path(*truths.__path__) / "cycles_script.py").read_text(encoding="utf-8")
@@ -162,7 +166,7 @@ def _ball_scene(ball: Head) -> Scene:
 
 
 def describe_scene(scene: Scene, centre_mm: ArrayLike) -> tuple[SceneDict, NDArray[np.float32] | None]:
-    """Return the lights, camera and world for the script, and the panorama of the environment or None.
+    """Return the lights, camera and world for the script, and the environment's panorama if there is one.
 
     centre_mm : (3,) point that becomes the origin of the exported scene [mm]
 
@@ -181,14 +185,20 @@ def describe_scene(scene: Scene, centre_mm: ArrayLike) -> tuple[SceneDict, NDArr
 
 
 def _convert_transform(to_world: ArrayLike, centre: Floats) -> list[list[float]]:
-    """Convert a transformation from Y up in mm to Blender's coordinates: Z up, in metres."""
+    """Convert a transformation from Y up, with lengths in `UNIT_MM`, to Blender's Z up, in metres.
+
+    centre : (3,) position of the input's origin in the exported scene, with Y up [m]
+    """
     matrix = np.array(to_world, np.float64)
     matrix[:3, 3] = matrix[:3, 3] * _UNIT_M + centre
     return [[float(value) for value in row] for row in _Y_UP_TO_Z_UP @ matrix]
 
 
 def _convert_lamp(lamp: SceneDict, centre: Floats) -> SceneDict:
-    """Convert the description of a lamp from Y up in mm to Blender's coordinates: Z up, in metres."""
+    """Convert the description of a lamp from Y up, with lengths in `UNIT_MM`, to Blender's Z up, in metres.
+
+    centre : (3,) position of the input's origin in the exported scene, with Y up [m]
+    """
     fields = dict(lamp["set"])
     fields |= {name: fields[name] * _UNIT_M for name in _LAMP_LENGTH_FIELDS if name in fields}
     if lamp["type"] != "SUN":

@@ -1,6 +1,6 @@
 """Export to Blender: formulas and profiles of the subsurface methods of Cycles and EEVEE.
 
-They follow the kernel source of Blender 4.5, 5.0 and 5.2, which is part of each release.
+The formulas follow the source of the kernels in the releases 4.5, 5.0 and 5.2 of Blender.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ _METRES_PER_MM = 1e-3
 _4_PI = 4.0 * np.pi
 JENSEN_DMFP_MM = 3.67, 1.37, 0.68
 """Diffuse mean free paths of skin1 in [Jensen2001], widely used as the radii of skin [mm]."""
-_FIRST_VERSION = 4, 5
-_MFP_VERSION = 5, 2  # first version in which the radius of a random walk is a mean free path
+_FIRST_SUPPORTED_VERSION = 4, 5
+_FIRST_MFP_VERSION = 5, 2  # first version in which the radius of a random walk is a mean free path
 _INFINITE_RADIUS = 1e9
 
 
@@ -53,7 +53,7 @@ def burley_cdf(radius: ArrayLike) -> Floats:
 
 
 def burley_shape_factor(colour: ArrayLike) -> Floats:
-    """Return Burley's factor s(A) (3,); EEVEE divides the radius by it to get the profile's width [-].
+    """Return Burley's factor s(A) (3,); in EEVEE, the profile's width is the radius divided by s(A) [-].
 
     colour : (3,) base colour; A is the colour divided by its brightest channel
 
@@ -81,12 +81,12 @@ def hulst_albedo(colour: ArrayLike) -> Floats:
 
 
 def skin_path_ratio(colour: ArrayLike, eta: float) -> Floats:
-    """Return the ratio of mean free path to radius in the method RANDOM_WALK_SKIN of Cycles [-].
+    """Return the ratio of mean free path to subsurface radius in Cycles' method RANDOM_WALK_SKIN [-].
 
-    Cycles interprets the radius as a diffuse mean free path. It chooses the albedo for which the reflectance
-    of a dipole equals the colour.
+    Cycles interprets the radius as a diffuse mean free path. Cycles derives the single-scattering albedo from
+    the base colour: the albedo at which the diffuse reflectance of a dipole equals the colour.
 
-    colour : base colour
+    colour : base colour [-]
     eta : value of Subsurface IOR
 
     Source: [Jensen2001].
@@ -117,32 +117,35 @@ def walk_cdf(radius: ArrayLike, albedo: float, entry: WalkEntry) -> Floats:
     entry : direction in which light enters: "straight" for RANDOM_WALK, "skin" for RANDOM_WALK_SKIN
     """
     walk_albedo = max(albedo, MIN_ALBEDO)
-    radii, within = _interpolate_walk_table(round(walk_albedo, 7), entry)
+    radii, fraction_within = _interpolate_walk_table(round(walk_albedo, 7), entry)
     r = np.asarray(radius, np.float64)
-    fraction = np.interp(np.log(np.maximum(r, 1e-12)), np.log(radii), within)
+    fraction = np.interp(np.log(np.maximum(r, 1e-12)), np.log(radii), fraction_within)
     near = np.minimum(r / radii[0], 1.0)  # linear in the radius below the first tabulated one
     return np.asarray(albedo / walk_albedo * fraction * near)
 
 
 @cache
 def _interpolate_walk_table(albedo: float, entry: WalkEntry) -> tuple[Floats, Floats]:
-    """Return radii [mean free paths] and the fraction of light within each [-], for one albedo.
+    """Return radii [mean free paths] and the fraction of light within each radius [-], for one albedo.
 
     The tabulated random walks are interpolated to this albedo, and to radii that are eight times as dense.
     """
     from scipy.interpolate import PchipInterpolator
 
-    roots, radii, within = _load_walk_table()[entry]
-    fraction = PchipInterpolator(roots, within, axis=0)(np.clip(np.sqrt(1.0 - albedo), roots[0], roots[-1]))
+    roots, radii, fraction_within = _load_walk_table()[entry]
+    fraction = PchipInterpolator(roots, fraction_within, axis=0)(
+        np.clip(np.sqrt(1.0 - albedo), roots[0], roots[-1])
+    )
     fine = np.geomspace(radii[0], radii[-1], 8 * len(radii))
     return fine, np.asarray(PchipInterpolator(np.log(radii), fraction)(np.log(fine)))
 
 
 @cache
 def _load_walk_table() -> dict[WalkEntry, tuple[Floats, Floats, Floats]]:
-    """Return Cycles' random walks by direction of entry: sqrt(1 - albedo), radii, and light fractions.
+    """Return the tables of Cycles' random walks, one for each direction in which light enters.
 
-    Their shapes are (n,), (m,) [mean free paths] and (n, m) [-].
+    A table consists of sqrt(1 - albedo) (n,) [-], radii (m,) [mean free paths], and the fraction of light
+    that leaves within each radius (n, m) [-].
     """
     by_entry: dict[str, list[list[float]]] = {}
     for row in read_rows(__package__, "cycles_walk"):
@@ -167,12 +170,15 @@ class RandomWalk(NamedTuple):
     entry: WalkEntry
 
     def cdf(self, radius: Floats) -> Floats:
-        """Return the fraction of the returned light within radii [mean free paths]."""
+        """Return the fraction of the emerging light within given radii [-].
+
+        radius : radii [mean free paths]
+        """
         return walk_cdf(radius, self.albedo, self.entry) / self.total
 
     @property
     def total(self) -> float:
-        """Return the light that leaves along the normal, per incident light."""
+        """Return the light that leaves the skin along the normal, per incident light [-]."""
         return float(walk_cdf(np.array([_INFINITE_RADIUS]), self.albedo, self.entry)[0])
 
 
@@ -209,14 +215,14 @@ class Blender(Target):
         lengths = np.maximum(metres / _METRES_PER_MM * self._unit_lengths(subject, version), 1e-9)
         units = self._unit_cdfs(subject, version)
 
-        def within(r: Floats) -> Floats:
+        def fraction_within(r: Floats) -> Floats:
             return np.stack([unit(r / length) for unit, length in zip(units, lengths, strict=True)], axis=-1)
 
         energy = subject.curve.energy * self._energy_ratio(subject, version)
-        return CumulativeProfile.from_function(within, energy)
+        return CumulativeProfile.from_function(fraction_within, energy)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
-        """Write the Python script with the head and maps that it reads, or the .blend that the script saves.
+        """Write the Python script and its head and maps, or the .blend file that the script saves.
 
         Raises DermisError for a .blend if DERMIS_BLENDER_PYTHON does not name a Python with bpy.
         """
@@ -226,15 +232,21 @@ class Blender(Target):
     def _valid_versions(self, version: str) -> VersionRange:
         """Return the range of versions for which the parameters are valid, see `VersionRange`."""
         if self.variant != "random-walk":
-            return list(_FIRST_VERSION), None
-        return (list(_MFP_VERSION), None) if _is_mfp(version) else (list(_FIRST_VERSION), list(_MFP_VERSION))
+            return list(_FIRST_SUPPORTED_VERSION), None
+        return (
+            (list(_FIRST_MFP_VERSION), None)
+            if _radius_is_mfp(version)
+            else (list(_FIRST_SUPPORTED_VERSION), list(_FIRST_MFP_VERSION))
+        )
 
-    def _parameters(self, radius: tuple[float, ...], version: str) -> Parameters:
+    def _parameters(self, subsurface_radius: tuple[float, ...], version: str) -> Parameters:
         method = self.variant.replace("-", "_").upper()
         parameters = [
             Parameter("Subsurface Method", method, "-", "of the Principled BSDF"),
             Parameter("Subsurface Weight", 1.0, "-", "fraction of the diffuse light that is scattered"),
-            Parameter(_RADIUS_NAME, radius, "mm, times the scale", self._radius_description(version)),
+            Parameter(
+                _RADIUS_NAME, subsurface_radius, "mm, times the scale", self._radius_description(version)
+            ),
             Parameter(_SCALE_NAME, _METRES_PER_MM, "m", "metres per millimetre"),
             Parameter("IOR", SKIN_ETA, "-", "of the surface, for reflection and the start of random walks"),
         ]
@@ -245,7 +257,7 @@ class Blender(Target):
         return tuple(parameters)
 
     def _radius_description(self, version: str) -> str:
-        walk = "the mean free path" if _is_mfp(version) else "4 pi mean free paths"
+        walk = "the mean free path" if _radius_is_mfp(version) else "4 pi mean free paths"
         return {
             "random-walk": walk,
             "random-walk-skin": "the diffuse mean free path",
@@ -254,9 +266,9 @@ class Blender(Target):
         }[self.variant]
 
     def _unit_lengths(self, subject: Subject, version: str) -> Floats:
-        """Return the Burley width or mean free path (3,) that Blender derives from a radius of 1."""
+        """Return the Burley width or mean free path (3,) that results from a subsurface radius of 1."""
         if self.variant == "random-walk":
-            return np.full(3, 1.0 if _is_mfp(version) else 1.0 / _4_PI)
+            return np.full(3, 1.0 if _radius_is_mfp(version) else 1.0 / _4_PI)
         if self.variant == "random-walk-skin":
             return skin_path_ratio(subject.clipped_albedo(), SKIN_ETA)
         factor = burley_shape_factor(subject.clipped_albedo()) if self.variant == "eevee" else 1.0
@@ -264,27 +276,27 @@ class Blender(Target):
 
     def _random_walks(self, subject: Subject, version: str) -> list[RandomWalk]:
         plain = self.variant == "random-walk"
-        albedo = hulst_albedo if plain and _is_mfp(version) else legacy_albedo
+        albedo = hulst_albedo if plain and _radius_is_mfp(version) else legacy_albedo
         albedos = albedo(subject.clipped_albedo())
         return [RandomWalk(float(one), "straight" if plain else "skin") for one in albedos]
 
     def _unit_cdfs(self, subject: Subject, version: str) -> list[Cdf]:
-        """Return each channel's cumulative profile as a function of r/d or r/(mean free path)."""
+        """Return each channel's cumulative profile, a function of the radius in units of `_unit_lengths`."""
         if self.variant in ("burley", "eevee"):
             return [burley_cdf] * 3
         return [walk.cdf for walk in self._random_walks(subject, version)]
 
     def _energy_ratio(self, subject: Subject, version: str) -> Floats:
-        """Return the light (3,) that leaves along the normal, divided by the base colour."""
+        """Return the light (3,) that leaves the skin along the normal, divided by the base colour [-]."""
         if self.variant in ("burley", "eevee"):
             return np.ones(3)
         total = np.array([walk.total for walk in self._random_walks(subject, version)])
         return total / np.maximum(subject.albedo, 1e-6)
 
 
-def _is_mfp(version: str) -> bool:
-    """Return whether this version of Blender treats the radius of a random walk as a mean free path."""
-    return tuple(map(int, version.split("."))) >= _MFP_VERSION
+def _radius_is_mfp(version: str) -> bool:
+    """Return whether a version of Blender interprets the radius of a random walk as a mean free path."""
+    return tuple(map(int, version.split("."))) >= _FIRST_MFP_VERSION
 
 
 TARGET = Blender()

@@ -21,10 +21,10 @@ _TABLE_STEPS = 1024
 
 
 def encode_glb(subject: Subject, extensions: Extensions, draft: str) -> bytes:
-    """Return the .glb of the head, or of a ball, with its eyes, hairs, morph targets and bones.
+    """Return the head with eyes, hairs, morph targets and bones, or a ball for a skin without head, as .glb.
 
     extensions : JSON of each extension of the skin's material, by name
-    draft : name of an extension that is not ratified, to mark it in the file; "" for none
+    draft : notice that an extension is a draft, to be stored in the file; "" if all extensions are ratified
     """
     head = subject.head_or_ball
     notes: dict[str, object] = {"draft": draft} if draft else {}
@@ -43,9 +43,10 @@ def encode_glb(subject: Subject, extensions: Extensions, draft: str) -> bytes:
 
 
 def _skin_additions(subject: Subject, head: Head, extensions: Extensions, draft: str) -> SkinAdditions:
-    """Return the skin material's extensions and uniform colour, and a map of multiscatter colours if needed.
+    """Return the skin material's extensions, uniform colour and, if needed, map of multiscatter colours.
 
-    The draft extension needs this map for a head with a colour map; it replaces the multiscatter factor.
+    The draft extension needs such a map for a head with a colour map: the map replaces the uniform
+    multiscatter colour.
     """
     if not draft:
         colour = {"baseColorFactor": [*(float(x) for x in subject.albedo), 1.0]}

@@ -54,7 +54,7 @@ class Gltf(Target):
         return _scatter_parameters(fit_volume(subject.curve, subject.albedo))
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the skin's colour for all colours, and light's mean exit radius as attenuation distance."""
+        """Return the skin's colour for all colours, and the mean exit radius as attenuation distance."""
         if self.variant == TRANSMISSION_VARIANT:
             return _diffuse_parameters(subject, _NAIVE_TRANSMISSION, subject.albedo)
         radius_m = 1e-3 * float(2.5 * fit_burley_width(subject.curve).max())
@@ -69,7 +69,7 @@ class Gltf(Target):
         return subject.rescale_energy(volume_curve(_parameter_volume(parameters)))
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
-        """Write a .glb file whose skin material has the extensions as optional ones."""
+        """Write a .glb file whose skin material has the extensions; programs may ignore the extensions."""
         extensions: dict[str, dict[str, ParameterValue | list[float]]] = {
             "KHR_materials_ior": {"ior": SKIN_ETA}
         }
@@ -105,11 +105,13 @@ def _scatter_parameters(volume: Volume) -> Parameters:
     )
 
 
-def _diffuse_parameters(subject: Subject, factor: float, colour: Floats) -> Parameters:
-    """Return the parameters of the variant that transmits without scattering.
+def _diffuse_parameters(
+    subject: Subject, transmitted_fraction: float, transmitted_colour: Floats
+) -> Parameters:
+    """Return the parameters of the variant "diffuse-transmission", in which light is not scattered.
 
-    factor : fraction of the diffuse light that is transmitted [-]
-    colour : (3,) colour of the transmitted light
+    transmitted_fraction : fraction of the diffuse light that is transmitted [-]
+    transmitted_colour : (3,) colour of the transmitted light
     """
     return (
         Parameter(
@@ -120,19 +122,21 @@ def _diffuse_parameters(subject: Subject, factor: float, colour: Floats) -> Para
         ),
         Parameter(
             _TRANSMISSION_FACTOR_NAME,
-            float(factor),
+            float(transmitted_fraction),
             "-",
             f"transmitted fraction at {_EAR_THICKNESS_MM:g} mm, as of an ear",
         ),
-        Parameter(_TRANSMISSION_COLOUR_NAME, flat_tuple(colour), "-", "colour of the transmitted light"),
+        Parameter(
+            _TRANSMISSION_COLOUR_NAME, flat_tuple(transmitted_colour), "-", "colour of the transmitted light"
+        ),
         _IOR_PARAMETER,
     )
 
 
 def _ear_transmission(subject: Subject) -> tuple[float, Floats]:
-    """Return the fraction [-] and the colour (3,) of the light that leaves an ear on its far face.
+    """Return the fraction [-] and the colour (3,) of the light that leaves an ear on the far face.
 
-    The fraction is relative to the light that leaves on both faces.
+    The fraction is relative to the light that leaves the ear on both faces.
 
     Source: [ChristensenBurley2015], integrated over a plane at the depth of the far face.
     """

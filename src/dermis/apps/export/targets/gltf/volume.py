@@ -35,7 +35,9 @@ class Volume(NamedTuple):
 
 
 def volume_from_paths(mean_free_path_mm: ArrayLike, multiscatter: ArrayLike) -> Volume:
-    """Return the volume with given mean free paths (3,) [mm]; its distance is the longest of them.
+    """Return the volume with given mean free paths; the attenuation distance is the longest mean free path.
+
+    mean_free_path_mm : (3,) mean free paths [mm]
 
     multiscatter : (3,) multiscatter colour [-]
     """

@@ -24,8 +24,8 @@ _SUBDIVISIONS = 4  # segments per edge
 def skin_meshes(backend: XmlBackend, head: Head) -> dict[str, bytes]:
     """Return the skin's surfaces as PLY files by shape name, relative to the head's centre [mm].
 
-    "skin" has normals and uv, and "caps" closes its openings. "upper" and "upper_caps" are slightly outside;
-    they are the outer layer of the index-matched surface.
+    "skin" has normals and uv, and "caps" closes the openings of "skin". "upper" and "upper_caps" lie slightly
+    outside "skin" and "caps", and are the outer layer of the index-matched surface.
 
     Raises DermisError if the skin does not enclose a volume.
     """
@@ -48,7 +48,7 @@ def skin_meshes(backend: XmlBackend, head: Head) -> dict[str, bytes]:
 
 
 class SubdividedTriangles(NamedTuple):
-    """Triangles of a mesh, each divided evenly into smaller ones.
+    """Triangles of a mesh, each divided evenly into smaller triangles.
 
     triangle : (n,) index of the original triangle that contains each new vertex
     weights : (n, 3) barycentric weights of each new vertex in that original triangle
@@ -60,17 +60,21 @@ class SubdividedTriangles(NamedTuple):
     corners: NDArray[np.int64]
 
 
-def subdivide_triangles(triangles: NDArray[np.integer], n: int = _SUBDIVISIONS) -> SubdividedTriangles:
-    """Divide each triangle into n^2 smaller ones, without sharing vertices between original triangles.
+def subdivide_triangles(triangles: NDArray[np.integer], segments: int = _SUBDIVISIONS) -> SubdividedTriangles:
+    """Divide each triangle into segments^2 smaller triangles; different original triangles share no vertices.
 
     triangles : (t,) indices of the original triangles
-    n : number of segments per edge
+    segments : number of segments per edge
     """
-    grid = [(i, j) for i in range(n + 1) for j in range(n + 1 - i)]
+    grid = [(i, j) for i in range(segments + 1) for j in range(segments + 1 - i)]
     at = {point: index for index, point in enumerate(grid)}
-    upward = [(at[i, j], at[i + 1, j], at[i, j + 1]) for i in range(n) for j in range(n - i)]
-    downward = [(at[i + 1, j], at[i + 1, j + 1], at[i, j + 1]) for i in range(n) for j in range(n - i - 1)]
-    second, third = np.array(grid, np.float64).T / n
+    upward = [(at[i, j], at[i + 1, j], at[i, j + 1]) for i in range(segments) for j in range(segments - i)]
+    downward = [
+        (at[i + 1, j], at[i + 1, j + 1], at[i, j + 1])
+        for i in range(segments)
+        for j in range(segments - i - 1)
+    ]
+    second, third = np.array(grid, np.float64).T / segments
     weights = np.stack([1.0 - second - third, second, third], axis=1)
     first = len(grid) * np.arange(len(triangles))[:, None, None]
     corners = (first + np.array(upward + downward)).reshape(-1, 3)
@@ -79,11 +83,12 @@ def subdivide_triangles(triangles: NDArray[np.integer], n: int = _SUBDIVISIONS) 
 
 
 def coloured_meshes(renderer: Renderer, scene: Scene, materials: Iterable[int]) -> dict[int, bytes]:
-    """Return a PLY file for each given material by its index, relative to the head's centre [mm].
+    """Return a PLY file with the triangles of each material, relative to the head's centre [mm].
 
-    Triangles are subdivided and have a colour per vertex instead of maps.
+    The triangles are subdivided and have a colour per vertex instead of maps. The files are keyed by material
+    index.
 
-    materials : material indices
+    materials : indices of the materials
     """
     mesh = scene.head.mesh
     parts = {k: subdivide_triangles(np.flatnonzero(mesh.material == k)) for k in materials}

@@ -57,11 +57,11 @@ class SkinAppearance(NamedTuple):
     roughness : Beckmann m, a number or a map (n, n)
     transmittance : (n, n, 3) map by which a refracting surface scales light on entry and again on exit; None
         for uniform skin
-    dimming : (n, n) fraction of the leaving light that an index-matched surface absorbs; None for uniform
+    dimming : (n, n) fraction of the emerging light that an index-matched surface absorbs; None for uniform
         skin
-    opaque : PLY file of each other material, by material index
-    pictured : roles of the pictures of a material, by material index, for materials with pictures
-    pictures : PNG files by role
+    opaque : PLY file of each material except skin, by material index
+    pictured : roles of a material's pictures, by material index; materials without pictures are absent
+    pictures : PNG files of the pictures that all materials share, by role
     """
 
     media: Mapping[Boundary, IsotropicMedium]
@@ -95,8 +95,8 @@ def scene_files(
         yield f"boundary_{each}.xml", xml.scene_document(_skin_elements(backend, each, appearance, meshes))
     yield from ((f"meshes/{name}.ply", content) for name, content in meshes.items())
     for index, content in appearance.opaque.items():
-        yield _opaque_file(index), content
-    yield from ((_part_file(role), content) for role, content in appearance.pictures.items())
+        yield _opaque_mesh_file(index), content
+    yield from ((_part_picture_file(role), content) for role, content in appearance.pictures.items())
     if appearance.transmittance is not None and appearance.dimming is not None:
         yield "textures/passing.exr", encode_map_exr("passing", appearance.transmittance)
         yield "textures/held_back.exr", encode_map_exr("held_back", appearance.dimming)
@@ -107,7 +107,7 @@ def scene_files(
 
 
 def medium_description(medium: IsotropicMedium) -> SceneDict:
-    """Return Mitsuba's description of a homogeneous medium [mm], with the largest extinction as its scale."""
+    """Return Mitsuba's description of a homogeneous medium [mm]; the scale is the largest extinction."""
     extinction = np.asarray(medium.sigma_t)
     return {
         "type": "homogeneous",
@@ -140,17 +140,17 @@ def surface_description(
     return {"type": "roughdielectric", "id": "skin_surface", **facets, **refraction}
 
 
-def _lower_surface(dimmed: bool) -> SceneDict:
+def _lower_surface(has_dimming: bool) -> SceneDict:
     """Return Mitsuba's description of the inner layer of an index-matched surface.
 
     This layer absorbs part of the light that leaves the skin, where the skin is darker than its medium.
 
-    dimmed : whether the skin has a texture of the absorbed fraction
+    has_dimming : whether the skin has a texture of the absorbed fraction
     """
-    if not dimmed:
+    if not has_dimming:
         return {"type": "null", "id": "skin_below"}
     black = {"type": "diffuse", "reflectance": mitsuba_rgb((0.0, 0.0, 0.0))}
-    return {"type": "mask", "opacity": _texture("held_back"), "bsdf": black, "id": "skin_below"}
+    return {"type": "mask", "opacity": _exr_texture("held_back"), "bsdf": black, "id": "skin_below"}
 
 
 def _scene_elements(
@@ -158,15 +158,15 @@ def _scene_elements(
     scene: Scene,
     appearance: SkinAppearance,
     boundary: Boundary,
-    picture: tuple[int, int, int],
+    size_and_samples: tuple[int, int, int],
 ) -> list[ET.Element]:
-    """Return the XML elements of camera, lights and other materials, and the inclusion of the skin's file.
+    """Return the XML elements of the scene without skin, and the element that includes the skin's XML file.
 
     boundary : surface model of the skin that is included by default
-    picture : width and height [pixel], and samples per pixel
+    size_and_samples : width and height of the picture [pixel], and samples per pixel
     """
-    sizes = zip(("width", "height", "samples"), map(str, picture), strict=True)
-    sensor = mitsuba_sensor(backend, scene.camera, picture[:2])
+    sizes = zip(("width", "height", "samples"), map(str, size_and_samples), strict=True)
+    sensor = mitsuba_sensor(backend, scene.camera, size_and_samples[:2])
     sensor["film"] |= {"width": xml.Override("integer", "width"), "height": xml.Override("integer", "height")}
     sensor["sampler"]["sample_count"] = xml.Override("integer", "samples")
     # Spectral multiple importance sampling, as extinction differs between channels.
@@ -179,12 +179,12 @@ def _scene_elements(
     colour = {"type": "mesh_attribute", "name": "vertex_color"}
     opaque = {"type": "principled", "roughness": _OPAQUE_ROUGHNESS, "eta": SKIN_ETA, "base_color": colour}
     for role in appearance.pictures:
-        texture = {"type": "bitmap", "id": _part_texture(role).name, "filename": _part_file(role)}
+        texture = {"type": "bitmap", "id": _part_texture(role).name, "filename": _part_picture_file(role)}
         parts.append({**texture, "raw": role != "colour", "wrap_mode": "clamp"})
     for index in appearance.opaque:
         roles = appearance.pictured.get(index)
         bsdf = opaque if roles is None else _part_surface(roles)
-        parts.append({"type": "ply", "filename": _opaque_file(index), "bsdf": bsdf})
+        parts.append({"type": "ply", "filename": _opaque_mesh_file(index), "bsdf": bsdf})
     defaults = [xml.default_element(*one) for one in (("boundary", boundary), *sizes)]
     elements = [xml.object_element(part, "", backend) for part in parts]
     return [*defaults, *elements, xml.include_element("boundary_$boundary.xml")]
@@ -197,8 +197,8 @@ def _skin_elements(
 
     meshes : PLY files of the skin's surfaces by shape name
     """
-    roughness = appearance.roughness if isinstance(appearance.roughness, float) else _texture("roughness")
-    transmittance = None if appearance.transmittance is None else _texture("passing")
+    roughness = appearance.roughness if isinstance(appearance.roughness, float) else _exr_texture("roughness")
+    transmittance = None if appearance.transmittance is None else _exr_texture("passing")
     parts = [
         medium_description(appearance.media[boundary]),
         surface_description(boundary, transmittance, roughness),
@@ -216,7 +216,10 @@ def _skin_elements(
 
 
 def _part_surface(roles: set[PartRole]) -> SceneDict:
-    """Return Mitsuba's description of the surface of a part that is not skin, with pictures."""
+    """Return Mitsuba's description of a surface that is not skin and has pictures.
+
+    roles : roles of these pictures
+    """
     bsdf: SceneDict = {"type": "principled", "eta": _PART_IOR, "roughness": _OPAQUE_ROUGHNESS}
     bsdf |= {name: _part_texture(role) for role, name in _PART_INPUTS.items() if role in roles}
     if "normal" in roles:
@@ -229,13 +232,13 @@ def _part_texture(role: PartRole) -> xml.Ref:
     return xml.Ref(f"parts_{role}")
 
 
-def _part_file(role: PartRole) -> str:
+def _part_picture_file(role: PartRole) -> str:
     return f"textures/{_part_texture(role).name}.png"
 
 
-def _opaque_file(index: int) -> str:
-    return f"meshes/material_{index}.ply"
+def _opaque_mesh_file(material_index: int) -> str:
+    return f"meshes/material_{material_index}.ply"
 
 
-def _texture(name: str) -> SceneDict:
-    return {"type": "bitmap", "filename": f"textures/{name}.exr", "raw": True}
+def _exr_texture(file_stem: str) -> SceneDict:
+    return {"type": "bitmap", "filename": f"textures/{file_stem}.exr", "raw": True}

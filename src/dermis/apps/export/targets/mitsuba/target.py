@@ -109,12 +109,12 @@ class Mitsuba(Target):
         curve = half_space(_half_space_kind(boundary), albedo, 1.0 / sigma)
         matched = boundary == "matched"
         energy = half_space("walk", albedo, np.ones(3)).energy if matched else curve.energy
-        factor = subject.curve.energy * _boundary_factor(boundary)
+        factor = subject.curve.energy * _boundary_transmittance(boundary)
         mean = np.maximum(skin_colours(subject).mean, 1e-9)
         return curve.with_energy(factor * energy * transmittance / mean)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
-        """Write the scene with one XML file for each surface model, and its meshes and textures."""
+        """Write the scene with one XML file for each surface model, and with meshes and textures."""
         colours, scene = skin_colours(subject), subject.scene or Scene(subject.head_or_ball)
         media = {each: fit_medium(subject.curve, colours, each) for each in BOUNDARIES}
         pictured = _pictured_parts(subject)
@@ -139,7 +139,7 @@ def fit_medium(curve: CumulativeProfile, colours: SkinColours, boundary: Boundar
     curve : reference profile
     boundary : surface model of the skin
     """
-    energy = colours.medium_colour(boundary) / _boundary_factor(boundary)
+    energy = colours.medium_colour(boundary) / _boundary_transmittance(boundary)
     if boundary == "matched":
         energy = half_space("matched", tabulated_albedo("walk", energy), np.ones(3)).energy
     medium = fit_homogeneous_medium(curve, energy, _half_space_kind(boundary))
@@ -150,13 +150,13 @@ def _half_space_kind(boundary: Boundary) -> HalfSpaceKind:
     return "matched" if boundary == "matched" else "skin"
 
 
-def _boundary_factor(boundary: Boundary) -> float:
+def _boundary_transmittance(boundary: Boundary) -> float:
     """Return the fraction of light that a matched surface transmits, or 1 for a refracting surface [-]."""
     return 1.0 - MATCHED_REFLECTANCE if boundary == "matched" else 1.0
 
 
 def _pictured_parts(subject: Subject) -> dict[int, set[PartRole]]:
-    """Return the roles of each part's pictures by material index, except eyes with their own geometry."""
+    """Return the roles of each part's pictures by material index, without the materials of eyeballs."""
     head, pictures = subject.head_or_ball, subject.part_pictures
     if pictures is None:
         return {}
@@ -165,26 +165,30 @@ def _pictured_parts(subject: Subject) -> dict[int, set[PartRole]]:
     return {k: part_roles for k, part_roles in roles.items() if part_roles}
 
 
-def _opaque_meshes(scene: Scene, adapter: str, pictured: Container[int]) -> dict[int, bytes]:
+def _opaque_meshes(scene: Scene, adapter: str, picture_materials: Container[int]) -> dict[int, bytes]:
     """Return a PLY file for each of the head's materials except skin, by material index.
 
-    pictured : indices of the materials with pictures
+    picture_materials : indices of the materials with pictures; files of other materials have vertex colours
     """
     mesh, centre = scene.head.mesh, scene.head.centre_mm
     opaque = [k for k in np.unique(mesh.material).tolist() if mesh.materials[k].kind != "skin"]
-    meshes = {k: mesh_ply(mesh, mesh.material == k, centre, v_up=False) for k in opaque if k in pictured}
+    meshes = {
+        k: mesh_ply(mesh, mesh.material == k, centre, v_up=False) for k in opaque if k in picture_materials
+    }
     if len(meshes) == len(opaque):
         return meshes
     from dermis.apps.export.targets.mitsuba.meshes import coloured_meshes
     from dermis.frame.renderer import Renderer
 
-    coloured = [k for k in opaque if k not in pictured]
+    coloured = [k for k in opaque if k not in picture_materials]
     return meshes | coloured_meshes(Renderer(adapter), scene, coloured)
 
 
 @dataclass(frozen=True, eq=False)
 class SkinColours:
-    """Colours of a skin: the medium gets the brightest one, and textures dim it to the others.
+    """Mean and brightest colour of a skin.
+
+    The medium has the brightest colour, and textures darken this colour to the colours of the skin's map.
 
     mean, brightest : (3,) mean and brightest colour, linear Rec. 709; equal for uniform skin
     lightness_ratio : luminance of the lightest texels relative to the mean [-]
@@ -229,9 +233,9 @@ def mean_roughness(subject: Subject) -> float:
 
 
 def skin_textures(subject: Subject, colours: SkinColours) -> tuple[float | Map, Map | None, Map | None]:
-    """Return the skin's roughness, transmittance for refracting surfaces, and dimming for matched ones.
+    """Return the roughness, transmittance and dimming of the skin, see `SkinAppearance`.
 
-    Roughness is a number without a roughness map; the other two are None without a colour map.
+    Without a roughness map, roughness is a number. Without a colour map, transmittance and dimming are None.
     """
     roughness: float | Map = mean_roughness(subject)
     maps = None if subject.head is None else subject.head.maps

@@ -33,15 +33,15 @@ _KIND_BY_PLUGIN = {plugin: kind for kind, plugins in _PLUGINS_BY_KIND.items() fo
 
 
 class Transform:
-    """Affine transformation, composed as in Mitsuba: each call adds a step that is applied first."""
+    """Affine transformation, composed as in Mitsuba: each method prepends another transformation."""
 
     def __init__(self, matrix: ArrayLike | None = None) -> None:
         self.matrix = np.eye(4) if matrix is None else np.asarray(matrix, np.float64).reshape(4, 4)
 
     def look_at(self, origin: ArrayLike, target: ArrayLike, up: ArrayLike) -> Transform:
-        """Return this transformation, preceded by one that moves a camera to `origin`.
+        """Return this transformation, preceded by a transformation that moves a camera to `origin`.
 
-        The camera's +Z points towards `target`.
+        The +Z axis of the camera then points towards `target`.
         """
         forward = _normalise(np.subtract(target, origin))
         left = _normalise(np.cross(np.asarray(up, np.float64), forward))
@@ -66,9 +66,9 @@ class Bitmap:
 
 @dataclass
 class XmlBackend:
-    """Substitute for the module `mitsuba` in functions that describe scenes, so that they need no Mitsuba.
+    """Substitute for the module `mitsuba`, with which functions describe scenes without Mitsuba installed.
 
-    bitmaps : images found so far, in the order in which they are written
+    bitmaps : images of the elements converted so far, in the order in which the images are written
     """
 
     bitmaps: list[NDArray[np.float32]] = field(default_factory=list)
@@ -100,7 +100,7 @@ def object_element(description: Mapping[str, object], name: str, backend: XmlBac
     """Return the XML element of an object described by a dictionary.
 
     description : properties of the object; "type" is the plugin
-    name : name of the object in its parent; "" for none
+    name : name of the object in the parent element; "" for an object without a name
     backend : collector of the images that the description contains
     """
     plugin = str(description["type"])

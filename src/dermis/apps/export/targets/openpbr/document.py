@@ -21,7 +21,7 @@ from dermis.base.errors import refuse
 def build_document(definitions: Sequence[OpenPbrMaterial], shader: str, prefix: str) -> MaterialX.Document:
     """Return a validated MaterialX document of materials; lengths are in metres, colours linear Rec. 709.
 
-    shader : node category of the surfaces, `OPEN_PBR` or `STANDARD_SURFACE`
+    shader : MaterialX node category of the surface shaders, `OPEN_PBR` or `STANDARD_SURFACE`
     prefix : prefix of the file names of the maps beside the document
     """
     document = MaterialX.createDocument()
@@ -66,17 +66,17 @@ def _add_material(
         material.setAttribute("uiname", definition.name)
 
 
-def _add_map(graph: MaterialX.NodeGraph, role: str, file: str, shader: str) -> MaterialX.Output:
+def _add_map(graph: MaterialX.NodeGraph, role: str, map_path: str, shader: str) -> MaterialX.Output:
     """Add the nodes that read a map file to a graph, and return their output.
 
-    role : role of the map, such as "colour", which sets its type and colour space
-    file : path of the map
-    shader : node category of the surface
+    role : role of the map, such as "colour", which determines the type and colour space of the map's node
+    map_path : path of the map
+    shader : MaterialX node category of the surface shaders
     """
     map_type = MAP_TYPES[role]
     output_type = map_type.type
     image = graph.addNode("image", f"{role}_image", map_type.type)
-    filename = image.setInputValue("file", file, "filename")
+    filename = image.setInputValue("file", map_path, "filename")
     if map_type.space:
         filename.setColorSpace(map_type.space)
     last_node = image

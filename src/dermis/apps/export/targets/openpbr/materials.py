@@ -75,12 +75,13 @@ def input_name(shader: str, name: str) -> str:
     """Return the name that an input of OpenPBR has in a shader.
 
     shader : `OPEN_PBR` or `STANDARD_SURFACE`
+    name : name of the input in OpenPBR
     """
     return name if shader == OPEN_PBR else _STANDARD_SURFACE_NAMES[name]
 
 
 class MapType(NamedTuple):
-    """Type and colour space of a map in MaterialX, and its colour space in UsdPreviewSurface."""
+    """Type and colour space of a map in MaterialX, and colour space of the map in UsdPreviewSurface."""
 
     type: str
     space: str
@@ -106,7 +107,7 @@ MAP_TYPES: Mapping[str, MapType] = {
 class OpenPbrMaterial:
     """OpenPBR material: values of its inputs, and the maps that set other inputs.
 
-    name : any text
+    name : name of the material; any text
     values : value of each input without a map; lengths in metres
     maps : role of the map of each input with a map, such as "colour"
     """
@@ -181,7 +182,7 @@ def eye_material(name: str) -> OpenPbrMaterial:
 
 
 def hair_material(absorption: Floats, radius_mm: float) -> OpenPbrMaterial:
-    """Return the OpenPBR material of hairs: an opaque surface of their mean colour.
+    """Return the OpenPBR material of hairs: an opaque surface with the mean colour of the hairs.
 
     absorption : (n, 3) absorption coefficient inside the hairs [1/mm]
     radius_mm : radius of the hairs [mm]
@@ -216,13 +217,13 @@ def map_arrays(maps: Maps, skin: Skin, slopes: Floats | None = None) -> dict[str
 def encode_map_files(arrays: Mapping[str, Floats]) -> dict[str, bytes]:
     """Return maps as 8-bit PNG files by role."""
     with ThreadPoolExecutor() as pool:  # compression releases the interpreter lock
-        return dict(zip(arrays, pool.map(_png, arrays, arrays.values()), strict=True))
+        return dict(zip(arrays, pool.map(_encode_map_png, arrays, arrays.values()), strict=True))
 
 
-def _png(role: str, values: Floats) -> bytes:
+def _encode_map_png(role: str, texels: Floats) -> bytes:
     if role in ("colour", "eye"):
-        return encode_png(encode_srgb8(values))
-    levels = np.rint(np.clip(values, 0.0, 1.0) * 255).astype(np.uint8)
+        return encode_png(encode_srgb8(texels))
+    levels = np.rint(np.clip(texels, 0.0, 1.0) * 255).astype(np.uint8)
     return encode_png(levels if levels.ndim == 3 else levels[..., None])
 
 
@@ -268,11 +269,11 @@ def mesh_materials(subject: Subject, mfp_mm: Doubles, roles: Iterable[str]) -> d
     colour, known_roles = flat_tuple(subject.clipped_albedo()), list(roles)
     mesh, parts = subject.head_or_ball.mesh, subject.part_pictures
 
-    def definition(material: Material) -> OpenPbrMaterial:
+    def material_definition(material: Material) -> OpenPbrMaterial:
         if parts is not None and material.has_maps:
             return part_material(material, parts)
         if material.kind != "skin":
             return opaque_material(material)
         return skin_material(material.name, subject.skin, (red, green, blue), colour, known_roles)
 
-    return {index: definition(mesh.materials[index]) for index in np.unique(mesh.material).tolist()}
+    return {index: material_definition(mesh.materials[index]) for index in np.unique(mesh.material).tolist()}

@@ -1,7 +1,7 @@
 """Export to OpenPBR and Standard Surface as a MaterialX document, with the maps of a head beside it.
 
-OpenPBR interprets the radius as the mean free path of a random walk through an index-matched medium,
-independent of its phase function. The parameters are fitted so that such a walk has the skin's profile.
+OpenPBR interprets the radius as the mean free path of a random walk through an index-matched medium, for any
+phase function of this medium. The parameters are fitted so that the random walk has the skin's profile.
 """
 
 from __future__ import annotations
@@ -154,8 +154,8 @@ def fitted_mean_free_path_mm(subject: Subject) -> Floats:
 def published_mean_free_path_mm(subject: Subject) -> Floats:
     """Return the diffuse mean free paths (3,) of the tissue by the dipole model [mm].
 
-    They are 1 / sigma_tr of the lowest layer, [Jensen2001]. If its coefficients are not given for RGB, the
-    widths of the closest Burley profiles are returned instead.
+    A diffuse mean free path is 1 / sigma_tr of the lowest layer, [Jensen2001]. If the coefficients of this
+    layer are not given for RGB, the widths of the closest Burley profiles are returned instead.
     """
     layer = lowest_layer(subject)
     if layer is None:
@@ -174,8 +174,8 @@ def lowest_layer(subject: Subject) -> Layer | None:
 def walk_curve(colour: Floats, mfp_mm: Floats, subject: Subject) -> CumulativeProfile:
     """Return the cumulative profile of a random walk whose albedo is derived from the base colour.
 
-    The albedo is given by van de Hulst's formula. The energy is set by `Subject.rescale_energy`, so that it
-    includes the error of this formula.
+    The albedo is given by van de Hulst's formula. `Subject.rescale_energy` sets the energy of the profile,
+    which therefore includes the error of this formula.
 
     colour : (3,) base colour
     mfp_mm : (3,) mean free paths [mm]

@@ -30,7 +30,7 @@ _CDN_URL = "https://cdn.jsdelivr.net/npm"
 _MAX_SCRIPT_BYTES = 32 << 20
 _METRES_PER_MM = 1e-3
 _SHADOW_MAP_SIDE = 2048
-_WARM_FRAMES = 4  # frames until all shaders are compiled
+_WARM_UP_FRAMES = 4  # frames until all shaders are compiled
 _LOAD_ERROR = "{} could not be loaded from {}. Check the network, or export again with --library."
 _TEXTURE_POLICY = "img-src blob: data:; connect-src blob: data:"  # for textures in the head's file
 _PAGE_FOLDER = Path(__file__).parent
@@ -38,9 +38,10 @@ _PAGE_FOLDER = Path(__file__).parent
 
 @dataclass(frozen=True)
 class LibraryFile:
-    """JavaScript file of an npm package, with the hash by which it is checked.
+    """JavaScript file of an npm package, with a hash by which the content of the file is checked.
 
-    package, version, path : name and version of the package, and path of the file in it
+    package, version : name and version of the package
+    path : path of the file within the package
     sha384 : SHA-384 of the file, in base64
     name : name by which modules of the page import the file; "" for a script without imports
     """
@@ -114,7 +115,7 @@ class EnginePage(Target):
             script=escape_script(script),
             policy=_TEXTURE_POLICY,
             sources=sources,
-            settings=html_safe_json(self._settings(subject, parameters, version)),
+            settings=html_safe_json(self._page_settings(subject, parameters, version)),
             head=base64.b64encode(encode_glb(subject, {"KHR_materials_ior": {"ior": SKIN_ETA}}, "")).decode(),
             libraries=libraries,
         )
@@ -123,9 +124,9 @@ class EnginePage(Target):
 
     @abstractmethod
     def library_elements(self, version: str) -> tuple[str, list[str]]:
-        """Return the HTML that loads or embeds the library, and sources that the page's policy must allow."""
+        """Return the library's HTML elements, and the script sources that the page's policy must allow."""
 
-    def _settings(self, subject: Subject, parameters: Parameters, version: str) -> Json:
+    def _page_settings(self, subject: Subject, parameters: Parameters, version: str) -> Json:
         scene = subject.scene or Scene(subject.head_or_ball)
         centre_mm = scene.head.centre_mm if subject.scene else (0.0, 0.0, 0.0)  # of the ball
         return {
@@ -133,7 +134,7 @@ class EnginePage(Target):
             "lights": [page_light(light) for light in scene.lights],
             "skin": {one.name.rpartition(".")[2]: one.value for one in parameters},
             "shadow_side": _SHADOW_MAP_SIDE,
-            "warm_frames": _WARM_FRAMES,
+            "warm_frames": _WARM_UP_FRAMES,
             "smooth": True,
             "no_library": _LOAD_ERROR.format(self.title, self.library_files[version][0].url),
         }

@@ -1,4 +1,4 @@
-"""HTML files with embedded scripts and styles, and a Content-Security-Policy that allows no others."""
+"""HTML files with embedded scripts and styles, and a Content-Security-Policy that forbids further ones."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ def render_page(
 
     title, note : plain texts, which are escaped
     script : script from `escape_script`
-    policy : Content-Security-Policy directives other than those of scripts and styles
-    sources : allowed sources of other scripts, as in a Content-Security-Policy
+    policy : directives of the Content-Security-Policy except script-src and style-src
+    sources : sources that script-src allows in addition to the embedded script
     fields : HTML or data of the template's other placeholders, by name
     """
     style = (folder / "page.css").read_text("utf-8")

@@ -31,20 +31,20 @@ PICTURE_SIDE, SAMPLES_PER_PIXEL = 1024, 256
 _MAX_BOUNCES = 100
 
 
-def directive(word: str, kind: str, parameters: DirectiveParameters | None = None) -> str:
+def directive(directive_name: str, implementation: str, parameters: DirectiveParameters | None = None) -> str:
     """Return a directive of a scene file, such as `Material "subsurface" "float eta" [ 1.4 ]`.
 
-    word : first word of the directive, such as "Material"
-    kind : pbrt's name of the implementation, such as "subsurface"
+    directive_name : first word of the directive, such as "Material"
+    implementation : pbrt's name of the implementation, such as "subsurface"
     parameters : values by type and name, such as "float eta": text, texts, Boolean, number or numbers
     """
-    texts = [f'"{key}" [ {_text(value)} ]' for key, value in (parameters or {}).items()]
-    return " ".join([word, f'"{kind}"', *texts])
+    texts = [f'"{key}" [ {_format_value(value)} ]' for key, value in (parameters or {}).items()]
+    return " ".join([directive_name, f'"{implementation}"', *texts])
 
 
-def _text(value: ArrayLike | Sequence[str]) -> str:
+def _format_value(value: ArrayLike | Sequence[str]) -> str:
     if isinstance(value, list) and isinstance(value[0], str):
-        return " ".join(map(_text, value))
+        return " ".join(map(_format_value, value))
     if isinstance(value, str):
         return '"' + value.replace("\\", "_").replace('"', "_") + '"'
     if isinstance(value, bool):
@@ -52,22 +52,22 @@ def _text(value: ArrayLike | Sequence[str]) -> str:
     return " ".join(f"{number:.7g}" for number in np.ravel(np.asarray(value)).tolist())
 
 
-def camera_lines(camera: Camera, file: str) -> Lines:
-    """Return the directives of camera, film and integrator, which precede the directive WorldBegin.
+def camera_lines(camera: Camera, picture_name: str) -> Lines:
+    """Return the directives of camera, film and integrator, to be written before the directive WorldBegin.
 
-    file : name of the image that pbrt writes
+    picture_name : name of the picture file that pbrt writes
     """
     vectors = np.concatenate([camera.position, camera.target, camera.up])
     half, shift = camera.window(1.0)
     screen = [(end + shift[axis]) * half[axis] for axis in (0, 1) for end in (-1.0, 1.0)]
     film: DirectiveParameters = {
-        "string filename": file,
+        "string filename": picture_name,
         "integer xresolution": PICTURE_SIDE,
         "integer yresolution": PICTURE_SIDE,
     }
     return [
         "Scale -1 1 1  # pbrt's coordinates are left-handed",
-        f"LookAt {_text(vectors)}",
+        f"LookAt {_format_value(vectors)}",
         directive("Camera", "perspective", {"float fov": 90.0, "float screenwindow": screen}),
         directive("Sampler", "zsobol", {"integer pixelsamples": SAMPLES_PER_PIXEL}),
         directive("Integrator", "volpath", {"integer maxdepth": _MAX_BOUNCES}),
@@ -76,10 +76,10 @@ def camera_lines(camera: Camera, file: str) -> Lines:
 
 
 def light_lines(lights: Iterable[Light], environment: Environment | None) -> Lines:
-    """Return the directives of lights and environment; those that pbrt lacks are omitted with a warning."""
+    """Return the directives of lights and environment; lights that pbrt lacks are omitted with a warning."""
     lines = Lines()
     for number, light in enumerate(supported_lights(lights, PBRT_LIGHTS, "pbrt"), start=1):
-        if PBRT_LIGHTS[light.kind] is _unsupported:
+        if PBRT_LIGHTS[light.kind] is _omit_unsupported_light:
             notify(f"pbrt has no {light.kind} light, so light {number} is omitted")
             continue
         lines += ["AttributeBegin", *PBRT_LIGHTS[light.kind](light), "AttributeEnd"]
@@ -90,27 +90,31 @@ def light_lines(lights: Iterable[Light], environment: Environment | None) -> Lin
     return lines
 
 
-def _distance(light: PointLight) -> float:
+def _light_distance_mm(light: PointLight) -> float:
     return float(np.linalg.norm(np.subtract(light.target, light.position)))
 
 
-def _intensity(light: PointLight) -> NDArray[np.float64]:
-    return np.asarray(np.multiply(light.irradiance, _distance(light) ** 2))
+def _point_light_intensity(light: PointLight) -> NDArray[np.float64]:
+    return np.asarray(np.multiply(light.irradiance, _light_distance_mm(light) ** 2))
 
 
-def _point(light: PointLight) -> Lines:
-    return [directive("LightSource", "point", {"point3 from": light.position, "rgb I": _intensity(light)})]
+def _point_light(light: PointLight) -> Lines:
+    return [
+        directive(
+            "LightSource", "point", {"point3 from": light.position, "rgb I": _point_light_intensity(light)}
+        )
+    ]
 
 
-def _spot(light: SpotLight) -> Lines:
+def _spot_light(light: SpotLight) -> Lines:
     cone = {"float coneangle": light.outer_degrees}
     cone["float conedeltaangle"] = light.outer_degrees - light.inner_degrees
     axis = {"point3 from": light.position, "point3 to": light.target}
-    return [directive("LightSource", "spot", {**axis, "rgb I": _intensity(light), **cone})]
+    return [directive("LightSource", "spot", {**axis, "rgb I": _point_light_intensity(light), **cone})]
 
 
-def _rectangle(light: RectangleLight) -> Lines:
-    forward = np.subtract(light.target, light.position) / _distance(light)
+def _rectangle_light(light: RectangleLight) -> Lines:
+    forward = np.subtract(light.target, light.position) / _light_distance_mm(light)
     across = np.cross(forward, (0.0, 1.0, 0.0))
     if np.linalg.norm(across) < 1e-6:
         across = np.array([1.0, 0.0, 0.0])
@@ -119,7 +123,7 @@ def _rectangle(light: RectangleLight) -> Lines:
     # The order of the sides makes the normal point to the target.
     first, second = -0.5 * light.width_mm * across, 0.5 * light.height_mm * above
     corners = [np.add(light.position, a * first + b * second) for b in (-1, 1) for a in (-1, 1)]
-    unit_irradiance = facing_irradiance(light.width_mm, light.height_mm, _distance(light))
+    unit_irradiance = facing_irradiance(light.width_mm, light.height_mm, _light_distance_mm(light))
     radiance = np.divide(light.irradiance, unit_irradiance)
     return [
         directive("AreaLightSource", "diffuse", {"rgb L": radiance}),
@@ -127,33 +131,33 @@ def _rectangle(light: RectangleLight) -> Lines:
     ]
 
 
-def _sphere(light: SphereLight) -> Lines:
-    radiance = np.divide(light.irradiance, np.pi * (light.radius_mm / _distance(light)) ** 2)
+def _sphere_light(light: SphereLight) -> Lines:
+    radiance = np.divide(light.irradiance, np.pi * (light.radius_mm / _light_distance_mm(light)) ** 2)
     return [
-        f"Translate {_text(light.position)}",
+        f"Translate {_format_value(light.position)}",
         directive("AreaLightSource", "diffuse", {"rgb L": radiance}),
         directive("Shape", "sphere", {"float radius": light.radius_mm}),
     ]
 
 
-def _directional(light: DirectionalLight) -> Lines:
+def _directional_light(light: DirectionalLight) -> Lines:
     points = {"point3 from": (0.0, 0.0, 0.0), "point3 to": light.direction}
     return [directive("LightSource", "distant", {**points, "rgb L": light.irradiance})]
 
 
-def _unsupported(light: StripeLight) -> Lines:
+def _omit_unsupported_light(light: StripeLight) -> Lines:
     return []
 
 
 PBRT_LIGHTS: Registry[Callable[[Any], Lines]] = Registry(
     "light of pbrt",
     {
-        "point": _point,
-        "spot": _spot,
-        "rectangle": _rectangle,
-        "sphere": _sphere,
-        "directional": _directional,
-        "stripe": _unsupported,
+        "point": _point_light,
+        "spot": _spot_light,
+        "rectangle": _rectangle_light,
+        "sphere": _sphere_light,
+        "directional": _directional_light,
+        "stripe": _omit_unsupported_light,
     },
 )
 """Functions that return the directives of a light, by its kind."""

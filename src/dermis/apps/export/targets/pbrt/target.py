@@ -1,4 +1,4 @@
-"""Export to pbrt: its subsurface material, fitted with pbrt's own table of photon beam diffusion."""
+"""Export to pbrt, whose subsurface material is fitted with pbrt's own table of photon beam diffusion."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ _RELATIVE_BALL_DISTANCE, _RELATIVE_BALL_FRAME = (
 
 
 class DiffusionTable(NamedTuple):
-    """Radial profiles of pbrt's subsurface material, by albedo, at one index of refraction.
+    """Radial profiles of pbrt's subsurface material for a range of albedos, at one index of refraction.
 
     albedo : (n,) single-scattering albedos
     radius : (m,) radii [mean free paths]
@@ -77,8 +77,8 @@ class DiffusionTable(NamedTuple):
         row = np.interp(reflectance, self.reflectance, np.arange(_ALBEDO_COUNT))
         low = int(min(row, _ALBEDO_COUNT - 2))
         first, second = self.reflectance_within[low : low + 2]
-        within = first + (row - low) * (second - first)
-        return np.asarray(np.interp(np.asarray(radius, np.float64), self.radius, within))
+        reflectance_within = first + (row - low) * (second - first)
+        return np.asarray(np.interp(np.asarray(radius, np.float64), self.radius, reflectance_within))
 
 
 @cache
@@ -94,12 +94,12 @@ def diffusion_table(eta: float) -> DiffusionTable:
     albedo = np.expm1(-_ALBEDO_DENSITY * steps) / np.expm1(-_ALBEDO_DENSITY)
     multiple = np.stack([_multiple_scattering(radius, one, eta) for one in albedo])
     profile = 2.0 * np.pi * radius * (multiple + albedo[:, None] * _single_scattering(radius, eta))
-    within = _integrate_spline(radius, profile)
-    return DiffusionTable(albedo, radius, within[:, -1], within)
+    reflectance_within = _integrate_spline(radius, profile)
+    return DiffusionTable(albedo, radius, reflectance_within[:, -1], reflectance_within)
 
 
 def _multiple_scattering(radius: Floats, albedo: float, eta: float) -> Floats:
-    """Return the radiant exitance (m,) of light scattered more than once, for an extinction of 1.
+    """Return the radiant exitance (m,) of light scattered more than once, for a unit extinction coefficient.
 
     radius : (m,) distances from a beam of unit power [mean free paths]
     """
@@ -121,7 +121,7 @@ def _multiple_scattering(radius: Floats, albedo: float, eta: float) -> Floats:
 
 
 def _single_scattering(radius: Floats, eta: float) -> Floats:
-    """Return the radiant exitance (m,) of light scattered once, per unit albedo, for an extinction of 1.
+    """Return the radiant exitance (m,) of light scattered once, for unit albedo and extinction coefficient.
 
     radius : (m,) distances from a beam of unit power [mean free paths]
     """
@@ -154,7 +154,7 @@ def _integrate_spline(x: Floats, values: Floats) -> Floats:
 
 
 class Pbrt(Target):
-    """Export to a pbrt-v4 scene in mm, with meshes and maps in files beside it."""
+    """Export to a pbrt-v4 scene in mm, with meshes and maps in files beside the scene file."""
 
     name = "pbrt"
     title = "pbrt"
@@ -174,12 +174,12 @@ class Pbrt(Target):
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the reflectance, and the mean free paths for which pbrt is closest to the reference."""
+        """Return the reflectance, and the mean free paths with the profile closest to the reference."""
         path = fit_scale(subject.curve, _unit_curve(subject.albedo))
         return _parameters(subject, path, "1 / (sigma_a + sigma_s); a unit is 1 mm")
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the skin's colour, and published diffuse mean free paths in place of mean free paths."""
+        """Return the skin's colour as reflectance, and published diffuse mean free paths as parameter mfp."""
         return _parameters(subject, published_mean_free_path_mm(subject), "as published, 1 / sigma_tr")
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
@@ -203,18 +203,18 @@ def _unit_curve(reflectance: Floats) -> CumulativeProfile:
     table = diffusion_table(SKIN_ETA)
     total = np.array([table.interpolate(table.radius[-1], float(one)) for one in reflectance], np.float64)
 
-    def within(radius: Floats) -> Floats:
+    def fraction_within(radius: Floats) -> Floats:
         columns = [table.interpolate(radius, float(one)) for one in reflectance]
         return np.asarray(np.clip(np.stack(columns, axis=-1) / np.maximum(total, 1e-9), 0.0, 1.0))
 
-    return CumulativeProfile.from_function(within, total)
+    return CumulativeProfile.from_function(fraction_within, total)
 
 
-def _parameters(subject: Subject, path_mm: Floats, meaning: str) -> Parameters:
+def _parameters(subject: Subject, mean_free_path_mm: Floats, meaning: str) -> Parameters:
     skin, colour = subject.skin, flat_tuple(subject.clipped_albedo())
     return (
         Parameter(_REFLECTANCE_NAME, colour, "-", "of the light that enters, or a texture"),
-        Parameter(_MFP_NAME, flat_tuple(path_mm), "mm", meaning),
+        Parameter(_MFP_NAME, flat_tuple(mean_free_path_mm), "mm", meaning),
         Parameter("scale", 1.0, "-", "factor of mfp; must not be changed"),
         Parameter("g", 0.0, "-", "the mean free paths are reduced ones"),
         Parameter("eta", SKIN_ETA, "-", "index of refraction of the skin"),
@@ -238,7 +238,7 @@ def _ball_scene(ball: Head) -> Scene:
 def _scene_lines(
     subject: Subject, parameters: Parameters, scene: Scene, prefix: str
 ) -> tuple[Lines, dict[str, bytes]]:
-    """Return the directives of the scene, and the contents of its mesh and image files by file name.
+    """Return the directives of the scene, and the contents of the mesh and image files by file name.
 
     prefix : prefix of the names of mesh and image files
     """

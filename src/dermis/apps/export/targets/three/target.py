@@ -1,4 +1,4 @@
-"""Export to a web page with three.js, on which lights and head can be moved; its skin diffuses no light."""
+"""Export to a web page with three.js that lets users move lights and head; the skin diffuses no light."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ class Unity(Target):
     untested = True
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the scattering colour and multiplier with which HDRP is closest to the reference."""
+        """Return the scattering colour and multiplier with the profile closest to the reference."""
         d = fit_burley_width(subject.curve)
         return (
             *_scattering_distances(d, version),
@@ -109,9 +109,9 @@ def _scattering_distances(d_mm: Floats, version: str) -> Parameters:
 
 
 def asset_text(asset_name: str, parameters: Parameters, version: str) -> str:
-    """Return the YAML of the asset; the editor adds the profile's hash when it first opens it."""
+    """Return the YAML of the asset, without the profile's hash, which Unity adds on first opening."""
     values = {one.name: one.value for one in parameters}
-    colour, tint = (_rgba(get_numbers(parameters, key)) for key in (_COLOUR_NAME, _TRANSMISSION_NAME))
+    colour, tint = (_format_rgba(get_numbers(parameters, key)) for key in (_COLOUR_NAME, _TRANSMISSION_NAME))
     low, high = get_numbers(parameters, _THICKNESS_NAME)
     multiplier = (
         f"    {_MULTIPLIER_NAME}: {values[_MULTIPLIER_NAME]:.6g}\n" if _MULTIPLIER_NAME in values else ""
@@ -130,7 +130,7 @@ def asset_text(asset_name: str, parameters: Parameters, version: str) -> str:
     )
 
 
-def _rgba(colour: tuple[float, ...]) -> str:
+def _format_rgba(colour: tuple[float, ...]) -> str:
     r, g, b = colour
     return f"{{r: {r:.6g}, g: {g:.6g}, b: {b:.6g}, a: 1}}"
 

@@ -87,9 +87,9 @@ class Unreal(Target):
         return [file, *write_files(file.parent, zip(names.values(), maps.values(), strict=True))]
 
 
-def _parameters(albedo: Floats, path_cm: Floats, version: str) -> Parameters:
-    distance = float(np.clip(path_cm.max(), 0.1, _MAX_DISTANCE_CM))
-    colour = np.clip(path_cm / distance, _MIN_COLOUR, 1.0)
+def _parameters(albedo: Floats, mean_free_path_cm: Floats, version: str) -> Parameters:
+    distance = float(np.clip(mean_free_path_cm.max(), 0.1, _MAX_DISTANCE_CM))
+    colour = np.clip(mean_free_path_cm / distance, _MIN_COLOUR, 1.0)
     depth = Parameter(
         DEPTH_SCALE_NAME, 0.1, "-", "for thin parts; its product with the unit scale must be 0.1"
     )
@@ -107,15 +107,17 @@ def _parameters(albedo: Floats, path_cm: Floats, version: str) -> Parameters:
     )
 
 
-def _editor_script(subject: Subject, parameters: Parameters, maps: Mapping[str, str], version: str) -> str:
-    """Return a Python script for the editor that creates the profile and imports the maps beside it.
+def _editor_script(
+    subject: Subject, parameters: Parameters, map_files: Mapping[str, str], version: str
+) -> str:
+    """Return a Python script for the editor that creates the profile and imports the maps beside the script.
 
-    maps : file names of the maps by role
+    map_files : file names of the maps by role
     """
     settings = [
         f"    {json.dumps(one.name)}: {_python_literal(one.value)},  # {one.unit}\n" for one in parameters
     ]
-    files = [f"    {json.dumps(role)}: {json.dumps(name)},\n" for role, name in maps.items()]
+    files = [f"    {json.dumps(role)}: {json.dumps(name)},\n" for role, name in map_files.items()]
     text = Path(__file__).with_name("editor_script.txt").read_text("utf-8")
     fields = {"NAME": json.dumps(subject.identifier), "VERSION": version}
     fields |= {"SETTINGS": "".join(settings), "MAPS": "".join(files)}

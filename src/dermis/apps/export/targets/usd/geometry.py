@@ -57,7 +57,7 @@ def add_mesh(
 ) -> dict[int, UsdGeom.Subset]:
     """Add the mesh in its rest pose to the stage; return the geometry subset of each material index.
 
-    deformable : the head's mesh with all morph targets at 0
+    deformable : the head's mesh with morph targets and bone weights, all morph targets at weight 0
     """
     mesh, polygons = head.mesh, mesh_polygons(head.mesh)
     vertex = point_vertices(mesh)
@@ -82,7 +82,10 @@ def add_mesh(
 
 
 def texture_coordinates(head: Head) -> Floats:
-    """Return (v, 2) texture coordinates with v downwards; those of eyes refer to the painted eye textures."""
+    """Return the texture coordinates (v, 2) of all vertices, with v downwards.
+
+    Vertices of eyes have coordinates in the painted eye textures.
+    """
     mesh, uv = head.mesh, head.mesh.uv.copy()
     if head.eyes is not None:
         frames = head.eyes.frames(head.control, head.control.rest)
@@ -93,9 +96,9 @@ def texture_coordinates(head: Head) -> Floats:
 
 
 def _add_uv(prim: UsdGeom.Mesh, uv: Floats, polygons: Polygons) -> None:
-    """Add texture coordinates to a mesh as face-varying values.
+    """Add texture coordinates to a mesh as face-varying values, with v upwards as in USD.
 
-    uv : (v, 2) texture coordinates of the vertices, with v downwards; USD has v upwards
+    uv : (v, 2) texture coordinates of the vertices, with v downwards
     """
     upwards = np.ascontiguousarray(np.column_stack([uv[:, 0], 1.0 - uv[:, 1]]), np.float32)
     types, tokens = Sdf.ValueTypeNames, UsdGeom.Tokens
@@ -126,11 +129,11 @@ def to_metres(positions_mm: NDArray[np.floating]) -> Floats:
 
 
 def add_motion(stage: Usd.Stage, root: Sdf.Path, mesh: Usd.Prim, deformable: DeformableMesh) -> None:
-    """Add blend shapes, a skeleton and a rest animation to the head, so that programs can pose it.
+    """Add blend shapes, a skeleton and a rest animation, with which programs can pose the head.
 
     root : path of the UsdSkelRoot
     mesh : mesh that blend shapes and skeleton deform
-    deformable : the head's mesh with all morph targets at 0
+    deformable : the head's mesh with morph targets and bone weights, all morph targets at weight 0
     """
     path = root.AppendChild("skeleton")
     skeleton = UsdSkel.Skeleton.Define(stage, path)
@@ -164,7 +167,7 @@ def unique_usd_names(names: Sequence[str]) -> list[str]:
 
 
 def _add_joints(prim: UsdSkel.Skeleton, skeleton: Skeleton | None) -> list[str]:
-    """Set the joints of a USD skeleton and return their paths; a head without bones gets a single joint."""
+    """Set the joints of a USD skeleton, and return their paths; a head without bones gets one joint."""
     joints, rest, bind = ["root"], np.eye(4)[None], np.eye(4)[None]
     if skeleton is not None:
         joints = []
@@ -178,7 +181,10 @@ def _add_joints(prim: UsdSkel.Skeleton, skeleton: Skeleton | None) -> list[str]:
 
 
 def _bone_transforms(skeleton: Skeleton) -> tuple[Doubles, Doubles]:
-    """Return each bone's rest transform to its parent, and bind transform to the head, (b, 4, 4) [m]."""
+    """Return the rest and bind transforms of the bones, each (b, 4, 4), in metres.
+
+    The rest transform of a bone is relative to the bone's parent; the bind transform is relative to the head.
+    """
     to_file = np.diag([METRES_PER_MM, METRES_PER_MM, METRES_PER_MM, 1.0]) @ skeleton.to_head
     scale = float(np.cbrt(abs(np.linalg.det(to_file[:3, :3]))))
     enlarge, reduce = (np.diag([factor, factor, factor, 1.0]) for factor in (scale, 1.0 / scale))

@@ -86,13 +86,13 @@ def _add_hairs(stage: Usd.Stage, root: Sdf.Path, head: Head) -> None:
 
 
 def _add_material(
-    stage: Usd.Stage, path: Sdf.Path, definition: OpenPbrMaterial, prefix: str
+    stage: Usd.Stage, prim_path: Sdf.Path, definition: OpenPbrMaterial, prefix: str
 ) -> UsdShade.Material:
-    """Add an OpenPBR material with its preview surface to the stage and return it.
+    """Add an OpenPBR material with a preview surface to the stage, and return the material.
 
     prefix : prefix of the file names of the maps
     """
-    material = UsdShade.Material.Define(stage, path)
+    material = UsdShade.Material.Define(stage, prim_path)
     material.GetPrim().SetDisplayName(definition.name)
     _add_open_pbr(material, definition, prefix)
     _add_preview(material, definition, prefix)
@@ -173,12 +173,12 @@ def _add_preview(material: UsdShade.Material, definition: OpenPbrMaterial, prefi
     material.CreateSurfaceOutput().ConnectToSource(out)
 
 
-def _add_shader(material: UsdShade.Material, name: str, kind: str) -> UsdShade.Shader:
-    shader = UsdShade.Shader.Define(material.GetPrim().GetStage(), material.GetPath().AppendChild(name))
-    shader.CreateIdAttr(kind)
+def _add_shader(material: UsdShade.Material, node_name: str, node_type: str) -> UsdShade.Shader:
+    shader = UsdShade.Shader.Define(material.GetPrim().GetStage(), material.GetPath().AppendChild(node_name))
+    shader.CreateIdAttr(node_type)
     return shader
 
 
-def _set_input(shader: UsdShade.Shader, name: str, value: InputValue) -> None:
+def _set_input(shader: UsdShade.Shader, input_name: str, value: InputValue) -> None:
     types = Sdf.ValueTypeNames
-    shader.CreateInput(name, types.Color3f if isinstance(value, tuple) else types.Float).Set(value)
+    shader.CreateInput(input_name, types.Color3f if isinstance(value, tuple) else types.Float).Set(value)

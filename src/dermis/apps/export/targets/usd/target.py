@@ -64,7 +64,7 @@ class Usd(OpenPbr):
 
 
 def _write_stage(subject: Subject, parameters: Parameters, file: Path, prefix: str) -> list[Path]:
-    """Write the stage file, and the maps beside it; return the paths of the maps.
+    """Write the stage file, and the maps beside the stage file; return the paths of the maps.
 
     prefix : prefix of the file names of the maps
     """

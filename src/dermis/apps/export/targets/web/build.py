@@ -1,4 +1,4 @@
-"""Capture of the frames of the web page, for GPUs and software adapters and in several picture sizes."""
+"""Capture of the frames that the web page replays, for GPUs and software adapters, in several sizes."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class PageContent:
     poster: NDArray[np.uint8] | None = None
 
     def add_picture(self, key: PictureKey) -> tuple[int, int, int]:
-        """Add one layer of a map with its value curves unless present; return its entry of `picture_entries`.
+        """Add the picture and value curves of a map layer unless present; return the layer's picture entry.
 
         key : role, mip level and layer
         """
@@ -115,8 +115,9 @@ class PageRequest:
 def build_content(request: PageRequest, on_renderer: OnRenderer = lambda *_: None) -> PageContent:
     """Capture the frames of all kinds of adapter, and return the data that the page embeds.
 
-    on_renderer : called for each kind of adapter with its renderer, scene and settings, after the renderer's
-        maps were replaced by those that the page will decode; tests compare its pictures with the page's
+    on_renderer : function that is called for each kind of adapter, with the renderer, the scene and the
+        settings, after the page's maps were uploaded to the renderer; tests use it to compare pictures of the
+        renderer with pictures of the page
     """
     content = PageContent()
     for adapter_kind in (one for one in ADAPTER_KINDS if request.sizes.get(one)):
@@ -132,7 +133,7 @@ def build_content(request: PageRequest, on_renderer: OnRenderer = lambda *_: Non
 def _capture_frames(
     content: PageContent, renderer: Renderer, request: PageRequest, adapter_kind: str
 ) -> Json:
-    """Capture the frames for one kind of adapter, add their data to `content` and return their description.
+    """Capture the frames for one kind of adapter, add the data to `content`, and return the frames' JSON.
 
     adapter_kind : kind of adapter, "gpu" or "software"
     """
@@ -163,23 +164,25 @@ def _frame_changes(
     renderer: Renderer,
     request: PageRequest,
     settings: Settings,
-    base: FrameInputs,
+    default_inputs: FrameInputs,
     frame: NamedFrame,
 ) -> Json:
     """Return, by slider name, how a frame's records and buffers change at each node of the slider.
 
-    base : inputs of the frame with all sliders at their defaults
+    default_inputs : inputs of the frame with all sliders at their default values
     """
     capture = FrameCapture(renderer.device)
 
-    def changes(inputs: FrameInputs | None) -> Json | None:
+    def node_json(inputs: FrameInputs | None) -> Json | None:
         if inputs is None:
             return None
         node = reduce_hair(capture_frame(capture, inputs), frame.merged_hairs)
         return node_changes(frame.captured, node, byte_runs)
 
     return {
-        slider.name: [*map(changes, node_inputs(slider, lambda one: renderer.prepare(one, settings), base))]
+        slider.name: [
+            *map(node_json, node_inputs(slider, lambda one: renderer.prepare(one, settings), default_inputs))
+        ]
         for slider in request.sliders
     }
 
@@ -191,7 +194,11 @@ def _mip_entries(content: PageContent, map_: PictureMap) -> list[list[tuple[int,
 
 
 def _colour_maps(content: PageContent, renderer: Renderer, request: PageRequest, maps: PictureMaps) -> Json:
-    """Return the index of the colour map and, by slider, the pictures that replace it at the nodes."""
+    """Return the JSON of the colour maps of slider nodes.
+
+    The JSON has the resource index of the colour map and, by slider name, the picture entry that replaces the
+    colour map at each node.
+    """
     map_index = next((k for k, one in maps.items() if one.role == "colour_map"), None)
     if map_index is None:
         return {}
@@ -205,28 +212,28 @@ def _colour_maps(content: PageContent, renderer: Renderer, request: PageRequest,
 
 
 def _colour_entry(
-    content: PageContent, renderer: Renderer, scene: Scene | None, settings: Settings, name: str
+    content: PageContent, renderer: Renderer, scene: Scene | None, settings: Settings, role: str
 ) -> tuple[int, int, int] | None:
     """Return the picture entry of the colour map in a slider node's scene; None if the map is unchanged.
 
-    name : role under which the picture is stored
+    role : role under which the picture is stored
     """
     if scene is None:
         return None
-    if (name, 0, 0) not in content.maps.pictures:
+    if (role, 0, 0) not in content.maps.pictures:
         capture = FrameCapture(renderer.device)
         texture = renderer.prepare(scene, settings).bindings["colour_map"]
         texels = read_texels(capture, capture.resource(texture), 0)[0]
         if content.maps.matches_picture("colour_map", texels):
             return None
-        content.maps.pictures[name, 0, 0] = encode_picture(texels, True)
-    return *content.add_picture((name, 0, 0))[:2], 3
+        content.maps.pictures[role, 0, 0] = encode_picture(texels, True)
+    return *content.add_picture((role, 0, 0))[:2], 3
 
 
 def _interaction_json(scene: Scene, inputs: FrameInputs) -> Json:
-    """Return what the page needs to move camera and lights: views, lights and the head's outline.
+    """Return the JSON with which the page moves camera and lights: views, lights and the head's outline.
 
-    The page fits shadow maps to the outline.
+    The page fits shadow maps to this outline.
     """
     camera, settings = scene.camera, inputs.settings
     projection, outline = pinhole(camera, scene.head, settings), scene.head.mesh.outline

@@ -39,7 +39,8 @@ class PictureMap(NamedTuple):
 
     role : name of the map's binding in shaders, such as "colour_map"
     mips : number of mip levels stored as pictures
-    mip_passes : passes that compute further levels on the device; None if those are stored as texels
+    mip_passes : passes that compute further mip levels on the device; None if further levels are stored as
+        texels
     """
 
     role: str
@@ -55,24 +56,26 @@ def frames_json(
     capture: FrameCapture,
     frames: list[NamedFrame],
     picture_maps: PictureMaps,
-    steps: dict[int, tuple[float, ...]],
+    quantisation_steps: dict[int, tuple[float, ...]],
     byte_runs: ByteRunCollector,
 ) -> Json:
-    """Return the JSON of frames with their shaders, resources and passes, and collect their data.
+    """Return the JSON of frames with shaders, resources and passes, and collect the data of the resources.
 
     Data that is all zero is not stored, as the page creates resources filled with zeros.
 
     picture_maps : maps that are stored as pictures, by resource index
-    steps : quantisation step of each column of quantised float buffers, by resource index
+    quantisation_steps : quantisation step of each column of a quantised float buffer, by resource index
     byte_runs : collector of the data, to which the JSON refers by byte run
     """
     pictures = [[capture.resource(f.picture.bytes), capture.resource(f.picture.exposed)] for f in frames]
     captured_frames = [frame.captured for frame in frames]
     contents, tables = {}, set(resources_bound_as(capture, captured_frames, _TRIANGLE_TABLES))
     for index in resources_read_first(capture, captured_frames):
-        if index in steps:
-            floats = capture.read_content(index)[0].view(np.float32).reshape(-1, len(steps[index]))
-            contents[index] = [byte_runs.add_floats(floats, steps[index])]
+        if index in quantisation_steps:
+            floats = (
+                capture.read_content(index)[0].view(np.float32).reshape(-1, len(quantisation_steps[index]))
+            )
+            contents[index] = [byte_runs.add_floats(floats, quantisation_steps[index])]
             continue
         _, picture_count, mip_passes = picture_maps.get(index, PictureMap("", 0, None))
         mips = [] if mip_passes else _mip_bytes(capture, index)[picture_count:]
@@ -91,19 +94,19 @@ def frames_json(
 
 
 def _column_packer(byte_runs: ByteRunCollector) -> Callable[[Bytes], int]:
-    """Return a function that packs each third of a buffer separately and returns the index of the joined run.
+    """Return a function that adds a triangle table to `byte_runs` and returns the index of the byte run.
 
-    The buffers are triangle tables: three columns of equal length, one after the other.
+    A triangle table has three columns of equal length, one after the other; each column is packed separately.
     """
     return lambda data: byte_runs.add_parts(np.split(data, 3) if len(data) % 3 == 0 else [data])
 
 
-def _mip_bytes(capture: FrameCapture, index: int) -> list[Bytes]:
+def _mip_bytes(capture: FrameCapture, resource_index: int) -> list[Bytes]:
     """Return the bytes of each mip level of a texture, with its layers joined; a buffer has one level.
 
-    index : resource index
+    resource_index : index of the texture or buffer in the capture
     """
-    parts, layers = capture.read_content(index), capture.resources[index].get("size")
+    parts, layers = capture.read_content(resource_index), capture.resources[resource_index].get("size")
     count = layers[2] if isinstance(layers, list) else 1
     return [np.concatenate(parts[k : k + count]) for k in range(0, len(parts), count)]
 
@@ -123,7 +126,7 @@ def _frame_json(frame: NamedFrame, picture: list[int], byte_runs: ByteRunCollect
 
 
 def _view_record(captured: CapturedFrame, stage: str) -> int:
-    """Return the index of the uniform record with a stage's view matrices; -1 if it has none.
+    """Return the index of the uniform record with a stage's view matrices; -1 if there is no such record.
 
     stage : "visibility" or "shadows"
     """
@@ -151,10 +154,10 @@ def _struct_json(dtype: np.dtype[Any]) -> Json:
     return {"size": dtype.itemsize, "members": members}
 
 
-def _member_json(kind: np.dtype[Any], offset: int) -> list[int] | Json:
-    base = kind.base
+def _member_json(dtype: np.dtype[Any], offset: int) -> list[int] | Json:
+    base = dtype.base
     if base.fields is None:
-        return [offset // 4, kind.itemsize // 4]
+        return [offset // 4, dtype.itemsize // 4]
     return {"offset": offset // 4, "each": base.itemsize // 4, "members": _struct_json(base)["members"]}
 
 
@@ -165,16 +168,16 @@ def _camel_keys(value: object) -> object:
     return value
 
 
-def _camel_case(name: str) -> str:
-    first, *others = name.split("_")
+def _camel_case(snake_case: str) -> str:
+    first, *others = snake_case.split("_")
     return first + "".join(word.title() for word in others)
 
 
 def resources_read_first(capture: FrameCapture, frames: Frames) -> list[int]:
-    """Return the sorted indices of the resources that a frame reads before it writes them.
+    """Return the sorted indices of the resources that a frame reads before writing.
 
     The page stores the data of these resources. Views are replaced by their textures, so that a texture
-    counts as written if any part of it is.
+    counts as written if any part of the texture is written.
     """
     found: set[int] = set()
     for frame in frames:
@@ -186,7 +189,7 @@ def resources_read_first(capture: FrameCapture, frames: Frames) -> list[int]:
 
 
 def resources_bound_as(capture: FrameCapture, frames: Frames, names: tuple[str, ...]) -> dict[int, str]:
-    """Return, by resource index, the name under which shaders bind a resource, if it is one of `names`."""
+    """Return the name under which shaders bind each resource, by resource index, for bindings in `names`."""
     found: dict[int, str] = {}
     for one in (one for frame in frames for one in frame.passes if one.program is not None):
         bound_names = [name for _, name, _ in capture.programs[one.program or 0]["bindings"]]
@@ -194,18 +197,18 @@ def resources_bound_as(capture: FrameCapture, frames: Frames, names: tuple[str, 
     return found
 
 
-def base_resource(capture: FrameCapture, index: int) -> int:
+def base_resource(capture: FrameCapture, resource_index: int) -> int:
     """Return the resource index of a view's texture; any other resource index is returned unchanged.
 
-    index : resource index
+    resource_index : index of the texture or buffer in the capture
     """
-    return int(capture.resources[index].get("of", index))
+    return int(capture.resources[resource_index].get("of", resource_index))
 
 
 def resources_read_by(capture: FrameCapture, captured_pass: CapturedPass) -> Iterator[int]:
     """Yield the indices of the resources that a pass may read.
 
-    captured_pass : pass that reads
+    captured_pass : pass of a captured frame
     """
     yield from (k for k, entry in _bound_entries(capture, captured_pass) if _allows_reading(entry))
     if captured_pass.raster and captured_pass.raster["indices"] >= 0:
@@ -215,7 +218,7 @@ def resources_read_by(capture: FrameCapture, captured_pass: CapturedPass) -> Ite
 def resources_written_by(capture: FrameCapture, captured_pass: CapturedPass) -> Iterator[int]:
     """Yield the indices of the resources that a pass may write.
 
-    captured_pass : pass that writes
+    captured_pass : pass of a captured frame
     """
     if captured_pass.written:
         yield captured_pass.written[0]
@@ -234,9 +237,12 @@ def _bound_entries(capture: FrameCapture, captured_pass: CapturedPass) -> Iterat
         )
 
 
-def _allows_reading(entry: Json) -> bool:
-    return "sampler" not in entry and entry.get("storage_texture", {}).get("access") != "write-only"
+def _allows_reading(layout_entry: Json) -> bool:
+    return (
+        "sampler" not in layout_entry
+        and layout_entry.get("storage_texture", {}).get("access") != "write-only"
+    )
 
 
-def _allows_writing(entry: Json) -> bool:
-    return "storage_texture" in entry or entry.get("buffer") == {"type": "storage"}
+def _allows_writing(layout_entry: Json) -> bool:
+    return "storage_texture" in layout_entry or layout_entry.get("buffer") == {"type": "storage"}

@@ -32,8 +32,8 @@ _COLOUR_CHANNELS = 3
 class Picture:
     """One layer of a map, encoded as a WebP picture.
 
-    data : WebP file; for maps other than colours a grey picture with the channels below each other
-    curves : (c, 256) value that each of the 256 levels of a channel decodes to
+    data : WebP file; for a map that is not a colour, a grey picture with the channels below each other
+    curves : (c, 256) decoded value of each of the 256 levels of a channel
     texels : (h, w, c) texels decoded from the picture
     """
 
@@ -62,21 +62,24 @@ def encode_picture(texels: Halves, colours: bool) -> Picture:
     return Picture(data, curves.astype(np.float16), decoded.astype(np.float16))
 
 
-def _value_curve(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _value_curve(texels: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the 256 increasing values to which a channel is quantised, with smaller steps near 0.
 
-    values : texels of the channel, whose minimum and maximum are the ends of the curve
+    texels : texels of the channel, whose minimum and maximum are the ends of the curve
     """
-    limits = np.array([values.min(), values.max()])
+    limits = np.array([texels.min(), texels.max()])
     first, last = np.sign(limits) * np.sqrt(np.abs(limits))
     root = np.linspace(first, last, _VALUE_LEVELS)
     return np.asarray(np.sign(root) * root * root)
 
 
-def _nearest_steps(values: Halves, curve: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """Return for each texel the index of the nearest value of an increasing curve."""
+def _nearest_steps(texels: Halves, curve: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """Return the index of the curve value nearest to each texel.
+
+    curve : increasing values
+    """
     midpoints = 0.5 * (curve[1:] + curve[:-1])
-    return np.searchsorted(midpoints, values.astype(np.float64)).astype(np.uint8)
+    return np.searchsorted(midpoints, texels.astype(np.float64)).astype(np.uint8)
 
 
 def _encode_webp(image: NDArray[np.uint8]) -> bytes:
@@ -104,7 +107,7 @@ _MAP_ROLES = (_COLOUR_ROLE, "relief_map", "slope_map", "specular_map", "roughnes
 class MapPictures:
     """WebP pictures of all maps that the page stores, by role, mip level and layer.
 
-    Where the device can compute further mip levels, only the first is stored.
+    For a map whose further mip levels the device can compute, only the first mip level is stored.
     """
 
     pictures: dict[PictureKey, Picture] = field(default_factory=dict)
@@ -117,7 +120,8 @@ class MapPictures:
     def replace_textures(self, renderer: Renderer, capture: FrameCapture, frames: Frames) -> PictureMaps:
         """Encode the frames' maps as pictures, and upload the decoded texels to the renderer's textures.
 
-        The renderer then shows the same maps as the page. Returns the maps by resource index.
+        The renderer then draws with the maps that the page decodes. Returns the replaced maps by resource
+        index.
         """
         maps = {}
         for index, role in _picture_textures(capture, frames).items():
@@ -133,13 +137,15 @@ class MapPictures:
             maps[index] = PictureMap(role, mips, capture_mips(capture, texture) if storable else None)
         return maps
 
-    def _add_pictures(self, capture: FrameCapture, index: int, role: str, mip: int) -> NDArray[np.float16]:
-        """Add the pictures of a mip level, and return the (l, h, w, c) texels decoded from them.
+    def _add_pictures(
+        self, capture: FrameCapture, resource_index: int, role: str, mip: int
+    ) -> NDArray[np.float16]:
+        """Add the pictures of a mip level, and return the (l, h, w, c) texels decoded from the pictures.
 
-        index : resource index
+        resource_index : index of the texture or buffer in the capture
         mip : mip level
         """
-        layers = read_texels(capture, index, mip)
+        layers = read_texels(capture, resource_index, mip)
         for layer, texels in enumerate(layers):
             if (role, mip, layer) not in self.pictures:
                 self.pictures[role, mip, layer] = encode_picture(texels, role == _COLOUR_ROLE)
@@ -158,15 +164,15 @@ def with_reduced_maps(head: Head, max_side: int) -> Head:
     return replace(head, maps=replace(maps, **reduced))
 
 
-def _reduce_map(values: NDArray[np.float32], max_side: int) -> NDArray[np.float32]:
-    mip = max(0, (max(values.shape[:2]) - 1).bit_length() - (max_side - 1).bit_length())
-    return np.asarray(mip_chain(values)[mip], np.float32)
+def _reduce_map(texels: NDArray[np.float32], max_side: int) -> NDArray[np.float32]:
+    mip = max(0, (max(texels.shape[:2]) - 1).bit_length() - (max_side - 1).bit_length())
+    return np.asarray(mip_chain(texels)[mip], np.float32)
 
 
 def quantise_hairs(renderer: Renderer, capture: FrameCapture, frames: Frames) -> dict[int, tuple[float, ...]]:
-    """Round hair knots in the device's buffers so that they compress well.
+    """Round the hair knots in the device's buffers to multiples of a step, so that the buffers compress well.
 
-    Returns the quantisation step of each column by resource index.
+    Returns the steps of a buffer's columns, by resource index of the buffer.
     """
     buffers = resources_bound_as(capture, frames, ("knots",))
     for index in buffers:
@@ -176,14 +182,14 @@ def quantise_hairs(renderer: Renderer, capture: FrameCapture, frames: Frames) ->
     return dict.fromkeys(buffers, _KNOT_STEPS_MM)
 
 
-def read_texels(capture: FrameCapture, index: int, mip: int) -> NDArray[np.float16]:
+def read_texels(capture: FrameCapture, resource_index: int, mip: int) -> NDArray[np.float16]:
     """Return the (l, h, w, c) texels of a mip level of a half-float texture.
 
-    index : resource index
+    resource_index : index of the texture or buffer in the capture
     """
-    width, height, layers = capture.resources[index]["size"]
+    width, height, layers = capture.resources[resource_index]["size"]
     sides = max(1, height >> mip), max(1, width >> mip)
-    parts = capture.read_content(index)[mip * layers : (mip + 1) * layers]
+    parts = capture.read_content(resource_index)[mip * layers : (mip + 1) * layers]
     return np.stack([one.view(np.float16).reshape(*sides, -1) for one in parts])
 
 

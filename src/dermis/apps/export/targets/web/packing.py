@@ -28,7 +28,7 @@ _WORD_TYPES = {1: np.uint8, 2: np.uint16, 4: np.uint32}
 class ByteRunCollector:
     """Collector of byte runs for one compressed file, in which equal runs are stored once.
 
-    A run is the data of a buffer, texture or record; `runs` describes how each is encoded.
+    A byte run is the data of a buffer, texture or record. `runs` has the position and encoding of each run.
     """
 
     def __init__(self) -> None:
@@ -38,31 +38,31 @@ class ByteRunCollector:
         self._end = 0
 
     def add(self, data: Bytes | bytes, layouts: Iterable[tuple[int, int, int]] | None = None) -> int:
-        """Add a run of bytes and return its index in `runs`.
+        """Add a run of bytes, and return the run's index in `runs`.
 
-        layouts : possible layouts of the run, of which the one that compresses best is used: bytes per word,
-            words per row, and order of the differences
+        layouts : layouts to try: bytes per word, words per row, and order of the differences; the layout with
+            the best compression is used
         """
         raw = np.frombuffer(data, np.uint8)
-        return self._add(raw, list(layouts or _possible_layouts(len(raw))), ())
+        return self._add_run(raw, list(layouts or _possible_layouts(len(raw))), ())
 
     def add_parts(self, parts: Iterable[Bytes]) -> int:
-        """Add a run that concatenates parts, each encoded with its own layout; return its index in `runs`."""
+        """Add a run that concatenates separately encoded parts, and return the run's index in `runs`."""
         numbers = tuple(self.add(one) for one in parts)
         self.runs.append((0, sum(self.runs[k][1] for k in numbers), 0, 0, 0, numbers))
         return len(self.runs) - 1
 
     def add_floats(self, values: NDArray[np.float32], steps: tuple[float, ...]) -> int:
-        """Add a run of floats as integer multiples of one step per column; return its index in `runs`.
+        """Add a run of floats as integer multiples of one step per column; return the run's index in `runs`.
 
         values : (n, c) floats that are multiples of the steps
         steps : (c,) steps, powers of two
         """
         words = np.rint(values / np.array(steps)).astype(np.int32)
         layouts = [(4, len(steps), order) for order in _DIFFERENCE_ORDERS]
-        return self._add(words.view(np.uint8).reshape(-1), layouts, steps)
+        return self._add_run(words.view(np.uint8).reshape(-1), layouts, steps)
 
-    def _add(self, raw: Bytes, layouts: list[tuple[int, int, int]], steps: tuple[float, ...]) -> int:
+    def _add_run(self, raw: Bytes, layouts: list[tuple[int, int, int]], steps: tuple[float, ...]) -> int:
         key = hashlib.sha256(raw.tobytes()).digest() + repr(steps).encode()
         if key not in self._run_indices:
             self._run_indices[key] = len(self.runs)
@@ -79,9 +79,9 @@ class ByteRunCollector:
 
 
 def quantise(values: NDArray[np.float32], steps: tuple[float, ...]) -> NDArray[np.float32]:
-    """Return floats (n, c) rounded to multiples of a step for each column.
+    """Return floats (n, c) with each column rounded to multiples of a step.
 
-    steps : (c,) steps
+    steps : (c,) step of each column
     """
     return np.asarray(np.rint(values / np.array(steps)) * np.array(steps), np.float32)
 
@@ -97,23 +97,23 @@ def encode_seven_bits(data: bytes) -> str:
     return codes.tobytes().decode("ascii").translate({code: code + 256 for code in _ESCAPED_CHARACTERS})
 
 
-def byte_planes(raw: Bytes, word: int, row: int, order: int) -> bytes:
+def byte_planes(raw: Bytes, bytes_per_word: int, words_per_row: int, difference_order: int) -> bytes:
     """Return the bytes of a table of words, one byte column after another, which improves compression.
 
-    raw : the table, row by row
-    word, row : bytes per word and words per row
-    order : number of times that rows are replaced by their differences from the previous rows
+    raw : bytes of the table, row by row
+    bytes_per_word, words_per_row : number of bytes per word, and number of words per row
+    difference_order : number of times that rows are replaced by their differences from the previous rows
     """
-    words = raw.view(_WORD_TYPES[word]).copy()
-    for _ in range(order):
-        words[row:] -= words[:-row].copy()
-    return words.view(np.uint8).reshape(-1, word * row).T.tobytes()
+    words = raw.view(_WORD_TYPES[bytes_per_word]).copy()
+    for _ in range(difference_order):
+        words[words_per_row:] -= words[:-words_per_row].copy()
+    return words.view(np.uint8).reshape(-1, bytes_per_word * words_per_row).T.tobytes()
 
 
-def _possible_layouts(size: int) -> Iterable[tuple[int, int, int]]:
+def _possible_layouts(byte_count: int) -> Iterable[tuple[int, int, int]]:
     yield 1, 1, 0
     for word, row in (
-        (word, row) for word in _WORD_TYPES for row in _ROW_LENGTHS if size % (word * row) == 0
+        (word, row) for word in _WORD_TYPES for row in _ROW_LENGTHS if byte_count % (word * row) == 0
     ):
         yield from ((word, row, order) for order in _DIFFERENCE_ORDERS)
 
@@ -121,7 +121,7 @@ def _possible_layouts(size: int) -> Iterable[tuple[int, int, int]]:
 def _best_layout(raw: Bytes, layouts: list[tuple[int, int, int]]) -> tuple[int, int, int]:
     """Return the layout with which a sample of the bytes compresses best.
 
-    layouts : bytes per word, words per row, and order of the differences
+    layouts : layouts to try: bytes per word, words per row, and order of the differences
     """
     sample = raw
     if len(raw) > _SAMPLE_COUNT * _SAMPLE_BYTES:

@@ -30,12 +30,12 @@ PIGMENT_FACTORS = (0.4, 1.0, 3.0)
 
 @dataclass(frozen=True)
 class Slider:
-    """Slider of the web page, which interpolates a frame between values at which it was captured (nodes).
+    """Slider of the web page, which interpolates between frames captured at certain values (nodes).
 
     values : increasing values of the nodes; one of them is `default_value`
     default_value : value with which the page starts
-    scenes : scene at each node; None for the node of the default
-    changes_pose_only : whether the scenes differ from the default in the head's pose only
+    scenes : scene at each node; None at the node of the default value
+    changes_pose_only : whether these scenes differ from the default scene only in the head's pose
     """
 
     name: str
@@ -48,7 +48,7 @@ class Slider:
 def node_inputs(
     slider: Slider, prepare: Callable[[Scene], FrameInputs], base: FrameInputs
 ) -> Iterator[FrameInputs | None]:
-    """Yield the frame inputs at each node of a slider; None for the node of the default value.
+    """Yield the frame inputs at each node of a slider; None at the node of the default value.
 
     prepare : function that returns the frame inputs of a scene
     base : frame inputs of the default scene
@@ -82,7 +82,10 @@ def node_changes(base: CapturedFrame, node: CapturedFrame, byte_runs: ByteRunCol
     written = [
         (k, (_written_floats(one), _written_floats(other))) for k, (one, other) in passes if one.written
     ]
-    return {"records": _differences(records, byte_runs), "written": _differences(written, byte_runs)}
+    return {
+        "records": _node_differences(records, byte_runs),
+        "written": _node_differences(written, byte_runs),
+    }
 
 
 def _record_floats(record: UniformRecord) -> Floats:
@@ -106,7 +109,7 @@ def _written_floats(captured_pass: CapturedPass) -> Floats:
     return np.frombuffer(captured_pass.written[1] if captured_pass.written else b"", "<f4")
 
 
-def _differences(
+def _node_differences(
     pairs: list[tuple[int, tuple[Floats, Floats]]], byte_runs: ByteRunCollector
 ) -> list[tuple[int, int, int]]:
     changes = []
@@ -161,10 +164,10 @@ def _pigment_sliders(scene: Scene) -> list[Slider]:
     return sliders
 
 
-def _with_pigment(scene: Scene, maps: PaintedMaps, name: str, value: float) -> Scene:
+def _with_pigment(scene: Scene, maps: PaintedMaps, pigment: str, value: float) -> Scene:
     assert scene.skin.pigments is not None
-    pigments = scene.skin.pigments.model_copy(update={name: value})
-    changed: Any = {name: value}
+    pigments = scene.skin.pigments.model_copy(update={pigment: value})
+    changed: Any = {pigment: value}
     painted = replace(maps, look=replace(maps.look, **changed))
     skin = scene.skin.model_copy(update={"pigments": pigments})
     return replace(scene, head=replace(scene.head, maps=painted), skin=skin)

@@ -67,7 +67,7 @@ def page_html(content: build.PageContent, sliders: tuple[Slider, ...], title: st
         note=note,
         script=escape_script(player_script()),
         policy="img-src data:",
-        poster=f"data:image/webp;base64,{base64.b64encode(_webp(content.poster)).decode()}",
+        poster=f"data:image/webp;base64,{base64.b64encode(_encode_webp(content.poster)).decode()}",
         scene=encode_seven_bits(gzip.compress(json.dumps(scene).encode(), 9, mtime=0)),
         data=encode_seven_bits(content.byte_runs.compress()),
         pictures=encode_seven_bits(b"".join(content.pictures)),
@@ -80,7 +80,7 @@ def player_script() -> str:
     return "".join(_EXPORT_KEYWORD.sub("", _IMPORT_STATEMENT.sub("", text)) for text in texts)
 
 
-def _webp(picture: NDArray[np.uint8]) -> bytes:
+def _encode_webp(picture: NDArray[np.uint8]) -> bytes:
     from PIL import Image
 
     file = io.BytesIO()
@@ -104,7 +104,7 @@ class Web(Target):
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the side of the atlas, and the Gaussians with which the page diffuses light."""
-        profile = self._profile(subject)
+        profile = self._diffusion_profile(subject)
         return (
             Parameter("atlas", _ATLAS_SIDE, "texel", "side of the map in which light is diffused"),
             Parameter("variance", flat_tuple(profile.variance_mm2), "mm2", "of each Gaussian"),
@@ -119,12 +119,12 @@ class Web(Target):
         return self.parameters(subject, version)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the cumulative profile of the sum of Gaussians."""
+        """Return the cumulative profile of the Gaussians with which the page diffuses light."""
         _, variance, *weight = (np.array(get_numbers(parameters, one.name)) for one in parameters)
         return gaussian_curve(variance, np.stack(weight, axis=1), subject.curve.energy)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
-        """Capture the frames of the scene and write the page with them."""
+        """Capture the frames of the scene, and write the page with these frames."""
         scene = subject.scene
         if scene is None:
             actual = f"got the skin {subject.name}"
@@ -138,7 +138,7 @@ class Web(Target):
         return [output]
 
     @staticmethod
-    def _profile(subject: Subject) -> GaussianSum:
+    def _diffusion_profile(subject: Subject) -> GaussianSum:
         return SkinProfiles().profile(subject.scene.skin) if subject.scene else load_profile(subject.name)
 
 

@@ -53,7 +53,7 @@ def with_painted_maps(device: Device, head: Head, side: int) -> Head:
 
     side : side of the painted maps, a power of two from 256 to 4096 [texels]
 
-    Raises DermisError for other sides.
+    Raises DermisError for an invalid side.
     """
     if not MIN_SIDE <= side <= MAX_SIDE or side & (side - 1):
         expected = f"a power of two from {MIN_SIDE} to {MAX_SIDE}"

@@ -26,7 +26,7 @@ _PAIR_BYTES = 12
 
 
 class SearchPasses:
-    """Passes of a search, submitted in batches because the size of later ones depends on earlier results.
+    """Passes of a search, submitted in batches, as the size of later passes depends on earlier results.
 
     commands : command list of the passes that are not yet submitted
     blocks : number of blocks of tiles along a side of the atlas
@@ -267,7 +267,7 @@ class PairTable:
 
 
 def search_pairs(device: Device, surface: Bindings, cells: Cells) -> PairTable | None:
-    """Return all pairs that transmit a relevant amount of light, None if a buffer cannot hold them.
+    """Return all pairs that transmit a relevant amount of light, None if a buffer cannot hold the pairs.
 
     surface : resources of geometry.wgsl for the shape to search in, and of the atlas
     """
