@@ -7,14 +7,12 @@ import numpy as np
 import pytest
 
 from dermis import Human, Renderer, Scene
-from dermis.base.arrays import Doubles, Floats
+from dermis.base.arrays import Floats
 from dermis.frame.features.hair import passes
 from dermis.frame.features.hair.resources import StrandCounts, StrandTables
-from dermis.human.hair.guides import body_surface
 from dermis.human.hair.styles import styles
 from dermis.mesh.grown_strands import grow_strands
 from dermis.mesh.head import Head
-from dermis.mesh.strands import Strands
 
 _BY_STYLE = {"long": 0.3, "cornrows": 0.9, "bun": 0.1, "afro": 0.95, "twists": 0.9, "short": 0.0}
 
@@ -59,10 +57,3 @@ def test_device_and_numpy_grow_the_same_strands(
     assert np.quantile(distance, 0.999) < 0.05
     assert np.allclose(grown[:, 2:, 3], strands.radius_mm, rtol=1e-3)
     assert np.allclose(grown[:, 1, :3], strands.absorption, rtol=1e-3)
-
-
-def heights_mm(strands: Strands, head: Head) -> Doubles:
-    """Return the height of each knot above the mean person's skin [mm]."""
-    knots = strands.knot_positions_mm(head.mesh, head.mesh.points_mm).reshape(-1, 3)
-    base, normal = body_surface().project(knots)
-    return np.asarray(((knots - base) * normal).sum(axis=1))

@@ -50,7 +50,7 @@ def add_hair(
     rows = list(_grow_lashes(surface, root_finder, eye_centres(control_head.mesh), rngs))
     groups = [left, *rows[:2], right, *rows[2:]]
     strands = _join_groups(groups, _fine_hair_absorption(groups, look))
-    return replace(head, strands=strands, hair=make_groom(look, recession, head.levels, hairs))
+    return replace(head, strands=strands, hair=make_groom(look, recession, root_finder, head.levels, hairs))
 
 
 def _grow_brows(

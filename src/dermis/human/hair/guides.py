@@ -161,12 +161,12 @@ COMBS: dict[str, Callable[[Doubles, Style], Doubles]] = {
 
 
 @cache
-def body_surface(ears: bool = True) -> SkinSurface:
-    """Return the skin of the mean person: head, neck and shoulders.
+def body_surface(mesh: Mesh, ears: bool = True) -> SkinSurface:
+    """Return the skin of a person: head, neck and shoulders.
 
+    mesh : mesh of the mean person
     ears : False puts a smooth surface in place of the ears
     """
-    mesh = mean_mesh()
     skin = np.unique(mesh.triangles[mesh.material == 0])
     points, normals = mesh.positions[skin].astype(np.float64), mesh.normals[skin].astype(np.float64)
     if ears:
@@ -200,19 +200,12 @@ def ear_weight(points: Doubles) -> Doubles:
     return np.asarray(np.exp(-(away[:, 1:] ** 2).sum(axis=1)))
 
 
-def mean_mesh() -> Mesh:
-    """Return the mesh of the mean person after one subdivision, whose first points are the control points."""
-    from dermis.human.model import template
-
-    return template("own", 1).head.mesh
-
-
-def grow_guides(points: Doubles, style: Style) -> tuple[Doubles, Doubles, Doubles]:
+def grow_guides(mesh: Mesh, points: Doubles, style: Style) -> tuple[Doubles, Doubles, Doubles]:
     """Return the knots (g, k, 3), the skin normals below them (g, k, 3) and their heights (g, k) [mm].
 
-    points : (g, 3) roots on the skin of the mean person [mm]
+    mesh, points : mesh of the mean person, and (g, 3) roots on its skin [mm]
     """
-    surface = body_surface(ears=style.comb not in _OVER_EARS)
+    surface = body_surface(mesh, ears=style.comb not in _OVER_EARS)
     _, normal = surface.project(points)
     state = Growth(points, normal, points, _first_direction(points, normal, style), normal,
                    np.zeros(len(points)), np.zeros(len(points)), np.full(len(points), np.inf))  # fmt: skip

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.base.arrays import Doubles
-from dermis.human.hair.guides import mean_mesh
 from dermis.human.hair.look import HairLook
-from dermis.human.hair.strand_roots import BEARD_STRANDS_PER_CM2, STRANDS_PER_CM2, StyleTables, style_tables
+from dermis.human.hair.root_finder import RootFinder
+from dermis.human.hair.strand_roots import BEARD_STRANDS_PER_CM2, STRANDS_PER_CM2, style_tables
 from dermis.human.hair.styles import BEARD, Style, styles
 from dermis.human.skin.face import hairline_heights
 from dermis.mesh.groom import Groom
-from dermis.mesh.strands import quad_corners, quad_weights
 from dermis.specular.hair import absorption_per_mm
 
 MAX_PER_CM2 = 200.0
@@ -51,10 +47,13 @@ PART_DTYPE = np.dtype(
 """Numbers of a part of a groom, the struct GroomPart in strands_grow.wgsl."""
 
 
-def make_groom(look: HairLook, recession: float, levels: int, hair_fraction: float = 1.0) -> Groom | None:
+def make_groom(
+    look: HairLook, recession: float, root_finder: RootFinder, levels: int, hair_fraction: float = 1.0
+) -> Groom | None:
     """Return the scalp hair and beard of a person, None for a bald person without a beard.
 
     recession : recession of the hairline, 0 to 1, see `SkinLook`
+    root_finder : root finder of the mean person
     levels : subdivision levels of the person's mesh
     hair_fraction : fraction of the strands to grow; they are widened by its inverse to keep coverage
     """
@@ -63,12 +62,12 @@ def make_groom(look: HairLook, recession: float, levels: int, hair_fraction: flo
         scalp = None
     if scalp is None and not bearded:
         return None
-    tables = style_tables(scalp, bearded, levels)
+    tables = style_tables(scalp, bearded, root_finder, levels)
     parts = [_scalp_part(scalp, look, recession)] if scalp else []
     parts += [_beard_part(look)] if bearded else []
     parameters, strands = np.array(parts, PART_DTYPE), round(hair_fraction * len(tables.roots))
     heights, knots = hairline_heights(max(recession, scalp.crown if scalp else 0.0)), _knot_count(parameters)
-    return Groom(tables.guides, tables.roots, parameters, strands, knots, heights, _centre(tables))
+    return Groom(tables.guides, tables.roots, parameters, strands, knots, heights, tables.centre_mm)
 
 
 def _scalp_part(style: Style, look: HairLook, recession: float) -> tuple[object, ...]:
@@ -143,11 +142,3 @@ def _knot_count(parameters: NDArray[np.void]) -> int:
     curled = np.where((curls > 1.0) & (ropes == 0.0), _KNOTS_PER_TURN * lengths / pitches, 0.0)
     roped = np.where(ropes > 0.0, _KNOTS_PER_TURN * lengths / (7.0 * np.maximum(ropes, 1.0)), 0.0)
     return int(np.clip(np.ceil(np.max([straight, curled, roped])), _MIN_KNOTS, _MAX_KNOTS))
-
-
-@lru_cache(16)
-def _centre(tables: StyleTables) -> Doubles:
-    mesh, roots = mean_mesh(), tables.roots.roots
-    some = slice(None, 2000)
-    points = mesh.points_mm[quad_corners(mesh, roots.quad[some] % len(mesh.quads))]
-    return np.asarray(np.einsum("nk,nkc->c", quad_weights(roots.position[some]), points) / len(points))

@@ -17,14 +17,13 @@ from dermis.human.hair.guides import (
     bind_guides,
     cut_fractions,
     grow_guides,
-    mean_mesh,
     parting_side,
     row_of,
     smoothstep,
 )
+from dermis.human.hair.root_finder import RootFinder
 from dermis.human.hair.styles import BEARD, Style
 from dermis.mesh.groom import GUIDE_KNOTS, Guides, StrandRoots
-from dermis.mesh.mesh import Mesh
 from dermis.mesh.strands import Roots, quad_corners, quad_weights, refine_roots
 
 STRANDS_PER_CM2 = 150.0
@@ -35,26 +34,33 @@ _VERSION = 9  # of this module's algorithm, part of the keys of cached tables
 _CACHED_STYLES = 8
 _APART_MM = 25.0, 55.0  # distances between guides from which strands are not interpolated between them
 _SEED = 20
+_CENTRE_ROOTS = 2000  # number of roots whose mean is the centre of the hair
 _GUIDE_FIELDS = "corner", "local_mm", "weight", "rest_mm", "cut"
 _ROOT_FIELDS = "quad", "position", "guide", "guide_weight", "clump", "place", "along_mm"
 
 
 class StyleTables(NamedTuple):
-    """Guides and roots of the parts of a groom, which all people with these styles share."""
+    """Guides and roots of the parts of a groom, which all people with these styles share.
+
+    centre_mm : (3,) mean position of the roots on the mean person [mm]
+    """
 
     guides: Guides
     roots: StrandRoots
+    centre_mm: Doubles
 
 
 @lru_cache(_CACHED_STYLES)
-def style_tables(scalp: Style | None, bearded: bool, levels: int) -> StyleTables:
+def style_tables(scalp: Style | None, bearded: bool, root_finder: RootFinder, levels: int) -> StyleTables:
     """Return the guides and the roots of a hair style and a beard.
 
     scalp : style of the hair of the head, None for a bald head
     bearded : whether roots of a beard are included
+    root_finder : root finder of the mean person
     levels : subdivision levels of the mesh on whose quads the roots lie
     """
-    parts = [_cached_part(style) for style in [*([scalp] if scalp else []), *([BEARD] if bearded else [])]]
+    worn = [*([scalp] if scalp else []), *([BEARD] if bearded else [])]
+    parts = [_cached_part(style, root_finder) for style in worn]
     guides = Guides(*(np.concatenate([part[name] for part in parts]) for name in _GUIDE_FIELDS))
     counts = [len(part["quad"]) for part in parts]
     order = np.random.default_rng(_SEED).permutation(sum(counts))
@@ -66,19 +72,23 @@ def style_tables(scalp: Style | None, bearded: bool, levels: int) -> StyleTables
     columns["clump"] = place[columns["clump"] + np.repeat(first_strand[:-1], counts)].astype(np.int32)
     columns["part"] = np.repeat(np.arange(len(parts), dtype=np.int32), counts)
     quad, position, *rest = (columns[name].take(order, axis=0) for name in (*_ROOT_FIELDS, "part"))
-    roots = refine_roots(_control_mesh(), Roots(quad, position), levels)
-    return StyleTables(guides, StrandRoots(roots, *rest))
+    some = slice(None, _CENTRE_ROOTS)
+    corners_mm = root_finder.mean_mesh.points_mm[quad_corners(root_finder.mesh, quad[some])]
+    centre_mm = np.einsum("nk,nkc->nc", quad_weights(position[some]), corners_mm).mean(axis=0)
+    roots = refine_roots(root_finder.mesh, Roots(quad, position), levels)
+    return StyleTables(guides, StrandRoots(roots, *rest), centre_mm)
 
 
 @lru_cache(_CACHED_STYLES)
-def _cached_part(style: Style) -> Arrays:
-    names = [*_GUIDE_FIELDS, *_ROOT_FIELDS]
-    return cached_arrays(mean_mesh().points_mm, f"groom {_VERSION} {style}", names, lambda: _make_part(style))
+def _cached_part(style: Style, root_finder: RootFinder) -> Arrays:
+    names, points_mm = [*_GUIDE_FIELDS, *_ROOT_FIELDS], root_finder.mean_mesh.points_mm
+    parameters = f"groom {_VERSION} {style}"
+    return cached_arrays(points_mm, parameters, names, lambda: _make_part(style, root_finder))
 
 
-def _make_part(style: Style) -> Arrays:
+def _make_part(style: Style, root_finder: RootFinder) -> Arrays:
     """Compute the guides and the roots of one style: arrays by the names of their fields."""
-    mesh, rng = _control_mesh(), np.random.default_rng(_SEED)
+    mesh, rng = root_finder.mesh, np.random.default_rng(_SEED)
     beard = style is BEARD
     where = density.beard_density() if beard else density.scalp_density(0.0)
     per_cm2 = BEARD_STRANDS_PER_CM2 if beard else STRANDS_PER_CM2
@@ -86,8 +96,8 @@ def _make_part(style: Style) -> Arrays:
     corners = quad_corners(mesh, roots.quad)
     points, guide = np.unique(corners, return_inverse=True)
     guide = guide.reshape(corners.shape)
-    points_mm = mean_mesh().points_mm
-    knots, _, heights = grow_guides(points_mm[points], style)
+    points_mm = root_finder.mean_mesh.points_mm
+    knots, _, heights = grow_guides(root_finder.mean_mesh, points_mm[points], style)
     weight = quad_weights(roots.position)
     root_mm = np.einsum("nk,nkc->nc", weight, points_mm[corners])
     if style.comb == "fall":
@@ -159,9 +169,3 @@ def _clump_middles(
     middles = rng.permutation(len(root_mm))[:count]
     near = np.column_stack([root_mm, 0.5 * half_mm])  # hairs that part from each other are not in one clump
     return np.asarray(middles[cKDTree(near[middles]).query(near)[1]], np.int64)
-
-
-def _control_mesh() -> Mesh:
-    from dermis.human.model import template
-
-    return template("own", 0).head.mesh
