@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dermis.base.arrays import Doubles
+from dermis.human.hair.root_finder import RootFinder
 from dermis.human.hair.skin_surface import SkinSurface, tangent_component
 from dermis.human.hair.styles import Style
 from dermis.mesh.groom import GUIDE_ANCHORS, GUIDE_KNOTS, Guides
@@ -161,12 +162,13 @@ COMBS: dict[str, Callable[[Doubles, Style], Doubles]] = {
 
 
 @cache
-def body_surface(mesh: Mesh, ears: bool = True) -> SkinSurface:
-    """Return the skin of a person: head, neck and shoulders.
+def body_surface(root_finder: RootFinder, ears: bool = True) -> SkinSurface:
+    """Return the skin of the mean person: head, neck and shoulders.
 
-    mesh : mesh of the mean person
+    root_finder : root finder of the mean person
     ears : False puts a smooth surface in place of the ears
     """
+    mesh = root_finder.mean_mesh
     skin = np.unique(mesh.triangles[mesh.material == 0])
     points, normals = mesh.positions[skin].astype(np.float64), mesh.normals[skin].astype(np.float64)
     if ears:
@@ -200,12 +202,12 @@ def ear_weight(points: Doubles) -> Doubles:
     return np.asarray(np.exp(-(away[:, 1:] ** 2).sum(axis=1)))
 
 
-def grow_guides(mesh: Mesh, points: Doubles, style: Style) -> tuple[Doubles, Doubles, Doubles]:
+def grow_guides(root_finder: RootFinder, points: Doubles, style: Style) -> tuple[Doubles, Doubles, Doubles]:
     """Return the knots (g, k, 3), the skin normals below them (g, k, 3) and their heights (g, k) [mm].
 
-    mesh, points : mesh of the mean person, and (g, 3) roots on its skin [mm]
+    points : (g, 3) roots on the skin of the mean person [mm]
     """
-    surface = body_surface(mesh, ears=style.comb not in _OVER_EARS)
+    surface = body_surface(root_finder, ears=style.comb not in _OVER_EARS)
     _, normal = surface.project(points)
     state = Growth(points, normal, points, _first_direction(points, normal, style), normal,
                    np.zeros(len(points)), np.zeros(len(points)), np.full(len(points), np.inf))  # fmt: skip

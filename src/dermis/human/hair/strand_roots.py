@@ -97,7 +97,7 @@ def _make_part(style: Style, root_finder: RootFinder) -> Arrays:
     points, guide = np.unique(corners, return_inverse=True)
     guide = guide.reshape(corners.shape)
     points_mm = root_finder.mean_mesh.points_mm
-    knots, _, heights = grow_guides(root_finder.mean_mesh, points_mm[points], style)
+    knots, _, heights = grow_guides(root_finder, points_mm[points], style)
     weight = quad_weights(roots.position)
     root_mm = np.einsum("nk,nkc->nc", weight, points_mm[corners])
     if style.comb == "fall":
