@@ -1,6 +1,6 @@
-"""Measure how accurately the light and skin of path-traced faces are estimated.
+"""Measure how accurately the light and skin of path-traced faces and of drawn people are estimated.
 
-Renders the reference pictures that are not cached yet, fits each, and writes the figures after each scene;
+Renders the reference pictures that are not cached yet, fits each, and writes the figures after each face;
 `unmixing_page.py` writes docs/fit.md from them.
 """
 
@@ -28,6 +28,7 @@ from dermis.base.console import print_lines
 from dermis.environment.panorama import directions, solid_angles
 from dermis.frame.renderer import Renderer
 from dermis.human.person import Human
+from dermis.human.skin.painted import PaintedMaps
 from dermis.images.hdr import encode_exr
 from dermis.optics.pigments.parameters import DEFAULT_SKIN
 from dermis.scene.camera import Camera
@@ -68,13 +69,18 @@ class Case:
     sun: float
 
 
-def case(number: int) -> Case:
-    """Return the case with a number; equal numbers give equal cases."""
+def case(number: int, measured: bool = False) -> Case:
+    """Return the case with a number; equal numbers give equal cases.
+
+    measured : whether melanin and blood are those of the drawn person, as in measured people, instead of
+        uniformly distributed over their logarithms
+    """
     random = np.random.default_rng((_SEED, number))
     melanin, blood = (float(10.0 ** random.uniform(*span)) for span in (_MELANIN, _BLOOD))
     roughness = float(random.uniform(*_ROUGHNESS))
-    pigments = {"melanin": melanin, "blood": blood}
+    pigments = {} if measured else {"melanin": melanin, "blood": blood}
     person = Human.drawn(100 + number, skin=pigments, hair={"style": "none", "beard_mm": 0.0})
+    melanin, blood = person.look.melanin, person.look.blood
     head = person.head()
     turn, tilt = np.radians(random.uniform(-65.0, 65.0)), np.radians(random.uniform(-10.0, 60.0))
     towards = np.array([np.sin(turn) * np.cos(tilt), np.sin(tilt), np.cos(turn) * np.cos(tilt)])
@@ -139,6 +145,7 @@ def _under_uniform_light(colour: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 RESULTS = Path(__file__).parent / "results" / "fitting.json"
+_SMALL_SIDE = 64  # side of pictures of people with measured pigments [pixel]
 _NO_LIMIT = 1e9
 """Residual limit so large that it disables the robust loss, which would discard the strong noise of paths."""
 
@@ -152,6 +159,7 @@ def main(
     scenes: int = SCENES,
     variant: MitsubaVariant = "scalar_rgb",
     own: int = 3,
+    people: int = 20,
     trace_only: Annotated[bool, Parameter(negative="")] = False,
 ) -> None:
     """Render, fit, and write the figures.
@@ -170,12 +178,21 @@ def main(
         Variant of Mitsuba, such as cuda_ad_rgb.
     own:
         Number of scenes that are also rendered by dermis.
+    people:
+        Number of people with measured pigments, rendered by dermis, whose oxygen and epidermal thickness the
+        fit does not know.
     trace_only:
         Render the pictures that are not cached yet, and fit none.
     """
     renderer = Renderer(adapter)
     figures: JsonObject = {"side": side, "samples": samples}
-    figures |= {"adapter": renderer.device.adapter.name, "traced": [], "own": []}
+    figures |= {"adapter": renderer.device.adapter.name, "traced": [], "own": [], "people": []}
+    for number in range(0 if trace_only else people):
+        one = case(number, measured=True)
+        settings = Settings(size=(_SMALL_SIDE, _SMALL_SIDE), atlas=2 * _SMALL_SIDE, strands=False)
+        figures["people"].append(fitted_stranger(one, renderer.draw(one.scene, settings).linear(), adapter))
+        print_lines(str(figures["people"][-1]))
+        write_results(output, figures, 4)
     for number in range(scenes):
         one, began = case(number), time.perf_counter()
         image = photograph(renderer, one, side, samples, variant).image
@@ -197,10 +214,8 @@ def fitted(one: Case, image: NDArray[np.float32], adapter: str) -> JsonObject:
     """
     began = time.process_time()
     look = one.person.look
-    held = Pigments(eumelanin=look.eumelanin, oxygen=look.oxygen, epidermis_mm=DEFAULT_SKIN.epidermis_mm)
-    skin = one.scene.skin.model_copy(update={"pigments": held, "roughness": 0.3, "rho_s": 0.5})
-    given = replace(one.scene, skin=skin, lights=(), environment=None)
-    found = fit(image, given, robust=_NO_LIMIT, adapter=adapter)
+    held = Pigments(eumelanin=look.eumelanin, oxygen=look.oxygen, epidermis_mm=look.epidermis_mm)
+    found = fit(image, _given(one.scene, held), robust=_NO_LIMIT, adapter=adapter)
     return {"scene": one.number, **_compared_with_truth(one, found)} | {
         "seconds": found.seconds,
         "processor_seconds": time.process_time() - began,
@@ -208,6 +223,22 @@ def fitted(one: Case, image: NDArray[np.float32], adapter: str) -> JsonObject:
         "residual": found.residual,
         "not_determined": list(found.uncertainty.undetermined),
     }
+
+
+def fitted_stranger(one: Case, image: NDArray[np.float32], adapter: str) -> JsonObject:
+    """Return the estimates of a case whose oxygenation and epidermal thickness the fit assumes."""
+    oxygen, epidermis_mm = DEFAULT_SKIN.oxygen, DEFAULT_SKIN.epidermis_mm
+    look = replace(one.person.look, oxygen=oxygen, epidermis_mm=epidermis_mm)
+    scene = replace(one.scene, head=replace(one.scene.head, maps=PaintedMaps(look=look)))
+    given = _given(scene, Pigments(eumelanin=look.eumelanin))
+    found = fit(image, given, side=_SMALL_SIDE, atlas=2 * _SMALL_SIDE, adapter=adapter)
+    return {"scene": one.number, **_compared_with_truth(one, found)}
+
+
+def _given(scene: Scene, pigments: Pigments) -> Scene:
+    """Return what a fit is given of a scene: no light, and a usual surface with the given pigments."""
+    skin = scene.skin.model_copy(update={"pigments": pigments, "roughness": 0.3, "rho_s": 0.5})
+    return replace(scene, skin=skin, lights=(), environment=None)
 
 
 def _compared_with_truth(one: Case, found: FitResult) -> JsonObject:

@@ -166,7 +166,18 @@ def _fitting(results: JsonObject) -> str:
     busy = statistics.median(one["processor_seconds"] for one in results["traced"])
     size = f"{results['side']} x {results['side']} pixels, {results['samples']} paths per pixel"
     took = f"{results['adapter']}: a fit takes {seconds:.3g} s (median), {busy:.3g} s of processor time"
-    text = f"{size}, fitted at a width of 128 pixels. {took}.\n\n{_stated(results['traced'])}"
+    text = f"{size}, fitted at a width of 128 pixels. {took}.\n\n"
+    errors = f"relative to the stated standard deviations: {_stated(results['traced'])}"
+    text += f"Errors of path-traced faces {errors}.\n"
+    if people := results.get("people"):
+        text += (
+            f"\nThe same of {len(people)} people with measured pigments, rendered by this package, of whom "
+        )
+        text += f"the fit knows neither oxygen nor thickness of the epidermis: {_stated(people)}.\n"
+    else:
+        text += (
+            "\nThese figures are of people and of a skin model before the comparison with measured people.\n"
+        )
     return f"{_table(heads, rows)}\n{text}"
 
 
@@ -195,7 +206,7 @@ def _stated(cases: Sequence[JsonObject]) -> str:
         one, two = (_percent(sum(abs(x) < limit for x in over) / len(over)) for limit in (1.0, 2.0))
         rms = math.sqrt(statistics.fmean(x * x for x in over))
         words.append(f"{name} {rms:.2f} (RMS; within one deviation for {one} of the faces, two for {two})")
-    return f"Errors of path-traced faces relative to the stated standard deviations: {', '.join(words)}.\n"
+    return ", ".join(words)
 
 
 def _thousandths(value: float) -> str:

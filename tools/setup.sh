@@ -111,6 +111,7 @@ install_locked() {
     say "installing $(grep -c '==' $lock) locked packages (once)"
     pip_install --require-hashes -r $lock || fail "could not install the locked packages (see above)."
     pip_install --no-deps --no-build-isolation -e . || fail "could not install dermis itself (see above)."
+    .venv/bin/python -m compileall -q src/dermis || true # otherwise the first command compiles hundreds of modules
     wanted_stamp $lock >"$installed_stamp"
 }
 

@@ -12,14 +12,16 @@ from numpy.typing import NDArray
 
 from dermis import DermisError, DirectionalLight, Environment, Human, Renderer, Scene, Settings
 from dermis.apps.inverse.fitting import light_basis
-from dermis.apps.inverse.fitting.fit import fit
+from dermis.apps.inverse.fitting.fit import InitialGuess, fit
 from dermis.apps.inverse.fitting.inputs import fit_subject, read_photograph
 from dermis.apps.inverse.fitting.light_basis import solve_strengths
 from dermis.apps.inverse.fitting.placement import align_to_landmarks
 from dermis.apps.inverse.fitting.result import FitResult, save_fit
 from dermis.apps.inverse.fitting.solve import SYSTEMATIC_SD
+from dermis.apps.inverse.fitting.unknowns import SKIN_UNKNOWNS, prior_point
 from dermis.apps.inverse.unmixing.unknown_skin import unknown_skin_sd
 from dermis.human.landmarks.points import landmark_points
+from dermis.human.skin.measured import measured_cells
 from dermis.images.colour import encode_srgb8
 from dermis.mesh.geometry import fibonacci_sphere
 from dermis.scene.camera import Camera
@@ -177,3 +179,36 @@ def test_stated_pigments_are_known() -> None:
     skin = Skin(profile="spectral", pigments=Pigments(oxygen=0.9, epidermis_mm=0.06))
     subject = fit_subject(Scene(Human().head(subdivide=0), skin=skin))
     assert subject.known == ("oxygen", "epidermis_mm")
+
+
+def test_priors_of_pigments_are_those_of_measured_people() -> None:
+    """Medians of groups and sites differ less than people: nearly all are within two deviations."""
+    cells = [one for one in measured_cells() if not one.sex + one.age_group and one.people >= 50]
+    for unknown in SKIN_UNKNOWNS[:2]:
+        values = np.log([getattr(one.pigments, unknown.name) for one in cells])
+        score = (values - np.log(unknown.prior_median)) / unknown.prior_sd
+        assert abs(np.median(score)) < 0.5 and np.abs(score).max() < 2.5, unknown.name
+        assert (np.abs(score) < 1.0).mean() > 0.68, unknown.name
+
+
+class TwoWells(InitialGuess):
+    """Coarse search whose squared residual has minima at melanin fractions of 0.4 and 0.05.
+
+    ratio : squared residual of the second minimum relative to that of the first
+    """
+
+    def __init__(self, ratio: float) -> None:
+        self.point, self.ratio = prior_point(np.array([[0.0, 0.0, 1.0]])), ratio
+
+    def _squared_residual(self, logs: NDArray[np.float64], suns: list[int]) -> float:
+        dark, pale = (abs(logs[0] - np.log(melanin)) for melanin in (0.4, 0.05))
+        return float(min(1.0 + dark, self.ratio + pale) + abs(logs[1] - np.log(0.01)))
+
+
+def test_fits_start_from_dark_and_from_pale_skin_that_look_alike() -> None:
+    dark, pale = TwoWells(1.3).minima(TwoWells(1.3).best(1))
+    assert dark[0] > 0.1 and dark[-1] == pytest.approx(0.4)
+    assert pale[0] < 0.05 < pale[-1] < 0.2
+    assert np.exp(TwoWells(1.3).best(1, pale).logs[0]) == pytest.approx(0.05, rel=0.2)
+    (everything,) = TwoWells(3.0).minima(TwoWells(3.0).best(1))
+    assert (everything[0], everything[-1]) == pytest.approx((0.002, 0.4))

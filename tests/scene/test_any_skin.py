@@ -12,6 +12,8 @@ from small_figure import CENTRE, arm, figure, patch, write_obj
 import dermis
 from dermis.formats.parts import GREY
 from dermis.frame.features.shading.view import camera_views, pinhole
+from dermis.human.skin.measured import measured_cells
+from dermis.images.colour import lab
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Mesh
@@ -141,6 +143,40 @@ def test_given_picture_is_used_as_colour(tmp_path: Path) -> None:
     dermis.write_image(tmp_path / "white.png", np.ones((1, 1, 3), np.float32))
     path = write_obj(tmp_path / "arm.obj", arm())
     assert load(path, colour=tmp_path / "white.png").maps.mean_colour == pytest.approx(np.ones(3))
+
+
+def lab_of(path: Path, site: str) -> np.ndarray:
+    colour = load(path, skin_site=site).maps.mean_colour
+    assert colour is not None
+    return lab(colour)
+
+
+def test_skin_of_a_named_site_has_its_measured_colour(tmp_path: Path) -> None:
+    """Palms are lighter than backs of hands; the difference is the largest in dark skin."""
+    path = write_obj(tmp_path / "arm.obj", arm())
+    cell = next(one for one in measured_cells() if (one.group, one.site) == ("african", "palm"))
+    with pytest.warns(
+        dermis.base.errors.DermisWarning, match="african palm, the median of 47 measured people"
+    ):
+        palm = lab_of(path, "african palm")
+    assert palm == pytest.approx(cell.cielab, abs=0.01)
+    with pytest.warns(dermis.base.errors.DermisWarning, match="an estimate from other groups"):
+        lab_of(path, "south asian palm")
+    with pytest.warns(dermis.base.errors.DermisWarning, match="mean of 8 groups"):
+        back = lab_of(path, "back_of_hand")
+    with pytest.warns(dermis.base.errors.DermisWarning, match="mean of 6 groups"):
+        assert lab_of(path, "palm")[0] > back[0] + 5.0
+
+
+def test_a_site_is_refused_where_it_would_have_no_effect(tmp_path: Path) -> None:
+    dermis.write_image(tmp_path / "white.png", np.ones((1, 1, 3), np.float32))
+    path = write_obj(tmp_path / "arm.obj", arm())
+    with pytest.raises(dermis.DermisError, match="expected one of back of hand"):
+        load(path, skin_site="elbow")
+    with pytest.raises(dermis.DermisError, match="the skin has a colour map"):
+        load(path, skin_site="palm", colour=tmp_path / "white.png")
+    with pytest.raises(dermis.DermisError, match="expected a mesh file to which it applies"):
+        dermis.load_head("human", skin_site="palm")
 
 
 def test_front_option_rotates_the_head(tmp_path: Path) -> None:

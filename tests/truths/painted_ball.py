@@ -19,14 +19,15 @@ CAMERA = Camera(position=(0.0, 0.0, 200.0), frame_mm=50.0)
 EVERYWHERE = Environment(name="uniform")
 
 
-def paint(colour: Any = (0.5, 0.3, 0.2), roughness: float = 0.3, side: int = 16) -> SkinTextures:
+def paint(
+    colour: Any = (0.5, 0.3, 0.2), roughness: float = 0.3, strength: float = 1.0, side: int = 16
+) -> SkinTextures:
     """Return textures of uniform skin, and of eyes and teeth in one colour each."""
     even = np.ones((side, side), np.float32)
     skin = np.broadcast_to(np.asarray(colour, np.float32), (side, side, 3))
     plain = [even[..., None] * np.float32(c) * np.ones(3, np.float32) for c in (0.1, 0.6, 0.5)]
-    return SkinTextures(
-        skin, even * np.float32(roughness), 0.0 * even, plain[0], 6.5, plain[1], (plain[2],) * 2
-    )
+    gloss = even * np.float32(roughness), even * np.float32(strength)
+    return SkinTextures(skin, *gloss, 0.0 * even, plain[0], 6.5, plain[1], (plain[2],) * 2)
 
 
 def ball(**painted: Any) -> Person:

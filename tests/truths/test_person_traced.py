@@ -23,7 +23,7 @@ from dermis.scene.lights import RectangleLight
 from dermis.scene.model import Scene
 
 pytest.importorskip("mitsuba")
-WAY, COLOUR = np.array([0.2, 0.1, 0.1]), np.array([0.5, 0.3, 0.2])
+MEDIUM = medium.uniform_skin((0.5, 0.3, 0.2), (0.2, 0.1, 0.1), 1.0)
 LIGHT = RectangleLight(position=(-300.0, 300.0, 900.0))
 
 
@@ -42,7 +42,7 @@ def scene(**given: Any) -> Scene:
 
 
 def traced(samples: int, **painted: Any) -> PathTraced:
-    return path_trace_person(scene(), paint(**painted), WAY, COLOUR, (24, 24), samples)
+    return path_trace_person(scene(), paint(**painted), MEDIUM, (24, 24), samples)
 
 
 def test_more_samples_are_added_to_cached_ones() -> None:
@@ -58,12 +58,14 @@ def test_more_samples_are_added_to_cached_ones() -> None:
 
 
 def test_cache_keys_depend_on_all_inputs() -> None:
-    person, path = posed_person(scene(), paint()), np.ones(3)
+    person, path = posed_person(scene(), paint()), MEDIUM
     brows, *others = person.hairs
     thicker = replace(person, hairs=(replace(brows, radius_mm=2 * brows.radius_mm), *others))
     others = [
         person_key(scene(), person, path, "form"),
-        person_key(scene(), person, 2 * path, "form"),
+        person_key(scene(), person, MEDIUM.with_eta(1.4), "form"),
+        person_key(scene(), person, None, "form"),
+        person_key(scene(), replace(person, textures=paint(strength=0.5)), path, "form"),
         person_key(scene(), person, path, "another"),
         person_key(scene(), thicker, path, "form"),
         person_key(scene(), replace(person, eyes=2 * person.eyes), path, "form"),
@@ -97,4 +99,4 @@ def test_eyes_look_out_of_the_head() -> None:
 
 def test_heads_without_true_eyes_are_refused() -> None:
     with pytest.raises(DermisError, match="eyes of true shape"):
-        path_trace_person(ball_scene(), ball().textures, WAY, COLOUR, (8, 8), 4)
+        path_trace_person(ball_scene(), ball().textures, MEDIUM, (8, 8), 4)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,19 +16,23 @@ from dermis.apps.validation.comparisons.person import (
     EYE_FRAME_MM,
     VIEWS,
     PersonComparison,
+    PersonSubject,
     as_softbox,
     compare_person,
     iris_errors,
     person_comparison,
     render_frame,
+    shared_skin,
     view_scene,
+    without_cause,
 )
 from dermis.apps.validation.comparisons.person_textures import person_textures
-from dermis.base.errors import DermisError
 from dermis.frame.renderer import Renderer
 from dermis.human.person import Human
+from dermis.human.skin.painted import mean_colour
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.head import Head
+from dermis.optics.profiles import load_profile
 from dermis.scene.lights import PointLight, RectangleLight, SphereLight
 from dermis.scene.settings import Settings
 
@@ -97,21 +102,37 @@ def test_picture_is_downsampled_from_twice_its_size(renderer: Renderer) -> None:
 
 
 def test_an_eye_is_close_to_its_path_traced_image(
-    renderer: Renderer, paint: SkinTextures, monkeypatch: pytest.MonkeyPatch
+    renderer: Renderer, paint: SkinTextures, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     pytest.importorskip("mitsuba")
     monkeypatch.setattr(medium, "GRID_VOXELS", 8)
-    pair = compare_person(renderer, head(), paint, "eye", side=32, samples=8, atlas=256, use_cache=False)
-    assert pair.samples == 16  # views of eyes use twice as many
+    subject = PersonSubject(view_scene(head(), VIEWS["eye"]), paint)
+    skin = shared_skin(renderer, head(), "matched", tmp_path)
+    pair = compare_person(renderer, subject, skin, "eye", side=32, samples=16, atlas=256, use_cache=False)
+    assert pair.samples == 16
     assert 0.6 < pair.energy.value < 1.6 and pair.energy.standard_error > 0.0
     assert pair.tone_mapped(pair.ours).shape == (32, 32, 3)
     pupil = pair.reference[15:17, 15:17].mean()
     assert pupil < 0.3 * pair.reference[pair.mask].mean() and pair.ours[15:17, 15:17].mean() < 0.1
 
 
-def test_unknown_views_are_refused(renderer: Renderer, paint: SkinTextures) -> None:
-    with pytest.raises(DermisError, match="expected one of portrait"):
-        compare_person(renderer, head(), paint, "aura")
+def test_a_cause_is_left_out_on_both_sides(renderer: Renderer, paint: SkinTextures) -> None:
+    subject = PersonSubject(view_scene(head(), VIEWS["portrait"]), paint)
+    plain = without_cause(subject, "pigments")
+    assert np.ptp(plain.textures.colour[..., 0]) == 0.0 < np.ptp(paint.colour[..., 0])
+    assert np.array_equal(plain.scene.head.maps.colour, plain.textures.colour)
+    flat = without_cause(subject, "relief")
+    assert flat.textures.height_mm.max() == 0.0 == flat.scene.head.maps.height.max()
+    bald = without_cause(subject, "hair").scene.head
+    assert bald.hair is None and bald.strands is None
+    matte = without_cause(subject, "reflection")
+    assert matte.textures.strength.max() == 0.0
+
+
+def test_layered_skin_has_the_thickness_of_the_person(renderer: Renderer, tmp_path: Path) -> None:
+    skin = shared_skin(renderer, head(), "layered", tmp_path)
+    assert skin.medium.layers[0].thickness_mm == head().maps.look.epidermis_mm
+    assert load_profile(skin.profile).albedo == pytest.approx(mean_colour(head().maps.look), rel=0.03)
 
 
 def iris_pair(shift: int, gain: float) -> PersonComparison:

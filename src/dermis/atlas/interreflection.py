@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+import os
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.atlas.shipped import shipped_arrays
 from dermis.base.arrays import Doubles, Floats, Index, Mask
 from dermis.base.disk import load_or_make
 from dermis.base.progress import logged_step
@@ -28,6 +31,8 @@ _MAX_TRACED_TRIANGLES = 300_000  # above this, points closer than _MERGED_LINES 
 _MERGED_LINES = 1.5  # distance below which points are merged, in spacings of adjacent lines
 _MIN_FORM_FACTOR = 1e-3  # smaller form factors are dropped, and the remaining ones of a cell scaled up
 _SEED = 20
+_MAX_THREADS = 8
+_TRIANGLES_AT_ONCE = 1 << 14  # limits the memory of each thread
 _LINES_PER_ROW = 4096  # stride of line indices: more than the lines along a bundle's side
 
 
@@ -67,7 +72,10 @@ class FormFactors:
 
 
 def cached_form_factors(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> FormFactors:
-    """Return the form factors that `compute_form_factors` computes, cached on disk."""
+    """Return the form factors that `compute_form_factors` computes, cached on disk or from the package."""
+    names = [field.name for field in fields(FormFactors)]
+    if shipped := shipped_arrays(mesh, form_factor_table(mapped), names):
+        return FormFactors(**shipped)
     cut_out = [np.packbits(mesh.cut_out)] if mesh.cut_out.any() else []
     digest = hashlib.sha256(
         f"{_CACHE_VERSION} {CELLS_PER_SIDE} {SAMPLES_PER_PATCH} "
@@ -75,7 +83,6 @@ def cached_form_factors(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> FormFact
     )
     for array in (mesh.positions, mesh.triangles, corner_uv, np.packbits(mapped), *cut_out):
         digest.update(np.ascontiguousarray(array).tobytes())
-    names = [field.name for field in fields(FormFactors)]
 
     @logged_step("computing form factors of the skin")
     def make() -> dict[str, NDArray[np.generic]]:
@@ -83,6 +90,14 @@ def cached_form_factors(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> FormFact
         return {name: getattr(form_factors, name) for name in names}
 
     return FormFactors(**load_or_make("interreflection", digest.hexdigest()[:40], names, make))
+
+
+def form_factor_table(mapped: Mask) -> str:
+    """Return the name of the table with the form factors of a mesh.
+
+    mapped : (f,) mask of triangles that have texels
+    """
+    return f"form factors {_CACHE_VERSION} {hashlib.sha256(np.packbits(mapped).tobytes()).hexdigest()[:16]}"
 
 
 def compute_form_factors(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> FormFactors:
@@ -121,18 +136,31 @@ def _trace_lines(
         vertices, corner = merge_near_points(vertices, corner, _MERGED_LINES / per_mm)
         proper = np.flatnonzero((corner != np.roll(corner, 1, axis=1)).all(axis=1))
         corner, corner_uv, mapped = corner[proper], corner_uv[proper], mapped[proper]
-    rng, line_counts, facing = (
-        np.random.default_rng(_SEED),
-        np.zeros(CELLS_PER_SIDE * CELLS_PER_SIDE),
-        [np.zeros((0, 2), np.int64)],
-    )
-    for direction in _hemisphere_directions(bundles):
-        axes = per_mm * _line_axes(direction, rng.uniform(0.0, 2.0 * np.pi))
-        points = vertices @ axes.T + np.append(lines + rng.uniform(-0.5, 0.5, 2), 0.0)
-        line, depth, outward, triangle, weights = intersect_lines(points[corner])
-        cell = np.where(mapped[triangle], _cell_index(corner_uv[triangle], weights), -1)
-        line_counts += np.bincount(cell[cell >= 0], minlength=CELLS_PER_SIDE * CELLS_PER_SIDE)
-        facing.append(_facing_cells(line, depth, outward, cell))
+    x, y, z = np.ascontiguousarray(vertices.T)[:, :, None]
+    rng = np.random.default_rng(_SEED)
+    bundle_axes = [
+        (per_mm * _line_axes(direction, rng.uniform(0.0, 2.0 * np.pi)), lines + rng.uniform(-0.5, 0.5, 2))
+        for direction in _hemisphere_directions(bundles)
+    ]
+
+    def trace(bundle: tuple[Doubles, Doubles]) -> tuple[Index, Index]:
+        axes, offset = bundle
+        # a matrix product would depend on the number of threads in its last bits
+        points = x * axes[:, 0] + y * axes[:, 1] + z * axes[:, 2] + np.append(offset, 0.0)
+        met = []
+        for first in range(0, max(len(corner), 1), _TRIANGLES_AT_ONCE):
+            part = slice(first, first + _TRIANGLES_AT_ONCE)
+            line, depth, outward, triangle, weights = intersect_lines(points[corner[part]])
+            cell = np.where(mapped[part][triangle], _cell_index(corner_uv[part][triangle], weights), -1)
+            met.append((line, depth, outward, cell))
+        line, depth, outward, cell = (np.concatenate(parts) for parts in zip(*met, strict=True))
+        return _facing_cells(line, depth, outward, cell), cell[cell >= 0]
+
+    line_counts, facing = np.zeros(CELLS_PER_SIDE * CELLS_PER_SIDE), [np.zeros((0, 2), np.int64)]
+    with ThreadPoolExecutor(min(os.cpu_count() or 1, _MAX_THREADS)) as pool:
+        for pairs, cells in pool.map(trace, bundle_axes):
+            facing.append(pairs)
+            line_counts += np.bincount(cells, minlength=len(line_counts))
     return np.concatenate(facing), line_counts
 
 

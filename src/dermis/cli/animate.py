@@ -18,7 +18,13 @@ from dermis.base.errors import refuse
 from dermis.base.quantities import checked_number
 from dermis.cli.options import AdapterOption, FlagOption, IntegerOption, JsonOption, Options, OutputPath
 from dermis.cli.output_options import AnimationOutput
-from dermis.cli.scene_options import DEFAULT_SCENE_OPTIONS, SceneOptions, assemble_scene, note_subdivision
+from dermis.cli.scene_options import (
+    DEFAULT_SCENE_OPTIONS,
+    SceneOptions,
+    assemble_scene,
+    fit_atlas,
+    note_subdivision,
+)
 
 if TYPE_CHECKING:
     from dermis.frame.renderer import Renderer
@@ -119,6 +125,8 @@ def animate(
     """
     if names:
         return _print_animatable_names(head, scene, as_json)
+    from dermis.gpu.adapters import select_adapters
+
     started = time.perf_counter()
     span, target = parse_time_span(begin, end, fps, motion_fps), AnimationOutput(output, crf, overwrite)
     target.check(scene.settings.get("size", (2, 2)))
@@ -131,6 +139,7 @@ def animate(
     if motion_clip.note:
         note(f"note: {motion_clip.note}")
     note_subdivision(head, scene, animated.head)
+    settings = fit_atlas(animated, settings, select_adapters(adapter)[0][0].kind)
     animation = _AnimatedScene(animated, settings, motion_clip, rate, numbers[0])
     missing = target.frames_to_render(
         numbers, settings.size, _frame_digest(animation, scene, head, motion_path)

@@ -19,7 +19,13 @@ from dermis.cli.output_options import (
     OutputsFormatOption,
     OutputsOption,
 )
-from dermis.cli.scene_options import DEFAULT_SCENE_OPTIONS, SceneOptions, assemble_scene, note_subdivision
+from dermis.cli.scene_options import (
+    DEFAULT_SCENE_OPTIONS,
+    SceneOptions,
+    assemble_scene,
+    fit_atlas,
+    note_subdivision,
+)
 from dermis.scene.techniques import TECHNIQUES
 
 if TYPE_CHECKING:
@@ -96,7 +102,8 @@ def render(
         note_subdivision(head, scene, loaded_scene.head)
         with spinner("rendering"):
             renderer = future.result()
-            rendered = renderer.draw(loaded_scene, settings, outputs=frame_outputs.names)
+            settings = fit_atlas(loaded_scene, settings, renderer.device.adapter.kind)
+            rendered = renderer.draw(loaded_scene, settings, timed=False, outputs=frame_outputs.names)
             values = {name: rendered.output(name) for name in frame_outputs.names}
             setup_ms = rendered.setup_ms
             if as_json:  # time a second frame, because the first one fills the caches

@@ -49,7 +49,8 @@ ENVIRONMENT_OPTION_NAMES |= {"name": "env", "rotation_degrees": "env_rotation"}
 if not TYPE_CHECKING:
     SkinPreset = Literal[tuple(SKIN_PRESETS)] | None
     SkinOptions = model_options(Skin)
-    SettingsOptions = model_options(Settings, defaults=PHOTOGRAPHIC_SETTINGS)
+    _ATLAS_DEFAULT = f"{Settings().atlas}, without a GPU what the picture resolves"
+    SettingsOptions = model_options(Settings, defaults={**PHOTOGRAPHIC_SETTINGS, "atlas": _ATLAS_DEFAULT})
     EnvironmentOptions = model_options(Environment, names=ENVIRONMENT_OPTION_NAMES)
 
 
@@ -130,6 +131,23 @@ def assemble_scene(name: str, options: SceneOptions) -> tuple[Scene, Settings]:
     final_settings = Settings(**{**PHOTOGRAPHIC_SETTINGS, **set_values})
     _note_profile_map(assembled.skin, final_settings)
     return assembled, final_settings
+
+
+def fit_atlas(scene: Scene, settings: Settings, adapter_kind: str) -> Settings:
+    """Return settings for an adapter: software adapters get the atlas that the picture resolves, with a note.
+
+    An atlas that the user or the scene file gives is kept.
+
+    adapter_kind : kind of the graphics adapter, "CPU" for software
+    """
+    from dermis.scene.resolved_atlas import resolved_atlas
+
+    if adapter_kind != "CPU" or "atlas" in settings.model_fields_set:
+        return settings
+    side = resolved_atlas(scene, settings)
+    if side < settings.atlas and TECHNIQUES[settings.technique].uses_atlas:
+        note(f"note: --atlas {side} without a GPU, as the picture resolves no more texels")
+    return settings.model_copy(update={"atlas": side})
 
 
 def note_subdivision(name: str, options: SceneOptions, head: Head) -> None:

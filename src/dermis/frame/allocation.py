@@ -203,7 +203,10 @@ def _make_layout(
         gutter_update = cached(_gutter_update, tracing, geometry, shapes.rest_shape, owner=layout_key)
     if request.has_occlusion:
         inputs = bindings, textures.resources["atlas"]
-        occlusion = cached(cached_occlusion_map, device, head, atlas, untracked=inputs, owner=layout_key)
+        hair = request.head.hair if settings.strands else None
+        occlusion = cached(
+            cached_occlusion_map, device, head, atlas, hair, untracked=inputs, owner=layout_key
+        )
     else:
         occlusion = placeholder_occlusion(device)
     moving_occlusion = translucency = None

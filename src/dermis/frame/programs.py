@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pkgutil
 from collections.abc import Callable, Sequence
-from functools import cache
+from functools import cache, lru_cache
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -40,6 +40,7 @@ _SPLAT_STEP_TEXELS = 2.0  # step along hairs in shadow maps on software adapters
 _MAX_SAMPLES = 64  # limit of samples per invocation, as a driver ends loops after 65,535 iterations
 
 
+ListMembers = Callable[[], Sequence[ShaderListMember]]
 _COMMON_SHADERS = (  # shaders of most frames
     "shading/shade.wgsl",
     "surface/surface_texels.wgsl",
@@ -57,17 +58,20 @@ def shader_folders(*options: str) -> tuple[Folder, ...]:
 
     options : names of the `//#if` conditions that hold
     """
-    constants: dict[str, float] = {
-        **light_shader_constants(),
-        **isotropic_lobe_constants(),
-        **reflection_constants(),
-    }
-    lists: dict[str, Callable[[], Sequence[ShaderListMember]]] = {"lights": light_shaders}
+    lists, constants = _feature_definitions(registry_version())
+    shared = ShaderFolder(FEATURES_FOLDER, lists, lambda: constants, frozenset(options))
+    return (shared, FRAME_FOLDER / "wgsl", FRAME_FOLDER / "techniques", SPECULAR_FOLDER)
+
+
+@lru_cache(maxsize=1)
+def _feature_definitions(_: int) -> tuple[dict[str, ListMembers], dict[str, float]]:
+    """Return the lists and constants of all features, for one `registry_version`."""
+    constants = light_shader_constants() | isotropic_lobe_constants() | reflection_constants()
+    lists: dict[str, ListMembers] = {"lights": light_shaders}
     for feature in _features():
         constants |= getattr(feature, "shader_constants", dict)()
         lists |= getattr(feature, "shader_lists", dict)()
-    shared = ShaderFolder(FEATURES_FOLDER, lists, lambda: constants, frozenset(options))
-    return (shared, FRAME_FOLDER / "wgsl", FRAME_FOLDER / "techniques", SPECULAR_FOLDER)
+    return {name: cache(members) for name, members in lists.items()}, constants
 
 
 @cache

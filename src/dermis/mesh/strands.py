@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dermis.base.arrays import Doubles, Floats, Ints
 from dermis.base.summary import ShortRepr
-from dermis.mesh.geometry import cross_columns, dot_columns
+from dermis.mesh.geometry import cross_columns, dot_columns, triangle_areas
 from dermis.mesh.mesh import Mesh
 
 _MIN_LENGTH_MM = 1e-9
@@ -107,6 +107,23 @@ def quad_weights(position: NDArray[np.floating]) -> Doubles:
     """
     s, t = position.astype(np.float64).T
     return np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t], axis=-1)
+
+
+def cover_of_points(mesh: Mesh, strands: Strands) -> Doubles:
+    """Return the projected area of the strands rooted around each point of a mesh, per area of skin (p,) [-].
+
+    Half of the area of a strand seen from the side counts, for inclined hair. It covers skin at the root.
+    """
+    lengths = np.linalg.norm(np.diff(strands.knots_mm.astype(np.float64), axis=1), axis=2)
+    widths = strands.radius_mm[:, 1:].astype(np.float64) + strands.radius_mm[:, :-1]
+    area = 0.5 * (lengths * widths).sum(axis=1)
+    corners, weights = quad_corners(mesh, strands.roots.quad), quad_weights(strands.roots.position)
+    count = len(mesh.points_mm)
+    hair = np.bincount(corners.ravel(), (weights * area[:, None]).ravel(), minlength=count)
+    points = mesh.point[mesh.triangles]
+    thirds = np.repeat(triangle_areas(mesh.points_mm[points].astype(np.float64)) / 3.0, 3)
+    skin = np.bincount(points.ravel(), thirds, minlength=count)
+    return np.asarray(hair / np.maximum(skin, 1e-9))
 
 
 def root_frames(mesh: Mesh, roots: Roots, points_mm: NDArray[np.floating]) -> tuple[Doubles, Doubles]:

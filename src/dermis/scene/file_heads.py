@@ -31,7 +31,7 @@ from dermis.scene.file_surfaces import (
     with_missing_uv,
 )
 from dermis.scene.head_table import NormalY, check_relief
-from dermis.scene.skin_tone import with_skin_tone
+from dermis.scene.skin_tone import NO_PICTURE, with_skin_tone
 
 MapFile = str | os.PathLike[str] | None
 
@@ -42,11 +42,13 @@ class MapOptions:
 
     files : picture files by role, in place of pictures of the mesh file; None keeps the mesh file's picture
     height_mm, normal_y : see `load_maps`
+    skin_site : name of a measured colour for skin without a picture, see `measured_tone`
     """
 
     files: Mapping[str, MapFile]
     height_mm: float | None = None
     normal_y: NormalY = "up"
+    skin_site: str | None = None
 
     @property
     def user_files(self) -> dict[str, MapFile]:
@@ -99,7 +101,7 @@ def load_file_head(name: str, mesh_options: dict[str, Any], options: MapOptions)
     )
     check_uv_range(mesh, path)
     check_relief(options.height_mm, maps.height, f"{name}: height_mm")
-    maps, tone_note = (maps, "") if "colour" in options.user_files else with_skin_tone(mesh, maps)
+    maps, tone_note = with_skin_tone(mesh, maps, options.skin_site, "colour" in options.user_files)
     for note in filter(None, (*rigged.notes, tone_note, *notes)):
         notify(f"{path}: {note}")
     return Head(name, mesh, maps, "", rigged.rig, file_vertices=rigged.file_vertices), look
@@ -116,6 +118,8 @@ def _load_sample(sample: Sample, mesh_options: dict[str, Any], options: MapOptio
         hint = f"Use one of {', '.join(name for name, one in SAMPLES.items() if one.kind == 'head')}"
         refuse(sample.name, "a head", f"this sample is an {sample.kind}", hint)
     files = fetch_sample(sample.name)
+    if options.skin_site is not None:
+        refuse("skin_site", NO_PICTURE, f"{sample.name} has a colour map", "Leave it out")
     sample_options = mesh_options | {"unit_mm": mesh_options["unit_mm"] or sample.unit_mm}
     if sample_options["v_origin"] == "auto":
         sample_options["v_origin"] = sample.v_origin or "auto"

@@ -65,6 +65,9 @@ class HeadTable(FrozenModel):
     .ply .stl)."""
     colour: str | None = None
     """Colour map (sRGB)."""
+    skin_site: str | None = None
+    """Measured colour of skin that has no picture: a site of the body, such as palm, back of hand, inner arm
+    or cheek, alone or after a group of people, as in south asian palm."""
     normal: str | None = None
     """Tangent-space normal map."""
     height: str | None = None

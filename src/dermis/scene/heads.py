@@ -47,6 +47,7 @@ def load_head(
     head: str | os.PathLike[str],
     *,
     colour: MapFile = None,
+    skin_site: str | None = None,
     normal: MapFile = None,
     height: MapFile = None,
     height_mm: float | None = None,
@@ -77,6 +78,9 @@ def load_head(
         head`, a sample ("lee_perry_smith") or a mesh file (.glb, .gltf, .vrm, .usdz, .obj, .ply, .stl).
     colour, normal, height, specular, roughness : str or path, optional
         Image files of the maps; see `dermis.formats.maps.load_maps`.
+    skin_site : str, optional
+        Measured colour of skin that has no picture: a site of the body, such as "palm", "back of hand" or
+        "inner arm", alone or after a group of people, as in "south asian palm" [Lu2025].
     height_mm : float, optional
         Relief of one grey level of an 8-bit height map [mm].
     unit_mm : float, optional
@@ -144,7 +148,7 @@ def load_head(
     map_files = {"colour": colour, "normal": normal, "height": height}
     map_files |= {"specular": specular, "roughness": roughness}
     check_files_and_lengths(map_files, unit_mm=unit_mm, height_mm=height_mm)
-    levels, map_options = resolve_levels(subdivide), MapOptions(map_files, height_mm, normal_y)
+    levels, map_options = resolve_levels(subdivide), MapOptions(map_files, height_mm, normal_y, skin_site)
     mesh_options: dict[str, Any] = {
         "unit_mm": unit_mm,
         "v_origin": v_origin,
@@ -153,9 +157,11 @@ def load_head(
         **named,
     }
     others = {"height_mm": height_mm, "normal_y": normal_y, "eyes": eyes, "eye": eye, "regions": regions}
-    check_options(**mesh_options, **others, subdivide=AUTO if callable(subdivide) else subdivide)
+    check_options(
+        **mesh_options, **others, skin_site=skin_site, subdivide=AUTO if callable(subdivide) else subdivide
+    )
     if is_person_name(name):
-        mesh_options["eyes"] = eyes
+        mesh_options |= {"eyes": eyes, "skin_site": skin_site}
         return _with_look(_load_human(name, map_files, height_mm, normal_y, mesh_options, levels), eye)
     if name not in SAMPLES and not is_file(path):
         _refuse_name(name)
@@ -214,7 +220,15 @@ def _load_human(
     levels : subdivision levels, or a function of the head that returns them
     """
     texts = {"v_origin": "auto", "front": "auto", "eyes": "fitted"}
-    defaults = {"unit_mm": None, "up": None, "skin_groups": (), "opaque": (), "eye_groups": (), **texts}
+    defaults = {
+        "unit_mm": None,
+        "up": None,
+        "skin_site": None,
+        "skin_groups": (),
+        "opaque": (),
+        "eye_groups": (),
+        **texts,
+    }
     for option, value in mesh_options.items():
         if value != defaults[option]:
             refuse(option, "a mesh file to which it applies", f"it is given with {HUMAN!r}", "Leave it out")

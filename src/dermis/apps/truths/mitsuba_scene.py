@@ -150,7 +150,7 @@ def _head_shapes(mi: Mitsuba, head: Head, medium: Medium | Lambertian) -> tuple[
         skin_materials = _materials_of_kind(head, "skin")
         skin = {f"skin_{k}": _material_mesh(mi, head, k, bsdf=diffuse) for k in skin_materials}
         return {**skin, **opaque}, ()
-    bodies, notes = _layer_interfaces(mi, head, medium)
+    bodies, notes = layer_interfaces(mi, head, medium)
     return {**bodies, **opaque}, notes
 
 
@@ -187,26 +187,43 @@ def _material_mesh(mi: Mitsuba, head: Head, index: int, **attributes: MitsubaObj
     return mesh_shape(mi, vertices, corners.reshape(-1, 3), mesh.normals[used], **attributes)
 
 
-def _layer_interfaces(mi: Mitsuba, head: Head, medium: Medium) -> tuple[SceneDict, tuple[str, ...]]:
+def layer_interfaces(mi: Mitsuba, head: Head, medium: Medium) -> tuple[SceneDict, tuple[str, ...]]:
     """Return closed surfaces around the skin and between its layers, and notes on changes to the head."""
     skin = closed_skin(head.mesh, head.name)
     skin = replace(skin, positions=(skin.positions - np.array(head.centre_mm)).astype(np.float32))
     notes = [f"{skin.caps} openings closed, {skin.cap_area:.0f} mm2"] if skin.caps else []
-    gap = interface_gap_mm(mi, skin)
-    layers = [mi.load_dict(_homogeneous_medium(layer)) for layer in medium.layers]
-    media: list[MitsubaObject] = [None, *layers, None]
-    shapes = {}
-    depth = -gap
-    for k, (above, below) in enumerate(pairwise(media)):
-        if np.isinf(depth).any():
+    media = [mi.load_dict(homogeneous_medium(layer)) for layer in medium.layers]
+    gap, sides = interface_gap_mm(mi, skin), {"exterior": None, "interior": media[0]}
+    surfaces = {"upper": -gap, "lower": np.zeros(len(gap))}
+    outermost = {
+        f"skin_{side}": interface_mesh(mi, offset_inwards(skin, depth, head.name)[0], sides)
+        for side, depth in surfaces.items()
+    }
+    inner, inner_notes = inner_interfaces(mi, skin, medium, media, head.name)
+    return outermost | inner, (*notes, *inner_notes)
+
+
+def inner_interfaces(
+    mi: Mitsuba, skin: ClosedSurface, medium: Medium, media: Sequence[MitsubaObject], name: str
+) -> tuple[SceneDict, tuple[str, ...]]:
+    """Return the closed surfaces below each layer of finite thickness, and notes on surfaces that fold over.
+
+    skin : closed skin surface relative to the head's centre
+    media : Mitsuba's media of the layers of `medium`
+    name : name of the head, for messages
+    """
+    gap, shapes, notes = interface_gap_mm(mi, skin), {}, []
+    depth = np.zeros(len(gap))
+    for k, (layer, (above, below)) in enumerate(zip(medium.layers, pairwise([*media, None]), strict=True)):
+        if np.isinf(layer.thickness_mm):
             break
+        depth = depth + layer.thickness_mm
         for side, offset_mm in (("upper", depth), ("lower", depth + gap)):
-            surface, folded = offset_inwards(skin, offset_mm, head.name)
-            shapes[f"face_{k}_{side}"] = interface_mesh(mi, surface, {"exterior": above, "interior": below})
+            surface, folded = offset_inwards(skin, offset_mm, name)
+            shapes[f"below_{k}_{side}"] = interface_mesh(mi, surface, {"exterior": above, "interior": below})
+        depth = depth + gap
         if folded > _REPORTED_FOLD:
             notes.append(f"{folded:.1%} of the face under layer {k} is folded")
-        if k < len(medium.layers):
-            depth = depth + gap + medium.layers[k].thickness_mm
     return shapes, tuple(notes)
 
 
@@ -218,7 +235,8 @@ def interface_gap_mm(mi: Mitsuba, skin: ClosedSurface) -> Doubles:
     return np.asarray(_RELATIVE_GAP * (1.0 + np.abs(skin.positions).max(axis=1)) * mi.math.RayEpsilon)
 
 
-def _homogeneous_medium(layer: Layer) -> SceneDict:
+def homogeneous_medium(layer: Layer) -> SceneDict:
+    """Return Mitsuba's description of a homogeneous, isotropically scattering medium."""
     extinction = layer.sigma_t_prime
     # Textures are limited to 1, so the scale is the largest extinction.
     return {

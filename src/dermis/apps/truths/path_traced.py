@@ -241,6 +241,14 @@ def hash_lighting(digest: hashlib._Hash, scene: Scene) -> None:
         digest.update(np.ascontiguousarray(load_panorama(scene.environment.name)).tobytes())
 
 
+def hash_medium(digest: hashlib._Hash, medium: Medium) -> None:
+    """Update a hash with the layers and the index of refraction of a medium."""
+    digest.update(f"index {medium.eta}".encode())
+    for layer in medium.layers:
+        digest.update(f"layer {layer.thickness_mm}".encode())
+        digest.update(np.ascontiguousarray([layer.sigma_a, layer.sigma_s_prime], np.float64).tobytes())
+
+
 def scene_key(scene: Scene, medium: Medium | Lambertian, size: tuple[int, int], trace_settings: str) -> str:
     """Return a hash of all inputs of a path-traced image, used as the name of its cached passes.
 
@@ -255,9 +263,7 @@ def scene_key(scene: Scene, medium: Medium | Lambertian, size: tuple[int, int], 
     if isinstance(medium, Lambertian):
         digest.update(repr(medium).encode())
     else:
-        for layer in medium.layers:
-            digest.update(f"layer {layer.thickness_mm}".encode())
-            digest.update(np.ascontiguousarray([layer.sigma_a, layer.sigma_s_prime], np.float64).tobytes())
+        hash_medium(digest, medium)
     return digest.hexdigest()[:40]
 
 

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from dermis.atlas.atlas import MAX_SHEAR, Atlas
+from dermis.atlas.shipped import shipped_arrays
 from dermis.atlas.stitched.coverage import (
     Coverage,
     compute_coverage,
@@ -14,7 +18,7 @@ from dermis.atlas.stitched.coverage import (
 )
 from dermis.atlas.stitched.gutter import GutterWidth, Packing, find_border
 from dermis.atlas.stitched.overlap_cuts import cut_overlaps
-from dermis.atlas.stitched.pack import pack_pieces
+from dermis.atlas.stitched.pack import MAX_CELLS, PieceLayout, find_layout, pack_pieces
 from dermis.atlas.stitched.surface import FlatSurface, flat_surface
 from dermis.atlas.unwrap.charts import connected_pieces
 from dermis.base.arrays import Doubles, Index, Mask
@@ -24,6 +28,9 @@ _MIN_DENSITY = 0.05  # lowest ratio of a piece's uv density to the mean at which
 _SPECK_MM2 = 1.0  # parts of a chart with less area are merged into its largest part
 _DENSITY_RANGE = (0.5, 1.4)  # ratio of uv density to the mean; pieces outside are scaled towards this range
 _MAX_GUTTER = 1 / 8  # largest width of gutters as a fraction of the map's side
+_LAYOUT_VERSION = 1  # increment when `find_stitched_layout` gives other results, and write the tables again
+LAYOUT_NAMES = "piece", "scale", "origins"
+"""Names of the arrays of `find_stitched_layout`."""
 
 
 def find_pieces(surface: FlatSurface) -> tuple[Index, Doubles]:
@@ -85,9 +92,14 @@ def build_stitched(mesh: Mesh, size: int, gutter_mm: float) -> Atlas | None:
     """
     surface = flat_surface(mesh)
     piece, scale = find_pieces(surface)
-    piece = cut_overlaps(surface, piece, gutter_mm)
     width = GutterWidth(gutter_mm, _MAX_GUTTER * size)
-    packing = pack_pieces(surface, piece, scale, size, width)
+    shipped = shipped_arrays(mesh, layout_table(gutter_mm), LAYOUT_NAMES) if size >= MAX_CELLS else None
+    if shipped is None:
+        piece, layout = cut_overlaps(surface, piece, gutter_mm), None
+    else:
+        piece = shipped["piece"].astype(np.int64)
+        layout = PieceLayout(float(shipped["scale"]), shipped["origins"])
+    packing = pack_pieces(surface, piece, scale, size, width, layout)
     if packing is None:
         return None
     # where a piece overlaps itself, only one layer owns texels, and gutters must not read the hidden one
@@ -96,6 +108,27 @@ def build_stitched(mesh: Mesh, size: int, gutter_mm: float) -> Atlas | None:
     border = find_border(surface, piece, members)
     coverage = compute_coverage(surface, piece, members, border, packing, width, (size, size))
     return _assemble_atlas(surface, packing, coverage, piece >= 0)
+
+
+def layout_table(gutter_mm: float) -> str:
+    """Return the name of the table with the pieces and their positions in maps of at least 512 texels."""
+    return f"layout {_LAYOUT_VERSION} {gutter_mm:g}"
+
+
+def find_stitched_layout(mesh: Mesh, gutter_mm: float) -> dict[str, NDArray[Any]]:
+    """Return the table of `layout_table` for a mesh: piece indices (f,), and scale and origins of the layout.
+
+    Raises ValueError if the charts do not fit.
+    """
+    surface = flat_surface(mesh)
+    piece, scale = find_pieces(surface)
+    piece = cut_overlaps(surface, piece, gutter_mm)
+    width = GutterWidth(gutter_mm, _MAX_GUTTER * MAX_CELLS)
+    layout = find_layout(surface, piece, scale, MAX_CELLS, width)
+    if layout is None:
+        raise ValueError("the charts do not fit")
+    values = piece.astype(np.int16), np.float64(layout.scale), layout.origins
+    return {name: np.asarray(value) for name, value in zip(LAYOUT_NAMES, values, strict=True)}
 
 
 def _assemble_atlas(surface: FlatSurface, packing: Packing, coverage: Coverage, mapped: Mask) -> Atlas:

@@ -14,7 +14,8 @@ from dermis.base.arrays import Doubles, Index, Mask
 
 Span = tuple[int, int, int]
 """Run of cells in a row: row, first and last column."""
-_MAX_CELLS = 512  # largest number of cells along each side of the square
+MAX_CELLS = 512
+"""Largest number of cells along each side of the square; layouts of larger maps are the same."""
 _COARSE_CELL_SIDE = 4  # side of a coarse cell, with which the best order is searched [cell]
 _BISECTION_COUNT = 8  # number of trials in the search for the scale
 _FINE_BISECTIONS, _FINE_GAIN = 4, 1.12  # trials with fine cells, and the largest factor of scale to gain
@@ -104,8 +105,8 @@ class _PieceMask(NamedTuple):
     scale: float
 
 
-class _Layout(NamedTuple):
-    """Positions of packed pieces on the grid of cells.
+class PieceLayout(NamedTuple):
+    """Positions of packed pieces on the grid of cells, 512 x 512 for maps of 512 texels and more.
 
     scale : cells per unit of the pieces' scaled uv
     origins : (p, 2) position of the origin of each piece's uv [cell]
@@ -116,32 +117,49 @@ class _Layout(NamedTuple):
 
 
 def pack_pieces(
-    surface: FlatSurface, piece: Index, scale: Doubles, size: int, width: GutterWidth
+    surface: FlatSurface,
+    piece: Index,
+    scale: Doubles,
+    size: int,
+    width: GutterWidth,
+    layout: PieceLayout | None = None,
 ) -> Packing | None:
     """Pack chart pieces with their gutters at the largest common scale; return None if they do not fit.
 
     piece : (f,) index of each triangle's piece from 0, -1 for triangles in no piece
     scale : (f,) factor of each triangle's uv that evens out texel density
     size : texels along each side of the map
+    layout : known result of `find_layout`, which is slow; None to compute it
     """
-    cells = min(size, _MAX_CELLS)
-    order = np.argsort(piece, kind="stable")[np.count_nonzero(piece < 0) :]
-    groups = [
-        members for members in np.split(order, np.flatnonzero(np.diff(piece[order])) + 1) if len(members)
-    ]
-    pieces = [_single_piece(surface, piece, members, float(scale[members[0]])) for members in groups]
+    groups, pieces = _prepare_pieces(surface, piece, scale)
     packing = Packing(np.zeros(surface.uv.shape), *np.zeros((2, len(piece))))
     if not pieces:
         return packing
-    found = _find_layout(pieces, cells, width._replace(max_texels=width.max_texels * cells / size))
+    found = layout or _find_layout(pieces, size, width)
     if found is None:
         return None
-    per_cell = size / cells
+    per_cell = size / min(size, MAX_CELLS)
     for members, one, low in zip(groups, pieces, found.origins, strict=True):
         packing.corners[members] = (one.uv * found.scale + low) * per_cell - 0.5
         packing.texels_per_uv[members] = one.scale * found.scale * per_cell
         packing.texels_per_mm[members] = one.uv_per_mm * found.scale * per_cell
     return packing
+
+
+def find_layout(
+    surface: FlatSurface, piece: Index, scale: Doubles, size: int, width: GutterWidth
+) -> PieceLayout | None:
+    """Return the layout with which `pack_pieces` packs the same pieces; None if they do not fit."""
+    return _find_layout(_prepare_pieces(surface, piece, scale)[1], size, width)
+
+
+def _prepare_pieces(surface: FlatSurface, piece: Index, scale: Doubles) -> tuple[list[Index], list[_Piece]]:
+    """Return the triangles of each piece, and the pieces prepared for packing."""
+    order = np.argsort(piece, kind="stable")[np.count_nonzero(piece < 0) :]
+    groups = [
+        members for members in np.split(order, np.flatnonzero(np.diff(piece[order])) + 1) if len(members)
+    ]
+    return groups, [_single_piece(surface, piece, members, float(scale[members[0]])) for members in groups]
 
 
 def _single_piece(surface: FlatSurface, piece: Index, members: Index, scale: float) -> _Piece:
@@ -155,8 +173,10 @@ def _single_piece(surface: FlatSurface, piece: Index, members: Index, scale: flo
     return _Piece(subset, uv, uv.max(axis=(0, 1)), scale, uv_per_mm, border)
 
 
-def _find_layout(pieces: list[_Piece], cells: int, width: GutterWidth) -> _Layout | None:
+def _find_layout(pieces: list[_Piece], size: int, width: GutterWidth) -> PieceLayout | None:
     """Return the layout with the largest scale that the search finds, or None if the pieces never fit."""
+    cells = min(size, MAX_CELLS)
+    width = width._replace(max_texels=width.max_texels * cells / size)
     area = sum(float(np.abs(one.surface.area_uv).sum()) * one.scale**2 for one in pieces)
     top = cells / float(np.sqrt(area))
     for _ in range(_MAX_MASK_ATTEMPTS):
@@ -167,7 +187,7 @@ def _find_layout(pieces: list[_Piece], cells: int, width: GutterWidth) -> _Layou
     return None
 
 
-def _find_largest_scale(masks: list[_PieceMask], cells: int, top: float) -> _Layout | None:
+def _find_largest_scale(masks: list[_PieceMask], cells: int, top: float) -> PieceLayout | None:
     """Return the layout with the largest scale below `top`, for the best of several orders of the pieces.
 
     The best order is searched with coarse cells.
@@ -184,13 +204,13 @@ def _find_largest_scale(masks: list[_PieceMask], cells: int, top: float) -> _Lay
             coarse, best = (found, order) if found else (coarse, best)
     if coarse is None:
         return _bisect_scale(masks, (0.0, top), cells, 0, _BISECTION_COUNT)
-    same = _Layout(_COARSE_CELL_SIDE * coarse.scale, _COARSE_CELL_SIDE * coarse.origins)
+    same = PieceLayout(_COARSE_CELL_SIDE * coarse.scale, _COARSE_CELL_SIDE * coarse.origins)
     return _bisect_scale(masks, (same.scale, same.scale * _FINE_GAIN), cells, best, _FINE_BISECTIONS) or same
 
 
 def _bisect_scale(
     masks: list[_PieceMask], bounds: tuple[float, float], cells: int, order: int, bisections: int
-) -> _Layout | None:
+) -> PieceLayout | None:
     """Return the layout with the largest scale between two bounds, or None if no trial fits."""
     (low, high), best = bounds, None
     for _ in range(bisections):
@@ -203,7 +223,7 @@ def _bisect_scale(
     return best
 
 
-def _try_scale(masks: list[_PieceMask], scale: float, cells: int, order: int) -> _Layout | None:
+def _try_scale(masks: list[_PieceMask], scale: float, cells: int, order: int) -> PieceLayout | None:
     """Return the layout of the pieces at one scale, or None if they do not fit.
 
     scale : cells per unit of the pieces' scaled uv
@@ -222,7 +242,7 @@ def _try_scale(masks: list[_PieceMask], scale: float, cells: int, order: int) ->
         return None
     corners = np.empty((len(masks), 2))
     corners[first] = np.array(found)[:, ::-1] if order % 2 == 1 else found
-    return _Layout(scale, corners + low)
+    return PieceLayout(scale, corners + low)
 
 
 def _scaled_mask(mask: _PieceMask, scale: float) -> tuple[Mask, Doubles]:

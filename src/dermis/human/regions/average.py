@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.tables import read_rows
-from dermis.human.model import MATERIALS
+from dermis.human.model import MATERIALS, build_head, template
 from dermis.human.person import Human
 from dermis.human.regions.region_table import Doubles, classify_regions
+from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
 
 AVERAGE_HUMAN = Human(sex=0.5, age=35.0)
 _DENSE_LEVELS = 2  # levels of subdivision, for triangles of about 1 mm
@@ -33,13 +35,13 @@ class DenseSkin(NamedTuple):
 
     def nearest_quads(self, points: Doubles) -> NDArray[np.int64]:
         """Return the index (m,) of the control quad nearest to each point (m, 3) [mm]."""
-        return np.asarray(self.quad_index[self.tree.query(points)[1]])
+        return np.asarray(self.quad_index[self.tree.query(points, workers=-1)[1]])
 
 
 @cache
 def average_head() -> Head:
-    """Return the head of the average human without subdivision."""
-    return AVERAGE_HUMAN.head(subdivide=0)
+    """Return the bare head of the average human without subdivision."""
+    return _bare_head(0)
 
 
 @cache
@@ -47,12 +49,17 @@ def average_skin() -> DenseSkin:
     """Return dense samples of the average human's outer skin, without the inside of the mouth."""
     from scipy.spatial import cKDTree
 
-    head = AVERAGE_HUMAN.head(subdivide=_DENSE_LEVELS)
+    head = _bare_head(_DENSE_LEVELS)
     mesh = head.mesh
     quad_index = control_quads(head, np.arange(len(mesh.triangles)))
     is_outer = (mesh.material == 0) & ~np.isin(quad_index, part_quads()["mouth"])
     centroids = mesh.positions[mesh.triangles[is_outer]].astype(np.float64).mean(axis=1)
     return DenseSkin(quad_index[is_outer], cKDTree(centroids))
+
+
+def _bare_head(levels: int) -> Head:
+    """Return the head of the average human without hair, at a level of subdivision."""
+    return template("own", levels).refine_head(build_head(AVERAGE_HUMAN.weights(), Maps(), "own", EyeLook()))
 
 
 def landmark_indices() -> dict[str, int]:
@@ -74,13 +81,11 @@ def human_landmarks(head: Head) -> dict[str, Doubles]:
 
 def is_human(head: Head) -> bool:
     """Return whether a head is a parametric human, judged by its control points, targets and materials."""
-    average, rig = average_head().control, head.rig
-    return (
-        rig is not None
-        and rig.positions_mm.shape == average.positions_mm.shape
-        and rig.targets.names == average.targets.names
-        and head.mesh.materials == tuple(MATERIALS.values())
-    )
+    rig = head.rig
+    if rig is None or head.mesh.materials != tuple(MATERIALS.values()):
+        return False  # without building the average head
+    average = average_head().control
+    return rig.positions_mm.shape == average.positions_mm.shape and rig.targets.names == average.targets.names
 
 
 def control_quads(head: Head, triangle: NDArray[Any]) -> NDArray[np.int64]:

@@ -22,7 +22,7 @@ from dermis.base.errors import format_value, refuse
 from dermis.base.quantities import checked_number
 from dermis.base.tables import float_columns, read_rows
 from dermis.human.skin.colours import skin_colour_table
-from dermis.images.colour import lab
+from dermis.images.colour import lab, linear_of_lab
 from dermis.images.skin_tone import ita_degrees
 from dermis.optics.pigments.parameters import DEFAULT_SKIN
 
@@ -64,8 +64,8 @@ _MELANIN_RANGE, _BLOOD_RANGE = (5e-4, 0.7), (3e-4, 0.08)
 _EPIDERMIS_RANGE_MM = (0.02, 0.2)
 _ITA_STEP = 1.0  # half width of the interval over which the density of an ITA is averaged [degrees]
 _MAX_SCORE = 2.9  # largest absolute normal score of an ITA
-# Numbers of melanin fractions, of bisections between two of them, and of steps that reduce blood:
-_ITA_NODES, _BISECTIONS, _MAX_PALING_STEPS = 257, 40, 15
+# Numbers of melanin fractions, of bisections between two of them, and of changes of the other pigments:
+_ITA_NODES, _BISECTIONS, _MAX_ITA_STEPS = 257, 40, 15
 Weights = Mapping[str, float]
 """Weights of groups, with a sum of 1."""
 
@@ -342,17 +342,22 @@ def with_ita(
 ) -> MeasuredPigments:
     """Return pigments with the melanin fraction that results in a given ITA.
 
-    If no melanin fraction does, as for very light skin with much blood, blood is also reduced and its
-    oxygenation raised.
+    If no melanin fraction does, other pigments change too: very light skin gets less blood with more oxygen,
+    very dark skin a thicker epidermis.
     """
-    for _ in range(_MAX_PALING_STEPS):
+    for _ in range(_MAX_ITA_STEPS):
         table = skin_colour_table(eumelanin, pigments.oxygen, pigments.epidermis_mm)
         melanin = np.geomspace(*_MELANIN_RANGE, _ITA_NODES)
         found = ita_degrees(lab(table.lookup(melanin, np.full(_ITA_NODES, pigments.blood))))
-        if found[0] >= ita:
+        if found[0] < ita:
+            oxygen = pigments.oxygen + 0.2 * (1.0 - pigments.oxygen)
+            pigments = pigments._replace(blood=max(0.8 * pigments.blood, _BLOOD_RANGE[0]), oxygen=oxygen)
+        elif found[-1] > ita:
+            pigments = pigments._replace(
+                epidermis_mm=min(1.3 * pigments.epidermis_mm, _EPIDERMIS_RANGE_MM[1])
+            )
+        else:
             break
-        oxygen = pigments.oxygen + 0.2 * (1.0 - pigments.oxygen)
-        pigments = pigments._replace(blood=max(0.8 * pigments.blood, _BLOOD_RANGE[0]), oxygen=oxygen)
     below = np.flatnonzero(found <= ita)
     index = int(below[0]) if len(below) else _ITA_NODES - 1
     low, high = np.log(melanin[[max(index - 1, 0), index]])
@@ -422,6 +427,47 @@ def measured_cells() -> tuple[MeasuredCell, ...]:
         )
         for row, colour, values in zip(rows, colours, pigments, strict=True)
     )  # fmt: skip
+
+
+class MeasuredTone(NamedTuple):
+    """Colour of a site of the body.
+
+    colour : (3,) diffuse reflectance, linear Rec. 709 [-]
+    note : sentence that says whose skin it is, and names its pigments
+    """
+
+    colour: Doubles
+    note: str
+
+
+def measured_tone(name: str) -> MeasuredTone:
+    """Return the median colour of a site of the body, for one group of people or as the mean of all groups.
+
+    name : one of `SITES`, alone or after one of `SKIN_ANCESTRIES`, such as "palm" or "south asian palm"
+
+    Raises DermisError for other names.
+    """
+    words = " ".join(name.lower().replace("_", " ").split())
+    site = next((one for one in SITES if words == one or words.endswith(f" {one}")), "")
+    group = words[: len(words) - len(site)].strip()
+    if not site or (group and group not in SKIN_ANCESTRIES):
+        expected = f"one of {', '.join(SITES)}, alone or after one of {', '.join(SKIN_ANCESTRIES)}"
+        refuse("skin_site", expected, f"got {format_value(name)}", "Correct it")
+    members = UNIONS.get(group, (group,)) if group else tuple(GROUPS.values())
+    cells = [
+        one
+        for one in measured_cells()
+        if one.group in members and one.site == site and not one.sex + one.age_group
+    ]
+    measured = [one for one in cells if one.people] or cells
+    colour = linear_of_lab(np.mean([one.cielab for one in measured], axis=0))
+    people = sum(one.people for one in measured)
+    source = f"the median of {people:,} measured people" if people else "an estimate from other groups"
+    if len(measured) > 1:
+        source = f"the mean of {len(measured)} groups' medians, {people:,} measured people"
+    melanin, blood = (np.exp(np.mean(np.log([one.pigments[k] for one in measured]))) for k in (0, 1))
+    pigments = f"--melanin {melanin:.2g} --blood {blood:.2g} makes the profile that of such skin"
+    return MeasuredTone(colour, f"its skin is drawn as {words}, {source}; {pigments}")
 
 
 @cache

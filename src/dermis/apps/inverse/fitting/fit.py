@@ -41,6 +41,9 @@ _SUN_COUNT = 28
 _MIN_SUN_COSINE = -0.35  # smallest cosine between sun and camera directions
 _MELANIN_GRID, _BLOOD_GRID = np.geomspace(0.002, 0.4, 14), np.geomspace(0.002, 0.06, 8)
 _STRENGTH_GRID = 0.5, 0.75, 1.0
+_RIVAL_RATIO, _RIVAL_NODES = 2.0, 2
+"""Ratio of the squared residual of a local minimum of the coarse search to the smallest one, up to which a
+fit also starts there, and half width of the range of melanin around it in nodes of the grid."""
 _RING_DEGREES, _RING_DIRECTIONS = (9.0, 18.0), 6
 """Angular radii of rings around a sun of the coarse search, and number of directions on each ring. The suns
 of the coarse search are 35 degrees apart."""
@@ -101,15 +104,45 @@ class InitialGuess:
         fixed = pigments.overrides()
         self._table = skin_colour_table(fixed["eumelanin"], fixed["oxygen"], fixed["epidermis_mm"])
 
-    def best(self, sun_count: int) -> FitPoint:
-        """Return the pigments, specular strength and `sun_count` suns with the smallest residual."""
-        grid = list(product(np.log(_MELANIN_GRID), np.log(_BLOOD_GRID), np.log(_STRENGTH_GRID)))
+    def best(self, sun_count: int, melanin: Floats = _MELANIN_GRID) -> FitPoint:
+        """Return the pigments, specular strength and `sun_count` suns with the smallest residual.
+
+        melanin : melanin fractions to try
+        """
         log_skin, suns = self.point.logs, self._select_suns(self.point.logs, sun_count)
         for _ in range(2):
-            trials = [np.array([m, b, log_skin[2], s]) for m, b, s in grid]
-            log_skin = trials[int(np.argmin([self._squared_residual(one, suns) for one in trials]))]
+            trials, residuals = self._trials(log_skin, suns, melanin)
+            log_skin = trials[int(np.argmin(residuals))]
             suns = self._select_suns(log_skin, sun_count)
         return replace(self.point, logs=log_skin, suns=self.point.suns[suns])
+
+    def minima(self, best: FitPoint) -> list[Floats]:
+        """Return the ranges of melanin around the local minima of the residual, the lowest minimum first.
+
+        Dark skin in strong light and pale skin in weak light can both be minima. Minima whose residual is
+        much larger than the smallest are left out; the range of a single minimum is the whole grid.
+
+        best : result of `best`
+        """
+        suns = [int(np.argmax(self.point.suns @ one)) for one in best.suns]
+        _, residuals = self._trials(best.logs, suns, _MELANIN_GRID)
+        profile = residuals.reshape(len(_MELANIN_GRID), -1).min(axis=1)
+        padded = np.concatenate([[np.inf], profile, [np.inf]])
+        is_minimum = (profile <= padded[:-2]) & (profile <= padded[2:])
+        usable = np.flatnonzero(is_minimum & (profile < _RIVAL_RATIO * profile.min()))
+        if len(usable) == 1:
+            return [_MELANIN_GRID]
+        ordered = usable[np.argsort(profile[usable])]
+        return [_MELANIN_GRID[max(k - _RIVAL_NODES, 0) : k + _RIVAL_NODES + 1] for k in ordered]
+
+    def _trials(self, logs: Floats, suns: list[int], melanin: Floats) -> tuple[list[Floats], Floats]:
+        """Return skins (n lists of 4 logarithms) with all pigments of the grid, and their squared residuals.
+
+        logs : (4,) logarithms of the skin unknowns, whose roughness is kept
+        """
+        grid = product(np.log(melanin), np.log(_BLOOD_GRID), np.log(_STRENGTH_GRID))
+        trials = [np.array([m, b, logs[2], s]) for m, b, s in grid]
+        return trials, np.array([self._squared_residual(one, suns) for one in trials])
 
     def _select_suns(self, logs: Floats, sun_count: int) -> list[int]:
         """Return the indices of the suns with the smallest residual, selected greedily.
@@ -237,7 +270,9 @@ def fit(
         frames = FaceRenderer(Renderer(adapter, cache_size=2), subject.scene, settings, Path(folder))
         candidate = _find_skin(frames, small)
         problem = FitProblem(frames, small.linear[frames.mask] / scale, noise, white == "specular", robust)
-        state, derivatives = solve_fit(problem, _initial_point(problem, candidate, suns), progress)
+        starts = _initial_points(problem, candidate, suns)
+        found = [solve_fit(problem, start, progress) for start in starts]
+        state, derivatives = min(found, key=lambda one: block_residual(problem, one[0]))
         scene = frames.lit_scene(state.point, state.strengths)
         picture = frames.picture(scene) * scale * light_tint(state.point)
     relative_residual = np.abs(state.residual) / np.maximum(problem.target, 1e-6)
@@ -298,14 +333,19 @@ def _find_skin(frames: FaceRenderer, photo: Photograph) -> FitPoint:
     return candidate
 
 
-def _initial_point(problem: FitProblem, candidate: FitPoint, suns: int) -> FitPoint:
-    """Return the point at which the fit starts, by a coarse search and a finer one around its suns."""
+def _initial_points(problem: FitProblem, candidate: FitPoint, suns: int) -> list[FitPoint]:
+    """Return the points at which fits start: local minima of a coarse search, with suns of a finer one."""
     frames, target, weight = problem.frames, problem.target, problem.initial_weights()
-    start = InitialGuess(frames, candidate, target, weight).best(suns)
-    if suns:
-        nearer = replace(start, suns=neighbouring_suns(start.suns))
-        start = InitialGuess(frames, nearer, target, weight).best(suns)
-    return start
+    coarse = InitialGuess(frames, candidate, target, weight)
+    best = coarse.best(suns)
+    starts = []
+    for melanin in coarse.minima(best):
+        start = coarse.best(suns, melanin)
+        if suns:
+            nearer = replace(start, suns=neighbouring_suns(start.suns))
+            start = InitialGuess(frames, nearer, target, weight).best(suns, melanin)
+        starts.append(start)
+    return starts
 
 
 def _checked_white(white: WhitePoint) -> Floats:

@@ -128,7 +128,7 @@ class FitResult:
         fixed = f"eumelanin {skin.eumelanin:g}, oxygen {skin.oxygen:g}, epidermis {skin.epidermis_mm:g} mm"
         return [
             *(
-                f"{u.name}: {u.prior_median:g} within a factor of {np.exp(u.prior_sd):.2g}"
+                f"{u.name}: {u.prior_median:.2g} within a factor of {np.exp(u.prior_sd):.2g}"
                 for u in SKIN_UNKNOWNS
             ),
             *([sun] if self.suns else []),

@@ -152,7 +152,7 @@ def solve_fit(
     damping = _DAMPING
     for iteration in range(_MAX_STEPS):
         progress(iteration, _MAX_STEPS)
-        derivatives = problem.derivatives(state, f"light_{iteration}")
+        derivatives = problem.derivatives(state, f"light_{problem.frames.frame_count}")
         improved, step, damping = _try_steps(problem, state, derivatives, damping)
         if improved is None:
             return state, derivatives

@@ -9,6 +9,7 @@ import numpy as np
 
 from dermis.human.skin.painted import PaintedMaps
 from dermis.optics.media import Floats
+from dermis.optics.pigments.priors import skin_prior
 from dermis.scene.lights import DirectionalLight
 from dermis.scene.model import Scene
 from dermis.scene.skin import Pigments, Skin
@@ -35,14 +36,20 @@ class SkinUnknown:
     step: float
 
 
+def _measured_unknown(name: str, low: float, high: float, step: float) -> SkinUnknown:
+    """Return an unknown pigment whose prior is its distribution among measured people of all groups."""
+    mean, sd = skin_prior().moments(name)
+    return SkinUnknown(name, float(np.exp(mean)), sd, low, high, step)
+
+
 SKIN_UNKNOWNS = (
-    SkinUnknown("melanin", 0.03, 2.0, 0.0005, 0.6, 0.1),
-    SkinUnknown("blood", 0.01, 0.7, 0.0005, 0.2, 0.15),
+    _measured_unknown("melanin", 0.0005, 0.6, 0.1),
+    _measured_unknown("blood", 0.0005, 0.2, 0.15),
     SkinUnknown("roughness", 0.3, 0.35, 0.05, 1.0, 0.06),
     SkinUnknown("rho_s", 0.7, 0.5, 0.02, 1.0, 0.1),
 )
-"""Unknown parameters of the skin. The priors are wide: melanin covers all populations, roughness all regions
-of a face, and `rho_s` the range from dry skin to a smooth boundary."""
+"""Unknown parameters of the skin. The priors of pigments are those of measured people; the others are wide:
+roughness covers all regions of a face, and `rho_s` the range from dry skin to a smooth boundary."""
 _PROFILE_STEP = 0.25
 """Step to which logarithms of pigments are rounded for the diffusion profile, as profiles are slow to fit."""
 SUN_STEP = 0.02

@@ -1,18 +1,24 @@
-"""Scattering medium below a person's painted skin: mean free path and a grid of albedos."""
+"""Layers below a person's painted skin: their coefficients, and a grid of albedos in the deepest."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.apps.truths.half_space import diffuse_albedo
+from dermis.apps.truths.half_space import directional_albedo
+from dermis.apps.truths.mitsuba_scene import homogeneous_medium
 from dermis.apps.truths.person.person import Person
-from dermis.apps.truths.scene_description import Mitsuba, MitsubaObject, mitsuba_rgb
+from dermis.apps.truths.scene_description import Mitsuba, MitsubaObject
 from dermis.apps.truths.slab_mc import ScatteringLayer, trace_slab
+from dermis.base.errors import refuse
 from dermis.mesh.geometry import triangle_areas
-from dermis.optics.media import SKIN_ETA
+from dermis.optics.media import SKIN_ETA, Layer, Medium
+from dermis.optics.pigments.parameters import SkinParameters
+from dermis.optics.pigments.skin import spectral_medium
+from dermis.optics.pigments.spectra import rgb_weights
 from dermis.scene.camera import Camera
 
 Doubles = NDArray[np.float64]
@@ -28,71 +34,158 @@ _GRID_MARGIN, _MIN_HALF_SIDE_MM = 0.75, 25.0
 _COLOUR_DEPTH_MM = 3.0  # depth to which the medium has the colour of the surface
 _SAMPLES_PER_VOXEL = 3.0  # samples per area of one voxel face
 _MAX_COLOUR = 0.97
-_MIN_ROOT = 0.01  # smallest tabulated square root of 1 - albedo
-_PHOTONS = 40_000
+_MIN_ROOT = 0.02  # smallest tabulated square root of 1 - albedo
+_PHOTONS, _TABLE_PHOTONS = 40_000, 40_000
+_HALF_SPACE_STEPS = 48
+_ALBEDO_STEPS = 20
+"""Number of tabulated albedos of the last of several layers."""
+
+
+def uniform_skin(colour: ArrayLike, distance_mm: ArrayLike, eta: float) -> Medium:
+    """Return the homogeneous skin with a given colour and mean distance between entry and exit of light.
+
+    colour : (3,) reflectance of light at normal incidence [-]
+    distance_mm : (3,) mean lateral offset of exit points at normal incidence [mm]
+    eta : index of refraction, 1 or `SKIN_ETA` [-]
+    """
+    albedo = _half_space_albedo(colour, eta)
+    offsets = [_mean_offset(round(float(one), 4), eta) for one in albedo]
+    extinction = np.array(offsets) / np.asarray(distance_mm, np.float64)
+    return Medium("uniform", (Layer((1.0 - albedo) * extinction, albedo * extinction, name="skin"),), eta)
+
+
+def pigmented_skin(parameters: SkinParameters, colour: ArrayLike, eta: float) -> Medium:
+    """Return an epidermis over a dermis in three channels, with a given colour.
+
+    The spectra of both layers are averaged over the sensitivity of each channel, where it is positive. The
+    absorption of the dermis is then replaced by that for which the skin has the colour.
+
+    parameters : pigments and thickness of the epidermis
+    colour : (3,) reflectance of light at normal incidence [-]
+    eta : index of refraction, 1 or `SKIN_ETA` [-]
+
+    Source: [DonnerJensen2006].
+    """
+    sensitivity = np.maximum(rgb_weights(), 0.0)
+    sensitivity /= sensitivity.sum(axis=1, keepdims=True)
+    layers = tuple(
+        replace(one, sigma_a=sensitivity @ one.sigma_a, sigma_s_prime=sensitivity @ one.sigma_s_prime)
+        for one in spectral_medium("dj2006", parameters).layers
+    )
+    medium = Medium("pigmented", layers, eta)
+    return with_deepest_albedo(medium, deepest_albedo(medium, colour))
+
+
+def with_deepest_albedo(medium: Medium, albedo: ArrayLike) -> Medium:
+    """Return a medium whose last layer has another single-scattering albedo (3,), at the same extinction."""
+    *above, last = medium.layers
+    extinction, albedo = last.sigma_t_prime, np.asarray(albedo)
+    return replace(
+        medium,
+        layers=(
+            *above,
+            replace(last, sigma_a=(1.0 - albedo) * extinction, sigma_s_prime=albedo * extinction),
+        ),
+    )
+
+
+def deepest_albedo(medium: Medium, colour: ArrayLike) -> Doubles:
+    """Return the single-scattering albedos of the last layer with which a medium has given colours [-].
+
+    Colours that the layers above rule out get the nearest possible one.
+
+    medium : layers in three channels; the albedo of the last one is ignored
+    colour : (..., 3) reflectance of light at normal incidence, relative to the light that enters [-]
+    """
+    wanted = np.asarray(colour, np.float64)
+    if len(medium.layers) == 1:
+        return _half_space_albedo(wanted, medium.eta)
+    layers = tuple(
+        tuple(
+            (*map(float, pair), one.thickness_mm) for pair in zip(one.sigma_a, one.sigma_s_prime, strict=True)
+        )
+        for one in medium.layers
+    )
+    roots = np.linspace(1.0, _MIN_ROOT, _ALBEDO_STEPS)
+    found = [
+        np.interp(wanted[..., c], _totals_by_root(tuple(one[c] for one in layers), medium.eta), roots)
+        for c in range(3)
+    ]
+    return np.asarray(1.0 - np.stack(found, axis=-1) ** 2)
 
 
 @cache
-def _albedo_table() -> tuple[Doubles, Doubles]:
-    """Return tabulated diffuse albedos of half-spaces, and sqrt(1 - single-scattering albedo) of each."""
-    absorption_root = np.linspace(1.0, _MIN_ROOT, 32)
-    return np.array([diffuse_albedo(float(1.0 - one**2)) for one in absorption_root]), absorption_root
+def _totals_by_root(layers: tuple[tuple[float, float, float], ...], eta: float) -> Doubles:
+    """Return the reflectance of a stack for each tabulated albedo of its last layer, by photon counts [-].
 
-
-def single_scattering_albedo(colour: ArrayLike) -> Doubles:
-    """Return the single-scattering albedo of half-spaces that have a given diffuse albedo under the coat [-].
-
-    colour : diffuse albedo of the medium as seen through the coat, which transmits `COAT_TRANSMITTANCE`
+    layers : absorption and scattering [1/mm] and thickness [mm] of each layer
     """
-    diffuse_albedos, absorption_root = _albedo_table()
-    clipped = np.clip(np.asarray(colour, np.float64) / COAT_TRANSMITTANCE, 0.0, _MAX_COLOUR)
-    return np.asarray(1.0 - np.interp(clipped, diffuse_albedos, absorption_root) ** 2)
+    above = [ScatteringLayer(a, s, thickness, eta=eta) for a, s, thickness in layers[:-1]]
+    extinction = layers[-1][0] + layers[-1][1]
+    totals = []
+    for root in np.linspace(1.0, _MIN_ROOT, _ALBEDO_STEPS):
+        last = ScatteringLayer(root**2 * extinction, (1.0 - root**2) * extinction, eta=eta)
+        totals.append(trace_slab([*above, last], _TABLE_PHOTONS).relative_to_entering.total_reflectance)
+    return np.maximum.accumulate(totals)
 
 
-def mean_free_paths(colour: ArrayLike, distance_mm: ArrayLike) -> Doubles:
-    """Return mean free paths (3,) of media in which light leaves at given mean distances from entry [mm].
-
-    The mean distances in media with a mean free path of 1 mm are found by Monte Carlo at normal incidence.
-
-    colour : (3,) diffuse albedo of the medium as seen through the coat
-    distance_mm : (3,) mean lateral offset of exit points [mm]
-    """
-    pairs = zip(single_scattering_albedo(colour), np.asarray(distance_mm, np.float64), strict=True)
-    return np.array([distance / _mean_offset(round(float(albedo), 4)) for albedo, distance in pairs])
+def _half_space_albedo(colour: ArrayLike, eta: float) -> Doubles:
+    """Return single-scattering albedos of half-spaces that have given colours [-]."""
+    totals, roots = _half_space_totals(eta)
+    wanted = np.clip(np.asarray(colour, np.float64), 0.0, _MAX_COLOUR)
+    return np.asarray(1.0 - np.interp(wanted, totals, roots) ** 2)
 
 
 @cache
-def _mean_offset(albedo: float) -> float:
+def _half_space_totals(eta: float) -> tuple[Doubles, Doubles]:
+    """Return reflectances of half-spaces at normal incidence, and sqrt(1 - single-scattering albedo) of each.
+
+    They are exact for an index of refraction of 1, and counted photons for `SKIN_ETA`.
+    """
+    roots = np.linspace(1.0, _MIN_ROOT, _HALF_SPACE_STEPS)
+    if eta == 1.0:
+        return np.array([float(directional_albedo(1.0, float(1.0 - root**2))) for root in roots]), roots
+    if eta != SKIN_ETA:
+        refuse("skin", f"an index of refraction of 1 or {SKIN_ETA}", f"got {eta:g}", "Choose one of them")
+    layers = (ScatteringLayer(root**2, 1.0 - root**2, eta=eta) for root in roots.tolist())
+    runs = (trace_slab([layer], _TABLE_PHOTONS).relative_to_entering for layer in layers)
+    return np.maximum.accumulate([run.total_reflectance for run in runs]), roots
+
+
+@cache
+def _mean_offset(albedo: float, eta: float) -> float:
     """Return the mean lateral distance between entry and exit in a half-space, in mean free paths.
 
     albedo : single-scattering albedo [-]
+    eta : index of refraction [-]
     """
     edges = np.concatenate([[0.0], np.geomspace(1e-3, 400.0, 120)])
-    layer = ScatteringLayer(1.0 - albedo, albedo, eta=1.0)
+    layer = ScatteringLayer(1.0 - albedo, albedo, eta=eta)
     energy = trace_slab([layer], _PHOTONS, edges_mm=edges).reflectance * np.pi * np.diff(edges**2)
     return float((energy * 0.5 * (edges[1:] + edges[:-1])).sum() / energy.sum())
 
 
-def skin_medium(mi: Mitsuba, person: Person, camera: Camera, mean_free_path_mm: Doubles) -> MitsubaObject:
-    """Return Mitsuba's medium below the skin, with a grid of albedos around the camera's target."""
-    extinction = 1.0 / mean_free_path_mm
+def skin_media(mi: Mitsuba, person: Person, camera: Camera, medium: Medium) -> list[MitsubaObject]:
+    """Return Mitsuba's media of the layers of a skin, topmost first.
+
+    The last one has a grid of albedos around the camera's target, from the painted colours.
+
+    medium : layers of skin of the mean colour
+    """
+    *above, last = medium.layers
     low, high = _grid_box(person, camera)
-    grid = single_scattering_albedo(colour_grid(person, low, high, GRID_VOXELS)).astype(np.float32)
+    transmittance = COAT_TRANSMITTANCE if medium.eta == 1.0 else 1.0
+    colours = colour_grid(person, low, high, GRID_VOXELS) / transmittance
+    grid = deepest_albedo(medium, colours).astype(np.float32)
     to_world = mi.ScalarTransform4f().translate([float(c) for c in low])
-    return mi.load_dict(
-        {
-            "type": "homogeneous",
-            "albedo": {
-                "type": "gridvolume",
-                "grid": mi.VolumeGrid(np.ascontiguousarray(grid)),
-                "raw": True,
-                "to_world": to_world.scale([float(c) for c in high - low]),
-            },
-            "sigma_t": mitsuba_rgb(extinction / extinction.max()),  # textures are limited to 1
-            "scale": float(extinction.max()),
-            "phase": {"type": "isotropic"},
-        }
-    )
+    albedo = {
+        "type": "gridvolume",
+        "grid": mi.VolumeGrid(np.ascontiguousarray(grid)),
+        "raw": True,
+        "to_world": to_world.scale([float(c) for c in high - low]),
+    }
+    deepest = homogeneous_medium(last) | {"albedo": albedo}
+    return [mi.load_dict(one) for one in (*map(homogeneous_medium, above), deepest)]
 
 
 def _grid_box(person: Person, camera: Camera) -> tuple[Doubles, Doubles]:

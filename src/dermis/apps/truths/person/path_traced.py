@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dermis.apps.truths.mitsuba_scene import (
     ROULETTE_DEPTH,
@@ -20,18 +19,25 @@ from dermis.apps.truths.path_traced import (
     PathTraced,
     ProgressCallback,
     hash_lighting,
+    hash_medium,
     pass_count,
     render_passes,
 )
-from dermis.apps.truths.person.medium import COAT_TRANSMITTANCE, GRID_VOXELS, mean_free_paths, skin_medium
+from dermis.apps.truths.person.medium import COAT_TRANSMITTANCE, GRID_VOXELS, skin_media
 from dermis.apps.truths.person.person import Person, SkinTextures, posed_person
-from dermis.apps.truths.person.shapes import eye_shapes, hair_shapes, mitsuba_texture, skin_shapes
+from dermis.apps.truths.person.shapes import (
+    diffuse_skin_shapes,
+    eye_shapes,
+    hair_shapes,
+    mitsuba_texture,
+    skin_shapes,
+)
 from dermis.apps.truths.scene_description import Mitsuba, MitsubaObject, SceneDict, mitsuba_rgb
 from dermis.mesh.mesh import Material
+from dermis.optics.media import Medium
 from dermis.scene.model import Scene
 
-Doubles = NDArray[np.float64]
-_CACHE_VERSION = "person 1"  # change when the result for the same person changes
+_CACHE_VERSION = "person 2"  # change when the result for the same person changes
 _SALIVA_ROUGHNESS, _TONGUE_ROUGHNESS = 0.12, 0.25
 _SALIVA_INDEX = 1.4
 
@@ -39,25 +45,28 @@ _SALIVA_INDEX = 1.4
 def path_trace_person(
     scene: Scene,
     textures: SkinTextures,
-    distance_mm: Doubles,
-    colour: Doubles,
+    medium: Medium | None,
     size: tuple[int, int],
     samples: int = 64,
     *,
+    max_depth: int | None = None,
     variant: MitsubaVariant = "scalar_rgb",
     use_cache: bool = True,
     progress: ProgressCallback | None = None,
 ) -> PathTraced:
     """Return the path-traced image of the person in a scene, with the given textures.
 
-    The skin is a medium under a rough coat that does not refract; its albedo is a grid of painted colours.
-    The cornea refracts, and the iris is a painted disc behind it, so lights must have a size. The skin's
-    profile and surface lobe are ignored.
+    The skin consists of layers under the two specular lobes of the frame. With an index of refraction of 1
+    the reflection is added to light that passes the surface without refraction; with `SKIN_ETA` the surface
+    is a rough boundary that refracts. The albedo of the deepest layer is a grid of painted colours. The
+    cornea refracts, and the iris is a painted disc behind it, so lights must have a size. The skin settings
+    of the scene are ignored.
 
     textures : textures of skin, eyes and teeth
-    distance_mm : (3,) mean lateral offset of exit points in skin of the mean colour [mm]
-    colour : (3,) mean colour of the skin, linear Rec. 709 [-]
+    medium : layers of skin of the mean colour, see `uniform_skin` and `pigmented_skin`; None for Lambertian
+        skin of the painted colours
     size : width and height of the image [pixel]
+    max_depth : largest number of scattering events plus 1, 2 for direct light; None for no limit
     samples, variant, use_cache, progress : as in `path_trace`
 
     Raises DermisError when Mitsuba is missing, and for heads without modelled eyes.
@@ -65,35 +74,46 @@ def path_trace_person(
     Sources: [Jakob2022], [Miller2019], [Chiang2016].
     """
     target_count, mi = pass_count(samples), load_mitsuba()
-    person, path = posed_person(scene, textures), mean_free_paths(colour, distance_mm)
-    constants = f"{SAMPLES_PER_PASS} {ROULETTE_DEPTH} {COAT_TRANSMITTANCE} {GRID_VOXELS}"
+    person = posed_person(scene, textures)
+    constants = f"{SAMPLES_PER_PASS} {ROULETTE_DEPTH} {COAT_TRANSMITTANCE} {GRID_VOXELS} {max_depth}"
     trace_settings = f"{_CACHE_VERSION} {mi.__version__} {variant} {constants} {size}"
-    key = person_key(scene, person, path, trace_settings) if use_cache else None
+    key = person_key(scene, person, medium, trace_settings) if use_cache else None
     return render_passes(
         mi,
         variant,
         target_count,
         size,
         key,
-        lambda: person_scene(mi, scene, person, path, size),
+        lambda: person_scene(mi, scene, person, medium, size, max_depth),
         lambda: coverage_scene(mi, scene.camera, size, _emissive_head(mi, person)),
         progress,
     )
 
 
 def person_scene(
-    mi: Mitsuba, scene: Scene, person: Person, mean_free_path_mm: Doubles, size: tuple[int, int]
+    mi: Mitsuba,
+    scene: Scene,
+    person: Person,
+    medium: Medium | None,
+    size: tuple[int, int],
+    max_depth: int | None = None,
 ) -> tuple[MitsubaObject, tuple[str, ...]]:
     """Return the Mitsuba scene of a person's radiance image, and notes on changes made to the head.
 
-    mean_free_path_mm : (3,) mean free paths in the skin [mm]
+    medium, max_depth : as in `path_trace_person`
     """
-    medium = skin_medium(mi, person, scene.camera, mean_free_path_mm)
-    shapes, notes = skin_shapes(mi, person, medium)
+    notes: tuple[str, ...] = ()
+    if medium is None:
+        shapes = diffuse_skin_shapes(mi, person)
+    else:
+        media = skin_media(mi, person, scene.camera, medium)
+        shapes, notes = skin_shapes(mi, person, medium, media)
     shapes |= eye_shapes(mi, person) | _opaque_parts(mi, person)
     for number, hairs in enumerate(person.hairs):
         shapes |= hair_shapes(mi, hairs, f"hairs_{number}")
     integrator = {"type": "volpathmis", "rr_depth": ROULETTE_DEPTH, "hide_emitters": True}
+    if max_depth is not None:
+        integrator["max_depth"] = max_depth
     return mitsuba_scene(mi, scene, integrator, shapes, size), notes
 
 
@@ -137,15 +157,18 @@ def _emissive_head(mi: Mitsuba, person: Person) -> SceneDict:
     return {"head": mesh_shape(mi, mesh.positions, mesh.triangles, mesh.normals, emitter=emitter)}
 
 
-def person_key(scene: Scene, person: Person, mean_free_path_mm: Doubles, trace_settings: str) -> str:
+def person_key(scene: Scene, person: Person, medium: Medium | None, trace_settings: str) -> str:
     """Return a hash of all inputs of a path-traced person, used as the name of the cached passes.
 
+    medium : as in `path_trace_person`
     trace_settings : versions and settings of the path tracer
     """
     digest = hashlib.sha256(f"{trace_settings} {person.textures.reach_mm} {person.eye_materials}".encode())
     hash_lighting(digest, scene)
     digest.update(repr(person.mesh.materials).encode())
-    for array in (*person.arrays(), mean_free_path_mm):
+    if medium is not None:
+        hash_medium(digest, medium)
+    for array in person.arrays():
         digest.update(f"{array.shape} {array.dtype}".encode())
         digest.update(np.ascontiguousarray(array).tobytes())
     return digest.hexdigest()[:40]

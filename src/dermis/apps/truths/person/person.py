@@ -22,6 +22,7 @@ class SkinTextures:
     """Textures of skin, eyes and teeth of a person, linear Rec. 709, row 0 at v = 0.
 
     colour, roughness : (n, n, 3) and (n, n) maps of the skin by its uv [-]
+    strength : (n, n) specular strength of the skin, `Surface.rho_s` of the frame [-]
     height_mm : (n, n) relief of the skin [mm]
     iris : (k, k, 3) texture of the iris plane, from -reach_mm to reach_mm along x and y of the eye
     reach_mm : half the side of the iris texture [mm]
@@ -32,6 +33,7 @@ class SkinTextures:
 
     colour: Floats
     roughness: Floats
+    strength: Floats
     height_mm: Floats
     iris: Floats
     reach_mm: float
@@ -40,7 +42,15 @@ class SkinTextures:
 
     def arrays(self) -> Iterator[Floats]:
         """Yield all texture arrays, for hashing."""
-        yield from (self.colour, self.roughness, self.height_mm, self.iris, self.white, *self.teeth)
+        yield from (
+            self.colour,
+            self.roughness,
+            self.strength,
+            self.height_mm,
+            self.iris,
+            self.white,
+            *self.teeth,
+        )
 
 
 @dataclass(frozen=True, eq=False)

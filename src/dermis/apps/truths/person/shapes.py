@@ -3,18 +3,31 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.truths.mitsuba_scene import interface_gap_mm, interface_mesh, mesh_shape
+from dermis.apps.truths.mitsuba_scene import (
+    inner_interfaces,
+    interface_gap_mm,
+    interface_mesh,
+    mesh_shape,
+)
 from dermis.apps.truths.mitsuba_solid import ClosedSurface, closed_skin, offset_inwards
 from dermis.apps.truths.person.medium import COAT_INDEX, COAT_TRANSMITTANCE
 from dermis.apps.truths.person.person import HairFibres, Person, SkinTextures
 from dermis.apps.truths.scene_description import Mitsuba, MitsubaObject, SceneDict, mitsuba_rgb
 from dermis.mesh.eyeball import LIMBUS_MM, SCLERA_MM, cornea_centre_mm, iris_mm, profile_mm
+from dermis.optics.media import Medium
+from dermis.specular.two_lobe import MAX_ROUGHNESS, MIN_ROUGHNESS, NARROW_FACTOR, NARROW_WEIGHT, WIDE_FACTOR
+
+_MIRROR_FRACTION = 0.1
+"""Fraction of the paths that meet the rough lobes of a refracting surface."""
+_NEARLY_SMOOTH = 0.02
+_ROUGHNESS_RANGE = MIN_ROUGHNESS, MAX_ROUGHNESS
 
 
 def mitsuba_texture(mi: Mitsuba, values: NDArray[np.floating]) -> SceneDict:
@@ -24,43 +37,109 @@ def mitsuba_texture(mi: Mitsuba, values: NDArray[np.floating]) -> SceneDict:
 
 
 def coat_bsdf(mi: Mitsuba, textures: SkinTextures) -> MitsubaObject:
-    """Return the BSDF of skin that reflects like a rough dielectric and transmits without refraction.
+    """Return the BSDF of skin that reflects by the frame's two lobes and transmits without refraction.
 
     Paths cannot connect to a point light through a refracting surface. Therefore most light passes this
     surface undeflected. A small fraction meets a rough dielectric, whose reflectance is divided by this
-    fraction.
+    fraction. The reflection is added to the light from below, which loses only the small fraction.
     """
     mirror_fraction = 1.0 - COAT_TRANSMITTANCE
-    mirror = {
-        "type": "roughconductor",
+    coat = {"type": "mask", "opacity": mirror_fraction, "bsdf": _mirror(mi, textures, mirror_fraction)}
+    return mi.load_dict(coat)
+
+
+def _mirror(mi: Mitsuba, textures: SkinTextures, fraction: float) -> SceneDict:
+    """Return the two lobes of `specular.two_lobe` in relief, with their reflectance divided by a fraction."""
+    lobe = {
         "distribution": "beckmann",
-        "alpha": mitsuba_texture(mi, textures.roughness),
+        "type": "roughconductor",
         "eta": COAT_INDEX,
         "k": 0.0,  # with a real index it reflects like a dielectric
-        "specular_reflectance": 1.0 / mirror_fraction,
+        "specular_reflectance": mitsuba_texture(mi, textures.strength / fraction),
     }
-    bumped = {"type": "bumpmap", "relief": mitsuba_texture(mi, textures.height_mm), "bsdf": mirror}
-    return mi.load_dict({"type": "mask", "opacity": mirror_fraction, "bsdf": bumped})
+    narrow, wide = (
+        lobe | {"alpha": mitsuba_texture(mi, np.clip(factor * textures.roughness, *_ROUGHNESS_RANGE))}
+        for factor in (NARROW_FACTOR, WIDE_FACTOR)
+    )
+    both = {"type": "blendbsdf", "weight": 1.0 - NARROW_WEIGHT, "narrow": narrow, "wide": wide}
+    return {"type": "bumpmap", "relief": mitsuba_texture(mi, textures.height_mm), "bsdf": both}
 
 
-def skin_shapes(mi: Mitsuba, person: Person, medium: MitsubaObject) -> tuple[SceneDict, tuple[str, ...]]:
-    """Return two closed surfaces around the medium, the upper one coated, and notes on changes to the head.
+def refracting_bsdfs(mi: Mitsuba, textures: SkinTextures) -> tuple[MitsubaObject, MitsubaObject]:
+    """Return the BSDFs of skin with a refracting surface, for light from outside and from inside.
 
-    The two surfaces form an interface as in `mitsuba_scene`.
+    From outside, a fraction of the light meets the rough lobes of `coat_bsdf`, the rest a smooth dielectric
+    that transmits only. From inside, all light meets a smooth dielectric. The transmission is that of a
+    boundary that reflects with a strength of 1. Lights must have a size, because no path connects to a point
+    light through this boundary.
+    """
+    indices = {"int_ior": COAT_INDEX, "ext_ior": 1.0}
+    # A blend with a perfectly smooth dielectric would be up to 20 % too bright in Mitsuba 3.9.
+    below = {"type": "roughdielectric", "distribution": "beckmann", "alpha": _NEARLY_SMOOTH}
+    below |= {"specular_reflectance": 0.0, "specular_transmittance": 1.0 / (1.0 - _MIRROR_FRACTION)}
+    mirror = _mirror(mi, textures, _MIRROR_FRACTION)
+    outside = {
+        "type": "blendbsdf",
+        "weight": _MIRROR_FRACTION,
+        "below": indices | below,
+        "mirror": mirror,
+    }
+    return mi.load_dict(outside), mi.load_dict({"type": "dielectric"} | indices)
+
+
+def painted_diffuse_bsdf(mi: Mitsuba, textures: SkinTextures) -> MitsubaObject:
+    """Return the BSDF of skin that reflects by the frame's two lobes over a Lambertian base of its colour."""
+    fraction = 1.0 - COAT_TRANSMITTANCE
+    base = {
+        "type": "diffuse",
+        "reflectance": mitsuba_texture(mi, np.clip(textures.colour / COAT_TRANSMITTANCE, 0.0, 1.0)),
+    }
+    mirror = _mirror(mi, textures, fraction)
+    return mi.load_dict({"type": "blendbsdf", "weight": fraction, "base": base, "mirror": mirror})
+
+
+def diffuse_skin_shapes(mi: Mitsuba, person: Person) -> SceneDict:
+    """Return the skin without volume, with `painted_diffuse_bsdf`."""
+    triangles = person.mesh.triangles[_skin_mask(person)]
+    vertices, corners = np.unique(triangles, return_inverse=True)
+    positions, normals, uv = (
+        values[vertices] for values in (person.mesh.positions, person.mesh.normals, person.mesh.uv)
+    )
+    bsdf = painted_diffuse_bsdf(mi, person.textures)
+    return {"skin": mesh_shape(mi, positions, corners.reshape(-1, 3), normals, uv, bsdf=bsdf)}
+
+
+def skin_shapes(
+    mi: Mitsuba, person: Person, medium: Medium, media: Sequence[MitsubaObject]
+) -> tuple[SceneDict, tuple[str, ...]]:
+    """Return closed surfaces around the layers of the skin, and notes on changes to the head.
+
+    Each interface consists of two surfaces as in `mitsuba_scene`. The outermost upper surface has the
+    reflection of the skin; both outermost surfaces refract if the medium has an index above 1, and light from
+    inside then meets the lower one.
+
+    medium : layers of the skin
+    media : Mitsuba's media of these layers
     """
     solid = closed_skin(person.mesh, person.name)
-    notes = (f"{solid.caps} openings closed, {solid.cap_area:.0f} mm2",) if solid.caps else ()
-    gap = interface_gap_mm(mi, solid)
+    notes = [f"{solid.caps} openings closed, {solid.cap_area:.0f} mm2"] if solid.caps else []
+    gap, top = interface_gap_mm(mi, solid), {"exterior": None, "interior": media[0]}
     upper, _ = offset_inwards(solid, -gap, person.name)
     lower, _ = offset_inwards(solid, np.zeros(len(gap)), person.name)
-    inside = {"exterior": None, "interior": medium}
-    shapes = {"skin_lower": interface_mesh(mi, lower, inside)}
-    shapes["skin"] = _coated_mesh(mi, person, upper, medium)
-    skin = int(_skin_mask(person).sum())
-    if len(solid.triangles) > skin:
-        fan = replace(upper, triangles=solid.triangles[skin:])
-        shapes["skin_openings"] = interface_mesh(mi, fan, inside)
-    return shapes, notes
+    textures, refracts = person.textures, medium.eta != 1.0
+    outer, inner = refracting_bsdfs(mi, textures) if refracts else (coat_bsdf(mi, textures), None)
+    shapes = {"skin": _painted_mesh(mi, person, upper, outer, media[0])}
+    fans = solid.triangles[int(_skin_mask(person).sum()) :]
+    if refracts:
+        shapes["skin_lower"] = _painted_mesh(mi, person, lower, inner, media[0])
+        if len(fans):
+            shapes["openings_lower"] = interface_mesh(mi, replace(lower, triangles=fans), top)
+    else:
+        shapes["skin_lower"] = interface_mesh(mi, lower, top)
+    if len(fans):
+        shapes["openings"] = interface_mesh(mi, replace(upper, triangles=fans), top)
+    deeper, deeper_notes = inner_interfaces(mi, solid, medium, media, person.name)
+    return shapes | deeper, (*notes, *deeper_notes)
 
 
 def _skin_mask(person: Person) -> NDArray[np.bool_]:
@@ -68,13 +147,19 @@ def _skin_mask(person: Person) -> NDArray[np.bool_]:
     return np.asarray(np.array([material.kind == "skin" for material in mesh.materials])[mesh.material])
 
 
-def _coated_mesh(mi: Mitsuba, person: Person, upper: ClosedSurface, medium: MitsubaObject) -> MitsubaObject:
-    """Return the coated upper surface as a Mitsuba mesh, with the head's normals and uv."""
+def _painted_mesh(
+    mi: Mitsuba, person: Person, surface: ClosedSurface, bsdf: MitsubaObject, medium: MitsubaObject
+) -> MitsubaObject:
+    """Return the skin moved to a closed surface as a Mitsuba mesh, with the head's normals and uv.
+
+    surface : `closed_skin` of the head, offset
+    medium : medium inside it
+    """
     mesh, triangles = person.mesh, person.mesh.triangles[_skin_mask(person)]
     vertices, corners = np.unique(triangles, return_inverse=True)
     points = np.unique(mesh.point[triangles])
-    positions = upper.positions[np.searchsorted(points, mesh.point[vertices])]
-    attributes = {"bsdf": coat_bsdf(mi, person.textures), "interior": medium}
+    positions = surface.positions[np.searchsorted(points, mesh.point[vertices])]
+    attributes = {"bsdf": bsdf, "interior": medium}
     uv, normals = mesh.uv[vertices], mesh.normals[vertices]
     return mesh_shape(mi, positions, corners.reshape(-1, 3), normals, uv, **attributes)
 

@@ -1,62 +1,243 @@
-"""Views of the package's human by dermis and by path tracing, compared for docs/path_traced.md.
+"""People by dermis and by path tracing with the same model of the skin, for docs/path_traced.md.
 
-Paths are cached on disk while they are traced, so an interrupted run continues where it stopped.
+Each comparison is written to a file of results when it is finished, and paths are cached while they are
+traced, so that an interrupted run continues where it stopped. The page is written from the file.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache, partial
+from pathlib import Path
+from typing import Any, Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dermis.apps.gallery.panels import Panels, panel_sheet
 from dermis.apps.gallery.script import encode_webp
-from dermis.apps.truths.metrics import Estimate
+from dermis.apps.truths.metrics import Estimate, energy_ratio, relative_rmse, signed_difference
+from dermis.apps.truths.path_traced import MitsubaVariant, path_trace
 from dermis.apps.validation.comparisons.person import (
+    CAUSES,
     EYE_FRAME_MM,
+    TRUTHS,
     VIEWS,
+    Cause,
     PersonComparison,
+    PersonSubject,
+    SharedSkin,
+    TruthName,
+    View,
     compare_person,
+    frame_of,
     iris_errors,
+    render_frame,
+    shared_skin,
     view_scene,
+    without_cause,
 )
+from dermis.apps.validation.comparisons.person_regions import picture_regions
 from dermis.apps.validation.comparisons.person_textures import person_textures
-from dermis.apps.validation.pages import DOCS, fill_page, in_checkout
+from dermis.apps.validation.comparisons.scenes import default_region, medium_scene
+from dermis.apps.validation.pages import DOCS, RESULTS, fill_page, in_checkout, read_results, write_results
 from dermis.base.console import print_lines
+from dermis.base.disk import load_arrays, try_save_arrays
 from dermis.frame.renderer import Renderer
+from dermis.human.person import Human
+from dermis.mesh.head import Head
+from dermis.optics.media import Medium, media
 from dermis.scene.heads import load_head
+from dermis.scene.settings import Settings
 
 PAGE = DOCS / "path_traced.md"
 PICTURE = DOCS / "images" / "path_traced.webp"
-PICTURE_SIDE, PATHS_PER_PIXEL = 192, 40
-SHEET_COLUMNS = 4
+FIGURES = RESULTS / "path_traced.json"
+PICTURE_SIDE, PATHS_PER_PIXEL = 160, 48
+SHEET_COLUMNS = 6
 MAX_SHEET_BYTES = 300_000
+NOT_MEASURED = "not measured"
+_PANEL_FOLDER, _PANEL_NAMES = "path-traced-panels", ("frame", "traced", "difference")
+_ABLATED_VIEWS = "portrait", "profile", "ear from behind", "three-quarter, lebombo"
+_FULL_COVERAGE = 0.999
+Figures = dict[str, Any]
+PersonName = Literal["human", "dark", "old"]
+_PEOPLE: dict[PersonName, Callable[[], Head]] = {
+    "human": lambda: load_head("human"),
+    "dark": lambda: Human(african=1.0, asian=0.0, caucasian=0.0, sex=1.0).head(),
+    "old": lambda: Human(caucasian=1.0, african=0.0, asian=0.0, age=80.0).head(),
+}
+_PEOPLE_VIEWS = "portrait", "three-quarter, lebombo", "moved"
+_MOVED = {"moved": View(VIEWS["three-quarter"].camera, "window", "surprise")}
+ALL_VIEWS: Mapping[str, View] = VIEWS | _MOVED
+_HEADS = {
+    "scan": "lee_perry_smith",
+    "old man": "heads/makehuman/head_old_male_dark.obj",
+    "young man": "heads/makehuman/head_young_male_light.obj",
+}
+_HEAD_LIGHTS = "front", "back", "laser"
+_MEDIA = "dj3", "skin1"
 
 
-def with_error(estimate: Estimate, digits: int = 2) -> str:
-    """Return an estimate with its standard error as text, such as "1.02 ± 0.04"."""
-    return f"{estimate.value:.{digits}f} ± {estimate.standard_error:.{digits}f}"
+@dataclass(frozen=True)
+class Measurement:
+    """One comparison of a person by dermis with path tracing.
+
+    person : key of `_PEOPLE`
+    view : key of `ALL_VIEWS`
+    cause : cause of error that both sides leave out, or None
+    """
+
+    person: PersonName
+    view: str
+    truth: TruthName
+    cause: Cause | None = None
+
+    @property
+    def key(self) -> str:
+        """Return the name of the comparison in the file of results."""
+        return f"{self.person} / {self.view} / {self.truth} / {self.cause or 'everything'}"
 
 
-def view_row(pair: PersonComparison) -> str:
-    """Return a Markdown row with the errors of one view."""
-    channels = ", ".join(f"{one.value:.2f}" for one in pair.energy_by_channel)
-    figures = f"{with_error(pair.relrmse, 3)} | {with_error(pair.energy, 3)} | {channels}"
-    return f"| {pair.name} | {VIEWS[pair.name].light} | {pair.samples} | {figures} |"
+def measurements() -> list[Measurement]:
+    """Return all comparisons of people, the most important ones first."""
+    found = [Measurement("human", view, "matched") for view in ALL_VIEWS]
+    found += [Measurement("human", view, "layered") for view in VIEWS]
+    people: tuple[PersonName, ...] = "dark", "old"
+    found += [Measurement(one, view, "matched") for one in people for view in _PEOPLE_VIEWS]
+    found += [Measurement("human", view, "matched", cause) for view in _ABLATED_VIEWS for cause in CAUSES]
+    found += [Measurement("human", view, "refracting") for view in VIEWS]
+    return found
 
 
-def iris_cells(pair: PersonComparison) -> dict[str, str]:
-    """Return errors of the iris in the eye view for docs/templates/path_traced.md, keyed by placeholder."""
-    return {name: with_error(one) for name, one in iris_errors(pair, EYE_FRAME_MM)._asdict().items()}
+class Measuring:
+    """Comparisons of people with path tracing, whose figures are kept in a file.
+
+    renderer : renderer of the frames
+    side : side of the pictures [pixel]
+    samples : paths per pixel
+    variant : variant of Mitsuba
+    folder : folder for profiles
+    """
+
+    def __init__(
+        self, renderer: Renderer, side: int, samples: int, variant: MitsubaVariant, folder: Path
+    ) -> None:
+        self.renderer, self.side, self.samples = renderer, side, samples
+        self.variant, self.folder = variant, folder
+        self._people: dict[str, tuple[Head, Any]] = {}
+        self._skins: dict[tuple[str, str], SharedSkin] = {}
+
+    def measure(self, one: Measurement) -> Figures:
+        """Return the figures of a comparison, and keep its pictures in the cache."""
+        head, textures = self._person(one.person)
+        skin = self._skin(one.person, head, one.truth)
+        subject = PersonSubject(view_scene(head, ALL_VIEWS[one.view]), textures)
+        if one.cause is not None:
+            subject = without_cause(subject, one.cause)
+        samples = round(self.samples * ALL_VIEWS[one.view].sample_factor)
+        options: dict[str, Any] = {"side": self.side, "samples": samples, "variant": self.variant}
+        pair = compare_person(self.renderer, subject, skin, one.view, **options)
+        figures = pair_figures(pair)
+        if one.truth == "matched":
+            regions = picture_regions(self.renderer, subject.scene, self.side)
+            figures["regions"] = {name: list(ratio) for name, ratio in regions.signed_errors(pair).items()}
+        if one.truth == "matched" and one.cause is None:
+            settings = Settings(size=(self.side, self.side), samples=4)
+            shipped = frame_of(self.renderer, subject, None, settings)
+            error = relative_rmse(shipped, pair.reference, pair.mask, pair.variance)
+            figures["default"] = [*error, *energy_ratio(shipped, pair.reference, pair.mask, pair.variance)]
+            if one.view == "eye":
+                iris = iris_errors(pair, EYE_FRAME_MM)._asdict()
+                figures["iris"] = {name: list(value) for name, value in iris.items()}
+            if one.person == "human":
+                save_panels(one.view, pair)
+        return figures
+
+    def _person(self, name: PersonName) -> tuple[Head, Any]:
+        if name not in self._people:
+            head = _PEOPLE[name]()
+            textures = person_textures(self.renderer, view_scene(head, VIEWS["portrait"]))
+            self._people[name] = head, textures
+        return self._people[name]
+
+    def _skin(self, person: PersonName, head: Head, truth: TruthName) -> SharedSkin:
+        key = person, truth
+        if key not in self._skins:
+            folder = self.folder / person
+            folder.mkdir(exist_ok=True)
+            self._skins[key] = shared_skin(self.renderer, head, truth, folder)
+        return self._skins[key]
+
+    def measure_head(self, name: str, light: str, medium: Medium) -> Figures:
+        """Return the figures of a head without maps or surface reflection, of an index-matched medium.
+
+        name : key of `_HEADS`
+        light : key of `scenes.LIGHTS`
+        """
+        settings = Settings(size=(self.side, self.side), samples=4)
+        with medium_scene(_head(name), light, default_region(light), medium) as (scene, _):
+            traced = path_trace(scene, medium, self.samples, settings, variant=self.variant)
+            frame = render_frame(
+                self.renderer, scene.replace(skin=scene.skin.replace(direction="half-space")), settings
+            )
+        mask = traced.mask > _FULL_COVERAGE
+        image, variance = traced.image.astype(np.float64), traced.variance.astype(np.float64)
+        error, energy = (f(frame, image, mask, variance) for f in (relative_rmse, energy_ratio))
+        return {"error": list(error), "energy": list(energy), "paths": traced.samples, "notes": traced.notes}
 
 
-def picture_sheet(pairs: Sequence[PersonComparison]) -> bytes:
-    """Return a sheet of all views, with dermis's picture to the left of the reference, as a WebP file."""
-    panels = {}
-    for pair in pairs:
-        panels[pair.name] = pair.tone_mapped(pair.ours)
-        panels[f"{pair.name}, traced"] = pair.tone_mapped(pair.reference)
+@cache
+def _head(name: str) -> Head:
+    from dermis.apps.validation.pages import data_file
+
+    file = _HEADS[name]
+    return load_head(str(data_file(file)) if "/" in file else file)
+
+
+def pair_figures(pair: PersonComparison) -> Figures:
+    """Return errors of a comparison as JSON-compatible figures."""
+    return {
+        "error": list(pair.relrmse),
+        "energy": list(pair.energy),
+        "channels": [one.value for one in pair.energy_by_channel],
+        "paths": pair.samples,
+        "seconds": pair.seconds,
+    }
+
+
+def save_panels(view: str, pair: PersonComparison) -> None:
+    """Keep the pictures of a view in the cache: frame, path-traced picture, and their signed difference."""
+    from scipy.ndimage import uniform_filter
+
+    ours, reference = (
+        uniform_filter(np.maximum(pair.exposure * image, 0.0), (3, 3, 1))
+        for image in (pair.ours, pair.reference)
+    )
+    difference = np.rint(255 * signed_difference(ours, reference)).astype(np.uint8)
+    pictures = pair.tone_mapped(pair.ours), pair.tone_mapped(pair.reference), difference
+    try_save_arrays(_PANEL_FOLDER, _panel_key(view), dict(zip(_PANEL_NAMES, pictures, strict=True)))
+
+
+def picture_sheet(views: Sequence[str]) -> bytes:
+    """Return a sheet of views from the cache as a WebP file: frame, path-traced picture and difference."""
+    panels: dict[str, NDArray[np.uint8]] = {}
+    for view in views:
+        found = load_arrays(_PANEL_FOLDER, _panel_key(view), _PANEL_NAMES)
+        if found is not None:
+            panels[view] = found["frame"]
+            panels[f"{view}, traced"] = found["traced"]
+            panels[f"{view}, difference"] = found["difference"]
     return sheet_bytes(panels, SHEET_COLUMNS)
+
+
+def _panel_key(view: str) -> str:
+    return "".join(letter for letter in view if letter.isalnum())
 
 
 def sheet_bytes(panels: Panels, columns: int) -> bytes:
@@ -69,10 +250,40 @@ def sheet_bytes(panels: Panels, columns: int) -> bytes:
     return data
 
 
-def person(adapter: str = "auto", side: int = PICTURE_SIDE, samples: int = PATHS_PER_PIXEL) -> None:
-    """Path-trace and render the package's human, and write docs/path_traced.md with its picture.
+def fastest_variant() -> MitsubaVariant:
+    """Return the first variant of Mitsuba that works on this machine: CUDA, LLVM, or scalar.
 
-    Needs Mitsuba, and DERMIS_DATA or a network for the two panoramas.
+    Each is tried in a process of its own, because LLVM of some versions ends the process.
+    """
+    for variant in ("cuda_ad_rgb", "llvm_ad_rgb"):
+        done = subprocess.run([sys.executable, "-c", _PROBE, variant], capture_output=True, check=False)
+        if done.returncode == 0:
+            return variant
+    return "scalar_rgb"
+
+
+_PROBE = """
+import sys
+import mitsuba as mi
+mi.set_variant(sys.argv[1])
+scene = mi.cornell_box()
+scene["sensor"]["film"]["width"] = scene["sensor"]["film"]["height"] = 8
+import numpy as np
+assert np.isfinite(np.array(mi.render(mi.load_dict(scene), spp=4))).all()
+"""
+
+
+def person(
+    adapter: str = "auto",
+    side: int = PICTURE_SIDE,
+    samples: int = PATHS_PER_PIXEL,
+    variant: str = "auto",
+    seconds: float = 0.0,
+) -> None:
+    """Compare people with path tracing, keep the figures, and write docs/path_traced.md.
+
+    Comparisons that the file of results already has at the same size and with as many paths are skipped.
+    Needs Mitsuba, and DERMIS_DATA or a network for the panoramas and the heads.
 
     Parameters
     ----------
@@ -80,21 +291,140 @@ def person(adapter: str = "auto", side: int = PICTURE_SIDE, samples: int = PATHS
         Side of the pictures [pixel].
     samples:
         Paths per pixel.
+    variant:
+        Variant of Mitsuba, or "auto" for the fastest that works.
+    seconds:
+        Time after which no further comparison starts; 0 for no limit [s].
     """
     in_checkout(PICTURE.parent)
-    renderer, head = Renderer(adapter), load_head("human")
-    textures, pairs = person_textures(renderer, view_scene(head, VIEWS["portrait"])), []
-    for name in VIEWS:
-        pair = compare_person(renderer, head, textures, name, side=side, samples=samples)
-        print_lines(f"{view_row(pair)} {pair.seconds:.0f} s")
-        pairs.append(pair)
-    by_name = {pair.name: pair for pair in pairs}
-    PICTURE.write_bytes(picture_sheet(pairs))
+    started, renderer = time.perf_counter(), Renderer(adapter)
+    chosen: Any = fastest_variant() if variant == "auto" else variant
+    device = f"{renderer.device.adapter.name}, {renderer.device.adapter.backend}"
+    figures = read_results(FIGURES) if FIGURES.exists() else {}
+    settings = {"side": side, "samples": samples}
+    if figures.get("settings") != settings:
+        figures = {"settings": settings, "people": {}, "heads": {}}
+    figures |= {"adapter": device, "variant": chosen}
+    with tempfile.TemporaryDirectory() as folder:
+        measuring = Measuring(renderer, side, samples, chosen, Path(folder))
+        for group, key, measure in _jobs(measuring):
+            if key in figures[group] or (seconds and time.perf_counter() - started > seconds):
+                continue
+            figures[group][key] = measure()
+            write_results(FIGURES, figures, digits=5)
+            print_lines(f"{key}: {figures[group][key]['error']} {figures[group][key]['energy']}")
+    PICTURE.write_bytes(picture_sheet(list(ALL_VIEWS)))
+    person_page()
+
+
+_Job = tuple[str, str, Callable[[], Figures]]
+
+
+def _jobs(measuring: Measuring) -> list[_Job]:
+    """Return group, key and function of all comparisons; the human with everything first, then heads."""
+    people: list[_Job] = [("people", one.key, partial(measuring.measure, one)) for one in measurements()]
+    heads: list[_Job] = [
+        (
+            "heads",
+            f"{name} / {light} / {medium}",
+            partial(measuring.measure_head, name, light, media()[medium].with_eta(1.0)),
+        )
+        for medium in _MEDIA
+        for name in _HEADS
+        for light in _HEAD_LIGHTS
+    ]
+    first = len(ALL_VIEWS) + len(VIEWS)
+    return [*people[:first], *heads, *people[first:]]
+
+
+def person_page() -> None:
+    """Write docs/path_traced.md from the last measurement."""
+    figures = read_results(FIGURES)
     fill_page(
         PAGE,
-        adapter=f"{renderer.device.adapter.name}, {renderer.device.adapter.backend}",
-        side=side,
-        minutes=f"{sum(pair.seconds for pair in pairs) / 60:.0f}",
-        rows="\n".join(map(view_row, pairs)),
-        **iris_cells(by_name["eye"]),
+        adapter=figures["adapter"],
+        variant=figures["variant"],
+        **figures["settings"],
+        views=view_rows(figures["people"]),
+        people=people_rows(figures["people"]),
+        heads=head_rows(figures["heads"]),
+        regions=region_table(figures["people"]),
+        causes=cause_table(figures["people"]),
+        **iris_cells(figures["people"]),
     )
+
+
+def with_error(estimate: Sequence[float] | Estimate | None, digits: int = 3) -> str:
+    """Return an estimate with its standard error as text, such as "0.102 ± 0.004"."""
+    if estimate is None:
+        return NOT_MEASURED
+    value, error = estimate
+    return f"{value:.{digits}f} ± {error:.{digits}f}"
+
+
+def _cells(row: Figures | None) -> str:
+    """Return the cells of relative RMSE and energy of a comparison."""
+    return f"{with_error(row['error'])} | {row['energy'][0]:.3f}" if row else f"{NOT_MEASURED} | "
+
+
+def view_rows(people: Figures) -> str:
+    """Return Markdown rows of all views of the human, with the errors for each truth."""
+    lines = []
+    for view, where in ALL_VIEWS.items():
+        rows = {truth: people.get(Measurement("human", view, truth).key) for truth in TRUTHS}
+        matched = rows["matched"]
+        shipped = matched["default"] if matched else None
+        default = f"{with_error(shipped[:2])} | {shipped[2]:.3f}" if shipped else f"{NOT_MEASURED} | "
+        cells = " | ".join(_cells(rows[truth]) for truth in TRUTHS)
+        paths = matched["paths"] if matched else ""
+        lines.append(f"| {view} | {where.light} | {paths} | {cells} | {default} |")
+    return "\n".join(lines)
+
+
+def people_rows(people: Figures) -> str:
+    """Return Markdown rows of the other people."""
+    keys = [(one, view) for one in get_args(PersonName)[1:] for view in _PEOPLE_VIEWS]
+    rows = ((one, view, people.get(Measurement(one, view, "matched").key)) for one, view in keys)
+    return "\n".join(f"| {one} | {view} | {_cells(row)} |" for one, view, row in rows)
+
+
+def head_rows(heads: Figures) -> str:
+    """Return Markdown rows of heads without maps."""
+    lines = []
+    for medium in _MEDIA:
+        for name in _HEADS:
+            cells = " | ".join(_cells(heads.get(f"{name} / {light} / {medium}")) for light in _HEAD_LIGHTS)
+            lines.append(f"| {name} | {medium} | {cells} |")
+    return "\n".join(lines)
+
+
+def region_table(people: Figures) -> str:
+    """Return a Markdown table of the frame's light relative to the reference, by region and view."""
+    rows = {view: people.get(Measurement("human", view, "matched").key) for view in ALL_VIEWS}
+    found = {view: row["regions"] for view, row in rows.items() if row}
+    names = list(dict.fromkeys(name for regions in found.values() for name in regions))
+    lines = [f"| region | {' | '.join(found)} |", "|---" * (len(found) + 1) + "|"]
+    for name in names:
+        cells = (f"{regions[name][0]:.2f}" if name in regions else "" for regions in found.values())
+        lines.append(f"| {name} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def cause_table(people: Figures) -> str:
+    """Return a Markdown table of relative RMSE and energy without each cause of error."""
+    lines = [
+        f"| left out on both sides | {' | '.join(f'{view} | energy' for view in _ABLATED_VIEWS)} |",
+        "|---" * (2 * len(_ABLATED_VIEWS) + 1) + "|",
+    ]
+    for cause in (None, *CAUSES):
+        rows = (people.get(Measurement("human", view, "matched", cause).key) for view in _ABLATED_VIEWS)
+        lines.append(f"| {cause or 'nothing'} | {' | '.join(_cells(row) for row in rows)} |")
+    return "\n".join(lines)
+
+
+def iris_cells(people: Figures) -> dict[str, str]:
+    """Return errors of the iris in the eye view for the template, keyed by placeholder."""
+    row = people.get(Measurement("human", "eye", "matched").key) or {}
+    iris = row.get("iris", {})
+    names = "right", "down", "brightness", "left_half", "right_half"
+    return {name: with_error(iris.get(name), 2) for name in names}

@@ -2,42 +2,53 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from dermis.apps.truths.half_space import diffuse_albedo, directional_albedo
 from dermis.apps.truths.metrics import Estimate, energy_ratio, relative_rmse
 from dermis.apps.truths.path_traced import MitsubaVariant, PathTraced
+from dermis.apps.truths.person.medium import pigmented_skin, uniform_skin
 from dermis.apps.truths.person.path_traced import path_trace_person
 from dermis.apps.truths.person.person import SkinTextures
 from dermis.apps.validation.comparisons.references import check_visible
-from dermis.base.errors import refuse
+from dermis.apps.validation.comparisons.scenes import medium_gaussians
 from dermis.environment.panorama import UNIFORM
 from dermis.frame.renderer import Renderer
 from dermis.human.expressions import expression
+from dermis.human.skin.painted import PaintedMaps, mean_colour
 from dermis.images.colour import encode_srgb
 from dermis.mesh.head import Head
 from dermis.mesh.pose import Pose
+from dermis.optics.gaussians import GaussianSum
+from dermis.optics.media import SKIN_ETA, Medium
+from dermis.optics.pigments.parameters import SkinParameters
+from dermis.optics.profiles import write_profile
 from dermis.scene.camera import CAMERA_PRESETS, Camera, cheek, portrait, side, three_quarter
 from dermis.scene.environment import Environment
 from dermis.scene.lights import Light, PointLight, RectangleLight, preset_lights
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
+from dermis.scene.skin import DEFAULT_ROUGHNESS, Skin
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 _FULL_COVERAGE = 0.999  # fraction of a pixel from which it counts as covered
 _WHITE_PERCENTILE = 98.0
+_DIRECT_DEPTH = 2
 
 
 @dataclass(frozen=True, eq=False)
 class PersonComparison:
     """View of a person rendered by dermis and by path tracing, with the errors of dermis.
 
-    name : key of `VIEWS`
+    name : name of the view
     ours, reference : (h, w, 3) linear radiance by dermis, and by path tracing
     variance : (h, w, 3) variance of the reference's noise
     mask : (h, w) pixels that are compared
@@ -71,37 +82,154 @@ class PersonComparison:
         return np.asarray(np.rint(255 * encoded), np.uint8)
 
 
+TruthName = Literal["matched", "refracting", "layered"]
+"""Model of the skin that frame and path tracer share.
+
+"matched": homogeneous skin without refraction, whose surface adds its reflection. "refracting": homogeneous
+skin below a refracting surface of index 1.4 with a strength of 1. "layered": epidermis over dermis with the
+pigments of the person, with the surface of "matched".
+"""
+TRUTHS: tuple[TruthName, ...] = get_args(TruthName)
+Cause = Literal["pigments", "relief", "reflection", "hair", "scattering", "bounces"]
+"""Cause of error that frame and path tracer can leave out.
+
+"pigments": variation of the colour. "relief": folds, pores, and variation of gloss. "reflection": specular
+lobe of the skin. "hair": hair, brows and lashes. "scattering": subsurface scattering, so that skin is
+Lambertian. "bounces": all light but direct light on Lambertian skin, so that eyes are black; and hair.
+"""
+CAUSES: tuple[Cause, ...] = get_args(Cause)
+
+
+@dataclass(frozen=True, eq=False)
+class SharedSkin:
+    """Skin that frame and path tracer share: the layers, and the profile that the frame makes of them.
+
+    medium : layers of skin of the mean colour
+    profile : file with the Gaussians that fit photon counts of these layers
+    """
+
+    medium: Medium
+    profile: Path
+
+
+def shared_skin(renderer: Renderer, head: Head, truth: TruthName, folder: Path) -> SharedSkin:
+    """Return the skin of a person for a truth, with its profile in a file.
+
+    In homogeneous skin, light exits at the same mean distance from its entry as by the published profile.
+
+    folder : existing folder of the file
+    """
+    maps, eta = head.maps, SKIN_ETA if truth == "refracting" else 1.0
+    assert isinstance(maps, PaintedMaps)
+    colour = mean_colour(maps.look)
+    if truth == "layered":
+        look = maps.look
+        parameters = SkinParameters(look.melanin, look.eumelanin, look.blood, look.oxygen, look.epidermis_mm)
+        medium = pigmented_skin(parameters, colour, eta)
+    else:
+        medium = uniform_skin(colour, mean_distance_mm(renderer.skin_profile(Skin())), eta)
+    file = folder / f"{truth}.toml"
+    write_profile(file, medium_gaussians(medium, "montecarlo"), {"model": "montecarlo"})
+    return SharedSkin(medium, file)
+
+
+@dataclass(frozen=True, eq=False)
+class PersonSubject:
+    """Scene of a person with its textures, as frame and path tracer get it.
+
+    cause : cause of error that both leave out, or None
+    """
+
+    scene: Scene
+    textures: SkinTextures
+    cause: Cause | None = None
+
+
+def without_cause(subject: PersonSubject, cause: Cause) -> PersonSubject:
+    """Return a subject that lacks a cause of error on both sides."""
+    scene, textures, head = subject.scene, subject.textures, subject.scene.head
+    maps, flat = head.maps, np.ones((1, 1), np.float32)
+    assert isinstance(maps, PaintedMaps)
+    if cause == "pigments":
+        colour = np.broadcast_to(mean_colour(maps.look), textures.colour.shape).astype(np.float32)
+        maps, textures = replace(maps, colour=colour), replace(textures, colour=colour)
+    elif cause == "relief":
+        rough = flat * np.float32(DEFAULT_ROUGHNESS)
+        maps = replace(maps, height=0.0 * flat, specular=flat, roughness=rough)
+        strength = flat * np.float32(scene.skin.strength)
+        textures = replace(textures, height_mm=0.0 * flat, strength=strength, roughness=rough)
+    elif cause == "reflection":
+        textures = replace(textures, strength=0.0 * flat)
+    elif cause in ("hair", "bounces"):
+        head = replace(head, strands=None, hair=None)
+    return PersonSubject(scene.replace(head=replace(head, maps=maps)), textures, cause)
+
+
+def frame_of(
+    renderer: Renderer, subject: PersonSubject, skin: SharedSkin | None, settings: Settings
+) -> Floats:
+    """Return the linear radiance (h, w, 3) of the frame with the model of a truth.
+
+    Without refraction, the light from below is that of skin without a surface, and the reflection is added.
+
+    skin : skin that the path tracer has; None for the default skin
+    """
+    scene, cause = subject.scene, subject.cause
+    if cause in ("scattering", "bounces"):
+        settings = settings.model_copy(update={"technique": "none", "transmission": "none"})
+    if cause == "bounces":
+        settings = settings.model_copy(update={"interreflection": False, "occlusion": "none"})
+    own = scene.skin if skin is None else scene.skin.replace(profile=str(skin.profile))
+    if cause in ("scattering", "bounces"):
+        own = own.replace(direction="lambertian")
+    if skin is not None and skin.medium.eta != 1.0:
+        own = own.replace(rho_s=1.0)
+    matte = own.replace(specular="none")
+    if cause == "reflection":
+        return render_frame(renderer, scene.replace(skin=matte), settings)
+    if skin is None or skin.medium.eta != 1.0:
+        return render_frame(renderer, scene.replace(skin=own), settings)
+    parts = {"diffuse": matte, "specular": own}
+    return sum_of(
+        render_frame(renderer, scene.replace(skin=one), settings.model_copy(update={"parts": part}))
+        for part, one in parts.items()
+    )
+
+
+def sum_of(images: Iterable[Floats]) -> Floats:
+    """Return the sum of images of one shape."""
+    return np.asarray(np.sum(list(images), axis=0))
+
+
 def compare_person(
     renderer: Renderer,
-    head: Head,
-    textures: SkinTextures,
+    subject: PersonSubject,
+    skin: SharedSkin,
     name: str,
     *,
     side: int = 256,
     samples: int = 64,
     atlas: int = 2048,
     use_cache: bool = True,
+    variant: MitsubaVariant = "scalar_rgb",
     progress: Callable[[int, int], None] | None = None,
 ) -> PersonComparison:
-    """Render a view of a person by dermis and by path tracing.
+    """Render a person by dermis and by path tracing with the same model of the skin.
 
-    textures : maps of the skin as dermis paints them, from `person_textures`
-    name : key of `VIEWS`
+    skin : model of the skin, from `shared_skin`
+    name : name of the view
     side : side of the pictures [pixel]
-    samples : paths per pixel; some views use more
+    samples : paths per pixel
     atlas : side of dermis's atlas [texel]
-    use_cache, progress : as in `path_trace`
+    variant, use_cache, progress : as in `path_trace`
 
-    Raises DermisError for unknown views, and for heads without modelled eyes.
+    Raises DermisError for heads without modelled eyes.
     """
-    if name not in VIEWS:
-        refuse("view", f"one of {', '.join(VIEWS)}", f"got {name!r}", "Choose one of them")
     settings = Settings(size=(side, side), atlas=atlas, samples=4)
-    scene, sample_count = view_scene(head, VIEWS[name]), round(samples * VIEWS[name].sample_factor)
-    reference = path_trace_view(renderer, scene, textures, settings.size, sample_count, use_cache, progress)
+    reference = path_trace_subject(subject, skin, settings.size, samples, use_cache, variant, progress)
     mask = reference.mask > _FULL_COVERAGE
     check_visible(mask)
-    return person_comparison(name, render_frame(renderer, scene, settings), reference, mask)
+    return person_comparison(name, frame_of(renderer, subject, skin, settings), reference, mask)
 
 
 def render_frame(renderer: Renderer, scene: Scene, settings: Settings) -> Floats:
@@ -116,31 +244,77 @@ def render_frame(renderer: Renderer, scene: Scene, settings: Settings) -> Floats
     return np.asarray(image.reshape(height, 2, width, 2, 3).mean(axis=(1, 3)))
 
 
+def path_trace_subject(
+    subject: PersonSubject,
+    skin: SharedSkin,
+    size: tuple[int, int],
+    samples: int,
+    use_cache: bool = True,
+    variant: MitsubaVariant = "scalar_rgb",
+    progress: Callable[[int, int], None] | None = None,
+) -> PathTraced:
+    """Path-trace a person with the skin that the frame has.
+
+    size : width and height of the picture [pixel]
+    samples : paths per pixel
+    variant : variant of Mitsuba, as in `path_trace`
+    """
+    medium = None if subject.cause in ("scattering", "bounces") else skin.medium
+    textures, scene = subject.textures, subject.scene
+    if skin.medium.eta != 1.0 and scene.skin.strength > 0.0:
+        textures = replace(textures, strength=textures.strength / np.float32(scene.skin.strength))
+    return path_trace_person(
+        scene,
+        textures,
+        medium,
+        size,
+        samples,
+        max_depth=_DIRECT_DEPTH if subject.cause == "bounces" else None,
+        variant=variant,
+        use_cache=use_cache,
+        progress=progress,
+    )
+
+
 def path_trace_view(
     renderer: Renderer,
     scene: Scene,
     textures: SkinTextures,
     size: tuple[int, int],
     samples: int,
-    use_cache: bool = True,
-    progress: Callable[[int, int], None] | None = None,
+    *,
     variant: MitsubaVariant = "scalar_rgb",
 ) -> PathTraced:
-    """Path-trace a person.
+    """Path-trace a person of homogeneous skin that reflects with a strength of 1 and does not refract.
 
-    In the medium, light exits at the same mean distance from its entry as by the profile that dermis uses.
+    In the medium, light exits at the same mean distance from its entry as by the profile of the scene's skin.
 
-    textures : maps of the skin as dermis paints them, from `person_textures`
+    textures : maps of the skin as dermis paints them, but with colours under uniform light
     size : width and height of the picture [pixel]
     samples : paths per pixel
     variant : variant of Mitsuba, as in `path_trace`
     """
-    profile, colour = renderer.skin_profile(scene.skin), scene.head.maps.mean_colour
-    assert colour is not None  # painted maps always have one
+    mean = scene.head.maps.mean_colour
+    assert mean is not None  # painted maps always have one
+    medium = uniform_skin(at_normal_incidence(mean), mean_distance_mm(renderer.skin_profile(scene.skin)), 1.0)
+    colour = at_normal_incidence(textures.colour).astype(np.float32)
+    textures = replace(textures, colour=colour, strength=np.ones((1, 1), np.float32))
+    return path_trace_person(scene, textures, medium, size, samples, variant=variant)
+
+
+def mean_distance_mm(profile: GaussianSum) -> Floats:
+    """Return the mean lateral distance (3,) between entry and exit of light by a profile [mm]."""
     weight, width = profile.weight, np.sqrt(0.5 * np.pi * profile.variance_mm2)
-    distance = (weight * width[:, None]).sum(axis=0) / weight.sum(axis=0)
-    options: dict[str, Any] = {"variant": variant, "use_cache": use_cache, "progress": progress}
-    return path_trace_person(scene, textures, distance, colour, size, samples, **options)
+    return np.asarray((weight * width[:, None]).sum(axis=0) / weight.sum(axis=0))
+
+
+def at_normal_incidence(colour: ArrayLike) -> Floats:
+    """Return reflectances at normal incidence of half-spaces of index 1, by those for uniform light [-]."""
+    albedo = 1.0 - np.linspace(1.0, 0.01, 48) ** 2
+    uniform, normal = (
+        [float(f(one)) for one in albedo] for f in (diffuse_albedo, partial(directional_albedo, 1.0))
+    )
+    return np.asarray(np.interp(np.asarray(colour, float), uniform, normal))
 
 
 def person_comparison(name: str, ours: Floats, reference: PathTraced, mask: Mask) -> PersonComparison:

@@ -51,12 +51,13 @@ def _paint_textures(renderer: Renderer, scene: Scene, look: SkinLook, side: int)
     colour, gloss, rough, height = paint.paint_raw_arrays(device, surface, look, side)
     height = height + _detail_heights_mm(gloss[..., 1], rough[..., 1], gloss[..., 2])
     roughness = np.maximum(scene.skin.smoothing * rough[..., 0], _MIN_ROUGHNESS)
+    strength = np.ascontiguousarray(scene.skin.strength * gloss[..., 0])
     radius = float(np.sqrt(SCLERA_MM**2 - iris_mm() ** 2))
     iris, white, *teeth = (
         _part_texture(renderer, scene, part, radius) for part in range(len(_TEXTURED_PARTS))
     )
     colour = np.ascontiguousarray(colour[..., :3])
-    return SkinTextures(colour, roughness, height, iris, radius, white, (teeth[0], teeth[1]))
+    return SkinTextures(colour, roughness, strength, height, iris, radius, white, (teeth[0], teeth[1]))
 
 
 def _detail_heights_mm(pores: Floats, furrows: Floats, density: Floats) -> Floats:

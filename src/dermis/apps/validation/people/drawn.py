@@ -40,21 +40,21 @@ class DrawnPeople(NamedTuple):
     sex: Doubles
 
 
-def site_unknowns(look: SkinLook) -> Doubles:
-    """Return the unknowns (7, 4) of `model_spectra` for a skin look at each of `HEAD_SITES`."""
+def site_variables(look: SkinLook) -> Doubles:
+    """Return the variables (7, 4) of `model_spectra` for a skin look at each of `HEAD_SITES`."""
     differences = np.vstack([np.zeros(3), look.sites.array()])
-    fractions = np.array([look.melanin, look.blood]) * np.exp2(differences[:, :2])
+    cheek = np.log2([look.melanin, look.blood])
     oxygen = np.clip(look.oxygen + differences[:, 2], 0.0, 1.0)
-    thickness = np.full(len(differences), np.log(look.epidermis_mm))
-    return np.column_stack([np.sqrt(np.minimum(fractions, 1.0)), oxygen, thickness])
+    thickness = np.full(len(differences), np.log2(look.epidermis_mm))
+    return np.column_stack([cheek + differences[:, :2], oxygen, thickness])
 
 
 @logged_step("drawing people")
 def draw_people(group: str, seeds: Sequence[int]) -> DrawnPeople:
     """Return randomly drawn people of a measured group, with colours by the model, without rendering."""
     drawn = [Human.drawn(seed, skin_ancestry=group) for seed in seeds]
-    unknowns = np.concatenate([site_unknowns(one.look) for one in drawn])
-    colours = model_lab(unknowns).reshape(len(drawn), len(HEAD_SITES), 3)
+    variables = np.concatenate([site_variables(one.look) for one in drawn])
+    colours = model_lab(variables).reshape(len(drawn), len(HEAD_SITES), 3)
     return DrawnPeople(colours, np.array([one.age for one in drawn]), np.array([one.sex for one in drawn]))
 
 

@@ -14,12 +14,7 @@ from scipy.special import ndtri
 from scipy.stats import rankdata
 
 from dermis.apps.validation.pages import CHECKOUT, in_checkout
-from dermis.apps.validation.people.inversion import (
-    from_variables,
-    invert_spectra,
-    model_lab,
-    to_variables,
-)
+from dermis.apps.validation.people.inversion import invert_spectra, model_lab
 from dermis.apps.validation.spectral_archive import AGE_MIDDLES, Archive, read_archive
 from dermis.base.arrays import Doubles
 from dermis.base.atomic_write import atomic_file
@@ -70,7 +65,7 @@ _HEADER = """\
 def table() -> None:
     """Write the table of measured people in the package from the archive."""
     archive = read_archive()
-    variables = to_variables(invert_spectra(archive.spectra))
+    variables = invert_spectra(archive.spectra)
     document = build_table(archive, variables)
     folder = in_checkout(DATA)
     with atomic_file(folder / TABLE_FILE) as file:
@@ -85,7 +80,7 @@ def table() -> None:
 def build_table(archive: Archive, variables: Doubles) -> dict[str, Any]:
     """Return the JSON object of a `MeasuredTable`.
 
-    variables : (n, 4) variables of the measurements, from `to_variables`
+    variables : (n, 4) variables of the measurements, from `invert_spectra`
     """
     cheek, y = person_medians(archive, variables, _CHEEK)
     sex, age = _effects(cheek, y)
@@ -273,7 +268,7 @@ def _matching_shift(y: Doubles, target: Doubles, count: int) -> tuple[Doubles, D
     shift, used = np.zeros(4), np.arange(4) < count
 
     def median(offset: Doubles) -> Doubles:
-        return np.asarray(np.median(model_lab(from_variables(y + offset)), axis=0))
+        return np.asarray(np.median(model_lab(y + offset), axis=0))
 
     for _ in range(_CALIBRATION_STEPS):
         error = target - median(shift)
@@ -343,7 +338,7 @@ def _pooled_cell(found: MeasuredTable, group: str, site: int) -> list[str]:
     """Return median colour and pigments of a site without measurements by the pooled model."""
     y = found.variables({group: 1.0}, 0.5, 30.0, np.zeros((1, 4)))
     y[:, :3] += found.site_variables({group: 1.0}, y, np.zeros((1, len(SITES), 2)))[:, site]
-    colour, (melanin, blood, oxygen, thickness) = model_lab(from_variables(y))[0], y[0]
+    colour, (melanin, blood, oxygen, thickness) = model_lab(y)[0], y[0]
     pigments = [
         f"{np.exp2(melanin):.4f}",
         f"{np.exp2(blood):.5f}",

@@ -11,6 +11,7 @@ const HORIZON_WIDTH: f32 = 0.2; // half-width of the soft horizon of the skin, a
 const HORIZON_DROP: f32 = 0.3; // amount by which the horizon sinks per millimetre of height above the skin, as a cosine
 const REFLECTION_ROUGHNESS: f32 = 0.7; // roughness of the reflection of the environment by strands
 const SKY_WIDTH: f32 = 0.5; // half-width of the transition from skin to sky at the horizon, as a cosine
+const DIFFUSIVITY: f32 = 1.66; // path of diffuse light through a plane layer relative to the thickness of the layer, on average
 const BACKSCATTER_DENSITY: f32 = 0.7; // density factor of backscattering by the strands behind, as published
 const WIDE_VARIANCE: f32 = 0.3; // longitudinal variance of light that other strands have scattered
 const HEAD_MM: f32 = 85.0; // radius of a head
@@ -123,7 +124,7 @@ fn radiance_of(knot: Knot) -> vec3f {
         total += e * wide * (scattered * (forth + back) + (direct + scattered) * 2.0 * returned);
         skin_irradiance += e * (direct + scattered) * max(dot(l, knot.normal), 0.0);
     }
-    let through = exp(-knot.above * (1.0 - forth - back));
+    let through = exp(-DIFFUSIVITY * knot.above * (1.0 - forth - back));
     if (ENVIRONMENT) {
         skin_irradiance += through * panorama_at(knot.normal, 0u);
     }

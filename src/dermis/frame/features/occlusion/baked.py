@@ -13,15 +13,29 @@ from dermis.frame.features.shape.shape import evaluate_rest_shape, shape_tables
 from dermis.frame.features.visibility.layers import draw_layers, make_layers
 from dermis.frame.programs import program
 from dermis.frame.projection import ShadowView, parallel_shadow_view, shadow_map_views
-from dermis.gpu import Bindings, CommandList, ComputeProgram, Device, Texture, UniformRecord, make_texture
+from dermis.gpu import (
+    Bindings,
+    CommandList,
+    ComputeProgram,
+    Device,
+    Texture,
+    UniformRecord,
+    download,
+    make_texture,
+)
 from dermis.gpu.textures import texture_from_array
 from dermis.mesh.geometry import fibonacci_sphere
 from dermis.mesh.head import Head
+from dermis.mesh.mesh import Mesh
+from dermis.mesh.strands import Strands, cover_of_points
 
 DIRECTION_COUNT = 128
 """Number of directions from which a depth map of the head is drawn."""
 DEPTH_MAP_SIDE = 512
 """Side of a depth map [texels]."""
+DIFFUSIVITY = 1.66
+"""Path of diffuse light through a plane layer relative to its thickness, on average; also in
+strands_light.wgsl."""
 CACHE_VERSION = f"1 {DIRECTION_COUNT} {DEPTH_MAP_SIDE}"
 """Version of baked maps on disk; change it when baking gives other results."""
 _MAPS_PER_BATCH = 32  # number of depth maps that are drawn at a time
@@ -100,10 +114,11 @@ def fill_gaps(baked: NDArray[np.float32], side: int) -> NDArray[np.float32]:
 
 
 def cached_occlusion_map(
-    device: Device, head: Head, atlas: Atlas, bindings: Bindings, texels: Texture
+    device: Device, head: Head, atlas: Atlas, hair: Strands | None, bindings: Bindings, texels: Texture
 ) -> Texture:
     """Return a texture of the visible fraction of the sky at texels and vertices, baked or read from disk.
 
+    hair : hair of the head, which dims the sky on the skin below it
     bindings : resources of the lighting; the resources of geometry and lights are replaced
     texels : texture of the surface point of each atlas texel
     """
@@ -116,7 +131,35 @@ def cached_occlusion_map(
         return integers
 
     integers = cached_occlusion(head.mesh, atlas, f"{CACHE_VERSION} {side}", bake)
-    return texture_from_array(device, integers / np.float32(65535.0), "r32float")
+    visible = integers / np.float32(65535.0)
+    if hair is not None and len(hair):
+        visible = visible * _hair_transmittance(head.mesh, hair, download(device, texels), side)
+    return texture_from_array(device, visible, "r32float")
+
+
+def _hair_transmittance(
+    mesh: Mesh, hair: Strands, texels: NDArray[np.uint32], side: int
+) -> NDArray[np.float32]:
+    """Return the fraction of the light of the sky that passes the hair, in the layout of `fill_gaps` [-].
+
+    The hair of the scalp and the beard absorbs diffuse light as a plane layer over its roots; strands scatter
+    what they do not absorb.
+
+    texels : (s, s, 2) triangle + 1 and packed barycentric weights of each atlas texel, as on the device
+    side : side of the atlas in the result [texels]
+    """
+    chord = 0.5 * np.pi * hair.radius_mm.mean(axis=1, keepdims=True)
+    absorbed = float((1.0 - np.exp(-hair.absorption * chord)).mean())
+    passing = np.exp(-DIFFUSIVITY * absorbed * cover_of_points(mesh, hair))[mesh.point].astype(np.float32)
+    rows = ((np.arange(side) + 0.5) * len(texels) / side).astype(int)
+    chosen = texels[np.ix_(rows, rows)]
+    b, c = ((chosen[..., 1] >> shift & 0xFFFF).astype(np.float32) / 65535.0 for shift in (0, 16))
+    corners = passing[mesh.triangles[np.maximum(chosen[..., 0].astype(np.int64), 1) - 1]]
+    atlas = corners[..., 0] * (1.0 - b - c) + corners[..., 1] * b + corners[..., 2] * c
+    atlas[chosen[..., 0] == 0] = 1.0
+    rest = np.ones(-(-len(passing) // side) * side, np.float32)
+    rest[: len(passing)] = passing
+    return np.vstack([atlas, atlas[-1:], rest.reshape(-1, side)]).astype(np.float32)
 
 
 def placeholder_occlusion(device: Device) -> Texture:

@@ -47,6 +47,7 @@ CHEEK_AND_FOREHEAD = SITES.index("cheek"), SITES.index("forehead")
 FORMER_SKIN = replace(DEFAULT_SKIN, baseline=1.0, epidermis_mm=0.05, oxygen=0.75)
 """Default skin before it was compared with the archive."""
 _SAMPLE, _CONSTANTS_SAMPLE = 1500, 600  # numbers of spectra, for published models and for fits of constants
+_SITE_SAMPLE = 300  # number of spectra of a site, for fits of its constants
 _AT_LIMIT, _MATCHED = 1e-6, 0.25  # tolerance of oxygen at a bound [-], and of a matched colour [CIEDE2000]
 _NEIGHBOURS = 80  # of other people, for the local regression of colours
 _PERCENTILES = 50.0, 95.0
@@ -73,7 +74,8 @@ def measured(bioskin: Path | None = None, only: str | None = None) -> None:
     Parameters
     ----------
     only:
-        Part to measure again (models, surface, limits, folds, alternatives, additions, sites or edge); the
+        Part to measure again (models, surface, limits, folds, alternatives, additions, sites, site_folds or
+        edge); the
         other parts keep their last results.
     bioskin:
         File pretrained_models/BioSkin.pt of facebookresearch/BioSkin, to compare with its decoder.
@@ -88,6 +90,7 @@ def measured(bioskin: Path | None = None, only: str | None = None) -> None:
         "alternatives": lambda: _alternatives(archive.sample(_SAMPLE, 2), bioskin),
         "additions": lambda: _additions(archive.sample(_CONSTANTS_SAMPLE, 3)),
         "sites": lambda: _sites(archive),
+        "site_folds": lambda: _site_folds(archive),
         "edge": lambda: _edge(archive.sample(_CONSTANTS_SAMPLE, 3)),
     }
     results: JsonObject = {} if only is None else read_results(RESULT_FILE)
@@ -155,27 +158,34 @@ def _surface(archive: Archive) -> JsonObject:
     """Return the differences between colours and a smooth surface through the colours of other people.
 
     Models with two unknowns per spectrum, and the same constants for all people, cannot do better. The third
-    coordinate of a colour is predicted from the first two by local linear regression.
+    coordinate of a colour is predicted from the first two by local linear regression. "each site" has a
+    surface for each site, through the colours of other people at this site.
     """
+    face = np.isin(archive.site, CHEEK_AND_FOREHEAD)
+    sites = [_surface_distances(archive.rows(archive.site == site)) for site in range(len(SITES))]
+    return {
+        "all": _percentiles(_surface_distances(archive)),
+        "cheek and forehead": _percentiles(_surface_distances(archive.rows(face))),
+        "each site": _percentiles(np.concatenate(sites)),
+    }
+
+
+def _surface_distances(part: Archive) -> Floats:
+    """Return the difference (n,) of each colour from a surface through the colours of other people."""
     from scipy.spatial import cKDTree
 
-    face = np.isin(archive.site, CHEEK_AND_FOREHEAD)
-    results: JsonObject = {}
-    for label, chosen in (("all", np.ones(len(archive.spectra), bool)), ("cheek and forehead", face)):
-        part = archive.rows(chosen)
-        colours = lab(part.spectra @ rgb_weights().T)
-        mean, scale = colours.mean(axis=0), colour_metric(np.median(colours, axis=0)[None])[0]
-        axes = np.linalg.svd((colours - mean) @ scale.T, full_matrices=False)[2]
-        point = (colours - mean) @ scale.T @ axes.T
-        nearest = np.asarray(cKDTree(point[:, :2]).query(point[:, :2], k=_NEIGHBOURS + 40)[1])
-        on_surface = point.copy()
-        for k, neighbours in enumerate(nearest):
-            others = neighbours[part.person[neighbours] != part.person[k]][:_NEIGHBOURS]
-            A = np.column_stack([np.ones(len(others)), point[others, :2] - point[k, :2]])
-            on_surface[k, 2] = np.linalg.lstsq(A, point[others, 2], rcond=None)[0][0]
-        nearby = on_surface @ axes @ np.linalg.inv(scale).T + mean
-        results[label] = _percentiles(delta_e_2000(linear_of_lab(nearby), linear_of_lab(colours)))
-    return results
+    colours = lab(part.spectra @ rgb_weights().T)
+    mean, scale = colours.mean(axis=0), colour_metric(np.median(colours, axis=0)[None])[0]
+    axes = np.linalg.svd((colours - mean) @ scale.T, full_matrices=False)[2]
+    point = (colours - mean) @ scale.T @ axes.T
+    nearest = np.asarray(cKDTree(point[:, :2]).query(point[:, :2], k=_NEIGHBOURS + 40)[1])
+    on_surface = point.copy()
+    for k, neighbours in enumerate(nearest):
+        others = neighbours[part.person[neighbours] != part.person[k]][:_NEIGHBOURS]
+        A = np.column_stack([np.ones(len(others)), point[others, :2] - point[k, :2]])
+        on_surface[k, 2] = np.linalg.lstsq(A, point[others, 2], rcond=None)[0][0]
+    nearby = on_surface @ axes @ np.linalg.inv(scale).T + mean
+    return delta_e_2000(linear_of_lab(nearby), linear_of_lab(colours))
 
 
 def _limits(archive: Archive) -> JsonObject:
@@ -315,7 +325,7 @@ def _sites(archive: Archive) -> list[JsonObject]:
     """Return thickness and oxygen that fit each site best, by colour with two unknowns and by spectrum."""
     rows = []
     for site in range(len(SITES)):
-        sample = archive.rows(archive.site == site).sample(300, site)
+        sample = archive.rows(archive.site == site).sample(_SITE_SAMPLE, site)
         fixed = {"baseline": DEFAULT_SKIN.baseline}
         spectral = fit_constants(sample.spectra, THREE_UNKNOWNS, ("epidermis_mm",), fixed=fixed)
         colour = fit_constants(sample.spectra, TWO_UNKNOWNS, ("epidermis_mm", "oxygen"), "colour", fixed)
@@ -330,6 +340,31 @@ def _sites(archive: Archive) -> list[JsonObject]:
             }
         )
     return rows
+
+
+def _site_folds(archive: Archive) -> JsonObject:
+    """Return errors with two unknowns by colour, where each site has its own thickness and oxygen.
+
+    Both are fitted to samples of people of the other folds.
+    """
+    error = np.zeros(len(archive.spectra))
+    fixed = {"baseline": DEFAULT_SKIN.baseline}
+    for fold in range(FOLDS):
+        for site in range(len(SITES)):
+            here = archive.site == site
+            held = here & (archive.fold == fold)
+            sample = archive.rows(here & (archive.fold != fold)).sample(_SITE_SAMPLE, site)
+            free = ("epidermis_mm", "oxygen")
+            constants = fit_constants(sample.spectra, TWO_UNKNOWNS, free, "colour", fixed).constants
+            unknowns = [UNKNOWNS[name] for name in TWO_UNKNOWNS]
+            found = invert_spectra(archive.spectra[held], ExtendedModel(constants), unknowns, "colour")
+            error[held] = found.delta_e()
+    face = error[np.isin(archive.site, CHEEK_AND_FOREHEAD)]
+    return {
+        "all": _percentiles(error),
+        "cheek and forehead": _percentiles(face),
+        "above_2": float((error > 2.0).mean()),
+    }
 
 
 def _edge(sample: Archive) -> JsonObject:

@@ -1,0 +1,110 @@
+"""Regions of the face and of the light in a picture of a person, for tables of errors by place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.apps.truths.metrics import Estimate, energy_ratio
+from dermis.apps.validation.comparisons.person import PersonComparison
+from dermis.base.tables import float_columns, read_rows
+from dermis.frame.renderer import Renderer
+from dermis.frame.surface_points import surface_points
+from dermis.human.skin.surface import painted_surface
+from dermis.scene.model import Scene
+from dermis.scene.settings import Settings
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+ZONES: dict[str, tuple[str, ...]] = {
+    "forehead": ("forehead", "side of the forehead", "glabella", "temple"),
+    "cheek": ("apple of the cheek", "cheek", "cheekbone", "jaw", "beside the mouth"),
+    "nose side": ("wing of the nose", "inner cheek", "nasolabial"),
+    "nose": ("nose", "tip of the nose", "bridge of the nose"),
+    "chin": ("chin", "below the lip", "above the lip", "jaw in front"),
+    "ear": ("ear", "rim of the ear", "lobe"),
+    "neck": ("throat", "neck", "nape", "breast", "shoulder"),
+    "scalp": ("scalp", "crown"),
+}
+"""Zones of human/skin/zones.csv that form each region of the skin."""
+_LID_RANGE_MM = -0.6, 7.0  # distances from the edges of the lids
+_RIM_COSINE, _TERMINATOR_COSINE = 0.35, 0.2
+_LIPS, _LIDS = 8, 10  # columns of `PaintedSurface.vertices`
+_PLACES, _MIN_PIXELS = slice(2, 5), 12
+
+
+@dataclass(frozen=True, eq=False)
+class Regions:
+    """Masks (h, w) of the pixels of each region, by name."""
+
+    masks: dict[str, Mask]
+
+    def signed_errors(self, pair: PersonComparison) -> dict[str, Estimate]:
+        """Return the ratio of the light by dermis to the reference in each region with enough pixels [-]."""
+        found = {}
+        for name, mask in self.masks.items():
+            inside = mask & pair.mask
+            if inside.sum() >= _MIN_PIXELS:
+                found[name] = energy_ratio(pair.ours, pair.reference, inside, pair.variance)
+        return found
+
+
+def picture_regions(renderer: Renderer, scene: Scene, side: int) -> Regions:
+    """Return the regions of the skin that a square picture of a parametric human shows.
+
+    Regions by light follow the first light of the scene: "rim" is skin seen at a grazing angle, "terminator"
+    skin that the light grazes, "shadowed side" skin that faces away from the light. Normals are those of the
+    rest pose.
+
+    side : side of the picture [pixel]
+    """
+    head, mesh = scene.head, scene.head.mesh
+    visible = surface_points(renderer, scene, Settings(size=(side, side), atlas=256, samples=1))
+    corners = mesh.triangles[visible.triangle]
+    on_skin = np.array([one.kind == "skin" for one in mesh.materials])[mesh.material[visible.triangle]]
+    attributes = painted_surface(mesh, head.control.stencils).vertices.astype(np.float64)
+    placed, normals, positions = (
+        np.einsum("nk,nkc->nc", visible.barycentric, values[corners])
+        for values in (attributes, mesh.normals.astype(np.float64), mesh.positions.astype(np.float64))
+    )
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    lips = placed[:, _LIPS] > 0.0
+    lids = (placed[:, _LIDS] > _LID_RANGE_MM[0]) & (placed[:, _LIDS] < _LID_RANGE_MM[1])
+    zone = _nearest_zone(placed[:, _PLACES])
+    found = {name: on_skin & (zone == k) & ~lips & ~lids for k, name in enumerate(ZONES)}
+    found |= {"lips": on_skin & lips, "lids": on_skin & lids, "eyes and mouth": ~on_skin}
+    centre = np.array(head.centre_mm)
+    facing = _cosines(normals, np.array(scene.camera.position) + centre - positions)
+    found["rim"] = on_skin & (facing < _RIM_COSINE)
+    if scene.lights:
+        key = np.array(getattr(scene.lights[0], "position", (0.0, 0.0, 0.0))) + centre
+        cosine = _cosines(normals, key - positions)
+        found["lit side"] = on_skin & (cosine > _TERMINATOR_COSINE)
+        found["terminator"] = on_skin & (np.abs(cosine) <= _TERMINATOR_COSINE)
+        found["shadowed side"] = on_skin & (cosine < -_TERMINATOR_COSINE)
+    return Regions({name: _picture_mask(visible.mask, inside) for name, inside in found.items()})
+
+
+def _nearest_zone(places_mm: Floats) -> NDArray[np.int64]:
+    """Return the index of the region whose zone has the largest weight at points (n, 3)."""
+    rows = {row["zone"]: row for row in read_rows("dermis.human.skin", "zones")}
+    mirrored = np.abs(places_mm[:, :1])
+    points = np.concatenate([mirrored, places_mm[:, 1:]], axis=1)
+    distances = []
+    for names in ZONES.values():
+        zones = [rows[name] for name in names]
+        centres, radii = float_columns(zones, "x y z"), float_columns(zones, "rx ry rz")
+        distances.append((((points[:, None] - centres) / radii) ** 2).sum(axis=-1).min(axis=1))
+    return np.asarray(np.argmin(distances, axis=0))
+
+
+def _cosines(normals: Floats, directions: Floats) -> Floats:
+    return np.asarray((normals * directions).sum(axis=1) / np.linalg.norm(directions, axis=1))
+
+
+def _picture_mask(visible: Mask, inside: Mask) -> Mask:
+    mask = np.zeros(visible.shape, bool)
+    mask[visible] = inside
+    return mask

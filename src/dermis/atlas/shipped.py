@@ -1,0 +1,58 @@
+"""Tables of the package's own head that take seconds to compute; `tools/human_tables.py` writes them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib import resources
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.base.arrays import Doubles
+from dermis.mesh.mesh import Mesh
+
+_FINGERPRINT = "fingerprint"
+_SAMPLED_VERTICES = 64  # vertices whose positions are compared
+_TOLERANCE_MM = 1e-4  # processors differ in the last bits of a position
+
+
+def shipped_arrays(mesh: Mesh, table: str, names: Sequence[str]) -> dict[str, NDArray[Any]] | None:
+    """Return the arrays of a table that the package contains for a mesh; None if it contains none.
+
+    table : text with everything besides the mesh that the arrays depend on
+    names : names of the arrays
+    """
+    file = resources.files(__package__).joinpath("data", table_file(mesh))
+    if not file.is_file():
+        return None
+    with resources.as_file(file) as path, np.load(path) as stored:
+        is_same = np.allclose(stored[_FINGERPRINT], position_fingerprint(mesh), rtol=0.0, atol=_TOLERANCE_MM)
+        members = [f"{table} {name}" for name in names]
+        if not is_same or not all(member in stored for member in members):
+            return None
+        return {name: stored[member] for name, member in zip(names, members, strict=True)}
+
+
+def table_file(mesh: Mesh) -> str:
+    """Return the name of the file with the tables of a mesh."""
+    return f"{mesh.topology_key.hex()[:16]}.npz"
+
+
+def file_arrays(mesh: Mesh, tables: dict[str, dict[str, NDArray[Any]]]) -> dict[str, NDArray[Any]]:
+    """Return the arrays of a file of tables, by their names in the file.
+
+    tables : arrays of each table, as `shipped_arrays` returns them
+    """
+    members = {f"{table} {name}": array for table, one in tables.items() for name, array in one.items()}
+    return {_FINGERPRINT: position_fingerprint(mesh), **members}
+
+
+def position_fingerprint(mesh: Mesh) -> Doubles:
+    """Return mean and root mean square of the vertices, followed by some vertices, as one array [mm].
+
+    Heads of one topology have different fingerprints as soon as a few vertices differ by a millimetre.
+    """
+    positions = mesh.positions.astype(np.float64)
+    sample = positions[:: max(len(positions) // _SAMPLED_VERTICES, 1)]
+    return np.concatenate([positions.mean(axis=0), np.sqrt((positions**2).mean(axis=0)), sample.ravel()])
