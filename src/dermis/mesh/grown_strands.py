@@ -11,7 +11,7 @@ from dermis.base.arrays import Doubles, Ints
 from dermis.mesh.groom import GUIDE_KNOTS, Groom
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
-from dermis.mesh.strands import Roots, Strands, root_frames, to_frames
+from dermis.mesh.strands import Roots, Strands, cover_of_points, root_frames, to_frames
 
 Words = NDArray[np.uint32]
 MAX_EXPORTED_STRANDS = 40_000
@@ -22,6 +22,7 @@ _HAIRLINE_FADE_MM, _SHORT_HAIRLINE_MM = (-3.0, 11.0), (-2.0, 14.0)
 _HAIRLINE_STEP_DEGREES = 2.0
 _TIP_FRACTION, _TIP_WIDTH = 0.12, 0.35
 _COLOURED_HAIRS = 5
+_COVERING_MM = 60.0  # length from the root along which hair covers the skin around it
 _HEAD_RADIUS_MM, _LIFTED_MM = 80.0, 20.0
 _CHUNK = 4_000  # strands that are grown at once
 _FALLBACK_AXIS = np.array([0.31, 0.2, 0.93])
@@ -65,6 +66,25 @@ def hair_strands(head: Head, points_mm: NDArray[np.floating] | None = None) -> S
     if head.hair is None:
         return None
     return grow_strands(head.hair, head.mesh, head.mesh.points_mm if points_mm is None else points_mm)
+
+
+def hair_cover(groom: Groom, mesh: Mesh) -> Doubles:
+    """Return the projected area of the hair rooted around each point of a mesh, per area of skin (p,) [-]."""
+    index = _growing(groom, len(groom.roots))
+    part = groom.parameters[groom.roots.part[index]]
+    number = index.astype(np.uint32) + part["seed"].astype(np.uint32) * np.uint32(131071)
+    length = part["guide_mm"] * _lengths(groom, index, part, number, _above_hairline(groom, index))
+    roots = groom.roots.roots
+    kept = Roots(roots.quad.take(index), roots.position.take(index, axis=0))
+    return cover_of_points(mesh, kept, 2.0 * part["radius_mm"] * np.minimum(length, _COVERING_MM))
+
+
+def absorbed_by_hair(groom: Groom) -> float:
+    """Return the fraction of diffuse light that a hair absorbs, as a mean over the channels."""
+    parts = groom.parameters
+    chord = 0.5 * np.pi * (parts["radius_mm"] / parts["hairs_per_strand"])[:, None]
+    absorption = np.maximum((1.0 - parts["grey"][:, None]) * parts["dark"], parts["white"])
+    return float((1.0 - np.exp(-absorption * chord)).mean())
 
 
 class _Curves(NamedTuple):
