@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from setups import front_camera, frontal, run_frame, scene_of
-from strand_setups import hairy
+from strand_setups import hairy, woolly
 from tolerances import FURNACE_OF_HAIR
 
 from dermis.frame.features.hair import passes as drawing
 from dermis.frame.features.hair import resources as hairs
-from dermis.frame.features.hair.resources import make_strand_buffers, strand_capacity
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
 from dermis.mesh.head import Head
@@ -41,10 +40,7 @@ def wool(count: int, absorption: float, cover: float = 0.0) -> Head:
     rng = np.random.default_rng(5)
     begins = np.column_stack([rng.uniform(-9, 9, (count, 2)), np.full(count, 0.05)])
     ends = begins + np.column_stack([rng.normal(0, 0.8, (count, 2)), rng.uniform(1.5, 3.0, count)])
-    head = hairy(begins, ends, 0.03, absorption)
-    assert head.strands is not None
-    strands = replace(head.strands, cover=np.full(count, cover, np.float32))
-    return replace(head, strands=None, hair=strands)
+    return woolly(begins, ends, 0.03, absorption, cover)
 
 
 @pytest.mark.parametrize("absorption", [0.5, 20.0])
@@ -56,7 +52,9 @@ def test_brightness_does_not_depend_on_how_many_hairs_are_drawn(
     shown = []
     for share in (1, 4):
         monkeypatch.setattr(
-            drawing, "drawn_hair_count", lambda made, _, share=share: made.coarse.hairs // share
+            drawing,
+            "drawn_counts",
+            lambda made, _, share=share: made.coarse._replace(hairs=made.coarse.hairs // share),
         )
         renderer.clear_cache()
         shown.append(picture(renderer, scene, size=(48, 48))[..., :3])
@@ -69,8 +67,11 @@ def test_brightness_does_not_depend_on_how_many_hairs_are_drawn(
 
 def test_coarse_hairs_are_drawn_as_wide_as_pixels_are(renderer: Renderer) -> None:
     head, device = wool(20_000, 1.0), renderer.device
-    tables = hairs.make_strand_tables(device, head, make_strand_buffers(device, strand_capacity(head)))
-    near, far = (hairs.drawn_hair_count(tables, pixel_mm) for pixel_mm in (0.01, 0.5))
+    coarse, none = hairs.coarse_counts(device, head), hairs.StrandCounts(0, 2)
+    capacity = hairs.strand_capacity(none, coarse)
+    buffers = hairs.make_strand_buffers(device, capacity, capacity)
+    tables = hairs.make_strand_tables(device, head, coarse, buffers, None)
+    near, far = (hairs.drawn_counts(tables, pixel_mm).hairs for pixel_mm in (0.01, 0.5))
     assert near == 20_000 and hairs._MIN_DRAWN_STRANDS <= far < 12_000
     assert tables.coarse == (20_000, 5) and tables.fine.hairs == 0
 
@@ -99,6 +100,6 @@ def test_hair_shades_hair(renderer: Renderer, absorption: float, low: float, hig
         scene = replace(lit(head), lights=(frontal(shadows=True),))
         made = run_frame(renderer, scene, technique="none", size=(SIZE, SIZE)).resources.hair
         assert made is not None
-        raw = renderer.device.handle.queue.read_buffer(made.tables.projected)
+        raw = renderer.device.handle.queue.read_buffer(made.tables.buffers.projected)
         seen.append(np.frombuffer(raw, np.float32, 5 * 8).reshape(5, 8)[2, 4:7].mean())
     assert low <= seen[1] / seen[0] < high

@@ -194,7 +194,7 @@ def test_hairs_follow_the_skin(renderer: Renderer) -> None:
     inputs = run_frame(renderer, replace(lit(head), pose=Pose(positions_mm=moved)), technique="none")
     made = inputs.resources.hair
     assert made is not None and head.strands is not None
-    raw = renderer.device.handle.queue.read_buffer(made.tables.posed)
+    raw = renderer.device.handle.queue.read_buffer(made.tables.buffers.drawn)
     rows = np.frombuffer(raw, np.float32, 7 * 4).reshape(1, 7, 4)
     there = head.strands.knot_positions_mm(head.mesh, moved)
     assert np.abs(rows[:, 2:, :3] - there).max() < 1e-4

@@ -128,9 +128,9 @@ def head(
         Eye appearance, such as eumelanin=0.2: eumelanin from 0 (blue) to 1 (dark brown), pupil_mm, redness,
         seed. [default: from the person]
     hair:
-        Hair, such as style=cropped,length_mm=5: style (none, cropped or short), length_mm, density, curl,
-        fade, beard_mm, bushy, grey, eumelanin, pheomelanin and seed [default: from the person]. In .glb files
-        hairs are thin tubes, which dermis ignores when it reads the file.
+        Hair, such as style=bob,curl=0.3: style (none, short, long, afro, ponytail and others, see the guide),
+        length_mm, density, curl, fade, beard_mm, bushy, grey, eumelanin, pheomelanin and seed [default: from
+        the person]. In .glb files hairs are thin tubes, which dermis ignores when it reads the file.
     colour:
         Colour map of the skin, sRGB. [default: painted]
     normal:

@@ -54,7 +54,8 @@ def draw_frame(graph: Graph, inputs: FrameInputs, technique: Technique) -> None:
     shared, triangles = (bindings, view, inputs.light_constants), resources.visibility.texture
     if resources.hair:
         labels = outputs.hair_labels(graph, resources.outputs, stage_inputs)
-        radiance = hair.draw(graph, resources.hair, shared, resources.head, triangles, radiance, labels)
+        geometry = resources.shape.shape, resources.head
+        radiance = hair.draw(graph, resources.hair, geometry, shared, triangles, radiance, labels)
     post.draw(graph, resources.post, inputs.settings, radiance, *shared, triangles)
     outputs.draw(graph, resources.outputs, stage_inputs)
 

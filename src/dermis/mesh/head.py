@@ -11,6 +11,7 @@ from dermis.base.arrays import Doubles, Floats
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyes import Eyes
 from dermis.mesh.file_vertices import FileVertices
+from dermis.mesh.groom import Groom
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.rig import Rig
@@ -40,9 +41,10 @@ class Head:
         Morph targets and bones; None for a head whose poses state the positions of all its points.
     eyes : Eyes, optional
         Eyeballs of realistic shape.
-    strands, hair : Strands, optional
-        Strands of brows and lashes (`strands`), and of scalp and beard (`hair`). The strands of `hair` are in
-        random order, so that the first n strands are a random sample.
+    strands : Strands, optional
+        Strands of brows and lashes.
+    hair : Groom, optional
+        Scalp hair and beard, whose strands the device grows.
     note : str, optional
         Parts of the file that are not used, with reasons; empty if there is none.
     levels : int, optional
@@ -68,7 +70,7 @@ class Head:
     rig: Rig | None = None
     eyes: Eyes | None = None
     strands: Strands | None = None
-    hair: Strands | None = None
+    hair: Groom | None = None
     note: str = ""
     levels: int = 0
     template: Head | None = None

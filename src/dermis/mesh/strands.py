@@ -109,15 +109,15 @@ def quad_weights(position: NDArray[np.floating]) -> Doubles:
     return np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t], axis=-1)
 
 
-def cover_of_points(mesh: Mesh, strands: Strands) -> Doubles:
+def cover_of_points(mesh: Mesh, roots: Roots, area_mm2: Doubles) -> Doubles:
     """Return the projected area of the strands rooted around each point of a mesh, per area of skin (p,) [-].
 
     Half of the area of a strand seen from the side counts, for inclined hair. It covers skin at the root.
+
+    area_mm2 : (n,) area of each strand seen from the side [mm2]
     """
-    lengths = np.linalg.norm(np.diff(strands.knots_mm.astype(np.float64), axis=1), axis=2)
-    widths = strands.radius_mm[:, 1:].astype(np.float64) + strands.radius_mm[:, :-1]
-    area = 0.5 * (lengths * widths).sum(axis=1)
-    corners, weights = quad_corners(mesh, strands.roots.quad), quad_weights(strands.roots.position)
+    area = 0.5 * area_mm2
+    corners, weights = quad_corners(mesh, roots.quad), quad_weights(roots.position)
     count = len(mesh.points_mm)
     hair = np.bincount(corners.ravel(), (weights * area[:, None]).ravel(), minlength=count)
     points = mesh.point[mesh.triangles]

@@ -71,7 +71,8 @@ def subdivide_head(head: Head, levels: int | Callable[[Head], int]) -> Head:
     mesh, stencils = subdivide(head.mesh, levels)
     if stencils is None:
         return head
-    strands, hair = (part and part.refined(head.mesh, mesh, levels) for part in (head.strands, head.hair))
+    strands = head.strands and head.strands.refined(head.mesh, mesh, levels)
+    hair = head.hair and head.hair.refined(head.mesh, levels)
     rig = replace(head.control, stencils=stencils)
     return replace(head, mesh=mesh, rig=rig, strands=strands, hair=hair, levels=int(levels), template=None)
 

@@ -22,6 +22,7 @@ from dermis.human.person import Human
 from dermis.images.codecs import encode_png
 from dermis.images.colour import encode_srgb8
 from dermis.mesh.head import Head
+from dermis.mesh.strands import Roots, root_frames
 
 _MESHES = Path(__file__).parent / "meshes"
 _STRIPE_MM, _STITCH_MM = 22.0, 2.6  # period of the sweater's stripes, and size of its stitches
@@ -237,8 +238,9 @@ def _scalp_hair_paths(head: Head) -> tuple[Doubles, Doubles]:
     """
     assert head.hair is not None
     rng, mesh = np.random.default_rng(3), head.mesh
-    knots = head.hair.knot_positions_mm(mesh, mesh.points_mm)
-    point: Doubles = knots[rng.permutation(len(knots))[:_HAIR_CARD_COUNT], 0].astype(float)
+    roots = head.hair.roots.roots
+    some = rng.permutation(len(roots.quad))[:_HAIR_CARD_COUNT]
+    point = root_frames(mesh, Roots(roots.quad[some], roots.position[some]), mesh.points_mm)[0]
     skin = np.unique(mesh.triangles[mesh.material == 0])
     is_ear = (np.abs(mesh.positions[skin, 0]) > _EAR_MM) & (mesh.positions[skin, 1] > -100.0)
     skin = skin[~is_ear][::4]

@@ -25,6 +25,7 @@ from dermis.formats.gltf.materials import (
 from dermis.formats.gltf.primitives import FibreTubes, HairPrimitive, PrimitiveSource, SurfacePrimitive
 from dermis.formats.part_pictures import PartPictures
 from dermis.mesh.eyeball import EyeTextures
+from dermis.mesh.grown_strands import hair_strands
 from dermis.mesh.head import Head
 from dermis.mesh.skeleton import Skeleton
 
@@ -120,7 +121,7 @@ def _primitive_sources(
             materials.append(part_material(own, part_maps))
         else:
             materials.append(surface_material(own, pictures, roles, roughness))
-    for name, strands in ((BROWS, head.strands), (HAIR, head.hair)):
+    for name, strands in ((BROWS, head.strands), (HAIR, hair_strands(head))):
         if strands is not None and len(strands):
             fibres = FibreTubes.from_strands(strands, head.mesh, _MAX_HAIRS, _KNOTS_PER_HAIR[name])
             parts.append(HairPrimitive(deformable, fibres))

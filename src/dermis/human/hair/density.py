@@ -28,7 +28,6 @@ _BEARD_FADE = (0.25, 0.75)  # zone amounts between which the density of the bear
 _HAIRLINE_WAVES = np.array([[0.37, 0.0, 0.23], [0.81, -0.5, 0.0]])  # wave vectors of the hairline [rad/mm]
 
 _SCALP_MARGIN_MM = 25.0  # distance below the hairline down to which quads may have hair
-_HAIR_MARGIN_MM = 25.0  # distance from quads with scalp hair or beard within which it may touch the skin
 _BROW_MARGIN_MM = 8.0  # distance from quads of the brows within which their hairs may touch the skin
 _MIN_BEARD = 0.02  # zone amount above which quads may have a beard
 
@@ -79,9 +78,26 @@ def height_above_hairline(points: Doubles, recession: float = 0.0) -> Doubles:
     points : (n, 3 or more) positions on the average person [mm]
     recession : recession of the hairline, 0 to 1, see `SkinLook`
     """
-    angle = np.degrees(np.arctan2(np.abs(points[:, 0]), points[:, 2] - HEAD_AXIS_Z))
     edge = hairline_heights(recession)
-    return np.asarray(points[:, 1] - np.interp(angle, HAIRLINE_STEP_DEGREES * np.arange(len(edge)), edge))
+    angles = HAIRLINE_STEP_DEGREES * np.arange(len(edge))
+    return np.asarray(points[:, 1] - np.interp(hairline_angle(points), angles, edge))
+
+
+def hairline_angle(points: Doubles) -> Doubles:
+    """Return the angle (n,) of points around the axis of the head, 0 in front, 180 behind [degrees]."""
+    return np.degrees(np.arctan2(np.abs(points[:, 0]), points[:, 2] - HEAD_AXIS_Z))
+
+
+def hairline_waves(points: Doubles) -> Doubles:
+    """Return small displacements (n,) of the hairline, which make it irregular [mm]."""
+    return np.asarray(sum(np.sin(points[:, :3] @ wave) for wave in _HAIRLINE_WAVES))
+
+
+def zone_amounts(name: str, recession: float, points: Doubles) -> Doubles:
+    """Return the change (n,) of an amount, such as that of hair, by all zones that a recession changes."""
+    column = _amount_column(name)
+    receding = zone_table(recession)[:, column] != zone_table()[:, column]
+    return _sum_zones(name, zone_table(recession)[receding], points)
 
 
 def scalp_density(recession: float) -> HairDensity:
@@ -97,7 +113,7 @@ def scalp_density(recession: float) -> HairDensity:
         low, high = _HAIRLINE_FADE_MM
         margin = len(_HAIRLINE_WAVES)
         near = np.flatnonzero((above > low - margin) & (above < high + margin))
-        above[near] += sum(np.sin(points[near, :3] @ wave) for wave in _HAIRLINE_WAVES)
+        above[near] += hairline_waves(points[near])
         fraction = smoothstep(low, high, above) * (points[:, 1] > _SCALP_BOTTOM_Y)
         thinned = _sum_zones("hair", zone_table(recession)[receding], points)
         return np.asarray(fraction * np.clip(1.0 + thinned, 0.0, 1.0))
@@ -155,23 +171,16 @@ def _sum_zones(name: str, rows: Floats, points: Doubles) -> Doubles:
 
 
 @cache
-def skin_vertices_near_hair(root_finder: RootFinder, bearded: bool) -> Index:
-    """Return the indices of the subdivided vertices within reach of hair, which `SkinSurface` needs.
-
-    bearded : whether the beard is included
-    """
+def skin_vertices_near_hair(root_finder: RootFinder) -> Index:
+    """Return the indices of subdivided vertices within reach of brow hairs; `SkinSurface` needs no others."""
     from scipy.spatial import cKDTree
 
-    mesh = root_finder.mesh
-    corner_points = quad_corners(mesh, _hairy_quads(mesh))
-    near = np.zeros(len(root_finder.subdivided_mesh.positions), bool)
-    hairy = _scalp_candidates() | _beard_candidates() if bearded else _scalp_candidates()
-    brow_points = quad_corners(mesh, root_finder.brow_grid_roots.quad)
-    subsets = corner_points[hairy[corner_points].any(axis=1)], brow_points
-    for subset, reach in zip(subsets, (_HAIR_MARGIN_MM, _BROW_MARGIN_MM), strict=True):
-        tree = cKDTree(root_finder.points_mm[np.unique(subset)])
-        near |= tree.query(root_finder.subdivided_mesh.positions, distance_upper_bound=reach)[0] < reach
-    return np.flatnonzero(near)
+    brow_points = quad_corners(root_finder.mesh, root_finder.brow_grid_roots.quad)
+    tree, positions = (
+        cKDTree(root_finder.points_mm[np.unique(brow_points)]),
+        root_finder.subdivided_mesh.positions,
+    )
+    return np.flatnonzero(tree.query(positions, distance_upper_bound=_BROW_MARGIN_MM)[0] < _BROW_MARGIN_MM)
 
 
 def _amount_column(name: str) -> int:

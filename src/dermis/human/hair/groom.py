@@ -14,7 +14,7 @@ from dermis.base.arrays import Doubles
 from dermis.human.hair import brows, lashes
 from dermis.human.hair.brows import BrowSurface
 from dermis.human.hair.density import skin_vertices_near_hair
-from dermis.human.hair.head_hair import beard_hair, scalp_hair
+from dermis.human.hair.head_hair import make_groom
 from dermis.human.hair.look import HairLook
 from dermis.human.hair.root_finder import SIDE_SIGNS, RootFinder, eye_centres
 from dermis.human.hair.skin_surface import GrowthSurface, HairGroup, RootFrames, SkinSurface
@@ -23,8 +23,6 @@ from dermis.mesh.strands import Roots, Strands, to_frames
 from dermis.specular.hair import absorption_per_mm
 
 _LASH_PIGMENT_FACTOR = 1.6
-_HAIRS_PER_COLOUR = 5  # number of hairs whose colours are averaged in one strand
-_MIN_EUMELANIN = 0.07  # white hair is not quite white
 
 
 def add_hair(
@@ -44,27 +42,15 @@ def add_hair(
     hairs : fraction of scalp and beard hairs to generate; the hairs are widened by the inverse of this
         fraction, so that coverage stays the same
     """
-    skin = SkinSurface(head.mesh, skin_vertices_near_hair(root_finder, look.beard_mm > 0.0))
+    near = skin_vertices_near_hair(root_finder)
+    skin = SkinSurface(head.mesh.positions[near], head.mesh.normals[near])
     surface = GrowthSurface(head, control_head.mesh, skin, hairs)
     rngs = [np.random.default_rng((look.seed, int(side > 0))) for side in SIDE_SIGNS]
     left, right = _grow_brows(surface, root_finder, look, rngs)
     rows = list(_grow_lashes(surface, root_finder, eye_centres(control_head.mesh), rngs))
     groups = [left, *rows[:2], right, *rows[2:]]
-    head = replace(head, strands=_join_groups(groups, _fine_hair_absorption(groups, look)))
-    hair = [*scalp_hair(surface, look, recession), *beard_hair(surface, look)]
-    if not hair:
-        return head
-    joined = _join_groups(hair, _mixed_hair_absorption(hair, look))
-    return replace(head, hair=_shuffle_strands(joined, look.seed))
-
-
-def _shuffle_strands(strands: Strands, seed: int) -> Strands:
-    """Return the strands in random order, so that any first fraction of them is a fair sample."""
-    order = np.random.default_rng((seed, 5)).permutation(len(strands))
-    roots = Roots(strands.roots.quad.take(order), strands.roots.position.take(order, axis=0))
-    names = "knots_mm", "radius_mm", "absorption", "cover"
-    arrays = {name: getattr(strands, name).take(order, axis=0) for name in names}
-    return replace(strands, roots=roots, **arrays)
+    strands = _join_groups(groups, _fine_hair_absorption(groups, look))
+    return replace(head, strands=strands, hair=make_groom(look, recession, root_finder, head.levels, hairs))
 
 
 def _grow_brows(
@@ -154,16 +140,3 @@ def _fine_hair_absorption(groups: list[HairGroup], look: HairLook) -> Doubles:
     n = len(pigment_factor)
     amount = pigment_factor * rng.lognormal(0.0, 0.15, n) * (rng.random(n) >= look.grey)
     return absorption_per_mm(amount * look.eumelanin, amount * look.pheomelanin)
-
-
-def _mixed_hair_absorption(groups: list[HairGroup], look: HairLook) -> Doubles:
-    """Return absorption coefficients (n, 3) of strands that each represent white and pigmented hairs [1/mm].
-
-    A mixture of white and brown hairs looks grey, whereas brown hair with less pigment looks blond.
-    """
-    rng, n = np.random.default_rng((look.seed, 6)), sum(len(group.radius) for group in groups)
-    white = rng.binomial(_HAIRS_PER_COLOUR, look.grey, n)[:, None] / _HAIRS_PER_COLOUR
-    amount = rng.lognormal(0.0, 0.12, n)
-    dark = absorption_per_mm(amount * look.eumelanin, amount * look.pheomelanin)
-    mixed = (1.0 - white) * dark + white * dark.mean(axis=1, keepdims=True)
-    return np.asarray(np.maximum((1.0 - white) ** 2 * mixed, absorption_per_mm(_MIN_EUMELANIN, 0.0)))

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from typing import Literal, get_args
 
 import numpy as np
 
 from dermis.base.errors import format_value, refuse
 from dermis.base.quantities import check_fields
+from dermis.human.hair.styles import Style, styles
 from dermis.human.makehuman import OLD_AGE, YOUNG_AGE
 from dermis.human.skin.look import Demographics
 
-Style = Literal["none", "cropped", "short"]
-HAIR_STYLES: tuple[Style, ...] = get_args(Style)
+HAIR_STYLES: tuple[str, ...] = ("none", *styles())
 FIELD_RANGES = {
-    "length_mm": (1.0, 60.0),
-    "beard_mm": (0.0, 30.0),
+    "length_mm": (1.0, 500.0),
+    "beard_mm": (0.0, 150.0),
     "eumelanin": (0.0, 10.0),
     "pheomelanin": (0.0, 10.0),
     "seed": (0, 2**32 - 1),
@@ -24,8 +23,12 @@ FIELD_RANGES = {
 """Ranges of the fields whose range is not 0 to 1."""
 # Artist's values.
 _TYPICAL_CURL = {"african": 0.95, "asian": 0.0, "caucasian": 0.2}
-_CROPPED_CURL = 0.6  # curl above which hair is cropped
-_CROPPED_LENGTH_MM, _SHORT_LENGTH_MM, _SHORT_MALE_LENGTH_MM = 6.0, 32.0, 27.0
+_TIGHT_CURL = 0.6  # curl above which hair is worn in the styles of tightly coiled hair
+_BALD_CHANCES = {
+    False: 0.01,
+    True: 0.1,
+}  # chance of a bald or shaved head of women and of men, beside styles.toml
+_BALD = Style("up", max_length_mm=500.0, length_mm=6.0)
 _MAX_BEARD_MM = 14.0
 _DARK_EUMELANIN = 3.0  # eumelanin above which shaved hair has full visibility
 
@@ -36,19 +39,21 @@ class HairLook:
 
     Parameters
     ----------
-    style : {"none", "cropped", "short"}
-        "none" for a bald or shaved head, "cropped" for hair of equal length that stands up, "short" for hair
-        combed to the side and shorter at the sides and the nape.
-    length_mm : float
-        Length of the hair of the head where it is longest, 1 to 60 [mm].
+    style : str
+        "none" for a bald or shaved head, or a style from `HAIR_STYLES`, such as "cropped", "short", "long",
+        "bob", "afro" or "ponytail"; the gallery shows them all.
+    length_mm : float, optional
+        Length of the hair of the head where it is longest, from 1 to the maximum of the style; by default
+        the usual length of the style [mm].
     density : float
         Density of the hair of the head, 0 to 1; 1 is 200 hairs per cm2 [-].
     curl : float
-        Curl of all hair, from 0, straight, to 1, tightly coiled [-].
-    fade : float
-        Fraction by which "short" hair is shorter at the sides and the nape than on top, 0 to 1 [-].
+        From straight, 0, to tightly coiled, 1 [-].
+    fade : float, optional
+        How much shorter hair is at the sides and the nape than on top, 0 to 1; by default that of the style.
+        Styles of hair of equal length have none [-].
     beard_mm : float
-        Length of the beard, 0 to 30; 0 for no beard [mm].
+        Length of the beard, 0 to 150; 0 for none [mm].
     bushy : float
         Bushiness of the brows, from 0, sparse and short, to 1, dense and long [-].
     grey : float
@@ -61,7 +66,7 @@ class HairLook:
     Raises
     ------
     DermisError
-        For an unknown style and for values out of range.
+        For an unknown style, for values out of range, and for hair longer than its style allows.
 
     Examples
     --------
@@ -70,11 +75,11 @@ class HairLook:
     0.0
     """
 
-    style: Style = "none"
-    length_mm: float = 6.0
+    style: str = "none"
+    length_mm: float = None  # type: ignore[assignment]  # `__post_init__` replaces None
     density: float = 0.85
     curl: float = 0.1
-    fade: float = 0.6
+    fade: float = None  # type: ignore[assignment]
     beard_mm: float = 0.0
     bushy: float = 0.4
     grey: float = 0.0
@@ -83,14 +88,27 @@ class HairLook:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Raise DermisError for an unknown style and for fields out of range."""
+        """Replace missing values by those of the style.
+
+        Raises DermisError for an unknown style, fields out of range, and hair too long for its style.
+        """
         if self.style not in HAIR_STYLES:
             refuse(
                 "style", f"one of {', '.join(HAIR_STYLES)}", f"got {format_value(self.style)}", "Choose one"
             )
+        style = styles().get(self.style, _BALD)
+        for name in ("length_mm", "fade"):
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, getattr(style, name))
         check_fields(
             self, {field.name: FIELD_RANGES.get(field.name, (0.0, 1.0)) for field in fields(self)[1:]}
         )
+        if self.length_mm > style.max_length_mm:
+            limit, longest = (
+                f"at most {style.max_length_mm:g} mm for the style {self.style}",
+                max(styles(), key=lambda name: styles()[name].max_length_mm),
+            )
+            refuse("length_mm", limit, f"got {self.length_mm:g}", f"Choose another style, such as {longest}")
 
 
 def typical_hair(demographics: Demographics, eumelanin: float, pheomelanin: float) -> HairLook:
@@ -99,15 +117,12 @@ def typical_hair(demographics: Demographics, eumelanin: float, pheomelanin: floa
     eumelanin, pheomelanin : pigment concentrations of the hair, see `HairLook`
     """
     old = (demographics.age - YOUNG_AGE) / (OLD_AGE - YOUNG_AGE)
-    curl = demographics.weighted_mean(_TYPICAL_CURL)
-    tight = curl > _CROPPED_CURL
-    short_mm = _SHORT_LENGTH_MM + (_SHORT_MALE_LENGTH_MM - _SHORT_LENGTH_MM) * demographics.sex
+    curl, woman = demographics.weighted_mean(_TYPICAL_CURL), demographics.sex < 0.5
+    loose, tight = ("shoulder-length", "afro") if woman else ("short", "cropped")
     return HairLook(
-        style="cropped" if tight else "short",
-        length_mm=_CROPPED_LENGTH_MM if tight else short_mm,
+        style=tight if curl > _TIGHT_CURL else loose,
         density=0.9 - 0.25 * old,
         curl=curl,
-        fade=0.55 + 0.3 * demographics.sex,
         bushy=min(1.0, 0.25 + 0.5 * demographics.sex + 0.25 * old * demographics.sex),
         grey=max(0.0, 0.9 * old - 0.25),
         eumelanin=eumelanin,
@@ -118,31 +133,37 @@ def typical_hair(demographics: Demographics, eumelanin: float, pheomelanin: floa
 def sample_hair(rng: np.random.Generator, demographics: Demographics, typical: HairLook) -> HairLook:
     """Return a random hair look around the typical hair look of a person.
 
-    Men have cropped or shaved hair more often than women, and only men have beards. The order of random draws
-    does not depend on the person.
+    Styles have the chances of styles.toml, which are chosen, not measured; only men have beards. The order of
+    random draws does not depend on the person.
     """
     n, style_chance, beard_chance = rng.normal(size=4), rng.random(), rng.random()
     man = demographics.sex > 0.5
-    hairless_below, cropped_below = (0.12, 0.5) if man else (0.03, 0.25)
     curl = float(np.clip(typical.curl + 0.12 * n[0], 0.0, 1.0))
-    style: Style = "short"
-    length = typical.length_mm if typical.style == "short" else _SHORT_LENGTH_MM
-    if style_chance < hairless_below:
-        style = "none"
-    elif style_chance < cropped_below or typical.curl > _CROPPED_CURL:
-        style, length = "cropped", _CROPPED_LENGTH_MM
-    length *= float(np.exp((0.3 if style == "cropped" else 0.15) * n[1]))
+    name = _style_at(style_chance, man, curl > _TIGHT_CURL)
+    style = styles().get(name, _BALD)
+    length = style.length_mm * float(np.exp(0.2 * n[1]))
     beard = float(np.exp(rng.uniform(np.log(0.8), np.log(_MAX_BEARD_MM))))
     return replace(
         typical,
-        style=style,
-        length_mm=float(np.clip(length, 2.0, 45.0)),
+        style=name,
+        length_mm=float(np.clip(length, 1.0, style.max_length_mm)),
         density=float(np.clip(typical.density + 0.08 * n[2], 0.3, 1.0)),
         curl=curl,
-        fade=float(np.clip(typical.fade + 0.12 * n[3], 0.0, 1.0)),
+        fade=float(np.clip(style.fade + 0.12 * n[3], 0.0, 1.0)) if style.fade else 0.0,
         beard_mm=beard if man and beard_chance < 0.5 else 0.0,
         seed=int(rng.integers(2**31)),
     )
+
+
+def _style_at(chance: float, man: bool, tight: bool) -> str:
+    """Return the hair style at a position from 0 to 1 along the chances of all styles.
+
+    man, tight : sex of the person, and whether the hair is tightly coiled
+    """
+    worn = {name: one for name, one in styles().items() if (one.tight if tight else one.loose)}
+    chances = np.array([_BALD_CHANCES[man], *(one.men if man else one.women for one in worn.values())])
+    index = int(np.searchsorted(np.cumsum(chances) / chances.sum(), chance, side="right"))
+    return ("none", *worn)[min(index, len(worn))]
 
 
 def sample_recession(rng: np.random.Generator, demographics: Demographics) -> float:

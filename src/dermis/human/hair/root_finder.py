@@ -14,6 +14,7 @@ from dermis.human.hair import lashes
 from dermis.human.hair.brows import grid_points
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.strands import Roots, quad_corners
+from dermis.mesh.subdivide import subdivide
 
 Index = NDArray[np.int64]
 SIDE_SIGNS = 1.0, -1.0
@@ -104,6 +105,11 @@ class RootFinder:
         )
         quad = np.where(hit, front.quad[triangle], 0)
         return Roots(quad.astype(np.int32), np.clip(position, 0.0, 1.0).astype(np.float32)), hit
+
+    @cached_property
+    def mean_mesh(self) -> Mesh:
+        """Return the control mesh after one subdivision; its first points are the control points."""
+        return subdivide(self.mesh, 1)[0]
 
     @cached_property
     def brow_grid_roots(self) -> Roots:

@@ -19,14 +19,11 @@ _NEIGHBOURS = 6  # vertices whose tangent planes are averaged
 class SkinSurface:
     """Smooth skin surface for projections, interpolated from vertices and their normals.
 
-    mesh : subdivided mesh of the head
-    vertex_index : indices of the vertices to use, which limits the cost of queries; all by default
+    positions_mm, normals : (n, 3) points of the surface [mm], and unit normals there
     """
 
-    def __init__(self, mesh: Mesh, vertex_index: NDArray[np.int64] | None = None) -> None:
-        index = slice(None) if vertex_index is None else vertex_index
-        self._positions_mm = mesh.positions[index].astype(np.float64)
-        normals = mesh.normals[index].astype(np.float64)
+    def __init__(self, positions_mm: NDArray[np.floating], normals: NDArray[np.floating]) -> None:
+        self._positions_mm, normals = positions_mm.astype(np.float64), normals.astype(np.float64)
         self._planes = np.column_stack([normals, (self._positions_mm * normals).sum(axis=1)])
 
     def project(self, points_mm: Doubles) -> tuple[Doubles, Doubles]:

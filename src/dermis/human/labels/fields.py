@@ -95,15 +95,17 @@ def hair_classes(head: Head) -> NDArray[np.uint8]:
 
     Hair on meshes of another topology has the class "hair".
     """
-    strand_sets = [strands for strands in (head.strands, head.hair) if strands is not None]
-    quads = [strands.roots.quad >> (2 * head.levels) for strands in strand_sets]
+    quads = {}
+    if head.strands is not None:
+        quads["fine"] = head.strands.roots.quad >> (2 * head.levels)
+    if head.hair is not None:
+        quads["coarse"] = head.hair.roots.roots.quad >> (2 * head.levels)
     if not quads:
         return np.zeros(0, np.uint8)
-    fine, coarse = _quad_hair_classes()
-    if max(int(one.max(initial=0)) for one in quads) >= len(fine):
-        return np.full(sum(map(len, quads)), class_number("hair"), np.uint8)
-    tables = [fine if strands is head.strands else coarse for strands in strand_sets]
-    return np.concatenate([table[one] for table, one in zip(tables, quads, strict=True)])
+    tables = dict(zip(("fine", "coarse"), _quad_hair_classes(), strict=True))
+    if max(int(one.max(initial=0)) for one in quads.values()) >= len(tables["fine"]):
+        return np.full(sum(map(len, quads.values())), class_number("hair"), np.uint8)
+    return np.concatenate([tables[kind][one] for kind, one in quads.items()])
 
 
 @cache

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
+from dermis.mesh.grown_strands import hair_strands
 from dermis.mesh.mesh import Mesh, build_mesh
 from dermis.scene.model import Scene
 
@@ -114,7 +115,7 @@ def posed_person(scene: Scene, textures: SkinTextures) -> Person:
     )
     hairs = tuple(
         HairFibres(strands.knot_positions_mm(mesh, points), strands.radius_mm, strands.absorption)
-        for strands in (head.strands, head.hair)
+        for strands in (head.strands, hair_strands(head, points))
         if strands is not None and len(strands)
     )
     centred = np.eye(4)

@@ -8,8 +8,9 @@ from dermis.frame.features.hair.resources import (
     TILE_PIXELS,
     WINDOW_KNOTS,
     Resources,
+    StrandCounts,
     StrandTables,
-    drawn_hair_count,
+    drawn_counts,
 )
 from dermis.frame.features.shape.mesh import HeadGeometry
 from dermis.frame.features.shape.shape import Shape
@@ -17,6 +18,7 @@ from dermis.frame.programs import program, workgroup_grid
 from dermis.frame.projection import Views
 from dermis.gpu import (
     Bindings,
+    Buffer,
     ComputeProgram,
     Constants,
     Device,
@@ -32,7 +34,7 @@ ShadingInputs = tuple[Bindings, UniformRecord, Constants]
 
 _MAX_ROWS_PER_INVOCATION, _MAX_LOOP_ITERATIONS = 8, 60_000
 _HAIR_EXTENT_MM = 100.0  # side of a square in the picture that holds all hair of a head
-_CROWDING_FACTOR = 6.0  # ratio of the number of segments in a crowded tile to the mean of all tiles
+_CROWDING_FACTOR = 14.0  # ratio of the number of segments in a crowded tile to the mean of all tiles
 _CLEARING_GROUPS = 256
 _RAY_STRIDE = 4  # one of four rays to an area light is traced: pictures change by 0.0002 at most
 
@@ -41,31 +43,48 @@ def draw_shadows(
     graph: Graph, strands: Resources, shape: Shape, shadow_views: Views, lighting: Bindings
 ) -> None:
     """Declare the passes that pose the strands, and fill the deep opacity maps of their shadows."""
-    graph.repeat(pose_strands, strands.tables, shape)
+    graph.repeat(pose_guides, strands.tables, shape)
     if len(shadow_views.clips):
-        _draw_deep_opacity(graph, strands, lighting)
+        _draw_deep_opacity(graph, strands, shape, lighting)
 
 
-def pose_strands(graph: Recorder, tables: StrandTables, shape: Shape) -> None:
-    """Declare the pass that moves each strand with the quad of the skin mesh in which it is rooted."""
-    bindings: MutableBindings = {
-        "points": shape.surface["points"],
-        "strands": tables.strands,
-        "knots": tables.knots,
-        "hairs": tables.record,
-        "posed": tables.posed,
-    }
-    knots = tables.fine.all_knots() + tables.coarse.all_knots()
-    _dispatch(graph, "hair/strands_pose.wgsl", bindings, knots)
+def pose_guides(graph: Recorder, tables: StrandTables, shape: Shape) -> None:
+    """Declare the passes that move the guides of hair with the skin."""
+    if tables.groom is None:
+        return
+    style = tables.groom.style
+    guides: Bindings = {"guide_rest": style.guide_rest, "bound_guides": style.bound_guides}
+    knots, points = style.guide_rest.size // 16, shape.surface["points"]
+    _dispatch(graph, "hair/guides_pose.wgsl", {**guides, "points": points, "anchors": style.anchors}, knots)
+    _dispatch(graph, "hair/guides_smooth.wgsl", {**guides, "guides": style.guides}, knots)
 
 
-def _draw_deep_opacity(graph: Recorder, strands: Resources, lighting: Bindings) -> None:
+def pose_strands(
+    graph: Recorder, tables: StrandTables, shape: Shape, posed: Buffer, coarse: StrandCounts
+) -> None:
+    """Declare the passes that move fine strands with the skin, and grow coarse ones between posed guides.
+
+    posed : buffer of the strands
+    coarse : number of coarse strands to grow in place of all, and of their knots
+    """
+    shared: Bindings = {"points": shape.surface["points"], "hairs": tables.record(coarse), "posed": posed}
+    if tables.fine.hairs:
+        fine: Bindings = {"strands": tables.strands, "knots": tables.knots}
+        _dispatch(graph, "hair/strands_pose.wgsl", {**shared, **fine}, tables.fine.all_knots())
+    if tables.groom is not None:
+        groom, style = tables.groom, tables.groom.style
+        person: Bindings = {"roots": groom.roots, "parts": groom.parts, "hairline": groom.hairline}
+        guides: Bindings = {"guides": style.guides, "guide_cuts": style.guide_cuts}
+        _dispatch(graph, "hair/strands_grow.wgsl", {**shared, **person, **guides}, coarse.all_knots())
+
+
+def _draw_deep_opacity(graph: Recorder, strands: Resources, shape: Shape, lighting: Bindings) -> None:
     """Declare the passes that fill the deep opacity maps of all lights that cast shadows."""
-    tables = strands.tables
-    casters = tables.shadow_casters
-    segments = tables.fine.all_segments() + tables.coarse.all_segments(casters)
-    knots = tables.fine.all_knots() + tables.coarse.all_knots(casters)
-    bindings: MutableBindings = {**lighting, "posed": tables.posed, "hairs": tables.record}
+    tables, posed = strands.tables, strands.tables.buffers.casters
+    pose_strands(graph, tables, shape, posed, tables.casters)
+    segments = tables.fine.all_segments() + tables.casters.all_segments()
+    knots = tables.fine.all_knots() + tables.casters.all_knots()
+    bindings: MutableBindings = {**lighting, "posed": posed, "hairs": tables.record(tables.casters)}
     bindings |= {"windows": strands.shadows, "opacity": strands.shadows}
     clear = program(graph.device, "hair/strands_clear.wgsl")
     graph.dispatch("strands", clear, bindings, (_CLEARING_GROUPS, 1, 1))
@@ -78,29 +97,34 @@ def _draw_deep_opacity(graph: Recorder, strands: Resources, lighting: Bindings) 
 def draw(
     graph: Recorder,
     strands: Resources,
+    geometry: tuple[Shape, HeadGeometry],
     shading: ShadingInputs,
-    head: HeadGeometry,
     visibility: Texture,
     radiance: Texture,
     labels: Bindings | None = None,
 ) -> Texture:
     """Declare the passes that shade the strands and draw them over the picture; return the new picture.
 
+    geometry : shape of the head, and its vertices and triangles
+    shading : resources of the lighting, uniform record of the shading pass, and constants of the lights
     visibility : texture of the triangle at each sample
     radiance : texture of the picture without hair
     labels : resources with which the pass labels pixels of hair, None without label outputs
     """
     tables, picture, (lighting, view, light_constants) = strands.tables, strands.picture, shading
+    shape, head = geometry
     width, height = picture.result.size[:2]
     pixel_mm = _pixel_mm(view, tables, height)
-    coarse = drawn_hair_count(tables, pixel_mm)
-    segments = tables.fine.all_segments() + tables.coarse.all_segments(coarse)
-    knots = tables.fine.all_knots() + tables.coarse.all_knots(coarse)
+    coarse, posed = drawn_counts(tables, pixel_mm), tables.buffers.drawn
+    pose_strands(graph, tables, shape, posed, coarse)
+    segments = tables.fine.all_segments() + coarse.all_segments()
+    knots = tables.fine.all_knots() + coarse.all_knots()
     light_constants = (*light_constants, ("RAY_STRIDE", _RAY_STRIDE))
     light = program(graph.device, "hair/strands_light.wgsl", light_constants)
-    record = _view_record(light, strands, view, coarse)
-    shared: Bindings = {"strand_view": record, "projected": tables.projected, "hairs": tables.record}
-    graph.dispatch("strands", light, {**lighting, **shared, "posed": tables.posed}, workgroup_grid(knots))
+    record = _view_record(light, strands, view, coarse.hairs)
+    hairs = tables.record(coarse)
+    shared: Bindings = {"strand_view": record, "projected": tables.buffers.projected, "hairs": hairs}
+    graph.dispatch("strands", light, {**lighting, **shared, "posed": posed}, workgroup_grid(knots))
     lists: Bindings = {"chains": picture.chains, "links": picture.links}
     _dispatch(graph, "hair/strands_empty.wgsl", lists, picture.chains.size // 4)
     chains = (("CHAINS", picture.chains_per_tile),)
@@ -120,7 +144,7 @@ def draw(
 def _view_record(
     shader: ComputeProgram, strands: Resources, view: UniformRecord, coarse: int
 ) -> UniformRecord:
-    """Return a record of the shader's struct StrandView: camera, samples and width of the coarse strands.
+    """Return a record of the shader's struct StrandView: camera, samples and number of coarse strands.
 
     view : uniform record of the shading pass
     coarse : number of coarse strands to draw
@@ -129,7 +153,6 @@ def _view_record(
     record = shader.record("StrandView", **{name: view[name] for name in members})
     record["coarse"], record["size"] = coarse, strands.picture.result.size[:2]
     record["skin"] = strands.skin_albedo
-    record["width_scale"] = strands.tables.coarse.hairs / max(1, coarse)
     return record
 
 

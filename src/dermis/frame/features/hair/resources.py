@@ -12,7 +12,9 @@ from dermis.base.errors import refuse
 from dermis.frame.features.surface.record import DEFAULT_COLOUR
 from dermis.frame.request import FrameRequest
 from dermis.gpu import Buffer, Constants, Device, Memo, Texture, UniformRecord, make_texture
+from dermis.mesh.groom import GUIDE_ANCHORS, GUIDE_KNOTS, Groom, Guides, StrandRoots
 from dermis.mesh.head import Head
+from dermis.mesh.mesh import Mesh
 from dermis.mesh.strands import Strands, quad_corners, quad_weights
 from dermis.scene.settings import Settings
 from dermis.specular.hair import hair_constants
@@ -30,16 +32,43 @@ _LINKS_PER_KNOT = 4
 _MAX_LINKS = 1 << 22
 # Steps to which capacities for fine strands and for knots are rounded up, so that most heads share them.
 _FINE_CAPACITY_STEP, _KNOT_CAPACITY_STEP = 1 << 12, 1 << 19
-_MAX_SHADOW_CASTERS = 32_000  # number of coarse strands that cast the shadows of all coarse strands
-_MIN_DRAWN_STRANDS = 5_000
-_DRAWN_WIDTH_PX = 0.45  # width of the drawn coarse strands [pixel]
-_WIDTH_PER_COVER_PX = 0.2  # added width per unit of cover: where hair hides hair, fewer strands suffice
+_PROJECTED_KNOT_BYTES = 32
+_MIN_DRAWN_STRANDS, _MIN_KNOTS = 5_000, 5
+_WIDTH_PER_COVER_PX, _MAX_DRAWN_COVER = (
+    0.2,
+    1.0,
+)  # added width per unit of cover: where hair hides hair, fewer strands suffice
+_LEVELS_PER_OCTAVE = 4  # levels of detail for each doubling of the size of a pixel
 WINDOW_KNOTS = 1 << 12
 """Number of knots for which one workgroup of strands_window.wgsl computes bounds."""
 # Row of the table of strands in strands_pose.wgsl.
 _STRAND_DTYPE = np.dtype([("corner", "u4", 4), ("weight", "f4", 4), ("absorption", "f4", 4)])
+# Rows of the tables in guides_pose.wgsl and strands_grow.wgsl.
+_ANCHOR_DTYPE = np.dtype([("corner", "u4", 4), ("local", "f4", 4)])
+_ROOT_MEMBERS = ("corner", "u4", 4), ("weight", "f4", 4), ("guide", "u4", 4), ("guide_weight", "f4", 4)
+_ROOT_DTYPE = np.dtype(
+    [*_ROOT_MEMBERS, ("place", "f4", 4), ("clump", "u4"), ("part", "u4"), ("along_mm", "f4"), ("pad", "u4")]
+)
 _COUNT_MEMBERS = "fine", "coarse", "shadow_casters", "fine_knots", "coarse_knots"
 _HAIRS_DTYPE = np.dtype([*((name, "u4") for name in _COUNT_MEMBERS), ("width_scale", "f4")])
+
+
+class Detail(NamedTuple):
+    """Detail in which coarse strands are grown on a kind of adapter.
+
+    drawn_knots : largest number of knots of all drawn strands
+    casters, caster_knots : largest number of strands that cast the shadows of all, and of their knots
+    width_px, segment_px : least width of the drawn strands, and least length of their segments [pixel]
+    """
+
+    drawn_knots: int
+    casters: int
+    caster_knots: int
+    width_px: float
+    segment_px: float
+
+
+_GPU_DETAIL, _SOFTWARE_DETAIL = Detail(1 << 23, 10_000, 24, 0.6, 2.0), Detail(1 << 20, 5_000, 10, 0.9, 4.0)
 
 
 class StrandCounts(NamedTuple):
@@ -70,9 +99,10 @@ class StrandCapacity(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class StrandBuffers:
-    """Buffers that each frame fills: posed strands, and their knots projected to the picture."""
+    """Buffers that each frame fills: strands that cast shadows, drawn strands, and projected knots."""
 
-    posed: Buffer
+    casters: Buffer
+    drawn: Buffer
     projected: Buffer
 
 
@@ -97,9 +127,28 @@ def strand_counts(strands: Strands | None) -> StrandCounts:
     return StrandCounts(0, 2) if strands is None else StrandCounts(*strands.radius_mm.shape)
 
 
-def strand_capacity(head: Head) -> StrandCapacity:
-    """Return the buffer capacity for the strands of a head, rounded up so that most heads share buffers."""
-    fine, coarse = map(strand_counts, (head.strands, head.hair))
+def coarse_counts(device: Device, head: Head) -> StrandCounts:
+    """Return the largest number of coarse strands to draw, and the largest number of knots of each."""
+    if head.hair is None:
+        return StrandCounts(0, 2)
+    fitting = device.max_storage_bytes // _PROJECTED_KNOT_BYTES - _KNOT_CAPACITY_STEP
+    limit = min(fitting, adapter_detail(device).drawn_knots) // head.hair.knots
+    return StrandCounts(min(len(head.hair), limit), head.hair.knots)
+
+
+def caster_counts(device: Device, coarse: StrandCounts) -> StrandCounts:
+    """Return the number of coarse strands that cast the shadows of all, and the number of knots of each."""
+    detail = adapter_detail(device)
+    return StrandCounts(min(coarse.hairs, detail.casters), min(coarse.knots, detail.caster_knots))
+
+
+def adapter_detail(device: Device) -> Detail:
+    """Return the detail of hair on a device."""
+    return _SOFTWARE_DETAIL if device.adapter.kind == "CPU" else _GPU_DETAIL
+
+
+def strand_capacity(fine: StrandCounts, coarse: StrandCounts) -> StrandCapacity:
+    """Return the capacity for fine and coarse strands, rounded up so that most heads can share buffers."""
     knots = fine.all_knots() + coarse.all_knots()
     step = _KNOT_CAPACITY_STEP if coarse.hairs else _FINE_CAPACITY_STEP
     return StrandCapacity(_round_up(fine.hairs, _FINE_CAPACITY_STEP), _round_up(knots, step))
@@ -109,11 +158,12 @@ def _round_up(count: int, step: int) -> int:
     return -(-count // step) * step
 
 
-def make_strand_buffers(device: Device, capacity: StrandCapacity) -> StrandBuffers:
+def make_strand_buffers(device: Device, capacity: StrandCapacity, casters: StrandCapacity) -> StrandBuffers:
     """Allocate the buffers of posed strands and of projected knots."""
-    max_hairs = capacity.knots // 2
-    posed = _make_buffer(device, 4 * (capacity.knots + 2 * max_hairs))
-    return StrandBuffers(posed, _make_buffer(device, 8 * capacity.knots))
+    first, second = (
+        _make_buffer(device, 4 * (one.knots + 2 * (one.knots // 2))) for one in (casters, capacity)
+    )
+    return StrandBuffers(first, second, _make_buffer(device, 8 * capacity.knots))
 
 
 def make_strand_picture(device: Device, capacity: StrandCapacity, size: tuple[int, int]) -> StrandPicture:
@@ -154,32 +204,62 @@ def _make_buffer(device: Device, words: int) -> Buffer:
 
 
 @dataclass(frozen=True, eq=False)
+class GuideTables:
+    """Guides of a style in buffers, by the names of guides_pose.wgsl and strands_grow.wgsl."""
+
+    anchors: Buffer
+    guide_rest: Buffer
+    guide_cuts: Buffer
+    bound_guides: Buffer
+    guides: Buffer
+
+
+@dataclass(frozen=True, eq=False)
+class GroomTables:
+    """Groom of a person in buffers: the tables of the style, and the numbers of the person."""
+
+    style: GuideTables
+    roots: Buffer
+    parts: Buffer
+    hairline: Buffer
+
+
+@dataclass(frozen=True, eq=False)
 class StrandTables:
     """Strands of a head in buffers, with the counts and mean values from which strands are drawn.
 
-    strands, knots : tables of strands at rest and of their knots, see strands_pose.wgsl
-    posed, projected : strands in the current pose, and knots projected to the picture
-    record : uniform record of the struct Hairs in strand_knots.wgsl
+    strands, knots : tables of the fine strands at rest and of their knots, see strands_pose.wgsl
+    buffers : buffers that each frame fills
     fine : number of strands and knots of brows and lashes
-    coarse : number of strands and knots of the hair on head and chin
-    shadow_casters : number of coarse strands that cast the shadows of all coarse strands
-    centre_mm : (3,) centre of the roots of the coarse strands at rest [mm]
-    mean_width_mm : mean width of the coarse strands [mm]
-    mean_cover : mean over the coarse strands of `Strands.cover`, the projected area of hair per area of skin
-        around the root [-]
+    coarse : largest number of strands and knots of the hair on head and chin
+    casters : number of strands and knots of the hair that cast the shadows of all of it
+    detail : detail in which the hair is drawn
+    groom : tables from which the hair grows; None without any
+    possible : number of strands of which the hair consists
+    centre_mm : (3,) centre of the roots of the hair at rest [mm]
+    length_mm, width_mm : length of the hair, and mean width of a strand [mm]
+    cover : projected area of hair per area of skin around a root [-]
     """
 
     strands: Buffer
     knots: Buffer
-    posed: Buffer
-    projected: Buffer
-    record: UniformRecord
+    buffers: StrandBuffers
     fine: StrandCounts
     coarse: StrandCounts
-    shadow_casters: int
+    casters: StrandCounts
+    detail: Detail
+    groom: GroomTables | None
+    possible: int
     centre_mm: NDArray[np.float64]
-    mean_width_mm: float
-    mean_cover: float
+    length_mm: float
+    width_mm: float
+    cover: float
+
+    def record(self, coarse: StrandCounts) -> UniformRecord:
+        """Return the uniform record of the struct Hairs in strand_knots.wgsl for some coarse strands."""
+        width_scale = self.possible / max(1, coarse.hairs)
+        values = self.fine.hairs, coarse.hairs, coarse.hairs, self.fine.knots, coarse.knots, width_scale
+        return np.array(values, _HAIRS_DTYPE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,7 +282,8 @@ def shader_constants() -> dict[str, float]:
     """Return the values that `//#fill` lines insert in the hair shaders, by name."""
     opacity = {"strand_window": DEEP_OPACITY_WIDTH, "strand_layers": DEEP_OPACITY_LAYERS}
     words = {"strand_window_words": DEEP_OPACITY_HEADER_WORDS, "strand_window_knots": WINDOW_KNOTS}
-    return {"strand_tile": TILE_PIXELS, **opacity, **words, **hair_constants()}
+    guides = {"guide_anchors": GUIDE_ANCHORS, "guide_knots": GUIDE_KNOTS}
+    return {"strand_tile": TILE_PIXELS, **opacity, **words, **guides, **hair_constants()}
 
 
 def has_strands(head: Head, settings: Settings) -> bool:
@@ -215,51 +296,85 @@ def strand_constants(head: Head, settings: Settings) -> Constants:
     return (("STRANDS", 1),) if has_strands(head, settings) else ()
 
 
-def drawn_hair_count(tables: StrandTables, pixel_mm: float) -> int:
-    """Return the number of coarse strands to draw.
+def drawn_counts(tables: StrandTables, pixel_mm: float) -> StrandCounts:
+    """Return the number of coarse strands to draw, and the number of knots of each.
 
     Where strands are thinner than a pixel, fewer but wider strands are drawn, which cover the same area.
 
     pixel_mm : side of a pixel at the depth of the strands [mm]
     """
-    total_mm = tables.coarse.hairs * tables.mean_width_mm
-    drawn_mm = (_DRAWN_WIDTH_PX + _WIDTH_PER_COVER_PX * tables.mean_cover) * pixel_mm
-    return int(min(tables.coarse.hairs, max(_MIN_DRAWN_STRANDS, total_mm / drawn_mm)))
+    if not tables.coarse.hairs:
+        return tables.coarse
+    pixel_mm = 2.0 ** (np.round(_LEVELS_PER_OCTAVE * np.log2(pixel_mm)) / _LEVELS_PER_OCTAVE)
+    drawn_px = tables.detail.width_px + _WIDTH_PER_COVER_PX * min(tables.cover, _MAX_DRAWN_COVER)
+    hairs = max(_MIN_DRAWN_STRANDS, tables.possible * tables.width_mm / (drawn_px * pixel_mm))
+    knots = max(_MIN_KNOTS, 1 + np.ceil(tables.length_mm / (tables.detail.segment_px * pixel_mm)))
+    return StrandCounts(int(min(tables.coarse.hairs, hairs)), int(min(tables.coarse.knots, knots)))
 
 
-def make_strand_tables(device: Device, head: Head, buffers: StrandBuffers) -> StrandTables:
-    """Upload the strands of a head.
+def make_strand_tables(
+    device: Device, head: Head, coarse: StrandCounts, buffers: StrandBuffers, groom: GroomTables | None
+) -> StrandTables:
+    """Upload the fine strands of a head, and collect the tables of its hair.
 
-    buffers : buffers that each frame fills with posed strands and projected knots
+    coarse : numbers from `coarse_counts`
+    buffers : buffers that each frame fills
+    groom : tables from which the hair grows; None without any
 
     Raises DermisError for strands that are rooted in another mesh.
     """
-    both = head.strands, head.hair
-    parts = [part for part in both if part is not None]
-    fine, coarse = map(strand_counts, both)
-    rows = np.zeros(fine.hairs + coarse.hairs, _STRAND_DTYPE)
-    for part, first in zip(parts, (0, len(parts[0])), strict=False):
-        _fill_rows(rows[first : first + len(part)], head, part)
-    knots = np.concatenate([_knot_rows(part) for part in parts])
-    casters = min(coarse.hairs, _MAX_SHADOW_CASTERS)
-    width_scale = coarse.hairs / max(1, casters)
-    record = np.array(
-        (fine.hairs, coarse.hairs, casters, fine.knots, coarse.knots, width_scale), _HAIRS_DTYPE
-    )
-    hair = head.hair
+    fine, hair = head.strands, head.hair
+    rows, knots = np.zeros(1, _STRAND_DTYPE), np.zeros((1, 4), np.float32)
+    if fine is not None and len(fine):
+        rows, knots = np.zeros(len(fine), _STRAND_DTYPE), _knot_rows(fine)
+        _fill_rows(rows, head, fine)
+    largest = None if hair is None else hair.parameters[hair.parameters["length_mm"].argmax()]
     return StrandTables(
         strands=device.buffer(rows.view(np.uint32), "STORAGE"),
         knots=device.buffer(knots, "STORAGE"),
-        posed=buffers.posed,
-        projected=buffers.projected,
-        record=record,
-        fine=fine,
+        buffers=buffers,
+        fine=strand_counts(fine),
         coarse=coarse,
-        shadow_casters=casters,
-        centre_mm=np.zeros(3) if hair is None else hair.root_centre_mm(head.mesh),
-        mean_width_mm=0.0 if hair is None else 2.0 * float(hair.radius_mm[:, 0].mean()),
-        mean_cover=0.0 if hair is None or hair.cover is None else float(hair.cover.mean()),
+        casters=caster_counts(device, coarse),
+        detail=adapter_detail(device),
+        groom=groom,
+        possible=0 if hair is None else len(hair.roots),
+        centre_mm=np.zeros(3) if hair is None else hair.centre_mm,
+        length_mm=0.0 if largest is None else float(largest["length_mm"]),
+        width_mm=0.0 if largest is None else 2.0 * float(largest["radius_mm"]),
+        cover=0.0 if largest is None else float(largest["cover"]),
     )
+
+
+def make_guide_tables(device: Device, guides: Guides) -> GuideTables:
+    """Upload the guides of a style, and allocate a buffer for the guides in a pose."""
+    anchors = np.empty(guides.weight.shape, _ANCHOR_DTYPE)
+    anchors["corner"] = guides.corner
+    anchors["local"][..., :3], anchors["local"][..., 3] = guides.local_mm, guides.weight
+    bound, smooth = (_make_buffer(device, 2 * guides.rest_mm.size) for _ in range(2))
+    rest, cuts = (device.buffer(array, "STORAGE") for array in (guides.rest_mm, guides.cut))
+    return GuideTables(device.buffer(anchors.view(np.uint32), "STORAGE"), rest, cuts, bound, smooth)
+
+
+def make_strand_roots(device: Device, roots: StrandRoots, mesh: Mesh) -> Buffer:
+    """Upload the roots of the possible strands of a style.
+
+    mesh : mesh of quads in which the strands are rooted
+    """
+    rows = np.zeros(len(roots), _ROOT_DTYPE)
+    rows["corner"], rows["weight"] = quad_corners(mesh, roots.roots.quad), quad_weights(roots.roots.position)
+    for name in ("guide", "guide_weight", "place", "clump", "part", "along_mm"):
+        rows[name] = getattr(roots, name)
+    return device.buffer(rows.view(np.uint32), "STORAGE")
+
+
+def make_groom_tables(device: Device, groom: Groom, style: GuideTables, roots: Buffer) -> GroomTables:
+    """Upload the numbers of a person's groom.
+
+    style, roots : tables of the style, which people share
+    """
+    parts = device.buffer(groom.parameters.view(np.float32), "STORAGE")
+    return GroomTables(style, roots, parts, device.buffer(groom.hairline_mm, "STORAGE"))
 
 
 def _fill_rows(rows: NDArray[np.void], head: Head, strands: Strands) -> None:
@@ -294,8 +409,15 @@ def make(memo: Memo, device: Device, request: FrameRequest) -> Resources | None:
     head, cached, layers = request.head, memo.get, request.shadow_layers
     if not has_strands(head, request.settings):
         return None
-    capacity = strand_capacity(head)
-    tables = cached(make_strand_tables, device, head.bare, cached(make_strand_buffers, device, capacity))
+    fine, coarse = strand_counts(head.strands), coarse_counts(device, head)
+    capacity, casters = (strand_capacity(fine, one) for one in (coarse, caster_counts(device, coarse)))
+    groom = None
+    if head.hair is not None:
+        style = cached(make_guide_tables, device, head.hair.guides)
+        roots = cached(make_strand_roots, device, head.hair.roots, head.topology.mesh)
+        groom = cached(make_groom_tables, device, head.hair, style, roots)
+    buffers = cached(make_strand_buffers, device, capacity, casters)
+    tables = cached(make_strand_tables, device, head.bare, coarse, buffers, groom)
     picture = cached(make_strand_picture, device, capacity, request.settings.size)
     shadows = cached(make_deep_opacity, device, layers, owner=f"{layers} {request.view_name}")
     return Resources(tables, picture, shadows, cached(mean_skin_albedo, head))

@@ -109,11 +109,13 @@ fn fragment_of(position: vec2f, one: Segment) -> Fragment {
         return none;
     }
     let from_a = position - one.a;
-    let along = clamp(dot(from_a, one.direction) / one.extent, 0.0, 1.0);
+    let forward = dot(from_a, one.direction);
+    let along = clamp(forward / one.extent, 0.0, 1.0);
     let lateral = abs(from_a.x * one.direction.y - from_a.y * one.direction.x);
     let width = mix(one.ends.x, one.ends.y, along);
     let drawn_width = max(width, 1.0);
-    if (lateral >= 0.5 * drawn_width + 0.5 || dot(from_a, one.first) < 0.0 || dot(position - one.b, one.last) >= 0.0) {
+    let beyond = max(-forward, forward - one.extent); // beyond an end, where strands bend sharply
+    if (lateral >= 0.5 * drawn_width + 0.5 || beyond > 0.5 * drawn_width + 0.5 || dot(from_a, one.first) < 0.0 || dot(position - one.b, one.last) >= 0.0) {
         return none;
     }
     let cover = clamp(0.5 * drawn_width + 0.5 - lateral, 0.0, 1.0) * width / drawn_width;

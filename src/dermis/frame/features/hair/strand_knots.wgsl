@@ -1,7 +1,8 @@
 // Layout of strands in buffers: normal of the skin, absorption and the knots from root to tip. Fine strands, brows and lashes,
-// come first, then the coarse ones of head and beard; some passes draw only the first coarse strands, in place of all.
+// come first, then the coarse ones of head and beard, some in place of all.
 
-const ROWS_BEFORE: u32 = 2u; // rows of a strand before its knots: normal of the skin; absorption [1/mm] and cover by other hair
+const ROWS_BEFORE: u32 = 2u; // rows of a strand before its knots: normal of the skin, and radius by which light is absorbed,
+// 0 for that of the knots; absorption [1/mm] and cover by other hair
 
 struct Hairs {
     fine: u32, // number of strands
@@ -9,7 +10,7 @@ struct Hairs {
     shadow_casters: u32, // coarse strands that cast shadows
     fine_knots: u32, // knots per strand
     coarse_knots: u32,
-    width_scale: f32, // factor of the width of shadow casters, so that they cast the shadows of all coarse strands
+    width_scale: f32, // factor of the width of coarse strands, so that they cover the area of all
 }
 
 @group(0) @binding(41) var<uniform> hairs: Hairs;

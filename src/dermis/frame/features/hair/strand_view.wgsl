@@ -10,7 +10,6 @@ struct StrandView {
     shift: vec2f, // of the picture's middle from the axis, in half pictures
     light_factors: vec2f, // of light from below the skin and of reflected light; that of hair counts as reflected
     size: vec2f, // of the picture [pixel]
-    width_scale: f32, // factor of the width of coarse strands, so that they cover the area of all
     skin: vec3f, // albedo of the skin below the strands
     jitter: array<vec4f, 64>, // positions of samples in the pixel, 0..1
 }

@@ -38,7 +38,7 @@ fn knot_at(hair: u32, k: u32) -> Knot {
     let first = row + ROWS_BEFORE;
     let here = posed[first + k];
     let along = normalize(posed[first + min(k + 1u, knots_of(hair) - 1u)].xyz - posed[first + max(k, 1u) - 1u].xyz);
-    let depth = posed[row + 1u].xyz * here.w;
+    let depth = posed[row + 1u].xyz * select(here.w, posed[row].w, posed[row].w > 0.0);
     let height = dot(here.xyz - posed[first].xyz, posed[row].xyz);
     let cover = posed[row + 1u].w;
     let along_strand = f32(k) / f32(knots_of(hair) - 1u);
@@ -156,7 +156,6 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     let hair = hair_of_knot(index);
     let here = posed[row_of_knot(index, hair)];
     var knot = project_knot(here.xyz, here.w);
-    knot.width *= select(1.0, strand_view.width_scale, is_coarse(hair));
     if (is_hidden(hair)) {
         knot.width = -1.0;
     }

@@ -39,7 +39,7 @@ fn add_cover(layer: i32, texel: vec2i, cover: f32, depth: f32) {
     }
 }
 
-fn splat(light: Light, a: vec4f, b: vec4f, width_scale: f32) {
+fn splat(light: Light, a: vec4f, b: vec4f) {
     let window = window_at(light.layer);
     let begin = to_window(window, project_to_map(light, a.xyz));
     let end = to_window(window, project_to_map(light, b.xyz));
@@ -48,7 +48,7 @@ fn splat(light: Light, a: vec4f, b: vec4f, width_scale: f32) {
     let direction = b.xyz - a.xyz;
     let across = length(vec2f(dot(direction, light.map_right), dot(direction, light.map_up)));
     let count = max(1u, u32(ceil(distance(begin.xy, end.xy) / SPLAT_STEP)));
-    let cover = width_scale * (a.w + b.w) * across * abs(right * up) / f32(count);
+    let cover = (a.w + b.w) * across * abs(right * up) / f32(count);
     for (var k = 0u; k < count; k += 1u) {
         let at = mix(begin, end, (f32(k) + 0.5) / f32(count));
         let position = at.xy - 0.5;
@@ -69,10 +69,12 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     }
     let hair = hair_of_segment(index);
     let row = row_of_knot(index + hair, hair);
-    let width_scale = select(1.0, hairs.width_scale, is_coarse(hair));
+    if (posed[row].w < 0.0) { // does not grow
+        return;
+    }
     for (var i = 0u; i < skin.light_count; i += 1u) {
         if (lights.light[i].layer >= 0) {
-            splat(lights.light[i], posed[row], posed[row + 1u], width_scale);
+            splat(lights.light[i], posed[row], posed[row + 1u]);
         }
     }
 }

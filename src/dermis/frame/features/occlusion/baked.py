@@ -25,9 +25,10 @@ from dermis.gpu import (
 )
 from dermis.gpu.textures import texture_from_array
 from dermis.mesh.geometry import fibonacci_sphere
+from dermis.mesh.groom import Groom
+from dermis.mesh.grown_strands import absorbed_by_hair, hair_cover
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
-from dermis.mesh.strands import Strands, cover_of_points
 
 DIRECTION_COUNT = 128
 """Number of directions from which a depth map of the head is drawn."""
@@ -114,7 +115,7 @@ def fill_gaps(baked: NDArray[np.float32], side: int) -> NDArray[np.float32]:
 
 
 def cached_occlusion_map(
-    device: Device, head: Head, atlas: Atlas, hair: Strands | None, bindings: Bindings, texels: Texture
+    device: Device, head: Head, atlas: Atlas, hair: Groom | None, bindings: Bindings, texels: Texture
 ) -> Texture:
     """Return a texture of the visible fraction of the sky at texels and vertices, baked or read from disk.
 
@@ -138,7 +139,7 @@ def cached_occlusion_map(
 
 
 def _hair_transmittance(
-    mesh: Mesh, hair: Strands, texels: NDArray[np.uint32], side: int
+    mesh: Mesh, hair: Groom, texels: NDArray[np.uint32], side: int
 ) -> NDArray[np.float32]:
     """Return the fraction of the light of the sky that passes the hair, in the layout of `fill_gaps` [-].
 
@@ -148,9 +149,8 @@ def _hair_transmittance(
     texels : (s, s, 2) triangle + 1 and packed barycentric weights of each atlas texel, as on the device
     side : side of the atlas in the result [texels]
     """
-    chord = 0.5 * np.pi * hair.radius_mm.mean(axis=1, keepdims=True)
-    absorbed = float((1.0 - np.exp(-hair.absorption * chord)).mean())
-    passing = np.exp(-DIFFUSIVITY * absorbed * cover_of_points(mesh, hair))[mesh.point].astype(np.float32)
+    absorbed = absorbed_by_hair(hair)
+    passing = np.exp(-DIFFUSIVITY * absorbed * hair_cover(hair, mesh))[mesh.point].astype(np.float32)
     rows = ((np.arange(side) + 0.5) * len(texels) / side).astype(int)
     chosen = texels[np.ix_(rows, rows)]
     corners, triangle = passing[mesh.triangles], chosen[..., 0].astype(np.int64) - 1

@@ -13,6 +13,7 @@ from pxr import Sdf, Usd, UsdGeom, UsdShade, UsdSkel
 from dermis.apps.export.targets.openpbr.materials import MAP_TYPES, InputValue, OpenPbrMaterial, hair_material
 from dermis.apps.export.targets.usd.geometry import add_hairs, add_mesh, add_motion, unique_usd_names
 from dermis.formats.deformable_mesh import DeformableMesh
+from dermis.mesh.grown_strands import hair_strands
 from dermis.mesh.head import Head
 
 _IMAGE_NODES = {"color3": "ND_image_color3", "float": "ND_image_float", "vector3": "ND_image_vector3"}
@@ -75,7 +76,7 @@ def _add_materials(
 
 
 def _add_hairs(stage: Usd.Stage, root: Sdf.Path, head: Head) -> None:
-    for name, strands in (("lashes_and_brows", head.strands), ("hair", head.hair)):
+    for name, strands in (("lashes_and_brows", head.strands), ("hair", hair_strands(head))):
         if strands is None:
             continue
         curves = add_hairs(stage, root.AppendChild(name), head, strands)

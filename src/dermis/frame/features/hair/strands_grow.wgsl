@@ -1,0 +1,269 @@
+// Grows the coarse strands of a groom: each is interpolated between four guides, drawn into its clump, curled and varied at
+// random. Strands that the hairline or the density of a person leaves out get a negative radius.
+//#include "each.wgsl"
+//#include "strand_knots.wgsl"
+
+//#fill const GUIDE_KNOTS: u32 = {guide_knots}; // of each guide
+const MIN_HEIGHT_MM: f32 = 0.35; // least height of strands above the skin, away from their roots
+const RISE_MM: f32 = 4.0; // length from the root along which this height is reached
+const HAIRLINE_FADE_MM: vec2f = vec2f(-3.0, 11.0); // heights above the hairline between which density rises from 0 to 1
+const SHORT_HAIRLINE_MM: vec2f = vec2f(-2.0, 14.0); // heights above it between which hair becomes longer and thicker
+const HAIRLINE_STEP: f32 = 2.0; // angle between heights of the hairline [degrees]
+const HEAD_RADIUS_MM: f32 = 80.0;
+const LIFTED_MM: f32 = 20.0; // height above the skin to which strands between guides are lifted onto the curved head
+const TIP_FRACTION: f32 = 0.12; // part of a strand along which it tapers
+const TIP_WIDTH: f32 = 0.35;
+const COLOURED_HAIRS: u32 = 5u; // hairs whose colours are averaged in a strand
+const TURN: f32 = 6.2831853;
+
+struct StrandRoot {
+    corner: vec4u, // points of its quad, in order around it
+    weight: vec4f, // of the points at the root
+    guide: vec4u,
+    guide_weight: vec4f,
+    place: vec4f, // see the field `place` of StrandRoots
+    clump: u32, // strand at the middle of its clump
+    part: u32,
+    along_mm: f32, // position of the clump along its row
+    pad: u32,
+}
+
+// Numbers of a part of a groom, such as scalp or beard; see groom.py.
+struct GroomPart {
+    density: f32,
+    hairline: f32, // 1 if the hairline limits the hair
+    thinning: f32, // of the crown, 0 to 1
+    length_mm: f32,
+    guide_mm: f32, // length of the guides
+    fade: f32,
+    layers: f32,
+    clump: f32,
+    clump_start_mm: f32, // distance from the root along which strands draw together
+    rope_mm: f32,
+    braid: f32,
+    curl_mm: f32,
+    pitch_mm: f32,
+    incoherence: f32, // of the phases of curls in a clump
+    frizz_mm: f32,
+    flyaways: f32, // fraction of strands
+    radius_mm: f32,
+    cover: f32,
+    grey: f32,
+    hairs_per_strand: f32,
+    dark: vec3f, // absorption by the pigments of a hair [1/mm]
+    seed: f32,
+    white: vec3f, // least absorption
+    pad: f32,
+}
+
+@group(0) @binding(0) var<storage, read> points: array<f32>; // x, y, z [mm]
+@group(0) @binding(1) var<storage, read> roots: array<StrandRoot>;
+@group(0) @binding(2) var<storage, read> guides: array<vec4f>; // see guides_pose.wgsl
+@group(0) @binding(3) var<storage, read> guide_cuts: array<f32>; // fraction of each guide up to the cut of the style
+@group(0) @binding(4) var<storage, read> parts: array<GroomPart>;
+@group(0) @binding(5) var<storage, read> hairline: array<f32>; // heights by angle [mm]
+@group(0) @binding(6) var<storage, read_write> posed: array<vec4f>; // see strand_knots.wgsl
+
+fn point_at(index: u32) -> vec3f {
+    return vec3f(points[3u * index], points[3u * index + 1u], points[3u * index + 2u]);
+}
+
+// Uniform random number of a strand, 0 to 1. Source: PCG hash [JarzynskiOlano2020].
+fn random(strand: u32, stream: u32) -> f32 {
+    let state = (strand * 64u + stream) * 747796405u + 2891336453u;
+    let word = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;
+    return f32(((word >> 22u) ^ word) >> 8u) / 16777216.0;
+}
+
+// Random number with a mean of 0 and a variance of 1, nearly normal.
+fn random_normal(strand: u32, stream: u32) -> f32 {
+    let sum = random(strand, stream) + random(strand, stream + 1u) + random(strand, stream + 2u);
+    return 2.0 * (sum - 1.5);
+}
+
+struct Root {
+    position: vec3f,
+    along: vec3f,
+    normal: vec3f,
+}
+
+fn root_of(strand: StrandRoot) -> Root {
+    let a = point_at(strand.corner.x);
+    let b = point_at(strand.corner.y);
+    let c = point_at(strand.corner.z);
+    let d = point_at(strand.corner.w);
+    let along = normalize((b - a) + (c - d));
+    let across = cross(c - a, d - b);
+    return Root(mat4x3f(a, b, c, d) * strand.weight, along, normalize(across - dot(across, along) * along));
+}
+
+// Point of a curve that is interpolated between guides.
+struct CurvePoint {
+    position: vec3f,
+    height: f32, // above the skin [mm]
+    normal: vec3f, // of the skin below
+    tangent: vec3f,
+}
+
+// u: position along the guides, 0 to 1; root: position of the root, through which the curve passes
+fn curve_at(strand: StrandRoot, u: f32, root: vec3f) -> CurvePoint {
+    let at = clamp(u, 0.0, 1.0) * f32(GUIDE_KNOTS - 1u);
+    let first = min(u32(at), GUIDE_KNOTS - 2u);
+    let part = at - f32(first);
+    var sum = CurvePoint(root, 0.0, vec3f(0.0), vec3f(0.0));
+    var middle = vec3f(0.0);
+    var square = 0.0;
+    for (var k = 0u; k < 4u; k += 1u) {
+        let weight = strand.guide_weight[k];
+        let begin = 2u * strand.guide[k] * GUIDE_KNOTS;
+        let row = begin + 2u * first;
+        let a = guides[row];
+        let b = guides[row + 2u];
+        let here = mix(a, b, part);
+        sum.position += weight * (here.xyz - guides[begin].xyz);
+        sum.height += weight * here.w;
+        let from_root = here.xyz - root;
+        middle += weight * from_root;
+        square += weight * dot(from_root, from_root);
+        sum.normal += weight * mix(guides[row + 1u].xyz, guides[row + 3u].xyz, part);
+        sum.tangent += weight * (b.xyz - a.xyz);
+    }
+    sum.normal = normalize(sum.normal);
+    sum.tangent = normalize(sum.tangent + 1e-9 * sum.normal);
+    // a mean of points around a head lies below its surface
+    let near = 1.0 / (1.0 + pow(max(sum.height, 0.0) / LIFTED_MM, 2.0));
+    sum.position += near * max(square - dot(middle, middle), 0.0) / (2.0 * HEAD_RADIUS_MM) * sum.normal;
+    return sum;
+}
+
+// Height of a root above the hairline of the person [mm].
+fn above_hairline(place: vec4f) -> f32 {
+    let at = place.x / HAIRLINE_STEP;
+    let first = min(u32(at), arrayLength(&hairline) - 2u);
+    return place.y - mix(hairline[first], hairline[first + 1u], at - f32(first));
+}
+
+fn grows(index: u32, strand: StrandRoot, part: GroomPart, above: f32) -> bool {
+    let fade = smoothstep(HAIRLINE_FADE_MM.x, HAIRLINE_FADE_MM.y, above);
+    let density = mix(1.0, fade, part.hairline) * part.density * (1.0 - part.thinning * strand.place.z);
+    return random(index, 0u) < density;
+}
+
+// Length of a strand, as a fraction of its guides.
+fn length_of(index: u32, strand: StrandRoot, part: GroomPart, above: f32) -> f32 {
+    var cut = 0.0;
+    for (var k = 0u; k < 4u; k += 1u) {
+        cut += strand.guide_weight[k] * guide_cuts[strand.guide[k]];
+    }
+    let sides = 1.0 - part.fade * (1.0 - strand.place.w);
+    let edge = mix(1.0, 0.25 + 0.75 * smoothstep(SHORT_HAIRLINE_MM.x, SHORT_HAIRLINE_MM.y, above), part.hairline);
+    let length = min(cut, part.length_mm / part.guide_mm * sides) * edge;
+    return length * (1.0 - part.layers * random(index, 1u));
+}
+
+// Unit vectors across a curve.
+fn axes_across(at: CurvePoint) -> mat2x3f {
+    var side = cross(at.tangent, at.normal);
+    if (dot(side, side) < 0.08) {
+        side = cross(at.tangent, vec3f(0.31, 0.2, 0.93));
+    }
+    side = normalize(side);
+    return mat2x3f(side, cross(side, at.tangent));
+}
+
+// Offset of a strand within a rope of hair: one of three braided bundles, or a twist.
+fn rope_offset(index: u32, part: GroomPart, s: f32, across: mat2x3f) -> vec3f {
+    let radius = part.rope_mm * sqrt(random(index, 4u));
+    let turn = TURN * random(index, 5u);
+    if (part.braid > 0.0) {
+        let phase = TURN * (s / (8.0 * part.rope_mm) + floor(3.0 * random(index, 6u)) / 3.0);
+        let middle = part.rope_mm * vec2f(sin(phase), 0.45 * sin(2.0 * phase));
+        return across * (middle + 0.5 * radius * vec2f(cos(turn), sin(turn)));
+    }
+    let phase = turn + TURN * s / (7.0 * part.rope_mm);
+    return across * (radius * vec2f(cos(phase), sin(phase)));
+}
+
+fn curl_offset(index: u32, clump: u32, part: GroomPart, s: f32, across: mat2x3f) -> vec3f {
+    let own = TURN * part.incoherence * random(index, 7u);
+    let pitch = part.pitch_mm * (0.85 + 0.3 * random(clump, 8u));
+    let phase = TURN * (s / pitch + random(clump, 9u)) + own;
+    let radius = part.curl_mm * (0.75 + 0.5 * random(index, 10u)) * min(s / (0.5 * part.pitch_mm + 4.0), 1.0);
+    return across * (radius * vec2f(cos(phase), sin(phase)));
+}
+
+// Smooth random displacement, 0 at the root; larger for hairs that fly away.
+fn frizz_offset(index: u32, part: GroomPart, s: f32, across: mat2x3f) -> vec3f {
+    let flies = random(index, 11u) < part.flyaways;
+    let amount = part.frizz_mm * select(1.0, 5.0, flies) * min(s / 25.0, 1.0);
+    let phases = TURN * vec2f(random(index, 12u), random(index, 13u));
+    let slow = TURN * s / 90.0;
+    let fast = TURN * s / 31.0;
+    let waves = vec2f(sin(slow + phases.x) + 0.4 * sin(fast + phases.y), cos(slow + phases.y) + 0.4 * cos(fast + phases.x));
+    return across * (amount * vec2f(random_normal(index, 14u), random_normal(index, 17u)) * waves);
+}
+
+fn absorption_of(index: u32, part: GroomPart) -> vec3f {
+    var grey_hairs = 0.0;
+    for (var k = 0u; k < COLOURED_HAIRS; k += 1u) {
+        grey_hairs += f32(random(index, 20u + k) < part.grey);
+    }
+    let white = grey_hairs / f32(COLOURED_HAIRS);
+    let dark = part.dark * exp(0.12 * random_normal(index, 26u));
+    let grey = vec3f((dark.x + dark.y + dark.z) / 3.0);
+    let mixed = (1.0 - white) * (1.0 - white) * mix(dark, grey, white);
+    return max(mixed, part.white) / (part.hairs_per_strand * hairs.width_scale);
+}
+
+fn strand_position(index: u32, seed: u32, strand: StrandRoot, part: GroomPart, root: Root, u: f32) -> vec3f {
+    let s = u * part.guide_mm;
+    let own = curve_at(strand, u, root.position);
+    let middle = roots[strand.clump];
+    let at = curve_at(middle, u, root_of(middle).position);
+    let near = 1.0 - exp(-pow(s / part.clump_start_mm, 1.5));
+    let pull = part.clump * near * mix(0.6 + 0.4 * random(index, 2u), 1.0, f32(part.rope_mm > 0.0));
+    let across = axes_across(at);
+    var offset = pull * (at.position - own.position);
+    if (part.rope_mm > 0.0) {
+        offset += near * rope_offset(index, part, s + strand.along_mm, across);
+    }
+    if (part.curl_mm > 0.0 && part.rope_mm == 0.0) {
+        offset += curl_offset(index, strand.clump + seed, part, s, across);
+    }
+    offset += frizz_offset(index, part, s, across);
+    let height = mix(own.height, at.height, pull) + dot(offset - pull * (at.position - own.position), own.normal);
+    let least = MIN_HEIGHT_MM * min(s / RISE_MM, 1.0);
+    return own.position + offset + max(least - height, 0.0) * own.normal;
+}
+
+@compute @workgroup_size(64)
+fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) lane: u32) {
+    let knot = list_index(group, groups, lane);
+    let index = knot / hairs.coarse_knots;
+    if (index >= hairs.coarse) {
+        return;
+    }
+    let hair = hairs.fine + index;
+    let k = knot % hairs.coarse_knots;
+    let strand = roots[index];
+    let part = parts[strand.part];
+    let root = root_of(strand);
+    let above = above_hairline(strand.place);
+    let seed = u32(part.seed) * 131071u;
+    let random_index = index + seed;
+    var at = vec4f(root.position, -1.0);
+    if (grows(random_index, strand, part, above)) {
+        let along = f32(k) / f32(hairs.coarse_knots - 1u);
+        let u = along * length_of(random_index, strand, part, above);
+        let taper = mix(1.0, TIP_WIDTH, smoothstep(1.0 - TIP_FRACTION, 1.0, along));
+        let edge = mix(1.0, 0.55 + 0.45 * smoothstep(SHORT_HAIRLINE_MM.x, SHORT_HAIRLINE_MM.y, above), part.hairline);
+        let radius = hairs.width_scale * part.radius_mm * (0.8 + 0.4 * random(random_index, 3u)) * taper * edge;
+        at = vec4f(strand_position(random_index, seed, strand, part, root, u), radius);
+    }
+    posed[row_of_knot(hairs.fine * hairs.fine_knots + knot, hair)] = at;
+    if (k == 0u) {
+        let row = row_of_hair(hair);
+        posed[row] = vec4f(root.normal, hairs.width_scale * part.radius_mm);
+        posed[row + 1u] = vec4f(absorption_of(random_index, part), part.cover);
+    }
+}

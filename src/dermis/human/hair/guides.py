@@ -1,0 +1,402 @@
+"""Guide hairs: curves combed over the mean person, bent by gravity, kept outside the skin and cut."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+from dermis.base.arrays import Doubles
+from dermis.human.hair.root_finder import RootFinder
+from dermis.human.hair.skin_surface import SkinSurface, tangent_component
+from dermis.human.hair.styles import Style
+from dermis.mesh.groom import GUIDE_ANCHORS, GUIDE_KNOTS, Guides
+from dermis.mesh.mesh import Mesh
+from dermis.mesh.strands import quad_corners
+
+ROW_MM = 14.0
+"""Distance between the middles of cornrows [mm]."""
+_STEP_MM = 5.0  # largest step of the growth of guides
+_MIN_HEIGHT_MM = 0.5  # least height of guides above the skin, away from their roots
+_LAYER_LENGTH_MM = 35.0  # length along which hair rises to the outermost layer
+_WHORL_MM = np.array([9.0, 86.0, -131.0])
+_SKULL_CENTRE_MM = np.array([0.0, 12.0, -66.0])
+_ROUND_RADII_MM = np.array([75.0, 96.0, 92.0])  # semi-axes of the skull
+# Elliptic cylinder around the face that combed hair avoids: centre (z), semi-axes along x and z, and the
+# heights between which it begins [mm].
+_FACE_CENTRE_Z, _FACE_RADII_MM, _FACE_TOP_MM = -60.0, (74.0, 118.0), (78.0, 40.0)
+_ANCHOR_MM = 6.0  # distance below which the quads that a knot follows have about equal weights
+_OVER_EARS = "fall", "twist"  # combs of hair that bulges over the ears
+_EAR_CENTRE_MM = np.array([75.0, -22.0, -76.0])
+_EAR_SPREAD_MM = np.array([1.0, 42.0, 34.0])
+_EAR_HEIGHT_MM, _EAR_BEGIN_X = 17.0, 55.0  # height of the ears above the head; x beyond which they begin
+_TIE_RADIUS_MM, _TIE_REACH_MM = (
+    9.0,
+    5.0,
+)  # radius of gathered hair at its tie; distance at which a guide is in its place
+
+
+class Growth(NamedTuple):
+    """State of growing guides.
+
+    root_mm, root_normal : (g, 3) roots on the mean person, and the normals of the skin there
+    position_mm, direction : (g, 3) ends of the guides and unit directions of growth
+    skin_normal, height_mm : (g, 3) normals of the skin below the ends, and (g,) heights above it
+    length_mm : (g,) length so far
+    tied_mm : (g,) length at which the guide passed its tie, infinite before
+    """
+
+    root_mm: Doubles
+    root_normal: Doubles
+    position_mm: Doubles
+    direction: Doubles
+    skin_normal: Doubles
+    height_mm: Doubles
+    length_mm: Doubles
+    tied_mm: Doubles
+
+
+def smoothstep(low: float, high: float, x: Doubles) -> Doubles:
+    """Return the smooth Hermite transition from 0 at `low` to 1 at `high`, in either order."""
+    t = np.clip((x - low) / (high - low), 0.0, 1.0)
+    return np.asarray(t * t * (3.0 - 2.0 * t))
+
+
+def unit(vectors: Doubles) -> Doubles:
+    """Return vectors (n, 3) scaled to length 1; a vector of length 0 stays 0."""
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9))
+
+
+def parting_side(points_mm: Doubles, style: Style) -> Doubles:
+    """Return the side (n,) of the parting of points (n, 3): 1 left, -1 right, 0 behind and below it.
+
+    The parting runs from the forehead to the whorl and turns to the middle of the head there.
+    """
+    x, y, z = points_mm.T
+    return np.where(
+        (z < -125.0) | (y < 35.0),
+        0.0,
+        np.where(x > style.parting_mm * smoothstep(-140.0, -95.0, z), 1.0, -1.0),
+    )
+
+
+def row_of(points_mm: Doubles) -> Doubles:
+    """Return the position (n,) of points across cornrows, in rows."""
+    x, y = points_mm[:, 0], points_mm[:, 1] - _SKULL_CENTRE_MM[1]
+    return np.asarray(np.arctan2(x, np.maximum(y, -60.0) + 75.0) * 110.0 / ROW_MM)
+
+
+def fringe_weight(points_mm: Doubles, style: Style) -> Doubles:
+    """Return how much hair with roots at points (n, 3) belongs to the fringe, 0 to 1, as an array (n,)."""
+    if style.fringe_y_mm is None:
+        return np.zeros(len(points_mm))
+    return smoothstep(-48.0, -34.0, points_mm[:, 2]) * smoothstep(56.0, 44.0, np.abs(points_mm[:, 0]))
+
+
+def _fall(points: Doubles, style: Style) -> Doubles:
+    """Return the directions (n, 3) of hair that falls to both sides of a parting."""
+    x, y, z = points.T
+    side, top = (
+        np.where(x > style.parting_mm * smoothstep(-140.0, -95.0, z), 1.0, -1.0),
+        smoothstep(40.0, 85.0, y),
+    )
+    ahead = smoothstep(-70.0, 0.0, z)
+    sides = np.stack([side * (0.25 + top), -0.9 * (1.0 - top) - 0.1, -0.22 - 0.5 * ahead], axis=1)
+    behind = np.stack([x / 200.0, np.full(len(x), -1.0), np.zeros(len(x))], axis=1)
+    back, fringe = smoothstep(-110.0, -150.0, z)[:, None], fringe_weight(points, style)[:, None]
+    forward = np.stack([x / 120.0, 0.0 * x, np.ones(len(x))], axis=1)
+    return np.asarray((1.0 - fringe) * ((1.0 - back) * sides + back * behind) + fringe * forward)
+
+
+def _back(points: Doubles, style: Style) -> Doubles:
+    """Return the directions (n, 3) of hair combed back, and down at the nape and below the temples."""
+    x, y, z = points.T
+    down = np.maximum(smoothstep(60.0, -10.0, y), smoothstep(-100.0, -150.0, z))
+    return np.stack([x / 400.0, -0.9 * down, -1.0 + 0.75 * smoothstep(-110.0, -150.0, z)], axis=1)
+
+
+def _spiral(points: Doubles, style: Style) -> Doubles:
+    """Return the directions (n, 3) of uncombed hair: away from the whorl, down at sides and nape."""
+    away = points - _WHORL_MM
+    low = 70.0 * smoothstep(40.0, -30.0, points[:, 1])
+    return np.asarray(away + np.stack([0.0 * low, -low, -0.3 * low], axis=1))
+
+
+def _twist(points: Doubles, style: Style) -> Doubles:
+    """Return the directions (n, 3) of ropes that fall to all sides of the head."""
+    away = points - np.array([0.0, 100.0, -70.0])
+    return np.asarray(away * [1.0, 0.6, 0.9])
+
+
+def _beard(points: Doubles, style: Style) -> Doubles:
+    sideways = 0.4 * np.clip(points[:, 0] / 25.0, -1.0, 1.0)
+    return np.stack([sideways, np.full(len(points), -1.0), np.zeros(len(points))], axis=1)
+
+
+def _to_tie(points: Doubles, style: Style) -> Doubles:
+    return np.asarray(np.array(style.tie_mm) - points)
+
+
+def _rows(points: Doubles, style: Style) -> Doubles:
+    """Return the directions (n, 3) of cornrows: to the back along curves of equal `row_of`."""
+    x, y, z = points.T
+    angle = np.arctan2(x, np.maximum(y - _SKULL_CENTRE_MM[1], -60.0) + 75.0)
+    down = smoothstep(-90.0, -150.0, z)
+    ahead = np.stack([0.0 * x, 0.35 * smoothstep(0.0, 30.0, z), -np.ones(len(x))], axis=1)
+    fall = np.stack([0.3 * np.sin(angle), -np.ones(len(x)), 0.1 * np.ones(len(x))], axis=1)
+    return np.asarray((1.0 - down)[:, None] * ahead + down[:, None] * fall)
+
+
+COMBS: dict[str, Callable[[Doubles, Style], Doubles]] = {
+    "up": _spiral,
+    "fall": _fall,
+    "back": _back,
+    "rows": _rows,
+    "gather": _to_tie,
+    "twist": _twist,
+    "beard": _beard,
+}
+"""Directions (n, 3) along which hair is combed at points (n, 3) of the scalp, by the comb of a style."""
+
+
+@cache
+def body_surface(root_finder: RootFinder, ears: bool = True) -> SkinSurface:
+    """Return the skin of the mean person: head, neck and shoulders.
+
+    root_finder : root finder of the mean person
+    ears : False puts a smooth surface in place of the ears
+    """
+    mesh = root_finder.mean_mesh
+    skin = np.unique(mesh.triangles[mesh.material == 0])
+    points, normals = mesh.positions[skin].astype(np.float64), mesh.normals[skin].astype(np.float64)
+    if ears:
+        return SkinSurface(points, normals)
+    y, z = np.abs(points[:, 1:] - _EAR_CENTRE_MM[1:]).T
+    ear = (np.abs(points[:, 0]) > _EAR_BEGIN_X) & (y < 36.0) & (z < 28.0)
+    around = ~ear & (points[:, 0] > _EAR_BEGIN_X) & (y < 60.0) & (z < 50.0)
+    fit = np.linalg.lstsq(_quadratic_terms(points[around]), points[around, 0], rcond=None)[0]
+    grid = np.stack(np.meshgrid(0.0, np.arange(-36.0, 37.0, 4.0), np.arange(-28.0, 29.0, 4.0)), axis=-1)
+    filled = grid.reshape(-1, 3) * [0, 1, 1] + _EAR_CENTRE_MM * [0, 1, 1]
+    filled[:, 0] = _quadratic_terms(filled) @ fit
+    dy, dz = filled[:, 1:].T - _EAR_CENTRE_MM[1:, None]
+    slopes = fit[1] + 2 * fit[3] * dy + fit[5] * dz, fit[2] + 2 * fit[4] * dz + fit[5] * dy
+    facing = unit(np.stack([np.ones(len(filled)), -slopes[0], -slopes[1]], axis=1))
+    sides = [1.0, 1.0, 1.0], [-1.0, 1.0, 1.0]
+    return SkinSurface(
+        np.concatenate([points[~ear], *(filled * side for side in sides)]),
+        np.concatenate([normals[~ear], *(facing * side for side in sides)]),
+    )
+
+
+def _quadratic_terms(points: Doubles) -> Doubles:
+    """Return the terms (n, 6) of a quadratic function of y and z around the middle of the ear."""
+    y, z = points[:, 1:].T - _EAR_CENTRE_MM[1:, None]
+    return np.stack([np.ones(len(y)), y, z, y * y, z * z, y * z], axis=1)
+
+
+def ear_weight(points: Doubles) -> Doubles:
+    """Return a weight (n,) of points (n, 3): 1 at the middle of an ear, falling smoothly to 0 around it."""
+    away = (np.abs(points) * [1, 0, 0] + points * [0, 1, 1] - _EAR_CENTRE_MM) / _EAR_SPREAD_MM
+    return np.asarray(np.exp(-(away[:, 1:] ** 2).sum(axis=1)))
+
+
+def grow_guides(root_finder: RootFinder, points: Doubles, style: Style) -> tuple[Doubles, Doubles, Doubles]:
+    """Return the knots (g, k, 3), the skin normals below them (g, k, 3) and their heights (g, k) [mm].
+
+    points : (g, 3) roots on the skin of the mean person [mm]
+    """
+    surface = body_surface(root_finder, ears=style.comb not in _OVER_EARS)
+    _, normal = surface.project(points)
+    state = Growth(points, normal, points, _first_direction(points, normal, style), normal,
+                   np.zeros(len(points)), np.zeros(len(points)), np.full(len(points), np.inf))  # fmt: skip
+    knots = [(points, normal, state.height_mm)]
+    segment = style.max_length_mm / (GUIDE_KNOTS - 1)
+    substeps = max(1, int(np.ceil(segment / _STEP_MM)))
+    for _ in range(GUIDE_KNOTS - 1):
+        for _ in range(substeps):
+            state = _advance(surface, state, segment / substeps, style)
+        knots.append((state.position_mm, state.skin_normal, state.height_mm))
+    positions, normals, heights = (np.stack(part, axis=1) for part in zip(*knots, strict=True))
+    return positions, normals, heights
+
+
+def _first_direction(points: Doubles, normals: Doubles, style: Style) -> Doubles:
+    combed = unit(tangent_component(COMBS[style.comb](points, style), normals))
+    if style.comb == "up":
+        return unit(normals + style.tilt * combed)
+    lift = style.lift * (smoothstep(10.0, 70.0, points[:, 1]) if style.comb == "fall" else 1.0)
+    return unit(np.reshape(lift, (-1, 1)) * normals + combed)
+
+
+def _advance(surface: SkinSurface, state: Growth, step: float, style: Style) -> Growth:
+    """Return the guides after one step of growth [mm]."""
+    direction, length, tied = _steer(state, style), state.length_mm + step, state.tied_mm
+    if style.comb == "gather":
+        near = (
+            np.linalg.norm(state.position_mm - style.tie_mm - _tie_offsets(state, style), axis=1)
+            < _TIE_REACH_MM
+        )
+        tied = np.where(near & ~np.isfinite(tied), length, tied)
+    moved = state.position_mm + step * direction
+    base, normal = surface.project(moved)
+    height = ((moved - base) * normal).sum(axis=1)
+    height_of_ears = _EAR_HEIGHT_MM * ear_weight(base) if style.comb in _OVER_EARS else 0.0
+    layer = style.volume_mm * (1.0 - np.exp(-length / _LAYER_LENGTH_MM)) * np.minimum(length / 20.0, 1.0)
+    least = np.minimum(length / 6.0, 1.0) * (_MIN_HEIGHT_MM + layer + height_of_ears)
+    pushed = np.clip(least - height, 0.0, 0.8 * step)[:, None]
+    moved += pushed * normal
+    if style.comb == "fall":
+        loose = fringe_weight(state.root_mm, style)[:, None] < 0.5
+        moved = np.where(loose, _clear_face(moved), moved)
+    if style.coil_mm:
+        wound = np.clip((length - tied) / 25.0, 0.0, 1.0)[:, None]
+        moved += wound * (_bun(state, length, style) - moved)
+    # hair that is held out slides along the obstacle: it loses its inward motion, but gains no outward motion
+    inward = np.minimum((direction * normal).sum(axis=1, keepdims=True), 0.0)
+    direction = np.where(
+        (pushed > 0) & ~np.isfinite(tied)[:, None], unit(direction - inward * normal), direction
+    )
+    base, normal = surface.project(moved)
+    height = ((moved - base) * normal).sum(axis=1)
+    return state._replace(position_mm=moved, direction=direction, skin_normal=normal, height_mm=height,
+                          length_mm=length, tied_mm=tied)  # fmt: skip
+
+
+def _steer(state: Growth, style: Style) -> Doubles:
+    """Return the unit directions (g, 3) of the next step."""
+    free = np.minimum(state.length_mm / 60.0, 1.0)[:, None] + 0.15
+    pull = 4.0 * style.gravity * free * np.array([0.0, -1.0, 0.0])
+    if style.comb in ("gather", "rows", "back"):
+        combed = unit(tangent_component(COMBS[style.comb](state.position_mm, style), state.skin_normal))
+        close = np.exp(-np.maximum(state.height_mm - style.volume_mm, 0.0) / 8.0)[:, None]
+        if style.comb == "gather":
+            to_tie = np.array(style.tie_mm) + _tie_offsets(state, style) - state.position_mm
+            distance = np.linalg.norm(to_tie, axis=1, keepdims=True)
+            combed = unit(np.where(distance < 35.0, to_tie, combed))
+            tail = _tail(state, style, pull)
+            return np.where(np.isfinite(state.tied_mm)[:, None], tail, unit(0.5 * state.direction + combed))
+        return unit(0.6 * state.direction + 0.8 * close * combed + 0.3 * (1.0 - close) * pull)
+    return unit(style.stiffness * state.direction + (1.0 - style.stiffness) * pull)
+
+
+def _tie_offsets(state: Growth, style: Style) -> Doubles:
+    """Return the places (g, 3) of guides in the tie, relative to its middle, towards their roots [mm]."""
+    outward = unit(np.array(style.tie_mm) - _SKULL_CENTRE_MM)
+    away = tangent_component(
+        state.root_mm - np.array(style.tie_mm), np.broadcast_to(outward, state.root_mm.shape)
+    )
+    reach = np.linalg.norm(away, axis=1, keepdims=True)
+    return np.asarray(_TIE_RADIUS_MM * np.minimum(reach / 60.0, 1.0) * unit(away))
+
+
+def _tail(state: Growth, style: Style, pull: Doubles) -> Doubles:
+    """Return the directions (g, 3) of hair behind its tie: outward, then down and slightly apart."""
+    outward = unit(np.array(style.tie_mm) - _SKULL_CENTRE_MM)[None]
+    since = np.maximum(state.length_mm - np.where(np.isfinite(state.tied_mm), state.tied_mm, 0.0), 0.0)[
+        :, None
+    ]
+    apart = _tie_offsets(state, style) / _TIE_RADIUS_MM
+    spread = 0.12 * np.exp(-since / 60.0) - 0.03 * smoothstep(150.0, 400.0, since)
+    return unit(0.85 * state.direction + 0.15 * pull + 0.3 * np.exp(-since / 25.0) * outward + spread * apart)
+
+
+def _since_tie(state: Growth, length: Doubles) -> Doubles:
+    """Return the length (g,) of guides behind their tie, 0 before it, at a length from the root [mm]."""
+    return np.maximum(length - np.where(np.isfinite(state.tied_mm), state.tied_mm, length), 0.0)
+
+
+def _bun(state: Growth, length: Doubles, style: Style) -> Doubles:
+    """Return points (g, 3) of hair that winds around a bun behind its tie, at lengths (g,) [mm]."""
+    outward = unit(np.array(style.tie_mm) - _SKULL_CENTRE_MM)
+    side = unit(np.cross(outward, [0.0, 1.0, 0.0]))
+    up = np.cross(side, outward)
+    offset = _tie_offsets(state, style)
+    turn = np.arctan2(offset @ up, offset @ side)
+    rank = np.linalg.norm(offset, axis=1) / _TIE_RADIUS_MM
+    since = _since_tie(state, length)
+    radius = style.coil_mm * (0.7 + 0.3 * rank)
+    tilt = 1.9 - 1.5 * smoothstep(0.0, 260.0, since) + 0.25 * np.sin(3.0 * turn)
+    turn = turn + since / (0.8 * radius)
+    across = (np.sin(tilt) * np.cos(turn))[:, None] * side + (np.sin(tilt) * np.sin(turn))[:, None] * up
+    centre = np.array(style.tie_mm) + 0.6 * style.coil_mm * outward
+    return np.asarray(centre + radius[:, None] * (across + np.cos(tilt)[:, None] * outward))
+
+
+def _clear_face(points: Doubles) -> Doubles:
+    """Return points (g, 3) moved sideways out of an elliptic cylinder around the face."""
+    x, y, z = points.T
+    along = np.clip((z - _FACE_CENTRE_Z) / _FACE_RADII_MM[1], -1.0, 1.0)
+    grown = smoothstep(*_FACE_TOP_MM, y) * smoothstep(-40.0, -5.0, z)
+    least = _FACE_RADII_MM[0] * np.sqrt(1.0 - along**2) * grown
+    inside = np.clip(least - np.abs(x), 0.0, 2.5)
+    return np.asarray(points + np.stack([inside * np.where(x >= 0, 1.0, -1.0), 0.0 * x, 0.0 * x], axis=1))
+
+
+def cut_fractions(knots: Doubles, style: Style) -> Doubles:
+    """Return the fraction (g,) of each guide from its root to where the style cuts it.
+
+    knots : (g, k, 3) knots of the guides on the mean person [mm]
+    """
+    cut = np.ones(len(knots))
+    root = knots[:, 0]
+    if style.cut_y_mm is not None:
+        cut = np.minimum(cut, _first_below(knots, np.full(len(knots), style.cut_y_mm)))
+    if style.fringe_y_mm is not None:
+        fringe = fringe_weight(root, style) > 0.5
+        cut = np.where(fringe, _first_below(knots, np.full(len(knots), style.fringe_y_mm)), cut)
+    if style.round:
+        radius = np.linalg.norm((knots - _SKULL_CENTRE_MM) / _ROUND_RADII_MM, axis=2)
+        limit = 1.0 + style.round * style.max_length_mm / 90.0
+        outside = radius > limit
+        first = np.where(outside.any(axis=1), outside.argmax(axis=1), GUIDE_KNOTS - 1)
+        cut = np.minimum(cut, first / (GUIDE_KNOTS - 1))
+    return cut
+
+
+def _first_below(knots: Doubles, level: Doubles) -> Doubles:
+    """Return the fraction (g,) of each curve (g, k, 3) at which it first falls below a height (g,) [mm]."""
+    y = knots[..., 1] - level[:, None]
+    crosses = (y[:, 1:] < 0) & (y[:, :-1] >= 0)
+    first = crosses.argmax(axis=1)
+    row = np.arange(len(y))
+    part = y[row, first] / np.maximum(y[row, first] - y[row, first + 1], 1e-9)
+    return np.where(crosses.any(axis=1), (first + part) / (GUIDE_KNOTS - 1), 1.0)
+
+
+def bind_guides(
+    control_mesh: Mesh, points_mm: Doubles, knots: Doubles, heights: Doubles, cut: Doubles
+) -> Guides:
+    """Return guides whose knots follow the nearest quads of the skin.
+
+    control_mesh, points_mm : control mesh, and its points (p, 3) on the subdivided mean person [mm]
+    knots, heights : (g, k, 3) knots and (g, k) their heights above the skin, see `grow_guides` [mm]
+    cut : (g,) fractions from `cut_fractions`
+    """
+    from scipy.spatial import cKDTree
+
+    skin = np.flatnonzero(control_mesh.material[control_mesh.quads[:, 0]] == 0)
+    corners = quad_corners(control_mesh, skin)
+    around = points_mm[corners]
+    distance, near = cKDTree(around.mean(axis=1)).query(knots, k=GUIDE_ANCHORS)
+    weight = np.asarray(1.0 / (distance**2 + _ANCHOR_MM**2))
+    weight /= weight.sum(axis=-1, keepdims=True)
+    origin, axes = quad_frames(around)
+    local = np.einsum("gkaic,gkac->gkai", axes[near], knots[:, :, None] - origin[near])
+    return Guides(
+        corners[near].astype(np.int32),
+        local.astype(np.float32),
+        weight.astype(np.float32),
+        np.concatenate([knots, heights[..., None]], axis=2).astype(np.float32),
+        cut.astype(np.float32),
+    )
+
+
+def quad_frames(corners_mm: Doubles) -> tuple[Doubles, Doubles]:
+    """Return the middles (q, 3) and frames (q, 3, 3) of quads (q, 4, 3); rows of a frame are its axes."""
+    a, b, c, d = corners_mm.swapaxes(0, 1)
+    along = unit((b - a) + (c - d))
+    normal = np.cross(c - a, d - b)
+    normal = unit(normal - (normal * along).sum(axis=1, keepdims=True) * along)
+    return corners_mm.mean(axis=1), np.stack([along, np.cross(normal, along), normal], axis=1)

@@ -1,0 +1,171 @@
+"""Possible strands of a hair style: roots on the scalp or the chin, their guides and their clumps."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.base.arrays import Doubles
+from dermis.base.disk import Arrays, cached_arrays
+from dermis.human.hair import density
+from dermis.human.hair.density import average_points, zone_amounts
+from dermis.human.hair.guides import (
+    ROW_MM,
+    bind_guides,
+    cut_fractions,
+    grow_guides,
+    parting_side,
+    row_of,
+    smoothstep,
+)
+from dermis.human.hair.root_finder import RootFinder
+from dermis.human.hair.styles import BEARD, Style
+from dermis.mesh.groom import GUIDE_KNOTS, Guides, StrandRoots
+from dermis.mesh.strands import Roots, quad_corners, quad_weights, refine_roots
+
+STRANDS_PER_CM2 = 150.0
+"""Density of the possible strands of the scalp [1/cm2]."""
+BEARD_STRANDS_PER_CM2 = 60.0
+"""Density of the possible strands of beards [1/cm2]."""
+_VERSION = 9  # of this module's algorithm, part of the keys of cached tables
+_CACHED_STYLES = 8
+_APART_MM = 25.0, 55.0  # distances between guides from which strands are not interpolated between them
+_SEED = 20
+_CENTRE_ROOTS = 2000  # number of roots whose mean is the centre of the hair
+_GUIDE_FIELDS = "corner", "local_mm", "weight", "rest_mm", "cut"
+_ROOT_FIELDS = "quad", "position", "guide", "guide_weight", "clump", "place", "along_mm"
+
+
+class StyleTables(NamedTuple):
+    """Guides and roots of the parts of a groom, which all people with these styles share.
+
+    centre_mm : (3,) mean position of the roots on the mean person [mm]
+    """
+
+    guides: Guides
+    roots: StrandRoots
+    centre_mm: Doubles
+
+
+@lru_cache(_CACHED_STYLES)
+def style_tables(scalp: Style | None, bearded: bool, root_finder: RootFinder, levels: int) -> StyleTables:
+    """Return the guides and the roots of a hair style and a beard.
+
+    scalp : style of the hair of the head, None for a bald head
+    bearded : whether roots of a beard are included
+    root_finder : root finder of the mean person
+    levels : subdivision levels of the mesh on whose quads the roots lie
+    """
+    worn = [*([scalp] if scalp else []), *([BEARD] if bearded else [])]
+    parts = [_cached_part(style, root_finder) for style in worn]
+    guides = Guides(*(np.concatenate([part[name] for part in parts]) for name in _GUIDE_FIELDS))
+    counts = [len(part["quad"]) for part in parts]
+    order = np.random.default_rng(_SEED).permutation(sum(counts))
+    place = np.argsort(order)  # new index of each strand
+    first_guide = np.cumsum([0, *(len(part["cut"]) for part in parts)])
+    first_strand = np.cumsum([0, *counts])
+    columns = {name: np.concatenate([part[name] for part in parts]) for name in _ROOT_FIELDS}
+    columns["guide"] += np.repeat(first_guide[:-1], counts)[:, None].astype(np.int32)
+    columns["clump"] = place[columns["clump"] + np.repeat(first_strand[:-1], counts)].astype(np.int32)
+    columns["part"] = np.repeat(np.arange(len(parts), dtype=np.int32), counts)
+    quad, position, *rest = (columns[name].take(order, axis=0) for name in (*_ROOT_FIELDS, "part"))
+    some = slice(None, _CENTRE_ROOTS)
+    corners_mm = root_finder.mean_mesh.points_mm[quad_corners(root_finder.mesh, quad[some])]
+    centre_mm = np.einsum("nk,nkc->nc", quad_weights(position[some]), corners_mm).mean(axis=0)
+    roots = refine_roots(root_finder.mesh, Roots(quad, position), levels)
+    return StyleTables(guides, StrandRoots(roots, *rest), centre_mm)
+
+
+@lru_cache(_CACHED_STYLES)
+def _cached_part(style: Style, root_finder: RootFinder) -> Arrays:
+    names, points_mm = [*_GUIDE_FIELDS, *_ROOT_FIELDS], root_finder.mean_mesh.points_mm
+    parameters = f"groom {_VERSION} {style}"
+    return cached_arrays(points_mm, parameters, names, lambda: _make_part(style, root_finder))
+
+
+def _make_part(style: Style, root_finder: RootFinder) -> Arrays:
+    """Compute the guides and the roots of one style: arrays by the names of their fields."""
+    mesh, rng = root_finder.mesh, np.random.default_rng(_SEED)
+    beard = style is BEARD
+    where = density.beard_density() if beard else density.scalp_density(0.0)
+    per_cm2 = BEARD_STRANDS_PER_CM2 if beard else STRANDS_PER_CM2
+    roots = density.sample_roots(mesh, where, per_cm2, rng)
+    corners = quad_corners(mesh, roots.quad)
+    points, guide = np.unique(corners, return_inverse=True)
+    guide = guide.reshape(corners.shape)
+    points_mm = root_finder.mean_mesh.points_mm
+    knots, _, heights = grow_guides(root_finder, points_mm[points], style)
+    weight = quad_weights(roots.position)
+    root_mm = np.einsum("nk,nkc->nc", weight, points_mm[corners])
+    if style.comb == "fall":
+        same = parting_side(points_mm[points], style)[guide] * parting_side(root_mm, style)[:, None] >= 0
+        one_sided = weight * same
+        total = one_sided.sum(axis=1, keepdims=True)
+        weight = np.where(total > 1e-3, one_sided / np.maximum(total, 1e-9), weight)
+    weight = _agreeing_weights(weight, guide, knots)
+    place = _places(weight, average_points()[corners])
+    guides = bind_guides(mesh, points_mm, knots, heights, cut_fractions(knots, style))
+    clump = _clump_middles(
+        root_mm, np.einsum("nk,nkc->nc", weight, knots[guide, GUIDE_KNOTS // 2]), style, rng
+    )
+    columns = roots.quad, roots.position, guide, weight, clump, place, -root_mm[clump, 2]
+    types = np.int32, np.float32, np.int32, np.float32, np.int32, np.float32, np.float32
+    found = {
+        name: np.asarray(column, kind)
+        for name, column, kind in zip(_ROOT_FIELDS, columns, types, strict=True)
+    }
+    return found | {name: getattr(guides, name) for name in _GUIDE_FIELDS}
+
+
+def _agreeing_weights(weight: Doubles, guide: NDArray[np.int64], knots: Doubles) -> Doubles:
+    """Return the weights (n, 4) of guides without those that part from the guide with the largest weight.
+
+    A mean of guides that go to opposite sides of the head would lead through the head.
+
+    knots : (g, k, 3) knots of the guides [mm]
+    """
+    main = np.take_along_axis(guide, weight.argmax(axis=1)[:, None], axis=1)
+    some = knots[:, :: GUIDE_KNOTS // 8]
+    apart = np.linalg.norm(some[guide] - some[main], axis=-1).max(axis=2)
+    agreeing = weight * smoothstep(_APART_MM[1], _APART_MM[0], apart)
+    return np.asarray(agreeing / agreeing.sum(axis=1, keepdims=True))
+
+
+def _places(weight: Doubles, corners: Doubles) -> Doubles:
+    """Return the field `place` of `StrandRoots`.
+
+    weight, corners : (n, 4) weights of the corners of quads, and (n, 4, 4) their `average_points`
+    """
+    points = np.einsum("nk,nkc->nc", weight, corners)
+    angle = density.hairline_angle(points)
+    height = points[:, 1] + density.hairline_waves(points)
+    thinning = -zone_amounts("hair", 1.0, points)
+    top = smoothstep(-45.0, 62.0, points[:, 1] + 0.15 * (points[:, 2] - density.HEAD_AXIS_Z))
+    return np.stack([angle, height, np.clip(thinning, 0.0, 1.0), top], axis=1)
+
+
+def _clump_middles(
+    root_mm: Doubles, half_mm: Doubles, style: Style, rng: np.random.Generator
+) -> NDArray[np.int64]:
+    """Return the strand (n,) in the middle of each strand's clump.
+
+    Clumps of cornrows lie one behind the other along the rows; others are the cells around random strands.
+
+    root_mm, half_mm : (n, 3) roots on the mean person and points at half the length of the guides [mm]
+    """
+    from scipy.spatial import cKDTree
+
+    if style.comb == "rows":
+        across = row_of(root_mm)
+        along = root_mm[:, 1:]
+        found = cKDTree(np.column_stack([ROW_MM * across, along])).query(
+            np.column_stack([ROW_MM * np.round(across), along])
+        )[1]
+        return np.asarray(found, np.int64)
+    count = max(1, round(len(root_mm) / (STRANDS_PER_CM2 * (style.clump_mm / 10.0) ** 2)))
+    middles = rng.permutation(len(root_mm))[:count]
+    near = np.column_stack([root_mm, 0.5 * half_mm])  # hairs that part from each other are not in one clump
+    return np.asarray(middles[cKDTree(near[middles]).query(near)[1]], np.int64)

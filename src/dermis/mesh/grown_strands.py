@@ -1,0 +1,295 @@
+"""Strands grown from a groom without a device, for exports and path tracing, as in strands_grow.wgsl."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.base.arrays import Doubles, Ints
+from dermis.mesh.groom import GUIDE_KNOTS, Groom
+from dermis.mesh.head import Head
+from dermis.mesh.mesh import Mesh
+from dermis.mesh.strands import Roots, Strands, cover_of_points, root_frames, to_frames
+
+Words = NDArray[np.uint32]
+MAX_EXPORTED_STRANDS = 40_000
+"""Number of strands with which exports and path tracing show hair."""
+_SMOOTH_REACH, _SMOOTH_HEIGHTS_MM = 8, (2.0, 18.0)
+_MIN_HEIGHT_MM, _RISE_MM = 0.35, 4.0
+_HAIRLINE_FADE_MM, _SHORT_HAIRLINE_MM = (-3.0, 11.0), (-2.0, 14.0)
+_HAIRLINE_STEP_DEGREES = 2.0
+_TIP_FRACTION, _TIP_WIDTH = 0.12, 0.35
+_COLOURED_HAIRS = 5
+_COVERING_MM = 60.0  # length from the root along which hair covers the skin around it
+_HEAD_RADIUS_MM, _LIFTED_MM = 80.0, 20.0
+_CHUNK = 4_000  # strands that are grown at once
+_FALLBACK_AXIS = np.array([0.31, 0.2, 0.93])
+
+
+def grow_strands(
+    groom: Groom, mesh: Mesh, points_mm: NDArray[np.floating], max_strands: int = MAX_EXPORTED_STRANDS
+) -> Strands:
+    """Return the strands of a groom on a posed skin; those that the person's look leaves out are missing.
+
+    mesh, points_mm : mesh of quads in which the strands are rooted, and its points (p, 3) in a pose [mm]
+    max_strands : largest number of strands, which are wider where they stand for more
+    """
+    count = min(len(groom), max_strands)
+    guides = _posed_guides(groom, points_mm)
+    scale = len(groom.roots) / max(count, 1)
+    roots = Roots(groom.roots.roots.quad[:count], groom.roots.roots.position[:count])
+    root_mm, frames = root_frames(mesh, roots, points_mm)
+    middle = groom.roots.clump[:count]
+    every = groom.roots.roots
+    middles = Roots(every.quad.take(middle), every.position.take(middle, axis=0))
+    middle_mm, _ = root_frames(mesh, middles, points_mm)
+    grown = _growing(groom, count)
+    parts = [
+        _grow(groom, guides, index, root_mm[index], frames[index], middle_mm[index])
+        for index in np.array_split(grown, max(1, -(-len(grown) // _CHUNK)))
+    ]
+    knots, radius, absorption, cover = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+    kept = Roots(roots.quad[grown], roots.position[grown])
+    types = np.float32
+    return Strands(
+        kept, knots, (scale * radius).astype(types), (absorption / scale).astype(types), cover.astype(types)
+    )
+
+
+def hair_strands(head: Head, points_mm: NDArray[np.floating] | None = None) -> Strands | None:
+    """Return the strands of a head's hair as exports show it, None for a head without hair.
+
+    points_mm : (p, 3) points of the mesh in a pose; at rest by default [mm]
+    """
+    if head.hair is None:
+        return None
+    return grow_strands(head.hair, head.mesh, head.mesh.points_mm if points_mm is None else points_mm)
+
+
+def hair_cover(groom: Groom, mesh: Mesh) -> Doubles:
+    """Return the projected area of the hair rooted around each point of a mesh, per area of skin (p,) [-]."""
+    index = _growing(groom, len(groom.roots))
+    part = groom.parameters[groom.roots.part[index]]
+    number = index.astype(np.uint32) + part["seed"].astype(np.uint32) * np.uint32(131071)
+    length = part["guide_mm"] * _lengths(groom, index, part, number, _above_hairline(groom, index))
+    roots = groom.roots.roots
+    kept = Roots(roots.quad.take(index), roots.position.take(index, axis=0))
+    return cover_of_points(mesh, kept, 2.0 * part["radius_mm"] * np.minimum(length, _COVERING_MM))
+
+
+def absorbed_by_hair(groom: Groom) -> float:
+    """Return the fraction of diffuse light that a hair absorbs, as a mean over the channels."""
+    parts = groom.parameters
+    chord = 0.5 * np.pi * (parts["radius_mm"] / parts["hairs_per_strand"])[:, None]
+    absorption = np.maximum((1.0 - parts["grey"][:, None]) * parts["dark"], parts["white"])
+    return float((1.0 - np.exp(-absorption * chord)).mean())
+
+
+class _Curves(NamedTuple):
+    """Points of curves between guides: position, skin normal and tangent (n, k, 3), height (n, k) [mm]."""
+
+    position: Doubles
+    height: Doubles
+    normal: Doubles
+    tangent: Doubles
+
+
+def _posed_guides(groom: Groom, points_mm: NDArray[np.floating]) -> tuple[Doubles, Doubles]:
+    """Return the knots (g, k, 3) of the guides on a posed skin, and the normals of the skin there."""
+    guides = groom.guides
+    a, b, c, d = np.moveaxis(points_mm.astype(np.float64)[guides.corner], -2, 0)
+    along = _unit((b - a) + (c - d))
+    across = np.cross(c - a, d - b)
+    normal = _unit(across - (across * along).sum(axis=-1, keepdims=True) * along)
+    axes = np.stack([along, np.cross(normal, along), normal], axis=-2)
+    knots = 0.25 * (a + b + c + d) + np.einsum("gkaic,gkai->gkac", axes, guides.local_mm)
+    weight = guides.weight[..., None]
+    bound, outward = (weight * knots).sum(axis=2), _unit((weight * normal).sum(axis=2))
+    moved, total = bound - guides.rest_mm[..., :3], 0.0
+    smooth = np.zeros_like(moved)
+    for step in range(-_SMOOTH_REACH, _SMOOTH_REACH + 1):
+        factor = 1.0 - abs(step) / (_SMOOTH_REACH + 1)
+        smooth += factor * moved[:, np.clip(np.arange(GUIDE_KNOTS) + step, 0, GUIDE_KNOTS - 1)]
+        total += factor
+    far = _smoothstep(*_SMOOTH_HEIGHTS_MM, guides.rest_mm[..., 3].astype(np.float64))[..., None]
+    return (1.0 - far) * bound + far * (guides.rest_mm[..., :3] + smooth / total), outward
+
+
+def _grow(
+    groom: Groom,
+    guides: tuple[Doubles, Doubles],
+    index: Ints,
+    root_mm: Doubles,
+    frames: Doubles,
+    middle_mm: Doubles,
+) -> tuple[NDArray[np.float32], Doubles, Doubles, Doubles]:
+    """Return knots (n, k, 3) in the root frames, radii (n, k), absorptions (n, 3) and covers (n,) of strands.
+
+    guides : knots and skin normals of the posed guides
+    index : (n,) indices of the strands
+    root_mm, frames, middle_mm : positions and frames of their roots, and roots of the middles of their clumps
+    """
+    roots, seed = groom.roots, groom.parameters["seed"].astype(np.uint32) * np.uint32(131071)
+    part = groom.parameters[roots.part[index]]
+    number = index.astype(np.uint32) + seed[roots.part[index]]
+    clump = roots.clump[index]
+    clump_number = clump.astype(np.uint32) + seed[roots.part[index]]
+    above = _above_hairline(groom, index)
+    t = np.linspace(0.0, 1.0, groom.knots)[None]
+    u = t * _lengths(groom, index, part, number, above)[:, None]
+    own, at = _curves(groom, guides, index, u, root_mm), _curves(groom, guides, clump, u, middle_mm)
+    s = u * _column(part, "guide_mm")
+    near = 1.0 - np.exp(-((s / _column(part, "clump_start_mm")) ** 1.5))
+    rope = _column(part, "rope_mm") > 0
+    pull = _column(part, "clump") * near * np.where(rope, 1.0, 0.6 + 0.4 * _random(number, 2)[:, None])
+    side, other = _axes_across(at)
+    to_middle = pull[..., None] * (at.position - own.position)
+    across = near * np.where(rope, 1.0, 0.0) * _rope_offsets(number, part, s + roots.along_mm[index, None])
+    across = across + np.where(rope, 0.0, 1.0) * _curl_offsets(number, clump_number, part, s)
+    across = across + _frizz_offsets(number, part, s)
+    varied = across[0][..., None] * side + across[1][..., None] * other
+    height = (1.0 - pull) * own.height + pull * at.height + (varied * own.normal).sum(axis=-1)
+    least = _MIN_HEIGHT_MM * np.minimum(s / _RISE_MM, 1.0)
+    positions = own.position + to_middle + varied + np.maximum(least - height, 0.0)[..., None] * own.normal
+    taper = 1.0 - (1.0 - _TIP_WIDTH) * _smoothstep(1.0 - _TIP_FRACTION, 1.0, t)
+    edge = 1.0 - part["hairline"] * (0.45 - 0.45 * _smoothstep(*_SHORT_HAIRLINE_MM, above))
+    radius = (part["radius_mm"] * (0.8 + 0.4 * _random(number, 3)) * edge)[:, None] * taper
+    return to_frames(frames, positions - root_mm[:, None]), radius, _absorption(number, part), part["cover"]
+
+
+def _column(part: NDArray[np.void], name: str) -> Doubles:
+    return part[name].astype(np.float64)[:, None]
+
+
+def _random(strand: Words, stream: int) -> Doubles:
+    """Return a uniform random number (n,) of each strand, 0 to 1. Source: PCG hash [JarzynskiOlano2020]."""
+    with np.errstate(over="ignore"):
+        state = (strand * np.uint32(64) + np.uint32(stream)) * np.uint32(747796405) + np.uint32(2891336453)
+        word = ((state >> ((state >> np.uint32(28)) + np.uint32(4))) ^ state) * np.uint32(277803737)
+        return np.asarray((((word >> np.uint32(22)) ^ word) >> np.uint32(8)) / 16777216.0)
+
+
+def _random_normal(strand: Words, stream: int) -> Doubles:
+    return np.asarray(2.0 * (sum(_random(strand, stream + k) for k in range(3)) - 1.5))
+
+
+def _above_hairline(groom: Groom, index: Ints) -> Doubles:
+    place = groom.roots.place[index]
+    angles = _HAIRLINE_STEP_DEGREES * np.arange(len(groom.hairline_mm))
+    return np.asarray(place[:, 1] - np.interp(place[:, 0], angles, groom.hairline_mm))
+
+
+def _growing(groom: Groom, count: int) -> Ints:
+    """Return the indices of the strands, of the first `count`, that grow."""
+    index = np.arange(count, dtype=np.int32)
+    roots, part = groom.roots, groom.parameters[groom.roots.part[:count]]
+    fade = _smoothstep(*_HAIRLINE_FADE_MM, _above_hairline(groom, index))
+    density = 1.0 + part["hairline"] * (fade - 1.0)
+    density = density * part["density"] * (1.0 - part["thinning"] * roots.place[:count, 2])
+    number = index.astype(np.uint32) + part["seed"].astype(np.uint32) * np.uint32(131071)
+    return np.flatnonzero(_random(number, 0) < density).astype(np.int32)
+
+
+def _lengths(groom: Groom, index: Ints, part: NDArray[np.void], number: Words, above: Doubles) -> Doubles:
+    """Return the length (n,) of each strand as a fraction of its guides."""
+    roots = groom.roots
+    cut = (roots.guide_weight[index] * groom.guides.cut[roots.guide[index]]).sum(axis=1)
+    sides = 1.0 - part["fade"] * (1.0 - roots.place[index, 3])
+    edge = 1.0 - part["hairline"] * (0.75 - 0.75 * _smoothstep(*_SHORT_HAIRLINE_MM, above))
+    length = np.minimum(cut, part["length_mm"] / part["guide_mm"] * sides) * edge
+    return np.asarray(length * (1.0 - part["layers"] * _random(number, 1)))
+
+
+def _curves(
+    groom: Groom, guides: tuple[Doubles, Doubles], index: Ints, u: Doubles, root_mm: Doubles
+) -> _Curves:
+    """Return the curves of strands between their guides, at positions u (n, k) along them from 0 to 1."""
+    knots, normals = guides
+    at = np.clip(u, 0.0, 1.0) * (GUIDE_KNOTS - 1)
+    first = np.minimum(at.astype(np.int64), GUIDE_KNOTS - 2)
+    part = (at - first)[..., None]
+    height_mm = groom.guides.rest_mm[..., 3]
+    position = np.repeat(root_mm[:, None], u.shape[1], axis=1)
+    normal, tangent, middle = (np.zeros_like(position) for _ in range(3))
+    height, square = np.zeros(u.shape), np.zeros(u.shape)
+    for k in range(4):
+        guide, weight = (
+            groom.roots.guide[index, k][:, None],
+            groom.roots.guide_weight[index, k][:, None, None],
+        )
+        a, b = knots[guide, first], knots[guide, first + 1]
+        here = (1.0 - part) * a + part * b
+        position += weight * (here - knots[guide, 0])
+        middle += weight * (here - root_mm[:, None])
+        square += weight[..., 0] * ((here - root_mm[:, None]) ** 2).sum(axis=-1)
+        normal += weight * ((1.0 - part) * normals[guide, first] + part * normals[guide, first + 1])
+        tangent += weight * (b - a)
+        heights = (1.0 - part[..., 0]) * height_mm[guide, first] + part[..., 0] * height_mm[guide, first + 1]
+        height += weight[..., 0] * heights
+    normal = _unit(normal)
+    near = 1.0 / (1.0 + (np.maximum(height, 0.0) / _LIFTED_MM) ** 2)
+    sag = near * np.maximum(square - (middle**2).sum(axis=-1), 0.0) / (2.0 * _HEAD_RADIUS_MM)
+    position += sag[..., None] * normal
+    return _Curves(position, height, normal, _unit(tangent + 1e-9 * normal))
+
+
+def _axes_across(at: _Curves) -> tuple[Doubles, Doubles]:
+    """Return two unit vectors (n, k, 3) across curves."""
+    side = np.cross(at.tangent, at.normal)
+    upright = (side**2).sum(axis=-1, keepdims=True) < 0.08
+    side = _unit(np.where(upright, np.cross(at.tangent, _FALLBACK_AXIS), side))
+    return side, np.cross(side, at.tangent)
+
+
+def _rope_offsets(number: Words, part: NDArray[np.void], s: Doubles) -> Doubles:
+    """Return the offsets (2, n, k) of strands in twisted or braided ropes [mm]."""
+    rope = np.maximum(_column(part, "rope_mm"), 1e-6)
+    radius, turn = rope * np.sqrt(_random(number, 4))[:, None], 2 * np.pi * _random(number, 5)[:, None]
+    bundle = np.floor(3.0 * _random(number, 6))[:, None]
+    phase = 2 * np.pi * (s / (8.0 * rope) + bundle / 3.0)
+    middle = rope * np.sin(phase), 0.45 * rope * np.sin(2 * phase)
+    braided = np.stack([middle[0] + 0.5 * radius * np.cos(turn), middle[1] + 0.5 * radius * np.sin(turn)])
+    phase = turn + 2 * np.pi * s / (7.0 * rope)
+    twisted = np.stack([radius * np.cos(phase), radius * np.sin(phase)])
+    return np.where(_column(part, "braid") > 0, braided, twisted)
+
+
+def _curl_offsets(number: Words, clump: Words, part: NDArray[np.void], s: Doubles) -> Doubles:
+    """Return the offsets (2, n, k) of strands by their curls [mm]."""
+    pitch = _column(part, "pitch_mm") * (0.85 + 0.3 * _random(clump, 8))[:, None]
+    phase = 2 * np.pi * (s / pitch + (_random(clump, 9) + part["incoherence"] * _random(number, 7))[:, None])
+    radius = _column(part, "curl_mm") * (0.75 + 0.5 * _random(number, 10))[:, None]
+    radius = radius * np.minimum(s / (0.5 * _column(part, "pitch_mm") + 4.0), 1.0)
+    return np.stack([radius * np.cos(phase), radius * np.sin(phase)])
+
+
+def _frizz_offsets(number: Words, part: NDArray[np.void], s: Doubles) -> Doubles:
+    """Return smooth random offsets (2, n, k) of strands [mm]."""
+    amount = part["frizz_mm"] * np.where(_random(number, 11) < part["flyaways"], 5.0, 1.0)
+    amount = amount[:, None] * np.minimum(s / 25.0, 1.0)
+    x, y = (2 * np.pi * _random(number, stream)[:, None] for stream in (12, 13))
+    slow, fast = 2 * np.pi * s / 90.0, 2 * np.pi * s / 31.0
+    waves = np.sin(slow + x) + 0.4 * np.sin(fast + y), np.cos(slow + y) + 0.4 * np.cos(fast + x)
+    return np.stack(
+        [amount * _random_normal(number, k)[:, None] * wave for k, wave in zip((14, 17), waves, strict=True)]
+    )
+
+
+def _absorption(number: Words, part: NDArray[np.void]) -> Doubles:
+    """Return the absorption (n, 3) of strands that each stand for white and pigmented hairs [1/mm]."""
+    white = sum(_random(number, 20 + k) < part["grey"] for k in range(_COLOURED_HAIRS)) / _COLOURED_HAIRS
+    white = np.asarray(white)[:, None]
+    dark = part["dark"] * np.exp(0.12 * _random_normal(number, 26))[:, None]
+    mixed = (1.0 - white) ** 2 * ((1.0 - white) * dark + white * dark.mean(axis=1, keepdims=True))
+    return np.asarray(np.maximum(mixed, part["white"]) / part["hairs_per_strand"][:, None])
+
+
+def _unit(vectors: Doubles) -> Doubles:
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12))
+
+
+def _smoothstep(low: float, high: float, x: Doubles) -> Doubles:
+    t = np.clip((x - low) / (high - low), 0.0, 1.0)
+    return np.asarray(t * t * (3.0 - 2.0 * t))
