@@ -23,7 +23,7 @@ def encode_glb(
     """
     binary = BufferBuilder()
     attributes = {
-        "POSITION": binary.add_accessor(mesh.positions, VERTICES, bounded=True),
+        "POSITION": binary.add_accessor(mesh.positions, VERTICES, with_bounds=True),
         "NORMAL": binary.add_accessor(mesh.normals, VERTICES),
         "TEXCOORD_0": binary.add_accessor(mesh.uv, VERTICES),
     }

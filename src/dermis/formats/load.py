@@ -51,7 +51,7 @@ _ARRAY_NAMES = [
     *(f"target {name}" for name in _TARGET_FIELDS),
     *(f"bone {name}" for name in _SKELETON_FIELDS),
 ]
-_EMPTY_ARRAY = np.zeros(0, np.float32)
+_ABSENT_FIELD = np.zeros(0, np.float32)
 _WORD_PATTERN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 _EYE_WORDS = "eyes?|eyeballs?|sclerae?|corneas?|iris|irises|pupils?"
 _EYE_PATTERN = re.compile(rf"(?:l|r|left|right)?(?:{_EYE_WORDS})(?:l|r|left|right)?", re.IGNORECASE)
@@ -166,13 +166,13 @@ def _resolve_axes(user_axes: Axes, file_axes: Axes, source: Path) -> Axes:
     return axes
 
 
-def _find_front(axes: Axes, mesh_file: MeshFile, part: MeshPart, skin: Mask) -> tuple[Axes, str]:
+def _find_front(axes: Axes, mesh_file: MeshFile, part: MeshPart, skin_triangles: Mask) -> tuple[Axes, str]:
     """Detect the front from the shape; return axes with this front, and a note if it is not the default.
 
     A front that is already set is kept, and so is the default front of files that this package wrote.
 
     part : mesh part with all vertices of the file
-    skin : (f,) mask of triangles that are skin
+    skin_triangles : (f,) mask of triangles that are skin
     """
     if axes.front != "auto" or any(one.maps is not None for one in mesh_file.materials):
         return axes, ""
@@ -181,7 +181,7 @@ def _find_front(axes: Axes, mesh_file: MeshFile, part: MeshPart, skin: Mask) -> 
         of_eyes = [is_eye_name([name]) for name in mesh_file.bones.names]
         eyes = [mesh_file.bones.world[of_eyes, :3, 3]]
     positions, points = (to_y_up(one, axes) for one in (part.positions, np.vstack([np.empty((0, 3)), *eyes])))
-    direction = face_direction(positions, part.triangles[skin], points)
+    direction = face_direction(positions, part.triangles[skin_triangles], points)
     if direction is None or direction == "z":
         return axes, ""
     front = file_axis(direction, axes)
@@ -221,15 +221,17 @@ class _AssignedMaterials(NamedTuple):
         return np.array([one.kind == "skin" for one in self.materials])
 
 
-def _assign_materials(mesh_file: MeshFile, names: GroupNames, source: Path) -> tuple[_AssignedMaterials, str]:
+def _assign_materials(
+    mesh_file: MeshFile, declared_names: GroupNames, source: Path
+) -> tuple[_AssignedMaterials, str]:
     """Return the materials of the mesh, in the order of the file, and a note on which of them are skin."""
     parts, unnamed = mesh_file.parts, (source.stem,)
     groups = [replace(part.group, names=part.group.names or unnamed) for part in parts]
-    is_opaque = _match_groups(groups, names.opaque, "opaque", source)
-    is_eye = _match_groups(groups, names.eyes, "eye_groups", source)
+    is_opaque = _match_groups(groups, declared_names.opaque, "opaque", source)
+    is_eye = _match_groups(groups, declared_names.eyes, "eye_groups", source)
     scatters = [group.material >= 0 and mesh_file.materials[group.material].scatters for group in groups]
-    is_skin = _match_groups(groups, names.skin, "skin_groups", source)
-    if not names.skin:
+    is_skin = _match_groups(groups, declared_names.skin, "skin_groups", source)
+    if not declared_names.skin:
         candidates = [k for k, opaque in enumerate(is_opaque) if not opaque]
         chosen = choose_skin(
             [parts[k] for k in candidates], [groups[k] for k in candidates], [scatters[k] for k in candidates]
@@ -239,8 +241,8 @@ def _assign_materials(mesh_file: MeshFile, names: GroupNames, source: Path) -> t
             is_skin[k] = skin
     is_skin = [skin and not opaque for skin, opaque in zip(is_skin, is_opaque, strict=True)]
     stated = (
-        names.skin
-        or names.opaque
+        declared_names.skin
+        or declared_names.opaque
         or any(one.maps is not None for one in mesh_file.materials)  # this package wrote the file
         or all(
             skin or eye or is_eye_name(group.names)
@@ -278,17 +280,17 @@ def _without_empty_materials(
 
 
 def _match_groups(
-    groups: list[MaterialGroup], names: tuple[str, ...], option: str, source: Path
+    groups: list[MaterialGroup], declared_names: tuple[str, ...], option_name: str, source: Path
 ) -> list[bool]:
-    """Return for each group whether one of its names is in `names`; refuse names that no group has.
+    """Return for each group whether one of its names is in `declared_names`; refuse names that no group has.
 
-    option : argument of `load_rigged` with these names, for the error
+    option_name : argument of `load_rigged` with these names, for the error
     """
-    folded = {name.casefold() for name in names}
+    folded = {name.casefold() for name in declared_names}
     unknown = folded - {name.casefold() for group in groups for name in group.names}
     if unknown:
         known = ", ".join(dict.fromkeys(name for group in groups for name in group.names))
-        expected = f"{option} with names of groups of the file ({known})"
+        expected = f"{option_name} with names of groups of the file ({known})"
         refuse(source, expected, f"{sorted(unknown)[0]!r} is none", "Check the spelling")
     return [any(name.casefold() in folded for name in group.names) for group in groups]
 
@@ -334,15 +336,15 @@ class RiggedMesh(NamedTuple):
     file_vertices: FileVertices | None = None
 
 
-def cached_rigged(data: bytes, options: str, load: Callable[[], RiggedMesh]) -> RiggedMesh:
+def cached_rigged(file_bytes: bytes, options: str, load: Callable[[], RiggedMesh]) -> RiggedMesh:
     """Return mesh and rig of a file from the disk cache; load and cache both if the cache lacks them.
 
-    data : bytes of the file; the mesh must not depend on other files
+    file_bytes : bytes of the file; the mesh must not depend on other files
     options : text with all options that influence the result, part of the cache key
     load : function that reads the file
     """
     digest = hashlib.sha256(f"{_CACHE_VERSION} {options}".encode())
-    digest.update(data)
+    digest.update(file_bytes)
     return _from_arrays(
         load_or_make("meshes", digest.hexdigest()[:40], _ARRAY_NAMES, lambda: _to_arrays(load()))
     )
@@ -358,9 +360,9 @@ def _to_arrays(rigged: RiggedMesh) -> Arrays:
     metadata["file"] = rigged.file_vertices.count, rigged.file_vertices.to_head.tolist()
     arrays = {name: getattr(mesh, name) for name in _MESH_FIELDS} | {"outline": mesh.outline.points_mm}
     arrays["file vertex"] = rigged.file_vertices.vertex
-    arrays["colours"] = _EMPTY_ARRAY if surface.colours is None else surface.colours
-    arrays["other uv"] = np.stack([*surface.other_uv.values()]) if surface.other_uv else _EMPTY_ARRAY
-    rig_arrays: Arrays = dict.fromkeys((name for name in _ARRAY_NAMES if name not in arrays), _EMPTY_ARRAY)
+    arrays["colours"] = _ABSENT_FIELD if surface.colours is None else surface.colours
+    arrays["other uv"] = np.stack([*surface.other_uv.values()]) if surface.other_uv else _ABSENT_FIELD
+    rig_arrays: Arrays = dict.fromkeys((name for name in _ARRAY_NAMES if name not in arrays), _ABSENT_FIELD)
     if rig is not None:
         metadata |= {"targets": list(rig.targets.names), "bones": None}
         rig_arrays["control"] = rig.positions_mm
@@ -372,9 +374,9 @@ def _to_arrays(rigged: RiggedMesh) -> Arrays:
     return arrays | rig_arrays | {"metadata": encoded}
 
 
-def _prefixed_fields(value: MorphTargets | Skeleton, prefix: str, names: list[str]) -> Arrays:
-    arrays = {f"{prefix} {name}": getattr(value, name) for name in names}
-    return {name: _EMPTY_ARRAY if array is None else array for name, array in arrays.items()}
+def _prefixed_fields(instance: MorphTargets | Skeleton, prefix: str, field_names: list[str]) -> Arrays:
+    arrays = {f"{prefix} {name}": getattr(instance, name) for name in field_names}
+    return {name: _ABSENT_FIELD if array is None else array for name, array in arrays.items()}
 
 
 def _from_arrays(arrays: Arrays) -> RiggedMesh:
@@ -404,14 +406,14 @@ def _from_arrays(arrays: Arrays) -> RiggedMesh:
     return rigged._replace(rig=Rig(arrays["control"], targets, skeleton))
 
 
-def is_eye_name(names: Sequence[str]) -> bool:
+def is_eye_name(group_names: Sequence[str]) -> bool:
     """Return whether a group's names denote an eyeball or its parts, such as Eye_L, sclera, Std_Cornea_R.
 
-    names : names of the group, with its material first; the first name with a known word decides
+    group_names : names of the group, with its material first; the first name with a known word decides
 
     Lashes, brows, lids and transparent layers on the eye, such as tear films, are not eyes.
     """
-    for name in names:
+    for name in group_names:
         words = _WORD_PATTERN.findall(name)
         if any(_NOT_EYE_PATTERN.fullmatch(word) for word in words):
             return False

@@ -23,12 +23,12 @@ MAX_ABSOLUTE_UV = 1e4
 S = TypeVar("S", np.int64, np.float64)
 Origin = Literal["auto", "top", "bottom"]
 _BLENDER_ADVICE = "Convert it in Blender: {}File > Export > glTF 2.0"
-_OTHER_PROGRAMS = (".3ds", ".c4d", ".dae", ".lwo", ".ma", ".max", ".mb", ".wrl", ".x3d", ".zpr", ".ztl")
+_UNSUPPORTED_SUFFIXES = (".3ds", ".c4d", ".dae", ".lwo", ".ma", ".max", ".mb", ".wrl", ".x3d", ".zpr", ".ztl")
 _SUFFIX_ADVICE = {
     ".fbx": _BLENDER_ADVICE.format("File > Import > FBX, then "),
     ".abc": _BLENDER_ADVICE.format("File > Import > Alembic, then "),
     ".blend": _BLENDER_ADVICE.format(""),
-    **dict.fromkeys(_OTHER_PROGRAMS, "Export it as glTF (.glb) or OBJ from the program that wrote it"),
+    **dict.fromkeys(_UNSUPPORTED_SUFFIXES, "Export it as glTF (.glb) or OBJ from the program that wrote it"),
 }
 """Advice for files of formats that are not read."""
 
@@ -71,9 +71,9 @@ def _joined_colours(parts: list[MeshPart]) -> Doubles | None:
     return np.vstack([np.ones_like(p.positions) if p.colours is None else p.colours for p in parts])
 
 
-def _joined_uv(parts: list[MeshPart], index: int) -> Doubles:
+def _joined_uv(parts: list[MeshPart], uv_set: int) -> Doubles:
     """Join an additional uv set of all parts, with zeros for parts that lack it."""
-    return np.vstack([p.other_uv.get(index, np.zeros((len(p.positions), 2))) for p in parts])
+    return np.vstack([p.other_uv.get(uv_set, np.zeros((len(p.positions), 2))) for p in parts])
 
 
 def select_vertices(part: MeshPart, vertices: Index) -> MeshPart:
@@ -102,9 +102,9 @@ def select_vertices(part: MeshPart, vertices: Index) -> MeshPart:
 
 
 def _transpose_targets(
-    rows: dict[str, list[tuple[Index, Doubles]]],
+    displacements_by_target: dict[str, list[tuple[Index, Doubles]]],
 ) -> dict[str, tuple[list[Index], list[Doubles]]]:
-    items = rows.items()
+    items = displacements_by_target.items()
     return {name: ([first for first, _ in own], [second for _, second in own]) for name, own in items}
 
 
@@ -114,10 +114,10 @@ def _part_normals(part: MeshPart) -> Doubles:
     return np.full(part.positions.shape, np.nan)
 
 
-def _stack_padded(arrays: list[NDArray[S] | None]) -> NDArray[S] | None:
+def _stack_padded(vertex_arrays: list[NDArray[S] | None]) -> NDArray[S] | None:
     """Stack arrays (n, k) vertically, padded with 0 to the largest k; None if one of the arrays is None."""
-    present = [array for array in arrays if array is not None]
-    if len(present) < len(arrays):
+    present = [array for array in vertex_arrays if array is not None]
+    if len(present) < len(vertex_arrays):
         return None
     width = max(array.shape[1] for array in present)
     return np.vstack([np.pad(array, ((0, 0), (0, width - array.shape[1]))) for array in present])

@@ -12,63 +12,67 @@ from dermis.formats.parts import Bones, MeshPart
 from dermis.formats.size_limits import DAMAGED_ADVICE
 from dermis.mesh.rig import INFLUENCES, MorphTargets, Rig, Skeleton, no_targets
 
-SPLIT_TOLERANCE_MM = 0.01
+COINCIDENCE_TOLERANCE_MM = 0.01
 """Distance beyond which coincident vertices that a morph target moves apart become separate points, such as
 those of touching lips [mm]."""
-_MAX_COINCIDENT = 64  # vertices at one position that move differently
-_WEIGHT_TOLERANCE = 0.004  # one step of 8-bit weights
+_MAX_COINCIDENT_VERTICES = 64  # vertices at one position that move differently
+_BONE_WEIGHT_TOLERANCE = 0.004  # one step of 8-bit weights
 _MIN_DISPLACEMENT_MM = 1e-4  # smaller displacements are rounding errors and count as 0
 
 
-def split_points(point: Ints, part: MeshPart, linear: Doubles, culprit: object) -> Ints:
+def split_points(point: Ints, part: MeshPart, linear_to_head: Doubles, culprit: object) -> Ints:
     """Return point indices (v,) in which coincident vertices that move differently are separate points.
 
     point : (v,) index of the point of each vertex, welded by position
     part : vertices with their morph targets and bone weights
-    linear : (3, 3) matrix from the file's space to the head's [mm]
+    linear_to_head : (3, 3) matrix from the file's space to the head's [mm]
 
     Raises DermisError if too many vertices at one position move differently.
     """
     remaining = np.flatnonzero(np.bincount(point)[point] > 1)
     copy, number = np.zeros(len(point), np.int64), 0
     while len(remaining):
-        if number > _MAX_COINCIDENT:
+        if number > _MAX_COINCIDENT_VERTICES:
             actual = f"{number} of them move differently"
             refuse(culprit, "a few coincident vertices", actual, DAMAGED_ADVICE)
         groups, first = np.unique(point[remaining], return_index=True)
         other = remaining[first[np.searchsorted(groups, point[remaining])]]
-        apart = _targets_differ(part, remaining, other, linear) | _weights_differ(part, remaining, other)
+        apart = _targets_differ(part, remaining, other, linear_to_head) | _weights_differ(
+            part, remaining, other
+        )
         copy[remaining[~apart]] = number
         remaining, number = remaining[apart], number + 1
     _, split = np.unique(point * np.int64(number + 1) + copy, return_inverse=True)
     return np.asarray(split.reshape(-1), np.int32)
 
 
-def _targets_differ(part: MeshPart, first: Index, second: Index, linear: Doubles) -> Mask:
+def _targets_differ(
+    part: MeshPart, first_vertex: Index, second_vertex: Index, linear_to_head: Doubles
+) -> Mask:
     """Return the mask (n,) of vertex pairs that some morph target moves apart.
 
-    first, second : (n,) vertex indices of the pairs
-    linear : (3, 3) matrix from the file's space to the head's [mm]
+    first_vertex, second_vertex : (n,) vertex indices of the pairs
+    linear_to_head : (3, 3) matrix from the file's space to the head's [mm]
     """
-    apart, delta = np.zeros(len(first), bool), np.zeros((len(part.positions), 3))
+    apart, delta = np.zeros(len(first_vertex), bool), np.zeros((len(part.positions), 3))
     for vertex, delta_of_vertex in part.targets.values():
-        delta[vertex] = delta_of_vertex @ linear.T
-        apart |= np.linalg.norm(delta[first] - delta[second], axis=1) > SPLIT_TOLERANCE_MM
+        delta[vertex] = delta_of_vertex @ linear_to_head.T
+        apart |= np.linalg.norm(delta[first_vertex] - delta[second_vertex], axis=1) > COINCIDENCE_TOLERANCE_MM
         delta[vertex] = 0
     return apart
 
 
-def _weights_differ(part: MeshPart, first: Index, second: Index) -> Mask:
+def _weights_differ(part: MeshPart, first_vertex: Index, second_vertex: Index) -> Mask:
     """Return the mask (n,) of vertex pairs with different bone weights.
 
-    first, second : (n,) vertex indices of the pairs
+    first_vertex, second_vertex : (n,) vertex indices of the pairs
     """
     if part.bone is None or part.weight is None:
-        return np.zeros(len(first), bool)
-    bones = np.concatenate([part.bone[first], part.bone[second]], axis=1)
-    weights = np.concatenate([part.weight[first], -part.weight[second]], axis=1)
+        return np.zeros(len(first_vertex), bool)
+    bones = np.concatenate([part.bone[first_vertex], part.bone[second_vertex]], axis=1)
+    weights = np.concatenate([part.weight[first_vertex], -part.weight[second_vertex]], axis=1)
     same = bones[:, :, None] == bones[:, None, :]
-    return np.asarray((np.abs((same * weights[:, None, :]).sum(axis=2)) > _WEIGHT_TOLERANCE).any(axis=1))
+    return np.asarray((np.abs((same * weights[:, None, :]).sum(axis=2)) > _BONE_WEIGHT_TOLERANCE).any(axis=1))
 
 
 def build_rig(

@@ -53,18 +53,18 @@ class Sample:
     height_mm: float | None = None
 
 
-def _load_registry() -> Mapping[str, Sample]:
+def _load_sample_registry() -> Mapping[str, Sample]:
     text = resources.files(__package__).joinpath("samples.toml").read_text("utf-8")
     return MappingProxyType({name: _parse_sample(name, entry) for name, entry in tomllib.loads(text).items()})
 
 
-def _parse_sample(name: str, entry: dict[str, Any]) -> Sample:
-    home, listed = entry.pop("home"), entry.pop("files")
+def _parse_sample(name: str, sample_table: dict[str, Any]) -> Sample:
+    home, listed = sample_table.pop("home"), sample_table.pop("files")
     files = {role: SampleFile(**file, url=home + file["name"]) for role, file in listed.items()}
-    return Sample(name=name, files=MappingProxyType(files), **entry)
+    return Sample(name=name, files=MappingProxyType(files), **sample_table)
 
 
-SAMPLES = _load_registry()
+SAMPLES = _load_sample_registry()
 
 
 def fetch_sample(name: str) -> dict[str, Path]:
@@ -123,7 +123,7 @@ def _has_expected_hash(path: Path, file: SampleFile) -> bool:
 
 
 @lru_cache(maxsize=256)
-def _file_sha256(path: Path, size: int, mtime_ns: int) -> str:
+def _file_sha256(path: Path, byte_count: int, mtime_ns: int) -> str:
     """Return the SHA-256 of a file; the result is cached for its size and modification time."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

@@ -154,7 +154,7 @@ def _direct_maps(path: Path, material: FileMaterial, options: MapOptions) -> tup
     mtl_maps, faults = obj_maps(
         path,
         material.name,
-        overridden=options.user_files,
+        overridden_roles=options.user_files,
         height_mm=options.height_mm,
         normal_y=options.normal_y,
     )

@@ -13,7 +13,7 @@ from dermis.atlas.texture_tiles import UV_TOLERANCE
 from dermis.atlas.unwrap.missing_uv import with_layout
 from dermis.base.arrays import Floats, Mask
 from dermis.formats.load import FileSurface, RiggedMesh
-from dermis.formats.materials import IDENTITY, FileMaterial, Role
+from dermis.formats.materials import IDENTITY_UV_TRANSFORM, FileMaterial, Role
 from dermis.mesh.maps import Maps, PartMaps
 from dermis.mesh.mesh import Material, Mesh
 
@@ -54,7 +54,7 @@ def direct_material(rigged: RiggedMesh, materials: Sequence[FileMaterial]) -> Fi
         return material
     uv = mesh.uv[np.unique(mesh.triangles[skin[mesh.material]])]
     inside = uv.min() > -UV_TOLERANCE and uv.max() < 1.0 + UV_TOLERANCE
-    plain = all(texture.mapping == (0, IDENTITY) for texture in material.textures.values())
+    plain = all(texture.mapping == (0, IDENTITY_UV_TRANSFORM) for texture in material.textures.values())
     return material if inside and plain and not _has_colours(mesh, surface, skin) else None
 
 

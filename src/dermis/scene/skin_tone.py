@@ -9,7 +9,7 @@ import numpy as np
 
 from dermis.base.arrays import Doubles
 from dermis.base.errors import refuse
-from dermis.formats.parts import GREY
+from dermis.formats.parts import DEFAULT_COLOUR
 from dermis.human.skin.measured import measured_tone
 from dermis.mesh.geometry import triangle_areas
 from dermis.mesh.maps import Maps
@@ -53,7 +53,9 @@ def with_skin_tone(
         return replace(maps, colour=measured.colour.astype(np.float32)[None, None]), measured.note
     skin = [k for k, one in enumerate(mesh.materials) if one.kind == "skin"]
     stated = [mesh.materials[k].colour if maps.colour is None else maps.colour[0, 0] for k in skin]
-    plain = [any(np.allclose(one, none, atol=_TOLERANCE) for none in (GREY, _WHITE)) for one in stated]
+    plain = [
+        any(np.allclose(one, none, atol=_TOLERANCE) for none in (DEFAULT_COLOUR, _WHITE)) for one in stated
+    ]
     colours = np.array(
         [default_skin_colour() if bare else one for one, bare in zip(stated, plain, strict=True)]
     )

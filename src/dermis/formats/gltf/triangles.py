@@ -15,7 +15,7 @@ from dermis.formats import size_limits as limits
 from dermis.formats.gltf import draco, vrm
 from dermis.formats.gltf.document import Document, Tree, read_document
 from dermis.formats.gltf.nodes import Nodes, read_nodes
-from dermis.formats.gltf.read_materials import KNOWN_EXTENSIONS, read_materials
+from dermis.formats.gltf.read_materials import MATERIAL_EXTENSIONS, read_materials
 from dermis.formats.gltf.rigs import (
     Armature,
     SkinInfluences,
@@ -27,13 +27,13 @@ from dermis.formats.gltf.rigs import (
     read_targets,
     target_names,
 )
-from dermis.formats.gltf.unread import LIGHTS, note_unread
+from dermis.formats.gltf.unread import LIGHTS_EXTENSION, note_unread
 from dermis.formats.materials import FileMaterial
-from dermis.formats.parts import GREY, MaterialGroup, MeshFile, MeshPart, find_quads
+from dermis.formats.parts import DEFAULT_COLOUR, MaterialGroup, MeshFile, MeshPart, find_quads
 from dermis.formats.text_files import list_names
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
-_MAX_COUNTS = {
+_MAX_SCENE_COUNTS = {
     "primitives": limits.MAX_GROUPS,
     "triangles": limits.MAX_TRIANGLES,
     "vertices": limits.MAX_VERTICES,
@@ -49,11 +49,11 @@ GLTF_PROPERTIES = (
     noted("alpha of `COLOR_0`", "no note if it is 1"),
     drawn(f"sparse accessors, normalised integers, `{_QUANTISATION_EXTENSION}`", "", _QUANTISATION_EXTENSION),
     drawn(
-        f"`{draco.EXTENSION}`",
+        f"`{draco.DRACO_EXTENSION}`",
         'with `pip install "dermis[formats]"` ([DracoPy](https://github.com/seung-lab/DracoPy)): positions, '
         "normals, uv, colours, joints and weights; refused if the data does not have the size that its "
         "accessors state",
-        draco.EXTENSION,
+        draco.DRACO_EXTENSION,
     ),
     refused(
         f"{in_code(_MESHOPT_EXTENSIONS)}, if required",
@@ -65,7 +65,7 @@ GLTF_PROPERTIES = (
     drawn("transforms of nodes"),
     drawn("morph targets, default weights, skins", "they move the head, see [motion](motion.md)"),
     drawn("animations", "by `--motion`, see [motion](motion.md)"),
-    noted(f"`{LIGHTS}`, cameras", "`--lights` and `--camera` set others", LIGHTS),
+    noted(f"`{LIGHTS_EXTENSION}`, cameras", "`--lights` and `--camera` set others", LIGHTS_EXTENSION),
     noted("several scenes", "the default scene is read"),
     refused("buffers without data", "such as the fallback of a compressed one"),
     drawn_with_note(
@@ -75,12 +75,12 @@ GLTF_PROPERTIES = (
     no_effect("`asset`, `extras`, other names", "information for programs and people"),
 )
 """Properties of glTF files besides their materials."""
-_READ_EXTENSIONS = {*KNOWN_EXTENSIONS, *keys_of((*GLTF_PROPERTIES, *vrm.VRM_PROPERTIES))}
+_READ_EXTENSIONS = {*MATERIAL_EXTENSIONS, *keys_of((*GLTF_PROPERTIES, *vrm.VRM_PROPERTIES))}
 _COMPRESSION_ADVICE = (
     "Export without this compression: gltfpack without -c and -cc, or gltf-transform copy IN.glb OUT.glb"
 )
 _EXTENSION_ADVICE = dict.fromkeys(_MESHOPT_EXTENSIONS, _COMPRESSION_ADVICE)
-_OTHER_ADVICE = "Export without it"
+_OTHER_EXTENSION_ADVICE = "Export without it"
 
 
 def read_gltf(path: Path) -> MeshFile:
@@ -107,7 +107,8 @@ def _refuse_extensions(document: Document) -> None:
     unsupported = [name for name in required if name not in _READ_EXTENSIONS]
     if unsupported:
         advice = next(
-            (_EXTENSION_ADVICE[name] for name in unsupported if name in _EXTENSION_ADVICE), _OTHER_ADVICE
+            (_EXTENSION_ADVICE[name] for name in unsupported if name in _EXTENSION_ADVICE),
+            _OTHER_EXTENSION_ADVICE,
         )
         refuse(document.path, "plain glTF", f"the file requires {list_names(unsupported)}", advice)
 
@@ -130,7 +131,7 @@ class _SceneReader:
 
     def parts(self) -> Iterator[MeshPart]:
         """Yield each triangle primitive of the scene as a mesh part; check the scene's total size."""
-        counts = dict.fromkeys(_MAX_COUNTS, 0)
+        counts = dict.fromkeys(_MAX_SCENE_COUNTS, 0)
         for part in self._all_parts():
             displaced = sum(len(vertex) for vertex, _ in part.targets.values())
             added = 1, len(part.triangles), len(part.positions), displaced
@@ -139,13 +140,13 @@ class _SceneReader:
                 self._check_count(name, counts[name])
             yield part
 
-    def _check_count(self, name: str, count: int) -> None:
+    def _check_count(self, item_noun: str, count: int) -> None:
         """Refuse more triangles, vertices or displacements than allowed, before the scene fills the memory.
 
-        name : name of the limit, a key of `_MAX_COUNTS`
+        item_noun : name of the limit, a key of `_MAX_SCENE_COUNTS`
         """
         advice = "Export the head alone, or decimated"
-        limits.check_limit(self.document.path, count, _MAX_COUNTS[name], name, advice)
+        limits.check_limit(self.document.path, count, _MAX_SCENE_COUNTS[item_noun], item_noun, advice)
 
     def _all_parts(self) -> Iterator[MeshPart]:
         nodes, scene_nodes = self.document.items("nodes"), self.nodes.scene_nodes or ()
@@ -163,12 +164,14 @@ class _SceneReader:
             if has_triangles and _dermis_extras(primitive).get("hair") is not True:
                 yield self._scene_part(mesh, names, primitive, node)
 
-    def _scene_part(self, mesh: Tree, names: tuple[str, ...], primitive: Tree, node: int | None) -> MeshPart:
+    def _scene_part(
+        self, mesh: Tree, target_names: tuple[str, ...], primitive: Tree, node: int | None
+    ) -> MeshPart:
         """Return a primitive as a mesh part in scene space, transformed by its node or by its skin.
 
-        names : names of the morph targets of the mesh
+        target_names : names of the morph targets of the mesh
         """
-        part, targets = self._read_primitive(mesh, names, primitive)
+        part, targets = self._read_primitive(mesh, target_names, primitive)
         if node is None:
             return _transform_part(part, targets, np.eye(4))
         if "skin" in self.document.tree["nodes"][node] and self.armature:
@@ -182,7 +185,7 @@ class _SceneReader:
         return replace(transformed, bone=np.full((count, 1), bone), weight=np.ones((count, 1)))
 
     def _read_primitive(
-        self, mesh: Tree, names: tuple[str, ...], primitive: Tree
+        self, mesh: Tree, target_names: tuple[str, ...], primitive: Tree
     ) -> tuple[MeshPart, dict[str, VertexDisplacements]]:
         """Return a primitive in mesh space, deformed by the default weights, and all its morph targets."""
         attributes = primitive["attributes"]
@@ -193,8 +196,8 @@ class _SceneReader:
             self.document.read_floats(attributes[name]) if name in attributes else None
             for name in ("TEXCOORD_0", "NORMAL", "COLOR_0")
         )
-        targets = read_targets(self.document, mesh, names, primitive, len(positions))
-        targets = self.avatar.with_expressions(mesh, names, targets)
+        targets = read_targets(self.document, mesh, target_names, primitive, len(positions))
+        targets = self.avatar.with_expressions(mesh, target_names, targets)
         displaced = apply_targets(positions, targets, self.weights)
         if displaced is not positions:
             normals = None  # the normals of the file belong to the undisplaced shape
@@ -215,23 +218,23 @@ class _SceneReader:
             other_uv=self._read_other_uv(group, attributes, len(positions)),
         ), targets
 
-    def _read_other_uv(self, group: MaterialGroup, attributes: Tree, count: int) -> dict[int, Doubles]:
-        """Return the additional uv sets (count, 2) that textures of a material use, by index of the set."""
+    def _read_other_uv(self, group: MaterialGroup, attributes: Tree, vertex_count: int) -> dict[int, Doubles]:
+        """Return the additional uv sets (vertex_count, 2) that a material's textures use, by set index."""
         material = self.materials[group.material] if group.material >= 0 else FileMaterial()
         found = {}
         for index in sorted({texture.uv_set for texture in material.textures.values()} - {0}):
             if f"TEXCOORD_{index}" not in attributes:
                 actual = f"material {material.name!r} uses uv set {index}, which its mesh does not have"
                 refuse(self.document.path, "uv for each texture", actual, limits.DAMAGED_ADVICE)
-            found[index] = self.document.read_floats(attributes[f"TEXCOORD_{index}"]).reshape(count, 2)
+            found[index] = self.document.read_floats(attributes[f"TEXCOORD_{index}"]).reshape(vertex_count, 2)
         return found
 
-    def _read_triangles(self, primitive: Tree, count: int) -> Index:
+    def _read_triangles(self, primitive: Tree, vertex_count: int) -> Index:
         """Return the vertex indices of a primitive's triangles, (f, 3); strips and fans are expanded.
 
-        count : number of vertices of the primitive
+        vertex_count : number of vertices of the primitive
         """
-        index = np.arange(count)
+        index = np.arange(vertex_count)
         if "indices" in primitive:
             corners = self.document.item("accessors", primitive["indices"])["count"]
             self._check_count("triangles", corners // 3)
@@ -252,7 +255,7 @@ class _SceneReader:
         index = primitive.get("material", -1)
         names = tuple(str(item["name"]) for item in (material, mesh) if item.get("name"))
         colour = self.materials[index].colour if index >= 0 else None
-        return MaterialGroup(names, colour or GREY, index)
+        return MaterialGroup(names, colour or DEFAULT_COLOUR, index)
 
 
 def _dermis_extras(primitive: Tree) -> Tree:
@@ -319,15 +322,15 @@ def _skin_part(
     )
 
 
-def _normal_matrix(linear: Doubles) -> Doubles:
+def _normal_matrix(linear_transform: Doubles) -> Doubles:
     """Return the matrices (..., 3, 3) that transform normals for linear transforms (..., 3, 3).
 
     The matrices are scaled so that a uniform scale preserves the length of normals. Cofactors are used
     because cofactors exist for singular transforms, too.
     """
-    rows = [linear[..., k, :] for k in range(3)]
+    rows = [linear_transform[..., k, :] for k in range(3)]
     cofactors = np.stack([np.cross(rows[(i + 1) % 3], rows[(i + 2) % 3]) for i in range(3)], axis=-2)
-    determinant = np.asarray(np.linalg.det(linear))
+    determinant = np.asarray(np.linalg.det(linear_transform))
     sign = np.where(determinant < 0, -1.0, 1.0)
     scale = np.where(determinant == 0, 1.0, np.abs(determinant) ** (2 / 3))
     return np.asarray((sign / scale)[..., None, None] * cofactors)

@@ -22,7 +22,7 @@ _ROLE_OF_INPUT = {
     "metallic": "metalness",
     "emissiveColor": "emission",
 }
-_DEFAULTS: Mapping[str, Any] = {
+_INPUT_DEFAULTS: Mapping[str, Any] = {
     "diffuseColor": (0.18, 0.18, 0.18),
     "emissiveColor": (0.0, 0.0, 0.0),
     "roughness": 0.5,
@@ -30,7 +30,7 @@ _DEFAULTS: Mapping[str, Any] = {
     "opacity": 1.0,
     "opacityThreshold": 0.0,
 }
-_WITHOUT_EFFECT = {
+_INPUTS_WITHOUT_EFFECT = {
     "clearcoat": ("clear coat", 0.0),
     "displacement": ("displacement", 0.0),
     "ior": ("index of refraction", 1.5),
@@ -48,18 +48,18 @@ USD_MATERIALS = (
     noted("another picture of the `opacity`"),
     drawn("`scale`, `wrapS`, `wrapT`, `UsdTransform2d`"),
     noted("`bias`, `wrap...` of `black`, `sourceColorSpace` of `raw`", "normals use their `bias`"),
-    noted(in_code(_WITHOUT_EFFECT), "no note for values that change nothing"),
+    noted(in_code(_INPUTS_WITHOUT_EFFECT), "no note for values that change nothing"),
     drawn_with_note("emission without a `diffuseColor`", "taken for the reflectance, as in scans"),
     noted("shaders other than `UsdPreviewSurface`", "drawn in the colour of the mesh"),
     noted("a picture that is missing"),
 )
 """Inputs of UsdPreviewSurface and of its textures."""
-_WRAPS = {"repeat": "repeat", "mirror": "mirror"}
-_CHANNELS = {"r": 0, "g": 1, "b": 2, "a": 3}
+_WRAP_OF_USD_MODE = {"repeat": "repeat", "mirror": "mirror"}
+_CHANNEL_OF_OUTPUT = {"r": 0, "g": 1, "b": 2, "a": 3}
 _BLACK = (0.0, 0.0, 0.0)
 
 
-class _Source(NamedTuple):
+class _InputSource(NamedTuple):
     """Output of a shader to which an input is connected."""
 
     shader: UsdShade.Shader
@@ -87,7 +87,9 @@ class MaterialReader:
         if kind != "UsdPreviewSurface":
             tree["unused"].append(f"surface {kind}" if kind else "material without a UsdPreviewSurface")
             return tree
-        values = {name: self._constant_value(surface, name, default) for name, default in _DEFAULTS.items()}
+        values = {
+            name: self._constant_value(surface, name, default) for name, default in _INPUT_DEFAULTS.items()
+        }
         tree["colour"], tree["emission"] = list(values["diffuseColor"]), list(values["emissiveColor"])
         tree |= {"roughness": values["roughness"], "stated_metalness": values["metallic"]}
         for name, role in _ROLE_OF_INPUT.items():
@@ -97,7 +99,7 @@ class MaterialReader:
         self._list_unused_inputs(tree, surface)
         return _emission_to_colour(tree)
 
-    def _add_source(self, tree: Tree, input_name: str, role: str, source: _Source) -> None:
+    def _add_source(self, tree: Tree, input_name: str, role: str, source: _InputSource) -> None:
         """Add the texture or the vertex colours to which an input is connected."""
         kind = str(source.shader.GetIdAttr().Get())
         if kind.startswith("UsdPrimvarReader_float") and role == "colour":
@@ -118,7 +120,7 @@ class MaterialReader:
                 key = "stated_metalness" if role == "metalness" else role
                 tree[key] = factor[texture["channel"] or 0]
 
-    def _texture_tree(self, source: _Source, tree: Tree) -> Tree:
+    def _texture_tree(self, source: _InputSource, tree: Tree) -> Tree:
         shader = source.shader
         wraps = [self._text_value(shader, f"wrap{axis}") for axis in "ST"]
         if "black" in wraps:
@@ -134,8 +136,8 @@ class MaterialReader:
         return {
             "file": self._picture_name(shader),
             "transform": transform,
-            "wrap": [_WRAPS.get(one, "clamp") for one in wraps],
-            "channel": _CHANNELS.get(source.output),
+            "wrap": [_WRAP_OF_USD_MODE.get(one, "clamp") for one in wraps],
+            "channel": _CHANNEL_OF_OUTPUT.get(source.output),
             "scale": list(self._constant_value(shader, "scale", (1.0, 1.0, 1.0, 1.0))),
             "bias": list(self._constant_value(shader, "bias", (0.0, 0.0, 0.0, 0.0))),
         }
@@ -170,7 +172,7 @@ class MaterialReader:
         tree |= {"alpha_mode": "mask" if cutoff > 0 else "blend", "alpha_cutoff": cutoff or 0.5}
 
     def _list_unused_inputs(self, tree: Tree, surface: UsdShade.Shader) -> None:
-        for name, (text, neutral) in _WITHOUT_EFFECT.items():
+        for name, (text, neutral) in _INPUTS_WITHOUT_EFFECT.items():
             value = self._constant_value(surface, name, neutral)
             if value != neutral or self._connected_source(surface, name) is not None:
                 tree["unused"].append(text)
@@ -190,12 +192,12 @@ class MaterialReader:
         found: list[Usd.Attribute] = list(entry.GetValueProducingAttributes()) if entry else []
         return found
 
-    def _connected_source(self, shader: UsdShade.Shader, input_name: str) -> _Source | None:
+    def _connected_source(self, shader: UsdShade.Shader, input_name: str) -> _InputSource | None:
         """Return the shader output to which an input of a shader is connected; None without a connection."""
         for attribute in self._value_attributes(shader, input_name):
             kind, output = str(attribute.GetName()).split(":", 1)
             if kind == "outputs":
-                return _Source(self.shade.Shader(attribute.GetPrim()), output)
+                return _InputSource(self.shade.Shader(attribute.GetPrim()), output)
         return None
 
     def _constant_value(self, shader: UsdShade.Shader, input_name: str, default: Any) -> Any:
