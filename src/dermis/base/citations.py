@@ -12,7 +12,7 @@ from importlib.resources import files
 
 from dermis.base.errors import refuse
 
-_ENTRY_HEAD = re.compile(r"@(?P<kind>\w+)\s*\{\s*(?P<key>[^\s,{}]+)\s*,")
+_ENTRY_HEAD_PATTERN = re.compile(r"@(?P<kind>\w+)\s*\{\s*(?P<key>[^\s,{}]+)\s*,")
 
 
 def citation_keys() -> frozenset[str]:
@@ -49,7 +49,7 @@ def parse_bibtex(text: str, source: str = "base/references.bib") -> dict[str, st
     """
     found: dict[str, str] = {}
     for entry in _bibtex_entries(text, source):
-        head = _ENTRY_HEAD.match(entry)
+        head = _ENTRY_HEAD_PATTERN.match(entry)
         if head is None:
             refuse(source, "each entry to begin with @kind{key,", f"one begins {entry[:40]!r}", "Correct it")
         if head["key"] in found:

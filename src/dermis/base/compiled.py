@@ -66,8 +66,8 @@ class _CodeCache(caching.NullCache):  # type: ignore[misc, name-defined]
         code = np.frombuffer(serialize.dumps(data._reduce()), np.uint8)
         try_save_arrays(_CACHE_FOLDER, self._key(sig, data.codegen), {_ARRAY_NAME: code})
 
-    def _key(self, sig: Any, codegen: Any) -> str:
-        text = f"{self._source_key} {sig} {codegen.magic_tuple()}"
+    def _key(self, signature: Any, codegen: Any) -> str:
+        text = f"{self._source_key} {signature} {codegen.magic_tuple()}"
         return hashlib.sha256(text.encode()).hexdigest()[:40]
 
 

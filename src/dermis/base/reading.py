@@ -206,12 +206,12 @@ def _refuse_constant(text: str) -> NoReturn:
     raise ValueError(f"{text} is not a number")
 
 
-def _format_megabytes(size: int) -> str:
-    return f"{size / 1e6:,.1f} MB" if size >= 1e5 else f"{size:,} bytes"
+def _format_megabytes(byte_count: int) -> str:
+    return f"{byte_count / 1e6:,.1f} MB" if byte_count >= 1e5 else f"{byte_count:,} bytes"
 
 
-def _short_error(fault: BaseException) -> str:
+def _short_error(error: BaseException) -> str:
     """Return the text of an error, shortened to one line."""
-    text = " ".join(str(fault)[:1000].split())
-    text = text if text and isinstance(fault, ValueError) else f"{type(fault).__name__}: {text}"
+    text = " ".join(str(error)[:1000].split())
+    text = text if text and isinstance(error, ValueError) else f"{type(error).__name__}: {text}"
     return text if len(text) <= 200 else f"{text[:197]}..."

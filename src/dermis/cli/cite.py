@@ -14,8 +14,10 @@ if TYPE_CHECKING:
     SettingsOptions = Options
     SkinOptions = Options
 else:
-    SettingsOptions = model_options(Settings, only=("technique", "seams", "transmission", "tone", "bloom"))
-    SkinOptions = model_options(Skin, only=("profile", "specular", "fresnel", "energy", "direction"))
+    SettingsOptions = model_options(
+        Settings, only_fields=("technique", "seams", "transmission", "tone", "bloom")
+    )
+    SkinOptions = model_options(Skin, only_fields=("profile", "specular", "fresnel", "energy", "direction"))
 
 
 def cite(

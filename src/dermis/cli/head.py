@@ -200,18 +200,18 @@ def _build_person(seed: int | None, numbers: Options, tone: Options, targets: di
     return replace(base, **numbers, targets={**base.targets, **targets})
 
 
-def _with_values(look: Look, option_values: list[str] | None, option: str) -> Look:
+def _with_values(look: Look, option_values: list[str] | None, option_name: str) -> Look:
     """Return a copy of a skin, eye or hair look with the fields set on the command line.
 
     option_values : texts "NAME=NUMBER,..." of the option, such as --skin
     """
     from dermis.human.skin.look import SITES_FIELD
 
-    values = parse_weights(option_values or [], option)
+    values = parse_weights(option_values or [], option_name)
     field_names = [field.name for field in fields(look) if field.name != SITES_FIELD]
     for name in values:
         if name not in field_names:
-            refuse(option, f"a name of {', '.join(field_names)}", f"got {name!r}", "Correct it")
+            refuse(option_name, f"a name of {', '.join(field_names)}", f"got {name!r}", "Correct it")
     numbers: Options = dict(values)
     if (seed := values.get("seed")) is not None and seed.is_integer():
         numbers["seed"] = int(seed)

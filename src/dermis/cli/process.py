@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 
     Handler = Callable[[int, FrameType | None], Any] | int | signal.Handlers | None
 
-_OPEN_MODES = os.O_RDONLY, os.O_RDONLY, os.O_WRONLY  # for null devices that replace closed standard streams
+# modes of null devices that replace closed standard streams
+_STREAM_OPEN_MODES = os.O_RDONLY, os.O_RDONLY, os.O_WRONLY
 
 
 class StandardStreams:
@@ -38,7 +39,7 @@ class StandardStreams:
 
     def __enter__(self) -> Self:
         """Replace sys.stdout and sys.stderr."""
-        for descriptor, mode in enumerate(_OPEN_MODES):
+        for descriptor, mode in enumerate(_STREAM_OPEN_MODES):
             _reserve_descriptor(descriptor, mode)
         self._original = sys.stdout, sys.stderr
         self._raw: list[_GuardedStream] = []
@@ -49,7 +50,7 @@ class StandardStreams:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self, error_type: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Flush the replacement streams and restore the original ones."""
         for stream, original in zip((sys.stdout, sys.stderr), self._original, strict=True):
@@ -89,8 +90,8 @@ class _GuardedStream(io.RawIOBase):
     fault : error of the first failed write; None until then
     """
 
-    def __init__(self, inner: io.RawIOBase, descriptor: int) -> None:
-        self._inner, self.descriptor = inner, descriptor
+    def __init__(self, raw_stream: io.RawIOBase, descriptor: int) -> None:
+        self._inner, self.descriptor = raw_stream, descriptor
         self.fault: OSError | None = None
 
     def write(self, data: ReadableBuffer, /) -> int:
@@ -131,8 +132,9 @@ def _reserve_descriptor(descriptor: int, open_mode: int) -> None:
 
 
 _SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
-_SECOND_SIGNAL_S = 0.5  # earlier repetitions are ignored: intermediate programs may send a signal twice
-_RETRY_S = 0.02
+# earlier repetitions are ignored: intermediate programs may send a signal twice
+_MIN_SECOND_SIGNAL_DELAY_S = 0.5
+_SIGNAL_RETRY_S = 0.02
 _UNSAFE_PACKAGES = {"importlib", "pydantic"}  # exceptions leave half-imported modules, or are lost in Rust
 _DRIVER_PACKAGES = {"wgpu", "glfw"}
 _RETRY, _END = b"\0", b"\xff"  # bytes that are not signal numbers
@@ -172,7 +174,7 @@ class Interruption:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self, error_type: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Restore the previous signal handlers."""
         if threading.current_thread() is not threading.main_thread():
@@ -185,14 +187,14 @@ class Interruption:
         self._thread.join()
         self._writing.close()
 
-    def _handle(self, signal_number: int, frame: FrameType | None) -> None:
+    def _handle(self, signal_number: int, stack_frame: FrameType | None) -> None:
         self.code = self.code or _SIGNAL_EXIT_BASE + signal_number
         if self._is_raised:
             return
         if (loop := _running_loop()) is not None:  # raised inside a task, asyncio would print it
             self._is_raised = True
             loop.call_soon_threadsafe(_raise_keyboard_interrupt)
-        elif _caller_swallows_exceptions(frame):
+        elif _caller_swallows_exceptions(stack_frame):
             self._raise_later()
         else:
             self._is_raised = True
@@ -217,7 +219,9 @@ class Interruption:
         first_signal_s = 0.0
         with self._reading:
             while True:
-                if not select.select([self._reading], [], [], _RETRY_S if self._is_postponed else None)[0]:
+                if not select.select(
+                    [self._reading], [], [], _SIGNAL_RETRY_S if self._is_postponed else None
+                )[0]:
                     self._is_postponed = False
                     self._send_again()
                     continue
@@ -230,7 +234,7 @@ class Interruption:
                     self._resent -= 1
                 elif not first_signal_s:
                     first_signal_s = time.monotonic()
-                elif time.monotonic() - first_signal_s > _SECOND_SIGNAL_S:
+                elif time.monotonic() - first_signal_s > _MIN_SECOND_SIGNAL_DELAY_S:
                     os._exit(_SIGNAL_EXIT_BASE + received[0])
 
     def _send_again(self) -> None:

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
     PigmentOptions = Options
 else:
-    PigmentOptions = model_options(Pigments, names=_OPTION_NAMES, defaults=_default_pigments())
+    PigmentOptions = model_options(Pigments, option_names=_OPTION_NAMES, shown_defaults=_default_pigments())
 
 Clamp = Literal["layer", "none"]
 Model = Literal["counted", "dipole", "better-dipole", "multipole", "layered", "layered-point", "montecarlo"]
@@ -155,7 +155,9 @@ def profile(
         spectrum = _reflectance_spectrum(tissue, model, clamp)
     conserve = keep_energy or radial.model == COUNTED_MODEL
     table_fit, terms = (table, _DEFAULT_TERM_COUNT) if fit is None else (None, fit)
-    fitted = gaussian_fit(radial, table_fit, terms, shared=variances == "shared", keep_energy=conserve)
+    fitted = gaussian_fit(
+        radial, table_fit, terms, shared_variances=variances == "shared", keep_energy=conserve
+    )
     report = ProfileReport(
         radial, tissue, fitted, additional_fit(radial, fit_kind), thicknesses, model_error, spectrum
     )

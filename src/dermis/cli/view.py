@@ -123,8 +123,8 @@ def _load_motion(motion_path: str | None, fps: float | None, state: ViewerState)
     return motion
 
 
-def _print_url(url: str, exposed: bool) -> None:
-    if exposed:
+def _print_url(url: str, is_exposed: bool) -> None:
+    if is_exposed:
         note("warning: other machines can reach this page; whoever knows its URL controls the viewer")
         note("warning: the connection is not encrypted: use a trusted network or a tunnel")
     print_lines(f"{url}  (Ctrl+C to stop)")

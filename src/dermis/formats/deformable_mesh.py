@@ -18,7 +18,7 @@ from dermis.base.arrays import Doubles, Floats, Index, Numbers
 from dermis.mesh.geometry import vertex_normals
 from dermis.mesh.head import Head
 from dermis.mesh.rig import Rig
-from dermis.mesh.skeleton import INFLUENCES, Skeleton
+from dermis.mesh.skeleton import BONES_PER_POINT, Skeleton
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -152,8 +152,8 @@ def point_bone_influences(rig: Rig, refinement: csr_array | None) -> tuple[Index
     weights = _bone_weights(skeleton)
     if refinement is not None:
         weights = _fit_bone_weights(rig.positions_mm.astype(np.float64), skeleton, weights, refinement)
-    bone = np.argsort(-weights, axis=1, kind="stable")[:, :INFLUENCES]
-    bone = np.pad(bone, ((0, 0), (0, INFLUENCES - bone.shape[1])))
+    bone = np.argsort(-weights, axis=1, kind="stable")[:, :BONES_PER_POINT]
+    bone = np.pad(bone, ((0, 0), (0, BONES_PER_POINT - bone.shape[1])))
     weight = np.take_along_axis(weights, bone, axis=1)
     weight[:, weights.shape[1] :] = 0.0
     weight /= weight.sum(axis=1, keepdims=True)
@@ -246,7 +246,7 @@ def _best_bone_weights(hessian: Doubles, gradient: Doubles) -> Doubles:
     """
     count, bones = gradient.shape
     smallest, best = np.full(count, np.inf), np.zeros(gradient.shape)
-    for subset in chain.from_iterable(combinations(range(bones), k) for k in range(1, INFLUENCES + 1)):
+    for subset in chain.from_iterable(combinations(range(bones), k) for k in range(1, BONES_PER_POINT + 1)):
         chosen = list(subset)
         matrix, vector = hessian[:, chosen][:, :, chosen], gradient[:, chosen]
         system = np.ones((count, len(chosen) + 1, len(chosen) + 1))

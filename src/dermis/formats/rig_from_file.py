@@ -10,7 +10,7 @@ from dermis.base.arrays import Doubles, Floats, Index, Ints, Mask
 from dermis.base.errors import refuse
 from dermis.formats.parts import Bones, MeshPart
 from dermis.formats.size_limits import DAMAGED_ADVICE
-from dermis.mesh.rig import INFLUENCES, MorphTargets, Rig, Skeleton, no_targets
+from dermis.mesh.rig import BONES_PER_POINT, MorphTargets, Rig, Skeleton, no_targets
 
 COINCIDENCE_TOLERANCE_MM = 0.01
 """Distance beyond which coincident vertices that a morph target moves apart become separate points, such as
@@ -141,8 +141,8 @@ def _point_skeleton(
     first : (p,) first vertex of each point, whose bone weights the point gets
     """
     assert part.bone is not None and part.weight is not None
-    bone = np.zeros((len(first), INFLUENCES), np.int32)
-    weight = np.zeros((len(first), INFLUENCES), np.float32)
+    bone = np.zeros((len(first), BONES_PER_POINT), np.int32)
+    weight = np.zeros((len(first), BONES_PER_POINT), np.float32)
     bone[:, : part.bone.shape[1]], weight[:, : part.weight.shape[1]] = part.bone[first], part.weight[first]
     size = np.linalg.norm(bones.world[:, :3, :3], axis=(1, 2))
     flat = np.abs(np.linalg.det(bones.world[:, :3, :3])) <= 1e-9 * size**3

@@ -21,9 +21,9 @@ IRIS_BEHIND_MM = 3.0
 """Depth of the plane of the iris behind the cornea's apex [mm]."""
 QUADS_PER_EDGE = 10
 """Quads along each edge of the cube that becomes a ball; even, so that a point is on the axis."""
-UV_RIM = 0.49
+UV_RADIUS_OF_BACK = 0.49
 """Distance of the back of the eye from the centre of the uv layout [-]."""
-UV_DECAY_RADIANS = 0.9
+UV_DECAY_ANGLE_RADIANS = 0.9
 """Constant a: at the angle t from the axis, the distance in uv is proportional to 1 - exp(-t / a) [rad]."""
 
 
@@ -50,15 +50,15 @@ def iris_mm() -> float:
     return apex_mm() - IRIS_BEHIND_MM
 
 
-def profile_mm(angle: Doubles) -> Doubles:
+def profile_mm(angle_from_axis: Doubles) -> Doubles:
     """Return the distance from the ball's centre to the surface of ball and cornea [mm].
 
-    angle : angle between the direction and the eye's axis [rad]
+    angle_from_axis : angle between the direction and the eye's axis [rad]
     """
     centre = cornea_centre_mm()
-    within = np.maximum(CORNEA_MM**2 - (centre * np.sin(angle)) ** 2, 0.0)
+    within = np.maximum(CORNEA_MM**2 - (centre * np.sin(angle_from_axis)) ** 2, 0.0)
     edge = np.arctan2(LIMBUS_MM, np.sqrt(SCLERA_MM**2 - LIMBUS_MM**2))
-    return np.where(angle < edge, centre * np.cos(angle) + np.sqrt(within), SCLERA_MM)
+    return np.where(angle_from_axis < edge, centre * np.cos(angle_from_axis) + np.sqrt(within), SCLERA_MM)
 
 
 def radial_distances_mm(points: Doubles, axis: Doubles) -> tuple[Doubles, Doubles]:
@@ -145,7 +145,7 @@ def eyeball_uv(quads_per_edge: int = QUADS_PER_EDGE) -> Doubles:
     """
     x, y, z = _point_directions(quads_per_edge).T
     angle, azimuth = np.arccos(np.clip(z, -1.0, 1.0)), np.arctan2(y, x)
-    radius = UV_RIM * angle / np.pi
+    radius = UV_RADIUS_OF_BACK * angle / np.pi
     return 0.5 + np.stack([radius * np.cos(azimuth), -radius * np.sin(azimuth)], axis=-1)
 
 
@@ -183,6 +183,10 @@ def eye_uv(points: Doubles) -> Floats:
     """
     across = np.hypot(points[:, 0], points[:, 1])
     angle = np.arctan2(across, points[:, 2])
-    radius = UV_RIM * np.expm1(-angle / UV_DECAY_RADIANS) / np.expm1(-np.pi / UV_DECAY_RADIANS)
+    radius = (
+        UV_RADIUS_OF_BACK
+        * np.expm1(-angle / UV_DECAY_ANGLE_RADIANS)
+        / np.expm1(-np.pi / UV_DECAY_ANGLE_RADIANS)
+    )
     direction = points[:, :2] * [1.0, -1.0] / np.maximum(across, 1e-12)[:, None]
     return np.asarray(0.5 + radius[:, None] * direction, np.float32)

@@ -17,7 +17,7 @@ from dermis.mesh.rig import Rig
 from dermis.mesh.skull import Point, centre_of_box, facing_axes, head_bone
 from dermis.mesh.strands import Strands
 
-_HEAD_WEIGHT = 0.5  # smallest weight of the head bone for points of the skull
+_MIN_HEAD_BONE_WEIGHT = 0.5  # smallest weight of the head bone for points of the skull
 
 
 @dataclass(frozen=True, repr=False)
@@ -137,7 +137,7 @@ class Head:
         bone = None if skeleton is None else head_bone(skeleton.names)
         if skeleton is None or bone is None:
             return self.mesh.skull_mm
-        follows = ((skeleton.bone == bone) & (skeleton.weight > _HEAD_WEIGHT)).any(axis=1)
+        follows = ((skeleton.bone == bone) & (skeleton.weight > _MIN_HEAD_BONE_WEIGHT)).any(axis=1)
         points = self.control.positions_mm[follows]
         return centre_of_box(points) if len(points) else self.mesh.skull_mm
 

@@ -15,10 +15,10 @@ from dermis.mesh.eyeball import LidContact
 from dermis.mesh.morph_targets import MorphTargets, no_targets
 from dermis.mesh.outline import RigOutline, extreme_points, find_outline_points, rig_outline
 from dermis.mesh.rotations import rigid_motion
-from dermis.mesh.skeleton import INFLUENCES, Skeleton
+from dermis.mesh.skeleton import BONES_PER_POINT, Skeleton
 
 __all__ = [
-    "INFLUENCES",
+    "BONES_PER_POINT",
     "BoneRotation",
     "MorphTargets",
     "Motion",

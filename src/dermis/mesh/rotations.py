@@ -14,12 +14,12 @@ import numpy as np
 from dermis.base.arrays import Doubles
 
 
-def quaternion_matrix(q: Doubles) -> Doubles:
+def quaternion_matrix(quaternion: Doubles) -> Doubles:
     """Return the matrices (..., 4, 4) of quaternions (..., 4) x, y, z, w.
 
     Quaternions need not be normalised; quaternions of length 0 give the identity.
     """
-    x, y, z, w = np.moveaxis(np.asarray(q, np.float64), -1, 0)
+    x, y, z, w = np.moveaxis(np.asarray(quaternion, np.float64), -1, 0)
     squared = x * x + y * y + z * z + w * w
     s = np.where(squared > 0, 2.0 / np.where(squared > 0, squared, 1.0), 0.0)
     matrix = np.zeros((*np.shape(x), 4, 4))
@@ -86,15 +86,15 @@ def rigid_motion(before: Doubles, after: Doubles) -> tuple[Doubles, Doubles]:
     return np.asarray(matrix), np.asarray(new_centre - matrix @ centre)
 
 
-def slerp(a: Doubles, b: Doubles, s: float | Doubles) -> Doubles:
+def slerp(start: Doubles, end: Doubles, fraction: float | Doubles) -> Doubles:
     """Interpolate unit quaternions (..., 4) along the shorter arc, from a for s = 0 to b for s = 1."""
-    cosine = np.sum(a * b, axis=-1, keepdims=True)
-    b, cosine = np.where(cosine < 0, -b, b), np.minimum(np.abs(cosine), 1.0)
+    cosine = np.sum(start * end, axis=-1, keepdims=True)
+    end, cosine = np.where(cosine < 0, -end, end), np.minimum(np.abs(cosine), 1.0)
     angle = np.arccos(cosine)
     sine = np.sin(angle)
     is_small = sine < 1e-6
     divisor = np.where(is_small, 1.0, sine)
-    left = np.where(is_small, 1 - s, np.sin((1 - s) * angle) / divisor)
-    right = np.where(is_small, s, np.sin(s * angle) / divisor)
-    mixed = left * a + right * b
+    left = np.where(is_small, 1 - fraction, np.sin((1 - fraction) * angle) / divisor)
+    right = np.where(is_small, fraction, np.sin(fraction * angle) / divisor)
+    mixed = left * start + right * end
     return np.asarray(mixed / np.linalg.norm(mixed, axis=-1, keepdims=True))

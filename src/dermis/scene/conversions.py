@@ -90,13 +90,13 @@ def as_environment(environment: object) -> Environment | None:
     return Environment(name=str(environment))
 
 
-def as_model(settings_class: type[P], values: object, argument: str, example: str) -> P:
+def as_model(settings_class: type[P], values: object, argument_name: str, example_text: str) -> P:
     """Return settings of a given class.
 
     settings_class : class of the settings, such as `Skin`
     values : instance of the class, or a mapping from field names to values
-    argument : name of the argument of `Scene`, for the error message
-    example : example of fields with values, for the error message
+    argument_name : name of the argument of `Scene`, for the error message
+    example_text : example of fields with values, for the error message
 
     Raises DermisError for any other object.
     """
@@ -105,9 +105,9 @@ def as_model(settings_class: type[P], values: object, argument: str, example: st
     if not isinstance(values, Mapping):
         actual, advice = (
             f"got {format_value(values)}",
-            f"Write {argument}=dermis.{settings_class.__name__}({example})",
+            f"Write {argument_name}=dermis.{settings_class.__name__}({example_text})",
         )
-        refuse(argument, f"a {settings_class.__name__}", actual, advice)
+        refuse(argument_name, f"a {settings_class.__name__}", actual, advice)
     return settings_class(**values)
 
 

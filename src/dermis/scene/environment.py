@@ -33,7 +33,7 @@ class Environment(FrozenModel):
     """Rotation about the upward axis, counter-clockwise as seen from above [degrees]."""
     exposure: Annotated[
         float,
-        Field(ge=0, le=1e6, json_schema_extra=slider(0.02, 10, log=True)),
+        Field(ge=0, le=1e6, json_schema_extra=slider(0.02, 10, logarithmic=True)),
         Reason("up to 20 stops brighter; light is not negative"),
     ] = 1.0
     """Factor of the panorama's radiance."""

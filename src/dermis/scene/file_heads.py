@@ -31,7 +31,7 @@ from dermis.scene.file_surfaces import (
     with_missing_uv,
 )
 from dermis.scene.head_table import NormalY, check_relief
-from dermis.scene.skin_tone import NO_PICTURE, with_skin_tone
+from dermis.scene.skin_tone import NO_COLOUR_MAP, with_skin_tone
 
 MapFile = str | os.PathLike[str] | None
 
@@ -119,7 +119,7 @@ def _load_sample(sample: Sample, mesh_options: dict[str, Any], options: MapOptio
         refuse(sample.name, "a head", f"this sample is an {sample.kind}", hint)
     files = fetch_sample(sample.name)
     if options.skin_site is not None:
-        refuse("skin_site", NO_PICTURE, f"{sample.name} has a colour map", "Leave it out")
+        refuse("skin_site", NO_COLOUR_MAP, f"{sample.name} has a colour map", "Leave it out")
     sample_options = mesh_options | {"unit_mm": mesh_options["unit_mm"] or sample.unit_mm}
     if sample_options["v_origin"] == "auto":
         sample_options["v_origin"] = sample.v_origin or "auto"

@@ -29,7 +29,7 @@ from dermis.scene.skin import SKIN_PRESETS, Skin
 from dermis.scene.smoothness import SmoothIn
 
 P = TypeVar("P", bound=FrozenModel)
-_TABLE_NAMES = {"head", "pose", "skin", "lights", "environment", "camera", "render"}
+_SCENE_TABLE_NAMES = {"head", "pose", "skin", "lights", "environment", "camera", "render"}
 _MAP_ROLES = ("colour", "normal", "height", "specular", "roughness")
 _Weight = Annotated[float, Field(ge=-MAX_WEIGHT, le=MAX_WEIGHT), Reason("faces break apart long before")]
 
@@ -131,9 +131,12 @@ def load_scene(
     """
     path = checked_path(path, "a scene in TOML")
     table = _read_scene_file(path, "a scene in TOML")
-    for part in table.keys() - _TABLE_NAMES:
+    for part in table.keys() - _SCENE_TABLE_NAMES:
         refuse(
-            path, f"only the tables {', '.join(sorted(_TABLE_NAMES))}", f"got {part!r}", "Correct its name"
+            path,
+            f"only the tables {', '.join(sorted(_SCENE_TABLE_NAMES))}",
+            f"got {part!r}",
+            "Correct its name",
         )
     skin = _parse_skin(path, table.get("skin", {}))
     settings = _build_settings(Settings, path, "render", table.get("render", {}))
@@ -205,15 +208,18 @@ def head_and_skin(
     return head, skin.model_copy(update={"rho_s": rho_s})
 
 
-def _parse_skin(path: Path, entry: Any) -> Skin:
+def _parse_skin(path: Path, skin_entry: Any) -> Skin:
     """Return the skin of a scene file, from its [skin] table or from the name of a skin preset."""
-    if not isinstance(entry, str):
-        return _build_settings(Skin, path, "skin", entry)
-    if entry not in SKIN_PRESETS:
+    if not isinstance(skin_entry, str):
+        return _build_settings(Skin, path, "skin", skin_entry)
+    if skin_entry not in SKIN_PRESETS:
         refuse(
-            f"{path}: skin", f"a table or one of {', '.join(SKIN_PRESETS)}", f"got {entry!r}", "Correct it"
+            f"{path}: skin",
+            f"a table or one of {', '.join(SKIN_PRESETS)}",
+            f"got {skin_entry!r}",
+            "Correct it",
         )
-    return Skin.preset(entry)
+    return Skin.preset(skin_entry)
 
 
 def _resolve_skin_files(folder: Path, skin: Skin) -> Skin:
@@ -234,10 +240,10 @@ def _check_rho_s_given_once(path: Path, table: HeadTable, skin: Skin) -> None:
         refuse(f"{path}: skin: rho_s", "one or the other", actual, "Leave one out, or use oiliness")
 
 
-def _parse_camera(path: Path, entry: Any, head: Head) -> Camera:
-    if isinstance(entry, str):
-        return load_camera(_resolve_file(path.parent, entry), head)
-    return _build_settings(Camera, path, "camera", entry)
+def _parse_camera(path: Path, camera_entry: Any, head: Head) -> Camera:
+    if isinstance(camera_entry, str):
+        return load_camera(_resolve_file(path.parent, camera_entry), head)
+    return _build_settings(Camera, path, "camera", camera_entry)
 
 
 def _parse_pose(path: Path, table: Any, head: Head) -> Pose:
@@ -247,11 +253,11 @@ def _parse_pose(path: Path, table: Any, head: Head) -> Pose:
     return pose
 
 
-def _parse_environment(path: Path, table: Any) -> Environment:
-    if isinstance(table, dict) and "visible" in table:
+def _parse_environment(path: Path, environment_table: Any) -> Environment:
+    if isinstance(environment_table, dict) and "visible" in environment_table:
         advice = 'Write background = "environment" into [render]'
         refuse(f"{path}: environment: visible", "no such key any more", "it is given", advice)
-    environment = _build_settings(Environment, path, "environment", table)
+    environment = _build_settings(Environment, path, "environment", environment_table)
     return environment.model_copy(update={"name": _resolve_file(path.parent, environment.name)})
 
 
@@ -271,11 +277,11 @@ def _parse_lights(culprit: object, tables: Any) -> tuple[Light, ...]:
     return tuple(_parse_light(culprit, f"light {k}", table) for k, table in enumerate(tables, start=1))
 
 
-def _parse_light(culprit: object, label: str, table: Any) -> Light:
-    kind = table.get("kind", "point") if isinstance(table, dict) else "point"
+def _parse_light(culprit: object, label: str, light_table: Any) -> Light:
+    kind = light_table.get("kind", "point") if isinstance(light_table, dict) else "point"
     if not isinstance(kind, str) or kind not in LIGHTS:
         refuse(f"{culprit}: {label}", f"a kind of {', '.join(LIGHTS)}", f"got {kind!r}", "Correct it")
-    return _build_settings(LIGHTS[kind], culprit, label, table)
+    return _build_settings(LIGHTS[kind], culprit, label, light_table)
 
 
 def _build_settings(settings_class: type[P], file_name: object, table_name: str, table: Any) -> P:
@@ -299,8 +305,8 @@ def _build_settings(settings_class: type[P], file_name: object, table_name: str,
             raise InvalidFieldsError(f"{file_name}: {table_name}", error.messages) from None
 
 
-def _read_scene_file(name: str | Path, expected: str) -> dict[str, Any]:
-    return read_toml(checked_path(name, expected), expected)
+def _read_scene_file(file_name: str | Path, expected: str) -> dict[str, Any]:
+    return read_toml(checked_path(file_name, expected), expected)
 
 
 class PoseTable(FrozenModel):

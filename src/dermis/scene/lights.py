@@ -32,11 +32,13 @@ __all__ = [
 
 _Degrees = Annotated[
     float,
-    Field(ge=0.01, le=89, json_schema_extra=slider(0.5, 88, log=True)),
+    Field(ge=0.01, le=89, json_schema_extra=slider(0.5, 88, logarithmic=True)),
     Reason("degrees: half angle of a cone in front of the lamp"),
 ]
 _LAMP_REASON = Reason("mm: from the thickness of paper to 100 m")
-_Length = Annotated[float, Field(ge=0.1, le=1e5, json_schema_extra=slider(1, 3000, log=True)), _LAMP_REASON]
+_Length = Annotated[
+    float, Field(ge=0.1, le=1e5, json_schema_extra=slider(1, 3000, logarithmic=True)), _LAMP_REASON
+]
 
 _BRIGHTNESS_SYNONYMS = ("brightness", "color", "colour", "energy", "intensity", "power", "strength")
 
@@ -58,7 +60,7 @@ class _LightBase(FrozenModel):
     """Whether the light casts shadows."""
     softness_mm: Annotated[
         float,
-        Field(ge=1e-3, le=1000, json_schema_extra=slider(0.1, 100, log=True)),
+        Field(ge=1e-3, le=1000, json_schema_extra=slider(0.1, 100, logarithmic=True)),
         Reason("mm: from the wavelength of light to a metre"),
     ] = 1.5
     """Width over which the edge of a shadow fades, at most 12 texels of the shadow map; for area lights the
@@ -156,7 +158,7 @@ class SphereLight(PointLight):
     kind: Literal["sphere"] = "sphere"  # type: ignore[assignment]
     """Word for this kind of light in scene files."""
     radius_mm: Annotated[
-        float, Field(ge=0.1, le=1e5, json_schema_extra=slider(1, 500, log=True)), _LAMP_REASON
+        float, Field(ge=0.1, le=1e5, json_schema_extra=slider(1, 500, logarithmic=True)), _LAMP_REASON
     ] = 100.0
     """Radius of the sphere [mm]."""
 

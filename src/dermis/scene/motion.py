@@ -13,7 +13,7 @@ from dermis.formats.motion.live_link import load_live_link
 from dermis.formats.motion.mediapipe import load_mediapipe
 from dermis.formats.motion.sequence import is_sequence, load_sequence
 from dermis.formats.parts import is_gltf
-from dermis.mesh.clip import Clip, check_rate
+from dermis.mesh.clip import Clip, check_frame_rate
 from dermis.mesh.head import Head
 from dermis.scene.head_table import check_options
 
@@ -82,7 +82,7 @@ def load_motion(
     """
     clip_path = checked_path(path, _ACCEPTED_FILES)
     check_options(unit_mm=unit_mm, up=up, front=front)
-    fps = None if fps is None else check_rate("fps", fps)
+    fps = None if fps is None else check_frame_rate("fps", fps)
     source, clip_name = _split_clip_name(clip_path, clip)
     if is_gltf(source):
         return load_gltf_clip(source, head, clip_name)

@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 from dermis.base.errors import format_value, refuse
 from dermis.base.registry import Registry
 
-_WGSL_TYPES = {"float32": "f32", "int32": "i32", "uint8": "u32"}
+_WGSL_TYPE_OF_CHANNEL = {"float32": "f32", "int32": "i32", "uint8": "u32"}
 
 Kind = Literal["float32", "int32", "uint8"]
 
@@ -79,7 +79,7 @@ class Output:
     @property
     def wgsl_type(self) -> str:
         """Return the WGSL type of one channel in the output buffer, which has four bytes."""
-        return _WGSL_TYPES[self.kind]
+        return _WGSL_TYPE_OF_CHANNEL[self.kind]
 
 
 _FLOAT: Kind = "float32"
@@ -91,7 +91,7 @@ _LENGTH, _SIGNED_LENGTH, _THICKNESS = (
 )
 _FRACTION, _UNIT = Quantisation(1 / 65535), Quantisation(1 / 32767, _SIGNED_ZERO_LEVEL)
 _MOTION, _RADIANCE = Quantisation(1 / 64, _SIGNED_ZERO_LEVEL), Quantisation(1 / 4096)
-_OUTPUTS = (
+_BUILT_IN_OUTPUTS = (
     Output("depth", "geometry", "Z", _FLOAT, "mm", "distance along the optical axis", 0.0, _LENGTH),
     Output("position", "geometry", "XYZ", _FLOAT, "mm", "position in world space", 0.0, _SIGNED_LENGTH),
     Output("normal", "surface", "XYZ", _FLOAT, "", "normal with relief, in world space", 0.0, _UNIT),
@@ -115,19 +115,19 @@ _OUTPUTS = (
     Output("label_face_synthetics", "label", "I", "uint8", "", "class as in FaceSynthetics"),
 )
 
-OUTPUTS: Registry[Output] = Registry("output", {output.name: output for output in _OUTPUTS})
+OUTPUTS: Registry[Output] = Registry("output", {output.name: output for output in _BUILT_IN_OUTPUTS})
 """Outputs by the names that `Renderer.draw` and `dermis render --outputs` accept."""
 
 
-def check_outputs(names: Iterable[str]) -> tuple[str, ...]:
+def check_outputs(output_names: Iterable[str]) -> tuple[str, ...]:
     """Validate names of outputs and return them without duplicates.
 
     Raises DermisError for a name that is not registered.
     """
-    if isinstance(names, str) or not isinstance(names, Iterable):
-        actual = f"got {format_value(names)}"
+    if isinstance(output_names, str) or not isinstance(output_names, Iterable):
+        actual = f"got {format_value(output_names)}"
         refuse("outputs", "a list of names", actual, 'Write outputs=("depth", "normal")')
-    unique = tuple(dict.fromkeys(names))
+    unique = tuple(dict.fromkeys(output_names))
     for name in unique:
         OUTPUTS[name]
     return unique

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 else:
     Exposure = Annotated[
         float,
-        Field(ge=1e-6, le=1e6, json_schema_extra=slider(0.05, 20, log=True)),
+        Field(ge=1e-6, le=1e6, json_schema_extra=slider(0.05, 20, logarithmic=True)),
         Reason("20 stops either way"),
         Keywords("auto"),
     ]

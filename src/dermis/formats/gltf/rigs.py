@@ -20,7 +20,7 @@ from dermis.formats.size_limits import (
     MAX_TARGETS,
     check_limit,
 )
-from dermis.mesh.rig import INFLUENCES
+from dermis.mesh.rig import BONES_PER_POINT
 
 _NODE_PATHS = {"translation", "rotation", "scale"}
 _STATIC_BONE_NAME = "scene"
@@ -164,8 +164,8 @@ def _strongest_influences(joint: Index, weight: Doubles) -> tuple[Index, Doubles
 
     The weights are normalised to sum 1.
     """
-    if weight.shape[1] > INFLUENCES:
-        order = np.argsort(-weight, axis=1, kind="stable")[:, :INFLUENCES]
+    if weight.shape[1] > BONES_PER_POINT:
+        order = np.argsort(-weight, axis=1, kind="stable")[:, :BONES_PER_POINT]
         joint, weight = np.take_along_axis(joint, order, axis=1), np.take_along_axis(weight, order, axis=1)
     total = weight.sum(axis=1, keepdims=True)
     first = np.eye(1, weight.shape[1])  # a vertex without weights follows its first joint

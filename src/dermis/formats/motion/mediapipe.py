@@ -35,7 +35,7 @@ from dermis.formats.motion.captures import (
     to_fractions,
     to_seconds,
 )
-from dermis.mesh.clip import Clip, check_rate
+from dermis.mesh.clip import Clip, check_frame_rate
 from dermis.mesh.head import Head
 
 _SHAPE_KEYS = ("blendshapes", "faceblendshapes")
@@ -144,7 +144,7 @@ def _read_records(path: Path) -> tuple[float | None, Iterator[tuple[str, object]
             return None, chain([(first[0], document)], rest)
     fields = _plain_fields(document)
     rate = next(
-        (check_rate(f"{path}: {key}", fields[key]) for key in _FRAME_RATE_KEYS if key in fields), None
+        (check_frame_rate(f"{path}: {key}", fields[key]) for key in _FRAME_RATE_KEYS if key in fields), None
     )
     return rate, ((f"{path}, frame {k}", record) for k, record in enumerate(_frame_list(document), 1))
 
