@@ -72,10 +72,10 @@ class _CodeCache(caching.NullCache):  # type: ignore[misc, name-defined]
 
 
 @cache
-def _source_hash(folder: Path) -> str:
+def _source_hash(source_folder: Path) -> str:
     """Return a hash of all Python files in a folder, as part of the cache key.
 
     Compiled loops contain the constants and functions that they import from these files.
     """
-    texts = (file.read_bytes() for file in sorted(folder.rglob("*.py")))
+    texts = (file.read_bytes() for file in sorted(source_folder.rglob("*.py")))
     return hashlib.sha256(b"".join(texts)).hexdigest()[:12]

@@ -73,36 +73,36 @@ def array_key(sources: Sequence[Array], parameters: str) -> str:
     return digest.hexdigest()[:40]
 
 
-def load_or_make(folder: str, key: str, names: list[str], compute: Callable[[], Arrays]) -> Arrays:
+def load_or_make(folder: str, cache_key: str, names: list[str], compute: Callable[[], Arrays]) -> Arrays:
     """Return arrays from the disk cache; if there is no valid entry, compute the arrays and cache them.
 
     folder : name of a folder of the cache
     names : names of the arrays in the result
     """
-    arrays = load_arrays(folder, key, names)
+    arrays = load_arrays(folder, cache_key, names)
     if arrays is None:
         arrays = compute()
-        try_save_arrays(folder, key, arrays)
+        try_save_arrays(folder, cache_key, arrays)
     return arrays
 
 
-def try_save_arrays(folder: str, key: str, arrays: Arrays) -> None:
+def try_save_arrays(folder: str, cache_key: str, arrays: Arrays) -> None:
     """Save arrays to the disk cache if the cache has room; disk errors are ignored."""
     path = cache_folder() / folder
     with contextlib.suppress(OSError):
         if _has_room(path, sum(array.nbytes for array in arrays.values())):
-            save_arrays(folder, key, arrays)
+            save_arrays(folder, cache_key, arrays)
             _prune_folder(path)
 
 
-def load_arrays(folder: str, key: str, names: Sequence[str]) -> Arrays | None:
+def load_arrays(folder: str, cache_key: str, names: Sequence[str]) -> Arrays | None:
     """Return arrays from the disk cache; None if the entry is missing or damaged, or lacks one of `names`."""
-    path = cache_folder() / folder / f"{key}{_SUFFIX}"
+    path = cache_folder() / folder / f"{cache_key}{_SUFFIX}"
     with contextlib.suppress(OSError, MemoryError):
         if not _is_trusted(path.parent):
             return None
         try:
-            arrays = _read_arrays(path, f"{folder}/{key}")
+            arrays = _read_arrays(path, f"{folder}/{cache_key}")
         except _DAMAGE_ERRORS:
             path.unlink()
             return None
@@ -112,18 +112,18 @@ def load_arrays(folder: str, key: str, names: Sequence[str]) -> Arrays | None:
     return None
 
 
-def save_arrays(folder: str, key: str, arrays: Arrays) -> None:
+def save_arrays(folder: str, cache_key: str, arrays: Arrays) -> None:
     """Write arrays to the disk cache atomically.
 
     Raises OSError when the disk fails, or when other users can write to the folder.
     """
-    path = cache_folder() / folder / f"{key}{_SUFFIX}"
+    path = cache_folder() / folder / f"{cache_key}{_SUFFIX}"
     if not _is_trusted(path.parent):
         raise PermissionError(path.parent)
     data = {k: a if a.flags.fnc else np.ascontiguousarray(a).reshape(a.shape) for k, a in arrays.items()}
     blocks = _byte_blocks(data.values())
     header = {
-        "key": f"{folder}/{key}",
+        "key": f"{folder}/{cache_key}",
         "arrays": [[k, a.dtype.str, a.shape, "F" if a.flags.fnc else "C"] for k, a in data.items()],
         "blocks": _map_threaded(lambda block: hashlib.sha256(block).hexdigest(), blocks),
     }
@@ -174,7 +174,7 @@ def _folder_files(folder: Path, suffix: str) -> list[tuple[Path, os.stat_result]
     return found
 
 
-def _read_arrays(path: Path, key: str) -> Arrays:
+def _read_arrays(path: Path, cache_key: str) -> Arrays:
     """Return the arrays in a file of the cache.
 
     Raises OSError or MemoryError when the file cannot be read, and one of `_DAMAGE_ERRORS` when the file is
@@ -184,16 +184,16 @@ def _read_arrays(path: Path, key: str) -> Arrays:
         digest, head = file.readline(_MAX_HEADER_LINE_BYTES), file.readline(_MAX_HEADER_LINE_BYTES)
         start, size = file.tell(), os.fstat(file.fileno()).st_size
     header = json.loads(head) if digest == _digest_line(head) else {}
-    if header.get("key") != key:
-        raise ValueError(key)
+    if header.get("key") != cache_key:
+        raise ValueError(cache_key)
     kinds = [(name, np.dtype(kind), shape, order) for name, kind, shape, order in header["arrays"]]
     if start + sum(_byte_count(kind, shape) for _, kind, shape, _ in kinds) != size:
-        raise ValueError(key)
+        raise ValueError(cache_key)
     arrays = {name: np.empty(shape, kind, order) for name, kind, shape, order in kinds}
     blocks = _byte_blocks(arrays.values())
     offsets = start + np.cumsum([0, *(len(block) for block in blocks)])
     if _map_threaded(partial(_read_block, path), blocks, offsets.tolist()) != header["blocks"]:
-        raise ValueError(key)
+        raise ValueError(cache_key)
     return arrays
 
 
@@ -201,15 +201,15 @@ def _digest_line(header_line: bytes) -> bytes:
     return hashlib.sha256(header_line).hexdigest().encode() + b"\n"
 
 
-def _byte_count(dtype: np.dtype[Any], shape: Sequence[int]) -> int:
+def _byte_count(dtype: np.dtype[Any], array_shape: Sequence[int]) -> int:
     """Return the size of an array in bytes, after a check of type and shape, before memory is allocated."""
     if (
         dtype.kind not in _PLAIN_DTYPE_KINDS
         or not dtype.itemsize
-        or any(type(n) is not int or n < 0 for n in shape)
+        or any(type(n) is not int or n < 0 for n in array_shape)
     ):
-        raise ValueError(f"no array: {dtype} {shape}")
-    return math.prod(shape) * dtype.itemsize
+        raise ValueError(f"no array: {dtype} {array_shape}")
+    return math.prod(array_shape) * dtype.itemsize
 
 
 def _read_block(path: Path, block: memoryview, offset: int) -> str:

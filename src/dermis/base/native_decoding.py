@@ -111,8 +111,8 @@ def _pack_arrays(arrays: Mapping[str, Bytes]) -> bytes:
     return b"".join([json.dumps(header).encode(), b"\n", *(array.tobytes() for array in arrays.values())])
 
 
-def _unpack_arrays(data: bytes) -> Arrays:
-    line, _, body = data.partition(b"\n")
+def _unpack_arrays(packed_arrays: bytes) -> Arrays:
+    line, _, body = packed_arrays.partition(b"\n")
     arrays, start = Arrays(), 0
     for name, (dtype, shape) in json.loads(line).items():
         flat = np.frombuffer(body, dtype, math.prod(shape), start)

@@ -119,30 +119,30 @@ def read_toml(path: str | Path, expected: str = "a TOML file") -> dict[str, Any]
     return tables
 
 
-def parse_json(text: str | bytes, culprit: object, expected: str) -> Any:
+def parse_json(json_text: str | bytes, culprit: object, expected: str) -> Any:
     """Return the value of a JSON text in which all numbers are finite.
 
     Raises DermisError for invalid JSON, deep nesting, and numbers that are too large.
     """
     with parsing(culprit, expected):
         return json.loads(
-            text,
+            json_text,
             parse_constant=_refuse_constant,
             parse_float=_parse_finite_float,
             parse_int=_parse_bounded_int,
         )
 
 
-def checked_path(name: object, expected: str) -> Path:
+def checked_path(file_name: object, expected: str) -> Path:
     """Convert the name of a file to a path.
 
     expected : what the name should denote, for the error
 
     Raises DermisError when the name is neither text nor a path.
     """
-    if not isinstance(name, str | os.PathLike):
-        refuse("file", f"the name of {expected}", f"got a {type(name).__name__}", "Pass its name")
-    return Path(name)
+    if not isinstance(file_name, str | os.PathLike):
+        refuse("file", f"the name of {expected}", f"got a {type(file_name).__name__}", "Pass its name")
+    return Path(file_name)
 
 
 @contextmanager

@@ -45,10 +45,10 @@ def plain_key(key_or_column: str) -> str:
     return re.sub(r"[\W_]", "", key_or_column).casefold()
 
 
-def float_columns(rows: Sequence[Mapping[str, str]], column_names: str) -> NDArray[np.float64]:
-    """Return selected columns of a table as floats, (rows, columns).
+def float_columns(table_rows: Sequence[Mapping[str, str]], column_names: str) -> NDArray[np.float64]:
+    """Return selected columns of a table as floats, (table_rows, columns).
 
-    rows : rows of the table, by column name
+    table_rows : rows of the table, by column name
     column_names : names of the columns, separated by spaces
     """
-    return np.array([[float(row[name]) for name in column_names.split()] for row in rows])
+    return np.array([[float(row[name]) for name in column_names.split()] for row in table_rows])

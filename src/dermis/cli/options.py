@@ -169,7 +169,7 @@ def _option_help(model: type[FrozenModel], field: str, shown_defaults: Mapping[s
 
 
 def check_fields(
-    model: type[M], values: Mapping[str, object], option_names: Mapping[str, str] | None = None
+    model: type[M], field_values: Mapping[str, object], option_names: Mapping[str, str] | None = None
 ) -> M:
     """Return a model with given field values; error messages name the option instead of the field.
 
@@ -180,10 +180,10 @@ def check_fields(
     from dermis.scene.field_errors import InvalidFieldsError
 
     try:
-        return model(**values)
+        return model(**field_values)
     except InvalidFieldsError as error:
         path, finding = next(iter(error.messages.items()))
-        field = path.partition(".")[0] or next(name for name in model.model_fields if name in values)
+        field = path.partition(".")[0] or next(name for name in model.model_fields if name in field_values)
         raise DermisError(f"{option_name(field, option_names)}: {finding}. Correct it.") from None
 
 

@@ -69,21 +69,21 @@ class FrameOutputs:
         if "motion" in self.names:
             note("note: motion is 0 in a single picture; Renderer.observe measures it between pictures")
 
-    def write(self, picture: Floats | None, values: Mapping[str, PlaneArray]) -> None:
+    def write(self, picture: Floats | None, output_values: Mapping[str, PlaneArray]) -> None:
         """Write the outputs to their files.
 
         picture : linear image that shares one EXR file with the outputs; None if the outputs have separate
             files
-        values : pixel arrays by output name
+        output_values : pixel arrays by output name
         """
         from dermis.frame.output_files import write_multipart, write_output
 
         if self.in_image_file:
             assert picture is not None
-            write_multipart(self.image, picture, values)
+            write_multipart(self.image, picture, output_values)
             return
         for name, path in self.paths.items():
-            write_output(path, name, values[name])
+            write_output(path, name, output_values[name])
 
     @property
     def report(self) -> dict[str, str]:
@@ -181,7 +181,7 @@ class AnimationOutput:
         """Return whether the images store linear light as floats (EXR)."""
         return self.path.suffix.lower() == ".exr"
 
-    def check(self, size: tuple[int, int]) -> None:
+    def check(self, frame_size: tuple[int, int]) -> None:
         """Raise DermisError if frames of this size cannot be written, before anything is rendered."""
         from dermis.images.movie import DEFAULT_CRF, MOVIE_SUFFIX, check_movie
         from dermis.images.writer import FrameFiles
@@ -196,10 +196,10 @@ class AnimationOutput:
         if self.path.suffix.lower() in (".png", ".exr"):
             numbered = self.path.with_name(f"%05d{self.path.suffix}")
             refuse(self.path, "a movie or numbered pictures", "it is one picture", f"Name it {numbered}")
-        check_movie(self.path, size, DEFAULT_CRF if self.crf is None else self.crf)
+        check_movie(self.path, frame_size, DEFAULT_CRF if self.crf is None else self.crf)
 
     def frames_to_render(
-        self, frame_numbers: range, size: tuple[int, int], frame_digest: str
+        self, frame_numbers: range, frame_size: tuple[int, int], frame_digest: str
     ) -> Sequence[int]:
         """Return the numbers of the frames to render: frames without a complete image of an earlier run.
 
@@ -212,10 +212,10 @@ class AnimationOutput:
             return frame_numbers
         files = FrameFiles(self.path)
         files.start(frame_digest, force=self.overwrite)
-        return files.missing(frame_numbers, size)
+        return files.missing(frame_numbers, frame_size)
 
     @contextmanager
-    def open_writer(self, size: tuple[int, int], rate: Fraction) -> Iterator[WriteFrame]:
+    def open_writer(self, frame_size: tuple[int, int], rate: Fraction) -> Iterator[WriteFrame]:
         """Yield a function that queues a frame for writing; the with block ends when all frames are written.
 
         rate : frame rate of a movie [1/s]
@@ -228,5 +228,5 @@ class AnimationOutput:
             with ImageWriter() as writer:
                 yield lambda number, picture: writer.write(files.path(number), picture)
             return
-        with MovieWriter(self.path, size, rate, DEFAULT_CRF if self.crf is None else self.crf) as movie:
+        with MovieWriter(self.path, frame_size, rate, DEFAULT_CRF if self.crf is None else self.crf) as movie:
             yield lambda _, picture: movie.write(cast("Bytes", picture))

@@ -203,21 +203,21 @@ def _tracing_options(photons: int | None, seed: int | None, anisotropy: float, i
     }
 
 
-def _refuse_tissue_options(name: str, options: Options) -> None:
+def _refuse_tissue_options(medium_name: str, options: Options) -> None:
     for option, value in options.items():
         if value is not None:
-            expected, actual = "a medium or a pigmented skin", f"{name} is a table of Gaussians"
+            expected, actual = "a medium or a pigmented skin", f"{medium_name} is a table of Gaussians"
             refuse(option_name(option, _OPTION_NAMES), expected, actual, "Remove the option")
 
 
-def _load_tissue(name: str, options: Options, eta: float | None) -> Tissue:
+def _load_tissue(medium_name: str, options: Options, eta: float | None) -> Tissue:
     from dermis.optics.tissue import load_tissue
 
     pigments = dict(options)
     structure = pigments.pop("structure", None)
-    tissue = load_tissue(name, structure, pigments)
+    tissue = load_tissue(medium_name, structure, pigments)
     if structure is not None and tissue.parameters is None:
-        refuse("--skin", "a pigmented skin", f"{name} is a medium", "Remove the option")
+        refuse("--skin", "a pigmented skin", f"{medium_name} is a medium", "Remove the option")
     return tissue if eta is None else replace(tissue, medium=tissue.medium.with_eta(eta))
 
 

@@ -145,11 +145,11 @@ def _gc_disabled() -> Iterator[None]:
 
 
 def _write_images(
-    rendered: RenderedFrame, output: Path, outputs: FrameOutputs, values: Mapping[str, PlaneArray]
+    rendered: RenderedFrame, output: Path, outputs: FrameOutputs, output_values: Mapping[str, PlaneArray]
 ) -> None:
     """Write the image file and the requested outputs, which may share the image's EXR file.
 
-    values : pixel arrays of the outputs by name
+    output_values : pixel arrays of the outputs by name
     """
     from dermis.images.io import write_image, write_png
 
@@ -161,7 +161,7 @@ def _write_images(
         if not (outputs.names and outputs.in_image_file):
             write_image(output, linear)
     if outputs.names:
-        outputs.write(linear, values)
+        outputs.write(linear, output_values)
 
 
 def _note_light(scene: Scene, settings: Settings, rendered: RenderedFrame) -> None:

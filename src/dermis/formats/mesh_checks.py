@@ -85,11 +85,11 @@ def check_rig(rig: Rig, culprit: object) -> None:
             _check_finite(f"bones ({name})", getattr(rig.skeleton, name), culprit, "of them")
 
 
-def check_mesh_counts(parts: Sequence[MeshPart], culprit: object) -> None:
+def check_mesh_counts(mesh_parts: Sequence[MeshPart], culprit: object) -> None:
     """Refuse mesh parts with too many triangles or vertices in total, before they are joined."""
-    triangles = sum(len(part.triangles) for part in parts)
+    triangles = sum(len(part.triangles) for part in mesh_parts)
     limits.check_limit(culprit, triangles, limits.MAX_TRIANGLES, "triangles", limits.DECIMATE_ADVICE)
-    vertices = sum(len(part.positions) for part in parts)
+    vertices = sum(len(part.positions) for part in mesh_parts)
     limits.check_limit(culprit, vertices, limits.MAX_VERTICES, "vertices", limits.DECIMATE_ADVICE)
 
 

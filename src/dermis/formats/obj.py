@@ -44,12 +44,12 @@ def read_obj(path: Path) -> MeshFile:
     return parse_obj(path, read_obj_text(path))
 
 
-def parse_obj(path: Path, text: str) -> MeshFile:
+def parse_obj(path: Path, obj_text: str) -> MeshFile:
     """Parse the text of a .obj file, one mesh part per pair of `usemtl` and `g`.
 
     path : path of the file, for errors and to find its .mtl
     """
-    geometry = parse_geometry(path, text)
+    geometry = parse_geometry(path, obj_text)
     library = read_library(path, geometry.statements)
     names = [tuple(dict.fromkeys(name for name in pair if name)) for pair in geometry.pairs]
     known = [library.materials.get(pair[0]) for pair in geometry.pairs]

@@ -108,13 +108,13 @@ class _StatementRows:
     start: Index
 
 
-def parse_geometry(path: Path, text: str) -> ObjGeometry:
+def parse_geometry(path: Path, obj_text: str) -> ObjGeometry:
     """Return the geometry in the text of an OBJ file.
 
     Raises DermisError with the number of the line for numbers and indices that are invalid.
     """
-    limits.check_limit(path, text.count("\n"), _MAX_LINES, "lines", limits.DECIMATE_ADVICE)
-    rows, others, unread = _split_statements(path, _plain_text(text))
+    limits.check_limit(path, obj_text.count("\n"), _MAX_LINES, "lines", limits.DECIMATE_ADVICE)
+    rows, others, unread = _split_statements(path, _plain_text(obj_text))
     positions, colours, notes = _parse_vertices(path, rows["v"])
     uv, normals = (
         _parse_number_table(path, rows["vt"], "vt")[0],
@@ -140,24 +140,26 @@ def parse_geometry(path: Path, text: str) -> ObjGeometry:
     return ObjGeometry(polygons, pairs, pair[kept], statements, notes)
 
 
-def _plain_text(text: str) -> str:
+def _plain_text(obj_text: str) -> str:
     """Join continued lines; remove blanks at the start of lines and comments at their end.
 
     The number of lines is unchanged.
     """
-    if "\\\n" in text:
-        text = _CONTINUED_LINE.sub(lambda m: m[0].replace("\\\n", " ") + "\n" * m[0].count("\n"), text)
-    if text[:1] in (" ", "\t") or "\n " in text or "\n\t" in text:
-        text = _LEADING_BLANKS.sub("", text)
-    commented = text.count("#") != text.count("\n#") + text.startswith("#")
-    return _TRAILING_COMMENT.sub(r"\1", text) if commented else text
+    if "\\\n" in obj_text:
+        obj_text = _CONTINUED_LINE.sub(
+            lambda m: m[0].replace("\\\n", " ") + "\n" * m[0].count("\n"), obj_text
+        )
+    if obj_text[:1] in (" ", "\t") or "\n " in obj_text or "\n\t" in obj_text:
+        obj_text = _LEADING_BLANKS.sub("", obj_text)
+    commented = obj_text.count("#") != obj_text.count("\n#") + obj_text.startswith("#")
+    return _TRAILING_COMMENT.sub(r"\1", obj_text) if commented else obj_text
 
 
 def _split_statements(
-    path: Path, text: str
+    path: Path, plain_text: str
 ) -> tuple[dict[str, _StatementRows], list[_Statement], dict[str, None]]:
     """Return numeric statements by kind, other statements that are used, and the first words of the rest."""
-    data = np.frombuffer(f"{text}\n".encode("utf-8", "replace"), np.uint8)
+    data = np.frombuffer(f"{plain_text}\n".encode("utf-8", "replace"), np.uint8)
     end = np.flatnonzero(data == _LINE_FEED)
     start = np.concatenate([[0], end[:-1] + 1])
     length = end - start + 1
@@ -197,27 +199,30 @@ def _check_lines(path: Path, text_length: Index, is_vertex: Mask) -> None:
 
 
 def _refuse_line(
-    path: Path, rows: _StatementRows, row_index: int, expected: str, actual: str = ""
+    path: Path, statement_rows: _StatementRows, row_index: int, expected: str, actual: str = ""
 ) -> NoReturn:
-    """Raise the error for one of the statements in `rows`; the message names its line.
+    """Raise the error for one of the statements in `statement_rows`; the message names its line.
 
-    row_index : index of the statement in `rows`
+    row_index : index of the statement in `statement_rows`
     actual : clause that says what is wrong; by default, it quotes the statement
     """
-    ends = np.append(rows.start[1:], len(rows.text))
+    ends = np.append(statement_rows.start[1:], len(statement_rows.text))
     words = " ".join(
-        rows.text[rows.start[row_index] : ends[row_index]].tobytes().decode(errors="replace").split()
+        statement_rows.text[statement_rows.start[row_index] : ends[row_index]]
+        .tobytes()
+        .decode(errors="replace")
+        .split()
     )
     said = actual or (f"it has {words!r}" if words else "it has nothing")
-    refuse(path, expected, f"in line {rows.line[row_index] + 1} {said}", limits.DAMAGED_ADVICE)
+    refuse(path, expected, f"in line {statement_rows.line[row_index] + 1} {said}", limits.DAMAGED_ADVICE)
 
 
-def _parse_vertices(path: Path, rows: _StatementRows) -> tuple[Doubles, Doubles | None, list[str]]:
+def _parse_vertices(path: Path, statement_rows: _StatementRows) -> tuple[Doubles, Doubles | None, list[str]]:
     """Return positions (n, 3), linear colours (n, 3) or None, and notes.
 
     One number after the position is a weight, by which the position is divided; three numbers are a colour.
     """
-    table, counts = _parse_number_table(path, rows, "v")
+    table, counts = _parse_number_table(path, statement_rows, "v")
     positions, notes = table[:, :3], list[str]()
     if (counts == 5).any() or (counts > _USED_NUMBERS).any():
         notes.append("further numbers after the position or colour of vertices (v) are left out")
@@ -245,19 +250,21 @@ def _parse_polypaint(hex_digits: str, vertex_count: int) -> tuple[Doubles | None
     return linear_colours(levels[:, 1:])
 
 
-def _parse_number_table(path: Path, rows: _StatementRows, statement_key: str) -> tuple[Doubles, Index]:
+def _parse_number_table(
+    path: Path, statement_rows: _StatementRows, statement_key: str
+) -> tuple[Doubles, Index]:
     """Return the first six numbers (n, 6) of each statement, padded with NaN, and their true count (n,)."""
-    words = run_starts(rows.text > _SPACE)
-    first = np.searchsorted(words, rows.start)
+    words = run_starts(statement_rows.text > _SPACE)
+    first = np.searchsorted(words, statement_rows.start)
     counts = np.diff(first, append=len(words))
     fewest = _MIN_NUMBERS_PER_STATEMENT[statement_key]
     expected = f"{fewest} to {_MOST_NUMBERS} numbers after {statement_key}"
     if (faulty := (counts < fewest) | (counts > _MOST_NUMBERS)).any():
-        _refuse_line(path, rows, int(faulty.argmax()), expected)
+        _refuse_line(path, statement_rows, int(faulty.argmax()), expected)
     try:
-        values = parse_numbers(rows.text, len(words), np.float64)
+        values = parse_numbers(statement_rows.text, len(words), np.float64)
     except ValueError:
-        _refuse_line(path, rows, _first_non_numeric(rows, np.float64), expected)
+        _refuse_line(path, statement_rows, _first_non_numeric(statement_rows, np.float64), expected)
     column = np.arange(_USED_NUMBERS)
     table = np.full((len(counts), _USED_NUMBERS), np.nan)
     given = column < counts[:, None]
@@ -265,9 +272,9 @@ def _parse_number_table(path: Path, rows: _StatementRows, statement_key: str) ->
     return table, counts
 
 
-def _first_non_numeric(rows: _StatementRows, dtype: type[np.float64] | type[np.int64]) -> int:
+def _first_non_numeric(statement_rows: _StatementRows, dtype: type[np.float64] | type[np.int64]) -> int:
     """Return the index of the first statement with a word that is not a number."""
-    for index, statement in enumerate(rows.text.tobytes().split(b"\n")):
+    for index, statement in enumerate(statement_rows.text.tobytes().split(b"\n")):
         try:
             parse_numbers(np.frombuffer(statement, np.uint8), len(statement.split()), dtype)  # type: ignore[type-var]
         except ValueError:
@@ -275,12 +282,12 @@ def _first_non_numeric(rows: _StatementRows, dtype: type[np.float64] | type[np.i
     return 0
 
 
-def _parse_faces(path: Path, rows: Mapping[str, _StatementRows]) -> tuple[Index, Index]:
+def _parse_faces(path: Path, rows_of_statement: Mapping[str, _StatementRows]) -> tuple[Index, Index]:
     """Return the number of corners of each face, and position, uv and normal index of each corner (c, 3).
 
     The index is -1 for a corner without uv or normal.
     """
-    faces = rows["f"]
+    faces = rows_of_statement["f"]
     slash = faces.text == _SLASH
     spaced = replace(faces, text=np.where(slash, np.uint8(_SPACE), faces.text))
     corner_start, index_start = run_starts(faces.text > _SPACE), run_starts(spaced.text > _SPACE)
@@ -303,10 +310,10 @@ def _parse_faces(path: Path, rows: Mapping[str, _StatementRows]) -> tuple[Index,
     refuse_at(column > 2, index_start, "corners of faces as position/uv/normal")
     corners = np.zeros((len(corner_start), 3), np.int64)
     corners[corner, column] = values
-    given, sizes = corners != 0, [len(rows[kind].line) for kind in _VERTEX_STATEMENTS]
+    given, sizes = corners != 0, [len(rows_of_statement[kind].line) for kind in _VERTEX_STATEMENTS]
     if (values < 0).any():
         before = np.column_stack(
-            [np.searchsorted(rows[kind].line, faces.line) for kind in _VERTEX_STATEMENTS]
+            [np.searchsorted(rows_of_statement[kind].line, faces.line) for kind in _VERTEX_STATEMENTS]
         )
         corners = np.where(corners < 0, corners + np.repeat(before, counts, axis=0) + 1, corners)
     faulty = (given & ((corners < 1) | (corners > sizes))).any(axis=1) | ~given[:, 0]

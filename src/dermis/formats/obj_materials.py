@@ -151,13 +151,13 @@ class MaterialLibrary:
     missing: list[str] = field(default_factory=list)
 
 
-def read_library(path: Path, text: str) -> MaterialLibrary:
+def read_library(path: Path, obj_text: str) -> MaterialLibrary:
     """Read the .mtl files that an OBJ file references.
 
-    path, text : path and text of the OBJ file
+    path, obj_text : path and text of the OBJ file
     """
     library, remaining = MaterialLibrary(), limits.MAX_MTL_BYTES
-    for listed in library_names(text)[: limits.MAX_MTL_FILES]:
+    for listed in library_names(obj_text)[: limits.MAX_MTL_FILES]:
         found = find_referenced_file(path, listed)
         names = [listed] if found else listed.split(".mtl ")[: limits.MAX_MTL_FILES]
         for name in names:
@@ -172,16 +172,16 @@ def read_library(path: Path, text: str) -> MaterialLibrary:
     return library
 
 
-def library_names(text: str) -> list[str]:
+def library_names(obj_text: str) -> list[str]:
     """Return the .mtl file names in the `mtllib` lines of an OBJ text, without duplicates."""
-    names = (line[1].strip() for line in _LIBRARY_LINE.finditer(text))
+    names = (line[1].strip() for line in _LIBRARY_LINE.finditer(obj_text))
     return [name for name in dict.fromkeys(names) if name]
 
 
-def _parse_mtl(text: str) -> dict[str, MtlMaterial]:
+def _parse_mtl(mtl_text: str) -> dict[str, MtlMaterial]:
     materials: dict[str, MtlMaterial] = {}
     current = MtlMaterial()
-    for line in text.splitlines():
+    for line in mtl_text.splitlines():
         statement = line.strip().replace("\t", " ")
         if len(line) > _MAX_LINE_LENGTH or not statement or statement.startswith("#"):
             continue
@@ -244,21 +244,21 @@ def _with_option(texture: MtlTexture, texture_option: re.Match[str]) -> MtlTextu
 
 
 def with_materials(
-    path: Path, parts: Sequence[MeshPart], library: MaterialLibrary
+    path: Path, mesh_parts: Sequence[MeshPart], library: MaterialLibrary
 ) -> tuple[list[MeshPart], tuple[FileMaterial, ...], list[str]]:
     """Return the parts of an OBJ file with their materials, and notes on missing pictures.
 
     Parts whose pictures are a sequence of UDIM tiles are divided into one part for each tile.
 
     path : path of the OBJ file
-    parts : mesh parts; if a part has a material, the first name of the part's group is the name of the
+    mesh_parts : mesh parts; if a part has a material, the first name of the part's group is the name of the
         material
     """
     materials: list[FileMaterial] = []
     notes = [f"mtllib: {name} is not in its folder. {_MISSING_ADVICE}" for name in library.missing]
     index: dict[tuple[str, int], int] = {}
     assigned = []
-    for part in parts:
+    for part in mesh_parts:
         name = next((name for name in part.group.names if name in library.materials), None)
         if name is None:
             assigned.append(part)
@@ -274,18 +274,22 @@ def with_materials(
     return assigned, tuple(materials), notes
 
 
-def _udim_tiles(part: MeshPart) -> list[tuple[int, MeshPart]]:
+def _udim_tiles(mesh_part: MeshPart) -> list[tuple[int, MeshPart]]:
     """Divide a part into the UDIM tiles of its triangles; return the number and the part of each tile."""
-    if part.uv is None or not len(part.triangles):
-        return [(_FIRST_UDIM, part)]
-    column, row = np.floor(part.uv[part.triangles].mean(axis=1)).astype(int).T
+    if mesh_part.uv is None or not len(mesh_part.triangles):
+        return [(_FIRST_UDIM, mesh_part)]
+    column, row = np.floor(mesh_part.uv[mesh_part.triangles].mean(axis=1)).astype(int).T
     number = np.clip(_FIRST_UDIM + column + _UDIM_COLUMNS * row, _FIRST_UDIM, _MAX_UDIM)
     pieces = []
     for udim in np.unique(number).tolist():
         own = number == udim
         position = np.cumsum(own) - 1
-        quads = position[part.quads[own[part.quads].all(axis=1)]] if len(part.quads) else part.quads
-        pieces.append((udim, replace(part, triangles=part.triangles[own], quads=quads)))
+        quads = (
+            position[mesh_part.quads[own[mesh_part.quads].all(axis=1)]]
+            if len(mesh_part.quads)
+            else mesh_part.quads
+        )
+        pieces.append((udim, replace(mesh_part, triangles=mesh_part.triangles[own], quads=quads)))
     return pieces
 
 

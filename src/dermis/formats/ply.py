@@ -189,18 +189,18 @@ def read_ply(path: Path) -> MeshFile:
     return MeshFile(parts, materials=materials, notes=tuple(notes))
 
 
-def _read_header(path: Path, data: bytes) -> _Header:
+def _read_header(path: Path, ply_bytes: bytes) -> _Header:
     """Return the header of a PLY file after checking its counts of elements and properties.
 
-    data : bytes of the whole file
+    ply_bytes : bytes of the whole file
 
     Raises DermisError for an invalid header.
     """
-    end = _HEADER_END.search(data, 0, _MAX_HEADER_BYTES)
-    if not data.startswith(b"ply") or end is None:
+    end = _HEADER_END.search(ply_bytes, 0, _MAX_HEADER_BYTES)
+    if not ply_bytes.startswith(b"ply") or end is None:
         refuse(path, "a PLY file", "it cannot be read (its header is invalid)", limits.DAMAGED_ADVICE)
-    size = end.end() - (end[1] == b"\r\n" and b"\n" not in data[: end.start()])
-    lines = decode_text(data[: end.start()]).split("\n")
+    size = end.end() - (end[1] == b"\r\n" and b"\n" not in ply_bytes[: end.start()])
+    lines = decode_text(ply_bytes[: end.start()]).split("\n")
     words = [line.split() for line in lines]
     properties = sum(line[:1] == ["property"] for line in words)
     limits.check_limit(path, properties, _MAX_PROPERTIES, "properties", limits.DAMAGED_ADVICE)
@@ -210,7 +210,7 @@ def _read_header(path: Path, data: bytes) -> _Header:
             case ["format", name, *_] if name in _BYTE_ORDERS:
                 header = header._replace(order=_BYTE_ORDERS[name])
             case ["element", *declared]:
-                header.elements.append(_declared_element(path, declared, len(data) - size))
+                header.elements.append(_declared_element(path, declared, len(ply_bytes) - size))
             case ["property", *declared] if header.elements:
                 header.elements[-1].properties.append(_declared_property(path, declared))
             case ["comment", key, _, *_] if key.lower() == "texturefile":
@@ -222,49 +222,51 @@ def _read_header(path: Path, data: bytes) -> _Header:
     return header
 
 
-def _declared_element(path: Path, words: Sequence[str], remaining_bytes: int) -> _Element:
+def _declared_element(path: Path, header_words: Sequence[str], remaining_bytes: int) -> _Element:
     """Return an element without its properties; refuse a count too large for a mesh or for the file's size.
 
-    words : words after "element"
+    header_words : words after "element"
     """
-    name, count = words if len(words) == 2 else ("", "")
+    name, count = header_words if len(header_words) == 2 else ("", "")
     if not (count.isdecimal() and len(count) < 12):
-        actual = f"got {' '.join(words)[:80]!r}"
+        actual = f"got {' '.join(header_words)[:80]!r}"
         refuse(path, "elements with a name and a number", actual, limits.DAMAGED_ADVICE)
     limit = min(_MAX_ELEMENTS.get(name, limits.MAX_TRIANGLES), remaining_bytes)
     limits.check_limit(path, int(count), limit, f"elements named {name!r}", limits.DECIMATE_ADVICE)
     return _Element(name, int(count), [])
 
 
-def _declared_property(path: Path, words: Sequence[str]) -> _Property:
+def _declared_property(path: Path, header_words: Sequence[str]) -> _Property:
     """Return a property.
 
-    words : words after "property"
+    header_words : words after "property"
     """
-    is_list = words[:1] == ["list"]
-    kinds = words[is_list:-1]
+    is_list = header_words[:1] == ["list"]
+    kinds = header_words[is_list:-1]
     if len(kinds) != 1 + is_list or not all(kind in _NUMPY_TYPES for kind in kinds):
-        actual = f"got {' '.join(words)[:80]!r}"
+        actual = f"got {' '.join(header_words)[:80]!r}"
         refuse(path, "properties with a name and known types", actual, limits.DAMAGED_ADVICE)
-    return _Property(words[-1], *(_NUMPY_TYPES[kind] for kind in reversed(kinds)))
+    return _Property(header_words[-1], *(_NUMPY_TYPES[kind] for kind in reversed(kinds)))
 
 
-def _read_elements(path: Path, header: _Header, data: Bytes) -> dict[str, _Columns]:
+def _read_elements(path: Path, header: _Header, ply_data: Bytes) -> dict[str, _Columns]:
     """Return the columns of all elements by name.
 
-    data : bytes after the header
+    ply_data : bytes after the header
     """
     is_text = header.order == _BYTE_ORDERS["ascii"]
     if is_text:
-        data = parse_numbers(data, len(run_starts(data > _SPACE_BYTE)), np.float64).view(np.uint8)
+        ply_data = parse_numbers(ply_data, len(run_starts(ply_data > _SPACE_BYTE)), np.float64).view(np.uint8)
     tables, position = dict[str, _Columns](), 0
     for element in header.elements:
         if element.count:
-            reader = _ElementReader(path, element, header.order, is_text, data)
+            reader = _ElementReader(path, element, header.order, is_text, ply_data)
             tables[element.name], position = reader.read(position)
-    if position < len(data) and (is_text or (data[position:] > _SPACE_BYTE).any()):
+    if position < len(ply_data) and (is_text or (ply_data[position:] > _SPACE_BYTE).any()):
         left, unit = (
-            (len(data) - position, "bytes") if not is_text else ((len(data) - position) // 8, "numbers")
+            (len(ply_data) - position, "bytes")
+            if not is_text
+            else ((len(ply_data) - position) // 8, "numbers")
         )
         actual = f"{left:,} {unit} follow its last element"
         refuse(path, "as much data as the header states", actual, limits.DAMAGED_ADVICE)

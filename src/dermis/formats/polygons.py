@@ -63,7 +63,11 @@ class Polygons:
         return [self._build_part(*piece, triangle_order) for piece in zip(chosen, *pieces, strict=True)]
 
     def _build_part(
-        self, group: MaterialGroup, corner_counts: Index, corners: Index, triangle_order: TriangleOrder
+        self,
+        material_group: MaterialGroup,
+        corner_counts: Index,
+        corners: Index,
+        triangle_order: TriangleOrder,
     ) -> MeshPart:
         """Return selected polygons as a part with one vertex per combination of position, normal and uv."""
         vertex, uv, normal = corners.T + np.array([[0], [1], [1]])
@@ -80,7 +84,7 @@ class Polygons:
             vertex, normal = np.divmod(keys, sizes[0])
         triangles, quads = triangulate(corner_counts, triangle_order)
         return MeshPart(
-            group,
+            material_group,
             self.positions[vertex] + 0.0,  # converts -0 to 0
             self.uv[uv - 1] if uv.all() else None,
             np.where(normal[:, None], self.normals[normal - 1] + 0.0, np.nan) if normal.any() else None,

@@ -58,10 +58,10 @@ def _load_sample_registry() -> Mapping[str, Sample]:
     return MappingProxyType({name: _parse_sample(name, entry) for name, entry in tomllib.loads(text).items()})
 
 
-def _parse_sample(name: str, sample_table: dict[str, Any]) -> Sample:
+def _parse_sample(sample_name: str, sample_table: dict[str, Any]) -> Sample:
     home, listed = sample_table.pop("home"), sample_table.pop("files")
     files = {role: SampleFile(**file, url=home + file["name"]) for role, file in listed.items()}
-    return Sample(name=name, files=MappingProxyType(files), **sample_table)
+    return Sample(name=sample_name, files=MappingProxyType(files), **sample_table)
 
 
 SAMPLES = _load_sample_registry()
@@ -96,10 +96,12 @@ def is_available(name: str) -> bool:
     return all(_has_expected_hash(folder / file.name, file) for file in sample.files.values())
 
 
-def _find_sample(name: str) -> Sample:
-    if name not in SAMPLES:
-        refuse(f"sample {name!r}", f"one of {', '.join(SAMPLES)}", "it is unknown", "Choose one of them")
-    return SAMPLES[name]
+def _find_sample(sample_name: str) -> Sample:
+    if sample_name not in SAMPLES:
+        refuse(
+            f"sample {sample_name!r}", f"one of {', '.join(SAMPLES)}", "it is unknown", "Choose one of them"
+        )
+    return SAMPLES[sample_name]
 
 
 def _data_folder() -> str:
@@ -111,13 +113,13 @@ def _sample_folder(sample: Sample) -> Path:
     return Path(base) / sample.folder
 
 
-def _has_expected_hash(path: Path, file: SampleFile) -> bool:
+def _has_expected_hash(path: Path, sample_file: SampleFile) -> bool:
     """Return whether a file exists and has the expected SHA-256."""
     try:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):  # a pipe would block the reader
             return False
-        return _file_sha256(path, status.st_size, status.st_mtime_ns) == file.sha256
+        return _file_sha256(path, status.st_size, status.st_mtime_ns) == sample_file.sha256
     except OSError:
         return False
 

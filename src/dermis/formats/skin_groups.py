@@ -60,7 +60,7 @@ _MIN_HEAD_AREA_FRACTION = 0.1  # smallest fraction of the head's area that a par
 
 
 def choose_skin(
-    parts: Sequence[MeshPart], groups: Sequence[MaterialGroup], scatters: Sequence[bool]
+    mesh_parts: Sequence[MeshPart], groups: Sequence[MaterialGroup], scatters: Sequence[bool]
 ) -> list[bool]:
     """Return whether each mesh part is skin.
 
@@ -78,26 +78,26 @@ def choose_skin(
     for rule in (list(scatters), named, body):
         if any(rule):
             return rule
-    covering = _covers_head(parts, is_other)
-    return covering if any(covering) else [True] * len(parts)
+    covering = _covers_head(mesh_parts, is_other)
+    return covering if any(covering) else [True] * len(mesh_parts)
 
 
-def _group_words(group: MaterialGroup) -> set[str]:
-    return {word.casefold() for name in group.names for word in _WORD_PATTERN.findall(name)}
+def _group_words(material_group: MaterialGroup) -> set[str]:
+    return {word.casefold() for name in material_group.names for word in _WORD_PATTERN.findall(name)}
 
 
-def _has_skin_word(words: set[str]) -> bool:
+def _has_skin_word(name_words: set[str]) -> bool:
     """Return whether any word means skin, alone or in a compound such as faceskin."""
-    own = {word for word in words if word.endswith(("skin", "skins")) and word not in NON_SKIN_WORDS}
-    return bool(own | (words & set(SKIN_WORDS)))
+    own = {word for word in name_words if word.endswith(("skin", "skins")) and word not in NON_SKIN_WORDS}
+    return bool(own | (name_words & set(SKIN_WORDS)))
 
 
-def _covers_head(parts: Sequence[MeshPart], is_not_skin: Sequence[bool]) -> list[bool]:
+def _covers_head(mesh_parts: Sequence[MeshPart], is_not_skin: Sequence[bool]) -> list[bool]:
     """Return whether each mesh part covers a notable fraction of the head's area."""
-    heights = np.concatenate([part.positions[:, 1] for part in parts])
+    heights = np.concatenate([part.positions[:, 1] for part in mesh_parts])
     lowest = heights.max() - HEAD_HEIGHT_FRACTION * np.ptp(heights)
-    area = np.zeros(len(parts))
-    for index, part in enumerate(parts):
+    area = np.zeros(len(mesh_parts))
+    for index, part in enumerate(mesh_parts):
         corners = part.positions[part.triangles]
         area[index] = triangle_areas(corners)[corners[..., 1].mean(axis=1) >= lowest].sum()
     area[np.array(is_not_skin)] = 0.0

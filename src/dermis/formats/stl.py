@@ -42,23 +42,23 @@ def read_stl(path: Path) -> MeshFile:
     return MeshFile([part], notes=notes)
 
 
-def _binary_corners(path: Path, data: bytes, triangle_count: int) -> tuple[Doubles, tuple[str, ...]]:
+def _binary_corners(path: Path, stl_bytes: bytes, triangle_count: int) -> tuple[Doubles, tuple[str, ...]]:
     """Return the corners (3f, 3) of a binary file, and notes.
 
     triangle_count : number of triangles that the header states
     """
     _check_triangle_count(path, triangle_count)
-    if len(data) < _HEADER_BYTES + triangle_count * _TRIANGLE_DTYPE.itemsize:
-        actual = f"{len(data):,} bytes are too few for its {triangle_count:,} triangles"
+    if len(stl_bytes) < _HEADER_BYTES + triangle_count * _TRIANGLE_DTYPE.itemsize:
+        actual = f"{len(stl_bytes):,} bytes are too few for its {triangle_count:,} triangles"
         refuse(path, "a whole STL file", actual, limits.DAMAGED_ADVICE)
-    records = np.frombuffer(data, _TRIANGLE_DTYPE, triangle_count, _HEADER_BYTES)
+    records = np.frombuffer(stl_bytes, _TRIANGLE_DTYPE, triangle_count, _HEADER_BYTES)
     notes = ("colours of triangles are left out",) if records["attribute"].any() else ()
     return records["corners"].reshape(-1, 3).astype(np.float64), notes
 
 
-def _text_corners(path: Path, data: bytes) -> Doubles:
+def _text_corners(path: Path, stl_bytes: bytes) -> Doubles:
     """Return the corners (3f, 3) of a text file."""
-    lines = _CORNER_LINE.findall(data)
+    lines = _CORNER_LINE.findall(stl_bytes)
     _check_triangle_count(path, len(lines) // 3)
     if len(lines) % 3:
         actual = f"it has {len(lines):,} corners"

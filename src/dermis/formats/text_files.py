@@ -20,21 +20,21 @@ _UTF16_MARKS = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 T = TypeVar("T", np.float64, np.int64)
 
 
-def decode_text(data: bytes) -> str:
+def decode_text(encoded_text: bytes) -> str:
     """Decode a text, with line feeds as the only line ends.
 
-    data : UTF-8, or UTF-16 with a byte order mark; lines that are not valid UTF-8 are read as Latin-1
+    encoded_text : UTF-8, or UTF-16 with a byte order mark; lines that are not valid UTF-8 are read as Latin-1
 
     Raises ValueError for damaged UTF-16.
     """
-    if data.startswith(_UTF16_MARKS):
-        text = data.decode("utf-16")
+    if encoded_text.startswith(_UTF16_MARKS):
+        text = encoded_text.decode("utf-16")
     else:
-        data = data.removeprefix(codecs.BOM_UTF8)
+        encoded_text = encoded_text.removeprefix(codecs.BOM_UTF8)
         try:
-            text = data.decode("utf-8")
+            text = encoded_text.decode("utf-8")
         except UnicodeDecodeError:
-            text = "\n".join(map(_decode_line, data.replace(b"\r", b"\n").split(b"\n")))
+            text = "\n".join(map(_decode_line, encoded_text.replace(b"\r", b"\n").split(b"\n")))
     return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
 
 
@@ -59,17 +59,17 @@ def run_starts(inside_mask: Mask) -> Index:
     return np.flatnonzero(first)
 
 
-def parse_numbers(text: Bytes, number_count: int, dtype: type[T]) -> NDArray[T]:
+def parse_numbers(number_text: Bytes, number_count: int, dtype: type[T]) -> NDArray[T]:
     """Return the numbers in a text, separated by blanks and line feeds.
 
-    text : ASCII codes
+    number_text : ASCII codes
     number_count : number of words in the text
 
     Raises ValueError if a word is not a number.
     """
     # NumPy parses blanks alone as a number, and some versions only warn about words that are not numbers
     try:
-        values = np.fromstring(text.tobytes(), dtype, sep=" ") if number_count else np.empty(0, dtype)
+        values = np.fromstring(number_text.tobytes(), dtype, sep=" ") if number_count else np.empty(0, dtype)
     except (ValueError, DeprecationWarning):
         values = np.empty(0, dtype)
     if len(values) != number_count:

@@ -320,7 +320,7 @@ def eyeball_mesh() -> tuple[Doubles, Index]:
 
     The eyeball looks along +Z.
     """
-    return build_eyeball(scale=CONTROL_MESH_SCALE)
+    return build_eyeball(position_scale=CONTROL_MESH_SCALE)
 
 
 def place_eyeball(socket: EyeSocket) -> tuple[Doubles, Doubles]:

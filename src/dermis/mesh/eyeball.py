@@ -110,12 +110,12 @@ class LidContact(ShortRepr):
 
 
 @cache
-def build_eyeball(quads_per_edge: int = QUADS_PER_EDGE, scale: float = 1.0) -> tuple[Doubles, Index]:
+def build_eyeball(quads_per_edge: int = QUADS_PER_EDGE, position_scale: float = 1.0) -> tuple[Doubles, Index]:
     """Return the points (n, 3) of an eyeball that looks along +Z [mm], and its quads (q, 4).
 
     quads_per_edge : number of quads along each edge of the cube that is projected to the ball
-    scale : factor of the positions; control points need a factor above 1, as their subdivision surface is
-        smaller
+    position_scale : factor of the positions; control points need a factor above 1, as their subdivision surface
+        is smaller
     """
     points, quads = list[Doubles](), list[Index]()
     grid = np.tan(np.linspace(-np.pi / 4, np.pi / 4, quads_per_edge + 1))  # evenly spaced in angle
@@ -132,7 +132,7 @@ def build_eyeball(quads_per_edge: int = QUADS_PER_EDGE, scale: float = 1.0) -> t
     _, first, welded = np.unique(np.rint(1e6 * cube), axis=0, return_index=True, return_inverse=True)
     direction = cube[first] / np.linalg.norm(cube[first], axis=1, keepdims=True)
     radius = profile_mm(np.arccos(np.clip(direction[:, 2], -1.0, 1.0)))
-    return scale * radius[:, None] * direction, welded.reshape(-1)[np.concatenate(quads)]
+    return position_scale * radius[:, None] * direction, welded.reshape(-1)[np.concatenate(quads)]
 
 
 @cache

@@ -14,12 +14,12 @@ MIN_UV_CROSS = 1e-12
 T = TypeVar("T", np.float32, np.float64)
 
 
-def weld(rows: ArrayLike) -> Ints:
+def weld(vertex_rows: ArrayLike) -> Ints:
     """Return the index of each row (v, k) among the unique rows, (v,); rows are compared in float32.
 
-    rows : positions [mm], or positions and uv side by side
+    vertex_rows : positions [mm], or positions and uv side by side
     """
-    table = np.asarray(rows, dtype=np.float32)
+    table = np.asarray(vertex_rows, dtype=np.float32)
     order = np.lexsort(table.T)
     ordered = table[order]
     starts = np.ones(len(table), dtype=np.int32)

@@ -213,9 +213,11 @@ def _add_edge_vertices(cage: Cage, sides: _Sides) -> tuple[Doubles, Index]:
     return uv, np.concatenate((cage.point, sides.point_count + edge_of_cut))
 
 
-def _sparse_matrix(rows: Index, columns: Index, weights: Doubles, shape: tuple[int, int]) -> csr_array:
+def _sparse_matrix(
+    row_index: Index, column_index: Index, weights: Doubles, matrix_shape: tuple[int, int]
+) -> csr_array:
     """Return a sparse matrix of nonzero weights; weights with equal row and column are summed."""
     from scipy.sparse import coo_array
 
     used = weights != 0
-    return coo_array((weights[used], (rows[used], columns[used])), shape=shape).tocsr()
+    return coo_array((weights[used], (row_index[used], column_index[used])), shape=matrix_shape).tocsr()

@@ -274,22 +274,22 @@ CAMERA_PRESETS = {
 """Functions of the head that return a camera, by name; hyphens and underscores are interchangeable."""
 
 
-def camera_preset(name: str, head: Head) -> Camera:
+def camera_preset(preset_name: str, head: Head) -> Camera:
     """Return the camera of a preset, placed for a head.
 
     Raises DermisError for a name that is not in `CAMERA_PRESETS`.
     """
-    preset = find_preset(name)
+    preset = find_preset(preset_name)
     if preset is None:
         expected = f"one of {', '.join(CAMERA_PRESETS)} or a TOML file"
-        refuse(f"camera {name}", expected, "it is neither", "Check the name")
+        refuse(f"camera {preset_name}", expected, "it is neither", "Check the name")
     return preset(head)
 
 
-def find_preset(name: str) -> Callable[[Head], Camera] | None:
+def find_preset(preset_name: str) -> Callable[[Head], Camera] | None:
     """Return the function of a camera preset, or None for a name that is not a preset."""
     by_name = {key.replace("-", "_"): preset for key, preset in CAMERA_PRESETS.items()}
-    return by_name.get(name.replace("-", "_"))
+    return by_name.get(preset_name.replace("-", "_"))
 
 
 def _camera_at_azimuth(head: Head, azimuth_degrees: float) -> Camera:

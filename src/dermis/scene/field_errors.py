@@ -81,22 +81,24 @@ def numeric_fields(model: type[BaseModel]) -> Mapping[str, bool]:
     return found
 
 
-def python_numbers(value: Any, accepts_text: bool = False) -> Any:
+def python_numbers(field_value: Any, accepts_text: bool = False) -> Any:
     """Convert NumPy scalars and arrays to Python numbers, and wrap booleans and text in `_NotANumber`.
 
     accepts_text : whether text is a valid value, which is then not wrapped
     """
     import numpy as np  # importing it takes longer than printing help
 
-    if isinstance(value, np.generic | np.ndarray):
-        value = value.tolist()
-    if isinstance(value, list | tuple):
-        return [python_numbers(one) for one in value]
-    if isinstance(value, Mapping):
-        return {name: python_numbers(one) for name, one in value.items()}
-    if isinstance(value, bool | set | frozenset) or (isinstance(value, _TEXT_TYPES) and not accepts_text):
-        return _NotANumber(value)
-    return value
+    if isinstance(field_value, np.generic | np.ndarray):
+        field_value = field_value.tolist()
+    if isinstance(field_value, list | tuple):
+        return [python_numbers(one) for one in field_value]
+    if isinstance(field_value, Mapping):
+        return {name: python_numbers(one) for name, one in field_value.items()}
+    if isinstance(field_value, bool | set | frozenset) or (
+        isinstance(field_value, _TEXT_TYPES) and not accepts_text
+    ):
+        return _NotANumber(field_value)
+    return field_value
 
 
 def field_keywords(model: type[BaseModel], field: str) -> tuple[str, ...]:

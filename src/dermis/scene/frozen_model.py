@@ -251,13 +251,15 @@ def accepted_values(model: type[BaseModel], field: str) -> str:
     return ", ".join(words)
 
 
-def format_default(value: Any) -> str:
+def format_default(default: Any) -> str:
     """Return a default value as typed on the command line; "" for None, booleans and missing defaults."""
-    if isinstance(value, tuple):
-        return ("x" if all(isinstance(one, int) for one in value) else ",").join(map(format_default, value))
-    if value is None or isinstance(value, bool) or value is PydanticUndefined:
+    if isinstance(default, tuple):
+        return ("x" if all(isinstance(one, int) for one in default) else ",").join(
+            map(format_default, default)
+        )
+    if default is None or isinstance(default, bool) or default is PydanticUndefined:
         return ""
-    return f"{value:g}" if isinstance(value, float) else str(value)
+    return f"{default:g}" if isinstance(default, float) else str(default)
 
 
 def _registry_names(field_info: FieldInfo) -> list[RegisteredName]:

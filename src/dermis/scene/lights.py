@@ -43,9 +43,13 @@ _Length = Annotated[
 _BRIGHTNESS_SYNONYMS = ("brightness", "color", "colour", "energy", "intensity", "power", "strength")
 
 
-def _equal_channels(value: Any) -> Any:
+def _equal_channels(number_or_colour: Any) -> Any:
     """Return a number as three equal channels (red, green, blue); return other values unchanged."""
-    return (value,) * 3 if isinstance(value, int | float) and not isinstance(value, bool) else value
+    return (
+        (number_or_colour,) * 3
+        if isinstance(number_or_colour, int | float) and not isinstance(number_or_colour, bool)
+        else number_or_colour
+    )
 
 
 class _LightBase(FrozenModel):
@@ -264,7 +268,7 @@ def light_presets() -> list[str]:
     return sorted([NO_LIGHTS, *(name.removesuffix(".toml") for name in names if name.endswith(".toml"))])
 
 
-def preset_lights(name: str, head: Head | None = None) -> tuple[Light, ...]:
+def preset_lights(preset_name: str, head: Head | None = None) -> tuple[Light, ...]:
     """Return the lights of a light preset, placed for a head.
 
     head : head that is lit; None for a head of ordinary size that faces +Z
@@ -273,9 +277,11 @@ def preset_lights(name: str, head: Head | None = None) -> tuple[Light, ...]:
     skin, the lights are on the side to which the skin faces. Narrow spots keep their distance, as they are
     aimed at a part of the head.
     """
-    if name == NO_LIGHTS:
+    if preset_name == NO_LIGHTS:
         return ()
-    lights = tuple(LIGHTS[table["kind"]](**table) for table in tomllib.loads(preset_toml(name))["lights"])
+    lights = tuple(
+        LIGHTS[table["kind"]](**table) for table in tomllib.loads(preset_toml(preset_name))["lights"]
+    )
     return lights if head is None else tuple(_place_light(light, head) for light in lights)
 
 
@@ -303,9 +309,9 @@ def _keeps_distance(light: Light) -> bool:
     )
 
 
-def preset_toml(name: str) -> str:
+def preset_toml(preset_name: str) -> str:
     """Return the [[lights]] tables of a light preset as TOML text."""
-    return (resources.files("dermis.scene") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
+    return (resources.files("dermis.scene") / "presets" / f"{preset_name}.toml").read_text(encoding="utf-8")
 
 
 def studio(head: Head | None = None) -> tuple[Light, ...]:

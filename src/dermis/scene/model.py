@@ -95,8 +95,8 @@ class Scene:
         """Return a validated copy in which the given fields, such as skin or lights, have new values."""
         return replace(self, **parts)
 
-    def _set_field(self, part: str, value: object) -> None:
-        object.__setattr__(self, part, value)
+    def _set_field(self, field_name: str, field_value: object) -> None:
+        object.__setattr__(self, field_name, field_value)
 
     @cached_property
     def motion(self) -> Motion | None:

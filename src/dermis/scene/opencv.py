@@ -67,17 +67,17 @@ def from_opencv(K: ArrayLike, R: ArrayLike, t: ArrayLike, size: tuple[int, int])
     }
 
 
-def intrinsics(lens: tuple[float, tuple[float, float], float], size: tuple[int, int]) -> Doubles:
+def intrinsics(lens: tuple[float, tuple[float, float], float], picture_size: tuple[int, int]) -> Doubles:
     """Return the intrinsic matrix K (3, 3) of a camera [pixel].
 
     lens : tangent of half the vertical angle of view; principal point as fractions of width and height from
         the upper left corner; and width of a pixel divided by its height
-    size : width and height of the picture [pixel]
+    picture_size : width and height of the picture [pixel]
     """
     half_view_tangent, principal_point, pixel_aspect = lens
-    size = _checked_picture_size(size)
-    fy = 0.5 * size[1] / half_view_tangent
-    cx, cy = np.multiply(principal_point, size) - _PIXEL_CENTRE_OFFSET
+    picture_size = _checked_picture_size(picture_size)
+    fy = 0.5 * picture_size[1] / half_view_tangent
+    cx, cy = np.multiply(principal_point, picture_size) - _PIXEL_CENTRE_OFFSET
     return np.array([[fy / pixel_aspect, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
 
 
@@ -103,16 +103,20 @@ def _check_intrinsics(K: Doubles) -> None:
         refuse("K", "pixels with right angles", actual, advice)
 
 
-def _checked_matrix(matrix_name: str, matrix: ArrayLike, shape: tuple[int, ...]) -> Doubles:
+def _checked_matrix(matrix_name: str, matrix: ArrayLike, matrix_shape: tuple[int, ...]) -> Doubles:
     try:
         found = np.asarray(matrix, np.float64)
     except (TypeError, ValueError, OverflowError):
-        refuse(matrix_name, f"numbers of shape {shape}", f"got {format_value(matrix, 40)}", "Correct it")
-    if shape == (3,) and found.shape in ((3, 1), (1, 3)):  # as OpenCV returns them
+        refuse(
+            matrix_name, f"numbers of shape {matrix_shape}", f"got {format_value(matrix, 40)}", "Correct it"
+        )
+    if matrix_shape == (3,) and found.shape in ((3, 1), (1, 3)):  # as OpenCV returns them
         found = found.reshape(3)
-    if found.shape != shape or not (np.abs(found) <= _MAX_MATRIX_VALUE).all():
-        actual = f"got shape {found.shape}" if found.shape != shape else "got larger numbers"
-        refuse(matrix_name, f"numbers of shape {shape} up to {_MAX_MATRIX_VALUE:g}", actual, "Correct it")
+    if found.shape != matrix_shape or not (np.abs(found) <= _MAX_MATRIX_VALUE).all():
+        actual = f"got shape {found.shape}" if found.shape != matrix_shape else "got larger numbers"
+        refuse(
+            matrix_name, f"numbers of shape {matrix_shape} up to {_MAX_MATRIX_VALUE:g}", actual, "Correct it"
+        )
     return found
 
 

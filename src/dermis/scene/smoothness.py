@@ -93,14 +93,14 @@ class Silhouette(NamedTuple):
         return float(self.deviation_px[order][index])
 
 
-def silhouette(mesh: Mesh, K: Doubles, R: Doubles, t: Doubles, size: tuple[int, int]) -> Silhouette:
+def silhouette(mesh: Mesh, K: Doubles, R: Doubles, t: Doubles, picture_size: tuple[int, int]) -> Silhouette:
     """Return the silhouette edges of a mesh that lie in the picture, including occluded edges.
 
     Edges of eyeballs are omitted. A smooth curve through two points with unit normals n0 and n1 deviates from
     the chord d by |(n1 - n0) . d| / 8.
 
     K, R, t : matrices of the camera in OpenCV's convention, for positions of the mesh [mm]
-    size : width and height of the picture [pixel]
+    picture_size : width and height of the picture [pixel]
     """
     camera_points = mesh.points_mm @ R.T + t
     normals = sum_by_index(mesh.point, mesh.normals.astype(np.float64), len(camera_points))
@@ -113,7 +113,7 @@ def silhouette(mesh: Mesh, K: Doubles, R: Doubles, t: Doubles, size: tuple[int, 
     on_silhouette = (sides == 2) & (np.bincount(of_side, facing, len(ends)) == 1)
     a, b = ends[on_silhouette].T
     middle = (pixels[a] + pixels[b]) / 2
-    visible = ((middle >= 0) & (middle < size)).all(axis=1)
+    visible = ((middle >= 0) & (middle < picture_size)).all(axis=1)
     visible &= np.minimum(depth[a], depth[b]) > _NEAR_PLANE_MM
     a, b = a[visible], b[visible]
     chords = (camera_points[a] - camera_points[b])[:, :2]

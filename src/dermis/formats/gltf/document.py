@@ -98,10 +98,10 @@ class Document:
         accessor = self.item("accessors", accessor_index)
         return _checked_byte_or_value_count(accessor["count"]), _COMPONENT_COUNTS[accessor["type"]]
 
-    def replace_values(self, accessor_index: int, values: Numbers) -> None:
+    def replace_values(self, accessor_index: int, new_values: Numbers) -> None:
         """Replace the values of an accessor by an array of the same shape, converted to its type."""
         accessor = self.item("accessors", accessor_index)
-        data = values.astype(_COMPONENT_TYPES[accessor["componentType"]]).tobytes()
+        data = new_values.astype(_COMPONENT_TYPES[accessor["componentType"]]).tobytes()
         buffers, views = (self.tree.setdefault(key, []) for key in ("buffers", "bufferViews"))
         self._buffers[len(buffers)] = data
         views.append({"buffer": len(buffers), "byteLength": len(data)})
@@ -140,20 +140,22 @@ class Document:
             return values.astype(np.float64)
         return to_floats(values)
 
-    def _substitute_sparse(self, values: Numbers, sparse: Tree) -> Numbers:
-        count = _checked_byte_or_value_count(sparse["count"])
-        if count > len(values):
-            raise ValueError(f"{count} of {len(values)} values are listed as sparse")
-        index_type = np.dtype(_COMPONENT_TYPES[sparse["indices"]["componentType"]])
-        index = self._view_array(sparse["indices"], (count, 1), index_type).ravel()
-        result = values.copy()
-        result[index] = self._view_array(sparse["values"], (count, values.shape[1]), values.dtype)
+    def _substitute_sparse(self, dense_values: Numbers, sparse_tree: Tree) -> Numbers:
+        count = _checked_byte_or_value_count(sparse_tree["count"])
+        if count > len(dense_values):
+            raise ValueError(f"{count} of {len(dense_values)} values are listed as sparse")
+        index_type = np.dtype(_COMPONENT_TYPES[sparse_tree["indices"]["componentType"]])
+        index = self._view_array(sparse_tree["indices"], (count, 1), index_type).ravel()
+        result = dense_values.copy()
+        result[index] = self._view_array(
+            sparse_tree["values"], (count, dense_values.shape[1]), dense_values.dtype
+        )
         return result
 
     def _view_array(
-        self, location: Tree, shape: tuple[int, int], dtype: np.dtype[np.number], stride_bytes: int = 0
+        self, location: Tree, array_shape: tuple[int, int], dtype: np.dtype[np.number], stride_bytes: int = 0
     ) -> Numbers:
-        """Return an array of `shape` (n, k) and type `dtype` from a buffer view.
+        """Return an array of `array_shape` (n, k) and type `dtype` from a buffer view.
 
         location : JSON object with "bufferView" and "byteOffset"
         stride_bytes : distance between the starts of rows [byte]; 0 if they are contiguous
@@ -163,9 +165,9 @@ class Document:
             _checked_byte_or_value_count(location.get("byteOffset", 0)),
         )
         size = dtype.itemsize
-        if 0 in shape:
-            return np.zeros(shape, dtype)
-        return np.ndarray(shape, dtype, data, start, (stride_bytes or size * shape[1], size))
+        if 0 in array_shape:
+            return np.zeros(array_shape, dtype)
+        return np.ndarray(array_shape, dtype, data, start, (stride_bytes or size * array_shape[1], size))
 
     def _read_uri(self, uri: str | None) -> bytes:
         if uri is None:

@@ -84,11 +84,13 @@ def _store_attributes(
         tree["mode"] = _TRIANGLES_MODE
 
 
-def _replace_accessor(document: Document, accessor_index: int, values: Numbers, items_noun: str) -> None:
+def _replace_accessor(
+    document: Document, accessor_index: int, decoded_values: Numbers, items_noun: str
+) -> None:
     shape = document.accessor_shape(accessor_index)
-    if values.shape != shape:
-        actual = f"its compressed {items_noun} are {' x '.join(map(str, values.shape))} numbers"
+    if decoded_values.shape != shape:
+        actual = f"its compressed {items_noun} are {' x '.join(map(str, decoded_values.shape))} numbers"
         refuse(
             document.path, f"{shape[0]} x {shape[1]} as its accessor states", actual, limits.DAMAGED_ADVICE
         )
-    document.replace_values(accessor_index, values)
+    document.replace_values(accessor_index, decoded_values)

@@ -218,9 +218,11 @@ class _SceneReader:
             other_uv=self._read_other_uv(group, attributes, len(positions)),
         ), targets
 
-    def _read_other_uv(self, group: MaterialGroup, attributes: Tree, vertex_count: int) -> dict[int, Doubles]:
+    def _read_other_uv(
+        self, material_group: MaterialGroup, attributes: Tree, vertex_count: int
+    ) -> dict[int, Doubles]:
         """Return the additional uv sets (vertex_count, 2) that a material's textures use, by set index."""
-        material = self.materials[group.material] if group.material >= 0 else FileMaterial()
+        material = self.materials[material_group.material] if material_group.material >= 0 else FileMaterial()
         found = {}
         for index in sorted({texture.uv_set for texture in material.textures.values()} - {0}):
             if f"TEXCOORD_{index}" not in attributes:
@@ -265,17 +267,19 @@ def _dermis_extras(primitive: Tree) -> Tree:
     return own if isinstance(own, dict) else {}
 
 
-def _transform_part(part: MeshPart, targets: dict[str, VertexDisplacements], matrix: Doubles) -> MeshPart:
+def _transform_part(
+    mesh_part: MeshPart, targets: dict[str, VertexDisplacements], matrix: Doubles
+) -> MeshPart:
     """Return a mesh part and its morph targets transformed by `matrix` (4, 4).
 
     Reflections reverse the vertex order of triangles, so that triangles still face outwards.
     """
     linear = matrix[:3, :3]
     return replace(
-        part,
-        positions=part.positions @ linear.T + matrix[:3, 3],
-        normals=None if part.normals is None else part.normals @ _normal_matrix(linear).T,
-        triangles=part.triangles[:, ::-1] if np.linalg.det(linear) < 0 else part.triangles,
+        mesh_part,
+        positions=mesh_part.positions @ linear.T + matrix[:3, 3],
+        normals=None if mesh_part.normals is None else mesh_part.normals @ _normal_matrix(linear).T,
+        triangles=mesh_part.triangles[:, ::-1] if np.linalg.det(linear) < 0 else mesh_part.triangles,
         targets={name: (own.vertex, own.delta @ linear.T) for name, own in targets.items()},
     )
 
@@ -296,23 +300,26 @@ def _nearest_rigid(matrix: Doubles) -> Doubles:
 
 
 def _skin_part(
-    part: MeshPart, targets: dict[str, VertexDisplacements], influences: SkinInfluences, matrices: Doubles
+    mesh_part: MeshPart,
+    targets: dict[str, VertexDisplacements],
+    influences: SkinInfluences,
+    matrices: Doubles,
 ) -> MeshPart:
     """Return a mesh part and its morph targets with each vertex transformed by its skinning matrix.
 
     matrices : (v, 4, 4) skinning matrices at rest
     """
-    if len(influences.bone) != len(part.positions):
-        raise ValueError(f"{len(part.positions)} vertices have {len(influences.bone)} joints")
+    if len(influences.bone) != len(mesh_part.positions):
+        raise ValueError(f"{len(mesh_part.positions)} vertices have {len(influences.bone)} joints")
     linear = matrices[:, :3, :3]
     mirrored = np.linalg.det(linear) < 0
     return replace(
-        part,
-        positions=np.einsum("vij,vj->vi", linear, part.positions) + matrices[:, :3, 3],
+        mesh_part,
+        positions=np.einsum("vij,vj->vi", linear, mesh_part.positions) + matrices[:, :3, 3],
         normals=None
-        if part.normals is None
-        else np.einsum("vij,vj->vi", _normal_matrix(linear), part.normals),
-        triangles=part.triangles[:, ::-1] if mirrored.mean() > 0.5 else part.triangles,
+        if mesh_part.normals is None
+        else np.einsum("vij,vj->vi", _normal_matrix(linear), mesh_part.normals),
+        triangles=mesh_part.triangles[:, ::-1] if mirrored.mean() > 0.5 else mesh_part.triangles,
         targets={
             name: (own.vertex, np.einsum("vij,vj->vi", linear[own.vertex], own.delta))
             for name, own in targets.items()

@@ -167,14 +167,14 @@ def _row_values(
 
 
 def _complete_table(
-    path: Path, line_numbers: list[str], table: _CaptureTable, has_shape_count: Mask
+    path: Path, line_numbers: list[str], capture_table: _CaptureTable, has_shape_count: Mask
 ) -> _CaptureTable:
     """Return a table without gaps, with weights as fractions and angles in radians.
 
     line_numbers : name of each row, for errors
     has_shape_count : (k,) mask of rows that state a number of blend shapes above 0
     """
-    values, names = table.values, table.names
+    values, names = capture_table.values, capture_table.names
     is_angle = np.array([plain_key(name) in _ANGLE_COLUMNS for name in names])
     lost = _rows_without_face(values, is_angle, has_shape_count)
     values[lost] = np.nan
@@ -193,7 +193,7 @@ def _complete_table(
         notify(f"{path}: its angles are taken as degrees")
         values[:, is_angle] = np.radians(values[:, is_angle])
     check_weights(line_numbers, names, values)
-    return _CaptureTable(names, table.times_s, fill_gaps(table.times_s, values))
+    return _CaptureTable(names, capture_table.times_s, fill_gaps(capture_table.times_s, values))
 
 
 def _rows_without_face(cell_values: Doubles, is_angle: Mask, has_shape_count: Mask) -> Mask:
@@ -271,9 +271,11 @@ def _timecode_rate(timecodes: Sequence[_Timecode]) -> float:
     return fitting[0] if seconds_advance else max(_APP_FRAME_RATE, fitting[0])
 
 
-def _bone_angles(table: _CaptureTable, bones: RotationBones) -> tuple[dict[str, Doubles], tuple[str, ...]]:
+def _bone_angles(
+    capture_table: _CaptureTable, bones: RotationBones
+) -> tuple[dict[str, Doubles], tuple[str, ...]]:
     """Return angles (k, 3) by bone name [degrees], and the angle columns for which the head has no bone."""
-    columns = {plain_key(name): k for k, name in enumerate(table.names)}
+    columns = {plain_key(name): k for k, name in enumerate(capture_table.names)}
     angles: dict[str, Doubles] = {}
     unused: list[str] = []
     for part in _ROTATED_OBJECTS:
@@ -281,7 +283,7 @@ def _bone_angles(table: _CaptureTable, bones: RotationBones) -> tuple[dict[str, 
         if all(column is None for column in part_columns.values()):
             continue
         used = part_columns.values()
-        rows = np.degrees([[0.0 if k is None else row[k] for k in used] for row in table.values])
+        rows = np.degrees([[0.0 if k is None else row[k] for k in used] for row in capture_table.values])
         eye = bones.eyes.get(part.removesuffix("eye")) if part != "head" else None
         if eye is not None:
             angles[eye] = unwrap_degrees(rows)
@@ -289,5 +291,5 @@ def _bone_angles(table: _CaptureTable, bones: RotationBones) -> tuple[dict[str, 
             rotations = matrix_quaternion(np.array([angles_matrix(row) for row in rows.tolist()]))
             angles |= head_bone_angles(bones, rotations)
         elif rows.any():
-            unused += [table.names[k] for k in part_columns.values() if k is not None]
+            unused += [capture_table.names[k] for k in part_columns.values() if k is not None]
     return angles, tuple(unused)

@@ -153,7 +153,7 @@ class _FrameCache:
         self._check_size(file, positions)
         return positions
 
-    def _check_topology(self, file: Path, vertices: FrameVertices) -> None:
+    def _check_topology(self, mesh_file: Path, vertices: FrameVertices) -> None:
         assert self._first is not None
         source, count = self._source, self._source.count
         same_triangles = np.array_equal(vertices.triangles, self._first.triangles)
@@ -163,37 +163,40 @@ class _FrameCache:
         if len(vertices.positions_mm) != count or not matches_head:
             actual = f"it has {len(vertices.positions_mm)} and {len(vertices.triangles)} triangles"
             expected = f"the topology of the head, {count} vertices connected as in its file"
-            refuse(file, expected, actual, "Load the head from one of the frames")
+            refuse(mesh_file, expected, actual, "Load the head from one of the frames")
         if not same_triangles or not np.array_equal(vertices.uv, self._first.uv):
             actual = f"its faces or uv differ from those of {self.files[0].name}"
-            refuse(file, "frames of one topology", actual, "Export all of them from the same mesh")
+            refuse(mesh_file, "frames of one topology", actual, "Export all of them from the same mesh")
 
-    def _check_size(self, file: Path, positions: Floats) -> None:
+    def _check_size(self, mesh_file: Path, positions: Floats) -> None:
         sizes = [float(np.linalg.norm(np.ptp(one, axis=0))) for one in (positions, self.head.positions_mm)]
         if not _FRAME_SIZE_RANGE[0] <= sizes[0] / sizes[1] <= _FRAME_SIZE_RANGE[1]:
             actual = f"it is {sizes[0] / sizes[1]:.3g} times as large"
-            refuse(file, "a frame of about the size of the head", actual, "Set the files' unit (unit_mm)")
+            refuse(
+                mesh_file, "a frame of about the size of the head", actual, "Set the files' unit (unit_mm)"
+            )
 
 
-def _unit_of_head(file: Path, head: Head, reader: FrameReader) -> float:
+def _unit_of_head(mesh_file: Path, head: Head, reader: FrameReader) -> float:
     """Return the unit with which the mesh in a file is about as large as a head [mm].
 
     The unit of the file's format is preferred; if another unit is chosen, a note states it.
     """
     read_mm, head_mm = (
-        np.linalg.norm(np.ptp(one, axis=0)) for one in (reader.read(file).positions_mm, head.positions_mm)
+        np.linalg.norm(np.ptp(one, axis=0))
+        for one in (reader.read(mesh_file).positions_mm, head.positions_mm)
     )
-    default = default_unit_mm(file)
+    default = default_unit_mm(mesh_file)
     low, high = _FRAME_SIZE_RANGE
     if low <= read_mm / head_mm <= high:
         return default
     unit = min(COMMON_UNITS_MM, key=lambda one: abs(np.log(one / default * read_mm / head_mm)))
-    notify(f"{file}: its unit is not stated; 1 unit = {unit:g} mm makes it as large as the head")
+    notify(f"{mesh_file}: its unit is not stated; 1 unit = {unit:g} mm makes it as large as the head")
     return unit
 
 
-def _folder_files(folder: Path) -> list[Path]:
-    return list(folder.iterdir()) if _is_folder(folder) else []
+def _folder_files(sequence_folder: Path) -> list[Path]:
+    return list(sequence_folder.iterdir()) if _is_folder(sequence_folder) else []
 
 
 def _is_folder(path: Path) -> bool:
@@ -203,10 +206,10 @@ def _is_folder(path: Path) -> bool:
         return False
 
 
-def _frame_sort_key(file: Path) -> tuple[int, str]:
+def _frame_sort_key(mesh_file: Path) -> tuple[int, str]:
     """Return the sort key of a file: the last number in its name, then the whole name."""
-    numbers = re.findall(r"\d+", file.stem)
-    return int(numbers[-1]) if numbers else -1, file.name
+    numbers = re.findall(r"\d+", mesh_file.stem)
+    return int(numbers[-1]) if numbers else -1, mesh_file.name
 
 
 class FrameVertices(NamedTuple):

@@ -68,7 +68,7 @@ class _Faces(NamedTuple):
 class _SceneReader:
     """Reader of the meshes of a stage; collects arrays, materials and notes."""
 
-    def __init__(self, path: Path, stage: Usd.Stage, folder: Path) -> None:
+    def __init__(self, path: Path, stage: Usd.Stage, layer_folder: Path) -> None:
         task = f"{path}: USD scenes"
         self.usd, self.geom, self.shade = (
             import_extra(f"pxr.{name}", task) for name in ("Usd", "UsdGeom", "UsdShade")
@@ -76,7 +76,7 @@ class _SceneReader:
         self.path, self.stage = path, stage
         self.time = self.usd.TimeCode.EarliestTime()
         self.transform_cache = self.geom.XformCache(self.time)
-        self.material_reader = MaterialReader(path, folder, self.time)
+        self.material_reader = MaterialReader(path, layer_folder, self.time)
         self.material_index: dict[str, int] = {}
         self.materials: list[Tree] = []
         self.arrays, self.notes = Arrays(), dict[str, None]()
@@ -229,14 +229,14 @@ class _SceneReader:
         )
 
     def _checked_primvar(
-        self, values: Doubles, element_index: Index | None, attribute_path: object
+        self, primvar_values: Doubles, element_index: Index | None, attribute_path: object
     ) -> _Primvar:
         if element_index is None or (
-            len(element_index) and (element_index.min() < 0 or element_index.max() >= len(values))
+            len(element_index) and (element_index.min() < 0 or element_index.max() >= len(primvar_values))
         ):
             actual = f"{attribute_path} has other numbers of values"
             refuse(self.path, "a value for each vertex or corner", actual, limits.DAMAGED_ADVICE)
-        return _Primvar(values, element_index)
+        return _Primvar(primvar_values, element_index)
 
     def _read_normals(self, mesh: UsdGeom.Mesh, faces: _Faces) -> _Primvar | None:
         """Return the normals of a mesh; None for a mesh without normals or a subdivision surface."""

@@ -49,7 +49,7 @@ def open_stage(file: Path, path: Path, copy_folder: Path) -> OpenedStage:
     return OpenedStage(stage, folder)
 
 
-def _extract_layers(file: Path, path: Path, folder: Path) -> Path:
+def _extract_layers(file: Path, path: Path, layer_folder: Path) -> Path:
     """Copy the layers of a package to a folder, and return the root layer, which is the first entry."""
     with zipfile.ZipFile(file) as package:
         entries = package.infolist()
@@ -59,15 +59,15 @@ def _extract_layers(file: Path, path: Path, folder: Path) -> Path:
         check_limit(path, total, MAX_FILE_BYTES, "bytes of layers", "Export the head alone")
         if not layers or layers[0] is not entries[0]:
             refuse(path, "a package whose first file is a USD layer", "it is not", DAMAGED_ADVICE)
-        copies = [Path(package.extract(one, folder)) for one in layers]
+        copies = [Path(package.extract(one, layer_folder)) for one in layers]
     return copies[0]
 
 
-def _check_layers(path: Path, root_layer: Path, folder: Path) -> None:
+def _check_layers(path: Path, root_layer: Path, layer_folder: Path) -> None:
     """Refuse a file with layers outside its folder, before they are opened.
 
     root_layer : root layer
-    folder : folder that must contain all layers
+    layer_folder : folder that must contain all layers
     """
     sdf: Any = import_extra("pxr.Sdf", f"{path}: USD scenes")
     pending, known, size = [root_layer], {root_layer}, 0
@@ -83,7 +83,7 @@ def _check_layers(path: Path, root_layer: Path, folder: Path) -> None:
         if layer is None:
             _refuse_damaged(path)
         for name in _layer_names(path, layer):
-            found = _layer_file(file, name, folder)
+            found = _layer_file(file, name, layer_folder)
             if found is None:
                 refuse(path, "layers in its own folder or below", f"it references {name!r}", _LAYER_ADVICE)
             if found not in known:
@@ -110,17 +110,17 @@ def _layer_names(path: Path, layer: Sdf.Layer) -> Iterator[str]:
         refuse(path, "a scene without value clips", f"{clips[0]} has some", _LAYER_ADVICE)
 
 
-def _layer_file(layer: Path, layer_name: str, folder: Path) -> Path | None:
+def _layer_file(layer: Path, layer_name: str, layer_folder: Path) -> Path | None:
     """Return the file of a layer that another layer references; None for a file outside the folder.
 
     layer : file of the referencing layer
     layer_name : name by which it references the other layer
-    folder : folder that must contain all layers
+    layer_folder : folder that must contain all layers
     """
     if any(mark in layer_name for mark in ":[`\0"):  # names with schemes, packages or expressions
         return None
     file = (layer.parent / layer_name).resolve()
-    is_layer = file.suffix.lower() in LAYER_SUFFIXES and file.is_relative_to(folder) and file.is_file()
+    is_layer = file.suffix.lower() in LAYER_SUFFIXES and file.is_relative_to(layer_folder) and file.is_file()
     return file if is_layer else None
 
 

@@ -72,8 +72,8 @@ class MaterialReader:
     folder : folder of the layers, to which the names of pictures are relative
     """
 
-    def __init__(self, path: Path, folder: Path, time: Usd.TimeCode) -> None:
-        self.path, self.folder, self.time = path, folder, time
+    def __init__(self, path: Path, layer_folder: Path, time: Usd.TimeCode) -> None:
+        self.path, self.folder, self.time = path, layer_folder, time
         self.shade: Any = import_extra("pxr.UsdShade", f"{path}: USD scenes")
 
     def read(self, material: UsdShade.Material) -> Tree:
@@ -99,15 +99,18 @@ class MaterialReader:
         self._list_unused_inputs(tree, surface)
         return _emission_to_colour(tree)
 
-    def _add_source(self, tree: Tree, input_name: str, role: str, source: _InputSource) -> None:
+    def _add_source(self, tree: Tree, input_name: str, role: str, input_source: _InputSource) -> None:
         """Add the texture or the vertex colours to which an input is connected."""
-        kind = str(source.shader.GetIdAttr().Get())
+        kind = str(input_source.shader.GetIdAttr().Get())
         if kind.startswith("UsdPrimvarReader_float") and role == "colour":
-            tree |= {"vertex_colours": self._text_value(source.shader, "varname"), "colour": [1.0, 1.0, 1.0]}
+            tree |= {
+                "vertex_colours": self._text_value(input_source.shader, "varname"),
+                "colour": [1.0, 1.0, 1.0],
+            }
         elif kind != "UsdUVTexture":
             tree["unused"].append(f"{input_name} from {kind}")
         else:
-            texture = self._texture_tree(source, tree)
+            texture = self._texture_tree(input_source, tree)
             tree["textures"][role] = texture
             factor, bias = texture.pop("scale"), texture.pop("bias")
             if role == "normal":
@@ -120,12 +123,12 @@ class MaterialReader:
                 key = "stated_metalness" if role == "metalness" else role
                 tree[key] = factor[texture["channel"] or 0]
 
-    def _texture_tree(self, source: _InputSource, tree: Tree) -> Tree:
-        shader = source.shader
+    def _texture_tree(self, input_source: _InputSource, tree: Tree) -> Tree:
+        shader = input_source.shader
         wraps = [self._text_value(shader, f"wrap{axis}") for axis in "ST"]
         if "black" in wraps:
             tree["unused"].append("black beyond the edges of pictures")
-        if self._text_value(shader, "sourceColorSpace") == "raw" and source.output == "rgb":
+        if self._text_value(shader, "sourceColorSpace") == "raw" and input_source.output == "rgb":
             tree["unused"].append("colour space raw of pictures, except for that of normals")
         coordinates, transform = self._connected_source(shader, "st"), [1.0, 0.0, 0.0, 0.0, 1.0, 0.0]
         if coordinates is not None and coordinates.shader.GetIdAttr().Get() == "UsdTransform2d":
@@ -137,7 +140,7 @@ class MaterialReader:
             "file": self._picture_name(shader),
             "transform": transform,
             "wrap": [_WRAP_OF_USD_MODE.get(one, "clamp") for one in wraps],
-            "channel": _CHANNEL_OF_OUTPUT.get(source.output),
+            "channel": _CHANNEL_OF_OUTPUT.get(input_source.output),
             "scale": list(self._constant_value(shader, "scale", (1.0, 1.0, 1.0, 1.0))),
             "bias": list(self._constant_value(shader, "bias", (0.0, 0.0, 0.0, 0.0))),
         }
@@ -153,9 +156,9 @@ class MaterialReader:
         a, b, d, e = cos * scale_x, -sin * scale_y, sin * scale_x, cos * scale_y
         return [a, -b, b + x, -d, e, 1.0 - e - y]
 
-    def _add_opacity(self, tree: Tree, surface: UsdShade.Shader, values: Mapping[str, Any]) -> None:
+    def _add_opacity(self, tree: Tree, surface: UsdShade.Shader, input_values: Mapping[str, Any]) -> None:
         """Add the opacity; a picture is only supported if it is the alpha channel of the colour's picture."""
-        source, cutoff = self._connected_source(surface, "opacity"), values["opacityThreshold"]
+        source, cutoff = self._connected_source(surface, "opacity"), input_values["opacityThreshold"]
         colour = tree["textures"].get("colour")
         if source is not None:
             file = (
@@ -166,9 +169,9 @@ class MaterialReader:
             if colour is None or source.output != "a" or colour["file"] != file:
                 tree["unused"].append("picture of the opacity")
                 return
-        elif values["opacity"] >= 1.0:
+        elif input_values["opacity"] >= 1.0:
             return
-        tree |= {"alpha": 1.0 if source is not None else values["opacity"]}
+        tree |= {"alpha": 1.0 if source is not None else input_values["opacity"]}
         tree |= {"alpha_mode": "mask" if cutoff > 0 else "blend", "alpha_cutoff": cutoff or 0.5}
 
     def _list_unused_inputs(self, tree: Tree, surface: UsdShade.Shader) -> None:

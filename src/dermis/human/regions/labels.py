@@ -121,16 +121,16 @@ def _check_landmarks(head: Head, landmarks: Landmarks, reference_landmarks: Land
         refuse(subject, "points all around the head", "they lie in one plane", "Add some outside of it")
 
 
-def label_texels(head: Head, atlas: Atlas, table: RegionTable) -> NDArray[np.uint8]:
+def label_texels(head: Head, atlas: Atlas, region_table: RegionTable) -> NDArray[np.uint8]:
     """Return the region (n,) of each covered atlas texel in row order, as indices into `REGIONS`.
 
     The first of these sources that exists is used: label map or landmarks of the table, label map of the
     head, landmarks known to the package. Raises DermisError for a head without any of these sources.
     """
-    if table.labels is not None:
-        return _labels_from_map(load_labels(table.labels), atlas, str(table.labels))
-    if table.landmarks is not None:
-        return _labels_from_landmarks(head, atlas, load_landmarks(table.landmarks))
+    if region_table.labels is not None:
+        return _labels_from_map(load_labels(region_table.labels), atlas, str(region_table.labels))
+    if region_table.landmarks is not None:
+        return _labels_from_landmarks(head, atlas, load_landmarks(region_table.landmarks))
     if head.maps.region is not None:
         return _labels_from_map(head.maps.region, atlas, head.name)
     if is_human(head):

@@ -152,7 +152,12 @@ def _region_values(path: Path, region: str, region_entry: Any) -> list[float]:
     ]
 
 
-def _file_path(path: Path, key: str, file_name: Any) -> Path:
+def _file_path(path: Path, table_key: str, file_name: Any) -> Path:
     if not isinstance(file_name, str):
-        refuse(f"{path}: {key}", "the name of a file", f"got {format_value(file_name)}", "Write it in quotes")
+        refuse(
+            f"{path}: {table_key}",
+            "the name of a file",
+            f"got {format_value(file_name)}",
+            "Write it in quotes",
+        )
     return path.parent / file_name

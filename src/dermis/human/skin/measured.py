@@ -448,19 +448,19 @@ class MeasuredTone(NamedTuple):
     note: str
 
 
-def measured_tone(name: str) -> MeasuredTone:
+def measured_tone(tone_name: str) -> MeasuredTone:
     """Return the median colour of a site of the body, for one group of people or as the mean of all groups.
 
-    name : one of `SITES`, alone or after one of `SKIN_ANCESTRIES`, such as "palm" or "south asian palm"
+    tone_name : one of `SITES`, alone or after one of `SKIN_ANCESTRIES`, such as "palm" or "south asian palm"
 
     Raises DermisError for other names.
     """
-    words = " ".join(name.lower().replace("_", " ").split())
+    words = " ".join(tone_name.lower().replace("_", " ").split())
     site = next((one for one in SITES if words == one or words.endswith(f" {one}")), "")
     group = words[: len(words) - len(site)].strip()
     if not site or (group and group not in SKIN_ANCESTRIES):
         expected = f"one of {', '.join(SITES)}, alone or after one of {', '.join(SKIN_ANCESTRIES)}"
-        refuse("skin_site", expected, f"got {format_value(name)}", "Correct it")
+        refuse("skin_site", expected, f"got {format_value(tone_name)}", "Correct it")
     members = ANCESTRY_UNIONS.get(group, (group,)) if group else tuple(GROUP_OF_CODE.values())
     cells = [
         one

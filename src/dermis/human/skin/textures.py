@@ -56,14 +56,14 @@ class Noise(NamedTuple):
 
 
 def _isotropic_noise(
-    name: str,
+    noise_name: str,
     feature_mm: float,
     gain: float = 1.0,
     octaves: int = 1,
     antialiased: bool = False,
     region: NoiseRegion = "all",
 ) -> Noise:
-    return Noise(name, (feature_mm, feature_mm, feature_mm), "body", gain, octaves, antialiased, region)
+    return Noise(noise_name, (feature_mm, feature_mm, feature_mm), "body", gain, octaves, antialiased, region)
 
 
 # Artist's values [mm]. Noises that warp zones come first, and those that warp a space before those in it.

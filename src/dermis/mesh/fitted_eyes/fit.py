@@ -126,17 +126,17 @@ def _eye_shapes(corners_mm: Doubles, balls: tuple[DetectedEyeball, DetectedEyeba
     return shapes
 
 
-def _eyeball_points(ball: Sphere, shape: _EyeShape) -> Doubles:
+def _eyeball_points(ball: Sphere, eye_shape: _EyeShape) -> Doubles:
     """Return the points (n, 3) of a fitted eyeball in head space [mm]."""
-    return np.asarray(ball.centre + shape.scale * _shape_points(shape) @ eye_axes(shape.axis))
+    return np.asarray(ball.centre + eye_shape.scale * _shape_points(eye_shape) @ eye_axes(eye_shape.axis))
 
 
-def _shape_points(shape: _EyeShape) -> Doubles:
+def _shape_points(eye_shape: _EyeShape) -> Doubles:
     """Return the points (n, 3) of an eyeball before scaling, about its centre and with axis +Z [mm]."""
     points, _ = build_eyeball(_QUADS_PER_CUBE_EDGE)
     x, y, z = (points / np.linalg.norm(points, axis=1, keepdims=True)).T
     angle, azimuth = np.arccos(np.clip(z, -1.0, 1.0)), np.arctan2(y, x)
-    centre, radius = cornea_centre_mm() - shape.centre_offset_mm, shape.radius_mm
+    centre, radius = cornea_centre_mm() - eye_shape.centre_offset_mm, eye_shape.radius_mm
     limbus = (radius**2 - CORNEA_MM**2 + centre**2) / (2 * centre)  # distance along the axis
     sclera_edge, edge = float(np.arccos(limbus / radius)), float(np.arcsin(LIMBUS_MM / SCLERA_MM))
     on_cornea = float(np.arccos((limbus - centre) / CORNEA_MM)) * angle / edge
