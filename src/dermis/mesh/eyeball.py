@@ -114,8 +114,8 @@ def build_eyeball(quads_per_edge: int = QUADS_PER_EDGE, position_scale: float = 
     """Return the points (n, 3) of an eyeball that looks along +Z [mm], and its quads (q, 4).
 
     quads_per_edge : number of quads along each edge of the cube that is projected to the ball
-    position_scale : factor of the positions; control points need a factor above 1, as their subdivision surface
-        is smaller
+    position_scale : factor of the positions; control points need a factor above 1, as their subdivision
+        surface is smaller
     """
     points, quads = list[Doubles](), list[Index]()
     grid = np.tan(np.linspace(-np.pi / 4, np.pi / 4, quads_per_edge + 1))  # evenly spaced in angle

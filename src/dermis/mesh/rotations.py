@@ -87,7 +87,7 @@ def rigid_motion(points_before: Doubles, points_after: Doubles) -> tuple[Doubles
 
 
 def slerp(start_rotation: Doubles, end_rotation: Doubles, fraction: float | Doubles) -> Doubles:
-    """Interpolate unit quaternions (..., 4) along the shorter arc, from the start for fraction 0 to the end for fraction 1."""
+    """Interpolate unit quaternions (..., 4) along the shorter arc; `fraction` 0 is the start, 1 the end."""
     cosine = np.sum(start_rotation * end_rotation, axis=-1, keepdims=True)
     end_rotation, cosine = np.where(cosine < 0, -end_rotation, end_rotation), np.minimum(np.abs(cosine), 1.0)
     angle = np.arccos(cosine)
