@@ -65,8 +65,8 @@ def atomic_file(path: str | Path) -> Iterator[Path]:
 def atomic_folder(path: str | Path, marker: str) -> Iterator[Path]:
     """Yield a new empty folder that replaces `path` on success and is deleted after an error.
 
-    marker : name of a file by which an existing folder is recognised as output of this package; only such a
-        folder, or an empty one, is replaced
+    marker : name of a file by which an existing folder is recognised as output of this package; only a folder
+        with this file, or an empty folder, is replaced
 
     Raises DermisError for any other existing folder, and for paths that cannot be written.
     """

@@ -64,7 +64,7 @@ def array_key(sources: Sequence[Array], parameters: str) -> str:
     """Return the cache key of a result that is computed from arrays.
 
     sources : arrays from which the result is computed
-    parameters : text with everything else on which the result depends
+    parameters : text with all parameters, besides the arrays, on which the result depends
     """
     digest = hashlib.sha256(parameters.encode())
     for source in sources:

@@ -185,7 +185,7 @@ def _render_frames(
 
 
 def _common_exposure(animated_scene: _AnimatedScene, renderer: Renderer) -> float:
-    """Return the exposure of all frames: the value of --exposure, or else metered at the first frame."""
+    """Return the exposure of all frames: the value of --exposure, or the metered exposure of the first."""
     if animated_scene.settings.exposure != "auto":
         return animated_scene.settings.exposure
     (scene,) = animated_scene.scenes([animated_scene.first])

@@ -65,7 +65,7 @@ class StandardStreams:
         return next((fault for fault in faults if not isinstance(fault, BrokenPipeError)), None)
 
     def discard_stdout(self) -> None:
-        """Discard the buffered output to stdout after an interruption, as a reader of it may be blocked."""
+        """Discard buffered output to stdout after an interruption, as the reader may be blocked."""
         for raw in self._raw:
             if raw.descriptor == 1:
                 raw.fault = raw.fault or BrokenPipeError()

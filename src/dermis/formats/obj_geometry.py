@@ -1,6 +1,6 @@
 """Geometry of OBJ files: polygons with positions, uv, normals and colours, and the group of each polygon.
 
-Numeric statements are parsed as arrays, all others individually.
+Numeric statements are parsed as arrays, all other statements individually.
 """
 
 from __future__ import annotations
@@ -158,7 +158,7 @@ def _plain_text(obj_text: str) -> str:
 def _split_statements(
     path: Path, plain_text: str
 ) -> tuple[dict[str, _StatementRows], list[_Statement], dict[str, None]]:
-    """Return numeric statements by kind, other statements that are used, and the first words of the rest."""
+    """Return numeric statements by kind, other used statements, and the first words of unused statements."""
     data = np.frombuffer(f"{plain_text}\n".encode("utf-8", "replace"), np.uint8)
     end = np.flatnonzero(data == _LINE_FEED)
     start = np.concatenate([[0], end[:-1] + 1])

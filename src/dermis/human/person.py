@@ -444,8 +444,7 @@ class Human:
         """Return the head of another person with the skin and eyes of this person.
 
         With `Pose(positions_mm=person.positions_mm)` the head also gets the shape of this person; only its
-        skin is painted again, which is faster than a new head. Hair and joint positions are still those of
-        the other person.
+        skin is painted again, which is faster than a new head. Hair and joint positions remain unchanged.
 
         Parameters
         ----------

@@ -1,6 +1,6 @@
 """The standard eyeball: its shape, mesh and uv, and contact with the lids.
 
-The eyeball is a sphere (the sclera, in short *ball*) with the spherical cap of a cornea. Lengths are those of
+The eyeball is a sphere (the sclera, in short *ball*) with the spherical cap of a cornea. Lengths are for
 an adult eye [mm], and the origin is the centre of the ball.
 """
 
@@ -150,7 +150,7 @@ def eyeball_uv(quads_per_edge: int = QUADS_PER_EDGE) -> Doubles:
 
 
 def axis_points(quads_per_edge: int = QUADS_PER_EDGE) -> tuple[int, int, int]:
-    """Return three point indices: the cornea's apex, the back of the ball, and its equator towards +X.
+    """Return three point indices: the apex of the cornea, the back of the ball, and the ball's equator at +X.
 
     quads_per_edge : number of quads along a cube edge, see `build_eyeball`
     """

@@ -36,8 +36,8 @@ class Pose(ShortRepr):
         Weights of morph targets by name, mostly 0 to 1; targets that are left out keep their weight at rest.
     bones : mapping of str to array_like, optional
         Bones by name: either three angles [degrees] about the head's own axes (x: nod, y: turn, z: tilt)
-        relative to the rest pose, applied about z first, then x, then y; or a (4, 4) matrix from the space of
-        the bone to that of its parent, in the units of the file, as in animations.
+        relative to the rest pose, applied about z first, then x, then y; or a (4, 4) matrix from the bone's
+        space to its parent's space, in the units of the file, as in animations.
     positions_mm : (n, 3) array, optional
         Rest positions of all points of the control mesh, in the order of `Head.positions_mm` [mm]: another
         person of the same topology, or a motion from another program.
@@ -168,7 +168,9 @@ class Pose(ShortRepr):
 
 
 def merge_poses(pose: Pose, base: Pose | Mapping[str, float] | None) -> Pose:
-    """Fill what a pose does not set, among weights, bones and positions, from a base pose."""
+    """Return a pose with the weights and bones of both poses, in which `pose` overrides `base`.
+
+    The rest positions are those of `pose`, or of `base` if `pose` has no rest positions."""
     base = Pose.coerce(base) or Pose()
     positions = base.positions_mm if pose.positions_mm is None else pose.positions_mm
     return Pose({**base.weights, **pose.weights}, {**base.bones, **pose.bones}, positions)

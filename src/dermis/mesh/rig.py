@@ -77,7 +77,7 @@ class BoneRotation(NamedTuple):
 
 
 class RigidFollowers(NamedTuple):
-    """Points that follow other points as one rigid body, such as those of a fitted eyeball.
+    """Points that follow other points as one rigid body, such as the points of a fitted eyeball.
 
     leaders : (n,) indices of the points to follow, which are in the file
     points : (m,) indices of the points that follow the leaders
@@ -122,7 +122,7 @@ class Rig(ShortRepr):
         return len(self.positions_mm) - sum(len(one.points) for one in self.rigid_followers)
 
     def complete_positions(self, file_positions_mm: Floats) -> Floats:
-        """Return the rest positions of all control points (p, 3) from those of the file's points [mm].
+        """Return the rest positions of all control points (p, 3), from positions of the file's points [mm].
 
         Rigid followers, such as fitted eyeballs, move with the file's points that they follow.
         """
@@ -146,7 +146,7 @@ class Rig(ShortRepr):
     def outline_mm(self, motion: Motion) -> Floats:
         """Return points (s, 3) that bound the head in a pose in every direction, to about a millimetre [mm].
 
-        If `motion` has other rest positions than the rig, the extreme points of those positions are added.
+        If `motion` has rest positions of its own, their extreme points are added.
         """
         if motion.positions_mm is self.positions_mm:
             return self.outline.pose(motion.weights, motion.matrices)
@@ -155,7 +155,7 @@ class Rig(ShortRepr):
     def _outline_for(self, rest_positions: Floats) -> RigOutline:
         """Return the outline of this rig for other rest positions of its control points.
 
-        The last result is cached, and returned again while the outline points have the same positions.
+        The last outline is cached, and returned again if the outline points have the same positions.
 
         rest_positions : (p, 3) rest positions of all control points [mm]
         """
@@ -201,7 +201,7 @@ class Rig(ShortRepr):
 
     @cached_property
     def _lid_edges(self) -> tuple[Intp, Doubles, RigOutline]:
-        """Return what `lid_edges_mm` computes the points of the lid edges from.
+        """Return the data from which `lid_edges_mm` computes the points of the lid edges.
 
         Returns the indices (n,) of control points; their weights (e, n) in the e points of the edges; and an
         outline that poses the control points.

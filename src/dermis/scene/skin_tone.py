@@ -1,4 +1,4 @@
-"""Skin tone of meshes without a colour map: a measured one, that of their materials, or the default skin."""
+"""Skin tone of meshes without a colour map: a measured tone, the tone of the materials, or the default."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def with_skin_tone(
 ) -> tuple[Maps, str]:
     """Return maps in which a uniform colour replaces a missing colour map, and a note for the user or "".
 
-    skin_site : name of a measured colour, which replaces that of the materials, see `measured_tone`
+    skin_site : name of a measured colour, which replaces the materials' colour, see `measured_tone`
     colour_map_chosen : whether the user has chosen the colour map
 
     The colour is the mean colour of the skin's materials. A material with no colour, white, or the default

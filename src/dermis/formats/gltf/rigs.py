@@ -53,8 +53,8 @@ class Armature:
     def bone_for_node(self, nodes: Nodes, node: int) -> int | None:
         """Return the bone that moves the mesh of a node without a skin; None if there is none.
 
-        The bone is that of the node itself, else that of the nearest ancestor with a bone, else
-        `static_bone`.
+        The bone belongs to the node itself, or to the nearest ancestor with a bone. Without such an
+        ancestor the bone is `static_bone`.
         """
         bones = (self.bone_of_node[k] for k in nodes.ancestors(node) if k in self.bone_of_node)
         return next(bones, self.static_bone)

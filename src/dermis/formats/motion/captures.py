@@ -141,7 +141,7 @@ def to_seconds(culprit: object, times: Doubles, unit: float | None) -> Doubles:
 
 
 def assumed_rate(culprit: object, fps: float | None, default_fps: float) -> float:
-    """Return the frame rate of a capture without times: `fps`, or else `default_fps` with a note about it."""
+    """Return the frame rate of a capture without times: `fps`; if it is None, `default_fps`, with a note."""
     if fps is None:
         assumed = f"{default_fps:g} frames per second are assumed"
         notify(f"{culprit}: it has no times; {assumed}, which fps (--motion-fps) changes")

@@ -74,7 +74,7 @@ def load_live_link(path: Path, head: Head, fps: float | None = None) -> Clip:
     """Load a CSV file of Live Link Face as a clip for a head.
 
     Columns are identified by name, in any order: Timecode or another time, blend shapes, and angles [rad]
-    HeadPitch, HeadYaw and HeadRoll about the head's x, y and z axes, likewise for LeftEye and RightEye. The
+    HeadPitch, HeadYaw and HeadRoll about the head's x, y and z axes, and LeftEyePitch and so on. The
     angles rotate the bones found by `find_rotation_bones`. Columns are separated by commas, semicolons or
     tabs. Empty cells and frames without a face are interpolated, weights in percent and angles in degrees are
     converted, each with a note.

@@ -204,7 +204,7 @@ class _SceneReader:
         return self.material_index[key]
 
     def _find_uv(self, prim: Usd.Prim, faces: _Faces, materials: list[int]) -> _Primvar | None:
-        """Return the uv that the mesh's materials name, else the uv with a usual name; None without uv."""
+        """Return the uv set that the materials name, or a uv set with a usual name; None without uv."""
         named = dict.fromkeys(one for k in materials if k >= 0 and (one := self.materials[k].get("uv")))
         if len(named) > 1:
             self.notes[_SEVERAL_UV_NOTE] = None

@@ -114,7 +114,7 @@ def _layer_file(layer: Path, layer_name: str, layer_folder: Path) -> Path | None
     """Return the file of a layer that another layer references; None for a file outside the folder.
 
     layer : file of the referencing layer
-    layer_name : name by which it references the other layer
+    layer_name : name of the referenced layer, as written in the referencing layer
     layer_folder : folder that must contain all layers
     """
     if any(mark in layer_name for mark in ":[`\0"):  # names with schemes, packages or expressions

@@ -52,7 +52,7 @@ def with_regions(head: Head, table: RegionTable | str | Path = DEFAULT_TABLE_NAM
     head : Head
         Head with known regions: the human, a sample, or a head with landmarks or labels in the table.
     table : RegionTable, str or path
-        Roughness and strength of each region: a table, its TOML file, or "default" for that of the package.
+        Roughness and strength of each region: a table, its TOML file, or "default" for the package's table.
 
     Returns
     -------

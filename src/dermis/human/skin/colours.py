@@ -1,4 +1,4 @@
-"""Tables of skin colours by melanin and blood, cached for people who share the other parameters."""
+"""Tables of skin colours by melanin and blood, cached by eumelanin, oxygen and thickness of the epidermis."""
 
 from __future__ import annotations
 

@@ -136,7 +136,7 @@ class Demographics(NamedTuple):
     sex : from 0, female, to 1, male [-]
     age : age [years]
     skin_groups : weights of the measured groups that the skin follows, see `measured.group_weights`
-    ita : desired individual typology angle (ITA) of the cheek, or None [degrees]
+    ita : individual typology angle (ITA) that the cheek must have; None for no condition [degrees]
     """
 
     african: float
