@@ -68,7 +68,7 @@ def read_file(path: str | Path, expected: str, max_bytes: int, name: object = No
 
 @contextmanager
 def open_regular_file(path: str | Path, expected: str) -> Iterator[BinaryIO]:
-    """Open a regular file of any size; callers must limit how much they read at a time.
+    """Open a regular file of any size; callers must limit the number of bytes per read.
 
     expected : what the file should be, for error messages
 

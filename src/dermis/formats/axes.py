@@ -17,7 +17,7 @@ Front = Literal["auto", "x", "y", "z", "-x", "-y", "-z"]
 class Axes(NamedTuple):
     """Axes of a file that point upwards and to the front.
 
-    up : axis that points upwards; None if it is not known, and Y is assumed
+    up : axis that points upwards; None if the axis is unknown, in which case Y is assumed
     front : axis along which the face looks, perpendicular to `up`; "auto" if it is not known, and -Y is
         assumed if Z is up, as in Blender, else Z
     """
@@ -27,7 +27,7 @@ class Axes(NamedTuple):
 
     @property
     def top(self) -> Axis:
-        """Return the axis that points upwards, Y if it is not known."""
+        """Return the axis that points upwards: `up`, or Y if `up` is None."""
         return self.up or "y"
 
     @property

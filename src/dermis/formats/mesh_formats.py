@@ -26,7 +26,7 @@ class MeshFormat:
     """Format of mesh files.
 
     suffixes : file name suffixes in lower case, with the dot
-    read : function that reads a file; it may raise any exception for a damaged one
+    read : function that reads a file; may raise any exception for a damaged file
     properties : properties of the files, except properties of materials, and what the reader does with each
     materials : properties of materials, and what the reader does with each
     """

@@ -57,7 +57,7 @@ class RawMesh:
     """Triangles of a file in the head's space, before they become a `Mesh`.
 
     positions : (v, 3) vertex positions [mm]
-    normals : (v, 3) normals of the file, NaN where it has none
+    normals : (v, 3) normals of the file, NaN where the file has none
     uv : (v, 2) uv with v down
     point : (v,) index of the point at which each vertex is
     triangles : (f, 3) vertex indices
@@ -159,7 +159,7 @@ def _drop_triangles(mesh: RawMesh, flat_mask: Mask, is_skin: Mask, notes: list[s
     """Return the mesh without the flat triangles of a mask (f,) and without duplicates.
 
     Among triangles of one material with the same three points, the first is kept. Among materials with
-    exactly the same triangles, skin is kept, else the first one.
+    exactly the same triangles, skin is kept, or else the first material.
     """
     if flat_mask.any():
         notes.append(f"left out {_count_with_noun(int(flat_mask.sum()), 'triangle')} without area")

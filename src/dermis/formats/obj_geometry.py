@@ -204,7 +204,7 @@ def _refuse_line(
     """Raise the error for one of the statements in `statement_rows`; the message names its line.
 
     row_index : index of the statement in `statement_rows`
-    actual : clause that says what is wrong; by default, it quotes the statement
+    actual : clause that says what is wrong; by default a quotation of the statement
     """
     ends = np.append(statement_rows.start[1:], len(statement_rows.text))
     words = " ".join(

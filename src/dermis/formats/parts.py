@@ -139,7 +139,7 @@ def parse_colour(numbers: Sequence[float | str]) -> Colour:
 
 
 def find_quads(corner_counts: NDArray[np.integer], triangles: Index) -> Index:
-    """Return the pairs of triangles that are halves of quads, (q, 2); empty if they cannot be identified.
+    """Return the pairs of triangles that are halves of quads, (q, 2); empty if quads cannot be identified.
 
     corner_counts : (n,) number of corners of each polygon of the file
     triangles : (f, 3) triangulated polygons, either in the order of the file, or all triangles first, then

@@ -80,7 +80,7 @@ def _joined_uv(mesh_parts: list[MeshPart], uv_set: int) -> Doubles:
 def select_vertices(mesh_part: MeshPart, vertices: Index) -> MeshPart:
     """Return a mesh part with the selected vertices, their morph targets and bones.
 
-    vertices : (n,) indices of the vertices; they may repeat
+    vertices : (n,) indices of the vertices, possibly repeated
 
     Triangles, uv and normals still refer to the vertices of `mesh_part`.
     """

@@ -12,7 +12,7 @@ _MAX_PATH_LENGTH = 4096  # characters; some systems are slow to refuse longer pa
 
 
 def find_referenced_file(path: Path, file_name: str) -> Path | None:
-    """Return the path of an existing file that a mesh file references by name; None if it does not exist.
+    """Return the path of an existing file that a mesh file references by name; None for a missing file.
 
     path : path of the mesh file
     file_name : name relative to the folder of the mesh file; Windows separators are accepted
@@ -28,7 +28,7 @@ def find_referenced_file(path: Path, file_name: str) -> Path | None:
 
 
 def resolve_uri(path: Path, uri: str) -> Path:
-    """Return the path of a file that a glTF file references by a relative URI; it need not exist.
+    """Return the path of a file that a glTF file references by a relative URI; the file need not exist.
 
     Raises DermisError for a file outside the folder of the glTF file, even if a link in it leads there.
     """

@@ -169,7 +169,7 @@ class _DownloadProgress:
         self._bars.reset(self._task)
 
     def close(self) -> None:
-        """Do nothing: pooch calls it only after success, so `stop` removes the bar instead."""
+        """Do nothing: pooch calls `close` only after success, so `stop` removes the bar instead."""
 
     def stop(self) -> None:
         if self._bars.live.is_started:

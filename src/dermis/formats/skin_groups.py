@@ -69,7 +69,7 @@ def choose_skin(
     least a tenth of the head and have no word of `NON_SKIN_WORDS`. If no rule applies, all parts are skin.
 
     groups : names of the parts
-    scatters : for each part, whether the file states that light scatters below its surface
+    scatters : for each part, whether the file states that light scatters below the surface
     """
     words = [_group_words(group) for group in groups]
     is_other = [bool(own & set(NON_SKIN_WORDS)) for own in words]

@@ -18,7 +18,7 @@ _END_TOLERANCE_FRAMES = 1e-6  # fraction of a frame by which rounding may put th
 
 
 def check_frame_rate(culprit: object, frame_rate: object) -> float:
-    """Return a frame rate [1/s] after checking that it is a positive number; raise DermisError if not."""
+    """Return a frame rate [1/s] after checking that the rate is positive; raise DermisError if not."""
     return checked_number(culprit, frame_rate, _MIN_RATE, _MAX_RATE, "frames a second")
 
 
@@ -33,7 +33,7 @@ class Clip(ShortRepr):
     duration_s : float
         Time of the last frame [s].
     rate : float or None
-        Frame rate that the file states [1/s]; None if it states none.
+        Frame rate that the file states [1/s]; None if the file states no rate.
     targets, bones : tuple of str
         Names of the morph targets and bones that the clip moves.
     left_out : tuple of str

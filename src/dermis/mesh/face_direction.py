@@ -32,11 +32,11 @@ _MIN_ASYMMETRY_RATIO, _MIN_RELIEF_RATIO, _MIN_NOSE_RATIO = 2.2, 1.4, 1.35
 
 
 def face_direction(positions: Doubles, triangles: Index, eyes: Doubles) -> Direction | None:
-    """Return the horizontal axis along which a face looks; None if it is uncertain.
+    """Return the horizontal axis along which a face looks; None if the axis is uncertain.
 
     positions : (v, 3) vertices of any unit, Y up
     triangles : (f, 3) vertex indices
-    eyes : (n, 3) vertices of eyeballs, or joints of the eyes; empty if they are not known
+    eyes : (n, 3) vertices of eyeballs, or joints of the eyes; empty if unknown
 
     Eyes lie in front of the middle of the head. If no eyes are known, the head must be symmetric about a
     vertical plane, and its front is the side with more relief and with a ridge in the middle, the nose.

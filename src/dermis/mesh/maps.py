@@ -16,7 +16,7 @@ _MEAN_SAMPLES, _MAX_STRIDE = 64, 16  # samples of means along each side, and lar
 
 @dataclass(frozen=True, repr=False)
 class PartMaps(ShortRepr):
-    """Texture maps that all groups of triangles other than skin share; the uv of these groups refer to them.
+    """Texture maps that all groups of triangles except skin share, in one common uv layout.
 
     colour : (H, W, 4) base colour, linear Rec. 709, and opacity; surfaces are cut out below 0.5 [-]
     surface : (H, W, 4) slopes as in `Maps.normal`, perceptual roughness and metalness [-]

@@ -1,4 +1,4 @@
-"""Outlines: a few points of a shape that bound it in every direction.
+"""Outlines: a few points of a shape that bound the shape in every direction.
 
 Shadow maps and depth ranges are fitted to outlines. The outline points of a rig are selected once, from the
 rest pose, every morph target and random poses; posing these points gives the bounds of the head in any pose.

@@ -96,7 +96,7 @@ class Rig(ShortRepr):
     stencils : subdivision from control points to mesh points; None without subdivision
     bone_rotations : rotations of bones by morph targets
     rigid_followers : points that are not in the file, such as fitted eyeballs; they follow the file's points
-    contact : lids that must stay outside the eyeballs; None to let them intersect
+    contact : lids that must stay outside the eyeballs; None if lids may intersect eyeballs
     template : rig of the same topology whose outline points are used, together with the extreme points of
         this rig; None to search for outline points
     """
@@ -118,7 +118,7 @@ class Rig(ShortRepr):
 
     @property
     def file_point_count(self) -> int:
-        """Return the number of control points that are in the file; they come first."""
+        """Return the number of control points from the file, which precede all other control points."""
         return len(self.positions_mm) - sum(len(one.points) for one in self.rigid_followers)
 
     def complete_positions(self, file_positions_mm: Floats) -> Floats:
@@ -140,7 +140,7 @@ class Rig(ShortRepr):
 
     @cached_property
     def outline(self) -> RigOutline:
-        """Return the outline of the rig; its points are searched once and cached on disk."""
+        """Return the outline of the rig; the outline points are searched once and cached on disk."""
         return rig_outline(self.positions_mm, self.targets, self.skeleton, self._outline_points)
 
     def outline_mm(self, motion: Motion) -> Floats:

@@ -13,7 +13,7 @@ from dermis.scene.frozen_model import FrozenModel, slider
 class Environment(FrozenModel):
     """Panorama of distant light around the head.
 
-    The centre of the panorama lies behind the head, so a camera in front of the face has it as background.
+    The centre of the panorama lies behind the head, so it is the background of a camera in front of the face.
 
     Examples
     --------

@@ -36,7 +36,7 @@ class Scene:
     camera : Camera, str or callable, optional
         A camera, the name of a preset, or a function of the head; by default `portrait`.
     skin : Skin or mapping, optional
-        Skin settings or their values by name; by default `Skin()`.
+        Skin settings, or values of fields of `Skin` by name; by default `Skin()`.
     environment : Environment, str or path, optional
         An environment or the name of its panorama.
     pose : Pose or mapping, optional

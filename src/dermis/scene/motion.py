@@ -38,7 +38,7 @@ def load_motion(
     Parameters
     ----------
     path : str or path
-        A glTF file: the head's own, or one whose nodes or targets have the same names ("file.glb#clip"
+        A glTF file: the head's own file, or a file with the same names of nodes or targets ("file.glb#clip"
         selects one of several clips); a CSV file of Live Link Face; results of MediaPipe's face landmarker in
         JSON; or a sequence of mesh files of one topology: a folder, "face_%05d.obj" or "face_*.ply".
     head : Head

@@ -294,7 +294,7 @@ class FibreTubes:
         return np.asarray((start[:, None, None] + np.concatenate(faces)).reshape(-1, 3), np.int64)
 
     def colours(self) -> tuple[Floats, Floats]:
-        """Return a palette of c linear hair colours (1, c, 3), and uv (n m, 2) of the tube vertices in it."""
+        """Return a palette of c linear hair colours (1, c, 3), and the tube vertices' uv (n m, 2)."""
         absorbance = self.strands.absorption * self.strands.radius_mm.max(axis=1, keepdims=True)
         albedo = np.exp(-_HAIR_ALBEDO_EXPONENT * np.sqrt(absorbance.astype(np.float64)))
         order = np.argsort(albedo.sum(axis=1), kind="stable")

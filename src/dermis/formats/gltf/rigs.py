@@ -42,7 +42,7 @@ class Armature:
     """Bones of a glTF scene: joints of skins, and animated nodes.
 
     bone_of_node : bone index by node index
-    static_bone : index of the root bone that was added for meshes that no bone moves; None if it was not
+    static_bone : index of the root bone that was added for meshes that no bone moves; None without it
         needed
     """
 

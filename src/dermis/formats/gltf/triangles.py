@@ -86,7 +86,7 @@ _OTHER_EXTENSION_ADVICE = "Export without it"
 def read_gltf(path: Path) -> MeshFile:
     """Read the scene of a .glb or .gltf file in its rest pose.
 
-    Joints have the transforms of their nodes, and morph targets their default weights. A mesh with a skin is
+    Joints have the transforms of their nodes; morph targets have their default weights. A mesh with a skin is
     transformed by its joints; the transform of its node has no effect.
     """
     document = read_document(path)

@@ -149,7 +149,7 @@ def assumed_rate(culprit: object, fps: float | None, default_fps: float) -> floa
 
 
 def note_lost_frames(culprit: object, lost_frame_count: int, frame_count: int) -> None:
-    """Issue a note on the number of frames that show no face, unless it is 0.
+    """Issue a note on the number of frames that show no face; none if all frames show a face.
 
     lost_frame_count, frame_count : number of frames without a face, and of all frames
     """

@@ -42,7 +42,7 @@ class _UsedTrack(NamedTuple):
 
 
 def load_gltf_clip(path: Path, head: Head, clip_name: str | None) -> Clip:
-    """Load a clip of a .glb or .gltf file; its bones and morph targets are matched to the head's by name.
+    """Load a clip of a .glb or .gltf file; bones and morph targets are matched to the head by name.
 
     Translations, rotations and scales of bones that the clip does not animate keep their rest values.
 

@@ -1,4 +1,4 @@
-"""Captures of MediaPipe's face landmarker: one result per frame in JSON, as its APIs return them."""
+"""Captures of MediaPipe's face landmarker: one result per frame in JSON, as MediaPipe returns it."""
 
 from __future__ import annotations
 
@@ -175,7 +175,7 @@ def _parse_frame(
 ) -> _CapturedFrame:
     """Return a frame, without faces if the record has neither blend shapes nor a facial transformation.
 
-    shape_columns : column index by blend shape name; names that are not in it are added
+    shape_columns : column index by blend shape name; missing names are added
     """
     if isinstance(json_record, list):
         json_record = {"blendshapes": json_record}

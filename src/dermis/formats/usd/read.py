@@ -174,7 +174,7 @@ class _UsdPictures:
         return "folder of the file" if self.package is None else "package"
 
     def _find_picture(self, picture_name: str) -> PathLike | None:
-        """Return the picture with a name relative to the layers; None if it does not exist."""
+        """Return the picture with a name relative to the layers; None for a missing picture."""
         if self.package is None:
             return find_referenced_file(self.path, picture_name) if picture_name else None
         if picture_name not in self.sizes:

@@ -181,7 +181,7 @@ class MaterialReader:
                 tree["unused"].append(text)
 
     def _picture_name(self, texture: UsdShade.Shader) -> str:
-        """Return a picture's name relative to the folder of the layers, or unchanged if it is outside."""
+        """Return a picture's name relative to the folder of the layers; names outside are unchanged."""
         for attribute in self._value_attributes(texture, "file"):
             layer, asset = attribute.GetPropertyStack(self.time)[0].layer, attribute.Get(self.time)
             name = str(asset.path) if asset else ""

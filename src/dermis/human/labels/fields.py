@@ -155,7 +155,7 @@ class MeshLabels(NamedTuple):
     """Label classes of a mesh, whose borders may cross triangles.
 
     base : (t,) class of each triangle where no field is positive
-    classes : (k,) class of each field; the first positive field at a surface point determines its class
+    classes : (k,) class of each field; a surface point has the class of its first positive field
     fields : (v, k) signed distances of the vertices to the class borders, positive inside, interpolated
         linearly over the triangles [mm]
     """

@@ -57,9 +57,9 @@ def landmark_points(head: Head, set_or_table: str) -> LandmarkPoints:
 
 
 def check_landmarks(set_or_table: object) -> str:
-    """Validate the name of a landmark set or the path of a landmark table, and return it.
+    """Return the name of a landmark set, or the path of a landmark table, after validation.
 
-    Raises DermisError if it is neither a published set nor a .csv file.
+    Raises DermisError for anything except published sets and .csv files.
     """
     text = str(checked_path(set_or_table, "a set of landmarks or its table"))
     if text not in LANDMARK_SETS and not text.endswith(".csv"):

@@ -111,7 +111,7 @@ class RegionTable:
 
     values : (10, 2) Beckmann roughness m and specular strength rho_s [-], in the order of `REGIONS`
     landmarks : CSV file of the head's landmarks, for heads unknown to the package
-    labels : label map of the head, whose texels are indices into `REGIONS`; it makes landmarks unnecessary
+    labels : label map of the head, whose texels are indices into `REGIONS`; replaces landmarks
     """
 
     values: NDArray[np.float64]

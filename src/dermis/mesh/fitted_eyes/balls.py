@@ -1,4 +1,4 @@
-"""Detection of the two eyeballs of a head in the meshes that its file declares to be eyes."""
+"""Detection of the two eyeballs of a head in the meshes that the head's file declares to be eyes."""
 
 from __future__ import annotations
 

@@ -95,7 +95,7 @@ def _ball_triangles(
 ) -> tuple[Index, Index]:
     """Return the indices of the triangles of each eyeball.
 
-    stencils : stencils of a subdivided mesh; None if it is not subdivided
+    stencils : stencils of a subdivided mesh; None without subdivision
     """
     first = mesh.point[mesh.triangles[:, 0]]
     if stencils is not None:

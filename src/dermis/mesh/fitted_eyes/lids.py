@@ -1,4 +1,4 @@
-"""Lids in front of an eyeball: they suggest the direction of gaze and limit the position of the cornea."""
+"""Lids in front of an eyeball, which suggest the direction of gaze and limit the cornea's position."""
 
 from __future__ import annotations
 
