@@ -28,7 +28,7 @@ from dermis.base.private import cache_folder, make_private_folder, open_private_
 
 Array = NDArray[Any]
 Arrays = dict[str, Array]
-_SUFFIX, _UNFINISHED_SUFFIX = ".arrays", ".part"
+_CACHE_FILE_SUFFIX, _UNFINISHED_SUFFIX = ".arrays", ".part"
 _MAX_FOLDER_BYTES = 2 << 30
 _MAX_RECENT_USE_AGE_S = 300.0  # longer than a process takes to read all its cached files
 _MAX_UNFINISHED_AGE_S = 24 * 3600.0  # older unfinished files were left by processes that were killed
@@ -97,7 +97,7 @@ def try_save_arrays(folder: str, cache_key: str, arrays: Arrays) -> None:
 
 def load_arrays(folder: str, cache_key: str, names: Sequence[str]) -> Arrays | None:
     """Return arrays from the disk cache; None if the entry is missing or damaged, or lacks one of `names`."""
-    path = cache_folder() / folder / f"{cache_key}{_SUFFIX}"
+    path = cache_folder() / folder / f"{cache_key}{_CACHE_FILE_SUFFIX}"
     with contextlib.suppress(OSError, MemoryError):
         if not _is_trusted(path.parent):
             return None
@@ -117,7 +117,7 @@ def save_arrays(folder: str, cache_key: str, arrays: Arrays) -> None:
 
     Raises OSError when the disk fails, or when other users can write to the folder.
     """
-    path = cache_folder() / folder / f"{cache_key}{_SUFFIX}"
+    path = cache_folder() / folder / f"{cache_key}{_CACHE_FILE_SUFFIX}"
     if not _is_trusted(path.parent):
         raise PermissionError(path.parent)
     data = {k: a if a.flags.fnc else np.ascontiguousarray(a).reshape(a.shape) for k, a in arrays.items()}
@@ -154,7 +154,7 @@ def _has_room(folder: Path, byte_count: int) -> bool:
     now = time.time()
     used = sum(
         status.st_size
-        for _, status in _folder_files(folder, _SUFFIX)
+        for _, status in _folder_files(folder, _CACHE_FILE_SUFFIX)
         if now - status.st_mtime < _MAX_RECENT_USE_AGE_S
     )
     return byte_count + used <= _MAX_FOLDER_BYTES
@@ -265,7 +265,7 @@ def _temporary_file(path: Path) -> Iterator[BinaryIO]:
 def _prune_folder(cache_path: Path) -> None:
     """Delete the least recently used files beyond the size limit of the folder, and old unfinished files."""
     newest_first = sorted(
-        _folder_files(cache_path, _SUFFIX), key=lambda entry: entry[1].st_mtime, reverse=True
+        _folder_files(cache_path, _CACHE_FILE_SUFFIX), key=lambda entry: entry[1].st_mtime, reverse=True
     )
     total, now = 0, time.time()
     for path, status in newest_first:

@@ -21,13 +21,13 @@ from dermis.base.arrays import Bytes
 from dermis.base.disk import Arrays
 from dermis.base.errors import DermisError, refuse, shorten
 
-_BASE_CPU_LIMIT_S, _SMALL_BYTES = 8.0, 64 << 20
-"""Limit of CPU time [s] for files of up to `_SMALL_BYTES`; for larger files it grows with their size."""
+_BASE_CPU_LIMIT_S, _BASE_CPU_LIMIT_BYTES = 8.0, 64 << 20
+"""Limit of CPU time [s] for files of up to `_BASE_CPU_LIMIT_BYTES`; it is proportional to larger sizes."""
 # limit of elapsed time, as a multiple of the limit of CPU time: the machine may be busy
 _MAX_WAIT_PER_CPU_TIME = 3.0
 _MAX_MEMORY_BYTES = 2 << 30  # limit of the address space; the libraries of USD use a third of it
 _MAX_ANSWER_BYTES = 1 << 30  # limit of the answer, and of each temporary file
-_REFUSED, _FAILED = "refused", "failed"
+_REFUSED_KEY, _FAILED_KEY = "refused", "failed"
 _MAX_MESSAGE_LENGTH = 2000  # characters
 _DAMAGED_ADVICE = "The file is damaged: export it again"
 _DECODER_ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1", "PXR_WORK_THREAD_LIMIT": "1"}
@@ -47,7 +47,7 @@ def run_decoder(
 
     Raises DermisError when the decoder refuses the data, fails, or exceeds a limit.
     """
-    cpu_s = _BASE_CPU_LIMIT_S * max(1.0, data_bytes / _SMALL_BYTES)
+    cpu_s = _BASE_CPU_LIMIT_S * max(1.0, data_bytes / _BASE_CPU_LIMIT_BYTES)
     command = [sys.executable, "-P", "-m", decoder_module, str(math.ceil(cpu_s))]
     kept = {name: value for name, value in os.environ.items() if name not in _REMOVED_ENVIRONMENT_VARIABLES}
     with TemporaryDirectory() as folder, TemporaryFile() as output:
@@ -69,10 +69,10 @@ def run_decoder(
             refuse(culprit, expected, actual, _DAMAGED_ADVICE)
         output.seek(0)
         answer = _unpack_arrays(output.read())
-    if _REFUSED in answer:
-        raise DermisError(shorten(as_text(answer[_REFUSED]), _MAX_MESSAGE_LENGTH))
-    if _FAILED in answer:
-        refuse(culprit, expected, f"it cannot be decoded ({as_text(answer[_FAILED])})", _DAMAGED_ADVICE)
+    if _REFUSED_KEY in answer:
+        raise DermisError(shorten(as_text(answer[_REFUSED_KEY]), _MAX_MESSAGE_LENGTH))
+    if _FAILED_KEY in answer:
+        refuse(culprit, expected, f"it cannot be decoded ({as_text(answer[_FAILED_KEY])})", _DAMAGED_ADVICE)
     return answer
 
 
@@ -88,10 +88,10 @@ def answer_request(decode: Callable[[Arrays], Arrays]) -> None:
     try:
         answer = _pack_arrays(decode(_unpack_arrays(sys.stdin.buffer.read())))
     except DermisError as error:
-        answer = _pack_arrays({_REFUSED: from_text(str(error))})
+        answer = _pack_arrays({_REFUSED_KEY: from_text(str(error))})
     except Exception as error:
         text = " ".join(f"{type(error).__name__}: {error}"[:_MAX_MESSAGE_LENGTH].split())
-        answer = _pack_arrays({_FAILED: from_text(shorten(text, 200))})
+        answer = _pack_arrays({_FAILED_KEY: from_text(shorten(text, 200))})
     with output:
         output.write(answer)
 

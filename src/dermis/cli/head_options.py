@@ -71,11 +71,11 @@ def note_eyes(head: Head, eyes_option: str | None) -> None:
 
 
 _MAX_OPTION_NUMBER = 1e10
-POSE, BONE, LOOK_AT = "--pose", "--bone", "--look-at"
+POSE_OPTION, BONE_OPTION, LOOK_AT_OPTION = "--pose", "--bone", "--look-at"
 WeightsOption = Annotated[
     list[str] | None,
     Parameter(
-        name=POSE,
+        name=POSE_OPTION,
         negative="",
         metavar="NAME=WEIGHT,...",
         help="Weights of morph targets, such as jawOpen=0.6,mouthSmileLeft=1, in addition to the [pose] of a "
@@ -85,7 +85,7 @@ WeightsOption = Annotated[
 LookAtOption = Annotated[
     str | None,
     Parameter(
-        name=LOOK_AT,
+        name=LOOK_AT_OPTION,
         metavar="X,Y,Z",
         help="Point that the eyes look at, relative to the centre of the head [mm], or the word camera.",
     ),
@@ -93,7 +93,7 @@ LookAtOption = Annotated[
 BoneAngleOptions = Annotated[
     list[str] | None,
     Parameter(
-        name=BONE,
+        name=BONE_OPTION,
         negative="",
         metavar="NAME=X,Y,Z",
         help="Rotation of a bone about the head's x (nod), y (turn) and z (tilt) axes, such as head=0,25,0 "
@@ -102,7 +102,7 @@ BoneAngleOptions = Annotated[
 ]
 
 
-def parse_weights(option_values: Sequence[str], option_name: str = POSE) -> dict[str, float]:
+def parse_weights(option_values: Sequence[str], option_name: str = POSE_OPTION) -> dict[str, float]:
     """Return weights by name from option values such as "jawOpen=0.6,mouthSmileLeft=1"."""
     expected = "NAME=WEIGHT,..., such as jawOpen=0.6,mouthSmileLeft=1"
     parts = (part for text in option_values for part in text.split(","))
@@ -112,7 +112,9 @@ def parse_weights(option_values: Sequence[str], option_name: str = POSE) -> dict
 def parse_bone_angles(option_values: Sequence[str]) -> dict[str, list[float]]:
     """Return the angles about x, y and z [degrees] by bone from option values such as "head=0,25,0"."""
     return dict(
-        _parse_pairs(option_values, 3, BONE, "NAME=X,Y,Z with three angles in degrees, such as head=0,25,0")
+        _parse_pairs(
+            option_values, 3, BONE_OPTION, "NAME=X,Y,Z with three angles in degrees, such as head=0,25,0"
+        )
     )
 
 
@@ -146,7 +148,7 @@ def pose_from_options(
     """
     from dermis.mesh.pose import Pose
 
-    parts = {POSE: Pose(weights), BONE: Pose(bones=bone_angles)}
+    parts = {POSE_OPTION: Pose(weights), BONE_OPTION: Pose(bones=bone_angles)}
     for option, part in parts.items():
         try:
             part.motion(head.control, option)
@@ -167,7 +169,7 @@ def pose_with_gaze(option_value: str, scene: Scene) -> Pose:
     point = scene.camera.position if option_value == "camera" else _parse_numbers(option_value)
     if point is None or len(point) != 3:
         expected = "camera, or X,Y,Z in mm from the head's centre"
-        refuse(LOOK_AT, expected, f"got {option_value!r}", "Correct it")
+        refuse(LOOK_AT_OPTION, expected, f"got {option_value!r}", "Correct it")
     return looking_at(scene.head, point, scene.pose)
 
 

@@ -131,13 +131,15 @@ def _reserve_descriptor(descriptor: int, open_mode: int) -> None:
             os.set_inheritable(descriptor, True)
 
 
-_SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+_HANDLED_SIGNALS = [
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+]
 # earlier repetitions are ignored: intermediate programs may send a signal twice
 _MIN_SECOND_SIGNAL_DELAY_S = 0.5
 _SIGNAL_RETRY_S = 0.02
 _UNSAFE_PACKAGES = {"importlib", "pydantic"}  # exceptions leave half-imported modules, or are lost in Rust
 _DRIVER_PACKAGES = {"wgpu", "glfw"}
-_RETRY, _END = b"\0", b"\xff"  # bytes that are not signal numbers
+_RETRY_BYTE, _END_BYTE = b"\0", b"\xff"  # bytes that are not signal numbers
 _SIGNAL_EXIT_BASE = 128  # exit status after a signal, minus the number of the signal
 
 
@@ -160,7 +162,7 @@ class Interruption:
         """Install the signal handlers; do nothing outside the main thread."""
         if threading.current_thread() is not threading.main_thread():
             return self
-        for signal_number in _SIGNALS:
+        for signal_number in _HANDLED_SIGNALS:
             handler = signal.getsignal(signal_number)
             if handler in (signal.SIG_DFL, signal.default_int_handler):
                 self._original[signal_number] = handler
@@ -183,7 +185,7 @@ class Interruption:
             signal.signal(signal_number, signal.SIG_DFL if self.code else handler)
         signal.set_wakeup_fd(self._original_fd)
         sys.unraisablehook = self._original_hook
-        self._writing.send(_END)
+        self._writing.send(_END_BYTE)
         self._thread.join()
         self._writing.close()
 
@@ -202,7 +204,7 @@ class Interruption:
 
     def _raise_later(self) -> None:
         self._is_raised, self._is_postponed = False, True
-        self._writing.send(_RETRY)
+        self._writing.send(_RETRY_BYTE)
 
     def _on_unraisable(self, error: sys.UnraisableHookArgs) -> None:
         """Repeat a KeyboardInterrupt that was raised where Python ignores exceptions, as in a destructor."""
@@ -226,7 +228,7 @@ class Interruption:
                     self._send_again()
                     continue
                 received = self._reading.recv(1)
-                if received == _END:
+                if received == _END_BYTE:
                     return
                 if received[0] not in self._original or signal.getsignal(received[0]) != self._handle:
                     continue  # a server has installed its own handler

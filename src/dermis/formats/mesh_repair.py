@@ -43,7 +43,7 @@ _MIN_VISIBILITY_BALANCE = 0.25
 _MIN_VISIBLE_SAMPLES = 8
 _MIN_VIEW_COSINE = 0.05  # smallest cosine of normal and view; surfaces seen at grazing angles do not count
 _MIN_VISIBLE_FRACTION = 0.02  # smallest ratio of visible samples to those visible without other components
-_VIEW_COUNT, _VIEW_CELLS = 20, 64  # number of views from outside, and of cells along a side of each view
+_VIEW_COUNT, _CELLS_PER_VIEW_SIDE = 20, 64  # views from outside, and cells along a side of each view
 _VISIBILITY_SAMPLE_COUNT = 120_000  # points on the mesh whose visibility is tested
 _DOUBTFUL_SAMPLE_FRACTION = 0.25  # reserved for components that may be inside out
 _MAX_UV_EXCESS = 0.02
@@ -453,8 +453,11 @@ class _PieceSurface:
         )
         for view in fibonacci_sphere(_VIEW_COUNT):
             across = np.linalg.svd(view[None])[2][1:]
-            cell = ((across @ sample / radius + 1) * (_VIEW_CELLS / 2)).astype(np.int64)
-            nearest, order = np.full((_VIEW_CELLS + 1, _VIEW_CELLS + 1), -1), np.argsort(view @ sample)
+            cell = ((across @ sample / radius + 1) * (_CELLS_PER_VIEW_SIDE / 2)).astype(np.int64)
+            nearest, order = (
+                np.full((_CELLS_PER_VIEW_SIDE + 1, _CELLS_PER_VIEW_SIDE + 1), -1),
+                np.argsort(view @ sample),
+            )
             nearest[tuple(cell[:, order])] = order  # the last, nearest sample of a cell remains
             visible = nearest[nearest >= 0]
             cosine = view @ normal[:, visible]
@@ -462,7 +465,7 @@ class _PieceSurface:
             for side, facing in zip(seen, facings, strict=True):
                 side += np.bincount(piece[visible[facing]], minlength=len(component_area))
         cells = (
-            component_area / 8 * (_VIEW_CELLS / 2 / radius) ** 2
+            component_area / 8 * (_CELLS_PER_VIEW_SIDE / 2 / radius) ** 2
         )  # that a convex component would cover alone
         alone = _VIEW_COUNT * np.minimum(cells, np.bincount(piece, minlength=len(component_area)) / 2)
         front, back = seen

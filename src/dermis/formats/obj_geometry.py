@@ -35,7 +35,8 @@ _TRAILING_COMMENT = re.compile(r"^((?:v[tn]?|f)[ \t][^#\n]*)#[^\n]*", re.MULTILI
 _LINE_FEED, _SPACE, _SLASH = b"\n /"
 _VERTEX_STATEMENTS = ("v", "vt", "vn")
 _MIN_NUMBERS_PER_STATEMENT = {"v": 3, "vt": 1, "vn": 3}
-_USED_NUMBERS, _MOST_NUMBERS = 6, 16  # numbers in a statement that are used (position, colour) and allowed
+# numbers in a statement that are used (position, colour), and that are allowed
+_USED_NUMBERS_PER_STATEMENT, _MAX_NUMBERS_PER_STATEMENT = 6, 16
 _POLYPAINT_MARK = "#MRGB"
 _CURVE_STATEMENTS = "cstype deg bmat step curv curv2 surf con vp parm trim hole scrv sp end"
 _LEFT_OUT_STATEMENTS = {"lines": ("l",), "points": ("p",), "curves": tuple(_CURVE_STATEMENTS.split())}
@@ -224,13 +225,13 @@ def _parse_vertices(path: Path, statement_rows: _StatementRows) -> tuple[Doubles
     """
     table, counts = _parse_number_table(path, statement_rows, "v")
     positions, notes = table[:, :3], list[str]()
-    if (counts == 5).any() or (counts > _USED_NUMBERS).any():
+    if (counts == 5).any() or (counts > _USED_NUMBERS_PER_STATEMENT).any():
         notes.append("further numbers after the position or colour of vertices (v) are left out")
     weight = np.where(counts == 4, table[:, 3], 1.0)
     if (weight != 1).any():
         notes.append("vertices have a fourth coordinate: their positions are divided by it")
         positions = positions / weight[:, None]
-    coloured = counts >= _USED_NUMBERS
+    coloured = counts >= _USED_NUMBERS_PER_STATEMENT
     if not coloured.any():
         return positions, None, notes
     colours, faults = linear_colours(np.where(coloured[:, None], table[:, 3:], np.nan))
@@ -258,15 +259,15 @@ def _parse_number_table(
     first = np.searchsorted(words, statement_rows.start)
     counts = np.diff(first, append=len(words))
     fewest = _MIN_NUMBERS_PER_STATEMENT[statement_key]
-    expected = f"{fewest} to {_MOST_NUMBERS} numbers after {statement_key}"
-    if (faulty := (counts < fewest) | (counts > _MOST_NUMBERS)).any():
+    expected = f"{fewest} to {_MAX_NUMBERS_PER_STATEMENT} numbers after {statement_key}"
+    if (faulty := (counts < fewest) | (counts > _MAX_NUMBERS_PER_STATEMENT)).any():
         _refuse_line(path, statement_rows, int(faulty.argmax()), expected)
     try:
         values = parse_numbers(statement_rows.text, len(words), np.float64)
     except ValueError:
         _refuse_line(path, statement_rows, _first_non_numeric(statement_rows, np.float64), expected)
-    column = np.arange(_USED_NUMBERS)
-    table = np.full((len(counts), _USED_NUMBERS), np.nan)
+    column = np.arange(_USED_NUMBERS_PER_STATEMENT)
+    table = np.full((len(counts), _USED_NUMBERS_PER_STATEMENT), np.nan)
     given = column < counts[:, None]
     table[given] = values[(first[:, None] + column)[given]]
     return table, counts

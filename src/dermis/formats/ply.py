@@ -32,7 +32,7 @@ from dermis.mesh.geometry import expand_runs, weld
 
 _MAX_HEADER_BYTES = 1 << 16  # bytes
 _MAX_ELEMENTS = {"vertex": limits.MAX_VERTICES, "face": limits.MAX_TRIANGLES}
-_MAX_PROPERTIES, _MAX_LISTS = 256, 8
+_MAX_PROPERTIES_PER_ELEMENT, _MAX_LISTS_PER_ELEMENT = 256, 8
 _BYTE_ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
 _SPACE_BYTE = 32
 _NUMPY_TYPES = {
@@ -203,7 +203,7 @@ def _read_header(path: Path, ply_bytes: bytes) -> _Header:
     lines = decode_text(ply_bytes[: end.start()]).split("\n")
     words = [line.split() for line in lines]
     properties = sum(line[:1] == ["property"] for line in words)
-    limits.check_limit(path, properties, _MAX_PROPERTIES, "properties", limits.DAMAGED_ADVICE)
+    limits.check_limit(path, properties, _MAX_PROPERTIES_PER_ELEMENT, "properties", limits.DAMAGED_ADVICE)
     header = _Header("", size, [], [])
     for line, text in zip(words, lines, strict=True):
         match line:
@@ -294,7 +294,9 @@ class _ElementReader:
         """
         columns, properties = _Columns(), self.element.properties
         lists = [one for one in properties if one.length_dtype]
-        limits.check_limit(self.path, len(lists), _MAX_LISTS, "lists of an element", limits.DAMAGED_ADVICE)
+        limits.check_limit(
+            self.path, len(lists), _MAX_LISTS_PER_ELEMENT, "lists of an element", limits.DAMAGED_ADVICE
+        )
         lengths = dict(zip(lists, self._list_lengths(byte_position), strict=True))
         size = np.full(self.element.count, self._fixed_size(properties), np.int64)
         for one, length in lengths.items():

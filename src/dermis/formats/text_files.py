@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from dermis.base.arrays import Bytes, Index, Mask
 from dermis.base.errors import format_value
 
-_MAX_LISTED, _MAX_NAME = 8, 40
-_PLAIN_NAME_PATTERN = re.compile(rf"[\w.()/ -]{{1,{_MAX_NAME}}}")
+_MAX_LISTED_NAMES, _MAX_NAME_LENGTH = 8, 40
+_PLAIN_NAME_PATTERN = re.compile(rf"[\w.()/ -]{{1,{_MAX_NAME_LENGTH}}}")
 _UTF16_MARKS = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 T = TypeVar("T", np.float64, np.int64)
 
@@ -47,8 +47,11 @@ def _decode_line(line: bytes) -> str:
 
 def list_names(names: Collection[str]) -> str:
     """Return the first eight names as text for a message, with the number of further names."""
-    first, more = islice(names, _MAX_LISTED), len(names) - _MAX_LISTED
-    shown = [name if _PLAIN_NAME_PATTERN.fullmatch(name) else format_value(name, _MAX_NAME) for name in first]
+    first, more = islice(names, _MAX_LISTED_NAMES), len(names) - _MAX_LISTED_NAMES
+    shown = [
+        name if _PLAIN_NAME_PATTERN.fullmatch(name) else format_value(name, _MAX_NAME_LENGTH)
+        for name in first
+    ]
     return ", ".join(shown) + (f" and {more} more" if more > 0 else "")
 
 

@@ -21,10 +21,14 @@ COMMON_UNITS_MM = (1.0, 10.0, 25.4, 100.0, 1000.0)
 _ACCEPTED_SIZE_RANGE_MM = (1.0, 3000.0)  # smallest and largest accepted size
 # sizes in units of the file for which the unit is assumed to be the millimetre
 _SIZE_RANGE_OF_MM_FILES = (100.0, 1000.0)
-_FIGURE_MM, _HEAD_MM, _PIECE_MM = 1700.0, 270.0, 150.0  # typical sizes
+_TYPICAL_FIGURE_MM, _TYPICAL_HEAD_MM, _TYPICAL_PIECE_MM = 1700.0, 270.0, 150.0  # typical sizes
 _MAX_FLATNESS = 0.25  # thickness relative to length below which a mesh is a patch of skin or a hand
 _INCH_MM = 25.4
-_INCH_LOG_SIZE_PENALTY = {_FIGURE_MM: 0.4, _HEAD_MM: 0.4, _PIECE_MM: 9.0}  # added to the error of log(size)
+_INCH_LOG_SIZE_PENALTY = {
+    _TYPICAL_FIGURE_MM: 0.4,
+    _TYPICAL_HEAD_MM: 0.4,
+    _TYPICAL_PIECE_MM: 9.0,
+}  # added to the error of log(size)
 _EXPORTED_UNITS_MM = (1.0, 10.0)  # units that programs write although the format requires metres
 # usual sizes of standing figures (True) and of other meshes (False)
 _USUAL_SIZE_RANGE_MM = {True: (1200.0, 2200.0), False: (150.0, 500.0)}
@@ -70,13 +74,13 @@ def guess_unit_mm(positions: Floats, triangles: Ints) -> float:
     positions : (v, 3) vertices in the unit of the file, Y up
     triangles : (f, 3) vertex indices
     """
-    size, typical = float(np.ptp(positions, axis=0).max()), _FIGURE_MM
+    size, typical = float(np.ptp(positions, axis=0).max()), _TYPICAL_FIGURE_MM
     if not is_standing_figure(positions, triangles):
         thickness, width, length = principal_sizes(positions)
         if size == 0 or _is_in_mm(positions):
             return 1.0
         is_piece = length > MAX_ELONGATION * width or thickness < _MAX_FLATNESS * length
-        typical = _PIECE_MM if is_piece else _HEAD_MM
+        typical = _TYPICAL_PIECE_MM if is_piece else _TYPICAL_HEAD_MM
     penalty = _INCH_LOG_SIZE_PENALTY[typical]
     return min(
         COMMON_UNITS_MM, key=lambda unit: abs(log(size * unit / typical)) + penalty * (unit == _INCH_MM)

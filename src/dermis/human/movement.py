@@ -25,12 +25,13 @@ _BONE_ORIGINS: dict[str, tuple[str, str, float]] = {  # two joints, and the posi
 _BONE_PARENTS = {"neck02": "neck01", "neck03": "neck02", "head": "neck03"}
 _BONE_PARENTS |= dict.fromkeys(("jaw", "eye.L", "eye.R"), "head")
 _BONE_PARENTS |= dict.fromkeys(("neck01", "clavicle.L", "clavicle.R"), "spine")
-_SIDEWAYS_DEGREES, _UP_DEGREES, _DOWN_DEGREES = 28.0, 20.0, 22.0  # rotation of an eye at a weight of 1
+# rotation of an eye at a weight of 1
+_GAZE_SIDEWAYS_DEGREES, _GAZE_UP_DEGREES, _GAZE_DOWN_DEGREES = 28.0, 20.0, 22.0
 _GAZE_ANGLES = {
-    "In": (0.0, -_SIDEWAYS_DEGREES, 0.0),
-    "Out": (0.0, _SIDEWAYS_DEGREES, 0.0),
-    "Up": (-_UP_DEGREES, 0.0, 0.0),
-    "Down": (_DOWN_DEGREES, 0.0, 0.0),
+    "In": (0.0, -_GAZE_SIDEWAYS_DEGREES, 0.0),
+    "Out": (0.0, _GAZE_SIDEWAYS_DEGREES, 0.0),
+    "Up": (-_GAZE_UP_DEGREES, 0.0, 0.0),
+    "Down": (_GAZE_DOWN_DEGREES, 0.0, 0.0),
 }
 """Angles of the left eye, at +X, about x, y and z [degrees]; of the right eye with the opposite sign of y."""
 

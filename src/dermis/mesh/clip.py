@@ -13,13 +13,13 @@ from dermis.mesh.pose import Pose
 _MAX_LISTED_NAMES = 8  # largest number of names in a note
 MAX_DURATION_S = 86_400.0
 _MAX_TIME_S = 1e9
-_MIN_RATE, _MAX_RATE = 0.001, 1000.0
+_MIN_FRAME_RATE, _MAX_FRAME_RATE = 0.001, 1000.0
 _END_TOLERANCE_FRAMES = 1e-6  # fraction of a frame by which rounding may put the last frame behind the end
 
 
 def check_frame_rate(culprit: object, frame_rate: object) -> float:
     """Return a frame rate [1/s] after checking that the rate is positive; raise DermisError if not."""
-    return checked_number(culprit, frame_rate, _MIN_RATE, _MAX_RATE, "frames a second")
+    return checked_number(culprit, frame_rate, _MIN_FRAME_RATE, _MAX_FRAME_RATE, "frames a second")
 
 
 @dataclass(frozen=True, eq=False, repr=False)

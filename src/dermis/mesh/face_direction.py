@@ -11,12 +11,13 @@ from dermis.mesh.geometry import cross_columns, dot_columns
 
 Direction = Literal["x", "z", "-x", "-z"]
 # Numbers of examined triangles, of points sampled on them, and of points that are mirrored:
-_MAX_TRIANGLES, _SAMPLES, _MIRRORED = 40_000, 6_000, 800
+_MAX_ANALYSED_TRIANGLES, _SURFACE_SAMPLE_COUNT, _MIRRORED_SAMPLE_COUNT = 40_000, 6_000, 800
 # Limits for the eyes, relative to the width of both together:
 _MAX_EYE_DEPTH, _MAX_EYE_HEIGHT = 0.67, 0.6  # largest extent from back to front, and upwards
 _MIN_EYE_GAP = 0.1  # smallest gap between the eyes
 _HEAD_RADIUS_IN_EYE_WIDTHS = 3.0  # horizontal radius around the eyes within which vertices count as the head
-_MIN_AHEAD, _MAX_ASIDE = 0.25, 0.25  # offset of the eyes from the middle of the head: forwards, and to a side
+# offset of the eyes from the middle of the head: forwards, and to a side
+_MIN_EYE_OFFSET_AHEAD, _MAX_EYE_OFFSET_ASIDE = 0.25, 0.25
 # Limits for the head, relative to its height:
 _MAX_HEAD_WIDTH = 0.68  # largest width of the head without shoulders
 _HEAD_DEPTH_RANGE = 0.5, 1.6  # smallest and largest depth
@@ -25,7 +26,7 @@ _MIN_NOSE_HEIGHT = 0.04  # smallest protrusion of the middle of the face
 _MIN_NORMAL_VARIATION = 0.03  # smallest variation of normals, see `_normal_variation`
 _VARIATION_CELL_SIDE = 0.08  # side of the cells in `_normal_variation`
 # Height of the rows in `_ridge_height`, largest distance of the ridge from the middle, distance of its sides:
-_ROW, _RIDGE, _SIDES = 0.05, 0.03, (0.07, 0.12)
+_RIDGE_ROW_HEIGHT, _MAX_RIDGE_OFFSET, _RIDGE_SIDE_RANGE = 0.05, 0.03, (0.07, 0.12)
 # Smallest ratio of the larger to the smaller asymmetry about the horizontal axes, and of relief and of nose
 # at the front to those at the back:
 _MIN_ASYMMETRY_RATIO, _MIN_RELIEF_RATIO, _MIN_NOSE_RATIO = 2.2, 1.4, 1.35
@@ -43,7 +44,7 @@ def face_direction(positions: Doubles, triangles: Index, eyes: Doubles) -> Direc
     """
     if not len(triangles):
         return None
-    corners = positions[triangles[:: 1 + len(triangles) // _MAX_TRIANGLES]]
+    corners = positions[triangles[:: 1 + len(triangles) // _MAX_ANALYSED_TRIANGLES]]
     return _direction_from_eyes(corners[:, 0], eyes) or _direction_from_shape(corners)
 
 
@@ -63,7 +64,10 @@ def _direction_from_eyes(points: Doubles, eyes: Doubles) -> Direction | None:
     if spread[front] > _MAX_EYE_DEPTH * width or spread[1] > _MAX_EYE_HEIGHT * width or not len(near):
         return None
     shift = middle - (near.min(axis=0) + near.max(axis=0)) / 2
-    if abs(shift[front]) < _MIN_AHEAD * width or abs(shift[2 - front]) > _MAX_ASIDE * width:
+    if (
+        abs(shift[front]) < _MIN_EYE_OFFSET_AHEAD * width
+        or abs(shift[2 - front]) > _MAX_EYE_OFFSET_ASIDE * width
+    ):
         return None
     return _axis_name(front, shift[front])
 
@@ -132,8 +136,10 @@ def _sample_surface(corners: Doubles, normals: Doubles) -> tuple[Doubles, Double
     """
     areas = np.sqrt(dot_columns(normals, normals))
     total = np.cumsum(areas)
-    chosen = np.searchsorted(total, (np.arange(_SAMPLES) + 0.5) / _SAMPLES * total[-1])
-    shares = np.sort(np.random.default_rng(0).random((2, _SAMPLES)), axis=0)
+    chosen = np.searchsorted(
+        total, (np.arange(_SURFACE_SAMPLE_COUNT) + 0.5) / _SURFACE_SAMPLE_COUNT * total[-1]
+    )
+    shares = np.sort(np.random.default_rng(0).random((2, _SURFACE_SAMPLE_COUNT)), axis=0)
     shares = np.diff(shares, axis=0, prepend=0, append=1)
     return np.einsum("fkc,kf->fc", corners[chosen], shares), (normals[:, chosen] / areas[chosen]).T
 
@@ -144,9 +150,9 @@ def _asymmetry(points: Doubles, mirrored_axis: int) -> float:
     mirrored_axis : index of the coordinate that is mirrored
     """
     single = points.astype(np.float32)
-    mirrored = single[:: len(points) // _MIRRORED] * np.where(np.arange(3) == mirrored_axis, -1, 1).astype(
-        np.float32
-    )
+    mirrored = single[:: len(points) // _MIRRORED_SAMPLE_COUNT] * np.where(
+        np.arange(3) == mirrored_axis, -1, 1
+    ).astype(np.float32)
     squares = (-2 * mirrored) @ single[::2].T
     squares += (single[::2] ** 2).sum(axis=1)
     nearest = squares.min(axis=1) + (mirrored**2).sum(axis=1)
@@ -167,10 +173,14 @@ def _ridge_height(points: Doubles, front_axis: int) -> float:
     points : (n, 3) points of the front or back of a head
     front_axis : index of the coordinate along which the face may look
     """
-    row = (points[:, 1] / -_ROW).astype(int)
+    row = (points[:, 1] / -_RIDGE_ROW_HEIGHT).astype(int)
     across, depth = points[:, 2 - front_axis], np.abs(points[:, front_axis])
-    low, high = _SIDES
-    bands = np.abs(across) < _RIDGE, (across > low) & (across < high), (across < -low) & (across > -high)
+    low, high = _RIDGE_SIDE_RANGE
+    bands = (
+        np.abs(across) < _MAX_RIDGE_OFFSET,
+        (across > low) & (across < high),
+        (across < -low) & (across > -high),
+    )
     middle, left, right = reach = np.zeros((3, row.max(initial=0) + 1))
     for deepest, band in zip(reach, bands, strict=True):
         np.maximum.at(deepest, row[band], depth[band])

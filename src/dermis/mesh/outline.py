@@ -26,7 +26,7 @@ _DIRECTION_COUNTS_OF_PASSES = 64, 512, 2048
 _IGNORED_EXCESS_MM = 0.5
 _NUMBERS_PER_BLOCK = 80_000  # numbers that are computed at a time
 _CANDIDATES_PER_DIRECTION = 16  # candidates per direction; any of them may be outermost in some pose
-_RANDOM_POSE_COUNT, _SEED = 128, 0
+_RANDOM_POSE_COUNT, _RANDOM_POSE_SEED = 128, 0
 _MAX_BONE_DEGREES = 60.0
 _MAX_ROTATED_BONES = 4  # bones that are rotated in one pose
 _ACTIVE_TARGET_FRACTION = 0.3  # fraction of the targets that are active in one pose
@@ -151,7 +151,7 @@ def find_outline_points(positions: Floats, targets: MorphTargets, skeleton: Skel
         _select_extreme(chosen, positions[candidates], count)
     for weights in np.eye(len(targets.names), dtype=np.float32):
         _select_extreme(chosen, outline.pose(weights, rest))
-    rng = np.random.default_rng(_SEED)
+    rng = np.random.default_rng(_RANDOM_POSE_SEED)
     for _ in range(_RANDOM_POSE_COUNT if targets.names or skeleton else 0):
         random_weights = rng.random(len(targets.names)) * (
             rng.random(len(targets.names)) < _ACTIVE_TARGET_FRACTION

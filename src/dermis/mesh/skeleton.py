@@ -14,7 +14,7 @@ from dermis.mesh.rotations import angles_matrix
 
 BONES_PER_POINT = 4
 """Largest number of bones that move a point; if a file has more, those with the largest weights are kept."""
-_IDENTITY = np.eye(4)
+_IDENTITY_MATRIX = np.eye(4)
 _MAX_SEQUENTIAL_BONES = 12  # largest number of moving bones that are handled one after the other
 
 
@@ -107,7 +107,7 @@ class Skeleton(ShortRepr):
         The result (b, 4, 4) is the head-space transform of every bone relative to its rest pose.
         """
         nearest, transform = np.zeros(len(self.names), np.intp), np.empty((len(bones) + 1, 4, 4))
-        transform[0] = _IDENTITY
+        transform[0] = _IDENTITY_MATRIX
         for index, bone in enumerate(bones, start=1):
             np.matmul(transform[nearest[bone]], bone_changes[index - 1], out=transform[index])
             nearest[self._descendants[bone]] = index
@@ -118,7 +118,7 @@ class Skeleton(ShortRepr):
 
         The result (b, 4, 4) is the head-space transform of every bone relative to its rest pose.
         """
-        transform = np.tile(_IDENTITY, (len(self.names), 1, 1))
+        transform = np.tile(_IDENTITY_MATRIX, (len(self.names), 1, 1))
         transform[list(bones)] = bone_changes
         for bones_of_depth, parents in self._bones_by_depth[1:]:
             transform[bones_of_depth] = transform[parents] @ transform[bones_of_depth]

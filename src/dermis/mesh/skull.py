@@ -22,7 +22,9 @@ _MAX_FLAT_THICKNESS_RATIO = 0.5  # thickness relative to width below which a mes
 _MIN_MEAN_NORMAL_LENGTH = 0.2  # length of the mean normal of an open surface; 0 for closed meshes
 _WORD_PATTERN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 # Sections of a standing figure, as fractions of its height, and widths relative to its height.
-_HEAD_SECTION, _NECK_SECTIONS, _SHOULDER_SECTIONS = 0.95, (0.82, 0.85, 0.88), (0.74, 0.77, 0.8)
+_HEAD_SECTION_HEIGHT = 0.95
+_NECK_SECTION_HEIGHTS = 0.82, 0.85, 0.88
+_SHOULDER_SECTION_HEIGHTS = 0.74, 0.77, 0.8
 _MIN_FIGURE_TO_DEPTH = 2.5
 _MAX_HEAD_WIDTH, _MAX_NECK_WIDTH, _MIN_SHOULDERS_TO_NECK = 0.25, 0.16, 1.6
 
@@ -54,11 +56,11 @@ def is_standing_figure(positions: Floats, triangles: Ints) -> bool:
         return False
     points, ends = positions.astype(np.float64), positions[:, 1][triangles]
     low, high = ends.min(axis=1), ends.max(axis=1)
-    levels = (_HEAD_SECTION, *_NECK_SECTIONS, *_SHOULDER_SECTIONS)
+    levels = (_HEAD_SECTION_HEIGHT, *_NECK_SECTION_HEIGHTS, *_SHOULDER_SECTION_HEIGHTS)
     heights = [float(points[:, 1].min()) + level * height for level in levels]
     head, *others = (_horizontal_section(points, triangles[(low <= y) & (high > y)], y) for y in heights)
-    neck = min(others[: len(_NECK_SECTIONS)], key=lambda one: one.width)
-    shoulders = max(others[len(_NECK_SECTIONS) :], key=lambda one: one.width)
+    neck = min(others[: len(_NECK_SECTION_HEIGHTS)], key=lambda one: one.width)
+    shoulders = max(others[len(_NECK_SECTION_HEIGHTS) :], key=lambda one: one.width)
     return (
         head.parts == neck.parts == 1
         and 0 < head.width < _MAX_HEAD_WIDTH * height

@@ -17,7 +17,7 @@ from dermis.mesh.clip import Clip, check_frame_rate
 from dermis.mesh.head import Head
 from dermis.scene.head_table import check_options
 
-_TABLES, _JSON = (".csv", ".tsv"), (".jsonl", ".ndjson", ".json")
+_TABLE_SUFFIXES, _JSON_SUFFIXES = (".csv", ".tsv"), (".jsonl", ".ndjson", ".json")
 _ACCEPTED_FILES = (
     "a glTF clip (.glb .gltf), Live Link Face (.csv), MediaPipe (.json .jsonl) or a sequence of .obj or .ply"
 )
@@ -92,9 +92,9 @@ def load_motion(
         return load_sequence(source, head, fps, unit_mm, up, front)
     if not is_file(source):
         refuse(source, _ACCEPTED_FILES, "there is no such file", "Check the name")
-    if source.suffix.lower() not in (*_TABLES, *_JSON):
+    if source.suffix.lower() not in (*_TABLE_SUFFIXES, *_JSON_SUFFIXES):
         refuse(source, _ACCEPTED_FILES, f"the suffix is {source.suffix!r}", "Convert it to one of these")
-    load = load_live_link if source.suffix.lower() in _TABLES else load_mediapipe
+    load = load_live_link if source.suffix.lower() in _TABLE_SUFFIXES else load_mediapipe
     return load(source, head, fps)
 
 

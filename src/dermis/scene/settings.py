@@ -16,7 +16,7 @@ from dermis.scene.talk import Gamma, SeamColour, Seams, Stretch
 from dermis.scene.techniques import TECHNIQUES
 
 _Side = Annotated[int, Field(ge=1, le=16384), Reason("pixels: what the largest GPUs hold")]
-_MAX_SAMPLES = 64
+_MAX_SAMPLES_PER_PIXEL = 64
 MAX_SAMPLE_COUNT = 2**27
 _HEX_COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
 
@@ -74,7 +74,9 @@ class Settings(FrozenModel):
     """Width and height of the picture [pixel]."""
     atlas: Annotated[int, Field(ge=64, le=16384), Reason("texels: what the largest GPUs hold")] = 2048
     """Side of the atlas, the map in which light is diffused [texel]."""
-    samples: Annotated[int, Field(ge=1, le=_MAX_SAMPLES), Reason("more make no visible difference")] = 4
+    samples: Annotated[
+        int, Field(ge=1, le=_MAX_SAMPLES_PER_PIXEL), Reason("more make no visible difference")
+    ] = 4
     """Samples per pixel for antialiasing."""
     technique: Annotated[str, RegisteredName(TECHNIQUES)] = "texture-space"
     """Technique for subsurface scattering."""

@@ -19,7 +19,7 @@ from dermis.mesh.rotations import slerp
 
 _PROPERTY_COMPONENT_COUNTS = {"translation": 3, "rotation": 4, "scale": 3}
 Interpolation = Literal["STEP", "LINEAR", "CUBICSPLINE"]
-_TANGENT_IN, _VALUE, _TANGENT_OUT = range(3)
+_SPLINE_TANGENT_IN, _SPLINE_VALUE, _SPLINE_TANGENT_OUT = range(3)
 
 
 class AnimationTrack(NamedTuple):
@@ -96,7 +96,7 @@ def _read_tracks(document: Document, clip_index: int, clip_name: str) -> list[An
             tracks.append(_weight_track(document, target["node"], sampler, culprit, names))
             continue
         keys = _read_keyframes(document, sampler, _PROPERTY_COMPONENT_COUNTS[target["path"]], culprit)
-        rotations = keys.values[:, _VALUE] if keys.kind == "CUBICSPLINE" else keys.values
+        rotations = keys.values[:, _SPLINE_VALUE] if keys.kind == "CUBICSPLINE" else keys.values
         if target["path"] == "rotation" and not rotations.any(axis=-1).all():
             refuse(culprit, "unit quaternions as rotations", "one is 0", DAMAGED_ADVICE)
         group = (target["path"], keys.kind, keys.times_s.tobytes())
@@ -184,7 +184,7 @@ class AnimationCurve:
     def sample(self, seconds: float) -> Doubles:
         """Return the values at a time [s], (m, n); constant before the first and after the last key."""
         index = int(np.searchsorted(self.times_s, seconds, side="right")) - 1
-        keys = self.values[:, _VALUE] if self.kind == "CUBICSPLINE" else self.values
+        keys = self.values[:, _SPLINE_VALUE] if self.kind == "CUBICSPLINE" else self.values
         if index < 0 or index + 1 >= len(self.times_s):
             return self._normalise_rotations(keys[max(index, 0)])
         if self.kind == "STEP":
@@ -201,11 +201,11 @@ class AnimationCurve:
 
     def _cubic_spline_value(self, key_index: int, fraction: float, interval_s: float) -> Doubles:
         before, after = self.values[key_index], self.values[key_index + 1]
-        value = (2 * fraction**3 - 3 * fraction**2 + 1) * before[_VALUE] + (
+        value = (2 * fraction**3 - 3 * fraction**2 + 1) * before[_SPLINE_VALUE] + (
             3 * fraction**2 - 2 * fraction**3
-        ) * after[_VALUE]
-        value += interval_s * (fraction**3 - 2 * fraction**2 + fraction) * before[_TANGENT_OUT]
-        value += interval_s * (fraction**3 - fraction**2) * after[_TANGENT_IN]
+        ) * after[_SPLINE_VALUE]
+        value += interval_s * (fraction**3 - 2 * fraction**2 + fraction) * before[_SPLINE_TANGENT_OUT]
+        value += interval_s * (fraction**3 - fraction**2) * after[_SPLINE_TANGENT_IN]
         return np.asarray(value)
 
     def _normalise_rotations(self, key_values: Doubles) -> Doubles:

@@ -13,7 +13,7 @@ import numpy as np
 from dermis.base.arrays import Numbers
 from dermis.formats.gltf.document import FrozenTree, Tree
 
-VERTICES, INDICES = 34962, 34963
+VERTEX_TARGET, INDEX_TARGET = 34962, 34963
 """Kinds of data in a buffer view, which glTF calls its target."""
 CLAMPED_SAMPLER = {"magFilter": 9729, "minFilter": 9987, "wrapS": 33071, "wrapT": 33071}
 """Sampler with mip levels and without repetition."""
@@ -34,7 +34,7 @@ class BufferBuilder:
     def add_view(self, view_bytes: bytes, buffer_target: int | None = None) -> int:
         """Append bytes to the buffer and return the index of their buffer view.
 
-        buffer_target : `VERTICES` or `INDICES`; None for other data
+        buffer_target : `VERTEX_TARGET` or `INDEX_TARGET`; None for other data
         """
         self.data += b"\0" * (-len(self.data) % 4)
         entry = {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(view_bytes)}
@@ -48,7 +48,7 @@ class BufferBuilder:
         """Append n elements of k components, (n, k), and return the index of their accessor.
 
         elements : float32 or unsigned integers
-        buffer_target : `VERTICES` or `INDICES`; None for other data
+        buffer_target : `VERTEX_TARGET` or `INDEX_TARGET`; None for other data
         with_bounds : whether to store each component's minimum and maximum, which glTF requires for positions
         """
         values = _to_little_endian(elements)
@@ -61,7 +61,7 @@ class BufferBuilder:
 
         vertex_count : number of vertices of the primitive, which determines the type of the indices
         """
-        return self.add_accessor(vertex_index.reshape(-1, 1).astype(_index_dtype(vertex_count)), INDICES)
+        return self.add_accessor(vertex_index.reshape(-1, 1).astype(_index_dtype(vertex_count)), INDEX_TARGET)
 
     def add_displacements(
         self, moved_vertex: Numbers, displacements: Sequence[Numbers], vertex_count: int
@@ -104,7 +104,7 @@ class BufferBuilder:
     def _dense_accessor(self, moved_vertex: Numbers, displacement: Numbers, vertex_count: int) -> int:
         dense = np.zeros((vertex_count, 3), "<f4")
         dense[moved_vertex] = displacement
-        return self.add_accessor(dense, VERTICES, with_bounds=True)
+        return self.add_accessor(dense, VERTEX_TARGET, with_bounds=True)
 
     def _append_accessor(self, elements: Numbers, accessor_entries: FrozenTree) -> int:
         layout = {

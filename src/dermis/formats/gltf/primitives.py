@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from dermis.base.arrays import Doubles, Floats, Index, Intp, Ints
 from dermis.formats.deformable_mesh import DeformableMesh, VertexTarget
-from dermis.formats.gltf.binary import VERTICES, BufferBuilder
+from dermis.formats.gltf.binary import VERTEX_TARGET, BufferBuilder
 from dermis.formats.gltf.document import Tree
 from dermis.mesh.eyeball import eye_uv
 from dermis.mesh.head import Head
@@ -153,9 +153,9 @@ def _vertex_attributes(
     binary: BufferBuilder, positions_mm: NDArray[np.floating], normals: Floats, uv: Floats
 ) -> dict[str, int]:
     return {
-        "POSITION": binary.add_accessor(to_metres(positions_mm), VERTICES, with_bounds=True),
-        "NORMAL": binary.add_accessor(normals, VERTICES),
-        "TEXCOORD_0": binary.add_accessor(uv, VERTICES),
+        "POSITION": binary.add_accessor(to_metres(positions_mm), VERTEX_TARGET, with_bounds=True),
+        "NORMAL": binary.add_accessor(normals, VERTEX_TARGET),
+        "TEXCOORD_0": binary.add_accessor(uv, VERTEX_TARGET),
     }
 
 
@@ -170,8 +170,8 @@ def _bone_attributes(
         return {}
     bone, weight = deformable.bone_influences
     return {
-        "JOINTS_0": binary.add_accessor(bone[vertex_index], VERTICES),
-        "WEIGHTS_0": binary.add_accessor(weight[vertex_index], VERTICES),
+        "JOINTS_0": binary.add_accessor(bone[vertex_index], VERTEX_TARGET),
+        "WEIGHTS_0": binary.add_accessor(weight[vertex_index], VERTEX_TARGET),
     }
 
 

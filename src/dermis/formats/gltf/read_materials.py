@@ -36,7 +36,7 @@ _SCATTERING_EXTENSIONS = (
     "KHR_materials_diffuse_transmission",
     "KHR_materials_subsurface",
 )
-_GLOSS_EXTENSION, _UNLIT_EXTENSION, _STRENGTH_EXTENSION = (
+_GLOSS_EXTENSION, _UNLIT_EXTENSION, _EMISSIVE_STRENGTH_EXTENSION = (
     "KHR_materials_pbrSpecularGlossiness",
     "KHR_materials_unlit",
     "KHR_materials_emissive_strength",
@@ -67,7 +67,12 @@ GLTF_MATERIALS = (
     noted("`roughnessFactor`", "skin has a measured roughness", other_parts="drawn"),
     noted("`metallicFactor`", other_parts="drawn"),
     noted("`emissiveFactor`, `emissiveTexture`", other_parts="drawn"),
-    noted(f"`{_STRENGTH_EXTENSION}`", "factor of the emission", _STRENGTH_EXTENSION, other_parts="drawn"),
+    noted(
+        f"`{_EMISSIVE_STRENGTH_EXTENSION}`",
+        "factor of the emission",
+        _EMISSIVE_STRENGTH_EXTENSION,
+        other_parts="drawn",
+    ),
     drawn_with_note("emission without a base colour", "taken for the reflectance, as in scans"),
     noted(f"`{_UNLIT_EXTENSION}`", "the colour is taken for the reflectance", _UNLIT_EXTENSION),
     noted("`alphaMode`, `alphaCutoff`", "cut out, also in shadows; `BLEND` at 0.5", other_parts="drawn"),
@@ -182,7 +187,9 @@ class _MaterialReader:
         return {role: texture for role, texture in found.items() if texture is not None}
 
     def _emitted_radiance(self) -> Colour:
-        strength = float((self.extensions.get(_STRENGTH_EXTENSION) or {}).get("emissiveStrength", 1.0))
+        strength = float(
+            (self.extensions.get(_EMISSIVE_STRENGTH_EXTENSION) or {}).get("emissiveStrength", 1.0)
+        )
         r, g, b = (strength * float(value) for value in self.material.get("emissiveFactor", (0.0, 0.0, 0.0)))
         return r, g, b
 

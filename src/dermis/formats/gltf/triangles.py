@@ -32,7 +32,7 @@ from dermis.formats.materials import FileMaterial
 from dermis.formats.parts import DEFAULT_COLOUR, MaterialGroup, MeshFile, MeshPart, find_quads
 from dermis.formats.text_files import list_names
 
-_TRIANGLES, _STRIP, _FAN = 4, 5, 6
+_TRIANGLES_MODE, _STRIP_MODE, _FAN_MODE = 4, 5, 6
 _MAX_SCENE_COUNTS = {
     "primitives": limits.MAX_GROUPS,
     "triangles": limits.MAX_TRIANGLES,
@@ -160,7 +160,11 @@ class _SceneReader:
     def _mesh_parts(self, mesh: Tree, node: int | None) -> Iterator[MeshPart]:
         names = target_names(mesh)
         for primitive in mesh["primitives"]:
-            has_triangles = primitive.get("mode", _TRIANGLES) in (_TRIANGLES, _STRIP, _FAN)
+            has_triangles = primitive.get("mode", _TRIANGLES_MODE) in (
+                _TRIANGLES_MODE,
+                _STRIP_MODE,
+                _FAN_MODE,
+            )
             if has_triangles and _dermis_extras(primitive).get("hair") is not True:
                 yield self._scene_part(mesh, names, primitive, node)
 
@@ -241,10 +245,10 @@ class _SceneReader:
             corners = self.document.item("accessors", primitive["indices"])["count"]
             self._check_count("triangles", corners // 3)
             index = self.document.read_values(primitive["indices"]).ravel().astype(np.int64)
-        mode = primitive.get("mode", _TRIANGLES)
-        if mode == _TRIANGLES:
+        mode = primitive.get("mode", _TRIANGLES_MODE)
+        if mode == _TRIANGLES_MODE:
             return index.reshape(-1, 3)
-        if mode == _FAN:
+        if mode == _FAN_MODE:
             return np.column_stack((index[1:-1], index[2:], np.full(max(len(index) - 2, 0), index[0])))
         strip = np.column_stack((index[:-2], index[1:-1], index[2:]))
         strip[1::2] = strip[1::2, ::-1]

@@ -18,7 +18,7 @@ from dermis.mesh.skeleton import Skeleton
 
 MAX_CLIP_BYTES = 48 << 20
 """Largest capture file."""
-MAX_FRAMES, MAX_NAMES = 200_000, 500
+MAX_CAPTURE_FRAMES, MAX_CAPTURE_COLUMNS = 200_000, 500
 """Largest numbers of frames (almost an hour at 60 per second) and of columns in a capture."""
 SECONDS_PER_TIME_KEY: Mapping[str, float | None] = {
     "time": 1.0,
@@ -199,8 +199,8 @@ def check_size(culprit: object, frame_count: int, column_count: int) -> None:
 
     frame_count, column_count : numbers of frames and of columns read so far
     """
-    if frame_count > MAX_FRAMES or column_count > MAX_NAMES:
-        expected = f"at most {MAX_FRAMES:,} frames of {MAX_NAMES} numbers"
+    if frame_count > MAX_CAPTURE_FRAMES or column_count > MAX_CAPTURE_COLUMNS:
+        expected = f"at most {MAX_CAPTURE_FRAMES:,} frames of {MAX_CAPTURE_COLUMNS} numbers"
         actual = f"it has more ({frame_count:,} of {column_count:,} so far)"
         refuse(culprit, expected, actual, "Shorten it, or remove columns that heads do not have")
 

@@ -51,7 +51,8 @@ _TIMECODE_PATTERN = re.compile(
 )
 _TIMECODE_FRAME_RATES = (24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 100.0, 120.0, 240.0)
 _APP_FRAME_RATE = 60.0
-_DAY_S, _MIDNIGHT_S = 86400.0, 82800.0  # a timecode that falls by more than the latter has passed midnight
+_SECONDS_PER_DAY = 86400.0
+_MIN_FALL_AT_MIDNIGHT_S = 82800.0  # a timecode that falls by more has passed midnight
 _MAX_ANGLE_RADIANS = 2 * np.pi  # largest angle of a head in radians; larger angles are taken as degrees
 
 
@@ -226,8 +227,8 @@ def _row_times(
         codes = [_parse_timecode(line, cell) for line, cell in zip(line_numbers, time_cells, strict=True)]
         rate = fps or _timecode_rate(codes)
         times = np.array([code.seconds + code.frames / rate for code in codes])
-        days = np.cumsum(np.diff(times, prepend=times[0]) < -_MIDNIGHT_S)
-        times += _DAY_S * days
+        days = np.cumsum(np.diff(times, prepend=times[0]) < -_MIN_FALL_AT_MIDNIGHT_S)
+        times += _SECONDS_PER_DAY * days
     else:
         times = np.array(
             [_parse_time(line, cell) for line, cell in zip(line_numbers, time_cells, strict=True)]

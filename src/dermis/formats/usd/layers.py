@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 LAYER_SUFFIXES = (".usd", ".usda", ".usdc")
 _FAULT_LOCATION_PATTERN = re.compile(r"/([^/\s]+:\d+:\d+: .*)")
 """Pattern of an error message with the position of the error in a text layer."""
-_MAX_LAYERS, _MAX_ENTRIES = 256, 4096
+_MAX_LAYERS, _MAX_PACKAGE_ENTRIES = 256, 4096
 _LAYER_ADVICE = "Flatten it into one file (usdcat --flatten), or export a .usdz"
 
 
@@ -54,7 +54,7 @@ def _extract_layers(file: Path, path: Path, layer_folder: Path) -> Path:
     with zipfile.ZipFile(file) as package:
         entries = package.infolist()
         layers = [one for one in entries if Path(one.filename).suffix.lower() in LAYER_SUFFIXES]
-        check_limit(path, len(entries), _MAX_ENTRIES, "files in the package", "Export the head alone")
+        check_limit(path, len(entries), _MAX_PACKAGE_ENTRIES, "files in the package", "Export the head alone")
         total = sum(one.file_size for one in layers)
         check_limit(path, total, MAX_FILE_BYTES, "bytes of layers", "Export the head alone")
         if not layers or layers[0] is not entries[0]:

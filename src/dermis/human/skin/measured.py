@@ -67,7 +67,7 @@ _EPIDERMIS_RANGE_MM = (0.02, 0.2)
 _ITA_HALF_WIDTH_DEGREES = 1.0
 _MAX_NORMAL_SCORE = 2.9  # largest absolute normal score of an ITA
 # Numbers of melanin fractions, of bisections between two of them, and of changes of the other pigments:
-_ITA_NODES, _BISECTIONS, _MAX_ITA_STEPS = 257, 40, 15
+_MELANIN_NODE_COUNT, _BISECTION_COUNT, _MAX_ITA_STEPS = 257, 40, 15
 Weights = Mapping[str, float]
 """Weights of groups, with a sum of 1."""
 
@@ -355,8 +355,8 @@ def with_ita(
     """
     for _ in range(_MAX_ITA_STEPS):
         table = skin_colour_table(eumelanin, pigments.oxygen, pigments.epidermis_mm)
-        melanin = np.geomspace(*_MELANIN_RANGE, _ITA_NODES)
-        found = ita_degrees(lab(table.lookup(melanin, np.full(_ITA_NODES, pigments.blood))))
+        melanin = np.geomspace(*_MELANIN_RANGE, _MELANIN_NODE_COUNT)
+        found = ita_degrees(lab(table.lookup(melanin, np.full(_MELANIN_NODE_COUNT, pigments.blood))))
         if found[0] < ita:
             oxygen = pigments.oxygen + 0.2 * (1.0 - pigments.oxygen)
             pigments = pigments._replace(blood=max(0.8 * pigments.blood, _BLOOD_RANGE[0]), oxygen=oxygen)
@@ -367,9 +367,9 @@ def with_ita(
         else:
             break
     below = np.flatnonzero(found <= ita)
-    index = int(below[0]) if len(below) else _ITA_NODES - 1
+    index = int(below[0]) if len(below) else _MELANIN_NODE_COUNT - 1
     low, high = np.log(melanin[[max(index - 1, 0), index]])
-    for _ in range(_BISECTIONS):  # ITA falls with melanin
+    for _ in range(_BISECTION_COUNT):  # ITA falls with melanin
         middle = 0.5 * (low + high)
         colour = table.lookup(np.exp([middle]), np.array([pigments.blood]))[0]
         low, high = (middle, high) if float(ita_degrees(lab(colour))) > ita else (low, middle)

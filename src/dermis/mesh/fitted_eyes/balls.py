@@ -20,7 +20,7 @@ _MIN_COVERED_FRACTION = 0.25  # fraction of the sphere that an eyeball covers
 _MAX_PART_DISTANCE_RADII = 1.2  # distance from the centre within which cornea, iris and pupil are, in radii
 _GAZE_TARGET_DISTANCE_MM = 1000.0  # distance of the point that eyes without a cornea look at
 _FIT_ITERATIONS = 12
-_MIN_BULGE, _MIN_CORNEA = 0.025, 0.045
+_MIN_BULGE_RADII, _MIN_CORNEA_RADII = 0.025, 0.045
 """Least height above the sphere of points that may belong to a cornea, and of a cornea's apex, in radii."""
 _MIN_CORNEA_COSINE = 0.7  # cosine of the largest angle between a cornea's points and its axis
 _DEVIATION_QUANTILE = 0.85  # fraction of the area that is closer to the sphere than its `deviation`
@@ -196,8 +196,8 @@ def corneal_axis(
     offset = points - ball.centre
     distance = np.linalg.norm(offset, axis=1)
     height = distance / ball.radius - 1.0
-    bulges = (height > _MIN_BULGE) & (offset @ front_direction > 0.3 * distance)
-    if not bulges.any() or height[bulges].max() < _MIN_CORNEA:
+    bulges = (height > _MIN_BULGE_RADII) & (offset @ front_direction > 0.3 * distance)
+    if not bulges.any() or height[bulges].max() < _MIN_CORNEA_RADII:
         return None
     volume = (point_areas * height)[bulges]
     mean = _normalise((volume[:, None] * offset[bulges]).sum(axis=0))

@@ -12,10 +12,10 @@ from dermis.base.arrays import Doubles, Floats, Index, Ints
 from dermis.mesh.rig import BONES_PER_POINT, BoneRotation, MorphTargets, Rig, RigidFollowers, Skeleton
 from dermis.mesh.rotations import matrix_angles, rigid_motion
 
-_ROOT_NAME, _BONE_NAMES = "scene", ("eye.L", "eye.R")
+_ROOT_BONE_NAME, _EYE_BONE_NAMES = "scene", ("eye.L", "eye.R")
 _MAX_OTHER_FOLLOWER_FRACTION = 0.05
 """Largest fraction of points outside the eye among the followers of an eye bone; a head bone has more."""
-_MIN_DEGREES, _MIN_SHIFT_MM = 0.5, 0.02  # smaller motions of a target are ignored
+_MIN_ROTATION_DEGREES, _MIN_SHIFT_MM = 0.5, 0.02  # smaller motions of a target are ignored
 
 
 class FittedEyeball(NamedTuple):
@@ -68,7 +68,9 @@ def _with_eye_bones(rig: Rig, eyeballs: Sequence[FittedEyeball]) -> tuple[Skelet
         if bones[k] < 0:
             parent = int(np.argmax(_follower_counts(skeleton, eyeball)))
             name = next(
-                name for name in (_BONE_NAMES[k], f"fitted {_BONE_NAMES[k]}") if name not in skeleton.names
+                name
+                for name in (_EYE_BONE_NAMES[k], f"fitted {_EYE_BONE_NAMES[k]}")
+                if name not in skeleton.names
             )
             skeleton, bones[k] = _with_bone(skeleton, name, parent, eyeball.centre), len(skeleton.names)
     for eyeball, bone in zip(eyeballs, bones, strict=True):
@@ -95,7 +97,7 @@ def _single_bone(point_count: int) -> Skeleton:
         np.zeros((point_count, BONES_PER_POINT), np.float32),
     )
     weight[:, 0] = 1.0
-    return Skeleton((_ROOT_NAME,), np.array([-1], np.int32), identity, identity, np.eye(4), bone, weight)
+    return Skeleton((_ROOT_BONE_NAME,), np.array([-1], np.int32), identity, identity, np.eye(4), bone, weight)
 
 
 def _eye_bones(skeleton: Skeleton, eyeballs: Sequence[FittedEyeball]) -> list[int]:
@@ -153,7 +155,7 @@ def _rigid_targets(
             continue
         matrix, _ = rigid_motion(rest, rest + delta)
         x, y, z = matrix_angles(matrix)
-        if np.linalg.norm((x, y, z)) < _MIN_DEGREES:
+        if np.linalg.norm((x, y, z)) < _MIN_ROTATION_DEGREES:
             matrix = np.eye(3)
         else:
             rotations.append(BoneRotation(rig.targets.names[index], bone_name, (x, y, z)))

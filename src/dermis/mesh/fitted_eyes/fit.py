@@ -30,7 +30,7 @@ from dermis.mesh.rig import Stencils
 
 # quads along a cube edge, as many as the human has after one subdivision
 _QUADS_PER_CUBE_EDGE = 2 * eyeball.QUADS_PER_EDGE
-_MATERIAL_NAMES = "left eye", "right eye"
+_EYE_MATERIAL_NAMES = "left eye", "right eye"
 # the iris is closer to the nose than the centre of the eye's opening
 _INWARD_GAZE_ANGLE_RADIANS = np.radians(2.5)
 
@@ -172,7 +172,7 @@ def _replace_eyeballs(mesh: Mesh, balls: tuple[Index, Index], positions: list[Do
     vertex, triangles = np.unique(mesh.triangles[remains], return_inverse=True)
     used, material = np.unique(mesh.material[remains], return_inverse=True)
     old_materials = [mesh.materials[mesh.material[ball[0]]] for ball in balls]
-    pairs = zip(_MATERIAL_NAMES, old_materials, strict=True)
+    pairs = zip(_EYE_MATERIAL_NAMES, old_materials, strict=True)
     new_materials = tuple(Material(name, "opaque", old.colour, eye=True) for name, old in pairs)
     new = _eyeball_meshes(positions, quads, new_materials)
     new_index = np.full(len(mesh.triangles), -1)
