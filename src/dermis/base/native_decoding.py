@@ -22,7 +22,7 @@ from dermis.base.disk import Arrays
 from dermis.base.errors import DermisError, refuse, shorten
 
 _BASE_CPU_LIMIT_S, _BASE_CPU_LIMIT_BYTES = 8.0, 64 << 20
-"""Limit of CPU time [s] for files of up to `_BASE_CPU_LIMIT_BYTES`; it is proportional to larger sizes."""
+"""Limit of CPU time [s] up to `_BASE_CPU_LIMIT_BYTES`; for larger files proportional to their size."""
 # limit of elapsed time, as a multiple of the limit of CPU time: the machine may be busy
 _MAX_WAIT_PER_CPU_TIME = 3.0
 _MAX_MEMORY_BYTES = 2 << 30  # limit of the address space; the libraries of USD use a third of it

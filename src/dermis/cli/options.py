@@ -24,11 +24,13 @@ def _to_int(_: type, tokens: Sequence[Token]) -> int:
     return int(tokens[0].value)
 
 
-def _to_choice(model: type[FrozenModel], field: str, choice_type: object, tokens: Sequence[Token]) -> str:
+def _to_choice(
+    model: type[FrozenModel], field_name: str, choice_type: object, tokens: Sequence[Token]
+) -> str:
     """Return the choice that was typed, after a check against all choices, including those of plug-ins."""
     from dermis.scene.frozen_model import field_choices
 
-    if (word := tokens[0].value) in (choices := field_choices(model, field)):
+    if (word := tokens[0].value) in (choices := field_choices(model, field_name)):
         return word
     expected_type: Any = Literal[choices]
     raise CoercionError(token=tokens[0], target_type=expected_type)

@@ -144,11 +144,11 @@ def fit_atlas(scene: Scene, settings: Settings, adapter_kind: str) -> Settings:
 
     adapter_kind : kind of the graphics adapter, "CPU" for software
     """
-    from dermis.scene.resolved_atlas import resolved_atlas
+    from dermis.scene.resolved_atlas import resolved_atlas_side
 
     if adapter_kind != "CPU" or "atlas" in settings.model_fields_set:
         return settings
-    side = resolved_atlas(scene, settings)
+    side = resolved_atlas_side(scene, settings)
     if side < settings.atlas and TECHNIQUES[settings.technique].uses_atlas:
         note(f"note: --atlas {side} without a GPU, as the picture resolves no more texels")
     return settings.model_copy(update={"atlas": side})

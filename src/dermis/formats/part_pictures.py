@@ -78,9 +78,9 @@ class PartPictures:
         return bool(self.maps.surface[..., :2].any())
 
 
-def normal_levels(slopes: Floats) -> Bytes:
+def normal_levels(surface_slopes: Floats) -> Bytes:
     """Return the tangent-space normal map (h, w, 3) of slopes (h, w, 2) as 8-bit levels, green up."""
-    normal = np.concatenate([-slopes, np.ones_like(slopes[..., :1])], axis=-1)
+    normal = np.concatenate([-surface_slopes, np.ones_like(surface_slopes[..., :1])], axis=-1)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
     return linear_levels(0.5 * normal + 0.5)
 

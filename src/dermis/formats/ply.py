@@ -435,9 +435,9 @@ def _polygon_corners(path: Path, faces: _Columns, strips: _Columns, vertex_count
     return counts, index
 
 
-def _strip_triangles(strips: _ListColumn) -> Index:
+def _strip_triangles(strip_lists: _ListColumn) -> Index:
     """Return the triangles (t, 3) of strips that are separated by -1; every second triangle is reversed."""
-    index = np.insert(strips.items.astype(np.int64), np.cumsum(strips.lengths), -1)
+    index = np.insert(strip_lists.items.astype(np.int64), np.cumsum(strip_lists.lengths), -1)
     place = np.arange(len(index))
     step = place - np.maximum.accumulate(np.where(index < 0, place, -1)) - 1
     triangles = np.column_stack((index[:-2], index[1:-1], index[2:]))
@@ -448,15 +448,15 @@ def _strip_triangles(strips: _ListColumn) -> Index:
 
 
 def _corner_uv(
-    path: Path, vertices: _Columns, faces: _Columns, corner_counts: Index, corner_vertex: Index
+    path: Path, vertex_columns: _Columns, face_columns: _Columns, corner_counts: Index, corner_vertex: Index
 ) -> tuple[Doubles, Index]:
     """Return uv coordinates (t, 2), and the index of each corner's uv, -1 if there is none.
 
     corner_counts, corner_vertex : number of corners of each polygon, and the vertex of each corner
     """
-    wedges = faces.take_list(("texcoord",))
+    wedges = face_columns.take_list(("texcoord",))
     if wedges is None:
-        uv = vertices.take_first(UV_NAMES)
+        uv = vertex_columns.take_first(UV_NAMES)
         none = np.empty((0, 2)), np.full_like(corner_vertex, -1)
         return none if uv is None else (to_floats(uv), corner_vertex)
     given, expected = wedges.lengths > 0, corner_counts[: len(wedges.lengths)]
@@ -471,9 +471,9 @@ def _corner_uv(
     return unique, uv_index
 
 
-def _vertex_colours(vertices: _Columns) -> tuple[Doubles | None, list[str]]:
+def _vertex_colours(vertex_columns: _Columns) -> tuple[Doubles | None, list[str]]:
     """Return the linear colours (n, 3) of vertices or None, and notes."""
-    values, alpha = vertices.take_first(COLOUR_NAMES), vertices.take_first(_ALPHA_NAMES)
+    values, alpha = vertex_columns.take_first(COLOUR_NAMES), vertex_columns.take_first(_ALPHA_NAMES)
     notes = []
     if alpha is not None and len(np.unique(alpha)) > 1:
         notes.append("the transparency of vertices (alpha) is left out")

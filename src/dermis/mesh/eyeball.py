@@ -61,16 +61,16 @@ def profile_mm(angle_from_axis: Doubles) -> Doubles:
     return np.where(angle_from_axis < edge, centre * np.cos(angle_from_axis) + np.sqrt(within), SCLERA_MM)
 
 
-def radial_distances_mm(points: Doubles, axis: Doubles) -> tuple[Doubles, Doubles]:
+def radial_distances_mm(points: Doubles, eye_axis: Doubles) -> tuple[Doubles, Doubles]:
     """Return the distances (...) of points and of the eyeball's surface from the ball's centre [mm].
 
     points : (..., 3) positions relative to the ball's centre [mm]
-    axis : (..., 3) unit vectors of the eyes' axes
+    eye_axis : (..., 3) unit vectors of the eyes' axes
 
     The distance of the surface is measured along the ray from the centre through the point.
     """
     distance = np.linalg.norm(points, axis=-1)
-    cosine = (points * axis).sum(axis=-1) / np.maximum(distance, 1e-9)
+    cosine = (points * eye_axis).sum(axis=-1) / np.maximum(distance, 1e-9)
     return distance, profile_mm(np.arccos(np.clip(cosine, -1.0, 1.0)))
 
 

@@ -16,7 +16,7 @@ _FILLED_ATLAS_FRACTION = 0.5  # part of an atlas that shows skin
 _MIN_ATLAS_SIDE = 1024  # coarser texels would blur the light of the narrowest profiles
 
 
-def resolved_atlas(scene: Scene, settings: Settings) -> int:
+def resolved_atlas_side(scene: Scene, settings: Settings) -> int:
     """Return the side of the smallest atlas with a texel for every three pixels [texel].
 
     It is a power of two, at least 1024 and at most the side in `settings`. Pixels are measured at the target

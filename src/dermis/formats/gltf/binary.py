@@ -56,12 +56,14 @@ class BufferBuilder:
         view = self.add_view(values.tobytes(), buffer_target)
         return self._append_accessor(values, {"bufferView": view} | bounds)
 
-    def add_triangles(self, vertex_index: Numbers, vertex_count: int) -> int:
+    def add_triangles(self, corner_vertices: Numbers, vertex_count: int) -> int:
         """Append the vertex indices of triangles, (f, 3), and return the index of their accessor.
 
         vertex_count : number of vertices of the primitive, which determines the type of the indices
         """
-        return self.add_accessor(vertex_index.reshape(-1, 1).astype(_index_dtype(vertex_count)), INDEX_TARGET)
+        return self.add_accessor(
+            corner_vertices.reshape(-1, 1).astype(_index_dtype(vertex_count)), INDEX_TARGET
+        )
 
     def add_displacements(
         self, moved_vertex: Numbers, displacements: Sequence[Numbers], vertex_count: int

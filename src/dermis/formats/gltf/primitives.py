@@ -32,11 +32,11 @@ _MIN_VECTOR_LENGTH = 1e-9
 class PrimitiveSource(Protocol):
     """Geometry that can be written as a glTF primitive with morph targets."""
 
-    def primitive(self, binary: BufferBuilder) -> Tree:
+    def add_primitive(self, binary: BufferBuilder) -> Tree:
         """Append vertices and triangles to the buffer; return the primitive without material and targets."""
         ...
 
-    def target(self, binary: BufferBuilder, target: VertexTarget) -> dict[str, int]:
+    def add_target(self, binary: BufferBuilder, vertex_target: VertexTarget) -> dict[str, int]:
         """Append a morph target to the buffer, and return its accessor indices by attribute name."""
         ...
 
@@ -63,7 +63,7 @@ class SurfacePrimitive:
         """Return the indices of the mesh vertices that the triangles use, (v,), in increasing order."""
         return np.unique(self._head.mesh.triangles[self.faces])
 
-    def primitive(self, binary: BufferBuilder) -> Tree:
+    def add_primitive(self, binary: BufferBuilder) -> Tree:
         """Append vertices and triangles to the buffer; return the primitive without material and targets.
 
         The extras of the primitive record whether its triangles form quads, and whether no other primitive
@@ -81,11 +81,11 @@ class SurfacePrimitive:
         extras = {key: True for key, value in flags.items() if value}
         return primitive | ({"extras": {"dermis": extras}} if extras else {})
 
-    def target(self, binary: BufferBuilder, target: VertexTarget) -> dict[str, int]:
+    def add_target(self, binary: BufferBuilder, vertex_target: VertexTarget) -> dict[str, int]:
         """Append position and normal displacements to the buffer; return accessors by attribute name."""
-        used = np.flatnonzero(np.isin(target.vertex, self.vertices, assume_unique=True))
-        row = np.searchsorted(self.vertices, target.vertex[used])
-        columns = [to_metres(target.delta_mm[used]), target.normal[used]]
+        used = np.flatnonzero(np.isin(vertex_target.vertex, self.vertices, assume_unique=True))
+        row = np.searchsorted(self.vertices, vertex_target.vertex[used])
+        columns = [to_metres(vertex_target.delta_mm[used]), vertex_target.normal[used]]
         accessors = binary.add_displacements(row, columns, len(self.vertices))
         return dict(zip(("POSITION", "NORMAL"), accessors, strict=True))
 
@@ -121,7 +121,7 @@ class HairPrimitive:
     def _rest_points(self) -> Doubles:
         return replace(self.deformable.head.mesh, positions=self.deformable.positions_mm).points_mm
 
-    def primitive(self, binary: BufferBuilder) -> Tree:
+    def add_primitive(self, binary: BufferBuilder) -> Tree:
         """Append vertices and triangles to the buffer; return the primitive without material and targets.
 
         The extras of the primitive mark it as hair, so that `read_gltf` skips it.
@@ -135,10 +135,10 @@ class HairPrimitive:
         index = binary.add_triangles(self.fibres.triangles(), len(positions))
         return {"attributes": attributes, "indices": index, "extras": {"dermis": {"hair": True}}}
 
-    def target(self, binary: BufferBuilder, target: VertexTarget) -> dict[str, int]:
+    def add_target(self, binary: BufferBuilder, vertex_target: VertexTarget) -> dict[str, int]:
         """Append position displacements to the buffer and return their accessor; normals do not change."""
         delta, mesh = np.zeros_like(self._rest_points), self.deformable.head.mesh
-        delta[mesh.point[target.vertex]] = target.delta_mm
+        delta[mesh.point[vertex_target.vertex]] = vertex_target.delta_mm
         vertex, displacement = self.fibres.displacements_at(self._rest_points, delta)
         (accessor,) = binary.add_displacements(vertex, [to_metres(displacement)], self.fibres.vertex_count)
         return {"POSITION": accessor}

@@ -146,14 +146,14 @@ def _gltf_mesh(
 
     parts : geometry of each primitive; the material of a primitive has the same index
     """
-    primitives = [part.primitive(binary) | {"material": number} for number, part in enumerate(parts)]
+    primitives = [part.add_primitive(binary) | {"material": number} for number, part in enumerate(parts)]
     mesh: Tree = {"name": _mesh_name(deformable.head), "primitives": primitives}
     names, rest = deformable.rig.targets.names, deformable.rig.targets.rest
     if not names:
         return mesh
     for target in deformable.targets():
         for primitive, part in zip(primitives, parts, strict=True):
-            primitive.setdefault("targets", []).append(part.target(binary, target))
+            primitive.setdefault("targets", []).append(part.add_target(binary, target))
     resting = {} if rest is None else dict(zip(names, rest.tolist(), strict=True))
     values = [float({**resting, **weights}.get(name, 0.0)) for name in names]
     return mesh | {"weights": values, "extras": {"targetNames": list(names)}}
