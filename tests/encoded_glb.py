@@ -5,7 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from dermis.formats.gltf.binary import CLAMPED_SAMPLER, VERTICES, BufferBuilder, glb_bytes, resolve_textures
+from dermis.formats.gltf.binary import (
+    CLAMPED_SAMPLER,
+    VERTEX_TARGET,
+    BufferBuilder,
+    glb_bytes,
+    resolve_textures,
+)
 from dermis.mesh.mesh import Mesh
 
 
@@ -23,9 +29,9 @@ def encode_glb(
     """
     binary = BufferBuilder()
     attributes = {
-        "POSITION": binary.add_accessor(mesh.positions, VERTICES, bounded=True),
-        "NORMAL": binary.add_accessor(mesh.normals, VERTICES),
-        "TEXCOORD_0": binary.add_accessor(mesh.uv, VERTICES),
+        "POSITION": binary.add_accessor(mesh.positions, VERTEX_TARGET, with_bounds=True),
+        "NORMAL": binary.add_accessor(mesh.normals, VERTEX_TARGET),
+        "TEXCOORD_0": binary.add_accessor(mesh.uv, VERTEX_TARGET),
     }
     indices = binary.add_triangles(mesh.triangles, len(mesh.positions))
     kind = {"mimeType": "image/png"}

@@ -12,7 +12,7 @@ import numpy as np
 
 from dermis.base.errors import DermisError
 from dermis.base.file_properties import FileProperty, Treatment
-from dermis.formats.parts import GREY
+from dermis.formats.parts import DEFAULT_COLOUR
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.scene.heads import load_head
@@ -45,7 +45,9 @@ def load_quietly(path: Path, unit_mm: float = 1000.0) -> Head:
 def digest_of(head: Head) -> str:
     """Return a digest of all that is drawn: a map of colours replaces the colour of skin materials."""
     replaced = {"skin"} if head.maps.colour is not None else set()
-    own = [replace(one, colour=GREY) if one.kind in replaced else one for one in head.mesh.materials]
+    own = [
+        replace(one, colour=DEFAULT_COLOUR) if one.kind in replaced else one for one in head.mesh.materials
+    ]
     digest = hashlib.sha256(repr([astuple(one) for one in own]).encode())
     arrays = [head.mesh.positions, head.mesh.normals, head.mesh.uv, head.mesh.triangles, head.mesh.material]
     arrays += [getattr(head.maps, one.name) for one in fields(Maps) if one.name != "parts"]

@@ -16,7 +16,7 @@ from scipy.sparse import coo_array, diags_array, eye_array, vstack
 
 from dermis.base.command_line import run_script
 from dermis.human.makehuman import DELTA_UNIT_MM
-from dermis.mesh.rig import INFLUENCES
+from dermis.mesh.rig import BONES_PER_POINT
 
 Doubles = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -249,7 +249,7 @@ def influences(data: Arrays, mix: Any) -> tuple[Index, Doubles]:
     table = np.zeros((len(data["positions_dm"]), len(BONES)))
     np.add.at(table, (data["weight_vertex"].astype(int), standing[data["weight_bone"]]), data["weight"])
     table = np.asarray(mix @ table)
-    order = np.argsort(-table, axis=1, kind="stable")[:, :INFLUENCES]
+    order = np.argsort(-table, axis=1, kind="stable")[:, :BONES_PER_POINT]
     weight = np.take_along_axis(table, order, axis=1)
     weight[weight.sum(axis=1) <= 0, 0] = 1.0
     return order, weight / weight.sum(axis=1, keepdims=True)

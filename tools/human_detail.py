@@ -13,7 +13,7 @@ from scipy.ndimage import gaussian_filter
 from scipy.spatial import cKDTree
 
 from dermis.base.command_line import run_script
-from dermis.human.skin.textures import MAX_HEIGHT_MM, TILE_LENGTH_MM, TILE_SIDE
+from dermis.human.skin.textures import MAX_TILE_HEIGHT_MM, TILE_LENGTH_MM, TILE_SIDE
 
 Doubles = NDArray[np.float64]
 
@@ -39,7 +39,7 @@ def main() -> None:
     heights = gaussian_filter(
         np.stack(layers, axis=-1).reshape(TILE_SIDE, TILE_SIDE, 3), (BLUR_TEXELS, BLUR_TEXELS, 0), mode="wrap"
     )
-    levels = np.clip(np.rint(255 * (heights / MAX_HEIGHT_MM + 0.75)), 0, 255).astype(np.uint8)
+    levels = np.clip(np.rint(255 * (heights / MAX_TILE_HEIGHT_MM + 0.75)), 0, 255).astype(np.uint8)
     Image.fromarray(levels).save(OUT, optimize=True)
     sys.stdout.write(f"{OUT}  {OUT.stat().st_size / 1e3:.0f} kB\n")
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.human.hair import brows
-from dermis.human.model import MATERIALS
+from dermis.human.model import MATERIAL_OF_GROUP
 from dermis.human.regions.average import AVERAGE_HUMAN, average_head, part_quads
 from dermis.human.skin.surface import BORDER_FIELDS, average_surface, lid_rings
 from dermis.mesh.strands import Roots, quad_corners, quad_weights, refine_roots
@@ -163,8 +163,8 @@ class Surface:
     def apex(self, name: str) -> int:
         """Return the index of the candidate at the corneal apex of an eye."""
         mesh = average_head().mesh
-        material = mesh.material[mesh.quads[self.quad, 0]] == list(MATERIALS.values()).index(
-            next(one for one in MATERIALS.values() if one.name == name)
+        material = mesh.material[mesh.quads[self.quad, 0]] == list(MATERIAL_OF_GROUP.values()).index(
+            next(one for one in MATERIAL_OF_GROUP.values() if one.name == name)
         )
         those = np.flatnonzero(material)
         return int(those[self.at_mm[those, 2].argmax()])

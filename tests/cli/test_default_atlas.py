@@ -16,7 +16,7 @@ from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere
 from dermis.scene.camera import Camera
 from dermis.scene.model import Scene
-from dermis.scene.resolved_atlas import resolved_atlas
+from dermis.scene.resolved_atlas import resolved_atlas_side
 from dermis.scene.settings import Settings
 
 RADIUS_MM = 100.0
@@ -30,14 +30,14 @@ def ball(frame_mm: float = 340.0) -> Scene:
 
 def test_side_has_a_texel_for_three_pixels() -> None:
     # 4 pi 100^2 mm2 in half of the atlas: 501 texels for one per mm; 1024 texels for 6.13 pixels per mm
-    assert resolved_atlas(ball(170.0), Settings(size=(700, 1040))) == 1024
-    assert resolved_atlas(ball(170.0), Settings(size=(700, 1060))) == 2048
-    assert resolved_atlas(ball(85.0), Settings(size=(700, 520))) == 1024
+    assert resolved_atlas_side(ball(170.0), Settings(size=(700, 1040))) == 1024
+    assert resolved_atlas_side(ball(170.0), Settings(size=(700, 1060))) == 2048
+    assert resolved_atlas_side(ball(85.0), Settings(size=(700, 520))) == 1024
 
 
 def test_side_is_at_most_that_of_the_settings() -> None:
-    assert resolved_atlas(ball(10.0), Settings()) == Settings().atlas
-    assert resolved_atlas(ball(), Settings(atlas=256)) == 256
+    assert resolved_atlas_side(ball(10.0), Settings()) == Settings().atlas
+    assert resolved_atlas_side(ball(), Settings(atlas=256)) == 256
 
 
 def test_gpus_keep_the_default(capsys: pytest.CaptureFixture[str]) -> None:

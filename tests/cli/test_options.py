@@ -33,7 +33,7 @@ class WaxedSkin(Skin):
     wax: Annotated[float, Field(ge=0, le=1)] = 0.25
     """Share of the skin that is waxed,
     seen from above."""
-    coats: Annotated[int, Field(ge=1, json_schema_extra=slider(1, 5, log=True))] = 2
+    coats: Annotated[int, Field(ge=1, json_schema_extra=slider(1, 5, logarithmic=True))] = 2
     """Coats of wax."""
     polish: Literal["cloth", "wheel"] | None = None
     """What it is polished with."""
@@ -41,7 +41,7 @@ class WaxedSkin(Skin):
     """Colour of the wax."""
 
 
-WaxOptions = model_options(WaxedSkin, without=("mix",), names={"coats": "wax_coats"})
+WaxOptions = model_options(WaxedSkin, excluded_fields=("mix",), option_names={"coats": "wax_coats"})
 
 
 def taken(*words: str) -> Any:

@@ -22,7 +22,7 @@ def answer_to(request: str) -> dict[str, np.ndarray]:
 @pytest.fixture(autouse=True)
 def _tests_are_importable(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))
-    monkeypatch.setattr(native_decoding, "_CPU_S", 1.0)
+    monkeypatch.setattr(native_decoding, "_BASE_CPU_LIMIT_S", 1.0)
 
 
 def test_arrays_pass_through_the_decoder_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -50,7 +50,7 @@ def test_decoder_errors_become_refusals(fault: str, message: str) -> None:
 
 
 def test_stalled_decoder_is_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(native_decoding, "_MAX_WAIT", 0.01)
+    monkeypatch.setattr(native_decoding, "_MAX_WAIT_PER_CPU_TIME", 0.01)
     with pytest.raises(DermisError, match="its decoder takes more than 1 s"):
         answer_to("loop")
 

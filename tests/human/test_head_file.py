@@ -10,7 +10,7 @@ import pytest
 from gltf_rules import check_rules, khronos_issues
 
 from dermis import Human, Pose, load_head
-from dermis.human.model import MATERIALS
+from dermis.human.model import MATERIAL_OF_GROUP
 from dermis.human.person_file import write_person_glb
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -50,7 +50,7 @@ def test_files_keep_the_rules(tmp_path: Path, layout: str, levels: int) -> None:
     assert mesh["extras"]["targetNames"] == list(head.targets) and "jawOpen" in head.targets
     names = [material["name"] for material in tree["materials"]]
     hairs = ["brows and lashes", "hair"]
-    assert names == [*[one.name for one in MATERIALS.values()][: len(names) - 2], *hairs]
+    assert names == [*[one.name for one in MATERIAL_OF_GROUP.values()][: len(names) - 2], *hairs]
     assert [load_head(tmp_path / "person.glb", eyes="plain").strands] == [None]  # hairs are not its mesh
 
 

@@ -15,7 +15,7 @@ from dermis.base.tables import Rows, read_rows
 from dermis.human.skin.colours import skin_colour_table
 from dermis.human.skin.measured import (
     FACE_SITES,
-    GROUPS,
+    GROUP_OF_CODE,
     SITES,
     measured_table,
     pigment_ancestry,
@@ -43,7 +43,7 @@ def ita(person: Human) -> float:
     return skin_tone(mean_colour(person.look)).ita_degrees
 
 
-@pytest.mark.parametrize("group", GROUPS.values())
+@pytest.mark.parametrize("group", GROUP_OF_CODE.values())
 def test_medians_of_all_sites_of_the_head_are_those_of_the_archive(group: str, cells: Rows) -> None:
     """Sample the distribution of each group for adults of all ages, half of them women."""
     table, rng, weights = measured_table(), np.random.default_rng(5), {group: 1.0}
@@ -84,7 +84,7 @@ def test_women_are_lighter_and_old_people_darker(drawn: dict[str, DrawnPeople]) 
 
 
 def test_the_neck_has_less_blood_than_the_cheek() -> None:
-    for group in GROUPS.values():
+    for group in GROUP_OF_CODE.values():
         assert Human(skin_ancestry=group).look.sites.neck[1] < -0.3
 
 

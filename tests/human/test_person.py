@@ -13,7 +13,7 @@ from dermis import DermisError, Human, Pose
 from dermis.atlas.build import build_atlas
 from dermis.atlas.unwrap.flatten import singular_values
 from dermis.human.makehuman import mesh_point_count
-from dermis.human.model import MATERIALS
+from dermis.human.model import MATERIAL_OF_GROUP
 from dermis.human.skin import face
 from dermis.human.skin.painted import PaintedMaps
 from dermis.images.codecs import encode_png
@@ -92,7 +92,7 @@ def test_the_layout_has_most_room_for_the_face(head: Head) -> None:
     corners, uv = mesh.positions[mesh.triangles], mesh.uv[mesh.triangles]
     assert mesh.uv.min() >= 0.0 and mesh.uv.max() <= 1.0
     stretch = singular_values(corners, uv)
-    skin = mesh.material == list(MATERIALS).index("body")
+    skin = mesh.material == list(MATERIAL_OF_GROUP).index("body")
     assert (stretch[skin, 1] > 0).all()  # none is mirrored
     side_mm = 1.0 / np.sqrt(np.abs(stretch.prod(axis=1))) / 4096
     middle = corners.mean(axis=1)
@@ -112,8 +112,8 @@ def test_every_triangle_has_texels_of_its_own(layout: str) -> None:
 def test_the_bust_is_closed(head: Head) -> None:
     """Check that the cap begins where the skin ends."""
     mesh = head.mesh
-    cap = mesh.material == list(MATERIALS).index("cap")
-    body = mesh.material == list(MATERIALS).index("body")
+    cap = mesh.material == list(MATERIAL_OF_GROUP).index("cap")
+    body = mesh.material == list(MATERIAL_OF_GROUP).index("body")
     edges = [_border(mesh.point[mesh.triangles[part]], head.positions_mm) for part in (cap, body)]
     assert len(edges[0]) > 100 and edges[0] == edges[1]
 

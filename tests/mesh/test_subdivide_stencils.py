@@ -95,7 +95,7 @@ def test_a_loaded_head_has_its_stencils(tmp_path: Path) -> None:
 def test_weights_of_large_meshes_are_cached_by_topology(monkeypatch: pytest.MonkeyPatch) -> None:
     mesh = _quads()
     expected = subdivide(mesh, 2)
-    monkeypatch.setattr(module, "_CACHED_TRIANGLES", 0)
+    monkeypatch.setattr(module, "_MIN_CACHED_TRIANGLES", 0)
     made = subdivide(mesh, 2)
     monkeypatch.setattr(
         module, "_compute_refinement", None

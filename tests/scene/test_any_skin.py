@@ -10,7 +10,7 @@ import pytest
 from small_figure import CENTRE, arm, figure, patch, write_obj
 
 import dermis
-from dermis.formats.parts import GREY
+from dermis.formats.parts import DEFAULT_COLOUR
 from dermis.frame.features.shading.view import camera_views, pinhole
 from dermis.human.skin.measured import measured_cells
 from dermis.images.colour import lab
@@ -130,7 +130,7 @@ def test_skin_without_any_colour_has_that_of_the_default_skin(tmp_path: Path) ->
     assert 0.6 > red > green > blue > 0.15
 
 
-@pytest.mark.parametrize(("colour", "expected"), [((0.4, 0.2, 0.1), (0.4, 0.2, 0.1)), (GREY, None)])
+@pytest.mark.parametrize(("colour", "expected"), [((0.4, 0.2, 0.1), (0.4, 0.2, 0.1)), (DEFAULT_COLOUR, None)])
 def test_a_stated_colour_is_kept_but_not_the_grey_of_new_materials(
     tmp_path: Path, colour: tuple[float, float, float], expected: tuple[float, float, float] | None
 ) -> None:

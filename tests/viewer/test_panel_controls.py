@@ -158,7 +158,7 @@ class WetSkin(Skin):
 
 
 class GrainySettings(Settings):
-    grain: Annotated[float, Field(ge=0, le=1, json_schema_extra=slider(0.01, 0.1, log=True))] = 0.02
+    grain: Annotated[float, Field(ge=0, le=1, json_schema_extra=slider(0.01, 0.1, logarithmic=True))] = 0.02
     """Noise of the film."""
 
 

@@ -13,7 +13,7 @@ from dermis.base.arrays import Doubles, Floats, Mask, Numbers
 from dermis.formats.load import FileSurface
 from dermis.formats.maps import colour_map, slope_map
 from dermis.formats.materials import FileMaterial, Role, Texture, Wrap
-from dermis.formats.parts import GREY
+from dermis.formats.parts import DEFAULT_COLOUR
 from dermis.images.filters import mip_chain
 from dermis.images.io import read_image
 from dermis.mesh.mesh import Mesh
@@ -175,7 +175,7 @@ def _barycentric_coordinates(corners: Doubles, points: Doubles) -> Doubles:
 def _material_factor(material: FileMaterial, role: Role, has_vertex_colours: bool) -> Floats:
     """Return the factor (k,) by which a material multiplies its values of a role."""
     has_colour = has_vertex_colours or "colour" in material.textures
-    colour = material.colour or ((1.0, 1.0, 1.0) if has_colour else GREY)
+    colour = material.colour or ((1.0, 1.0, 1.0) if has_colour else DEFAULT_COLOUR)
     factors: dict[Role, Sequence[float]] = {
         "colour": (*colour, material.alpha),
         "normal": (material.normal_scale, material.normal_scale),

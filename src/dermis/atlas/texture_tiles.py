@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dermis.base.arrays import Doubles, Floats, Mask
 from dermis.formats.load import FileSurface
-from dermis.formats.maps import MAX_SIDE
+from dermis.formats.maps import MAX_MAP_SIDE
 from dermis.formats.materials import FileMaterial, Texture
 from dermis.images.io import read_size
 from dermis.mesh.geometry import label_components, triangle_areas
@@ -155,9 +155,9 @@ def _pack_tiles(tiles: list[Tile]) -> tuple[list[Tile], int, float]:
     while True:
         sizes = [tuple(max(1, round(scale * length)) for length in tile.size) for tile in tiles]
         side, corners = _pack_in_rows(sizes)
-        if side <= MAX_SIDE:
+        if side <= MAX_MAP_SIDE:
             break
-        scale *= 0.98 * MAX_SIDE / side
+        scale *= 0.98 * MAX_MAP_SIDE / side
     placed = [
         Tile(t.material, t.vertices, t.triangles, t.uv, t.low, t.high, (w, h), corner)
         for t, (w, h), corner in zip(tiles, sizes, corners, strict=True)

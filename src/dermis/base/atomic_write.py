@@ -65,8 +65,8 @@ def atomic_file(path: str | Path) -> Iterator[Path]:
 def atomic_folder(path: str | Path, marker: str) -> Iterator[Path]:
     """Yield a new empty folder that replaces `path` on success and is deleted after an error.
 
-    marker : name of a file by which an existing folder is recognised as output of this package; only such a
-        folder, or an empty one, is replaced
+    marker : name of a file by which an existing folder is recognised as output of this package; only a folder
+        with this file, or an empty folder, is replaced
 
     Raises DermisError for any other existing folder, and for paths that cannot be written.
     """
@@ -83,17 +83,17 @@ def atomic_folder(path: str | Path, marker: str) -> Iterator[Path]:
 
 
 @contextmanager
-def temporary_folder(target: Path) -> Iterator[Path]:
-    """Yield a new empty folder next to `target`; the folder is deleted at the end of the with block.
+def temporary_folder(target_path: Path) -> Iterator[Path]:
+    """Yield a new empty folder next to `target_path`; the folder is deleted at the end of the with block.
 
     Raises DermisError when the folder cannot be created, or when writing into it fails.
     """
-    temporary = _temporary_name(target).with_suffix("")
+    temporary = _temporary_name(target_path).with_suffix("")
     try:
         temporary.mkdir()
         yield temporary
     except (OSError, ValueError) as fault:
-        refuse_output(target, fault)
+        refuse_output(target_path, fault)
     finally:
         with suppress(OSError):
             shutil.rmtree(temporary, ignore_errors=True)
@@ -103,17 +103,17 @@ def _is_empty(folder: Path) -> bool:
     return next(folder.iterdir(), None) is None
 
 
-def _move_folder(source: Path, target: Path) -> None:
+def _move_folder(source_folder: Path, target_path: Path) -> None:
     """Move a folder to a path; an existing folder at the path is deleted once the move has succeeded."""
-    if not target.exists():
-        source.replace(target)
+    if not target_path.exists():
+        source_folder.replace(target_path)
         return
-    old = _temporary_name(target)
-    target.replace(old)
+    old = _temporary_name(target_path)
+    target_path.replace(old)
     try:
-        source.replace(target)
+        source_folder.replace(target_path)
     except OSError:
-        old.replace(target)
+        old.replace(target_path)
         raise
     shutil.rmtree(old, ignore_errors=True)
 
@@ -129,8 +129,8 @@ def refuse_output(path: str | Path, fault: Exception) -> NoReturn:
     ) from fault
 
 
-def _temporary_name(target: Path) -> Path:
-    return target.with_name(f".dermis-{secrets.token_hex(6)}{target.suffix}")
+def _temporary_name(target_path: Path) -> Path:
+    return target_path.with_name(f".dermis-{secrets.token_hex(6)}{target_path.suffix}")
 
 
 def check_folder(folder: Path, json_name: str) -> None:

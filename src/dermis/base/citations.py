@@ -12,7 +12,7 @@ from importlib.resources import files
 
 from dermis.base.errors import refuse
 
-_ENTRY_HEAD = re.compile(r"@(?P<kind>\w+)\s*\{\s*(?P<key>[^\s,{}]+)\s*,")
+_ENTRY_HEAD_PATTERN = re.compile(r"@(?P<kind>\w+)\s*\{\s*(?P<key>[^\s,{}]+)\s*,")
 
 
 def citation_keys() -> frozenset[str]:
@@ -40,20 +40,24 @@ def bibtex(keys: Iterable[str]) -> str:
     return "".join(f"{known[key]}\n\n" for key in unique).rstrip("\n")
 
 
-def parse_bibtex(text: str, source: str = "base/references.bib") -> dict[str, str]:
+def parse_bibtex(bibtex_text: str, source_name: str = "base/references.bib") -> dict[str, str]:
     """Return the unchanged text of each entry of a BibTeX file, by the key of the entry.
 
-    source : name of the file, for error messages
+    source_name : name of the file, for error messages
 
     Raises DermisError for invalid BibTeX.
     """
     found: dict[str, str] = {}
-    for entry in _bibtex_entries(text, source):
-        head = _ENTRY_HEAD.match(entry)
+    for entry in _bibtex_entries(bibtex_text, source_name):
+        head = _ENTRY_HEAD_PATTERN.match(entry)
         if head is None:
-            refuse(source, "each entry to begin with @kind{key,", f"one begins {entry[:40]!r}", "Correct it")
+            refuse(
+                source_name, "each entry to begin with @kind{key,", f"one begins {entry[:40]!r}", "Correct it"
+            )
         if head["key"] in found:
-            refuse(source, "each key once", f"{head['key']} is there twice", "Rename or remove one of them")
+            refuse(
+                source_name, "each key once", f"{head['key']} is there twice", "Rename or remove one of them"
+            )
         found[head["key"]] = entry
     return found
 
@@ -63,13 +67,13 @@ def _references() -> dict[str, str]:
     return parse_bibtex(files("dermis").joinpath("base/references.bib").read_text(encoding="utf-8"))
 
 
-def _bibtex_entries(text: str, source: str) -> Iterator[str]:
+def _bibtex_entries(bibtex_text: str, source_name: str) -> Iterator[str]:
     """Yield the text of each BibTeX entry, from the `@` to the closing brace.
 
     Text between entries is a comment.
     """
     depth, start = 0, -1
-    for i, character in enumerate(text):
+    for i, character in enumerate(bibtex_text):
         if character == "@" and depth == 0:
             start = i
         elif character == "{":
@@ -77,7 +81,7 @@ def _bibtex_entries(text: str, source: str) -> Iterator[str]:
         elif character == "}":
             depth -= 1
             if depth == 0 and start >= 0:
-                yield text[start : i + 1]
+                yield bibtex_text[start : i + 1]
                 start = -1
     if depth != 0 or start >= 0:
-        refuse(source, "balanced braces", f"{depth:+d} are left open at its end", "Close the last entry")
+        refuse(source_name, "balanced braces", f"{depth:+d} are left open at its end", "Close the last entry")

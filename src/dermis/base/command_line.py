@@ -24,17 +24,17 @@ from cyclopts.exceptions import (
 from dermis.base.errors import DermisError, DermisWarning, error_text, format_value, shorten
 
 _MAX_TEXT_LENGTH = 400  # characters
-_TYPE_TEXTS = {float: "a number", int: "a whole number", NoneType: ""}
+_TEXT_OF_TYPE = {float: "a number", int: "a whole number", NoneType: ""}
 _OUT_OF_MEMORY_TEXTS = (
     "failed to map segment",
     "allocate memory",
 )  # parts of messages of libraries that cannot be loaded
 
 
-def make_app(name: str, help_text: str | None) -> App:
+def make_app(program_name: str, help_text: str | None) -> App:
     """Return a cyclopts app without commands, with plain text help and exit statuses as return values."""
     return App(
-        name=name,
+        name=program_name,
         help=help_text,
         help_format="plaintext",
         version_flags=(),
@@ -43,17 +43,17 @@ def make_app(name: str, help_text: str | None) -> App:
     )
 
 
-def run_app(app: App, arguments: Sequence[str] | None = None) -> int:
+def run_app(cyclopts_app: App, arguments: Sequence[str] | None = None) -> int:
     """Run a command line and return its exit status: 2 for invalid input, with a message on stderr.
 
     arguments : words after the program's name; by default, the arguments of this process
     """
-    name = app.name[0]
+    name = cyclopts_app.name[0]
     try:
         with warnings.catch_warnings():
             _show_warnings_as_notes()
             tokens = sys.argv[1:] if arguments is None else arguments
-            return int(app(tokens, exit_on_error=False, print_error=False) or 0)
+            return int(cyclopts_app(tokens, exit_on_error=False, print_error=False) or 0)
     except DermisError as error:
         return print_failure(name, str(error))
     except CycloptsError as error:
@@ -64,47 +64,49 @@ def run_app(app: App, arguments: Sequence[str] | None = None) -> int:
         return print_failure(name, f"memory: expected more, but none is left ({error}). Request less.")
 
 
-def run_script(run: Callable[..., int | None] | Mapping[str, str], name: str | None = None) -> NoReturn:
+def run_script(
+    function_or_commands: Callable[..., int | None] | Mapping[str, str], program_name: str | None = None
+) -> NoReturn:
     """Run a script as a command-line program, with its docstring as help, and exit.
 
-    run : function of the program; or, for a program with several commands, the summary of each command by
-        "module:function"
-    name : name of the program; by default the name of the script's file
+    function_or_commands : function of the program; or, for a program with several commands, the summary
+        of each command by "module:function"
+    program_name : name of the program; by default the name of the script's file
     """
-    name, help_text = name or Path(sys.argv[0]).name, reflow(sys.modules["__main__"].__doc__)
-    if isinstance(run, Mapping):
-        app = make_app(name, help_text)
-        for target, summary in run.items():
+    program_name, help_text = program_name or Path(sys.argv[0]).name, reflow(sys.modules["__main__"].__doc__)
+    if isinstance(function_or_commands, Mapping):
+        app = make_app(program_name, help_text)
+        for target, summary in function_or_commands.items():
             add_command(app, target.partition(":")[2].replace("_", "-"), target, summary)
     else:
-        app = make_app(name, help_text)
-        app.default(run)
+        app = make_app(program_name, help_text)
+        app.default(function_or_commands)
     try:
         code = run_app(app)
     except OSError as error:
         reason = f"expected a usable file, but {error_text(error)}"
-        code = print_failure(name, f"{error.filename}: {reason}. Name another.")
+        code = print_failure(program_name, f"{error.filename}: {reason}. Name another.")
     sys.exit(code)
 
 
-def add_command(app: App, name: str, target: str, summary: str) -> None:
+def add_command(app: App, command_name: str, function_path: str, summary: str) -> None:
     """Add a command to an app; the module of the command is imported only when a user runs the command.
 
-    name : name of the command
-    target : function of the command, as "module:function"
+    command_name : name of the command
+    function_path : function of the command, as "module:function"
     summary : text in the list of commands
     """
-    chosen = sys.argv[1:2] == [name]
+    chosen = sys.argv[1:2] == [command_name]
     if chosen:
-        module, _, function = target.partition(":")
+        module, _, function = function_path.partition(":")
         command = getattr(import_module(module), function)
         command.__doc__ = reflow(command.__doc__)
-    app.command(target, name=name, help=None if chosen else summary, version_flags=())
+    app.command(function_path, name=command_name, help=None if chosen else summary, version_flags=())
 
 
-def print_failure(name: str, message: str) -> int:
+def print_failure(program_name: str, message: str) -> int:
     """Print "name: message" to stderr and return the exit status 2."""
-    sys.stderr.write(f"{name}: {message}\n")
+    sys.stderr.write(f"{program_name}: {message}\n")
     return 2
 
 
@@ -123,12 +125,12 @@ def _show_warnings_as_notes() -> None:
     warnings.showwarning = show_once
 
 
-def usage_message(error: CycloptsError, name: str) -> str:
+def usage_message(error: CycloptsError, program_name: str) -> str:
     """Return the error message for an invalid command line: what was expected and given, and where help is.
 
-    name : name of the program
+    program_name : name of the program
     """
-    command = " ".join((name, *(error.command_chain or ())))
+    command = " ".join((program_name, *(error.command_chain or ())))
     culprit, expected, actual = (shorten(part, _MAX_TEXT_LENGTH) for part in _describe_error(error, command))
     error.verbose = False
     hint = str(error).partition("Did you mean ")[2]
@@ -170,7 +172,7 @@ def _type_text(annotation: Any) -> str:
     """Return a type in words, such as "a number", or the choices of a `Literal`."""
     if get_args(annotation):
         return " or ".join(filter(None, map(_type_text, get_args(annotation))))
-    return _TYPE_TEXTS.get(annotation, str(annotation))
+    return _TEXT_OF_TYPE.get(annotation, str(annotation))
 
 
 def reflow(docstring: str | None) -> str:
@@ -184,14 +186,19 @@ def reflow(docstring: str | None) -> str:
     return "\n".join(paragraphs)
 
 
-def _continues_paragraph(before: str, line: str) -> bool:
-    """Return whether `line` belongs to the same paragraph as `before`, the line above it.
+def _continues_paragraph(previous_line: str, line: str) -> bool:
+    """Return whether `line` belongs to the same paragraph as `previous_line`, the line above it.
 
     Blank lines, changes of indent and underlines end a paragraph.
     """
-    if not before.strip() or not line.strip() or {*before.strip()} == {"-"} or {*line.strip()} == {"-"}:
+    if (
+        not previous_line.strip()
+        or not line.strip()
+        or {*previous_line.strip()} == {"-"}
+        or {*line.strip()} == {"-"}
+    ):
         return False
-    return _indent_width(before) == _indent_width(line)
+    return _indent_width(previous_line) == _indent_width(line)
 
 
 def _indent_width(line: str) -> int:

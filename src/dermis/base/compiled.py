@@ -25,7 +25,7 @@ compiler = import_extra("numba.core.compiler", "ground truth")
 serialize = import_extra("numba.core.serialize", "ground truth")
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-_CACHE_FOLDER, _ARRAY_NAME = "machine-code", "code"
+_CACHE_FOLDER, _CODE_ARRAY_NAME = "machine-code", "code"
 
 
 def compiled(function: Function) -> Function:
@@ -54,28 +54,30 @@ class _CodeCache(caching.NullCache):  # type: ignore[misc, name-defined]
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the cached machine code for a signature, or None if there is no cached code."""
         target_context.refresh()
-        found = load_arrays(_CACHE_FOLDER, self._key(sig, target_context.codegen()), [_ARRAY_NAME])
+        found = load_arrays(_CACHE_FOLDER, self._key(sig, target_context.codegen()), [_CODE_ARRAY_NAME])
         if found is None:
             return None
-        return compiler.CompileResult._rebuild(target_context, *pickle.loads(found[_ARRAY_NAME].tobytes()))
+        return compiler.CompileResult._rebuild(
+            target_context, *pickle.loads(found[_CODE_ARRAY_NAME].tobytes())
+        )
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Cache the machine code for a signature, unless it contains addresses of this process."""
         if data.lifted or _embeds_addresses(data):
             return
         code = np.frombuffer(serialize.dumps(data._reduce()), np.uint8)
-        try_save_arrays(_CACHE_FOLDER, self._key(sig, data.codegen), {_ARRAY_NAME: code})
+        try_save_arrays(_CACHE_FOLDER, self._key(sig, data.codegen), {_CODE_ARRAY_NAME: code})
 
-    def _key(self, sig: Any, codegen: Any) -> str:
-        text = f"{self._source_key} {sig} {codegen.magic_tuple()}"
+    def _key(self, signature: Any, codegen: Any) -> str:
+        text = f"{self._source_key} {signature} {codegen.magic_tuple()}"
         return hashlib.sha256(text.encode()).hexdigest()[:40]
 
 
 @cache
-def _source_hash(folder: Path) -> str:
+def _source_hash(source_folder: Path) -> str:
     """Return a hash of all Python files in a folder, as part of the cache key.
 
     Compiled loops contain the constants and functions that they import from these files.
     """
-    texts = (file.read_bytes() for file in sorted(folder.rglob("*.py")))
+    texts = (file.read_bytes() for file in sorted(source_folder.rglob("*.py")))
     return hashlib.sha256(b"".join(texts)).hexdigest()[:12]

@@ -16,9 +16,9 @@ from dermis.base.progress import LOGGER
 SHOW_STEP_AFTER_S = 2.0
 
 
-def print_json(value: Any) -> None:
+def print_json(json_value: Any) -> None:
     """Print a value as JSON to stdout; numbers that JSON cannot represent, such as NaN, become null."""
-    print_lines(json.dumps(_with_null_for_nonfinite(value), indent=2, allow_nan=False))
+    print_lines(json.dumps(_with_null_for_nonfinite(json_value), indent=2, allow_nan=False))
 
 
 def _with_null_for_nonfinite(value: Any) -> Any:
@@ -47,9 +47,9 @@ def print_report(as_json: bool, report: object, lines: Callable[[], Iterable[str
         print_lines(*lines())
 
 
-def note(text: str) -> None:
+def note(note_text: str) -> None:
     """Print a line of text to stderr."""
-    sys.stderr.write(text + "\n")
+    sys.stderr.write(note_text + "\n")
 
 
 @contextmanager

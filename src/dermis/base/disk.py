@@ -28,43 +28,43 @@ from dermis.base.private import cache_folder, make_private_folder, open_private_
 
 Array = NDArray[Any]
 Arrays = dict[str, Array]
-_SUFFIX, _UNFINISHED_SUFFIX = ".arrays", ".part"
+_CACHE_FILE_SUFFIX, _UNFINISHED_SUFFIX = ".arrays", ".part"
 _MAX_FOLDER_BYTES = 2 << 30
-_RECENT_USE_S = 300.0  # longer than a process takes to read all its cached files
-_MAX_WRITE_S = 24 * 3600.0  # older unfinished files were left by processes that were killed
+_MAX_RECENT_USE_AGE_S = 300.0  # longer than a process takes to read all its cached files
+_MAX_UNFINISHED_AGE_S = 24 * 3600.0  # older unfinished files were left by processes that were killed
 _DAMAGE_ERRORS = (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError)
-_PLAIN_KINDS = "biufcSU"  # NumPy kinds without pointers
-_BLOCK_BYTES = 2 << 20  # bytes that a thread reads or hashes at once
-_MAX_LINE_BYTES = 1 << 20  # bytes
+_PLAIN_DTYPE_KINDS = "biufcSU"  # NumPy kinds without pointers
+_BYTES_PER_BLOCK = 2 << 20  # bytes that a thread reads or hashes at once
+_MAX_HEADER_LINE_BYTES = 1 << 20  # bytes
 _MIN_THREADED_BYTES = 4 << 20
 _MAX_THREADS = 4
 
 
-def cached_array(sources: Array | Sequence[Array], parameters: str, make: Callable[[], Array]) -> Array:
-    """Return the array that `make` computes from `sources`, from the disk cache if the cache has the array.
+def cached_array(sources: Array | Sequence[Array], parameters: str, compute: Callable[[], Array]) -> Array:
+    """Return the array that `compute` computes from `sources`, from the disk cache if it is cached.
 
     parameters : text with everything besides `sources` on which the result depends; part of the cache key
     """
-    return cached_arrays(sources, parameters, ["array"], lambda: {"array": make()})["array"]
+    return cached_arrays(sources, parameters, ["array"], lambda: {"array": compute()})["array"]
 
 
 def cached_arrays(
-    sources: Array | Sequence[Array], parameters: str, names: list[str], make: Callable[[], Arrays]
+    sources: Array | Sequence[Array], parameters: str, names: list[str], compute: Callable[[], Arrays]
 ) -> Arrays:
-    """Return the arrays that `make` computes from `sources`, from the disk cache if the cache has the arrays.
+    """Return the arrays that `compute` computes from `sources`, from the disk cache if they are cached.
 
     parameters : text with everything besides `sources` on which the result depends; part of the cache key
     names : names of the arrays in the result
     """
     sources = [sources] if isinstance(sources, np.ndarray) else sources
-    return load_or_make("arrays", array_key(sources, parameters), names, make)
+    return load_or_make("arrays", array_key(sources, parameters), names, compute)
 
 
 def array_key(sources: Sequence[Array], parameters: str) -> str:
     """Return the cache key of a result that is computed from arrays.
 
     sources : arrays from which the result is computed
-    parameters : text with everything else on which the result depends
+    parameters : text with all parameters, besides the arrays, on which the result depends
     """
     digest = hashlib.sha256(parameters.encode())
     for source in sources:
@@ -73,36 +73,36 @@ def array_key(sources: Sequence[Array], parameters: str) -> str:
     return digest.hexdigest()[:40]
 
 
-def load_or_make(folder: str, key: str, names: list[str], make: Callable[[], Arrays]) -> Arrays:
+def load_or_make(folder: str, cache_key: str, names: list[str], compute: Callable[[], Arrays]) -> Arrays:
     """Return arrays from the disk cache; if there is no valid entry, compute the arrays and cache them.
 
     folder : name of a folder of the cache
     names : names of the arrays in the result
     """
-    arrays = load_arrays(folder, key, names)
+    arrays = load_arrays(folder, cache_key, names)
     if arrays is None:
-        arrays = make()
-        try_save_arrays(folder, key, arrays)
+        arrays = compute()
+        try_save_arrays(folder, cache_key, arrays)
     return arrays
 
 
-def try_save_arrays(folder: str, key: str, arrays: Arrays) -> None:
+def try_save_arrays(folder: str, cache_key: str, arrays: Arrays) -> None:
     """Save arrays to the disk cache if the cache has room; disk errors are ignored."""
     path = cache_folder() / folder
     with contextlib.suppress(OSError):
         if _has_room(path, sum(array.nbytes for array in arrays.values())):
-            save_arrays(folder, key, arrays)
+            save_arrays(folder, cache_key, arrays)
             _prune_folder(path)
 
 
-def load_arrays(folder: str, key: str, names: Sequence[str]) -> Arrays | None:
+def load_arrays(folder: str, cache_key: str, names: Sequence[str]) -> Arrays | None:
     """Return arrays from the disk cache; None if the entry is missing or damaged, or lacks one of `names`."""
-    path = cache_folder() / folder / f"{key}{_SUFFIX}"
+    path = cache_folder() / folder / f"{cache_key}{_CACHE_FILE_SUFFIX}"
     with contextlib.suppress(OSError, MemoryError):
         if not _is_trusted(path.parent):
             return None
         try:
-            arrays = _read_arrays(path, f"{folder}/{key}")
+            arrays = _read_arrays(path, f"{folder}/{cache_key}")
         except _DAMAGE_ERRORS:
             path.unlink()
             return None
@@ -112,18 +112,18 @@ def load_arrays(folder: str, key: str, names: Sequence[str]) -> Arrays | None:
     return None
 
 
-def save_arrays(folder: str, key: str, arrays: Arrays) -> None:
+def save_arrays(folder: str, cache_key: str, arrays: Arrays) -> None:
     """Write arrays to the disk cache atomically.
 
     Raises OSError when the disk fails, or when other users can write to the folder.
     """
-    path = cache_folder() / folder / f"{key}{_SUFFIX}"
+    path = cache_folder() / folder / f"{cache_key}{_CACHE_FILE_SUFFIX}"
     if not _is_trusted(path.parent):
         raise PermissionError(path.parent)
     data = {k: a if a.flags.fnc else np.ascontiguousarray(a).reshape(a.shape) for k, a in arrays.items()}
     blocks = _byte_blocks(data.values())
     header = {
-        "key": f"{folder}/{key}",
+        "key": f"{folder}/{cache_key}",
         "arrays": [[k, a.dtype.str, a.shape, "F" if a.flags.fnc else "C"] for k, a in data.items()],
         "blocks": _map_threaded(lambda block: hashlib.sha256(block).hexdigest(), blocks),
     }
@@ -146,18 +146,18 @@ def _notify_once(message: str) -> None:
     notify(message)
 
 
-def _has_room(folder: Path, size: int) -> bool:
-    """Return whether a file of `size` bytes fits into a folder beside all files used in the last minutes.
+def _has_room(folder: Path, byte_count: int) -> bool:
+    """Return whether a file of `byte_count` bytes fits into a folder beside all recently used files.
 
     Without this check, files that a process needs at the same time would evict each other.
     """
     now = time.time()
     used = sum(
         status.st_size
-        for _, status in _folder_files(folder, _SUFFIX)
-        if now - status.st_mtime < _RECENT_USE_S
+        for _, status in _folder_files(folder, _CACHE_FILE_SUFFIX)
+        if now - status.st_mtime < _MAX_RECENT_USE_AGE_S
     )
-    return size + used <= _MAX_FOLDER_BYTES
+    return byte_count + used <= _MAX_FOLDER_BYTES
 
 
 def _folder_files(folder: Path, suffix: str) -> list[tuple[Path, os.stat_result]]:
@@ -174,42 +174,42 @@ def _folder_files(folder: Path, suffix: str) -> list[tuple[Path, os.stat_result]
     return found
 
 
-def _read_arrays(path: Path, key: str) -> Arrays:
+def _read_arrays(path: Path, cache_key: str) -> Arrays:
     """Return the arrays in a file of the cache.
 
     Raises OSError or MemoryError when the file cannot be read, and one of `_DAMAGE_ERRORS` when the file is
     damaged or has another key.
     """
     with open_private_file(path) as raw, io.BufferedReader(raw) as file:
-        digest, head = file.readline(_MAX_LINE_BYTES), file.readline(_MAX_LINE_BYTES)
+        digest, head = file.readline(_MAX_HEADER_LINE_BYTES), file.readline(_MAX_HEADER_LINE_BYTES)
         start, size = file.tell(), os.fstat(file.fileno()).st_size
     header = json.loads(head) if digest == _digest_line(head) else {}
-    if header.get("key") != key:
-        raise ValueError(key)
+    if header.get("key") != cache_key:
+        raise ValueError(cache_key)
     kinds = [(name, np.dtype(kind), shape, order) for name, kind, shape, order in header["arrays"]]
     if start + sum(_byte_count(kind, shape) for _, kind, shape, _ in kinds) != size:
-        raise ValueError(key)
+        raise ValueError(cache_key)
     arrays = {name: np.empty(shape, kind, order) for name, kind, shape, order in kinds}
     blocks = _byte_blocks(arrays.values())
     offsets = start + np.cumsum([0, *(len(block) for block in blocks)])
     if _map_threaded(partial(_read_block, path), blocks, offsets.tolist()) != header["blocks"]:
-        raise ValueError(key)
+        raise ValueError(cache_key)
     return arrays
 
 
-def _digest_line(head: bytes) -> bytes:
-    return hashlib.sha256(head).hexdigest().encode() + b"\n"
+def _digest_line(header_line: bytes) -> bytes:
+    return hashlib.sha256(header_line).hexdigest().encode() + b"\n"
 
 
-def _byte_count(dtype: np.dtype[Any], shape: Sequence[int]) -> int:
+def _byte_count(dtype: np.dtype[Any], array_shape: Sequence[int]) -> int:
     """Return the size of an array in bytes, after a check of type and shape, before memory is allocated."""
     if (
-        dtype.kind not in _PLAIN_KINDS
+        dtype.kind not in _PLAIN_DTYPE_KINDS
         or not dtype.itemsize
-        or any(type(n) is not int or n < 0 for n in shape)
+        or any(type(n) is not int or n < 0 for n in array_shape)
     ):
-        raise ValueError(f"no array: {dtype} {shape}")
-    return math.prod(shape) * dtype.itemsize
+        raise ValueError(f"no array: {dtype} {array_shape}")
+    return math.prod(array_shape) * dtype.itemsize
 
 
 def _read_block(path: Path, block: memoryview, offset: int) -> str:
@@ -229,19 +229,23 @@ def _byte_blocks(arrays: Iterable[Array]) -> list[memoryview]:
     """Return views of at most 2 MiB that together cover the bytes of all arrays, in the same order."""
     buffers = [array.reshape(-1, order="A").view(np.uint8).data for array in arrays]
     return [
-        data[start : start + _BLOCK_BYTES] for data in buffers for start in range(0, len(data), _BLOCK_BYTES)
+        data[start : start + _BYTES_PER_BLOCK]
+        for data in buffers
+        for start in range(0, len(data), _BYTES_PER_BLOCK)
     ]
 
 
-def _map_threaded(function: Callable[..., str], blocks: list[memoryview], *more: Sequence[int]) -> list[str]:
+def _map_threaded(
+    function: Callable[..., str], blocks: list[memoryview], *further_arguments: Sequence[int]
+) -> list[str]:
     """Apply a function to each block, and return the results; large data are divided among threads.
 
-    more : sequences of further arguments, one value for each block
+    further_arguments : sequences of further arguments, one value for each block
     """
     if sum(map(len, blocks)) < _MIN_THREADED_BYTES:
-        return list(map(function, blocks, *more))
+        return list(map(function, blocks, *further_arguments))
     with ThreadPoolExecutor(min(os.cpu_count() or 1, _MAX_THREADS)) as pool:
-        return list(pool.map(function, blocks, *more))
+        return list(pool.map(function, blocks, *further_arguments))
 
 
 @contextlib.contextmanager
@@ -258,14 +262,16 @@ def _temporary_file(path: Path) -> Iterator[BinaryIO]:
             unfinished.unlink()
 
 
-def _prune_folder(folder: Path) -> None:
+def _prune_folder(cache_path: Path) -> None:
     """Delete the least recently used files beyond the size limit of the folder, and old unfinished files."""
-    newest_first = sorted(_folder_files(folder, _SUFFIX), key=lambda entry: entry[1].st_mtime, reverse=True)
+    newest_first = sorted(
+        _folder_files(cache_path, _CACHE_FILE_SUFFIX), key=lambda entry: entry[1].st_mtime, reverse=True
+    )
     total, now = 0, time.time()
     for path, status in newest_first:
         total += status.st_size
         if total > _MAX_FOLDER_BYTES:
             path.unlink(missing_ok=True)
-    for path, status in _folder_files(folder, _UNFINISHED_SUFFIX):
-        if now - status.st_mtime > _MAX_WRITE_S:
+    for path, status in _folder_files(cache_path, _UNFINISHED_SUFFIX):
+        if now - status.st_mtime > _MAX_UNFINISHED_AGE_S:
             path.unlink(missing_ok=True)

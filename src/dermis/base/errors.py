@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import NoReturn
 
-_MAX_NAME, _MAX_TEXT = 300, 400  # characters in a message
+_MAX_NAME_LENGTH, _MAX_TEXT_LENGTH = 300, 400  # characters in a message
 
 
 class DermisError(Exception):
@@ -59,7 +59,7 @@ def refuse(culprit: object, expected: str, actual: str, advice: str) -> NoReturn
     actual : clause after "but", such as "got 3" or "it has none"
     advice : what to do, without a full stop
     """
-    name, actual = shorten(str(culprit), _MAX_NAME), shorten(actual, _MAX_TEXT)
+    name, actual = shorten(str(culprit), _MAX_NAME_LENGTH), shorten(actual, _MAX_TEXT_LENGTH)
     end = "" if advice.endswith("?") else "."
     raise DermisError(f"{name}: expected {expected}, but {actual}. {advice}{end}")
 

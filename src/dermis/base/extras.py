@@ -23,25 +23,25 @@ EXTRAS = {
     "DracoPy": "formats",
 }
 """Name of the extra that installs each optional module."""
-_DISTRIBUTIONS = {"pxr": "usd-core"}  # distributions with other names than their modules
+_DISTRIBUTION_OF_MODULE = {"pxr": "usd-core"}  # distributions with other names than their modules
 
 
-def import_extra(module: str, task: str) -> Any:
+def import_extra(module_name: str, task_noun: str) -> Any:
     """Import a module of an optional dependency listed in `EXTRAS` and return it.
 
-    task : noun phrase for the purpose that needs the module, for the error
+    task_noun : noun phrase for the purpose that needs the module, for the error
 
     Raises DermisError when the dependency is not installed.
     """
-    package = module.partition(".")[0]
+    package = module_name.partition(".")[0]
     try:
-        return import_module(module)
+        return import_module(module_name)
     except ImportError as fault:
         advice = f'Install it: pip install "dermis[{EXTRAS[package]}]", or ".[{EXTRAS[package]}]" in a clone'
         name = distribution_name(package)
-        refuse(task, f"the package {name}", f"it cannot be imported ({fault})", advice)
+        refuse(task_noun, f"the package {name}", f"it cannot be imported ({fault})", advice)
 
 
-def distribution_name(module: str) -> str:
+def distribution_name(module_name: str) -> str:
     """Return the name on PyPI of the package that contains a module."""
-    return _DISTRIBUTIONS.get(module, module.replace("_", "-"))
+    return _DISTRIBUTION_OF_MODULE.get(module_name, module_name.replace("_", "-"))

@@ -37,18 +37,22 @@ class FileProperty:
         return [self.name, self.treatment, *others, self.detail]
 
 
-def _property(
-    treatment: Treatment, name: str, detail: str = "", *keys: str, other_parts: Treatment | None = None
+def _file_property(
+    treatment: Treatment,
+    property_name: str,
+    detail_text: str = "",
+    *keys: str,
+    other_parts: Treatment | None = None,
 ) -> FileProperty:
     """Return a file property; `drawn`, `noted` and so on are this function with a fixed treatment."""
-    return FileProperty(treatment, name, detail, keys, other_parts)
+    return FileProperty(treatment, property_name, detail_text, keys, other_parts)
 
 
-drawn = partial(_property, "drawn")
-drawn_with_note = partial(_property, "drawn with a note")
-noted = partial(_property, "noted")
-refused = partial(_property, "refused")
-no_effect = partial(_property, "no effect")
+drawn = partial(_file_property, "drawn")
+drawn_with_note = partial(_file_property, "drawn with a note")
+noted = partial(_file_property, "noted")
+refused = partial(_file_property, "refused")
+no_effect = partial(_file_property, "no effect")
 
 
 def keys_of(properties: Iterable[FileProperty], *treatments: Treatment) -> tuple[str, ...]:

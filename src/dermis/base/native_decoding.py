@@ -21,42 +21,45 @@ from dermis.base.arrays import Bytes
 from dermis.base.disk import Arrays
 from dermis.base.errors import DermisError, refuse, shorten
 
-_CPU_S, _SMALL_BYTES = 8.0, 64 << 20
-"""Limit of CPU time [s] for files of up to `_SMALL_BYTES`; for larger files it grows with their size."""
-_MAX_WAIT = 3.0  # limit of elapsed time, as a multiple of the limit of CPU time: the machine may be busy
+_BASE_CPU_LIMIT_S, _BASE_CPU_LIMIT_BYTES = 8.0, 64 << 20
+"""Limit of CPU time [s] up to `_BASE_CPU_LIMIT_BYTES`; for larger files proportional to their size."""
+# limit of elapsed time, as a multiple of the limit of CPU time: the machine may be busy
+_MAX_WAIT_PER_CPU_TIME = 3.0
 _MAX_MEMORY_BYTES = 2 << 30  # limit of the address space; the libraries of USD use a third of it
 _MAX_ANSWER_BYTES = 1 << 30  # limit of the answer, and of each temporary file
-_REFUSED, _FAILED = "refused", "failed"
+_REFUSED_KEY, _FAILED_KEY = "refused", "failed"
 _MAX_MESSAGE_LENGTH = 2000  # characters
 _DAMAGED_ADVICE = "The file is damaged: export it again"
-_SET_VARIABLES = {"OPENBLAS_NUM_THREADS": "1", "PXR_WORK_THREAD_LIMIT": "1"}
-_REMOVED_VARIABLES = ("PXR_AR_DEFAULT_SEARCH_PATH", "PXR_PLUGINPATH_NAME", "PYTHONSTARTUP")
+_DECODER_ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1", "PXR_WORK_THREAD_LIMIT": "1"}
+_REMOVED_ENVIRONMENT_VARIABLES = ("PXR_AR_DEFAULT_SEARCH_PATH", "PXR_PLUGINPATH_NAME", "PYTHONSTARTUP")
 
 
-def run_decoder(module: str, request: Arrays, size: int, culprit: object, expected: str) -> Arrays:
+def run_decoder(
+    decoder_module: str, request_arrays: Arrays, data_bytes: int, culprit: object, expected: str
+) -> Arrays:
     """Run a decoder in a separate process and return its answer.
 
-    module : module of the decoder, which runs in an empty temporary folder
-    request : numeric arrays by name
-    size : size of the data to decode, which determines the time limit [bytes]
+    decoder_module : module of the decoder, which runs in an empty temporary folder
+    request_arrays : numeric arrays by name
+    data_bytes : size of the data to decode, which determines the time limit [bytes]
     culprit : name of the file, for errors
     expected : what the file should be, for errors
 
     Raises DermisError when the decoder refuses the data, fails, or exceeds a limit.
     """
-    cpu_s = _CPU_S * max(1.0, size / _SMALL_BYTES)
-    command = [sys.executable, "-P", "-m", module, str(math.ceil(cpu_s))]
-    kept = {name: value for name, value in os.environ.items() if name not in _REMOVED_VARIABLES}
+    cpu_s = _BASE_CPU_LIMIT_S * max(1.0, data_bytes / _BASE_CPU_LIMIT_BYTES)
+    command = [sys.executable, "-P", "-m", decoder_module, str(math.ceil(cpu_s))]
+    kept = {name: value for name, value in os.environ.items() if name not in _REMOVED_ENVIRONMENT_VARIABLES}
     with TemporaryDirectory() as folder, TemporaryFile() as output:
         try:
             status = subprocess.run(
                 command,
-                input=_pack_arrays(request),
+                input=_pack_arrays(request_arrays),
                 stdout=output,
                 stderr=subprocess.DEVNULL,
                 cwd=folder,
-                env=kept | _SET_VARIABLES,
-                timeout=_MAX_WAIT * cpu_s,
+                env=kept | _DECODER_ENVIRONMENT,
+                timeout=_MAX_WAIT_PER_CPU_TIME * cpu_s,
                 check=False,
             ).returncode
         except subprocess.TimeoutExpired:
@@ -66,10 +69,10 @@ def run_decoder(module: str, request: Arrays, size: int, culprit: object, expect
             refuse(culprit, expected, actual, _DAMAGED_ADVICE)
         output.seek(0)
         answer = _unpack_arrays(output.read())
-    if _REFUSED in answer:
-        raise DermisError(shorten(as_text(answer[_REFUSED]), _MAX_MESSAGE_LENGTH))
-    if _FAILED in answer:
-        refuse(culprit, expected, f"it cannot be decoded ({as_text(answer[_FAILED])})", _DAMAGED_ADVICE)
+    if _REFUSED_KEY in answer:
+        raise DermisError(shorten(as_text(answer[_REFUSED_KEY]), _MAX_MESSAGE_LENGTH))
+    if _FAILED_KEY in answer:
+        refuse(culprit, expected, f"it cannot be decoded ({as_text(answer[_FAILED_KEY])})", _DAMAGED_ADVICE)
     return answer
 
 
@@ -85,10 +88,10 @@ def answer_request(decode: Callable[[Arrays], Arrays]) -> None:
     try:
         answer = _pack_arrays(decode(_unpack_arrays(sys.stdin.buffer.read())))
     except DermisError as error:
-        answer = _pack_arrays({_REFUSED: from_text(str(error))})
+        answer = _pack_arrays({_REFUSED_KEY: from_text(str(error))})
     except Exception as error:
         text = " ".join(f"{type(error).__name__}: {error}"[:_MAX_MESSAGE_LENGTH].split())
-        answer = _pack_arrays({_FAILED: from_text(shorten(text, 200))})
+        answer = _pack_arrays({_FAILED_KEY: from_text(shorten(text, 200))})
     with output:
         output.write(answer)
 
@@ -108,8 +111,8 @@ def _pack_arrays(arrays: Mapping[str, Bytes]) -> bytes:
     return b"".join([json.dumps(header).encode(), b"\n", *(array.tobytes() for array in arrays.values())])
 
 
-def _unpack_arrays(data: bytes) -> Arrays:
-    line, _, body = data.partition(b"\n")
+def _unpack_arrays(packed_arrays: bytes) -> Arrays:
+    line, _, body = packed_arrays.partition(b"\n")
     arrays, start = Arrays(), 0
     for name, (dtype, shape) in json.loads(line).items():
         flat = np.frombuffer(body, dtype, math.prod(shape), start)
@@ -138,5 +141,11 @@ def _limit_process(cpu_s: int) -> None:
         resource.setrlimit(kind, (allowed, allowed))
 
 
-def _stop_reason(status: int) -> str:
-    return f"signal {-status}" if status < 0 else f"status {status}" if status else "its answer is too large"
+def _stop_reason(exit_status: int) -> str:
+    return (
+        f"signal {-exit_status}"
+        if exit_status < 0
+        else f"status {exit_status}"
+        if exit_status
+        else "its answer is too large"
+    )

@@ -10,10 +10,10 @@ import stat
 from collections.abc import Iterator
 from pathlib import Path
 
-_READ_FLAGS = os.O_RDONLY | sum(
+_OPEN_FOR_READING_FLAGS = os.O_RDONLY | sum(
     getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC", "O_BINARY")
 )
-_MAX_LINKS = 40  # symbolic links in the resolution of one path, as in Linux
+_MAX_SYMBOLIC_LINKS = 40  # symbolic links in the resolution of one path, as in Linux
 _WRITABLE_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
 
@@ -73,7 +73,7 @@ def open_private_file(path: Path) -> io.FileIO:
 
     Raises OSError when the file cannot be read, and ValueError when other users may have written the file.
     """
-    descriptor = os.open(path, _READ_FLAGS)
+    descriptor = os.open(path, _OPEN_FOR_READING_FLAGS)
     status = os.fstat(descriptor)
     shared = status.st_mode & _WRITABLE_BY_OTHERS
     private = os.name != "posix" or (status.st_uid in (0, os.geteuid()) and not shared)
@@ -96,14 +96,14 @@ def _path_components(path: Path) -> Iterator[Path]:
         yield (current := current / name)
         if current.is_symlink():
             links += 1
-            if links > _MAX_LINKS:
+            if links > _MAX_SYMBOLIC_LINKS:
                 raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
             target = current.readlink()
             names += reversed(target.parts[1:] if target.anchor else target.parts)
             current = Path(target.anchor) if target.anchor else current.parent
 
 
-def _is_shared(status: os.stat_result) -> bool:
+def _is_shared(file_status: os.stat_result) -> bool:
     """Return whether users other than this one have write access to a file or folder.
 
     Access of a group whose only member is this user does not count.
@@ -111,12 +111,12 @@ def _is_shared(status: os.stat_result) -> bool:
     import grp
     import pwd
 
-    if status.st_mode & stat.S_IWOTH:
+    if file_status.st_mode & stat.S_IWOTH:
         return True
-    if not status.st_mode & stat.S_IWGRP:
+    if not file_status.st_mode & stat.S_IWGRP:
         return False
     try:
-        user, group = pwd.getpwuid(os.geteuid()), grp.getgrgid(status.st_gid)
+        user, group = pwd.getpwuid(os.geteuid()), grp.getgrgid(file_status.st_gid)
     except KeyError:
         return True
     is_own = group.gr_gid == user.pw_gid and group.gr_name == user.pw_name

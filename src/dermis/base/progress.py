@@ -11,14 +11,14 @@ LOGGER = logging.getLogger("dermis")
 
 
 @contextmanager
-def logged_step(step: str) -> Iterator[None]:
+def logged_step(step_text: str) -> Iterator[None]:
     """Log the start of a slow preparation step with level INFO, and its duration with level DEBUG.
 
-    step : description, such as "fitting the eyes"
+    step_text : description, such as "fitting the eyes"
     """
     start = time.perf_counter()
-    LOGGER.info(step)
+    LOGGER.info(step_text)
     try:
         yield
     finally:
-        LOGGER.debug("%s: %.2f s", step, time.perf_counter() - start)
+        LOGGER.debug("%s: %.2f s", step_text, time.perf_counter() - start)

@@ -67,18 +67,20 @@ def checked_array(
     return found
 
 
-def check_fields(owner: object, ranges: Mapping[str, tuple[float, float]], prefix: str = "") -> None:
+def check_fields(
+    checked_object: object, range_of_field: Mapping[str, tuple[float, float]], prefix: str = ""
+) -> None:
     """Check that the values of an object's attributes lie in given ranges.
 
-    ranges : lowest and highest value by name of the attribute; if both are ints, the value must be a whole
-        number
+    range_of_field : lowest and highest value by name of the attribute; if both are ints, the value must be a
+        whole number
     prefix : text before the name of the attribute in errors
 
     Raises DermisError as `checked_number` does.
     """
-    for name, (low, high) in ranges.items():
+    for name, (low, high) in range_of_field.items():
         check = checked_integer if isinstance(low, int) and isinstance(high, int) else checked_number
-        check(f"{prefix}{name}", getattr(owner, name), low, high)
+        check(f"{prefix}{name}", getattr(checked_object, name), low, high)
 
 
 def _number_in_range(value: object, low: float, high: float) -> int | float | None:
@@ -92,23 +94,23 @@ def _number_in_range(value: object, low: float, high: float) -> int | float | No
     return found if is_number and low <= found <= high else None
 
 
-def _has_text(values: Any, dimensions: int) -> bool:
+def _has_text(values: Any, dimension_count: int) -> bool:
     """Return whether nested lists or arrays contain text or booleans, which NumPy would convert to numbers.
 
-    dimensions : number of dimensions of the expected array; lists nested more deeply count as text
+    dimension_count : number of dimensions of the expected array; lists nested more deeply count as text
     """
     import numpy as np
 
-    if dimensions and isinstance(values, list | tuple):
-        return any(_has_text(value, dimensions - 1) for value in values)
+    if dimension_count and isinstance(values, list | tuple):
+        return any(_has_text(value, dimension_count - 1) for value in values)
     return isinstance(values, list | tuple | str | bytes | bool | np.bool_) or (
         isinstance(values, np.ndarray) and values.dtype.kind not in "iuf"
     )
 
 
 def _refuse_number(
-    culprit: object, kind: str, value: object, low: float, high: float, reason: str
+    culprit: object, number_noun: str, value: object, low: float, high: float, reason: str
 ) -> NoReturn:
     suffix = f" ({reason})" if reason else ""
-    expected = f"{kind} from {low:.10g} to {high:.10g}{suffix}"
+    expected = f"{number_noun} from {low:.10g} to {high:.10g}{suffix}"
     refuse(culprit, expected, f"got {format_value(value)}", "Choose one in this range")

@@ -68,7 +68,7 @@ def read_file(path: str | Path, expected: str, max_bytes: int, name: object = No
 
 @contextmanager
 def open_regular_file(path: str | Path, expected: str) -> Iterator[BinaryIO]:
-    """Open a regular file of any size; callers must limit how much they read at a time.
+    """Open a regular file of any size; callers must limit the number of bytes per read.
 
     expected : what the file should be, for error messages
 
@@ -119,30 +119,30 @@ def read_toml(path: str | Path, expected: str = "a TOML file") -> dict[str, Any]
     return tables
 
 
-def parse_json(text: str | bytes, culprit: object, expected: str) -> Any:
+def parse_json(json_text: str | bytes, culprit: object, expected: str) -> Any:
     """Return the value of a JSON text in which all numbers are finite.
 
     Raises DermisError for invalid JSON, deep nesting, and numbers that are too large.
     """
     with parsing(culprit, expected):
         return json.loads(
-            text,
+            json_text,
             parse_constant=_refuse_constant,
             parse_float=_parse_finite_float,
             parse_int=_parse_bounded_int,
         )
 
 
-def checked_path(name: object, expected: str) -> Path:
+def checked_path(file_name: object, expected: str) -> Path:
     """Convert the name of a file to a path.
 
     expected : what the name should denote, for the error
 
     Raises DermisError when the name is neither text nor a path.
     """
-    if not isinstance(name, str | os.PathLike):
-        refuse("file", f"the name of {expected}", f"got a {type(name).__name__}", "Pass its name")
-    return Path(name)
+    if not isinstance(file_name, str | os.PathLike):
+        refuse("file", f"the name of {expected}", f"got a {type(file_name).__name__}", "Pass its name")
+    return Path(file_name)
 
 
 @contextmanager
@@ -206,12 +206,12 @@ def _refuse_constant(text: str) -> NoReturn:
     raise ValueError(f"{text} is not a number")
 
 
-def _format_megabytes(size: int) -> str:
-    return f"{size / 1e6:,.1f} MB" if size >= 1e5 else f"{size:,} bytes"
+def _format_megabytes(byte_count: int) -> str:
+    return f"{byte_count / 1e6:,.1f} MB" if byte_count >= 1e5 else f"{byte_count:,} bytes"
 
 
-def _short_error(fault: BaseException) -> str:
+def _short_error(error: BaseException) -> str:
     """Return the text of an error, shortened to one line."""
-    text = " ".join(str(fault)[:1000].split())
-    text = text if text and isinstance(fault, ValueError) else f"{type(fault).__name__}: {text}"
+    text = " ".join(str(error)[:1000].split())
+    text = text if text and isinstance(error, ValueError) else f"{type(error).__name__}: {text}"
     return text if len(text) <= 200 else f"{text[:197]}..."

@@ -40,9 +40,9 @@ class Registry(Mapping[str, T], Generic[T]):
     """
 
     def __init__(
-        self, kind: str, entries: Mapping[str, T | str] | None = None, advice: str = "Correct it"
+        self, entry_noun: str, entries: Mapping[str, T | str] | None = None, advice: str = "Correct it"
     ) -> None:
-        self.kind, self.advice = kind, advice
+        self.kind, self.advice = entry_noun, advice
         self.changes = 0
         self._entries: dict[str, T | str] = dict(entries or {})
         self._summaries: dict[str, str] = {}
@@ -96,7 +96,7 @@ class Registry(Mapping[str, T], Generic[T]):
         return [f"{name}: {summary}" for name, summary in self._summaries.items()]
 
     def __getitem__(self, name: str) -> T:
-        """Return the object of an entry; it is imported on first use.
+        """Return the object of an entry; an object named by text is imported on first use.
 
         Raises DermisError for a name that is not registered.
         """

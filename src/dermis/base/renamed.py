@@ -43,17 +43,17 @@ RENAMED_MODULES: Mapping[str, str] = {
 
 P = ParamSpec("P")
 R = TypeVar("R")
-_PACKAGE = __name__.partition(".")[0]
+_PACKAGE_NAME = __name__.partition(".")[0]
 _REMOVAL_NOTICE = "the old name will be removed in the next release"
 
 
-def successor(module: str, name: str) -> str | None:
+def successor(module_name: str, old_name: str) -> str | None:
     """Return the new name of a renamed object and issue a DeprecationWarning; None for any other name.
 
-    module : module of the object
-    name : old name of the object
+    module_name : module of the object
+    old_name : old name of the object
     """
-    old = f"{module}.{name}".removeprefix(f"{_PACKAGE}.")
+    old = f"{module_name}.{old_name}".removeprefix(f"{_PACKAGE_NAME}.")
     if old not in RENAMED_OBJECTS:
         return None
     _warn_renamed(old, RENAMED_OBJECTS[old], stacklevel=4)
@@ -81,13 +81,13 @@ def renamed_keywords(**new_names: str) -> Callable[[Callable[P, R]], Callable[P,
     return decorate
 
 
-def renamed_attribute(old: str, new: str) -> property:
+def renamed_attribute(old_name: str, new_name: str) -> property:
     """Return a property for the old name of an attribute; it warns and returns the renamed attribute."""
 
     def get(instance: Any) -> Any:
-        text = f"{type(instance).__name__}.{old} is now {new}"
+        text = f"{type(instance).__name__}.{old_name} is now {new_name}"
         warnings.warn(f"{text}; {_REMOVAL_NOTICE}", DeprecationWarning, stacklevel=2)
-        return getattr(instance, new)
+        return getattr(instance, new_name)
 
     return property(get)
 
@@ -112,8 +112,8 @@ class _RenamedModuleFinder:
         old = module.__name__
         new = _new_module_path(old)
         assert new is not None
-        sys.modules[old] = import_module(f"{_PACKAGE}.{new}")
-        _warn_renamed(old.removeprefix(f"{_PACKAGE}."), new, stacklevel=3)
+        sys.modules[old] = import_module(f"{_PACKAGE_NAME}.{new}")
+        _warn_renamed(old.removeprefix(f"{_PACKAGE_NAME}."), new, stacklevel=3)
 
 
 def _new_module_path(fullname: str) -> str | None:
@@ -122,7 +122,7 @@ def _new_module_path(fullname: str) -> str | None:
     fullname : old path with the package's name
     """
     package, _, path = fullname.partition(".")
-    if package != _PACKAGE:
+    if package != _PACKAGE_NAME:
         return None
     for old in sorted(RENAMED_MODULES, reverse=True):  # longer paths first
         if path == old or path.startswith(f"{old}."):
@@ -131,5 +131,5 @@ def _new_module_path(fullname: str) -> str | None:
 
 
 def _warn_renamed(old_name: str, new_name: str, stacklevel: int) -> None:
-    text = f"{_PACKAGE}.{old_name} is now {_PACKAGE}.{new_name}"
+    text = f"{_PACKAGE_NAME}.{old_name} is now {_PACKAGE_NAME}.{new_name}"
     warnings.warn(f"{text}; {_REMOVAL_NOTICE}", DeprecationWarning, stacklevel)

@@ -8,8 +8,8 @@ from typing import Any, cast
 
 import numpy as np
 
-_MAX_ITEMS = 6  # longest collection whose items are written
-_MAX_LENGTH = 60  # characters of a value
+_MAX_SHOWN_ITEMS = 6  # longest collection whose items are written
+_MAX_REPR_LENGTH = 60  # characters of a value
 
 
 class ShortRepr:
@@ -26,11 +26,11 @@ def short_repr(value: object) -> str:
     """Return the repr of a value, or for arrays and long collections the type with the shape or length."""
     if isinstance(value, np.ndarray):
         return f"{value.dtype}{list(value.shape)}"
-    if isinstance(value, Collection) and (len(value) > _MAX_ITEMS or not _is_short(value)):
+    if isinstance(value, Collection) and (len(value) > _MAX_SHOWN_ITEMS or not _is_short(value)):
         return value.__repr__() if isinstance(value, str) else f"<{len(value):,} in a {type(value).__name__}>"
     text = repr(value)
-    return text if len(text) <= _MAX_LENGTH else f"<{type(value).__name__}>"
+    return text if len(text) <= _MAX_REPR_LENGTH else f"<{type(value).__name__}>"
 
 
 def _is_short(value: Collection[Any]) -> bool:
-    return not any(isinstance(one, np.ndarray) for one in value) and len(repr(value)) <= _MAX_LENGTH
+    return not any(isinstance(one, np.ndarray) for one in value) and len(repr(value)) <= _MAX_REPR_LENGTH

@@ -17,38 +17,38 @@ from numpy.typing import NDArray
 Rows = list[dict[str, str]]
 
 
-def read_rows(package: str, name: str) -> Rows:
+def read_rows(package: str, table_name: str) -> Rows:
     """Return the rows of a CSV table in a package, as dictionaries by column name.
 
     package : name of the package, such as "dermis.environment"
-    name : path of the table in the package, without .csv
+    table_name : path of the table in the package, without .csv
     """
-    return parse_rows(resources.files(package).joinpath(f"{name}.csv").read_text("utf-8"))
+    return parse_rows(resources.files(package).joinpath(f"{table_name}.csv").read_text("utf-8"))
 
 
-def parse_rows(text: str) -> Rows:
+def parse_rows(csv_text: str) -> Rows:
     """Parse the rows of a CSV text as dictionaries by column name; lines that start with # are comments."""
-    return list(csv.DictReader(line for line in text.splitlines() if not line.startswith("#")))
+    return list(csv.DictReader(line for line in csv_text.splitlines() if not line.startswith("#")))
 
 
-def column_separator(line: str) -> str:
+def column_separator(table_line: str) -> str:
     """Return the separator of a line of a table: a tab if the line has one, else a semicolon, else a comma.
 
     In lines with tabs or semicolons, commas are decimal signs.
     """
-    return next((mark for mark in "\t;" if mark in line), ",")
+    return next((mark for mark in "\t;" if mark in table_line), ",")
 
 
 @lru_cache(4096)
-def plain_key(key: str) -> str:
+def plain_key(key_or_column: str) -> str:
     """Return a key or column name in lower case without punctuation: timestampms for timestamp_ms."""
-    return re.sub(r"[\W_]", "", key).casefold()
+    return re.sub(r"[\W_]", "", key_or_column).casefold()
 
 
-def float_columns(rows: Sequence[Mapping[str, str]], columns: str) -> NDArray[np.float64]:
-    """Return selected columns of a table as floats, (rows, columns).
+def float_columns(table_rows: Sequence[Mapping[str, str]], column_names: str) -> NDArray[np.float64]:
+    """Return selected columns of a table as floats, (table_rows, columns).
 
-    rows : rows of the table, by column name
-    columns : names of the columns, separated by spaces
+    table_rows : rows of the table, by column name
+    column_names : names of the columns, separated by spaces
     """
-    return np.array([[float(row[name]) for name in columns.split()] for row in rows])
+    return np.array([[float(row[name]) for name in column_names.split()] for row in table_rows])

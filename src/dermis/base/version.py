@@ -6,7 +6,7 @@ import tomllib
 from importlib import metadata
 from pathlib import Path
 
-_PROJECT = Path(__file__).parents[3] / "pyproject.toml"
+_PROJECT_FILE = Path(__file__).parents[3] / "pyproject.toml"
 
 
 def version() -> str:
@@ -14,4 +14,4 @@ def version() -> str:
     try:
         return metadata.version("dermis")
     except metadata.PackageNotFoundError:
-        return str(tomllib.loads(_PROJECT.read_text("utf-8"))["project"]["version"])
+        return str(tomllib.loads(_PROJECT_FILE.read_text("utf-8"))["project"]["version"])

@@ -50,14 +50,14 @@ class _AnimatedScene:
     rate: Fraction
     first: int
 
-    def scenes(self, numbers: Iterable[int]) -> Iterator[Scene]:
+    def scenes(self, frame_numbers: Iterable[int]) -> Iterator[Scene]:
         """Yield the scene at each frame; morph targets and bones that the clip does not move keep their pose.
 
-        numbers : numbers of the frames
+        frame_numbers : numbers of the frames
         """
         from dermis.mesh.pose import merge_poses
 
-        for frame in numbers:
+        for frame in frame_numbers:
             pose = self.clip.pose_at(float(frame / self.rate))
             yield replace(self.scene, pose=merge_poses(pose, self.scene.pose))
 
@@ -163,30 +163,33 @@ def animate(
 
 
 def _render_frames(
-    animation: _AnimatedScene, frame_numbers: Sequence[int], animation_output: AnimationOutput, adapter: str
+    animated_scene: _AnimatedScene,
+    frame_numbers: Sequence[int],
+    animation_output: AnimationOutput,
+    adapter: str,
 ) -> str:
     """Render and write the frames with the given numbers, and return the name of the adapter."""
     from dermis.frame.renderer import Renderer
 
-    renderer, size = Renderer(adapter), animation.settings.size
-    options: Options = {**animation.settings.model_dump(), "linear": animation_output.is_linear}
-    options["exposure"] = _common_exposure(animation, renderer)
-    options["alpha"] = animation_output.is_numbered and animation.settings.background == "none"
-    writing, bar = animation_output.open_writer(size, animation.rate), progress_bar("rendering frames")
+    renderer, size = Renderer(adapter), animated_scene.settings.size
+    options: Options = {**animated_scene.settings.model_dump(), "linear": animation_output.is_linear}
+    options["exposure"] = _common_exposure(animated_scene, renderer)
+    options["alpha"] = animation_output.is_numbered and animated_scene.settings.background == "none"
+    writing, bar = animation_output.open_writer(size, animated_scene.rate), progress_bar("rendering frames")
     with writing as write, bar as report:
-        pictures = renderer.render_many(animation.scenes(frame_numbers), **options)
+        pictures = renderer.render_many(animated_scene.scenes(frame_numbers), **options)
         for done, (number, picture) in enumerate(zip(frame_numbers, pictures, strict=True), 1):
             write(number, picture)
             report(done, len(frame_numbers))
     return str(renderer.device.adapter.name)
 
 
-def _common_exposure(animation: _AnimatedScene, renderer: Renderer) -> float:
-    """Return the exposure of all frames: the value of --exposure, or else metered at the first frame."""
-    if animation.settings.exposure != "auto":
-        return animation.settings.exposure
-    (scene,) = animation.scenes([animation.first])
-    exposure = renderer.draw(scene, animation.settings, timed=False).exposure
+def _common_exposure(animated_scene: _AnimatedScene, renderer: Renderer) -> float:
+    """Return the exposure of all frames: the value of --exposure, or the metered exposure of the first."""
+    if animated_scene.settings.exposure != "auto":
+        return animated_scene.settings.exposure
+    (scene,) = animated_scene.scenes([animated_scene.first])
+    exposure = renderer.draw(scene, animated_scene.settings, timed=False).exposure
     note(f"note: --exposure {exposure:.3g}, metered at the first frame")
     return exposure
 
@@ -224,15 +227,15 @@ def _summary_line(report: Options) -> str:
     return f"{report['file']}  {frames}{reused} at {report['fps']:g}/s  {report['seconds']:.1f} s{device}"
 
 
-def _print_animatable_names(name: str, options: SceneOptions, as_json: bool) -> int:
+def _print_animatable_names(head_or_scene: str, options: SceneOptions, as_json: bool) -> int:
     with spinner("loading"):
-        names = animatable_names(name, assemble_scene(name, options)[0].head)
+        names = animatable_names(head_or_scene, assemble_scene(head_or_scene, options)[0].head)
     lines = (f"{kind}: {', '.join(each) or 'none'}" for kind, each in names.items())
     print_report(as_json, names, lambda: lines)
     return 0
 
 
-_DEFAULT_RATE = 30.0
+_DEFAULT_FRAME_RATE = 30.0
 
 
 @dataclass(frozen=True)
@@ -256,7 +259,7 @@ class TimeSpan:
         """
         from dermis.images.movie import parse_frame_rate
 
-        rate = self.rate or parse_frame_rate(clip.rate or _DEFAULT_RATE)
+        rate = self.rate or parse_frame_rate(clip.rate or _DEFAULT_FRAME_RATE)
         first = math.ceil((self.begin or 0) * rate)
         count = clip.frame_count(float(rate))
         stop = count if self.end is None else min(count, math.ceil(self.end * rate))
@@ -277,7 +280,7 @@ def parse_time_span(
     Raises DermisError for invalid values.
     """
     from dermis.images.movie import parse_frame_rate
-    from dermis.mesh.clip import MAX_DURATION_S, check_rate
+    from dermis.mesh.clip import MAX_DURATION_S, check_frame_rate
 
     for option, seconds in (("--from", begin), ("--to", end)):
         if seconds is not None:
@@ -285,22 +288,22 @@ def parse_time_span(
     if end is not None and end <= (begin or 0):
         refuse("--to", f"a time after --from ({begin or 0:g} s)", f"got {end:g} s", "Correct one of them")
     if motion_rate is not None:
-        check_rate("--motion-fps", motion_rate)
+        check_frame_rate("--motion-fps", motion_rate)
     # exact decimal values: the float nearest to 0.1 is after frame 3 at 30 frames per second
     start, stop = (None if seconds is None else Fraction(str(seconds)) for seconds in (begin, end))
     return TimeSpan(start, stop, None if fps is None else parse_frame_rate(fps, "--fps"), motion_rate)
 
 
-def motion_file(name: str, motion: str | None) -> str:
+def motion_file(head_or_scene: str, motion: str | None) -> str:
     """Return the name of the motion file: the value of --motion, or the head's file if that file is glTF.
 
-    name : head or scene file as named on the command line
+    head_or_scene : head or scene file as named on the command line
     """
     from dermis.formats.parts import is_gltf
 
     if motion is not None:
         return motion
-    own_file = str(_head_table(name).get("name", name))
+    own_file = str(_head_table(head_or_scene).get("name", head_or_scene))
     if not is_gltf(own_file):
         advice = "Add --motion with a .glb, .csv or .json file, or a sequence of .obj files"
         refuse("--motion", "a file", f"it is missing, and {own_file} cannot contain clips", advice)
@@ -308,11 +311,11 @@ def motion_file(name: str, motion: str | None) -> str:
 
 
 def load_clip(
-    name: str, head: Head, motion: str, clip: str | None, head_options: Options, span: TimeSpan
+    head_or_scene: str, head: Head, motion: str, clip: str | None, head_options: Options, span: TimeSpan
 ) -> Clip:
     """Load the clip that animates a head from a motion file.
 
-    name : head or scene file as named on the command line
+    head_or_scene : head or scene file as named on the command line
     motion : motion file
     clip : name of a clip in the motion file; None for the only clip
     head_options : options of the head; `unit_mm`, `up` and `front` also apply to mesh sequences
@@ -324,23 +327,23 @@ def load_clip(
     rate = span.motion_rate
     if rate is None and span.rate and is_sequence(Path(motion)):  # one file per frame
         rate = float(span.rate)
-    fields = {**_head_table(name), **head_options}
+    fields = {**_head_table(head_or_scene), **head_options}
     units = {key: fields[key] for key in ("unit_mm", "up", "front") if key in fields}
     return load_motion(motion, head, clip=clip, fps=rate, **units)
 
 
-def animatable_names(name: str, head: Head) -> dict[str, tuple[str, ...]]:
+def animatable_names(head_or_scene: str, head: Head) -> dict[str, tuple[str, ...]]:
     """Return the names of morph targets, bones and clips, by kind; the clips are those in the head's file."""
     from dermis.formats.gltf.animations import clip_names
     from dermis.formats.parts import is_gltf
 
-    own_file = Path(str(_head_table(name).get("name", name)))
+    own_file = Path(str(_head_table(head_or_scene).get("name", head_or_scene)))
     clips = clip_names(own_file) if is_gltf(own_file) else ()
     return {"targets": head.targets, "bones": head.bones, "clips": clips}
 
 
-def _head_table(name: str) -> Options:
+def _head_table(head_or_scene: str) -> Options:
     """Return the [head] table of a scene file; an empty table for any other head name."""
     from dermis.scene.files import head_table
 
-    return head_table(Path(name)) if Path(name).suffix.lower() == ".toml" else {}
+    return head_table(Path(head_or_scene)) if Path(head_or_scene).suffix.lower() == ".toml" else {}

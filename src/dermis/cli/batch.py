@@ -148,18 +148,18 @@ def batch(
     return 0
 
 
-def _parse_fraction(option: str, text: str) -> tuple[int, int]:
+def _parse_fraction(option: str, option_value: str) -> tuple[int, int]:
     """Return the integers I and N of an option's value "I/N"."""
-    match = re.fullmatch(r"(\d{1,9})/(\d{1,9})", text)
+    match = re.fullmatch(r"(\d{1,9})/(\d{1,9})", option_value)
     if not match or int(match[1]) >= int(match[2]):
-        refuse(option, "I/N with I from 0 to N - 1, such as 3/16", f"got {text!r}", "Correct it")
+        refuse(option, "I/N with I from 0 to N - 1, such as 3/16", f"got {option_value!r}", "Correct it")
     return int(match[1]), int(match[2])
 
 
-def _check_count(option: str, value: int | None, minimum: int) -> int | None:
-    if value is not None and not minimum <= value <= _MAX_PROCESSES:
-        refuse(option, f"{minimum} to {_MAX_PROCESSES}", f"got {value}", "Correct it")
-    return value
+def _check_count(option_name: str, option_value: int | None, minimum: int) -> int | None:
+    if option_value is not None and not minimum <= option_value <= _MAX_PROCESSES:
+        refuse(option_name, f"{minimum} to {_MAX_PROCESSES}", f"got {option_value}", "Correct it")
+    return option_value
 
 
 def _local_processes(
@@ -236,7 +236,7 @@ def _dry_run(spec: Spec, adapter: str, contact_sheet: Path, as_json: bool) -> in
 
 
 _LOG_INTERVAL_S = 30.0
-_RATE_WINDOW_S = 60.0  # over which the rate is averaged
+_RATE_AVERAGING_S = 60.0  # over which the rate is averaged
 
 
 @contextmanager
@@ -259,7 +259,9 @@ def image_progress() -> Iterator[Callable[[Progress], None]]:
         TextColumn("{task.fields[rate]}"),
         TimeRemainingColumn(elapsed_when_finished=True),
     )
-    with rich.Progress(*columns, console=Console(stderr=True), speed_estimate_period=_RATE_WINDOW_S) as bar:
+    with rich.Progress(
+        *columns, console=Console(stderr=True), speed_estimate_period=_RATE_AVERAGING_S
+    ) as bar:
         task = bar.add_task("rendering images", rate="", total=None)
         image_rate = ImageRate()
 
@@ -284,14 +286,14 @@ class ImageRate:
         self._clock = clock
         self._samples = deque([(clock(), 0)])
 
-    def update(self, done: int) -> float:
+    def update(self, finished_images: int) -> float:
         """Record the number of images finished so far, and return the rate [1/s]."""
         now = self._clock()
-        self._samples.append((now, done))
-        while len(self._samples) > 2 and now - self._samples[1][0] >= _RATE_WINDOW_S:
+        self._samples.append((now, finished_images))
+        while len(self._samples) > 2 and now - self._samples[1][0] >= _RATE_AVERAGING_S:
             self._samples.popleft()
         start, done_at_start = self._samples[0]
-        return (done - done_at_start) / (now - start) if now > start else 0.0
+        return (finished_images - done_at_start) / (now - start) if now > start else 0.0
 
 
 class ProgressLog:

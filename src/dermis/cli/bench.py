@@ -91,7 +91,9 @@ def _report_lines(benchmark: Benchmark) -> list[str]:
     return [report.summary_line(benchmark), "", *table_lines, *default_lines, *published_lines]
 
 
-def _align_columns(table: Sequence[tuple[str, ...]]) -> list[str]:
+def _align_columns(table_rows: Sequence[tuple[str, ...]]) -> list[str]:
     """Return the rows of a table as lines of text with right-aligned columns."""
-    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    return ["  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in table]
+    widths = [max(map(len, column)) for column in zip(*table_rows, strict=True)]
+    return [
+        "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in table_rows
+    ]

@@ -14,8 +14,10 @@ if TYPE_CHECKING:
     SettingsOptions = Options
     SkinOptions = Options
 else:
-    SettingsOptions = model_options(Settings, only=("technique", "seams", "transmission", "tone", "bloom"))
-    SkinOptions = model_options(Skin, only=("profile", "specular", "fresnel", "energy", "direction"))
+    SettingsOptions = model_options(
+        Settings, only_fields=("technique", "seams", "transmission", "tone", "bloom")
+    )
+    SkinOptions = model_options(Skin, only_fields=("profile", "specular", "fresnel", "energy", "direction"))
 
 
 def cite(
@@ -70,14 +72,14 @@ def _comparison_sources(against: str, technique: str | None) -> tuple[str, ...]:
     return comparison_sources(against, [technique] if technique else TECHNIQUES)
 
 
-def _picture_sources(file: Path | None, settings: Options, skin: Options) -> tuple[str, ...]:
+def _picture_sources(scene_file: Path | None, settings: Options, skin: Options) -> tuple[str, ...]:
     from dermis.scene import load_scene
     from dermis.scene.lights import studio
     from dermis.scene.sources import picture_sources
 
-    if file is None:
+    if scene_file is None:
         return picture_sources(Skin(**skin), Settings(**settings), studio())
-    scene, scene_settings = load_scene(file)
+    scene, scene_settings = load_scene(scene_file)
     maps = scene.head.maps
     return picture_sources(
         Skin(**(scene.skin.model_dump() | dict(skin))),

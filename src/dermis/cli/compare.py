@@ -36,8 +36,8 @@ from dermis.specular.cosines import cosines
 from dermis.specular.models import MODELS
 
 _PATH_TRACERS = ("path-traced", "cycles")
-_DEFAULT_SIZES = {"size": (256, 256), "atlas": 1024}
-_DIRECTION_DEFAULT = {"direction": "that of the truth's skin"}
+_DEFAULT_SIZE_SETTINGS = {"size": (256, 256), "atlas": 1024}
+_DIRECTION_DEFAULT_HELP = {"direction": "that of the truth's skin"}
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -47,8 +47,12 @@ if TYPE_CHECKING:
     SizeOptions = Options
     SkinOptions = Options
 else:
-    SizeOptions = model_options(Settings, only=_DEFAULT_SIZES, defaults=_DEFAULT_SIZES)
-    SkinOptions = model_options(Skin, only=("direction", "roughness"), defaults=_DIRECTION_DEFAULT)
+    SizeOptions = model_options(
+        Settings, only_fields=_DEFAULT_SIZE_SETTINGS, shown_defaults=_DEFAULT_SIZE_SETTINGS
+    )
+    SkinOptions = model_options(
+        Skin, only_fields=("direction", "roughness"), shown_defaults=_DIRECTION_DEFAULT_HELP
+    )
 
 
 def compare(
@@ -126,12 +130,12 @@ def compare(
     return 0
 
 
-def _refuse_unused_options(subject: str, options: Options) -> None:
+def _refuse_unused_options(compared_subject: str, options: Options) -> None:
     """Raise DermisError for options that have no effect on a comparison of this subject.
 
-    subject : name of a head, or "specular"
+    compared_subject : name of a head, or "specular"
     """
-    if subject == "specular":
+    if compared_subject == "specular":
         unused = dict.fromkeys(options.keys() - {"roughness"}, "specular models are compared without a head")
     else:
         unused = {"roughness": "techniques are compared without surface reflection"}
@@ -152,7 +156,7 @@ def _comparison_arguments(options: Options, sizes: Options) -> Options:
     from dermis.apps.validation.comparisons.scenes import default_region
 
     names = [name.strip() for name in options.get("techniques", ",".join(TECHNIQUES)).split(",")]
-    size_settings = {**_DEFAULT_SIZES, **sizes}
+    size_settings = {**_DEFAULT_SIZE_SETTINGS, **sizes}
     for name in names:
         check_fields(Settings, {**size_settings, "technique": name}, {"technique": "techniques"})
     light = options.get("light", "front")
@@ -217,16 +221,17 @@ def _report_lines(comparison: Comparison) -> Sequence[str]:
     return lines
 
 
-_ALBEDO_DEGREES = (0, 30, 60, 75, 85)  # angles of the printed albedos
-_INCIDENT_COLOURS = {
+_ALBEDO_INCIDENCE_DEGREES = (0, 30, 60, 75, 85)  # angles of the printed albedos
+_COLOUR_OF_INCIDENCE_DEGREES = {
     15: "#2a62b0",
     45: "#2e8b57",
     75: "#c0392b",
 }  # angles of incidence [degrees] and plot colours
 _DUPLICATE_MODEL = "kelemen-direct"  # the same lobe as kelemen
-_PLOT_COLUMNS = 4
-_PLOT_RADIUS = 1.8  # smallest radius of the plots: square root of the intensity relative to kelemen's peak
-_NORMAL = np.array([0.0, 0.0, 1.0])
+_PLOT_COLUMN_COUNT = 4
+# smallest radius of the plots: square root of the intensity relative to kelemen's peak
+_MIN_PLOT_RADIUS = 1.8
+_SURFACE_NORMAL = np.array([0.0, 0.0, 1.0])
 
 
 def compare_specular(output: Path | None, roughness: float, adapter: str, as_json: bool) -> None:
@@ -270,8 +275,8 @@ def _specular_report(adapter: str) -> Options:
 def _specular_lines(report: Options, roughness: float) -> list[str]:
     from dermis.specular.comparison import normal_incidence_peak
 
-    cosine = np.cos(np.radians(_ALBEDO_DEGREES))
-    angles = "".join(f"{f'{angle}°':>8}" for angle in _ALBEDO_DEGREES)
+    cosine = np.cos(np.radians(_ALBEDO_INCIDENCE_DEGREES))
+    angles = "".join(f"{f'{angle}°':>8}" for angle in _ALBEDO_INCIDENCE_DEGREES)
     lines = [
         f"roughness {roughness:g}, rho_s 1, Schlick's Fresnel term; "
         f"cost per evaluation on {report['adapter']}",
@@ -319,15 +324,15 @@ def _lobe_figure(roughness: float) -> Figure:
     """
     peak = _lobe_intensity("kelemen", roughness).max(axis=1, keepdims=True)
     curves_by_model = {name: np.sqrt(_lobe_intensity(name, roughness) / peak) for name in _distinct_models()}
-    radius = max(_PLOT_RADIUS, 1.05 * float(np.max(list(curves_by_model.values()))))
-    rows = -(-len(curves_by_model) // _PLOT_COLUMNS)
-    figure = _empty_figure(3.0 * _PLOT_COLUMNS, 2.4 * rows)
+    radius = max(_MIN_PLOT_RADIUS, 1.05 * float(np.max(list(curves_by_model.values()))))
+    rows = -(-len(curves_by_model) // _PLOT_COLUMN_COUNT)
+    figure = _empty_figure(3.0 * _PLOT_COLUMN_COUNT, 2.4 * rows)
     figure.suptitle(f"Intensity relative to the peak of kelemen, square root scale; m = {roughness:g}")
-    panels = figure.subplots(rows, _PLOT_COLUMNS, subplot_kw={"projection": "polar"}).ravel()
+    panels = figure.subplots(rows, _PLOT_COLUMN_COUNT, subplot_kw={"projection": "polar"}).ravel()
     for axes in panels[len(curves_by_model) :]:
         axes.remove()
     for axes, (name, curves) in zip(panels, curves_by_model.items(), strict=False):
-        for (degrees, colour), curve in zip(_INCIDENT_COLOURS.items(), curves, strict=True):
+        for (degrees, colour), curve in zip(_COLOUR_OF_INCIDENCE_DEGREES.items(), curves, strict=True):
             axes.plot(_view_angles(), curve, color=colour, label=f"light from {degrees}°")
         axes.set(thetamin=-90, thetamax=90, theta_zero_location="N", theta_direction=-1, rmax=radius)
         axes.set(rticks=np.sqrt([0.25, 1.0, 2.25]), yticklabels=["", "1", ""])
@@ -341,7 +346,7 @@ def _lobe_figure(roughness: float) -> Figure:
 def _lobe_intensity(model_name: str, roughness: float) -> Doubles:
     """Return the reflected intensity f cos(theta_i) cos(theta_o), (3, n), for the BRDF f of a model [1/sr].
 
-    The rows are for the angles of incidence in `_INCIDENT_COLOURS`, the columns for the angles of
+    The rows are for the angles of incidence in `_COLOUR_OF_INCIDENCE_DEGREES`, the columns for the angles of
     `_view_angles`.
 
     model_name : name of the specular model
@@ -350,11 +355,13 @@ def _lobe_intensity(model_name: str, roughness: float) -> Doubles:
     angle = _view_angles()
     view = np.stack([np.sin(angle), 0.0 * angle, np.cos(angle)], axis=-1)
     rows = []
-    for degrees in _INCIDENT_COLOURS:
+    for degrees in _COLOUR_OF_INCIDENCE_DEGREES:
         theta = np.radians(degrees)
         light = np.broadcast_to([-np.sin(theta), 0.0, np.cos(theta)], view.shape)
         rows.append(
-            MODELS[model_name].lobe(cosines(_NORMAL, light, view), roughness) * np.cos(theta) * np.cos(angle)
+            MODELS[model_name].lobe(cosines(_SURFACE_NORMAL, light, view), roughness)
+            * np.cos(theta)
+            * np.cos(angle)
         )
     return np.stack(rows)
 

@@ -13,7 +13,7 @@ from dermis.cli.options import AdapterOption, JsonOption, Options
 if TYPE_CHECKING:
     from dermis.frame.renderer import Renderer
 
-_LIBRARIES = ("dermis", "wgpu", "numpy", "scipy", "pydantic", "OpenEXR", "pillow")
+_REPORTED_PACKAGES = ("dermis", "wgpu", "numpy", "scipy", "pydantic", "OpenEXR", "pillow")
 
 
 def doctor(*, adapter: AdapterOption = "auto", as_json: JsonOption = False) -> int:
@@ -54,16 +54,16 @@ def diagnose(adapter: str) -> Options:
         "adapters": adapters,
         "python": platform.python_version(),
         "platform": platform.platform(),
-        "libraries": {name: _package_version(name) for name in _LIBRARIES},
+        "libraries": {name: _package_version(name) for name in _REPORTED_PACKAGES},
         "cache": str(cache_folder()),
         "samples": {name: is_available(name) for name in SAMPLES},
     }
 
 
-def _package_version(name: str) -> str:
+def _package_version(package_name: str) -> str:
     """Return the version of an installed Python package, or "not installed"."""
     try:
-        return version(name)
+        return version(package_name)
     except PackageNotFoundError:
         return "not installed"
 

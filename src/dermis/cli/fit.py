@@ -91,8 +91,8 @@ def fit(
     return 0
 
 
-def _print_report(result: FitResult, written: list[Path], as_json: bool) -> None:
-    summary = result.summary() | {"files": [str(path) for path in written]}
+def _print_report(fit_result: FitResult, written: list[Path], as_json: bool) -> None:
+    summary = fit_result.summary() | {"files": [str(path) for path in written]}
     if as_json:
         print_json(summary)
         return

@@ -13,7 +13,7 @@ from dermis.cli.options import AdapterOption, IntegerOption, JsonOption, OutputP
 if TYPE_CHECKING:
     from dermis.apps.gallery.script import GalleryPicture
 
-_PANEL_SIDE = 448
+_PANEL_SIDE_PX = 448
 
 
 def gallery(
@@ -56,7 +56,7 @@ def gallery(
     from dermis.base.atomic_write import refuse_output
     from dermis.base.errors import refuse
 
-    side = _PANEL_SIDE if size is None else size
+    side = _PANEL_SIDE_PX if size is None else size
     if not 32 <= side <= 2048:
         refuse("--size", "32 to 2048 pixels", f"got {side}", "Correct it")
     scripts, studio = find_scripts(only or ()), Studio(head, side, adapter)

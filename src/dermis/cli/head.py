@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from dermis.mesh.head import Head
 
 Look = TypeVar("Look", "SkinLook", "EyeLook", "HairLook")
-TARGET, EXPRESSION = "--target", "--expression"
+TARGET_OPTION, EXPRESSION_OPTION = "--target", "--expression"
 _ValuesParameter = Parameter(negative="", metavar="NAME=VALUE,...", show_default=False)
 _WeightsParameter = Parameter(negative="", metavar="NAME=WEIGHT,...", show_default=False)
 
@@ -161,9 +161,9 @@ def head(
     check_output(output, (".glb", ".json"), "Choose .glb for a head, .json for the parameters of a person")
     ancestry = drop_none(african=african, asian=asian, caucasian=caucasian)
     numbers = ancestry | drop_none(sex=sex, age=age, weight=weight, muscle=muscle)
-    rest_weights = parse_weights(expression or [], EXPRESSION)
+    rest_weights = parse_weights(expression or [], EXPRESSION_OPTION)
     tone = drop_none(skin_ancestry=skin_ancestry, ita=ita)
-    person = _build_person(seed, numbers, tone, parse_weights(target or [], TARGET))
+    person = _build_person(seed, numbers, tone, parse_weights(target or [], TARGET_OPTION))
     person = replace(
         person,
         skin=_with_values(person.look, skin, "--skin"),
@@ -200,18 +200,18 @@ def _build_person(seed: int | None, numbers: Options, tone: Options, targets: di
     return replace(base, **numbers, targets={**base.targets, **targets})
 
 
-def _with_values(look: Look, option_values: list[str] | None, option: str) -> Look:
+def _with_values(look: Look, option_values: list[str] | None, option_name: str) -> Look:
     """Return a copy of a skin, eye or hair look with the fields set on the command line.
 
     option_values : texts "NAME=NUMBER,..." of the option, such as --skin
     """
     from dermis.human.skin.look import SITES_FIELD
 
-    values = parse_weights(option_values or [], option)
+    values = parse_weights(option_values or [], option_name)
     field_names = [field.name for field in fields(look) if field.name != SITES_FIELD]
     for name in values:
         if name not in field_names:
-            refuse(option, f"a name of {', '.join(field_names)}", f"got {name!r}", "Correct it")
+            refuse(option_name, f"a name of {', '.join(field_names)}", f"got {name!r}", "Correct it")
     numbers: Options = dict(values)
     if (seed := values.get("seed")) is not None and seed.is_integer():
         numbers["seed"] = int(seed)
@@ -243,5 +243,5 @@ def _write_glb(
     from dermis.mesh.pose import Pose
     from dermis.scene.skin import Skin
 
-    Pose(expression).motion(head.control, EXPRESSION)  # raises for unknown names and invalid weights
+    Pose(expression).motion(head.control, EXPRESSION_OPTION)  # raises for unknown names and invalid weights
     return write_person_glb(output, person, head, roughness=Skin().roughness, weights=expression, eyes=eyes)

@@ -27,27 +27,29 @@ if TYPE_CHECKING:
     ShapeOptions = Options
     FileOptions = Options
 else:
-    HeadOptions = model_options(HeadTable, without=("name",), names=HEAD_OPTION_NAMES)
-    ShapeOptions = model_options(HeadTable, only=_SHAPE_FIELDS)
-    FileOptions = model_options(HeadTable, only=(*_SHAPE_FIELDS, *_MAP_FIELDS), names=HEAD_OPTION_NAMES)
+    HeadOptions = model_options(HeadTable, excluded_fields=("name",), option_names=HEAD_OPTION_NAMES)
+    ShapeOptions = model_options(HeadTable, only_fields=_SHAPE_FIELDS)
+    FileOptions = model_options(
+        HeadTable, only_fields=(*_SHAPE_FIELDS, *_MAP_FIELDS), option_names=HEAD_OPTION_NAMES
+    )
 
 
-def check_head(name: str, options: Options) -> None:
+def check_head(head_name: str, options: Options) -> None:
     """Validate the options of a head.
 
-    name : name of the head or its file
+    head_name : name of the head or its file
 
     Raises DermisError that names the invalid option.
     """
-    check_fields(HeadTable, {"name": name, **options}, HEAD_OPTION_NAMES)
+    check_fields(HeadTable, {"name": head_name, **options}, HEAD_OPTION_NAMES)
 
 
-EYE = "--eye"
+EYE_OPTION = "--eye"
 _MIN_PUPIL_MM, _MAX_PUPIL_MM = EYE_LOOK_RANGES["pupil_mm"]
 EyeOptions = Annotated[
     list[str] | None,
     Parameter(
-        name=EYE,
+        name=EYE_OPTION,
         negative="",
         metavar="NAME=NUMBER,...",
         help="Eye appearance, such as eumelanin=0.1,pupil_mm=2.5: eumelanin of the iris, 0 (blue) to 1 (dark "
@@ -68,12 +70,12 @@ def note_eyes(head: Head, eyes_option: str | None) -> None:
         note("note: eyes: no group has a name of an eye; name the groups with --eye-groups")
 
 
-_LARGEST_NUMBER = 1e10
-POSE, BONE, LOOK_AT = "--pose", "--bone", "--look-at"
+_MAX_OPTION_NUMBER = 1e10
+POSE_OPTION, BONE_OPTION, LOOK_AT_OPTION = "--pose", "--bone", "--look-at"
 WeightsOption = Annotated[
     list[str] | None,
     Parameter(
-        name=POSE,
+        name=POSE_OPTION,
         negative="",
         metavar="NAME=WEIGHT,...",
         help="Weights of morph targets, such as jawOpen=0.6,mouthSmileLeft=1, in addition to the [pose] of a "
@@ -83,7 +85,7 @@ WeightsOption = Annotated[
 LookAtOption = Annotated[
     str | None,
     Parameter(
-        name=LOOK_AT,
+        name=LOOK_AT_OPTION,
         metavar="X,Y,Z",
         help="Point that the eyes look at, relative to the centre of the head [mm], or the word camera.",
     ),
@@ -91,7 +93,7 @@ LookAtOption = Annotated[
 BoneAngleOptions = Annotated[
     list[str] | None,
     Parameter(
-        name=BONE,
+        name=BONE_OPTION,
         negative="",
         metavar="NAME=X,Y,Z",
         help="Rotation of a bone about the head's x (nod), y (turn) and z (tilt) axes, such as head=0,25,0 "
@@ -100,56 +102,60 @@ BoneAngleOptions = Annotated[
 ]
 
 
-def parse_weights(texts: Sequence[str], option: str = POSE) -> dict[str, float]:
+def parse_weights(option_values: Sequence[str], option_name: str = POSE_OPTION) -> dict[str, float]:
     """Return weights by name from option values such as "jawOpen=0.6,mouthSmileLeft=1"."""
     expected = "NAME=WEIGHT,..., such as jawOpen=0.6,mouthSmileLeft=1"
-    parts = (part for text in texts for part in text.split(","))
-    return {name: weight for name, (weight,) in _parse_pairs(parts, 1, option, expected)}
+    parts = (part for text in option_values for part in text.split(","))
+    return {name: weight for name, (weight,) in _parse_pairs(parts, 1, option_name, expected)}
 
 
-def parse_bone_angles(texts: Sequence[str]) -> dict[str, list[float]]:
+def parse_bone_angles(option_values: Sequence[str]) -> dict[str, list[float]]:
     """Return the angles about x, y and z [degrees] by bone from option values such as "head=0,25,0"."""
-    return dict(_parse_pairs(texts, 3, BONE, "NAME=X,Y,Z with three angles in degrees, such as head=0,25,0"))
+    return dict(
+        _parse_pairs(
+            option_values, 3, BONE_OPTION, "NAME=X,Y,Z with three angles in degrees, such as head=0,25,0"
+        )
+    )
 
 
 def _parse_pairs(
-    texts: Iterable[str], count: int, option: str, expected: str
+    option_values: Iterable[str], number_count: int, option_name: str, expected: str
 ) -> Iterator[tuple[str, list[float]]]:
     """Yield the name and the numbers of each option value "NAME=NUMBER,...".
 
-    count : how many numbers each value must have
-    option : name of the option, for error messages
+    number_count : how many numbers each value must have
+    option_name : name of the option, for error messages
     expected : expected format of the values, for error messages
     """
-    for item in texts:
+    for item in option_values:
         name, _, text = item.rpartition("=")
         numbers = _parse_numbers(text)
-        if not name.strip() or numbers is None or len(numbers) != count:
-            refuse(option, expected, f"got {item!r}", "Correct it")
+        if not name.strip() or numbers is None or len(numbers) != number_count:
+            refuse(option_name, expected, f"got {item!r}", "Correct it")
         yield name.strip(), numbers
 
 
 def pose_from_options(
-    weights: Mapping[str, float], bone_angles: Mapping[str, Sequence[float]], head: Head, name: str
+    weights: Mapping[str, float], bone_angles: Mapping[str, Sequence[float]], head: Head, head_name: str
 ) -> Pose:
     """Return the pose of the options --pose and --bone.
 
     weights : morph target weights by name of the target [-]
     bone_angles : rotation about x, y and z by name of the bone [degrees]
-    name : head as named on the command line, for error messages
+    head_name : head as named on the command line, for error messages
 
     Raises DermisError for targets and bones that the head does not have.
     """
     from dermis.mesh.pose import Pose
 
-    parts = {POSE: Pose(weights), BONE: Pose(bones=bone_angles)}
+    parts = {POSE_OPTION: Pose(weights), BONE_OPTION: Pose(bones=bone_angles)}
     for option, part in parts.items():
         try:
             part.motion(head.control, option)
         except DermisError as fault:
             if not (head.targets or head.bones):
                 raise
-            raise DermisError(f"{fault} All names: dermis animate {name} --names.") from None
+            raise DermisError(f"{fault} All names: dermis animate {head_name} --names.") from None
     return Pose(weights, bone_angles)
 
 
@@ -163,14 +169,14 @@ def pose_with_gaze(option_value: str, scene: Scene) -> Pose:
     point = scene.camera.position if option_value == "camera" else _parse_numbers(option_value)
     if point is None or len(point) != 3:
         expected = "camera, or X,Y,Z in mm from the head's centre"
-        refuse(LOOK_AT, expected, f"got {option_value!r}", "Correct it")
+        refuse(LOOK_AT_OPTION, expected, f"got {option_value!r}", "Correct it")
     return looking_at(scene.head, point, scene.pose)
 
 
-def _parse_numbers(text: str) -> list[float] | None:
+def _parse_numbers(option_value: str) -> list[float] | None:
     """Return the numbers of a comma-separated text; None if a part is not a number or exceeds 1e10."""
     try:
-        numbers = [float(part) for part in text.split(",")]
+        numbers = [float(part) for part in option_value.split(",")]
     except ValueError:
         return None
-    return numbers if all(abs(number) <= _LARGEST_NUMBER for number in numbers) else None
+    return numbers if all(abs(number) <= _MAX_OPTION_NUMBER for number in numbers) else None

@@ -24,11 +24,13 @@ def _to_int(_: type, tokens: Sequence[Token]) -> int:
     return int(tokens[0].value)
 
 
-def _to_choice(model: type[FrozenModel], field: str, kind: object, tokens: Sequence[Token]) -> str:
+def _to_choice(
+    model: type[FrozenModel], field_name: str, choice_type: object, tokens: Sequence[Token]
+) -> str:
     """Return the choice that was typed, after a check against all choices, including those of plug-ins."""
     from dermis.scene.frozen_model import field_choices
 
-    if (word := tokens[0].value) in (choices := field_choices(model, field)):
+    if (word := tokens[0].value) in (choices := field_choices(model, field_name)):
         return word
     expected_type: Any = Literal[choices]
     raise CoercionError(token=tokens[0], target_type=expected_type)
@@ -54,9 +56,9 @@ AdapterOption = Annotated[
         "(see `dermis doctor`)."
     ),
 ]
-_OUTPUT_NAMES = Parameter(name=("--output", "-o"))
-OptionalOutputPath = Annotated[Path | None, _OUTPUT_NAMES]
-OutputPath = Annotated[Path, _OUTPUT_NAMES]
+_OUTPUT_OPTION_NAMES = Parameter(name=("--output", "-o"))
+OptionalOutputPath = Annotated[Path | None, _OUTPUT_OPTION_NAMES]
+OutputPath = Annotated[Path, _OUTPUT_OPTION_NAMES]
 FlagOption = Annotated[bool, Parameter(negative="", show_default=False)]
 _LENGTH_RANGE_MM = 1e-6, 1e4
 Options = dict[str, Any]
@@ -70,10 +72,10 @@ IntegerOption = Annotated[int | None, Parameter(converter=_to_int)]
 def model_options(
     model: type[FrozenModel],
     *,
-    only: Collection[str] = (),
-    without: Collection[str] = (),
-    names: Mapping[str, str] | None = None,
-    defaults: Mapping[str, object] | None = None,
+    only_fields: Collection[str] = (),
+    excluded_fields: Collection[str] = (),
+    option_names: Mapping[str, str] | None = None,
+    shown_defaults: Mapping[str, object] | None = None,
 ) -> Any:
     """Return a parameter type for cyclopts that has one option per field of a settings model.
 
@@ -81,18 +83,21 @@ def model_options(
     option. The value of the parameter is a dictionary from field names to the options given on the command
     line.
 
-    only : names of the fields to include; all fields by default
-    without : names of the fields to exclude
-    names : option names that differ from the field name, by field name
-    defaults : defaults that the help shows in place of the model's defaults, by field name
+    only_fields : names of the fields to include; all fields by default
+    excluded_fields : names of the fields to exclude
+    option_names : option names that differ from the field name, by field name
+    shown_defaults : defaults that the help shows in place of the model's defaults, by field name
     """
     from dermis.scene.frozen_model import field_heading
 
     options: dict[str, object] = {}
-    for field in only or model.model_fields:
+    for field in only_fields or model.model_fields:
         kind, keywords = _option_type(model, field)
-        if kind is not None and field not in without:
-            name, help_text = option_name(field, names), _option_help(model, field, defaults or {})
+        if kind is not None and field not in excluded_fields:
+            name, help_text = (
+                option_name(field, option_names),
+                _option_help(model, field, shown_defaults or {}),
+            )
             if heading := field_heading(model, field):
                 keywords = keywords | {"group": Group(heading, sort_key=1)}  # after cyclopts' own groups
             options[field] = Annotated[kind, Parameter(name=name, help=help_text, **keywords)]
@@ -105,12 +110,12 @@ def drop_none(**options: object) -> Options:
     return {name: value for name, value in options.items() if value is not None}
 
 
-def option_name(field: str, names: Mapping[str, str] | None = None) -> str:
+def option_name(field: str, option_names: Mapping[str, str] | None = None) -> str:
     """Return the command line option for a field, such as --rho-s for rho_s.
 
-    names : option names that differ from the field name, by field name
+    option_names : option names that differ from the field name, by field name
     """
-    return "--" + (names or {}).get(field, field).replace("_", "-")
+    return "--" + (option_names or {}).get(field, field).replace("_", "-")
 
 
 def is_option(model: type[FrozenModel], field: str) -> bool:
@@ -152,7 +157,7 @@ def _option_type(model: type[FrozenModel], field: str) -> tuple[Any, Options]:
     return (kind, {}) if kind in (bool, float, str) else known.get(parts or kind, (None, {}))
 
 
-def _option_help(model: type[FrozenModel], field: str, defaults: Mapping[str, object]) -> str:
+def _option_help(model: type[FrozenModel], field: str, shown_defaults: Mapping[str, object]) -> str:
     """Return the help text of a field's option, with its range and default."""
     from dermis.scene.field_errors import field_keywords
     from dermis.scene.frozen_model import accepted_values, field_choices, field_help, format_default
@@ -161,60 +166,66 @@ def _option_help(model: type[FrozenModel], field: str, defaults: Mapping[str, ob
     has_choices = field_choices(model, field) or field_keywords(model, field)  # added by cyclopts
     if (values := accepted_values(model, field)) and not has_choices:
         text += f" [range: {values}]"
-    default = format_default(defaults.get(field, model.model_fields[field].get_default()))
+    default = format_default(shown_defaults.get(field, model.model_fields[field].get_default()))
     return f"{text} [default: {default}]" if default else text
 
 
-def check_fields(model: type[M], values: Mapping[str, object], names: Mapping[str, str] | None = None) -> M:
+def check_fields(
+    model: type[M], field_values: Mapping[str, object], option_names: Mapping[str, str] | None = None
+) -> M:
     """Return a model with given field values; error messages name the option instead of the field.
 
-    names : option names that differ from the field name, by field name
+    option_names : option names that differ from the field name, by field name
 
     Raises DermisError for invalid values.
     """
     from dermis.scene.field_errors import InvalidFieldsError
 
     try:
-        return model(**values)
+        return model(**field_values)
     except InvalidFieldsError as error:
         path, finding = next(iter(error.messages.items()))
-        field = path.partition(".")[0] or next(name for name in model.model_fields if name in values)
-        raise DermisError(f"{option_name(field, names)}: {finding}. Correct it.") from None
+        field = path.partition(".")[0] or next(name for name in model.model_fields if name in field_values)
+        raise DermisError(f"{option_name(field, option_names)}: {finding}. Correct it.") from None
 
 
-def refuse_options(fields: Iterable[str], names: Mapping[str, str] | None, context: str, advice: str) -> None:
+def refuse_options(
+    fields: Iterable[str], option_names: Mapping[str, str] | None, context: str, advice: str
+) -> None:
     """Raise DermisError if any option is given in a context in which it would have no effect.
 
     fields : field names of the given options
-    names : option names that differ from the field name, by field name
+    option_names : option names that differ from the field name, by field name
     context : description of the context for the message, such as "with a dask cluster"
     advice : advice to the user
     """
     for field in fields:
-        refuse(option_name(field, names), f"no such option {context}", "it is given", advice)
+        refuse(option_name(field, option_names), f"no such option {context}", "it is given", advice)
 
 
-def parse_size(text: str, option: str = "--size") -> tuple[int, int]:
+def parse_size(option_value: str, option: str = "--size") -> tuple[int, int]:
     """Return the width and height [pixel] of an option value such as "1024x1024"."""
-    match = re.fullmatch(r"(\d{1,9})x(\d{1,9})", text)
+    match = re.fullmatch(r"(\d{1,9})x(\d{1,9})", option_value)
     if not match:
-        refuse(option, "WIDTHxHEIGHT, such as 1024x1024", f"got {text!r}", "Write two integers with an x")
+        refuse(
+            option, "WIDTHxHEIGHT, such as 1024x1024", f"got {option_value!r}", "Write two integers with an x"
+        )
     return int(match[1]), int(match[2])
 
 
-def parse_colour(text: str, option: str) -> tuple[float, float, float]:
+def parse_colour(option_value: str, option: str) -> tuple[float, float, float]:
     """Return the linear Rec. 709 colour of an option value "red,green,blue"."""
     try:
-        red, green, blue = (float(part) for part in text.split(","))
+        red, green, blue = (float(part) for part in option_value.split(","))
     except ValueError:
-        refuse(option, "red,green,blue, such as 0,0,0", f"got {text!r}", "Write three numbers")
+        refuse(option, "red,green,blue, such as 0,0,0", f"got {option_value!r}", "Write three numbers")
     return red, green, blue
 
 
-def parse_lengths(option: str, text: str) -> tuple[float, ...]:
+def parse_lengths(option: str, option_value: str) -> tuple[float, ...]:
     """Return the lengths [mm] of an option value such as "0.5,1,2"."""
     try:
-        lengths = tuple(float(part) for part in text.split(","))
+        lengths = tuple(float(part) for part in option_value.split(","))
     except ValueError:
-        refuse(option, "lengths in mm, such as 0.5,1,2", f"got {text!r}", "Write numbers with commas")
+        refuse(option, "lengths in mm, such as 0.5,1,2", f"got {option_value!r}", "Write numbers with commas")
     return tuple(checked_number(option, length, *_LENGTH_RANGE_MM, "mm") for length in lengths)

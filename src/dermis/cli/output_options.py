@@ -47,13 +47,13 @@ class FrameOutputs:
     """
 
     def __init__(
-        self, typed: str | None, file_format: Literal["exr", "png", "npy"] | None, image: Path
+        self, option_value: str | None, file_format: Literal["exr", "png", "npy"] | None, image_path: Path
     ) -> None:
-        if file_format and typed is None:
+        if file_format and option_value is None:
             refuse("--outputs-format", "the option --outputs", "it is missing", "Add --outputs")
-        self.image = image
-        self.names = check_outputs(_split_names(typed)) if typed is not None else ()
-        self.in_image_file = image.suffix.lower() == ".exr" and file_format in (None, "exr")
+        self.image = image_path
+        self.names = check_outputs(_split_names(option_value)) if option_value is not None else ()
+        self.in_image_file = image_path.suffix.lower() == ".exr" and file_format in (None, "exr")
         if not self.names:
             self.paths: dict[str, Path] = {}
             return
@@ -61,7 +61,7 @@ class FrameOutputs:
 
         check_formats(self.names, file_format or "exr")
         self.paths = {
-            name: image if self.in_image_file else output_path(image, name, file_format or "exr")
+            name: image_path if self.in_image_file else output_path(image_path, name, file_format or "exr")
             for name in self.names
         }
         for path in self.paths.values():
@@ -69,21 +69,21 @@ class FrameOutputs:
         if "motion" in self.names:
             note("note: motion is 0 in a single picture; Renderer.observe measures it between pictures")
 
-    def write(self, picture: Floats | None, values: Mapping[str, PlaneArray]) -> None:
+    def write(self, picture: Floats | None, output_values: Mapping[str, PlaneArray]) -> None:
         """Write the outputs to their files.
 
         picture : linear image that shares one EXR file with the outputs; None if the outputs have separate
             files
-        values : pixel arrays by output name
+        output_values : pixel arrays by output name
         """
         from dermis.frame.output_files import write_multipart, write_output
 
         if self.in_image_file:
             assert picture is not None
-            write_multipart(self.image, picture, values)
+            write_multipart(self.image, picture, output_values)
             return
         for name, path in self.paths.items():
-            write_output(path, name, values[name])
+            write_output(path, name, output_values[name])
 
     @property
     def report(self) -> dict[str, str]:
@@ -91,8 +91,8 @@ class FrameOutputs:
         return {name: str(path) for name, path in self.paths.items()}
 
 
-def _split_names(typed: str) -> list[str]:
-    return [name.strip() for name in typed.split(",")]
+def _split_names(option_value: str) -> list[str]:
+    return [name.strip() for name in option_value.split(",")]
 
 
 _LANDMARKS_HELP = (
@@ -110,13 +110,13 @@ class FrameLandmarks:
     Raises DermisError for unknown sets and for a file that cannot be written.
     """
 
-    def __init__(self, typed: str | None, image: Path) -> None:
+    def __init__(self, option_value: str | None, image_path: Path) -> None:
         self.names: tuple[str, ...] = ()
-        self.path = image.with_name(f"{image.stem}.landmarks.json")
-        if typed is not None:
+        self.path = image_path.with_name(f"{image_path.stem}.landmarks.json")
+        if option_value is not None:
             from dermis.frame.features.outputs.landmarks import checked_landmarks
 
-            self.names = checked_landmarks(_split_names(typed))
+            self.names = checked_landmarks(_split_names(option_value))
             check_output(self.path, (self.path.suffix,))
 
     def check(self, head: Head) -> None:
@@ -181,7 +181,7 @@ class AnimationOutput:
         """Return whether the images store linear light as floats (EXR)."""
         return self.path.suffix.lower() == ".exr"
 
-    def check(self, size: tuple[int, int]) -> None:
+    def check(self, frame_size: tuple[int, int]) -> None:
         """Raise DermisError if frames of this size cannot be written, before anything is rendered."""
         from dermis.images.movie import DEFAULT_CRF, MOVIE_SUFFIX, check_movie
         from dermis.images.writer import FrameFiles
@@ -196,23 +196,26 @@ class AnimationOutput:
         if self.path.suffix.lower() in (".png", ".exr"):
             numbered = self.path.with_name(f"%05d{self.path.suffix}")
             refuse(self.path, "a movie or numbered pictures", "it is one picture", f"Name it {numbered}")
-        check_movie(self.path, size, DEFAULT_CRF if self.crf is None else self.crf)
+        check_movie(self.path, frame_size, DEFAULT_CRF if self.crf is None else self.crf)
 
-    def frames_to_render(self, numbers: range, size: tuple[int, int], digest: str) -> Sequence[int]:
+    def frames_to_render(
+        self, frame_numbers: range, frame_size: tuple[int, int], frame_digest: str
+    ) -> Sequence[int]:
         """Return the numbers of the frames to render: frames without a complete image of an earlier run.
 
-        digest : hash of everything that determines the frames; images with another hash are rendered again
+        frame_digest : hash of everything that determines the frames; images with another hash are rendered
+            again
         """
         from dermis.images.writer import FrameFiles
 
         if not self.is_numbered:
-            return numbers
+            return frame_numbers
         files = FrameFiles(self.path)
-        files.start(digest, force=self.overwrite)
-        return files.missing(numbers, size)
+        files.start(frame_digest, force=self.overwrite)
+        return files.missing(frame_numbers, frame_size)
 
     @contextmanager
-    def open_writer(self, size: tuple[int, int], rate: Fraction) -> Iterator[WriteFrame]:
+    def open_writer(self, frame_size: tuple[int, int], rate: Fraction) -> Iterator[WriteFrame]:
         """Yield a function that queues a frame for writing; the with block ends when all frames are written.
 
         rate : frame rate of a movie [1/s]
@@ -225,5 +228,5 @@ class AnimationOutput:
             with ImageWriter() as writer:
                 yield lambda number, picture: writer.write(files.path(number), picture)
             return
-        with MovieWriter(self.path, size, rate, DEFAULT_CRF if self.crf is None else self.crf) as movie:
+        with MovieWriter(self.path, frame_size, rate, DEFAULT_CRF if self.crf is None else self.crf) as movie:
             yield lambda _, picture: movie.write(cast("Bytes", picture))

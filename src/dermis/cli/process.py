@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 
     Handler = Callable[[int, FrameType | None], Any] | int | signal.Handlers | None
 
-_OPEN_MODES = os.O_RDONLY, os.O_RDONLY, os.O_WRONLY  # for null devices that replace closed standard streams
+# modes of null devices that replace closed standard streams
+_STREAM_OPEN_MODES = os.O_RDONLY, os.O_RDONLY, os.O_WRONLY
 
 
 class StandardStreams:
@@ -38,7 +39,7 @@ class StandardStreams:
 
     def __enter__(self) -> Self:
         """Replace sys.stdout and sys.stderr."""
-        for descriptor, mode in enumerate(_OPEN_MODES):
+        for descriptor, mode in enumerate(_STREAM_OPEN_MODES):
             _reserve_descriptor(descriptor, mode)
         self._original = sys.stdout, sys.stderr
         self._raw: list[_GuardedStream] = []
@@ -49,7 +50,7 @@ class StandardStreams:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self, error_type: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Flush the replacement streams and restore the original ones."""
         for stream, original in zip((sys.stdout, sys.stderr), self._original, strict=True):
@@ -64,7 +65,7 @@ class StandardStreams:
         return next((fault for fault in faults if not isinstance(fault, BrokenPipeError)), None)
 
     def discard_stdout(self) -> None:
-        """Discard the buffered output to stdout after an interruption, as a reader of it may be blocked."""
+        """Discard buffered output to stdout after an interruption, as the reader may be blocked."""
         for raw in self._raw:
             if raw.descriptor == 1:
                 raw.fault = raw.fault or BrokenPipeError()
@@ -89,8 +90,8 @@ class _GuardedStream(io.RawIOBase):
     fault : error of the first failed write; None until then
     """
 
-    def __init__(self, inner: io.RawIOBase, descriptor: int) -> None:
-        self._inner, self.descriptor = inner, descriptor
+    def __init__(self, raw_stream: io.RawIOBase, descriptor: int) -> None:
+        self._inner, self.descriptor = raw_stream, descriptor
         self.fault: OSError | None = None
 
     def write(self, data: ReadableBuffer, /) -> int:
@@ -130,12 +131,15 @@ def _reserve_descriptor(descriptor: int, open_mode: int) -> None:
             os.set_inheritable(descriptor, True)
 
 
-_SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
-_SECOND_SIGNAL_S = 0.5  # earlier repetitions are ignored: intermediate programs may send a signal twice
-_RETRY_S = 0.02
+_HANDLED_SIGNALS = [
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+]
+# earlier repetitions are ignored: intermediate programs may send a signal twice
+_MIN_SECOND_SIGNAL_DELAY_S = 0.5
+_SIGNAL_RETRY_S = 0.02
 _UNSAFE_PACKAGES = {"importlib", "pydantic"}  # exceptions leave half-imported modules, or are lost in Rust
 _DRIVER_PACKAGES = {"wgpu", "glfw"}
-_RETRY, _END = b"\0", b"\xff"  # bytes that are not signal numbers
+_RETRY_BYTE, _END_BYTE = b"\0", b"\xff"  # bytes that are not signal numbers
 _SIGNAL_EXIT_BASE = 128  # exit status after a signal, minus the number of the signal
 
 
@@ -158,7 +162,7 @@ class Interruption:
         """Install the signal handlers; do nothing outside the main thread."""
         if threading.current_thread() is not threading.main_thread():
             return self
-        for signal_number in _SIGNALS:
+        for signal_number in _HANDLED_SIGNALS:
             handler = signal.getsignal(signal_number)
             if handler in (signal.SIG_DFL, signal.default_int_handler):
                 self._original[signal_number] = handler
@@ -172,7 +176,7 @@ class Interruption:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self, error_type: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Restore the previous signal handlers."""
         if threading.current_thread() is not threading.main_thread():
@@ -181,18 +185,18 @@ class Interruption:
             signal.signal(signal_number, signal.SIG_DFL if self.code else handler)
         signal.set_wakeup_fd(self._original_fd)
         sys.unraisablehook = self._original_hook
-        self._writing.send(_END)
+        self._writing.send(_END_BYTE)
         self._thread.join()
         self._writing.close()
 
-    def _handle(self, signal_number: int, frame: FrameType | None) -> None:
+    def _handle(self, signal_number: int, stack_frame: FrameType | None) -> None:
         self.code = self.code or _SIGNAL_EXIT_BASE + signal_number
         if self._is_raised:
             return
         if (loop := _running_loop()) is not None:  # raised inside a task, asyncio would print it
             self._is_raised = True
             loop.call_soon_threadsafe(_raise_keyboard_interrupt)
-        elif _caller_swallows_exceptions(frame):
+        elif _caller_swallows_exceptions(stack_frame):
             self._raise_later()
         else:
             self._is_raised = True
@@ -200,7 +204,7 @@ class Interruption:
 
     def _raise_later(self) -> None:
         self._is_raised, self._is_postponed = False, True
-        self._writing.send(_RETRY)
+        self._writing.send(_RETRY_BYTE)
 
     def _on_unraisable(self, error: sys.UnraisableHookArgs) -> None:
         """Repeat a KeyboardInterrupt that was raised where Python ignores exceptions, as in a destructor."""
@@ -217,12 +221,14 @@ class Interruption:
         first_signal_s = 0.0
         with self._reading:
             while True:
-                if not select.select([self._reading], [], [], _RETRY_S if self._is_postponed else None)[0]:
+                if not select.select(
+                    [self._reading], [], [], _SIGNAL_RETRY_S if self._is_postponed else None
+                )[0]:
                     self._is_postponed = False
                     self._send_again()
                     continue
                 received = self._reading.recv(1)
-                if received == _END:
+                if received == _END_BYTE:
                     return
                 if received[0] not in self._original or signal.getsignal(received[0]) != self._handle:
                     continue  # a server has installed its own handler
@@ -230,7 +236,7 @@ class Interruption:
                     self._resent -= 1
                 elif not first_signal_s:
                     first_signal_s = time.monotonic()
-                elif time.monotonic() - first_signal_s > _SECOND_SIGNAL_S:
+                elif time.monotonic() - first_signal_s > _MIN_SECOND_SIGNAL_DELAY_S:
                     os._exit(_SIGNAL_EXIT_BASE + received[0])
 
     def _send_again(self) -> None:

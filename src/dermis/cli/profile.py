@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
     PigmentOptions = Options
 else:
-    PigmentOptions = model_options(Pigments, names=_OPTION_NAMES, defaults=_default_pigments())
+    PigmentOptions = model_options(Pigments, option_names=_OPTION_NAMES, shown_defaults=_default_pigments())
 
 Clamp = Literal["layer", "none"]
 Model = Literal["counted", "dipole", "better-dipole", "multipole", "layered", "layered-point", "montecarlo"]
@@ -155,7 +155,9 @@ def profile(
         spectrum = _reflectance_spectrum(tissue, model, clamp)
     conserve = keep_energy or radial.model == COUNTED_MODEL
     table_fit, terms = (table, _DEFAULT_TERM_COUNT) if fit is None else (None, fit)
-    fitted = gaussian_fit(radial, table_fit, terms, shared=variances == "shared", keep_energy=conserve)
+    fitted = gaussian_fit(
+        radial, table_fit, terms, shared_variances=variances == "shared", keep_energy=conserve
+    )
     report = ProfileReport(
         radial, tissue, fitted, additional_fit(radial, fit_kind), thicknesses, model_error, spectrum
     )
@@ -201,21 +203,21 @@ def _tracing_options(photons: int | None, seed: int | None, anisotropy: float, i
     }
 
 
-def _refuse_tissue_options(name: str, options: Options) -> None:
+def _refuse_tissue_options(medium_name: str, options: Options) -> None:
     for option, value in options.items():
         if value is not None:
-            expected, actual = "a medium or a pigmented skin", f"{name} is a table of Gaussians"
+            expected, actual = "a medium or a pigmented skin", f"{medium_name} is a table of Gaussians"
             refuse(option_name(option, _OPTION_NAMES), expected, actual, "Remove the option")
 
 
-def _load_tissue(name: str, options: Options, eta: float | None) -> Tissue:
+def _load_tissue(medium_name: str, options: Options, eta: float | None) -> Tissue:
     from dermis.optics.tissue import load_tissue
 
     pigments = dict(options)
     structure = pigments.pop("structure", None)
-    tissue = load_tissue(name, structure, pigments)
+    tissue = load_tissue(medium_name, structure, pigments)
     if structure is not None and tissue.parameters is None:
-        refuse("--skin", "a pigmented skin", f"{name} is a medium", "Remove the option")
+        refuse("--skin", "a pigmented skin", f"{medium_name} is a medium", "Remove the option")
     return tissue if eta is None else replace(tissue, medium=tissue.medium.with_eta(eta))
 
 

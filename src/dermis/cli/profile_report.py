@@ -29,46 +29,53 @@ if TYPE_CHECKING:
     from dermis.optics.tissue import Tissue
 
 
-def _format_row(values: Floats) -> str:
+def _format_row(channel_values: Floats) -> str:
     """Return a number for each of red, green and blue as aligned text."""
-    return " ".join(f"{value:7.4f}" for value in values)
+    return " ".join(f"{value:7.4f}" for value in channel_values)
 
 
-def _to_lists(value: object) -> object:
+def _to_lists(nested_arrays: object) -> object:
     """Convert nested arrays to lists for JSON, and drop dictionary entries that are None."""
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    if isinstance(value, dict):
-        return {key: _to_lists(item) for key, item in value.items() if item is not None}
-    if isinstance(value, list | tuple):
-        return [_to_lists(item) for item in value]
-    return value
+    if isinstance(nested_arrays, np.ndarray):
+        return nested_arrays.tolist()
+    if isinstance(nested_arrays, dict):
+        return {key: _to_lists(item) for key, item in nested_arrays.items() if item is not None}
+    if isinstance(nested_arrays, list | tuple):
+        return [_to_lists(item) for item in nested_arrays]
+    return nested_arrays
 
 
 def gaussian_fit(
-    radial: RadialProfile, table: GaussianSum | None, terms: int, *, shared: bool, keep_energy: bool
+    radial_profile: RadialProfile,
+    published_gaussians: GaussianSum | None,
+    term_count: int,
+    *,
+    shared_variances: bool,
+    keep_energy: bool,
 ) -> GaussianFit:
     """Return the Gaussians fitted to a diffusion profile, or a published table of Gaussians unchanged.
 
-    table : published Gaussians; None to fit the profile
-    terms : number of Gaussians to fit
-    shared : whether all colour channels have the same variances
+    published_gaussians : published Gaussians; None to fit the profile
+    term_count : number of Gaussians to fit
+    shared_variances : whether all colour channels have the same variances
     keep_energy : whether the weights must sum to the total reflectance
     """
-    if table is not None:
-        return GaussianFit(table, np.zeros(3), np.zeros(3), "pointwise", shared=True)
-    target = radial.points() if radial.finite_at_centre else radial.rings()
-    return fit_gaussians(target, terms, shared=shared, keep_energy=keep_energy, name=radial.name)
+    if published_gaussians is not None:
+        return GaussianFit(published_gaussians, np.zeros(3), np.zeros(3), "pointwise", shared=True)
+    target = radial_profile.points() if radial_profile.finite_at_centre else radial_profile.rings()
+    return fit_gaussians(
+        target, term_count, shared=shared_variances, keep_energy=keep_energy, name=radial_profile.name
+    )
 
 
-def additional_fit(radial: RadialProfile, kind: str) -> BurleyFit | SeparableFit | None:
+def additional_fit(radial_profile: RadialProfile, fit_kind: str) -> BurleyFit | SeparableFit | None:
     """Return the fit that --fit-kind requests in addition to Gaussians; None for "gaussian".
 
-    kind : "burley", "separable" or "gaussian"
+    fit_kind : "burley", "separable" or "gaussian"
     """
-    if kind == "burley":
-        return fit_burley(radial.rings())
-    return fit_separable(radial.rings()) if kind == "separable" else None
+    if fit_kind == "burley":
+        return fit_burley(radial_profile.rings())
+    return fit_separable(radial_profile.rings()) if fit_kind == "separable" else None
 
 
 @dataclass(frozen=True)
@@ -242,14 +249,14 @@ class ProfileReport:
 
 
 _CHANNEL_COLOURS = ("#c0392b", "#2e8b57", "#2a62b0")
-_LEGEND_ABOVE: dict[str, Any] = {"frameon": False, "loc": "lower left", "bbox_to_anchor": (0, 1)}
+_LEGEND_SETTINGS: dict[str, Any] = {"frameon": False, "loc": "lower left", "bbox_to_anchor": (0, 1)}
 _LAYER_COLOURS = ("#b8860b", "#8e44ad", "#16808a", "#7f8c8d")
-_DASH_PATTERN = (0, (4, 3))
+_MODEL_DASH_PATTERN = (0, (4, 3))
 _CHANNEL_NAMES = ("red", "green", "blue")
-_PLOT_FLOOR = 1e-5  # lowest plotted value, relative to the peak of r R(r); smaller values are noise
+_MIN_PLOTTED_FRACTION = 1e-5  # lowest plotted value, relative to the peak of r R(r); smaller values are noise
 _DATELESS_METADATA: dict[str, dict[str, str | None]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 """Metadata without dates, so that equal plots are equal files."""
-_MAX_PHOTON_ERROR = 0.3  # relative standard error above which a point is not plotted
+_MAX_PLOTTED_RELATIVE_ERROR = 0.3  # relative standard error above which a point is not plotted
 
 
 def draw_plot(path: Path, report: ProfileReport, monte_carlo: RadialProfile | None) -> None:
@@ -269,7 +276,7 @@ def draw_plot(path: Path, report: ProfileReport, monte_carlo: RadialProfile | No
     if monte_carlo is not None:
         peak = max(peak, _plot_photons(axes, monte_carlo))
     axes.set(xscale="log", yscale="log", xlabel="r [mm]", ylabel="r R(r) [1/mm]")
-    axes.set(xlim=(1e-3, 30.0), ylim=(_PLOT_FLOOR * peak, 2.0 * peak))
+    axes.set(xlim=(1e-3, 30.0), ylim=(_MIN_PLOTTED_FRACTION * peak, 2.0 * peak))
     axes.set_title(_plot_title(report), fontsize=10, loc="left")
     axes.grid(which="major", alpha=0.25, linewidth=0.6)
     _add_legend(figure, axes)
@@ -289,10 +296,10 @@ def _plot_spectra(axes: Axes, report: ProfileReport) -> None:
     right.set(yscale="log", ylabel="µa, µs′ [1/mm]")
     for layer, colour in zip(report.tissue.medium.layers, _LAYER_COLOURS, strict=False):
         right.plot(WAVELENGTHS_NM, layer.sigma_a, color=colour, linewidth=1.0, label=f"µa, {layer.name}")
-        dashed: dict[str, Any] = {"linestyle": _DASH_PATTERN, "label": f"µs′, {layer.name}"}
+        dashed: dict[str, Any] = {"linestyle": _MODEL_DASH_PATTERN, "label": f"µs′, {layer.name}"}
         right.plot(WAVELENGTHS_NM, layer.sigma_s_prime, color=colour, linewidth=1.0, **dashed)
     lines = [*axes.get_lines(), *right.get_lines()]
-    axes.legend(lines, [str(line.get_label()) for line in lines], ncols=5, fontsize=7, **_LEGEND_ABOVE)
+    axes.legend(lines, [str(line.get_label()) for line in lines], ncols=5, fontsize=7, **_LEGEND_SETTINGS)
 
 
 def _add_legend(figure: Figure, axes: Axes) -> None:
@@ -319,7 +326,7 @@ def _plot_curves(axes: Axes, report: ProfileReport) -> float:
         terms = len(fit.weight) if report.fit.shared else np.count_nonzero(fit.weight[:, channel])
         label = f"{name}, {terms} Gaussians, error {report.fit.error[channel]:.2%}"
         axes.plot(
-            r, r * fitted[:, channel], color=colour, linewidth=1.1, linestyle=_DASH_PATTERN, label=label
+            r, r * fitted[:, channel], color=colour, linewidth=1.1, linestyle=_MODEL_DASH_PATTERN, label=label
         )
         if isinstance(report.other_fit, BurleyFit):
             other = r * report.other_fit.profile.radiant_exitance(r)[:, channel]
@@ -334,7 +341,7 @@ def _plot_photons(axes: Axes, profile: RadialProfile) -> float:
     error: Floats = profile.standard_error if profile.standard_error is not None else np.zeros((len(r), 3))
     for channel, colour in enumerate(_CHANNEL_COLOURS):
         R, se = profile.reflectance[:, channel], error[:, channel]
-        precise = (R > 0.0) & (se < _MAX_PHOTON_ERROR * np.abs(R)) & (r > 1e-3)
+        precise = (R > 0.0) & (se < _MAX_PLOTTED_RELATIVE_ERROR * np.abs(R)) & (r > 1e-3)
         peak = max(peak, float((r * R)[precise].max(initial=0.0)))
         label = f"{_CHANNEL_NAMES[channel]}, Monte Carlo"
         bars: dict[str, Any] = {"markersize": 2.2, "elinewidth": 0.8, "color": colour, "alpha": 0.7}

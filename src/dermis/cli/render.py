@@ -34,10 +34,10 @@ if TYPE_CHECKING:
     from dermis.scene.model import Scene
     from dermis.scene.settings import Settings
 
-_MAX_UNSCATTERED = 0.05
+_MAX_UNSCATTERED_FRACTION = 0.05
 """Fraction of the skin's triangles above which a note says that they are lit without scattering; closed eyes
 and other collapsed charts of scans stay below it."""
-_MAX_CLIPPED = 0.02
+_MAX_CLIPPED_FRACTION = 0.02
 """Fraction of the head's pixels above which a note says that they are overexposed."""
 
 
@@ -145,11 +145,11 @@ def _gc_disabled() -> Iterator[None]:
 
 
 def _write_images(
-    rendered: RenderedFrame, output: Path, outputs: FrameOutputs, values: Mapping[str, PlaneArray]
+    rendered: RenderedFrame, output: Path, outputs: FrameOutputs, output_values: Mapping[str, PlaneArray]
 ) -> None:
     """Write the image file and the requested outputs, which may share the image's EXR file.
 
-    values : pixel arrays of the outputs by name
+    output_values : pixel arrays of the outputs by name
     """
     from dermis.images.io import write_image, write_png
 
@@ -161,7 +161,7 @@ def _write_images(
         if not (outputs.names and outputs.in_image_file):
             write_image(output, linear)
     if outputs.names:
-        outputs.write(linear, values)
+        outputs.write(linear, output_values)
 
 
 def _note_light(scene: Scene, settings: Settings, rendered: RenderedFrame) -> None:
@@ -171,7 +171,11 @@ def _note_light(scene: Scene, settings: Settings, rendered: RenderedFrame) -> No
     environment, and one for the setting gamma "wrong".
     """
     technique, suns = TECHNIQUES[settings.technique], rendered.suns
-    if technique.uses_atlas and technique.stitches_seams and rendered.unscattered_fraction > _MAX_UNSCATTERED:
+    if (
+        technique.uses_atlas
+        and technique.stitches_seams
+        and rendered.unscattered_fraction > _MAX_UNSCATTERED_FRACTION
+    ):
         fraction = f"{rendered.unscattered_fraction:.0%} of the skin's triangles"
         reason = "their uv is collapsed, mirrored onto other skin, or thinner than a texel of the atlas"
         note(f"note: {fraction} are lit without scattering: {reason}")
@@ -184,6 +188,6 @@ def _note_light(scene: Scene, settings: Settings, rendered: RenderedFrame) -> No
 
 
 def _note_clipped(rendered: RenderedFrame) -> None:
-    if (fraction := rendered.clipped()) > _MAX_CLIPPED:
+    if (fraction := rendered.clipped()) > _MAX_CLIPPED_FRACTION:
         advice = f"use less than --exposure {rendered.exposure:.3g}, or --tone neutral"
         note(f"note: {fraction:.0%} of the head is overexposed: {advice}")

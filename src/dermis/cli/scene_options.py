@@ -12,7 +12,7 @@ from cyclopts import Parameter
 from dermis.base.console import note
 from dermis.base.errors import refuse
 from dermis.cli.head_options import (
-    EYE,
+    EYE_OPTION,
     HEAD_OPTION_NAMES,
     BoneAngleOptions,
     EyeOptions,
@@ -50,8 +50,10 @@ if not TYPE_CHECKING:
     SkinPreset = Literal[tuple(SKIN_PRESETS)] | None
     SkinOptions = model_options(Skin)
     _ATLAS_DEFAULT = f"{Settings().atlas}, without a GPU what the picture resolves"
-    SettingsOptions = model_options(Settings, defaults={**PHOTOGRAPHIC_SETTINGS, "atlas": _ATLAS_DEFAULT})
-    EnvironmentOptions = model_options(Environment, names=ENVIRONMENT_OPTION_NAMES)
+    SettingsOptions = model_options(
+        Settings, shown_defaults={**PHOTOGRAPHIC_SETTINGS, "atlas": _ATLAS_DEFAULT}
+    )
+    EnvironmentOptions = model_options(Environment, option_names=ENVIRONMENT_OPTION_NAMES)
 
 
 @Parameter(name="*")
@@ -94,25 +96,27 @@ class SceneOptions:
 DEFAULT_SCENE_OPTIONS = SceneOptions()
 
 
-def assemble_scene(name: str, options: SceneOptions) -> tuple[Scene, Settings]:
+def assemble_scene(head_or_scene: str, options: SceneOptions) -> tuple[Scene, Settings]:
     """Return the scene and settings that a head or scene file and the command line options describe.
 
     Settings that neither the file nor an option gives have the values of `PHOTOGRAPHIC_SETTINGS`.
 
-    name : head or scene file as named on the command line
+    head_or_scene : head or scene file as named on the command line
     """
     from dermis.scene import Scene, load_camera
 
     weights, bone_angles = parse_weights(options.pose or ()), parse_bone_angles(options.bone or ())
     if options.eye:
-        options = replace(options, head=options.head | {"eye": parse_weights(options.eye, EYE)}, eye=None)
-    _check_values(name, options)
-    scene, settings = _base_scene(name, options)
+        options = replace(
+            options, head=options.head | {"eye": parse_weights(options.eye, EYE_OPTION)}, eye=None
+        )
+    _check_values(head_or_scene, options)
+    scene, settings = _base_scene(head_or_scene, options)
     note_eyes(scene.head, options.head.get("eyes"))
     if weights or bone_angles:
         from dermis.mesh.pose import merge_poses
 
-        pose = pose_from_options(weights, bone_angles, scene.head, name)
+        pose = pose_from_options(weights, bone_angles, scene.head, head_or_scene)
         scene = replace(scene, pose=merge_poses(pose, scene.pose))
     environment = _merge_environment(scene.environment, options.environment)
     assembled = Scene(
@@ -140,25 +144,27 @@ def fit_atlas(scene: Scene, settings: Settings, adapter_kind: str) -> Settings:
 
     adapter_kind : kind of the graphics adapter, "CPU" for software
     """
-    from dermis.scene.resolved_atlas import resolved_atlas
+    from dermis.scene.resolved_atlas import resolved_atlas_side
 
     if adapter_kind != "CPU" or "atlas" in settings.model_fields_set:
         return settings
-    side = resolved_atlas(scene, settings)
+    side = resolved_atlas_side(scene, settings)
     if side < settings.atlas and TECHNIQUES[settings.technique].uses_atlas:
         note(f"note: --atlas {side} without a GPU, as the picture resolves no more texels")
     return settings.model_copy(update={"atlas": side})
 
 
-def note_subdivision(name: str, options: SceneOptions, head: Head) -> None:
+def note_subdivision(head_or_scene: str, options: SceneOptions, head: Head) -> None:
     """Print a note on stderr if the subdivision level of the head was chosen automatically.
 
-    name : head or scene file as named on the command line
+    head_or_scene : head or scene file as named on the command line
     """
     from dermis.scene.files import head_table
     from dermis.scene.heads import MIN_HUMAN_LEVELS, is_person_name
 
-    head_options = head_table(Path(name)) if Path(name).suffix.lower() == ".toml" else options.head
+    head_options = (
+        head_table(Path(head_or_scene)) if Path(head_or_scene).suffix.lower() == ".toml" else options.head
+    )
     min_levels = MIN_HUMAN_LEVELS if is_person_name(head.name) else 0
     if head_options.get("subdivide", AUTO) == AUTO and head.levels > min_levels:
         count = f"{len(head.mesh.triangles):,} triangles"

@@ -172,12 +172,12 @@ def _parse_change(
     return PigmentChange(**values) if values else None
 
 
-def _print_report(result: UnmixResult, written: list[Path], seconds: float, as_json: bool) -> None:
-    summary = result.summary() | {"files": [str(path) for path in written], "seconds": round(seconds, 3)}
+def _print_report(unmixed: UnmixResult, written: list[Path], seconds: float, as_json: bool) -> None:
+    summary = unmixed.summary() | {"files": [str(path) for path in written], "seconds": round(seconds, 3)}
     if as_json:
         print_json(summary)
         return
-    height, width = result.melanin.shape
+    height, width = unmixed.melanin.shape
     lines = [f"{width} x {height} texels, {100.0 * summary['skin']:.0f} % of them skin ({seconds:.1f} s)"]
     if "melanin" in summary:
         for name in ("melanin", "blood"):

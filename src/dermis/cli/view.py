@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from dermis.apps.viewer.player import MotionFile
     from dermis.apps.viewer.state import ViewerState
 
-_HOST, _PORT, _WINDOW = "127.0.0.1", 8765, (1280, 800)
+_DEFAULT_HOST, _DEFAULT_PORT, _DEFAULT_WINDOW_SIZE = "127.0.0.1", 8765, (1280, 800)
 _ATLAS_SIDE_ON_CPU = 1024  # a still frame with the default atlas takes several seconds on a CPU
 
 
@@ -81,9 +81,9 @@ def view(
         state = _initial_state(head, scene, adapter)
         return state, _load_motion(motion, motion_fps, state)
 
-    window = scene.settings.get("size", _WINDOW)
+    window = scene.settings.get("size", _DEFAULT_WINDOW_SIZE)
     if browser:
-        address = host or _HOST, _PORT if port is None else port
+        address = host or _DEFAULT_HOST, _DEFAULT_PORT if port is None else port
         serve(load_state_and_motion, adapter, window, *address, _print_url, require_token=token)
     else:
         with spinner("loading"):
@@ -123,8 +123,8 @@ def _load_motion(motion_path: str | None, fps: float | None, state: ViewerState)
     return motion
 
 
-def _print_url(url: str, exposed: bool) -> None:
-    if exposed:
+def _print_url(url: str, is_exposed: bool) -> None:
+    if is_exposed:
         note("warning: other machines can reach this page; whoever knows its URL controls the viewer")
         note("warning: the connection is not encrypted: use a trusted network or a tunnel")
     print_lines(f"{url}  (Ctrl+C to stop)")

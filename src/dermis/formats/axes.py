@@ -17,7 +17,7 @@ Front = Literal["auto", "x", "y", "z", "-x", "-y", "-z"]
 class Axes(NamedTuple):
     """Axes of a file that point upwards and to the front.
 
-    up : axis that points upwards; None if it is not known, and Y is assumed
+    up : axis that points upwards; None if the axis is unknown, in which case Y is assumed
     front : axis along which the face looks, perpendicular to `up`; "auto" if it is not known, and -Y is
         assumed if Z is up, as in Blender, else Z
     """
@@ -27,7 +27,7 @@ class Axes(NamedTuple):
 
     @property
     def top(self) -> Axis:
-        """Return the axis that points upwards, Y if it is not known."""
+        """Return the axis that points upwards: `up`, or Y if `up` is None."""
         return self.up or "y"
 
     @property
@@ -52,13 +52,16 @@ class Axes(NamedTuple):
 DEFAULT_AXES = Axes()
 
 
-def to_y_up(vectors: Doubles, axes: Axes) -> Doubles:
+def to_y_up(vectors: Doubles, file_axes: Axes) -> Doubles:
     """Rotate vectors (v, 3) of a file so that the file's up axis becomes +Y and its front becomes +Z."""
     import numpy as np
 
-    if (axes.top, axes.face) == ("y", "z"):
+    if (file_axes.top, file_axes.face) == ("y", "z"):
         return vectors
-    (up, up_sign), (front, front_sign) = _index_and_sign(axes.top), _index_and_sign(axes.face)
+    (up, up_sign), (front, front_sign) = (
+        _axis_index_and_sign(file_axes.top),
+        _axis_index_and_sign(file_axes.face),
+    )
     side = 3 - up - front
     side_sign = up_sign * front_sign * (1 if (up + 1) % 3 == front else -1)
     columns = (side, side_sign), (up, up_sign), (front, front_sign)
@@ -73,12 +76,12 @@ def file_axis(direction: Axis, axes: Axes) -> Axis:
     """
     import numpy as np
 
-    index, sign = _index_and_sign(direction)
+    index, sign = _axis_index_and_sign(direction)
     along = sign * to_y_up(np.eye(3), axes)[:, index]
     names: tuple[Axis, ...] = ("x", "y", "z", "-x", "-y", "-z")
     return names[int(np.concatenate((along, -along)).argmax())]
 
 
-def _index_and_sign(axis: Axis) -> tuple[int, int]:
+def _axis_index_and_sign(axis: Axis) -> tuple[int, int]:
     """Return the index of an axis, 0 to 2, and its sign."""
     return "xyz".index(axis[-1]), -1 if axis[0] == "-" else 1

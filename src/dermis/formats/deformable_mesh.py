@@ -18,7 +18,7 @@ from dermis.base.arrays import Doubles, Floats, Index, Numbers
 from dermis.mesh.geometry import vertex_normals
 from dermis.mesh.head import Head
 from dermis.mesh.rig import Rig
-from dermis.mesh.skeleton import INFLUENCES, Skeleton
+from dermis.mesh.skeleton import BONES_PER_POINT, Skeleton
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 
 _MIN_DISPLACEMENT_MM = 1e-3  # smaller displacements count as 0
 _MIN_NORMAL_CHANGE = 2e-3  # smaller changes of unit normals count as 0: a tenth of a degree
-_MIN_WEIGHT = 1e-6  # smaller weights count as 0
-_MAX_CANDIDATES = 8  # bones among which four are selected
-_PRIOR_MM2 = 1.0  # penalty for the squared deviation from the interpolated weights
+_MIN_BONE_WEIGHT = 1e-6  # smaller weights count as 0
+_MAX_CANDIDATE_BONES = 8  # bones among which four are selected
+_INTERPOLATED_WEIGHTS_PENALTY_MM2 = 1.0  # penalty for the squared deviation from the interpolated weights
 
 
 class VertexTarget(NamedTuple):
@@ -126,16 +126,16 @@ class DeformableMesh:
         point = self.head.mesh.point
         return bone[point].astype(dtype), weight[point].astype(np.float32)
 
-    def _control_displacements(self, target: int) -> Doubles:
+    def _control_displacements(self, target_index: int) -> Doubles:
         """Return the displacements of the control points by a morph target at weight 1, (p, 3) [mm]."""
         targets, displacement = self.rig.targets, np.zeros((len(self.rig.positions_mm), 3))
-        part = targets.rows(target)
+        part = targets.rows(target_index)
         displacement[targets.point[part]] = targets.delta_mm[part]
         return displacement
 
-    def _refine_vectors(self, values: Doubles) -> Doubles:
+    def _refine_vectors(self, control_vectors: Doubles) -> Doubles:
         """Interpolate vectors at control points (p, 3) to the points of the subdivided mesh, (q, 3)."""
-        return values if self.refinement is None else np.asarray(self.refinement @ values)
+        return control_vectors if self.refinement is None else np.asarray(self.refinement @ control_vectors)
 
 
 def point_bone_influences(rig: Rig, refinement: csr_array | None) -> tuple[Index, Doubles]:
@@ -151,9 +151,9 @@ def point_bone_influences(rig: Rig, refinement: csr_array | None) -> tuple[Index
     assert skeleton is not None
     weights = _bone_weights(skeleton)
     if refinement is not None:
-        weights = _fit_weights(rig.positions_mm.astype(np.float64), skeleton, weights, refinement)
-    bone = np.argsort(-weights, axis=1, kind="stable")[:, :INFLUENCES]
-    bone = np.pad(bone, ((0, 0), (0, INFLUENCES - bone.shape[1])))
+        weights = _fit_bone_weights(rig.positions_mm.astype(np.float64), skeleton, weights, refinement)
+    bone = np.argsort(-weights, axis=1, kind="stable")[:, :BONES_PER_POINT]
+    bone = np.pad(bone, ((0, 0), (0, BONES_PER_POINT - bone.shape[1])))
     weight = np.take_along_axis(weights, bone, axis=1)
     weight[:, weights.shape[1] :] = 0.0
     weight /= weight.sum(axis=1, keepdims=True)
@@ -168,7 +168,7 @@ def _bone_weights(skeleton: Skeleton) -> Doubles:
     return np.asarray(weights / weights.sum(axis=1, keepdims=True))
 
 
-def _fit_weights(
+def _fit_bone_weights(
     positions_mm: Doubles, skeleton: Skeleton, control_weights: Doubles, refinement: csr_array
 ) -> Doubles:
     """Return bone weights (q, b) of subdivided points, at most four of them above 0 for each point.
@@ -177,7 +177,7 @@ def _fit_weights(
     refinement : (q, p) subdivision matrix from control points to mesh points
     """
     weights = np.asarray(refinement @ control_weights)
-    weights[weights < _MIN_WEIGHT] = 0.0
+    weights[weights < _MIN_BONE_WEIGHT] = 0.0
     descendants = _descendant_matrix(skeleton)
     patterns, pattern = np.unique(weights > 0, axis=0, return_inverse=True)
     order = np.argsort(pattern.reshape(-1), kind="stable")
@@ -186,8 +186,8 @@ def _fit_weights(
         interpolated = weights[rows]
         bones = np.flatnonzero(used)
         if len(bones) > 1:
-            if len(bones) > _MAX_CANDIDATES:
-                bones = np.sort(np.argsort(-interpolated.sum(axis=0), kind="stable")[:_MAX_CANDIDATES])
+            if len(bones) > _MAX_CANDIDATE_BONES:
+                bones = np.sort(np.argsort(-interpolated.sum(axis=0), kind="stable")[:_MAX_CANDIDATE_BONES])
             hessian, gradient = _quadratic_error(
                 positions_mm,
                 skeleton,
@@ -195,10 +195,10 @@ def _fit_weights(
                 refinement[rows],
                 descendants[:, bones],
             )
-            hessian += _PRIOR_MM2 * np.eye(len(bones))
+            hessian += _INTERPOLATED_WEIGHTS_PENALTY_MM2 * np.eye(len(bones))
             weights[rows] = 0.0
-            gradient += _PRIOR_MM2 * interpolated[:, bones]
-            weights[rows[:, None], bones] = _best_weights(hessian, gradient)
+            gradient += _INTERPOLATED_WEIGHTS_PENALTY_MM2 * interpolated[:, bones]
+            weights[rows[:, None], bones] = _best_bone_weights(hessian, gradient)
     return weights
 
 
@@ -214,39 +214,39 @@ def _descendant_matrix(skeleton: Skeleton) -> Doubles:
 def _quadratic_error(
     positions_mm: Doubles,
     skeleton: Skeleton,
-    control_motion: Doubles,
+    followed_fractions: Doubles,
     refinement: csr_array,
-    descendants: Doubles,
+    descendant_matrix: Doubles,
 ) -> tuple[Doubles, Doubles]:
     """Return H (n, u, u) and g (n, u) of the squared error w H w - 2 g w [mm²] of skinned points.
 
     w are the weights of u candidate bones for each of n points.
 
-    control_motion : (p, b) fraction of each bone's rotation that each control point follows, as the sum of
-        the weights of the bone and of its descendants
+    followed_fractions : (p, b) fraction of each bone's rotation that each control point follows, as the sum
+        of the weights of the bone and of its descendants
     refinement : (n, p) subdivision matrix from control points to the n points
-    descendants : (b, u) 1 where candidate bone u is bone b or one of its descendants, else 0
+    descendant_matrix : (b, u) 1 where candidate bone u is bone b or one of its descendants, else 0
     """
     points = np.asarray(refinement @ positions_mm)
-    hessian = np.zeros((len(points), descendants.shape[1], descendants.shape[1]))
+    hessian = np.zeros((len(points), descendant_matrix.shape[1], descendant_matrix.shape[1]))
     gradient = np.zeros(hessian.shape[:2])
-    for bone in np.flatnonzero(descendants.any(axis=1)):
-        origin, moves = np.array(skeleton.origin_mm[bone]), descendants[bone]
+    for bone in np.flatnonzero(descendant_matrix.any(axis=1)):
+        origin, moves = np.array(skeleton.origin_mm[bone]), descendant_matrix[bone]
         arm = points - origin
-        target = np.asarray(refinement @ (control_motion[:, bone, None] * (positions_mm - origin)))
+        target = np.asarray(refinement @ (followed_fractions[:, bone, None] * (positions_mm - origin)))
         hessian += (arm**2).sum(axis=1)[:, None, None] * np.outer(moves, moves)
         gradient += (arm * target).sum(axis=1)[:, None] * moves
     return hessian, gradient
 
 
-def _best_weights(hessian: Doubles, gradient: Doubles) -> Doubles:
+def _best_bone_weights(hessian: Doubles, gradient: Doubles) -> Doubles:
     """Return the weights w (n, u) that minimise w H w - 2 g w: non-negative, sum 1, at most four above 0.
 
     hessian, gradient : H (n, u, u) and g (n, u), see `_quadratic_error`
     """
     count, bones = gradient.shape
     smallest, best = np.full(count, np.inf), np.zeros(gradient.shape)
-    for subset in chain.from_iterable(combinations(range(bones), k) for k in range(1, INFLUENCES + 1)):
+    for subset in chain.from_iterable(combinations(range(bones), k) for k in range(1, BONES_PER_POINT + 1)):
         chosen = list(subset)
         matrix, vector = hessian[:, chosen][:, :, chosen], gradient[:, chosen]
         system = np.ones((count, len(chosen) + 1, len(chosen) + 1))

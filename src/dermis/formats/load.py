@@ -51,7 +51,7 @@ _ARRAY_NAMES = [
     *(f"target {name}" for name in _TARGET_FIELDS),
     *(f"bone {name}" for name in _SKELETON_FIELDS),
 ]
-_EMPTY_ARRAY = np.zeros(0, np.float32)
+_ABSENT_FIELD = np.zeros(0, np.float32)
 _WORD_PATTERN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 _EYE_WORDS = "eyes?|eyeballs?|sclerae?|corneas?|iris|irises|pupils?"
 _EYE_PATTERN = re.compile(rf"(?:l|r|left|right)?(?:{_EYE_WORDS})(?:l|r|left|right)?", re.IGNORECASE)
@@ -105,45 +105,47 @@ def load_rigged(
 
 
 def _load_uncached(
-    source: Path,
+    mesh_path: Path,
     unit_mm: float | None,
     v_origin: Origin,
     axes: Axes,
     groups: GroupNames,
 ) -> RiggedMesh:
     """Load mesh and rig without the disk cache; for the parameters see `load_rigged`."""
-    with np.errstate(all="ignore"), parsing(source, "a mesh", *MALFORMED_DATA_ERRORS):
-        mesh_file = read_mesh_file(source)
-        stated_mm = mesh_file.unit_mm or default_unit_mm(source)
+    with np.errstate(all="ignore"), parsing(mesh_path, "a mesh", *MALFORMED_DATA_ERRORS):
+        mesh_file = read_mesh_file(mesh_path)
+        stated_mm = mesh_file.unit_mm or default_unit_mm(mesh_path)
         unit = stated_mm if unit_mm is None else unit_mm
-        assigned, note = _assign_materials(mesh_file, groups, source)
-        part, to_head = join_parts(mesh_file.parts, source), np.eye(4)
+        assigned, note = _assign_materials(mesh_file, groups, mesh_path)
+        part, to_head = join_parts(mesh_file.parts, mesh_path), np.eye(4)
         counts = [len(part.triangles) for part in mesh_file.parts]
         material = np.repeat(np.array(assigned.of_part, np.int32), counts)
         axes, turned = _find_front(
-            _resolve_axes(axes, mesh_file.axes, source), mesh_file, part, assigned.skin[material]
+            _resolve_axes(axes, mesh_file.axes, mesh_path), mesh_file, part, assigned.skin[material]
         )
         assert part.uv is not None and part.normals is not None
         to_head[:3, :3] = to_y_up(unit * np.eye(3), axes).T
         positions = to_y_up(unit * part.positions, axes).astype(np.float32)
         normals = to_y_up(part.normals, axes)
-        uv = _uv_from_top(part.uv, source, v_origin).astype(np.float32)
-        check_arrays(positions, uv, part.triangles, source)
+        uv = _uv_from_top(part.uv, mesh_path, v_origin).astype(np.float32)
+        check_arrays(positions, uv, part.triangles, mesh_path)
         used, corners = compact_vertices(part.triangles)
         vertices = select_vertices(part, used)
         point = weld(np.column_stack((positions, _weld_groups(mesh_file.parts)))[used])
         if mesh_file.is_deformable:
-            point = split_points(point, vertices, to_head[:3, :3], source)
+            point = split_points(point, vertices, to_head[:3, :3], mesh_path)
         arrays = positions[used], normals[used], uv[used], point, corners, material, part.quads, vertices
         in_file = [mesh_file.materials[index] if index >= 0 else None for index in assigned.in_file]
         raw, repairs = repair_mesh(RawMesh(*arrays, np.arange(len(used))), in_file, assigned.skin)
         raw, assigned, emptied = _without_empty_materials(raw, assigned)
         mesh, vertices, point = raw.build(assigned.materials), raw.vertices, raw.point
         has_pictures = any(one.textures for one in mesh_file.materials)
-        check_mesh(mesh, source, has_pictures=has_pictures)
-        rig = build_rig(mesh.positions, point, vertices, mesh_file.bones, mesh_file.weights, to_head, source)
+        check_mesh(mesh, mesh_path, has_pictures=has_pictures)
+        rig = build_rig(
+            mesh.positions, point, vertices, mesh_file.bones, mesh_file.weights, to_head, mesh_path
+        )
         if rig is not None:
-            check_rig(rig, source)
+            check_rig(rig, mesh_path)
     notes = (*filter(None, (note, turned)), *mesh_file.notes, *repairs, *emptied)
     colours = None if vertices.colours is None else vertices.colours.astype(np.float32)
     other_uv = {index: own.astype(np.float32) for index, own in vertices.other_uv.items()}
@@ -154,7 +156,7 @@ def _load_uncached(
     return RiggedMesh(mesh, rig, notes, surface, mesh_file.materials, stated_mm, file_vertices)
 
 
-def _resolve_axes(user_axes: Axes, file_axes: Axes, source: Path) -> Axes:
+def _resolve_axes(user_axes: Axes, file_axes: Axes, mesh_path: Path) -> Axes:
     """Return the axes that the user chose, completed by the axes that the file states.
 
     Raises DermisError if the front is parallel to the up axis.
@@ -162,17 +164,19 @@ def _resolve_axes(user_axes: Axes, file_axes: Axes, source: Path) -> Axes:
     axes = user_axes.or_stated(file_axes)
     if axes.face[-1] == axes.top[-1]:
         actual = f"front is {axes.front}, and up is {axes.top} in the file"
-        refuse(source, "a front across the up axis of the file", actual, "Choose another front")
+        refuse(mesh_path, "a front across the up axis of the file", actual, "Choose another front")
     return axes
 
 
-def _find_front(axes: Axes, mesh_file: MeshFile, part: MeshPart, skin: Mask) -> tuple[Axes, str]:
+def _find_front(
+    axes: Axes, mesh_file: MeshFile, joined_part: MeshPart, skin_triangles: Mask
+) -> tuple[Axes, str]:
     """Detect the front from the shape; return axes with this front, and a note if it is not the default.
 
     A front that is already set is kept, and so is the default front of files that this package wrote.
 
-    part : mesh part with all vertices of the file
-    skin : (f,) mask of triangles that are skin
+    joined_part : mesh part with all vertices of the file
+    skin_triangles : (f,) mask of triangles that are skin
     """
     if axes.front != "auto" or any(one.maps is not None for one in mesh_file.materials):
         return axes, ""
@@ -180,8 +184,10 @@ def _find_front(axes: Axes, mesh_file: MeshFile, part: MeshPart, skin: Mask) -> 
     if not eyes and mesh_file.bones is not None:
         of_eyes = [is_eye_name([name]) for name in mesh_file.bones.names]
         eyes = [mesh_file.bones.world[of_eyes, :3, 3]]
-    positions, points = (to_y_up(one, axes) for one in (part.positions, np.vstack([np.empty((0, 3)), *eyes])))
-    direction = face_direction(positions, part.triangles[skin], points)
+    positions, points = (
+        to_y_up(one, axes) for one in (joined_part.positions, np.vstack([np.empty((0, 3)), *eyes]))
+    )
+    direction = face_direction(positions, joined_part.triangles[skin_triangles], points)
     if direction is None or direction == "z":
         return axes, ""
     front = file_axis(direction, axes)
@@ -189,15 +195,15 @@ def _find_front(axes: Axes, mesh_file: MeshFile, part: MeshPart, skin: Mask) -> 
     return axes._replace(front=front), note
 
 
-def _weld_groups(parts: list[MeshPart]) -> Floats:
+def _weld_groups(mesh_parts: list[MeshPart]) -> Floats:
     """Return a weld group for each vertex, (v,): coincident vertices of different groups are not welded."""
-    numbers = [number if part.separate else 0 for number, part in enumerate(parts, start=1)]
-    return np.repeat(np.array(numbers, np.float32), [len(part.positions) for part in parts])
+    numbers = [number if part.separate else 0 for number, part in enumerate(mesh_parts, start=1)]
+    return np.repeat(np.array(numbers, np.float32), [len(part.positions) for part in mesh_parts])
 
 
-def _uv_from_top(uv: Doubles, source: Path, v_origin: Origin) -> Doubles:
+def _uv_from_top(uv: Doubles, mesh_path: Path, v_origin: Origin) -> Doubles:
     """Return uv (v, 2) with v = 0 in the top row, clamped to [0, 1] where rounding exceeds it."""
-    from_top = v_origin == "top" or (v_origin == "auto" and is_gltf(source))
+    from_top = v_origin == "top" or (v_origin == "auto" and is_gltf(mesh_path))
     flipped = uv if from_top else np.column_stack((uv[:, 0], 1 - uv[:, 1]))
     clamped = np.clip(flipped, 0, 1)
     return np.where(np.abs(flipped - clamped) <= UV_TOLERANCE, clamped, flipped)
@@ -221,15 +227,17 @@ class _AssignedMaterials(NamedTuple):
         return np.array([one.kind == "skin" for one in self.materials])
 
 
-def _assign_materials(mesh_file: MeshFile, names: GroupNames, source: Path) -> tuple[_AssignedMaterials, str]:
+def _assign_materials(
+    mesh_file: MeshFile, declared_names: GroupNames, mesh_path: Path
+) -> tuple[_AssignedMaterials, str]:
     """Return the materials of the mesh, in the order of the file, and a note on which of them are skin."""
-    parts, unnamed = mesh_file.parts, (source.stem,)
+    parts, unnamed = mesh_file.parts, (mesh_path.stem,)
     groups = [replace(part.group, names=part.group.names or unnamed) for part in parts]
-    is_opaque = _match_groups(groups, names.opaque, "opaque", source)
-    is_eye = _match_groups(groups, names.eyes, "eye_groups", source)
+    is_opaque = _match_groups(groups, declared_names.opaque, "opaque", mesh_path)
+    is_eye = _match_groups(groups, declared_names.eyes, "eye_groups", mesh_path)
     scatters = [group.material >= 0 and mesh_file.materials[group.material].scatters for group in groups]
-    is_skin = _match_groups(groups, names.skin, "skin_groups", source)
-    if not names.skin:
+    is_skin = _match_groups(groups, declared_names.skin, "skin_groups", mesh_path)
+    if not declared_names.skin:
         candidates = [k for k, opaque in enumerate(is_opaque) if not opaque]
         chosen = choose_skin(
             [parts[k] for k in candidates], [groups[k] for k in candidates], [scatters[k] for k in candidates]
@@ -239,8 +247,8 @@ def _assign_materials(mesh_file: MeshFile, names: GroupNames, source: Path) -> t
             is_skin[k] = skin
     is_skin = [skin and not opaque for skin, opaque in zip(is_skin, is_opaque, strict=True)]
     stated = (
-        names.skin
-        or names.opaque
+        declared_names.skin
+        or declared_names.opaque
         or any(one.maps is not None for one in mesh_file.materials)  # this package wrote the file
         or all(
             skin or eye or is_eye_name(group.names)
@@ -278,18 +286,18 @@ def _without_empty_materials(
 
 
 def _match_groups(
-    groups: list[MaterialGroup], names: tuple[str, ...], option: str, source: Path
+    groups: list[MaterialGroup], declared_names: tuple[str, ...], option_name: str, mesh_path: Path
 ) -> list[bool]:
-    """Return for each group whether one of its names is in `names`; refuse names that no group has.
+    """Return for each group whether one of its names is in `declared_names`; refuse names that no group has.
 
-    option : argument of `load_rigged` with these names, for the error
+    option_name : argument of `load_rigged` with these names, for the error
     """
-    folded = {name.casefold() for name in names}
+    folded = {name.casefold() for name in declared_names}
     unknown = folded - {name.casefold() for group in groups for name in group.names}
     if unknown:
         known = ", ".join(dict.fromkeys(name for group in groups for name in group.names))
-        expected = f"{option} with names of groups of the file ({known})"
-        refuse(source, expected, f"{sorted(unknown)[0]!r} is none", "Check the spelling")
+        expected = f"{option_name} with names of groups of the file ({known})"
+        refuse(mesh_path, expected, f"{sorted(unknown)[0]!r} is none", "Check the spelling")
     return [any(name.casefold() in folded for name in group.names) for group in groups]
 
 
@@ -334,15 +342,15 @@ class RiggedMesh(NamedTuple):
     file_vertices: FileVertices | None = None
 
 
-def cached_rigged(data: bytes, options: str, load: Callable[[], RiggedMesh]) -> RiggedMesh:
+def cached_rigged(file_bytes: bytes, options_text: str, load: Callable[[], RiggedMesh]) -> RiggedMesh:
     """Return mesh and rig of a file from the disk cache; load and cache both if the cache lacks them.
 
-    data : bytes of the file; the mesh must not depend on other files
-    options : text with all options that influence the result, part of the cache key
+    file_bytes : bytes of the file; the mesh must not depend on other files
+    options_text : text with all options that influence the result, part of the cache key
     load : function that reads the file
     """
-    digest = hashlib.sha256(f"{_CACHE_VERSION} {options}".encode())
-    digest.update(data)
+    digest = hashlib.sha256(f"{_CACHE_VERSION} {options_text}".encode())
+    digest.update(file_bytes)
     return _from_arrays(
         load_or_make("meshes", digest.hexdigest()[:40], _ARRAY_NAMES, lambda: _to_arrays(load()))
     )
@@ -358,9 +366,9 @@ def _to_arrays(rigged: RiggedMesh) -> Arrays:
     metadata["file"] = rigged.file_vertices.count, rigged.file_vertices.to_head.tolist()
     arrays = {name: getattr(mesh, name) for name in _MESH_FIELDS} | {"outline": mesh.outline.points_mm}
     arrays["file vertex"] = rigged.file_vertices.vertex
-    arrays["colours"] = _EMPTY_ARRAY if surface.colours is None else surface.colours
-    arrays["other uv"] = np.stack([*surface.other_uv.values()]) if surface.other_uv else _EMPTY_ARRAY
-    rig_arrays: Arrays = dict.fromkeys((name for name in _ARRAY_NAMES if name not in arrays), _EMPTY_ARRAY)
+    arrays["colours"] = _ABSENT_FIELD if surface.colours is None else surface.colours
+    arrays["other uv"] = np.stack([*surface.other_uv.values()]) if surface.other_uv else _ABSENT_FIELD
+    rig_arrays: Arrays = dict.fromkeys((name for name in _ARRAY_NAMES if name not in arrays), _ABSENT_FIELD)
     if rig is not None:
         metadata |= {"targets": list(rig.targets.names), "bones": None}
         rig_arrays["control"] = rig.positions_mm
@@ -372,9 +380,9 @@ def _to_arrays(rigged: RiggedMesh) -> Arrays:
     return arrays | rig_arrays | {"metadata": encoded}
 
 
-def _prefixed_fields(value: MorphTargets | Skeleton, prefix: str, names: list[str]) -> Arrays:
-    arrays = {f"{prefix} {name}": getattr(value, name) for name in names}
-    return {name: _EMPTY_ARRAY if array is None else array for name, array in arrays.items()}
+def _prefixed_fields(instance: MorphTargets | Skeleton, prefix: str, field_names: list[str]) -> Arrays:
+    arrays = {f"{prefix} {name}": getattr(instance, name) for name in field_names}
+    return {name: _ABSENT_FIELD if array is None else array for name, array in arrays.items()}
 
 
 def _from_arrays(arrays: Arrays) -> RiggedMesh:
@@ -404,14 +412,14 @@ def _from_arrays(arrays: Arrays) -> RiggedMesh:
     return rigged._replace(rig=Rig(arrays["control"], targets, skeleton))
 
 
-def is_eye_name(names: Sequence[str]) -> bool:
+def is_eye_name(group_names: Sequence[str]) -> bool:
     """Return whether a group's names denote an eyeball or its parts, such as Eye_L, sclera, Std_Cornea_R.
 
-    names : names of the group, with its material first; the first name with a known word decides
+    group_names : names of the group, with its material first; the first name with a known word decides
 
     Lashes, brows, lids and transparent layers on the eye, such as tear films, are not eyes.
     """
-    for name in names:
+    for name in group_names:
         words = _WORD_PATTERN.findall(name)
         if any(_NOT_EYE_PATTERN.fullmatch(word) for word in words):
             return False

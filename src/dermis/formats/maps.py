@@ -29,32 +29,34 @@ from dermis.mesh.maps import Maps
 PathLike = str | Path | EmbeddedPicture
 A = TypeVar("A", bound=Numbers)
 
-MAX_SIDE = 8192
+MAX_MAP_SIDE = 8192
 """Largest number of texels along a side of a map; every device supports textures of this size."""
 _GREY_TOLERANCE = 2.5 / 255  # JPEG changes channels of a grey picture by a level or two
-_MIN_NORMAL_Z = 0.05  # clamps slopes to 87 degrees
+_MIN_OUTWARD_NORMAL_Z = 0.05  # clamps slopes to 87 degrees
 MapLoader = Callable[[PathLike], Numbers]
 _MAX_PARALLEL_TEXELS = MAX_PIXELS  # total of all maps that are decoded in parallel
 _MIN_CACHED_BYTES = 1 << 14  # larger files are cached on disk, as reading is faster than decoding
 _CACHE_VERSION = 2  # increment when the same files result in other maps
 
 
-def check_finite(path: PathLike, values: A) -> A:
+def check_finite(path: PathLike, texels: A) -> A:
     """Return a map after checking that all its values are finite.
 
     Raises DermisError for infinite values and NaN.
     """
-    if values.size and not (np.isfinite(values.min()) and np.isfinite(values.max())):
+    if texels.size and not (np.isfinite(texels.min()) and np.isfinite(texels.max())):
         advice = "Export it again, scaled to 0 to 1"
         refuse(path, "a map of finite numbers", "some are infinite or NaN", advice)
-    return values
+    return texels
 
 
-def _convert_in_strips(image: Pixels, shape: tuple[int, ...], convert: Callable[[Any], Floats]) -> Floats:
+def _convert_in_strips(
+    image: Pixels, texel_shape: tuple[int, ...], convert_strip: Callable[[Any], Floats]
+) -> Floats:
     """Convert a picture (H, W, ...) to an array (H, W, *shape) in strips of rows, to limit memory."""
-    converted = np.empty((*image.shape[:2], *shape), np.float32)
+    converted = np.empty((*image.shape[:2], *texel_shape), np.float32)
     for rows in strips(image):
-        converted[rows] = convert(image[rows])
+        converted[rows] = convert_strip(image[rows])
     return converted
 
 
@@ -132,7 +134,7 @@ def slope_map(path: PathLike, normal_y: str) -> Floats:
         value = _to_unit_range(image[rows])
         normals = value if signed else 2 * value - 1
         statistics += _normal_statistics(normals)
-        np.divide(-normals[..., :2], np.maximum(normals[..., 2:], _MIN_NORMAL_Z), out=slopes[rows])
+        np.divide(-normals[..., :2], np.maximum(normals[..., 2:], _MIN_OUTWARD_NORMAL_Z), out=slopes[rows])
         slopes[rows][normals[..., 2] <= 0] = 0
     _check_normals(path, *statistics.tolist())
     if normal_y == "down":
@@ -148,22 +150,24 @@ def _normal_statistics(normals: Floats) -> Doubles:
     return np.array([z.size, outward.sum(), z.sum(dtype=np.float64), z[outward].sum(dtype=np.float64)])
 
 
-def _check_normals(path: PathLike, texels: float, outward: float, z: float, outward_z: float) -> None:
+def _check_normals(
+    path: PathLike, texel_count: float, outward_count: float, z_sum: float, outward_z_sum: float
+) -> None:
     """Refuse a picture with too few outward unit normals to be a tangent-space normal map.
 
-    texels, outward : numbers of all texels and of outward unit normals
-    z, outward_z : sums of the z components over all texels and over outward unit normals
+    texel_count, outward_count : numbers of all texels and of outward unit normals
+    z_sum, outward_z_sum : sums of the z components over all texels and over outward unit normals
     """
     # A quarter suffices, as the rest may be empty space between uv islands.
-    if outward < 0.25 * texels or outward_z < 0.7 * outward:
-        actual = f"its mean blue is {(z / texels + 1) / 2:.2f} and its colours are not unit vectors"
+    if outward_count < 0.25 * texel_count or outward_z_sum < 0.7 * outward_count:
+        actual = f"its mean blue is {(z_sum / texel_count + 1) / 2:.2f} and its colours are not unit vectors"
         refuse(path, "a tangent-space normal map, which looks light blue", actual, "Check which map this is")
 
 
 def _check_side(path: PathLike, role: str) -> None:
     width, height = read_size(path)
-    if max(width, height) > MAX_SIDE:
-        expected = f"{role} of at most {MAX_SIDE} texels a side"
+    if max(width, height) > MAX_MAP_SIDE:
+        expected = f"{role} of at most {MAX_MAP_SIDE} texels a side"
         refuse(path, expected, f"it has {width} x {height}", "Resize it")
 
 
@@ -195,11 +199,11 @@ def _to_unit_range(image: Pixels) -> Floats:
     return np.asarray(image.astype(np.float32) / np.float32(np.iinfo(image.dtype.str).max))
 
 
-def _check_unit_range(path: PathLike, role: str, values: Floats) -> Floats:
-    low, high = float(values.min()), float(values.max())
+def _check_unit_range(path: PathLike, role: str, texels: Floats) -> Floats:
+    low, high = float(texels.min()), float(texels.max())
     if low < -1e-3 or high > 1 + 1e-3:
         refuse(path, f"{role} with values of 0 to 1", f"they go from {low:.4g} to {high:.4g}", "Scale them")
-    return np.clip(values, 0, 1, out=values)
+    return np.clip(texels, 0, 1, out=texels)
 
 
 def load_maps(

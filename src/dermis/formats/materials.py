@@ -21,8 +21,8 @@ Role = Literal["colour", "normal", "height", "roughness", "metalness", "specular
 AlphaMode = Literal["opaque", "mask", "blend"]
 UvTransform = tuple[float, float, float, float, float, float]
 
-_BLENDED_CUTOFF = 0.5
-IDENTITY: UvTransform = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+_BLENDED_OPACITY_CUTOFF = 0.5
+IDENTITY_UV_TRANSFORM: UvTransform = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Texture:
 
     picture: PathLike
     uv_set: int = 0
-    transform: UvTransform = IDENTITY
+    transform: UvTransform = IDENTITY_UV_TRANSFORM
     wrap: tuple[Wrap, Wrap] = ("repeat", "repeat")
     channel: int | None = None
 
@@ -93,7 +93,7 @@ class FileMaterial:
     @property
     def cutoff(self) -> float:
         """Return the opacity at which the surface ends; blended materials end where they are half opaque."""
-        return self.alpha_cutoff if self.alpha_mode == "mask" else _BLENDED_CUTOFF
+        return self.alpha_cutoff if self.alpha_mode == "mask" else _BLENDED_OPACITY_CUTOFF
 
     def skin_pictures(self) -> dict[str, object]:
         """Return keyword arguments of `load_maps` for skin that shows the pictures in its own uv."""

@@ -16,7 +16,7 @@ from dermis.mesh.mesh import Mesh
 from dermis.mesh.rig import Rig
 
 UV_TOLERANCE = 1e-4
-MAX_DISTANCE_MM = 1e6
+MAX_DISTANCE_FROM_ORIGIN_MM = 1e6
 """Largest distance from the origin: beyond a kilometre single precision is too coarse for skin [mm]."""
 MIN_RELATIVE_AREA = 1e-6
 """Ratio of a triangle's area to its squared longest side below which single precision is too coarse [-]."""
@@ -60,18 +60,18 @@ def check_arrays(
     for name, values in (("positions", positions), ("uv", uv)):
         _check_finite(name, values, culprit)
     farthest = float(np.abs(positions).max())
-    if farthest > MAX_DISTANCE_MM:
-        expected = f"positions within {MAX_DISTANCE_MM:g} mm of the origin"
+    if farthest > MAX_DISTANCE_FROM_ORIGIN_MM:
+        expected = f"positions within {MAX_DISTANCE_FROM_ORIGIN_MM:g} mm of the origin"
         advice = f"{_UNIT_ADVICE}, or move the head to the origin"
         refuse(culprit, expected, f"one is {farthest:.3g} mm away", advice)
 
 
 def _check_finite(
-    quantity: str, values: NDArray[np.floating], culprit: object, items: str = "vertices"
+    quantity: str, array: NDArray[np.floating], culprit: object, items_noun: str = "vertices"
 ) -> None:
-    lost = np.flatnonzero(~np.isfinite(values).all(axis=tuple(range(1, values.ndim))))
+    lost = np.flatnonzero(~np.isfinite(array).all(axis=tuple(range(1, array.ndim))))
     if len(lost):
-        actual = f"{len(lost)} {items} are NaN or infinite, first {lost[0]}"
+        actual = f"{len(lost)} {items_noun} are NaN or infinite, first {lost[0]}"
         refuse(culprit, f"finite {quantity}", actual, limits.DAMAGED_ADVICE)
 
 
@@ -85,11 +85,11 @@ def check_rig(rig: Rig, culprit: object) -> None:
             _check_finite(f"bones ({name})", getattr(rig.skeleton, name), culprit, "of them")
 
 
-def check_mesh_counts(parts: Sequence[MeshPart], culprit: object) -> None:
+def check_mesh_counts(mesh_parts: Sequence[MeshPart], culprit: object) -> None:
     """Refuse mesh parts with too many triangles or vertices in total, before they are joined."""
-    triangles = sum(len(part.triangles) for part in parts)
+    triangles = sum(len(part.triangles) for part in mesh_parts)
     limits.check_limit(culprit, triangles, limits.MAX_TRIANGLES, "triangles", limits.DECIMATE_ADVICE)
-    vertices = sum(len(part.positions) for part in parts)
+    vertices = sum(len(part.positions) for part in mesh_parts)
     limits.check_limit(culprit, vertices, limits.MAX_VERTICES, "vertices", limits.DECIMATE_ADVICE)
 
 

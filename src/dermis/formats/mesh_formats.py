@@ -26,7 +26,7 @@ class MeshFormat:
     """Format of mesh files.
 
     suffixes : file name suffixes in lower case, with the dot
-    read : function that reads a file; it may raise any exception for a damaged one
+    read : function that reads a file; may raise any exception for a damaged file
     properties : properties of the files, except properties of materials, and what the reader does with each
     materials : properties of materials, and what the reader does with each
     """
@@ -37,11 +37,11 @@ class MeshFormat:
     materials: tuple[FileProperty, ...] = ()
 
 
-_GLTF = (*GLTF_PROPERTIES, *VRM_PROPERTIES)
+_GLTF_FILE_PROPERTIES = (*GLTF_PROPERTIES, *VRM_PROPERTIES)
 MESH_FORMATS = Registry[MeshFormat](
     "mesh format",
     {
-        "gltf": MeshFormat((".glb", ".gltf", ".vrm"), read_gltf, _GLTF, GLTF_MATERIALS),
+        "gltf": MeshFormat((".glb", ".gltf", ".vrm"), read_gltf, _GLTF_FILE_PROPERTIES, GLTF_MATERIALS),
         "obj": MeshFormat((".obj",), read_obj, OBJ_PROPERTIES, MTL_PROPERTIES),
         "ply": MeshFormat((".ply",), read_ply, PLY_PROPERTIES),
         "stl": MeshFormat((".stl",), read_stl, STL_PROPERTIES),

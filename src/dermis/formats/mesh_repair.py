@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.arrays import Doubles, Floats, Index, Ints, Mask
-from dermis.formats.materials import IDENTITY, FileMaterial, Wrap
+from dermis.formats.materials import IDENTITY_UV_TRANSFORM, FileMaterial, Wrap
 from dermis.formats.mesh_checks import UV_TOLERANCE, flat_triangles
 from dermis.formats.parts import MeshPart
 from dermis.formats.read import select_vertices
@@ -32,24 +32,24 @@ _MAX_FLAT_FRACTION = 0.5
 """Fraction of triangles without area above which a mesh is refused instead of repaired [-]."""
 _MAX_NON_MANIFOLD_EDGES = 100_000
 """Number of non-manifold edges above which a mesh is refused instead of repaired."""
-_MAX_PAIRED_SIDES = 8
+_MAX_TRIANGLES_PER_EDGE = 8
 """Number of triangles at an edge above which it is cut open without a search for sheets that cross it."""
-_MIN_CONVEXITY = -0.05
+_MIN_MEAN_CONVEXITY_COSINE = -0.05
 """Mean cosine of normals and directions from the centroid: below it, a component may be inside out [-]."""
-_MAX_OPPOSITE_COSINE = -0.5
+_MAX_COSINE_OF_OPPOSITE_NORMALS = -0.5
 """Mean cosine of the file's normals and the triangles' normals: below it, they count as opposite [-]."""
-_MIN_BALANCE = 0.25
+_MIN_VISIBILITY_BALANCE = 0.25
 """Absolute visible balance above which the more visible side of a component is its outer side [-]."""
 _MIN_VISIBLE_SAMPLES = 8
 _MIN_VIEW_COSINE = 0.05  # smallest cosine of normal and view; surfaces seen at grazing angles do not count
 _MIN_VISIBLE_FRACTION = 0.02  # smallest ratio of visible samples to those visible without other components
-_VIEWS, _VIEW_CELLS = 20, 64  # number of views from outside, and of cells along a side of each view
-_SURFACE_SAMPLES = 120_000  # points on the mesh whose visibility is tested
-_DOUBTFUL_FRACTION = 0.25  # fraction of the samples that is reserved for components that may be inside out
+_VIEW_COUNT, _CELLS_PER_VIEW_SIDE = 20, 64  # views from outside, and cells along a side of each view
+_VISIBILITY_SAMPLE_COUNT = 120_000  # points on the mesh whose visibility is tested
+_DOUBTFUL_SAMPLE_FRACTION = 0.25  # reserved for components that may be inside out
 _MAX_UV_EXCESS = 0.02
 """Largest distance of uv from [0, 1] at which they are clamped [-]."""
-_NO_PERIOD = 1e9
-_PERIODS: dict[Wrap, float] = {"repeat": 1.0, "mirror": 2.0, "clamp": _NO_PERIOD}
+_UNLIMITED_UV_PERIOD = 1e9
+_UV_PERIOD_OF_WRAP: dict[Wrap, float] = {"repeat": 1.0, "mirror": 2.0, "clamp": _UNLIMITED_UV_PERIOD}
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class RawMesh:
     """Triangles of a file in the head's space, before they become a `Mesh`.
 
     positions : (v, 3) vertex positions [mm]
-    normals : (v, 3) normals of the file, NaN where it has none
+    normals : (v, 3) normals of the file, NaN where the file has none
     uv : (v, 2) uv with v down
     point : (v,) index of the point at which each vertex is
     triangles : (f, 3) vertex indices
@@ -92,16 +92,18 @@ class RawMesh:
         """Return the sides of the triangles, grouped by edge."""
         return _group_sides(self.corners)
 
-    def with_triangles(self, mask: Mask) -> RawMesh:
+    def with_triangles(self, triangle_mask: Mask) -> RawMesh:
         """Return the mesh with the triangles that a mask (f,) selects."""
-        quads = (np.cumsum(mask) - 1)[self.quads[mask[self.quads].all(axis=1)]]
-        return replace(self, triangles=self.triangles[mask], material=self.material[mask], quads=quads)
+        quads = (np.cumsum(triangle_mask) - 1)[self.quads[triangle_mask[self.quads].all(axis=1)]]
+        return replace(
+            self, triangles=self.triangles[triangle_mask], material=self.material[triangle_mask], quads=quads
+        )
 
-    def with_corners(self, corners: Index) -> RawMesh:
+    def with_corners(self, corner_points: Index) -> RawMesh:
         """Return the mesh with new points at corners (f, 3); vertices at several points are duplicated."""
-        triangles, stride = self.triangles.copy(), int(corners.max()) + 1
-        moved = corners != self.point[triangles]
-        copies, number = np.unique(triangles[moved] * stride + corners[moved], return_inverse=True)
+        triangles, stride = self.triangles.copy(), int(corner_points.max()) + 1
+        moved = corner_points != self.point[triangles]
+        copies, number = np.unique(triangles[moved] * stride + corner_points[moved], return_inverse=True)
         triangles[moved] = len(self.point) + number.reshape(-1)
         source = np.concatenate((np.arange(len(self.point)), copies // stride))
         point = np.concatenate((self.point, copies % stride)).astype(np.int32)
@@ -115,15 +117,15 @@ class RawMesh:
         whole = (first[:, [0, 2]] == second[:, [2, 0]]).all(axis=1)
         return replace(self._select_vertices(used), point=point, triangles=triangles, quads=self.quads[whole])
 
-    def _select_vertices(self, source: Index) -> RawMesh:
+    def _select_vertices(self, vertex_index: Index) -> RawMesh:
         """Return the mesh with the vertices at the given indices (n,); points and triangles are unchanged."""
         return replace(
             self,
-            positions=self.positions[source],
-            normals=self.normals[source],
-            uv=self.uv[source],
-            vertices=select_vertices(self.vertices, source),
-            file_vertex=self.file_vertex[source],
+            positions=self.positions[vertex_index],
+            normals=self.normals[vertex_index],
+            uv=self.uv[vertex_index],
+            vertices=select_vertices(self.vertices, vertex_index),
+            file_vertex=self.file_vertex[vertex_index],
         )
 
 
@@ -149,19 +151,19 @@ def repair_mesh(
     return _move_uv(repaired if repaired is mesh else repaired.compact(), materials, notes), tuple(notes)
 
 
-def _count_with_noun(count: int, noun: str) -> str:
-    return f"{count:,} {noun}{'' if count == 1 else 's'}"
+def _count_with_noun(item_count: int, noun: str) -> str:
+    return f"{item_count:,} {noun}{'' if item_count == 1 else 's'}"
 
 
-def _drop_triangles(mesh: RawMesh, flat: Mask, is_skin: Mask, notes: list[str]) -> RawMesh:
+def _drop_triangles(mesh: RawMesh, flat_mask: Mask, is_skin: Mask, notes: list[str]) -> RawMesh:
     """Return the mesh without the flat triangles of a mask (f,) and without duplicates.
 
     Among triangles of one material with the same three points, the first is kept. Among materials with
-    exactly the same triangles, skin is kept, else the first one.
+    exactly the same triangles, skin is kept, or else the first material.
     """
-    if flat.any():
-        notes.append(f"left out {_count_with_noun(int(flat.sum()), 'triangle')} without area")
-        mesh = mesh.with_triangles(~flat)
+    if flat_mask.any():
+        notes.append(f"left out {_count_with_noun(int(flat_mask.sum()), 'triangle')} without area")
+        mesh = mesh.with_triangles(~flat_mask)
     key = triangle_keys(mesh.corners, int(mesh.point.max()) + 1)
     ordered = np.sort(key)
     if (ordered[1:] == ordered[:-1]).any():
@@ -176,13 +178,13 @@ def _drop_triangles(mesh: RawMesh, flat: Mask, is_skin: Mask, notes: list[str]) 
     return mesh
 
 
-def _duplicate_materials(key: Index, material: Ints, is_skin: Mask) -> Mask:
+def _duplicate_materials(triangle_key: Index, material: Ints, is_skin: Mask) -> Mask:
     """Return the mask (m,) of materials that have exactly the triangles of another material, which is kept.
 
-    key, material : (f,) key of each triangle, see `triangle_keys`, and its material index
+    triangle_key, material : (f,) key of each triangle, see `triangle_keys`, and its material index
     """
     ends = np.cumsum(np.bincount(material, minlength=len(is_skin)))
-    triangles = np.split(key[np.lexsort((key, material))], ends[:-1])
+    triangles = np.split(triangle_key[np.lexsort((triangle_key, material))], ends[:-1])
     is_duplicate, seen = np.zeros(len(is_skin), bool), {b""}
     for index in np.argsort(~is_skin, kind="stable"):
         content = triangles[index].tobytes()
@@ -214,24 +216,26 @@ class _Sides(NamedTuple):
         return np.column_stack((self.side[first], self.side[first + 1]))
 
 
-def _group_sides(corners: Index) -> _Sides:
-    start, end = corners.ravel(), corners[:, [1, 2, 0]].ravel()
-    key = edge_keys(corners).ravel()
+def _group_sides(corner_points: Index) -> _Sides:
+    start, end = corner_points.ravel(), corner_points[:, [1, 2, 0]].ravel()
+    key = edge_keys(corner_points).ravel()
     side = np.argsort(key)
     ordered = key[side]
     first = np.flatnonzero(np.concatenate(([True], ordered[1:] != ordered[:-1])))
     return _Sides(side, first, np.diff(first, append=len(key)), start, end)
 
 
-def _label_components(count: int, links: NDArray[np.integer]) -> Index:
+def _label_components(node_count: int, node_pairs: NDArray[np.integer]) -> Index:
     """Return the connected component of each node of a graph, (count,).
 
-    links : (n, 2) nodes at the ends of each link
+    node_pairs : (n, 2) nodes at the ends of each link
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    graph = coo_array((np.ones(len(links), bool), (links[:, 0], links[:, 1])), shape=(count, count))
+    graph = coo_array(
+        (np.ones(len(node_pairs), bool), (node_pairs[:, 0], node_pairs[:, 1])), shape=(node_count, node_count)
+    )
     return np.asarray(connected_components(graph, directed=False)[1], np.int64)
 
 
@@ -249,23 +253,23 @@ def _separate_sheets(mesh: RawMesh, notes: list[str]) -> RawMesh:
     if (sides.counts > 2).any():  # sheets that are also connected around both ends of an edge
         kept = np.zeros(len(sides.side), bool)
         kept[sides.side[sides.first[sides.counts == 1]]] = True
-        kept[np.concatenate((sides.pairs, _continue_sheets(mesh, rounds=1)))] = True
+        kept[np.concatenate((sides.pairs, _continue_sheets(mesh, max_pairs_per_edge=1)))] = True
         apart, corners = ~kept.reshape(-1, 3).all(axis=1), mesh.corners.copy()
         corners[apart] = corners.max() + 1 + np.arange(3 * int(apart.sum())).reshape(-1, 3)
         mesh = mesh.with_corners(corners)
     return mesh
 
 
-def _continue_sheets(mesh: RawMesh, rounds: int = _MAX_PAIRED_SIDES // 2) -> Index:
+def _continue_sheets(mesh: RawMesh, max_pairs_per_edge: int = _MAX_TRIANGLES_PER_EDGE // 2) -> Index:
     """Return pairs of triangle sides (n, 2) across which sheets continue at non-manifold edges.
 
     At each edge, the first pair preferably has the same material, opposite directions and the flattest
     continuation; further pairs must have opposite directions.
 
-    rounds : largest number of pairs at an edge
+    max_pairs_per_edge : largest number of pairs at an edge
     """
     sides, material = mesh.sides, mesh.material
-    crowded = np.flatnonzero((sides.counts > 2) & (sides.counts <= _MAX_PAIRED_SIDES))
+    crowded = np.flatnonzero((sides.counts > 2) & (sides.counts <= _MAX_TRIANGLES_PER_EDGE))
     count = sides.counts[crowded, None]
     column = np.arange(int(count.max(initial=0)))
     table = np.where(
@@ -275,7 +279,7 @@ def _continue_sheets(mesh: RawMesh, rounds: int = _MAX_PAIRED_SIDES // 2) -> Ind
     inwards = _directions_from_sides(mesh, table)
     forward, piece = sides.start < sides.end, _label_components(len(mesh.triangles), sides.pairs // 3)
     found = [np.empty((0, 2), np.int64)]
-    for turn in range(rounds):
+    for turn in range(max_pairs_per_edge):
         best, chosen = np.full(len(table), np.inf), np.zeros((len(table), 2), np.int64)
         for a, b in combinations(range(len(column)), 2):
             row = np.flatnonzero((table[:, a] >= 0) & (table[:, b] >= 0))
@@ -302,19 +306,20 @@ def _directions_from_sides(mesh: RawMesh, sides: Index) -> Floats:
     return np.asarray(inwards / np.linalg.norm(inwards, axis=-1, keepdims=True))
 
 
-def _split_points(mesh: RawMesh, links: Index) -> Index:
+def _split_points(mesh: RawMesh, side_pairs: Index) -> Index:
     """Return the point index at each corner (f, 3) after points at non-manifold edges were split.
 
-    Corners at a point still share the point if `links` connect their triangles around it. The largest group
+    Corners at a point still share the point if `side_pairs` connect their triangles around it. The largest
+    group
     of such corners keeps the point, other groups get new points.
 
-    links : (n, 2) pairs of sides across which sheets continue
+    side_pairs : (n, 2) pairs of sides across which sheets continue
     """
     sides, flat = mesh.sides, mesh.corners.ravel()
     crowded = sides.side[sides.first[sides.counts > 2]]
     busy = np.zeros(int(flat.max()) + 1, bool)
     busy[sides.start[crowded]] = busy[sides.end[crowded]] = True
-    first, second = links.T  # the index of a side is also that of the corner at its start
+    first, second = side_pairs.T  # the index of a side is also that of the corner at its start
     following = [3 * (one // 3) + (one + 1) % 3 for one in (first, second)]
     crossed = flat[first] != flat[second]
     ends = np.concatenate((first, following[0]))
@@ -341,10 +346,10 @@ def _turn_outwards(mesh: RawMesh, notes: list[str]) -> RawMesh:
     x = np.ascontiguousarray(mesh.positions.T, np.float64)
     a, b, c = (x.take(one, axis=1) for one in np.ascontiguousarray(mesh.triangles.T))
     area = cross_columns(b - a, c - a) * np.where(reverse, -1.0, 1.0)
-    surface = _Surface(piece, area, np.stack((a, b, c)))
+    surface = _PieceSurface(piece, area, np.stack((a, b, c)))
     agreement = surface.mean_cosine(_corner_normals(mesh))
-    doubtful = (surface.mean_cosine(surface.outward_directions()) < _MIN_CONVEXITY) | (
-        agreement < _MAX_OPPOSITE_COSINE
+    doubtful = (surface.mean_cosine(surface.outward_directions()) < _MIN_MEAN_CONVEXITY_COSINE) | (
+        agreement < _MAX_COSINE_OF_OPPOSITE_NORMALS
     )
     if doubtful.any():
         turned = _inside_out_pieces(surface, doubtful, agreement)
@@ -355,7 +360,7 @@ def _turn_outwards(mesh: RawMesh, notes: list[str]) -> RawMesh:
         notes.append(f"reversed {count} of {len(reverse):,} that are wound inside out")
         triangles = np.where(reverse[:, None], mesh.triangles[:, ::-1], mesh.triangles)
         mesh = replace(mesh, triangles=triangles)
-    inwards = np.unique(mesh.triangles[(agreement < _MAX_OPPOSITE_COSINE)[piece]])
+    inwards = np.unique(mesh.triangles[(agreement < _MAX_COSINE_OF_OPPOSITE_NORMALS)[piece]])
     if len(inwards):
         notes.append(f"turned {_count_with_noun(len(inwards), 'normal')} outwards")
         normals = mesh.normals.copy()
@@ -395,7 +400,7 @@ def _corner_normals(mesh: RawMesh) -> Doubles:
 
 
 @dataclass(frozen=True)
-class _Surface:
+class _PieceSurface:
     """Triangles, and the connected component ("piece") of each.
 
     piece : (f,) index of each triangle's component
@@ -427,29 +432,32 @@ class _Surface:
         total = np.bincount(self.piece, dot_columns(self.area_normals, direction))
         return total / np.where(length > 0, length, 1)
 
-    def visible_balance(self, doubtful: Mask) -> tuple[Doubles, bool]:
+    def visible_balance(self, doubtful_pieces: Mask) -> tuple[Doubles, bool]:
         """Return how much of each component's front and back is visible, and whether backs prevail.
 
         The visible balance of a component is 1 if only its front is visible from outside, -1 if only its back
         is visible, and 0 if hardly any part of it is visible. Backs prevail if they are two thirds of all
         visible samples.
 
-        doubtful : mask of components that get additional samples, so that small components have enough
+        doubtful_pieces : mask of components that get additional samples, so that small components have enough
         """
         component_area = np.bincount(self.piece, self.double_area)
-        more = _DOUBTFUL_FRACTION * doubtful / (component_area * doubtful.sum())
+        more = _DOUBTFUL_SAMPLE_FRACTION * doubtful_pieces / (component_area * doubtful_pieces.sum())
         triangle, sample = self._draw_samples(
-            self.double_area * ((1 - _DOUBTFUL_FRACTION) / component_area.sum() + more[self.piece])
+            self.double_area * ((1 - _DOUBTFUL_SAMPLE_FRACTION) / component_area.sum() + more[self.piece])
         )
         normal, piece = self.area_normals[:, triangle] / self.double_area[triangle], self.piece[triangle]
         radius, seen = (
             float(np.sqrt(dot_columns(sample, sample).max())),
             np.zeros((2, len(component_area)), np.int64),
         )
-        for view in fibonacci_sphere(_VIEWS):
+        for view in fibonacci_sphere(_VIEW_COUNT):
             across = np.linalg.svd(view[None])[2][1:]
-            cell = ((across @ sample / radius + 1) * (_VIEW_CELLS / 2)).astype(np.int64)
-            nearest, order = np.full((_VIEW_CELLS + 1, _VIEW_CELLS + 1), -1), np.argsort(view @ sample)
+            cell = ((across @ sample / radius + 1) * (_CELLS_PER_VIEW_SIDE / 2)).astype(np.int64)
+            nearest, order = (
+                np.full((_CELLS_PER_VIEW_SIDE + 1, _CELLS_PER_VIEW_SIDE + 1), -1),
+                np.argsort(view @ sample),
+            )
             nearest[tuple(cell[:, order])] = order  # the last, nearest sample of a cell remains
             visible = nearest[nearest >= 0]
             cosine = view @ normal[:, visible]
@@ -457,40 +465,42 @@ class _Surface:
             for side, facing in zip(seen, facings, strict=True):
                 side += np.bincount(piece[visible[facing]], minlength=len(component_area))
         cells = (
-            component_area / 8 * (_VIEW_CELLS / 2 / radius) ** 2
+            component_area / 8 * (_CELLS_PER_VIEW_SIDE / 2 / radius) ** 2
         )  # that a convex component would cover alone
-        alone = _VIEWS * np.minimum(cells, np.bincount(piece, minlength=len(component_area)) / 2)
+        alone = _VIEW_COUNT * np.minimum(cells, np.bincount(piece, minlength=len(component_area)) / 2)
         front, back = seen
         is_seen = front + back >= np.maximum(_MIN_VISIBLE_FRACTION * alone, _MIN_VISIBLE_SAMPLES)
         balance = np.where(is_seen, (front - back) / np.maximum(front + back, 1), 0)
         return balance, bool(back.sum() > 2 * front.sum())
 
-    def _draw_samples(self, weight: Doubles) -> tuple[Index, Doubles]:
+    def _draw_samples(self, triangle_weight: Doubles) -> tuple[Index, Doubles]:
         """Return random points on the triangles: index of the triangle (n,), and position (3, n) [mm].
 
-        weight : (f,) relative probability of each triangle
+        triangle_weight : (f,) relative probability of each triangle
         Positions are relative to the centre of the mesh.
         """
-        total = np.cumsum(weight)
-        triangle = np.searchsorted(total, (np.arange(_SURFACE_SAMPLES) + 0.5) / _SURFACE_SAMPLES * total[-1])
-        shares = np.sort(np.random.default_rng(0).random((2, _SURFACE_SAMPLES)), axis=0)
+        total = np.cumsum(triangle_weight)
+        triangle = np.searchsorted(
+            total, (np.arange(_VISIBILITY_SAMPLE_COUNT) + 0.5) / _VISIBILITY_SAMPLE_COUNT * total[-1]
+        )
+        shares = np.sort(np.random.default_rng(0).random((2, _VISIBILITY_SAMPLE_COUNT)), axis=0)
         shares = np.diff(shares, axis=0, prepend=0, append=1)
         points = (self.corners[:, :, triangle] * shares[:, None]).sum(axis=0)
         return triangle, points - self.corners.mean(axis=(0, 2))[:, None]
 
 
-def _inside_out_pieces(surface: _Surface, doubtful: Mask, agreement: Doubles) -> Mask:
+def _inside_out_pieces(surface: _PieceSurface, doubtful_pieces: Mask, normals_cosine: Doubles) -> Mask:
     """Return the mask of connected components that are wound inside out.
 
     A component is judged by the side that is visible from outside. If both sides are equally visible, the
     normals of the file decide. A hidden component is inside out if the backs of the whole mesh prevail.
 
-    doubtful : mask of components that may be inside out
-    agreement : mean cosine between the file's normals and the triangles' normals, for each component
+    doubtful_pieces : mask of components that may be inside out
+    normals_cosine : mean cosine between the file's normals and the triangles' normals, for each component
     """
-    balance, backs_prevail = surface.visible_balance(doubtful)
-    opposed = (agreement < _MAX_OPPOSITE_COSINE) & (balance <= _MIN_BALANCE)
-    return np.asarray((balance < -_MIN_BALANCE) | opposed | ((balance == 0) & backs_prevail))
+    balance, backs_prevail = surface.visible_balance(doubtful_pieces)
+    opposed = (normals_cosine < _MAX_COSINE_OF_OPPOSITE_NORMALS) & (balance <= _MIN_VISIBILITY_BALANCE)
+    return np.asarray((balance < -_MIN_VISIBILITY_BALANCE) | opposed | ((balance == 0) & backs_prevail))
 
 
 def _move_uv(mesh: RawMesh, materials: Sequence[FileMaterial | None], notes: list[str]) -> RawMesh:
@@ -527,9 +537,9 @@ def _uv_periods(material: FileMaterial | None) -> tuple[float, float]:
     """Return the number of tiles along u and v after which a material's pictures repeat."""
     periods = [(1.0, 1.0)]
     for texture in material.textures.values() if material else ():
-        if texture.mapping == (0, IDENTITY):
-            periods.append((_PERIODS[texture.wrap[0]], _PERIODS[texture.wrap[1]]))
+        if texture.mapping == (0, IDENTITY_UV_TRANSFORM):
+            periods.append((_UV_PERIOD_OF_WRAP[texture.wrap[0]], _UV_PERIOD_OF_WRAP[texture.wrap[1]]))
         elif texture.uv_set == 0:
-            periods.append((_NO_PERIOD, _NO_PERIOD))
+            periods.append((_UNLIMITED_UV_PERIOD, _UNLIMITED_UV_PERIOD))
     u, v = zip(*periods, strict=True)
     return max(u), max(v)

@@ -15,15 +15,15 @@ from dermis.formats import size_limits as limits
 from dermis.formats.maps import check_finite, load_maps
 from dermis.formats.obj_geometry import parse_geometry
 from dermis.formats.obj_materials import MtlTexture, picture_name, read_library, with_materials
-from dermis.formats.parts import GREY, MaterialGroup, MeshFile, MeshPart
+from dermis.formats.parts import DEFAULT_COLOUR, MaterialGroup, MeshFile, MeshPart
 from dermis.formats.referenced_files import find_referenced_file
 from dermis.formats.text_files import decode_text
 from dermis.images.io import read_image, read_size
 from dermis.images.sizes import MAX_TOTAL_PIXELS
 from dermis.mesh.maps import Maps
 
-_RELIEF_ROLES = ("normal", "height")
-_GREY_TEST_SAMPLES = 256  # compared texels along a side
+_RELIEF_MAP_ROLES = ("normal", "height")
+_GREY_TEST_TEXELS_PER_SIDE = 256  # compared texels along a side
 
 
 def read_obj_text(path: Path) -> str:
@@ -44,16 +44,16 @@ def read_obj(path: Path) -> MeshFile:
     return parse_obj(path, read_obj_text(path))
 
 
-def parse_obj(path: Path, text: str) -> MeshFile:
+def parse_obj(path: Path, obj_text: str) -> MeshFile:
     """Parse the text of a .obj file, one mesh part per pair of `usemtl` and `g`.
 
     path : path of the file, for errors and to find its .mtl
     """
-    geometry = parse_geometry(path, text)
+    geometry = parse_geometry(path, obj_text)
     library = read_library(path, geometry.statements)
     names = [tuple(dict.fromkeys(name for name in pair if name)) for pair in geometry.pairs]
     known = [library.materials.get(pair[0]) for pair in geometry.pairs]
-    colours = [GREY if own is None else own.colour or GREY for own in known]
+    colours = [DEFAULT_COLOUR if own is None else own.colour or DEFAULT_COLOUR for own in known]
     groups = [MaterialGroup(name, colour) for name, colour in zip(names, colours, strict=True)]
     parts = geometry.polygons.parts(groups, geometry.pair, "by polygon")
     used, none = {part.group for part in parts}, np.empty((0, 3))
@@ -66,7 +66,7 @@ def obj_maps(
     path: Path,
     material: str,
     *,
-    overridden: Collection[str] = (),
+    overridden_roles: Collection[str] = (),
     height_mm: float | None = None,
     normal_y: Literal["up", "down"] = "up",
 ) -> tuple[Maps, list[str]]:
@@ -77,13 +77,13 @@ def obj_maps(
     root of the roughness m.
 
     material : name of the material in the .mtl files
-    overridden : roles of the maps that the caller sets by other means; these maps are not read from the file
+    overridden_roles : roles of the maps that the caller sets by other means; the file's maps are not read
     height_mm, normal_y : see `load_maps`
     """
     textures = read_library(path, read_obj_text(path)).materials[material].textures
     maps, faults = Maps(), list[str]()
-    roles = [role for role in ("colour", "specular", "roughness") if role not in overridden]
-    if not set(_RELIEF_ROLES) & set(overridden):
+    roles = [role for role in ("colour", "specular", "roughness") if role not in overridden_roles]
+    if not set(_RELIEF_MAP_ROLES) & set(overridden_roles):
         roles.append("normal" if "normal" in textures else "bump")
     remaining = MAX_TOTAL_PIXELS
     for role in (one for one in roles if one in textures):
@@ -99,36 +99,40 @@ def obj_maps(
     return maps, faults
 
 
-def _checked_texel_count(file: Path, remaining: int) -> int:
-    """Return the number of texels of a picture after checking that it is at most `remaining`."""
-    width, height = read_size(file)
-    if width * height > remaining:
+def _checked_texel_count(picture_file: Path, remaining_texels: int) -> int:
+    """Return the number of texels of a picture after checking that it is at most `remaining_texels`."""
+    width, height = read_size(picture_file)
+    if width * height > remaining_texels:
         expected = f"pictures of at most {MAX_TOTAL_PIXELS / 1e6:.0f} million texels together"
-        refuse(file, expected, "this one exceeds the limit", "Resize them")
+        refuse(picture_file, expected, "this one exceeds the limit", "Resize them")
     return width * height
 
 
 def _load_map(
-    role: str, file: Path, texture: MtlTexture, height_mm: float | None, normal_y: Literal["up", "down"]
+    role: str,
+    picture_file: Path,
+    texture: MtlTexture,
+    height_mm: float | None,
+    normal_y: Literal["up", "down"],
 ) -> dict[str, Any]:
     """Load the map in a picture file by its role; heights and slopes are multiplied by -bm.
 
     The result is {role: map}; the role "bump" becomes "height" for a grey picture, else "normal".
     """
     if role == "bump":
-        role = "height" if _is_grey(file) else "normal"
-    if role not in _RELIEF_ROLES:
-        values = getattr(load_maps(**{role: file}), role)  # type: ignore[arg-type]
+        role = "height" if _is_grey(picture_file) else "normal"
+    if role not in _RELIEF_MAP_ROLES:
+        values = getattr(load_maps(**{role: picture_file}), role)  # type: ignore[arg-type]
         return {role: values * values if role == "roughness" else values}
-    maps = load_maps(**{role: file}, height_mm=height_mm, normal_y=normal_y)
+    maps = load_maps(**{role: picture_file}, height_mm=height_mm, normal_y=normal_y)
     with np.errstate(over="ignore", invalid="ignore"):
-        return {role: check_finite(file, getattr(maps, role) * np.float32(texture.factor))}
+        return {role: check_finite(picture_file, getattr(maps, role) * np.float32(texture.factor))}
 
 
-def _is_grey(file: Path) -> bool:
+def _is_grey(picture_file: Path) -> bool:
     """Return whether a picture is grey up to JPEG artefacts; large pictures are subsampled."""
-    picture = read_image(file)
-    step = max(min(picture.shape[:2]) // _GREY_TEST_SAMPLES, 1)
+    picture = read_image(picture_file)
+    step = max(min(picture.shape[:2]) // _GREY_TEST_TEXELS_PER_SIDE, 1)
     samples = picture[::step, ::step, :3].astype(float)
     largest = float(samples.max()) or 1.0
     return bool((abs(samples - samples[..., :1]) <= 0.02 * largest).all())

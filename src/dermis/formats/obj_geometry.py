@@ -1,6 +1,6 @@
 """Geometry of OBJ files: polygons with positions, uv, normals and colours, and the group of each polygon.
 
-Numeric statements are parsed as arrays, all others individually.
+Numeric statements are parsed as arrays, all other statements individually.
 """
 
 from __future__ import annotations
@@ -33,12 +33,13 @@ _CONTINUED_LINE = re.compile(r"^(?![ \t]*#)(?:[^\n]*\\\n)+[^\n]*", re.MULTILINE)
 _LEADING_BLANKS = re.compile(r"^[ \t]+", re.MULTILINE)
 _TRAILING_COMMENT = re.compile(r"^((?:v[tn]?|f)[ \t][^#\n]*)#[^\n]*", re.MULTILINE)
 _LINE_FEED, _SPACE, _SLASH = b"\n /"
-_VERTEX_KINDS = ("v", "vt", "vn")
-_FEWEST_NUMBERS = {"v": 3, "vt": 1, "vn": 3}
-_USED_NUMBERS, _MOST_NUMBERS = 6, 16  # numbers in a statement that are used (position, colour) and allowed
+_VERTEX_STATEMENTS = ("v", "vt", "vn")
+_MIN_NUMBERS_PER_STATEMENT = {"v": 3, "vt": 1, "vn": 3}
+# numbers in a statement that are used (position, colour), and that are allowed
+_USED_NUMBERS_PER_STATEMENT, _MAX_NUMBERS_PER_STATEMENT = 6, 16
 _POLYPAINT_MARK = "#MRGB"
 _CURVE_STATEMENTS = "cstype deg bmat step curv curv2 surf con vp parm trim hole scrv sp end"
-_LEFT_OUT = {"lines": ("l",), "points": ("p",), "curves": tuple(_CURVE_STATEMENTS.split())}
+_LEFT_OUT_STATEMENTS = {"lines": ("l",), "points": ("p",), "curves": tuple(_CURVE_STATEMENTS.split())}
 OBJ_PROPERTIES = (
     drawn("`v x y z`", "position", "v"),
     drawn_with_note("`v x y z w`", "position divided by w (no note if w is 1)"),
@@ -65,13 +66,13 @@ OBJ_PROPERTIES = (
     noted("`s` in a file without normals", "the surface is smooth everywhere (no note for one group)"),
     no_effect("`s` in a file with normals", "the normals decide"),
     no_effect("`mg`", "for curves only", "mg"),
-    *(noted(f"{kind}: {in_code(keys)}", "", *keys) for kind, keys in _LEFT_OUT.items()),
+    *(noted(f"{kind}: {in_code(keys)}", "", *keys) for kind, keys in _LEFT_OUT_STATEMENTS.items()),
     noted("other statements"),
 )
 """Statements of OBJ files; `parse_geometry` reads those that are drawn, and `s`."""
 _USED_STATEMENTS = {*keys_of(OBJ_PROPERTIES, "drawn", "drawn with a note"), "s"}
-_WITHOUT_EFFECT = keys_of(OBJ_PROPERTIES, "no effect")
-_KINDS_LEFT_OUT = {key: kind for kind, keys in _LEFT_OUT.items() for key in keys}
+_STATEMENTS_WITHOUT_EFFECT = keys_of(OBJ_PROPERTIES, "no effect")
+_KIND_OF_LEFT_OUT_STATEMENT = {key: kind for kind, keys in _LEFT_OUT_STATEMENTS.items() for key in keys}
 
 
 @dataclass(frozen=True)
@@ -95,7 +96,7 @@ _Statement = tuple[int, str, str]
 
 
 @dataclass(frozen=True)
-class _Rows:
+class _StatementRows:
     """Statements of one kind without their first word.
 
     line : (n,) line of each statement, counted from 0
@@ -108,13 +109,13 @@ class _Rows:
     start: Index
 
 
-def parse_geometry(path: Path, text: str) -> ObjGeometry:
+def parse_geometry(path: Path, obj_text: str) -> ObjGeometry:
     """Return the geometry in the text of an OBJ file.
 
     Raises DermisError with the number of the line for numbers and indices that are invalid.
     """
-    limits.check_limit(path, text.count("\n"), _MAX_LINES, "lines", limits.DECIMATE_ADVICE)
-    rows, others, unread = _split_statements(path, _plain_text(text))
+    limits.check_limit(path, obj_text.count("\n"), _MAX_LINES, "lines", limits.DECIMATE_ADVICE)
+    rows, others, unread = _split_statements(path, _plain_text(obj_text))
     positions, colours, notes = _parse_vertices(path, rows["v"])
     uv, normals = (
         _parse_number_table(path, rows["vt"], "vt")[0],
@@ -140,22 +141,26 @@ def parse_geometry(path: Path, text: str) -> ObjGeometry:
     return ObjGeometry(polygons, pairs, pair[kept], statements, notes)
 
 
-def _plain_text(text: str) -> str:
+def _plain_text(obj_text: str) -> str:
     """Join continued lines; remove blanks at the start of lines and comments at their end.
 
     The number of lines is unchanged.
     """
-    if "\\\n" in text:
-        text = _CONTINUED_LINE.sub(lambda m: m[0].replace("\\\n", " ") + "\n" * m[0].count("\n"), text)
-    if text[:1] in (" ", "\t") or "\n " in text or "\n\t" in text:
-        text = _LEADING_BLANKS.sub("", text)
-    commented = text.count("#") != text.count("\n#") + text.startswith("#")
-    return _TRAILING_COMMENT.sub(r"\1", text) if commented else text
+    if "\\\n" in obj_text:
+        obj_text = _CONTINUED_LINE.sub(
+            lambda m: m[0].replace("\\\n", " ") + "\n" * m[0].count("\n"), obj_text
+        )
+    if obj_text[:1] in (" ", "\t") or "\n " in obj_text or "\n\t" in obj_text:
+        obj_text = _LEADING_BLANKS.sub("", obj_text)
+    commented = obj_text.count("#") != obj_text.count("\n#") + obj_text.startswith("#")
+    return _TRAILING_COMMENT.sub(r"\1", obj_text) if commented else obj_text
 
 
-def _split_statements(path: Path, text: str) -> tuple[dict[str, _Rows], list[_Statement], dict[str, None]]:
-    """Return numeric statements by kind, other statements that are used, and the first words of the rest."""
-    data = np.frombuffer(f"{text}\n".encode("utf-8", "replace"), np.uint8)
+def _split_statements(
+    path: Path, plain_text: str
+) -> tuple[dict[str, _StatementRows], list[_Statement], dict[str, None]]:
+    """Return numeric statements by kind, other used statements, and the first words of unused statements."""
+    data = np.frombuffer(f"{plain_text}\n".encode("utf-8", "replace"), np.uint8)
     end = np.flatnonzero(data == _LINE_FEED)
     start = np.concatenate([[0], end[:-1] + 1])
     length = end - start + 1
@@ -169,7 +174,7 @@ def _split_statements(path: Path, text: str) -> tuple[dict[str, _Rows], list[_St
         own = data[np.repeat(mask, length)]
         own_start = np.cumsum(length[mask]) - length[mask]
         own[own_start[:, None] + np.arange(len(key))] = _SPACE
-        rows[key] = _Rows(np.flatnonzero(mask), own, own_start)
+        rows[key] = _StatementRows(np.flatnonzero(mask), own, own_start)
     is_comment = (first == ord("#")) & ~((second == ord("M")) & (third == ord("R")))
     other = ~np.logical_or.reduce([is_comment, first == _LINE_FEED, *masks.values()])
     count, items = int(other.sum()), "statements besides vertices and faces"
@@ -186,82 +191,91 @@ def _split_statements(path: Path, text: str) -> tuple[dict[str, _Rows], list[_St
     return rows, used, unread
 
 
-def _check_lines(path: Path, length: Index, is_vertex: Mask) -> None:
-    if length.max() > _MAX_LINE_LENGTH or length[is_vertex].max(initial=0) > _MAX_VERTEX_LINE:
+def _check_lines(path: Path, text_length: Index, is_vertex: Mask) -> None:
+    if text_length.max() > _MAX_LINE_LENGTH or text_length[is_vertex].max(initial=0) > _MAX_VERTEX_LINE:
         expected = f"lines of at most {_MAX_LINE_LENGTH:,} characters, {_MAX_VERTEX_LINE} for vertices"
-        refuse(path, expected, f"one has {length.max():,}", limits.DAMAGED_ADVICE)
+        refuse(path, expected, f"one has {text_length.max():,}", limits.DAMAGED_ADVICE)
     items = "lines of vertices, uv and normals"
     limits.check_limit(path, int(is_vertex.sum()), 3 * limits.MAX_VERTICES, items, limits.DECIMATE_ADVICE)
 
 
-def _refuse_line(path: Path, rows: _Rows, index: int, expected: str, actual: str = "") -> NoReturn:
-    """Raise the error for one of the statements in `rows`; the message names its line.
+def _refuse_line(
+    path: Path, statement_rows: _StatementRows, row_index: int, expected: str, actual: str = ""
+) -> NoReturn:
+    """Raise the error for one of the statements in `statement_rows`; the message names its line.
 
-    index : index of the statement in `rows`
-    actual : clause that says what is wrong; by default, it quotes the statement
+    row_index : index of the statement in `statement_rows`
+    actual : clause that says what is wrong; by default a quotation of the statement
     """
-    ends = np.append(rows.start[1:], len(rows.text))
-    words = " ".join(rows.text[rows.start[index] : ends[index]].tobytes().decode(errors="replace").split())
+    ends = np.append(statement_rows.start[1:], len(statement_rows.text))
+    words = " ".join(
+        statement_rows.text[statement_rows.start[row_index] : ends[row_index]]
+        .tobytes()
+        .decode(errors="replace")
+        .split()
+    )
     said = actual or (f"it has {words!r}" if words else "it has nothing")
-    refuse(path, expected, f"in line {rows.line[index] + 1} {said}", limits.DAMAGED_ADVICE)
+    refuse(path, expected, f"in line {statement_rows.line[row_index] + 1} {said}", limits.DAMAGED_ADVICE)
 
 
-def _parse_vertices(path: Path, rows: _Rows) -> tuple[Doubles, Doubles | None, list[str]]:
+def _parse_vertices(path: Path, statement_rows: _StatementRows) -> tuple[Doubles, Doubles | None, list[str]]:
     """Return positions (n, 3), linear colours (n, 3) or None, and notes.
 
     One number after the position is a weight, by which the position is divided; three numbers are a colour.
     """
-    table, counts = _parse_number_table(path, rows, "v")
+    table, counts = _parse_number_table(path, statement_rows, "v")
     positions, notes = table[:, :3], list[str]()
-    if (counts == 5).any() or (counts > _USED_NUMBERS).any():
+    if (counts == 5).any() or (counts > _USED_NUMBERS_PER_STATEMENT).any():
         notes.append("further numbers after the position or colour of vertices (v) are left out")
     weight = np.where(counts == 4, table[:, 3], 1.0)
     if (weight != 1).any():
         notes.append("vertices have a fourth coordinate: their positions are divided by it")
         positions = positions / weight[:, None]
-    coloured = counts >= _USED_NUMBERS
+    coloured = counts >= _USED_NUMBERS_PER_STATEMENT
     if not coloured.any():
         return positions, None, notes
     colours, faults = linear_colours(np.where(coloured[:, None], table[:, 3:], np.nan))
     return positions, colours, notes + faults
 
 
-def _parse_polypaint(digits: str, count: int) -> tuple[Doubles | None, list[str]]:
+def _parse_polypaint(hex_digits: str, vertex_count: int) -> tuple[Doubles | None, list[str]]:
     """Return the linear colours (n, 3) of the polypaint of ZBrush, or None and a note.
 
-    digits : hexadecimal mask, red, green and blue of each vertex
-    count : number of vertices
+    hex_digits : hexadecimal mask, red, green and blue of each vertex
+    vertex_count : number of vertices
     """
     try:
-        levels = np.frombuffer(bytes.fromhex(digits), np.uint8).reshape(count, 4)
+        levels = np.frombuffer(bytes.fromhex(hex_digits), np.uint8).reshape(vertex_count, 4)
     except ValueError:
         return None, [f"the polypaint ({_POLYPAINT_MARK}) does not fit the vertices and is left out"]
     return linear_colours(levels[:, 1:])
 
 
-def _parse_number_table(path: Path, rows: _Rows, kind: str) -> tuple[Doubles, Index]:
+def _parse_number_table(
+    path: Path, statement_rows: _StatementRows, statement_key: str
+) -> tuple[Doubles, Index]:
     """Return the first six numbers (n, 6) of each statement, padded with NaN, and their true count (n,)."""
-    words = run_starts(rows.text > _SPACE)
-    first = np.searchsorted(words, rows.start)
+    words = run_starts(statement_rows.text > _SPACE)
+    first = np.searchsorted(words, statement_rows.start)
     counts = np.diff(first, append=len(words))
-    fewest = _FEWEST_NUMBERS[kind]
-    expected = f"{fewest} to {_MOST_NUMBERS} numbers after {kind}"
-    if (faulty := (counts < fewest) | (counts > _MOST_NUMBERS)).any():
-        _refuse_line(path, rows, int(faulty.argmax()), expected)
+    fewest = _MIN_NUMBERS_PER_STATEMENT[statement_key]
+    expected = f"{fewest} to {_MAX_NUMBERS_PER_STATEMENT} numbers after {statement_key}"
+    if (faulty := (counts < fewest) | (counts > _MAX_NUMBERS_PER_STATEMENT)).any():
+        _refuse_line(path, statement_rows, int(faulty.argmax()), expected)
     try:
-        values = parse_numbers(rows.text, len(words), np.float64)
+        values = parse_numbers(statement_rows.text, len(words), np.float64)
     except ValueError:
-        _refuse_line(path, rows, _first_non_numeric(rows, np.float64), expected)
-    column = np.arange(_USED_NUMBERS)
-    table = np.full((len(counts), _USED_NUMBERS), np.nan)
+        _refuse_line(path, statement_rows, _first_non_numeric(statement_rows, np.float64), expected)
+    column = np.arange(_USED_NUMBERS_PER_STATEMENT)
+    table = np.full((len(counts), _USED_NUMBERS_PER_STATEMENT), np.nan)
     given = column < counts[:, None]
     table[given] = values[(first[:, None] + column)[given]]
     return table, counts
 
 
-def _first_non_numeric(rows: _Rows, dtype: type[np.float64] | type[np.int64]) -> int:
+def _first_non_numeric(statement_rows: _StatementRows, dtype: type[np.float64] | type[np.int64]) -> int:
     """Return the index of the first statement with a word that is not a number."""
-    for index, statement in enumerate(rows.text.tobytes().split(b"\n")):
+    for index, statement in enumerate(statement_rows.text.tobytes().split(b"\n")):
         try:
             parse_numbers(np.frombuffer(statement, np.uint8), len(statement.split()), dtype)  # type: ignore[type-var]
         except ValueError:
@@ -269,12 +283,12 @@ def _first_non_numeric(rows: _Rows, dtype: type[np.float64] | type[np.int64]) ->
     return 0
 
 
-def _parse_faces(path: Path, rows: Mapping[str, _Rows]) -> tuple[Index, Index]:
+def _parse_faces(path: Path, rows_of_statement: Mapping[str, _StatementRows]) -> tuple[Index, Index]:
     """Return the number of corners of each face, and position, uv and normal index of each corner (c, 3).
 
     The index is -1 for a corner without uv or normal.
     """
-    faces = rows["f"]
+    faces = rows_of_statement["f"]
     slash = faces.text == _SLASH
     spaced = replace(faces, text=np.where(slash, np.uint8(_SPACE), faces.text))
     corner_start, index_start = run_starts(faces.text > _SPACE), run_starts(spaced.text > _SPACE)
@@ -297,9 +311,11 @@ def _parse_faces(path: Path, rows: Mapping[str, _Rows]) -> tuple[Index, Index]:
     refuse_at(column > 2, index_start, "corners of faces as position/uv/normal")
     corners = np.zeros((len(corner_start), 3), np.int64)
     corners[corner, column] = values
-    given, sizes = corners != 0, [len(rows[kind].line) for kind in _VERTEX_KINDS]
+    given, sizes = corners != 0, [len(rows_of_statement[kind].line) for kind in _VERTEX_STATEMENTS]
     if (values < 0).any():
-        before = np.column_stack([np.searchsorted(rows[kind].line, faces.line) for kind in _VERTEX_KINDS])
+        before = np.column_stack(
+            [np.searchsorted(rows_of_statement[kind].line, faces.line) for kind in _VERTEX_STATEMENTS]
+        )
         corners = np.where(corners < 0, corners + np.repeat(before, counts, axis=0) + 1, corners)
     faulty = (given & ((corners < 1) | (corners > sizes))).any(axis=1) | ~given[:, 0]
     expected = "faces by indices of its {:,} vertices, {:,} uv and {:,} normals"
@@ -330,12 +346,18 @@ def _face_groups(
     return list(numbers), np.array(states)[np.searchsorted(lines, face_line) - 1]
 
 
-def _unread_notes(keys: Collection[str], statements: Sequence[_Statement], has_normals: bool) -> list[str]:
+def _unread_notes(
+    statement_keys: Collection[str], statements: Sequence[_Statement], has_normals: bool
+) -> list[str]:
     """Return notes on statements that have no effect.
 
-    keys : first words of unknown statements
+    statement_keys : first words of unknown statements
     """
-    kinds = {key: _KINDS_LEFT_OUT.get(key) for key in keys if key not in _WITHOUT_EFFECT}
+    kinds = {
+        key: _KIND_OF_LEFT_OUT_STATEMENT.get(key)
+        for key in statement_keys
+        if key not in _STATEMENTS_WITHOUT_EFFECT
+    }
     names = [f"{key} ({kind})" if kind else key for key, kind in kinds.items()]
     notes = [f"statements are left out: {list_names(names)}"] if names else []
     smoothing = {value for _, key, value in statements if key == "s"}

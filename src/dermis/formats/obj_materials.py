@@ -12,8 +12,8 @@ import numpy as np
 from dermis.base.file_properties import drawn, keys_of, no_effect, noted
 from dermis.base.reading import parsing, read_file
 from dermis.formats import size_limits as limits
-from dermis.formats.materials import IDENTITY, FileMaterial, Role, Texture, UvTransform, Wrap
-from dermis.formats.parts import GREY, Colour, MeshPart, parse_colour
+from dermis.formats.materials import IDENTITY_UV_TRANSFORM, FileMaterial, Role, Texture, UvTransform, Wrap
+from dermis.formats.parts import DEFAULT_COLOUR, Colour, MeshPart, parse_colour
 from dermis.formats.referenced_files import find_referenced_file
 from dermis.formats.text_files import decode_text
 
@@ -67,8 +67,8 @@ MTL_PROPERTIES = (
     noted("other statements, such as `Ks`, `Ni`, `disp`"),
 )
 """Statements of .mtl files."""
-_WITHOUT_EFFECT = tuple(key.lower() for key in keys_of(MTL_PROPERTIES, "no effect"))
-_PART_ROLES: Mapping[str, Role] = {
+_STATEMENTS_WITHOUT_EFFECT = tuple(key.lower() for key in keys_of(MTL_PROPERTIES, "no effect"))
+_ROLES_OF_PARTS: Mapping[str, Role] = {
     "colour": "colour",
     "roughness": "roughness",
     "metalness": "metalness",
@@ -76,21 +76,21 @@ _PART_ROLES: Mapping[str, Role] = {
     "opacity": "opacity",
     "normal": "normal",
 }
-_NUMBER = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
+_NUMBER_REGEX = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
 _OPTION_PATTERN = re.compile(
-    rf"-(?:bm\s+(?P<factor>{_NUMBER})"
-    rf"|(?P<transform>[ost])(?P<numbers>(?:\s+{_NUMBER}(?=\s)){{1,3}})"
+    rf"-(?:bm\s+(?P<factor>{_NUMBER_REGEX})"
+    rf"|(?P<transform>[ost])(?P<numbers>(?:\s+{_NUMBER_REGEX}(?=\s)){{1,3}})"
     r"|clamp\s+(?P<clamp>\S+)"
     r"|(?P<unused>mm\s+\S+\s+\S+|(?:blendu|blendv|boost|cc|imfchan)\s+\S+)"
     r"|(?:texres|type)\s+\S+)\s+",
     re.IGNORECASE,
 )
 _NEUTRAL_OPTIONS = ("mm 0 1", "blendu on", "blendv on", "boost 0", "cc off")
-_NUMBER_PATTERN = re.compile(_NUMBER)
+_NUMBER_PATTERN = re.compile(_NUMBER_REGEX)
 _UDIM_PATTERN = re.compile(r"<udim>|%\(udim\)d", re.IGNORECASE)
 _MISSING_ADVICE = "Put it there, or set maps by options (--colour, --normal, ...)"
-_USUAL_KD = (0.0, 0.588, 0.64, 0.8, 1.0)  # default values of programs, which accompany a colour map
-_MAX_LINE = 4096  # characters
+_USUAL_KD_VALUES = (0.0, 0.588, 0.64, 0.8, 1.0)  # default values of programs, which accompany a colour map
+_MAX_LINE_LENGTH = 4096  # characters
 _LIBRARY_LINE = re.compile(r"^[ \t]*mtllib[ \t]([^\n]*)", re.MULTILINE)
 _UDIM_COLUMNS, _FIRST_UDIM, _MAX_UDIM = 10, 1001, 1100
 
@@ -120,7 +120,7 @@ class MtlTexture:
         """Return the transform of uv with v down."""
         (scale_u, scale_v), (u, v) = self.scale, self.offset
         if (self.scale, self.offset) == ((1.0, 1.0), (0.0, 0.0)):
-            return IDENTITY
+            return IDENTITY_UV_TRANSFORM
         return scale_u, 0.0, u, 0.0, scale_v, 1.0 - scale_v - v
 
 
@@ -151,15 +151,15 @@ class MaterialLibrary:
     missing: list[str] = field(default_factory=list)
 
 
-def read_library(path: Path, text: str) -> MaterialLibrary:
+def read_library(path: Path, obj_text: str) -> MaterialLibrary:
     """Read the .mtl files that an OBJ file references.
 
-    path, text : path and text of the OBJ file
+    path, obj_text : path and text of the OBJ file
     """
     library, remaining = MaterialLibrary(), limits.MAX_MTL_BYTES
-    for listed in library_names(text)[: limits.MAX_LIBRARIES]:
+    for listed in library_names(obj_text)[: limits.MAX_MTL_FILES]:
         found = find_referenced_file(path, listed)
-        names = [listed] if found else listed.split(".mtl ")[: limits.MAX_LIBRARIES]
+        names = [listed] if found else listed.split(".mtl ")[: limits.MAX_MTL_FILES]
         for name in names:
             file = find_referenced_file(path, name) or find_referenced_file(path, f"{name}.mtl")
             if file is None:
@@ -172,18 +172,18 @@ def read_library(path: Path, text: str) -> MaterialLibrary:
     return library
 
 
-def library_names(text: str) -> list[str]:
+def library_names(obj_text: str) -> list[str]:
     """Return the .mtl file names in the `mtllib` lines of an OBJ text, without duplicates."""
-    names = (line[1].strip() for line in _LIBRARY_LINE.finditer(text))
+    names = (line[1].strip() for line in _LIBRARY_LINE.finditer(obj_text))
     return [name for name in dict.fromkeys(names) if name]
 
 
-def _parse_mtl(text: str) -> dict[str, MtlMaterial]:
+def _parse_mtl(mtl_text: str) -> dict[str, MtlMaterial]:
     materials: dict[str, MtlMaterial] = {}
     current = MtlMaterial()
-    for line in text.splitlines():
+    for line in mtl_text.splitlines():
         statement = line.strip().replace("\t", " ")
-        if len(line) > _MAX_LINE or not statement or statement.startswith("#"):
+        if len(line) > _MAX_LINE_LENGTH or not statement or statement.startswith("#"):
             continue
         word, _, value = statement.partition(" ")
         key = word.lower()
@@ -193,28 +193,28 @@ def _parse_mtl(text: str) -> dict[str, MtlMaterial]:
             current.textures[TEXTURE_ROLES[key]] = _parse_texture(word, value.strip())
         elif key in NUMERIC_STATEMENTS and len(numbers := _parse_numbers(value)) >= NUMERIC_STATEMENTS[key]:
             current.numbers[key] = numbers
-        elif key not in _WITHOUT_EFFECT:
+        elif key not in _STATEMENTS_WITHOUT_EFFECT:
             current.unread.append(word)
     return materials
 
 
-def picture_name(texture: MtlTexture, udim: int = _FIRST_UDIM) -> str:
-    """Return the file name of a texture's picture; for UDIM tiles, the file name of the tile `udim`."""
-    return _UDIM_PATTERN.sub(str(udim), texture.name)
+def picture_name(texture: MtlTexture, udim_tile: int = _FIRST_UDIM) -> str:
+    """Return the file name of a texture's picture; for UDIM tiles, the file name of the tile `udim_tile`."""
+    return _UDIM_PATTERN.sub(str(udim_tile), texture.name)
 
 
-def _parse_numbers(value: str) -> list[float]:
-    words = value.split()
+def _parse_numbers(statement: str) -> list[float]:
+    words = statement.split()
     return [float(word) for word in words] if all(map(_NUMBER_PATTERN.fullmatch, words)) else []
 
 
-def _parse_texture(key: str, statement: str) -> MtlTexture:
+def _parse_texture(statement_key: str, statement: str) -> MtlTexture:
     """Parse a texture statement of an .mtl file; its file name extends to the end of the line.
 
-    key : statement, such as map_Kd
+    statement_key : statement, such as map_Kd
     statement : text after the key, options first
     """
-    texture, start = MtlTexture(key, ""), 0
+    texture, start = MtlTexture(statement_key, ""), 0
     while option := _OPTION_PATTERN.match(statement, start):
         texture, start = _with_option(texture, option), option.end()
     name, factor = statement[start:], texture.factor
@@ -224,16 +224,19 @@ def _parse_texture(key: str, statement: str) -> MtlTexture:
     return replace(texture, name=name, factor=factor)
 
 
-def _with_option(texture: MtlTexture, option: re.Match[str]) -> MtlTexture:
-    if option["factor"]:
-        return replace(texture, factor=float(option["factor"]))
-    if option["clamp"]:
-        return replace(texture, wrap="clamp" if option["clamp"].lower() == "on" else "repeat")
-    if not option["transform"]:
-        words = " ".join((option["unused"] or "").lower().split())
+def _with_option(texture: MtlTexture, texture_option: re.Match[str]) -> MtlTexture:
+    if texture_option["factor"]:
+        return replace(texture, factor=float(texture_option["factor"]))
+    if texture_option["clamp"]:
+        return replace(texture, wrap="clamp" if texture_option["clamp"].lower() == "on" else "repeat")
+    if not texture_option["transform"]:
+        words = " ".join((texture_option["unused"] or "").lower().split())
         unused = (f"-{words}",) if words and words not in _NEUTRAL_OPTIONS else ()
         return replace(texture, unused=texture.unused + unused)
-    which, numbers = option["transform"].lower(), [float(number) for number in option["numbers"].split()]
+    which, numbers = (
+        texture_option["transform"].lower(),
+        [float(number) for number in texture_option["numbers"].split()],
+    )
     if which == "t":
         return replace(texture, unused=(*texture.unused, *["-t"] * any(numbers)))
     u, v = (*numbers, 1.0 if which == "s" else 0.0)[:2]
@@ -241,21 +244,21 @@ def _with_option(texture: MtlTexture, option: re.Match[str]) -> MtlTexture:
 
 
 def with_materials(
-    path: Path, parts: Sequence[MeshPart], library: MaterialLibrary
+    path: Path, mesh_parts: Sequence[MeshPart], library: MaterialLibrary
 ) -> tuple[list[MeshPart], tuple[FileMaterial, ...], list[str]]:
     """Return the parts of an OBJ file with their materials, and notes on missing pictures.
 
     Parts whose pictures are a sequence of UDIM tiles are divided into one part for each tile.
 
     path : path of the OBJ file
-    parts : mesh parts; if a part has a material, the first name of the part's group is the name of the
+    mesh_parts : mesh parts; if a part has a material, the first name of the part's group is the name of the
         material
     """
     materials: list[FileMaterial] = []
     notes = [f"mtllib: {name} is not in its folder. {_MISSING_ADVICE}" for name in library.missing]
     index: dict[tuple[str, int], int] = {}
     assigned = []
-    for part in parts:
+    for part in mesh_parts:
         name = next((name for name in part.group.names if name in library.materials), None)
         if name is None:
             assigned.append(part)
@@ -271,50 +274,58 @@ def with_materials(
     return assigned, tuple(materials), notes
 
 
-def _udim_tiles(part: MeshPart) -> list[tuple[int, MeshPart]]:
+def _udim_tiles(mesh_part: MeshPart) -> list[tuple[int, MeshPart]]:
     """Divide a part into the UDIM tiles of its triangles; return the number and the part of each tile."""
-    if part.uv is None or not len(part.triangles):
-        return [(_FIRST_UDIM, part)]
-    column, row = np.floor(part.uv[part.triangles].mean(axis=1)).astype(int).T
+    if mesh_part.uv is None or not len(mesh_part.triangles):
+        return [(_FIRST_UDIM, mesh_part)]
+    column, row = np.floor(mesh_part.uv[mesh_part.triangles].mean(axis=1)).astype(int).T
     number = np.clip(_FIRST_UDIM + column + _UDIM_COLUMNS * row, _FIRST_UDIM, _MAX_UDIM)
     pieces = []
     for udim in np.unique(number).tolist():
         own = number == udim
         position = np.cumsum(own) - 1
-        quads = position[part.quads[own[part.quads].all(axis=1)]] if len(part.quads) else part.quads
-        pieces.append((udim, replace(part, triangles=part.triangles[own], quads=quads)))
+        quads = (
+            position[mesh_part.quads[own[mesh_part.quads].all(axis=1)]]
+            if len(mesh_part.quads)
+            else mesh_part.quads
+        )
+        pieces.append((udim, replace(mesh_part, triangles=mesh_part.triangles[own], quads=quads)))
     return pieces
 
 
-def _file_material(path: Path, name: str, material: MtlMaterial, udim: int) -> FileMaterial:
+def _file_material(path: Path, material_name: str, material: MtlMaterial, udim_tile: int) -> FileMaterial:
     """Return a material of an .mtl file."""
     textures, missing, unused = dict[Role, Texture](), dict[str, str](), list(material.unread)
     skin_only = list[str]()
-    row, column = divmod(udim - _FIRST_UDIM, _UDIM_COLUMNS)
+    row, column = divmod(udim_tile - _FIRST_UDIM, _UDIM_COLUMNS)
     for role, texture in material.textures.items():
-        written = picture_name(texture, udim)
+        written = picture_name(texture, udim_tile)
         file = find_referenced_file(path, written)
         if file is None:
             missing[role] = f"{texture.key}: {written} is not in its folder. {_MISSING_ADVICE}"
-        elif role not in _PART_ROLES:
+        elif role not in _ROLES_OF_PARTS:
             skin_only.append(f"picture of {texture.key}")
         else:
             a, b, c, d, e, f = texture.transform
             if written != texture.name:
                 c, f = c - column, f + row
-            textures[_PART_ROLES[role]] = Texture(file, 0, (a, b, c, d, e, f), (texture.wrap, texture.wrap))
+            textures[_ROLES_OF_PARTS[role]] = Texture(
+                file, 0, (a, b, c, d, e, f), (texture.wrap, texture.wrap)
+            )
         unused += [f"option {option} of {written}" for option in texture.unused]
     numbers = {key: values[0] for key, values in material.numbers.items()}
     alpha = numbers.get("d", 1.0 - numbers.get("tr", 0.0))
     roughness = numbers.get("pr")
     if roughness is None and "ns" in numbers:
         roughness = (2.0 / (max(numbers["ns"], 0.0) + 2.0)) ** 0.25
-    colour = None if material.colour == GREY else material.colour
+    colour = None if material.colour == DEFAULT_COLOUR else material.colour
     if "colour" in textures and colour is not None:
-        unused += [] if len(set(colour)) == 1 and round(colour[0], 3) in _USUAL_KD else ["Kd beside map_Kd"]
+        unused += (
+            [] if len(set(colour)) == 1 and round(colour[0], 3) in _USUAL_KD_VALUES else ["Kd beside map_Kd"]
+        )
         colour = None
     return FileMaterial(
-        name,
+        material_name,
         textures,
         colour,
         alpha=alpha,

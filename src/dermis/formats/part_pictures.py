@@ -59,7 +59,7 @@ class PartPictures:
         """Return 8-bit PNG files by role; roles that no part needs are left out."""
         parts = [self.mesh.materials[index] for index in np.unique(self.mesh.material)]
         used = set[PartRole]().union(*map(self.roles, parts))
-        levels = {role: _LEVELS[role](self.maps) for role in roles if role in used}
+        levels = {role: _ENCODER_OF_ROLE[role](self.maps) for role in roles if role in used}
         with ThreadPoolExecutor() as pool:  # compression releases the interpreter lock
             return dict(zip(levels, pool.map(encode_png, levels.values()), strict=True))
 
@@ -78,16 +78,16 @@ class PartPictures:
         return bool(self.maps.surface[..., :2].any())
 
 
-def normal_levels(slopes: Floats) -> Bytes:
+def normal_levels(surface_slopes: Floats) -> Bytes:
     """Return the tangent-space normal map (h, w, 3) of slopes (h, w, 2) as 8-bit levels, green up."""
-    normal = np.concatenate([-slopes, np.ones_like(slopes[..., :1])], axis=-1)
+    normal = np.concatenate([-surface_slopes, np.ones_like(surface_slopes[..., :1])], axis=-1)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
     return linear_levels(0.5 * normal + 0.5)
 
 
-def linear_levels(values: Numbers) -> Bytes:
+def linear_levels(linear_values: Numbers) -> Bytes:
     """Return values from 0 to 1, of any shape, as 8-bit levels without sRGB encoding."""
-    return np.asarray(np.rint(np.clip(values, 0, 1) * 255), np.uint8)
+    return np.asarray(np.rint(np.clip(linear_values, 0, 1) * 255), np.uint8)
 
 
 def _colour_levels(maps: PartMaps) -> Bytes:
@@ -103,7 +103,7 @@ def _emission_levels(maps: PartMaps) -> Bytes:
     return encode_srgb8(maps.emission / maps.emission.max())
 
 
-_LEVELS: Mapping[PartRole, Callable[[PartMaps], Bytes]] = {
+_ENCODER_OF_ROLE: Mapping[PartRole, Callable[[PartMaps], Bytes]] = {
     "colour": _colour_levels,
     "cutout": lambda maps: np.concatenate(
         [_colour_levels(maps), linear_levels(maps.colour[..., 3:])], axis=2

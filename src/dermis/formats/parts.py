@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 Colour = tuple[float, float, float]
 
-GREY: Colour = (0.8, 0.8, 0.8)
+DEFAULT_COLOUR: Colour = (0.8, 0.8, 0.8)
 
 
 def is_gltf(path: str | Path) -> bool:
@@ -49,7 +49,7 @@ class MaterialGroup:
     """
 
     names: tuple[str, ...]
-    colour: Colour = GREY
+    colour: Colour = DEFAULT_COLOUR
     material: int = -1
 
     def name_contains(self, word: str) -> bool:
@@ -126,10 +126,10 @@ class MeshFile:
         return self.bones is not None or any(part.targets for part in self.parts)
 
 
-def to_floats(values: Numbers) -> Doubles:
+def to_floats(stored_values: Numbers) -> Doubles:
     """Convert an array to floats; integers are divided by the largest value of their type."""
-    scale = np.iinfo(values.dtype.str).max if values.dtype.kind in "iu" else 1
-    return np.asarray(values / scale, dtype=np.float64)
+    scale = np.iinfo(stored_values.dtype.str).max if stored_values.dtype.kind in "iu" else 1
+    return np.asarray(stored_values / scale, dtype=np.float64)
 
 
 def parse_colour(numbers: Sequence[float | str]) -> Colour:
@@ -139,7 +139,7 @@ def parse_colour(numbers: Sequence[float | str]) -> Colour:
 
 
 def find_quads(corner_counts: NDArray[np.integer], triangles: Index) -> Index:
-    """Return the pairs of triangles that are halves of quads, (q, 2); empty if they cannot be identified.
+    """Return the pairs of triangles that are halves of quads, (q, 2); empty if quads cannot be identified.
 
     corner_counts : (n,) number of corners of each polygon of the file
     triangles : (f, 3) triangulated polygons, either in the order of the file, or all triangles first, then

@@ -32,9 +32,9 @@ from dermis.mesh.geometry import expand_runs, weld
 
 _MAX_HEADER_BYTES = 1 << 16  # bytes
 _MAX_ELEMENTS = {"vertex": limits.MAX_VERTICES, "face": limits.MAX_TRIANGLES}
-_MAX_PROPERTIES, _MAX_LISTS = 256, 8
+_MAX_PROPERTIES_PER_ELEMENT, _MAX_LISTS_PER_ELEMENT = 256, 8
 _BYTE_ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
-_SPACE_CODE = 32
+_SPACE_BYTE = 32
 _NUMPY_TYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),
     **dict.fromkeys(("uchar", "uint8"), "u1"),
@@ -50,10 +50,10 @@ _NUMPY_TYPES = {
 }
 UV_NAMES = (("texture_u", "texture_v"), ("u", "v"), ("s", "t"), ("s_coord", "t_coord"), ("tu", "tv"))
 COLOUR_NAMES = (("red", "green", "blue"), ("diffuse_red", "diffuse_green", "diffuse_blue"), ("r", "g", "b"))
-_FACE_NAMES = ("vertex_indices", "vertex_index")
+_FACE_LIST_NAMES = ("vertex_indices", "vertex_index")
 _SCALAR_PREFIX = "scalar_"  # prefix that CloudCompare writes before names of scanner values
 _ALPHA_NAMES = (("alpha",), ("diffuse_alpha",), ("a",))
-_SCANNER_VALUES = (
+_SCANNER_PROPERTIES = (
     *("confidence", "quality", "intensity", "density", "curvature", "radius", "flags", "value"),
     *("time", "timestamp", "id", "index", "original_index", "scan_index"),
     *("label", "class", "classification", "segment"),
@@ -68,7 +68,7 @@ PLY_PROPERTIES = (
     ),
     drawn_with_note("the same as floats above 1", "sRGB colours from 0 to 255"),
     noted(f"vertex: {in_code(name for (name,) in _ALPHA_NAMES)}", "no note if all are the same"),
-    drawn(f"face: {' or '.join(f'`{name}`' for name in _FACE_NAMES)}", "polygons"),
+    drawn(f"face: {' or '.join(f'`{name}`' for name in _FACE_LIST_NAMES)}", "polygons"),
     noted("faces of one or two corners"),
     drawn("face: `texcoord`", "uv of the corners of a face"),
     drawn_with_note("face: an empty `texcoord`", "as skin without uv"),
@@ -77,16 +77,16 @@ PLY_PROPERTIES = (
     drawn("`comment TextureFile NAME`", "colour picture in the folder of the file"),
     noted("`comment TextureFile NAME` of a missing file"),
     no_effect(
-        f"values of scanners: {in_code(_SCANNER_VALUES)}, `{_SCALAR_PREFIX}...`",
+        f"values of scanners: {in_code(_SCANNER_PROPERTIES)}, `{_SCALAR_PREFIX}...`",
         "they do not describe the look of a surface",
-        *_SCANNER_VALUES,
+        *_SCANNER_PROPERTIES,
     ),
     no_effect("other comments"),
     noted("other elements and properties"),
     refused("a file without faces", "a cloud of points"),
 )
 """Elements and properties of PLY files."""
-_WITHOUT_EFFECT = keys_of(PLY_PROPERTIES, "no effect")
+_PROPERTIES_WITHOUT_EFFECT = keys_of(PLY_PROPERTIES, "no effect")
 _HEADER_END = re.compile(rb"[\r\n]end_header[ \t]*(\r\n|\r|\n)")
 _STRUCT_CODES = dict(zip(dict.fromkeys(_NUMPY_TYPES.values()), "bBhHiIfdqQe", strict=True))
 
@@ -106,7 +106,7 @@ class _Element:
     properties: list[_Property]
 
 
-class _List(NamedTuple):
+class _ListColumn(NamedTuple):
     """List property of an element: lengths of the lists (n,), and the concatenated items."""
 
     lengths: Index
@@ -127,29 +127,29 @@ class _Header(NamedTuple):
     pictures: list[str]
 
 
-class _Columns(dict[str, "Numbers | _List"]):
+class _Columns(dict[str, "Numbers | _ListColumn"]):
     """Columns of an element by name; also records which columns were used."""
 
     def __init__(self) -> None:
         super().__init__()
         self.used: set[str] = set()
 
-    def take(self, names: Sequence[str]) -> Numbers | None:
+    def take(self, property_names: Sequence[str]) -> Numbers | None:
         """Return scalar properties as columns of an array (n, k); None unless all of them exist."""
-        columns = [column for name in names if isinstance(column := self.get(name), np.ndarray)]
-        if not columns or len(columns) < len(names):
+        columns = [column for name in property_names if isinstance(column := self.get(name), np.ndarray)]
+        if not columns or len(columns) < len(property_names):
             return None
-        self.used.update(names)
+        self.used.update(property_names)
         return np.column_stack(columns)
 
-    def take_first(self, choices: Sequence[Sequence[str]]) -> Numbers | None:
+    def take_first(self, property_choices: Sequence[Sequence[str]]) -> Numbers | None:
         """Return the first set of properties that exists as an array (n, k); None if there is none."""
-        return next((one for names in choices if (one := self.take(names)) is not None), None)
+        return next((one for names in property_choices if (one := self.take(names)) is not None), None)
 
-    def take_list(self, names: Sequence[str]) -> _List | None:
+    def take_list(self, list_names: Sequence[str]) -> _ListColumn | None:
         """Return the first existing list property among some names; None if none exists."""
-        for name in names:
-            if isinstance(column := self.get(name), _List):
+        for name in list_names:
+            if isinstance(column := self.get(name), _ListColumn):
                 self.used.add(name)
                 return column
         return None
@@ -189,28 +189,28 @@ def read_ply(path: Path) -> MeshFile:
     return MeshFile(parts, materials=materials, notes=tuple(notes))
 
 
-def _read_header(path: Path, data: bytes) -> _Header:
+def _read_header(path: Path, ply_bytes: bytes) -> _Header:
     """Return the header of a PLY file after checking its counts of elements and properties.
 
-    data : bytes of the whole file
+    ply_bytes : bytes of the whole file
 
     Raises DermisError for an invalid header.
     """
-    end = _HEADER_END.search(data, 0, _MAX_HEADER_BYTES)
-    if not data.startswith(b"ply") or end is None:
+    end = _HEADER_END.search(ply_bytes, 0, _MAX_HEADER_BYTES)
+    if not ply_bytes.startswith(b"ply") or end is None:
         refuse(path, "a PLY file", "it cannot be read (its header is invalid)", limits.DAMAGED_ADVICE)
-    size = end.end() - (end[1] == b"\r\n" and b"\n" not in data[: end.start()])
-    lines = decode_text(data[: end.start()]).split("\n")
+    size = end.end() - (end[1] == b"\r\n" and b"\n" not in ply_bytes[: end.start()])
+    lines = decode_text(ply_bytes[: end.start()]).split("\n")
     words = [line.split() for line in lines]
     properties = sum(line[:1] == ["property"] for line in words)
-    limits.check_limit(path, properties, _MAX_PROPERTIES, "properties", limits.DAMAGED_ADVICE)
+    limits.check_limit(path, properties, _MAX_PROPERTIES_PER_ELEMENT, "properties", limits.DAMAGED_ADVICE)
     header = _Header("", size, [], [])
     for line, text in zip(words, lines, strict=True):
         match line:
             case ["format", name, *_] if name in _BYTE_ORDERS:
                 header = header._replace(order=_BYTE_ORDERS[name])
             case ["element", *declared]:
-                header.elements.append(_declared_element(path, declared, len(data) - size))
+                header.elements.append(_declared_element(path, declared, len(ply_bytes) - size))
             case ["property", *declared] if header.elements:
                 header.elements[-1].properties.append(_declared_property(path, declared))
             case ["comment", key, _, *_] if key.lower() == "texturefile":
@@ -222,49 +222,51 @@ def _read_header(path: Path, data: bytes) -> _Header:
     return header
 
 
-def _declared_element(path: Path, words: Sequence[str], remaining_bytes: int) -> _Element:
+def _declared_element(path: Path, header_words: Sequence[str], remaining_bytes: int) -> _Element:
     """Return an element without its properties; refuse a count too large for a mesh or for the file's size.
 
-    words : words after "element"
+    header_words : words after "element"
     """
-    name, count = words if len(words) == 2 else ("", "")
+    name, count = header_words if len(header_words) == 2 else ("", "")
     if not (count.isdecimal() and len(count) < 12):
-        actual = f"got {' '.join(words)[:80]!r}"
+        actual = f"got {' '.join(header_words)[:80]!r}"
         refuse(path, "elements with a name and a number", actual, limits.DAMAGED_ADVICE)
     limit = min(_MAX_ELEMENTS.get(name, limits.MAX_TRIANGLES), remaining_bytes)
     limits.check_limit(path, int(count), limit, f"elements named {name!r}", limits.DECIMATE_ADVICE)
     return _Element(name, int(count), [])
 
 
-def _declared_property(path: Path, words: Sequence[str]) -> _Property:
+def _declared_property(path: Path, header_words: Sequence[str]) -> _Property:
     """Return a property.
 
-    words : words after "property"
+    header_words : words after "property"
     """
-    is_list = words[:1] == ["list"]
-    kinds = words[is_list:-1]
+    is_list = header_words[:1] == ["list"]
+    kinds = header_words[is_list:-1]
     if len(kinds) != 1 + is_list or not all(kind in _NUMPY_TYPES for kind in kinds):
-        actual = f"got {' '.join(words)[:80]!r}"
+        actual = f"got {' '.join(header_words)[:80]!r}"
         refuse(path, "properties with a name and known types", actual, limits.DAMAGED_ADVICE)
-    return _Property(words[-1], *(_NUMPY_TYPES[kind] for kind in reversed(kinds)))
+    return _Property(header_words[-1], *(_NUMPY_TYPES[kind] for kind in reversed(kinds)))
 
 
-def _read_elements(path: Path, header: _Header, data: Bytes) -> dict[str, _Columns]:
+def _read_elements(path: Path, header: _Header, ply_data: Bytes) -> dict[str, _Columns]:
     """Return the columns of all elements by name.
 
-    data : bytes after the header
+    ply_data : bytes after the header
     """
     is_text = header.order == _BYTE_ORDERS["ascii"]
     if is_text:
-        data = parse_numbers(data, len(run_starts(data > _SPACE_CODE)), np.float64).view(np.uint8)
+        ply_data = parse_numbers(ply_data, len(run_starts(ply_data > _SPACE_BYTE)), np.float64).view(np.uint8)
     tables, position = dict[str, _Columns](), 0
     for element in header.elements:
         if element.count:
-            reader = _ElementReader(path, element, header.order, is_text, data)
+            reader = _ElementReader(path, element, header.order, is_text, ply_data)
             tables[element.name], position = reader.read(position)
-    if position < len(data) and (is_text or (data[position:] > _SPACE_CODE).any()):
+    if position < len(ply_data) and (is_text or (ply_data[position:] > _SPACE_BYTE).any()):
         left, unit = (
-            (len(data) - position, "bytes") if not is_text else ((len(data) - position) // 8, "numbers")
+            (len(ply_data) - position, "bytes")
+            if not is_text
+            else ((len(ply_data) - position) // 8, "numbers")
         )
         actual = f"{left:,} {unit} follow its last element"
         refuse(path, "as much data as the header states", actual, limits.DAMAGED_ADVICE)
@@ -285,58 +287,62 @@ class _ElementReader:
     is_text: bool
     data: Bytes
 
-    def read(self, position: int) -> tuple[_Columns, int]:
+    def read(self, byte_position: int) -> tuple[_Columns, int]:
         """Return the columns of the element, and the position after its last row.
 
-        position : position of the first row [bytes]
+        byte_position : position of the first row [bytes]
         """
         columns, properties = _Columns(), self.element.properties
         lists = [one for one in properties if one.length_dtype]
-        limits.check_limit(self.path, len(lists), _MAX_LISTS, "lists of an element", limits.DAMAGED_ADVICE)
-        lengths = dict(zip(lists, self._list_lengths(position), strict=True))
+        limits.check_limit(
+            self.path, len(lists), _MAX_LISTS_PER_ELEMENT, "lists of an element", limits.DAMAGED_ADVICE
+        )
+        lengths = dict(zip(lists, self._list_lengths(byte_position), strict=True))
         size = np.full(self.element.count, self._fixed_size(properties), np.int64)
         for one, length in lengths.items():
             size += length * self._dtype(one.dtype).itemsize
-        start = position + np.cumsum(size) - size
+        start = byte_position + np.cumsum(size) - size
         end = int(start[-1] + size[-1])
         self._check_end(end)
         for one in properties:
             count = lengths.get(one, np.ones_like(start))
             start = start + (self._dtype(one.length_dtype).itemsize if one.length_dtype else 0)
             values = self._gather_values(start, count, one.dtype, size)
-            columns[one.name] = _List(count, values) if one.length_dtype else values
+            columns[one.name] = _ListColumn(count, values) if one.length_dtype else values
             start = start + count * self._dtype(one.dtype).itemsize
         return columns, end
 
-    def _dtype(self, name: str) -> np.dtype[Any]:
-        return np.dtype(np.float64 if self.is_text else self.order + name)
+    def _dtype(self, type_name: str) -> np.dtype[Any]:
+        return np.dtype(np.float64 if self.is_text else self.order + type_name)
 
     def _fixed_size(self, properties: Sequence[_Property]) -> int:
         """Return the size of a row's properties without the items of lists [bytes]."""
         return sum(self._dtype(one.length_dtype or one.dtype).itemsize for one in properties)
 
-    def _check_end(self, end: int) -> None:
-        if end > len(self.data):
+    def _check_end(self, end_byte: int) -> None:
+        if end_byte > len(self.data):
             actual = f"it ends within its elements named {self.element.name!r}"
             refuse(self.path, "as much data as the header states", actual, limits.DAMAGED_ADVICE)
 
-    def _gather_values(self, start: Index, count: Index, dtype: str, row_size: Index) -> Numbers:
+    def _gather_values(
+        self, first_byte: Index, value_count: Index, type_name: str, row_bytes: Index
+    ) -> Numbers:
         """Return the values of a property in all rows, concatenated.
 
-        start, count : (n,) position of each row's first value [bytes], and number of its values
-        row_size : (n,) size of each row [bytes]
+        first_byte, value_count : (n,) position of each row's first value [bytes], and number of its values
+        row_bytes : (n,) size of each row [bytes]
         """
-        stored = self._dtype(dtype)
-        if (row_size == row_size[0]).all() and (count == count[0]).all():
-            shape, strides = (len(count), int(count[0])), (int(row_size[0]), stored.itemsize)
-            values = np.ndarray(shape, stored, self.data, int(start[0]), strides).reshape(-1)
+        stored = self._dtype(type_name)
+        if (row_bytes == row_bytes[0]).all() and (value_count == value_count[0]).all():
+            shape, strides = (len(value_count), int(value_count[0])), (int(row_bytes[0]), stored.itemsize)
+            values = np.ndarray(shape, stored, self.data, int(first_byte[0]), strides).reshape(-1)
         else:
-            row, item = expand_runs(np.zeros_like(count), count)
-            first = start[row] + stored.itemsize * item
+            row, item = expand_runs(np.zeros_like(value_count), value_count)
+            first = first_byte[row] + stored.itemsize * item
             values = self.data[first[:, None] + np.arange(stored.itemsize)].view(stored).reshape(-1)
-        return np.asarray(values.astype(dtype))
+        return np.asarray(values.astype(type_name))
 
-    def _list_lengths(self, position: int) -> list[Index]:
+    def _list_lengths(self, byte_position: int) -> list[Index]:
         """Return the lengths of each list property, (n,) each."""
         steps, skipped = list[_ListStep](), list[_Property]()
         for one in self.element.properties:
@@ -348,20 +354,22 @@ class _ElementReader:
         if not steps:
             return []
         trailing_bytes, count = self._fixed_size(skipped), self.element.count
-        lengths, end = self._read_rows(position, steps, trailing_bytes, 1)
-        if not self._is_uniform(position, end - position, steps, lengths[0]):
-            lengths, _ = self._read_rows(position, steps, trailing_bytes, count)
+        lengths, end = self._read_rows(byte_position, steps, trailing_bytes, 1)
+        if not self._is_uniform(byte_position, end - byte_position, steps, lengths[0]):
+            lengths, _ = self._read_rows(byte_position, steps, trailing_bytes, count)
         return list(np.broadcast_to(lengths, (count, len(steps))).T)
 
-    def _is_uniform(self, position: int, size: int, steps: Sequence[_ListStep], lengths: Index) -> bool:
+    def _is_uniform(
+        self, byte_position: int, row_bytes: int, list_steps: Sequence[_ListStep], list_lengths: Index
+    ) -> bool:
         """Return whether the lists of all rows have the lengths of the first row.
 
-        size : size of the first row [bytes]
+        row_bytes : size of the first row [bytes]
         """
-        start = position + size * np.arange(self.element.count)
-        if start[-1] + size > len(self.data):
+        start = byte_position + row_bytes * np.arange(self.element.count)
+        if start[-1] + row_bytes > len(self.data):
             return False
-        for step, length in zip(steps, lengths.tolist(), strict=True):
+        for step, length in zip(list_steps, list_lengths.tolist(), strict=True):
             start = start + step.skip
             stored = self.data[start[:, None] + np.arange(step.length.itemsize)].view(step.length)
             if (stored != length).any():
@@ -370,30 +378,30 @@ class _ElementReader:
         return True
 
     def _read_rows(
-        self, position: int, steps: Sequence[_ListStep], trailing_bytes: int, rows: int
+        self, byte_position: int, list_steps: Sequence[_ListStep], trailing_bytes: int, row_count: int
     ) -> tuple[Index, int]:
-        """Read rows in sequence; return the lengths of their lists (rows, lists), and the next position.
+        """Read rows in sequence; return the lengths of their lists (row_count, lists), and the next position.
 
         trailing_bytes : size of the properties after the last list [bytes]
         """
         lengths, data, end = [], memoryview(self.data.tobytes()), len(self.data)
-        readers = [struct.Struct(self.order + _STRUCT_CODES[step.length.str[1:]]) for step in steps]
+        readers = [struct.Struct(self.order + _STRUCT_CODES[step.length.str[1:]]) for step in list_steps]
         walked = [
             (step.skip, reader.unpack_from, reader.size, step.item_size)
-            for step, reader in zip(steps, readers, strict=True)
+            for step, reader in zip(list_steps, readers, strict=True)
         ]
         try:
-            for _ in range(rows):
+            for _ in range(row_count):
                 for skip, unpack, length_size, item_size in walked:
-                    position += skip
-                    (length,) = unpack(data, position)
+                    byte_position += skip
+                    (length,) = unpack(data, byte_position)
                     lengths.append(length)
-                    position += length_size + int(length) * item_size
-                position += trailing_bytes
+                    byte_position += length_size + int(length) * item_size
+                byte_position += trailing_bytes
         except struct.error:
-            position = end + 1
-        self._check_end(end + 1 if lengths and min(lengths) < 0 else position)
-        return np.array(lengths, np.int64).reshape(rows, len(steps)), position
+            byte_position = end + 1
+        self._check_end(end + 1 if lengths and min(lengths) < 0 else byte_position)
+        return np.array(lengths, np.int64).reshape(row_count, len(list_steps)), byte_position
 
 
 class _ListStep(NamedTuple):
@@ -409,12 +417,14 @@ def _polygon_corners(path: Path, faces: _Columns, strips: _Columns, vertex_count
 
     vertex_count : number of vertices in the file
     """
-    own, counts, index = faces.take_list(_FACE_NAMES), np.empty(0, np.int64), np.empty(0, np.int64)
+    own, counts, index = faces.take_list(_FACE_LIST_NAMES), np.empty(0, np.int64), np.empty(0, np.int64)
     if faces and own is None:
-        refuse(path, f"faces with {_FACE_NAMES[0]}", f"they have {list_names(faces)}", limits.DAMAGED_ADVICE)
+        refuse(
+            path, f"faces with {_FACE_LIST_NAMES[0]}", f"they have {list_names(faces)}", limits.DAMAGED_ADVICE
+        )
     if own is not None:
         counts, index = own.lengths, own.items.astype(np.int64)
-    if (strip := strips.take_list(_FACE_NAMES)) is not None:
+    if (strip := strips.take_list(_FACE_LIST_NAMES)) is not None:
         triangles = _strip_triangles(strip)
         counts = np.concatenate([counts, np.full(len(triangles), 3)])
         index = np.concatenate([index, triangles.ravel()])
@@ -425,9 +435,9 @@ def _polygon_corners(path: Path, faces: _Columns, strips: _Columns, vertex_count
     return counts, index
 
 
-def _strip_triangles(strips: _List) -> Index:
+def _strip_triangles(strip_lists: _ListColumn) -> Index:
     """Return the triangles (t, 3) of strips that are separated by -1; every second triangle is reversed."""
-    index = np.insert(strips.items.astype(np.int64), np.cumsum(strips.lengths), -1)
+    index = np.insert(strip_lists.items.astype(np.int64), np.cumsum(strip_lists.lengths), -1)
     place = np.arange(len(index))
     step = place - np.maximum.accumulate(np.where(index < 0, place, -1)) - 1
     triangles = np.column_stack((index[:-2], index[1:-1], index[2:]))
@@ -438,22 +448,22 @@ def _strip_triangles(strips: _List) -> Index:
 
 
 def _corner_uv(
-    path: Path, vertices: _Columns, faces: _Columns, counts: Index, index: Index
+    path: Path, vertex_columns: _Columns, face_columns: _Columns, corner_counts: Index, corner_vertex: Index
 ) -> tuple[Doubles, Index]:
     """Return uv coordinates (t, 2), and the index of each corner's uv, -1 if there is none.
 
-    counts, index : number of corners of each polygon, and the vertex of each corner
+    corner_counts, corner_vertex : number of corners of each polygon, and the vertex of each corner
     """
-    wedges = faces.take_list(("texcoord",))
+    wedges = face_columns.take_list(("texcoord",))
     if wedges is None:
-        uv = vertices.take_first(UV_NAMES)
-        none = np.empty((0, 2)), np.full_like(index, -1)
-        return none if uv is None else (to_floats(uv), index)
-    given, expected = wedges.lengths > 0, counts[: len(wedges.lengths)]
+        uv = vertex_columns.take_first(UV_NAMES)
+        none = np.empty((0, 2)), np.full_like(corner_vertex, -1)
+        return none if uv is None else (to_floats(uv), corner_vertex)
+    given, expected = wedges.lengths > 0, corner_counts[: len(wedges.lengths)]
     if (wedges.lengths[given] != 2 * expected[given]).any():
         actual = "some have other numbers of them"
         refuse(path, "texcoord with u and v for each corner of a face", actual, limits.DAMAGED_ADVICE)
-    uv, uv_index = to_floats(wedges.items.reshape(-1, 2)), np.full_like(index, -1)
+    uv, uv_index = to_floats(wedges.items.reshape(-1, 2)), np.full_like(corner_vertex, -1)
     same = weld(uv)
     uv_index[: expected.sum()][np.repeat(given, expected)] = same
     unique = np.empty((same.max(initial=-1) + 1, 2))
@@ -461,9 +471,9 @@ def _corner_uv(
     return unique, uv_index
 
 
-def _vertex_colours(vertices: _Columns) -> tuple[Doubles | None, list[str]]:
+def _vertex_colours(vertex_columns: _Columns) -> tuple[Doubles | None, list[str]]:
     """Return the linear colours (n, 3) of vertices or None, and notes."""
-    values, alpha = vertices.take_first(COLOUR_NAMES), vertices.take_first(_ALPHA_NAMES)
+    values, alpha = vertex_columns.take_first(COLOUR_NAMES), vertex_columns.take_first(_ALPHA_NAMES)
     notes = []
     if alpha is not None and len(np.unique(alpha)) > 1:
         notes.append("the transparency of vertices (alpha) is left out")
@@ -473,31 +483,33 @@ def _vertex_colours(vertices: _Columns) -> tuple[Doubles | None, list[str]]:
     return colours, notes + faults
 
 
-def _main_picture(names: Sequence[str], picture_index: Numbers | None) -> tuple[str | None, list[str]]:
+def _main_picture(
+    picture_names: Sequence[str], picture_index: Numbers | None
+) -> tuple[str | None, list[str]]:
     """Return the picture that most faces use, and a note on the other pictures.
 
-    names : names of the pictures
-    picture_index : (n, 1) index of each face's picture in `names`; None if the file states none
+    picture_names : names of the pictures
+    picture_index : (n, 1) index of each face's picture in `picture_names`; None if the file states none
     """
-    if not names:
+    if not picture_names:
         return None, []
     used, counts = np.unique(
-        0 if picture_index is None else np.clip(picture_index, 0, len(names) - 1), return_counts=True
+        0 if picture_index is None else np.clip(picture_index, 0, len(picture_names) - 1), return_counts=True
     )
-    chosen = names[int(used[counts.argmax()])]
-    others = [name for name in dict.fromkeys(names) if name != chosen]
+    chosen = picture_names[int(used[counts.argmax()])]
+    others = [name for name in dict.fromkeys(picture_names) if name != chosen]
     return chosen, [f"of several pictures {chosen} is used; left out: {list_names(others)}"] if others else []
 
 
-def _unread_notes(tables: Mapping[str, _Columns]) -> list[str]:
+def _unread_notes(element_columns: Mapping[str, _Columns]) -> list[str]:
     """Return a note on elements and properties that have no effect."""
-    ignored = [name for name, columns in tables.items() if not columns.used]
+    ignored = [name for name, columns in element_columns.items() if not columns.used]
     ignored += [
         f"{element} {name}"
-        for element, columns in tables.items()
+        for element, columns in element_columns.items()
         for name in columns
         if columns.used
-        and name not in (*columns.used, *_WITHOUT_EFFECT)
+        and name not in (*columns.used, *_PROPERTIES_WITHOUT_EFFECT)
         and not name.startswith(_SCALAR_PREFIX)
     ]
     return [f"these are left out: {list_names(ignored)}"] if ignored else []

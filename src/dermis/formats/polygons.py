@@ -41,15 +41,17 @@ class Polygons:
         """Return the mask (n,) of polygons whose corners all have uv."""
         return np.minimum.reduceat(self.corners[:, 1], np.cumsum(self.counts) - self.counts) >= 0
 
-    def parts(self, groups: Sequence[MaterialGroup], group: Index, order: TriangleOrder) -> list[MeshPart]:
+    def parts(
+        self, groups: Sequence[MaterialGroup], group_index: Index, triangle_order: TriangleOrder
+    ) -> list[MeshPart]:
         """Return a mesh part for each group that has polygons, in the order of the groups' first polygons.
 
-        groups, group : all groups, and (n,) index in `groups` for each polygon
-        order : order of the triangles, see `triangulate`
+        groups, group_index : all groups, and (n,) index in `groups` for each polygon
+        triangle_order : order of the triangles, see `triangulate`
 
         Polygons without uv become separate parts, whose uv is None.
         """
-        keys, first, key = np.unique(2 * group + ~self.has_uv(), return_index=True, return_inverse=True)
+        keys, first, key = np.unique(2 * group_index + ~self.has_uv(), return_index=True, return_inverse=True)
         by_first = np.argsort(first)
         rank = np.argsort(by_first)[key]
         polygons = np.argsort(rank, kind="stable")
@@ -58,10 +60,14 @@ class Polygons:
         ends = np.cumsum(np.bincount(rank))[:-1]
         pieces = np.split(counts, ends), np.split(corners, np.cumsum(counts)[ends - 1])
         chosen = [groups[one] for one in keys[by_first] // 2]
-        return [self._build_part(*piece, order) for piece in zip(chosen, *pieces, strict=True)]
+        return [self._build_part(*piece, triangle_order) for piece in zip(chosen, *pieces, strict=True)]
 
     def _build_part(
-        self, group: MaterialGroup, counts: Index, corners: Index, order: TriangleOrder
+        self,
+        material_group: MaterialGroup,
+        corner_counts: Index,
+        corners: Index,
+        triangle_order: TriangleOrder,
     ) -> MeshPart:
         """Return selected polygons as a part with one vertex per combination of position, normal and uv."""
         vertex, uv, normal = corners.T + np.array([[0], [1], [1]])
@@ -76,9 +82,9 @@ class Polygons:
             keys, index = np.unique((vertex * sizes[0] + normal) * sizes[1] + uv, return_inverse=True)
             keys, uv = np.divmod(keys, sizes[1])
             vertex, normal = np.divmod(keys, sizes[0])
-        triangles, quads = triangulate(counts, order)
+        triangles, quads = triangulate(corner_counts, triangle_order)
         return MeshPart(
-            group,
+            material_group,
             self.positions[vertex] + 0.0,  # converts -0 to 0
             self.uv[uv - 1] if uv.all() else None,
             np.where(normal[:, None], self.normals[normal - 1] + 0.0, np.nan) if normal.any() else None,
@@ -95,25 +101,25 @@ def missing_uv(polygons: Polygons) -> list[str]:
     return [f"{missing:,} of {len(has_uv):,} faces have no uv"] if 0 < missing < len(has_uv) else []
 
 
-def check_polygon_sizes(path: Path, counts: Index) -> None:
+def check_polygon_sizes(path: Path, corner_counts: Index) -> None:
     """Refuse polygons with too many corners (n,), or with too many triangles in total."""
-    corners, triangles = int(counts.max(initial=0)), int(np.maximum(counts - 2, 0).sum())
+    corners, triangles = int(corner_counts.max(initial=0)), int(np.maximum(corner_counts - 2, 0).sum())
     advice = "Divide it into smaller ones"
-    limits.check_limit(path, corners, limits.MAX_CORNERS, "corners of a face", advice)
+    limits.check_limit(path, corners, limits.MAX_POLYGON_CORNERS, "corners of a face", advice)
     limits.check_limit(path, triangles, limits.MAX_TRIANGLES, "triangles", limits.DECIMATE_ADVICE)
 
 
-def without_small_polygons(counts: Index, corners: Index) -> tuple[Index, Index, Mask, list[str]]:
+def without_small_polygons(corner_counts: Index, corners: Index) -> tuple[Index, Index, Mask, list[str]]:
     """Remove polygons of fewer than three corners.
 
-    Returns `counts` and `corners` of the remaining polygons, the mask (n,) that selects these polygons, and a
-    list with a note if any polygons were removed.
+    Returns `corner_counts` and `corners` of the remaining polygons, the mask (n,) that selects these
+    polygons, and a list with a note if any polygons were removed.
     """
-    kept = counts >= 3
+    kept = corner_counts >= 3
     if kept.all():
-        return counts, corners, kept, []
+        return corner_counts, corners, kept, []
     note = f"{np.count_nonzero(~kept):,} faces of fewer than three corners are left out"
-    return counts[kept], corners[np.repeat(kept, counts)], kept, [note]
+    return corner_counts[kept], corners[np.repeat(kept, corner_counts)], kept, [note]
 
 
 def refuse_without_faces(path: Path, point_count: int) -> NoReturn:
@@ -128,22 +134,22 @@ def refuse_without_faces(path: Path, point_count: int) -> NoReturn:
     )
 
 
-def triangulate(counts: Index, order: TriangleOrder) -> tuple[Index, Index]:
+def triangulate(corner_counts: Index, triangle_order: TriangleOrder) -> tuple[Index, Index]:
     """Triangulate polygons as fans; return the corners of triangles (f, 3), and the halves of quads (q, 2).
 
-    counts : (n,) number of corners of each polygon; corners are numbered consecutively
-    order : "by polygon", or "by kind": all triangles first, then the first halves of all quads, their second
-        halves, and all other polygons; files of quads alone are always ordered by kind
+    corner_counts : (n,) number of corners of each polygon; corners are numbered consecutively
+    triangle_order : "by polygon", or "by kind": all triangles first, then the first halves of all quads,
+        their second halves, and all other polygons; files of quads alone are always ordered by kind
     """
-    sizes = counts - 2
+    sizes = corner_counts - 2
     polygon, step = expand_runs(np.zeros_like(sizes), sizes)
-    corner = (np.cumsum(counts) - counts)[polygon]
+    corner = (np.cumsum(corner_counts) - corner_counts)[polygon]
     triangles = np.column_stack((corner, corner + step + 1, corner + step + 2))
-    is_quad = counts[polygon] == 4
+    is_quad = corner_counts[polygon] == 4
     second = is_quad & (step == 1)
     triangles[second] = np.roll(triangles[second], -1, axis=1)
-    if order == "by kind" or is_quad.all():
-        kind = np.where(is_quad, 1 + step, np.where(counts[polygon] == 3, 0, 3))
+    if triangle_order == "by kind" or is_quad.all():
+        kind = np.where(is_quad, 1 + step, np.where(corner_counts[polygon] == 3, 0, 3))
         sequence = np.argsort(kind, kind="stable")
         triangles, is_quad, second = triangles[sequence], is_quad[sequence], second[sequence]
     return triangles, np.column_stack((np.flatnonzero(is_quad & ~second), np.flatnonzero(second)))

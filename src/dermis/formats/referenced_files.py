@@ -11,15 +11,15 @@ from dermis.base.reading import is_file
 _MAX_PATH_LENGTH = 4096  # characters; some systems are slow to refuse longer paths
 
 
-def find_referenced_file(path: Path, name: str) -> Path | None:
-    """Return the path of an existing file that a mesh file references by name; None if it does not exist.
+def find_referenced_file(path: Path, file_name: str) -> Path | None:
+    """Return the path of an existing file that a mesh file references by name; None for a missing file.
 
     path : path of the mesh file
-    name : name relative to the folder of the mesh file; Windows separators are accepted
+    file_name : name relative to the folder of the mesh file; Windows separators are accepted
 
     If the name leads outside the folder, its last component is looked up in the folder.
     """
-    named = PureWindowsPath(name.strip().strip('"'))
+    named = PureWindowsPath(file_name.strip().strip('"'))
     for candidate in (named, PureWindowsPath(named.name)):
         file = _resolve_below(path.parent, candidate)
         if file is not None and is_file(file):
@@ -28,7 +28,7 @@ def find_referenced_file(path: Path, name: str) -> Path | None:
 
 
 def resolve_uri(path: Path, uri: str) -> Path:
-    """Return the path of a file that a glTF file references by a relative URI; it need not exist.
+    """Return the path of a file that a glTF file references by a relative URI; the file need not exist.
 
     Raises DermisError for a file outside the folder of the glTF file, even if a link in it leads there.
     """
@@ -40,13 +40,13 @@ def resolve_uri(path: Path, uri: str) -> Path:
     return file
 
 
-def _resolve_below(folder: Path, name: PureWindowsPath) -> Path | None:
+def _resolve_below(folder: Path, file_name: PureWindowsPath) -> Path | None:
     """Return the resolved path of a name relative to a folder; None for a path outside the folder."""
-    if len(str(name)) > _MAX_PATH_LENGTH:
+    if len(str(file_name)) > _MAX_PATH_LENGTH:
         return None
     try:
         root = folder.resolve()
-        file = root.joinpath(*name.parts).resolve()
+        file = root.joinpath(*file_name.parts).resolve()
     except (OSError, ValueError):  # too long, a NUL, or circular links
         return None
-    return None if name.anchor or not file.is_relative_to(root) else file
+    return None if file_name.anchor or not file.is_relative_to(root) else file

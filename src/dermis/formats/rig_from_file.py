@@ -10,71 +10,75 @@ from dermis.base.arrays import Doubles, Floats, Index, Ints, Mask
 from dermis.base.errors import refuse
 from dermis.formats.parts import Bones, MeshPart
 from dermis.formats.size_limits import DAMAGED_ADVICE
-from dermis.mesh.rig import INFLUENCES, MorphTargets, Rig, Skeleton, no_targets
+from dermis.mesh.rig import BONES_PER_POINT, MorphTargets, Rig, Skeleton, no_targets
 
-SPLIT_TOLERANCE_MM = 0.01
+COINCIDENCE_TOLERANCE_MM = 0.01
 """Distance beyond which coincident vertices that a morph target moves apart become separate points, such as
 those of touching lips [mm]."""
-_MAX_COINCIDENT = 64  # vertices at one position that move differently
-_WEIGHT_TOLERANCE = 0.004  # one step of 8-bit weights
+_MAX_COINCIDENT_VERTICES = 64  # vertices at one position that move differently
+_BONE_WEIGHT_TOLERANCE = 0.004  # one step of 8-bit weights
 _MIN_DISPLACEMENT_MM = 1e-4  # smaller displacements are rounding errors and count as 0
 
 
-def split_points(point: Ints, part: MeshPart, linear: Doubles, culprit: object) -> Ints:
+def split_points(point: Ints, mesh_part: MeshPart, linear_to_head: Doubles, culprit: object) -> Ints:
     """Return point indices (v,) in which coincident vertices that move differently are separate points.
 
     point : (v,) index of the point of each vertex, welded by position
-    part : vertices with their morph targets and bone weights
-    linear : (3, 3) matrix from the file's space to the head's [mm]
+    mesh_part : vertices with their morph targets and bone weights
+    linear_to_head : (3, 3) matrix from the file's space to the head's [mm]
 
     Raises DermisError if too many vertices at one position move differently.
     """
     remaining = np.flatnonzero(np.bincount(point)[point] > 1)
     copy, number = np.zeros(len(point), np.int64), 0
     while len(remaining):
-        if number > _MAX_COINCIDENT:
+        if number > _MAX_COINCIDENT_VERTICES:
             actual = f"{number} of them move differently"
             refuse(culprit, "a few coincident vertices", actual, DAMAGED_ADVICE)
         groups, first = np.unique(point[remaining], return_index=True)
         other = remaining[first[np.searchsorted(groups, point[remaining])]]
-        apart = _targets_differ(part, remaining, other, linear) | _weights_differ(part, remaining, other)
+        apart = _targets_differ(mesh_part, remaining, other, linear_to_head) | _weights_differ(
+            mesh_part, remaining, other
+        )
         copy[remaining[~apart]] = number
         remaining, number = remaining[apart], number + 1
     _, split = np.unique(point * np.int64(number + 1) + copy, return_inverse=True)
     return np.asarray(split.reshape(-1), np.int32)
 
 
-def _targets_differ(part: MeshPart, first: Index, second: Index, linear: Doubles) -> Mask:
+def _targets_differ(
+    mesh_part: MeshPart, first_vertex: Index, second_vertex: Index, linear_to_head: Doubles
+) -> Mask:
     """Return the mask (n,) of vertex pairs that some morph target moves apart.
 
-    first, second : (n,) vertex indices of the pairs
-    linear : (3, 3) matrix from the file's space to the head's [mm]
+    first_vertex, second_vertex : (n,) vertex indices of the pairs
+    linear_to_head : (3, 3) matrix from the file's space to the head's [mm]
     """
-    apart, delta = np.zeros(len(first), bool), np.zeros((len(part.positions), 3))
-    for vertex, delta_of_vertex in part.targets.values():
-        delta[vertex] = delta_of_vertex @ linear.T
-        apart |= np.linalg.norm(delta[first] - delta[second], axis=1) > SPLIT_TOLERANCE_MM
+    apart, delta = np.zeros(len(first_vertex), bool), np.zeros((len(mesh_part.positions), 3))
+    for vertex, delta_of_vertex in mesh_part.targets.values():
+        delta[vertex] = delta_of_vertex @ linear_to_head.T
+        apart |= np.linalg.norm(delta[first_vertex] - delta[second_vertex], axis=1) > COINCIDENCE_TOLERANCE_MM
         delta[vertex] = 0
     return apart
 
 
-def _weights_differ(part: MeshPart, first: Index, second: Index) -> Mask:
+def _weights_differ(mesh_part: MeshPart, first_vertex: Index, second_vertex: Index) -> Mask:
     """Return the mask (n,) of vertex pairs with different bone weights.
 
-    first, second : (n,) vertex indices of the pairs
+    first_vertex, second_vertex : (n,) vertex indices of the pairs
     """
-    if part.bone is None or part.weight is None:
-        return np.zeros(len(first), bool)
-    bones = np.concatenate([part.bone[first], part.bone[second]], axis=1)
-    weights = np.concatenate([part.weight[first], -part.weight[second]], axis=1)
+    if mesh_part.bone is None or mesh_part.weight is None:
+        return np.zeros(len(first_vertex), bool)
+    bones = np.concatenate([mesh_part.bone[first_vertex], mesh_part.bone[second_vertex]], axis=1)
+    weights = np.concatenate([mesh_part.weight[first_vertex], -mesh_part.weight[second_vertex]], axis=1)
     same = bones[:, :, None] == bones[:, None, :]
-    return np.asarray((np.abs((same * weights[:, None, :]).sum(axis=2)) > _WEIGHT_TOLERANCE).any(axis=1))
+    return np.asarray((np.abs((same * weights[:, None, :]).sum(axis=2)) > _BONE_WEIGHT_TOLERANCE).any(axis=1))
 
 
 def build_rig(
     positions_mm: Floats,
     point: Ints,
-    part: MeshPart,
+    mesh_part: MeshPart,
     bones: Bones | None,
     weights: Mapping[str, float],
     to_head: Doubles,
@@ -84,44 +88,44 @@ def build_rig(
 
     positions_mm : (v, 3) vertices in the head's space
     point : (v,) index of the point of each vertex
-    part : the same vertices with their morph targets and bone weights, in the file's space
+    mesh_part : the same vertices with their morph targets and bone weights, in the file's space
     weights : default weights of morph targets by name
     to_head : (4, 4) matrix from the file's space to the head's [mm]
 
     Raises DermisError for bones with a scale of 0.
     """
-    if not part.targets and bones is None:
+    if not mesh_part.targets and bones is None:
         return None
     _, first = np.unique(point, return_index=True)
     point_positions = np.ascontiguousarray(positions_mm[first])
-    skeleton = None if bones is None else _point_skeleton(part, bones, first, to_head, culprit)
-    return Rig(point_positions, _point_targets(part, point, first, weights, to_head), skeleton)
+    skeleton = None if bones is None else _point_skeleton(mesh_part, bones, first, to_head, culprit)
+    return Rig(point_positions, _point_targets(mesh_part, point, first, weights, to_head), skeleton)
 
 
 def _point_targets(
-    part: MeshPart, point: Ints, first: Index, weights: Mapping[str, float], to_head: Doubles
+    mesh_part: MeshPart, point: Ints, first_vertex: Index, weights: Mapping[str, float], to_head: Doubles
 ) -> MorphTargets:
     """Return the morph targets of the p points of a mesh.
 
     point : (v,) index of the point of each vertex
-    first : (p,) first vertex of each point, whose displacement the point gets
+    first_vertex : (p,) first vertex of each point, whose displacement the point gets
     weights : default weights by target name
     """
-    if not part.targets:
+    if not mesh_part.targets:
         return no_targets()
     is_first = np.zeros(len(point), bool)
-    is_first[first] = True
+    is_first[first_vertex] = True
     points, deltas = [], []
-    for vertex, delta in part.targets.values():
+    for vertex, delta in mesh_part.targets.values():
         delta_mm = (delta @ to_head[:3, :3].T).astype(np.float32)
         used = np.flatnonzero(is_first[vertex] & (np.abs(delta_mm) > _MIN_DISPLACEMENT_MM).any(axis=1))
         used = used[np.argsort(point[vertex[used]])]
         points.append(point[vertex[used]])
         deltas.append(delta_mm[used])
     start = np.cumsum([0, *map(len, points)]).astype(np.int32)
-    rest = np.array([weights.get(name, 0.0) for name in part.targets], np.float32)
+    rest = np.array([weights.get(name, 0.0) for name in mesh_part.targets], np.float32)
     return MorphTargets(
-        tuple(part.targets),
+        tuple(mesh_part.targets),
         start,
         np.concatenate(points),
         np.concatenate(deltas),
@@ -130,16 +134,19 @@ def _point_targets(
 
 
 def _point_skeleton(
-    part: MeshPart, bones: Bones, first: Index, to_head: Doubles, culprit: object
+    mesh_part: MeshPart, bones: Bones, first_vertex: Index, to_head: Doubles, culprit: object
 ) -> Skeleton:
     """Return the skeleton of the p points of a mesh.
 
-    first : (p,) first vertex of each point, whose bone weights the point gets
+    first_vertex : (p,) first vertex of each point, whose bone weights the point gets
     """
-    assert part.bone is not None and part.weight is not None
-    bone = np.zeros((len(first), INFLUENCES), np.int32)
-    weight = np.zeros((len(first), INFLUENCES), np.float32)
-    bone[:, : part.bone.shape[1]], weight[:, : part.weight.shape[1]] = part.bone[first], part.weight[first]
+    assert mesh_part.bone is not None and mesh_part.weight is not None
+    bone = np.zeros((len(first_vertex), BONES_PER_POINT), np.int32)
+    weight = np.zeros((len(first_vertex), BONES_PER_POINT), np.float32)
+    bone[:, : mesh_part.bone.shape[1]], weight[:, : mesh_part.weight.shape[1]] = (
+        mesh_part.bone[first_vertex],
+        mesh_part.weight[first_vertex],
+    )
     size = np.linalg.norm(bones.world[:, :3, :3], axis=(1, 2))
     flat = np.abs(np.linalg.det(bones.world[:, :3, :3])) <= 1e-9 * size**3
     unusable = np.flatnonzero(flat & np.isin(np.arange(len(flat)), bone[weight > 0]))

@@ -53,18 +53,18 @@ class Sample:
     height_mm: float | None = None
 
 
-def _load_registry() -> Mapping[str, Sample]:
+def _load_sample_registry() -> Mapping[str, Sample]:
     text = resources.files(__package__).joinpath("samples.toml").read_text("utf-8")
     return MappingProxyType({name: _parse_sample(name, entry) for name, entry in tomllib.loads(text).items()})
 
 
-def _parse_sample(name: str, entry: dict[str, Any]) -> Sample:
-    home, listed = entry.pop("home"), entry.pop("files")
+def _parse_sample(sample_name: str, sample_table: dict[str, Any]) -> Sample:
+    home, listed = sample_table.pop("home"), sample_table.pop("files")
     files = {role: SampleFile(**file, url=home + file["name"]) for role, file in listed.items()}
-    return Sample(name=name, files=MappingProxyType(files), **entry)
+    return Sample(name=sample_name, files=MappingProxyType(files), **sample_table)
 
 
-SAMPLES = _load_registry()
+SAMPLES = _load_sample_registry()
 
 
 def fetch_sample(name: str) -> dict[str, Path]:
@@ -96,10 +96,12 @@ def is_available(name: str) -> bool:
     return all(_has_expected_hash(folder / file.name, file) for file in sample.files.values())
 
 
-def _find_sample(name: str) -> Sample:
-    if name not in SAMPLES:
-        refuse(f"sample {name!r}", f"one of {', '.join(SAMPLES)}", "it is unknown", "Choose one of them")
-    return SAMPLES[name]
+def _find_sample(sample_name: str) -> Sample:
+    if sample_name not in SAMPLES:
+        refuse(
+            f"sample {sample_name!r}", f"one of {', '.join(SAMPLES)}", "it is unknown", "Choose one of them"
+        )
+    return SAMPLES[sample_name]
 
 
 def _data_folder() -> str:
@@ -111,19 +113,19 @@ def _sample_folder(sample: Sample) -> Path:
     return Path(base) / sample.folder
 
 
-def _has_expected_hash(path: Path, file: SampleFile) -> bool:
+def _has_expected_hash(path: Path, sample_file: SampleFile) -> bool:
     """Return whether a file exists and has the expected SHA-256."""
     try:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):  # a pipe would block the reader
             return False
-        return _file_sha256(path, status.st_size, status.st_mtime_ns) == file.sha256
+        return _file_sha256(path, status.st_size, status.st_mtime_ns) == sample_file.sha256
     except OSError:
         return False
 
 
 @lru_cache(maxsize=256)
-def _file_sha256(path: Path, size: int, mtime_ns: int) -> str:
+def _file_sha256(path: Path, byte_count: int, mtime_ns: int) -> str:
     """Return the SHA-256 of a file; the result is cached for its size and modification time."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
@@ -167,7 +169,7 @@ class _DownloadProgress:
         self._bars.reset(self._task)
 
     def close(self) -> None:
-        """Do nothing: pooch calls it only after success, so `stop` removes the bar instead."""
+        """Do nothing: pooch calls `close` only after success, so `stop` removes the bar instead."""
 
     def stop(self) -> None:
         if self._bars.live.is_started:

@@ -12,20 +12,20 @@ MAX_FILE_BYTES = 512 << 20
 MAX_TRIANGLES = 1_250_000
 """Largest total number of triangles in all groups; the parametric human has at most 856,064."""
 MAX_VERTICES = 1_250_000
-MAX_CORNERS = 4096
+MAX_POLYGON_CORNERS = 4096
 """Largest number of corners of a polygon."""
 MAX_GROUPS = 4096
 """Largest number of materials, groups, or primitives of a glTF scene."""
 MAX_RELIEF_MM = 1.0
 """Largest height difference of one grey level of an 8-bit height map [mm]."""
 MAX_NODES, MAX_NODE_DEPTH = 1 << 16, 1024
-MAX_INFLUENCES = 16
+MAX_BONES_PER_VERTEX = 16
 """Largest number of bones that a vertex may have; only the four with the largest weights are used."""
 MAX_DISPLACEMENTS = 6_000_000
 """Largest number of displaced vertices, summed over all morph targets."""
 MAX_BONES = 2048
 MAX_TARGETS = 4096
-MAX_CHANNELS = 1 << 14
+MAX_ANIMATION_CURVES = 1 << 14
 """Largest number of curves of an animation clip."""
 MAX_ACCESSOR_COMPONENTS = 1 << 27
 """Largest number of accessor components that are read in total; each read counts as at least 512."""
@@ -33,15 +33,15 @@ MAX_JSON_VALUES = 1 << 21
 """Largest number of values in the JSON tree of a glTF file."""
 MAX_MTL_BYTES = 4 << 20
 """Largest total size of the .mtl files of an OBJ file."""
-MAX_LIBRARIES = 64
+MAX_MTL_FILES = 64
 """Largest number of .mtl files of an OBJ file."""
 
 
-def check_limit(culprit: object, count: int, limit: int, items: str, advice: str) -> None:
-    """Raise an error for a file with more than `limit` objects of one kind.
+def check_limit(culprit: object, actual_count: int, max_count: int, items_noun: str, advice: str) -> None:
+    """Raise an error for a file with more than `max_count` objects of one kind.
 
     culprit : the file, for the error
-    count, items : number of the objects, and a plural noun for them
+    actual_count, items_noun : number of the objects, and a plural noun for them
     """
-    if count > limit:
-        refuse(culprit, f"at most {limit:,} {items}", f"it has {count:,}", advice)
+    if actual_count > max_count:
+        refuse(culprit, f"at most {max_count:,} {items_noun}", f"it has {actual_count:,}", advice)

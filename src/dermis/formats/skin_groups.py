@@ -18,7 +18,7 @@ BODY_WORDS = (
     *("arm", "arms", "hand", "hands", "leg", "legs", "foot", "feet", "limbs", "finger", "fingers", "forearm"),
 )
 """Words in the names of skin groups, for files in which no group has one of `SKIN_WORDS`."""
-OTHER_WORDS = (
+NON_SKIN_WORDS = (
     *("hair", "hairs", "brow", "brows", "eyebrow", "eyebrows", "lash", "lashes", "eyelash", "eyelashes"),
     *("beard", "mustache", "moustache", "scalp", "eye", "eyes", "eyeball", "eyeballs", "iris", "cornea"),
     *("sclera", "pupil", "tear", "tears", "tearline", "occlusion", "highlight", "teeth", "tooth", "tongue"),
@@ -54,54 +54,54 @@ OTHER_WORDS = (
     *("eyeline", "eyeliner", "leather", "moleskin", "sheepskin", "horn", "horns", "background", "plinth"),
 )
 """Words in the names of groups that are not skin, unless another word of the name is in `SKIN_WORDS`."""
-HEAD_REGION = 0.3
+HEAD_HEIGHT_FRACTION = 0.3
 """Top fraction of a mesh's height that counts as the head when its skin is identified by area [-]."""
-_MIN_COVERAGE = 0.1  # smallest fraction of the head's area that a part covers if it is skin
+_MIN_HEAD_AREA_FRACTION = 0.1  # smallest fraction of the head's area that a part covers if it is skin
 
 
 def choose_skin(
-    parts: Sequence[MeshPart], groups: Sequence[MaterialGroup], scatters: Sequence[bool]
+    mesh_parts: Sequence[MeshPart], groups: Sequence[MaterialGroup], scatters: Sequence[bool]
 ) -> list[bool]:
     """Return whether each mesh part is skin.
 
     The first of these rules that applies to any part decides: parts whose materials scatter light; names with
-    words of `SKIN_WORDS`; names with words of `BODY_WORDS` and none of `OTHER_WORDS`; parts that cover at
-    least a tenth of the head and have no word of `OTHER_WORDS`. If no rule applies, all parts are skin.
+    words of `SKIN_WORDS`; names with words of `BODY_WORDS` and none of `NON_SKIN_WORDS`; parts that cover at
+    least a tenth of the head and have no word of `NON_SKIN_WORDS`. If no rule applies, all parts are skin.
 
     groups : names of the parts
-    scatters : for each part, whether the file states that light scatters below its surface
+    scatters : for each part, whether the file states that light scatters below the surface
     """
     words = [_group_words(group) for group in groups]
-    is_other = [bool(own & set(OTHER_WORDS)) for own in words]
+    is_other = [bool(own & set(NON_SKIN_WORDS)) for own in words]
     named = [_has_skin_word(own) for own in words]
     body = [bool(own & set(BODY_WORDS)) and not other for own, other in zip(words, is_other, strict=True)]
     for rule in (list(scatters), named, body):
         if any(rule):
             return rule
-    covering = _covers_head(parts, is_other)
-    return covering if any(covering) else [True] * len(parts)
+    covering = _covers_head(mesh_parts, is_other)
+    return covering if any(covering) else [True] * len(mesh_parts)
 
 
-def _group_words(group: MaterialGroup) -> set[str]:
-    return {word.casefold() for name in group.names for word in _WORD_PATTERN.findall(name)}
+def _group_words(material_group: MaterialGroup) -> set[str]:
+    return {word.casefold() for name in material_group.names for word in _WORD_PATTERN.findall(name)}
 
 
-def _has_skin_word(words: set[str]) -> bool:
+def _has_skin_word(name_words: set[str]) -> bool:
     """Return whether any word means skin, alone or in a compound such as faceskin."""
-    own = {word for word in words if word.endswith(("skin", "skins")) and word not in OTHER_WORDS}
-    return bool(own | (words & set(SKIN_WORDS)))
+    own = {word for word in name_words if word.endswith(("skin", "skins")) and word not in NON_SKIN_WORDS}
+    return bool(own | (name_words & set(SKIN_WORDS)))
 
 
-def _covers_head(parts: Sequence[MeshPart], is_other: Sequence[bool]) -> list[bool]:
+def _covers_head(mesh_parts: Sequence[MeshPart], is_not_skin: Sequence[bool]) -> list[bool]:
     """Return whether each mesh part covers a notable fraction of the head's area."""
-    heights = np.concatenate([part.positions[:, 1] for part in parts])
-    lowest = heights.max() - HEAD_REGION * np.ptp(heights)
-    area = np.zeros(len(parts))
-    for index, part in enumerate(parts):
+    heights = np.concatenate([part.positions[:, 1] for part in mesh_parts])
+    lowest = heights.max() - HEAD_HEIGHT_FRACTION * np.ptp(heights)
+    area = np.zeros(len(mesh_parts))
+    for index, part in enumerate(mesh_parts):
         corners = part.positions[part.triangles]
         area[index] = triangle_areas(corners)[corners[..., 1].mean(axis=1) >= lowest].sum()
-    area[np.array(is_other)] = 0.0
-    return [bool(own >= _MIN_COVERAGE * area.sum() > 0.0) for own in area]
+    area[np.array(is_not_skin)] = 0.0
+    return [bool(own >= _MIN_HEAD_AREA_FRACTION * area.sum() > 0.0) for own in area]
 
 
 def describe_choice(groups: Sequence[MaterialGroup], is_skin: Sequence[bool]) -> str:
@@ -116,6 +116,6 @@ def describe_choice(groups: Sequence[MaterialGroup], is_skin: Sequence[bool]) ->
     )
 
 
-def _list_names(names: Sequence[str], max_count: int = 6) -> str:
-    shown = ", ".join(repr(name) for name in names[:max_count])
-    return f"{shown} and {len(names) - max_count} more" if len(names) > max_count else shown
+def _list_names(group_names: Sequence[str], max_count: int = 6) -> str:
+    shown = ", ".join(repr(name) for name in group_names[:max_count])
+    return f"{shown} and {len(group_names) - max_count} more" if len(group_names) > max_count else shown

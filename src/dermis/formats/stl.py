@@ -16,7 +16,7 @@ from dermis.formats.parts import MaterialGroup, MeshFile, MeshPart
 from dermis.formats.text_files import parse_numbers
 
 _HEADER_BYTES = 84
-_RECORD_DTYPE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+_TRIANGLE_DTYPE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _CORNER_LINE = re.compile(rb"^[ \t]*vertex[ \t]+([^\r\n]*)", re.MULTILINE | re.IGNORECASE)
 
 STL_PROPERTIES = (
@@ -32,7 +32,7 @@ def read_stl(path: Path) -> MeshFile:
     """Read a .stl file; corners at the same position become one vertex."""
     data = read_file(path, "an STL file", limits.MAX_FILE_BYTES)
     count = int.from_bytes(data[_HEADER_BYTES - 4 : _HEADER_BYTES], "little")
-    is_binary = len(data) >= _HEADER_BYTES and len(data) == _HEADER_BYTES + count * _RECORD_DTYPE.itemsize
+    is_binary = len(data) >= _HEADER_BYTES and len(data) == _HEADER_BYTES + count * _TRIANGLE_DTYPE.itemsize
     if is_binary or data.lstrip()[:5].lower() != b"solid":
         corners, notes = _binary_corners(path, data, count)
     else:
@@ -42,29 +42,29 @@ def read_stl(path: Path) -> MeshFile:
     return MeshFile([part], notes=notes)
 
 
-def _binary_corners(path: Path, data: bytes, count: int) -> tuple[Doubles, tuple[str, ...]]:
+def _binary_corners(path: Path, stl_bytes: bytes, triangle_count: int) -> tuple[Doubles, tuple[str, ...]]:
     """Return the corners (3f, 3) of a binary file, and notes.
 
-    count : number of triangles that the header states
+    triangle_count : number of triangles that the header states
     """
-    _check_count(path, count)
-    if len(data) < _HEADER_BYTES + count * _RECORD_DTYPE.itemsize:
-        actual = f"{len(data):,} bytes are too few for its {count:,} triangles"
+    _check_triangle_count(path, triangle_count)
+    if len(stl_bytes) < _HEADER_BYTES + triangle_count * _TRIANGLE_DTYPE.itemsize:
+        actual = f"{len(stl_bytes):,} bytes are too few for its {triangle_count:,} triangles"
         refuse(path, "a whole STL file", actual, limits.DAMAGED_ADVICE)
-    records = np.frombuffer(data, _RECORD_DTYPE, count, _HEADER_BYTES)
+    records = np.frombuffer(stl_bytes, _TRIANGLE_DTYPE, triangle_count, _HEADER_BYTES)
     notes = ("colours of triangles are left out",) if records["attribute"].any() else ()
     return records["corners"].reshape(-1, 3).astype(np.float64), notes
 
 
-def _text_corners(path: Path, data: bytes) -> Doubles:
+def _text_corners(path: Path, stl_bytes: bytes) -> Doubles:
     """Return the corners (3f, 3) of a text file."""
-    lines = _CORNER_LINE.findall(data)
-    _check_count(path, len(lines) // 3)
+    lines = _CORNER_LINE.findall(stl_bytes)
+    _check_triangle_count(path, len(lines) // 3)
     if len(lines) % 3:
         actual = f"it has {len(lines):,} corners"
         refuse(path, "three corners for each triangle", actual, limits.DAMAGED_ADVICE)
     return parse_numbers(np.frombuffer(b" ".join(lines), np.uint8), 3 * len(lines), np.float64).reshape(-1, 3)
 
 
-def _check_count(path: Path, count: int) -> None:
-    limits.check_limit(path, count, limits.MAX_TRIANGLES, "triangles", limits.DECIMATE_ADVICE)
+def _check_triangle_count(path: Path, triangle_count: int) -> None:
+    limits.check_limit(path, triangle_count, limits.MAX_TRIANGLES, "triangles", limits.DECIMATE_ADVICE)

@@ -15,17 +15,23 @@ from dermis.formats.parts import default_unit_mm
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.skull import MAX_ELONGATION, is_standing_figure, principal_sizes
 
-WITHOUT_UNIT = (".obj", ".ply", ".stl")
+SUFFIXES_WITHOUT_UNIT = (".obj", ".ply", ".stl")
 """Suffixes of formats that do not state a unit."""
-UNITS_MM = (1.0, 10.0, 25.4, 100.0, 1000.0)
-_SIZE_MM = (1.0, 3000.0)  # smallest and largest accepted size
-_SIZE_IN_MM = (100.0, 1000.0)  # sizes in units of the file for which the unit is assumed to be the millimetre
-_FIGURE_MM, _HEAD_MM, _PIECE_MM = 1700.0, 270.0, 150.0  # typical sizes
+COMMON_UNITS_MM = (1.0, 10.0, 25.4, 100.0, 1000.0)
+_ACCEPTED_SIZE_RANGE_MM = (1.0, 3000.0)  # smallest and largest accepted size
+# sizes in units of the file for which the unit is assumed to be the millimetre
+_SIZE_RANGE_OF_MM_FILES = (100.0, 1000.0)
+_TYPICAL_FIGURE_MM, _TYPICAL_HEAD_MM, _TYPICAL_PIECE_MM = 1700.0, 270.0, 150.0  # typical sizes
 _MAX_FLATNESS = 0.25  # thickness relative to length below which a mesh is a patch of skin or a hand
 _INCH_MM = 25.4
-_INCH_PENALTY = {_FIGURE_MM: 0.4, _HEAD_MM: 0.4, _PIECE_MM: 9.0}  # added to the error of log(size)
+_INCH_LOG_SIZE_PENALTY = {
+    _TYPICAL_FIGURE_MM: 0.4,
+    _TYPICAL_HEAD_MM: 0.4,
+    _TYPICAL_PIECE_MM: 9.0,
+}  # added to the error of log(size)
 _EXPORTED_UNITS_MM = (1.0, 10.0)  # units that programs write although the format requires metres
-_ADVISED_MM = {True: (1200.0, 2200.0), False: (150.0, 500.0)}  # usual sizes: standing figures, other meshes
+# usual sizes of standing figures (True) and of other meshes (False)
+_USUAL_SIZE_RANGE_MM = {True: (1200.0, 2200.0), False: (150.0, 500.0)}
 
 
 def with_settled_unit(rigged: RiggedMesh, path: Path, unit_mm: float | None, culprit: object) -> RiggedMesh:
@@ -38,18 +44,22 @@ def with_settled_unit(rigged: RiggedMesh, path: Path, unit_mm: float | None, cul
     Raises DermisError for a mesh that is smaller than a millimetre or larger than three metres.
     """
     mesh, note = rigged.mesh, ""
-    guessed = unit_mm is None and path.suffix.lower() in WITHOUT_UNIT
+    guessed = unit_mm is None and path.suffix.lower() in SUFFIXES_WITHOUT_UNIT
     read_unit = unit_mm or rigged.unit_mm or default_unit_mm(path)
     unit = guess_unit_mm(mesh.positions, mesh.triangles) if guessed else read_unit
     if unit != read_unit:
         mesh = replace(mesh, positions=(mesh.positions * (unit / read_unit)).astype(np.float32))
     size = float(mesh.size_mm.max())
-    if not _SIZE_MM[0] <= size <= _SIZE_MM[1]:
+    if not _ACCEPTED_SIZE_RANGE_MM[0] <= size <= _ACCEPTED_SIZE_RANGE_MM[1]:
         _refuse_size(mesh, unit, culprit)
     if guessed and not (unit == 1.0 and _is_in_mm(mesh.positions)):
         made = f"1 unit = {unit:g} mm makes it {_size_text(mesh.size_mm)}"
         note = f"its unit is not stated; {made}; --unit-mm sets another"
-    elif size > _SIZE_IN_MM[1] and mesh.skull_mm is None and not (rigged.rig and rigged.rig.skeleton):
+    elif (
+        size > _SIZE_RANGE_OF_MM_FILES[1]
+        and mesh.skull_mm is None
+        and not (rigged.rig and rigged.rig.skeleton)
+    ):
         note = f"it is {_size_text(mesh.size_mm)} at {unit:g} mm per unit; --unit-mm sets another"
     return rigged._replace(mesh=mesh, notes=(note, *rigged.notes) if note else rigged.notes)
 
@@ -58,50 +68,57 @@ def guess_unit_mm(positions: Floats, triangles: Ints) -> float:
     """Return the likely unit of a mesh whose file states none [mm].
 
     The guess is the millimetre if the mesh is then 100 to 1000 mm large and not a standing figure. Otherwise
-    the guess is the unit of `UNITS_MM` with which the mesh is closest in size to an adult or a head, or to a
-    hand if the mesh is flat or slender.
+    the guess is the unit of `COMMON_UNITS_MM` with which the mesh is closest in size to an adult or a head,
+    or to a hand if the mesh is flat or slender.
 
     positions : (v, 3) vertices in the unit of the file, Y up
     triangles : (f, 3) vertex indices
     """
-    size, typical = float(np.ptp(positions, axis=0).max()), _FIGURE_MM
+    size, typical = float(np.ptp(positions, axis=0).max()), _TYPICAL_FIGURE_MM
     if not is_standing_figure(positions, triangles):
         thickness, width, length = principal_sizes(positions)
         if size == 0 or _is_in_mm(positions):
             return 1.0
         is_piece = length > MAX_ELONGATION * width or thickness < _MAX_FLATNESS * length
-        typical = _PIECE_MM if is_piece else _HEAD_MM
-    penalty = _INCH_PENALTY[typical]
-    return min(UNITS_MM, key=lambda unit: abs(log(size * unit / typical)) + penalty * (unit == _INCH_MM))
+        typical = _TYPICAL_PIECE_MM if is_piece else _TYPICAL_HEAD_MM
+    penalty = _INCH_LOG_SIZE_PENALTY[typical]
+    return min(
+        COMMON_UNITS_MM, key=lambda unit: abs(log(size * unit / typical)) + penalty * (unit == _INCH_MM)
+    )
 
 
 def _is_in_mm(positions: Floats) -> bool:
     """Return whether height or longest side of vertices (v, 3) suggest that their unit is the millimetre."""
-    sizes, (low, high) = np.ptp(positions, axis=0), _SIZE_IN_MM
+    sizes, (low, high) = np.ptp(positions, axis=0), _SIZE_RANGE_OF_MM_FILES
     return any(low <= size <= high for size in (sizes[1], sizes.max()))
 
 
-def _size_text(sizes: Floats) -> str:
+def _size_text(sizes_mm: Floats) -> str:
     """Return the height of an upright mesh, or the length of a lying mesh, as text with a unit.
 
-    sizes : (3,) sides of the bounding box [mm]
+    sizes_mm : (3,) sides of the bounding box [mm]
     """
-    longest = float(sizes.max())
+    longest = float(sizes_mm.max())
     length = f"{longest / 1000:.3g} m" if longest >= 1000 else f"{longest:.3g} mm"
-    return f"{length} {'high' if sizes[1] == longest else 'long'}"
+    return f"{length} {'high' if sizes_mm[1] == longest else 'long'}"
 
 
-def _refuse_size(mesh: Mesh, unit: float, culprit: object) -> None:
+def _refuse_size(mesh: Mesh, unit_mm: float, culprit: object) -> None:
     """Refuse a mesh of impossible size; the advice names units with which the size would be usual.
 
-    unit : unit of the file with which the mesh was read [mm]
+    unit_mm : unit of the file with which the mesh was read [mm]
     """
-    low, high = _ADVISED_MM[is_standing_figure(mesh.positions, mesh.triangles)]
+    low, high = _USUAL_SIZE_RANGE_MM[is_standing_figure(mesh.positions, mesh.triangles)]
     advice = "Set the millimetres per unit of the file with --unit-mm"
     for other in _EXPORTED_UNITS_MM:
-        sizes = mesh.size_mm * (other / unit)
+        sizes = mesh.size_mm * (other / unit_mm)
         if low <= sizes.max() <= high:
             program = "millimetres" if other == 1.0 else "centimetres"
             advice += f": {other:g}, for a program that writes {program}, makes it {_size_text(sizes)}"
-    actual = f"it is {_size_text(mesh.size_mm)} at {unit:g} mm per unit (a forgotten unit?)"
-    refuse(culprit, f"skin {_SIZE_MM[0]:g} to {_SIZE_MM[1]:g} mm large", actual, advice)
+    actual = f"it is {_size_text(mesh.size_mm)} at {unit_mm:g} mm per unit (a forgotten unit?)"
+    refuse(
+        culprit,
+        f"skin {_ACCEPTED_SIZE_RANGE_MM[0]:g} to {_ACCEPTED_SIZE_RANGE_MM[1]:g} mm large",
+        actual,
+        advice,
+    )

@@ -8,21 +8,21 @@ from dermis.base.arrays import Doubles, Numbers
 from dermis.images.colour import decode_srgb
 
 
-def linear_colours(values: Numbers) -> tuple[Doubles, list[str]]:
+def linear_colours(stored_colours: Numbers) -> tuple[Doubles, list[str]]:
     """Convert vertex colours of a file to linear colours (n, 3) from 0 to 1; also return notes for users.
 
-    values : (n, 3) sRGB; integers are divided by the largest value of their type, floats by 255 if one is
-        larger than 1; vertices whose values are NaN are white
+    stored_colours : (n, 3) sRGB; integers are divided by the largest value of their type, floats by 255 if
+        one is larger than 1; vertices whose values are NaN are white
     """
     notes = []
-    if values.dtype.kind in "iu":
-        scale = float(np.iinfo(values.dtype.str).max)
+    if stored_colours.dtype.kind in "iu":
+        scale = float(np.iinfo(stored_colours.dtype.str).max)
     else:
-        largest = np.fmax.reduce(values, axis=None, initial=0.0)
+        largest = np.fmax.reduce(stored_colours, axis=None, initial=0.0)
         scale = 255.0 if largest > 1 else 1.0
         if largest > 1:
             notes.append(f"colours of vertices run to {largest:g}: they are read as levels from 0 to 255")
-    colours = np.nan_to_num(values.astype(np.float64) / scale, nan=1.0, posinf=np.inf, neginf=-np.inf)
+    colours = np.nan_to_num(stored_colours.astype(np.float64) / scale, nan=1.0, posinf=np.inf, neginf=-np.inf)
     outside = np.count_nonzero(((colours < 0) | (colours > 1)).any(axis=1))
     if outside:
         notes.append(f"colours of {outside} vertices are out of range and are clamped")

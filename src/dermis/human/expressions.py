@@ -34,9 +34,13 @@ def expand_targets(names: Iterable[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(target for name in names for target in expand_sides(name)))
 
 
-def expand_sides(name: str) -> tuple[str, ...]:
+def expand_sides(target_name: str) -> tuple[str, ...]:
     """Return the left and the right target for a name without side; only the name if none exist."""
-    return tuple(f"{name}{side}" for side in TARGET_SIDES) if f"{name}Left" in _arkit_names() else (name,)
+    return (
+        tuple(f"{target_name}{side}" for side in TARGET_SIDES)
+        if f"{target_name}Left" in _arkit_names()
+        else (target_name,)
+    )
 
 
 @cache

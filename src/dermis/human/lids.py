@@ -20,15 +20,16 @@ PUBLISHED_EYE_RADIUS_MM = 15.4
 """Mean radius of the published average eyeball, which the published lids touch [mm]."""
 EYE_OFFSET_MM = 2.2
 """How far the smaller anatomical eyeball is in front of the published one, to align the corneas [mm]."""
-CONTROL_SCALE = 1.0045
+CONTROL_MESH_SCALE = 1.0045
 """Size of an eyeball's control mesh relative to its smooth surface."""
-_SKIN_REACH_MM = 15.0  # distance up to which skin follows the lids
-_SKIN_BLEND_MM = 1.0  # blend distance between the lid points that skin follows
-_MIN_HEIGHT_MM = -1.5  # of lid points above the eyeball; deeper points are never visible
-_LINEAR_RADIUS, _MAX_RADIUS = 0.75, 0.95  # fractions of the radius, see `_compress_radius`
-_CLEARANCES_MM = -0.3, 0.25, 0.75, 1.0  # minimum distances of wall, edge, crest and skin from the eye
-_EDGE_HEIGHT_MM = 0.2  # of lid edges above the eye, as the smooth surface lies inside its control points
-_ROW_CONTACT = np.array([0, 0.2, 0.6, *21 * [1.0], 0.6, 0.2, 0, 0])
+_MAX_SKIN_TO_LID_MM = 15.0  # distance up to which skin follows the lids
+_SKIN_BLEND_DISTANCE_MM = 1.0  # blend distance between the lid points that skin follows
+_MIN_LID_HEIGHT_MM = -1.5  # of lid points above the eyeball; deeper points are never visible
+# fractions of the radius, see `_compress_radius`
+_MAX_UNCOMPRESSED_RADIUS, _MAX_COMPRESSED_RADIUS = 0.75, 0.95
+_MIN_LID_CLEARANCES_MM = -0.3, 0.25, 0.75, 1.0  # minimum distances of wall, edge, crest and skin from the eye
+_LID_EDGE_HEIGHT_MM = 0.2  # of lid edges above the eye, as the smooth surface lies inside its control points
+_LID_ROW_CONTACT = np.array([0, 0.2, 0.6, *21 * [1.0], 0.6, 0.2, 0, 0])
 """Contact of each row of lid_rings.csv with the eyeball, 0 to 1; none around the caruncle."""
 _CARUNCLE_RISE_MM = np.array([[0.3, 0.7, 0.0, 0.0], [0.0, 0.2, 0.0, 0.0], *23 * [4 * [0.0]],
                          [0.0, 0.3, 0.0, 0.0], [0.5, 1.0, 0.0, 0.0], [0.6, 1.1, 0.0, 0.0]])  # fmt: skip
@@ -39,8 +40,8 @@ _UPPER_LID_ROWS, _LOWER_LID_ROWS = (
 )  # rows of lid_rings.csv that hold the upper and the lower lid
 _LID_OVERLAP_MM = 1.6 * np.array([0.4, 0.8, *7 * [1.0], 0.8, 0.4])
 """Overlap of closed upper lids over the lower lids."""
-_SLIDING_ROWS = 6  # rows of quads around the lids that may slide over the eye
-_BLINK_DISPLACEMENT_MM = 2.0  # minimum displacement of sliding skin by a blink
+_SLIDING_QUAD_ROWS = 6  # rows of quads around the lids that may slide over the eye
+_MIN_BLINK_DISPLACEMENT_MM = 2.0  # minimum displacement of sliding skin by a blink
 _RING_COUNT, _EDGE_COLUMN, _CREST_COLUMN = (
     4,
     1,
@@ -95,41 +96,48 @@ def fit_socket(eyeball_points: Points) -> EyeSocket:
 
 
 def fit_lids(
-    points_mm: Points, sockets: tuple[EyeSocket, EyeSocket], closed: bool = False, axis: Points = REST_GAZE
+    points_mm: Points,
+    sockets: tuple[EyeSocket, EyeSocket],
+    is_closed: bool = False,
+    gaze_axis: Points = REST_GAZE,
 ) -> Points:
     """Return a person's published points (n, 3) with the lids fitted to eyeballs of anatomical size [mm].
 
     sockets : sockets of the left and the right eye
-    closed : whether the upper lids are lowered onto the lower lids
-    axis : (3,) unit viewing direction of the eyes
+    is_closed : whether the upper lids are lowered onto the lower lids
+    gaze_axis : (3,) unit viewing direction of the eyes
     """
     fitted = points_mm.copy()
     for side, eye in zip(lid_sides(), sockets, strict=True):
-        _project_lids(fitted, side, eye, closed, axis)
+        _project_lids(fitted, side, eye, is_closed, gaze_axis)
     return fitted
 
 
-def _project_lids(points: Points, side: LidSide, eye: EyeSocket, closed: bool | Flags, axis: Points) -> None:
+def _project_lids(
+    points: Points, lid_side: LidSide, socket: EyeSocket, is_closed: bool | Flags, gaze_axis: Points
+) -> None:
     """Move the lids of one eye onto its eyeball in place, for one person or for m poses of a person.
 
     points : (n, 3) points of the person, or (m, n, 3) for m poses [mm]
-    closed : whether the upper lid is lowered onto the lower lid; (m,) for m poses
-    axis : (3,) unit viewing direction of the eye; (m, 1, 3) for m poses
+    is_closed : whether the upper lid is lowered onto the lower lid; (m,) for m poses
+    gaze_axis : (3,) unit viewing direction of the eye; (m, 1, 3) for m poses
     """
-    points[..., side.point, :] += side.weights @ _lid_displacements(points[..., side.rings, :], eye, closed)
-    centre = eye.centre + eye.size * EYE_OFFSET_MM * REST_GAZE
-    size = CONTROL_SCALE * eye.size
-    relative = (points[..., side.contact, :] - centre) / size
-    distance, surface = radial_distances_mm(relative, axis)
-    scale = np.maximum(1.0, (surface + side.clearances_mm) / distance)
-    points[..., side.contact, :] = centre + size * relative * scale[..., None]
+    points[..., lid_side.point, :] += lid_side.weights @ _lid_displacements(
+        points[..., lid_side.rings, :], socket, is_closed
+    )
+    centre = socket.centre + socket.size * EYE_OFFSET_MM * REST_GAZE
+    size = CONTROL_MESH_SCALE * socket.size
+    relative = (points[..., lid_side.contact, :] - centre) / size
+    distance, surface = radial_distances_mm(relative, gaze_axis)
+    scale = np.maximum(1.0, (surface + lid_side.clearances_mm) / distance)
+    points[..., lid_side.contact, :] = centre + size * relative * scale[..., None]
 
 
-def lid_contact(first: int, eyeball_size: int, apex: int, back: int) -> LidContact:
+def lid_contact(first_eye_point: int, eyeball_point_count: int, apex: int, back: int) -> LidContact:
     """Return the lid points that slide over the eyeballs, with minimum distances from the eyeballs.
 
-    first : index of the first point of the left eyeball
-    eyeball_size : number of points of an eyeball; the points of the right eyeball follow those of the left
+    first_eye_point : index of the first point of the left eyeball
+    eyeball_point_count : number of points of an eyeball; the points of the right eyeball come second
     apex, back : indices of the front and rear poles within an eyeball's points
     """
     both = lid_sides()
@@ -137,33 +145,33 @@ def lid_contact(first: int, eyeball_size: int, apex: int, back: int) -> LidConta
         np.concatenate([side.contact for side in both]).astype(np.int32),
         np.repeat(np.arange(2, dtype=np.int32), [len(side.contact) for side in both]),
         np.concatenate([side.clearances_mm for side in both]).astype(np.float32),
-        np.array([first + apex, first + eyeball_size + apex], np.int32),
-        np.array([first + back, first + eyeball_size + back], np.int32),
+        np.array([first_eye_point + apex, first_eye_point + eyeball_point_count + apex], np.int32),
+        np.array([first_eye_point + back, first_eye_point + eyeball_point_count + back], np.int32),
         lid_rings()[..., _EDGE_COLUMN].astype(np.int32),
     )
 
 
-def _lid_displacements(rings: Points, eye: EyeSocket, closed: bool | Flags) -> Points:
+def _lid_displacements(rings: Points, socket: EyeSocket, lid_is_closed: bool | Flags) -> Points:
     """Return the displacements (..., r, 3) of lid points from the published to the anatomical eyeball [mm].
 
     Seen from the front the points stay in place, except near the outline of the eyeball. The edges of the
     lids touch the eyeball, and the thickness of the lids is kept.
     """
-    published = (rings - eye.centre) / eye.size
-    relative, is_closed = published.copy(), np.asarray(closed)
-    lids = relative.reshape(-1, len(_ROW_CONTACT), _RING_COUNT, 3)
+    published = (rings - socket.centre) / socket.size
+    relative, is_closed = published.copy(), np.asarray(lid_is_closed)
+    lids = relative.reshape(-1, len(_LID_ROW_CONTACT), _RING_COUNT, 3)
     for one in np.flatnonzero(is_closed):
         _close_upper_lid(lids[one])
     above = np.linalg.norm(published, axis=-1) - PUBLISHED_EYE_RADIUS_MM
     above = above.reshape(*is_closed.shape, -1, _RING_COUNT)
-    above += (_ROW_CONTACT * (_EDGE_HEIGHT_MM - above[..., _EDGE_COLUMN]))[..., None]
-    radius = SCLERA_MM + np.maximum(above.reshape(*is_closed.shape, -1), _MIN_HEIGHT_MM)
+    above += (_LID_ROW_CONTACT * (_LID_EDGE_HEIGHT_MM - above[..., _EDGE_COLUMN]))[..., None]
+    radius = SCLERA_MM + np.maximum(above.reshape(*is_closed.shape, -1), _MIN_LID_HEIGHT_MM)
     across = np.linalg.norm(relative[..., :2], axis=-1)
     target_radius = radius * _compress_radius(across / radius)
     floor = np.where(is_closed[..., None], 0.0, _CARUNCLE_RISE_MM.ravel())
     depth = EYE_OFFSET_MM + np.sqrt(radius**2 - target_radius**2) + floor
     front = relative[..., :2] * (target_radius / np.maximum(across, 1e-9))[..., None]
-    return np.asarray(eye.size * (np.concatenate([front, depth[..., None]], axis=-1) - published))
+    return np.asarray(socket.size * (np.concatenate([front, depth[..., None]], axis=-1) - published))
 
 
 def _close_upper_lid(rings: Points) -> None:
@@ -177,14 +185,14 @@ def _close_upper_lid(rings: Points) -> None:
     rings[_UPPER_LID_ROWS, :, 1] += (ends - crest[_UPPER_LID_ROWS, 1])[:, None]
 
 
-def _compress_radius(across: Points) -> Points:
+def _compress_radius(axis_distance: Points) -> Points:
     """Compress distances from the viewing axis near the outline of the eyeball, to keep lid points on it.
 
-    across : distances from the axis divided by the radius of the eyeball [-]
+    axis_distance : distances from the axis divided by the radius of the eyeball [-]
     """
-    room = _MAX_RADIUS - _LINEAR_RADIUS
-    compressed = _LINEAR_RADIUS + room * np.tanh((across - _LINEAR_RADIUS) / room)
-    return np.where(across < _LINEAR_RADIUS, across, compressed)
+    room = _MAX_COMPRESSED_RADIUS - _MAX_UNCOMPRESSED_RADIUS
+    compressed = _MAX_UNCOMPRESSED_RADIUS + room * np.tanh((axis_distance - _MAX_UNCOMPRESSED_RADIUS) / room)
+    return np.where(axis_distance < _MAX_UNCOMPRESSED_RADIUS, axis_distance, compressed)
 
 
 @cache
@@ -195,38 +203,40 @@ def lid_sides() -> tuple[LidSide, LidSide]:
     return _lid_side(left, points_mm, body, "Left"), _lid_side(right, points_mm, body, "Right")
 
 
-def _lid_side(rings: Index, points_mm: Points, body: Index, name: str) -> LidSide:
+def _lid_side(rings: Index, points_mm: Points, body_points: Index, side_name: str) -> LidSide:
     ring_points = rings.ravel()
     centre = points_mm[ring_points].mean(axis=0)
-    near = body[np.abs(points_mm[body] - centre).max(axis=1) < 4 * _SKIN_REACH_MM]
+    near = body_points[np.abs(points_mm[body_points] - centre).max(axis=1) < 4 * _MAX_SKIN_TO_LID_MM]
     distance = np.linalg.norm(points_mm[near][:, None] - points_mm[ring_points], axis=-1)
-    within = distance.min(axis=1) < _SKIN_REACH_MM
+    within = distance.min(axis=1) < _MAX_SKIN_TO_LID_MM
     point, distance = near[within], distance[within]
-    weights = 1.0 / (distance**2 + _SKIN_BLEND_MM**2) ** 2
+    weights = 1.0 / (distance**2 + _SKIN_BLEND_DISTANCE_MM**2) ** 2
     weights /= weights.sum(axis=1, keepdims=True)
-    t = distance.min(axis=1) / _SKIN_REACH_MM
+    t = distance.min(axis=1) / _MAX_SKIN_TO_LID_MM
     weights *= (1.0 - t * t * (3.0 - 2.0 * t))[:, None]
     is_ring = np.isin(point, ring_points)
     weights[is_ring] = point[is_ring][:, None] == ring_points
-    sliding = _sliding_points(rings, point, name)
-    clear = np.concatenate([np.repeat(_CLEARANCES_MM, len(rings)), np.full(len(sliding), _CLEARANCES_MM[-1])])
+    sliding = _sliding_points(rings, point, side_name)
+    clear = np.concatenate(
+        [np.repeat(_MIN_LID_CLEARANCES_MM, len(rings)), np.full(len(sliding), _MIN_LID_CLEARANCES_MM[-1])]
+    )
     return LidSide(ring_points, point, weights, np.concatenate([rings.T.ravel(), sliding]), clear)
 
 
-def _sliding_points(rings: Index, point: Index, name: str) -> Index:
+def _sliding_points(rings: Index, candidate_points: Index, side_name: str) -> Index:
     """Return the skin points (c,) beyond the lid rings that slide over the eye because a blink moves them.
 
     rings : (rows, 4) lid points from lid_rings.csv
-    point : (n,) candidates
-    name : "Left" or "Right"
+    candidate_points : (n,) candidates
+    side_name : "Left" or "Right"
     """
-    index = target_deltas().names.index(f"{EXPRESSION_PREFIX}eyeBlink{name}")
+    index = target_deltas().names.index(f"{EXPRESSION_PREFIX}eyeBlink{side_name}")
     part = slice(*target_deltas().first[index : index + 2])
-    is_far = np.linalg.norm(target_deltas().delta_mm[part], axis=1) > _BLINK_DISPLACEMENT_MM
-    moving = np.intersect1d(target_deltas().point[part][is_far], point)
+    is_far = np.linalg.norm(target_deltas().delta_mm[part], axis=1) > _MIN_BLINK_DISPLACEMENT_MM
+    moving = np.intersect1d(target_deltas().point[part][is_far], candidate_points)
     quads, skin = model_data()["quads"].astype(np.int64), rings[:, -1]
     quads = quads[np.isin(quads, moving).any(axis=1) & ~np.isin(quads, rings[:, :-1]).any(axis=1)]
-    for _ in range(_SLIDING_ROWS):  # from the lids outwards
+    for _ in range(_SLIDING_QUAD_ROWS):  # from the lids outwards
         skin = np.union1d(skin, quads[np.isin(quads, skin).any(axis=1)])
     return np.setdiff1d(np.intersect1d(skin, moving), rings)
 
@@ -310,10 +320,10 @@ def eyeball_mesh() -> tuple[Doubles, Index]:
 
     The eyeball looks along +Z.
     """
-    return build_eyeball(scale=CONTROL_SCALE)
+    return build_eyeball(position_scale=CONTROL_MESH_SCALE)
 
 
-def place_eyeball(eye: EyeSocket) -> tuple[Doubles, Doubles]:
+def place_eyeball(socket: EyeSocket) -> tuple[Doubles, Doubles]:
     """Return the control points (n, 3) and the centre (3,) of the anatomical eyeball in a socket [mm]."""
-    centre = eye.centre + eye.size * EYE_OFFSET_MM * REST_GAZE
-    return centre + eye.size * eyeball_mesh()[0], centre
+    centre = socket.centre + socket.size * EYE_OFFSET_MM * REST_GAZE
+    return centre + socket.size * eyeball_mesh()[0], centre

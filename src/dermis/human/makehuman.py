@@ -107,10 +107,10 @@ def model_data() -> Mapping[str, NDArray[Any]]:
 
 
 @cache
-def group_points(name: str) -> NDArray[np.int64]:
+def group_points(group_name: str) -> NDArray[np.int64]:
     """Return the sorted point indices of a mesh group, such as "helper-l-eye" for the left eyeball."""
     arrays = model_data()
-    group = list(map(str, arrays["group_names"])).index(name)
+    group = list(map(str, arrays["group_names"])).index(group_name)
     return np.unique(arrays["quads"][arrays["group"] == group]).astype(np.int64)
 
 

@@ -14,7 +14,7 @@ from dermis.human import lids, teeth
 from dermis.human.hair.root_finder import RootFinder, eye_centres
 from dermis.human.lids import fit_lid_targets
 from dermis.human.makehuman import Points, group_points, mesh_point_count, model_data, morphed_points_mm
-from dermis.human.movement import expression_targets, gaze_rotations, skeleton
+from dermis.human.movement import build_skeleton, expression_targets, gaze_rotations
 from dermis.mesh import eyeball
 from dermis.mesh.eye_look import EyeLook
 from dermis.mesh.eyes import Eyes
@@ -31,7 +31,7 @@ Index = NDArray[np.int64]
 MAKEHUMAN_CREDIT = "MakeHuman community, CC0"
 _EYE_COLOUR, _TOOTH_COLOUR, _TONGUE_COLOUR = (0.85, 0.83, 0.8), (0.7, 0.66, 0.56), (0.45, 0.16, 0.14)
 LEFT_EYE, RIGHT_EYE = "helper-l-eye", "helper-r-eye"
-MATERIALS = {
+MATERIAL_OF_GROUP = {
     "body": Material("skin"),
     LEFT_EYE: Material("left eye", "opaque", _EYE_COLOUR),
     RIGHT_EYE: Material("right eye", "opaque", _EYE_COLOUR),
@@ -41,9 +41,9 @@ MATERIALS = {
     "cap": Material("cut", "opaque", (0.02, 0.02, 0.02)),
 }
 """Materials by group of quads."""
-_EQUAL_WEIGHT = 1 / 6
+_EQUAL_MACRO_WEIGHT = 1 / 6
 MEAN_WEIGHTS = {
-    f"macrodetails/{people}-{sex}-young": _EQUAL_WEIGHT
+    f"macrodetails/{people}-{sex}-young": _EQUAL_MACRO_WEIGHT
     for people in ("african", "asian", "caucasian")
     for sex in ("female", "male")
 }
@@ -56,7 +56,7 @@ class _LayoutFaces(NamedTuple):
     point : (v,) index of the control point of each vertex
     uv : (v, 2) texture coordinates
     quads : (q, 4) vertex indices
-    material : (q,) index into `MATERIALS`
+    material : (q,) index into `MATERIAL_OF_GROUP`
     """
 
     point: Index
@@ -82,11 +82,11 @@ def build_head(weights: Mapping[str, float], maps: Maps, layout: Layout, eyes: E
         faces.uv,
         split_quads(faces.quads),
         np.repeat(faces.material, 2),
-        tuple(MATERIALS.values()),
+        tuple(MATERIAL_OF_GROUP.values()),
         point=faces.point,
         quads=np.arange(2 * len(faces.quads)).reshape(-1, 2),
     )
-    bones = skeleton(points_mm[mesh_point_count() :], (left_centre, right_centre), len(left))
+    bones = build_skeleton(points_mm[mesh_point_count() :], (left_centre, right_centre), len(left))
     targets = replace(expression_targets(), delta_mm=fit_lid_targets(points_mm, sockets))
     apex, back, _ = eyeball.axis_points()
     contact = lids.lid_contact(mesh_point_count(), len(left), apex, back)
@@ -116,7 +116,7 @@ def _build_eyes(look: EyeLook) -> Eyes:
     size = len(lids.eyeball_mesh()[0])
     first = mesh_point_count() + np.array([0, size], np.int32)
     apex, back, side = (np.asarray(first + point, np.int32) for point in eyeball.axis_points())
-    material = np.array([list(MATERIALS).index(name) for name in (LEFT_EYE, RIGHT_EYE)], np.int32)
+    material = np.array([list(MATERIAL_OF_GROUP).index(name) for name in (LEFT_EYE, RIGHT_EYE)], np.int32)
     return Eyes(apex, back, side, material, look)
 
 
@@ -140,7 +140,7 @@ def _combined_quads(layout: Layout) -> tuple[Points, Index, Index, Index]:
         uv, corner = arrays["uv1"] * [1.0, -1.0] + [0.0, 1.0], arrays["quads_uv1"].astype(np.int64)
     names = [str(arrays["group_names"][group]) for group in arrays["group"][: len(corner)]]
     is_kept = np.array([name not in (LEFT_EYE, RIGHT_EYE) for name in names])
-    material = np.array([list(MATERIALS).index(name) for name in names])
+    material = np.array([list(MATERIAL_OF_GROUP).index(name) for name in names])
     ball, quads = lids.eyeball_mesh()
     size, points = len(ball), arrays["quads"][: len(corner)].astype(np.int64)
     for upper, name in ((True, "helper-upper-teeth"), (False, "helper-lower-teeth")):
@@ -148,7 +148,7 @@ def _combined_quads(layout: Layout) -> tuple[Points, Index, Index, Index]:
         is_tooth = np.array(names) == name
         corner[is_tooth] = len(uv) + np.searchsorted(tooth_points, points[is_tooth])
         uv = np.concatenate([uv, tooth_uv])
-    eyes = [np.full(len(quads), list(MATERIALS).index(name)) for name in (LEFT_EYE, RIGHT_EYE)]
+    eyes = [np.full(len(quads), list(MATERIAL_OF_GROUP).index(name)) for name in (LEFT_EYE, RIGHT_EYE)]
     return (
         np.concatenate([uv, eyeball.eyeball_uv()]),
         np.concatenate([points[is_kept], mesh_point_count() + quads, mesh_point_count() + size + quads]),

@@ -25,12 +25,13 @@ _BONE_ORIGINS: dict[str, tuple[str, str, float]] = {  # two joints, and the posi
 _BONE_PARENTS = {"neck02": "neck01", "neck03": "neck02", "head": "neck03"}
 _BONE_PARENTS |= dict.fromkeys(("jaw", "eye.L", "eye.R"), "head")
 _BONE_PARENTS |= dict.fromkeys(("neck01", "clavicle.L", "clavicle.R"), "spine")
-_SIDEWAYS_DEGREES, _UP_DEGREES, _DOWN_DEGREES = 28.0, 20.0, 22.0  # rotation of an eye at a weight of 1
+# rotation of an eye at a weight of 1
+_GAZE_SIDEWAYS_DEGREES, _GAZE_UP_DEGREES, _GAZE_DOWN_DEGREES = 28.0, 20.0, 22.0
 _GAZE_ANGLES = {
-    "In": (0.0, -_SIDEWAYS_DEGREES, 0.0),
-    "Out": (0.0, _SIDEWAYS_DEGREES, 0.0),
-    "Up": (-_UP_DEGREES, 0.0, 0.0),
-    "Down": (_DOWN_DEGREES, 0.0, 0.0),
+    "In": (0.0, -_GAZE_SIDEWAYS_DEGREES, 0.0),
+    "Out": (0.0, _GAZE_SIDEWAYS_DEGREES, 0.0),
+    "Up": (-_GAZE_UP_DEGREES, 0.0, 0.0),
+    "Down": (_GAZE_DOWN_DEGREES, 0.0, 0.0),
 }
 """Angles of the left eye, at +X, about x, y and z [degrees]; of the right eye with the opposite sign of y."""
 
@@ -69,17 +70,19 @@ def _moved_points() -> NDArray[np.bool_]:
     return moved
 
 
-def skeleton(joint_mm: Points, centres: tuple[Points, Points], eyeball_size: int) -> Skeleton:
+def build_skeleton(
+    joint_mm: Points, eye_centres_mm: tuple[Points, Points], eyeball_point_count: int
+) -> Skeleton:
     """Return the skeleton of a person: spine, clavicles, three neck bones, head, jaw and eyes.
 
     joint_mm : (j, 3) positions of the person's joints [mm]
-    centres : centres (3,) of the left and the right eyeball, about which they rotate [mm]
-    eyeball_size : number of points of an eyeball; the left and the right eyeball follow the mesh points
+    eye_centres_mm : centres (3,) of the left and the right eyeball, about which they rotate [mm]
+    eyeball_point_count : number of points of an eyeball; both eyeballs follow the mesh points, left first
     """
     arrays = model_data()
     names = tuple(map(str, arrays["bone_names"]))
     joints = dict(zip(map(str, arrays["joint_names"]), joint_mm, strict=True))
-    joints |= dict(zip(("l-eye", "r-eye"), centres, strict=True))
+    joints |= dict(zip(("l-eye", "r-eye"), eye_centres_mm, strict=True))
     origins_mm = np.array(
         [(1 - t) * joints[a] + t * joints[b] for a, b, t in (_BONE_ORIGINS[name] for name in names)]
     )
@@ -87,22 +90,24 @@ def skeleton(joint_mm: Points, centres: tuple[Points, Points], eyeball_size: int
     local, bind = (np.tile(np.eye(4), (len(names), 1, 1)) for _ in range(2))
     local[:, :3, 3] = origins_mm - np.where(parent[:, None] >= 0, origins_mm[parent], 0.0)
     bind[:, :3, 3] = -origins_mm
-    bone, weight = _skin_weights(tuple(names.index(name) for name in ("eye.L", "eye.R")), eyeball_size)
+    bone, weight = _skin_weights(tuple(names.index(name) for name in ("eye.L", "eye.R")), eyeball_point_count)
     return Skeleton(names, parent, local, bind, np.eye(4), bone, weight)
 
 
 @cache
-def _skin_weights(eyes: tuple[int, ...], eyeball_size: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+def _skin_weights(
+    eye_bones: tuple[int, ...], eyeball_point_count: int
+) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
     """Return the bone indices (p, 4) of all points, and the skinning weights (p, 4) of these bones.
 
     An eyeball follows only its own bone.
 
-    eyes : indices of the bones of the left and the right eye
+    eye_bones : indices of the bones of the left and the right eye
     """
     arrays = model_data()
     weights = arrays["weight"].astype(np.float32)
-    eyeball_weights = np.zeros((2 * eyeball_size, weights.shape[1]), np.float32)
+    eyeball_weights = np.zeros((2 * eyeball_point_count, weights.shape[1]), np.float32)
     eyeball_weights[:, 0] = 1.0
     bone = np.concatenate([arrays["bone"], np.zeros_like(eyeball_weights)]).astype(np.int32)
-    bone[len(weights) :, 0] = np.repeat(eyes, eyeball_size)
+    bone[len(weights) :, 0] = np.repeat(eye_bones, eyeball_point_count)
     return bone, np.concatenate([weights / weights.sum(axis=1, keepdims=True), eyeball_weights])

@@ -26,9 +26,9 @@ from dermis.human.skin.look import (
     typical_skin,
 )
 from dermis.human.skin.measured import (
+    ANCESTRY_UNIONS,
     ITA_RANGE,
     SKIN_ANCESTRIES,
-    UNIONS,
     group_weights,
     likely_groups,
     pigment_ancestry,
@@ -45,7 +45,7 @@ _ANCESTRY_CONCENTRATION = 0.35  # of a Dirichlet distribution; small, so that mo
 _SEX_DEVIATION = 0.08  # standard deviation of `sex` from 0 or 1
 _OPPOSITE_SUFFIXES = {"decr": "incr", "down": "up", "in": "out", "backward": "forward", "concave": "convex"}
 """Suffixes of the names of targets with opposite effects."""
-_FOLDER_DEVIATIONS = {  # standard deviation of the weights of targets by folder
+_WEIGHT_DEVIATION_OF_FOLDER = {  # standard deviation of the weights of targets by folder
     "head": 0.1,
     "forehead": 0.25,
     "eyebrows": 0.25,
@@ -59,10 +59,10 @@ _FOLDER_DEVIATIONS = {  # standard deviation of the weights of targets by folder
 }
 # Words in the names of targets for macro quantities and for shifts of whole parts, which are not sampled:
 _EXCLUDED_TARGETS = ("trans", "age", "fat", "measure", "push")
-_SIDE_DEVIATION = 0.2  # of the difference between left and right, relative to that of the weight
+_RELATIVE_SIDE_DEVIATION = 0.2  # of the difference between left and right, relative to that of the weight
 _ASYMMETRY_DEVIATION = 0.1
 _HEAD_SHAPES = ("diamond", "invertedtriangular", "oval", "rectangular", "round", "square", "triangular")
-_MAX_SHAPE_WEIGHT = 0.3
+_MAX_HEAD_SHAPE_WEIGHT = 0.3
 _ANCESTRIES = "african", "asian", "caucasian"
 _NESTED_FIELDS = "targets", "skin", "eyes", "hair"
 _FIELD_RANGES = {
@@ -77,9 +77,11 @@ _FIELD_RANGES = {
     "hair_pheomelanin": (0.0, 10.0),
 }
 _OPTIONAL_FIELDS = "ita", "skin_ancestry"
-_OTHER_SKIN_FRACTION = 0.45  # of Caucasian shapes: they have one of `_OTHER_SKINS`, if no ancestry is given
-_OTHER_SKINS = ("south asian", "iraqi", "arabian")
-_SHAPE_OF_SKIN = {  # Dirichlet parameters of African, Asian, Caucasian shape by skin group; artist's values
+# fraction of Caucasian shapes that have one of `_OTHER_SKIN_ANCESTRIES`, if no ancestry is given
+_OTHER_SKIN_ANCESTRY_FRACTION = 0.45
+_OTHER_SKIN_ANCESTRIES = ("south asian", "iraqi", "arabian")
+# Dirichlet parameters of African, Asian, Caucasian shape by skin group; artist's values
+_SHAPE_CONCENTRATIONS_OF_SKIN = {
     "african": (3.0, 0.05, 0.05),
     "caucasian": (0.05, 0.05, 3.0),
     "chinese": (0.05, 3.0, 0.05),
@@ -90,7 +92,7 @@ _SHAPE_OF_SKIN = {  # Dirichlet parameters of African, Asian, Caucasian shape by
     "arabian": (0.4, 0.1, 3.0),
 }
 _MIN_HAIR_FRACTION = 0.05
-_TARGET_RANGE = -2.0, 2.0
+_TARGET_WEIGHT_RANGE = -2.0, 2.0
 _NO_TARGETS: Mapping[str, float] = MappingProxyType({})
 
 
@@ -178,36 +180,38 @@ def _sample_ancestry(
         group = _pick_name(
             group_weights(0, 0, 0, name) if name else likely_groups(float(fixed_fields["ita"])), picks[0]
         )
-        shape = ancestry if shape_given else rng.dirichlet(_SHAPE_OF_SKIN[group])
+        shape = ancestry if shape_given else rng.dirichlet(_SHAPE_CONCENTRATIONS_OF_SKIN[group])
         return shape, {group: 1.0}
     groups: dict[str, float] = {}
     for fraction, people, pick in zip(ancestry, _ANCESTRIES, picks, strict=True):
-        other = people == "caucasian" and not shape_given and chance < _OTHER_SKIN_FRACTION
-        names = _OTHER_SKINS if other else UNIONS.get(people, (people,))
+        other = people == "caucasian" and not shape_given and chance < _OTHER_SKIN_ANCESTRY_FRACTION
+        names = _OTHER_SKIN_ANCESTRIES if other else ANCESTRY_UNIONS.get(people, (people,))
         groups[names[min(int(pick * len(names)), len(names) - 1)]] = float(fraction)
     return ancestry, groups
 
 
-def _pick_name(weights: Mapping[str, float], chance: float) -> str:
-    """Return the name at which the cumulative weight exceeds `chance`, a number from 0 to 1."""
-    ends = np.cumsum(list(weights.values()))
-    return list(weights)[min(int(np.searchsorted(ends, chance, "right")), len(weights) - 1)]
+def _pick_name(weight_of_name: Mapping[str, float], cumulative_chance: float) -> str:
+    """Return the name at which the cumulative weight exceeds `cumulative_chance`, a number from 0 to 1."""
+    ends = np.cumsum(list(weight_of_name.values()))
+    return list(weight_of_name)[
+        min(int(np.searchsorted(ends, cumulative_chance, "right")), len(weight_of_name) - 1)
+    ]
 
 
 def _sample_hair_and_skin(
     rng: np.random.Generator,
-    person: Demographics,
+    demographics: Demographics,
     typical_look: HairLook,
     skin: SkinLook,
     fixed_fields: Mapping[str, Any],
 ) -> dict[str, Any]:
     """Return the fields "hair" and "skin": a random hair look, and the skin with its stubble and recession.
 
-    person, typical_look : demographics and typical hair look of the person
+    demographics, typical_look : demographics and typical hair look of the person
     skin : sampled skin look, whose shadow of shaved hair is adjusted to the hair
     fixed_fields : values of fields that are not sampled
     """
-    hair, recession = sample_hair(rng, person, typical_look), sample_recession(rng, person)
+    hair, recession = sample_hair(rng, demographics, typical_look), sample_recession(rng, demographics)
     hair = replace(hair, **fixed_fields.get("hair", {}))
     visibility = stubble_visibility(hair)
     beard = visibility * max(skin.beard, _MIN_BEARD_SHADOW if hair.beard_mm else 0.0)
@@ -237,9 +241,11 @@ def _sample_targets(rng: np.random.Generator) -> Iterator[tuple[str, float]]:
         if one.truncated:
             value = min(max(value, -2 * one.spread), 2 * one.spread)
         if one.shared_name:  # left and right are nearly alike
-            value = common.setdefault(one.shared_name, value) + _SIDE_DEVIATION * one.spread * next(samples)
+            value = common.setdefault(one.shared_name, value) + _RELATIVE_SIDE_DEVIATION * one.spread * next(
+                samples
+            )
         yield (one.more if value > 0 else one.less), abs(value)
-    yield f"head/head-{rng.choice(_HEAD_SHAPES)}", float(rng.uniform(0.0, _MAX_SHAPE_WEIGHT))
+    yield f"head/head-{rng.choice(_HEAD_SHAPES)}", float(rng.uniform(0.0, _MAX_HEAD_SHAPE_WEIGHT))
 
 
 class _OppositeTargets(NamedTuple):
@@ -267,14 +273,14 @@ def _opposite_targets() -> tuple[_OppositeTargets, ...]:
         folder, local_name = name.split("/")
         if folder == "asym" and name.endswith("-l"):
             pairs.append(_OppositeTargets(f"{name[:-1]}r", name, _ASYMMETRY_DEVIATION, False, ""))
-        if folder not in _FOLDER_DEVIATIONS or any(word in local_name for word in _EXCLUDED_TARGETS):
+        if folder not in _WEIGHT_DEVIATION_OF_FOLDER or any(word in local_name for word in _EXCLUDED_TARGETS):
             continue
         sided = local_name[:2] in ("l-", "r-")
         for low, high in _OPPOSITE_SUFFIXES.items():
             stem = name.removesuffix(low)
             if stem != name and f"{stem}{high}" in known:
                 shared_name = f"{folder}/{local_name[2:].removesuffix(low)}" if sided else ""
-                deviation = _FOLDER_DEVIATIONS[folder]
+                deviation = _WEIGHT_DEVIATION_OF_FOLDER[folder]
                 pairs.append(_OppositeTargets(name, f"{stem}{high}", deviation, True, shared_name))
     return tuple(pairs)
 
@@ -352,7 +358,7 @@ class Human:
         for name, weight in self.targets.items():
             if not isinstance(name, str):
                 refuse("targets", "names", f"got {format_value(name)}", "See human_targets()")
-            checked_number(f"target {name!r}", weight, *_TARGET_RANGE, "beyond it is no face")
+            checked_number(f"target {name!r}", weight, *_TARGET_WEIGHT_RANGE, "beyond it is no face")
         for name, kind in (("skin", SkinLook), ("eyes", EyeLook), ("hair", HairLook)):
             if not isinstance(look := getattr(self, name), kind | None):
                 refuse(name, f"a {kind.__name__}", f"got {format_value(look)}", "Make one, or leave it out")
@@ -438,8 +444,7 @@ class Human:
         """Return the head of another person with the skin and eyes of this person.
 
         With `Pose(positions_mm=person.positions_mm)` the head also gets the shape of this person; only its
-        skin is painted again, which is faster than a new head. Hair and joint positions are still those of
-        the other person.
+        skin is painted again, which is faster than a new head. Hair and joint positions remain unchanged.
 
         Parameters
         ----------
@@ -550,6 +555,10 @@ def _check_skin_fields(skin_ancestry: object, ita: object) -> None:
         checked_number("ita", ita, *ITA_RANGE, "degrees")
 
 
-def _blend_fractions(value: float) -> dict[str, float]:
+def _blend_fractions(body_parameter: float) -> dict[str, float]:
     """Return linear blend fractions of "min", "average" and "max" for a parameter from -1 to 1."""
-    return {"min": max(-value, 0.0), "average": 1.0 - abs(value), "max": max(value, 0.0)}
+    return {
+        "min": max(-body_parameter, 0.0),
+        "average": 1.0 - abs(body_parameter),
+        "max": max(body_parameter, 0.0),
+    }

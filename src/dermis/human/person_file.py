@@ -66,17 +66,17 @@ def read_person(path: Path) -> Human:
     return human
 
 
-def _build_dataclass(path: Path, kind: type[T], values: Any) -> T:
+def _build_dataclass(path: Path, dataclass_type: type[T], field_values: Any) -> T:
     """Return an instance of a dataclass, such as `Human` or `SkinLook`, from its fields in a file."""
-    known = [one.name for one in fields(kind)]
-    if not isinstance(values, Mapping):
-        actual = f"got {format_value(values)}"
+    known = [one.name for one in fields(dataclass_type)]
+    if not isinstance(field_values, Mapping):
+        actual = f"got {format_value(field_values)}"
         refuse(path, f"numbers of {', '.join(known)}", actual, "Correct the file")
-    for name in values:
+    for name in field_values:
         if name not in known:
             refuse(path, f"names of {', '.join(known)}", f"got {format_value(name)}", "Correct the file")
     try:
-        return kind(**values)
+        return dataclass_type(**field_values)
     except DermisError as fault:
         raise DermisError(f"{path}: {fault}") from None
 

@@ -16,7 +16,7 @@ MM_PER_U, MM_PER_V = 160.0, 40.0
 """Lengths of a unit of u and of v [mm]."""
 ARCH_MIDDLE_U, BITING_EDGE_V = 0.5, 0.02
 """u of the gap between the two middle teeth, and v of the biting edge."""
-_ARCH_SAMPLES = 2000
+_ARCH_SAMPLE_COUNT = 2000
 
 
 @cache
@@ -33,12 +33,12 @@ def teeth_layout(upper: bool) -> tuple[NDArray[np.int64], Doubles]:
     return points, np.stack([ARCH_MIDDLE_U + _arc_length(angle, across, deep) / MM_PER_U, v], axis=-1)
 
 
-def _arc_length(angle: Doubles, across: float, deep: float) -> Doubles:
+def _arc_length(ellipse_angle: Doubles, half_width_mm: float, half_depth_mm: float) -> Doubles:
     """Return the signed arc length (n,) of an ellipse from its vertex in the middle of the teeth [mm].
 
-    angle : (n,) parameter of the ellipse [rad]
-    across, deep : half axes of the ellipse, sideways and backwards [mm]
+    ellipse_angle : (n,) parameter of the ellipse [rad]
+    half_width_mm, half_depth_mm : half axes of the ellipse, sideways and backwards [mm]
     """
-    t = np.linspace(0.0, np.pi / 2, _ARCH_SAMPLES)
-    step = np.hypot(across * np.cos(t), deep * np.sin(t)) * (t[1] - t[0])
-    return np.asarray(np.sign(angle) * np.interp(np.abs(angle), t, np.cumsum(step) - step[0]))
+    t = np.linspace(0.0, np.pi / 2, _ARCH_SAMPLE_COUNT)
+    step = np.hypot(half_width_mm * np.cos(t), half_depth_mm * np.sin(t)) * (t[1] - t[0])
+    return np.asarray(np.sign(ellipse_angle) * np.interp(np.abs(ellipse_angle), t, np.cumsum(step) - step[0]))

@@ -10,16 +10,16 @@ from dermis.base.quantities import checked_number
 from dermis.base.summary import ShortRepr
 from dermis.mesh.pose import Pose
 
-_MAX_NAMES = 8  # largest number of names in a note
+_MAX_LISTED_NAMES = 8  # largest number of names in a note
 MAX_DURATION_S = 86_400.0
 _MAX_TIME_S = 1e9
-_MIN_RATE, _MAX_RATE = 0.001, 1000.0
-_ROUNDING_TOLERANCE = 1e-6  # fraction of a frame by which rounding may put the last frame behind the end
+_MIN_FRAME_RATE, _MAX_FRAME_RATE = 0.001, 1000.0
+_END_TOLERANCE_FRAMES = 1e-6  # fraction of a frame by which rounding may put the last frame behind the end
 
 
-def check_rate(culprit: object, rate: object) -> float:
-    """Return a frame rate [1/s] after checking that it is a positive number; raise DermisError if not."""
-    return checked_number(culprit, rate, _MIN_RATE, _MAX_RATE, "frames a second")
+def check_frame_rate(culprit: object, frame_rate: object) -> float:
+    """Return a frame rate [1/s] after checking that the rate is positive; raise DermisError if not."""
+    return checked_number(culprit, frame_rate, _MIN_FRAME_RATE, _MAX_FRAME_RATE, "frames a second")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -33,7 +33,7 @@ class Clip(ShortRepr):
     duration_s : float
         Time of the last frame [s].
     rate : float or None
-        Frame rate that the file states [1/s]; None if it states none.
+        Frame rate that the file states [1/s]; None if the file states no rate.
     targets, bones : tuple of str
         Names of the morph targets and bones that the clip moves.
     left_out : tuple of str
@@ -101,7 +101,10 @@ class Clip(ShortRepr):
         DermisError
             For an invalid rate.
         """
-        return math.floor(self.duration_s * check_rate(f"{self.name}: rate", rate) + _ROUNDING_TOLERANCE) + 1
+        return (
+            math.floor(self.duration_s * check_frame_rate(f"{self.name}: rate", rate) + _END_TOLERANCE_FRAMES)
+            + 1
+        )
 
     def __post_init__(self) -> None:
         """Refuse an invalid duration."""
@@ -113,6 +116,10 @@ class Clip(ShortRepr):
         """Return a sentence about names of the file that the head lacks; empty if the head lacks none."""
         if not self.left_out:
             return ""
-        names = ", ".join(self.left_out[:_MAX_NAMES])
-        more = f" and {len(self.left_out) - _MAX_NAMES} more" if len(self.left_out) > _MAX_NAMES else ""
+        names = ", ".join(self.left_out[:_MAX_LISTED_NAMES])
+        more = (
+            f" and {len(self.left_out) - _MAX_LISTED_NAMES} more"
+            if len(self.left_out) > _MAX_LISTED_NAMES
+            else ""
+        )
         return f"{self.name}: the head has no {names}{more}; left out."

@@ -1,6 +1,6 @@
 """The standard eyeball: its shape, mesh and uv, and contact with the lids.
 
-The eyeball is a sphere (the sclera, in short *ball*) with the spherical cap of a cornea. Lengths are those of
+The eyeball is a sphere (the sclera, in short *ball*) with the spherical cap of a cornea. Lengths are for
 an adult eye [mm], and the origin is the centre of the ball.
 """
 
@@ -21,9 +21,9 @@ IRIS_BEHIND_MM = 3.0
 """Depth of the plane of the iris behind the cornea's apex [mm]."""
 QUADS_PER_EDGE = 10
 """Quads along each edge of the cube that becomes a ball; even, so that a point is on the axis."""
-UV_RIM = 0.49
+UV_RADIUS_OF_BACK = 0.49
 """Distance of the back of the eye from the centre of the uv layout [-]."""
-UV_DECAY_RADIANS = 0.9
+UV_DECAY_ANGLE_RADIANS = 0.9
 """Constant a: at the angle t from the axis, the distance in uv is proportional to 1 - exp(-t / a) [rad]."""
 
 
@@ -50,27 +50,27 @@ def iris_mm() -> float:
     return apex_mm() - IRIS_BEHIND_MM
 
 
-def profile_mm(angle: Doubles) -> Doubles:
+def profile_mm(angle_from_axis: Doubles) -> Doubles:
     """Return the distance from the ball's centre to the surface of ball and cornea [mm].
 
-    angle : angle between the direction and the eye's axis [rad]
+    angle_from_axis : angle between the direction and the eye's axis [rad]
     """
     centre = cornea_centre_mm()
-    within = np.maximum(CORNEA_MM**2 - (centre * np.sin(angle)) ** 2, 0.0)
+    within = np.maximum(CORNEA_MM**2 - (centre * np.sin(angle_from_axis)) ** 2, 0.0)
     edge = np.arctan2(LIMBUS_MM, np.sqrt(SCLERA_MM**2 - LIMBUS_MM**2))
-    return np.where(angle < edge, centre * np.cos(angle) + np.sqrt(within), SCLERA_MM)
+    return np.where(angle_from_axis < edge, centre * np.cos(angle_from_axis) + np.sqrt(within), SCLERA_MM)
 
 
-def radial_distances_mm(points: Doubles, axis: Doubles) -> tuple[Doubles, Doubles]:
+def radial_distances_mm(points: Doubles, eye_axis: Doubles) -> tuple[Doubles, Doubles]:
     """Return the distances (...) of points and of the eyeball's surface from the ball's centre [mm].
 
     points : (..., 3) positions relative to the ball's centre [mm]
-    axis : (..., 3) unit vectors of the eyes' axes
+    eye_axis : (..., 3) unit vectors of the eyes' axes
 
     The distance of the surface is measured along the ray from the centre through the point.
     """
     distance = np.linalg.norm(points, axis=-1)
-    cosine = (points * axis).sum(axis=-1) / np.maximum(distance, 1e-9)
+    cosine = (points * eye_axis).sum(axis=-1) / np.maximum(distance, 1e-9)
     return distance, profile_mm(np.arccos(np.clip(cosine, -1.0, 1.0)))
 
 
@@ -110,12 +110,12 @@ class LidContact(ShortRepr):
 
 
 @cache
-def build_eyeball(quads_per_edge: int = QUADS_PER_EDGE, scale: float = 1.0) -> tuple[Doubles, Index]:
+def build_eyeball(quads_per_edge: int = QUADS_PER_EDGE, position_scale: float = 1.0) -> tuple[Doubles, Index]:
     """Return the points (n, 3) of an eyeball that looks along +Z [mm], and its quads (q, 4).
 
     quads_per_edge : number of quads along each edge of the cube that is projected to the ball
-    scale : factor of the positions; control points need a factor above 1, as their subdivision surface is
-        smaller
+    position_scale : factor of the positions; control points need a factor above 1, as their subdivision
+        surface is smaller
     """
     points, quads = list[Doubles](), list[Index]()
     grid = np.tan(np.linspace(-np.pi / 4, np.pi / 4, quads_per_edge + 1))  # evenly spaced in angle
@@ -132,7 +132,7 @@ def build_eyeball(quads_per_edge: int = QUADS_PER_EDGE, scale: float = 1.0) -> t
     _, first, welded = np.unique(np.rint(1e6 * cube), axis=0, return_index=True, return_inverse=True)
     direction = cube[first] / np.linalg.norm(cube[first], axis=1, keepdims=True)
     radius = profile_mm(np.arccos(np.clip(direction[:, 2], -1.0, 1.0)))
-    return scale * radius[:, None] * direction, welded.reshape(-1)[np.concatenate(quads)]
+    return position_scale * radius[:, None] * direction, welded.reshape(-1)[np.concatenate(quads)]
 
 
 @cache
@@ -145,12 +145,12 @@ def eyeball_uv(quads_per_edge: int = QUADS_PER_EDGE) -> Doubles:
     """
     x, y, z = _point_directions(quads_per_edge).T
     angle, azimuth = np.arccos(np.clip(z, -1.0, 1.0)), np.arctan2(y, x)
-    radius = UV_RIM * angle / np.pi
+    radius = UV_RADIUS_OF_BACK * angle / np.pi
     return 0.5 + np.stack([radius * np.cos(azimuth), -radius * np.sin(azimuth)], axis=-1)
 
 
 def axis_points(quads_per_edge: int = QUADS_PER_EDGE) -> tuple[int, int, int]:
-    """Return three point indices: the cornea's apex, the back of the ball, and its equator towards +X.
+    """Return three point indices: the apex of the cornea, the back of the ball, and the ball's equator at +X.
 
     quads_per_edge : number of quads along a cube edge, see `build_eyeball`
     """
@@ -183,6 +183,10 @@ def eye_uv(points: Doubles) -> Floats:
     """
     across = np.hypot(points[:, 0], points[:, 1])
     angle = np.arctan2(across, points[:, 2])
-    radius = UV_RIM * np.expm1(-angle / UV_DECAY_RADIANS) / np.expm1(-np.pi / UV_DECAY_RADIANS)
+    radius = (
+        UV_RADIUS_OF_BACK
+        * np.expm1(-angle / UV_DECAY_ANGLE_RADIANS)
+        / np.expm1(-np.pi / UV_DECAY_ANGLE_RADIANS)
+    )
     direction = points[:, :2] * [1.0, -1.0] / np.maximum(across, 1e-12)[:, None]
     return np.asarray(0.5 + radius[:, None] * direction, np.float32)

@@ -11,39 +11,40 @@ from dermis.mesh.geometry import cross_columns, dot_columns
 
 Direction = Literal["x", "z", "-x", "-z"]
 # Numbers of examined triangles, of points sampled on them, and of points that are mirrored:
-_MAX_TRIANGLES, _SAMPLES, _MIRRORED = 40_000, 6_000, 800
+_MAX_ANALYSED_TRIANGLES, _SURFACE_SAMPLE_COUNT, _MIRRORED_SAMPLE_COUNT = 40_000, 6_000, 800
 # Limits for the eyes, relative to the width of both together:
 _MAX_EYE_DEPTH, _MAX_EYE_HEIGHT = 0.67, 0.6  # largest extent from back to front, and upwards
-_MIN_GAP = 0.1  # smallest gap between the eyes
-_HEAD_REACH = 3.0  # horizontal radius around the eyes within which vertices count as the head
-_MIN_AHEAD, _MAX_ASIDE = 0.25, 0.25  # offset of the eyes from the middle of the head: forwards, and to a side
+_MIN_EYE_GAP = 0.1  # smallest gap between the eyes
+_HEAD_RADIUS_IN_EYE_WIDTHS = 3.0  # horizontal radius around the eyes within which vertices count as the head
+# offset of the eyes from the middle of the head: forwards, and to a side
+_MIN_EYE_OFFSET_AHEAD, _MAX_EYE_OFFSET_ASIDE = 0.25, 0.25
 # Limits for the head, relative to its height:
-_HEAD_WIDTH = 0.68  # largest width of the head without shoulders
-_DEPTH_RANGE = 0.5, 1.6  # smallest and largest depth
+_MAX_HEAD_WIDTH = 0.68  # largest width of the head without shoulders
+_HEAD_DEPTH_RANGE = 0.5, 1.6  # smallest and largest depth
 _MAX_ASYMMETRY = 0.03  # largest root mean square distance of mirrored points from the surface
-_MIN_NOSE = 0.04  # smallest protrusion of the middle of the face
-_MIN_RELIEF = 0.03  # smallest variation of normals, see `_normal_variation`
-_VARIATION_CELL = 0.08  # side of the cells in `_normal_variation`
+_MIN_NOSE_HEIGHT = 0.04  # smallest protrusion of the middle of the face
+_MIN_NORMAL_VARIATION = 0.03  # smallest variation of normals, see `_normal_variation`
+_VARIATION_CELL_SIDE = 0.08  # side of the cells in `_normal_variation`
 # Height of the rows in `_ridge_height`, largest distance of the ridge from the middle, distance of its sides:
-_ROW, _RIDGE, _SIDES = 0.05, 0.03, (0.07, 0.12)
+_RIDGE_ROW_HEIGHT, _MAX_RIDGE_OFFSET, _RIDGE_SIDE_RANGE = 0.05, 0.03, (0.07, 0.12)
 # Smallest ratio of the larger to the smaller asymmetry about the horizontal axes, and of relief and of nose
 # at the front to those at the back:
 _MIN_ASYMMETRY_RATIO, _MIN_RELIEF_RATIO, _MIN_NOSE_RATIO = 2.2, 1.4, 1.35
 
 
 def face_direction(positions: Doubles, triangles: Index, eyes: Doubles) -> Direction | None:
-    """Return the horizontal axis along which a face looks; None if it is uncertain.
+    """Return the horizontal axis along which a face looks; None if the axis is uncertain.
 
     positions : (v, 3) vertices of any unit, Y up
     triangles : (f, 3) vertex indices
-    eyes : (n, 3) vertices of eyeballs, or joints of the eyes; empty if they are not known
+    eyes : (n, 3) vertices of eyeballs, or joints of the eyes; empty if unknown
 
     Eyes lie in front of the middle of the head. If no eyes are known, the head must be symmetric about a
     vertical plane, and its front is the side with more relief and with a ridge in the middle, the nose.
     """
     if not len(triangles):
         return None
-    corners = positions[triangles[:: 1 + len(triangles) // _MAX_TRIANGLES]]
+    corners = positions[triangles[:: 1 + len(triangles) // _MAX_ANALYSED_TRIANGLES]]
     return _direction_from_eyes(corners[:, 0], eyes) or _direction_from_shape(corners)
 
 
@@ -53,14 +54,20 @@ def _direction_from_eyes(points: Doubles, eyes: Doubles) -> Direction | None:
     middle, spread = (eyes.min(axis=0) + eyes.max(axis=0)) / 2, np.ptp(eyes, axis=0)
     front = 2 if spread[0] > spread[2] else 0
     width = spread[2 - front]
-    if (2 * np.abs(eyes - middle)[:, 2 - front]).min() < _MIN_GAP * width:
+    if (2 * np.abs(eyes - middle)[:, 2 - front]).min() < _MIN_EYE_GAP * width:
         return None  # the vertices are those of one eye
     offset = np.abs(points - middle)
-    near = points[(offset[:, 1] < width / 2) & (np.hypot(offset[:, 0], offset[:, 2]) < _HEAD_REACH * width)]
+    near = points[
+        (offset[:, 1] < width / 2)
+        & (np.hypot(offset[:, 0], offset[:, 2]) < _HEAD_RADIUS_IN_EYE_WIDTHS * width)
+    ]
     if spread[front] > _MAX_EYE_DEPTH * width or spread[1] > _MAX_EYE_HEIGHT * width or not len(near):
         return None
     shift = middle - (near.min(axis=0) + near.max(axis=0)) / 2
-    if abs(shift[front]) < _MIN_AHEAD * width or abs(shift[2 - front]) > _MAX_ASIDE * width:
+    if (
+        abs(shift[front]) < _MIN_EYE_OFFSET_AHEAD * width
+        or abs(shift[2 - front]) > _MAX_EYE_OFFSET_ASIDE * width
+    ):
         return None
     return _axis_name(front, shift[front])
 
@@ -82,15 +89,15 @@ def _direction_from_shape(corners: Doubles) -> Direction | None:
     if (
         low > _MAX_ASYMMETRY
         or high < _MIN_ASYMMETRY_RATIO * low
-        or not _DEPTH_RANGE[0] < depths < _DEPTH_RANGE[1]
+        or not _HEAD_DEPTH_RANGE[0] < depths < _HEAD_DEPTH_RANGE[1]
     ):
         return None
     sides = points[:, front] > 0, points[:, front] < 0
     reliefs = [_normal_variation(points[side], normals[side]) for side in sides]
     noses = [_ridge_height(points[side], front) for side in sides]
     first = int(noses[1] > noses[0])
-    has_nose = noses[first] > max(_MIN_NOSE, _MIN_NOSE_RATIO * noses[1 - first])
-    has_relief = reliefs[first] > max(_MIN_RELIEF, _MIN_RELIEF_RATIO * reliefs[1 - first])
+    has_nose = noses[first] > max(_MIN_NOSE_HEIGHT, _MIN_NOSE_RATIO * noses[1 - first])
+    has_relief = reliefs[first] > max(_MIN_NORMAL_VARIATION, _MIN_RELIEF_RATIO * reliefs[1 - first])
     if not (has_nose and has_relief):
         return None
     return _axis_name(front, 1 - 2 * first)
@@ -112,7 +119,7 @@ def _head_height(points: Doubles) -> float:
     ordered = points[np.argsort(-points[:, 1])]
     depth, across = ordered[0, 1] - ordered[:, 1], ordered[:, ::2]
     widths = np.maximum.accumulate(across) - np.minimum.accumulate(across)
-    fits = np.flatnonzero((widths.min(axis=1) <= _HEAD_WIDTH * depth) & (depth > 0.03 * depth[-1]))
+    fits = np.flatnonzero((widths.min(axis=1) <= _MAX_HEAD_WIDTH * depth) & (depth > 0.03 * depth[-1]))
     return float(depth[fits[0]] if len(fits) else depth[-1])
 
 
@@ -129,19 +136,23 @@ def _sample_surface(corners: Doubles, normals: Doubles) -> tuple[Doubles, Double
     """
     areas = np.sqrt(dot_columns(normals, normals))
     total = np.cumsum(areas)
-    chosen = np.searchsorted(total, (np.arange(_SAMPLES) + 0.5) / _SAMPLES * total[-1])
-    shares = np.sort(np.random.default_rng(0).random((2, _SAMPLES)), axis=0)
+    chosen = np.searchsorted(
+        total, (np.arange(_SURFACE_SAMPLE_COUNT) + 0.5) / _SURFACE_SAMPLE_COUNT * total[-1]
+    )
+    shares = np.sort(np.random.default_rng(0).random((2, _SURFACE_SAMPLE_COUNT)), axis=0)
     shares = np.diff(shares, axis=0, prepend=0, append=1)
     return np.einsum("fkc,kf->fc", corners[chosen], shares), (normals[:, chosen] / areas[chosen]).T
 
 
-def _asymmetry(points: Doubles, axis: int) -> float:
+def _asymmetry(points: Doubles, mirrored_axis: int) -> float:
     """Return the root mean square distance of mirrored points (n, 3) from the nearest original points.
 
-    axis : index of the coordinate that is mirrored
+    mirrored_axis : index of the coordinate that is mirrored
     """
     single = points.astype(np.float32)
-    mirrored = single[:: len(points) // _MIRRORED] * np.where(np.arange(3) == axis, -1, 1).astype(np.float32)
+    mirrored = single[:: len(points) // _MIRRORED_SAMPLE_COUNT] * np.where(
+        np.arange(3) == mirrored_axis, -1, 1
+    ).astype(np.float32)
     squares = (-2 * mirrored) @ single[::2].T
     squares += (single[::2] ** 2).sum(axis=1)
     nearest = squares.min(axis=1) + (mirrored**2).sum(axis=1)
@@ -150,22 +161,26 @@ def _asymmetry(points: Doubles, axis: int) -> float:
 
 def _normal_variation(points: Doubles, normals: Doubles) -> float:
     """Return the variation of normals (n, 3) at points (n, 3) within small cells, 0 to 1 [-]."""
-    keys = np.floor(points / _VARIATION_CELL).astype(np.int64) @ [1, 1 << 20, 1 << 40]
+    keys = np.floor(points / _VARIATION_CELL_SIDE).astype(np.int64) @ [1, 1 << 20, 1 << 40]
     cells = np.unique(keys, return_inverse=True)[1].reshape(-1)
     sums: Doubles = np.stack([np.bincount(cells, one) for one in normals.T])
     return 1 - float(np.sqrt(dot_columns(sums, sums)).sum()) / max(len(points), 1)
 
 
-def _ridge_height(points: Doubles, front: int) -> float:
+def _ridge_height(points: Doubles, front_axis: int) -> float:
     """Return the largest distance at any height by which the middle of a face protrudes beyond its sides.
 
     points : (n, 3) points of the front or back of a head
-    front : index of the coordinate along which the face may look
+    front_axis : index of the coordinate along which the face may look
     """
-    row = (points[:, 1] / -_ROW).astype(int)
-    across, depth = points[:, 2 - front], np.abs(points[:, front])
-    low, high = _SIDES
-    bands = np.abs(across) < _RIDGE, (across > low) & (across < high), (across < -low) & (across > -high)
+    row = (points[:, 1] / -_RIDGE_ROW_HEIGHT).astype(int)
+    across, depth = points[:, 2 - front_axis], np.abs(points[:, front_axis])
+    low, high = _RIDGE_SIDE_RANGE
+    bands = (
+        np.abs(across) < _MAX_RIDGE_OFFSET,
+        (across > low) & (across < high),
+        (across < -low) & (across > -high),
+    )
     middle, left, right = reach = np.zeros((3, row.max(initial=0) + 1))
     for deepest, band in zip(reach, bands, strict=True):
         np.maximum.at(deepest, row[band], depth[band])

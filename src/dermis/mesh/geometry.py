@@ -14,12 +14,12 @@ MIN_UV_CROSS = 1e-12
 T = TypeVar("T", np.float32, np.float64)
 
 
-def weld(rows: ArrayLike) -> Ints:
+def weld(vertex_rows: ArrayLike) -> Ints:
     """Return the index of each row (v, k) among the unique rows, (v,); rows are compared in float32.
 
-    rows : positions [mm], or positions and uv side by side
+    vertex_rows : positions [mm], or positions and uv side by side
     """
-    table = np.asarray(rows, dtype=np.float32)
+    table = np.asarray(vertex_rows, dtype=np.float32)
     order = np.lexsort(table.T)
     ordered = table[order]
     starts = np.ones(len(table), dtype=np.int32)
@@ -74,15 +74,15 @@ def edge_keys(corners: NDArray[np.integer]) -> Index:
     return np.minimum(start, end) * (int(start.max(initial=0)) + 1) + np.maximum(start, end)
 
 
-def triangle_keys(corners: NDArray[np.integer], count: int) -> Index:
+def triangle_keys(corners: NDArray[np.integer], point_count: int) -> Index:
     """Return a key (f,) for each triangle, which is equal for triangles with the same three points.
 
     corners : (f, 3) point indices
-    count : number of points, at most two million
+    point_count : number of points, at most two million
     """
     a, b, c = corners.T.astype(np.int64)
     low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
-    return np.asarray((low * count + a + b + c - low - high) * count + high)
+    return np.asarray((low * point_count + a + b + c - low - high) * point_count + high)
 
 
 def unique_sides(sides: NDArray[np.integer]) -> tuple[Index, Index, Index]:
@@ -124,9 +124,9 @@ def vertex_normals(positions: Floats, point: Ints, triangles: Ints) -> Floats:
     return np.ascontiguousarray((total / length).astype(np.float32).take(point, axis=1).T)
 
 
-def sum_by_index(index: NDArray[np.integer], values: Doubles, count: int) -> Doubles:
-    """Sum rows of `values` (n, k) of equal `index` (n,); row i of the sums (count, k) is for index i."""
-    columns = [np.bincount(index, weights=column, minlength=count) for column in values.T]
+def sum_by_index(row_index: NDArray[np.integer], row_values: Doubles, sum_count: int) -> Doubles:
+    """Sum rows of `row_values` (n, k) of equal `row_index` (n,); sum i of (sum_count, k) is for index i."""
+    columns = [np.bincount(row_index, weights=column, minlength=sum_count) for column in row_values.T]
     return np.column_stack(columns)
 
 
@@ -221,42 +221,49 @@ def cross_columns(a: NDArray[T], b: NDArray[T]) -> NDArray[T]:
     return result
 
 
-def label_components(count: int, a: NDArray[np.integer], b: NDArray[np.integer]) -> Index:
+def label_components(
+    node_count: int, link_start: NDArray[np.integer], link_end: NDArray[np.integer]
+) -> Index:
     """Return for each node of a graph the number of its connected component, (n,).
 
     Components are numbered in the order in which they first appear.
 
-    count : n, number of nodes
-    a, b : (l,) nodes at the two ends of each link
+    node_count : n, number of nodes
+    link_start, link_end : (l,) nodes at the two ends of each link
     """
-    label = np.arange(count)
+    label = np.arange(node_count)
     while True:
         before = label.copy()
-        smaller = np.minimum(before[a], before[b])
-        for nodes in (a, b, before[a], before[b]):  # the nodes and their labels, which are nodes too
+        smaller = np.minimum(before[link_start], before[link_end])
+        for nodes in (
+            link_start,
+            link_end,
+            before[link_start],
+            before[link_end],
+        ):  # the nodes and their labels, which are nodes too
             np.minimum.at(label, nodes, smaller)
         label = label[label]
         if np.array_equal(label, before):
             return np.asarray(np.unique(label, return_inverse=True)[1].reshape(-1), dtype=np.int64)
 
 
-def expand_runs(first: Index, count: Index) -> tuple[Index, Index]:
+def expand_runs(run_start: Index, run_length: Index) -> tuple[Index, Index]:
     """Return the integers of r runs of consecutive integers, preceded by the index of each integer's run.
 
-    first, count : (r,) first integer and length of each run
+    run_start, run_length : (r,) first integer and length of each run
     """
-    which = np.repeat(np.arange(len(count)), count)
-    start = np.repeat(np.cumsum(count) - count, count)
-    return which, np.arange(len(which)) - start + first[which]
+    which = np.repeat(np.arange(len(run_length)), run_length)
+    start = np.repeat(np.cumsum(run_length) - run_length, run_length)
+    return which, np.arange(len(which)) - start + run_start[which]
 
 
-def fibonacci_sphere(count: int) -> Doubles:
-    """Return unit vectors (count, 3) distributed evenly over the sphere, on a golden-angle spiral about +Y.
+def fibonacci_sphere(vector_count: int) -> Doubles:
+    """Return unit vectors (vector_count, 3), even over the sphere, on a golden-angle spiral about +Y.
 
     Source: [Keinert2015].
     """
-    index = np.arange(count) + 0.5
-    y = 1.0 - 2.0 * index / count
+    index = np.arange(vector_count) + 0.5
+    y = 1.0 - 2.0 * index / vector_count
     phi = np.pi * (1.0 + np.sqrt(5.0)) * index
     r = np.sqrt(1.0 - y**2)
     return np.stack([r * np.cos(phi), y, r * np.sin(phi)], axis=-1)

@@ -18,7 +18,7 @@ from dermis.mesh.rig import Rig
 from dermis.mesh.skull import Point, centre_of_box, facing_axes, head_bone
 from dermis.mesh.strands import Strands
 
-_HEAD_WEIGHT = 0.5  # smallest weight of the head bone for points of the skull
+_MIN_HEAD_BONE_WEIGHT = 0.5  # smallest weight of the head bone for points of the skull
 
 
 @dataclass(frozen=True, repr=False)
@@ -103,7 +103,7 @@ class Head:
 
     @property
     def topology(self) -> Head:
-        """Return the head whose atlas and tables this head uses: its template if that fits, else `bare`."""
+        """Return the head that provides atlas and tables: the template of the rig, or else `bare`."""
         template = self.template
         if template is None or self.rig is None or self.rig.template is not template.rig:
             return self.bare
@@ -133,13 +133,13 @@ class Head:
     def skull_mm(self) -> Point | None:
         """Return the centre of the skull, without neck and shoulders; None for a mesh without a head [mm].
 
-        The skull of a body is at its head bone, if the skeleton has such a bone.
+        The skull of a body is at the head bone, if the skeleton has a head bone.
         """
         skeleton = None if self.mesh.is_head_sized or self.rig is None else self.rig.skeleton
         bone = None if skeleton is None else head_bone(skeleton.names)
         if skeleton is None or bone is None:
             return self.mesh.skull_mm
-        follows = ((skeleton.bone == bone) & (skeleton.weight > _HEAD_WEIGHT)).any(axis=1)
+        follows = ((skeleton.bone == bone) & (skeleton.weight > _MIN_HEAD_BONE_WEIGHT)).any(axis=1)
         points = self.control.positions_mm[follows]
         return centre_of_box(points) if len(points) else self.mesh.skull_mm
 
@@ -170,7 +170,9 @@ class Head:
         return float(np.linalg.norm(corners, axis=1).max())
 
     def frontmost(self, x_mm: float, y_mm: float) -> tuple[float, float, float]:
-        """Return the frontmost vertex near a position, relative to the head's centre (x, y, z) [mm].
+        """Return the position (x, y, z) of the frontmost vertex near a point seen from the front [mm].
+
+        Both are relative to the head's centre.
 
         x_mm, y_mm : position to the right and upwards, relative to the head's centre [mm]
         """

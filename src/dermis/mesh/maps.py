@@ -11,12 +11,13 @@ import numpy as np
 from dermis.base.arrays import Bytes, Doubles, Floats
 from dermis.base.summary import ShortRepr
 
-_MEAN_SAMPLES, _MAX_STRIDE = 64, 16  # samples of means along each side, and largest distance between them
+# samples of means along each side, and largest distance between samples
+_MEAN_SAMPLES_PER_SIDE, _MAX_SAMPLE_DISTANCE_TEXELS = 64, 16
 
 
 @dataclass(frozen=True, repr=False)
 class PartMaps(ShortRepr):
-    """Texture maps that all groups of triangles other than skin share; the uv of these groups refer to them.
+    """Texture maps that all groups of triangles except skin share, in one common uv layout.
 
     colour : (H, W, 4) base colour, linear Rec. 709, and opacity; surfaces are cut out below 0.5 [-]
     surface : (H, W, 4) slopes as in `Maps.normal`, perceptual roughness and metalness [-]
@@ -63,7 +64,9 @@ class Maps(ShortRepr):
         """Return the mean (3,) of the colour map, leaving out unused (black) texels; None without a map."""
         if self.colour is None:
             return None
-        stride = int(np.clip(min(self.colour.shape[:2]) // _MEAN_SAMPLES, 1, _MAX_STRIDE))
+        stride = int(
+            np.clip(min(self.colour.shape[:2]) // _MEAN_SAMPLES_PER_SIDE, 1, _MAX_SAMPLE_DISTANCE_TEXELS)
+        )
         texels = self.colour[::stride, ::stride].reshape(-1, 3).astype(np.float64)
         used = texels[texels.sum(axis=1) > 0.0]
         return np.asarray(used.mean(axis=0)) if len(used) else np.zeros(3)

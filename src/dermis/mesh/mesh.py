@@ -134,15 +134,17 @@ class Mesh(ShortRepr):
         return tangents(self.positions, self.uv, self.normals, self.triangles)
 
 
-def _valid_normals(normals: Floats, computed: Floats) -> Floats:
+def _valid_normals(file_normals: Floats, computed_normals: Floats) -> Floats:
     """Return the file's normals (v, 3), replaced by computed normals where not finite or not of unit length.
 
-    normals, computed : (v, 3) normals of the file, and normals computed from the triangles
+    file_normals, computed_normals : (v, 3) normals of the file, and normals computed from the triangles
     """
-    finite = np.isfinite(normals)
-    length = np.linalg.norm(np.where(finite, normals, 0).astype(np.float64), axis=1, keepdims=True)
+    finite = np.isfinite(file_normals)
+    length = np.linalg.norm(np.where(finite, file_normals, 0).astype(np.float64), axis=1, keepdims=True)
     valid = finite.all(axis=1, keepdims=True) & (np.abs(length - 1) < 0.05)
-    return np.asarray(np.where(valid, normals / np.where(valid, length, 1), computed).astype(np.float32))
+    return np.asarray(
+        np.where(valid, file_normals / np.where(valid, length, 1), computed_normals).astype(np.float32)
+    )
 
 
 def build_mesh(

@@ -38,17 +38,17 @@ class MorphTargets(ShortRepr):
         """Return the permutation (n,) that sorts the displacements by point, then by target."""
         return np.argsort(self.point, kind="stable")
 
-    def rows(self, target: int) -> slice:
+    def rows(self, target_index: int) -> slice:
         """Return the slice of the rows of `point` and `delta_mm` that belong to a target."""
-        return slice(int(self.first[target]), int(self.first[target + 1]))
+        return slice(int(self.first[target_index]), int(self.first[target_index + 1]))
 
-    def dense(self, points: Intp, count: int) -> Floats:
+    def dense(self, points: Intp, point_count: int) -> Floats:
         """Return the displacements (t, n, 3) of n points by all targets at weight 1 [mm].
 
         points : (n,) indices of the points
-        count : number of points of the mesh
+        point_count : number of points of the mesh
         """
-        column_of = np.full(count, -1, np.int64)
+        column_of = np.full(point_count, -1, np.int64)
         column_of[points] = np.arange(len(points))
         column = column_of.take(self.point)
         rows = np.flatnonzero(column >= 0)

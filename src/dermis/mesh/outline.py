@@ -1,4 +1,4 @@
-"""Outlines: a few points of a shape that bound it in every direction.
+"""Outlines: a few points of a shape that bound the shape in every direction.
 
 Shadow maps and depth ranges are fitted to outlines. The outline points of a rig are selected once, from the
 rest pose, every morph target and random poses; posing these points gives the bounds of the head in any pose.
@@ -19,16 +19,18 @@ from dermis.mesh.geometry import fibonacci_sphere
 from dermis.mesh.morph_targets import MorphTargets
 from dermis.mesh.skeleton import Skeleton
 
-_DIRECTIONS, _FEW_DIRECTIONS = 512, 256
-_REFINED_DIRECTIONS = 64, 512, 2048  # few first, so that later passes skip points close to chosen ones
-_CLOSE_MM = 0.5  # points are skipped if they exceed the bounds of the chosen points by at most this distance
-_BLOCK_NUMBERS = 80_000  # numbers that are computed at a time
+_DIRECTION_COUNT, _COARSE_DIRECTION_COUNT = 512, 256
+# few directions first, so that later passes skip points close to chosen ones
+_DIRECTION_COUNTS_OF_PASSES = 64, 512, 2048
+# points are skipped if they exceed the bounds of the chosen points by at most this distance
+_IGNORED_EXCESS_MM = 0.5
+_NUMBERS_PER_BLOCK = 80_000  # numbers that are computed at a time
 _CANDIDATES_PER_DIRECTION = 16  # candidates per direction; any of them may be outermost in some pose
-_RANDOM_POSES, _SEED = 128, 0
-_MAX_DEGREES = 60.0
-_MAX_BONES = 4  # bones that are rotated in one pose
-_ACTIVE_TARGETS = 0.3  # fraction of the targets that are active in one pose
-_MIN_WEIGHT = 0.02  # least weight of a bone that a point follows
+_RANDOM_POSE_COUNT, _RANDOM_POSE_SEED = 128, 0
+_MAX_BONE_DEGREES = 60.0
+_MAX_ROTATED_BONES = 4  # bones that are rotated in one pose
+_ACTIVE_TARGET_FRACTION = 0.3  # fraction of the targets that are active in one pose
+_MIN_BONE_WEIGHT = 0.02  # least weight of a bone that a point follows
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -105,28 +107,32 @@ class RigOutline(ShortRepr):
 
 
 def rig_outline(
-    positions: Floats, targets: MorphTargets, skeleton: Skeleton | None, points: Intp
+    positions: Floats, targets: MorphTargets, skeleton: Skeleton | None, outline_points: Intp
 ) -> RigOutline:
     """Return the outline formed by some points of a rig, with their morph targets and bone weights.
 
     positions : (p, 3) positions of all control points at rest [mm]
-    points : (s,) indices of the outline points
+    outline_points : (s,) indices of the outline points
     """
-    rest = np.vstack([positions[points].T, np.ones(len(points), np.float32)])
-    delta = targets.dense(points, len(positions)).transpose(0, 2, 1).reshape(-1, 3 * len(points))
+    rest = np.vstack([positions[outline_points].T, np.ones(len(outline_points), np.float32)])
+    delta = (
+        targets.dense(outline_points, len(positions)).transpose(0, 2, 1).reshape(-1, 3 * len(outline_points))
+    )
     if skeleton is None:
         return RigOutline(rest, delta, None, np.zeros(0, np.intp))
-    bone, weight = skeleton.bone[points], skeleton.weight[points]
+    bone, weight = skeleton.bone[outline_points], skeleton.weight[outline_points]
     bones, row = np.unique(bone, return_inverse=True)
-    weights = np.zeros((len(bones), len(points)), np.float32)
-    np.add.at(weights, (row.reshape(bone.shape), np.arange(len(points))[:, None]), weight)
+    weights = np.zeros((len(bones), len(outline_points)), np.float32)
+    np.add.at(weights, (row.reshape(bone.shape), np.arange(len(outline_points))[:, None]), weight)
     return RigOutline(rest, delta, weights, bones.astype(np.intp))
 
 
-def extreme_points(positions: Floats, count: int = _FEW_DIRECTIONS) -> Intp:
-    """Return the indices of the points (p, 3) that are farthest in at least one of `count` directions."""
+def extreme_points(positions: Floats, direction_count: int = _COARSE_DIRECTION_COUNT) -> Intp:
+    """Return the indices of the points (p, 3) that are farthest in one of `direction_count` directions."""
     return np.unique(
-        np.concatenate([height.argmax(axis=1) for height in _project_on_directions(positions, count)])
+        np.concatenate(
+            [height.argmax(axis=1) for height in _project_on_directions(positions, direction_count)]
+        )
     )
 
 
@@ -141,54 +147,58 @@ def find_outline_points(positions: Floats, targets: MorphTargets, skeleton: Skel
     outline = rig_outline(positions, targets, skeleton, candidates)
     rest = np.zeros((0, 3, 4), np.float32) if skeleton is None else skeleton.rest_matrices
     chosen = np.zeros(len(candidates), bool)
-    for count in _REFINED_DIRECTIONS:
+    for count in _DIRECTION_COUNTS_OF_PASSES:
         _select_extreme(chosen, positions[candidates], count)
     for weights in np.eye(len(targets.names), dtype=np.float32):
         _select_extreme(chosen, outline.pose(weights, rest))
-    rng = np.random.default_rng(_SEED)
-    for _ in range(_RANDOM_POSES if targets.names or skeleton else 0):
-        random_weights = rng.random(len(targets.names)) * (rng.random(len(targets.names)) < _ACTIVE_TARGETS)
+    rng = np.random.default_rng(_RANDOM_POSE_SEED)
+    for _ in range(_RANDOM_POSE_COUNT if targets.names or skeleton else 0):
+        random_weights = rng.random(len(targets.names)) * (
+            rng.random(len(targets.names)) < _ACTIVE_TARGET_FRACTION
+        )
         matrices = rest if skeleton is None else _random_pose(skeleton, rng)
         _select_extreme(chosen, outline.pose(random_weights.astype(np.float32), matrices))
     return candidates[chosen]
 
 
-def _select_extreme(chosen: Mask, positions: Floats, count: int = _DIRECTIONS) -> None:
-    """Select points that exceed the bounds of the points selected before, in one of `count` directions.
+def _select_extreme(
+    selected_points: Mask, positions: Floats, direction_count: int = _DIRECTION_COUNT
+) -> None:
+    """Select points that exceed the bounds of selected points in one of `direction_count` directions.
 
-    chosen : (p,) mask of the selected points, which this function extends
+    selected_points : (p,) mask of the selected points, which this function extends
     positions : (p, 3) positions of all points
     """
-    for height in _project_on_directions(positions, count):
+    for height in _project_on_directions(positions, direction_count):
         top = height.argmax(axis=1)
-        reached = height[:, chosen].max(axis=1, initial=-np.inf)
-        chosen[top[height[np.arange(len(top)), top] - reached > _CLOSE_MM]] = True
+        reached = height[:, selected_points].max(axis=1, initial=-np.inf)
+        selected_points[top[height[np.arange(len(top)), top] - reached > _IGNORED_EXCESS_MM]] = True
 
 
-def _project_on_directions(positions: Floats, count: int) -> Iterator[Floats]:
+def _project_on_directions(positions: Floats, direction_count: int) -> Iterator[Floats]:
     """Yield the projections of points (p, 3) on unit vectors, for blocks of n directions, (n, p) each.
 
-    count : number of all directions
+    direction_count : number of all directions
 
     A block is so small that NumPy multiplies it on one thread; several threads would wait for each other on
     busy cores.
     """
-    block = max(1, _BLOCK_NUMBERS // len(positions))
-    for start in range(0, count, block):
-        yield _directions(count)[start : start + block] @ positions.T
+    block = max(1, _NUMBERS_PER_BLOCK // len(positions))
+    for start in range(0, direction_count, block):
+        yield _directions(direction_count)[start : start + block] @ positions.T
 
 
 @lru_cache(maxsize=3)
-def _directions(count: int) -> Floats:
-    """Return unit vectors (count, 3) distributed evenly over the sphere."""
-    return np.ascontiguousarray(fibonacci_sphere(count)[:, [0, 2, 1]], np.float32)
+def _directions(direction_count: int) -> Floats:
+    """Return unit vectors (direction_count, 3) distributed evenly over the sphere."""
+    return np.ascontiguousarray(fibonacci_sphere(direction_count)[:, [0, 2, 1]], np.float32)
 
 
 def _outline_candidates(positions: Floats, targets: MorphTargets, skeleton: Skeleton | None) -> Intp:
     """Return the indices of points that may be outermost in some pose, to limit the search."""
     layers = min(_CANDIDATES_PER_DIRECTION, len(positions))
-    found: list[Numbers] = [extreme_points(positions, _REFINED_DIRECTIONS[-1])]
-    for height in _project_on_directions(positions, _DIRECTIONS):
+    found: list[Numbers] = [extreme_points(positions, _DIRECTION_COUNTS_OF_PASSES[-1])]
+    for height in _project_on_directions(positions, _DIRECTION_COUNT):
         found.append(np.argpartition(height, -layers, axis=1)[:, -layers:].ravel())
     for target in range(len(targets.names)):
         rows = targets.rows(target)
@@ -198,7 +208,7 @@ def _outline_candidates(positions: Floats, targets: MorphTargets, skeleton: Skel
     if skeleton is None:
         return np.unique(np.concatenate(found))
     for bone in range(len(skeleton.names)):
-        followers = ((skeleton.bone == bone) & (skeleton.weight > _MIN_WEIGHT)).any(axis=1).nonzero()[0]
+        followers = ((skeleton.bone == bone) & (skeleton.weight > _MIN_BONE_WEIGHT)).any(axis=1).nonzero()[0]
         if len(followers):
             found.append(followers[extreme_points(positions[followers])])
     return np.unique(np.concatenate(found))
@@ -210,8 +220,8 @@ def _random_pose(skeleton: Skeleton, rng: np.random.Generator) -> Floats:
     Bones are chosen with a probability proportional to the number of points that follow them.
     """
     probability = skeleton.follower_counts / skeleton.follower_counts.sum()
-    count = min(int(rng.integers(1, _MAX_BONES + 1)), int((probability > 0).sum()))
+    count = min(int(rng.integers(1, _MAX_ROTATED_BONES + 1)), int((probability > 0).sum()))
     bones = np.sort(rng.choice(len(probability), count, replace=False, p=probability)).tolist()
-    angles = rng.uniform(-_MAX_DEGREES, _MAX_DEGREES, (count, 3))
+    angles = rng.uniform(-_MAX_BONE_DEGREES, _MAX_BONE_DEGREES, (count, 3))
     rows = [skeleton.bone_rotation(*pair) for pair in zip(bones, angles.tolist(), strict=True)]
     return skeleton.pose_matrices(bones, np.array(rows).reshape(-1, 4, 4))

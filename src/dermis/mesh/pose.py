@@ -20,10 +20,10 @@ from dermis.mesh.skeleton import Skeleton
 MAX_WEIGHT = 100.0
 MAX_DEGREES = 1e5
 MAX_DISTANCE_MM = 1e6
-_BONE_VALUES = "three angles [degrees] or a (4, 4) matrix"
-_SUGGESTIONS = 3  # names that an error message proposes
-_MAX_LETTERS = 80  # compared letters of a name
-_MIN_DETERMINANT = 1e-9  # least determinant of a matrix, relative to the cube of its norm
+_EXPECTED_BONE_VALUE = "three angles [degrees] or a (4, 4) matrix"
+_MAX_SUGGESTED_NAMES = 3  # names that an error message proposes
+_MAX_COMPARED_LETTERS = 80  # compared letters of a name
+_MIN_RELATIVE_DETERMINANT = 1e-9  # least determinant of a matrix, relative to the cube of its norm
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -36,8 +36,8 @@ class Pose(ShortRepr):
         Weights of morph targets by name, mostly 0 to 1; targets that are left out keep their weight at rest.
     bones : mapping of str to array_like, optional
         Bones by name: either three angles [degrees] about the head's own axes (x: nod, y: turn, z: tilt)
-        relative to the rest pose, applied about z first, then x, then y; or a (4, 4) matrix from the space of
-        the bone to that of its parent, in the units of the file, as in animations.
+        relative to the rest pose, applied about z first, then x, then y; or a (4, 4) matrix from the bone's
+        space to its parent's space, in the units of the file, as in animations.
     positions_mm : (n, 3) array, optional
         Rest positions of all points of the control mesh, in the order of `Head.positions_mm` [mm]: another
         person of the same topology, or a motion from another program.
@@ -168,93 +168,106 @@ class Pose(ShortRepr):
 
 
 def merge_poses(pose: Pose, base: Pose | Mapping[str, float] | None) -> Pose:
-    """Fill what a pose does not set, among weights, bones and positions, from a base pose."""
+    """Return a pose with the weights and bones of both poses, in which `pose` overrides `base`.
+
+    The rest positions are those of `pose`, or of `base` if `pose` has no rest positions."""
     base = Pose.coerce(base) or Pose()
     positions = base.positions_mm if pose.positions_mm is None else pose.positions_mm
     return Pose({**base.weights, **pose.weights}, {**base.bones, **pose.bones}, positions)
 
 
 def _bone_transforms(
-    skeleton: Skeleton, ordered: list[tuple[int, str]], values: Mapping[str, Any], culprit: object
+    skeleton: Skeleton, ordered_bones: list[tuple[int, str]], bone_values: Mapping[str, Any], culprit: object
 ) -> Doubles:
     """Return the transforms (n, 4, 4) in head space that move bones from the rest pose to the pose [mm].
 
-    ordered : (n,) index and name of each bone, parents before children
-    values : angles or matrix of each bone by name, see `Pose`
+    ordered_bones : (n,) index and name of each bone, parents before children
+    bone_values : angles or matrix of each bone by name, see `Pose`
     """
-    changes = np.empty((len(ordered), 4, 4))
+    changes = np.empty((len(ordered_bones), 4, 4))
     rows: list[list[float]] = []
     by_angles: list[int] = []
     by_matrix: list[int] = []
-    for k, (bone, name) in enumerate(ordered):
+    for k, (bone, name) in enumerate(ordered_bones):
         try:
-            if len(values[name]) == 3:
-                angles = checked_array(culprit, values[name], (3,), -MAX_DEGREES, MAX_DEGREES)
+            if len(bone_values[name]) == 3:
+                angles = checked_array(culprit, bone_values[name], (3,), -MAX_DEGREES, MAX_DEGREES)
                 rows.append(skeleton.bone_rotation(bone, angles.tolist()))
                 by_angles.append(k)
             else:
-                changes[k] = checked_array(culprit, values[name], (4, 4), -MAX_DISTANCE_MM, MAX_DISTANCE_MM)
+                changes[k] = checked_array(
+                    culprit, bone_values[name], (4, 4), -MAX_DISTANCE_MM, MAX_DISTANCE_MM
+                )
                 by_matrix.append(k)
         except (TypeError, DermisError):
-            _refuse_bone_value(f"{culprit}: bones.{name}", values[name])
+            _refuse_bone_value(f"{culprit}: bones.{name}", bone_values[name])
     if by_angles:
         changes[by_angles] = np.array(rows).reshape(-1, 4, 4)
     if by_matrix:
-        _check_matrices(changes[by_matrix], [ordered[k][1] for k in by_matrix], culprit)
-        bones = [ordered[k][0] for k in by_matrix]
+        _check_matrices(changes[by_matrix], [ordered_bones[k][1] for k in by_matrix], culprit)
+        bones = [ordered_bones[k][0] for k in by_matrix]
         changes[by_matrix] = skeleton.head_space_transforms(bones, changes[by_matrix])
     return changes
 
 
-def _check_matrices(matrices: Doubles, names: list[str], culprit: object) -> None:
+def _check_matrices(matrices: Doubles, bone_names: list[str], culprit: object) -> None:
     """Raise DermisError if one of the matrices (n, 4, 4) is singular.
 
-    names : (n,) names of the bones
+    bone_names : (n,) names of the bones
     """
     linear = matrices[:, :3, :3]
     size = np.sqrt(np.einsum("nij,nij->n", linear, linear))
-    singular = np.abs(np.linalg.det(linear)) <= _MIN_DETERMINANT * size**3
+    singular = np.abs(np.linalg.det(linear)) <= _MIN_RELATIVE_DETERMINANT * size**3
     if singular.any():
-        name = f"{culprit}: bones.{names[int(singular.argmax())]}"
+        name = f"{culprit}: bones.{bone_names[int(singular.argmax())]}"
         refuse(name, "a matrix that can be inverted", "this one flattens what it moves", "Correct it")
 
 
-def _refuse_bone_value(culprit: str, value: object) -> NoReturn:
-    expected = f"{_BONE_VALUES}, no angle beyond {MAX_DEGREES:g}, nothing beyond {MAX_DISTANCE_MM:g}"
-    refuse(culprit, expected, f"got {format_value(value, 80)}", "Correct it")
+def _refuse_bone_value(culprit: str, bone_value: object) -> NoReturn:
+    expected = f"{_EXPECTED_BONE_VALUE}, no angle beyond {MAX_DEGREES:g}, nothing beyond {MAX_DISTANCE_MM:g}"
+    refuse(culprit, expected, f"got {format_value(bone_value, 80)}", "Correct it")
 
 
-def _refuse_weights(weights: Mapping[str, object], names: tuple[str, ...], culprit: object) -> NoReturn:
+def _refuse_weights(
+    weights: Mapping[str, object], target_names: tuple[str, ...], culprit: object
+) -> NoReturn:
     """Raise DermisError for the first invalid weight or unknown morph target.
 
-    names : names of the morph targets of the rig
+    target_names : names of the morph targets of the rig
     """
     for name, weight in weights.items():
-        if name not in names:
-            _refuse_name(f"{culprit}: weights", name, names, "morph target")
+        if name not in target_names:
+            _refuse_name(f"{culprit}: weights", name, target_names, "morph target")
         checked_number(f"{culprit}: weights.{name}", weight, -MAX_WEIGHT, MAX_WEIGHT)
     refuse(f"{culprit}: weights", "a number for each target", "got something else", "Correct it")
 
 
-def _refuse_name(culprit: str, name: object, known_names: Iterable[str], kind: str) -> NoReturn:
+def _refuse_name(culprit: str, unknown_name: object, known_names: Iterable[str], name_noun: str) -> NoReturn:
     """Raise DermisError for an unknown name, and propose similar known names.
 
-    kind : "bone" or "morph target"
+    name_noun : "bone" or "morph target"
     """
     names = list(known_names)
     if not names:
-        actual = f"got {format_value(name)} and it has none"
-        refuse(culprit, f"a {kind} of the head", actual, f"Load a glTF file with {kind}s, or leave it out")
+        actual = f"got {format_value(unknown_name)} and it has none"
+        refuse(
+            culprit,
+            f"a {name_noun} of the head",
+            actual,
+            f"Load a glTF file with {name_noun}s, or leave it out",
+        )
     plain = {one.casefold(): one for one in names}
-    similar = difflib.get_close_matches(str(name)[:_MAX_LETTERS].casefold(), plain, _SUGGESTIONS, 0.5)
+    similar = difflib.get_close_matches(
+        str(unknown_name)[:_MAX_COMPARED_LETTERS].casefold(), plain, _MAX_SUGGESTED_NAMES, 0.5
+    )
     advice = (
         f"Nearest: {', '.join(plain[one] for one in similar)}"
         if similar
         else f"It has {_short_name_list(names)}"
     )
-    refuse(culprit, f"a {kind} of the head", f"there is no {format_value(name)}", advice)
+    refuse(culprit, f"a {name_noun} of the head", f"there is no {format_value(unknown_name)}", advice)
 
 
-def _short_name_list(names: list[str]) -> str:
-    shown = ", ".join(names[:8])
-    return f"{shown} and {len(names) - 8} more" if len(names) > 8 else shown
+def _short_name_list(known_names: list[str]) -> str:
+    shown = ", ".join(known_names[:8])
+    return f"{shown} and {len(known_names) - 8} more" if len(known_names) > 8 else shown

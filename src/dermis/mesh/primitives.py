@@ -21,14 +21,14 @@ _WEDGE_FACES = (
 )
 
 
-def _grid_triangles(columns: int, rows: int) -> tuple[Ints, Ints]:
+def _grid_triangles(column_count: int, row_count: int) -> tuple[Ints, Ints]:
     """Return the upper and the lower triangle of each cell of a grid, (rows * columns, 3) each.
 
     Vertices are numbered row by row from the top, columns + 1 in each row.
     """
-    row, column = np.mgrid[:rows, :columns].astype(np.int32)
-    top_left = (row * (columns + 1) + column).ravel()
-    below = top_left + columns + 1
+    row, column = np.mgrid[:row_count, :column_count].astype(np.int32)
+    top_left = (row * (column_count + 1) + column).ravel()
+    below = top_left + column_count + 1
     upper = np.column_stack((top_left, below + 1, top_left + 1))
     lower = np.column_stack((top_left, below, below + 1))
     return upper, lower

@@ -15,10 +15,10 @@ from dermis.mesh.eyeball import LidContact
 from dermis.mesh.morph_targets import MorphTargets, no_targets
 from dermis.mesh.outline import RigOutline, extreme_points, find_outline_points, rig_outline
 from dermis.mesh.rotations import rigid_motion
-from dermis.mesh.skeleton import INFLUENCES, Skeleton
+from dermis.mesh.skeleton import BONES_PER_POINT, Skeleton
 
 __all__ = [
-    "INFLUENCES",
+    "BONES_PER_POINT",
     "BoneRotation",
     "MorphTargets",
     "Motion",
@@ -77,7 +77,7 @@ class BoneRotation(NamedTuple):
 
 
 class RigidFollowers(NamedTuple):
-    """Points that follow other points as one rigid body, such as those of a fitted eyeball.
+    """Points that follow other points as one rigid body, such as the points of a fitted eyeball.
 
     leaders : (n,) indices of the points to follow, which are in the file
     points : (m,) indices of the points that follow the leaders
@@ -96,7 +96,7 @@ class Rig(ShortRepr):
     stencils : subdivision from control points to mesh points; None without subdivision
     bone_rotations : rotations of bones by morph targets
     rigid_followers : points that are not in the file, such as fitted eyeballs; they follow the file's points
-    contact : lids that must stay outside the eyeballs; None to let them intersect
+    contact : lids that must stay outside the eyeballs; None if lids may intersect eyeballs
     template : rig of the same topology whose outline points are used, together with the extreme points of
         this rig; None to search for outline points
     """
@@ -118,11 +118,11 @@ class Rig(ShortRepr):
 
     @property
     def file_point_count(self) -> int:
-        """Return the number of control points that are in the file; they come first."""
+        """Return the number of control points from the file, which precede all other control points."""
         return len(self.positions_mm) - sum(len(one.points) for one in self.rigid_followers)
 
     def complete_positions(self, file_positions_mm: Floats) -> Floats:
-        """Return the rest positions of all control points (p, 3) from those of the file's points [mm].
+        """Return the rest positions of all control points (p, 3), from positions of the file's points [mm].
 
         Rigid followers, such as fitted eyeballs, move with the file's points that they follow.
         """
@@ -140,13 +140,13 @@ class Rig(ShortRepr):
 
     @cached_property
     def outline(self) -> RigOutline:
-        """Return the outline of the rig; its points are searched once and cached on disk."""
+        """Return the outline of the rig; the outline points are searched once and cached on disk."""
         return rig_outline(self.positions_mm, self.targets, self.skeleton, self._outline_points)
 
     def outline_mm(self, motion: Motion) -> Floats:
         """Return points (s, 3) that bound the head in a pose in every direction, to about a millimetre [mm].
 
-        If `motion` has other rest positions than the rig, the extreme points of those positions are added.
+        If `motion` has rest positions of its own, their extreme points are added.
         """
         if motion.positions_mm is self.positions_mm:
             return self.outline.pose(motion.weights, motion.matrices)
@@ -155,7 +155,7 @@ class Rig(ShortRepr):
     def _outline_for(self, rest_positions: Floats) -> RigOutline:
         """Return the outline of this rig for other rest positions of its control points.
 
-        The last result is cached, and returned again while the outline points have the same positions.
+        The last outline is cached, and returned again if the outline points have the same positions.
 
         rest_positions : (p, 3) rest positions of all control points [mm]
         """
@@ -201,7 +201,7 @@ class Rig(ShortRepr):
 
     @cached_property
     def _lid_edges(self) -> tuple[Intp, Doubles, RigOutline]:
-        """Return what `lid_edges_mm` computes the points of the lid edges from.
+        """Return the data from which `lid_edges_mm` computes the points of the lid edges.
 
         Returns the indices (n,) of control points; their weights (e, n) in the e points of the edges; and an
         outline that poses the control points.

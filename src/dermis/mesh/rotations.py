@@ -14,12 +14,12 @@ import numpy as np
 from dermis.base.arrays import Doubles
 
 
-def quaternion_matrix(q: Doubles) -> Doubles:
+def quaternion_matrix(quaternion: Doubles) -> Doubles:
     """Return the matrices (..., 4, 4) of quaternions (..., 4) x, y, z, w.
 
     Quaternions need not be normalised; quaternions of length 0 give the identity.
     """
-    x, y, z, w = np.moveaxis(np.asarray(q, np.float64), -1, 0)
+    x, y, z, w = np.moveaxis(np.asarray(quaternion, np.float64), -1, 0)
     squared = x * x + y * y + z * z + w * w
     s = np.where(squared > 0, 2.0 / np.where(squared > 0, squared, 1.0), 0.0)
     matrix = np.zeros((*np.shape(x), 4, 4))
@@ -72,29 +72,29 @@ def matrix_angles(matrix: Doubles) -> tuple[float, float, float]:
     return math.degrees(x), math.degrees(y), math.degrees(z)
 
 
-def rigid_motion(before: Doubles, after: Doubles) -> tuple[Doubles, Doubles]:
-    """Return the rotation (3, 3) and the translation (3,) that best map points `before` to points `after`.
+def rigid_motion(points_before: Doubles, points_after: Doubles) -> tuple[Doubles, Doubles]:
+    """Return the rotation (3, 3) and translation (3,) that best map `points_before` to `points_after`.
 
     Kabsch's method: the least squares solution from the singular value decomposition of the covariance.
 
-    before, after : (n, 3) positions of the points
+    points_before, points_after : (n, 3) positions of the points
     """
-    centre, new_centre = before.mean(axis=0), after.mean(axis=0)
-    u, _, vh = np.linalg.svd((before - centre).T @ (after - new_centre))
+    centre, new_centre = points_before.mean(axis=0), points_after.mean(axis=0)
+    u, _, vh = np.linalg.svd((points_before - centre).T @ (points_after - new_centre))
     mirror = np.diag([1.0, 1.0, np.sign(np.linalg.det(vh.T @ u.T)) or 1.0])
     matrix = vh.T @ mirror @ u.T
     return np.asarray(matrix), np.asarray(new_centre - matrix @ centre)
 
 
-def slerp(a: Doubles, b: Doubles, s: float | Doubles) -> Doubles:
-    """Interpolate unit quaternions (..., 4) along the shorter arc, from a for s = 0 to b for s = 1."""
-    cosine = np.sum(a * b, axis=-1, keepdims=True)
-    b, cosine = np.where(cosine < 0, -b, b), np.minimum(np.abs(cosine), 1.0)
+def slerp(start_rotation: Doubles, end_rotation: Doubles, fraction: float | Doubles) -> Doubles:
+    """Interpolate unit quaternions (..., 4) along the shorter arc; `fraction` 0 is the start, 1 the end."""
+    cosine = np.sum(start_rotation * end_rotation, axis=-1, keepdims=True)
+    end_rotation, cosine = np.where(cosine < 0, -end_rotation, end_rotation), np.minimum(np.abs(cosine), 1.0)
     angle = np.arccos(cosine)
     sine = np.sin(angle)
     is_small = sine < 1e-6
     divisor = np.where(is_small, 1.0, sine)
-    left = np.where(is_small, 1 - s, np.sin((1 - s) * angle) / divisor)
-    right = np.where(is_small, s, np.sin(s * angle) / divisor)
-    mixed = left * a + right * b
+    left = np.where(is_small, 1 - fraction, np.sin((1 - fraction) * angle) / divisor)
+    right = np.where(is_small, fraction, np.sin(fraction * angle) / divisor)
+    mixed = left * start_rotation + right * end_rotation
     return np.asarray(mixed / np.linalg.norm(mixed, axis=-1, keepdims=True))

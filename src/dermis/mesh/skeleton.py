@@ -12,10 +12,10 @@ from dermis.base.arrays import Doubles, Floats, Intp, Ints
 from dermis.base.summary import ShortRepr
 from dermis.mesh.rotations import angles_matrix
 
-INFLUENCES = 4
+BONES_PER_POINT = 4
 """Largest number of bones that move a point; if a file has more, those with the largest weights are kept."""
-_IDENTITY = np.eye(4)
-_MAX_SEQUENTIAL = 12  # largest number of moving bones that are handled one after the other
+_IDENTITY_MATRIX = np.eye(4)
+_MAX_SEQUENTIAL_BONES = 12  # largest number of moving bones that are handled one after the other
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -38,12 +38,12 @@ class Skeleton(ShortRepr):
     bone: Ints
     weight: Floats
 
-    def matrices(self, local: Doubles | None = None) -> Doubles:
+    def matrices(self, local_transforms: Doubles | None = None) -> Doubles:
         """Return the bone matrices (b, 3, 4), which transform points at rest in head space [mm].
 
-        local : (b, 4, 4) transforms from each bone's space to its parent's space; None for the rest pose
+        local_transforms : (b, 4, 4) transforms from each bone's space to its parent's; None for the rest pose
         """
-        world = self._bone_to_file(self.local if local is None else local)
+        world = self._bone_to_file(self.local if local_transforms is None else local_transforms)
         matrices = self.to_head @ world @ self.inverse_bind @ np.linalg.inv(self.to_head)
         return np.asarray(matrices[:, :3])
 
@@ -63,35 +63,37 @@ class Skeleton(ShortRepr):
         origins: list[list[float]] = (self.to_head @ self._bone_to_file(self.local))[:, :3, 3].tolist()
         return origins
 
-    def bone_rotation(self, bone: int, degrees: Sequence[float]) -> list[float]:
+    def bone_rotation(self, bone_index: int, degrees: Sequence[float]) -> list[float]:
         """Return the head-space matrix that rotates about a bone's joint at rest, as 16 numbers by rows.
 
         degrees : angles about x, y and z, see `angles_matrix`
         """
         (a, b, c), (d, e, f), (g, h, i) = angles_matrix(degrees)
-        x, y, z = self.origin_mm[bone]
+        x, y, z = self.origin_mm[bone_index]
         p, q, r = x - a * x - b * y - c * z, y - d * x - e * y - f * z, z - g * x - h * y - i * z
         return [a, b, c, p, d, e, f, q, g, h, i, r, 0.0, 0.0, 0.0, 1.0]
 
-    def head_space_transforms(self, bones: Sequence[int], local: Doubles) -> Doubles:
+    def head_space_transforms(self, bones: Sequence[int], local_transforms: Doubles) -> Doubles:
         """Return the transforms (n, 4, 4) in head space that move n bones from their rest pose [mm].
 
         bones : (n,) indices of the bones
-        local : (n, 4, 4) new transforms from the space of each bone to its parent's
+        local_transforms : (n, 4, 4) new transforms from the space of each bone to its parent's
         """
         index = list(bones)
-        return np.asarray(self._parent_to_head[index] @ local @ self._head_to_bone[index])
+        return np.asarray(self._parent_to_head[index] @ local_transforms @ self._head_to_bone[index])
 
-    def pose_matrices(self, bones: Sequence[int], changes: Doubles) -> Floats:
+    def pose_matrices(self, bones: Sequence[int], bone_changes: Doubles) -> Floats:
         """Return the bone matrices (b, 3, 4) of a pose in which n bones and their descendants move.
 
         For few bones, the cost depends on n and not on the number of all bones.
 
         bones : (n,) indices, parents before children
-        changes : (n, 4, 4) head-space transform of each bone relative to its rest pose [mm]
+        bone_changes : (n, 4, 4) head-space transform of each bone relative to its rest pose [mm]
         """
-        transforms = self._accumulate_in_order if len(bones) <= _MAX_SEQUENTIAL else self._accumulate_by_depth
-        transform = transforms(bones, changes)
+        transforms = (
+            self._accumulate_in_order if len(bones) <= _MAX_SEQUENTIAL_BONES else self._accumulate_by_depth
+        )
+        transform = transforms(bones, bone_changes)
         if self._is_bound_at_rest:
             return transform[:, :3].astype(np.float32)
         matrices = transform[:, :3].copy()
@@ -99,25 +101,25 @@ class Skeleton(ShortRepr):
         matrices[:, :, :3] = transform[:, :3, :3] @ self.rest_matrices[:, :, :3]
         return matrices.astype(np.float32)
 
-    def _accumulate_in_order(self, bones: Sequence[int], changes: Doubles) -> Doubles:
+    def _accumulate_in_order(self, bones: Sequence[int], bone_changes: Doubles) -> Doubles:
         """Accumulate transforms of n bones over the hierarchy, one moving bone after the other.
 
         The result (b, 4, 4) is the head-space transform of every bone relative to its rest pose.
         """
         nearest, transform = np.zeros(len(self.names), np.intp), np.empty((len(bones) + 1, 4, 4))
-        transform[0] = _IDENTITY
+        transform[0] = _IDENTITY_MATRIX
         for index, bone in enumerate(bones, start=1):
-            np.matmul(transform[nearest[bone]], changes[index - 1], out=transform[index])
+            np.matmul(transform[nearest[bone]], bone_changes[index - 1], out=transform[index])
             nearest[self._descendants[bone]] = index
         return transform[nearest]
 
-    def _accumulate_by_depth(self, bones: Sequence[int], changes: Doubles) -> Doubles:
+    def _accumulate_by_depth(self, bones: Sequence[int], bone_changes: Doubles) -> Doubles:
         """Accumulate transforms of n bones over the hierarchy, level by level, which is faster for large n.
 
         The result (b, 4, 4) is the head-space transform of every bone relative to its rest pose.
         """
-        transform = np.tile(_IDENTITY, (len(self.names), 1, 1))
-        transform[list(bones)] = changes
+        transform = np.tile(_IDENTITY_MATRIX, (len(self.names), 1, 1))
+        transform[list(bones)] = bone_changes
         for bones_of_depth, parents in self._bones_by_depth[1:]:
             transform[bones_of_depth] = transform[parents] @ transform[bones_of_depth]
         return transform
@@ -131,11 +133,11 @@ class Skeleton(ShortRepr):
         levels = [np.flatnonzero(depth == k) for k in range(int(depth.max(initial=0)) + 1)]
         return [(level.astype(np.int32), self.parent[level]) for level in levels]
 
-    def _bone_to_file(self, local: Doubles) -> Doubles:
+    def _bone_to_file(self, local_transforms: Doubles) -> Doubles:
         """Return the matrices (b, 4, 4) from each bone's space to the file's space."""
-        world = np.empty_like(local)
+        world = np.empty_like(local_transforms)
         for bone, parent in enumerate(self.parent.tolist()):
-            world[bone] = world[parent] @ local[bone] if parent >= 0 else local[bone]
+            world[bone] = world[parent] @ local_transforms[bone] if parent >= 0 else local_transforms[bone]
         return world
 
     @cached_property

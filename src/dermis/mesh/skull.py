@@ -17,12 +17,14 @@ _MIN_BODY_HEIGHT_MM = 300.0
 MAX_ELONGATION = 2.4
 """Largest ratio of length to width of a head with neck or shoulders; forearms have 3 and more [-]."""
 _MAX_RELATIVE_WIDTH = 3.0  # largest width of a bust relative to its depth
-_EYES_TO_HAIR_MM = 250.0  # largest horizontal distance between the eyes and other parts of the head
-_MAX_FLATNESS = 0.5  # thickness relative to width below which a mesh is flat
-_MIN_MEAN_NORMAL = 0.2  # length of the mean normal of an open surface; 0 for closed meshes
+_MAX_EYES_TO_HAIR_MM = 250.0  # largest horizontal distance between the eyes and other parts of the head
+_MAX_FLAT_THICKNESS_RATIO = 0.5  # thickness relative to width below which a mesh is flat
+_MIN_MEAN_NORMAL_LENGTH = 0.2  # length of the mean normal of an open surface; 0 for closed meshes
 _WORD_PATTERN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 # Sections of a standing figure, as fractions of its height, and widths relative to its height.
-_HEAD_SECTION, _NECK_SECTIONS, _SHOULDER_SECTIONS = 0.95, (0.82, 0.85, 0.88), (0.74, 0.77, 0.8)
+_HEAD_SECTION_HEIGHT = 0.95
+_NECK_SECTION_HEIGHTS = 0.82, 0.85, 0.88
+_SHOULDER_SECTION_HEIGHTS = 0.74, 0.77, 0.8
 _MIN_FIGURE_TO_DEPTH = 2.5
 _MAX_HEAD_WIDTH, _MAX_NECK_WIDTH, _MIN_SHOULDERS_TO_NECK = 0.25, 0.16, 1.6
 
@@ -54,11 +56,11 @@ def is_standing_figure(positions: Floats, triangles: Ints) -> bool:
         return False
     points, ends = positions.astype(np.float64), positions[:, 1][triangles]
     low, high = ends.min(axis=1), ends.max(axis=1)
-    levels = (_HEAD_SECTION, *_NECK_SECTIONS, *_SHOULDER_SECTIONS)
+    levels = (_HEAD_SECTION_HEIGHT, *_NECK_SECTION_HEIGHTS, *_SHOULDER_SECTION_HEIGHTS)
     heights = [float(points[:, 1].min()) + level * height for level in levels]
     head, *others = (_horizontal_section(points, triangles[(low <= y) & (high > y)], y) for y in heights)
-    neck = min(others[: len(_NECK_SECTIONS)], key=lambda one: one.width)
-    shoulders = max(others[len(_NECK_SECTIONS) :], key=lambda one: one.width)
+    neck = min(others[: len(_NECK_SECTION_HEIGHTS)], key=lambda one: one.width)
+    shoulders = max(others[len(_NECK_SECTION_HEIGHTS) :], key=lambda one: one.width)
     return (
         head.parts == neck.parts == 1
         and 0 < head.width < _MAX_HEAD_WIDTH * height
@@ -68,16 +70,16 @@ def is_standing_figure(positions: Floats, triangles: Ints) -> bool:
     )
 
 
-def skull_below(positions: NDArray[np.floating], top: float) -> Point:
+def skull_below(positions: NDArray[np.floating], crown_height: float) -> Point:
     """Return the centre of a skull below its crown [mm].
 
     positions : (v, 3) vertices of a head [mm]
-    top : height of the crown [mm]
+    crown_height : height of the crown [mm]
     """
     x, y, z = positions.T
-    skull = y > top - 2 * _CROWN_TO_CENTRE_MM
+    skull = y > crown_height - 2 * _CROWN_TO_CENTRE_MM
     centre_x, centre_z = (float(c.min() + c.max()) / 2 for c in (x[skull], z[skull]))
-    return centre_x, top - _CROWN_TO_CENTRE_MM, centre_z
+    return centre_x, crown_height - _CROWN_TO_CENTRE_MM, centre_z
 
 
 def body_skull(positions: Floats, triangles: Ints, eyes: Floats) -> Point | None:
@@ -94,16 +96,16 @@ def body_skull(positions: Floats, triangles: Ints, eyes: Floats) -> Point | None
         return None
     if len(eyes):
         x, y, z = 0.5 * (eyes.min(axis=0) + eyes.max(axis=0))
-        near = np.hypot(positions[:, 0] - x, positions[:, 2] - z) < _EYES_TO_HAIR_MM
+        near = np.hypot(positions[:, 0] - x, positions[:, 2] - z) < _MAX_EYES_TO_HAIR_MM
         return skull_below(positions[near], float(y) + _CROWN_TO_CENTRE_MM)
     if is_standing_figure(positions, triangles):
         return skull_below(positions, float(positions[:, 1].max()))
     return None
 
 
-def head_bone(names: tuple[str, ...]) -> int | None:
+def head_bone(bone_names: tuple[str, ...]) -> int | None:
     """Return the index of the bone of the head, such as "head" or "mixamorig:Head"; None if there is none."""
-    last_words = ([word.casefold() for word in _WORD_PATTERN.findall(name)[-1:]] for name in names)
+    last_words = ([word.casefold() for word in _WORD_PATTERN.findall(name)[-1:]] for name in bone_names)
     return next((k for k, word in enumerate(last_words) if word == ["head"]), None)
 
 
@@ -124,8 +126,8 @@ def facing_axes(positions: Floats, normals: Floats) -> Doubles:
     sizes = np.ptp(positions, axis=0)
     thin = int(sizes.argmin())
     front, up = np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0])
-    if sizes[thin] < _MAX_FLATNESS * np.partition(sizes, 1)[1]:
-        front = np.eye(3)[thin] * (-1.0 if normals[:, thin].mean() < -_MIN_MEAN_NORMAL else 1.0)
+    if sizes[thin] < _MAX_FLAT_THICKNESS_RATIO * np.partition(sizes, 1)[1]:
+        front = np.eye(3)[thin] * (-1.0 if normals[:, thin].mean() < -_MIN_MEAN_NORMAL_LENGTH else 1.0)
         up = up if thin != 1 else np.array([0.0, 0.0, -front[1]])
     return np.array([np.cross(up, front), up, front])
 
@@ -143,14 +145,14 @@ class _Section(NamedTuple):
     middle: float
 
 
-def _horizontal_section(positions: Doubles, cut: Ints, height: float) -> _Section:
+def _horizontal_section(positions: Doubles, cut_triangles: Ints, height: float) -> _Section:
     """Return the section of a mesh with the horizontal plane at a height.
 
-    cut : (n, 3) vertex indices of the triangles that the plane cuts
+    cut_triangles : (n, 3) vertex indices of the triangles that the plane cuts
     """
-    if not len(cut):
+    if not len(cut_triangles):
         return _Section(0, 0.0, 0.0)
-    (x, y), a, b = positions.T[:2], cut, np.roll(cut, 1, axis=1)
+    (x, y), a, b = positions.T[:2], cut_triangles, np.roll(cut_triangles, 1, axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         crossing: Doubles = x[a] + (x[b] - x[a]) * (height - y[a]) / (y[b] - y[a])
     crossing[(y[a] > height) == (y[b] > height)] = np.nan

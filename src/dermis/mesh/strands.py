@@ -62,15 +62,15 @@ class Strands(ShortRepr):
         """Return the mean position (3,) of the roots on the mesh at rest [mm]."""
         return np.asarray(_root_positions(mesh, self.roots, mesh.points_mm)[0].mean(axis=1))
 
-    def refined(self, mesh: Mesh, finer: Mesh, levels: int) -> Strands:
-        """Return these strands rooted on the Catmull-Clark subdivision `finer` of `mesh`.
+    def refined(self, mesh: Mesh, finer_mesh: Mesh, levels: int) -> Strands:
+        """Return these strands rooted on the Catmull-Clark subdivision `finer_mesh` of `mesh`.
 
-        levels : number of subdivision steps from `mesh` to `finer`
+        levels : number of subdivision steps from `mesh` to `finer_mesh`
         """
         _, frame = root_frames(mesh, self.roots, mesh.points_mm)
         offsets_mm = np.einsum("nic,nki->nkc", frame, self.knots_mm)
         roots = refine_roots(mesh, self.roots, levels)
-        return replace(self, roots=roots, knots_mm=to_root_frames(finer, roots, offsets_mm))
+        return replace(self, roots=roots, knots_mm=to_root_frames(finer_mesh, roots, offsets_mm))
 
 
 def to_root_frames(mesh: Mesh, roots: Roots, offsets_mm: Doubles) -> Floats:
@@ -81,31 +81,31 @@ def to_root_frames(mesh: Mesh, roots: Roots, offsets_mm: Doubles) -> Floats:
     return to_frames(root_frames(mesh, roots, mesh.points_mm)[1], offsets_mm)
 
 
-def to_frames(frame: Doubles, offsets_mm: Doubles) -> Floats:
+def to_frames(root_axes: Doubles, offsets_mm: Doubles) -> Floats:
     """Express knot offsets (n, k, 3), measured from each root, in the frame of that root.
 
-    frame : (n, 3, 3) axes of the frames as rows, as returned by `root_frames`
+    root_axes : (n, 3, 3) axes of the frames as rows, as returned by `root_frames`
     """
-    return np.asarray(np.einsum("nic,nkc->nki", frame, offsets_mm), np.float32)
+    return np.asarray(np.einsum("nic,nkc->nki", root_axes, offsets_mm), np.float32)
 
 
-def quad_corners(mesh: Mesh, quad: NDArray[np.integer]) -> Ints:
+def quad_corners(mesh: Mesh, quad_index: NDArray[np.integer]) -> Ints:
     """Return the point indices at the four corners of quads, (n, 4).
 
-    quad : (n,) rows of `Mesh.quads`
+    quad_index : (n,) rows of `Mesh.quads`
     """
-    first, second = mesh.quads.take(quad, axis=0).T
-    vertices = np.empty((4, len(quad)), np.int32)
+    first, second = mesh.quads.take(quad_index, axis=0).T
+    vertices = np.empty((4, len(quad_index)), np.int32)
     vertices[:3], vertices[3] = mesh.triangles.take(first, axis=0).T, mesh.triangles[:, 1].take(second)
     return mesh.point.take(vertices).T
 
 
-def quad_weights(position: NDArray[np.floating]) -> Doubles:
+def quad_weights(bilinear_position: NDArray[np.floating]) -> Doubles:
     """Return the bilinear weights (n, 4) of a quad's corners.
 
-    position : (n, 2) bilinear coordinates, see `Roots`
+    bilinear_position : (n, 2) bilinear coordinates, see `Roots`
     """
-    s, t = position.astype(np.float64).T
+    s, t = bilinear_position.astype(np.float64).T
     return np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t], axis=-1)
 
 
@@ -149,15 +149,15 @@ def _root_positions(mesh: Mesh, roots: Roots, points_mm: NDArray[np.floating]) -
     return interpolate_quads(roots.position, corners), corners.transpose(1, 0, 2)
 
 
-def interpolate_quads(position: NDArray[np.floating], corners: Doubles) -> Doubles:
+def interpolate_quads(bilinear_position: NDArray[np.floating], corner_values: Doubles) -> Doubles:
     """Interpolate c quantities bilinearly from the corners of n quads (c, 4, n) to a point in each, (c, n).
 
-    position : (n, 2) bilinear coordinates, see `Roots`
+    bilinear_position : (n, 2) bilinear coordinates, see `Roots`
     """
-    weight = quad_weights(position).T
-    result: Doubles = weight[0] * corners[:, 0]
+    weight = quad_weights(bilinear_position).T
+    result: Doubles = weight[0] * corner_values[:, 0]
     for k in range(1, 4):
-        result += weight[k] * corners[:, k]
+        result += weight[k] * corner_values[:, k]
     return result
 
 

@@ -22,9 +22,9 @@ from dermis.mesh.subdivision_rules import Cage, catmull_clark_limit, refine_catm
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-MAX_LEVELS = 3
+MAX_SUBDIVISION_LEVELS = 3
 _CACHE_VERSION = "subdivision 1"  # change it when weights or corners change for the same mesh
-_CACHED_TRIANGLES = 500_000
+_MIN_CACHED_TRIANGLES = 500_000
 """Smallest number of triangles of a finer mesh whose weights are cached on disk, to save half a second."""
 Corners = NDArray[np.integer]
 
@@ -86,9 +86,9 @@ def resolve_levels(head: Head, levels: int | Callable[[Head], int]) -> int:
 
 
 def _check_levels(levels: int) -> int:
-    if not isinstance(levels, int | np.integer) or levels not in range(MAX_LEVELS + 1):
+    if not isinstance(levels, int | np.integer) or levels not in range(MAX_SUBDIVISION_LEVELS + 1):
         actual = f"got {format_value(levels)}"
-        refuse("subdivide", f"0 to {MAX_LEVELS} levels", actual, "Each level takes 4x the memory")
+        refuse("subdivide", f"0 to {MAX_SUBDIVISION_LEVELS} levels", actual, "Each level takes 4x the memory")
     return int(levels)
 
 
@@ -136,7 +136,7 @@ def _cached_refinement(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
 
     by_quads : whether to use Catmull and Clark's rules instead of Loop's
     """
-    if len(mesh.triangles) * 4**levels < _CACHED_TRIANGLES:
+    if len(mesh.triangles) * 4**levels < _MIN_CACHED_TRIANGLES:
         return _compute_refinement(mesh, levels, by_quads)
     sources = [mesh.uv, mesh.point, mesh.triangles, mesh.material, mesh.quads]
     names = ["first", "control", "weight", "uv", "point", "corner", "material"]
@@ -248,10 +248,12 @@ def _coarsen_quads(quads: Corners, positions_mm: Floats, levels: int, tolerance_
     return np.concatenate((fans, split_quads(fine))).astype(np.int32)
 
 
-def _deviation_mm(positions_mm: Floats, middle: Corners, start: Corners, end: Corners) -> Floats:
+def _deviation_mm(
+    positions_mm: Floats, middle_vertex: Corners, start_vertex: Corners, end_vertex: Corners
+) -> Floats:
     """Return the distance of the vertices in the middle of coarse edges from the edges' midpoints [mm].
 
-    middle, start, end : indices of the vertex in the middle, and of both ends of each edge
+    middle_vertex, start_vertex, end_vertex : indices of the vertices in the middle and at both ends of edges
     """
-    halfway = 0.5 * (positions_mm[start] + positions_mm[end])
-    return np.asarray(np.linalg.norm(positions_mm[middle] - halfway, axis=-1))
+    halfway = 0.5 * (positions_mm[start_vertex] + positions_mm[end_vertex])
+    return np.asarray(np.linalg.norm(positions_mm[middle_vertex] - halfway, axis=-1))

@@ -162,27 +162,27 @@ def catmull_clark_limit(cage: Cage) -> csr_array:
     return limit
 
 
-def _inner_edge_weights(sides: _Sides, weight: float) -> Doubles:
-    """Return an array (n,) over sides that is `weight` on inner edges and 0 on borders."""
-    return np.where(sides.border, 0, weight)[sides.edge]
+def _inner_edge_weights(sides: _Sides, edge_weight: float) -> Doubles:
+    """Return an array (n,) over sides that is `edge_weight` on inner edges and 0 on borders."""
+    return np.where(sides.border, 0, edge_weight)[sides.edge]
 
 
-def _inner_point_weights(sides: _Sides, weight: Doubles) -> Doubles:
+def _inner_point_weights(sides: _Sides, point_weight: Doubles) -> Doubles:
     """Return for each side the weight of the point where it starts, (n,), 0 for points on borders.
 
-    weight : (p,) weight of each point
+    point_weight : (p,) weight of each point
     """
-    return np.where(sides.border_valence == 0, weight, 0)[sides.start]
+    return np.where(sides.border_valence == 0, point_weight, 0)[sides.start]
 
 
-def _edge_end_weights(sides: _Sides, weight: Doubles) -> csr_array:
+def _edge_end_weights(sides: _Sides, edge_weight: Doubles) -> csr_array:
     """Return the matrix (e, p) that has the weight of each edge at both end points of the edge.
 
-    weight : (e,) weight of each edge
+    edge_weight : (e,) weight of each edge
     """
     rows = np.repeat(np.arange(len(sides.ends)), 2)
     return _sparse_matrix(
-        rows, sides.ends.ravel(), np.repeat(weight, 2), (len(sides.ends), sides.point_count)
+        rows, sides.ends.ravel(), np.repeat(edge_weight, 2), (len(sides.ends), sides.point_count)
     )
 
 
@@ -213,9 +213,11 @@ def _add_edge_vertices(cage: Cage, sides: _Sides) -> tuple[Doubles, Index]:
     return uv, np.concatenate((cage.point, sides.point_count + edge_of_cut))
 
 
-def _sparse_matrix(rows: Index, columns: Index, weights: Doubles, shape: tuple[int, int]) -> csr_array:
+def _sparse_matrix(
+    row_index: Index, column_index: Index, weights: Doubles, matrix_shape: tuple[int, int]
+) -> csr_array:
     """Return a sparse matrix of nonzero weights; weights with equal row and column are summed."""
     from scipy.sparse import coo_array
 
     used = weights != 0
-    return coo_array((weights[used], (rows[used], columns[used])), shape=shape).tocsr()
+    return coo_array((weights[used], (row_index[used], column_index[used])), shape=matrix_shape).tocsr()

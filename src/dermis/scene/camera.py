@@ -18,10 +18,10 @@ from dermis.scene.field_errors import Reason
 from dermis.scene.frozen_model import Direction, FrozenModel, Vector
 from dermis.scene.opencv import OpenCvCamera, extrinsics, from_opencv, intrinsics
 
-_DISTANCE_MM = 1100.0  # as in portrait photography; from closer, the nose looks large
-_RELATIVE_DISTANCE = 3.0  # least distance relative to the size of a mesh that is shown completely
-_FRAME_MARGIN = 1.08  # size of the frame relative to a mesh that is shown completely
-_UP = (0.0, 1.0, 0.0)
+_DEFAULT_DISTANCE_MM = 1100.0  # as in portrait photography; from closer, the nose looks large
+_MIN_DISTANCE_PER_MESH_SIZE = 3.0  # least distance relative to the size of a mesh that is shown completely
+_FRAME_SIZE_PER_MESH_SIZE = 1.08  # size of the frame relative to a mesh that is shown completely
+_WORLD_UP = (0.0, 1.0, 0.0)
 
 
 _Fraction = Annotated[float, Field(ge=-10, le=10), Reason("lenses do not shift farther")]
@@ -248,9 +248,9 @@ def cheek(head: Head) -> Camera:
     """Return a camera for a close-up of the left cheek, where the studio's key light grazes pores."""
     beside = (40.0, -35.0) if head.skull_mm is not None else (0.0, 0.0)
     focus = _to_scene(head, head.frontmost(*beside))
-    view_direction = _to_scene(head, _azimuth_direction(58.0))
+    view_direction = _to_scene(head, _direction_at_azimuth(58.0))
     position = _offset_point(focus, view_direction, 300.0)
-    return Camera(position=position, target=focus, up=_to_scene(head, _UP), frame_mm=48.0)
+    return Camera(position=position, target=focus, up=_to_scene(head, _WORLD_UP), frame_mm=48.0)
 
 
 def ear(head: Head) -> Camera:
@@ -259,8 +259,8 @@ def ear(head: Head) -> Camera:
     near_ear = p[(np.abs(p[:, 1] + 10.0) < 40.0) & (np.abs(p[:, 2]) < 60.0)]
     x, y, z = (near_ear if len(near_ear) else p)[np.argmax((near_ear if len(near_ear) else p)[:, 0])]
     focus = _to_scene(head, (float(x), float(y), float(z)))
-    position = _offset_point(focus, _to_scene(head, _azimuth_direction(75.0)), 600.0)
-    return Camera(position=position, target=focus, up=_to_scene(head, _UP), frame_mm=120.0)
+    position = _offset_point(focus, _to_scene(head, _direction_at_azimuth(75.0)), 600.0)
+    return Camera(position=position, target=focus, up=_to_scene(head, _WORLD_UP), frame_mm=120.0)
 
 
 CAMERA_PRESETS = {
@@ -274,44 +274,50 @@ CAMERA_PRESETS = {
 """Functions of the head that return a camera, by name; hyphens and underscores are interchangeable."""
 
 
-def camera_preset(name: str, head: Head) -> Camera:
+def camera_preset(preset_name: str, head: Head) -> Camera:
     """Return the camera of a preset, placed for a head.
 
     Raises DermisError for a name that is not in `CAMERA_PRESETS`.
     """
-    preset = find_preset(name)
+    preset = find_preset(preset_name)
     if preset is None:
         expected = f"one of {', '.join(CAMERA_PRESETS)} or a TOML file"
-        refuse(f"camera {name}", expected, "it is neither", "Check the name")
+        refuse(f"camera {preset_name}", expected, "it is neither", "Check the name")
     return preset(head)
 
 
-def find_preset(name: str) -> Callable[[Head], Camera] | None:
+def find_preset(preset_name: str) -> Callable[[Head], Camera] | None:
     """Return the function of a camera preset, or None for a name that is not a preset."""
     by_name = {key.replace("-", "_"): preset for key, preset in CAMERA_PRESETS.items()}
-    return by_name.get(name.replace("-", "_"))
+    return by_name.get(preset_name.replace("-", "_"))
 
 
-def _camera_at_azimuth(head: Head, degrees: float) -> Camera:
+def _camera_at_azimuth(head: Head, azimuth_degrees: float) -> Camera:
     if head.skull_mm is None:
-        return _show_all(head, degrees)
+        return _show_all(head, azimuth_degrees)
     middle = (0.0, -25.0, 0.0)
-    return Camera(position=_offset_point(middle, _azimuth_direction(degrees), _DISTANCE_MM), target=middle)
+    return Camera(
+        position=_offset_point(middle, _direction_at_azimuth(azimuth_degrees), _DEFAULT_DISTANCE_MM),
+        target=middle,
+    )
 
 
-def _show_all(head: Head, degrees: float) -> Camera:
+def _show_all(head: Head, azimuth_degrees: float) -> Camera:
     """Return a camera that shows all of a mesh with a margin, from an azimuth relative to the front.
 
-    degrees : azimuth of the camera, 0 in front of the head [degrees]
+    azimuth_degrees : azimuth of the camera, 0 in front of the head [degrees]
     """
-    x, _, z = _azimuth_direction(degrees)
+    x, _, z = _direction_at_azimuth(azimuth_degrees)
     # rows: to the right, up and towards the camera
     axes = np.array([[z, 0.0, -x], [0.0, 1.0, 0.0], [x, 0.0, z]]) @ head.axes
     points = (head.mesh.outline.points_mm - np.array(head.centre_mm)) @ axes.T
     low, high = points.min(axis=0), points.max(axis=0)
-    middle, distance = 0.5 * (low + high), max(_DISTANCE_MM, _RELATIVE_DISTANCE * float((high - low).max()))
+    middle, distance = (
+        0.5 * (low + high),
+        max(_DEFAULT_DISTANCE_MM, _MIN_DISTANCE_PER_MESH_SIZE * float((high - low).max())),
+    )
     across, towards = np.abs(points - middle)[:, :2].max(axis=1), (points - middle)[:, 2]
-    frame_mm = 2.0 * _FRAME_MARGIN * float((across / (1.0 - towards / distance)).max())
+    frame_mm = 2.0 * _FRAME_SIZE_PER_MESH_SIZE * float((across / (1.0 - towards / distance)).max())
     target, position = (
         _vector_tuple(np.round((middle + np.array([0, 0, far])) @ axes, 3)) for far in (0.0, distance)
     )
@@ -328,8 +334,8 @@ def _vector_tuple(vector: Doubles) -> Vector:
     return x, y, z
 
 
-def _azimuth_direction(degrees: float) -> Vector:
-    return (math.sin(math.radians(degrees)), 0.0, math.cos(math.radians(degrees)))
+def _direction_at_azimuth(azimuth_degrees: float) -> Vector:
+    return (math.sin(math.radians(azimuth_degrees)), 0.0, math.cos(math.radians(azimuth_degrees)))
 
 
 def _offset_point(point: Vector, direction: Vector, length: float) -> Vector:

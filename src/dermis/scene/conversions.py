@@ -90,25 +90,25 @@ def as_environment(environment: object) -> Environment | None:
     return Environment(name=str(environment))
 
 
-def as_model(settings_class: type[P], values: object, argument: str, example: str) -> P:
+def as_model(settings_class: type[P], field_values: object, argument_name: str, example_text: str) -> P:
     """Return settings of a given class.
 
     settings_class : class of the settings, such as `Skin`
-    values : instance of the class, or a mapping from field names to values
-    argument : name of the argument of `Scene`, for the error message
-    example : example of fields with values, for the error message
+    field_values : instance of the class, or a mapping from field names to values
+    argument_name : name of the argument of `Scene`, for the error message
+    example_text : example of fields with values, for the error message
 
     Raises DermisError for any other object.
     """
-    if isinstance(values, settings_class):
-        return values
-    if not isinstance(values, Mapping):
+    if isinstance(field_values, settings_class):
+        return field_values
+    if not isinstance(field_values, Mapping):
         actual, advice = (
-            f"got {format_value(values)}",
-            f"Write {argument}=dermis.{settings_class.__name__}({example})",
+            f"got {format_value(field_values)}",
+            f"Write {argument_name}=dermis.{settings_class.__name__}({example_text})",
         )
-        refuse(argument, f"a {settings_class.__name__}", actual, advice)
-    return settings_class(**values)
+        refuse(argument_name, f"a {settings_class.__name__}", actual, advice)
+    return settings_class(**field_values)
 
 
 def _check_positions(lights: Sequence[Light]) -> Sequence[Light]:
@@ -118,10 +118,10 @@ def _check_positions(lights: Sequence[Light]) -> Sequence[Light]:
     return lights
 
 
-def _warn_near_centre(label: str, position: Vector) -> None:
+def _warn_near_centre(light_label: str, position: Vector) -> None:
     distance = float(np.linalg.norm(position))
     if 0.0 < distance < _NEAR_CENTRE_MM:
         notify(
-            f"{label}: expected a position outside the head [mm], but it is {distance:g} mm from the centre. "
-            "Write 1100 for 1.1 m."
+            f"{light_label}: expected a position outside the head [mm], but it is {distance:g} mm from the "
+            "centre. Write 1100 for 1.1 m."
         )

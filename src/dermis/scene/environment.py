@@ -13,7 +13,7 @@ from dermis.scene.frozen_model import FrozenModel, slider
 class Environment(FrozenModel):
     """Panorama of distant light around the head.
 
-    The centre of the panorama lies behind the head, so a camera in front of the face has it as background.
+    The centre of the panorama lies behind the head, so it is the background of a camera in front of the face.
 
     Examples
     --------
@@ -33,7 +33,7 @@ class Environment(FrozenModel):
     """Rotation about the upward axis, counter-clockwise as seen from above [degrees]."""
     exposure: Annotated[
         float,
-        Field(ge=0, le=1e6, json_schema_extra=slider(0.02, 10, log=True)),
+        Field(ge=0, le=1e6, json_schema_extra=slider(0.02, 10, logarithmic=True)),
         Reason("up to 20 stops brighter; light is not negative"),
     ] = 1.0
     """Factor of the panorama's radiance."""

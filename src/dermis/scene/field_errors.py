@@ -15,9 +15,9 @@ from pydantic_core import ErrorDetails
 
 from dermis.base.errors import DermisError, format_value, shorten
 
-_BOUND_ERRORS = {"greater_than", "greater_than_equal", "less_than", "less_than_equal", "finite_number"}
-_INT_ERRORS = {"int_type", "int_parsing", "int_from_float", "int_parsing_size"}
-_NUMBER_ERRORS = {"float_type", "float_parsing"} | _INT_ERRORS
+_BOUND_ERROR_TYPES = {"greater_than", "greater_than_equal", "less_than", "less_than_equal", "finite_number"}
+_INT_ERROR_TYPES = {"int_type", "int_parsing", "int_from_float", "int_parsing_size"}
+_NUMBER_ERROR_TYPES = {"float_type", "float_parsing"} | _INT_ERROR_TYPES
 _TEXT_TYPES = (str, bytes, bytearray)
 _MAX_NAME_LENGTH = 80
 _MAX_TABLE_LENGTH = 160
@@ -54,10 +54,10 @@ class InvalidFieldsError(DermisError):
     messages : text with the expected and the actual value of each rejected field, by field name
     """
 
-    def __init__(self, owner: str, messages: dict[str, str]) -> None:
-        texts = [f"{field}: {message}" if field else message for field, message in messages.items()]
-        super().__init__(f"{owner}: {'; '.join(texts)}. Correct it.")
-        self.messages = messages
+    def __init__(self, settings_name: str, message_of_field: dict[str, str]) -> None:
+        texts = [f"{field}: {message}" if field else message for field, message in message_of_field.items()]
+        super().__init__(f"{settings_name}: {'; '.join(texts)}. Correct it.")
+        self.messages = message_of_field
 
 
 class _NotANumber:
@@ -81,22 +81,24 @@ def numeric_fields(model: type[BaseModel]) -> Mapping[str, bool]:
     return found
 
 
-def python_numbers(value: Any, accepts_text: bool = False) -> Any:
+def python_numbers(field_value: Any, accepts_text: bool = False) -> Any:
     """Convert NumPy scalars and arrays to Python numbers, and wrap booleans and text in `_NotANumber`.
 
     accepts_text : whether text is a valid value, which is then not wrapped
     """
     import numpy as np  # importing it takes longer than printing help
 
-    if isinstance(value, np.generic | np.ndarray):
-        value = value.tolist()
-    if isinstance(value, list | tuple):
-        return [python_numbers(one) for one in value]
-    if isinstance(value, Mapping):
-        return {name: python_numbers(one) for name, one in value.items()}
-    if isinstance(value, bool | set | frozenset) or (isinstance(value, _TEXT_TYPES) and not accepts_text):
-        return _NotANumber(value)
-    return value
+    if isinstance(field_value, np.generic | np.ndarray):
+        field_value = field_value.tolist()
+    if isinstance(field_value, list | tuple):
+        return [python_numbers(one) for one in field_value]
+    if isinstance(field_value, Mapping):
+        return {name: python_numbers(one) for name, one in field_value.items()}
+    if isinstance(field_value, bool | set | frozenset) or (
+        isinstance(field_value, _TEXT_TYPES) and not accepts_text
+    ):
+        return _NotANumber(field_value)
+    return field_value
 
 
 def field_keywords(model: type[BaseModel], field: str) -> tuple[str, ...]:
@@ -105,10 +107,10 @@ def field_keywords(model: type[BaseModel], field: str) -> tuple[str, ...]:
     return found[0] if found else ()
 
 
-def field_bounds(info: FieldInfo) -> tuple[float | None, float | None]:
+def field_bounds(field_info: FieldInfo) -> tuple[float | None, float | None]:
     """Return the lower and the upper bound of a numeric field, each None if the field has no such bound."""
-    low = [getattr(one, name) for one in info.metadata for name in ("ge", "gt") if hasattr(one, name)]
-    high = [getattr(one, name) for one in info.metadata for name in ("le", "lt") if hasattr(one, name)]
+    low = [getattr(one, name) for one in field_info.metadata for name in ("ge", "gt") if hasattr(one, name)]
+    high = [getattr(one, name) for one in field_info.metadata for name in ("le", "lt") if hasattr(one, name)]
     return next(iter(low), None), next(iter(high), None)
 
 
@@ -117,21 +119,27 @@ def messages_by_field(errors: list[ErrorDetails], model: type[BaseModel]) -> dic
     return {".".join(str(part) for part in one["loc"]): _format_error(one, model) for one in errors}
 
 
-def _format_error(error: ErrorDetails, model: type[BaseModel]) -> str:
+def _format_error(pydantic_error: ErrorDetails, model: type[BaseModel]) -> str:
     """Return the message "expected ..., but got ..." for one validation error of pydantic."""
-    if error["type"] == "extra_forbidden":
-        return _unknown_field_message(str(error["loc"][-1]), model)
-    if error["type"] == "missing":
+    if pydantic_error["type"] == "extra_forbidden":
+        return _unknown_field_message(str(pydantic_error["loc"][-1]), model)
+    if pydantic_error["type"] == "missing":
         return "expected a value, but there is none"
-    expected = re.sub("^(Input should be|Tuple should have|Value error,) |, unable to .*", "", error["msg"])
-    expected = expected.replace("a valid tuple", f"a list{_length_text(error, model)}")
-    if error["type"] in _BOUND_ERRORS | _NUMBER_ERRORS:
-        expected = _range_text(error["loc"], model) or re.sub("^(greater|less)", r"a number \1", expected)
-    if len(error["loc"]) == 1 and (words := field_keywords(model, str(error["loc"][0]))):
+    expected = re.sub(
+        "^(Input should be|Tuple should have|Value error,) |, unable to .*", "", pydantic_error["msg"]
+    )
+    expected = expected.replace("a valid tuple", f"a list{_length_text(pydantic_error, model)}")
+    if pydantic_error["type"] in _BOUND_ERROR_TYPES | _NUMBER_ERROR_TYPES:
+        expected = _range_text(pydantic_error["loc"], model) or re.sub(
+            "^(greater|less)", r"a number \1", expected
+        )
+    if len(pydantic_error["loc"]) == 1 and (words := field_keywords(model, str(pydantic_error["loc"][0]))):
         expected = f"{', '.join(words)} or {expected}"
-    actual = format_value(error["input"])
-    if not error["loc"] and isinstance(error["input"], dict):  # inconsistent values of several fields
-        values = ", ".join(f"{name} {format_value(value)}" for name, value in error["input"].items())
+    actual = format_value(pydantic_error["input"])
+    if not pydantic_error["loc"] and isinstance(
+        pydantic_error["input"], dict
+    ):  # inconsistent values of several fields
+        values = ", ".join(f"{name} {format_value(value)}" for name, value in pydantic_error["input"].items())
         actual = shorten(values, _MAX_TABLE_LENGTH)
     return f"expected {expected}, but got {actual}"
 
@@ -169,9 +177,9 @@ def _leaf_types(annotation: Any) -> Iterator[Any]:
         yield annotation
 
 
-def _length_text(error: ErrorDetails, model: type[BaseModel]) -> str:
+def _length_text(pydantic_error: ErrorDetails, model: type[BaseModel]) -> str:
     """Return " of N numbers" if the error is in a tuple field of fixed length N, otherwise ""."""
-    info = model.model_fields.get(str(error["loc"][0])) if len(error["loc"]) == 1 else None
+    info = model.model_fields.get(str(pydantic_error["loc"][0])) if len(pydantic_error["loc"]) == 1 else None
     count = len([part for part in get_args(info.annotation) if part is not Ellipsis]) if info else 0
     return f" of {count} numbers" if count > 1 else ""
 

@@ -31,7 +31,7 @@ from dermis.scene.file_surfaces import (
     with_missing_uv,
 )
 from dermis.scene.head_table import NormalY, check_relief
-from dermis.scene.skin_tone import NO_PICTURE, with_skin_tone
+from dermis.scene.skin_tone import NO_COLOUR_MAP, with_skin_tone
 
 MapFile = str | os.PathLike[str] | None
 
@@ -83,83 +83,85 @@ class MapOptions:
         return mesh_relief_mm if self.height_mm is None else self.height_mm
 
 
-def load_file_head(name: str, mesh_options: dict[str, Any], options: MapOptions) -> tuple[Head, EyeLook]:
+def load_file_head(
+    sample_or_path: str, mesh_options: dict[str, Any], map_options: MapOptions
+) -> tuple[Head, EyeLook]:
     """Return the head of a sample or a mesh file, and the eye look that the file states.
 
-    name : name of the sample or of the file
+    sample_or_path : name of the sample or of the file
     mesh_options : keyword arguments of `load_rigged`
     """
-    sample = SAMPLES.get(name)
+    sample = SAMPLES.get(sample_or_path)
     if sample is not None:
-        return _load_sample(sample, mesh_options, options), EyeLook()
-    path, look, materials = Path(name), EyeLook(), None
+        return _load_sample(sample, mesh_options, map_options), EyeLook()
+    path, look, materials = Path(sample_or_path), EyeLook(), None
     if is_gltf(path):
         materials, look = embedded_materials(path), embedded_eye_look(path)
-    rigged = _load_mesh(path, name, mesh_options)
+    rigged = _load_mesh(path, sample_or_path, mesh_options)
     mesh, maps, notes = _with_materials(
-        rigged, rigged.materials if materials is None else materials, path, options
+        rigged, rigged.materials if materials is None else materials, path, map_options
     )
     check_uv_range(mesh, path)
-    check_relief(options.height_mm, maps.height, f"{name}: height_mm")
-    maps, tone_note = with_skin_tone(mesh, maps, options.skin_site, "colour" in options.user_files)
+    check_relief(map_options.height_mm, maps.height, f"{sample_or_path}: height_mm")
+    maps, tone_note = with_skin_tone(mesh, maps, map_options.skin_site, "colour" in map_options.user_files)
     for note in filter(None, (*rigged.notes, tone_note, *notes)):
         notify(f"{path}: {note}")
-    return Head(name, mesh, maps, "", rigged.rig, file_vertices=rigged.file_vertices), look
+    return Head(sample_or_path, mesh, maps, "", rigged.rig, file_vertices=rigged.file_vertices), look
 
 
-def _load_mesh(path: Path, name: str, mesh_options: dict[str, Any]) -> RiggedMesh:
+def _load_mesh(path: Path, culprit: str, mesh_options: dict[str, Any]) -> RiggedMesh:
     rigged = with_missing_uv(load_rigged(path, **mesh_options))
-    return with_settled_unit(rigged, path, mesh_options["unit_mm"], name)
+    return with_settled_unit(rigged, path, mesh_options["unit_mm"], culprit)
 
 
-def _load_sample(sample: Sample, mesh_options: dict[str, Any], options: MapOptions) -> Head:
+def _load_sample(sample: Sample, mesh_options: dict[str, Any], map_options: MapOptions) -> Head:
     """Return the head of a sample, whose unit and maps are known."""
     if sample.kind != "head":
         hint = f"Use one of {', '.join(name for name, one in SAMPLES.items() if one.kind == 'head')}"
         refuse(sample.name, "a head", f"this sample is an {sample.kind}", hint)
     files = fetch_sample(sample.name)
-    if options.skin_site is not None:
-        refuse("skin_site", NO_PICTURE, f"{sample.name} has a colour map", "Leave it out")
+    if map_options.skin_site is not None:
+        refuse("skin_site", NO_COLOUR_MAP, f"{sample.name} has a colour map", "Leave it out")
     sample_options = mesh_options | {"unit_mm": mesh_options["unit_mm"] or sample.unit_mm}
     if sample_options["v_origin"] == "auto":
         sample_options["v_origin"] = sample.v_origin or "auto"
     with ThreadPoolExecutor(1) as pool:
-        pending_maps = pool.submit(options.load, {**files, "height_mm": sample.height_mm})
+        pending_maps = pool.submit(map_options.load, {**files, "height_mm": sample.height_mm})
         rigged = _load_mesh(files["mesh"], sample.name, sample_options)
         maps = pending_maps.result()
-    check_relief(options.height_mm, maps.height, f"{sample.name}: height_mm")
+    check_relief(map_options.height_mm, maps.height, f"{sample.name}: height_mm")
     credit = f"{sample.attribution}, {sample.licence}"
     return Head(sample.name, rigged.mesh, maps, credit, rigged.rig, file_vertices=rigged.file_vertices)
 
 
 def _with_materials(
-    rigged: RiggedMesh, materials: Sequence[FileMaterial], path: Path, options: MapOptions
+    rigged: RiggedMesh, materials: Sequence[FileMaterial], path: Path, map_options: MapOptions
 ) -> tuple[Mesh, Maps, list[str]]:
     """Return the mesh and the maps of a file with materials, and notes on properties that are not drawn."""
     direct = direct_material(rigged, materials)
-    pack_skin = direct is None and not options.user_files
+    pack_skin = direct is None and not map_options.user_files
     mesh, packed, notes = with_file_textures(rigged, materials, pack_skin)
-    loaded, faults = _direct_maps(path, direct or FileMaterial(), options)
+    loaded, faults = _direct_maps(path, direct or FileMaterial(), map_options)
     roles = [one.name for one in fields(Maps)]
     loaded_maps = {role: one for role in roles if (one := getattr(loaded, role)) is not None}
     maps = replace(packed, **loaded_maps)
-    unused = unused_properties(mesh, materials, rigged.surface.in_file, options.replaced_roles, pack_skin)
+    unused = unused_properties(mesh, materials, rigged.surface.in_file, map_options.replaced_roles, pack_skin)
     return mesh, maps, [*notes, *faults, unused]
 
 
-def _direct_maps(path: Path, material: FileMaterial, options: MapOptions) -> tuple[Maps, list[str]]:
+def _direct_maps(path: Path, material: FileMaterial, map_options: MapOptions) -> tuple[Maps, list[str]]:
     """Return the maps of a material whose pictures serve as maps of the skin, and notes on omitted maps."""
     if path.suffix.lower() != ".obj" or not material.name:
-        return with_factors(options.load(material.skin_pictures()), material, options.user_files), []
+        return with_factors(map_options.load(material.skin_pictures()), material, map_options.user_files), []
     mtl_maps, faults = obj_maps(
         path,
         material.name,
-        overridden=options.user_files,
-        height_mm=options.height_mm,
-        normal_y=options.normal_y,
+        overridden_roles=map_options.user_files,
+        height_mm=map_options.height_mm,
+        normal_y=map_options.normal_y,
     )
-    loaded = options.load({})
-    chosen_maps: dict[str, Any] = {role: getattr(loaded, role) for role in options.user_files}
+    loaded = map_options.load({})
+    chosen_maps: dict[str, Any] = {role: getattr(loaded, role) for role in map_options.user_files}
     return with_factors(
-        replace(mtl_maps, **chosen_maps), material, {*options.user_files, "normal", "roughness"}
+        replace(mtl_maps, **chosen_maps), material, {*map_options.user_files, "normal", "roughness"}
     ), faults

@@ -13,7 +13,7 @@ from dermis.atlas.texture_tiles import UV_TOLERANCE
 from dermis.atlas.unwrap.missing_uv import with_layout
 from dermis.base.arrays import Floats, Mask
 from dermis.formats.load import FileSurface, RiggedMesh
-from dermis.formats.materials import IDENTITY, FileMaterial, Role
+from dermis.formats.materials import IDENTITY_UV_TRANSFORM, FileMaterial, Role
 from dermis.mesh.maps import Maps, PartMaps
 from dermis.mesh.mesh import Material, Mesh
 
@@ -54,7 +54,7 @@ def direct_material(rigged: RiggedMesh, materials: Sequence[FileMaterial]) -> Fi
         return material
     uv = mesh.uv[np.unique(mesh.triangles[skin[mesh.material]])]
     inside = uv.min() > -UV_TOLERANCE and uv.max() < 1.0 + UV_TOLERANCE
-    plain = all(texture.mapping == (0, IDENTITY) for texture in material.textures.values())
+    plain = all(texture.mapping == (0, IDENTITY_UV_TRANSFORM) for texture in material.textures.values())
     return material if inside and plain and not _has_colours(mesh, surface, skin) else None
 
 
@@ -83,16 +83,16 @@ def with_factors(maps: Maps, material: FileMaterial, user_roles: Collection[str]
     return replace(maps, **changed)
 
 
-def _materials_of_kind(mesh: Mesh, kind: str) -> Mask:
+def _materials_of_kind(mesh: Mesh, material_kind: str) -> Mask:
     """Return a mask (m,) of the materials of a mesh that have a kind, such as "skin"."""
-    return np.array([material.kind == kind for material in mesh.materials])
+    return np.array([material.kind == material_kind for material in mesh.materials])
 
 
-def _has_colours(mesh: Mesh, surface: FileSurface, members: Mask) -> bool:
+def _has_colours(mesh: Mesh, surface: FileSurface, material_mask: Mask) -> bool:
     """Return whether any vertex of the materials in a mask has a colour other than white."""
     if surface.colours is None:
         return False
-    return bool((surface.colours[np.unique(mesh.triangles[members[mesh.material]])] < 1.0).any())
+    return bool((surface.colours[np.unique(mesh.triangles[material_mask[mesh.material]])] < 1.0).any())
 
 
 def with_file_textures(
@@ -182,46 +182,46 @@ def _part_maps(packed: PackedTextures) -> PartMaps:
     return PartMaps(maps["colour"], surface, _emission_if_any(maps.get("emission")))
 
 
-def _emission_if_any(texels: Floats | None) -> Floats | None:
-    return texels if texels is not None and texels.any() else None
+def _emission_if_any(emission_texels: Floats | None) -> Floats | None:
+    return emission_texels if emission_texels is not None and emission_texels.any() else None
 
 
-def _with_surface(material: Material, in_file: FileMaterial | None, has_maps: bool) -> Material:
+def _with_surface(material: Material, file_material: FileMaterial | None, has_maps: bool) -> Material:
     """Return a material with the surface properties that the file states; skin materials are not changed.
 
-    in_file : material in the file; None if the file has no material
+    file_material : material in the file; None if the file has no material
     """
     if material.kind == "skin":
         return material
-    if in_file is None:
+    if file_material is None:
         return replace(material, has_maps=has_maps)
     return replace(
         material,
         has_maps=has_maps,
-        roughness=in_file.roughness,
-        metalness=in_file.metalness,
-        emission=in_file.emission,
-        opacity_cutoff=0.0 if in_file.alpha_mode == "opaque" else in_file.cutoff,
+        roughness=file_material.roughness,
+        metalness=file_material.metalness,
+        emission=file_material.emission,
+        opacity_cutoff=0.0 if file_material.alpha_mode == "opaque" else file_material.cutoff,
     )
 
 
 def unused_properties(
     mesh: Mesh,
     materials: Sequence[FileMaterial],
-    in_file: Sequence[int],
+    file_index: Sequence[int],
     user_roles: Collection[str],
     is_packed: bool,
 ) -> str:
     """Return a note on properties of a file's materials that are not drawn; empty if all are drawn.
 
-    in_file : (m,) for each material of the mesh, index of the material in the file, or -1 if there is none
+    file_index : (m,) for each material of the mesh, index of the material in the file, or -1 if there is none
     user_roles : roles of skin maps that the user replaces
     is_packed : whether the pictures of several skin materials are packed
     """
     if any(one.maps is not None for one in materials):  # this package wrote the file
         return ""
     lines = dict[str, None]()
-    for material, index in zip(mesh.materials, in_file, strict=True):
+    for material, index in zip(mesh.materials, file_index, strict=True):
         file_material, is_skin = materials[index] if index >= 0 else FileMaterial(), material.kind == "skin"
         unused = list(file_material.unused)
         unused += [

@@ -29,7 +29,7 @@ from dermis.scene.skin import SKIN_PRESETS, Skin
 from dermis.scene.smoothness import SmoothIn
 
 P = TypeVar("P", bound=FrozenModel)
-_TABLE_NAMES = {"head", "pose", "skin", "lights", "environment", "camera", "render"}
+_SCENE_TABLE_NAMES = {"head", "pose", "skin", "lights", "environment", "camera", "render"}
 _MAP_ROLES = ("colour", "normal", "height", "specular", "roughness")
 _Weight = Annotated[float, Field(ge=-MAX_WEIGHT, le=MAX_WEIGHT), Reason("faces break apart long before")]
 
@@ -68,13 +68,15 @@ def load_lights(name: str | Path, head: Head | None = None) -> tuple[Light, ...]
     )
 
 
-def load_camera(name: str | Path, head: Head) -> Camera:
+def load_camera(preset_or_path: str | Path, head: Head) -> Camera:
     """Return the camera of a preset, placed for the head, or of the [camera] table in a TOML file."""
-    preset = find_preset(str(name))
+    preset = find_preset(str(preset_or_path))
     if preset is not None:
         return preset(head)
-    table = _read_scene_file(name, f"a preset ({', '.join(CAMERA_PRESETS)}) or a TOML file").get("camera")
-    return _build_settings(Camera, name, "camera", table)
+    table = _read_scene_file(preset_or_path, f"a preset ({', '.join(CAMERA_PRESETS)}) or a TOML file").get(
+        "camera"
+    )
+    return _build_settings(Camera, preset_or_path, "camera", table)
 
 
 @renamed_keywords(known="head")
@@ -131,9 +133,12 @@ def load_scene(
     """
     path = checked_path(path, "a scene in TOML")
     table = _read_scene_file(path, "a scene in TOML")
-    for part in table.keys() - _TABLE_NAMES:
+    for part in table.keys() - _SCENE_TABLE_NAMES:
         refuse(
-            path, f"only the tables {', '.join(sorted(_TABLE_NAMES))}", f"got {part!r}", "Correct its name"
+            path,
+            f"only the tables {', '.join(sorted(_SCENE_TABLE_NAMES))}",
+            f"got {part!r}",
+            "Correct its name",
         )
     skin = _parse_skin(path, table.get("skin", {}))
     settings = _build_settings(Settings, path, "render", table.get("render", {}))
@@ -167,100 +172,109 @@ def head_table(path: Path) -> dict[str, Any]:
     return with_absolute_paths(_read_scene_file(path, "a scene in TOML").get("head", {}), path.parent)
 
 
-def with_absolute_paths(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+def with_absolute_paths(head_fields: Mapping[str, Any], scene_folder: Path) -> dict[str, Any]:
     """Return a [head] table with absolute names of its files.
 
-    folder : folder to which file names are relative
+    scene_folder : folder to which file names are relative
     """
-    named = {role: folder / table[role] for role in ("name", "regions", *_MAP_ROLES) if role in table}
-    return {**table} | {role: str(file.resolve()) for role, file in named.items() if is_file(file)}
+    named = {
+        role: scene_folder / head_fields[role]
+        for role in ("name", "regions", *_MAP_ROLES)
+        if role in head_fields
+    }
+    return {**head_fields} | {role: str(file.resolve()) for role, file in named.items() if is_file(file)}
 
 
 def head_and_skin(
-    table: HeadTable, skin: Skin, folder: Path, picture: SmoothIn | None = None
+    head_fields: HeadTable, skin: Skin, scene_folder: Path, picture: SmoothIn | None = None
 ) -> tuple[Head, Skin]:
     """Return the head of a [head] table, and the skin settings of the head.
 
     If the [head] table names a table of face regions, the returned skin has the mean rho_s of the regions.
 
     skin : skin settings of the scene file
-    folder : folder to which file names are relative
+    scene_folder : folder to which file names are relative
     picture : camera and size for which subdivision levels are chosen if the table does not state them
 
     Raises DermisError for files that cannot be used.
     """
     regions = (
-        load_region_table(_resolve_file(folder, table.regions)) if has_region_table(vars(table)) else None
+        load_region_table(_resolve_file(scene_folder, head_fields.regions))
+        if has_region_table(vars(head_fields))
+        else None
     )
-    options = table.model_dump(exclude={"name"}, exclude_none=True)
+    options = head_fields.model_dump(exclude={"name"}, exclude_none=True)
     if regions is not None:
         options["regions"] = NO_REGIONS
-    options |= {role: folder / options[role] for role in _MAP_ROLES if role in options}
-    if picture is not None and table.subdivide == AUTO:
+    options |= {role: scene_folder / options[role] for role in _MAP_ROLES if role in options}
+    if picture is not None and head_fields.subdivide == AUTO:
         options["subdivide"] = picture
-    head = load_head(_resolve_file(folder, table.name), **options)
+    head = load_head(_resolve_file(scene_folder, head_fields.name), **options)
     if regions is None:
         return head, skin
     head, rho_s = with_regions(head, regions)
     return head, skin.model_copy(update={"rho_s": rho_s})
 
 
-def _parse_skin(path: Path, entry: Any) -> Skin:
+def _parse_skin(path: Path, skin_entry: Any) -> Skin:
     """Return the skin of a scene file, from its [skin] table or from the name of a skin preset."""
-    if not isinstance(entry, str):
-        return _build_settings(Skin, path, "skin", entry)
-    if entry not in SKIN_PRESETS:
+    if not isinstance(skin_entry, str):
+        return _build_settings(Skin, path, "skin", skin_entry)
+    if skin_entry not in SKIN_PRESETS:
         refuse(
-            f"{path}: skin", f"a table or one of {', '.join(SKIN_PRESETS)}", f"got {entry!r}", "Correct it"
+            f"{path}: skin",
+            f"a table or one of {', '.join(SKIN_PRESETS)}",
+            f"got {skin_entry!r}",
+            "Correct it",
         )
-    return Skin.preset(entry)
+    return Skin.preset(skin_entry)
 
 
-def _resolve_skin_files(folder: Path, skin: Skin) -> Skin:
+def _resolve_skin_files(scene_folder: Path, skin: Skin) -> Skin:
     """Return a skin in which names of profile files are resolved relative to a folder."""
-    others = tuple(_resolve_file(folder, name) for name in skin.other_profiles)
-    mixture_map = skin.profile_map and _resolve_file(folder, skin.profile_map)
+    others = tuple(_resolve_file(scene_folder, name) for name in skin.other_profiles)
+    mixture_map = skin.profile_map and _resolve_file(scene_folder, skin.profile_map)
     names = {
-        "profile": _resolve_file(folder, skin.profile),
+        "profile": _resolve_file(scene_folder, skin.profile),
         "other_profiles": others,
         "profile_map": mixture_map,
     }
     return skin.model_copy(update={name: one for name, one in names.items() if one != getattr(skin, name)})
 
 
-def _check_rho_s_given_once(path: Path, table: HeadTable, skin: Skin) -> None:
-    if has_region_table(vars(table)) and "rho_s" in skin.model_fields_set:
+def _check_rho_s_given_once(path: Path, head_settings: HeadTable, skin: Skin) -> None:
+    if has_region_table(vars(head_settings)) and "rho_s" in skin.model_fields_set:
         actual = "it is given beside the head's regions, which set it for each region"
         refuse(f"{path}: skin: rho_s", "one or the other", actual, "Leave one out, or use oiliness")
 
 
-def _parse_camera(path: Path, entry: Any, head: Head) -> Camera:
-    if isinstance(entry, str):
-        return load_camera(_resolve_file(path.parent, entry), head)
-    return _build_settings(Camera, path, "camera", entry)
+def _parse_camera(path: Path, camera_entry: Any, head: Head) -> Camera:
+    if isinstance(camera_entry, str):
+        return load_camera(_resolve_file(path.parent, camera_entry), head)
+    return _build_settings(Camera, path, "camera", camera_entry)
 
 
-def _parse_pose(path: Path, table: Any, head: Head) -> Pose:
-    entry = _build_settings(PoseTable, path, "pose", table)
+def _parse_pose(path: Path, pose_entry: Any, head: Head) -> Pose:
+    entry = _build_settings(PoseTable, path, "pose", pose_entry)
     pose = Pose(entry.weights, entry.bones)
     pose.motion(head.control, f"{path}: pose")  # for an error that names the file
     return pose
 
 
-def _parse_environment(path: Path, table: Any) -> Environment:
-    if isinstance(table, dict) and "visible" in table:
+def _parse_environment(path: Path, environment_table: Any) -> Environment:
+    if isinstance(environment_table, dict) and "visible" in environment_table:
         advice = 'Write background = "environment" into [render]'
         refuse(f"{path}: environment: visible", "no such key any more", "it is given", advice)
-    environment = _build_settings(Environment, path, "environment", table)
+    environment = _build_settings(Environment, path, "environment", environment_table)
     return environment.model_copy(update={"name": _resolve_file(path.parent, environment.name)})
 
 
-def _resolve_file(folder: Path, file_or_preset: str) -> str:
+def _resolve_file(scene_folder: Path, file_or_preset: str) -> str:
     """Return the path of a file in a folder, or the name itself if there is no such file.
 
     Names of presets and samples are returned unchanged.
     """
-    file = folder / file_or_preset
+    file = scene_folder / file_or_preset
     return str(file) if is_file(file) else file_or_preset
 
 
@@ -271,21 +285,21 @@ def _parse_lights(culprit: object, tables: Any) -> tuple[Light, ...]:
     return tuple(_parse_light(culprit, f"light {k}", table) for k, table in enumerate(tables, start=1))
 
 
-def _parse_light(culprit: object, label: str, table: Any) -> Light:
-    kind = table.get("kind", "point") if isinstance(table, dict) else "point"
+def _parse_light(culprit: object, light_label: str, light_table: Any) -> Light:
+    kind = light_table.get("kind", "point") if isinstance(light_table, dict) else "point"
     if not isinstance(kind, str) or kind not in LIGHTS:
-        refuse(f"{culprit}: {label}", f"a kind of {', '.join(LIGHTS)}", f"got {kind!r}", "Correct it")
-    return _build_settings(LIGHTS[kind], culprit, label, table)
+        refuse(f"{culprit}: {light_label}", f"a kind of {', '.join(LIGHTS)}", f"got {kind!r}", "Correct it")
+    return _build_settings(LIGHTS[kind], culprit, light_label, light_table)
 
 
-def _build_settings(settings_class: type[P], file_name: object, table_name: str, table: Any) -> P:
+def _build_settings(settings_class: type[P], file_name: object, table_name: str, table_values: Any) -> P:
     """Return an instance of a settings class from a TOML table; errors name the file and the table.
 
     file_name : name of the file, for error messages
     table_name : name of the table, for error messages
     """
-    if not isinstance(table, dict):
-        actual = "there is none" if table is None else f"got {table!r}"
+    if not isinstance(table_values, dict):
+        actual = "there is none" if table_values is None else f"got {table_values!r}"
         refuse(
             f"{file_name}: {table_name}",
             f"a table with {', '.join(settings_class.model_fields)}",
@@ -294,13 +308,13 @@ def _build_settings(settings_class: type[P], file_name: object, table_name: str,
         )
     with error_context(f"{file_name}: {table_name}"):
         try:
-            return settings_class(**table)
+            return settings_class(**table_values)
         except InvalidFieldsError as error:
             raise InvalidFieldsError(f"{file_name}: {table_name}", error.messages) from None
 
 
-def _read_scene_file(name: str | Path, expected: str) -> dict[str, Any]:
-    return read_toml(checked_path(name, expected), expected)
+def _read_scene_file(file_name: str | Path, expected: str) -> dict[str, Any]:
+    return read_toml(checked_path(file_name, expected), expected)
 
 
 class PoseTable(FrozenModel):

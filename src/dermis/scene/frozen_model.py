@@ -45,7 +45,7 @@ else:
     ModelMetaclass = type(BaseModel)
 
 MAX_COORDINATE_MM = 1e6
-_DISPLAYED_BOUND = 1e5  # larger bounds are not shown to users, as they only keep numbers finite
+_MAX_DISPLAYED_BOUND = 1e5  # larger bounds are not shown to users, as they only keep numbers finite
 _MEMBER_TYPES = FunctionType, classmethod, property
 _DOCSTRING_WIDTH = 92
 
@@ -150,13 +150,13 @@ class SliderRange(NamedTuple):
     logarithmic: bool = False
 
 
-def slider(low: float, high: float, *, log: bool = False) -> dict[str, Any]:
+def slider(low: float, high: float, *, logarithmic: bool = False) -> dict[str, Any]:
     """Return the `json_schema_extra` that gives a field a slider range narrower than the bounds.
 
     low, high : values at the ends of the slider
-    log : whether the slider is logarithmic
+    logarithmic : whether the slider is logarithmic
     """
-    return {"slider": SliderRange(low, high, log)}
+    return {"slider": SliderRange(low, high, logarithmic)}
 
 
 def field_help(model: type[BaseModel], field: str) -> str:
@@ -246,38 +246,40 @@ def accepted_values(model: type[BaseModel], field: str) -> str:
     """Return the accepted words and bounds of a field, such as "auto, 0 to 1"; "" if there are none."""
     low, high = field_bounds(model.model_fields[field])
     words = [*field_keywords(model, field), *field_choices(model, field)]
-    if low is not None and high is not None and high < _DISPLAYED_BOUND:
+    if low is not None and high is not None and high < _MAX_DISPLAYED_BOUND:
         words.append(f"{low:g} to {high:g}")
     return ", ".join(words)
 
 
-def format_default(value: Any) -> str:
+def format_default(default: Any) -> str:
     """Return a default value as typed on the command line; "" for None, booleans and missing defaults."""
-    if isinstance(value, tuple):
-        return ("x" if all(isinstance(one, int) for one in value) else ",").join(map(format_default, value))
-    if value is None or isinstance(value, bool) or value is PydanticUndefined:
+    if isinstance(default, tuple):
+        return ("x" if all(isinstance(one, int) for one in default) else ",").join(
+            map(format_default, default)
+        )
+    if default is None or isinstance(default, bool) or default is PydanticUndefined:
         return ""
-    return f"{value:g}" if isinstance(value, float) else str(value)
+    return f"{default:g}" if isinstance(default, float) else str(default)
 
 
-def _registry_names(info: FieldInfo) -> list[RegisteredName]:
-    return [one for one in info.metadata if isinstance(one, RegisteredName)]
+def _registry_names(field_info: FieldInfo) -> list[RegisteredName]:
+    return [one for one in field_info.metadata if isinstance(one, RegisteredName)]
 
 
-def _union_members(info: FieldInfo) -> tuple[Any, ...]:
+def _union_members(field_info: FieldInfo) -> tuple[Any, ...]:
     """Return the types of a union annotation, or the single type of another annotation."""
-    kind = info.annotation
+    kind = field_info.annotation
     return get_args(kind) if get_origin(kind) in (Union, UnionType) else (kind,)
 
 
-def _slider_range(info: FieldInfo) -> SliderRange | None:
-    extra = info.json_schema_extra
+def _slider_range(field_info: FieldInfo) -> SliderRange | None:
+    extra = field_info.json_schema_extra
     if isinstance(extra, dict) and "slider" in extra:
         return SliderRange(*extra["slider"])  # type: ignore[misc]
-    for kind in _union_members(info):
+    for kind in _union_members(field_info):
         if get_origin(kind) is tuple:
             return _slider_range(FieldInfo.from_annotation(get_args(kind)[0]))
-    low, high = field_bounds(info)
+    low, high = field_bounds(field_info)
     return None if low is None or high is None else SliderRange(low, high)
 
 

@@ -25,7 +25,7 @@ MAX_GAZE_WEIGHT = 1.3
 _MAX_BONE_DEGREES = 36.0
 _ROTATION_ITERATIONS = 6
 _EYE_SIDES = "Left", "Right"
-_EYES_ADVICE = "Take the parametric human, or name the groups of the file's eyeballs with --eye-groups"
+_NO_EYES_ADVICE = "Take the parametric human, or name the groups of the file's eyeballs with --eye-groups"
 
 
 def looking_at(head: Head, target_mm: ArrayLike, pose: Pose | Mapping[str, float] | None = None) -> Pose:
@@ -41,7 +41,7 @@ def looking_at(head: Head, target_mm: ArrayLike, pose: Pose | Mapping[str, float
     """
     base, rig, eyes = Pose.coerce(pose) or Pose(), head.control, head.eyes
     if eyes is None or rig.skeleton is None:
-        advice = f"{head.note}. {_EYES_ADVICE}" if head.note else _EYES_ADVICE
+        advice = f"{head.note}. {_NO_EYES_ADVICE}" if head.note else _NO_EYES_ADVICE
         refuse(head.name, "a head with eyes that turn", "it has none", advice)
     bounds = -MAX_DISTANCE_MM, MAX_DISTANCE_MM
     point_mm = checked_array("look at", target_mm, (3,), *bounds, "mm from the head's centre")
@@ -65,25 +65,25 @@ def looking_at(head: Head, target_mm: ArrayLike, pose: Pose | Mapping[str, float
     return Pose(weights, bones, base.positions_mm)
 
 
-def _eyelid_rotations(rig: Rig, side: str) -> list[BoneRotation]:
+def _eyelid_rotations(rig: Rig, side_name: str) -> list[BoneRotation]:
     """Return the morph targets with which the lids of an eye follow the gaze, if a bone turns the eye.
 
     Each morph target comes with the rotation by which it turns the eye of the parametric human.
 
-    side : "Left" or "Right"
+    side_name : "Left" or "Right"
     """
-    arkit = [rotation for rotation in gaze_rotations() if rotation.target.endswith(side)]
+    arkit = [rotation for rotation in gaze_rotations() if rotation.target.endswith(side_name)]
     known = match_targets([rotation.target for rotation in arkit], rig.targets.names)
     return [one._replace(target=known[one.target]) for one in arkit if one.target in known]
 
 
-def _rotation_angles(direction: Doubles, axis: Doubles) -> tuple[float, float]:
-    """Return the angles about x and y of a rotation from the unit vector `axis` to `direction` [rad]."""
+def _rotation_angles(target_direction: Doubles, start_direction: Doubles) -> tuple[float, float]:
+    """Return the angles about x and y that rotate one unit vector to another unit vector [rad]."""
     x, y = 0.0, 0.0
     for _ in range(_ROTATION_ITERATIONS):
-        current = np.array(angles_matrix((math.degrees(x), math.degrees(y), 0.0))) @ axis
-        x += _pitch(direction) - _pitch(current)
-        y += math.remainder(_yaw(direction) - _yaw(current), math.tau)
+        current = np.array(angles_matrix((math.degrees(x), math.degrees(y), 0.0))) @ start_direction
+        x += _pitch(target_direction) - _pitch(current)
+        y += math.remainder(_yaw(target_direction) - _yaw(current), math.tau)
     return x, y
 
 
@@ -99,14 +99,14 @@ def _unit_vector(vector: Doubles) -> Doubles:
     return np.asarray(vector / max(float(np.linalg.norm(vector)), 1e-12))
 
 
-def _gaze_weights(rotations: list[BoneRotation], angles: tuple[float, float]) -> dict[str, Any]:
+def _gaze_weights(target_rotations: list[BoneRotation], eye_angles: tuple[float, float]) -> dict[str, Any]:
     """Return the weights of gaze targets, by name, that turn an eye by given angles.
 
-    angles : angles about x and y [rad]
+    eye_angles : angles about x and y [rad]
     """
     target_weights = {}
-    for rotation in rotations:
-        for angle, limit in zip(np.degrees(angles), rotation.degrees[:2], strict=True):
+    for rotation in target_rotations:
+        for angle, limit in zip(np.degrees(eye_angles), rotation.degrees[:2], strict=True):
             if limit and angle / limit > 0:
                 target_weights[rotation.target] = float(min(angle / limit, MAX_GAZE_WEIGHT))
     return target_weights

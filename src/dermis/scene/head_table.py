@@ -121,9 +121,9 @@ class HeadTable(FrozenModel):
         return front
 
 
-def has_region_table(table: Mapping[str, Any]) -> bool:
+def has_region_table(head_fields: Mapping[str, Any]) -> bool:
     """Return whether a [head] table names a table of face regions, which overrides roughness and rho_s."""
-    return table.get("regions", AUTO) not in (AUTO, NO_REGIONS)
+    return head_fields.get("regions", AUTO) not in (AUTO, NO_REGIONS)
 
 
 def head_name(head: object) -> str:

@@ -171,9 +171,11 @@ def load_head(
     return _with_look(with_fitted_eyes(loaded, coarse, look) if eyes == "fitted" else loaded, eye)
 
 
-def is_person_name(name: str) -> bool:
+def is_person_name(head_name: str) -> bool:
     """Return whether a name denotes a parametric human: "human", "human:SEED", or a person's .json file."""
-    return name == HUMAN or name.startswith(f"{HUMAN}:") or Path(name).suffix.lower() == ".json"
+    return (
+        head_name == HUMAN or head_name.startswith(f"{HUMAN}:") or Path(head_name).suffix.lower() == ".json"
+    )
 
 
 def _with_look(head: Head, look: Mapping[str, float] | None) -> Head:
@@ -195,17 +197,22 @@ def _with_look(head: Head, look: Mapping[str, float] | None) -> Head:
     return replace(head, eyes=head.eyes.with_look(replace(head.eyes.look, **dict[str, Any](look))))
 
 
-def _refuse_name(name: str) -> NoReturn:
+def _refuse_name(head_name: str) -> NoReturn:
     known = ", ".join(_head_names())
-    if name in REMOVED_HEADS:
+    if head_name in REMOVED_HEADS:
         actual = f"this mannequin was replaced by the parametric human, {HUMAN!r}"
-        refuse(name, f"one of {known} or a mesh file", actual, f"Write {HUMAN} instead")
-    refuse(name or "head", f"a mesh file or a sample ({known})", f"{name!r} is neither", "Check the name")
+        refuse(head_name, f"one of {known} or a mesh file", actual, f"Write {HUMAN} instead")
+    refuse(
+        head_name or "head",
+        f"a mesh file or a sample ({known})",
+        f"{head_name!r} is neither",
+        "Check the name",
+    )
 
 
 @logged_step("making the person")
 def _load_human(
-    name: str,
+    head_name: str,
     maps: dict[str, MapFile],
     height_mm: float | None,
     normal_y: NormalY,
@@ -214,7 +221,7 @@ def _load_human(
 ) -> Head:
     """Return the head of a parametric human in the layout "own".
 
-    name : "human", "human:SEED", or a person's .json file
+    head_name : "human", "human:SEED", or a person's .json file
     maps : map files that replace painted maps, by role
     mesh_options : options that apply only to mesh files; DermisError is raised unless all have their defaults
     levels : subdivision levels, or a function of the head that returns them
@@ -236,29 +243,29 @@ def _load_human(
     map_files: dict[str, Any] = {role: file for role, file in maps.items() if file is not None}
     loaded = load_maps(**map_files, height_mm=height_mm, normal_y=normal_y) if map_files else None
     level_of = levels if callable(levels) else lambda plain: levels
-    head = load_person(name).head(subdivide=lambda plain: max(MIN_HUMAN_LEVELS, level_of(plain)))
+    head = load_person(head_name).head(subdivide=lambda plain: max(MIN_HUMAN_LEVELS, level_of(plain)))
     user_maps = {role: getattr(loaded, role) for role in map_files}  # the other maps are painted
-    return replace(head, name=name, maps=replace(head.maps, **user_maps))
+    return replace(head, name=head_name, maps=replace(head.maps, **user_maps))
 
 
-def load_person(name: str) -> Human:
+def load_person(head_name: str) -> Human:
     """Return the person that a head name denotes.
 
-    name : "human" for the average person, "human:SEED" for a random person, or a person's .json file
+    head_name : "human" for the average person, "human:SEED" for a random person, or a person's .json file
 
     Raises DermisError for an invalid seed or file.
     """
     from dermis.human.person import Human
     from dermis.human.person_file import read_person
 
-    if name == HUMAN:
+    if head_name == HUMAN:
         return Human()
-    if Path(name).suffix.lower() == ".json":
-        return read_person(Path(name))
-    words = name.partition(":")[2]
+    if Path(head_name).suffix.lower() == ".json":
+        return read_person(Path(head_name))
+    words = head_name.partition(":")[2]
     if not words.isdecimal() or len(words) > _MAX_SEED_DIGITS:
         actual = f"got {format_value(words)}"
-        refuse(name, f"{HUMAN}, or {HUMAN}:SEED with a whole number", actual, f"Try {HUMAN}:7")
+        refuse(head_name, f"{HUMAN}, or {HUMAN}:SEED with a whole number", actual, f"Try {HUMAN}:7")
     return Human.drawn(int(words))
 
 

@@ -32,18 +32,24 @@ __all__ = [
 
 _Degrees = Annotated[
     float,
-    Field(ge=0.01, le=89, json_schema_extra=slider(0.5, 88, log=True)),
+    Field(ge=0.01, le=89, json_schema_extra=slider(0.5, 88, logarithmic=True)),
     Reason("degrees: half angle of a cone in front of the lamp"),
 ]
 _LAMP_REASON = Reason("mm: from the thickness of paper to 100 m")
-_Length = Annotated[float, Field(ge=0.1, le=1e5, json_schema_extra=slider(1, 3000, log=True)), _LAMP_REASON]
+_Length = Annotated[
+    float, Field(ge=0.1, le=1e5, json_schema_extra=slider(1, 3000, logarithmic=True)), _LAMP_REASON
+]
 
 _BRIGHTNESS_SYNONYMS = ("brightness", "color", "colour", "energy", "intensity", "power", "strength")
 
 
-def _equal_channels(value: Any) -> Any:
+def _equal_channels(number_or_colour: Any) -> Any:
     """Return a number as three equal channels (red, green, blue); return other values unchanged."""
-    return (value,) * 3 if isinstance(value, int | float) and not isinstance(value, bool) else value
+    return (
+        (number_or_colour,) * 3
+        if isinstance(number_or_colour, int | float) and not isinstance(number_or_colour, bool)
+        else number_or_colour
+    )
 
 
 class _LightBase(FrozenModel):
@@ -58,7 +64,7 @@ class _LightBase(FrozenModel):
     """Whether the light casts shadows."""
     softness_mm: Annotated[
         float,
-        Field(ge=1e-3, le=1000, json_schema_extra=slider(0.1, 100, log=True)),
+        Field(ge=1e-3, le=1000, json_schema_extra=slider(0.1, 100, logarithmic=True)),
         Reason("mm: from the wavelength of light to a metre"),
     ] = 1.5
     """Width over which the edge of a shadow fades, at most 12 texels of the shadow map; for area lights the
@@ -156,7 +162,7 @@ class SphereLight(PointLight):
     kind: Literal["sphere"] = "sphere"  # type: ignore[assignment]
     """Word for this kind of light in scene files."""
     radius_mm: Annotated[
-        float, Field(ge=0.1, le=1e5, json_schema_extra=slider(1, 500, log=True)), _LAMP_REASON
+        float, Field(ge=0.1, le=1e5, json_schema_extra=slider(1, 500, logarithmic=True)), _LAMP_REASON
     ] = 100.0
     """Radius of the sphere [mm]."""
 
@@ -262,7 +268,7 @@ def light_presets() -> list[str]:
     return sorted([NO_LIGHTS, *(name.removesuffix(".toml") for name in names if name.endswith(".toml"))])
 
 
-def preset_lights(name: str, head: Head | None = None) -> tuple[Light, ...]:
+def preset_lights(preset_name: str, head: Head | None = None) -> tuple[Light, ...]:
     """Return the lights of a light preset, placed for a head.
 
     head : head that is lit; None for a head of ordinary size that faces +Z
@@ -271,9 +277,11 @@ def preset_lights(name: str, head: Head | None = None) -> tuple[Light, ...]:
     skin, the lights are on the side to which the skin faces. Narrow spots keep their distance, as they are
     aimed at a part of the head.
     """
-    if name == NO_LIGHTS:
+    if preset_name == NO_LIGHTS:
         return ()
-    lights = tuple(LIGHTS[table["kind"]](**table) for table in tomllib.loads(preset_toml(name))["lights"])
+    lights = tuple(
+        LIGHTS[table["kind"]](**table) for table in tomllib.loads(preset_toml(preset_name))["lights"]
+    )
     return lights if head is None else tuple(_place_light(light, head) for light in lights)
 
 
@@ -301,9 +309,9 @@ def _keeps_distance(light: Light) -> bool:
     )
 
 
-def preset_toml(name: str) -> str:
+def preset_toml(preset_name: str) -> str:
     """Return the [[lights]] tables of a light preset as TOML text."""
-    return (resources.files("dermis.scene") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
+    return (resources.files("dermis.scene") / "presets" / f"{preset_name}.toml").read_text(encoding="utf-8")
 
 
 def studio(head: Head | None = None) -> tuple[Light, ...]:

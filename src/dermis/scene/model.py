@@ -36,7 +36,7 @@ class Scene:
     camera : Camera, str or callable, optional
         A camera, the name of a preset, or a function of the head; by default `portrait`.
     skin : Skin or mapping, optional
-        Skin settings or their values by name; by default `Skin()`.
+        Skin settings, or values of fields of `Skin` by name; by default `Skin()`.
     environment : Environment, str or path, optional
         An environment or the name of its panorama.
     pose : Pose or mapping, optional
@@ -95,8 +95,8 @@ class Scene:
         """Return a validated copy in which the given fields, such as skin or lights, have new values."""
         return replace(self, **parts)
 
-    def _set_field(self, part: str, value: object) -> None:
-        object.__setattr__(self, part, value)
+    def _set_field(self, field_name: str, field_value: object) -> None:
+        object.__setattr__(self, field_name, field_value)
 
     @cached_property
     def motion(self) -> Motion | None:

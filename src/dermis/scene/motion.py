@@ -13,11 +13,11 @@ from dermis.formats.motion.live_link import load_live_link
 from dermis.formats.motion.mediapipe import load_mediapipe
 from dermis.formats.motion.sequence import is_sequence, load_sequence
 from dermis.formats.parts import is_gltf
-from dermis.mesh.clip import Clip, check_rate
+from dermis.mesh.clip import Clip, check_frame_rate
 from dermis.mesh.head import Head
 from dermis.scene.head_table import check_options
 
-_TABLES, _JSON = (".csv", ".tsv"), (".jsonl", ".ndjson", ".json")
+_TABLE_SUFFIXES, _JSON_SUFFIXES = (".csv", ".tsv"), (".jsonl", ".ndjson", ".json")
 _ACCEPTED_FILES = (
     "a glTF clip (.glb .gltf), Live Link Face (.csv), MediaPipe (.json .jsonl) or a sequence of .obj or .ply"
 )
@@ -38,7 +38,7 @@ def load_motion(
     Parameters
     ----------
     path : str or path
-        A glTF file: the head's own, or one whose nodes or targets have the same names ("file.glb#clip"
+        A glTF file: the head's own file, or a file with the same names of nodes or targets ("file.glb#clip"
         selects one of several clips); a CSV file of Live Link Face; results of MediaPipe's face landmarker in
         JSON; or a sequence of mesh files of one topology: a folder, "face_%05d.obj" or "face_*.ply".
     head : Head
@@ -82,7 +82,7 @@ def load_motion(
     """
     clip_path = checked_path(path, _ACCEPTED_FILES)
     check_options(unit_mm=unit_mm, up=up, front=front)
-    fps = None if fps is None else check_rate("fps", fps)
+    fps = None if fps is None else check_frame_rate("fps", fps)
     source, clip_name = _split_clip_name(clip_path, clip)
     if is_gltf(source):
         return load_gltf_clip(source, head, clip_name)
@@ -92,9 +92,9 @@ def load_motion(
         return load_sequence(source, head, fps, unit_mm, up, front)
     if not is_file(source):
         refuse(source, _ACCEPTED_FILES, "there is no such file", "Check the name")
-    if source.suffix.lower() not in (*_TABLES, *_JSON):
+    if source.suffix.lower() not in (*_TABLE_SUFFIXES, *_JSON_SUFFIXES):
         refuse(source, _ACCEPTED_FILES, f"the suffix is {source.suffix!r}", "Convert it to one of these")
-    load = load_live_link if source.suffix.lower() in _TABLES else load_mediapipe
+    load = load_live_link if source.suffix.lower() in _TABLE_SUFFIXES else load_mediapipe
     return load(source, head, fps)
 
 

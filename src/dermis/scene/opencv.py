@@ -11,11 +11,12 @@ from dermis.base.errors import format_value, refuse
 from dermis.base.quantities import checked_array
 
 Doubles = NDArray[np.float64]
-_PIXEL_CENTRE = 0.5  # OpenCV's origin is the centre of the first pixel, not the corner of the picture [pixel]
-_TOLERANCE = 1e-4  # tolerance for rotations and skews that were rounded in files
+# OpenCV's origin is the centre of the first pixel, not the corner of the picture [pixel]
+_PIXEL_CENTRE_OFFSET = 0.5
+_ROUNDING_TOLERANCE = 1e-4  # tolerance for rotations and skews that were rounded in files
 _MIN_DISTANCE_MM = 1.0
 _MAX_MATRIX_VALUE = 1e9
-_MAX_PIXELS = 1e6  # largest number of pixels along a side
+_MAX_PICTURE_SIDE = 1e6  # largest number of pixels along a side
 
 
 class OpenCvCamera(NamedTuple):
@@ -47,10 +48,10 @@ def from_opencv(K: ArrayLike, R: ArrayLike, t: ArrayLike, size: tuple[int, int])
         _checked_matrix("t", t, (3,)),
     )
     _check_intrinsics(k)
-    if np.abs(rotation @ rotation.T - np.eye(3)).max() > _TOLERANCE or np.linalg.det(rotation) < 0:
+    if np.abs(rotation @ rotation.T - np.eye(3)).max() > _ROUNDING_TOLERANCE or np.linalg.det(rotation) < 0:
         actual = f"R R^T is not 1, or its determinant is {np.linalg.det(rotation):.3g}"
         refuse("R", "a rotation matrix", actual, "Convert a rotation vector with cv2.Rodrigues")
-    width, height = _checked_size(size)
+    width, height = _checked_picture_size(size)
     fx, fy, cx, cy = k[0, 0], k[1, 1], k[0, 2], k[1, 2]
     position = -rotation.T @ translation
     distance = translation[2]
@@ -61,22 +62,22 @@ def from_opencv(K: ArrayLike, R: ArrayLike, t: ArrayLike, size: tuple[int, int])
         "target": position + distance * rotation[2],
         "up": -rotation[1],
         "frame_mm": height / fy * distance,
-        "principal_point": ((cx + _PIXEL_CENTRE) / width, (cy + _PIXEL_CENTRE) / height),
+        "principal_point": ((cx + _PIXEL_CENTRE_OFFSET) / width, (cy + _PIXEL_CENTRE_OFFSET) / height),
         "pixel_aspect": fy / fx,
     }
 
 
-def intrinsics(lens: tuple[float, tuple[float, float], float], size: tuple[int, int]) -> Doubles:
+def intrinsics(lens: tuple[float, tuple[float, float], float], picture_size: tuple[int, int]) -> Doubles:
     """Return the intrinsic matrix K (3, 3) of a camera [pixel].
 
     lens : tangent of half the vertical angle of view; principal point as fractions of width and height from
         the upper left corner; and width of a pixel divided by its height
-    size : width and height of the picture [pixel]
+    picture_size : width and height of the picture [pixel]
     """
     half_view_tangent, principal_point, pixel_aspect = lens
-    size = _checked_size(size)
-    fy = 0.5 * size[1] / half_view_tangent
-    cx, cy = np.multiply(principal_point, size) - _PIXEL_CENTRE
+    picture_size = _checked_picture_size(picture_size)
+    fy = 0.5 * picture_size[1] / half_view_tangent
+    cx, cy = np.multiply(principal_point, picture_size) - _PIXEL_CENTRE_OFFSET
     return np.array([[fy / pixel_aspect, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
 
 
@@ -93,30 +94,34 @@ def extrinsics(position: ArrayLike, target: ArrayLike, up: ArrayLike) -> tuple[D
 
 
 def _check_intrinsics(K: Doubles) -> None:
-    if K[0, 0] <= 0 or K[1, 1] <= 0 or np.abs(K[2] - (0, 0, 1)).max() > _TOLERANCE:
+    if K[0, 0] <= 0 or K[1, 1] <= 0 or np.abs(K[2] - (0, 0, 1)).max() > _ROUNDING_TOLERANCE:
         actual = f"its diagonal is {np.diag(K).tolist()} and its last row {K[2].tolist()}"
         advice = "Pass [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]"
         refuse("K", "fx, fy above 0 and a last row of 0, 0, 1", actual, advice)
-    if abs(K[0, 1]) > _TOLERANCE * K[0, 0] or abs(K[1, 0]) > _TOLERANCE * K[0, 0]:
+    if abs(K[0, 1]) > _ROUNDING_TOLERANCE * K[0, 0] or abs(K[1, 0]) > _ROUNDING_TOLERANCE * K[0, 0]:
         actual, advice = f"its skew is {K[0, 1]:.4g} pixels", "Resample the picture to upright pixels"
         refuse("K", "pixels with right angles", actual, advice)
 
 
-def _checked_matrix(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Doubles:
+def _checked_matrix(matrix_name: str, matrix: ArrayLike, matrix_shape: tuple[int, ...]) -> Doubles:
     try:
-        found = np.asarray(values, np.float64)
+        found = np.asarray(matrix, np.float64)
     except (TypeError, ValueError, OverflowError):
-        refuse(name, f"numbers of shape {shape}", f"got {format_value(values, 40)}", "Correct it")
-    if shape == (3,) and found.shape in ((3, 1), (1, 3)):  # as OpenCV returns them
+        refuse(
+            matrix_name, f"numbers of shape {matrix_shape}", f"got {format_value(matrix, 40)}", "Correct it"
+        )
+    if matrix_shape == (3,) and found.shape in ((3, 1), (1, 3)):  # as OpenCV returns them
         found = found.reshape(3)
-    if found.shape != shape or not (np.abs(found) <= _MAX_MATRIX_VALUE).all():
-        actual = f"got shape {found.shape}" if found.shape != shape else "got larger numbers"
-        refuse(name, f"numbers of shape {shape} up to {_MAX_MATRIX_VALUE:g}", actual, "Correct it")
+    if found.shape != matrix_shape or not (np.abs(found) <= _MAX_MATRIX_VALUE).all():
+        actual = f"got shape {found.shape}" if found.shape != matrix_shape else "got larger numbers"
+        refuse(
+            matrix_name, f"numbers of shape {matrix_shape} up to {_MAX_MATRIX_VALUE:g}", actual, "Correct it"
+        )
     return found
 
 
-def _checked_size(size: tuple[int, int]) -> tuple[int, int]:
-    width, height = checked_array("size", size, (2,), 1, _MAX_PIXELS, "pixels").tolist()
+def _checked_picture_size(picture_size: tuple[int, int]) -> tuple[int, int]:
+    width, height = checked_array("size", picture_size, (2,), 1, _MAX_PICTURE_SIDE, "pixels").tolist()
     return int(width), int(height)
 
 

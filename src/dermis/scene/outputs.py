@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 from dermis.base.errors import format_value, refuse
 from dermis.base.registry import Registry
 
-_WGSL_TYPES = {"float32": "f32", "int32": "i32", "uint8": "u32"}
+_WGSL_TYPE_OF_CHANNEL = {"float32": "f32", "int32": "i32", "uint8": "u32"}
 
 Kind = Literal["float32", "int32", "uint8"]
 
@@ -79,55 +79,190 @@ class Output:
     @property
     def wgsl_type(self) -> str:
         """Return the WGSL type of one channel in the output buffer, which has four bytes."""
-        return _WGSL_TYPES[self.kind]
+        return _WGSL_TYPE_OF_CHANNEL[self.kind]
 
 
-_FLOAT: Kind = "float32"
+_FLOAT_CHANNEL: Kind = "float32"
 _SIGNED_ZERO_LEVEL = 1 << 15  # level of the value 0 of signed outputs
-_LENGTH, _SIGNED_LENGTH, _THICKNESS = (
-    Quantisation(0.1),
-    Quantisation(0.1, _SIGNED_ZERO_LEVEL),
-    Quantisation(0.001),
-)
-_FRACTION, _UNIT = Quantisation(1 / 65535), Quantisation(1 / 32767, _SIGNED_ZERO_LEVEL)
-_MOTION, _RADIANCE = Quantisation(1 / 64, _SIGNED_ZERO_LEVEL), Quantisation(1 / 4096)
-_OUTPUTS = (
-    Output("depth", "geometry", "Z", _FLOAT, "mm", "distance along the optical axis", 0.0, _LENGTH),
-    Output("position", "geometry", "XYZ", _FLOAT, "mm", "position in world space", 0.0, _SIGNED_LENGTH),
-    Output("normal", "surface", "XYZ", _FLOAT, "", "normal with relief, in world space", 0.0, _UNIT),
-    Output("normal_geometric", "geometry", "XYZ", _FLOAT, "", "normal of the flat triangle", 0.0, _UNIT),
-    Output("normal_camera", "surface", "XYZ", _FLOAT, "", "normal with relief, in camera space", 0.0, _UNIT),
-    Output("uv", "geometry", "UV", _FLOAT, "", "texture coordinates", 0.0, _FRACTION),
+_LENGTH_QUANTISATION = Quantisation(0.1)
+_SIGNED_LENGTH_QUANTISATION = Quantisation(0.1, _SIGNED_ZERO_LEVEL)
+_THICKNESS_QUANTISATION = Quantisation(0.001)
+_FRACTION_QUANTISATION = Quantisation(1 / 65535)
+_UNIT_VECTOR_QUANTISATION = Quantisation(1 / 32767, _SIGNED_ZERO_LEVEL)
+_MOTION_QUANTISATION = Quantisation(1 / 64, _SIGNED_ZERO_LEVEL)
+_RADIANCE_QUANTISATION = Quantisation(1 / 4096)
+_BUILT_IN_OUTPUTS = (
+    Output(
+        "depth",
+        "geometry",
+        "Z",
+        _FLOAT_CHANNEL,
+        "mm",
+        "distance along the optical axis",
+        0.0,
+        _LENGTH_QUANTISATION,
+    ),
+    Output(
+        "position",
+        "geometry",
+        "XYZ",
+        _FLOAT_CHANNEL,
+        "mm",
+        "position in world space",
+        0.0,
+        _SIGNED_LENGTH_QUANTISATION,
+    ),
+    Output(
+        "normal",
+        "surface",
+        "XYZ",
+        _FLOAT_CHANNEL,
+        "",
+        "normal with relief, in world space",
+        0.0,
+        _UNIT_VECTOR_QUANTISATION,
+    ),
+    Output(
+        "normal_geometric",
+        "geometry",
+        "XYZ",
+        _FLOAT_CHANNEL,
+        "",
+        "normal of the flat triangle",
+        0.0,
+        _UNIT_VECTOR_QUANTISATION,
+    ),
+    Output(
+        "normal_camera",
+        "surface",
+        "XYZ",
+        _FLOAT_CHANNEL,
+        "",
+        "normal with relief, in camera space",
+        0.0,
+        _UNIT_VECTOR_QUANTISATION,
+    ),
+    Output("uv", "geometry", "UV", _FLOAT_CHANNEL, "", "texture coordinates", 0.0, _FRACTION_QUANTISATION),
     Output("triangle", "geometry", "I", "int32", "", "index of the mesh triangle", -1.0),
-    Output("barycentric", "geometry", "ABC", _FLOAT, "", "weights of the triangle's corners", 0.0, _FRACTION),
-    Output("motion", "motion", "XY", _FLOAT, "pixel", "displacement since the previous scene", 0.0, _MOTION),
-    Output("alpha", "alpha", "A", _FLOAT, "", "coverage of the pixel by head and hair", 0.0, _FRACTION),
-    Output("albedo", "light", "RGB", _FLOAT, "", "diffuse reflectance", 0.0, _FRACTION),
-    Output("irradiance", "light", "RGB", _FLOAT, "", "irradiance before scattering", 0.0, _RADIANCE),
-    Output("diffuse", "light", "RGB", _FLOAT, "", "radiance scattered below the surface", 0.0, _RADIANCE),
-    Output("specular", "light", "RGB", _FLOAT, "", "radiance reflected by the surface", 0.0, _RADIANCE),
-    Output("translucent", "light", "RGB", _FLOAT, "", "diffuse radiance from thin parts", 0.0, _RADIANCE),
-    Output("visibility", "visibility", "", _FLOAT, "", "unshadowed fraction of each light"),
-    Output("melanin", "pigments", "A", _FLOAT, "", "melanosome fraction of the epidermis", 0.0, _FRACTION),
-    Output("blood", "pigments", "A", _FLOAT, "", "blood fraction of the dermis", 0.0, _FRACTION),
-    Output("thickness", "thickness", "A", _FLOAT, "mm", "thickness of the tissue below", 0.0, _THICKNESS),
+    Output(
+        "barycentric",
+        "geometry",
+        "ABC",
+        _FLOAT_CHANNEL,
+        "",
+        "weights of the triangle's corners",
+        0.0,
+        _FRACTION_QUANTISATION,
+    ),
+    Output(
+        "motion",
+        "motion",
+        "XY",
+        _FLOAT_CHANNEL,
+        "pixel",
+        "displacement since the previous scene",
+        0.0,
+        _MOTION_QUANTISATION,
+    ),
+    Output(
+        "alpha",
+        "alpha",
+        "A",
+        _FLOAT_CHANNEL,
+        "",
+        "coverage of the pixel by head and hair",
+        0.0,
+        _FRACTION_QUANTISATION,
+    ),
+    Output("albedo", "light", "RGB", _FLOAT_CHANNEL, "", "diffuse reflectance", 0.0, _FRACTION_QUANTISATION),
+    Output(
+        "irradiance",
+        "light",
+        "RGB",
+        _FLOAT_CHANNEL,
+        "",
+        "irradiance before scattering",
+        0.0,
+        _RADIANCE_QUANTISATION,
+    ),
+    Output(
+        "diffuse",
+        "light",
+        "RGB",
+        _FLOAT_CHANNEL,
+        "",
+        "radiance scattered below the surface",
+        0.0,
+        _RADIANCE_QUANTISATION,
+    ),
+    Output(
+        "specular",
+        "light",
+        "RGB",
+        _FLOAT_CHANNEL,
+        "",
+        "radiance reflected by the surface",
+        0.0,
+        _RADIANCE_QUANTISATION,
+    ),
+    Output(
+        "translucent",
+        "light",
+        "RGB",
+        _FLOAT_CHANNEL,
+        "",
+        "diffuse radiance from thin parts",
+        0.0,
+        _RADIANCE_QUANTISATION,
+    ),
+    Output("visibility", "visibility", "", _FLOAT_CHANNEL, "", "unshadowed fraction of each light"),
+    Output(
+        "melanin",
+        "pigments",
+        "A",
+        _FLOAT_CHANNEL,
+        "",
+        "melanosome fraction of the epidermis",
+        0.0,
+        _FRACTION_QUANTISATION,
+    ),
+    Output(
+        "blood",
+        "pigments",
+        "A",
+        _FLOAT_CHANNEL,
+        "",
+        "blood fraction of the dermis",
+        0.0,
+        _FRACTION_QUANTISATION,
+    ),
+    Output(
+        "thickness",
+        "thickness",
+        "A",
+        _FLOAT_CHANNEL,
+        "mm",
+        "thickness of the tissue below",
+        0.0,
+        _THICKNESS_QUANTISATION,
+    ),
     Output("label", "label", "I", "uint8", "", "class of the surface, see docs/labels.md"),
     Output("label_face_synthetics", "label", "I", "uint8", "", "class as in FaceSynthetics"),
 )
 
-OUTPUTS: Registry[Output] = Registry("output", {output.name: output for output in _OUTPUTS})
+OUTPUTS: Registry[Output] = Registry("output", {output.name: output for output in _BUILT_IN_OUTPUTS})
 """Outputs by the names that `Renderer.draw` and `dermis render --outputs` accept."""
 
 
-def check_outputs(names: Iterable[str]) -> tuple[str, ...]:
+def check_outputs(output_names: Iterable[str]) -> tuple[str, ...]:
     """Validate names of outputs and return them without duplicates.
 
     Raises DermisError for a name that is not registered.
     """
-    if isinstance(names, str) or not isinstance(names, Iterable):
-        actual = f"got {format_value(names)}"
+    if isinstance(output_names, str) or not isinstance(output_names, Iterable):
+        actual = f"got {format_value(output_names)}"
         refuse("outputs", "a list of names", actual, 'Write outputs=("depth", "normal")')
-    unique = tuple(dict.fromkeys(names))
+    unique = tuple(dict.fromkeys(output_names))
     for name in unique:
         OUTPUTS[name]
     return unique

@@ -11,20 +11,24 @@ from dermis.mesh.mesh import Mesh
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
-_TEXELS_PER_PIXEL = 1 / 3  # light in skin is smooth; shading reads normals and maps at each pixel
-_FILLED_FRACTION = 0.5  # part of an atlas that shows skin
-_MIN_SIDE = 1024  # coarser texels would blur the light of the narrowest profiles
+_ATLAS_TEXELS_PER_PIXEL = 1 / 3  # light in skin is smooth; shading reads normals and maps at each pixel
+_FILLED_ATLAS_FRACTION = 0.5  # part of an atlas that shows skin
+_MIN_ATLAS_SIDE = 1024  # coarser texels would blur the light of the narrowest profiles
 
 
-def resolved_atlas(scene: Scene, settings: Settings) -> int:
+def resolved_atlas_side(scene: Scene, settings: Settings) -> int:
     """Return the side of the smallest atlas with a texel for every three pixels [texel].
 
     It is a power of two, at least 1024 and at most the side in `settings`. Pixels are measured at the target
     of the camera, and texels by the area of the skin.
     """
     pixels_per_mm = settings.size[1] / scene.camera.frame_mm
-    side = _TEXELS_PER_PIXEL * pixels_per_mm * math.sqrt(_skin_area_mm2(scene.head.mesh) / _FILLED_FRACTION)
-    return min(1 << math.ceil(math.log2(max(side, _MIN_SIDE))), settings.atlas)
+    side = (
+        _ATLAS_TEXELS_PER_PIXEL
+        * pixels_per_mm
+        * math.sqrt(_skin_area_mm2(scene.head.mesh) / _FILLED_ATLAS_FRACTION)
+    )
+    return min(1 << math.ceil(math.log2(max(side, _MIN_ATLAS_SIDE))), settings.atlas)
 
 
 def _skin_area_mm2(mesh: Mesh) -> float:

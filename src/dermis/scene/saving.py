@@ -18,7 +18,7 @@ from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 from dermis.scene.toml_text import table_text
 
-_HEADER = "# A scene of dermis: lengths in mm from the head's centre, colours linear Rec. 709."
+_FILE_HEADER = "# A scene of dermis: lengths in mm from the head's centre, colours linear Rec. 709."
 _FIELDS_SET_BY_REGIONS = {"rho_s"}  # fields of skins that a table of face regions sets
 # fields of skins and environments that are file names, unless they name presets
 _PATH_FIELDS = {"profile", "profile_map", "other_profiles", "name"}
@@ -54,7 +54,7 @@ def scene_text(scene: Scene, settings: Settings, head: Mapping[str, Any]) -> str
     if scene.environment:
         parts.append(_model_table("[environment]", scene.environment))
     parts += [_model_table("[camera]", scene.camera), _model_table("[render]", settings)]
-    return "\n".join([_HEADER, *parts])
+    return "\n".join([_FILE_HEADER, *parts])
 
 
 def _pose_tables(pose: Pose | None) -> list[str]:
@@ -70,15 +70,15 @@ def _pose_tables(pose: Pose | None) -> list[str]:
     return [table_text(title, values) for title, values in tables.items() if values] or ["[pose]\n"]
 
 
-def _model_table(title: str, values: FrozenModel, exclude: set[str] | None = None) -> str:
-    table = values.model_dump(exclude=exclude, exclude_none=True)
+def _model_table(title: str, model: FrozenModel, excluded_fields: set[str] | None = None) -> str:
+    table = model.model_dump(exclude=excluded_fields, exclude_none=True)
     for key in _PATH_FIELDS & table.keys():
-        table[key] = _absolute_path(table[key])
+        table[key] = _with_absolute_path(table[key])
     return table_text(title, table)
 
 
-def _absolute_path(name: Any) -> Any:
+def _with_absolute_path(file_names: Any) -> Any:
     """Return a file name, or a tuple of file names, as absolute paths; names of presets are kept."""
-    if isinstance(name, tuple):
-        return tuple(map(_absolute_path, name))
-    return str(Path(name).resolve()) if is_file(name) else name
+    if isinstance(file_names, tuple):
+        return tuple(map(_with_absolute_path, file_names))
+    return str(Path(file_names).resolve()) if is_file(file_names) else file_names

@@ -16,18 +16,18 @@ from dermis.scene.talk import Gamma, SeamColour, Seams, Stretch
 from dermis.scene.techniques import TECHNIQUES
 
 _Side = Annotated[int, Field(ge=1, le=16384), Reason("pixels: what the largest GPUs hold")]
-_MAX_SAMPLES = 64
+_MAX_SAMPLES_PER_PIXEL = 64
 MAX_SAMPLE_COUNT = 2**27
 _HEX_COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
 
 
-def _parse_colour(value: Any) -> Any:
+def _parse_colour(typed_colour: Any) -> Any:
     """Convert "#rrggbb" or "red,green,blue" to linear Rec. 709; return other values unchanged."""
-    if not isinstance(value, str):
-        return value
-    if not _HEX_COLOUR.fullmatch(value):
+    if not isinstance(typed_colour, str):
+        return typed_colour
+    if not _HEX_COLOUR.fullmatch(typed_colour):
         try:
-            red, green, blue = map(float, value.split(","))
+            red, green, blue = map(float, typed_colour.split(","))
         except ValueError:
             raise ValueError("a colour: three linear numbers, or #rrggbb") from None
         return red, green, blue
@@ -35,7 +35,7 @@ def _parse_colour(value: Any) -> Any:
 
     from dermis.images.colour import decode_srgb_levels
 
-    levels = np.frombuffer(bytes.fromhex(value[1:]), np.uint8)
+    levels = np.frombuffer(bytes.fromhex(typed_colour[1:]), np.uint8)
     return tuple(float(one) for one in decode_srgb_levels(levels))
 
 
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 else:
     Exposure = Annotated[
         float,
-        Field(ge=1e-6, le=1e6, json_schema_extra=slider(0.05, 20, log=True)),
+        Field(ge=1e-6, le=1e6, json_schema_extra=slider(0.05, 20, logarithmic=True)),
         Reason("20 stops either way"),
         Keywords("auto"),
     ]
@@ -53,9 +53,9 @@ else:
     Background = Annotated[Colour, BeforeValidator(_parse_colour), _BACKGROUNDS]
 
 
-def _square_size(value: Any) -> Any:
+def _square_size(typed_size: Any) -> Any:
     """Return an integer as the width and height of a square; return other values unchanged."""
-    return (value, value) if isinstance(value, int) else value
+    return (typed_size, typed_size) if isinstance(typed_size, int) else typed_size
 
 
 class Settings(FrozenModel):
@@ -74,7 +74,9 @@ class Settings(FrozenModel):
     """Width and height of the picture [pixel]."""
     atlas: Annotated[int, Field(ge=64, le=16384), Reason("texels: what the largest GPUs hold")] = 2048
     """Side of the atlas, the map in which light is diffused [texel]."""
-    samples: Annotated[int, Field(ge=1, le=_MAX_SAMPLES), Reason("more make no visible difference")] = 4
+    samples: Annotated[
+        int, Field(ge=1, le=_MAX_SAMPLES_PER_PIXEL), Reason("more make no visible difference")
+    ] = 4
     """Samples per pixel for antialiasing."""
     technique: Annotated[str, RegisteredName(TECHNIQUES)] = "texture-space"
     """Technique for subsurface scattering."""

@@ -32,7 +32,7 @@ _Fraction = Annotated[float | None, Field(ge=0, le=1)]
 _COEFFICIENT_REASON = Reason("1/mm: white paint has some hundreds")
 _Absorption = Annotated[float, Field(ge=0, le=1e4), _COEFFICIENT_REASON]
 _Scattering = Annotated[float, Field(ge=1e-6, le=1e4), _COEFFICIENT_REASON]
-_COEFFICIENT_SLIDER = Field(json_schema_extra=slider(1e-4, 50, log=True))
+_COEFFICIENT_SLIDER = Field(json_schema_extra=slider(1e-4, 50, logarithmic=True))
 
 
 class Pigments(FrozenModel):
@@ -40,11 +40,11 @@ class Pigments(FrozenModel):
 
     structure: Structure | None = None
     """Model of the layers: "dj2006" has two, "donner2008" adds a layer of melanin, "biospec" has four."""
-    melanin: Annotated[_Fraction, Field(json_schema_extra=slider(0.0005, 0.6, log=True))] = None
+    melanin: Annotated[_Fraction, Field(json_schema_extra=slider(0.0005, 0.6, logarithmic=True))] = None
     """Volume fraction of melanosomes in the epidermis."""
     eumelanin: _Fraction = None
     """Fraction of eumelanin in the melanosomes; the rest is pheomelanin."""
-    blood: Annotated[_Fraction, Field(json_schema_extra=slider(0.0005, 0.2, log=True))] = None
+    blood: Annotated[_Fraction, Field(json_schema_extra=slider(0.0005, 0.2, logarithmic=True))] = None
     """Volume fraction of blood in the dermis."""
     oxygen: _Fraction = None
     """Oxygen saturation of the blood."""
@@ -71,7 +71,7 @@ class TissueLayer(FrozenModel):
     """Name of the layer."""
     thickness_mm: Annotated[
         float | None,
-        Field(ge=1e-4, le=1000, json_schema_extra=slider(0.01, 5, log=True)),
+        Field(ge=1e-4, le=1000, json_schema_extra=slider(0.01, 5, logarithmic=True)),
         Reason("mm: from a cell membrane to more than a body"),
     ] = None
     """Thickness; None for a last layer that is infinitely deep [mm]."""

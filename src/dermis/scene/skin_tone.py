@@ -1,4 +1,4 @@
-"""Skin tone of meshes without a colour map: a measured one, that of their materials, or the default skin."""
+"""Skin tone of meshes without a colour map: a measured tone, the tone of the materials, or the default."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from dermis.base.arrays import Doubles
 from dermis.base.errors import refuse
-from dermis.formats.parts import GREY
+from dermis.formats.parts import DEFAULT_COLOUR
 from dermis.human.skin.measured import measured_tone
 from dermis.mesh.geometry import triangle_areas
 from dermis.mesh.maps import Maps
@@ -18,9 +18,9 @@ from dermis.optics.pigments.parameters import DEFAULT_SKIN, SPECTRAL_PRESET
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 from dermis.optics.tissue import load_tissue
 
-NO_PICTURE = "skin without a colour map"
+NO_COLOUR_MAP = "skin without a colour map"
 _WHITE = (1.0, 1.0, 1.0)
-_TOLERANCE = 1e-3  # tolerance for colours that were rounded in files
+_COLOUR_TOLERANCE = 1e-3  # tolerance for colours that were rounded in files
 
 
 @cache
@@ -32,28 +32,31 @@ def default_skin_colour() -> Doubles:
 
 
 def with_skin_tone(
-    mesh: Mesh, maps: Maps, skin_site: str | None = None, chosen: bool = False
+    mesh: Mesh, maps: Maps, skin_site: str | None = None, colour_map_chosen: bool = False
 ) -> tuple[Maps, str]:
     """Return maps in which a uniform colour replaces a missing colour map, and a note for the user or "".
 
-    skin_site : name of a measured colour, which replaces that of the materials, see `measured_tone`
-    chosen : whether the user has chosen the colour map
+    skin_site : name of a measured colour, which replaces the materials' colour, see `measured_tone`
+    colour_map_chosen : whether the user has chosen the colour map
 
     The colour is the mean colour of the skin's materials. A material with no colour, white, or the default
     grey of Blender counts with the colour of the default skin. Maps with a colour map are returned unchanged.
 
     Raises DermisError for a site of skin together with a colour map, and for unknown sites.
     """
-    if chosen or (maps.colour is not None and maps.colour.shape[:2] != (1, 1)):
+    if colour_map_chosen or (maps.colour is not None and maps.colour.shape[:2] != (1, 1)):
         if skin_site is not None:
-            refuse("skin_site", NO_PICTURE, "the skin has a colour map", "Leave one of the two out")
+            refuse("skin_site", NO_COLOUR_MAP, "the skin has a colour map", "Leave one of the two out")
         return maps, ""
     if skin_site is not None:
         measured = measured_tone(skin_site)
         return replace(maps, colour=measured.colour.astype(np.float32)[None, None]), measured.note
     skin = [k for k, one in enumerate(mesh.materials) if one.kind == "skin"]
     stated = [mesh.materials[k].colour if maps.colour is None else maps.colour[0, 0] for k in skin]
-    plain = [any(np.allclose(one, none, atol=_TOLERANCE) for none in (GREY, _WHITE)) for one in stated]
+    plain = [
+        any(np.allclose(one, none, atol=_COLOUR_TOLERANCE) for none in (DEFAULT_COLOUR, _WHITE))
+        for one in stated
+    ]
     colours = np.array(
         [default_skin_colour() if bare else one for one, bare in zip(stated, plain, strict=True)]
     )
@@ -63,7 +66,7 @@ def with_skin_tone(
         pigments = f"{100 * DEFAULT_SKIN.melanin:g} % melanosomes and {100 * DEFAULT_SKIN.blood:g} % blood"
         note = f"its skin has no colour and is drawn as skin of {pigments}; --colour FILE sets another"
     else:
-        differ = np.ptp(colours, axis=0).max() > _TOLERANCE
+        differ = np.ptp(colours, axis=0).max() > _COLOUR_TOLERANCE
         note = (
             "its skin groups have no picture and are drawn with the mean of their colours" if differ else ""
         )

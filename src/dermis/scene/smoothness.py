@@ -14,7 +14,7 @@ from dermis.base.errors import refuse
 from dermis.mesh.geometry import edges, sum_by_index
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
-from dermis.mesh.subdivide import MAX_LEVELS
+from dermis.mesh.subdivide import MAX_SUBDIVISION_LEVELS
 from dermis.scene.camera import Camera, portrait
 from dermis.scene.head_table import AUTO
 
@@ -26,7 +26,7 @@ MAX_SMOOTH_TRIANGLES = 300_000
 """Largest number of triangles that `SmoothIn` subdivides to."""
 MAX_DEVIATION_PX = 0.6
 """Largest deviation of a silhouette from its smooth curve that the pixel filter hides."""
-_TYPICAL_QUANTILE = (
+_TYPICAL_DEVIATION_QUANTILE = (
     0.9  # fraction of the silhouette that must be smooth; the rest is mostly hidden or creases
 )
 _NEAR_PLANE_MM = 1.0
@@ -66,7 +66,9 @@ def resolve_levels(subdivide: Subdivide) -> SubdivisionLevels:
     if subdivide == AUTO:
         return SmoothIn()
     if isinstance(subdivide, str):
-        refuse("subdivide", f"{AUTO} or 0 to {MAX_LEVELS} levels", f"got {subdivide!r}", "Choose one")
+        refuse(
+            "subdivide", f"{AUTO} or 0 to {MAX_SUBDIVISION_LEVELS} levels", f"got {subdivide!r}", "Choose one"
+        )
     return subdivide
 
 
@@ -87,18 +89,18 @@ class Silhouette(NamedTuple):
             return 0.0
         order = np.argsort(self.deviation_px)
         cumulative_length = np.cumsum(self.length_px[order])
-        index = np.searchsorted(cumulative_length, _TYPICAL_QUANTILE * cumulative_length[-1])
+        index = np.searchsorted(cumulative_length, _TYPICAL_DEVIATION_QUANTILE * cumulative_length[-1])
         return float(self.deviation_px[order][index])
 
 
-def silhouette(mesh: Mesh, K: Doubles, R: Doubles, t: Doubles, size: tuple[int, int]) -> Silhouette:
+def silhouette(mesh: Mesh, K: Doubles, R: Doubles, t: Doubles, picture_size: tuple[int, int]) -> Silhouette:
     """Return the silhouette edges of a mesh that lie in the picture, including occluded edges.
 
     Edges of eyeballs are omitted. A smooth curve through two points with unit normals n0 and n1 deviates from
     the chord d by |(n1 - n0) . d| / 8.
 
     K, R, t : matrices of the camera in OpenCV's convention, for positions of the mesh [mm]
-    size : width and height of the picture [pixel]
+    picture_size : width and height of the picture [pixel]
     """
     camera_points = mesh.points_mm @ R.T + t
     normals = sum_by_index(mesh.point, mesh.normals.astype(np.float64), len(camera_points))
@@ -111,7 +113,7 @@ def silhouette(mesh: Mesh, K: Doubles, R: Doubles, t: Doubles, size: tuple[int, 
     on_silhouette = (sides == 2) & (np.bincount(of_side, facing, len(ends)) == 1)
     a, b = ends[on_silhouette].T
     middle = (pixels[a] + pixels[b]) / 2
-    visible = ((middle >= 0) & (middle < size)).all(axis=1)
+    visible = ((middle >= 0) & (middle < picture_size)).all(axis=1)
     visible &= np.minimum(depth[a], depth[b]) > _NEAR_PLANE_MM
     a, b = a[visible], b[visible]
     chords = (camera_points[a] - camera_points[b])[:, :2]
@@ -128,7 +130,7 @@ def smooth_levels(typical_deviation_px: float, triangle_count: int) -> int:
     """
     needed = math.ceil(math.log(max(typical_deviation_px / MAX_DEVIATION_PX, 1.0), 4))
     affordable = math.floor(math.log(max(MAX_SMOOTH_TRIANGLES / triangle_count, 1.0), 4))
-    return min(needed, affordable, MAX_LEVELS)
+    return min(needed, affordable, MAX_SUBDIVISION_LEVELS)
 
 
 def _faces_camera(pixels: Doubles, triangles: NDArray[np.int32]) -> NDArray[np.bool_]:

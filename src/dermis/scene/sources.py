@@ -10,7 +10,7 @@ from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 from dermis.scene.techniques import TECHNIQUES
 
-_FRAME_SOURCES = ("dEonLuebke2007", "Burns2013")
+_FRAME_CITATION_KEYS = ("dEonLuebke2007", "Burns2013")
 _FRESNEL_SOURCES = {"schlick": ("Schlick1994", "Dudash2007"), "exact": ("CookTorrance1982",)}
 _HALF_SPACE_SOURCES = ("Chandrasekhar1960", "Jensen2001")
 _ANISOTROPY_SOURCES = ("HenyeyGreenstein1941", "Wiscombe1977")
@@ -35,7 +35,7 @@ def picture_sources(
 
     Raises DermisError for an unknown profile.
     """
-    keys = [*_FRAME_SOURCES, *scattering_sources(settings), *_surface_sources(skin)]
+    keys = [*_FRAME_CITATION_KEYS, *scattering_sources(settings), *_surface_sources(skin)]
     keys += profile_sources(skin)
     if skin.direction == "half-space":
         keys += _HALF_SPACE_SOURCES + _ANISOTROPY_SOURCES * (skin.anisotropy > 0)

@@ -17,29 +17,29 @@ from dermis.specular.models import EnergyName
 
 COMPARISONS = Heading("Comparisons of the 2007 talk")
 
-_SPECULAR_COLOUR = 'Colour of reflections; "wrong" multiplies them by the colour map.'
-SpecularColour = Annotated[Literal["white", "wrong"], COMPARISONS, Field(description=_SPECULAR_COLOUR)]
+_SPECULAR_COLOUR_HELP = 'Colour of reflections; "wrong" multiplies them by the colour map.'
+SpecularColour = Annotated[Literal["white", "wrong"], COMPARISONS, Field(description=_SPECULAR_COLOUR_HELP)]
 
-_ENERGY = """Energy conservation of diffuse light: "full" subtracts what the surface reflects, "published"
-subtracts pi times too much, as the talk does, "none" subtracts nothing."""
-Energy = Annotated[EnergyName, COMPARISONS, Field(description=_ENERGY)]
+_ENERGY_HELP = """Energy conservation of diffuse light: "full" subtracts what the surface reflects,
+"published" subtracts pi times too much, as the talk does, "none" subtracts nothing."""
+Energy = Annotated[EnergyName, COMPARISONS, Field(description=_ENERGY_HELP)]
 
-_STRETCH = """Correction of blur kernels for the uv layout: "full" for stretch and shear, "axes" for stretch
-alone, "none" for the same kernel everywhere."""
-Stretch = Annotated[Literal["full", "axes", "none"], COMPARISONS, Field(description=_STRETCH)]
+_STRETCH_HELP = """Correction of blur kernels for the uv layout: "full" for stretch and shear, "axes" for
+stretch alone, "none" for the same kernel everywhere."""
+Stretch = Annotated[Literal["full", "axes", "none"], COMPARISONS, Field(description=_STRETCH_HELP)]
 
-_SEAMS = """How seams in the uv layout are treated: "stitch" diffuses light across them; the other methods are
-the talk's. Techniques that cannot stitch use "clear-colour" instead."""
+_SEAMS_HELP = """How seams in the uv layout are treated: "stitch" diffuses light across them; the other
+methods are the talk's. Techniques that cannot stitch use "clear-colour" instead."""
 Seams = Annotated[
     Literal["stitch", "none", "clear-colour", "stretch-map", "alpha", "multi-uv"],
     COMPARISONS,
-    Field(description=_SEAMS),
+    Field(description=_SEAMS_HELP),
 ]
 
-_SEAM_COLOUR = 'Light between the charts with seams "clear-colour", as irradiance divided by pi.'
-SeamColour = Annotated[Colour, COMPARISONS, Field(description=_SEAM_COLOUR)]
+_SEAM_COLOUR_HELP = 'Light between the charts with seams "clear-colour", as irradiance divided by pi.'
+SeamColour = Annotated[Colour, COMPARISONS, Field(description=_SEAM_COLOUR_HELP)]
 
-_GAMMA = (
+_GAMMA_HELP = (
     'Colour space: "wrong" reads the colour map as linear and leaves out the sRGB encoding of the picture.'
 )
-Gamma = Annotated[Literal["right", "wrong"], COMPARISONS, Field(description=_GAMMA)]
+Gamma = Annotated[Literal["right", "wrong"], COMPARISONS, Field(description=_GAMMA_HELP)]

@@ -68,7 +68,7 @@ class _Glb:
         """Add a mesh with a picture (h, w, 4), which hides parts of the mesh where alpha is low."""
         add_rows = self._buffer.add_accessor
         attributes = {
-            "POSITION": add_rows((surface.points_mm / 1000.0).astype("<f4"), bounded=True),
+            "POSITION": add_rows((surface.points_mm / 1000.0).astype("<f4"), with_bounds=True),
             "NORMAL": add_rows(surface.normals.astype("<f4")),
             "TEXCOORD_0": add_rows(surface.uv.astype("<f4")),
         }

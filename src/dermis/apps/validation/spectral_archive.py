@@ -32,7 +32,7 @@ class Archive(NamedTuple):
     spectra : (n, 31) diffuse reflectance at `WAVELENGTHS_NM`, without surface reflection [-]
     person : (n,) index of the person
     fold : (n,) index of the cross-validation fold that contains the person, 0 to `FOLDS` - 1
-    group : (n,) key of `dermis.human.skin.measured.GROUPS`
+    group : (n,) key of `dermis.human.skin.measured.GROUP_OF_CODE`
     site : (n,) index in `dermis.human.skin.measured.SITES`
     sex : (n,) 0 for female, 1 for male, NaN where unknown
     age : (n,) age in the middle of the person's age group, NaN where unknown [years]

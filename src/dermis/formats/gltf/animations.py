@@ -14,12 +14,12 @@ from dermis.base.reading import MALFORMED_DATA_ERRORS, parsing
 from dermis.formats.gltf.document import Document, Tree, checked_index, read_document
 from dermis.formats.gltf.nodes import Nodes, read_nodes
 from dermis.formats.gltf.rigs import target_names
-from dermis.formats.size_limits import DAMAGED_ADVICE, MAX_CHANNELS, check_limit
+from dermis.formats.size_limits import DAMAGED_ADVICE, MAX_ANIMATION_CURVES, check_limit
 from dermis.mesh.rotations import slerp
 
-_COMPONENT_COUNTS = {"translation": 3, "rotation": 4, "scale": 3}
+_PROPERTY_COMPONENT_COUNTS = {"translation": 3, "rotation": 4, "scale": 3}
 Interpolation = Literal["STEP", "LINEAR", "CUBICSPLINE"]
-_TANGENT_IN, _VALUE, _TANGENT_OUT = range(3)
+_SPLINE_TANGENT_IN, _SPLINE_VALUE, _SPLINE_TANGENT_OUT = range(3)
 
 
 class AnimationTrack(NamedTuple):
@@ -53,10 +53,10 @@ def clip_names(path: Path) -> tuple[str, ...]:
     return _document_clip_names(read_document(path))
 
 
-def read_clip(path: Path, name: str | None) -> Animation:
+def read_clip(path: Path, clip_name: str | None) -> Animation:
     """Read an animation clip of a .glb or .gltf file.
 
-    name : name of the clip; None for the only clip of the file
+    clip_name : name of the clip; None for the only clip of the file
 
     Raises DermisError for a missing or damaged clip.
     """
@@ -64,12 +64,12 @@ def read_clip(path: Path, name: str | None) -> Animation:
     names = _document_clip_names(document)
     if not names:
         refuse(path, "a file with animation clips", "it has none", "Export it with its animation")
-    if name is None and len(names) > 1:
+    if clip_name is None and len(names) > 1:
         actual, advice = f"it has {', '.join(names)}", f"Name one, as in {path.name}#{names[0]}"
         refuse(path, "the name of a clip", actual, advice)
-    if name is not None and name not in names:
-        refuse(path, f"one of its clips ({', '.join(names)})", f"got {name!r}", "Correct the name")
-    index = 0 if name is None else names.index(name)
+    if clip_name is not None and clip_name not in names:
+        refuse(path, f"one of its clips ({', '.join(names)})", f"got {clip_name!r}", "Correct the name")
+    index = 0 if clip_name is None else names.index(clip_name)
     with parsing(f"{path}: clip {names[index][:80]!r}", "a valid animation", *MALFORMED_DATA_ERRORS):
         return Animation(names[index], tuple(_read_tracks(document, index, names[index])))
 
@@ -79,24 +79,24 @@ def _document_clip_names(document: Document) -> tuple[str, ...]:
     return tuple(str(clip.get("name") or f"clip {k}") for k, clip in enumerate(clips))
 
 
-def _read_tracks(document: Document, index: int, name: str) -> list[AnimationTrack]:
+def _read_tracks(document: Document, clip_index: int, clip_name: str) -> list[AnimationTrack]:
     """Return the tracks of a clip; channels with equal path, interpolation and key times share one track."""
-    clip, nodes = document.item("animations", index), read_nodes(document)
-    culprit = f"{document.path}: clip {name!r}"
-    check_limit(culprit, len(clip["channels"]), MAX_CHANNELS, "channels", "Export it again")
+    clip, nodes = document.item("animations", clip_index), read_nodes(document)
+    culprit = f"{document.path}: clip {clip_name!r}"
+    check_limit(culprit, len(clip["channels"]), MAX_ANIMATION_CURVES, "channels", "Export it again")
     groups: dict[tuple[object, ...], list[tuple[str, _Keyframes]]] = {}
     tracks, names = [], dict[int, tuple[str, ...]]()
     for channel_index, channel in enumerate(clip["channels"]):
-        target, culprit = channel["target"], f"{document.path}: clip {name!r}, channel {channel_index}"
-        if "node" not in target or target["path"] not in (*_COMPONENT_COUNTS, "weights"):
+        target, culprit = channel["target"], f"{document.path}: clip {clip_name!r}, channel {channel_index}"
+        if "node" not in target or target["path"] not in (*_PROPERTY_COMPONENT_COUNTS, "weights"):
             continue  # a target of an extension
         _check_node(nodes, target["node"], culprit)
         sampler = clip["samplers"][checked_index(channel["sampler"], len(clip["samplers"]), "samplers")]
         if target["path"] == "weights":
             tracks.append(_weight_track(document, target["node"], sampler, culprit, names))
             continue
-        keys = _read_keys(document, sampler, _COMPONENT_COUNTS[target["path"]], culprit)
-        rotations = keys.values[:, _VALUE] if keys.kind == "CUBICSPLINE" else keys.values
+        keys = _read_keyframes(document, sampler, _PROPERTY_COMPONENT_COUNTS[target["path"]], culprit)
+        rotations = keys.values[:, _SPLINE_VALUE] if keys.kind == "CUBICSPLINE" else keys.values
         if target["path"] == "rotation" and not rotations.any(axis=-1).all():
             refuse(culprit, "unit quaternions as rotations", "one is 0", DAMAGED_ADVICE)
         group = (target["path"], keys.kind, keys.times_s.tobytes())
@@ -104,9 +104,9 @@ def _read_tracks(document: Document, index: int, name: str) -> list[AnimationTra
     return tracks + [_merge_tracks(str(path), members) for (path, *_), members in groups.items()]
 
 
-def _check_node(nodes: Nodes, node: int, culprit: str) -> None:
-    if not 0 <= node < len(nodes.names):
-        refuse(culprit, f"a node from 0 to {len(nodes.names) - 1}", f"got node {node}", DAMAGED_ADVICE)
+def _check_node(nodes: Nodes, node_index: int, culprit: str) -> None:
+    if not 0 <= node_index < len(nodes.names):
+        refuse(culprit, f"a node from 0 to {len(nodes.names) - 1}", f"got node {node_index}", DAMAGED_ADVICE)
 
 
 def _weight_track(
@@ -124,34 +124,34 @@ def _weight_track(
     if not names:
         actual = f"node {node} has no morph targets"
         refuse(culprit, "weights of a mesh with morph targets", actual, DAMAGED_ADVICE)
-    keys = _read_keys(document, sampler, len(names), culprit)
+    keys = _read_keyframes(document, sampler, len(names), culprit)
     curve = AnimationCurve(keys.times_s, keys.values[..., None, :], keys.kind)
     return AnimationTrack("weights", names, curve)
 
 
-def _merge_tracks(path: str, members: list[tuple[str, _Keyframes]]) -> AnimationTrack:
+def _merge_tracks(animated_property: str, keyframes_by_name: list[tuple[str, _Keyframes]]) -> AnimationTrack:
     """Merge animated nodes or targets with equal key times into one track.
 
-    path : animated property, see `AnimationTrack`
-    members : name and keyframes of each node or target
+    animated_property : animated property, see `AnimationTrack`
+    keyframes_by_name : name and keyframes of each node or target
     """
-    keys = members[0][1]
-    values = np.stack([own.values for _, own in members], axis=-2)
-    curve = AnimationCurve(keys.times_s, values, keys.kind, is_rotation=path == "rotation")
-    return AnimationTrack(path, tuple(name for name, _ in members), curve)
+    keys = keyframes_by_name[0][1]
+    values = np.stack([own.values for _, own in keyframes_by_name], axis=-2)
+    curve = AnimationCurve(keys.times_s, values, keys.kind, is_rotation=animated_property == "rotation")
+    return AnimationTrack(animated_property, tuple(name for name, _ in keyframes_by_name), curve)
 
 
-def _read_keys(document: Document, sampler: Tree, width: int, culprit: str) -> _Keyframes:
+def _read_keyframes(document: Document, sampler: Tree, component_count: int, culprit: str) -> _Keyframes:
     """Read times (k,) and values (k, n) of a sampler; values of a cubic spline are (k, 3, n) with tangents.
 
-    width : n, number of components per key
+    component_count : n, number of components per key
     """
     kind = sampler.get("interpolation", "LINEAR")
     if kind not in get_args(Interpolation):
         kinds = ", ".join(get_args(Interpolation))
         refuse(culprit, f"an interpolation of {kinds}", f"got {kind!r}", DAMAGED_ADVICE)
     times, values = document.read_floats(sampler["input"]).ravel(), document.read_floats(sampler["output"])
-    shape = (len(times), 3, width) if kind == "CUBICSPLINE" else (len(times), width)
+    shape = (len(times), 3, component_count) if kind == "CUBICSPLINE" else (len(times), component_count)
     if len(times) == 0 or values.size != np.prod(shape):
         actual = f"got {len(times)} and {values.size}"
         refuse(culprit, f"a time and {np.prod(shape[1:])} numbers for each key", actual, DAMAGED_ADVICE)
@@ -184,7 +184,7 @@ class AnimationCurve:
     def sample(self, seconds: float) -> Doubles:
         """Return the values at a time [s], (m, n); constant before the first and after the last key."""
         index = int(np.searchsorted(self.times_s, seconds, side="right")) - 1
-        keys = self.values[:, _VALUE] if self.kind == "CUBICSPLINE" else self.values
+        keys = self.values[:, _SPLINE_VALUE] if self.kind == "CUBICSPLINE" else self.values
         if index < 0 or index + 1 >= len(self.times_s):
             return self._normalise_rotations(keys[max(index, 0)])
         if self.kind == "STEP":
@@ -199,12 +199,18 @@ class AnimationCurve:
             )
         return np.asarray((1 - fraction) * keys[index] + fraction * keys[index + 1])
 
-    def _cubic_spline_value(self, index: int, s: float, step: float) -> Doubles:
-        before, after = self.values[index], self.values[index + 1]
-        value = (2 * s**3 - 3 * s**2 + 1) * before[_VALUE] + (3 * s**2 - 2 * s**3) * after[_VALUE]
-        value += step * (s**3 - 2 * s**2 + s) * before[_TANGENT_OUT]
-        value += step * (s**3 - s**2) * after[_TANGENT_IN]
+    def _cubic_spline_value(self, key_index: int, fraction: float, interval_s: float) -> Doubles:
+        before, after = self.values[key_index], self.values[key_index + 1]
+        value = (2 * fraction**3 - 3 * fraction**2 + 1) * before[_SPLINE_VALUE] + (
+            3 * fraction**2 - 2 * fraction**3
+        ) * after[_SPLINE_VALUE]
+        value += interval_s * (fraction**3 - 2 * fraction**2 + fraction) * before[_SPLINE_TANGENT_OUT]
+        value += interval_s * (fraction**3 - fraction**2) * after[_SPLINE_TANGENT_IN]
         return np.asarray(value)
 
-    def _normalise_rotations(self, values: Doubles) -> Doubles:
-        return values / np.linalg.norm(values, axis=-1, keepdims=True) if self.is_rotation else values
+    def _normalise_rotations(self, key_values: Doubles) -> Doubles:
+        return (
+            key_values / np.linalg.norm(key_values, axis=-1, keepdims=True)
+            if self.is_rotation
+            else key_values
+        )

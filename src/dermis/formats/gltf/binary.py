@@ -13,13 +13,13 @@ import numpy as np
 from dermis.base.arrays import Numbers
 from dermis.formats.gltf.document import FrozenTree, Tree
 
-VERTICES, INDICES = 34962, 34963
+VERTEX_TARGET, INDEX_TARGET = 34962, 34963
 """Kinds of data in a buffer view, which glTF calls its target."""
 CLAMPED_SAMPLER = {"magFilter": 9729, "minFilter": 9987, "wrapS": 33071, "wrapT": 33071}
 """Sampler with mip levels and without repetition."""
 _COMPONENT_TYPES = {"|u1": 5121, "<u2": 5123, "<u4": 5125, "<f4": 5126}
 _ELEMENT_TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
-_MAX_SHORT_COUNT = 65535  # most vertices with 16-bit indices, of which 65535 means primitive restart
+_MAX_UINT16_VERTICES = 65535  # most vertices with 16-bit indices, of which 65535 means primitive restart
 
 
 @dataclass
@@ -31,114 +31,124 @@ class BufferBuilder:
     accessors: list[Tree] = field(default_factory=list)
     _zero_accessors: dict[int, int] = field(default_factory=dict)
 
-    def add_view(self, data: bytes, target: int | None = None) -> int:
+    def add_view(self, view_bytes: bytes, buffer_target: int | None = None) -> int:
         """Append bytes to the buffer and return the index of their buffer view.
 
-        target : `VERTICES` or `INDICES`; None for other data
+        buffer_target : `VERTEX_TARGET` or `INDEX_TARGET`; None for other data
         """
         self.data += b"\0" * (-len(self.data) % 4)
-        entry = {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(data)}
-        self.views.append(entry if target is None else entry | {"target": target})
-        self.data += data
+        entry = {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(view_bytes)}
+        self.views.append(entry if buffer_target is None else entry | {"target": buffer_target})
+        self.data += view_bytes
         return len(self.views) - 1
 
-    def add_accessor(self, rows: Numbers, target: int | None = None, *, bounded: bool = False) -> int:
+    def add_accessor(
+        self, elements: Numbers, buffer_target: int | None = None, *, with_bounds: bool = False
+    ) -> int:
         """Append n elements of k components, (n, k), and return the index of their accessor.
 
-        rows : float32 or unsigned integers
-        target : `VERTICES` or `INDICES`; None for other data
-        bounded : whether to store each component's minimum and maximum, which glTF requires for positions
+        elements : float32 or unsigned integers
+        buffer_target : `VERTEX_TARGET` or `INDEX_TARGET`; None for other data
+        with_bounds : whether to store each component's minimum and maximum, which glTF requires for positions
         """
-        values = _to_little_endian(rows)
-        bounds = _component_bounds(values) if bounded else {}
-        view = self.add_view(values.tobytes(), target)
+        values = _to_little_endian(elements)
+        bounds = _component_bounds(values) if with_bounds else {}
+        view = self.add_view(values.tobytes(), buffer_target)
         return self._append_accessor(values, {"bufferView": view} | bounds)
 
-    def add_triangles(self, index: Numbers, count: int) -> int:
+    def add_triangles(self, corner_vertices: Numbers, vertex_count: int) -> int:
         """Append the vertex indices of triangles, (f, 3), and return the index of their accessor.
 
-        count : number of vertices of the primitive, by which the smallest sufficient integer type is chosen
+        vertex_count : number of vertices of the primitive, which determines the type of the indices
         """
-        return self.add_accessor(index.reshape(-1, 1).astype(_index_dtype(count)), INDICES)
+        return self.add_accessor(
+            corner_vertices.reshape(-1, 1).astype(_index_dtype(vertex_count)), INDEX_TARGET
+        )
 
-    def add_displacements(self, row: Numbers, columns: Sequence[Numbers], count: int) -> list[int]:
-        """Append arrays (count, 3) that are mostly 0, and return the indices of their accessors.
+    def add_displacements(
+        self, moved_vertex: Numbers, displacements: Sequence[Numbers], vertex_count: int
+    ) -> list[int]:
+        """Append arrays (vertex_count, 3) that are mostly 0, and return the indices of their accessors.
 
         The arrays are stored as sparse accessors, or as dense accessors if these are smaller.
 
-        row : (m,) indices of the rows that are not 0, in increasing order, the same for all arrays
-        columns : for each array, the values (m, 3) of the rows in `row`
-        count : number of vertices
+        moved_vertex : (m,) indices of the rows that are not 0, in increasing order, the same for all arrays
+        displacements : for each array, the values (m, 3) of the rows in `moved_vertex`
+        vertex_count : number of vertices
         """
-        if not len(row):
-            return [self._zero_accessor(count)] * len(columns)
-        index = row.astype(_index_dtype(count))
-        if len(row) * (12 + index.itemsize) >= 12 * count:
-            return [self._dense_accessor(row, values, count) for values in columns]
+        if not len(moved_vertex):
+            return [self._zero_accessor(vertex_count)] * len(displacements)
+        index = moved_vertex.astype(_index_dtype(vertex_count))
+        if len(moved_vertex) * (12 + index.itemsize) >= 12 * vertex_count:
+            return [self._dense_accessor(moved_vertex, values, vertex_count) for values in displacements]
         indices = {"bufferView": self.add_view(_to_little_endian(index).tobytes())}
         indices["componentType"] = _COMPONENT_TYPES[_to_little_endian(index).dtype.str]
         accessors = []
-        for values in columns:
+        for values in displacements:
             stored = _to_little_endian(values)
             view = {"bufferView": self.add_view(stored.tobytes())}
-            sparse = {"count": len(row), "indices": dict(indices), "values": view}
+            sparse = {"count": len(moved_vertex), "indices": dict(indices), "values": view}
             low, high = np.minimum(stored.min(axis=0), 0), np.maximum(stored.max(axis=0), 0)
             entries = {"sparse": sparse, "min": low.tolist(), "max": high.tolist()}
-            zeros = np.broadcast_to(np.zeros(1, "<f4"), (count, 3))
+            zeros = np.broadcast_to(np.zeros(1, "<f4"), (vertex_count, 3))
             accessors.append(self._append_accessor(zeros, entries))
         return accessors
 
-    def _zero_accessor(self, count: int) -> int:
-        """Return the index of an accessor of zero vectors (count, 3), which takes no space in the buffer."""
-        if count not in self._zero_accessors:
-            zeros = np.broadcast_to(np.zeros(1, "<f4"), (count, 3))
-            self._zero_accessors[count] = self._append_accessor(zeros, {"min": [0.0] * 3, "max": [0.0] * 3})
-        return self._zero_accessors[count]
+    def _zero_accessor(self, vertex_count: int) -> int:
+        """Return the index of an accessor of zero vectors (vertex_count, 3) without space in the buffer."""
+        if vertex_count not in self._zero_accessors:
+            zeros = np.broadcast_to(np.zeros(1, "<f4"), (vertex_count, 3))
+            self._zero_accessors[vertex_count] = self._append_accessor(
+                zeros, {"min": [0.0] * 3, "max": [0.0] * 3}
+            )
+        return self._zero_accessors[vertex_count]
 
-    def _dense_accessor(self, row: Numbers, values: Numbers, count: int) -> int:
-        dense = np.zeros((count, 3), "<f4")
-        dense[row] = values
-        return self.add_accessor(dense, VERTICES, bounded=True)
+    def _dense_accessor(self, moved_vertex: Numbers, displacement: Numbers, vertex_count: int) -> int:
+        dense = np.zeros((vertex_count, 3), "<f4")
+        dense[moved_vertex] = displacement
+        return self.add_accessor(dense, VERTEX_TARGET, with_bounds=True)
 
-    def _append_accessor(self, values: Numbers, entries: FrozenTree) -> int:
+    def _append_accessor(self, elements: Numbers, accessor_entries: FrozenTree) -> int:
         layout = {
-            "componentType": _COMPONENT_TYPES[values.dtype.str],
-            "type": _ELEMENT_TYPES[values.shape[1]],
+            "componentType": _COMPONENT_TYPES[elements.dtype.str],
+            "type": _ELEMENT_TYPES[elements.shape[1]],
         }
-        self.accessors.append({"count": len(values), **layout, **entries})
+        self.accessors.append({"count": len(elements), **layout, **accessor_entries})
         return len(self.accessors) - 1
 
 
-def _to_little_endian(rows: Numbers) -> Numbers:
+def _to_little_endian(array: Numbers) -> Numbers:
     """Return a contiguous array in little-endian byte order, which glTF requires."""
-    return np.ascontiguousarray(rows, rows.dtype.newbyteorder("<"))
+    return np.ascontiguousarray(array, array.dtype.newbyteorder("<"))
 
 
-def _component_bounds(values: Numbers) -> dict[str, list[float]]:
-    return {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
+def _component_bounds(elements: Numbers) -> dict[str, list[float]]:
+    return {"min": elements.min(axis=0).tolist(), "max": elements.max(axis=0).tolist()}
 
 
-def _index_dtype(count: int) -> str:
-    """Return the smallest integer type for indices of `count` vertices."""
-    return "<u2" if count <= _MAX_SHORT_COUNT else "<u4"
+def _index_dtype(vertex_count: int) -> str:
+    """Return the smallest integer type for indices of `vertex_count` vertices."""
+    return "<u2" if vertex_count <= _MAX_UINT16_VERTICES else "<u4"
 
 
-def resolve_textures(value: Any, textures: Mapping[str, int]) -> Any:
+def resolve_textures(json_value: Any, texture_indices: Mapping[str, int]) -> Any:
     """Return a JSON tree in which references {"index": picture name} become glTF texture indices.
 
-    textures : texture index by picture name
+    texture_indices : texture index by picture name
     """
-    if isinstance(value, Mapping):
+    if isinstance(json_value, Mapping):
         return {
-            key: textures[item] if key == "index" and item in textures else resolve_textures(item, textures)
-            for key, item in value.items()
+            key: texture_indices[item]
+            if key == "index" and item in texture_indices
+            else resolve_textures(item, texture_indices)
+            for key, item in json_value.items()
         }
-    return value
+    return json_value
 
 
-def glb_bytes(tree: FrozenTree, binary: bytes | bytearray) -> bytes:
+def glb_bytes(json_tree: FrozenTree, binary: bytes | bytearray) -> bytes:
     """Return the bytes of a .glb file that contains a JSON tree and one binary buffer."""
-    text = json.dumps(tree, separators=(",", ":")).encode()
+    text = json.dumps(json_tree, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
     body = bytes(binary) + b"\0" * (-len(binary) % 4)
     head = struct.pack("<4sII", b"glTF", 2, 28 + len(text) + len(body))

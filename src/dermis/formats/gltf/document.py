@@ -29,7 +29,7 @@ _GLB_MAGIC = 0x46546C67
 _JSON_CHUNK, _BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 _COMPONENT_TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _COMPONENT_COUNTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
-_MIN_READ_COST = 512  # smallest number of components that one read of an accessor counts as
+_MIN_COMPONENTS_PER_READ = 512  # smallest number of components that one read of an accessor counts as
 _TOP_LEVEL_ARRAYS = [
     "accessors",
     "animations",
@@ -60,45 +60,48 @@ class Document:
     _buffers: dict[int, bytes] = field(default_factory=dict)
     _read_components: int = 0
 
-    def items(self, key: str) -> list[Tree]:
+    def items(self, array_name: str) -> list[Tree]:
         """Return a top-level array of the JSON tree, such as "nodes"; empty if the file has none."""
-        listed: list[Tree] = self.tree.get(key, [])
+        listed: list[Tree] = self.tree.get(array_name, [])
         return listed
 
-    def item(self, key: str, index: object) -> Tree:
+    def item(self, array_name: str, object_index: object) -> Tree:
         """Return the object with an index in a top-level array of the JSON tree, such as "meshes".
 
         Raises ValueError for an invalid index.
         """
-        return self.items(key)[checked_index(index, len(self.items(key)), key)]
+        return self.items(array_name)[checked_index(object_index, len(self.items(array_name)), array_name)]
 
-    def read_buffer(self, index: int) -> bytes:
+    def read_buffer(self, buffer_index: int) -> bytes:
         """Return the bytes of a buffer from the .glb file, a data URI or another file."""
-        if index not in self._buffers:
-            uri = self.item("buffers", index).get("uri")
-            if uri is None and index > 0:
-                raise ValueError(f"buffer {index} has no data in the file")
-            self._buffers[index] = self._read_uri(uri)
-        return self._buffers[index]
+        if buffer_index not in self._buffers:
+            uri = self.item("buffers", buffer_index).get("uri")
+            if uri is None and buffer_index > 0:
+                raise ValueError(f"buffer {buffer_index} has no data in the file")
+            self._buffers[buffer_index] = self._read_uri(uri)
+        return self._buffers[buffer_index]
 
-    def read_view(self, index: int) -> memoryview:
+    def read_view(self, view_index: int) -> memoryview:
         """Return the bytes of a buffer view."""
-        view = self.item("bufferViews", index)
-        start, length = _checked_size(view.get("byteOffset", 0)), _checked_size(view["byteLength"])
+        view = self.item("bufferViews", view_index)
+        start, length = (
+            _checked_byte_or_value_count(view.get("byteOffset", 0)),
+            _checked_byte_or_value_count(view["byteLength"]),
+        )
         data = memoryview(self.read_buffer(view["buffer"]))[start : start + length]
         if len(data) != length:
-            raise ValueError(f"buffer view {index} ends outside of its buffer")
+            raise ValueError(f"buffer view {view_index} ends outside of its buffer")
         return data
 
-    def accessor_shape(self, index: int) -> tuple[int, int]:
+    def accessor_shape(self, accessor_index: int) -> tuple[int, int]:
         """Return the number of elements of an accessor, and the number of components of an element."""
-        accessor = self.item("accessors", index)
-        return _checked_size(accessor["count"]), _COMPONENT_COUNTS[accessor["type"]]
+        accessor = self.item("accessors", accessor_index)
+        return _checked_byte_or_value_count(accessor["count"]), _COMPONENT_COUNTS[accessor["type"]]
 
-    def replace_values(self, index: int, values: Numbers) -> None:
+    def replace_values(self, accessor_index: int, new_values: Numbers) -> None:
         """Replace the values of an accessor by an array of the same shape, converted to its type."""
-        accessor = self.item("accessors", index)
-        data = values.astype(_COMPONENT_TYPES[accessor["componentType"]]).tobytes()
+        accessor = self.item("accessors", accessor_index)
+        data = new_values.astype(_COMPONENT_TYPES[accessor["componentType"]]).tobytes()
         buffers, views = (self.tree.setdefault(key, []) for key in ("buffers", "bufferViews"))
         self._buffers[len(buffers)] = data
         views.append({"buffer": len(buffers), "byteLength": len(data)})
@@ -106,18 +109,20 @@ class Document:
         accessor.pop("sparse", None)
         accessor |= {"bufferView": len(views) - 1, "byteOffset": 0}
 
-    def read_values(self, index: int) -> Numbers:
+    def read_values(self, accessor_index: int) -> Numbers:
         """Return n elements of k components of an accessor in their stored type, (n, k)."""
-        accessor, shape = self.item("accessors", index), self.accessor_shape(index)
+        accessor, shape = self.item("accessors", accessor_index), self.accessor_shape(accessor_index)
         kind = np.dtype(_COMPONENT_TYPES[accessor["componentType"]])
-        self._read_components += max(shape[0] * shape[1], _MIN_READ_COST)
+        self._read_components += max(shape[0] * shape[1], _MIN_COMPONENTS_PER_READ)
         if self._read_components > MAX_ACCESSOR_COMPONENTS:
-            actual = f"accessor {index} exceeds the limit"
+            actual = f"accessor {accessor_index} exceeds the limit"
             advice = "Export it with fewer instances or targets, or decimated"
             limit = f"accessors of at most {MAX_ACCESSOR_COMPONENTS / 1e6:.0f} million numbers"
             refuse(self.path, limit, actual, advice)
         if "bufferView" in accessor:
-            stride = _checked_size(self.item("bufferViews", accessor["bufferView"]).get("byteStride", 0))
+            stride = _checked_byte_or_value_count(
+                self.item("bufferViews", accessor["bufferView"]).get("byteStride", 0)
+            )
             values = self._view_array(accessor, shape, kind, stride)
         else:
             values = np.zeros(shape, kind)
@@ -125,39 +130,44 @@ class Document:
             return values
         return self._substitute_sparse(values, accessor["sparse"])
 
-    def read_floats(self, index: int) -> Doubles:
+    def read_floats(self, accessor_index: int) -> Doubles:
         """Return n elements of k components of an accessor as floats, (n, k).
 
         Normalised integers are decoded to [0, 1] or [-1, 1].
         """
-        values = self.read_values(index)
-        if not self.item("accessors", index).get("normalized", False):
+        values = self.read_values(accessor_index)
+        if not self.item("accessors", accessor_index).get("normalized", False):
             return values.astype(np.float64)
         return to_floats(values)
 
-    def _substitute_sparse(self, values: Numbers, sparse: Tree) -> Numbers:
-        count = _checked_size(sparse["count"])
-        if count > len(values):
-            raise ValueError(f"{count} of {len(values)} values are listed as sparse")
-        index_type = np.dtype(_COMPONENT_TYPES[sparse["indices"]["componentType"]])
-        index = self._view_array(sparse["indices"], (count, 1), index_type).ravel()
-        result = values.copy()
-        result[index] = self._view_array(sparse["values"], (count, values.shape[1]), values.dtype)
+    def _substitute_sparse(self, dense_values: Numbers, sparse_tree: Tree) -> Numbers:
+        count = _checked_byte_or_value_count(sparse_tree["count"])
+        if count > len(dense_values):
+            raise ValueError(f"{count} of {len(dense_values)} values are listed as sparse")
+        index_type = np.dtype(_COMPONENT_TYPES[sparse_tree["indices"]["componentType"]])
+        index = self._view_array(sparse_tree["indices"], (count, 1), index_type).ravel()
+        result = dense_values.copy()
+        result[index] = self._view_array(
+            sparse_tree["values"], (count, dense_values.shape[1]), dense_values.dtype
+        )
         return result
 
     def _view_array(
-        self, location: Tree, shape: tuple[int, int], kind: np.dtype[np.number], stride: int = 0
+        self, location: Tree, array_shape: tuple[int, int], dtype: np.dtype[np.number], stride_bytes: int = 0
     ) -> Numbers:
-        """Return an array of `shape` (n, k) and type `kind` from a buffer view.
+        """Return an array of `array_shape` (n, k) and type `dtype` from a buffer view.
 
         location : JSON object with "bufferView" and "byteOffset"
-        stride : distance between the starts of rows [byte]; 0 if they are contiguous
+        stride_bytes : distance between the starts of rows [byte]; 0 if they are contiguous
         """
-        data, start = self.read_view(location["bufferView"]), _checked_size(location.get("byteOffset", 0))
-        size = kind.itemsize
-        if 0 in shape:
-            return np.zeros(shape, kind)
-        return np.ndarray(shape, kind, data, start, (stride or size * shape[1], size))
+        data, start = (
+            self.read_view(location["bufferView"]),
+            _checked_byte_or_value_count(location.get("byteOffset", 0)),
+        )
+        size = dtype.itemsize
+        if 0 in array_shape:
+            return np.zeros(array_shape, dtype)
+        return np.ndarray(array_shape, dtype, data, start, (stride_bytes or size * array_shape[1], size))
 
     def _read_uri(self, uri: str | None) -> bytes:
         if uri is None:
@@ -173,22 +183,24 @@ class Document:
         return data
 
 
-def checked_index(index: object, count: int, kind: str) -> int:
-    """Return an index after checking that it is an integer from 0 to `count` - 1.
+def checked_index(json_index: object, object_count: int, object_noun: str) -> int:
+    """Return an index after checking that it is an integer from 0 to `object_count` - 1.
 
-    kind : plural noun for the indexed objects, for the error
+    object_noun : plural noun for the indexed objects, for the error
 
     Raises ValueError for an invalid index.
     """
-    if not (isinstance(index, int) and 0 <= index < count):
-        raise ValueError(f"there are {count} {kind}, and {str(index)[:40]!r} is none of them")
-    return index
+    if not (isinstance(json_index, int) and 0 <= json_index < object_count):
+        raise ValueError(
+            f"there are {object_count} {object_noun}, and {str(json_index)[:40]!r} is none of them"
+        )
+    return json_index
 
 
-def _checked_size(value: object) -> int:
-    if not (isinstance(value, int) and 0 <= value <= MAX_FILE_BYTES):
-        raise ValueError(f"got {str(value)[:40]!r} for a number of bytes or values")
-    return value
+def _checked_byte_or_value_count(json_number: object) -> int:
+    if not (isinstance(json_number, int) and 0 <= json_number <= MAX_FILE_BYTES):
+        raise ValueError(f"got {str(json_number)[:40]!r} for a number of bytes or values")
+    return json_number
 
 
 def read_document(path: Path) -> Document:
@@ -199,22 +211,22 @@ def read_document(path: Path) -> Document:
     data = read_file(path, "a glTF file", MAX_FILE_BYTES)
     with parsing(path, "a glTF file", *MALFORMED_DATA_ERRORS):
         if not is_binary_gltf(path):
-            return Document(path, _parse_tree(path, data))
+            return Document(path, _parse_json_tree(path, data))
         magic, version, length = struct.unpack_from("<III", data)
         if magic != _GLB_MAGIC or version != 2:
             raise ValueError("it does not start like a .glb file of version 2")
         if length > len(data):
             raise ValueError(f"it should have {length} bytes and has {len(data)}")
         chunks = dict(_glb_chunks(data))
-        return Document(path, _parse_tree(path, chunks[_JSON_CHUNK]), chunks.get(_BINARY_CHUNK, b""))
+        return Document(path, _parse_json_tree(path, chunks[_JSON_CHUNK]), chunks.get(_BINARY_CHUNK, b""))
 
 
-def _parse_tree(path: Path, text: bytes) -> Tree:
+def _parse_json_tree(path: Path, json_text: bytes) -> Tree:
     """Parse the JSON of a file and check that its top-level arrays contain objects."""
-    values = sum(text.count(mark) for mark in (b",", b"[", b"{"))
+    values = sum(json_text.count(mark) for mark in (b",", b"[", b"{"))
     advice = "Export it with fewer nodes, materials or clips"
     check_limit(path, values, MAX_JSON_VALUES, "values in its JSON", advice)
-    tree = parse_json(text, path, "a glTF file")
+    tree = parse_json(json_text, path, "a glTF file")
     if not isinstance(tree, dict):
         raise ValueError("its JSON is not an object")
     for key in _TOP_LEVEL_ARRAYS:
@@ -224,15 +236,15 @@ def _parse_tree(path: Path, text: bytes) -> Tree:
     return tree
 
 
-def _glb_chunks(data: bytes) -> list[tuple[int, bytes]]:
+def _glb_chunks(glb_data: bytes) -> list[tuple[int, bytes]]:
     """Return type and bytes of each chunk of a .glb file.
 
     The order is reversed, so that a dict made of the list keeps the first chunk of each type.
     """
     chunks, offset = [], 12
-    while offset + 8 <= len(data):
-        length, kind = struct.unpack_from("<II", data, offset)
-        content = data[offset + 8 : offset + 8 + length]
+    while offset + 8 <= len(glb_data):
+        length, kind = struct.unpack_from("<II", glb_data, offset)
+        content = glb_data[offset + 8 : offset + 8 + length]
         if len(content) != length:
             raise ValueError("a chunk is truncated")
         chunks.append((kind, content))

@@ -14,7 +14,7 @@ from dermis.base.native_decoding import run_decoder
 from dermis.formats import size_limits as limits
 from dermis.formats.gltf.document import Document, Tree
 
-EXTENSION = "KHR_draco_mesh_compression"
+DRACO_EXTENSION = "KHR_draco_mesh_compression"
 _TRIANGLES_MODE = 4
 _DECODER_MODULE = "dermis.formats.gltf.draco_decoder"
 _SIZE_ADVICE = "Decimate it, or export without compression"
@@ -55,7 +55,7 @@ def decompress(document: Document) -> None:
 
 def _compressed_primitive(document: Document, primitive: Tree) -> _Primitive | None:
     """Return the compressed form of a primitive; None if the primitive is also stored without compression."""
-    extension = (primitive.get("extensions") or {}).get(EXTENSION)
+    extension = (primitive.get("extensions") or {}).get(DRACO_EXTENSION)
     positions = document.item("accessors", primitive["attributes"]["POSITION"])
     if extension is None or "bufferView" in positions:
         return None
@@ -70,23 +70,27 @@ def _check_sizes(document: Document, primitives: list[Tree]) -> None:
     limits.check_limit(document.path, sum(corners) // 3, limits.MAX_TRIANGLES, "triangles", _SIZE_ADVICE)
 
 
-def _store_attributes(document: Document, primitive: _Primitive, answer: Arrays, mesh_name: str) -> None:
+def _store_attributes(
+    document: Document, primitive: _Primitive, decoded_arrays: Arrays, mesh_name: str
+) -> None:
     tree, compressed = primitive
     for attribute, identifier in compressed["attributes"].items():
         _replace_accessor(
-            document, tree["attributes"][attribute], answer[f"{mesh_name}/{identifier}"], attribute
+            document, tree["attributes"][attribute], decoded_arrays[f"{mesh_name}/{identifier}"], attribute
         )
     if "indices" in tree:
-        triangles = answer[f"{mesh_name}/triangles"]
+        triangles = decoded_arrays[f"{mesh_name}/triangles"]
         _replace_accessor(document, tree["indices"], triangles.reshape(-1, 1), "indices of triangles")
         tree["mode"] = _TRIANGLES_MODE
 
 
-def _replace_accessor(document: Document, accessor: int, values: Numbers, items: str) -> None:
-    shape = document.accessor_shape(accessor)
-    if values.shape != shape:
-        actual = f"its compressed {items} are {' x '.join(map(str, values.shape))} numbers"
+def _replace_accessor(
+    document: Document, accessor_index: int, decoded_values: Numbers, items_noun: str
+) -> None:
+    shape = document.accessor_shape(accessor_index)
+    if decoded_values.shape != shape:
+        actual = f"its compressed {items_noun} are {' x '.join(map(str, decoded_values.shape))} numbers"
         refuse(
             document.path, f"{shape[0]} x {shape[1]} as its accessor states", actual, limits.DAMAGED_ADVICE
         )
-    document.replace_values(accessor, values)
+    document.replace_values(accessor_index, decoded_values)

@@ -18,11 +18,11 @@ from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Material
 from dermis.specular.hair import KERATIN_ETA
 
-_SKIN_IOR = {"KHR_materials_ior": {"ior": 1.4}}
+_SKIN_IOR_EXTENSION = {"KHR_materials_ior": {"ior": 1.4}}
 EYE_PICTURE, EYE_NORMAL_PICTURE = "eye", "eye normal"
 """Names of the pictures of an eye."""
 _TEAR_FILM_ROUGHNESS = 0.15  # perceptual roughness of the tear film
-_CLEARCOAT_FACTOR = 0.52  # eyes reflect 0.021 at normal incidence, glTF's clear coat 0.04
+_TEAR_FILM_CLEARCOAT_FACTOR = 0.52  # eyes reflect 0.021 at normal incidence, glTF's clear coat 0.04
 _HAIR_ROUGHNESS = 0.45
 _ROUGHNESS_BY_WORD = {"eye": 0.1, "teeth": 0.3, "tongue": 0.4}  # perceptual roughness by a word in the name
 _DEFAULT_ROUGHNESS = 0.8
@@ -119,7 +119,7 @@ def surface_material(
     gltf: Tree = {"name": name, "pbrMetallicRoughness": surface}
     if "normal" in pictures:
         gltf["normalTexture"] = {"index": "normal"}
-    return gltf | {"extensions": _SKIN_IOR, "extras": {"dermis": dict(roles)}}
+    return gltf | {"extensions": _SKIN_IOR_EXTENSION, "extras": {"dermis": dict(roles)}}
 
 
 def part_pictures(parts: PartPictures) -> dict[str, bytes]:
@@ -166,7 +166,7 @@ def _part_texture(role: PartRole) -> Tree:
 def eye_pictures(eyes: EyeTextures) -> dict[str, bytes]:
     """Return the colour map and the normal map of an eyeball as PNG files by name."""
     return {
-        EYE_PICTURE: colours_png(eyes.colour),
+        EYE_PICTURE: encode_colours_png(eyes.colour),
         EYE_NORMAL_PICTURE: encode_png(linear_levels(0.5 * eyes.normal + 0.5)),
     }
 
@@ -179,7 +179,7 @@ def eye_material(material: Material) -> Tree:
     """
     surface = _base_material(material, _TEAR_FILM_ROUGHNESS) | {"baseColorTexture": {"index": EYE_PICTURE}}
     del surface["baseColorFactor"]
-    coat = {"clearcoatFactor": _CLEARCOAT_FACTOR, "clearcoatRoughnessFactor": _TEAR_FILM_ROUGHNESS}
+    coat = {"clearcoatFactor": _TEAR_FILM_CLEARCOAT_FACTOR, "clearcoatRoughnessFactor": _TEAR_FILM_ROUGHNESS}
     return {
         "name": material.name,
         "pbrMetallicRoughness": surface,
@@ -188,19 +188,23 @@ def eye_material(material: Material) -> Tree:
     }
 
 
-def hair_material(name: str) -> Tree:
-    """Return the glTF material of hairs, whose colours are in the picture called `name`."""
-    surface = {"baseColorTexture": {"index": name}, "metallicFactor": 0.0, "roughnessFactor": _HAIR_ROUGHNESS}
+def hair_material(picture_name: str) -> Tree:
+    """Return the glTF material of hairs, whose colours are in the picture called `picture_name`."""
+    surface = {
+        "baseColorTexture": {"index": picture_name},
+        "metallicFactor": 0.0,
+        "roughnessFactor": _HAIR_ROUGHNESS,
+    }
     return {
-        "name": name,
+        "name": picture_name,
         "pbrMetallicRoughness": surface,
         "extensions": {"KHR_materials_ior": {"ior": KERATIN_ETA}},
     }
 
 
-def colours_png(linear: Floats) -> bytes:
+def encode_colours_png(linear_colours: Floats) -> bytes:
     """Encode linear colours (h, w, 3) as an sRGB PNG file."""
-    return encode_png(encode_srgb8(linear))
+    return encode_png(encode_srgb8(linear_colours))
 
 
 def _base_material(material: Material, roughness: float) -> Tree:

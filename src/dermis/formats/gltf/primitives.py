@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from dermis.base.arrays import Doubles, Floats, Index, Intp, Ints
 from dermis.formats.deformable_mesh import DeformableMesh, VertexTarget
-from dermis.formats.gltf.binary import VERTICES, BufferBuilder
+from dermis.formats.gltf.binary import VERTEX_TARGET, BufferBuilder
 from dermis.formats.gltf.document import Tree
 from dermis.mesh.eyeball import eye_uv
 from dermis.mesh.head import Head
@@ -19,23 +19,24 @@ from dermis.mesh.mesh import Mesh
 from dermis.mesh.strands import Roots, Strands, quad_weights, root_frames
 
 _METRES_PER_MM = 1e-3
-HAIR_COLOURS = 64
+HAIR_COLOUR_COUNT = 64
 """Number of colours into which the hairs of a head are sorted."""
 _TUBE_SIDES = 3
-_RADIUS_FACTOR = 2.0 * np.pi / (_TUBE_SIDES * np.sqrt(3.0))  # makes a tube as wide on average as a round hair
+# makes a tube as wide on average as a round hair
+_TUBE_RADIUS_PER_HAIR_RADIUS = 2.0 * np.pi / (_TUBE_SIDES * np.sqrt(3.0))
 _MIN_DISPLACEMENT_MM = 0.01  # smaller displacements count as 0
-_ALBEDO_EXPONENT = 5.89  # for fibres of roughness 0.3: [Chiang2016] equation 9
-_TINY = 1e-9
+_HAIR_ALBEDO_EXPONENT = 5.89  # for fibres of roughness 0.3: [Chiang2016] equation 9
+_MIN_VECTOR_LENGTH = 1e-9
 
 
 class PrimitiveSource(Protocol):
     """Geometry that can be written as a glTF primitive with morph targets."""
 
-    def primitive(self, binary: BufferBuilder) -> Tree:
+    def add_primitive(self, binary: BufferBuilder) -> Tree:
         """Append vertices and triangles to the buffer; return the primitive without material and targets."""
         ...
 
-    def target(self, binary: BufferBuilder, target: VertexTarget) -> dict[str, int]:
+    def add_target(self, binary: BufferBuilder, vertex_target: VertexTarget) -> dict[str, int]:
         """Append a morph target to the buffer, and return its accessor indices by attribute name."""
         ...
 
@@ -62,7 +63,7 @@ class SurfacePrimitive:
         """Return the indices of the mesh vertices that the triangles use, (v,), in increasing order."""
         return np.unique(self._head.mesh.triangles[self.faces])
 
-    def primitive(self, binary: BufferBuilder) -> Tree:
+    def add_primitive(self, binary: BufferBuilder) -> Tree:
         """Append vertices and triangles to the buffer; return the primitive without material and targets.
 
         The extras of the primitive record whether its triangles form quads, and whether no other primitive
@@ -80,11 +81,11 @@ class SurfacePrimitive:
         extras = {key: True for key, value in flags.items() if value}
         return primitive | ({"extras": {"dermis": extras}} if extras else {})
 
-    def target(self, binary: BufferBuilder, target: VertexTarget) -> dict[str, int]:
+    def add_target(self, binary: BufferBuilder, vertex_target: VertexTarget) -> dict[str, int]:
         """Append position and normal displacements to the buffer; return accessors by attribute name."""
-        used = np.flatnonzero(np.isin(target.vertex, self.vertices, assume_unique=True))
-        row = np.searchsorted(self.vertices, target.vertex[used])
-        columns = [to_metres(target.delta_mm[used]), target.normal[used]]
+        used = np.flatnonzero(np.isin(vertex_target.vertex, self.vertices, assume_unique=True))
+        row = np.searchsorted(self.vertices, vertex_target.vertex[used])
+        columns = [to_metres(vertex_target.delta_mm[used]), vertex_target.normal[used]]
         accessors = binary.add_displacements(row, columns, len(self.vertices))
         return dict(zip(("POSITION", "NORMAL"), accessors, strict=True))
 
@@ -120,7 +121,7 @@ class HairPrimitive:
     def _rest_points(self) -> Doubles:
         return replace(self.deformable.head.mesh, positions=self.deformable.positions_mm).points_mm
 
-    def primitive(self, binary: BufferBuilder) -> Tree:
+    def add_primitive(self, binary: BufferBuilder) -> Tree:
         """Append vertices and triangles to the buffer; return the primitive without material and targets.
 
         The extras of the primitive mark it as hair, so that `read_gltf` skips it.
@@ -134,10 +135,10 @@ class HairPrimitive:
         index = binary.add_triangles(self.fibres.triangles(), len(positions))
         return {"attributes": attributes, "indices": index, "extras": {"dermis": {"hair": True}}}
 
-    def target(self, binary: BufferBuilder, target: VertexTarget) -> dict[str, int]:
+    def add_target(self, binary: BufferBuilder, vertex_target: VertexTarget) -> dict[str, int]:
         """Append position displacements to the buffer and return their accessor; normals do not change."""
         delta, mesh = np.zeros_like(self._rest_points), self.deformable.head.mesh
-        delta[mesh.point[target.vertex]] = target.delta_mm
+        delta[mesh.point[vertex_target.vertex]] = vertex_target.delta_mm
         vertex, displacement = self.fibres.displacements_at(self._rest_points, delta)
         (accessor,) = binary.add_displacements(vertex, [to_metres(displacement)], self.fibres.vertex_count)
         return {"POSITION": accessor}
@@ -152,25 +153,25 @@ def _vertex_attributes(
     binary: BufferBuilder, positions_mm: NDArray[np.floating], normals: Floats, uv: Floats
 ) -> dict[str, int]:
     return {
-        "POSITION": binary.add_accessor(to_metres(positions_mm), VERTICES, bounded=True),
-        "NORMAL": binary.add_accessor(normals, VERTICES),
-        "TEXCOORD_0": binary.add_accessor(uv, VERTICES),
+        "POSITION": binary.add_accessor(to_metres(positions_mm), VERTEX_TARGET, with_bounds=True),
+        "NORMAL": binary.add_accessor(normals, VERTEX_TARGET),
+        "TEXCOORD_0": binary.add_accessor(uv, VERTEX_TARGET),
     }
 
 
 def _bone_attributes(
-    binary: BufferBuilder, deformable: DeformableMesh, vertex: NDArray[np.integer]
+    binary: BufferBuilder, deformable: DeformableMesh, vertex_index: NDArray[np.integer]
 ) -> dict[str, int]:
     """Append joints and weights of vertices to the buffer; return their accessors, {} without a skeleton.
 
-    vertex : (v,) indices of the vertices in the mesh
+    vertex_index : (v,) indices of the vertices in the mesh
     """
     if deformable.rig.skeleton is None:
         return {}
     bone, weight = deformable.bone_influences
     return {
-        "JOINTS_0": binary.add_accessor(bone[vertex], VERTICES),
-        "WEIGHTS_0": binary.add_accessor(weight[vertex], VERTICES),
+        "JOINTS_0": binary.add_accessor(bone[vertex_index], VERTEX_TARGET),
+        "WEIGHTS_0": binary.add_accessor(weight[vertex_index], VERTEX_TARGET),
     }
 
 
@@ -185,8 +186,8 @@ class FibreTubes:
     mesh: Mesh
 
     @classmethod
-    def from_strands(cls, strands: Strands, mesh: Mesh, max_hairs: int, knots: int) -> FibreTubes:
-        """Return tubes for at most `max_hairs` hairs with `knots` knots each.
+    def from_strands(cls, strands: Strands, mesh: Mesh, max_hairs: int, knot_count: int) -> FibreTubes:
+        """Return tubes for at most `max_hairs` hairs with `knot_count` knots each.
 
         The tubes are widened to cover as much area as all hairs of `strands`, and their absorption is reduced
         accordingly.
@@ -194,7 +195,7 @@ class FibreTubes:
         count = min(len(strands), max_hairs)
         width_factor = len(strands) / count
         roots = Roots(strands.roots.quad[:count], strands.roots.position[:count])
-        knot = np.rint(np.linspace(0, strands.knots_mm.shape[1] - 1, knots)).astype(int)
+        knot = np.rint(np.linspace(0, strands.knots_mm.shape[1] - 1, knot_count)).astype(int)
         reduced = replace(
             strands,
             roots=roots,
@@ -232,16 +233,16 @@ class FibreTubes:
         """Return tube vertices relative to the roots [mm] and normals, (n, m, 3) each, in root frames."""
         knots = self.strands.knots_mm.astype(np.float64)
         tangent = np.gradient(knots, axis=1)
-        tangent /= np.maximum(np.linalg.norm(tangent, axis=2, keepdims=True), _TINY)
+        tangent /= np.maximum(np.linalg.norm(tangent, axis=2, keepdims=True), _MIN_VECTOR_LENGTH)
         angle = 2.0 * np.pi * np.arange(_TUBE_SIDES) / _TUBE_SIDES
         side = np.eye(3)[np.abs(tangent[:, 0]).argmin(axis=1)]
         positions, normals = list[Doubles](), list[Doubles]()
         for k in range(self._knot_count - 1):
             side = side - (side * tangent[:, k]).sum(axis=1, keepdims=True) * tangent[:, k]
-            side = side / np.maximum(np.linalg.norm(side, axis=1, keepdims=True), _TINY)
+            side = side / np.maximum(np.linalg.norm(side, axis=1, keepdims=True), _MIN_VECTOR_LENGTH)
             basis = np.stack([side, np.cross(tangent[:, k], side)], axis=1)
             outward = np.einsum("sj,njc->nsc", np.stack([np.cos(angle), np.sin(angle)], axis=1), basis)
-            radius_mm = _RADIUS_FACTOR * self.strands.radius_mm[:, k, None, None]
+            radius_mm = _TUBE_RADIUS_PER_HAIR_RADIUS * self.strands.radius_mm[:, k, None, None]
             positions.append(knots[:, k, None] + radius_mm * outward)
             normals.append(outward)
         all_positions = np.concatenate([*positions, knots[:, -1:]], axis=1)
@@ -293,13 +294,13 @@ class FibreTubes:
         return np.asarray((start[:, None, None] + np.concatenate(faces)).reshape(-1, 3), np.int64)
 
     def colours(self) -> tuple[Floats, Floats]:
-        """Return a palette of c linear hair colours (1, c, 3), and uv (n m, 2) of the tube vertices in it."""
+        """Return a palette of c linear hair colours (1, c, 3), and the tube vertices' uv (n m, 2)."""
         absorbance = self.strands.absorption * self.strands.radius_mm.max(axis=1, keepdims=True)
-        albedo = np.exp(-_ALBEDO_EXPONENT * np.sqrt(absorbance.astype(np.float64)))
+        albedo = np.exp(-_HAIR_ALBEDO_EXPONENT * np.sqrt(absorbance.astype(np.float64)))
         order = np.argsort(albedo.sum(axis=1), kind="stable")
         group = np.empty(len(order), np.int64)
-        group[order] = np.arange(len(order)) * HAIR_COLOURS // len(order)
-        sums = np.stack([np.bincount(group, albedo[:, c], HAIR_COLOURS) for c in range(3)], axis=-1)
-        row = sums / np.maximum(np.bincount(group, minlength=HAIR_COLOURS), 1)[:, None]
-        u = np.repeat((group + 0.5) / HAIR_COLOURS, self.vertices_per_hair)
+        group[order] = np.arange(len(order)) * HAIR_COLOUR_COUNT // len(order)
+        sums = np.stack([np.bincount(group, albedo[:, c], HAIR_COLOUR_COUNT) for c in range(3)], axis=-1)
+        row = sums / np.maximum(np.bincount(group, minlength=HAIR_COLOUR_COUNT), 1)[:, None]
+        u = np.repeat((group + 0.5) / HAIR_COLOUR_COUNT, self.vertices_per_hair)
         return row[None].astype(np.float32), np.stack([u, np.full_like(u, 0.5)], axis=1).astype(np.float32)

@@ -10,15 +10,23 @@ from typing import Any
 from dermis.base.errors import refuse
 from dermis.base.file_properties import drawn, drawn_with_note, in_code, keys_of, no_effect, noted, refused
 from dermis.formats.gltf.document import Document, Tree
-from dermis.formats.materials import IDENTITY, AlphaMode, FileMaterial, Role, Texture, UvTransform, Wrap
+from dermis.formats.materials import (
+    IDENTITY_UV_TRANSFORM,
+    AlphaMode,
+    FileMaterial,
+    Role,
+    Texture,
+    UvTransform,
+    Wrap,
+)
 from dermis.formats.parts import Colour, parse_colour
 from dermis.formats.referenced_files import resolve_uri
 from dermis.formats.size_limits import MAX_RELIEF_MM
 from dermis.images.io import EmbeddedPicture
 
-EMBEDDED_ROLES = ("normal", "height", "specular", "roughness", "region")
+EMBEDDED_MAP_ROLES = ("normal", "height", "specular", "roughness", "region")
 """Maps besides the colour that files of this package store in the extras of the skin's material."""
-_WRAPS: Mapping[int, Wrap] = {10497: "repeat", 33648: "mirror", 33071: "clamp"}
+_WRAP_OF_GLTF_CODE: Mapping[int, Wrap] = {10497: "repeat", 33648: "mirror", 33071: "clamp"}
 _NEAREST_FILTER = 9728
 _SOURCE_EXTENSIONS = ("EXT_texture_webp", "EXT_texture_avif")
 _ALPHA_MODES: Mapping[str, AlphaMode] = {"OPAQUE": "opaque", "MASK": "mask", "BLEND": "blend"}
@@ -28,13 +36,13 @@ _SCATTERING_EXTENSIONS = (
     "KHR_materials_diffuse_transmission",
     "KHR_materials_subsurface",
 )
-_GLOSS_EXTENSION, _UNLIT_EXTENSION, _STRENGTH_EXTENSION = (
+_GLOSS_EXTENSION, _UNLIT_EXTENSION, _EMISSIVE_STRENGTH_EXTENSION = (
     "KHR_materials_pbrSpecularGlossiness",
     "KHR_materials_unlit",
     "KHR_materials_emissive_strength",
 )
 _ROUGHNESS_CHANNEL, _METALNESS_CHANNEL, _GLOSS_CHANNEL = 1, 2, 3
-_NOT_DRAWN = {
+_UNDRAWN_EXTENSIONS = {
     "KHR_materials_anisotropy": "anisotropic highlights",
     "KHR_materials_clearcoat": "clear coat",
     "KHR_materials_dispersion": "dispersion",
@@ -59,7 +67,12 @@ GLTF_MATERIALS = (
     noted("`roughnessFactor`", "skin has a measured roughness", other_parts="drawn"),
     noted("`metallicFactor`", other_parts="drawn"),
     noted("`emissiveFactor`, `emissiveTexture`", other_parts="drawn"),
-    noted(f"`{_STRENGTH_EXTENSION}`", "factor of the emission", _STRENGTH_EXTENSION, other_parts="drawn"),
+    noted(
+        f"`{_EMISSIVE_STRENGTH_EXTENSION}`",
+        "factor of the emission",
+        _EMISSIVE_STRENGTH_EXTENSION,
+        other_parts="drawn",
+    ),
     drawn_with_note("emission without a base colour", "taken for the reflectance, as in scans"),
     noted(f"`{_UNLIT_EXTENSION}`", "the colour is taken for the reflectance", _UNLIT_EXTENSION),
     noted("`alphaMode`, `alphaCutoff`", "cut out, also in shadows; `BLEND` at 0.5", other_parts="drawn"),
@@ -73,20 +86,20 @@ GLTF_MATERIALS = (
     refused(f"`{_BASISU_EXTENSION}` without another picture", "KTX2"),
     drawn_with_note(in_code(_SCATTERING_EXTENSIONS), "the material is skin", *_SCATTERING_EXTENSIONS),
     drawn_with_note(f"`{_GLOSS_EXTENSION}`", "without the specular colour", _GLOSS_EXTENSION),
-    *(noted(f"`{name}`", text, name) for name, text in _NOT_DRAWN.items()),
+    *(noted(f"`{name}`", text, name) for name, text in _UNDRAWN_EXTENSIONS.items()),
     noted("other extensions of materials"),
 )
 """Properties of glTF materials and textures."""
-KNOWN_EXTENSIONS = keys_of(GLTF_MATERIALS)
+MATERIAL_EXTENSIONS = keys_of(GLTF_MATERIALS)
 """Extensions of materials and textures that are read or named in a note."""
 
 
 def read_materials(document: Document) -> tuple[FileMaterial, ...]:
     """Return the materials of a file in its order."""
-    return tuple(_Reader(document, material).read() for material in document.items("materials"))
+    return tuple(_MaterialReader(document, material).read() for material in document.items("materials"))
 
 
-class _Reader:
+class _MaterialReader:
     """Reader of one material; it collects the properties without effect, which a note lists."""
 
     def __init__(self, document: Document, material: Tree) -> None:
@@ -111,8 +124,8 @@ class _Reader:
             self.unused.append("unlit colours, which are taken for the reflectance")
         if "occlusionTexture" in self.material:
             self.unused.append("picture of occlusion, which is computed from the shape")
-        self.unused += [text for name, text in _NOT_DRAWN.items() if name in self.extensions]
-        self.unused += [name for name in self.extensions if name not in KNOWN_EXTENSIONS]
+        self.unused += [text for name, text in _UNDRAWN_EXTENSIONS.items() if name in self.extensions]
+        self.unused += [name for name in self.extensions if name not in MATERIAL_EXTENSIONS]
         return FileMaterial(
             str(self.material.get("name") or ""),
             textures,
@@ -134,28 +147,28 @@ class _Reader:
         colour = extras.get("colour") or (self.material.get("pbrMetallicRoughness") or {}).get(
             "baseColorTexture"
         )
-        references = {"colour": colour, **{role: extras.get(role) for role in EMBEDDED_ROLES}}
+        references = {"colour": colour, **{role: extras.get(role) for role in EMBEDDED_MAP_ROLES}}
         pictures = {
             role: self._read_texture_picture(self.document.item("textures", reference["index"]))
             for role, reference in references.items()
             if reference is not None
         }
         maps: dict[str, object] = {role: picture for role, picture in pictures.items() if picture is not None}
-        height_mm = _checked_relief(extras.get("height_mm"))
+        height_mm = _checked_relief_mm(extras.get("height_mm"))
         return maps if height_mm is None else maps | {"height_mm": height_mm}
 
-    def _from_glossiness(self, gloss: Tree) -> Tree:
+    def _from_glossiness(self, glossiness_extension: Tree) -> Tree:
         """Return metallic-roughness properties of a specular-glossiness material."""
         pbr = {
-            "baseColorFactor": gloss.get("diffuseFactor", [1.0, 1.0, 1.0, 1.0]),
+            "baseColorFactor": glossiness_extension.get("diffuseFactor", [1.0, 1.0, 1.0, 1.0]),
             "metallicFactor": 0.0,
-            "roughnessFactor": 1.0 - float(gloss.get("glossinessFactor", 1.0)),
+            "roughnessFactor": 1.0 - float(glossiness_extension.get("glossinessFactor", 1.0)),
         }
-        if "specularFactor" in gloss:
+        if "specularFactor" in glossiness_extension:
             self.unused.append("specular colour")
-        if "diffuseTexture" in gloss:
-            pbr["baseColorTexture"] = gloss["diffuseTexture"]
-        if "specularGlossinessTexture" in gloss:
+        if "diffuseTexture" in glossiness_extension:
+            pbr["baseColorTexture"] = glossiness_extension["diffuseTexture"]
+        if "specularGlossinessTexture" in glossiness_extension:
             self.unused.append("picture of specular colour and glossiness")
         return pbr
 
@@ -174,7 +187,9 @@ class _Reader:
         return {role: texture for role, texture in found.items() if texture is not None}
 
     def _emitted_radiance(self) -> Colour:
-        strength = float((self.extensions.get(_STRENGTH_EXTENSION) or {}).get("emissiveStrength", 1.0))
+        strength = float(
+            (self.extensions.get(_EMISSIVE_STRENGTH_EXTENSION) or {}).get("emissiveStrength", 1.0)
+        )
         r, g, b = (strength * float(value) for value in self.material.get("emissiveFactor", (0.0, 0.0, 0.0)))
         return r, g, b
 
@@ -194,13 +209,16 @@ class _Reader:
         sampler = self.document.item("samplers", entry["sampler"]) if "sampler" in entry else {}
         if sampler.get("magFilter") == _NEAREST_FILTER:
             self.unused.append("magnification without interpolation")
-        wrap = _WRAPS[sampler.get("wrapS", 10497)], _WRAPS[sampler.get("wrapT", 10497)]
+        wrap = (
+            _WRAP_OF_GLTF_CODE[sampler.get("wrapS", 10497)],
+            _WRAP_OF_GLTF_CODE[sampler.get("wrapT", 10497)],
+        )
         return Texture(picture, uv_set, _uv_transform(extension), wrap, channel)
 
-    def _read_texture_picture(self, entry: Tree) -> EmbeddedPicture | None:
-        extensions = entry.get("extensions") or {}
+    def _read_texture_picture(self, texture_tree: Tree) -> EmbeddedPicture | None:
+        extensions = texture_tree.get("extensions") or {}
         sources = [extensions[name].get("source") for name in _SOURCE_EXTENSIONS if name in extensions]
-        sources.append(entry.get("source"))
+        sources.append(texture_tree.get("source"))
         source = next((one for one in sources if one is not None), None)
         if source is None:
             if _BASISU_EXTENSION in extensions:
@@ -212,15 +230,15 @@ class _Reader:
         return read_picture(self.document, source)
 
 
-def read_picture(document: Document, source: Any) -> EmbeddedPicture:
+def read_picture(document: Document, image_index: Any) -> EmbeddedPicture:
     """Return an image of a document, selected by index; its format is detected from its content.
 
-    source : index of the image
+    image_index : index of the image
 
     Raises DermisError for an image file outside the folder of the document.
     """
-    image = document.item("images", source)
-    name = f"{document.path}, image {image.get('name', source)}"
+    image = document.item("images", image_index)
+    name = f"{document.path}, image {image.get('name', image_index)}"
     if "bufferView" in image:
         return EmbeddedPicture(name, bytes(document.read_view(image["bufferView"])))
     uri = image["uri"]
@@ -230,7 +248,7 @@ def read_picture(document: Document, source: Any) -> EmbeddedPicture:
     return EmbeddedPicture(str(file), file)
 
 
-def _checked_relief(height_mm: object) -> float | None:
+def _checked_relief_mm(height_mm: object) -> float | None:
     """Return the relief of one grey level of an embedded 8-bit height map [mm], after checking its range."""
     if height_mm is None:
         return None
@@ -243,7 +261,7 @@ def _checked_relief(height_mm: object) -> float | None:
 def _uv_transform(extension: Tree) -> UvTransform:
     """Return the uv transform that KHR_texture_transform states: first scale, then rotation, then offset."""
     if not extension:
-        return IDENTITY
+        return IDENTITY_UV_TRANSFORM
     (x, y), (scale_x, scale_y) = extension.get("offset", (0.0, 0.0)), extension.get("scale", (1.0, 1.0))
     angle = float(extension.get("rotation", 0.0))
     cos, sin = math.cos(angle), math.sin(angle)

@@ -13,12 +13,18 @@ from dermis.base.errors import refuse
 from dermis.formats.gltf.document import Document, Tree, checked_index
 from dermis.formats.gltf.nodes import Nodes, node_names
 from dermis.formats.parts import Bones, to_floats
-from dermis.formats.size_limits import DAMAGED_ADVICE, MAX_BONES, MAX_INFLUENCES, MAX_TARGETS, check_limit
-from dermis.mesh.rig import INFLUENCES
+from dermis.formats.size_limits import (
+    DAMAGED_ADVICE,
+    MAX_BONES,
+    MAX_BONES_PER_VERTEX,
+    MAX_TARGETS,
+    check_limit,
+)
+from dermis.mesh.rig import BONES_PER_POINT
 
 _NODE_PATHS = {"translation", "rotation", "scale"}
 _STATIC_BONE_NAME = "scene"
-_BATCH_VERTICES = 1 << 16
+_VERTICES_PER_BATCH = 1 << 16
 
 
 class SkinInfluences(NamedTuple):
@@ -36,7 +42,7 @@ class Armature:
     """Bones of a glTF scene: joints of skins, and animated nodes.
 
     bone_of_node : bone index by node index
-    static_bone : index of the root bone that was added for meshes that no bone moves; None if it was not
+    static_bone : index of the root bone that was added for meshes that no bone moves; None without it
         needed
     """
 
@@ -47,8 +53,8 @@ class Armature:
     def bone_for_node(self, nodes: Nodes, node: int) -> int | None:
         """Return the bone that moves the mesh of a node without a skin; None if there is none.
 
-        The bone is that of the node itself, else that of the nearest ancestor with a bone, else
-        `static_bone`.
+        The bone belongs to the node itself, or to the nearest ancestor with a bone. Without such an
+        ancestor the bone is `static_bone`.
         """
         bones = (self.bone_of_node[k] for k in nodes.ancestors(node) if k in self.bone_of_node)
         return next(bones, self.static_bone)
@@ -117,7 +123,7 @@ def read_influences(
     skin, attributes = _node_skin(document, node), primitive["attributes"]
     count = max(1, sum(name.startswith("WEIGHTS_") for name in attributes))
     culprit = f"{document.path}: {nodes.names[node]!r}"
-    check_limit(culprit, 4 * count, MAX_INFLUENCES, "joints of a vertex", "Export it with fewer")
+    check_limit(culprit, 4 * count, MAX_BONES_PER_VERTEX, "joints of a vertex", "Export it with fewer")
     sets = [k for k in range(count) if f"JOINTS_{k}" in attributes and f"WEIGHTS_{k}" in attributes]
     if not sets:
         actual = f"the mesh of {nodes.names[node]!r} has none"
@@ -131,8 +137,8 @@ def read_influences(
         inverse_bind = document.read_floats(skin["inverseBindMatrices"]).reshape(-1, 4, 4).transpose(0, 2, 1)
     resting = nodes.world[skin["joints"]] @ inverse_bind[: len(skin["joints"])]
     matrices = np.empty((len(joint), 4, 4))
-    for start in range(0, len(joint), _BATCH_VERTICES):
-        batch = slice(start, start + _BATCH_VERTICES)
+    for start in range(0, len(joint), _VERTICES_PER_BATCH):
+        batch = slice(start, start + _VERTICES_PER_BATCH)
         matrices[batch] = np.einsum("vk,vkij->vij", weight[batch], resting[joint[batch]])
     bone = np.array([armature.bone_of_node[k] for k in skin["joints"]])
     return SkinInfluences(bone[joint], weight), np.asarray(matrices)
@@ -158,8 +164,8 @@ def _strongest_influences(joint: Index, weight: Doubles) -> tuple[Index, Doubles
 
     The weights are normalised to sum 1.
     """
-    if weight.shape[1] > INFLUENCES:
-        order = np.argsort(-weight, axis=1, kind="stable")[:, :INFLUENCES]
+    if weight.shape[1] > BONES_PER_POINT:
+        order = np.argsort(-weight, axis=1, kind="stable")[:, :BONES_PER_POINT]
         joint, weight = np.take_along_axis(joint, order, axis=1), np.take_along_axis(weight, order, axis=1)
     total = weight.sum(axis=1, keepdims=True)
     first = np.eye(1, weight.shape[1])  # a vertex without weights follows its first joint
@@ -195,23 +201,23 @@ def target_names(mesh: Tree) -> tuple[str, ...]:
 
 
 def read_targets(
-    document: Document, mesh: Tree, names: tuple[str, ...], primitive: Tree, count: int
+    document: Document, mesh: Tree, all_target_names: tuple[str, ...], primitive: Tree, vertex_count: int
 ) -> dict[str, VertexDisplacements]:
     """Return the vertex displacements of a primitive by morph target name, in the mesh's space.
 
-    names : names of the morph targets of the mesh
-    count : number of vertices of the primitive
+    all_target_names : names of the morph targets of the mesh
+    vertex_count : number of vertices of the primitive
 
-    Raises DermisError if the number of displacements is not `count`, and for values that are not finite.
+    Raises DermisError if the number of displacements is not `vertex_count` or values are not finite.
     """
     displacements: dict[str, VertexDisplacements] = {}
-    for name, target in zip(names, primitive.get("targets", []), strict=False):
+    for name, target in zip(all_target_names, primitive.get("targets", []), strict=False):
         if "POSITION" not in target:
             continue
         delta = document.read_floats(target["POSITION"])
-        if delta.shape != (count, 3):
+        if delta.shape != (vertex_count, 3):
             actual = f"{name!r} of mesh {mesh.get('name', '')!r} moves {len(delta)}"
-            refuse(document.path, f"targets of {count} vertices", actual, "Export the file again")
+            refuse(document.path, f"targets of {vertex_count} vertices", actual, "Export the file again")
         if not np.isfinite(delta).all():
             actual = f"{name!r} of mesh {mesh.get('name', '')!r} has some that are NaN or infinite"
             refuse(document.path, "finite displacements", actual, DAMAGED_ADVICE)

@@ -15,7 +15,7 @@ from dermis.formats import size_limits as limits
 from dermis.formats.gltf import draco, vrm
 from dermis.formats.gltf.document import Document, Tree, read_document
 from dermis.formats.gltf.nodes import Nodes, read_nodes
-from dermis.formats.gltf.read_materials import KNOWN_EXTENSIONS, read_materials
+from dermis.formats.gltf.read_materials import MATERIAL_EXTENSIONS, read_materials
 from dermis.formats.gltf.rigs import (
     Armature,
     SkinInfluences,
@@ -27,13 +27,13 @@ from dermis.formats.gltf.rigs import (
     read_targets,
     target_names,
 )
-from dermis.formats.gltf.unread import LIGHTS, note_unread
+from dermis.formats.gltf.unread import LIGHTS_EXTENSION, note_unread
 from dermis.formats.materials import FileMaterial
-from dermis.formats.parts import GREY, MaterialGroup, MeshFile, MeshPart, find_quads
+from dermis.formats.parts import DEFAULT_COLOUR, MaterialGroup, MeshFile, MeshPart, find_quads
 from dermis.formats.text_files import list_names
 
-_TRIANGLES, _STRIP, _FAN = 4, 5, 6
-_MAX_COUNTS = {
+_TRIANGLES_MODE, _STRIP_MODE, _FAN_MODE = 4, 5, 6
+_MAX_SCENE_COUNTS = {
     "primitives": limits.MAX_GROUPS,
     "triangles": limits.MAX_TRIANGLES,
     "vertices": limits.MAX_VERTICES,
@@ -49,11 +49,11 @@ GLTF_PROPERTIES = (
     noted("alpha of `COLOR_0`", "no note if it is 1"),
     drawn(f"sparse accessors, normalised integers, `{_QUANTISATION_EXTENSION}`", "", _QUANTISATION_EXTENSION),
     drawn(
-        f"`{draco.EXTENSION}`",
+        f"`{draco.DRACO_EXTENSION}`",
         'with `pip install "dermis[formats]"` ([DracoPy](https://github.com/seung-lab/DracoPy)): positions, '
         "normals, uv, colours, joints and weights; refused if the data does not have the size that its "
         "accessors state",
-        draco.EXTENSION,
+        draco.DRACO_EXTENSION,
     ),
     refused(
         f"{in_code(_MESHOPT_EXTENSIONS)}, if required",
@@ -65,7 +65,7 @@ GLTF_PROPERTIES = (
     drawn("transforms of nodes"),
     drawn("morph targets, default weights, skins", "they move the head, see [motion](motion.md)"),
     drawn("animations", "by `--motion`, see [motion](motion.md)"),
-    noted(f"`{LIGHTS}`, cameras", "`--lights` and `--camera` set others", LIGHTS),
+    noted(f"`{LIGHTS_EXTENSION}`, cameras", "`--lights` and `--camera` set others", LIGHTS_EXTENSION),
     noted("several scenes", "the default scene is read"),
     refused("buffers without data", "such as the fallback of a compressed one"),
     drawn_with_note(
@@ -75,18 +75,18 @@ GLTF_PROPERTIES = (
     no_effect("`asset`, `extras`, other names", "information for programs and people"),
 )
 """Properties of glTF files besides their materials."""
-_READ_EXTENSIONS = {*KNOWN_EXTENSIONS, *keys_of((*GLTF_PROPERTIES, *vrm.VRM_PROPERTIES))}
+_READ_EXTENSIONS = {*MATERIAL_EXTENSIONS, *keys_of((*GLTF_PROPERTIES, *vrm.VRM_PROPERTIES))}
 _COMPRESSION_ADVICE = (
     "Export without this compression: gltfpack without -c and -cc, or gltf-transform copy IN.glb OUT.glb"
 )
 _EXTENSION_ADVICE = dict.fromkeys(_MESHOPT_EXTENSIONS, _COMPRESSION_ADVICE)
-_OTHER_ADVICE = "Export without it"
+_OTHER_EXTENSION_ADVICE = "Export without it"
 
 
 def read_gltf(path: Path) -> MeshFile:
     """Read the scene of a .glb or .gltf file in its rest pose.
 
-    Joints have the transforms of their nodes, and morph targets their default weights. A mesh with a skin is
+    Joints have the transforms of their nodes; morph targets have their default weights. A mesh with a skin is
     transformed by its joints; the transform of its node has no effect.
     """
     document = read_document(path)
@@ -107,7 +107,8 @@ def _refuse_extensions(document: Document) -> None:
     unsupported = [name for name in required if name not in _READ_EXTENSIONS]
     if unsupported:
         advice = next(
-            (_EXTENSION_ADVICE[name] for name in unsupported if name in _EXTENSION_ADVICE), _OTHER_ADVICE
+            (_EXTENSION_ADVICE[name] for name in unsupported if name in _EXTENSION_ADVICE),
+            _OTHER_EXTENSION_ADVICE,
         )
         refuse(document.path, "plain glTF", f"the file requires {list_names(unsupported)}", advice)
 
@@ -130,7 +131,7 @@ class _SceneReader:
 
     def parts(self) -> Iterator[MeshPart]:
         """Yield each triangle primitive of the scene as a mesh part; check the scene's total size."""
-        counts = dict.fromkeys(_MAX_COUNTS, 0)
+        counts = dict.fromkeys(_MAX_SCENE_COUNTS, 0)
         for part in self._all_parts():
             displaced = sum(len(vertex) for vertex, _ in part.targets.values())
             added = 1, len(part.triangles), len(part.positions), displaced
@@ -139,13 +140,13 @@ class _SceneReader:
                 self._check_count(name, counts[name])
             yield part
 
-    def _check_count(self, name: str, count: int) -> None:
+    def _check_count(self, item_noun: str, count: int) -> None:
         """Refuse more triangles, vertices or displacements than allowed, before the scene fills the memory.
 
-        name : name of the limit, a key of `_MAX_COUNTS`
+        item_noun : name of the limit, a key of `_MAX_SCENE_COUNTS`
         """
         advice = "Export the head alone, or decimated"
-        limits.check_limit(self.document.path, count, _MAX_COUNTS[name], name, advice)
+        limits.check_limit(self.document.path, count, _MAX_SCENE_COUNTS[item_noun], item_noun, advice)
 
     def _all_parts(self) -> Iterator[MeshPart]:
         nodes, scene_nodes = self.document.items("nodes"), self.nodes.scene_nodes or ()
@@ -159,16 +160,22 @@ class _SceneReader:
     def _mesh_parts(self, mesh: Tree, node: int | None) -> Iterator[MeshPart]:
         names = target_names(mesh)
         for primitive in mesh["primitives"]:
-            has_triangles = primitive.get("mode", _TRIANGLES) in (_TRIANGLES, _STRIP, _FAN)
+            has_triangles = primitive.get("mode", _TRIANGLES_MODE) in (
+                _TRIANGLES_MODE,
+                _STRIP_MODE,
+                _FAN_MODE,
+            )
             if has_triangles and _dermis_extras(primitive).get("hair") is not True:
                 yield self._scene_part(mesh, names, primitive, node)
 
-    def _scene_part(self, mesh: Tree, names: tuple[str, ...], primitive: Tree, node: int | None) -> MeshPart:
+    def _scene_part(
+        self, mesh: Tree, target_names: tuple[str, ...], primitive: Tree, node: int | None
+    ) -> MeshPart:
         """Return a primitive as a mesh part in scene space, transformed by its node or by its skin.
 
-        names : names of the morph targets of the mesh
+        target_names : names of the morph targets of the mesh
         """
-        part, targets = self._read_primitive(mesh, names, primitive)
+        part, targets = self._read_primitive(mesh, target_names, primitive)
         if node is None:
             return _transform_part(part, targets, np.eye(4))
         if "skin" in self.document.tree["nodes"][node] and self.armature:
@@ -182,7 +189,7 @@ class _SceneReader:
         return replace(transformed, bone=np.full((count, 1), bone), weight=np.ones((count, 1)))
 
     def _read_primitive(
-        self, mesh: Tree, names: tuple[str, ...], primitive: Tree
+        self, mesh: Tree, target_names: tuple[str, ...], primitive: Tree
     ) -> tuple[MeshPart, dict[str, VertexDisplacements]]:
         """Return a primitive in mesh space, deformed by the default weights, and all its morph targets."""
         attributes = primitive["attributes"]
@@ -193,8 +200,8 @@ class _SceneReader:
             self.document.read_floats(attributes[name]) if name in attributes else None
             for name in ("TEXCOORD_0", "NORMAL", "COLOR_0")
         )
-        targets = read_targets(self.document, mesh, names, primitive, len(positions))
-        targets = self.avatar.with_expressions(mesh, names, targets)
+        targets = read_targets(self.document, mesh, target_names, primitive, len(positions))
+        targets = self.avatar.with_expressions(mesh, target_names, targets)
         displaced = apply_targets(positions, targets, self.weights)
         if displaced is not positions:
             normals = None  # the normals of the file belong to the undisplaced shape
@@ -215,31 +222,33 @@ class _SceneReader:
             other_uv=self._read_other_uv(group, attributes, len(positions)),
         ), targets
 
-    def _read_other_uv(self, group: MaterialGroup, attributes: Tree, count: int) -> dict[int, Doubles]:
-        """Return the additional uv sets (count, 2) that textures of a material use, by index of the set."""
-        material = self.materials[group.material] if group.material >= 0 else FileMaterial()
+    def _read_other_uv(
+        self, material_group: MaterialGroup, attributes: Tree, vertex_count: int
+    ) -> dict[int, Doubles]:
+        """Return the additional uv sets (vertex_count, 2) that a material's textures use, by set index."""
+        material = self.materials[material_group.material] if material_group.material >= 0 else FileMaterial()
         found = {}
         for index in sorted({texture.uv_set for texture in material.textures.values()} - {0}):
             if f"TEXCOORD_{index}" not in attributes:
                 actual = f"material {material.name!r} uses uv set {index}, which its mesh does not have"
                 refuse(self.document.path, "uv for each texture", actual, limits.DAMAGED_ADVICE)
-            found[index] = self.document.read_floats(attributes[f"TEXCOORD_{index}"]).reshape(count, 2)
+            found[index] = self.document.read_floats(attributes[f"TEXCOORD_{index}"]).reshape(vertex_count, 2)
         return found
 
-    def _read_triangles(self, primitive: Tree, count: int) -> Index:
+    def _read_triangles(self, primitive: Tree, vertex_count: int) -> Index:
         """Return the vertex indices of a primitive's triangles, (f, 3); strips and fans are expanded.
 
-        count : number of vertices of the primitive
+        vertex_count : number of vertices of the primitive
         """
-        index = np.arange(count)
+        index = np.arange(vertex_count)
         if "indices" in primitive:
             corners = self.document.item("accessors", primitive["indices"])["count"]
             self._check_count("triangles", corners // 3)
             index = self.document.read_values(primitive["indices"]).ravel().astype(np.int64)
-        mode = primitive.get("mode", _TRIANGLES)
-        if mode == _TRIANGLES:
+        mode = primitive.get("mode", _TRIANGLES_MODE)
+        if mode == _TRIANGLES_MODE:
             return index.reshape(-1, 3)
-        if mode == _FAN:
+        if mode == _FAN_MODE:
             return np.column_stack((index[1:-1], index[2:], np.full(max(len(index) - 2, 0), index[0])))
         strip = np.column_stack((index[:-2], index[1:-1], index[2:]))
         strip[1::2] = strip[1::2, ::-1]
@@ -252,7 +261,7 @@ class _SceneReader:
         index = primitive.get("material", -1)
         names = tuple(str(item["name"]) for item in (material, mesh) if item.get("name"))
         colour = self.materials[index].colour if index >= 0 else None
-        return MaterialGroup(names, colour or GREY, index)
+        return MaterialGroup(names, colour or DEFAULT_COLOUR, index)
 
 
 def _dermis_extras(primitive: Tree) -> Tree:
@@ -262,17 +271,19 @@ def _dermis_extras(primitive: Tree) -> Tree:
     return own if isinstance(own, dict) else {}
 
 
-def _transform_part(part: MeshPart, targets: dict[str, VertexDisplacements], matrix: Doubles) -> MeshPart:
+def _transform_part(
+    mesh_part: MeshPart, targets: dict[str, VertexDisplacements], matrix: Doubles
+) -> MeshPart:
     """Return a mesh part and its morph targets transformed by `matrix` (4, 4).
 
     Reflections reverse the vertex order of triangles, so that triangles still face outwards.
     """
     linear = matrix[:3, :3]
     return replace(
-        part,
-        positions=part.positions @ linear.T + matrix[:3, 3],
-        normals=None if part.normals is None else part.normals @ _normal_matrix(linear).T,
-        triangles=part.triangles[:, ::-1] if np.linalg.det(linear) < 0 else part.triangles,
+        mesh_part,
+        positions=mesh_part.positions @ linear.T + matrix[:3, 3],
+        normals=None if mesh_part.normals is None else mesh_part.normals @ _normal_matrix(linear).T,
+        triangles=mesh_part.triangles[:, ::-1] if np.linalg.det(linear) < 0 else mesh_part.triangles,
         targets={name: (own.vertex, own.delta @ linear.T) for name, own in targets.items()},
     )
 
@@ -293,23 +304,26 @@ def _nearest_rigid(matrix: Doubles) -> Doubles:
 
 
 def _skin_part(
-    part: MeshPart, targets: dict[str, VertexDisplacements], influences: SkinInfluences, matrices: Doubles
+    mesh_part: MeshPart,
+    targets: dict[str, VertexDisplacements],
+    influences: SkinInfluences,
+    matrices: Doubles,
 ) -> MeshPart:
     """Return a mesh part and its morph targets with each vertex transformed by its skinning matrix.
 
     matrices : (v, 4, 4) skinning matrices at rest
     """
-    if len(influences.bone) != len(part.positions):
-        raise ValueError(f"{len(part.positions)} vertices have {len(influences.bone)} joints")
+    if len(influences.bone) != len(mesh_part.positions):
+        raise ValueError(f"{len(mesh_part.positions)} vertices have {len(influences.bone)} joints")
     linear = matrices[:, :3, :3]
     mirrored = np.linalg.det(linear) < 0
     return replace(
-        part,
-        positions=np.einsum("vij,vj->vi", linear, part.positions) + matrices[:, :3, 3],
+        mesh_part,
+        positions=np.einsum("vij,vj->vi", linear, mesh_part.positions) + matrices[:, :3, 3],
         normals=None
-        if part.normals is None
-        else np.einsum("vij,vj->vi", _normal_matrix(linear), part.normals),
-        triangles=part.triangles[:, ::-1] if mirrored.mean() > 0.5 else part.triangles,
+        if mesh_part.normals is None
+        else np.einsum("vij,vj->vi", _normal_matrix(linear), mesh_part.normals),
+        triangles=mesh_part.triangles[:, ::-1] if mirrored.mean() > 0.5 else mesh_part.triangles,
         targets={
             name: (own.vertex, np.einsum("vij,vj->vi", linear[own.vertex], own.delta))
             for name, own in targets.items()
@@ -319,15 +333,15 @@ def _skin_part(
     )
 
 
-def _normal_matrix(linear: Doubles) -> Doubles:
+def _normal_matrix(linear_transform: Doubles) -> Doubles:
     """Return the matrices (..., 3, 3) that transform normals for linear transforms (..., 3, 3).
 
     The matrices are scaled so that a uniform scale preserves the length of normals. Cofactors are used
     because cofactors exist for singular transforms, too.
     """
-    rows = [linear[..., k, :] for k in range(3)]
+    rows = [linear_transform[..., k, :] for k in range(3)]
     cofactors = np.stack([np.cross(rows[(i + 1) % 3], rows[(i + 2) % 3]) for i in range(3)], axis=-2)
-    determinant = np.asarray(np.linalg.det(linear))
+    determinant = np.asarray(np.linalg.det(linear_transform))
     sign = np.where(determinant < 0, -1.0, 1.0)
     scale = np.where(determinant == 0, 1.0, np.abs(determinant) ** (2 / 3))
     return np.asarray((sign / scale)[..., None, None] * cofactors)

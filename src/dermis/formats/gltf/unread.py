@@ -8,8 +8,8 @@ from dermis.formats.gltf.document import Document
 from dermis.formats.gltf.nodes import Nodes
 from dermis.formats.text_files import list_names
 
-LIGHTS = "KHR_lights_punctual"
-_POINTS_AND_LINES = range(4)  # modes of primitives
+LIGHTS_EXTENSION = "KHR_lights_punctual"
+_POINT_AND_LINE_MODES = range(4)  # modes of primitives
 
 
 def note_unread(document: Document, nodes: Nodes, read_extensions: Collection[str]) -> Iterator[str]:
@@ -19,14 +19,14 @@ def note_unread(document: Document, nodes: Nodes, read_extensions: Collection[st
     """
     listed_nodes = document.items("nodes")
     in_scene = [listed_nodes[k] for k in nodes.scene_nodes or ()]
-    lights = sum(LIGHTS in (node.get("extensions") or {}) for node in in_scene)
+    lights = sum(LIGHTS_EXTENSION in (node.get("extensions") or {}) for node in in_scene)
     if lights:
         yield f"its lights ({lights}) are left out; --lights or the scene sets lights"
     cameras = sum("camera" in node for node in in_scene)
     if cameras:
         yield f"its cameras ({cameras}) are left out; --camera sets one"
     modes = [one.get("mode", 4) for mesh in document.items("meshes") for one in mesh["primitives"]]
-    thin = sum(mode in _POINTS_AND_LINES for mode in modes)
+    thin = sum(mode in _POINT_AND_LINE_MODES for mode in modes)
     if thin:
         yield f"points and lines ({thin} primitives) are left out"
     if len(document.items("scenes")) > 1:

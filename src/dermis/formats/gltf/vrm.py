@@ -18,7 +18,7 @@ from dermis.formats.text_files import list_names
 VRM_0, VRM_1 = "VRM", "VRMC_vrm"
 """Extensions of VRM 0.x, whose avatars look along -Z, and of VRM 1.0, whose avatars look along +Z."""
 _TOON_EXTENSION = "VRMC_materials_mtoon"
-_NOT_READ = {
+_UNREAD_PROPERTIES = {
     "springs of hair and cloth": ("secondaryAnimation", "VRMC_springBone"),
     "constraints of bones": ("VRMC_node_constraint",),
     "visibility in first person": ("firstPerson",),
@@ -39,13 +39,13 @@ VRM_PROPERTIES = (
     noted(
         f"MToon (`{_TOON_EXTENSION}`, in VRM 0 `VRM/MToon`)", "only the base colour is drawn", _TOON_EXTENSION
     ),
-    *(noted(text, "", *keys) for text, keys in _NOT_READ.items()),
+    *(noted(text, "", *keys) for text, keys in _UNREAD_PROPERTIES.items()),
 )
 """Properties of VRM files in addition to those of glTF."""
-_MATERIAL_BINDS = ("materialValues", "materialColorBinds", "textureTransformBinds")
-_CUSTOM_PRESETS = ("", "unknown")  # values of presetName for expressions that have a name of their own
-_PERCENT = 0.01
-_MAX_WEIGHT = 100.0
+_MATERIAL_BIND_KEYS = ("materialValues", "materialColorBinds", "textureTransformBinds")
+_CUSTOM_PRESET_NAMES = ("", "unknown")  # values of presetName for expressions that have a name of their own
+_FRACTION_PER_PERCENT = 0.01
+_MAX_TARGET_WEIGHT = 100.0
 
 
 @dataclass(frozen=True)
@@ -61,11 +61,11 @@ class Avatar:
     notes: tuple[str, ...] = ()
 
     def with_expressions(
-        self, mesh: Tree, names: Sequence[str], targets: dict[str, VertexDisplacements]
+        self, mesh: Tree, target_names: Sequence[str], targets: dict[str, VertexDisplacements]
     ) -> dict[str, VertexDisplacements]:
         """Return the morph targets of a primitive, with the expressions added as further morph targets.
 
-        names : names of the morph targets of the mesh
+        target_names : names of the morph targets of the mesh
         targets : morph targets of the primitive, by name
 
         An expression with the name of a morph target is omitted.
@@ -74,7 +74,7 @@ class Avatar:
         """
         combined, displaced = dict[str, VertexDisplacements](), 0
         for name, weights in self.expressions.get(id(mesh), {}).items():
-            bound = {names[k]: weight for k, weight in weights.items() if 0 <= k < len(names)}
+            bound = {target_names[k]: weight for k, weight in weights.items() if 0 <= k < len(target_names)}
             sources = [(targets[own], weight) for own, weight in bound.items() if own in targets]
             displaced += sum(len(own.vertex) for own, _ in sources)
             if displaced > MAX_DISPLACEMENTS:
@@ -101,7 +101,7 @@ def read_avatar(document: Document) -> Avatar:
     return Avatar(axes, expressions, tuple(_avatar_notes(extensions, avatar, is_vrm_0)))
 
 
-class _Bind(NamedTuple):
+class _TargetBind(NamedTuple):
     """Morph target that an expression moves.
 
     name : name of the expression
@@ -114,20 +114,20 @@ class _Bind(NamedTuple):
     weight: float
 
 
-def _vrm_0_binds(document: Document, avatar: Tree) -> Iterator[_Bind]:
+def _vrm_0_binds(document: Document, avatar: Tree) -> Iterator[_TargetBind]:
     """Yield the morph targets of all expressions in VRM 0.x, whose weights are percentages.
 
     avatar : VRM extension of the file
     """
     for group in _expression_groups(avatar):
         preset = str(group.get("presetName", "")).casefold()
-        name = str(group.get("name", "")) if preset in _CUSTOM_PRESETS else preset
+        name = str(group.get("name", "")) if preset in _CUSTOM_PRESET_NAMES else preset
         for bind in group.get("binds") or () if name else ():
             mesh = document.item("meshes", bind["mesh"])
-            yield _Bind(name, mesh, int(bind["index"]), _PERCENT * _bind_weight(bind))
+            yield _TargetBind(name, mesh, int(bind["index"]), _FRACTION_PER_PERCENT * _bind_weight(bind))
 
 
-def _vrm_1_binds(document: Document, avatar: Tree) -> Iterator[_Bind]:
+def _vrm_1_binds(document: Document, avatar: Tree) -> Iterator[_TargetBind]:
     """Yield the morph targets of all expressions in VRM 1.0.
 
     avatar : VRM extension of the file
@@ -137,12 +137,12 @@ def _vrm_1_binds(document: Document, avatar: Tree) -> Iterator[_Bind]:
             node = document.item("nodes", bind["node"])
             if "mesh" in node:
                 mesh = document.item("meshes", node["mesh"])
-                yield _Bind(name, mesh, int(bind["index"]), _bind_weight(bind))
+                yield _TargetBind(name, mesh, int(bind["index"]), _bind_weight(bind))
 
 
 def _bind_weight(bind: Tree) -> float:
     weight = float(bind["weight"])
-    if not abs(weight) <= _MAX_WEIGHT:
+    if not abs(weight) <= _MAX_TARGET_WEIGHT:
         raise ValueError(f"the weight of an expression is {weight:g}")
     return weight
 
@@ -159,10 +159,10 @@ def _expression_trees(avatar: Tree) -> Tree:
 
 def _avatar_notes(extensions: Tree, avatar: Tree, is_vrm_0: bool) -> Iterator[str]:
     expressions = _expression_groups(avatar) if is_vrm_0 else list(_expression_trees(avatar).values())
-    if any(one.get(key) for one in expressions for key in _MATERIAL_BINDS):
+    if any(one.get(key) for one in expressions for key in _MATERIAL_BIND_KEYS):
         yield "changes of materials by expressions are left out"
     present = {*avatar, *extensions}
-    not_read = [text for text, keys in _NOT_READ.items() if present.intersection(keys)]
+    not_read = [text for text, keys in _UNREAD_PROPERTIES.items() if present.intersection(keys)]
     if not_read:
         yield f"these properties of the avatar are left out: {', '.join(not_read)}"
     materials = avatar.get("materialProperties") or ()
@@ -171,9 +171,13 @@ def _avatar_notes(extensions: Tree, avatar: Tree, is_vrm_0: bool) -> Iterator[st
         yield f"cartoon shading (shade colour, outline, rim light) is not drawn: {list_names(toon)}"
 
 
-def _sum_displacements(sources: Sequence[tuple[VertexDisplacements, float]]) -> VertexDisplacements:
+def _sum_displacements(
+    weighted_displacements: Sequence[tuple[VertexDisplacements, float]],
+) -> VertexDisplacements:
     """Return the weighted sum of displacements."""
-    vertex, row = np.unique(np.concatenate([own.vertex for own, _ in sources]), return_inverse=True)
+    vertex, row = np.unique(
+        np.concatenate([own.vertex for own, _ in weighted_displacements]), return_inverse=True
+    )
     delta = np.zeros((len(vertex), 3))
-    np.add.at(delta, row, np.concatenate([weight * own.delta for own, weight in sources]))
+    np.add.at(delta, row, np.concatenate([weight * own.delta for own, weight in weighted_displacements]))
     return VertexDisplacements(vertex, delta)

@@ -13,7 +13,7 @@ from dermis.formats.gltf.binary import CLAMPED_SAMPLER, BufferBuilder, glb_bytes
 from dermis.formats.gltf.document import FrozenTree, Tree
 from dermis.formats.gltf.materials import (
     SkinAdditions,
-    colours_png,
+    encode_colours_png,
     eye_material,
     eye_pictures,
     hair_material,
@@ -32,7 +32,7 @@ from dermis.mesh.skeleton import Skeleton
 BROWS, HAIR = "brows and lashes", "hair"
 """Names of the materials and pictures of hairs."""
 _KNOTS_PER_HAIR = {BROWS: 5, HAIR: 4}
-_MAX_HAIRS = 16_000  # more hairs are represented by fewer, wider ones
+_MAX_EXPORTED_HAIRS = 16_000  # more hairs are represented by fewer, wider ones
 _METRES_PER_MM = 1e-3
 
 
@@ -44,7 +44,7 @@ def encode_head(
     slopes: Floats | None = None,
     notes: FrozenTree | None = None,
     eyes: EyeTextures | None = None,
-    additions: SkinAdditions | None = None,
+    skin_additions: SkinAdditions | None = None,
 ) -> bytes:
     """Encode a head as a .glb file in metres: one primitive per material, with morph targets and a skin.
 
@@ -55,15 +55,15 @@ def encode_head(
     slopes : (n, n, 2) slopes of the relief, written as normal map for programs that read no height map
     notes : entries for the extras of the file's "asset"
     eyes : maps of the eyeballs; None for eyes in a uniform colour
-    additions : properties to add to the material of skin
+    skin_additions : properties to add to the material of skin
     """
     binary, deformable = BufferBuilder(), DeformableMesh(head)
     pictures, roles = skin_pictures(head.maps, slopes)
-    pictures |= {} if additions is None else additions.pictures
+    pictures |= {} if skin_additions is None else skin_additions.pictures
     parts, materials = _primitive_sources(deformable, pictures, roles, roughness, eyes)
-    if additions is not None:
+    if skin_additions is not None:
         materials = [
-            additions.apply_to(material) if "dermis" in material.get("extras", {}) else material
+            skin_additions.apply_to(material) if "dermis" in material.get("extras", {}) else material
             for material in materials
         ]
     images = [
@@ -123,10 +123,10 @@ def _primitive_sources(
             materials.append(surface_material(own, pictures, roles, roughness))
     for name, strands in ((BROWS, head.strands), (HAIR, hair_strands(head))):
         if strands is not None and len(strands):
-            fibres = FibreTubes.from_strands(strands, head.mesh, _MAX_HAIRS, _KNOTS_PER_HAIR[name])
+            fibres = FibreTubes.from_strands(strands, head.mesh, _MAX_EXPORTED_HAIRS, _KNOTS_PER_HAIR[name])
             parts.append(HairPrimitive(deformable, fibres))
             materials.append(hair_material(name))
-            pictures[name] = colours_png(fibres.colours()[0])
+            pictures[name] = encode_colours_png(fibres.colours()[0])
     return parts, materials
 
 
@@ -147,14 +147,14 @@ def _gltf_mesh(
 
     parts : geometry of each primitive; the material of a primitive has the same index
     """
-    primitives = [part.primitive(binary) | {"material": number} for number, part in enumerate(parts)]
+    primitives = [part.add_primitive(binary) | {"material": number} for number, part in enumerate(parts)]
     mesh: Tree = {"name": _mesh_name(deformable.head), "primitives": primitives}
     names, rest = deformable.rig.targets.names, deformable.rig.targets.rest
     if not names:
         return mesh
     for target in deformable.targets():
         for primitive, part in zip(primitives, parts, strict=True):
-            primitive.setdefault("targets", []).append(part.target(binary, target))
+            primitive.setdefault("targets", []).append(part.add_target(binary, target))
     resting = {} if rest is None else dict(zip(names, rest.tolist(), strict=True))
     values = [float({**resting, **weights}.get(name, 0.0)) for name in names]
     return mesh | {"weights": values, "extras": {"targetNames": list(names)}}

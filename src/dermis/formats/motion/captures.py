@@ -18,9 +18,9 @@ from dermis.mesh.skeleton import Skeleton
 
 MAX_CLIP_BYTES = 48 << 20
 """Largest capture file."""
-MAX_FRAMES, MAX_NAMES = 200_000, 500
+MAX_CAPTURE_FRAMES, MAX_CAPTURE_COLUMNS = 200_000, 500
 """Largest numbers of frames (almost an hour at 60 per second) and of columns in a capture."""
-TIME_UNITS: Mapping[str, float | None] = {
+SECONDS_PER_TIME_KEY: Mapping[str, float | None] = {
     "time": 1.0,
     "times": 1.0,
     "timestamps": 1.0,
@@ -32,24 +32,26 @@ TIME_UNITS: Mapping[str, float | None] = {
     "timestamp": None,
 }
 """Unit [s] of a frame's time, by the plain key under which it is stored; None if the key states no unit."""
-FRAME_KEYS = ("frame", "frameindex", "framenumber", "frameid")
+FRAME_NUMBER_KEYS = ("frame", "frameindex", "framenumber", "frameid")
 """Plain keys under which the number of a frame is stored."""
 NEUTRAL_SCORE = "_neutral"
 """MediaPipe's score of the neutral face, which is not a blend shape."""
-MAX_TIME = 1e19
+MAX_STATED_TIME = 1e19
 """Largest time of a frame in any unit: nanoseconds of three centuries."""
-_MAX_STEP_S = 2.0  # largest plausible median interval between frames of a capture
+_MAX_FRAME_INTERVAL_S = 2.0  # largest plausible median interval between frames of a capture
 _TIME_UNIT_NAMES = {1.0: "seconds", 1e-3: "milliseconds", 1e-6: "microseconds", 1e-9: "nanoseconds"}
-_PERCENT_RANGE = (10.0, 200.0)  # range of the largest weight of a capture in percent; fractions are smaller
-_LARGE_WEIGHT = 2.0  # larger than the weights of exaggerated poses
-_COMMON_RATES = (24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 100.0, 120.0)
-_RATE_TOLERANCE = 0.02
+# range of the largest weight of a capture in percent; fractions are smaller
+_PERCENT_WEIGHT_RANGE = (10.0, 200.0)
+_IMPLAUSIBLE_WEIGHT = 2.0  # larger than the weights of exaggerated poses
+_COMMON_FRAME_RATES = (24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 100.0, 120.0)
+_FRAME_RATE_TOLERANCE = 0.02
 _SIDE_LETTERS = {"l": "left", "r": "right"}
 _PREFIX_WORDS = re.compile("mixamorig|cc|base|def|org|rig|bip|bone|joint|jnt|skel|j|c|x|m")
 """Words that programs add to the names of bones."""
 _SIDE_OF_WORD = {"left": "left", "l": "left", "right": "right", "r": "right"}
 _NECK_WORDS, _EYE_WORDS = (["neck"], ["neck", "twist"]), (["eye"], ["eyeball"])
-_HEAD_FRACTION = 0.5  # part of a head rotation that the head bone performs; neck bones perform the rest
+# part of a head rotation that the head bone performs; neck bones perform the rest
+_HEAD_BONE_ROTATION_FRACTION = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,11 +72,11 @@ class CaptureSamples:
     unused_names: tuple[str, ...] = ()
 
 
-def capture_clip(culprit: object, name: str, samples: CaptureSamples, head: Head) -> Clip:
+def capture_clip(culprit: object, clip_name: str, samples: CaptureSamples, head: Head) -> Clip:
     """Return a facial capture as a clip for a head, linearly interpolated between frames.
 
     culprit : the capture's file, for errors
-    name : name of the clip
+    clip_name : name of the clip
 
     Raises DermisError when no name matches the head.
     """
@@ -98,13 +100,15 @@ def capture_clip(culprit: object, name: str, samples: CaptureSamples, head: Head
         return Pose(dict(zip(targets, values.tolist(), strict=True)), angles)
 
     unused = tuple(name for name in samples.names if name not in target_of_name) + samples.unused_names
-    return Clip(name, float(times[-1]), frame_rate(times), targets, tuple(samples.angles), unused, sample)
+    return Clip(
+        clip_name, float(times[-1]), frame_rate(times), targets, tuple(samples.angles), unused, sample
+    )
 
 
-def refuse_unmatched(culprit: object, names: Sequence[str], head: Head) -> None:
+def refuse_unmatched(culprit: object, capture_names: Sequence[str], head: Head) -> None:
     """Raise the error for a motion in which no name matches a morph target or bone of the head."""
     targets = _short_list(head.targets) if head.targets else "none"
-    actual = f"it has {_short_list(names)} and the head {targets}"
+    actual = f"it has {_short_list(capture_names)} and the head {targets}"
     advice = "Use a head with targets of these names, such as those of ARKit"
     refuse(culprit, "names of targets or bones of the head", actual, advice)
 
@@ -118,8 +122,8 @@ def frame_rate(times: Doubles) -> float | None:
     rate = 1 / float(np.median(steps))
     if np.mean(np.abs(steps * rate - 1) < 0.5) < 0.5:
         return None
-    nearest = min(_COMMON_RATES, key=lambda common: abs(common - rate))
-    return nearest if abs(nearest / rate - 1) < _RATE_TOLERANCE else rate
+    nearest = min(_COMMON_FRAME_RATES, key=lambda common: abs(common - rate))
+    return nearest if abs(nearest / rate - 1) < _FRAME_RATE_TOLERANCE else rate
 
 
 def to_seconds(culprit: object, times: Doubles, unit: float | None) -> Doubles:
@@ -131,35 +135,37 @@ def to_seconds(culprit: object, times: Doubles, unit: float | None) -> Doubles:
     if unit is None:
         steps = np.diff(times)
         step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
-        unit = next((unit for unit in _TIME_UNIT_NAMES if unit * step <= _MAX_STEP_S), 1.0)
+        unit = next((unit for unit in _TIME_UNIT_NAMES if unit * step <= _MAX_FRAME_INTERVAL_S), 1.0)
         notify(f"{culprit}: the unit of its times is not stated; they are taken as {_TIME_UNIT_NAMES[unit]}")
     return times * unit
 
 
-def assumed_rate(culprit: object, fps: float | None, default: float) -> float:
-    """Return the frame rate of a capture without times: `fps`, or else `default` with a note about it."""
+def assumed_rate(culprit: object, fps: float | None, default_fps: float) -> float:
+    """Return the frame rate of a capture without times: `fps`; if it is None, `default_fps`, with a note."""
     if fps is None:
-        assumed = f"{default:g} frames per second are assumed"
+        assumed = f"{default_fps:g} frames per second are assumed"
         notify(f"{culprit}: it has no times; {assumed}, which fps (--motion-fps) changes")
-    return fps or default
+    return fps or default_fps
 
 
-def note_lost_frames(culprit: object, count: int, total: int) -> None:
-    """Issue a note on the number of frames that show no face, unless it is 0.
+def note_lost_frames(culprit: object, lost_frame_count: int, frame_count: int) -> None:
+    """Issue a note on the number of frames that show no face; none if all frames show a face.
 
-    count, total : number of frames without a face, and of all frames
+    lost_frame_count, frame_count : number of frames without a face, and of all frames
     """
-    if count:
-        notify(f"{culprit}: {count} of {total} frames show no face; their pose is interpolated")
+    if lost_frame_count:
+        notify(
+            f"{culprit}: {lost_frame_count} of {frame_count} frames show no face; their pose is interpolated"
+        )
 
 
-def fill_gaps(times_s: Doubles, values: Doubles) -> Doubles:
+def fill_gaps(times_s: Doubles, channels: Doubles) -> Doubles:
     """Replace NaN in values (k, n) by linear interpolation over time, and by constants at both ends.
 
     times_s : (k,) times of the rows [s]
     """
-    filled = values.copy()
-    for column, known in zip(filled.T, ~np.isnan(values).T, strict=True):
+    filled = channels.copy()
+    for column, known in zip(filled.T, ~np.isnan(channels).T, strict=True):
         column[~known] = np.interp(times_s[~known], times_s[known], column[known])
     return filled
 
@@ -167,24 +173,24 @@ def fill_gaps(times_s: Doubles, values: Doubles) -> Doubles:
 def to_fractions(culprit: object, weights: Doubles) -> Doubles:
     """Return blend shape weights (k, n) as fractions; weights in percent are divided by 100, with a note."""
     largest = float(np.nanmax(np.abs(weights), initial=0.0))
-    if _PERCENT_RANGE[0] < largest <= _PERCENT_RANGE[1]:
+    if _PERCENT_WEIGHT_RANGE[0] < largest <= _PERCENT_WEIGHT_RANGE[1]:
         notify(f"{culprit}: weights of up to {largest:g} are taken as percent")
         return weights / 100
-    if _LARGE_WEIGHT < largest <= _PERCENT_RANGE[0]:
+    if _IMPLAUSIBLE_WEIGHT < largest <= _PERCENT_WEIGHT_RANGE[0]:
         notify(f"{culprit}: weights of up to {largest:g} are used as they are, where 1 is the full shape")
     return weights
 
 
-def check_weights(culprits: Sequence[object], names: Sequence[str], values: Doubles) -> None:
+def check_weights(culprits: Sequence[object], shape_names: Sequence[str], shape_weights: Doubles) -> None:
     """Refuse implausibly large blend shape weights (k, n); NaN marks missing weights and is accepted.
 
-    culprits, names : (k,) frames and (n,) blend shapes, for errors
+    culprits, shape_names : (k,) frames and (n,) blend shapes, for errors
     """
-    invalid = np.argwhere(np.abs(values) > MAX_WEIGHT)
+    invalid = np.argwhere(np.abs(shape_weights) > MAX_WEIGHT)
     if len(invalid):
         row, column = invalid[0]
         expected = f"numbers from -{MAX_WEIGHT:g} to {MAX_WEIGHT:g}"
-        actual = f"{names[column]} is {values[row, column]:g}"
+        actual = f"{shape_names[column]} is {shape_weights[row, column]:g}"
         refuse(culprits[row], expected, actual, "Correct or remove the line")
 
 
@@ -193,8 +199,8 @@ def check_size(culprit: object, frame_count: int, column_count: int) -> None:
 
     frame_count, column_count : numbers of frames and of columns read so far
     """
-    if frame_count > MAX_FRAMES or column_count > MAX_NAMES:
-        expected = f"at most {MAX_FRAMES:,} frames of {MAX_NAMES} numbers"
+    if frame_count > MAX_CAPTURE_FRAMES or column_count > MAX_CAPTURE_COLUMNS:
+        expected = f"at most {MAX_CAPTURE_FRAMES:,} frames of {MAX_CAPTURE_COLUMNS} numbers"
         actual = f"it has more ({frame_count:,} of {column_count:,} so far)"
         refuse(culprit, expected, actual, "Shorten it, or remove columns that heads do not have")
 
@@ -204,29 +210,30 @@ def _short_list(names: Sequence[str]) -> str:
     return f"{listed} and {len(names) - 6} more" if len(names) > 6 else listed
 
 
-def match_targets(names: Iterable[str], targets: Sequence[str]) -> dict[str, str]:
+def match_targets(shape_names: Iterable[str], target_names: Sequence[str]) -> dict[str, str]:
     """Return the head's morph target for each blend shape name; names without a match are omitted.
 
     EyeBlinkLeft, eyeBlink_L and blendShape1.eye_blink_left all match eyeBlinkLeft; an identical name has
     priority.
     """
     exact, folded, plain = (
-        {key(target): target for target in reversed(targets)} for key in (str, str.casefold, _plain_name)
+        {key(target): target for target in reversed(target_names)}
+        for key in (str, str.casefold, _plain_shape_name)
     )
     matches: dict[str, str] = {}
-    for name in names:
-        target = exact.get(name) or folded.get(name.casefold()) or plain.get(_plain_name(name))
+    for name in shape_names:
+        target = exact.get(name) or folded.get(name.casefold()) or plain.get(_plain_shape_name(name))
         if target is not None and target not in matches.values():
             matches[name] = target
     return matches
 
 
-def _plain_name(name: str) -> str:
+def _plain_shape_name(shape_name: str) -> str:
     """Return a blend shape name in a form for comparison.
 
     The form has lower case, no prefix, and "left" or "right" for L or R.
     """
-    last = name.rpartition(".")[2]
+    last = shape_name.rpartition(".")[2]
     side = re.fullmatch(r"(.+)[_\-. ]([lrLR])", last)
     name_with_side = f"{side[1]}{_SIDE_LETTERS[side[2].lower()]}" if side else last
     return re.sub(r"[\W_]", "", name_with_side).casefold()
@@ -265,9 +272,11 @@ def find_rotation_bones(skeleton: Skeleton | None) -> RotationBones:
     for bone, (kind, side) in enumerate(words):
         if kind in _EYE_WORDS and side:
             eyes.setdefault(side, skeleton.names[bone])
-    fractions = {bone: (1 - _HEAD_FRACTION if head is not None else 1.0) / len(necks) for bone in necks}
+    fractions = {
+        bone: (1 - _HEAD_BONE_ROTATION_FRACTION if head is not None else 1.0) / len(necks) for bone in necks
+    }
     if head is not None:
-        fractions[head] = _HEAD_FRACTION if necks else 1.0
+        fractions[head] = _HEAD_BONE_ROTATION_FRACTION if necks else 1.0
     return RotationBones({skeleton.names[bone]: fraction for bone, fraction in fractions.items()}, eyes)
 
 
@@ -311,9 +320,9 @@ def _bone_ancestors(skeleton: Skeleton, bone: int) -> set[int]:
     return ancestors
 
 
-def _bone_words(name: str) -> tuple[list[str], str]:
+def _bone_words(bone_name: str) -> tuple[list[str], str]:
     """Return the words of a bone's name without numbers and prefixes, and the side "left", "right" or ""."""
-    separated = re.sub(r"(?<=[a-z])(?=[A-Z])|[\W_]|\d+", " ", name.rpartition(":")[2])
+    separated = re.sub(r"(?<=[a-z])(?=[A-Z])|[\W_]|\d+", " ", bone_name.rpartition(":")[2])
     words = [word for word in separated.lower().split() if not _PREFIX_WORDS.fullmatch(word)]
     sides = [_SIDE_OF_WORD[word] for word in words if word in _SIDE_OF_WORD]
     return [word for word in words if word not in _SIDE_OF_WORD], sides[0] if len(sides) == 1 else ""

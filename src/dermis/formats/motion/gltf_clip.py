@@ -41,16 +41,16 @@ class _UsedTrack(NamedTuple):
     indices: list[int]
 
 
-def load_gltf_clip(path: Path, head: Head, name: str | None) -> Clip:
-    """Load a clip of a .glb or .gltf file; its bones and morph targets are matched to the head's by name.
+def load_gltf_clip(path: Path, head: Head, clip_name: str | None) -> Clip:
+    """Load a clip of a .glb or .gltf file; bones and morph targets are matched to the head by name.
 
     Translations, rotations and scales of bones that the clip does not animate keep their rest values.
 
-    name : name of the clip; required if the file has several
+    clip_name : name of the clip; required if the file has several
 
     Raises DermisError for a damaged clip, and if no name matches the head.
     """
-    clip, skeleton = read_clip(path, name), head.control.skeleton
+    clip, skeleton = read_clip(path, clip_name), head.control.skeleton
     bones = _used_names([track for track in clip.tracks if track.path != "weights"], head.bones)
     targets = _used_names([track for track in clip.tracks if track.path == "weights"], head.targets)
     names = tuple(dict.fromkeys(name for track in clip.tracks for name in track.names))
@@ -88,9 +88,9 @@ def _used_names(tracks: list[AnimationTrack], head_names: tuple[str, ...]) -> li
     ]
 
 
-def _used_track(track: AnimationTrack, names: list[str]) -> _UsedTrack:
-    columns = [k for k, name in enumerate(track.names) if name in names]
-    return _UsedTrack(track.path, track.curve, columns, [names.index(track.names[k]) for k in columns])
+def _used_track(track: AnimationTrack, used_names: list[str]) -> _UsedTrack:
+    columns = [k for k, name in enumerate(track.names) if name in used_names]
+    return _UsedTrack(track.path, track.curve, columns, [used_names.index(track.names[k]) for k in columns])
 
 
 def _rest_transforms(skeleton: Skeleton, bones: list[str]) -> _BoneTransforms:

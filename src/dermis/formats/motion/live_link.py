@@ -18,11 +18,11 @@ from dermis.base.quantities import checked_number
 from dermis.base.reading import parsing, read_text
 from dermis.base.tables import column_separator, plain_key
 from dermis.formats.motion.captures import (
-    FRAME_KEYS,
+    FRAME_NUMBER_KEYS,
     MAX_CLIP_BYTES,
-    MAX_TIME,
+    MAX_STATED_TIME,
     NEUTRAL_SCORE,
-    TIME_UNITS,
+    SECONDS_PER_TIME_KEY,
     CaptureSamples,
     RotationBones,
     assumed_rate,
@@ -42,17 +42,18 @@ from dermis.mesh.head import Head
 from dermis.mesh.rotations import angles_matrix, matrix_quaternion
 
 _COUNT_COLUMN = "blendshapecount"
-_TIME_COLUMNS: Mapping[str, float | None] = {"timecode": None, **TIME_UNITS}
-_OTHER_COLUMNS = (*_TIME_COLUMNS, *FRAME_KEYS, _COUNT_COLUMN, plain_key(NEUTRAL_SCORE), "")
+_TIME_COLUMNS: Mapping[str, float | None] = {"timecode": None, **SECONDS_PER_TIME_KEY}
+_COLUMNS_WITHOUT_MOTION = (*_TIME_COLUMNS, *FRAME_NUMBER_KEYS, _COUNT_COLUMN, plain_key(NEUTRAL_SCORE), "")
 _ROTATED_OBJECTS = ("head", "lefteye", "righteye")
 _ANGLE_COLUMNS = [f"{part}{angle}" for part in _ROTATED_OBJECTS for angle in ("pitch", "yaw", "roll")]
 _TIMECODE_PATTERN = re.compile(
     r"(\d{1,3}):(\d{1,2}):(\d{1,2}(?:\.\d{1,12})?)(?:[:;](\d{1,4}(?:\.\d{1,12})?))?", re.ASCII
 )
-_TIMECODE_RATES = (24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 100.0, 120.0, 240.0)
-_APP_RATE = 60.0
-_DAY_S, _MIDNIGHT_S = 86400.0, 82800.0  # a timecode that falls by more than the latter has passed midnight
-_MAX_ANGLE = 2 * np.pi  # largest angle of a head in radians; larger angles are taken as degrees
+_TIMECODE_FRAME_RATES = (24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 100.0, 120.0, 240.0)
+_APP_FRAME_RATE = 60.0
+_SECONDS_PER_DAY = 86400.0
+_MIN_FALL_AT_MIDNIGHT_S = 82800.0  # a timecode that falls by more has passed midnight
+_MAX_ANGLE_RADIANS = 2 * np.pi  # largest angle of a head in radians; larger angles are taken as degrees
 
 
 class _Timecode(NamedTuple):
@@ -74,7 +75,7 @@ def load_live_link(path: Path, head: Head, fps: float | None = None) -> Clip:
     """Load a CSV file of Live Link Face as a clip for a head.
 
     Columns are identified by name, in any order: Timecode or another time, blend shapes, and angles [rad]
-    HeadPitch, HeadYaw and HeadRoll about the head's x, y and z axes, likewise for LeftEye and RightEye. The
+    HeadPitch, HeadYaw and HeadRoll about the head's x, y and z axes, and LeftEyePitch and so on. The
     angles rotate the bones found by `find_rotation_bones`. Columns are separated by commas, semicolons or
     tabs. Empty cells and frames without a face are interpolated, weights in percent and angles in degrees are
     converted, each with a note.
@@ -103,8 +104,8 @@ def _read_table(path: Path, fps: float | None) -> _CaptureTable:
             refuse(path, f"{expected} with a header and rows", "it is empty", "Export it again")
         _check_header(f"{path}, line {reader.line_num}", header)
         keys = [plain_key(name) for name in header]
-        columns = [k for k, key in enumerate(keys) if key not in _OTHER_COLUMNS]
-        time = next((keys.index(key) for key in (*_TIME_COLUMNS, *FRAME_KEYS) if key in keys), None)
+        columns = [k for k, key in enumerate(keys) if key not in _COLUMNS_WITHOUT_MOTION]
+        time = next((keys.index(key) for key in (*_TIME_COLUMNS, *FRAME_NUMBER_KEYS) if key in keys), None)
         count = keys.index(_COUNT_COLUMN) if _COUNT_COLUMN in keys else None
         lines, times, rows, states_shapes = [], [], [], []
         for row in filter(_has_text, reader):
@@ -123,23 +124,23 @@ def _read_table(path: Path, fps: float | None) -> _CaptureTable:
     return _complete_table(path, lines, table, np.array(states_shapes))
 
 
-def _has_text(row: Sequence[str]) -> bool:
-    return any(map(str.strip, row))
+def _has_text(table_row: Sequence[str]) -> bool:
+    return any(map(str.strip, table_row))
 
 
-def _check_row(culprit: str, header: Sequence[str], row: list[str], count_column: int | None) -> None:
+def _check_row(culprit: str, header: Sequence[str], table_row: list[str], count_column: int | None) -> None:
     """Refuse a row with too many or too few cells; complete a row that has no blend shapes.
 
     count_column : index of the column that states the number of blend shapes; None if there is none
     """
     if (
         count_column is not None
-        and count_column < len(row) < len(header)
-        and row[count_column].strip() == "0"
+        and count_column < len(table_row) < len(header)
+        and table_row[count_column].strip() == "0"
     ):
-        row += [""] * (len(header) - len(row))
-    if len(row) < len(header) or any(cell.strip() for cell in row[len(header) :]):
-        refuse(culprit, f"{len(header)} cells", f"got {len(row)}", "Correct or remove the line")
+        table_row += [""] * (len(header) - len(table_row))
+    if len(table_row) < len(header) or any(cell.strip() for cell in table_row[len(header) :]):
+        refuse(culprit, f"{len(header)} cells", f"got {len(table_row)}", "Correct or remove the line")
 
 
 def _check_header(culprit: str, header: Sequence[str]) -> None:
@@ -148,15 +149,17 @@ def _check_header(culprit: str, header: Sequence[str]) -> None:
     repeated = [name for name in header if name and folded.count(name.casefold()) > 1]
     if repeated:
         refuse(culprit, "each column once", f"{repeated[0]} occurs twice", "Remove one of them")
-    if all(plain_key(name) in _OTHER_COLUMNS for name in header):
+    if all(plain_key(name) in _COLUMNS_WITHOUT_MOTION for name in header):
         refuse(culprit, "columns of blend shapes", "there are none", "Export it from Live Link Face as it is")
 
 
-def _row_values(culprit: str, header: Sequence[str], row: Sequence[str], columns: Sequence[int]) -> Doubles:
+def _row_values(
+    culprit: str, header: Sequence[str], table_row: Sequence[str], column_index: Sequence[int]
+) -> Doubles:
     """Return the values of a row, NaN for empty cells; numbers may have a decimal comma."""
-    values = np.full(len(columns), np.nan)
-    for index, column in enumerate(columns):
-        cell = row[column].strip()
+    values = np.full(len(column_index), np.nan)
+    for index, column in enumerate(column_index):
+        cell = table_row[column].strip()
         try:
             values[index] = float(cell.replace(",", ".") or "nan")
         except ValueError:
@@ -164,15 +167,17 @@ def _row_values(culprit: str, header: Sequence[str], row: Sequence[str], columns
     return values
 
 
-def _complete_table(path: Path, lines: list[str], table: _CaptureTable, states_shapes: Mask) -> _CaptureTable:
+def _complete_table(
+    path: Path, line_numbers: list[str], capture_table: _CaptureTable, has_shape_count: Mask
+) -> _CaptureTable:
     """Return a table without gaps, with weights as fractions and angles in radians.
 
-    lines : name of each row, for errors
-    states_shapes : (k,) mask of rows that state a number of blend shapes above 0
+    line_numbers : name of each row, for errors
+    has_shape_count : (k,) mask of rows that state a number of blend shapes above 0
     """
-    values, names = table.values, table.names
+    values, names = capture_table.values, capture_table.names
     is_angle = np.array([plain_key(name) in _ANGLE_COLUMNS for name in names])
-    lost = _rows_without_face(values, is_angle, states_shapes)
+    lost = _rows_without_face(values, is_angle, has_shape_count)
     values[lost] = np.nan
     empty = np.asarray(np.isnan(values).all(axis=0))
     if empty.all():
@@ -185,54 +190,58 @@ def _complete_table(path: Path, lines: list[str], table: _CaptureTable, states_s
     if cells := np.isnan(values[~lost]).sum():
         notify(f"{path}: {cells} empty cells are interpolated between those of other frames")
     values[:, ~is_angle] = to_fractions(path, values[:, ~is_angle])
-    if np.nanmax(np.abs(values[:, is_angle]), initial=0.0) > _MAX_ANGLE:
+    if np.nanmax(np.abs(values[:, is_angle]), initial=0.0) > _MAX_ANGLE_RADIANS:
         notify(f"{path}: its angles are taken as degrees")
         values[:, is_angle] = np.radians(values[:, is_angle])
-    check_weights(lines, names, values)
-    return _CaptureTable(names, table.times_s, fill_gaps(table.times_s, values))
+    check_weights(line_numbers, names, values)
+    return _CaptureTable(names, capture_table.times_s, fill_gaps(capture_table.times_s, values))
 
 
-def _rows_without_face(values: Doubles, is_angle: Mask, states_shapes: Mask) -> Mask:
+def _rows_without_face(cell_values: Doubles, is_angle: Mask, has_shape_count: Mask) -> Mask:
     """Return the mask (k,) of rows without a face: empty rows, and rows of zeros that no face would have.
 
     Rows of zeros show no face if most other rows have a rotated head, or if the rows of zeros state no number
     of blend shapes and other rows do.
     """
-    numbers = np.nan_to_num(values)
+    numbers = np.nan_to_num(cell_values)
     zero = np.asarray(~numbers.any(axis=1))
     turned = np.asarray(numbers[:, is_angle].any(axis=1))
     always_turned = bool(turned[~zero].sum() > 0.5 * (~zero).sum())
-    unstated = ~states_shapes & states_shapes.any()
-    return np.asarray(np.isnan(values).all(axis=1)) | (zero & (always_turned | unstated))
+    unstated = ~has_shape_count & has_shape_count.any()
+    return np.asarray(np.isnan(cell_values).all(axis=1)) | (zero & (always_turned | unstated))
 
 
-def _row_times(path: Path, lines: list[str], cells: list[str], key: str | None, fps: float | None) -> Doubles:
+def _row_times(
+    path: Path, line_numbers: list[str], time_cells: list[str], time_column: str | None, fps: float | None
+) -> Doubles:
     """Return the time of each row [s]; times continue to increase when the timecode passes midnight.
 
-    lines : name of each row, for errors
-    cells : time of each row: a timecode or a number, as text
-    key : normalised name of the column of times or frame numbers; None if there is no such column
+    line_numbers : name of each row, for errors
+    time_cells : time of each row: a timecode or a number, as text
+    time_column : normalised name of the column of times or frame numbers; None if there is no such column
     fps : frame rate of the timecode; None to estimate it
     """
-    if key is None:
-        return np.arange(len(lines)) / assumed_rate(path, fps, _APP_RATE)
-    if any(":" in cell for cell in cells):
-        codes = [_parse_timecode(line, cell) for line, cell in zip(lines, cells, strict=True)]
+    if time_column is None:
+        return np.arange(len(line_numbers)) / assumed_rate(path, fps, _APP_FRAME_RATE)
+    if any(":" in cell for cell in time_cells):
+        codes = [_parse_timecode(line, cell) for line, cell in zip(line_numbers, time_cells, strict=True)]
         rate = fps or _timecode_rate(codes)
         times = np.array([code.seconds + code.frames / rate for code in codes])
-        days = np.cumsum(np.diff(times, prepend=times[0]) < -_MIDNIGHT_S)
-        times += _DAY_S * days
+        days = np.cumsum(np.diff(times, prepend=times[0]) < -_MIN_FALL_AT_MIDNIGHT_S)
+        times += _SECONDS_PER_DAY * days
     else:
-        times = np.array([_parse_time(line, cell) for line, cell in zip(lines, cells, strict=True)])
-        if key in FRAME_KEYS:
-            times = times / assumed_rate(path, fps, _APP_RATE)
+        times = np.array(
+            [_parse_time(line, cell) for line, cell in zip(line_numbers, time_cells, strict=True)]
+        )
+        if time_column in FRAME_NUMBER_KEYS:
+            times = times / assumed_rate(path, fps, _APP_FRAME_RATE)
         else:
-            times = to_seconds(path, times, _TIME_COLUMNS[key])
+            times = to_seconds(path, times, _TIME_COLUMNS[time_column])
     backwards = np.flatnonzero(np.diff(times) < 0)
     if len(backwards):
         row = int(backwards[0]) + 1
         actual = f"this line is {times[row - 1] - times[row]:.3f} s before the previous one"
-        refuse(lines[row], "increasing Timecodes", actual, "Sort the lines, or remove this one")
+        refuse(line_numbers[row], "increasing Timecodes", actual, "Sort the lines, or remove this one")
     return times
 
 
@@ -246,26 +255,28 @@ def _parse_timecode(culprit: str, cell: str) -> _Timecode:
 
 def _parse_time(culprit: str, cell: str) -> float:
     try:
-        return checked_number(culprit, float(cell), -MAX_TIME, MAX_TIME)
+        return checked_number(culprit, float(cell), -MAX_STATED_TIME, MAX_STATED_TIME)
     except ValueError:
         actual = f"got {cell!r}"
         refuse(culprit, "a Timecode as HH:MM:SS:FF.fff, or a number", actual, "Correct or remove the line")
 
 
-def _timecode_rate(codes: Sequence[_Timecode]) -> float:
+def _timecode_rate(timecodes: Sequence[_Timecode]) -> float:
     """Estimate the frame rate of timecodes: the lowest common rate above the largest frame number.
 
     If no full second was recorded, the rate is at least that of the app, 60.
     """
-    largest = max(int(code.frames) for code in codes)
-    seconds_advance = any(after.seconds > before.seconds for before, after in pairwise(codes))
-    fitting = [rate for rate in _TIMECODE_RATES if rate > largest] or [float(largest + 1)]
-    return fitting[0] if seconds_advance else max(_APP_RATE, fitting[0])
+    largest = max(int(code.frames) for code in timecodes)
+    seconds_advance = any(after.seconds > before.seconds for before, after in pairwise(timecodes))
+    fitting = [rate for rate in _TIMECODE_FRAME_RATES if rate > largest] or [float(largest + 1)]
+    return fitting[0] if seconds_advance else max(_APP_FRAME_RATE, fitting[0])
 
 
-def _bone_angles(table: _CaptureTable, bones: RotationBones) -> tuple[dict[str, Doubles], tuple[str, ...]]:
+def _bone_angles(
+    capture_table: _CaptureTable, bones: RotationBones
+) -> tuple[dict[str, Doubles], tuple[str, ...]]:
     """Return angles (k, 3) by bone name [degrees], and the angle columns for which the head has no bone."""
-    columns = {plain_key(name): k for k, name in enumerate(table.names)}
+    columns = {plain_key(name): k for k, name in enumerate(capture_table.names)}
     angles: dict[str, Doubles] = {}
     unused: list[str] = []
     for part in _ROTATED_OBJECTS:
@@ -273,7 +284,7 @@ def _bone_angles(table: _CaptureTable, bones: RotationBones) -> tuple[dict[str, 
         if all(column is None for column in part_columns.values()):
             continue
         used = part_columns.values()
-        rows = np.degrees([[0.0 if k is None else row[k] for k in used] for row in table.values])
+        rows = np.degrees([[0.0 if k is None else row[k] for k in used] for row in capture_table.values])
         eye = bones.eyes.get(part.removesuffix("eye")) if part != "head" else None
         if eye is not None:
             angles[eye] = unwrap_degrees(rows)
@@ -281,5 +292,5 @@ def _bone_angles(table: _CaptureTable, bones: RotationBones) -> tuple[dict[str, 
             rotations = matrix_quaternion(np.array([angles_matrix(row) for row in rows.tolist()]))
             angles |= head_bone_angles(bones, rotations)
         elif rows.any():
-            unused += [table.names[k] for k in part_columns.values() if k is not None]
+            unused += [capture_table.names[k] for k in part_columns.values() if k is not None]
     return angles, tuple(unused)

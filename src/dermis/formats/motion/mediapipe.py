@@ -1,4 +1,4 @@
-"""Captures of MediaPipe's face landmarker: one result per frame in JSON, as its APIs return them."""
+"""Captures of MediaPipe's face landmarker: one result per frame in JSON, as MediaPipe returns it."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from dermis.base.quantities import checked_array, checked_number
 from dermis.base.reading import parse_json, read_text
 from dermis.base.tables import plain_key
 from dermis.formats.motion.captures import (
-    FRAME_KEYS,
+    FRAME_NUMBER_KEYS,
     MAX_CLIP_BYTES,
-    MAX_TIME,
+    MAX_STATED_TIME,
     NEUTRAL_SCORE,
-    TIME_UNITS,
+    SECONDS_PER_TIME_KEY,
     CaptureSamples,
     RotationBones,
     assumed_rate,
@@ -35,7 +35,7 @@ from dermis.formats.motion.captures import (
     to_fractions,
     to_seconds,
 )
-from dermis.mesh.clip import Clip, check_rate
+from dermis.mesh.clip import Clip, check_frame_rate
 from dermis.mesh.head import Head
 
 _SHAPE_KEYS = ("blendshapes", "faceblendshapes")
@@ -47,12 +47,12 @@ _MATRIX_KEYS = (
 )
 _FACE_KEYS = ("faces", "landmarks", "facelandmarks")
 """Plain keys of lists with one entry for each face; landmarks are not used."""
-_LIST_KEYS = ("categories", "classification")
-_DATA_KEYS = ("data", "packeddata", "value")
+_CATEGORY_LIST_KEYS = ("categories", "classification")
+_MATRIX_DATA_KEYS = ("data", "packeddata", "value")
 _NAME_KEYS = ("categoryname", "label", "name", "displayname")
 _SCORE_KEYS = ("score", "value", "weight")
-_RATE_KEYS = ("fps", "framerate")
-_DEFAULT_RATE = 30.0
+_FRAME_RATE_KEYS = ("fps", "framerate")
+_DEFAULT_FRAME_RATE = 30.0
 _MAX_MATRIX_VALUE = 1e6
 _EXPECTED_CONTENT = "results of MediaPipe in JSON"
 _LINE_ADVICE = "Correct or remove the line"
@@ -143,7 +143,9 @@ def _read_records(path: Path) -> tuple[float | None, Iterator[tuple[str, object]
             )
             return None, chain([(first[0], document)], rest)
     fields = _plain_fields(document)
-    rate = next((check_rate(f"{path}: {key}", fields[key]) for key in _RATE_KEYS if key in fields), None)
+    rate = next(
+        (check_frame_rate(f"{path}: {key}", fields[key]) for key in _FRAME_RATE_KEYS if key in fields), None
+    )
     return rate, ((f"{path}, frame {k}", record) for k, record in enumerate(_frame_list(document), 1))
 
 
@@ -168,16 +170,18 @@ def _frame_list(document: object) -> list[object]:
     return [document] if is_frame or not lists else max(lists, key=len)
 
 
-def _parse_frame(culprit: str, index: int, record: object, columns: dict[str, int]) -> _CapturedFrame:
+def _parse_frame(
+    culprit: str, frame_index: int, json_record: object, shape_columns: dict[str, int]
+) -> _CapturedFrame:
     """Return a frame, without faces if the record has neither blend shapes nor a facial transformation.
 
-    columns : column index by blend shape name; names that are not in it are added
+    shape_columns : column index by blend shape name; missing names are added
     """
-    if isinstance(record, list):
-        record = {"blendshapes": record}
-    if not isinstance(record, dict | None):
-        refuse(culprit, "an object in JSON", f"got {format_value(record)}", _LINE_ADVICE)
-    fields = _plain_fields(record)
+    if isinstance(json_record, list):
+        json_record = {"blendshapes": json_record}
+    if not isinstance(json_record, dict | None):
+        refuse(culprit, "an object in JSON", f"got {format_value(json_record)}", _LINE_ADVICE)
+    fields = _plain_fields(json_record)
     for value in tuple(fields.values()):  # the record may contain the result as one of its values
         if not fields.keys() & {*_SHAPE_KEYS, *_MATRIX_KEYS}:
             fields = _plain_fields(value[0] if isinstance(value, list) and value else value) | fields
@@ -185,40 +189,50 @@ def _parse_frame(culprit: str, index: int, record: object, columns: dict[str, in
     matrix = next((fields[key] for key in _MATRIX_KEYS if key in fields), None)
     transformation = _facial_transformation(culprit, matrix)
     scores = _shape_scores(culprit, shapes or {})
-    key = next((key for key in TIME_UNITS if fields.get(key) is not None), "")
-    number = next((fields[key] for key in FRAME_KEYS if key in fields), index)
+    key = next((key for key in SECONDS_PER_TIME_KEY if fields.get(key) is not None), "")
+    number = next((fields[key] for key in FRAME_NUMBER_KEYS if key in fields), frame_index)
     listed = fields.get("faces")
     faces = max(faces, len(listed) if isinstance(listed, list) else 0)
     return _CapturedFrame(
         culprit,
-        checked_number(f"{culprit}: frame", number, -MAX_TIME, MAX_TIME),
-        checked_number(f"{culprit}: {key}", fields[key], -MAX_TIME, MAX_TIME) if key else np.nan,
-        TIME_UNITS.get(key, 1.0),
-        np.array([columns.setdefault(name, len(columns)) for name in scores], np.intp),
+        checked_number(f"{culprit}: frame", number, -MAX_STATED_TIME, MAX_STATED_TIME),
+        checked_number(f"{culprit}: {key}", fields[key], -MAX_STATED_TIME, MAX_STATED_TIME)
+        if key
+        else np.nan,
+        SECONDS_PER_TIME_KEY.get(key, 1.0),
+        np.array([shape_columns.setdefault(name, len(shape_columns)) for name in scores], np.intp),
         np.fromiter(scores.values(), np.float64, len(scores)),
         transformation,
         faces if scores or transformation is not None else 0,
     )
 
 
-def _first_face(value: object) -> tuple[object, int]:
+def _first_face(json_faces: object) -> tuple[object, int]:
     """Return the blend shapes of the first face, or None if there is no face, and the number of faces.
 
-    value : blend shapes of one face, an object around their list, or a list of such values, one for each face
+    json_faces : blend shapes of one face, an object around their list, or a list of such values, one per face
     """
     faces = 1
     while True:
-        if isinstance(value, dict) and _is_list_object(value):
-            value = next(item for key, item in value.items() if key in (*_LIST_KEYS, "value"))
-        elif isinstance(value, list) and value and (isinstance(value[0], list) or _is_list_object(value[0])):
-            faces, value = max(faces, len(value)), value[0]
+        if isinstance(json_faces, dict) and _is_list_object(json_faces):
+            json_faces = next(
+                item for key, item in json_faces.items() if key in (*_CATEGORY_LIST_KEYS, "value")
+            )
+        elif (
+            isinstance(json_faces, list)
+            and json_faces
+            and (isinstance(json_faces[0], list) or _is_list_object(json_faces[0]))
+        ):
+            faces, json_faces = max(faces, len(json_faces)), json_faces[0]
         else:
-            return value, faces
+            return json_faces, faces
 
 
-def _is_list_object(value: object) -> bool:
+def _is_list_object(json_value: object) -> bool:
     """Return whether a value is an object around the blend shapes: MediaPipe's lists, or a Java Optional."""
-    return isinstance(value, dict) and (bool(value.keys() & _LIST_KEYS) or value.keys() == {"value"})
+    return isinstance(json_value, dict) and (
+        bool(json_value.keys() & _CATEGORY_LIST_KEYS) or json_value.keys() == {"value"}
+    )
 
 
 def _shape_scores(culprit: str, shapes: object) -> dict[str, float]:
@@ -241,30 +255,34 @@ def _shape_scores(culprit: str, shapes: object) -> dict[str, float]:
     return {name: score for name, score in shapes.items() if name != NEUTRAL_SCORE}
 
 
-def _facial_transformation(culprit: str, value: object) -> Doubles | None:
+def _facial_transformation(culprit: str, json_matrix: object) -> Doubles | None:
     """Return the facial transformation (4, 4) of the first face, None if there is none.
 
     The translation is in the last column of the result. A flat list without a translation is taken to be in
     column-major order, as MediaPipe's APIs return it.
 
-    value : matrix as a nested or flat list, an object that contains the matrix, or a list of matrices or such
-        objects
+    json_matrix : matrix as a nested or flat list, an object that contains the matrix, or a list of
+        matrices or such objects
     """
     by_columns = False
-    while isinstance(value, dict) or (isinstance(value, list) and value and not _is_row(value[0])):
+    while isinstance(json_matrix, dict) or (
+        isinstance(json_matrix, list) and json_matrix and not _is_row(json_matrix[0])
+    ):
         by_columns = True
-        if isinstance(value, dict):
-            fields = _plain_fields(value)
+        if isinstance(json_matrix, dict):
+            fields = _plain_fields(json_matrix)
             by_columns = fields.get("layout") != "ROW_MAJOR"
-            value = next((fields[key] for key in _DATA_KEYS if key in fields), [*fields.values()])
+            json_matrix = next(
+                (fields[key] for key in _MATRIX_DATA_KEYS if key in fields), [*fields.values()]
+            )
         else:
-            value = value[0]
-    if not value:
+            json_matrix = json_matrix[0]
+    if not json_matrix:
         return None
-    flat = isinstance(value, list) and not any(isinstance(row, list) for row in value)
+    flat = isinstance(json_matrix, list) and not any(isinstance(row, list) for row in json_matrix)
     shape = (16,) if flat else (4, 4)
     limit = _MAX_MATRIX_VALUE
-    matrix = checked_array(f"{culprit}: matrix", value, shape, -limit, limit).reshape(4, 4)
+    matrix = checked_array(f"{culprit}: matrix", json_matrix, shape, -limit, limit).reshape(4, 4)
     if not abs(np.linalg.det(matrix[:3, :3])) > 1e-12:
         refuse(culprit, "an invertible matrix", "its determinant is 0", _LINE_ADVICE)
     last_row, last_column = np.abs(matrix[3, :3]).max(), np.abs(matrix[:3, 3]).max()
@@ -272,10 +290,10 @@ def _facial_transformation(culprit: str, value: object) -> Doubles | None:
     return matrix.T if last_row > last_column or (no_translation and flat and by_columns) else matrix
 
 
-def _is_row(value: object) -> bool:
+def _is_row(json_value: object) -> bool:
     """Return whether the first entry of a list is a row or a number of one matrix, not a whole matrix."""
-    is_nested = isinstance(value, list) and (len(value) != 4 or isinstance(value[0], list))
-    return not is_nested and not isinstance(value, dict)
+    is_nested = isinstance(json_value, list) and (len(json_value) != 4 or isinstance(json_value[0], list))
+    return not is_nested and not isinstance(json_value, dict)
 
 
 def _frame_times(path: Path, frames: Sequence[_CapturedFrame], fps: float | None) -> Doubles:
@@ -283,7 +301,7 @@ def _frame_times(path: Path, frames: Sequence[_CapturedFrame], fps: float | None
     times = np.array([frame.time for frame in frames])
     missing = np.isnan(times)
     if missing.all():
-        times = np.array([frame.number for frame in frames]) / assumed_rate(path, fps, _DEFAULT_RATE)
+        times = np.array([frame.number for frame in frames]) / assumed_rate(path, fps, _DEFAULT_FRAME_RATE)
     else:
         unstated = np.array([frame.unit is None for frame in frames])
         times *= [frame.unit or 1.0 for frame in frames]

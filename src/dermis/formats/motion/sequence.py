@@ -21,8 +21,8 @@ from dermis.formats.mesh_checks import check_arrays
 from dermis.formats.obj import parse_obj, read_obj_text
 from dermis.formats.parts import default_unit_mm
 from dermis.formats.read import join_parts, read_mesh_file
-from dermis.formats.rig_from_file import SPLIT_TOLERANCE_MM
-from dermis.formats.units import UNITS_MM
+from dermis.formats.rig_from_file import COINCIDENCE_TOLERANCE_MM
+from dermis.formats.units import COMMON_UNITS_MM
 from dermis.mesh.clip import Clip
 from dermis.mesh.file_vertices import FileVertices
 from dermis.mesh.geometry import compact_vertices, triangle_keys
@@ -31,16 +31,16 @@ from dermis.mesh.pose import Pose
 
 FRAME_SUFFIXES = (".obj", ".ply")
 DEFAULT_FRAME_RATE = 30.0
-_FRAME_TOLERANCE = 1e-6
-_RELATIVE_SIZE_RANGE = (0.33, 3.0)
-_NUMBER_FIELD = re.compile(r"%0?\d*d")
+_FRAME_NUMBER_TOLERANCE = 1e-6
+_FRAME_SIZE_RANGE = (0.33, 3.0)
+_FRAME_NUMBER_FIELD = re.compile(r"%0?\d*d")
 _VERTEX_LINE = re.compile(rb"^[ \t]*v[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)[^\n]*\n?", re.MULTILINE)
 _NORMAL_LINE = re.compile(rb"^[ \t]*vn[ \t][^\n]*\n?", re.MULTILINE)
 
 
 def is_sequence(path: Path) -> bool:
     """Return whether a path may be a mesh sequence: a folder, a pattern (face_%05d.obj), or a mesh file."""
-    is_pattern = bool(_NUMBER_FIELD.search(path.name)) or "*" in path.name
+    is_pattern = bool(_FRAME_NUMBER_FIELD.search(path.name)) or "*" in path.name
     return is_pattern or _is_folder(path) or path.suffix.lower() in FRAME_SUFFIXES
 
 
@@ -53,8 +53,8 @@ def frame_files(path: Path) -> list[Path]:
     """
     if _is_folder(path):
         files = [one for one in path.iterdir() if one.suffix.lower() in FRAME_SUFFIXES]
-    elif _NUMBER_FIELD.search(path.name):
-        before, after = _NUMBER_FIELD.split(path.name, maxsplit=1)
+    elif _FRAME_NUMBER_FIELD.search(path.name):
+        before, after = _FRAME_NUMBER_FIELD.split(path.name, maxsplit=1)
         shape = re.compile(rf"{re.escape(before)}\d+{re.escape(after)}")
         files = [one for one in _folder_files(path.parent) if shape.fullmatch(one.name)]
     elif "*" in path.name:
@@ -107,10 +107,10 @@ def load_sequence(
         frames.positions(index)
 
     def sample(seconds: float) -> Pose:
-        index = min(int(seconds * rate + _FRAME_TOLERANCE), len(files) - 1)
+        index = min(int(seconds * rate + _FRAME_NUMBER_TOLERANCE), len(files) - 1)
         fraction = min(max(seconds * rate - index, 0.0), 1.0)
         positions = frames.positions(index)
-        if fraction > _FRAME_TOLERANCE and index + 1 < len(files):
+        if fraction > _FRAME_NUMBER_TOLERANCE and index + 1 < len(files):
             following = frames.positions(index + 1)
             positions = ((1 - fraction) * positions + fraction * following).astype(np.float32)
         return Pose(positions_mm=positions)
@@ -135,9 +135,9 @@ class _FrameCache:
         own = FileVertices(len(vertex), vertex, mesh.point, mesh.triangles, np.eye(3))
         self._source = self.head.file_vertices or own
 
-    def _read_positions(self, index: int) -> Floats:
+    def _read_positions(self, frame_index: int) -> Floats:
         """Return the positions of the head's control points in a frame, (n, 3) [mm]."""
-        file = self.files[index]
+        file = self.files[frame_index]
         vertices = self.reader.read(file)
         self._first = self._first or vertices
         self._check_topology(file, vertices)
@@ -145,15 +145,15 @@ class _FrameCache:
         at_points = vertices.positions_mm[self._source.vertex]
         positions[point] = at_points
         difference = np.abs(positions[point] - at_points).max(axis=1)
-        if difference.max() > SPLIT_TOLERANCE_MM:
-            count = np.count_nonzero(difference > SPLIT_TOLERANCE_MM)
+        if difference.max() > COINCIDENCE_TOLERANCE_MM:
+            count = np.count_nonzero(difference > COINCIDENCE_TOLERANCE_MM)
             actual = f"{count} separate by up to {difference.max():.3g} mm"
             advice = "Load the head from a frame in which nothing touches, such as an open mouth"
             refuse(file, "vertices that coincide in the head to stay together", actual, advice)
         self._check_size(file, positions)
         return positions
 
-    def _check_topology(self, file: Path, vertices: FrameVertices) -> None:
+    def _check_topology(self, mesh_file: Path, vertices: FrameVertices) -> None:
         assert self._first is not None
         source, count = self._source, self._source.count
         same_triangles = np.array_equal(vertices.triangles, self._first.triangles)
@@ -163,37 +163,40 @@ class _FrameCache:
         if len(vertices.positions_mm) != count or not matches_head:
             actual = f"it has {len(vertices.positions_mm)} and {len(vertices.triangles)} triangles"
             expected = f"the topology of the head, {count} vertices connected as in its file"
-            refuse(file, expected, actual, "Load the head from one of the frames")
+            refuse(mesh_file, expected, actual, "Load the head from one of the frames")
         if not same_triangles or not np.array_equal(vertices.uv, self._first.uv):
             actual = f"its faces or uv differ from those of {self.files[0].name}"
-            refuse(file, "frames of one topology", actual, "Export all of them from the same mesh")
+            refuse(mesh_file, "frames of one topology", actual, "Export all of them from the same mesh")
 
-    def _check_size(self, file: Path, positions: Floats) -> None:
+    def _check_size(self, mesh_file: Path, positions: Floats) -> None:
         sizes = [float(np.linalg.norm(np.ptp(one, axis=0))) for one in (positions, self.head.positions_mm)]
-        if not _RELATIVE_SIZE_RANGE[0] <= sizes[0] / sizes[1] <= _RELATIVE_SIZE_RANGE[1]:
+        if not _FRAME_SIZE_RANGE[0] <= sizes[0] / sizes[1] <= _FRAME_SIZE_RANGE[1]:
             actual = f"it is {sizes[0] / sizes[1]:.3g} times as large"
-            refuse(file, "a frame of about the size of the head", actual, "Set the files' unit (unit_mm)")
+            refuse(
+                mesh_file, "a frame of about the size of the head", actual, "Set the files' unit (unit_mm)"
+            )
 
 
-def _unit_of_head(file: Path, head: Head, reader: FrameReader) -> float:
+def _unit_of_head(mesh_file: Path, head: Head, reader: FrameReader) -> float:
     """Return the unit with which the mesh in a file is about as large as a head [mm].
 
     The unit of the file's format is preferred; if another unit is chosen, a note states it.
     """
     read_mm, head_mm = (
-        np.linalg.norm(np.ptp(one, axis=0)) for one in (reader.read(file).positions_mm, head.positions_mm)
+        np.linalg.norm(np.ptp(one, axis=0))
+        for one in (reader.read(mesh_file).positions_mm, head.positions_mm)
     )
-    default = default_unit_mm(file)
-    low, high = _RELATIVE_SIZE_RANGE
+    default = default_unit_mm(mesh_file)
+    low, high = _FRAME_SIZE_RANGE
     if low <= read_mm / head_mm <= high:
         return default
-    unit = min(UNITS_MM, key=lambda one: abs(np.log(one / default * read_mm / head_mm)))
-    notify(f"{file}: its unit is not stated; 1 unit = {unit:g} mm makes it as large as the head")
+    unit = min(COMMON_UNITS_MM, key=lambda one: abs(np.log(one / default * read_mm / head_mm)))
+    notify(f"{mesh_file}: its unit is not stated; 1 unit = {unit:g} mm makes it as large as the head")
     return unit
 
 
-def _folder_files(folder: Path) -> list[Path]:
-    return list(folder.iterdir()) if _is_folder(folder) else []
+def _folder_files(sequence_folder: Path) -> list[Path]:
+    return list(sequence_folder.iterdir()) if _is_folder(sequence_folder) else []
 
 
 def _is_folder(path: Path) -> bool:
@@ -203,10 +206,10 @@ def _is_folder(path: Path) -> bool:
         return False
 
 
-def _frame_sort_key(file: Path) -> tuple[int, str]:
+def _frame_sort_key(mesh_file: Path) -> tuple[int, str]:
     """Return the sort key of a file: the last number in its name, then the whole name."""
-    numbers = re.findall(r"\d+", file.stem)
-    return int(numbers[-1]) if numbers else -1, file.name
+    numbers = re.findall(r"\d+", mesh_file.stem)
+    return int(numbers[-1]) if numbers else -1, mesh_file.name
 
 
 class FrameVertices(NamedTuple):
@@ -294,36 +297,36 @@ class FrameReader:
             return (positions @ self.to_head.T).astype(np.float32)
 
 
-def _split_vertex_lines(data: bytes) -> tuple[list[tuple[bytes, bytes, bytes]], bytes]:
+def _split_vertex_lines(obj_bytes: bytes) -> tuple[list[tuple[bytes, bytes, bytes]], bytes]:
     """Return the coordinates of the `v` lines as text, and a hash of all other lines except `vn`."""
-    others = _NORMAL_LINE.sub(b"", _VERTEX_LINE.sub(b"", data))
-    return _VERTEX_LINE.findall(data), hashlib.sha256(others).digest()
+    others = _NORMAL_LINE.sub(b"", _VERTEX_LINE.sub(b"", obj_bytes))
+    return _VERTEX_LINE.findall(obj_bytes), hashlib.sha256(others).digest()
 
 
-def _find_pattern(path: Path, data: bytes) -> _ObjPattern:
+def _find_pattern(path: Path, obj_bytes: bytes) -> _ObjPattern:
     """Return the pattern of an OBJ file.
 
-    data : text of the file in UTF-8
+    obj_bytes : text of the file in UTF-8
 
     The file is parsed with the index of each `v` line as its x coordinate, so that the x of a parsed vertex
     is the index of its line.
     """
-    positions, digest = _split_vertex_lines(data)
+    positions, digest = _split_vertex_lines(obj_bytes)
     count = iter(range(len(positions)))
-    numbered = _VERTEX_LINE.sub(lambda match: b"v %d 0 0\n" % next(count), data)
+    numbered = _VERTEX_LINE.sub(lambda match: b"v %d 0 0\n" % next(count), obj_bytes)
     model = parse_obj(path, numbered.decode())
     part = join_parts([part for part in model.parts if len(part.triangles)], path)
     used = np.unique(part.triangles)
     return _ObjPattern(digest, len(positions), part.positions[used, 0].astype(np.int64))
 
 
-def _parse_positions(data: bytes, pattern: _ObjPattern) -> Doubles | None:
+def _parse_positions(obj_bytes: bytes, pattern: _ObjPattern) -> Doubles | None:
     """Return the vertex positions (v, 3) of an OBJ file in its units; None for a file without the pattern.
 
-    data : bytes of the file
+    obj_bytes : bytes of the file
     pattern : pattern of the first file of the sequence
     """
-    rows, digest = _split_vertex_lines(data)
+    rows, digest = _split_vertex_lines(obj_bytes)
     if len(rows) != pattern.line_count or digest != pattern.digest:
         return None
     try:

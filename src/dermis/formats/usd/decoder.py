@@ -68,7 +68,7 @@ class _Faces(NamedTuple):
 class _SceneReader:
     """Reader of the meshes of a stage; collects arrays, materials and notes."""
 
-    def __init__(self, path: Path, stage: Usd.Stage, folder: Path) -> None:
+    def __init__(self, path: Path, stage: Usd.Stage, layer_folder: Path) -> None:
         task = f"{path}: USD scenes"
         self.usd, self.geom, self.shade = (
             import_extra(f"pxr.{name}", task) for name in ("Usd", "UsdGeom", "UsdShade")
@@ -76,7 +76,7 @@ class _SceneReader:
         self.path, self.stage = path, stage
         self.time = self.usd.TimeCode.EarliestTime()
         self.transform_cache = self.geom.XformCache(self.time)
-        self.material_reader = MaterialReader(path, folder, self.time)
+        self.material_reader = MaterialReader(path, layer_folder, self.time)
         self.material_index: dict[str, int] = {}
         self.materials: list[Tree] = []
         self.arrays, self.notes = Arrays(), dict[str, None]()
@@ -171,20 +171,20 @@ class _SceneReader:
             return faces.reversed_corners()
         return np.arange(len(faces.vertex))
 
-    def _material_groups(self, prim: Usd.Prim, count: int) -> tuple[list[int], Index]:
+    def _material_groups(self, prim: Usd.Prim, face_count: int) -> tuple[list[int], Index]:
         """Return the list of a mesh's materials (-1: none), and each face's index in this list (count,).
 
         Faces that are holes have the index -1.
         """
         binding = self.shade.MaterialBindingAPI(prim)
-        materials, group = [self._bound_material_index(binding)], np.zeros(count, np.int64)
+        materials, group = [self._bound_material_index(binding)], np.zeros(face_count, np.int64)
         for subset in binding.GetMaterialBindSubsets():
             faces = np.array(subset.GetIndicesAttr().Get(self.time) or [], np.int64)
-            self._check_face_indices(faces, count, subset.GetPath())
+            self._check_face_indices(faces, face_count, subset.GetPath())
             group[faces] = len(materials)
             materials.append(self._bound_material_index(self.shade.MaterialBindingAPI(subset.GetPrim())))
         holes = np.array(self.geom.Mesh(prim).GetHoleIndicesAttr().Get(self.time) or [], np.int64)
-        self._check_face_indices(holes, count, prim.GetPath())
+        self._check_face_indices(holes, face_count, prim.GetPath())
         group[holes] = -1
         return materials, group
 
@@ -204,7 +204,7 @@ class _SceneReader:
         return self.material_index[key]
 
     def _find_uv(self, prim: Usd.Prim, faces: _Faces, materials: list[int]) -> _Primvar | None:
-        """Return the uv that the mesh's materials name, else the uv with a usual name; None without uv."""
+        """Return the uv set that the materials name, or a uv set with a usual name; None without uv."""
         named = dict.fromkeys(one for k in materials if k >= 0 and (one := self.materials[k].get("uv")))
         if len(named) > 1:
             self.notes[_SEVERAL_UV_NOTE] = None
@@ -214,23 +214,29 @@ class _SceneReader:
         found = (self._read_primvar(primvars.FindPrimvarWithInheritance(name), faces, 2) for name in names)
         return next((one for one in found if one is not None), None)
 
-    def _read_primvar(self, primvar: UsdGeom.Primvar, faces: _Faces, width: int) -> _Primvar | None:
-        """Convert a primvar of the file; return None unless its elements have `width` numbers."""
+    def _read_primvar(self, primvar: UsdGeom.Primvar, faces: _Faces, component_count: int) -> _Primvar | None:
+        """Convert a primvar of the file; return None unless its elements have `component_count` numbers."""
         if not primvar or not primvar.HasValue():
             return None
         values = np.array(primvar.Get(self.time), np.float64)
-        if values.size == 0 or values.shape[-1] != width:
+        if values.size == 0 or values.shape[-1] != component_count:
             return None
         element = faces.corner_elements(str(primvar.GetInterpolation()))
         if element is not None and primvar.IsIndexed():
             element = np.array(primvar.GetIndices(self.time), np.int64)[element]
-        return self._checked_primvar(values.reshape(-1, width), element, primvar.GetAttr().GetPath())
+        return self._checked_primvar(
+            values.reshape(-1, component_count), element, primvar.GetAttr().GetPath()
+        )
 
-    def _checked_primvar(self, values: Doubles, element: Index | None, attribute_path: object) -> _Primvar:
-        if element is None or (len(element) and (element.min() < 0 or element.max() >= len(values))):
+    def _checked_primvar(
+        self, primvar_values: Doubles, element_index: Index | None, attribute_path: object
+    ) -> _Primvar:
+        if element_index is None or (
+            len(element_index) and (element_index.min() < 0 or element_index.max() >= len(primvar_values))
+        ):
             actual = f"{attribute_path} has other numbers of values"
             refuse(self.path, "a value for each vertex or corner", actual, limits.DAMAGED_ADVICE)
-        return _Primvar(values, element)
+        return _Primvar(primvar_values, element_index)
 
     def _read_normals(self, mesh: UsdGeom.Mesh, faces: _Faces) -> _Primvar | None:
         """Return the normals of a mesh; None for a mesh without normals or a subdivision surface."""
@@ -245,9 +251,9 @@ class _SceneReader:
         return self._checked_primvar(np.array(given, np.float64), element, mesh.GetPath())
 
     def _read_colours(
-        self, prim: Usd.Prim, faces: _Faces, materials: list[int], count: int
+        self, prim: Usd.Prim, faces: _Faces, materials: list[int], vertex_count: int
     ) -> tuple[list[float] | None, Doubles | None]:
-        """Return one colour for a whole mesh, or linear colours (count, 3) of its vertices, or neither."""
+        """Return the colour of a whole mesh, and vertex colours (vertex_count, 3); one or both are None."""
         named = [one for k in materials if k >= 0 and (one := self.materials[k].get("vertex_colours"))]
         if not named and any(k >= 0 for k in materials):
             return None, None
@@ -258,8 +264,10 @@ class _SceneReader:
             return None, None
         if primvar.GetInterpolation() == "constant" and not named:
             return found.values[0].tolist(), None
-        weight = np.maximum(np.bincount(faces.vertex, minlength=count), 1)
-        sums = [np.bincount(faces.vertex, found.values[found.corner_index, k], count) for k in range(3)]
+        weight = np.maximum(np.bincount(faces.vertex, minlength=vertex_count), 1)
+        sums = [
+            np.bincount(faces.vertex, found.values[found.corner_index, k], vertex_count) for k in range(3)
+        ]
         return None, np.clip(np.column_stack(sums) / weight[:, None], 0.0, 1.0)
 
 

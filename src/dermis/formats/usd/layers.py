@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from pxr import Sdf, Usd
 
 LAYER_SUFFIXES = (".usd", ".usda", ".usdc")
-_LOCATED_FAULT = re.compile(r"/([^/\s]+:\d+:\d+: .*)")
+_FAULT_LOCATION_PATTERN = re.compile(r"/([^/\s]+:\d+:\d+: .*)")
 """Pattern of an error message with the position of the error in a text layer."""
-_MAX_LAYERS, _MAX_ENTRIES = 256, 4096
+_MAX_LAYERS, _MAX_PACKAGE_ENTRIES = 256, 4096
 _LAYER_ADVICE = "Flatten it into one file (usdcat --flatten), or export a .usdz"
 
 
@@ -29,19 +29,19 @@ class OpenedStage(NamedTuple):
     folder: Path
 
 
-def open_stage(file: Path, path: Path, copies: Path) -> OpenedStage:
+def open_stage(file: Path, path: Path, copy_folder: Path) -> OpenedStage:
     """Open the stage of a USD file.
 
     file : absolute path of the file
     path : path that the user typed, for error messages
-    copies : empty folder to which the layers of a package are copied
+    copy_folder : empty folder to which the layers of a package are copied
 
     Raises DermisError when a layer is missing, damaged, or not in the folder of the file or below it.
     """
     usd: Any = import_extra("pxr.Usd", f"{path}: USD scenes")
     root, folder = file, file.parent
     if file.suffix.lower() == ".usdz":
-        root, folder = _extract_layers(file, path, copies.resolve()), copies.resolve()
+        root, folder = _extract_layers(file, path, copy_folder.resolve()), copy_folder.resolve()
     _check_layers(path, root, folder)
     stage = usd.Stage.Open(str(root))
     if stage is None:
@@ -49,28 +49,28 @@ def open_stage(file: Path, path: Path, copies: Path) -> OpenedStage:
     return OpenedStage(stage, folder)
 
 
-def _extract_layers(file: Path, path: Path, folder: Path) -> Path:
+def _extract_layers(file: Path, path: Path, layer_folder: Path) -> Path:
     """Copy the layers of a package to a folder, and return the root layer, which is the first entry."""
     with zipfile.ZipFile(file) as package:
         entries = package.infolist()
         layers = [one for one in entries if Path(one.filename).suffix.lower() in LAYER_SUFFIXES]
-        check_limit(path, len(entries), _MAX_ENTRIES, "files in the package", "Export the head alone")
+        check_limit(path, len(entries), _MAX_PACKAGE_ENTRIES, "files in the package", "Export the head alone")
         total = sum(one.file_size for one in layers)
         check_limit(path, total, MAX_FILE_BYTES, "bytes of layers", "Export the head alone")
         if not layers or layers[0] is not entries[0]:
             refuse(path, "a package whose first file is a USD layer", "it is not", DAMAGED_ADVICE)
-        copies = [Path(package.extract(one, folder)) for one in layers]
+        copies = [Path(package.extract(one, layer_folder)) for one in layers]
     return copies[0]
 
 
-def _check_layers(path: Path, root: Path, folder: Path) -> None:
+def _check_layers(path: Path, root_layer: Path, layer_folder: Path) -> None:
     """Refuse a file with layers outside its folder, before they are opened.
 
-    root : root layer
-    folder : folder that must contain all layers
+    root_layer : root layer
+    layer_folder : folder that must contain all layers
     """
     sdf: Any = import_extra("pxr.Sdf", f"{path}: USD scenes")
-    pending, known, size = [root], {root}, 0
+    pending, known, size = [root_layer], {root_layer}, 0
     while pending:
         file = pending.pop()
         size += file.stat().st_size
@@ -78,12 +78,12 @@ def _check_layers(path: Path, root: Path, folder: Path) -> None:
         try:
             layer = sdf.Layer.FindOrOpen(str(file))
         except RuntimeError as fault:
-            reason = _LOCATED_FAULT.search(str(fault))
+            reason = _FAULT_LOCATION_PATTERN.search(str(fault))
             _refuse_damaged(path, f" ({reason[1]})" if reason else "")
         if layer is None:
             _refuse_damaged(path)
         for name in _layer_names(path, layer):
-            found = _layer_file(file, name, folder)
+            found = _layer_file(file, name, layer_folder)
             if found is None:
                 refuse(path, "layers in its own folder or below", f"it references {name!r}", _LAYER_ADVICE)
             if found not in known:
@@ -110,17 +110,17 @@ def _layer_names(path: Path, layer: Sdf.Layer) -> Iterator[str]:
         refuse(path, "a scene without value clips", f"{clips[0]} has some", _LAYER_ADVICE)
 
 
-def _layer_file(layer: Path, name: str, folder: Path) -> Path | None:
+def _layer_file(layer: Path, layer_name: str, layer_folder: Path) -> Path | None:
     """Return the file of a layer that another layer references; None for a file outside the folder.
 
     layer : file of the referencing layer
-    name : name by which it references the other layer
-    folder : folder that must contain all layers
+    layer_name : name of the referenced layer, as written in the referencing layer
+    layer_folder : folder that must contain all layers
     """
-    if any(mark in name for mark in ":[`\0"):  # names with schemes, packages or expressions
+    if any(mark in layer_name for mark in ":[`\0"):  # names with schemes, packages or expressions
         return None
-    file = (layer.parent / name).resolve()
-    is_layer = file.suffix.lower() in LAYER_SUFFIXES and file.is_relative_to(folder) and file.is_file()
+    file = (layer.parent / layer_name).resolve()
+    is_layer = file.suffix.lower() in LAYER_SUFFIXES and file.is_relative_to(layer_folder) and file.is_file()
     return file if is_layer else None
 
 

@@ -19,7 +19,7 @@ from dermis.base.reading import parse_json, read_file
 from dermis.formats.axes import Axes, Axis
 from dermis.formats.maps import PathLike
 from dermis.formats.materials import FileMaterial, Role, Texture, check_pictures
-from dermis.formats.parts import GREY, MaterialGroup, MeshFile, MeshPart, parse_colour
+from dermis.formats.parts import DEFAULT_COLOUR, MaterialGroup, MeshFile, MeshPart, parse_colour
 from dermis.formats.polygons import Polygons, check_polygon_sizes, missing_uv, without_small_polygons
 from dermis.formats.referenced_files import find_referenced_file
 from dermis.formats.size_limits import DAMAGED_ADVICE, MAX_FILE_BYTES
@@ -69,7 +69,7 @@ def read_usd(path: Path) -> MeshFile:
     request = {"file": from_text(str(path.resolve())), "path": from_text(str(path))}
     answer = run_decoder(_DECODER_MODULE, request, len(data), path, "a valid USD file")
     scene: Tree = parse_json(as_text(answer["scene"]), path, "a valid USD file")
-    pictures = _Pictures(path, data)
+    pictures = _UsdPictures(path, data)
     materials = tuple(pictures.material(tree) for tree in scene["materials"])
     check_pictures(path, materials)
     parts, notes = list[MeshPart](), dict.fromkeys(scene["notes"])
@@ -87,19 +87,23 @@ def _material_groups(mesh: Tree, materials: Sequence[FileMaterial]) -> list[Mate
     for index in mesh["materials"]:
         material = materials[index] if index >= 0 else FileMaterial(colour=mesh["colour"])
         names = tuple(dict.fromkeys(name for name in (material.name, mesh["name"]) if name))
-        groups.append(MaterialGroup(names, parse_colour(material.colour or GREY), index))
+        groups.append(MaterialGroup(names, parse_colour(material.colour or DEFAULT_COLOUR), index))
     return groups
 
 
 def _mesh_parts(
-    path: Path, answer: Arrays, prefix: str, groups: list[MaterialGroup]
+    path: Path, decoded_arrays: Arrays, array_prefix: str, groups: list[MaterialGroup]
 ) -> tuple[list[MeshPart], list[str]]:
     """Return the parts of a mesh, one for each group, and notes.
 
-    answer : arrays of all meshes, see `_SceneReader.read`
-    prefix : prefix of the names of this mesh's arrays
+    decoded_arrays : arrays of all meshes, see `_SceneReader.read`
+    array_prefix : prefix of the names of this mesh's arrays
     """
-    mesh = {name.removeprefix(prefix): own for name, own in answer.items() if name.startswith(prefix)}
+    mesh = {
+        name.removeprefix(array_prefix): own
+        for name, own in decoded_arrays.items()
+        if name.startswith(array_prefix)
+    }
     check_polygon_sizes(path, mesh["counts"])
     none, vertex = np.empty((0, 3)), mesh["vertex"]
     missing = np.full(len(vertex), -1)
@@ -120,13 +124,15 @@ def _mesh_parts(
     return geometry.parts(groups, mesh["group"][kept][polygons], "by polygon"), notes + missing_uv(geometry)
 
 
-def _select_polygons(counts: Index, corners: Index, mask: Mask) -> tuple[Index, Index]:
+def _select_polygons(corner_counts: Index, corners: Index, polygon_mask: Mask) -> tuple[Index, Index]:
     """Return the polygons that a mask (n,) selects: their numbers of corners, and their corners."""
-    corner = expand_runs((np.cumsum(counts) - counts)[mask], counts[mask])[1]
-    return counts[mask], corners[corner]
+    corner = expand_runs(
+        (np.cumsum(corner_counts) - corner_counts)[polygon_mask], corner_counts[polygon_mask]
+    )[1]
+    return corner_counts[polygon_mask], corners[corner]
 
 
-class _Pictures:
+class _UsdPictures:
     """Pictures of a USD file, from its package or from its folder and subfolders.
 
     data : bytes of the file
@@ -138,13 +144,13 @@ class _Pictures:
             self.package = zipfile.ZipFile(io.BytesIO(data))
             self.sizes = {one.filename: one.file_size for one in self.package.infolist()}
 
-    def material(self, tree: Tree) -> FileMaterial:
+    def material(self, material_tree: Tree) -> FileMaterial:
         """Return a material; pictures that are missing are left out, with a note.
 
-        tree : material as returned by `MaterialReader.read`
+        material_tree : material as returned by `MaterialReader.read`
         """
         textures, missing = dict[Role, Texture](), dict[str, str]()
-        for role, one in tree["textures"].items():
+        for role, one in material_tree["textures"].items():
             picture = self._find_picture(one["file"])
             if picture is None:
                 missing[role] = f"its picture {one['file']!r} is not in the {self._picture_location()}"
@@ -153,21 +159,27 @@ class _Pictures:
                     picture, 0, tuple(one["transform"]), tuple(one["wrap"]), one["channel"]
                 )
         names = ("name", "colour", "alpha", "alpha_mode", "alpha_cutoff", "roughness", "stated_metalness")
-        values = {name: tree[name] for name in (*names, "emission", "normal_scale") if name in tree}
+        values = {
+            name: material_tree[name]
+            for name in (*names, "emission", "normal_scale")
+            if name in material_tree
+        }
         for name in ("colour", "emission"):
             values[name] = tuple(values.get(name, ())) or getattr(FileMaterial(), name)
-        return FileMaterial(textures=textures, missing=missing, unused=tuple(tree["unused"]), **values)
+        return FileMaterial(
+            textures=textures, missing=missing, unused=tuple(material_tree["unused"]), **values
+        )
 
     def _picture_location(self) -> str:
         return "folder of the file" if self.package is None else "package"
 
-    def _find_picture(self, name: str) -> PathLike | None:
-        """Return the picture with a name relative to the layers; None if it does not exist."""
+    def _find_picture(self, picture_name: str) -> PathLike | None:
+        """Return the picture with a name relative to the layers; None for a missing picture."""
         if self.package is None:
-            return find_referenced_file(self.path, name) if name else None
-        if name not in self.sizes:
+            return find_referenced_file(self.path, picture_name) if picture_name else None
+        if picture_name not in self.sizes:
             return None
-        if self.sizes[name] > MAX_FILE_BYTES:
+        if self.sizes[picture_name] > MAX_FILE_BYTES:
             expected = f"pictures of at most {MAX_FILE_BYTES >> 20} MiB"
-            refuse(self.path, expected, f"{name!r} is larger", DAMAGED_ADVICE)
-        return EmbeddedPicture(f"{self.path}, {name}", self.package.read(name))
+            refuse(self.path, expected, f"{picture_name!r} is larger", DAMAGED_ADVICE)
+        return EmbeddedPicture(f"{self.path}, {picture_name}", self.package.read(picture_name))

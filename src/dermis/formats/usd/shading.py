@@ -22,7 +22,7 @@ _ROLE_OF_INPUT = {
     "metallic": "metalness",
     "emissiveColor": "emission",
 }
-_DEFAULTS: Mapping[str, Any] = {
+_INPUT_DEFAULTS: Mapping[str, Any] = {
     "diffuseColor": (0.18, 0.18, 0.18),
     "emissiveColor": (0.0, 0.0, 0.0),
     "roughness": 0.5,
@@ -30,7 +30,7 @@ _DEFAULTS: Mapping[str, Any] = {
     "opacity": 1.0,
     "opacityThreshold": 0.0,
 }
-_WITHOUT_EFFECT = {
+_INPUTS_WITHOUT_EFFECT = {
     "clearcoat": ("clear coat", 0.0),
     "displacement": ("displacement", 0.0),
     "ior": ("index of refraction", 1.5),
@@ -48,18 +48,18 @@ USD_MATERIALS = (
     noted("another picture of the `opacity`"),
     drawn("`scale`, `wrapS`, `wrapT`, `UsdTransform2d`"),
     noted("`bias`, `wrap...` of `black`, `sourceColorSpace` of `raw`", "normals use their `bias`"),
-    noted(in_code(_WITHOUT_EFFECT), "no note for values that change nothing"),
+    noted(in_code(_INPUTS_WITHOUT_EFFECT), "no note for values that change nothing"),
     drawn_with_note("emission without a `diffuseColor`", "taken for the reflectance, as in scans"),
     noted("shaders other than `UsdPreviewSurface`", "drawn in the colour of the mesh"),
     noted("a picture that is missing"),
 )
 """Inputs of UsdPreviewSurface and of its textures."""
-_WRAPS = {"repeat": "repeat", "mirror": "mirror"}
-_CHANNELS = {"r": 0, "g": 1, "b": 2, "a": 3}
+_WRAP_OF_USD_MODE = {"repeat": "repeat", "mirror": "mirror"}
+_CHANNEL_OF_OUTPUT = {"r": 0, "g": 1, "b": 2, "a": 3}
 _BLACK = (0.0, 0.0, 0.0)
 
 
-class _Source(NamedTuple):
+class _InputSource(NamedTuple):
     """Output of a shader to which an input is connected."""
 
     shader: UsdShade.Shader
@@ -72,8 +72,8 @@ class MaterialReader:
     folder : folder of the layers, to which the names of pictures are relative
     """
 
-    def __init__(self, path: Path, folder: Path, time: Usd.TimeCode) -> None:
-        self.path, self.folder, self.time = path, folder, time
+    def __init__(self, path: Path, layer_folder: Path, time: Usd.TimeCode) -> None:
+        self.path, self.folder, self.time = path, layer_folder, time
         self.shade: Any = import_extra("pxr.UsdShade", f"{path}: USD scenes")
 
     def read(self, material: UsdShade.Material) -> Tree:
@@ -87,7 +87,9 @@ class MaterialReader:
         if kind != "UsdPreviewSurface":
             tree["unused"].append(f"surface {kind}" if kind else "material without a UsdPreviewSurface")
             return tree
-        values = {name: self._constant_value(surface, name, default) for name, default in _DEFAULTS.items()}
+        values = {
+            name: self._constant_value(surface, name, default) for name, default in _INPUT_DEFAULTS.items()
+        }
         tree["colour"], tree["emission"] = list(values["diffuseColor"]), list(values["emissiveColor"])
         tree |= {"roughness": values["roughness"], "stated_metalness": values["metallic"]}
         for name, role in _ROLE_OF_INPUT.items():
@@ -97,15 +99,18 @@ class MaterialReader:
         self._list_unused_inputs(tree, surface)
         return _emission_to_colour(tree)
 
-    def _add_source(self, tree: Tree, input_name: str, role: str, source: _Source) -> None:
+    def _add_source(self, tree: Tree, input_name: str, role: str, input_source: _InputSource) -> None:
         """Add the texture or the vertex colours to which an input is connected."""
-        kind = str(source.shader.GetIdAttr().Get())
+        kind = str(input_source.shader.GetIdAttr().Get())
         if kind.startswith("UsdPrimvarReader_float") and role == "colour":
-            tree |= {"vertex_colours": self._text_value(source.shader, "varname"), "colour": [1.0, 1.0, 1.0]}
+            tree |= {
+                "vertex_colours": self._text_value(input_source.shader, "varname"),
+                "colour": [1.0, 1.0, 1.0],
+            }
         elif kind != "UsdUVTexture":
             tree["unused"].append(f"{input_name} from {kind}")
         else:
-            texture = self._texture_tree(source, tree)
+            texture = self._texture_tree(input_source, tree)
             tree["textures"][role] = texture
             factor, bias = texture.pop("scale"), texture.pop("bias")
             if role == "normal":
@@ -118,12 +123,12 @@ class MaterialReader:
                 key = "stated_metalness" if role == "metalness" else role
                 tree[key] = factor[texture["channel"] or 0]
 
-    def _texture_tree(self, source: _Source, tree: Tree) -> Tree:
-        shader = source.shader
+    def _texture_tree(self, input_source: _InputSource, tree: Tree) -> Tree:
+        shader = input_source.shader
         wraps = [self._text_value(shader, f"wrap{axis}") for axis in "ST"]
         if "black" in wraps:
             tree["unused"].append("black beyond the edges of pictures")
-        if self._text_value(shader, "sourceColorSpace") == "raw" and source.output == "rgb":
+        if self._text_value(shader, "sourceColorSpace") == "raw" and input_source.output == "rgb":
             tree["unused"].append("colour space raw of pictures, except for that of normals")
         coordinates, transform = self._connected_source(shader, "st"), [1.0, 0.0, 0.0, 0.0, 1.0, 0.0]
         if coordinates is not None and coordinates.shader.GetIdAttr().Get() == "UsdTransform2d":
@@ -134,8 +139,8 @@ class MaterialReader:
         return {
             "file": self._picture_name(shader),
             "transform": transform,
-            "wrap": [_WRAPS.get(one, "clamp") for one in wraps],
-            "channel": _CHANNELS.get(source.output),
+            "wrap": [_WRAP_OF_USD_MODE.get(one, "clamp") for one in wraps],
+            "channel": _CHANNEL_OF_OUTPUT.get(input_source.output),
             "scale": list(self._constant_value(shader, "scale", (1.0, 1.0, 1.0, 1.0))),
             "bias": list(self._constant_value(shader, "bias", (0.0, 0.0, 0.0, 0.0))),
         }
@@ -151,9 +156,9 @@ class MaterialReader:
         a, b, d, e = cos * scale_x, -sin * scale_y, sin * scale_x, cos * scale_y
         return [a, -b, b + x, -d, e, 1.0 - e - y]
 
-    def _add_opacity(self, tree: Tree, surface: UsdShade.Shader, values: Mapping[str, Any]) -> None:
+    def _add_opacity(self, tree: Tree, surface: UsdShade.Shader, input_values: Mapping[str, Any]) -> None:
         """Add the opacity; a picture is only supported if it is the alpha channel of the colour's picture."""
-        source, cutoff = self._connected_source(surface, "opacity"), values["opacityThreshold"]
+        source, cutoff = self._connected_source(surface, "opacity"), input_values["opacityThreshold"]
         colour = tree["textures"].get("colour")
         if source is not None:
             file = (
@@ -164,19 +169,19 @@ class MaterialReader:
             if colour is None or source.output != "a" or colour["file"] != file:
                 tree["unused"].append("picture of the opacity")
                 return
-        elif values["opacity"] >= 1.0:
+        elif input_values["opacity"] >= 1.0:
             return
-        tree |= {"alpha": 1.0 if source is not None else values["opacity"]}
+        tree |= {"alpha": 1.0 if source is not None else input_values["opacity"]}
         tree |= {"alpha_mode": "mask" if cutoff > 0 else "blend", "alpha_cutoff": cutoff or 0.5}
 
     def _list_unused_inputs(self, tree: Tree, surface: UsdShade.Shader) -> None:
-        for name, (text, neutral) in _WITHOUT_EFFECT.items():
+        for name, (text, neutral) in _INPUTS_WITHOUT_EFFECT.items():
             value = self._constant_value(surface, name, neutral)
             if value != neutral or self._connected_source(surface, name) is not None:
                 tree["unused"].append(text)
 
     def _picture_name(self, texture: UsdShade.Shader) -> str:
-        """Return a picture's name relative to the folder of the layers, or unchanged if it is outside."""
+        """Return a picture's name relative to the folder of the layers; names outside are unchanged."""
         for attribute in self._value_attributes(texture, "file"):
             layer, asset = attribute.GetPropertyStack(self.time)[0].layer, attribute.Get(self.time)
             name = str(asset.path) if asset else ""
@@ -190,12 +195,12 @@ class MaterialReader:
         found: list[Usd.Attribute] = list(entry.GetValueProducingAttributes()) if entry else []
         return found
 
-    def _connected_source(self, shader: UsdShade.Shader, input_name: str) -> _Source | None:
+    def _connected_source(self, shader: UsdShade.Shader, input_name: str) -> _InputSource | None:
         """Return the shader output to which an input of a shader is connected; None without a connection."""
         for attribute in self._value_attributes(shader, input_name):
             kind, output = str(attribute.GetName()).split(":", 1)
             if kind == "outputs":
-                return _Source(self.shade.Shader(attribute.GetPrim()), output)
+                return _InputSource(self.shade.Shader(attribute.GetPrim()), output)
         return None
 
     def _constant_value(self, shader: UsdShade.Shader, input_name: str, default: Any) -> Any:

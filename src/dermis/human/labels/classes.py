@@ -33,6 +33,6 @@ def label_classes() -> tuple[LabelClass, ...]:
 
 
 @cache
-def class_number(name: str) -> int:
+def class_number(class_name: str) -> int:
     """Return the number of a label class by its name."""
-    return next(one.number for one in label_classes() if one.name == name)
+    return next(one.number for one in label_classes() if one.name == class_name)

@@ -42,14 +42,14 @@ HUMAN_FIELDS = (
 """Label classes of the skin, in order of precedence."""
 LIP_SEAM_MM = np.array([[0.0, -67.3], [10, -66.7], [18, -67.2], [22.2, -67.9]])
 """Polyline where the lips meet: distance from the middle of the face, and height [mm]."""
-_OUTSIDE_FIELD_MM = -1.0
-_MIN_BROW_Z = -30.0  # minimum z of brows
+_FIELD_OUTSIDE_CLASS_MM = -1.0
+_MIN_BROW_Z_MM = -30.0  # minimum z of brows
 _HAIRLINE_MARGIN_MM = -8.0  # height relative to the hairline below which hair belongs to the beard
-_DENSE_LEVELS = 2
+_DENSE_SUBDIVISION_LEVELS = 2
 SIDE_NAMES = "right", "left"
 _PART_CLASSES = {"upper teeth": "teeth", "lower teeth": "teeth", "tongue": "tongue", "cut": "neck"}
-_CACHE_SIZE = 3
-_LOCK = Lock()
+_MAX_CACHED_TOPOLOGIES = 3
+_LABEL_CACHE_LOCK = Lock()
 
 
 @cache
@@ -59,7 +59,7 @@ def label_fields() -> Doubles:
     Distances are positive inside a class.
     """
     points = average_head().positions_mm.astype(np.float64)
-    distances = np.full((len(BORDER_FIELDS), len(points)), -_OUTSIDE_FIELD_MM)
+    distances = np.full((len(BORDER_FIELDS), len(points)), -_FIELD_OUTSIDE_CLASS_MM)
     distances[:, : len(average_surface()[1])] = average_surface()[1].T
     lips, mouth, lids = distances
     left = points[:, 0] > 0
@@ -72,8 +72,8 @@ def label_fields() -> Doubles:
         "neck": neck_distance_mm(points),
     }
     for name, values in (("ear", _ear_field()), ("eye", -lids), ("brow", _brow_field(points))):
-        fields[f"left_{name}"] = np.where(left, values, _OUTSIDE_FIELD_MM)
-        fields[f"right_{name}"] = np.where(left, _OUTSIDE_FIELD_MM, values)
+        fields[f"left_{name}"] = np.where(left, values, _FIELD_OUTSIDE_CLASS_MM)
+        fields[f"right_{name}"] = np.where(left, _FIELD_OUTSIDE_CLASS_MM, values)
     return np.stack([fields[name] for name in HUMAN_FIELDS])
 
 
@@ -82,7 +82,7 @@ def dense_fields() -> tuple[Doubles, Doubles]:
 
     The fields are the signed distances of `label_fields`, interpolated on a subdivided mesh.
     """
-    head = AVERAGE_HUMAN.head(subdivide=_DENSE_LEVELS)
+    head = AVERAGE_HUMAN.head(subdivide=_DENSE_SUBDIVISION_LEVELS)
     assert head.control.stencils is not None
     skin = np.unique(head.mesh.point[head.mesh.triangles[head.mesh.material == 0]])
     fields = head.control.stencils.points(label_fields().T.copy())[skin].T
@@ -147,7 +147,7 @@ def _brow_field(points: Doubles) -> Doubles:
     ends = 0.5 * (low + high)
     below, above = (np.interp(x, *side.T) for side in (low, high))
     across = np.minimum(np.minimum(y - below, above - y), np.minimum(x - ends[0, 0], ends[-1, 0] - x))
-    return np.where(points[:, 2] > _MIN_BROW_Z, across, _OUTSIDE_FIELD_MM)
+    return np.where(points[:, 2] > _MIN_BROW_Z_MM, across, _FIELD_OUTSIDE_CLASS_MM)
 
 
 _LABEL_CACHE: dict[bytes, MeshLabels] = {}
@@ -157,7 +157,7 @@ class MeshLabels(NamedTuple):
     """Label classes of a mesh, whose borders may cross triangles.
 
     base : (t,) class of each triangle where no field is positive
-    classes : (k,) class of each field; the first positive field at a surface point determines its class
+    classes : (k,) class of each field; a surface point has the class of its first positive field
     fields : (v, k) signed distances of the vertices to the class borders, positive inside, interpolated
         linearly over the triangles [mm]
     """
@@ -173,9 +173,9 @@ def mesh_labels(head: Head) -> MeshLabels:
         return _build_labels(head)
     digest = hashlib.blake2b(head.mesh.triangles.tobytes(), digest_size=16).digest()
     key = digest + bytes([head.strands is not None])
-    with _LOCK:
+    with _LABEL_CACHE_LOCK:
         if key not in _LABEL_CACHE:
-            while len(_LABEL_CACHE) >= _CACHE_SIZE:
+            while len(_LABEL_CACHE) >= _MAX_CACHED_TOPOLOGIES:
                 _LABEL_CACHE.pop(next(iter(_LABEL_CACHE)))
             _LABEL_CACHE[key] = _build_labels(head)
         return _LABEL_CACHE[key]
@@ -214,8 +214,10 @@ def _iris_fields(head: Head) -> dict[str, Doubles]:
     for frame, material, side in zip(frames, head.eyes.material, reversed(SIDE_NAMES), strict=False):
         eyeball_points = np.unique(mesh.point[mesh.triangles[mesh.material == material]])
         local = points[eyeball_points] @ frame[:3, :3].T + frame[:3, 3]
-        inside = np.where(local[:, 2] > 0, LIMBUS_MM - np.hypot(local[:, 0], local[:, 1]), _OUTSIDE_FIELD_MM)
-        fields[f"{side}_iris"] = np.full(len(points), _OUTSIDE_FIELD_MM)
+        inside = np.where(
+            local[:, 2] > 0, LIMBUS_MM - np.hypot(local[:, 0], local[:, 1]), _FIELD_OUTSIDE_CLASS_MM
+        )
+        fields[f"{side}_iris"] = np.full(len(points), _FIELD_OUTSIDE_CLASS_MM)
         fields[f"{side}_iris"][eyeball_points] = inside
     return fields
 
@@ -237,7 +239,7 @@ def _skin_fields(head: Head) -> dict[str, Doubles]:
     is_skin = np.array([material.kind == "skin" for material in mesh.materials])
     outside = np.ones(count, bool)
     outside[mesh.point[mesh.triangles[is_skin[mesh.material]]]] = False
-    return {name: np.where(outside, _OUTSIDE_FIELD_MM, values) for name, values in fields.items()}
+    return {name: np.where(outside, _FIELD_OUTSIDE_CLASS_MM, values) for name, values in fields.items()}
 
 
 def _warped_fields(head: Head, landmarks: Mapping[str, tuple[float, float, float]]) -> dict[str, Doubles]:

@@ -39,72 +39,72 @@ class LandmarkPoints:
     material: NDArray[np.int32]
 
 
-def landmark_points(head: Head, name: str) -> LandmarkPoints:
+def landmark_points(head: Head, set_or_table: str) -> LandmarkPoints:
     """Return the landmarks of a head, from a published set or from a table of vertices.
 
-    name : one of `LANDMARK_SETS`, or a CSV file with columns name,vertex, where vertex is an index into
-        `Head.positions_mm`
+    set_or_table : one of `LANDMARK_SETS`, or a CSV file with columns name,vertex, where vertex is an index
+        into `Head.positions_mm`
 
     Raises DermisError for a published set on a head of another topology, and for tables that cannot be read.
     """
-    if name not in LANDMARK_SETS:
-        return _table_landmarks(head, name)
+    if set_or_table not in LANDMARK_SETS:
+        return _table_landmarks(head, set_or_table)
     if not is_human(head):
         actual = f"{head.name!r} has a topology of its own"
         advice = "Write a CSV table of name,vertex for its mesh, and pass the name of that file"
-        refuse(f"landmarks {name}", "a head of the parametric human", actual, advice)
-    return _human_landmarks(head, _landmark_rows(name))
+        refuse(f"landmarks {set_or_table}", "a head of the parametric human", actual, advice)
+    return _human_landmarks(head, _landmark_rows(set_or_table))
 
 
-def check_landmarks(name: object) -> str:
-    """Validate the name of a landmark set or the path of a landmark table, and return it.
+def check_landmarks(set_or_table: object) -> str:
+    """Return the name of a landmark set, or the path of a landmark table, after validation.
 
-    Raises DermisError if it is neither a published set nor a .csv file.
+    Raises DermisError for anything except published sets and .csv files.
     """
-    text = str(checked_path(name, "a set of landmarks or its table"))
+    text = str(checked_path(set_or_table, "a set of landmarks or its table"))
     if text not in LANDMARK_SETS and not text.endswith(".csv"):
         expected = f"{', '.join(LANDMARK_SETS)} or a CSV table"
         refuse("landmarks", expected, f"got {format_value(text)}", "Correct the name")
     return text
 
 
-def read_landmark_table(name: str) -> list[tuple[str, int]]:
+def read_landmark_table(table_path: str) -> list[tuple[str, int]]:
     """Return (name, vertex index) pairs from a CSV file of landmarks.
 
     Raises DermisError for tables that cannot be read.
     """
-    text = read_text(check_landmarks(name), _EXPECTED_CONTENT)
-    with parsing(name, _EXPECTED_CONTENT, KeyError, TypeError, csv.Error):
+    text = read_text(check_landmarks(table_path), _EXPECTED_CONTENT)
+    with parsing(table_path, _EXPECTED_CONTENT, KeyError, TypeError, csv.Error):
         found = [(str(row["name"]), int(row["vertex"])) for row in parse_rows(text)]
     if not 0 < len(found) <= _MAX_LANDMARKS:
-        refuse(name, f"1 to {_MAX_LANDMARKS} landmarks", f"got {len(found)}", "Correct the table")
+        refuse(table_path, f"1 to {_MAX_LANDMARKS} landmarks", f"got {len(found)}", "Correct the table")
     return found
 
 
 @cache
-def _landmark_rows(name: str) -> Rows:
-    return read_rows(__package__, name)
+def _landmark_rows(set_name: str) -> Rows:
+    return read_rows(__package__, set_name)
 
 
-def _human_landmarks(head: Head, rows: Rows) -> LandmarkPoints:
-    quad = np.array([int(row["quad"]) for row in rows], np.int32)
-    position = np.array([[float(row["along"]), float(row["across"])] for row in rows], np.float32)
+def _human_landmarks(head: Head, landmark_rows: Rows) -> LandmarkPoints:
+    quad = np.array([int(row["quad"]) for row in landmark_rows], np.int32)
+    position = np.array([[float(row["along"]), float(row["across"])] for row in landmark_rows], np.float32)
     refined = refine_roots(average_head().mesh, Roots(quad, position), head.levels)
     point, weight = quad_corners(head.mesh, refined.quad), quad_weights(refined.position).astype(np.float32)
-    material = np.full(len(rows), -1, np.int32)
-    for k in np.flatnonzero([float(row["sunk"]) > 0 for row in rows]):
+    material = np.full(len(landmark_rows), -1, np.int32)
+    for k in np.flatnonzero([float(row["sunk"]) > 0 for row in landmark_rows]):
         assert head.eyes is not None
         eye_material = head.mesh.material[head.mesh.quads[refined.quad[k], 0]]
         back = head.eyes.back[head.eyes.material == eye_material][0]
-        sunk, apex = float(rows[k]["sunk"]), point[k, weight[k].argmax()]
+        sunk, apex = float(landmark_rows[k]["sunk"]), point[k, weight[k].argmax()]
         point[k], weight[k], material[k] = (apex, back, back, back), (1 - sunk, sunk, 0, 0), eye_material
-    return LandmarkPoints(tuple(row["landmark"] for row in rows), point, weight, material)
+    return LandmarkPoints(tuple(row["landmark"] for row in landmark_rows), point, weight, material)
 
 
-def _table_landmarks(head: Head, name: str) -> LandmarkPoints:
-    found, count = read_landmark_table(name), len(head.positions_mm)
+def _table_landmarks(head: Head, table_path: str) -> LandmarkPoints:
+    found, count = read_landmark_table(table_path), len(head.positions_mm)
     for landmark, vertex in found:
-        checked_integer(f"{Path(name).name}: vertex of {landmark}", vertex, 0, count - 1)
+        checked_integer(f"{Path(table_path).name}: vertex of {landmark}", vertex, 0, count - 1)
     point = np.repeat(np.array([[vertex] for _, vertex in found], np.int32), 4, axis=1)
     weight = np.tile(np.array([1, 0, 0, 0], np.float32), (len(found), 1))
     names = tuple(landmark for landmark, _ in found)

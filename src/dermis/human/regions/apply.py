@@ -16,8 +16,8 @@ from dermis.base.errors import DermisError
 from dermis.base.progress import logged_step
 from dermis.human.regions.labels import known_landmarks, label_texels
 from dermis.human.regions.region_table import (
-    DEFAULT_TABLE,
-    VALUE_LIMITS,
+    DEFAULT_TABLE_NAME,
+    REGION_VALUE_LIMITS,
     Doubles,
     RegionTable,
     load_region_table,
@@ -31,16 +31,16 @@ MIN_MAP_SIDE = 1024
 """Minimum side of the maps [texel]; larger maps of the head keep their size."""
 REGION_BLUR_MM = 2.5
 """Standard deviation of the blur of borders between regions [mm]."""
-_DETAIL_MM = 6.0  # finer detail is taken from the head's own maps, the rest from the table
-_MIN_LOCAL_MEAN = 0.4  # smallest local mean of a map, relative to its mean
-_MAX_DETAIL = 3.0  # largest value of a map, relative to its local mean
-_GRID_CELL_MM = 2.0
-_MAX_GRID_CELLS = 256  # along the longest side of the grid
-_BLUR_TRUNCATION = 3  # radius of the blur kernel in standard deviations
+_DETAIL_BLUR_MM = 6.0  # finer detail is taken from the head's own maps, the rest from the table
+_MIN_RELATIVE_LOCAL_MEAN = 0.4  # smallest local mean of a map, relative to its mean
+_MAX_RELATIVE_DETAIL = 3.0  # largest value of a map, relative to its local mean
+_BLUR_GRID_CELL_MM = 2.0
+_MAX_BLUR_GRID_CELLS = 256  # along the longest side of the grid
+_BLUR_TRUNCATION_SIGMAS = 3  # radius of the blur kernel in standard deviations
 _CACHE_VERSION = 2  # increment when `with_regions` returns different maps for the same head
 
 
-def with_regions(head: Head, table: RegionTable | str | Path = DEFAULT_TABLE) -> tuple[Head, float]:
+def with_regions(head: Head, table: RegionTable | str | Path = DEFAULT_TABLE_NAME) -> tuple[Head, float]:
     """Return a head with roughness and specular maps by region of the face.
 
     The specular map contains rho_s itself. As the renderer scales specular maps to a mean of `Skin.rho_s`,
@@ -52,7 +52,7 @@ def with_regions(head: Head, table: RegionTable | str | Path = DEFAULT_TABLE) ->
     head : Head
         Head with known regions: the human, a sample, or a head with landmarks or labels in the table.
     table : RegionTable, str or path
-        Roughness and strength of each region: a table, its TOML file, or "default" for that of the package.
+        Roughness and strength of each region: a table, its TOML file, or "default" for the package's table.
 
     Returns
     -------
@@ -84,7 +84,7 @@ def with_regions(head: Head, table: RegionTable | str | Path = DEFAULT_TABLE) ->
     own_maps = (head.maps.roughness, head.maps.specular)
     roughness, specular = (
         np.clip(_region_map(atlas, points, smoothed[:, k], own_maps[k]), *limits)
-        for k, limits in enumerate(VALUE_LIMITS.values())
+        for k, limits in enumerate(REGION_VALUE_LIMITS.values())
     )
     y, x = np.nonzero(atlas.coverage)
     height, width = specular.shape
@@ -93,59 +93,60 @@ def with_regions(head: Head, table: RegionTable | str | Path = DEFAULT_TABLE) ->
 
 
 def _region_map(
-    atlas: Atlas, points: NDArray[np.float64], level: NDArray[np.float64], own_map: Floats | None
+    atlas: Atlas, points: NDArray[np.float64], region_values: NDArray[np.float64], own_map: Floats | None
 ) -> Floats:
     """Return a map (h, w) of a regional quantity, multiplied by the fine detail of the head's own map.
 
     points : (n, 3) positions of the covered texels of the atlas [mm]
-    level : (n,) quantity at these texels, smoothed across region borders
+    region_values : (n,) quantity at these texels, smoothed across region borders
     own_map : (h, w) existing map of the quantity, or None
     """
     if own_map is None:
-        return _texel_image(atlas, level)
+        return _texel_image(atlas, region_values)
     y, x = np.nonzero(atlas.coverage)
     height, width = own_map.shape
     values = own_map[y * height // MIN_MAP_SIDE, x * width // MIN_MAP_SIDE].astype(np.float64)
-    local_mean = gaussian_mean(points, values[:, None], _DETAIL_MM)[:, 0]
-    local_mean = np.maximum(local_mean, _MIN_LOCAL_MEAN * values.mean())
+    local_mean = gaussian_mean(points, values[:, None], _DETAIL_BLUR_MM)[:, 0]
+    local_mean = np.maximum(local_mean, _MIN_RELATIVE_LOCAL_MEAN * values.mean())
     local_mean = np.maximum(local_mean, np.finfo(np.float32).eps)
     shape = max(height, MIN_MAP_SIDE), max(width, MIN_MAP_SIDE)
     detail = np.minimum(
-        _resize_map(own_map, shape) / _resize_map(_texel_image(atlas, local_mean), shape), _MAX_DETAIL
+        _resize_map(own_map, shape) / _resize_map(_texel_image(atlas, local_mean), shape),
+        _MAX_RELATIVE_DETAIL,
     )
-    return np.asarray(detail * _resize_map(_texel_image(atlas, level), shape))
+    return np.asarray(detail * _resize_map(_texel_image(atlas, region_values), shape))
 
 
-def _texel_image(atlas: Atlas, values: NDArray[np.float64]) -> Floats:
+def _texel_image(atlas: Atlas, texel_values: NDArray[np.float64]) -> Floats:
     """Return values (n,) of covered atlas texels as an image; other texels copy the nearest covered texel."""
     from scipy.ndimage import distance_transform_edt
 
     image = np.zeros(atlas.coverage.shape, np.float32)
-    image[atlas.coverage] = values
+    image[atlas.coverage] = texel_values
     y, x = distance_transform_edt(~atlas.coverage, return_distances=False, return_indices=True)
     return np.asarray(image[y, x])
 
 
-def _resize_map(picture: Floats, shape: tuple[int, int]) -> Floats:
+def _resize_map(picture: Floats, map_shape: tuple[int, int]) -> Floats:
     from scipy.ndimage import zoom
 
-    if picture.shape == shape:
+    if picture.shape == map_shape:
         return picture
-    factors = shape[0] / picture.shape[0], shape[1] / picture.shape[1]
+    factors = map_shape[0] / picture.shape[0], map_shape[1] / picture.shape[1]
     return np.asarray(zoom(picture, factors, order=1, mode="nearest", grid_mode=True), np.float32)
 
 
-def gaussian_mean(points: Doubles, values: Doubles, sigma_mm: float) -> Doubles:
+def gaussian_mean(points: Doubles, point_values: Doubles, sigma_mm: float) -> Doubles:
     """Blur values on a surface with a Gaussian in 3D, which ignores seams of the uv layout; return (n, c).
 
     points : (n, 3) positions of the samples [mm]
-    values : (n, c) values of the samples
+    point_values : (n, c) values of the samples
     sigma_mm : standard deviation of the Gaussian [mm]
     """
     from scipy.ndimage import gaussian_filter, map_coordinates
 
     low, extent = points.min(axis=0), np.ptp(points, axis=0)
-    side = max(_GRID_CELL_MM, float(extent.max()) / _MAX_GRID_CELLS)
+    side = max(_BLUR_GRID_CELL_MM, float(extent.max()) / _MAX_BLUR_GRID_CELLS)
     position = (points - low) / side + 1
     shape = tuple(int(length) + 4 for length in extent / side)
     cell = np.ravel_multi_index(tuple(np.rint(position).astype(int).T), shape)
@@ -153,11 +154,11 @@ def gaussian_mean(points: Doubles, values: Doubles, sigma_mm: float) -> Doubles:
 
     def blur(quantity: Doubles) -> Doubles:
         grid = np.divide(quantity, count, out=np.zeros(len(count)), where=count > 0).reshape(shape)
-        smooth = gaussian_filter(grid, sigma_mm / side, mode="constant", truncate=_BLUR_TRUNCATION)
+        smooth = gaussian_filter(grid, sigma_mm / side, mode="constant", truncate=_BLUR_TRUNCATION_SIGMAS)
         return np.asarray(map_coordinates(smooth, position.T, order=1))
 
     weight = blur(count.astype(np.float64))
-    sums = [np.bincount(cell, column, minlength=len(count)).astype(np.float64) for column in values.T]
+    sums = [np.bincount(cell, column, minlength=len(count)).astype(np.float64) for column in point_values.T]
     return np.stack([blur(column) / weight for column in sums], axis=-1)
 
 
@@ -170,7 +171,7 @@ def with_default_regions(head: Head) -> Head:
     """
     if head.maps.has_roughness or known_landmarks(head) is None:
         return head
-    table = load_region_table(DEFAULT_TABLE)
+    table = load_region_table(DEFAULT_TABLE_NAME)
     missing = ["roughness"] if head.maps.specular is not None else ["roughness", "specular"]
     sources: list[Array] = [head.mesh.positions, head.mesh.uv, head.mesh.triangles, table.values]
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.tables import read_rows
-from dermis.human.model import MATERIALS, build_head, template
+from dermis.human.model import MATERIAL_OF_GROUP, build_head, template
 from dermis.human.person import Human
 from dermis.human.regions.region_table import Doubles, classify_regions
 from dermis.mesh.eye_look import EyeLook
@@ -18,7 +18,7 @@ from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 
 AVERAGE_HUMAN = Human(sex=0.5, age=35.0)
-_DENSE_LEVELS = 2  # levels of subdivision, for triangles of about 1 mm
+_DENSE_SUBDIVISION_LEVELS = 2  # levels of subdivision, for triangles of about 1 mm
 _EYE_LANDMARKS = ("left eye", "right eye")  # names of landmarks and of the materials whose centres they are
 _MOUTH_MATERIALS = ("upper teeth", "lower teeth", "tongue")
 
@@ -49,7 +49,7 @@ def average_skin() -> DenseSkin:
     """Return dense samples of the average human's outer skin, without the inside of the mouth."""
     from scipy.spatial import cKDTree
 
-    head = _bare_head(_DENSE_LEVELS)
+    head = _bare_head(_DENSE_SUBDIVISION_LEVELS)
     mesh = head.mesh
     quad_index = control_quads(head, np.arange(len(mesh.triangles)))
     is_outer = (mesh.material == 0) & ~np.isin(quad_index, part_quads()["mouth"])
@@ -82,23 +82,23 @@ def human_landmarks(head: Head) -> dict[str, Doubles]:
 def is_human(head: Head) -> bool:
     """Return whether a head is a parametric human, judged by its control points, targets and materials."""
     rig = head.rig
-    if rig is None or head.mesh.materials != tuple(MATERIALS.values()):
+    if rig is None or head.mesh.materials != tuple(MATERIAL_OF_GROUP.values()):
         return False  # without building the average head
     average = average_head().control
     return rig.positions_mm.shape == average.positions_mm.shape and rig.targets.names == average.targets.names
 
 
-def control_quads(head: Head, triangle: NDArray[Any]) -> NDArray[np.int64]:
+def control_quads(head: Head, triangle_index: NDArray[Any]) -> NDArray[np.int64]:
     """Return the index (n,) of the control quad from which each triangle was subdivided.
 
     head : parametric human in either uv layout, at any level of subdivision
-    triangle : (n,) triangle indices
+    triangle_index : (n,) triangle indices
     """
     control_triangles = len(average_head().mesh.triangles)
     levels = 0
     while len(head.mesh.triangles) > control_triangles * 4**levels:
         levels += 1
-    return np.asarray(triangle // (2 * 4**levels), np.int64)
+    return np.asarray(triangle_index // (2 * 4**levels), np.int64)
 
 
 def average_positions(head: Head) -> Doubles:

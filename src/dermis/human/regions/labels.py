@@ -33,7 +33,7 @@ Point = tuple[float, float, float]
 Landmarks = Mapping[str, Point]
 
 _MIN_LANDMARKS = 10
-_MIN_DEPTH_MM = 2.0  # RMS distance from the best plane; the warp needs landmarks in three dimensions
+_MIN_LANDMARK_DEPTH_MM = 2.0  # RMS distance from the best plane; the warp needs landmarks in three dimensions
 _MAX_SKIN_DISTANCE_MM = 15.0  # eye centres are this deep; farther landmarks belong to another head
 _MAX_COORDINATE_MM = 1e6
 _WARP_SMOOTHING = 1.0  # for landmarks picked by hand; 0 would interpolate them exactly
@@ -53,7 +53,7 @@ def known_landmarks(head: Head) -> Landmarks | None:
     Positions are relative to the centre of the head [mm].
     """
     if is_human(head):
-        return _to_tuples(human_landmarks(head), head.centre_mm)
+        return _landmark_tuples(human_landmarks(head), head.centre_mm)
     file = resources.files(__package__) / "landmarks" / f"{Path(head.name).stem}.csv"
     return _parse_landmarks(file.read_text("utf-8"), file.name) if file.is_file() else None
 
@@ -61,11 +61,11 @@ def known_landmarks(head: Head) -> Landmarks | None:
 @cache
 def average_landmarks() -> Landmarks:
     """Return the positions of all supported landmarks on the average human, by name [mm]."""
-    return _to_tuples(human_landmarks(average_head()))
+    return _landmark_tuples(human_landmarks(average_head()))
 
 
-def _to_tuples(positions: Mapping[str, Doubles], origin: Point = (0.0, 0.0, 0.0)) -> Landmarks:
-    relative = {name: position - np.array(origin) for name, position in positions.items()}
+def _landmark_tuples(landmark_positions: Mapping[str, Doubles], origin: Point = (0.0, 0.0, 0.0)) -> Landmarks:
+    relative = {name: position - np.array(origin) for name, position in landmark_positions.items()}
     return {name: (float(x), float(y), float(z)) for name, (x, y, z) in relative.items()}
 
 
@@ -86,21 +86,25 @@ def warp_to_average(head: Head, landmarks: Landmarks, points: Doubles) -> Double
     return np.asarray(warp(points - np.array(head.centre_mm)))
 
 
-def _parse_landmarks(text: str, name: str) -> Landmarks:
+def _parse_landmarks(csv_text: str, file_name: str) -> Landmarks:
     expected = "rows of landmark,x,y,z"
-    with parsing(name, expected, KeyError, TypeError, csv.Error):
-        landmarks = {row["landmark"]: tuple(float(row[axis]) for axis in "xyz") for row in parse_rows(text)}
+    with parsing(file_name, expected, KeyError, TypeError, csv.Error):
+        landmarks = {
+            row["landmark"]: tuple(float(row[axis]) for axis in "xyz") for row in parse_rows(csv_text)
+        }
     if not landmarks:
-        refuse(name, expected, "there are none", "Add them")
+        refuse(file_name, expected, "there are none", "Add them")
     for landmark, position in landmarks.items():
-        checked_array(f"{name}: {landmark}", position, (3,), -_MAX_COORDINATE_MM, _MAX_COORDINATE_MM, "mm")
+        checked_array(
+            f"{file_name}: {landmark}", position, (3,), -_MAX_COORDINATE_MM, _MAX_COORDINATE_MM, "mm"
+        )
     return {landmark: (x, y, z) for landmark, (x, y, z) in landmarks.items()}
 
 
-def _check_landmarks(head: Head, landmarks: Landmarks, average: Landmarks) -> None:
+def _check_landmarks(head: Head, landmarks: Landmarks, reference_landmarks: Landmarks) -> None:
     subject = f"landmarks of {head.name}"
-    for name in landmarks.keys() - average.keys():
-        refuse(subject, f"only {', '.join(average)}", f"got {name!r}", "Correct its name")
+    for name in landmarks.keys() - reference_landmarks.keys():
+        refuse(subject, f"only {', '.join(reference_landmarks)}", f"got {name!r}", "Correct its name")
     if len(landmarks) < _MIN_LANDMARKS:
         actual = f"got {len(landmarks)}"
         refuse(subject, f"at least {_MIN_LANDMARKS}", actual, "Add some all around the head")
@@ -113,20 +117,20 @@ def _check_landmarks(head: Head, landmarks: Landmarks, average: Landmarks) -> No
             refuse(subject, expected, actual, "Correct its position")
     points_mm = np.array(list(landmarks.values()))
     singular_values = np.linalg.svd(points_mm - points_mm.mean(axis=0), compute_uv=False)
-    if singular_values[-1] / np.sqrt(len(points_mm)) < _MIN_DEPTH_MM:
+    if singular_values[-1] / np.sqrt(len(points_mm)) < _MIN_LANDMARK_DEPTH_MM:
         refuse(subject, "points all around the head", "they lie in one plane", "Add some outside of it")
 
 
-def label_texels(head: Head, atlas: Atlas, table: RegionTable) -> NDArray[np.uint8]:
+def label_texels(head: Head, atlas: Atlas, region_table: RegionTable) -> NDArray[np.uint8]:
     """Return the region (n,) of each covered atlas texel in row order, as indices into `REGIONS`.
 
     The first of these sources that exists is used: label map or landmarks of the table, label map of the
     head, landmarks known to the package. Raises DermisError for a head without any of these sources.
     """
-    if table.labels is not None:
-        return _labels_from_map(load_labels(table.labels), atlas, str(table.labels))
-    if table.landmarks is not None:
-        return _labels_from_landmarks(head, atlas, load_landmarks(table.landmarks))
+    if region_table.labels is not None:
+        return _labels_from_map(load_labels(region_table.labels), atlas, str(region_table.labels))
+    if region_table.landmarks is not None:
+        return _labels_from_landmarks(head, atlas, load_landmarks(region_table.landmarks))
     if head.maps.region is not None:
         return _labels_from_map(head.maps.region, atlas, head.name)
     if is_human(head):
@@ -138,13 +142,13 @@ def label_texels(head: Head, atlas: Atlas, table: RegionTable) -> NDArray[np.uin
     return _labels_from_landmarks(head, atlas, landmarks)
 
 
-def _labels_from_map(labels: NDArray[np.uint8], atlas: Atlas, name: str) -> NDArray[np.uint8]:
+def _labels_from_map(label_map: NDArray[np.uint8], atlas: Atlas, head_name: str) -> NDArray[np.uint8]:
     y, x = np.nonzero(atlas.coverage)
-    height, width = labels.shape
-    chosen = labels[y * height // atlas.size, x * width // atlas.size]
+    height, width = label_map.shape
+    chosen = label_map[y * height // atlas.size, x * width // atlas.size]
     if chosen.size and chosen.max() >= len(REGIONS):
         expected = f"labels from 0 to {len(REGIONS) - 1} on the skin"
-        refuse(name, expected, f"got {chosen.max()}", "Correct the label map")
+        refuse(head_name, expected, f"got {chosen.max()}", "Correct the label map")
     return np.asarray(chosen)
 
 

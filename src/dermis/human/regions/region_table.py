@@ -45,10 +45,10 @@ _CHIN_OUTLINE = np.array([[-110.0, 26.0], [-68, 22.0]])
 """Heights on the chin, and its half width at each."""
 
 
-_MIN_NOSE_Z, _JAW_Y = -20.0, -108.0
-DEFAULT_TABLE = "default"
+_MIN_NOSE_Z_MM, _JAW_Y_MM = -20.0, -108.0
+DEFAULT_TABLE_NAME = "default"
 """Name of the package's table, which has artist's values."""
-VALUE_LIMITS = {"m": (0.05, 1.0), "rho_s": (0.0, 1.0)}
+REGION_VALUE_LIMITS = {"m": (0.05, 1.0), "rho_s": (0.0, 1.0)}
 _FILE_KEYS = ("landmarks", "labels")
 
 
@@ -60,7 +60,7 @@ def nose_distance_mm(points: Doubles) -> Doubles:
     x, y, z = np.abs(points[:, 0]), points[:, 1], points[:, 2]
     top, half = _NOSE_OUTLINE[-1]
     beside = np.interp(y, *_NOSE_OUTLINE.T) - np.maximum(y - top, 0.0) * half - x
-    return np.where(z > _MIN_NOSE_Z, np.minimum(beside, y - np.interp(x, *_NOSE_BASE.T)), -1.0)
+    return np.where(z > _MIN_NOSE_Z_MM, np.minimum(beside, y - np.interp(x, *_NOSE_BASE.T)), -1.0)
 
 
 def neck_distance_mm(points: Doubles) -> Doubles:
@@ -70,20 +70,20 @@ def neck_distance_mm(points: Doubles) -> Doubles:
 
     points : (n, 3) positions on the average human [mm]
     """
-    return np.asarray(_JAW_Y + 0.42 * np.maximum(6 - points[:, 2], 0) - points[:, 1])
+    return np.asarray(_JAW_Y_MM + 0.42 * np.maximum(6 - points[:, 2], 0) - points[:, 1])
 
 
-def classify_regions(points: Doubles, lips: Mask, ears: Mask) -> NDArray[np.int64]:
+def classify_regions(points: Doubles, on_lips: Mask, on_ears: Mask) -> NDArray[np.int64]:
     """Return the face region (n,) of points on the average human, as indices into `REGIONS`.
 
     points : (n, 3) positions [mm]
-    lips, ears : (n,) masks of points on the lips, including the inside of the mouth, and on the ears
+    on_lips, on_ears : (n,) masks of points on the lips, including the inside of the mouth, and on the ears
     """
     x, y, z = np.abs(points[:, 0]), points[:, 1], points[:, 2]
-    front, above_jaw = z > _MIN_NOSE_Z, neck_distance_mm(points) < 0
+    front, above_jaw = z > _MIN_NOSE_Z_MM, neck_distance_mm(points) < 0
     tests = {
-        "ear": ears,
-        "lips": lips,
+        "ear": on_ears,
+        "lips": on_lips,
         "eyelid": (((x - 30) / 18) ** 2 + ((y + 0.5) / 12) ** 2 < 1) & (z > -40),
         "brow": _brow_mask(x, y) & (z > -30),
         "nose": front
@@ -111,7 +111,7 @@ class RegionTable:
 
     values : (10, 2) Beckmann roughness m and specular strength rho_s [-], in the order of `REGIONS`
     landmarks : CSV file of the head's landmarks, for heads unknown to the package
-    labels : label map of the head, whose texels are indices into `REGIONS`; it makes landmarks unnecessary
+    labels : label map of the head, whose texels are indices into `REGIONS`; replaces landmarks
     """
 
     values: NDArray[np.float64]
@@ -119,35 +119,45 @@ class RegionTable:
     labels: Path | None = None
 
 
-def load_region_table(name: str | Path) -> RegionTable:
+def load_region_table(name_or_path: str | Path) -> RegionTable:
     """Load a region table from a TOML file; the name "default" loads the package's own table.
 
     Raises DermisError for missing and unknown regions and for invalid numbers.
     """
-    if str(name) == DEFAULT_TABLE:
+    if str(name_or_path) == DEFAULT_TABLE_NAME:
         text = resources.files(__package__).joinpath("default.toml").read_text("utf-8")
-        return _build_table(tomllib.loads(text), Path(DEFAULT_TABLE))
-    return _build_table(read_toml(name, "default, or regions in TOML"), Path(name))
+        return _build_table(tomllib.loads(text), Path(DEFAULT_TABLE_NAME))
+    return _build_table(read_toml(name_or_path, "default, or regions in TOML"), Path(name_or_path))
 
 
-def _build_table(entries: dict[str, Any], path: Path) -> RegionTable:
-    files = {key: _file_path(path, key, entries.pop(key)) for key in _FILE_KEYS if key in entries}
-    if set(entries) != set(REGIONS):
-        wrong = sorted(set(entries) - set(REGIONS)) or sorted(set(REGIONS) - set(entries))
-        actual = f"[{wrong[0]}] {'is none of them' if wrong[0] in entries else 'is missing'}"
+def _build_table(region_entries: dict[str, Any], path: Path) -> RegionTable:
+    files = {
+        key: _file_path(path, key, region_entries.pop(key)) for key in _FILE_KEYS if key in region_entries
+    }
+    if set(region_entries) != set(REGIONS):
+        wrong = sorted(set(region_entries) - set(REGIONS)) or sorted(set(REGIONS) - set(region_entries))
+        actual = f"[{wrong[0]}] {'is none of them' if wrong[0] in region_entries else 'is missing'}"
         refuse(path, f"one table for each of {', '.join(REGIONS)}", actual, "Correct it")
-    values = [_region_values(path, region, entries[region]) for region in REGIONS]
+    values = [_region_values(path, region, region_entries[region]) for region in REGIONS]
     return RegionTable(np.array(values), **files)
 
 
-def _region_values(path: Path, region: str, entry: Any) -> list[float]:
+def _region_values(path: Path, region: str, region_entry: Any) -> list[float]:
     label = f"{path}: {region}"
-    if not isinstance(entry, dict) or entry.keys() != VALUE_LIMITS.keys():
-        refuse(label, "m and rho_s", f"got {format_value(entry)}", "Give both, and nothing else")
-    return [checked_number(f"{label}: {name}", entry[name], *limits) for name, limits in VALUE_LIMITS.items()]
+    if not isinstance(region_entry, dict) or region_entry.keys() != REGION_VALUE_LIMITS.keys():
+        refuse(label, "m and rho_s", f"got {format_value(region_entry)}", "Give both, and nothing else")
+    return [
+        checked_number(f"{label}: {name}", region_entry[name], *limits)
+        for name, limits in REGION_VALUE_LIMITS.items()
+    ]
 
 
-def _file_path(path: Path, key: str, name: Any) -> Path:
-    if not isinstance(name, str):
-        refuse(f"{path}: {key}", "the name of a file", f"got {format_value(name)}", "Write it in quotes")
-    return path.parent / name
+def _file_path(path: Path, table_key: str, file_name: Any) -> Path:
+    if not isinstance(file_name, str):
+        refuse(
+            f"{path}: {table_key}",
+            "the name of a file",
+            f"got {format_value(file_name)}",
+            "Write it in quotes",
+        )
+    return path.parent / file_name

@@ -1,4 +1,4 @@
-"""Tables of skin colours by melanin and blood, cached for people who share the other parameters."""
+"""Tables of skin colours by melanin and blood, cached by eumelanin, oxygen and thickness of the epidermis."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from threading import Lock
 from dermis.optics.pigments.parameters import SkinParameters
 from dermis.optics.skin_colours import ColourTable, colour_table
 
-_LOCK = Lock()  # two threads may request the same table
+_COLOUR_TABLE_LOCK = Lock()  # two threads may request the same table
 
 
 def skin_colour_table(eumelanin: float, oxygen: float, epidermis_mm: float) -> ColourTable:
     """Return the table of skin colours by melanin and blood fraction; tables are cached."""
-    with _LOCK:
+    with _COLOUR_TABLE_LOCK:
         return _cached_colour_table(eumelanin, oxygen, epidermis_mm)
 
 

@@ -27,7 +27,7 @@ MOVEMENTS = (
     "pressed",
 )
 """Facial movements: first those that deepen folds, see folds.csv, then those that move blood."""
-FOLD_MOVEMENTS = MOVEMENTS.index("flush")
+FOLD_MOVEMENT_COUNT = MOVEMENTS.index("flush")
 """Number of movements that deepen folds."""
 _TABLE_AMOUNTS = (
     "blood", "melanin", "strength", "roughness", "pores", "furrows",
@@ -38,33 +38,33 @@ ZONE_AMOUNTS = (*_TABLE_AMOUNTS, "oxygen", "_unused", "_unused_too")
 _REFERENCE_SITE = "cheek"
 HAIRLINE_STEP_DEGREES = 2
 """Angle between samples of `hairline_heights` [degrees]."""
-_HAIRLINE_SAMPLES = 180 // HAIRLINE_STEP_DEGREES + 1
-_SAMPLES_PER_SEGMENT = 4
-_CACHE_SIZE = 32  # number of cached tables, one for each recession of the hair
+_HAIRLINE_SAMPLE_COUNT = 180 // HAIRLINE_STEP_DEGREES + 1
+_FOLD_SAMPLES_PER_SEGMENT = 4
+_MAX_CACHED_TABLES = 32  # number of cached tables, one for each recession of the hair
 _CROWN_ZONE = "crown"  # zone where hair thins first
 _TEMPLE_RECESSION_MM, _FOREHEAD_RECESSION_MM = 22.0, 16.0  # maximum recession of the hairline
 _TEMPLE_DEGREES, _TEMPLE_WIDTH_DEGREES, _FOREHEAD_WIDTH_DEGREES = 33.0, 15.0, 38.0  # from the front
 
 
-def movement_weights(names: tuple[str, ...], weights: Floats) -> Floats:
+def movement_weights(target_names: tuple[str, ...], target_weights: Floats) -> Floats:
     """Return the strength (m,) of each movement in `MOVEMENTS`, 0 to 1, from morph target weights.
 
-    names, weights : names of the t morph targets, and their weights (t,)
+    target_names, target_weights : names of the t morph targets, and their weights (t,)
     """
-    return np.asarray(np.clip(_movement_matrix(names) @ weights, 0.0, 1.0), np.float32)
+    return np.asarray(np.clip(_movement_matrix(target_names) @ target_weights, 0.0, 1.0), np.float32)
 
 
 @cache
-def _movement_matrix(names: tuple[str, ...]) -> Floats:
+def _movement_matrix(target_names: tuple[str, ...]) -> Floats:
     """Return the contribution (m, t) of each morph target to each movement in `MOVEMENTS`."""
-    table = np.zeros((len(MOVEMENTS), len(names)), np.float32)
+    table = np.zeros((len(MOVEMENTS), len(target_names)), np.float32)
     for row in read_rows(__package__, "movements"):
-        if row["target"] in names:
-            table[MOVEMENTS.index(row["movement"]), names.index(row["target"])] = float(row["share"])
+        if row["target"] in target_names:
+            table[MOVEMENTS.index(row["movement"]), target_names.index(row["target"])] = float(row["share"])
     return table
 
 
-@lru_cache(maxsize=_CACHE_SIZE)
+@lru_cache(maxsize=_MAX_CACHED_TABLES)
 def zone_table(recession: float = 0.0, sites: SiteDifferences | None = None) -> Floats:
     """Return the Gaussian zones of the face as rows (k, 24) for the paint shader.
 
@@ -103,7 +103,7 @@ def _site_amounts() -> NDArray[np.float64]:
     return np.asarray(shares @ np.linalg.inv(weights @ shares))
 
 
-@lru_cache(maxsize=_CACHE_SIZE)
+@lru_cache(maxsize=_MAX_CACHED_TABLES)
 def hairline_heights(recession: float = 0.0) -> Floats:
     """Return the height (91,) of the hairline above y = 0, by angle from the front, every 2 degrees [mm].
 
@@ -112,7 +112,7 @@ def hairline_heights(recession: float = 0.0) -> Floats:
     from scipy.interpolate import PchipInterpolator
 
     angle, height = float_columns(read_rows(__package__, "hairline"), "angle height").T
-    edges = HAIRLINE_STEP_DEGREES * np.arange(_HAIRLINE_SAMPLES)
+    edges = HAIRLINE_STEP_DEGREES * np.arange(_HAIRLINE_SAMPLE_COUNT)
     temples = np.exp(-(((edges - _TEMPLE_DEGREES) / _TEMPLE_WIDTH_DEGREES) ** 2))
     forehead = np.exp(-((edges / _FOREHEAD_WIDTH_DEGREES) ** 4))
     receded = recession * (_TEMPLE_RECESSION_MM * temples + recession * _FOREHEAD_RECESSION_MM * forehead)
@@ -158,12 +158,17 @@ def table_sizes() -> dict[str, int]:
     """
     lengths = Counter(row["fold"] for row in read_rows(__package__, "folds")).values()
     knots = sum(map(_sample_count, lengths))
-    return {"zones": len(zone_table()), "folds": len(lengths), "knots": knots, "edges": _HAIRLINE_SAMPLES}
+    return {
+        "zones": len(zone_table()),
+        "folds": len(lengths),
+        "knots": knots,
+        "edges": _HAIRLINE_SAMPLE_COUNT,
+    }
 
 
-def _sample_count(knots: int) -> int:
+def _sample_count(knot_count: int) -> int:
     """Return the number of samples of a spline with a given number of knots."""
-    return _SAMPLES_PER_SEGMENT * (knots - 1) + 1
+    return _FOLD_SAMPLES_PER_SEGMENT * (knot_count - 1) + 1
 
 
 def _spline_points(knots: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -28,8 +28,8 @@ SITES_FIELD = "sites"
 """Name of the only field of `SkinLook` that is not a number."""
 # Artist's values.
 _TYPICAL_FRECKLES = {"african": 0.02, "asian": 0.06, "caucasian": 0.16}
-_TYPICAL_IRIS = {"african": 0.95, "asian": 0.85, "caucasian": 0.4}
-_AGE_SPOTS_FROM = 45.0  # age from which there are age spots [years]
+_TYPICAL_IRIS_EUMELANIN = {"african": 0.95, "asian": 0.85, "caucasian": 0.4}
+_AGE_SPOTS_FROM_YEARS = 45.0  # age from which there are age spots [years]
 _MAX_AGE_FOLDS = 1.0  # `SkinLook.age` of people of 90 years
 
 
@@ -118,15 +118,15 @@ class SkinLook:
         object.__setattr__(self, SITES_FIELD, _checked_sites(self.sites))
 
 
-def _checked_sites(value: Any) -> SiteDifferences:
+def _checked_sites(site_differences: Any) -> SiteDifferences:
     """Return the differences between sites, converted if they are a mapping, as in files of people."""
     known = [one.name for one in fields(SiteDifferences)]
-    if isinstance(value, Mapping) and value.keys() <= set(known):
-        return SiteDifferences(**value)
-    if not isinstance(value, SiteDifferences):
+    if isinstance(site_differences, Mapping) and site_differences.keys() <= set(known):
+        return SiteDifferences(**site_differences)
+    if not isinstance(site_differences, SiteDifferences):
         expected = f"differences of pigments for {', '.join(known)}"
-        refuse(SITES_FIELD, expected, f"got {format_value(value)}", "Correct it, or leave it out")
-    return value
+        refuse(SITES_FIELD, expected, f"got {format_value(site_differences)}", "Correct it, or leave it out")
+    return site_differences
 
 
 class Demographics(NamedTuple):
@@ -136,7 +136,7 @@ class Demographics(NamedTuple):
     sex : from 0, female, to 1, male [-]
     age : age [years]
     skin_groups : weights of the measured groups that the skin follows, see `measured.group_weights`
-    ita : desired individual typology angle (ITA) of the cheek, or None [degrees]
+    ita : individual typology angle (ITA) that the cheek must have; None for no condition [degrees]
     """
 
     african: float
@@ -147,18 +147,18 @@ class Demographics(NamedTuple):
     skin_groups: Mapping[str, float]
     ita: float | None = None
 
-    def weighted_mean(self, values: dict[str, float]) -> float:
+    def weighted_mean(self, value_of_ancestry: dict[str, float]) -> float:
         """Return the mean of one value per ancestry, weighted by the ancestry fractions of the shape."""
-        return _weighted_mean((self.african, self.asian, self.caucasian), values)
+        return _weighted_mean((self.african, self.asian, self.caucasian), value_of_ancestry)
 
-    def pigmented_mean(self, values: dict[str, float]) -> float:
+    def pigmented_mean(self, value_of_ancestry: dict[str, float]) -> float:
         """Return the mean of one value per ancestry, weighted by the ancestry fractions of the skin."""
-        return _weighted_mean(pigment_ancestry(self.skin_groups), values)
+        return _weighted_mean(pigment_ancestry(self.skin_groups), value_of_ancestry)
 
 
-def _weighted_mean(fractions: tuple[float, float, float], values: dict[str, float]) -> float:
+def _weighted_mean(fractions: tuple[float, float, float], value_of_ancestry: dict[str, float]) -> float:
     names = "african", "asian", "caucasian"
-    return sum(fraction * values[name] for fraction, name in zip(fractions, names, strict=True))
+    return sum(fraction * value_of_ancestry[name] for fraction, name in zip(fractions, names, strict=True))
 
 
 def typical_skin(demographics: Demographics) -> SkinLook:
@@ -172,7 +172,7 @@ def typical_skin(demographics: Demographics) -> SkinLook:
 def _typical_look(demographics: Demographics, pigments: MeasuredPigments, sites: SiteDifferences) -> SkinLook:
     """Return the typical look of a person with measured pigments."""
     old = (demographics.age - YOUNG_AGE) / (OLD_AGE - YOUNG_AGE)
-    spot_progress = max(demographics.age - _AGE_SPOTS_FROM, 0.0) / (OLD_AGE - _AGE_SPOTS_FROM)
+    spot_progress = max(demographics.age - _AGE_SPOTS_FROM_YEARS, 0.0) / (OLD_AGE - _AGE_SPOTS_FROM_YEARS)
     return SkinLook(
         **pigments._asdict(),
         freckles=demographics.pigmented_mean(_TYPICAL_FRECKLES),
@@ -193,7 +193,7 @@ def _pigment_arguments(demographics: Demographics) -> tuple[Mapping[str, float],
 def typical_eyes(demographics: Demographics) -> EyeLook:
     """Return the typical eye look: brown irises, which are lighter with more European ancestry."""
     redness = 0.15 + 0.2 * (demographics.age - YOUNG_AGE) / (OLD_AGE - YOUNG_AGE)
-    return EyeLook(eumelanin=demographics.pigmented_mean(_TYPICAL_IRIS), redness=redness)
+    return EyeLook(eumelanin=demographics.pigmented_mean(_TYPICAL_IRIS_EUMELANIN), redness=redness)
 
 
 def sample_eyes(rng: np.random.Generator, demographics: Demographics) -> EyeLook:

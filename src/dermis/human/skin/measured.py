@@ -26,7 +26,7 @@ from dermis.images.colour import lab, linear_of_lab
 from dermis.images.skin_tone import ita_degrees
 from dermis.optics.pigments.parameters import DEFAULT_SKIN
 
-GROUPS: Final[Mapping[str, str]] = MappingProxyType(
+GROUP_OF_CODE: Final[Mapping[str, str]] = MappingProxyType(
     {
         "CA": "caucasian",
         "CN": "chinese",
@@ -46,26 +46,28 @@ SITES: Final = (
 """Sites of the archive, in the order of its codes from 1."""
 FACE_SITES: Final = ("cheekbone", "forehead", "chin", "nose_tip", "ear_lobe", "neck")
 """Sites of the head beside the cheek, as fields of `SiteDifferences`."""
-UNIONS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
+ANCESTRY_UNIONS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
     {"asian": ("chinese", "japanese", "southeast asian"), "middle eastern": ("iraqi", "arabian")}
 )
 """Names that each stand for several groups with equal weights."""
-SKIN_ANCESTRIES: Final = (*GROUPS.values(), *UNIONS)
+SKIN_ANCESTRIES: Final = (*GROUP_OF_CODE.values(), *ANCESTRY_UNIONS)
 """Names of skin ancestries."""
 ITA_RANGE: Final = (-65.0, 70.0)
 """Range of the individual typology angle (ITA) that can be requested for a person [degrees]."""
-_EUROPEAN: Mapping[str, float] = MappingProxyType(
+_EUROPEAN_FRACTION_OF_GROUP: Mapping[str, float] = MappingProxyType(
     {"caucasian": 1.0, "iraqi": 0.3, "arabian": 0.3, "south asian": 0.1}
 )
 """European fraction of a group, which allows fair hair and light eyes; artist's values except the first."""
-_MAX_DOUBLINGS = 6.0
-_MAX_DEVIATION = 0.7  # of the cheek from its median, to which differences between sites adapt [doublings]
+_MAX_SITE_DOUBLINGS = 6.0
+# deviation of the cheek from its median, to which differences between sites adapt [doublings]
+_MAX_CHEEK_DEVIATION_DOUBLINGS = 0.7
 _MELANIN_RANGE, _BLOOD_RANGE = (5e-4, 0.7), (3e-4, 0.08)
 _EPIDERMIS_RANGE_MM = (0.02, 0.2)
-_ITA_STEP = 1.0  # half width of the interval over which the density of an ITA is averaged [degrees]
-_MAX_SCORE = 2.9  # largest absolute normal score of an ITA
+# half width of the interval over which the density of an ITA is averaged [degrees]
+_ITA_HALF_WIDTH_DEGREES = 1.0
+_MAX_NORMAL_SCORE = 2.9  # largest absolute normal score of an ITA
 # Numbers of melanin fractions, of bisections between two of them, and of changes of the other pigments:
-_ITA_NODES, _BISECTIONS, _MAX_ITA_STEPS = 257, 40, 15
+_MELANIN_NODE_COUNT, _BISECTION_COUNT, _MAX_ITA_STEPS = 257, 40, 15
 Weights = Mapping[str, float]
 """Weights of groups, with a sum of 1."""
 
@@ -115,7 +117,7 @@ class SiteDifferences:
             if not isinstance(values, Sequence) or isinstance(values, str) or len(values) != 3:
                 expected = "differences of melanin and blood [doublings] and of oxygen"
                 refuse(f"sites.{one.name}", expected, f"got {format_value(values)}", "Write three numbers")
-            limits = (_MAX_DOUBLINGS, _MAX_DOUBLINGS, 1.0)
+            limits = (_MAX_SITE_DOUBLINGS, _MAX_SITE_DOUBLINGS, 1.0)
             checked = tuple(
                 float(checked_number(f"sites.{one.name}", value, -limit, limit))
                 for value, limit in zip(values, limits, strict=True)
@@ -175,29 +177,33 @@ class MeasuredTable(NamedTuple):
         ]
         return np.asarray(np.sum(parts, axis=0))
 
-    def variables(self, weights: Weights, sex: ArrayLike, age: ArrayLike, scores: Doubles) -> Doubles:
+    def variables(self, weights: Weights, sex: ArrayLike, age: ArrayLike, normal_scores: Doubles) -> Doubles:
         """Return the four variables (n, 4) of n people from a mixture of groups.
 
         weights : weight of each group in the mixture
         sex, age : (n,) or one number
-        scores : (n, 4) standard normal scores of the people, correlated as in the archive
+        normal_scores : (n, 4) standard normal scores of the people, correlated as in the archive
         """
         from scipy.special import ndtri
 
         nodes, quantiles = ndtri(self.probabilities), self.mixture("quantiles", weights)
-        values = np.column_stack([np.interp(scores[:, k], nodes, quantiles[k]) for k in range(4)])
+        values = np.column_stack([np.interp(normal_scores[:, k], nodes, quantiles[k]) for k in range(4)])
         sexes, terms = np.asarray(sex, np.float64) - 0.5, age_term(age) - self.mean_age_term
         return np.asarray(values + sexes[..., None] * self.sex + terms[..., None] * self.age)
 
-    def site_variables(self, weights: Weights, cheek: Doubles, normals: Doubles) -> Doubles:
+    def site_variables(self, weights: Weights, cheek_variables: Doubles, normals: Doubles) -> Doubles:
         """Return the differences of all sites from the cheek (n, 12, 3): melanin, blood [doublings], oxygen.
 
-        cheek : (n, 4) variables of the cheek
+        cheek_variables : (n, 4) variables of the cheek
         normals : (n, 12, 2) independent standard normal numbers, zeros for typical people
         """
         middle = self.mixture("quantiles", weights)[:2, len(self.probabilities) // 2]
-        deviation = np.clip(cheek[:, None, :2] - middle, -_MAX_DEVIATION, _MAX_DEVIATION)
-        found = np.broadcast_to(self.mixture("sites", weights), (len(cheek), len(SITES), 3)).copy()
+        deviation = np.clip(
+            cheek_variables[:, None, :2] - middle,
+            -_MAX_CHEEK_DEVIATION_DOUBLINGS,
+            _MAX_CHEEK_DEVIATION_DOUBLINGS,
+        )
+        found = np.broadcast_to(self.mixture("sites", weights), (len(cheek_variables), len(SITES), 3)).copy()
         found[:, :, :2] += self.site_slope * deviation + self.site_spread * normals
         return found
 
@@ -244,15 +250,15 @@ def group_weights(
     return weights
 
 
-def _spread_union(name: str, weight: float) -> dict[str, float]:
-    members = UNIONS.get(name, (name,))
+def _spread_union(union_name: str, weight: float) -> dict[str, float]:
+    members = ANCESTRY_UNIONS.get(union_name, (union_name,))
     return {one: weight / len(members) for one in members}
 
 
 def pigment_ancestry(weights: Weights) -> tuple[float, float, float]:
     """Return the African, Asian and European fractions that determine pigments of hair and eyes."""
     african = weights.get("african", 0.0)
-    european = sum(weight * _EUROPEAN.get(name, 0.0) for name, weight in weights.items())
+    european = sum(weight * _EUROPEAN_FRACTION_OF_GROUP.get(name, 0.0) for name, weight in weights.items())
     return african, 1.0 - african - european, european
 
 
@@ -261,7 +267,9 @@ def likely_groups(ita: float) -> dict[str, float]:
     table = measured_table()
     density = {}
     for name, group in table.groups.items():
-        low, high = _ita_scores(np.array([ita - _ITA_STEP, ita + _ITA_STEP]), group.ita)
+        low, high = _ita_scores(
+            np.array([ita - _ITA_HALF_WIDTH_DEGREES, ita + _ITA_HALF_WIDTH_DEGREES]), group.ita
+        )
         density[name] = float(np.exp(-0.125 * (low + high) ** 2) * (high - low))  # normal density times width
     total = sum(density.values())
     return {name: value / total for name, value in density.items()}
@@ -327,12 +335,12 @@ def _median_variables(weights: Weights) -> Doubles:
     return table.mixture("quantiles", weights)[:, len(table.probabilities) // 2]
 
 
-def _clipped_pigments(values: Doubles) -> MeasuredPigments:
-    melanin, blood, epidermis = np.exp2(values[[0, 1, 3]])
+def _clipped_pigments(pigment_values: Doubles) -> MeasuredPigments:
+    melanin, blood, epidermis = np.exp2(pigment_values[[0, 1, 3]])
     return MeasuredPigments(
         float(np.clip(melanin, *_MELANIN_RANGE)),
         float(np.clip(blood, *_BLOOD_RANGE)),
-        float(np.clip(values[2], 0.0, 1.0)),
+        float(np.clip(pigment_values[2], 0.0, 1.0)),
         float(np.clip(epidermis, *_EPIDERMIS_RANGE_MM)),
     )
 
@@ -347,8 +355,8 @@ def with_ita(
     """
     for _ in range(_MAX_ITA_STEPS):
         table = skin_colour_table(eumelanin, pigments.oxygen, pigments.epidermis_mm)
-        melanin = np.geomspace(*_MELANIN_RANGE, _ITA_NODES)
-        found = ita_degrees(lab(table.lookup(melanin, np.full(_ITA_NODES, pigments.blood))))
+        melanin = np.geomspace(*_MELANIN_RANGE, _MELANIN_NODE_COUNT)
+        found = ita_degrees(lab(table.lookup(melanin, np.full(_MELANIN_NODE_COUNT, pigments.blood))))
         if found[0] < ita:
             oxygen = pigments.oxygen + 0.2 * (1.0 - pigments.oxygen)
             pigments = pigments._replace(blood=max(0.8 * pigments.blood, _BLOOD_RANGE[0]), oxygen=oxygen)
@@ -359,9 +367,9 @@ def with_ita(
         else:
             break
     below = np.flatnonzero(found <= ita)
-    index = int(below[0]) if len(below) else _ITA_NODES - 1
+    index = int(below[0]) if len(below) else _MELANIN_NODE_COUNT - 1
     low, high = np.log(melanin[[max(index - 1, 0), index]])
-    for _ in range(_BISECTIONS):  # ITA falls with melanin
+    for _ in range(_BISECTION_COUNT):  # ITA falls with melanin
         middle = 0.5 * (low + high)
         colour = table.lookup(np.exp([middle]), np.array([pigments.blood]))[0]
         low, high = (middle, high) if float(ita_degrees(lab(colour))) > ita else (low, middle)
@@ -371,7 +379,7 @@ def with_ita(
 def _ita_score(ita: float, weights: Weights) -> float:
     """Return the standard normal score of an ITA among people of a mixture of groups, at most 2.9."""
     quantiles = measured_table().mixture("ita", weights)
-    return float(np.clip(_ita_scores(np.array([ita]), quantiles)[0], -_MAX_SCORE, _MAX_SCORE))
+    return float(np.clip(_ita_scores(np.array([ita]), quantiles)[0], -_MAX_NORMAL_SCORE, _MAX_NORMAL_SCORE))
 
 
 def _ita_scores(ita: Doubles, quantiles: Doubles) -> Doubles:
@@ -393,7 +401,7 @@ def symmetric_square_root(covariance: Doubles) -> Doubles:
 class MeasuredCell(NamedTuple):
     """Medians of one group, site, sex and age group of the archive.
 
-    group, site : as in `GROUPS` and `SITES`
+    group, site : as in `GROUP_OF_CODE` and `SITES`
     sex : "F" or "M", "" for both
     age_group : "1" (under 20), "2" (20 to 29) ... "6" (over 60), "" for all
     people : number of measured people; 0 for a cell with too few people, whose medians are estimated from all
@@ -440,20 +448,20 @@ class MeasuredTone(NamedTuple):
     note: str
 
 
-def measured_tone(name: str) -> MeasuredTone:
+def measured_tone(tone_name: str) -> MeasuredTone:
     """Return the median colour of a site of the body, for one group of people or as the mean of all groups.
 
-    name : one of `SITES`, alone or after one of `SKIN_ANCESTRIES`, such as "palm" or "south asian palm"
+    tone_name : one of `SITES`, alone or after one of `SKIN_ANCESTRIES`, such as "palm" or "south asian palm"
 
     Raises DermisError for other names.
     """
-    words = " ".join(name.lower().replace("_", " ").split())
+    words = " ".join(tone_name.lower().replace("_", " ").split())
     site = next((one for one in SITES if words == one or words.endswith(f" {one}")), "")
     group = words[: len(words) - len(site)].strip()
     if not site or (group and group not in SKIN_ANCESTRIES):
         expected = f"one of {', '.join(SITES)}, alone or after one of {', '.join(SKIN_ANCESTRIES)}"
-        refuse("skin_site", expected, f"got {format_value(name)}", "Correct it")
-    members = UNIONS.get(group, (group,)) if group else tuple(GROUPS.values())
+        refuse("skin_site", expected, f"got {format_value(tone_name)}", "Correct it")
+    members = ANCESTRY_UNIONS.get(group, (group,)) if group else tuple(GROUP_OF_CODE.values())
     cells = [
         one
         for one in measured_cells()
@@ -473,5 +481,5 @@ def measured_tone(name: str) -> MeasuredTone:
 @cache
 def typical_sites() -> SiteDifferences:
     """Return the median differences between sites over all groups, with equal weights."""
-    count = len(GROUPS)
-    return typical_pigments(dict.fromkeys(GROUPS.values(), 1.0 / count), 0.5, 30.0)[1]
+    count = len(GROUP_OF_CODE)
+    return typical_pigments(dict.fromkeys(GROUP_OF_CODE.values(), 1.0 / count), 0.5, 30.0)[1]

@@ -51,15 +51,15 @@ def lid_rings() -> NDArray[np.int64]:
     return np.stack([left, opposite.reshape(left.shape)])
 
 
-def _load_array(name: str) -> Floats:
+def _load_array(array_name: str) -> Floats:
     file = resources.files("dermis.human").joinpath("data", "average.npz")
     with resources.as_file(file) as path, np.load(path) as stored:
-        return np.asarray(stored[name].astype(np.float32) * np.float32(_STORED_UNIT_MM))
+        return np.asarray(stored[array_name].astype(np.float32) * np.float32(_STORED_UNIT_MM))
 
 
 _SURFACE_CACHE: dict[bytes, PaintedSurface] = {}
-_CACHE_SIZE = 3
-_LOCK = Lock()
+_MAX_CACHED_TOPOLOGIES = 3
+_SURFACE_CACHE_LOCK = Lock()
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,9 +86,9 @@ def painted_surface(mesh: Mesh, stencils: Stencils | None) -> PaintedSurface:
     stencils : subdivision stencils that give the points of the mesh; None without subdivision
     """
     key = mesh.topology_key
-    with _LOCK:
+    with _SURFACE_CACHE_LOCK:
         if key not in _SURFACE_CACHE:
-            while len(_SURFACE_CACHE) >= _CACHE_SIZE:
+            while len(_SURFACE_CACHE) >= _MAX_CACHED_TOPOLOGIES:
                 _SURFACE_CACHE.pop(next(iter(_SURFACE_CACHE)))
             _SURFACE_CACHE[key] = _build_surface(mesh, stencils)
         return _SURFACE_CACHE[key]

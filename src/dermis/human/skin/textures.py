@@ -23,14 +23,14 @@ NOISE_REGIONS: tuple[NoiseRegion, ...] = ("all", "lips", "lines", "furrows", "fo
 """Parts of the skin with noise: "all" is everywhere, "lines" are fine lines, "furrows" lines and folds."""
 _OCTAVE_ROTATION = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
 """Rotation between octaves of a fractal, so that their lattices do not align."""
-_OCTAVE_SCALE = 0.49  # ratio of the feature sizes of consecutive octaves
+_OCTAVE_SIZE_RATIO = 0.49  # ratio of the feature sizes of consecutive octaves
 ZONE_BORDER_NOISES = 2
 """Number of noises that warp the borders of zones: the first of `NOISES`, with a single octave each."""
 TILE_SIDE = 512
 """Side of the tile of fine relief [texel]."""
 TILE_LENGTH_MM = 32.0
 """Length of the tile on the skin [mm]."""
-MAX_HEIGHT_MM = 0.2
+MAX_TILE_HEIGHT_MM = 0.2
 """Full scale of the heights of the tile [mm]."""
 
 
@@ -56,14 +56,14 @@ class Noise(NamedTuple):
 
 
 def _isotropic_noise(
-    name: str,
+    noise_name: str,
     feature_mm: float,
     gain: float = 1.0,
     octaves: int = 1,
     antialiased: bool = False,
     region: NoiseRegion = "all",
 ) -> Noise:
-    return Noise(name, (feature_mm, feature_mm, feature_mm), "body", gain, octaves, antialiased, region)
+    return Noise(noise_name, (feature_mm, feature_mm, feature_mm), "body", gain, octaves, antialiased, region)
 
 
 # Artist's values [mm]. Noises that warp zones come first, and those that warp a space before those in it.
@@ -149,8 +149,8 @@ def _octave_rows() -> Iterator[tuple[NDArray[np.float64], float, float, int, int
         space, region = NOISE_SPACES.index(noise.space), NOISE_REGIONS.index(noise.region)
         for _ in range(noise.octaves):
             yield matrix, finest if noise.antialiased else 0.0, gain, seed, noise_index, space, region
-            matrix = matrix @ _OCTAVE_ROTATION / _OCTAVE_SCALE
-            gain, finest = gain * noise.gain, finest * _OCTAVE_SCALE
+            matrix = matrix @ _OCTAVE_ROTATION / _OCTAVE_SIZE_RATIO
+            gain, finest = gain * noise.gain, finest * _OCTAVE_SIZE_RATIO
             seed += 1
 
 
@@ -169,7 +169,7 @@ def detail_heights_mm() -> tuple[NDArray[np.float32], NDArray[np.float32]]:
 
     file = resources.files("dermis.human").joinpath("data", "detail.png")
     levels = np.asarray(Image.open(BytesIO(file.read_bytes())), np.float32)
-    pores, furrows = np.moveaxis(levels[..., :2] * np.float32(MAX_HEIGHT_MM / 255), -1, 0)
+    pores, furrows = np.moveaxis(levels[..., :2] * np.float32(MAX_TILE_HEIGHT_MM / 255), -1, 0)
     return pores, furrows
 
 

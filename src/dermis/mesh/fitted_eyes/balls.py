@@ -1,4 +1,4 @@
-"""Detection of the two eyeballs of a head in the meshes that its file declares to be eyes."""
+"""Detection of the two eyeballs of a head in the meshes that the head's file declares to be eyes."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from dermis.mesh.mesh import Mesh
 
 RADIUS_RANGE_MM = 8.0, 20.0
 """Range of the radius of an eyeball, which is 12 mm in reality but varies between artists [mm]."""
-MAX_DEVIATION = 0.06
+MAX_SPHERE_DEVIATION = 0.06
 """Largest deviation of most of an eyeball from a sphere, as a fraction of its radius."""
-_MIN_POINTS = 20
-_MIN_COVERED = 0.25  # fraction of the sphere that an eyeball covers
-_MAX_PART_RADII = 1.2  # distance from the centre within which cornea, iris and pupil are, in radii
-_FOCUS_MM = 1000.0  # distance of the point that eyes without a cornea look at
+_MIN_EYEBALL_POINTS = 20
+_MIN_COVERED_FRACTION = 0.25  # fraction of the sphere that an eyeball covers
+_MAX_PART_DISTANCE_RADII = 1.2  # distance from the centre within which cornea, iris and pupil are, in radii
+_GAZE_TARGET_DISTANCE_MM = 1000.0  # distance of the point that eyes without a cornea look at
 _FIT_ITERATIONS = 12
-_MIN_BULGE, _MIN_CORNEA = 0.025, 0.045
+_MIN_BULGE_RADII, _MIN_CORNEA_RADII = 0.025, 0.045
 """Least height above the sphere of points that may belong to a cornea, and of a cornea's apex, in radii."""
-_MIN_COSINE = 0.7  # cosine of the largest angle between a cornea's points and its axis
+_MIN_CORNEA_COSINE = 0.7  # cosine of the largest angle between a cornea's points and its axis
 _DEVIATION_QUANTILE = 0.85  # fraction of the area that is closer to the sphere than its `deviation`
 
 
@@ -58,14 +58,16 @@ class _EyePiece:
     def fault(self) -> str:
         """Return why this component is not an eyeball, such as "is a ball of ..."; empty for an eyeball."""
         (low, high), (_, radius, deviation) = RADIUS_RANGE_MM, self.sphere
-        if len(self.points) < _MIN_POINTS:
+        if len(self.points) < _MIN_EYEBALL_POINTS:
             return f"has only {len(self.points)} points"
-        if deviation > MAX_DEVIATION:
-            return f"deviates from a ball by {deviation:.0%} of its radius, more than {MAX_DEVIATION:.0%}"
+        if deviation > MAX_SPHERE_DEVIATION:
+            return (
+                f"deviates from a ball by {deviation:.0%} of its radius, more than {MAX_SPHERE_DEVIATION:.0%}"
+            )
         if not low <= radius <= high:
             return f"is a ball of {radius:.1f} mm radius, not of {low:g} to {high:g} mm"
         covered = self.covered_fraction
-        return "" if covered >= _MIN_COVERED else f"is only {covered:.0%} of a ball"
+        return "" if covered >= _MIN_COVERED_FRACTION else f"is only {covered:.0%} of a ball"
 
 
 def find_eyeballs(mesh: Mesh) -> tuple[tuple[DetectedEyeball, DetectedEyeball] | None, str]:
@@ -111,9 +113,9 @@ def _eye_pieces(mesh: Mesh, eye_triangles: Index) -> list[_EyePiece]:
     return pieces
 
 
-def _distance_in_radii(points: Doubles, piece: _EyePiece) -> Doubles:
+def _distance_in_radii(points: Doubles, eye_piece: _EyePiece) -> Doubles:
     """Return the distances of points (..., 3) from the centre of an eyeball, divided by its radius."""
-    return np.asarray(np.linalg.norm(points - piece.sphere.centre, axis=-1) / piece.sphere.radius)
+    return np.asarray(np.linalg.norm(points - eye_piece.sphere.centre, axis=-1) / eye_piece.sphere.radius)
 
 
 def _add_gaze(
@@ -131,10 +133,12 @@ def _add_gaze(
     balls = []
     for ball in (left, right):
         farthest = [0.0 if p is ball else _distance_in_radii(positions[p.points], ball).max() for p in pieces]
-        parts = [piece for piece, radii in zip(pieces, farthest, strict=True) if radii < _MAX_PART_RADII]
+        parts = [
+            piece for piece, radii in zip(pieces, farthest, strict=True) if radii < _MAX_PART_DISTANCE_RADII
+        ]
         points, area = (np.concatenate([getattr(p, name) for p in parts]) for name in ("points", "area"))
         axis = corneal_axis(positions[points], area, ball.sphere, ahead)
-        gaze = centre + _FOCUS_MM * ahead - ball.sphere.centre if axis is None else axis
+        gaze = centre + _GAZE_TARGET_DISTANCE_MM * ahead - ball.sphere.centre if axis is None else axis
         balls.append(DetectedEyeball(ball.sphere, gaze / np.linalg.norm(gaze), axis is not None, points))
     return balls[0], balls[1]
 
@@ -151,16 +155,16 @@ class Sphere(NamedTuple):
     deviation: float
 
 
-def fit_sphere(points: Doubles, area: Doubles) -> Sphere:
+def fit_sphere(points: Doubles, point_areas: Doubles) -> Sphere:
     """Fit a sphere to a surface robustly: outliers such as a cornea get low weights.
 
     For centre c and radius r this is a least squares fit of |p|² = 2 p·c + (r² - |c|²), with Cauchy weights
     that are updated iteratively.
 
     points : (n, 3) points p of the surface [mm]
-    area : (n,) area of the surface around each point [mm²]
+    point_areas : (n,) area of the surface around each point [mm²]
     """
-    weight, fraction = np.ones(len(points)), area / area.sum()
+    weight, fraction = np.ones(len(points)), point_areas / point_areas.sum()
     start = points.mean(axis=0)
     p = points - start
     for _ in range(_FIT_ITERATIONS):
@@ -179,27 +183,29 @@ def fit_sphere(points: Doubles, area: Doubles) -> Sphere:
     return Sphere(start + solution[:3], radius, most / max(radius, 1e-9))
 
 
-def corneal_axis(points: Doubles, area: Doubles, ball: Sphere, ahead: Doubles) -> Doubles | None:
+def corneal_axis(
+    points: Doubles, point_areas: Doubles, ball: Sphere, front_direction: Doubles
+) -> Doubles | None:
     """Return the unit vector (3,) from an eyeball's centre to its cornea, or None if there is no bulge.
 
     points : (n, 3) all points of the eye [mm]
-    area : (n,) area of the surface around each point [mm²]
+    point_areas : (n,) area of the surface around each point [mm²]
     ball : sphere of the sclera
-    ahead : (3,) unit vector, roughly the direction in which the head looks
+    front_direction : (3,) unit vector, roughly the direction in which the head looks
     """
     offset = points - ball.centre
     distance = np.linalg.norm(offset, axis=1)
     height = distance / ball.radius - 1.0
-    bulges = (height > _MIN_BULGE) & (offset @ ahead > 0.3 * distance)
-    if not bulges.any() or height[bulges].max() < _MIN_CORNEA:
+    bulges = (height > _MIN_BULGE_RADII) & (offset @ front_direction > 0.3 * distance)
+    if not bulges.any() or height[bulges].max() < _MIN_CORNEA_RADII:
         return None
-    volume = (area * height)[bulges]
+    volume = (point_areas * height)[bulges]
     mean = _normalise((volume[:, None] * offset[bulges]).sum(axis=0))
-    if volume[offset[bulges] @ mean < _MIN_COSINE * distance[bulges]].sum() > 0.1 * volume.sum():
+    if volume[offset[bulges] @ mean < _MIN_CORNEA_COSINE * distance[bulges]].sum() > 0.1 * volume.sum():
         return None
     if np.count_nonzero(bulges) < 8:
         return mean
-    axis = _normalise(fit_sphere(points[bulges], area[bulges]).centre - ball.centre)
+    axis = _normalise(fit_sphere(points[bulges], point_areas[bulges]).centre - ball.centre)
     return axis if axis @ mean > 0.95 else mean
 
 

@@ -9,13 +9,13 @@ from typing import NamedTuple
 import numpy as np
 
 from dermis.base.arrays import Doubles, Floats, Index, Ints
-from dermis.mesh.rig import INFLUENCES, BoneRotation, MorphTargets, Rig, RigidFollowers, Skeleton
+from dermis.mesh.rig import BONES_PER_POINT, BoneRotation, MorphTargets, Rig, RigidFollowers, Skeleton
 from dermis.mesh.rotations import matrix_angles, rigid_motion
 
-_ROOT_NAME, _BONE_NAMES = "scene", ("eye.L", "eye.R")
-_MAX_OTHER_FOLLOWERS = 0.05
+_ROOT_BONE_NAME, _EYE_BONE_NAMES = "scene", ("eye.L", "eye.R")
+_MAX_OTHER_FOLLOWER_FRACTION = 0.05
 """Largest fraction of points outside the eye among the followers of an eye bone; a head bone has more."""
-_MIN_DEGREES, _MIN_SHIFT_MM = 0.5, 0.02  # smaller motions of a target are ignored
+_MIN_ROTATION_DEGREES, _MIN_SHIFT_MM = 0.5, 0.02  # smaller motions of a target are ignored
 
 
 class FittedEyeball(NamedTuple):
@@ -68,13 +68,15 @@ def _with_eye_bones(rig: Rig, eyeballs: Sequence[FittedEyeball]) -> tuple[Skelet
         if bones[k] < 0:
             parent = int(np.argmax(_follower_counts(skeleton, eyeball)))
             name = next(
-                name for name in (_BONE_NAMES[k], f"fitted {_BONE_NAMES[k]}") if name not in skeleton.names
+                name
+                for name in (_EYE_BONE_NAMES[k], f"fitted {_EYE_BONE_NAMES[k]}")
+                if name not in skeleton.names
             )
             skeleton, bones[k] = _with_bone(skeleton, name, parent, eyeball.centre), len(skeleton.names)
     for eyeball, bone in zip(eyeballs, bones, strict=True):
         count = len(eyeball.points)
-        weight = np.tile(np.eye(1, INFLUENCES, dtype=np.float32), (count, 1))
-        index = np.zeros((count, INFLUENCES), np.int32)
+        weight = np.tile(np.eye(1, BONES_PER_POINT, dtype=np.float32), (count, 1))
+        index = np.zeros((count, BONES_PER_POINT), np.int32)
         index[:, 0] = bone
         skeleton = replace(
             skeleton,
@@ -84,15 +86,18 @@ def _with_eye_bones(rig: Rig, eyeballs: Sequence[FittedEyeball]) -> tuple[Skelet
     return skeleton, bones
 
 
-def _single_bone(count: int) -> Skeleton:
+def _single_bone(point_count: int) -> Skeleton:
     """Return a skeleton with a single bone, which all points follow.
 
-    count : number of points
+    point_count : number of points
     """
     identity = np.eye(4)[None]
-    bone, weight = np.zeros((count, INFLUENCES), np.int32), np.zeros((count, INFLUENCES), np.float32)
+    bone, weight = (
+        np.zeros((point_count, BONES_PER_POINT), np.int32),
+        np.zeros((point_count, BONES_PER_POINT), np.float32),
+    )
     weight[:, 0] = 1.0
-    return Skeleton((_ROOT_NAME,), np.array([-1], np.int32), identity, identity, np.eye(4), bone, weight)
+    return Skeleton((_ROOT_BONE_NAME,), np.array([-1], np.int32), identity, identity, np.eye(4), bone, weight)
 
 
 def _eye_bones(skeleton: Skeleton, eyeballs: Sequence[FittedEyeball]) -> list[int]:
@@ -103,7 +108,7 @@ def _eye_bones(skeleton: Skeleton, eyeballs: Sequence[FittedEyeball]) -> list[in
         own = _follower_counts(skeleton, eyeball)
         bone = int(np.argmax(own))
         others = total[bone] - own[bone]
-        bones.append(bone if others <= _MAX_OTHER_FOLLOWERS * own[bone] else -1)
+        bones.append(bone if others <= _MAX_OTHER_FOLLOWER_FRACTION * own[bone] else -1)
     return bones
 
 
@@ -113,10 +118,10 @@ def _follower_counts(skeleton: Skeleton, eyeball: FittedEyeball) -> Doubles:
     return np.bincount(bone.ravel(), weight.ravel(), len(skeleton.names)).astype(np.float64)
 
 
-def _with_bone(skeleton: Skeleton, name: str, parent: int, origin_mm: Doubles) -> Skeleton:
+def _with_bone(skeleton: Skeleton, bone_name: str, parent_bone: int, origin_mm: Doubles) -> Skeleton:
     """Return a skeleton with an additional bone, which no points follow yet.
 
-    parent : index of the parent of the new bone
+    parent_bone : index of the parent of the new bone
     origin_mm : (3,) position of the joint of the new bone in head space [mm]
     """
     to_head = np.eye(4)
@@ -124,22 +129,22 @@ def _with_bone(skeleton: Skeleton, name: str, parent: int, origin_mm: Doubles) -
     world = np.linalg.inv(skeleton.to_head) @ to_head
     return replace(
         skeleton,
-        names=(*skeleton.names, name),
-        parent=np.append(skeleton.parent, parent).astype(np.int32),
-        local=np.concatenate([skeleton.local, (skeleton.inverse_bind[parent] @ world)[None]]),
+        names=(*skeleton.names, bone_name),
+        parent=np.append(skeleton.parent, parent_bone).astype(np.int32),
+        local=np.concatenate([skeleton.local, (skeleton.inverse_bind[parent_bone] @ world)[None]]),
         inverse_bind=np.concatenate([skeleton.inverse_bind, np.linalg.inv(world)[None]]),
     )
 
 
 def _rigid_targets(
-    rig: Rig, eyeball: FittedEyeball, bone: str, origin_mm: Doubles
+    rig: Rig, eyeball: FittedEyeball, bone_name: str, origin_mm: Doubles
 ) -> tuple[list[BoneRotation], dict[int, Doubles]]:
     """Return the rotation and translation that best fit how each morph target moves the file's eyeball.
 
     Rotations are rotations of the eyeball's bone. Translations (3,) [mm] are keyed by the index of the
     target. Targets that do not move the eyeball are left out.
 
-    bone : name of the eyeball's bone
+    bone_name : name of the eyeball's bone
     origin_mm : (3,) position of the bone's joint [mm]
     """
     rest = rig.positions_mm[eyeball.replaced_points].astype(np.float64)
@@ -150,10 +155,10 @@ def _rigid_targets(
             continue
         matrix, _ = rigid_motion(rest, rest + delta)
         x, y, z = matrix_angles(matrix)
-        if np.linalg.norm((x, y, z)) < _MIN_DEGREES:
+        if np.linalg.norm((x, y, z)) < _MIN_ROTATION_DEGREES:
             matrix = np.eye(3)
         else:
-            rotations.append(BoneRotation(rig.targets.names[index], bone, (x, y, z)))
+            rotations.append(BoneRotation(rig.targets.names[index], bone_name, (x, y, z)))
         centre = rest.mean(axis=0)
         shift = delta.mean(axis=0) - (matrix - np.eye(3)) @ (centre - origin_mm)
         if np.linalg.norm(shift) > _MIN_SHIFT_MM:
@@ -161,21 +166,23 @@ def _rigid_targets(
     return rotations, shifts
 
 
-def _with_shifts(targets: MorphTargets, shifts: dict[int, Doubles], points: Index) -> MorphTargets:
+def _with_shifts(
+    targets: MorphTargets, shift_of_target: dict[int, Doubles], eyeball_points: Index
+) -> MorphTargets:
     """Return morph targets that also translate the points of a fitted eyeball.
 
-    shifts : translation (3,) by target index [mm]
-    points : (n,) indices of the control points of the eyeball
+    shift_of_target : translation (3,) by target index [mm]
+    eyeball_points : (n,) indices of the control points of the eyeball
     """
-    if not shifts:
+    if not shift_of_target:
         return targets
     point, delta, count = list[Ints](), list[Floats](), [0]
     for index in range(len(targets.names)):
         indices = [targets.point[targets.rows(index)]]
         deltas = [targets.delta_mm[targets.rows(index)]]
-        if index in shifts:
-            indices.append(points.astype(np.int32))
-            deltas.append(np.tile(shifts[index].astype(np.float32), (len(points), 1)))
+        if index in shift_of_target:
+            indices.append(eyeball_points.astype(np.int32))
+            deltas.append(np.tile(shift_of_target[index].astype(np.float32), (len(eyeball_points), 1)))
         point += indices
         delta += deltas
         count.append(sum(map(len, indices)))

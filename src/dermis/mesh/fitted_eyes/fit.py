@@ -28,11 +28,11 @@ from dermis.mesh.head import Head
 from dermis.mesh.mesh import Material, Mesh, build_mesh
 from dermis.mesh.rig import Stencils
 
-_GRID_SIDE = (
-    2 * eyeball.QUADS_PER_EDGE
-)  # quads along a cube edge, as many as the human has after one subdivision
-_MATERIAL_NAMES = "left eye", "right eye"
-_INWARD_ANGLE = np.radians(2.5)  # the iris is closer to the nose than the centre of the eye's opening
+# quads along a cube edge, as many as the human has after one subdivision
+_QUADS_PER_CUBE_EDGE = 2 * eyeball.QUADS_PER_EDGE
+_EYE_MATERIAL_NAMES = "left eye", "right eye"
+# the iris is closer to the nose than the centre of the eye's opening
+_INWARD_GAZE_ANGLE_RADIANS = np.radians(2.5)
 
 
 class _EyeShape(NamedTuple):
@@ -71,7 +71,7 @@ def with_fitted_eyes(head: Head, coarse: Mesh | None = None, look: EyeLook | Non
     shapes = _eye_shapes(
         np.delete(mesh.positions[mesh.triangles], np.concatenate(ball_triangles), axis=0), balls
     )
-    points, quads = build_eyeball(_GRID_SIDE)
+    points, quads = build_eyeball(_QUADS_PER_CUBE_EDGE)
     pairs = list(zip(balls, shapes, strict=True))
     eyeballs = [
         FittedEyeball(b.sphere.centre, _eyeball_points(b.sphere, shape), b.points) for b, shape in pairs
@@ -82,7 +82,7 @@ def with_fitted_eyes(head: Head, coarse: Mesh | None = None, look: EyeLook | Non
         rig = replace(rig, stencils=_extend_stencils(control.stencils, begin, 2 * count))
     new_mesh = _replace_eyeballs(mesh, ball_triangles, [one.points for one in eyeballs], quads)
     starts = np.array([begin, begin + count], np.int32)
-    apex, back, side = (starts + np.int32(k) for k in eyeball.axis_points(_GRID_SIDE))
+    apex, back, side = (starts + np.int32(k) for k in eyeball.axis_points(_QUADS_PER_CUBE_EDGE))
     material = np.arange(-2, 0, dtype=np.int32) + len(new_mesh.materials)
     radii, offsets = np.array([(shape.radius_mm, shape.centre_offset_mm) for shape in shapes]).T
     gaze = np.stack([eye_axes(shape.axis) @ ball.gaze for ball, shape in pairs])
@@ -95,7 +95,7 @@ def _ball_triangles(
 ) -> tuple[Index, Index]:
     """Return the indices of the triangles of each eyeball.
 
-    stencils : stencils of a subdivided mesh; None if it is not subdivided
+    stencils : stencils of a subdivided mesh; None without subdivision
     """
     first = mesh.point[mesh.triangles[:, 0]]
     if stencils is not None:
@@ -113,7 +113,7 @@ def _eye_shapes(corners_mm: Doubles, balls: tuple[DetectedEyeball, DetectedEyeba
     """
     lids = [lids_in_front(corners_mm, ball.sphere, ball.gaze) for ball in balls]
     (left, a), (right, b) = (one.opening_angles for one in lids)
-    outwards, up = (left - right) / 2 - _INWARD_ANGLE * (left != right), (a + b) / 2
+    outwards, up = (left - right) / 2 - _INWARD_GAZE_ANGLE_RADIANS * (left != right), (a + b) / 2
     shapes = []
     for ball, lid, side in zip(balls, lids, (1.0, -1.0), strict=True):
         scale, sunk, axis = min(1.0, ball.sphere.radius / SCLERA_MM), 0.0, ball.gaze
@@ -126,17 +126,17 @@ def _eye_shapes(corners_mm: Doubles, balls: tuple[DetectedEyeball, DetectedEyeba
     return shapes
 
 
-def _eyeball_points(ball: Sphere, shape: _EyeShape) -> Doubles:
+def _eyeball_points(ball: Sphere, eye_shape: _EyeShape) -> Doubles:
     """Return the points (n, 3) of a fitted eyeball in head space [mm]."""
-    return np.asarray(ball.centre + shape.scale * _shape_points(shape) @ eye_axes(shape.axis))
+    return np.asarray(ball.centre + eye_shape.scale * _shape_points(eye_shape) @ eye_axes(eye_shape.axis))
 
 
-def _shape_points(shape: _EyeShape) -> Doubles:
+def _shape_points(eye_shape: _EyeShape) -> Doubles:
     """Return the points (n, 3) of an eyeball before scaling, about its centre and with axis +Z [mm]."""
-    points, _ = build_eyeball(_GRID_SIDE)
+    points, _ = build_eyeball(_QUADS_PER_CUBE_EDGE)
     x, y, z = (points / np.linalg.norm(points, axis=1, keepdims=True)).T
     angle, azimuth = np.arccos(np.clip(z, -1.0, 1.0)), np.arctan2(y, x)
-    centre, radius = cornea_centre_mm() - shape.centre_offset_mm, shape.radius_mm
+    centre, radius = cornea_centre_mm() - eye_shape.centre_offset_mm, eye_shape.radius_mm
     limbus = (radius**2 - CORNEA_MM**2 + centre**2) / (2 * centre)  # distance along the axis
     sclera_edge, edge = float(np.arccos(limbus / radius)), float(np.arcsin(LIMBUS_MM / SCLERA_MM))
     on_cornea = float(np.arccos((limbus - centre) / CORNEA_MM)) * angle / edge
@@ -146,17 +146,17 @@ def _shape_points(shape: _EyeShape) -> Doubles:
     return np.stack([across * np.cos(azimuth), across * np.sin(azimuth), along], axis=1)
 
 
-def _extend_stencils(stencils: Stencils, begin: int, count: int) -> Stencils:
+def _extend_stencils(stencils: Stencils, first_point: int, point_count: int) -> Stencils:
     """Return stencils with additional mesh points that coincide with additional control points.
 
-    begin : index of the first additional control point
-    count : number of additional points
+    first_point : index of the first additional control point
+    point_count : number of additional points
     """
-    own = np.arange(count, dtype=np.int32)
+    own = np.arange(point_count, dtype=np.int32)
     return Stencils(
         np.concatenate([stencils.first, stencils.first[-1] + 1 + own]),
-        np.concatenate([stencils.point, begin + own]),
-        np.concatenate([stencils.weight, np.ones(count, np.float32)]),
+        np.concatenate([stencils.point, first_point + own]),
+        np.concatenate([stencils.weight, np.ones(point_count, np.float32)]),
     )
 
 
@@ -172,7 +172,7 @@ def _replace_eyeballs(mesh: Mesh, balls: tuple[Index, Index], positions: list[Do
     vertex, triangles = np.unique(mesh.triangles[remains], return_inverse=True)
     used, material = np.unique(mesh.material[remains], return_inverse=True)
     old_materials = [mesh.materials[mesh.material[ball[0]]] for ball in balls]
-    pairs = zip(_MATERIAL_NAMES, old_materials, strict=True)
+    pairs = zip(_EYE_MATERIAL_NAMES, old_materials, strict=True)
     new_materials = tuple(Material(name, "opaque", old.colour, eye=True) for name, old in pairs)
     new = _eyeball_meshes(positions, quads, new_materials)
     new_index = np.full(len(mesh.triangles), -1)
@@ -200,7 +200,7 @@ def _eyeball_meshes(positions: list[Doubles], quads: Index, materials: tuple[Mat
     count, faces = len(positions[0]), len(quads)
     return build_mesh(
         np.concatenate(positions),
-        np.tile(eyeball.eyeball_uv(_GRID_SIDE), (2, 1)),
+        np.tile(eyeball.eyeball_uv(_QUADS_PER_CUBE_EDGE), (2, 1)),
         split_quads(np.concatenate([quads, count + quads])),
         np.repeat([0, 1], 2 * faces),
         materials,

@@ -1,4 +1,4 @@
-"""Lids in front of an eyeball: they suggest the direction of gaze and limit the position of the cornea."""
+"""Lids in front of an eyeball, which suggest the direction of gaze and limit the cornea's position."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from dermis.mesh.geometry import cross_2d, expand_runs
 
 _RAYS_PER_SIDE, _HALF_SIDE_RADII = 49, 0.9
 """Rays along each side of the square before the eye, and half its side in radii of the ball."""
-_IRIS_HALF_WIDTH = 0.25  # half the width of the iris in radii of the ball
+_IRIS_HALF_WIDTH_RADII = 0.25  # half the width of the iris in radii of the ball
 _IRIS_RISE_FRACTION = 0.08  # height of the iris above the middle of the lids, in heights of their opening
-_MAX_OPEN_ENDS = 0.3  # largest fraction of rays at an end of the opening that meet no lid
-_MAX_ANGLE = np.radians(15.0)
+_MAX_OPEN_RAY_FRACTION = 0.3  # largest fraction of rays at an end of the opening that meet no lid
+_MAX_GAZE_ANGLE_RADIANS = np.radians(15.0)
 _MAX_PROTRUSION_MM, _MIN_BULGE_MM = 0.3, 0.5
 """Largest height of a cornea above a lid that touches the ball, and least height above the ball."""
 
@@ -89,29 +89,46 @@ class Lids:
         """
         angles = []
         for axis, other, shift in ((0, 1, 0.0), (1, 0, _IRIS_RISE_FRACTION)):
-            column = np.abs(self.ray_positions[:, other]) < _IRIS_HALF_WIDTH * self.ball.radius
+            column = np.abs(self.ray_positions[:, other]) < _IRIS_HALF_WIDTH_RADII * self.ball.radius
             position = self.ray_positions[column, axis]
             is_open = (self.obstacle_front < self.ball_front)[column]
             ends = np.sign(position) * (np.abs(position) > 0.99 * position.max())
-            if not is_open.any() or max(is_open[ends == end].mean() for end in (-1, 1)) > _MAX_OPEN_ENDS:
+            if (
+                not is_open.any()
+                or max(is_open[ends == end].mean() for end in (-1, 1)) > _MAX_OPEN_RAY_FRACTION
+            ):
                 return 0.0, 0.0
             centre = position[is_open].mean() + shift * np.ptp(position[is_open])
-            angles.append(float(np.clip(np.arcsin(centre / self.ball.radius), -_MAX_ANGLE, _MAX_ANGLE)))
+            angles.append(
+                float(
+                    np.clip(
+                        np.arcsin(centre / self.ball.radius),
+                        -_MAX_GAZE_ANGLE_RADIANS,
+                        _MAX_GAZE_ANGLE_RADIANS,
+                    )
+                )
+            )
         return angles[0], angles[1]
 
-    def direction(self, across: float, up: float) -> Doubles:
-        """Return the unit vector (3,) in head space at angles (side, up) from straight ahead [rad]."""
-        local = np.sin(across) * np.cos(up), np.sin(up), np.cos(across) * np.cos(up)
+    def direction(self, angle_across: float, angle_up: float) -> Doubles:
+        """Return the unit vector (3,) in head space at angles to the side and up from the front [rad]."""
+        local = (
+            np.sin(angle_across) * np.cos(angle_up),
+            np.sin(angle_up),
+            np.cos(angle_across) * np.cos(angle_up),
+        )
         return np.asarray(np.array(local) @ self.axes)
 
-    def cornea_recess_mm(self, axis: Doubles, scale: float) -> float:
+    def cornea_recess_mm(self, eye_axis: Doubles, cornea_scale: float) -> float:
         """Return the distance by which a cornea must be moved inwards to stay behind the lids [mm].
 
-        axis : (3,) unit vector of the eye's axis
-        scale : size of the cornea relative to an adult's [-]
+        eye_axis : (3,) unit vector of the eye's axis
+        cornea_scale : size of the cornea relative to an adult's [-]
         """
-        local, radius = self.axes @ axis, CORNEA_MM * scale
-        centre = scale * (limbus_plane_mm(self.ball.radius / scale) - limbus_plane_mm(CORNEA_MM))
+        local, radius = self.axes @ eye_axis, CORNEA_MM * cornea_scale
+        centre = cornea_scale * (
+            limbus_plane_mm(self.ball.radius / cornea_scale) - limbus_plane_mm(CORNEA_MM)
+        )
         distance2 = ((self.ray_positions - centre * local[:2]) ** 2).sum(axis=1)
         cornea = centre * local[2] + np.sqrt(np.maximum(radius**2 - distance2, 0.0))
         covered = (distance2 < radius**2) & (np.minimum(self.obstacle_front, cornea) > self.ball_front)
@@ -120,19 +137,19 @@ class Lids:
         return float(np.clip(protrusion - _MAX_PROTRUSION_MM, 0.0, deepest))
 
 
-def lids_in_front(corners_mm: Doubles, ball: Sphere, ahead: Doubles) -> Lids:
+def lids_in_front(corners_mm: Doubles, ball: Sphere, gaze_direction: Doubles) -> Lids:
     """Return the surfaces in front of an eyeball, mostly its lids.
 
     corners_mm : (f, 3, 3) corners of all triangles except the triangles of eyeballs, in head space
     ball : sphere of the eyeball
-    ahead : (3,) unit vector of the direction of gaze
+    gaze_direction : (3,) unit vector of the direction of gaze
     """
-    axes = eye_axes(ahead)
+    axes = eye_axes(gaze_direction)
     return Lids(ball, axes, (corners_mm.astype(np.float64) - ball.centre) @ axes.T)
 
 
-def eye_axes(axis: Doubles) -> Doubles:
-    """Return unit vectors as rows (3, 3): across (horizontal), up, and `axis` itself."""
-    across = np.cross((0.0, 1.0, 0.0), axis)
+def eye_axes(eye_axis: Doubles) -> Doubles:
+    """Return unit vectors as rows (3, 3): across (horizontal), up, and `eye_axis` itself."""
+    across = np.cross((0.0, 1.0, 0.0), eye_axis)
     across /= np.linalg.norm(across)
-    return np.stack([across, np.cross(axis, across), axis])
+    return np.stack([across, np.cross(eye_axis, across), eye_axis])

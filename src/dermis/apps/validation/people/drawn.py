@@ -16,7 +16,7 @@ from dermis.base.arrays import Doubles
 from dermis.base.progress import logged_step
 from dermis.human.person import Human
 from dermis.human.skin.look import SkinLook
-from dermis.human.skin.measured import FACE_SITES, GROUPS, SITES
+from dermis.human.skin.measured import FACE_SITES, GROUP_OF_CODE, SITES
 from dermis.images.skin_tone import ita_degrees
 
 HEAD_SITES: Final = ("cheek", *(name.replace("_", " ") for name in FACE_SITES))
@@ -60,7 +60,7 @@ def draw_people(group: str, seeds: Sequence[int]) -> DrawnPeople:
 
 def draw_all(seeds: int = _SEEDS) -> dict[str, DrawnPeople]:
     """Return people of all groups, drawn with the same seeds."""
-    return {group: draw_people(group, range(seeds)) for group in GROUPS.values()}
+    return {group: draw_people(group, range(seeds)) for group in GROUP_OF_CODE.values()}
 
 
 def people(seeds: int = _SEEDS) -> None:
@@ -104,7 +104,7 @@ def cheek_table(archive: Archive, drawn: Mapping[str, DrawnPeople]) -> str:
         "| 95 % |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
-    for code, group in GROUPS.items():
+    for code, group in GROUP_OF_CODE.items():
         measured = _measured(archive, code, "cheek")
         both = [_with_ita(one) for one in (measured.cielab, drawn[group].cielab[:, 0])]
         for k, name in enumerate(_QUANTITIES):
@@ -135,7 +135,7 @@ def site_differences(
     archive: Archive, drawn: Mapping[str, DrawnPeople]
 ) -> Iterator[tuple[str, str, int, Doubles, Doubles]]:
     """Yield group, site, number of people, measured median (3,), and drawn minus measured median (3,)."""
-    for code, group in GROUPS.items():
+    for code, group in GROUP_OF_CODE.items():
         for k, site in enumerate(HEAD_SITES):
             measured = _measured(archive, code, site)
             if len(measured.person):
@@ -169,7 +169,7 @@ def sex_age_table(archive: Archive, drawn: Mapping[str, DrawnPeople]) -> str:
         both = []
         for is_drawn in (False, True):
             differences, counts = [], []
-            for code, group in GROUPS.items():
+            for code, group in GROUP_OF_CODE.items():
                 measured, drawn_group = _measured(archive, code, "cheek"), drawn[group]
                 colours = drawn_group.cielab[:, 0] if is_drawn else measured.cielab
                 sex, age = (drawn_group.sex, drawn_group.age) if is_drawn else (measured.sex, measured.age)
@@ -185,7 +185,7 @@ def sex_age_table(archive: Archive, drawn: Mapping[str, DrawnPeople]) -> str:
 def empty_cells(archive: Archive) -> str:
     """Return text that lists sites without measurements by group; the package uses pooled values there."""
     parts = []
-    for code, group in GROUPS.items():
+    for code, group in GROUP_OF_CODE.items():
         empty = [
             site for j, site in enumerate(SITES) if not ((archive.group == code) & (archive.site == j)).any()
         ]

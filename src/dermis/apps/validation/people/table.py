@@ -21,7 +21,7 @@ from dermis.base.atomic_write import atomic_file
 from dermis.base.console import print_lines
 from dermis.human.skin.measured import (
     FACE_SITES,
-    GROUPS,
+    GROUP_OF_CODE,
     SITES,
     MeasuredTable,
     age_term,
@@ -101,11 +101,11 @@ def build_table(archive: Archive, variables: Doubles) -> dict[str, Any]:
         n, own = int(rows.sum()), np.corrcoef(scores[code].T)
         mixed = (n * own + _POOLING_PEOPLE * pooled) / (n + _POOLING_PEOPLE)
         ita = ita_degrees(cheek.rows(rows).cielab)
-        document["groups"][GROUPS[code]] = {
+        document["groups"][GROUP_OF_CODE[code]] = {
             "quantiles": _rounded(np.quantile(adjusted[rows], _PROBABILITIES, axis=0).T),
             "ita": _rounded(np.quantile(ita, _PROBABILITIES), 2),
             "correlation": _rounded(mixed, 3),
-            "sites": _rounded(shifts[list(GROUPS).index(code)]),
+            "sites": _rounded(shifts[list(GROUP_OF_CODE).index(code)]),
         }
     _calibrate(document, archive, ages, sexes)
     return document
@@ -122,14 +122,14 @@ def person_medians(archive: Archive, variables: Doubles, site: int) -> tuple[Arc
 
 
 def _by_group(archive: Archive) -> Iterator[tuple[str, NDArray[np.bool_]]]:
-    for code in GROUPS:
+    for code in GROUP_OF_CODE:
         yield code, archive.group == code
 
 
 def _effects(cheek: Archive, y: Doubles) -> tuple[Doubles, Doubles]:
     """Return the effects (4,) of sex and of `age_term`, by least squares with an intercept for each group."""
     known = np.isfinite(cheek.sex) & np.isfinite(cheek.age)
-    levels = (cheek.group[known, None] == np.array(list(GROUPS))).astype(np.float64)
+    levels = (cheek.group[known, None] == np.array(list(GROUP_OF_CODE))).astype(np.float64)
     terms = np.column_stack([levels, cheek.sex[known], age_term(cheek.age[known])])
     low, high = np.percentile(y, (1.0, 99.0), axis=0)
     found = np.linalg.lstsq(terms, np.clip(y[known], low, high), rcond=None)[0]
@@ -159,15 +159,15 @@ def _sites(archive: Archive, variables: Doubles) -> tuple[Doubles, Doubles, Doub
     A slope is the change of the difference with the deviation of the cheek from the median of its group.
     Cells with too few people are mixed with the mean of the other groups, weighted by people.
     """
-    shifts, counts = np.zeros((len(GROUPS), len(SITES), 3)), np.zeros((len(GROUPS), len(SITES)))
+    shifts, counts = np.zeros((len(GROUP_OF_CODE), len(SITES), 3)), np.zeros((len(GROUP_OF_CODE), len(SITES)))
     slope, spread = np.zeros((len(SITES), 2)), np.zeros((len(SITES), 2))
     cheek, y = person_medians(archive, variables, _CHEEK)
     for site in (k for k in range(len(SITES)) if k != _CHEEK):
         other, z = person_medians(archive, variables, site)
         _, here, there = np.intersect1d(cheek.person, other.person, return_indices=True)
         difference, deviation = z[there, :3] - y[here, :3], y[here].copy()
-        group = np.array([list(GROUPS).index(code) for code in cheek.group[here]])
-        for k in range(len(GROUPS)):
+        group = np.array([list(GROUP_OF_CODE).index(code) for code in cheek.group[here]])
+        for k in range(len(GROUP_OF_CODE)):
             rows = group == k
             counts[k, site] = rows.sum()
             if counts[k, site] > 0:
@@ -210,7 +210,7 @@ def _calibrate(document: dict[str, Any], archive: Archive, ages: Doubles, sexes:
         rng.standard_normal((_POPULATION, len(SITES), 2)),
     )
     for code, rows in _by_group(archive):
-        name, own = GROUPS[code], archive.rows(rows)
+        name, own = GROUP_OF_CODE[code], archive.rows(rows)
         trials = []
         for thickness in _THICKNESS_TRIALS:
             group = dict(document["groups"][name])
@@ -300,16 +300,26 @@ def cells_text(archive: Archive, variables: Doubles, found: MeasuredTable) -> st
             here = rows & (archive.site == site)
             if not here.any():
                 writer.writerow(
-                    [GROUPS[code], name, "", "", 0, 0, *_pooled_cell(found, GROUPS[code], site), "", ""]
+                    [
+                        GROUP_OF_CODE[code],
+                        name,
+                        "",
+                        "",
+                        0,
+                        0,
+                        *_pooled_cell(found, GROUP_OF_CODE[code], site),
+                        "",
+                        "",
+                    ]
                 )
                 continue
-            writer.writerow(_cell(archive, variables, here, (GROUPS[code], name, "", ""), True))
+            writer.writerow(_cell(archive, variables, here, (GROUP_OF_CODE[code], name, "", ""), True))
             for sex, value in (("F", 0.0), ("M", 1.0)):
                 if (own := here & (archive.sex == value)).sum() >= _MIN_PEOPLE:
-                    writer.writerow(_cell(archive, variables, own, (GROUPS[code], name, sex, "")))
+                    writer.writerow(_cell(archive, variables, own, (GROUP_OF_CODE[code], name, sex, "")))
             for number, middle in AGE_MIDDLES.items():
                 if (own := here & (archive.age == middle)).sum() >= _MIN_PEOPLE:
-                    writer.writerow(_cell(archive, variables, own, (GROUPS[code], name, "", number)))
+                    writer.writerow(_cell(archive, variables, own, (GROUP_OF_CODE[code], name, "", number)))
     return out.getvalue()
 
 

@@ -24,7 +24,7 @@ from dermis.apps.viewer.panel.fields import (
 from dermis.apps.viewer.session import Session, apply_regions
 from dermis.apps.viewer.state import ViewerState, validated_copy
 from dermis.base.errors import DermisError
-from dermis.human.regions.region_table import DEFAULT_TABLE
+from dermis.human.regions.region_table import DEFAULT_TABLE_NAME
 from dermis.images.skin_tone import CLASS_STATEMENT, skin_tone
 from dermis.optics.pigments.parameters import DEFAULT_SKIN, DEFAULT_STRUCTURE, SKINS
 from dermis.optics.profiles import PUBLISHED_PRESET, preset_names
@@ -83,7 +83,7 @@ def draw_surface(session: Session) -> None:
     for name in fields_under("", type(state.scene.skin)):
         if name == "rho_s":
             current = str(state.head.get("regions", AUTO))
-            names = dict.fromkeys((AUTO, NO_REGIONS, DEFAULT_TABLE, current))
+            names = dict.fromkeys((AUTO, NO_REGIONS, DEFAULT_TABLE_NAME, current))
             draw_combo(
                 session, "regions", current, names, lambda name: apply_regions(state, name, earlier_states)
             )

@@ -9,7 +9,7 @@ import numpy as np
 
 from dermis.apps.export.subject import Subject
 from dermis.apps.export.targets.gltf.volume import multiscatter_for_reflectance
-from dermis.formats.gltf.materials import SkinAdditions, colours_png
+from dermis.formats.gltf.materials import SkinAdditions, encode_colours_png
 from dermis.formats.gltf.write import encode_head
 from dermis.human.person_file import person_numbers, relief_slopes
 from dermis.mesh.head import Head
@@ -38,7 +38,7 @@ def encode_glb(subject: Subject, extensions: Extensions, draft: str) -> bytes:
         slopes=relief_slopes(head),
         notes=notes,
         eyes=subject.eye_pictures(),
-        additions=_skin_additions(subject, head, extensions, draft),
+        skin_additions=_skin_additions(subject, head, extensions, draft),
     )
 
 
@@ -59,4 +59,4 @@ def _skin_additions(subject: Subject, head: Head, extensions: Extensions, draft:
     scatter = {**extensions["KHR_materials_scatter"], "multiscatterColorFactor": [1.0, 1.0, 1.0]}
     scatter["multiscatterColorTexture"] = {"index": _MULTISCATTER_ROLE}
     extensions = {**extensions, "KHR_materials_scatter": scatter}
-    return SkinAdditions(white, extensions, extras, {_MULTISCATTER_ROLE: colours_png(scattered)})
+    return SkinAdditions(white, extensions, extras, {_MULTISCATTER_ROLE: encode_colours_png(scattered)})

@@ -35,7 +35,7 @@ from dermis.gpu.shader_types import make_record, struct_dtype
 from dermis.gpu.textures import download
 from dermis.gpu.wgsl_source import ShaderListMember
 from dermis.human.skin import face, textures
-from dermis.human.skin.face import FOLD_MOVEMENTS, HAIRLINE_STEP_DEGREES, ZONE_AMOUNTS, table_sizes
+from dermis.human.skin.face import FOLD_MOVEMENT_COUNT, HAIRLINE_STEP_DEGREES, ZONE_AMOUNTS, table_sizes
 from dermis.human.skin.look import SkinLook
 from dermis.human.skin.measured import SiteDifferences
 from dermis.human.skin.painted import oxygen_range, painted_colour_tables
@@ -63,7 +63,7 @@ _PADDING = (0, 0), (0, 2)  # padding from two to four columns
 _CACHE_FOLDER = "painted"
 _WORD_BYTES = 4
 _MAP_NAMES = ("colour", "specular", "roughness")
-_FOLDING_VALUE_COUNT = FOLD_MOVEMENTS + 1  # numbers in `folding` of the shader: fold movements and flush
+_FOLDING_VALUE_COUNT = FOLD_MOVEMENT_COUNT + 1  # numbers in `folding` of the shader: fold movements and flush
 
 
 def painting_lists() -> Mapping[str, Callable[[], Sequence[ShaderListMember]]]:
@@ -76,7 +76,7 @@ def painting_constants() -> dict[str, float]:
     counts = {name: len(names) for name, names in _PAINTING_LISTS.items()} | table_sizes()
     rows = {"noise_rows": len(noise_table()), "amount_rows": len(ZONE_AMOUNTS) // 4}
     sizes = {"degrees": float(HAIRLINE_STEP_DEGREES), "tile_mm": TILE_LENGTH_MM}
-    return sizes | counts | rows | {"folding": FOLD_MOVEMENTS, "wander_rows": ZONE_BORDER_NOISES}
+    return sizes | counts | rows | {"folding": FOLD_MOVEMENT_COUNT, "wander_rows": ZONE_BORDER_NOISES}
 
 
 def _as_members(names: Sequence[str]) -> Callable[[], Sequence[ShaderListMember]]:

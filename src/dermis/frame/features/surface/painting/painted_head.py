@@ -14,7 +14,7 @@ from dermis.gpu import CommandList, Device, download, make_texture
 from dermis.human.skin.painted import MAX_SIDE, MIN_SIDE, PaintedMaps
 from dermis.human.skin.surface import painted_surface
 from dermis.mesh.eye_look import EyeLook
-from dermis.mesh.eyeball import UV_DECAY_RADIANS, UV_RIM, EyeTextures
+from dermis.mesh.eyeball import UV_DECAY_ANGLE_RADIANS, UV_RADIUS_OF_BACK, EyeTextures
 from dermis.mesh.head import Head
 
 EYE_PICTURE_SIDE = 1024
@@ -27,7 +27,7 @@ def paint_eye(device: Device, look: EyeLook, side: int = EYE_PICTURE_SIDE) -> Ey
     side : side of the pictures [pixels]
     """
     shader = program(device, "surface/painting/eye_pictures.wgsl")
-    picture = shader.record("EyePicture", rim=UV_RIM, falling=UV_DECAY_RADIANS)
+    picture = shader.record("EyePicture", rim=UV_RADIUS_OF_BACK, falling=UV_DECAY_ANGLE_RADIANS)
     fill_eye(picture["eye"], look)
     textures = {name: make_texture(device, (side, side), "rgba32float") for name in ("colours", "normals")}
     frame = CommandList(device, timed=False)
