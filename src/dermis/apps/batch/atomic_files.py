@@ -12,7 +12,7 @@ from pathlib import Path
 
 from dermis.base.atomic_write import refuse_output
 
-_MAX_ATTEMPTS = 5
+_MAX_RENAME_ATTEMPTS = 5
 _UNFINISHED_NAME_PATTERN = re.compile(r"\.(.+)-[0-9a-f]{12}\.unfinished")
 
 
@@ -21,19 +21,19 @@ def temporary_path(target: Path) -> Path:
     return target.with_name(f".{target.name}-{secrets.token_hex(6)}.unfinished")
 
 
-def atomic_write(target: Path, write: Callable[[Path], object]) -> None:
+def atomic_write(target: Path, write_content: Callable[[Path], object]) -> None:
     """Write a file completely or not at all, through a temporary file that is renamed.
 
     Another process may remove the temporary file during a cleanup; the file is then written again.
 
-    write : function that writes the content to the path that it receives
+    write_content : function that writes the content to the path that it receives
 
     Raises DermisError if the file cannot be written.
     """
-    for attempts_left in reversed(range(_MAX_ATTEMPTS)):
+    for attempts_left in reversed(range(_MAX_RENAME_ATTEMPTS)):
         temporary = temporary_path(target)
         try:
-            write(temporary)
+            write_content(temporary)
             flush_to_disk(temporary)
             temporary.replace(target)
             flush_to_disk(target.parent)
@@ -48,7 +48,7 @@ def atomic_write(target: Path, write: Callable[[Path], object]) -> None:
         return
 
 
-def move_into_place(temporary: Path, target: Path, replaces_folder: bool = True) -> None:
+def move_into_place(temporary_file: Path, target: Path, replaces_folder: bool = True) -> None:
     """Rename a temporary file or folder to its final path, and replace a file or folder at this path.
 
     replaces_folder : whether to replace a folder that is not empty; if False, such a folder is kept and
@@ -60,7 +60,7 @@ def move_into_place(temporary: Path, target: Path, replaces_folder: bool = True)
         replaced = temporary_path(target)
         target.rename(replaced)
         try:
-            temporary.rename(target)
+            temporary_file.rename(target)
         except OSError:
             with contextlib.suppress(OSError):  # another process has moved a folder there
                 replaced.rename(target)
@@ -68,7 +68,7 @@ def move_into_place(temporary: Path, target: Path, replaces_folder: bool = True)
         finally:
             remove_path(replaced)
     else:
-        temporary.replace(target)
+        temporary_file.replace(target)
     flush_to_disk(target.parent)
 
 

@@ -40,7 +40,9 @@ def write_datasheet(out: Path, spec: Spec) -> None:
     nothing can be written.
     """
     existing = [shard for shard in list_shards(spec) if shard_exists(out, shard, spec)]
-    text = _readme(out, spec, [read_manifest(shard_path(out, shard, spec)) for shard in existing]).encode()
+    text = _readme_text(
+        out, spec, [read_manifest(shard_path(out, shard, spec)) for shard in existing]
+    ).encode()
     description = {
         "spec": spec.digest(),
         "count": spec.count,
@@ -55,7 +57,7 @@ def write_datasheet(out: Path, spec: Spec) -> None:
     atomic_write(out / README_FILE, lambda path: path.write_bytes(text))
 
 
-def _readme(out: Path, spec: Spec, manifests: Sequence[ShardManifest]) -> str:
+def _readme_text(out: Path, spec: Spec, manifests: Sequence[ShardManifest]) -> str:
     width, height = spec.size
     left_out = [image for manifest in manifests for image in manifest.left_out]
     images = sum(manifest.stop - manifest.first for manifest in manifests) - len(left_out)
