@@ -19,7 +19,7 @@ from dermis.apps.export.fitting import burley_curve, fit_burley_width
 from dermis.apps.export.registry import TARGETS
 from dermis.apps.export.subject import load_subject
 from dermis.apps.export.target import get_numbers
-from dermis.apps.export.targets.babylon.target import WIDTH_ERROR, spiral_samples
+from dermis.apps.export.targets.babylon.target import RENDERED_WIDTH_RATIO, spiral_samples
 from dermis.apps.validation.pages import RESULTS, JsonObject, chromium_page, write_results
 from dermis.base.errors import refuse
 
@@ -90,7 +90,7 @@ def predicted_radiance(colour: Floats, metres: float, pixel: float, azimuth: flo
     azimuth : direction across the edge of the light [rad]
     """
     r, angle, weight = spiral_samples(colour)
-    distance = WIDTH_ERROR * 1e-3 * r / metres / pixel
+    distance = RENDERED_WIDTH_RATIO * 1e-3 * r / metres / pixel
     right, upwards = np.round(distance * np.cos(angle)), np.round(distance * np.sin(angle))
     middle = np.arange(CANVAS_SIDE) + 0.5 - 0.5 * CANVAS_SIDE
     radiance = np.zeros((CANVAS_SIDE, CANVAS_SIDE, 3))
@@ -197,7 +197,7 @@ def babylon() -> None:
     """
     with babylon_page(babylon_library()) as page:
         plain = {
-            name: edge_responses(page, np.array(colour), 1e-3, WIDTH_ERROR / np.array(colour))
+            name: edge_responses(page, np.array(colour), 1e-3, RENDERED_WIDTH_RATIO / np.array(colour))
             for name, colour in DIFFUSION_COLOURS.items()
         }
         skins = {name: exported_skin(page, name) for name in ("skin1", "skin2", "dj3")}

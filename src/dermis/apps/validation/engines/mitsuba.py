@@ -20,7 +20,7 @@ from dermis.apps.export.targets.mitsuba.scene import (
     Boundary,
     IsotropicMedium,
     medium_description,
-    surface_description,
+    surface_bsdf,
 )
 from dermis.apps.export.targets.mitsuba.target import TARGET
 from dermis.apps.truths.mitsuba_scene import load_mitsuba, mitsuba_variant
@@ -80,7 +80,7 @@ def half_lit_plane(
             "type": "scene",
             "integrator": {"type": "volpath", "rr_depth": 400},
             "sensor": {**sensor, **({"medium": inside} if camera_below else {})},
-            "skin": {**skin, "bsdf": surface_description(boundary)},
+            "skin": {**skin, "bsdf": surface_bsdf(boundary)},
             "lamp": {**lamp, "emitter": {"type": "area", "radiance": mitsuba_rgb((1, 1, 1))}},
         }
     )

@@ -28,7 +28,7 @@ BOUNDARIES: Mapping[Boundary, float] = {"matched": 1.0, "smooth": SKIN_ETA, "rou
 """Surface models of the skin, with their index of refraction."""
 MATCHED_REFLECTANCE = 0.03
 """Reflectance of an index-matched surface in all directions: the mean reflectance of rough skin [-]."""
-_OPAQUE_ROUGHNESS = 0.3  # square root of Beckmann's m
+_OPAQUE_PART_ROUGHNESS = 0.3  # square root of Beckmann's m
 _PART_IOR = 1.5  # of the metallic-roughness model
 _PART_INPUTS: Mapping[PartRole, str] = {
     "colour": "base_color",
@@ -119,7 +119,7 @@ def medium_description(medium: IsotropicMedium) -> SceneDict:
     }
 
 
-def surface_description(
+def surface_bsdf(
     boundary: Boundary, transmittance: SceneDict | None = None, roughness: float | SceneDict = 0.3
 ) -> SceneDict:
     """Return Mitsuba's description of the skin's surface, or of the outer layer of an index-matched surface.
@@ -140,7 +140,7 @@ def surface_description(
     return {"type": "roughdielectric", "id": "skin_surface", **facets, **refraction}
 
 
-def _lower_surface(has_dimming: bool) -> SceneDict:
+def _lower_surface_bsdf(has_dimming: bool) -> SceneDict:
     """Return Mitsuba's description of the inner layer of an index-matched surface.
 
     This layer absorbs part of the light that leaves the skin, where the skin is darker than its medium.
@@ -177,13 +177,18 @@ def _scene_elements(
     if scene.environment is not None:
         parts.append(mitsuba_environment(backend, scene.environment))
     colour = {"type": "mesh_attribute", "name": "vertex_color"}
-    opaque = {"type": "principled", "roughness": _OPAQUE_ROUGHNESS, "eta": SKIN_ETA, "base_color": colour}
+    opaque = {
+        "type": "principled",
+        "roughness": _OPAQUE_PART_ROUGHNESS,
+        "eta": SKIN_ETA,
+        "base_color": colour,
+    }
     for role in appearance.pictures:
         texture = {"type": "bitmap", "id": _part_texture(role).name, "filename": _part_picture_file(role)}
         parts.append({**texture, "raw": role != "colour", "wrap_mode": "clamp"})
     for index in appearance.opaque:
         roles = appearance.pictured.get(index)
-        bsdf = opaque if roles is None else _part_surface(roles)
+        bsdf = opaque if roles is None else _part_bsdf(roles)
         parts.append({"type": "ply", "filename": _opaque_mesh_file(index), "bsdf": bsdf})
     defaults = [xml.default_element(*one) for one in (("boundary", boundary), *sizes)]
     elements = [xml.object_element(part, "", backend) for part in parts]
@@ -201,12 +206,12 @@ def _skin_elements(
     transmittance = None if appearance.transmittance is None else _exr_texture("passing")
     parts = [
         medium_description(appearance.media[boundary]),
-        surface_description(boundary, transmittance, roughness),
+        surface_bsdf(boundary, transmittance, roughness),
     ]
     shapes = dict.fromkeys(("skin", "caps"), "skin_surface")
     if boundary == "matched":
         # Inward rays hit the upper surface and skip the lower one, outward rays the reverse.
-        parts.append(_lower_surface(transmittance is not None))
+        parts.append(_lower_surface_bsdf(transmittance is not None))
         shapes = dict.fromkeys(("upper", "upper_caps"), "skin_surface")
         shapes |= dict.fromkeys(("skin", "caps"), "skin_below")
     for name in (name for name in shapes if name in meshes):
@@ -215,12 +220,12 @@ def _skin_elements(
     return [xml.object_element(part, "", backend) for part in parts]
 
 
-def _part_surface(roles: set[PartRole]) -> SceneDict:
+def _part_bsdf(roles: set[PartRole]) -> SceneDict:
     """Return Mitsuba's description of a surface that is not skin and has pictures.
 
     roles : roles of these pictures
     """
-    bsdf: SceneDict = {"type": "principled", "eta": _PART_IOR, "roughness": _OPAQUE_ROUGHNESS}
+    bsdf: SceneDict = {"type": "principled", "eta": _PART_IOR, "roughness": _OPAQUE_PART_ROUGHNESS}
     bsdf |= {name: _part_texture(role) for role, name in _PART_INPUTS.items() if role in roles}
     if "normal" in roles:
         bsdf = {"type": "normalmap", "normalmap": _part_texture("normal"), "bsdf": bsdf}
@@ -240,5 +245,5 @@ def _opaque_mesh_file(material_index: int) -> str:
     return f"meshes/material_{material_index}.ply"
 
 
-def _exr_texture(file_stem: str) -> SceneDict:
-    return {"type": "bitmap", "filename": f"textures/{file_stem}.exr", "raw": True}
+def _exr_texture(texture_name: str) -> SceneDict:
+    return {"type": "bitmap", "filename": f"textures/{texture_name}.exr", "raw": True}

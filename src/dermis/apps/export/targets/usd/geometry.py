@@ -156,10 +156,10 @@ def add_motion(stage: Usd.Stage, root: Sdf.Path, mesh: Usd.Prim, deformable: Def
         rest.CreateBlendShapeWeightsAttr([0.0] * len(names) if weights is None else weights.tolist())
 
 
-def unique_usd_names(names: Sequence[str]) -> list[str]:
+def unique_usd_names(original_names: Sequence[str]) -> list[str]:
     """Return the names made unique, and reduced to letters, digits and underscores as USD requires."""
     valid: list[str] = []
-    for name in names:
+    for name in original_names:
         identifier = Tf.MakeValidIdentifier(name)
         number = sum(one == identifier or one.startswith(f"{identifier}_again") for one in valid)
         valid.append(f"{identifier}_again{number}" if number else identifier)

@@ -100,16 +100,16 @@ class PageRequest:
                 side, samples, merged_hairs = self.interactive[adapter_kind]
                 yield self.settings_for(side, technique).model_copy(update={"samples": samples}), merged_hairs
 
-    def settings_for(self, side: int, technique: str = PAGE_TECHNIQUES[0]) -> Settings:
+    def settings_for(self, picture_side: int, technique: str = PAGE_TECHNIQUES[0]) -> Settings:
         """Return the settings of a frame with a given picture side and technique.
 
         Interreflection is off without diffusion, as links for a second atlas layout would add 0.6 MB to the
         page.
 
-        side : side of the square picture [pixel]
+        picture_side : side of the square picture [pixel]
         """
         diffusion = {"technique": technique, "interreflection": technique == PAGE_TECHNIQUES[0]}
-        return self.settings.model_copy(update={"size": (side, side), **diffusion})
+        return self.settings.model_copy(update={"size": (picture_side, picture_side), **diffusion})
 
 
 def build_content(request: PageRequest, on_renderer: OnRenderer = lambda *_: None) -> PageContent:
@@ -187,10 +187,13 @@ def _frame_changes(
     }
 
 
-def _mip_entries(content: PageContent, map_: PictureMap) -> list[list[tuple[int, int, int]]]:
+def _mip_entries(content: PageContent, picture_map: PictureMap) -> list[list[tuple[int, int, int]]]:
     """Return the entries in `PageContent.picture_entries` of each mip level and layer of a map."""
-    layers = 1 + max(layer for role, _, layer in content.maps.pictures if role == map_.role)
-    return [[content.add_picture((map_.role, mip, k)) for k in range(layers)] for mip in range(map_.mips)]
+    layers = 1 + max(layer for role, _, layer in content.maps.pictures if role == picture_map.role)
+    return [
+        [content.add_picture((picture_map.role, mip, k)) for k in range(layers)]
+        for mip in range(picture_map.mips)
+    ]
 
 
 def _colour_maps(content: PageContent, renderer: Renderer, request: PageRequest, maps: PictureMaps) -> Json:
