@@ -40,9 +40,11 @@ Floats = NDArray[np.float32]
 NumericArray = NDArray[np.generic]
 SubsurfaceMethod = Literal["random-walk", "burley"]
 _PASS_COUNT = 4
-_SCRIPT = Path(__file__).with_name("cycles_script.py")
-_TASK = BlenderTask("Cycles", "to render the scene", "Try bpy 5.0, the version that this is tested with")
-_MAX_START_S, _MAX_PATH_S = 300.0, 5e-4
+_CYCLES_SCRIPT = Path(__file__).with_name("cycles_script.py")
+_CYCLES_TASK = BlenderTask(
+    "Cycles", "to render the scene", "Try bpy 5.0, the version that this is tested with"
+)
+_MAX_STARTUP_S, _MAX_SECONDS_PER_PATH = 300.0, 5e-4
 """Time limits for the start of Blender and for each path: a hundred times the times on two cores."""
 
 
@@ -133,8 +135,8 @@ def cycles_passes(
     with tempfile.TemporaryDirectory(prefix="dermis-cycles-") as name:
         folder = Path(name)
         _write_scene(folder, scene_dict, arrays)
-        timeout_s = _MAX_START_S + _MAX_PATH_S * size[0] * size[1] * sum(samples)
-        run_blender(interpreter, _SCRIPT, [str(folder)], timeout_s, _TASK)
+        timeout_s = _MAX_STARTUP_S + _MAX_SECONDS_PER_PATH * size[0] * size[1] * sum(samples)
+        run_blender(interpreter, _CYCLES_SCRIPT, [str(folder)], timeout_s, _CYCLES_TASK)
         return read_passes(folder, samples, size)
 
 
@@ -170,7 +172,7 @@ def read_passes(folder: Path, samples: Sequence[int], size: tuple[int, int]) -> 
         ]
     except (OSError, ValueError, KeyError, TypeError, DermisError) as fault:
         actual = f"its files are unusable ({str(fault) or type(fault).__name__})"
-        refuse(_TASK.renderer, _TASK.goal, actual, _TASK.advice)
+        refuse(_CYCLES_TASK.renderer, _CYCLES_TASK.goal, actual, _CYCLES_TASK.advice)
 
 
 @dataclass(frozen=True)
@@ -238,12 +240,12 @@ def describe_scene(
     return scene_dict, arrays | panorama
 
 
-def _normal_map(slopes: NDArray[np.float32]) -> NDArray[np.float32]:
+def _normal_map(uv_slopes: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return a normal map for Cycles: tangent-space normals (h, w, 3) encoded as colours.
 
-    slopes : (h, w, 2) slopes of the surface along u and v
+    uv_slopes : (h, w, 2) slopes of the surface along u and v
     """
-    normal = np.dstack([-slopes, np.ones(slopes.shape[:2], np.float32)])
+    normal = np.dstack([-uv_slopes, np.ones(uv_slopes.shape[:2], np.float32)])
     normal /= np.linalg.norm(normal, axis=2, keepdims=True)
     return np.asarray(0.5 + 0.5 * normal, np.float32)
 

@@ -11,7 +11,7 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.inverse.unmixing.spectral_inversion import SPECULAR_INCLUDED
+from dermis.apps.inverse.unmixing.spectral_inversion import SPECULAR_INCLUDED_REFLECTANCE
 from dermis.apps.validation.pages import data_file
 from dermis.base.arrays import Doubles
 from dermis.base.tables import float_columns
@@ -77,7 +77,8 @@ def read_archive() -> Archive:
     number = {name: index for index, name in enumerate(dict.fromkeys(names))}
     ages = (AGE_MIDDLES[int(float(row["age_group"]))] if row["age_group"] else _NO_VALUE for row in rows)
     return Archive(
-        spectra=float_columns(rows, " ".join(f"r{nm:.0f}" for nm in WAVELENGTHS_NM)) - SPECULAR_INCLUDED,
+        spectra=float_columns(rows, " ".join(f"r{nm:.0f}" for nm in WAVELENGTHS_NM))
+        - SPECULAR_INCLUDED_REFLECTANCE,
         person=np.array([number[name] for name in names]),
         fold=np.array([crc32(name.encode()) % FOLDS for name in names]),
         group=np.array([row["group"] for row in rows]),

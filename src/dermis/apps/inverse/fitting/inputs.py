@@ -25,8 +25,8 @@ from dermis.scene.heads import is_person_name, load_person
 from dermis.scene.model import Scene
 from dermis.scene.skin import Pigments, Skin
 
-_CLIP_LEVEL = 0.985  # fraction of the largest level from which a channel counts as clipped
-_MIN_SIDE = 16
+_CLIPPED_LEVEL_FRACTION = 0.985  # fraction of the largest level from which a channel counts as clipped
+_MIN_PHOTO_SIDE = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,12 +45,12 @@ class Photograph:
         """Return the width and height of the photograph [pixel]."""
         return self.linear.shape[1], self.linear.shape[0]
 
-    def within(self, side: int) -> Photograph:
-        """Return the photograph reduced by area averaging to a longer side of at most `side` pixels."""
+    def within(self, max_side: int) -> Photograph:
+        """Return the photograph reduced by area averaging to a longer side of at most `max_side` pixels."""
         width, height = self.size
-        if max(width, height) <= side:
+        if max(width, height) <= max_side:
             return self
-        scale = side / max(width, height)
+        scale = max_side / max(width, height)
         size = max(1, round(width * scale)), max(1, round(height * scale))
         unclipped = _area_average(self.unclipped[..., None], size)[..., 0]
         return Photograph(_area_average(self.linear, size), unclipped)
@@ -71,8 +71,8 @@ def read_photograph(source: str | Path | EmbeddedPicture | ArrayLike) -> Photogr
         image, space = read_colours(source, upright=True)
     else:
         image = np.asarray(source)
-    if image.ndim != 3 or image.shape[2] not in (1, 3, 4) or min(image.shape[:2]) < _MIN_SIDE:
-        expected = f"a picture (h, w, 3) of at least {_MIN_SIDE} pixels a side"
+    if image.ndim != 3 or image.shape[2] not in (1, 3, 4) or min(image.shape[:2]) < _MIN_PHOTO_SIDE:
+        expected = f"a picture (h, w, 3) of at least {_MIN_PHOTO_SIDE} pixels a side"
         refuse(name, expected, f"got shape {image.shape}", "Save it as RGB")
     if image.dtype.kind != "f" and image.dtype not in (np.uint8, np.uint16):
         refuse(name, "sRGB bytes or linear floats", f"got {image.dtype}", "Convert it")
@@ -86,16 +86,16 @@ def read_photograph(source: str | Path | EmbeddedPicture | ArrayLike) -> Photogr
     if is_linear:
         colours = repaired_radiance(name, np.asarray(colours, np.float32))
     else:
-        usable &= colours.max(axis=2) < _CLIP_LEVEL * full
+        usable &= colours.max(axis=2) < _CLIPPED_LEVEL_FRACTION * full
     return Photograph(space.linear(colours).astype(np.float64), usable.astype(np.float64))
 
 
-def _area_average(image: Floats, size: tuple[int, int]) -> Floats:
+def _area_average(image: Floats, new_size: tuple[int, int]) -> Floats:
     """Downsample a picture (h, w, c): each pixel of the result is the mean over the area that it covers.
 
-    size : width and height of the result [pixel]
+    new_size : width and height of the result [pixel]
     """
-    for axis, count in ((0, size[1]), (1, size[0])):
+    for axis, count in ((0, new_size[1]), (1, new_size[0])):
         sums = np.cumsum(image, axis=axis)
         sums = np.concatenate([np.zeros_like(np.take(sums, [0], axis)), sums], axis=axis)
         edges = np.linspace(0.0, image.shape[axis], count + 1)

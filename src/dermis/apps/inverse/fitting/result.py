@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.inverse.fitting.inputs import FitSubject
-from dermis.apps.inverse.fitting.light_basis import BASIS_SIZE, panorama
+from dermis.apps.inverse.fitting.light_basis import AMBIENT_LOBE_COUNT, panorama
 from dermis.apps.inverse.fitting.solve import Uncertainty
 from dermis.apps.inverse.fitting.unknowns import (
     SKIN_UNKNOWNS,
-    SUN_SD,
-    WHITE_SD,
+    SUN_PRIOR_SD,
+    WHITE_PRIOR_SD,
     FitPoint,
     sun_lights,
     with_skin,
@@ -80,7 +80,7 @@ class FitResult:
     @property
     def suns(self) -> list[tuple[Floats, float]]:
         """Return the unit vector towards each sun, and the sun's irradiance at normal incidence."""
-        return list(zip(self.point.suns, map(float, self.strengths[BASIS_SIZE:]), strict=True))
+        return list(zip(self.point.suns, map(float, self.strengths[AMBIENT_LOBE_COUNT:]), strict=True))
 
     def summary(self) -> dict[str, Any]:
         """Return the fitted unknowns with uncertainties and priors, as they are written to fit.json.
@@ -101,7 +101,7 @@ class FitResult:
         return {
             "skin": skin,
             "suns": suns,
-            "around": {"mean_radiance": float(panorama(self.strengths[:BASIS_SIZE]).mean())},
+            "around": {"mean_radiance": float(panorama(self.strengths[:AMBIENT_LOBE_COUNT]).mean())},
             "white": self.white.tolist(),
             "white_sd": [sd[name] for name in ("white red", "white blue") if name in sd],
             "exposure": self.exposure,
@@ -119,8 +119,8 @@ class FitResult:
         """Return sentences that describe the priors of the unknowns and the fixed parameters."""
         skin = self.subject.scene.skin.pigments
         assert skin is not None
-        sun = f"directions of suns: within {np.degrees(SUN_SD):.0f} degrees of the initial guess"
-        white = f"neutral within {100 * WHITE_SD:.0f} %"
+        sun = f"directions of suns: within {np.degrees(SUN_PRIOR_SD):.0f} degrees of the initial guess"
+        white = f"neutral within {100 * WHITE_PRIOR_SD:.0f} %"
         if "white red" not in self.uncertainty.sd:
             white = f"given, {', '.join(f'{one:.3g}' for one in self.white)}"
         assumed = [name for name in FIXED_PARAMETERS if name not in self.subject.known]
@@ -150,7 +150,7 @@ def save_fit(folder: Path, result: FitResult) -> list[Path]:
         actual = "got a head without a name or file"
         refuse("head", "a Human or a head with a name, for scene.toml", actual, "Fit the Human itself")
     written = []
-    radiance = panorama(result.strengths[:BASIS_SIZE])
+    radiance = panorama(result.strengths[:AMBIENT_LOBE_COUNT])
     if radiance.max() > 0.0:
         written.append(folder / "light.exr")
         with atomic_file(written[-1]) as file:
@@ -174,8 +174,8 @@ def save_fit(folder: Path, result: FitResult) -> list[Path]:
 
 def fitted_scene(result: FitResult, folder: Path) -> Scene:
     """Return the scene with the fitted skin and lights; the ambient light is read from `folder`/light.exr."""
-    suns = sun_lights(result.point.suns, result.strengths[BASIS_SIZE:], result.white)
-    has_sky = panorama(result.strengths[:BASIS_SIZE]).max() > 0.0
+    suns = sun_lights(result.point.suns, result.strengths[AMBIENT_LOBE_COUNT:], result.white)
+    has_sky = panorama(result.strengths[:AMBIENT_LOBE_COUNT]).max() > 0.0
     ambient = Environment(name=str(folder / "light.exr")) if has_sky else None
     lights = [one for one in suns if max(one.irradiance) > 0.0]
     return with_skin(replace(result.subject.scene, lights=lights, environment=ambient), result.point)

@@ -10,24 +10,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.inverse.fitting.frames import FaceRenderer
-from dermis.apps.inverse.fitting.light_basis import BASIS_SIZE, solve_strengths
-from dermis.apps.inverse.fitting.unknowns import SKIN_UNKNOWNS, SUN_SD, SUN_STEP, WHITE_SD, FitPoint
+from dermis.apps.inverse.fitting.light_basis import AMBIENT_LOBE_COUNT, solve_strengths
+from dermis.apps.inverse.fitting.unknowns import (
+    SKIN_UNKNOWNS,
+    SUN_PRIOR_SD,
+    SUN_STEP_RAD,
+    WHITE_PRIOR_SD,
+    FitPoint,
+)
 from dermis.base.renamed import renamed_attribute
 from dermis.optics.media import Floats
 
-_NOISE_FLOOR = 0.03
+_NOISE_FLOOR_FRACTION = 0.03
 """Radiance that is added to that of a pixel before its standard deviation is computed, relative to the
 photograph's median; it limits the weight of dark pixels [-]."""
 ROBUST_LIMIT = 3.0
 """Number of standard deviations above which the weight of a residual decreases [Huber1964]."""
-NO_SD: Mapping[str, float] = MappingProxyType({})
+NO_ASSUMED_SD: Mapping[str, float] = MappingProxyType({})
 _MAD_TO_SD = 1.4826
-_MAX_STEPS = 8
+_MAX_ITERATIONS = 8
 _STEP_TOLERANCE = 0.01
-_MIN_GAIN = 1e-4
-_DAMPING = 1e-3
-_MAX_TRIALS = 3
-_MAX_STEP = 0.7  # largest step of a logarithm or of a direction [rad]
+_MIN_RELATIVE_COST_DECREASE = 1e-4
+_INITIAL_DAMPING = 1e-3
+_MAX_DAMPING_TRIALS = 3
+_MAX_UNKNOWN_STEP = 0.7  # largest step of a logarithm or of a direction [rad]
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,15 +75,17 @@ class FitProblem:
 
     def weights(self, radiance: Floats) -> Floats:
         """Return the inverse standard deviations (p, 3) of pixels with a given radiance."""
-        return np.asarray(1.0 / (self.noise * (radiance + _NOISE_FLOOR * float(np.median(self.target)))))
+        return np.asarray(
+            1.0 / (self.noise * (radiance + _NOISE_FLOOR_FRACTION * float(np.median(self.target))))
+        )
 
     def initial_weights(self) -> Floats:
         """Return the inverse standard deviations (p, 3) of pixels, by the brightness of the photograph."""
         return self.weights(self.target.mean(axis=1, keepdims=True) * np.ones(3))
 
-    def state(self, point: FitPoint, weight: Floats) -> FitState:
+    def state(self, point: FitPoint, pixel_weight: Floats) -> FitState:
         """Render the face at a point, and return the state with the best light strengths there."""
-        return self._state(point, self.frames.basis(point) * light_tint(point), weight)
+        return self._state(point, self.frames.basis(point) * light_tint(point), pixel_weight)
 
     def reweighted_state(self, state: FitState) -> FitState:
         """Return the state with new weights: those of the model's brightness, reduced for outliers."""
@@ -87,47 +95,49 @@ class FitProblem:
         weights *= np.sqrt(limit / np.maximum(scaled, limit))
         return self._state(state.point, state.basis, weights)
 
-    def _state(self, point: FitPoint, basis: Floats, weight: Floats) -> FitState:
-        A = (basis * weight).reshape(len(basis), -1).T
-        x = solve_strengths(A, (self.target * weight).ravel())
+    def _state(self, point: FitPoint, basis: Floats, pixel_weight: Floats) -> FitState:
+        A = (basis * pixel_weight).reshape(len(basis), -1).T
+        x = solve_strengths(A, (self.target * pixel_weight).ravel())
         residual = self.target - np.einsum("a,apc->pc", x, basis)
         prior = (self.prior_offsets(point) / self.prior_sd(2 * len(point.suns))) ** 2
-        cost = float(((residual * weight) ** 2).sum()) + float(prior.sum())
-        return FitState(point, x, basis, residual, weight, cost)
+        cost = float(((residual * pixel_weight) ** 2).sum()) + float(prior.sum())
+        return FitState(point, x, basis, residual, pixel_weight, cost)
 
-    def derivatives(self, state: FitState, name: str) -> Floats:
+    def derivatives(self, state: FitState, frame_name: str) -> Floats:
         """Return derivatives of the radiance by the u unknowns, (p, 3, u), from finite differences of frames.
 
-        name : file name of the ambient light's panorama, without suffix
+        frame_name : file name of the ambient light's panorama, without suffix
         """
         point, count = state.point, 2 * len(state.point.suns)
-        centre = self.frames.combined(point, state.strengths, name)
+        centre = self.frames.combined(point, state.strengths, frame_name)
         shifted = []
         for k, step in enumerate(self.steps(count)):
             change = np.zeros(len(SKIN_UNKNOWNS) + count + 2)
             limited = k < len(SKIN_UNKNOWNS) and point.logs[k] + step >= np.log(SKIN_UNKNOWNS[k].high)
             change[k] = -step if limited else step
-            neighbour = self.frames.combined(point.stepped(change), state.strengths, name)
+            neighbour = self.frames.combined(point.stepped(change), state.strengths, frame_name)
             shifted.append((neighbour - centre) / change[k])
         radiance, white = centre * light_tint(point), np.zeros((2, *centre.shape))
         white[0, :, 0], white[1, :, 2] = radiance[:, 0], radiance[:, 2]
         derivatives = np.concatenate([np.asarray(shifted) * light_tint(point), white])
         return np.moveaxis(derivatives, 0, -1)
 
-    def steps(self, sun_angles: int) -> list[float]:
+    def steps(self, sun_angle_count: int) -> list[float]:
         """Return the steps of the finite differences, for the skin unknowns and the directions of suns.
 
-        sun_angles : number of angles that describe the directions of all suns
+        sun_angle_count : number of angles that describe the directions of all suns
         """
-        return [one.step for one in SKIN_UNKNOWNS] + [SUN_STEP] * sun_angles
+        return [one.step for one in SKIN_UNKNOWNS] + [SUN_STEP_RAD] * sun_angle_count
 
-    def prior_sd(self, sun_angles: int) -> Floats:
+    def prior_sd(self, sun_angle_count: int) -> Floats:
         """Return the standard deviations of the priors of all unknowns (u,).
 
-        sun_angles : number of angles that describe the directions of all suns
+        sun_angle_count : number of angles that describe the directions of all suns
         """
-        white = WHITE_SD if self.free_white else 1e-6
-        return np.array([one.prior_sd for one in SKIN_UNKNOWNS] + [SUN_SD] * sun_angles + [white] * 2)
+        white = WHITE_PRIOR_SD if self.free_white else 1e-6
+        return np.array(
+            [one.prior_sd for one in SKIN_UNKNOWNS] + [SUN_PRIOR_SD] * sun_angle_count + [white] * 2
+        )
 
     def prior_offsets(self, point: FitPoint) -> Floats:
         """Return the differences of the unknowns from the means of their priors (u,), 0 for suns."""
@@ -149,16 +159,16 @@ def solve_fit(
     projection [GolubPereyra1973] with Kaufman's derivative [Kaufman1975].
     """
     state = problem.reweighted_state(problem.state(start, problem.initial_weights()))
-    damping = _DAMPING
-    for iteration in range(_MAX_STEPS):
-        progress(iteration, _MAX_STEPS)
+    damping = _INITIAL_DAMPING
+    for iteration in range(_MAX_ITERATIONS):
+        progress(iteration, _MAX_ITERATIONS)
         derivatives = problem.derivatives(state, f"light_{problem.frames.frame_count}")
         improved, step, damping = _try_steps(problem, state, derivatives, damping)
         if improved is None:
             return state, derivatives
         gain = 1.0 - improved.cost / state.cost
         state = problem.reweighted_state(improved)
-        if np.abs(step).max() < _STEP_TOLERANCE or gain < _MIN_GAIN:
+        if np.abs(step).max() < _STEP_TOLERANCE or gain < _MIN_RELATIVE_COST_DECREASE:
             break
     return state, derivatives
 
@@ -168,9 +178,9 @@ def _try_steps(
 ) -> tuple[FitState | None, Floats, float]:
     """Try damped steps; return a state of lower cost or None, the step to it, and the next damping."""
     H, g = _normal_equations(problem, state, derivatives)
-    for _ in range(_MAX_TRIALS):
+    for _ in range(_MAX_DAMPING_TRIALS):
         step = np.asarray(np.linalg.solve(H + damping * np.diag(np.diag(H)), g), np.float64)
-        step *= min(1.0, _MAX_STEP / max(float(np.abs(step).max()), 1e-12))
+        step *= min(1.0, _MAX_UNKNOWN_STEP / max(float(np.abs(step).max()), 1e-12))
         if np.abs(step).max() < 0.1 * _STEP_TOLERANCE:
             break
         trial = problem.state(state.point.stepped(step), state.weight)
@@ -196,7 +206,7 @@ def _eliminate_lights(state: FitState, J: Floats) -> tuple[Floats, Floats]:
 
     J : (3 p, u) derivatives of the radiance, multiplied by the weights
     """
-    free = [k for k in range(len(state.basis)) if k < BASIS_SIZE or state.strengths[k] > 0.0]
+    free = [k for k in range(len(state.basis)) if k < AMBIENT_LOBE_COUNT or state.strengths[k] > 0.0]
     Q = np.linalg.qr((state.basis[free] * state.weight).reshape(len(free), -1).T)[0]
     return J - Q @ (Q.T @ J), (state.residual * state.weight).ravel()
 
@@ -206,9 +216,9 @@ _BLOCKS_PER_SIDE = 16
 SYSTEMATIC_SD = {"melanin": 0.11, "blood": 0.1}
 """Standard deviations of the logarithms of pigments due to errors of the renderer. They are chosen so that
 68 % of the errors of fits to path-traced faces are within one stated standard deviation, see docs/fit.md."""
-_LIMIT_TOLERANCE = 1e-6
-_MIN_PRIOR_RATIO = 0.5
-_MIN_CORRELATION = 0.95
+_PARAMETER_LIMIT_TOLERANCE = 1e-6
+_MIN_UNDETERMINED_SD_RATIO = 0.5
+_MIN_NOTABLE_CORRELATION = 0.95
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,7 +243,7 @@ class Uncertainty:
 
 
 def fit_uncertainty(
-    problem: FitProblem, state: FitState, derivatives: Floats, assumed_sd: Mapping[str, float] = NO_SD
+    problem: FitProblem, state: FitState, derivatives: Floats, assumed_sd: Mapping[str, float] = NO_ASSUMED_SD
 ) -> Uncertainty:
     """Return the uncertainty of all unknowns, with residuals correlated within blocks of pixels [White1980].
 
@@ -257,15 +267,15 @@ def fit_uncertainty(
     covariance += np.diag(systematic[:count] ** 2)
     sd = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(sd, sd)
-    values, e = state.point.values(), _LIMIT_TOLERANCE
+    values, e = state.point.values(), _PARAMETER_LIMIT_TOLERANCE
     free = {one.name: one.low * (1 + e) < values[one.name] < one.high * (1 - e) for one in SKIN_UNKNOWNS}
-    uncertain = zip(names, sd > _MIN_PRIOR_RATIO * prior_sd, strict=False)
+    uncertain = zip(names, sd > _MIN_UNDETERMINED_SD_RATIO * prior_sd, strict=False)
     undetermined = tuple(name for name, large in uncertain if large or not free.get(name, True))
     correlated = tuple(
         (names[a], names[b], float(correlation[a, b]))
         for a in range(count)
         for b in range(a)
-        if abs(correlation[a, b]) > _MIN_CORRELATION and names[a][:5] != names[b][:5]
+        if abs(correlation[a, b]) > _MIN_NOTABLE_CORRELATION and names[a][:5] != names[b][:5]
     )
     singular_values = np.linalg.svd(J * prior_sd, compute_uv=False)
     sd_by_name = dict(zip(names, map(float, sd), strict=False))

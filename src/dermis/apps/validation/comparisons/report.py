@@ -11,7 +11,7 @@ from string import Template
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.truths.metrics import MID_GREY, signed_difference
+from dermis.apps.truths.metrics import ZERO_DIFFERENCE_GREY, signed_difference
 from dermis.apps.validation.comparisons.compare import Comparison, ComparisonRow, comparison_sources
 from dermis.base.atomic_write import atomic_file
 from dermis.images.codecs import encode_png
@@ -68,7 +68,7 @@ def _figures(comparison: Comparison, row: ComparisonRow) -> str:
     image, reference = comparison.images[row.technique], comparison.reference
     ours, exact = (np.maximum(comparison.exposure * one, 0.0) for one in (image, reference.image))
     difference = signed_difference(ours, exact)
-    difference = np.where(reference.mask[..., None], difference, MID_GREY)
+    difference = np.where(reference.mask[..., None], difference, ZERO_DIFFERENCE_GREY)
     pictures = {row.technique: comparison.tone_mapped(image), f"{row.technique}: difference": difference}
     return "\n".join(_figure(caption, picture) for caption, picture in pictures.items())
 

@@ -16,7 +16,7 @@ from dermis.apps.export.targets.mitsuba import xml
 from dermis.apps.export.targets.mitsuba.meshes import skin_meshes
 from dermis.apps.export.targets.mitsuba.xml import XmlBackend
 from dermis.apps.truths.lights import MITSUBA, mitsuba_emitter
-from dermis.apps.truths.mitsuba_scene import ROULETTE_DEPTH, mitsuba_sensor
+from dermis.apps.truths.mitsuba_scene import RUSSIAN_ROULETTE_DEPTH, mitsuba_sensor
 from dermis.apps.truths.scene_description import SceneDict, mitsuba_environment, mitsuba_rgb
 from dermis.formats.part_pictures import PartRole
 from dermis.scene.model import Scene
@@ -170,7 +170,7 @@ def _scene_elements(
     sensor["film"] |= {"width": xml.Override("integer", "width"), "height": xml.Override("integer", "height")}
     sensor["sampler"]["sample_count"] = xml.Override("integer", "samples")
     # Spectral multiple importance sampling, as extinction differs between channels.
-    integrator = {"type": "volpathmis", "rr_depth": ROULETTE_DEPTH, "hide_emitters": True}
+    integrator = {"type": "volpathmis", "rr_depth": RUSSIAN_ROULETTE_DEPTH, "hide_emitters": True}
     parts: list[SceneDict] = [integrator, sensor]
     lights = supported_lights(scene.lights, MITSUBA, "Mitsuba")
     parts += [mitsuba_emitter(backend, light, k) for k, light in enumerate(lights, start=1)]

@@ -191,7 +191,7 @@ def resources_read_first(capture: FrameCapture, frames: Frames) -> list[int]:
 def resources_bound_as(
     capture: FrameCapture, frames: Frames, binding_names: tuple[str, ...]
 ) -> dict[int, str]:
-    """Return the binding name of each resource that shaders bind under one of `binding_names`, by resource index."""
+    """Return the name under which shaders bind each resource by index, for names in `binding_names`."""
     found: dict[int, str] = {}
     for one in (one for frame in frames for one in frame.passes if one.program is not None):
         bound_names = [name for _, name, _ in capture.programs[one.program or 0]["bindings"]]
