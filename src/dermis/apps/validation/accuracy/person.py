@@ -35,9 +35,9 @@ from dermis.apps.validation.comparisons.person import (
     TruthName,
     View,
     compare_person,
-    frame_of,
     iris_errors,
     render_frame,
+    render_subject_frame,
     shared_skin,
     view_scene,
     without_cause,
@@ -149,7 +149,7 @@ class Measuring:
             figures["regions"] = {name: list(ratio) for name, ratio in regions.light_ratios(pair).items()}
         if measurement.truth == "matched" and measurement.cause is None:
             settings = Settings(size=(self.side, self.side), samples=4)
-            shipped = frame_of(self.renderer, subject, None, settings)
+            shipped = render_subject_frame(self.renderer, subject, None, settings)
             error = relative_rmse(shipped, pair.reference, pair.mask, pair.variance)
             figures["default"] = [*error, *energy_ratio(shipped, pair.reference, pair.mask, pair.variance)]
             if measurement.view == "eye":

@@ -28,7 +28,7 @@ from dermis.scene.skin import DirectionName, Skin
 from dermis.scene.sources import scattering_sources
 
 Floats = NDArray[np.float64]
-_WHITE_PERCENTILE = 99.0
+_EXPOSURE_PERCENTILE = 99.0
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class Comparison:
     @property
     def exposure(self) -> float:
         """Return the exposure factor that makes bright pixels of the reference nearly white."""
-        bright = np.percentile(self.reference.image[self.reference.mask], _WHITE_PERCENTILE)
+        bright = np.percentile(self.reference.image[self.reference.mask], _EXPOSURE_PERCENTILE)
         return 0.8 / max(float(bright), 1e-9)
 
     def tone_mapped(self, image: Floats) -> Floats:

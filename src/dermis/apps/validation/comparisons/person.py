@@ -40,8 +40,8 @@ from dermis.scene.skin import DEFAULT_ROUGHNESS, Skin
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 _FULL_COVERAGE = 0.999  # fraction of a pixel from which it counts as covered
-_WHITE_PERCENTILE = 98.0
-_DIRECT_DEPTH = 2
+_EXPOSURE_PERCENTILE = 98.0
+_DIRECT_LIGHT_DEPTH = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +73,7 @@ class PersonComparison:
     @property
     def exposure(self) -> float:
         """Return the exposure factor that makes bright pixels of the reference nearly white."""
-        bright = np.percentile(self.reference[self.mask], _WHITE_PERCENTILE)
+        bright = np.percentile(self.reference[self.mask], _EXPOSURE_PERCENTILE)
         return 0.8 / max(float(bright), 1e-9)
 
     def tone_mapped(self, image: Floats) -> NDArray[np.uint8]:
@@ -165,7 +165,7 @@ def without_cause(subject: PersonSubject, cause: Cause) -> PersonSubject:
     return PersonSubject(scene.replace(head=replace(head, maps=maps)), textures, cause)
 
 
-def frame_of(
+def render_subject_frame(
     renderer: Renderer, subject: PersonSubject, skin: SharedSkin | None, settings: Settings
 ) -> Floats:
     """Return the linear radiance (h, w, 3) of the frame with the model of a truth.
@@ -190,13 +190,13 @@ def frame_of(
     if skin is None or skin.medium.eta != 1.0:
         return render_frame(renderer, scene.replace(skin=own), settings)
     parts = {"diffuse": matte, "specular": own}
-    return sum_of(
+    return sum_images(
         render_frame(renderer, scene.replace(skin=one), settings.model_copy(update={"parts": part}))
         for part, one in parts.items()
     )
 
 
-def sum_of(images: Iterable[Floats]) -> Floats:
+def sum_images(images: Iterable[Floats]) -> Floats:
     """Return the sum of images of one shape."""
     return np.asarray(np.sum(list(images), axis=0))
 
@@ -205,9 +205,9 @@ def compare_person(
     renderer: Renderer,
     subject: PersonSubject,
     skin: SharedSkin,
-    name: str,
+    comparison_name: str,
     *,
-    side: int = 256,
+    picture_side: int = 256,
     samples: int = 64,
     atlas: int = 2048,
     use_cache: bool = True,
@@ -217,19 +217,21 @@ def compare_person(
     """Render a person by dermis and by path tracing with the same model of the skin.
 
     skin : model of the skin, from `shared_skin`
-    name : name of the view
-    side : side of the pictures [pixel]
+    comparison_name : name of the view
+    picture_side : side of the pictures [pixel]
     samples : paths per pixel
     atlas : side of dermis's atlas [texel]
     variant, use_cache, progress : as in `path_trace`
 
     Raises DermisError for heads without modelled eyes.
     """
-    settings = Settings(size=(side, side), atlas=atlas, samples=4)
+    settings = Settings(size=(picture_side, picture_side), atlas=atlas, samples=4)
     reference = path_trace_subject(subject, skin, settings.size, samples, use_cache, variant, progress)
     mask = reference.mask > _FULL_COVERAGE
     check_visible(mask)
-    return person_comparison(name, frame_of(renderer, subject, skin, settings), reference, mask)
+    return person_comparison(
+        comparison_name, render_subject_frame(renderer, subject, skin, settings), reference, mask
+    )
 
 
 def render_frame(renderer: Renderer, scene: Scene, settings: Settings) -> Floats:
@@ -269,7 +271,7 @@ def path_trace_subject(
         medium,
         size,
         samples,
-        max_depth=_DIRECT_DEPTH if subject.cause == "bounces" else None,
+        max_depth=_DIRECT_LIGHT_DEPTH if subject.cause == "bounces" else None,
         variant=variant,
         use_cache=use_cache,
         progress=progress,
@@ -308,37 +310,37 @@ def mean_distance_mm(profile: GaussianSum) -> Floats:
     return np.asarray((weight * width[:, None]).sum(axis=0) / weight.sum(axis=0))
 
 
-def at_normal_incidence(colour: ArrayLike) -> Floats:
+def at_normal_incidence(diffuse_reflectance: ArrayLike) -> Floats:
     """Return reflectances at normal incidence of half-spaces of index 1, by those for uniform light [-]."""
     albedo = 1.0 - np.linspace(1.0, 0.01, 48) ** 2
     uniform, normal = (
         [float(f(one)) for one in albedo] for f in (diffuse_albedo, partial(directional_albedo, 1.0))
     )
-    return np.asarray(np.interp(np.asarray(colour, float), uniform, normal))
+    return np.asarray(np.interp(np.asarray(diffuse_reflectance, float), uniform, normal))
 
 
-def person_comparison(name: str, ours: Floats, reference: PathTraced, mask: Mask) -> PersonComparison:
+def person_comparison(name: str, dermis_image: Floats, reference: PathTraced, mask: Mask) -> PersonComparison:
     """Return the comparison of a frame with a path-traced picture.
 
-    ours : (h, w, 3) linear radiance by dermis
+    dermis_image : (h, w, 3) linear radiance by dermis
     mask : (h, w) pixels to compare
     """
     image, variance = reference.image.astype(np.float64), reference.variance.astype(np.float64)
     return PersonComparison(
         name,
-        ours,
+        dermis_image,
         image,
         variance,
         mask,
-        relative_rmse(ours, image, mask, variance),
-        energy_ratio(ours, image, mask, variance),
-        tuple(energy_ratio(ours[..., c], image[..., c], mask, variance[..., c]) for c in range(3)),
+        relative_rmse(dermis_image, image, mask, variance),
+        energy_ratio(dermis_image, image, mask, variance),
+        tuple(energy_ratio(dermis_image[..., c], image[..., c], mask, variance[..., c]) for c in range(3)),
         reference.samples,
         reference.seconds,
     )
 
 
-_SOFTBOX_MM = 500.0
+_SOFTBOX_SIDE_MM = 500.0
 EYE_FRAME_MM = 30.0
 """Height of the field of view for pictures of an eye."""
 _LIPS_FRAME_MM, _EAR_FRAME_MM = 72.0, 120.0
@@ -437,12 +439,12 @@ def as_softbox(light: Light) -> Light:
     if type(light) is RectangleLight or not isinstance(light, PointLight) or hasattr(light, "radius_mm"):
         return light
     shared = light.model_dump(include={"position", "target", "irradiance"})
-    return RectangleLight(**shared, width_mm=_SOFTBOX_MM, height_mm=_SOFTBOX_MM)
+    return RectangleLight(**shared, width_mm=_SOFTBOX_SIDE_MM, height_mm=_SOFTBOX_SIDE_MM)
 
 
 _PUPIL_RADIUS_MM = 4.0  # around the middle, for the position of the pupil
-_IRIS_INNER_MM, _IRIS_OUTER_MM = 2.6, 5.0  # ring of the iris, as seen from the front
-_HIGHLIGHT_FACTOR = 1.6  # least brightness of highlights, relative to the median of the ring
+_IRIS_INNER_RADIUS_MM, _IRIS_OUTER_RADIUS_MM = 2.6, 5.0  # ring of the iris, as seen from the front
+_MIN_RELATIVE_HIGHLIGHT = 1.6  # least brightness of highlights, relative to the median of the ring
 
 
 class IrisErrors(NamedTuple):
@@ -461,52 +463,57 @@ class IrisErrors(NamedTuple):
     right_half: Estimate
 
 
-def iris_errors(pair: PersonComparison, frame_mm: float) -> IrisErrors:
+def iris_errors(comparison: PersonComparison, frame_mm: float) -> IrisErrors:
     """Return the errors of an iris, in pictures whose centre shows an eye from the front.
 
     frame_mm : visible height [mm]
     """
-    ours, reference = pair.ours.mean(axis=2), pair.reference.mean(axis=2)
-    noise = pair.variance.mean(axis=2)  # an upper bound, since channels may share paths
+    ours, reference = comparison.ours.mean(axis=2), comparison.reference.mean(axis=2)
+    noise = comparison.variance.mean(axis=2)  # an upper bound, since channels may share paths
     side = len(ours)
     along = (np.arange(side) + 0.5 - 0.5 * side) * frame_mm / side
     x, y = np.meshgrid(along, along)
     radius = np.hypot(x, y)
-    ring = (radius > _IRIS_INNER_MM) & (radius < _IRIS_OUTER_MM)
+    ring = (radius > _IRIS_INNER_RADIUS_MM) & (radius < _IRIS_OUTER_RADIUS_MM)
     dull = _without_highlights(ours, ring) & _without_highlights(reference, ring)
     right, down = _image_shift(ours, reference, noise, dull & (radius < _PUPIL_RADIUS_MM))
     masks = (ring & dull & half for half in (radius > 0, x < 0, x >= 0))
     return IrisErrors(right, down, *(_brightness_ratio(ours, reference, noise, mask) for mask in masks))
 
 
-def _without_highlights(image: Floats, ring: Mask) -> Mask:
+def _without_highlights(image: Floats, iris_ring: Mask) -> Mask:
     """Return the mask (h, w) of pixels outside highlights, which are found in a blurred picture.
 
-    ring : (h, w) mask of the iris, whose median brightness determines the threshold
+    iris_ring : (h, w) mask of the iris, whose median brightness determines the threshold
     """
     from scipy.ndimage import gaussian_filter
 
     smooth = gaussian_filter(image, 2.0)
-    return np.asarray(smooth < _HIGHLIGHT_FACTOR * np.median(smooth[ring]))
+    return np.asarray(smooth < _MIN_RELATIVE_HIGHLIGHT * np.median(smooth[iris_ring]))
 
 
-def _image_shift(ours: Floats, reference: Floats, noise: Floats, region: Mask) -> tuple[Estimate, Estimate]:
+def _image_shift(
+    dermis_image: Floats, reference: Floats, noise: Floats, region_mask: Mask
+) -> tuple[Estimate, Estimate]:
     """Return the shift of the reference relative to the picture by dermis, to the right and down [pixel].
 
     Shift and brightness are fitted together by least squares.
 
     noise : (h, w) variance of the reference
-    region : (h, w) mask of the pixels to compare
+    region_mask : (h, w) mask of the pixels to compare
     """
-    down, right = (np.asarray(slope) for slope in np.gradient(ours))
-    columns = np.stack([ours[region], -right[region], -down[region], np.ones(int(region.sum()))], axis=-1)
+    down, right = (np.asarray(slope) for slope in np.gradient(dermis_image))
+    columns = np.stack(
+        [dermis_image[region_mask], -right[region_mask], -down[region_mask], np.ones(int(region_mask.sum()))],
+        axis=-1,
+    )
     inverse = np.linalg.inv(columns.T @ columns) @ columns.T
-    gain, x, y, _ = (float(one) for one in inverse @ reference[region])
-    error: Floats = np.sqrt((inverse**2 * noise[region]).sum(axis=1)) / abs(gain)
+    gain, x, y, _ = (float(one) for one in inverse @ reference[region_mask])
+    error: Floats = np.sqrt((inverse**2 * noise[region_mask]).sum(axis=1)) / abs(gain)
     return Estimate(x / gain, float(error[1])), Estimate(y / gain, float(error[2]))
 
 
-def _brightness_ratio(ours: Floats, reference: Floats, noise: Floats, region: Mask) -> Estimate:
-    total = float(reference[region].sum())
-    ratio = float(ours[region].sum()) / total
-    return Estimate(ratio, ratio * float(np.sqrt(noise[region].sum())) / total)
+def _brightness_ratio(dermis_image: Floats, reference: Floats, noise: Floats, region_mask: Mask) -> Estimate:
+    total = float(reference[region_mask].sum())
+    ratio = float(dermis_image[region_mask].sum()) / total
+    return Estimate(ratio, ratio * float(np.sqrt(noise[region_mask].sum())) / total)

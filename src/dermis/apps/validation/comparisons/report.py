@@ -17,7 +17,7 @@ from dermis.base.atomic_write import atomic_file
 from dermis.images.codecs import encode_png
 
 Floats = NDArray[np.float64]
-_COLUMNS = ("technique", "relative RMSE", "FLIP", "energy ratio", "ms per frame")
+_COLUMN_TITLES = ("technique", "relative RMSE", "FLIP", "energy ratio", "ms per frame")
 
 
 def write_report(path: Path, comparison: Comparison) -> None:
@@ -27,14 +27,14 @@ def write_report(path: Path, comparison: Comparison) -> None:
     """
     text = Template((resources.files(__package__) / "report.html").read_text(encoding="utf-8"))
     reference = _figure("reference", comparison.tone_mapped(comparison.reference.image))
-    figures = [_figures(comparison, row) for row in comparison.rows]
+    figures = [_technique_figures(comparison, row) for row in comparison.rows]
     page = text.substitute(
         title=html.escape(comparison.title),
         against=html.escape(comparison.against),
         seconds=f"{comparison.reference.seconds:.0f}",
         notes=html.escape("; ".join(comparison.reference.notes)),
         adapter=html.escape(comparison.adapter),
-        table=_table(comparison.rows),
+        table=_errors_table(comparison.rows),
         keys=" ".join(comparison_sources(comparison.against, comparison.images)),
         figures="\n".join([reference, *figures]),
     )
@@ -54,17 +54,17 @@ def cells(row: ComparisonRow) -> tuple[str, ...]:
     )
 
 
-def _with_error(value: float, error: float) -> str:
-    return f"{value:.4f}" + (f" ± {error:.4f}" if error > 0 else "")
+def _with_error(value: float, standard_error: float) -> str:
+    return f"{value:.4f}" + (f" ± {standard_error:.4f}" if standard_error > 0 else "")
 
 
-def _table(rows: tuple[ComparisonRow, ...]) -> str:
-    head = "".join(f"<th>{name}</th>" for name in _COLUMNS)
+def _errors_table(rows: tuple[ComparisonRow, ...]) -> str:
+    head = "".join(f"<th>{name}</th>" for name in _COLUMN_TITLES)
     body = ["".join(f"<td>{html.escape(cell)}</td>" for cell in cells(row)) for row in rows]
     return f"<table><tr>{head}</tr>" + "".join(f"<tr>{row}</tr>" for row in body) + "</table>"
 
 
-def _figures(comparison: Comparison, row: ComparisonRow) -> str:
+def _technique_figures(comparison: Comparison, row: ComparisonRow) -> str:
     image, reference = comparison.images[row.technique], comparison.reference
     ours, exact = (np.maximum(comparison.exposure * one, 0.0) for one in (image, reference.image))
     difference = signed_difference(ours, exact)

@@ -19,7 +19,10 @@ with suppress(ImportError):  # only Blender's Python has these modules
     import bpy  # type: ignore[import-not-found,unused-ignore]
     from mathutils import Matrix  # type: ignore[import-not-found,unused-ignore]
 
-SIDE_M, CARD_HEIGHT_M = 1.0, 0.002  # half side of the plane, and height of the card that shades half of it
+PLANE_HALF_SIDE_M, CARD_HEIGHT_M = (
+    1.0,
+    0.002,
+)  # half side of the plane, and height of the card that shades half of it
 
 
 def main(folder: Path) -> None:
@@ -33,8 +36,8 @@ def main(folder: Path) -> None:
     material = skin.make_skin()
     shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
     shader.inputs["Specular IOR Level"].default_value = 0.0  # light below the surface only
-    add_rectangle(skin, material, -SIDE_M, SIDE_M, 0.0)
-    card = add_rectangle(skin, black_material(), -SIDE_M, 0.0, CARD_HEIGHT_M)
+    add_rectangle(skin, material, -PLANE_HALF_SIDE_M, PLANE_HALF_SIDE_M, 0.0)
+    card = add_rectangle(skin, black_material(), -PLANE_HALF_SIDE_M, 0.0, CARD_HEIGHT_M)
     card.visible_camera = False
     sun = bpy.data.lights.new("sun", "SUN")
     sun.energy, sun.angle = 1.0, 0.0
@@ -72,7 +75,12 @@ def add_rectangle(skin: Any, material: Any, left: float, right: float, height: f
     skin : module of the exported script
     """
     mesh = bpy.data.meshes.new("rectangle")
-    corners = [(left, -SIDE_M), (right, -SIDE_M), (right, SIDE_M), (left, SIDE_M)]
+    corners = [
+        (left, -PLANE_HALF_SIDE_M),
+        (right, -PLANE_HALF_SIDE_M),
+        (right, PLANE_HALF_SIDE_M),
+        (left, PLANE_HALF_SIDE_M),
+    ]
     mesh.from_pydata([(x, y, height) for x, y in corners], [], [(0, 1, 2, 3)])
     mesh.materials.append(material)
     return skin.add_object("rectangle", mesh)

@@ -26,7 +26,7 @@ from dermis.apps.validation.accuracy.measured.illuminants import ILLUMINANTS, co
 from dermis.apps.validation.accuracy.measured.page import GROUP_LABELS, RESULT_FILE, write_measured_page
 from dermis.apps.validation.accuracy.measured.probe import APERTURES_MM, edge_loss
 from dermis.apps.validation.pages import JsonObject, read_results, write_results
-from dermis.apps.validation.spectral_archive import FOLDS, Archive, read_archive
+from dermis.apps.validation.spectral_archive import FOLD_COUNT, Archive, read_archive
 from dermis.base.console import print_lines
 from dermis.human.skin.measured import SITES
 from dermis.images.colour import delta_e_2000, lab, linear_of_lab
@@ -88,7 +88,7 @@ def measured(bioskin: Path | None = None, only: str | None = None) -> None:
     """
     archive = read_archive()
     parts: dict[str, Callable[[], object]] = {
-        "counts": lambda: {"spectra": len(archive.spectra), "folds": FOLDS},
+        "counts": lambda: {"spectra": len(archive.spectra), "folds": FOLD_COUNT},
         "models": lambda: _default_skin_errors(archive),
         "surface": lambda: _smooth_surface_errors(archive),
         "limits": lambda: _limit_fractions(archive),
@@ -238,7 +238,7 @@ def _illuminant_errors(fits: dict[str, SpectralFit]) -> JsonObject:
 def _fold_errors(archive: Archive) -> list[JsonObject]:
     """Return, for each fold of people, constants fitted to the other folds, and its errors with them."""
     rows = []
-    for fold in range(FOLDS):
+    for fold in range(FOLD_COUNT):
         known = archive.rows(archive.fold != fold).sample(_CONSTANTS_SAMPLE_COUNT, fold)
         held = archive.rows(archive.fold == fold)
         spectral = fit_constants(known.spectra, THREE_UNKNOWNS, ("baseline", "epidermis_mm"))
@@ -357,7 +357,7 @@ def _site_fold_errors(archive: Archive) -> JsonObject:
     """
     error = np.zeros(len(archive.spectra))
     fixed = {"baseline": DEFAULT_SKIN.baseline}
-    for fold in range(FOLDS):
+    for fold in range(FOLD_COUNT):
         for site in range(len(SITES)):
             here = archive.site == site
             held = here & (archive.fold == fold)

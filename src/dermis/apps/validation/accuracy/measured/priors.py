@@ -53,7 +53,7 @@ def fit_mixture(points: Floats, component_count: int) -> SkinPrior:
 
     points : (n, d) points
     component_count : number of distributions; each starts from an equal part of the points, in order along
-        first axis
+        the first axis
     """
     count, dimensions = points.shape
     parts = np.argsort(np.argsort(points[:, 0])) * component_count // count
