@@ -121,14 +121,14 @@ class MotionPlayer:
         self._motion, self._head = motion, None
         self.play(0.0)
 
-    def play(self, seconds: float | None = None) -> None:
+    def play(self, start_s: float | None = None) -> None:
         """Play the motion from a given time; at the end of the motion, start from the beginning.
 
-        seconds : time to start from; None for the current time [s]
+        start_s : time to start from; None for the current time [s]
         """
         if self.clip is None:
             return
-        start = self.seconds if seconds is None else seconds
+        start = self.seconds if start_s is None else start_s
         self._seconds = 0.0 if start >= self.clip.duration_s else start
         self.is_playing, self._starting, self._start_time = True, True, None
 

@@ -32,8 +32,13 @@ from dermis.scene.camera import Camera
 from dermis.scene.settings import MAX_SAMPLE_COUNT, Settings
 
 _FRAME_BUDGET_MS = {True: 100.0, False: 33.0}  # time of a frame in motion on a software adapter and on a GPU
-_SLOW_RATIO, _FAST_RATIO = 1.25, 0.45  # ratios of frame time to budget at which the quality changes
-_STREAK_LENGTH = 2  # consecutive slow or fast frames before a change; a single one may have relit the atlas
+_SLOW_FRAME_RATIO, _FAST_FRAME_RATIO = (
+    1.25,
+    0.45,
+)  # ratios of frame time to budget at which the quality changes
+_FRAME_STREAK_LENGTH = (
+    2  # consecutive slow or fast frames before a change; a single one may have relit the atlas
+)
 
 
 @dataclass(frozen=True)
@@ -50,16 +55,16 @@ class Quality:
     shadow_size: int
 
 
-_NO_LIMIT = 1 << 14
+_UNLIMITED_SIZE = 1 << 14
 QUALITY_LEVELS = (
-    Quality(1.0, _NO_LIMIT, _NO_LIMIT, _NO_LIMIT),
+    Quality(1.0, _UNLIMITED_SIZE, _UNLIMITED_SIZE, _UNLIMITED_SIZE),
     Quality(1.0, 2, 1024, 1024),
     Quality(1.0, 1, 512, 512),
     Quality(0.75, 1, 512, 512),
     Quality(0.5, 1, 256, 512),
     Quality(0.35, 1, 256, 256),
 )
-_BEST_LEVEL_ON_CPU = 2
+_BEST_QUALITY_LEVEL_ON_CPU = 2
 
 
 class QualityController:
@@ -68,10 +73,10 @@ class QualityController:
     software : whether the adapter renders on the CPU
     """
 
-    def __init__(self, software: bool) -> None:
-        self.software = software
-        self._budget_ms = _FRAME_BUDGET_MS[software]
-        self._level = self._best_level = _BEST_LEVEL_ON_CPU if software else 0
+    def __init__(self, is_software_adapter: bool) -> None:
+        self.software = is_software_adapter
+        self._budget_ms = _FRAME_BUDGET_MS[is_software_adapter]
+        self._level = self._best_level = _BEST_QUALITY_LEVEL_ON_CPU if is_software_adapter else 0
         self._streak = 0
 
     @property
@@ -84,13 +89,13 @@ class QualityController:
 
         frame_ms : time of the frame without setup [ms]
         """
-        is_slow = frame_ms > _SLOW_RATIO * self._budget_ms
-        is_fast = frame_ms < _FAST_RATIO * self._budget_ms
+        is_slow = frame_ms > _SLOW_FRAME_RATIO * self._budget_ms
+        is_fast = frame_ms < _FAST_FRAME_RATIO * self._budget_ms
         step = is_slow - is_fast
         self._streak = self._streak + step if step * self._streak >= 0 else step
         if not step:
             self._streak = 0
-        if abs(self._streak) >= _STREAK_LENGTH:
+        if abs(self._streak) >= _FRAME_STREAK_LENGTH:
             self._level = max(self._best_level, min(len(QUALITY_LEVELS) - 1, self._level + step))
             self._streak = 0
 
@@ -112,10 +117,12 @@ class QualityController:
 
 Images = tuple[Texture, Texture | None]
 """Image of the live state, and image of the frozen state; None if no state is frozen."""
-_CACHED_RESOURCES = 2  # resources for frames in motion and for still frames
-_PREPARATION_SIZE = (96, 64)  # size of small frames that use all shaders [pixel]
+_CACHED_FRAME_RESOURCES = 2  # resources for frames in motion and for still frames
+_PREPARATION_FRAME_SIZE = (96, 64)  # size of small frames that use all shaders [pixel]
 _TIMED_FRAMES = 120
-_FROZEN_SIDE = "before"  # name of its atlas light, kept apart so that a moving camera relights neither side
+_FROZEN_DIVIDER_SIDE = (
+    "before"  # name of its atlas light, kept apart so that a moving camera relights neither side
+)
 
 
 @dataclass(frozen=True)
@@ -138,8 +145,10 @@ class ViewRenderer:
 
     def __init__(self, adapter: str = "auto") -> None:
         self.is_preparing = False
-        self.renderer = Renderer(adapter, cache_size=_CACHED_RESOURCES, reopens=False)
-        self.quality_controller = QualityController(software=self.renderer.device.adapter.kind == "CPU")
+        self.renderer = Renderer(adapter, cache_size=_CACHED_FRAME_RESOURCES, reopens=False)
+        self.quality_controller = QualityController(
+            is_software_adapter=self.renderer.device.adapter.kind == "CPU"
+        )
         self.rendered: RenderedFrame | None = None
         self.settings: Settings | None = None
         self._views = IntermediateViews(self.renderer)
@@ -160,10 +169,10 @@ class ViewRenderer:
         self.is_preparing = True
         try:
             for moving in (True, False):
-                self.renderer.prepare(state.scene, self._settings(state, _PREPARATION_SIZE, moving))
+                self.renderer.prepare(state.scene, self._settings(state, _PREPARATION_FRAME_SIZE, moving))
             on_resources_ready()
             for moving in (True, False):
-                self.render_image(state, state.scene.camera, _PREPARATION_SIZE, moving)
+                self.render_image(state, state.scene.camera, _PREPARATION_FRAME_SIZE, moving)
         finally:
             self.is_preparing = False
 
@@ -222,7 +231,7 @@ class ViewRenderer:
         is_cached = frozen and frozen.state is frozen_state and frozen.camera == camera
         if frozen and is_cached and frozen.settings in (settings, still_settings):
             return frozen.image
-        image = self._draw(replace(frozen_state, settings=settings).with_camera(camera), _FROZEN_SIDE)
+        image = self._draw(replace(frozen_state, settings=settings).with_camera(camera), _FROZEN_DIVIDER_SIDE)
         self._image_inputs = None  # the texture held the image of the live state
         image_copy = copy_texture(self.renderer.device, image, frozen.image if frozen else None)
         self._frozen = FrozenImage(frozen_state, camera, settings, image_copy)

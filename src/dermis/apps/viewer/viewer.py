@@ -43,13 +43,13 @@ class BlitProgram(Program):
 
     stages = "VERTEX", "FRAGMENT"
 
-    def __init__(self, device: Device, target: str) -> None:
+    def __init__(self, device: Device, target_format: str) -> None:
         super().__init__(device, Path(__file__).parent / "blit.wgsl")
         fragment = {
             "module": self._module,
             "entry_point": "fragment",
-            "constants": {"DECODED": target.endswith("-srgb")},
-            "targets": [{"format": target}],
+            "constants": {"DECODED": target_format.endswith("-srgb")},
+            "targets": [{"format": target_format}],
         }
         self._pipeline = device.handle.create_render_pipeline(
             layout=self._layout,
@@ -58,13 +58,18 @@ class BlitProgram(Program):
             primitive={"topology": "triangle-list", "cull_mode": "none"},
         )
 
-    def draw(self, patches: Sequence[Patch], view: TextureView) -> None:
+    def draw(self, patches: Sequence[Patch], target_view: TextureView) -> None:
         """Draw images over a black background.
 
-        view : view of the target texture
+        target_view : view of the target texture
         """
         encoder = self.device.handle.create_command_encoder()
-        attachment = {"view": view, "load_op": "clear", "store_op": "store", "clear_value": (0, 0, 0, 1)}
+        attachment = {
+            "view": target_view,
+            "load_op": "clear",
+            "store_op": "store",
+            "clear_value": (0, 0, 0, 1),
+        }
         render_pass = encoder.begin_render_pass(label="blit", color_attachments=[attachment])
         render_pass.set_pipeline(self._pipeline)
         for patch in patches:
@@ -78,7 +83,7 @@ class BlitProgram(Program):
         self.device.handle.queue.submit([encoder.finish()])
 
 
-_STILL_AFTER_S = 0.25  # time since the last change after which the picture is refined
+_STILL_FRAME_DELAY_S = 0.25  # time since the last change after which the picture is refined
 _MAX_EASING_STEP_S = 0.2  # largest time step of the camera easing in a frame
 _MAX_DEVICE_FAILURES = 1  # consecutive failures of the device
 _PANEL_SETTLING_FRAMES = 3  # frames that the panel needs to settle after an event
@@ -235,7 +240,7 @@ class Viewer:
         self.session.message = message
 
     def _is_moving(self, now: float) -> bool:
-        return self.session.player.is_playing or now - self._last_change < _STILL_AFTER_S
+        return self.session.player.is_playing or now - self._last_change < _STILL_FRAME_DELAY_S
 
     def _status_text(self, picture_size: tuple[int, int]) -> str:
         view_renderer = self.session.view_renderer

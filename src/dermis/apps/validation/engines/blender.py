@@ -132,7 +132,7 @@ def measure_edge(python: Path, version: str, subsurface_method: str, skin_name: 
 
 
 def binned_response(curve: CumulativeProfile, d_mm: Floats) -> Floats:
-    """Return the edge response (3, BIN_COUNT) of a cumulative profile, averaged over the pixels in each bin.
+    """Return the edge response (3, n) of a cumulative profile, averaged over the pixels in each bin.
 
     d_mm : (3,) Burley widths of the channels, which set the width of the bins [mm]
     """
