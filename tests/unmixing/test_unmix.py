@@ -52,7 +52,7 @@ def colours() -> Pixels:
 def test_known_skins_are_recovered_without_noise() -> None:
     m, b = random_fractions(24)
     found = solve_pigments(
-        skin_model(), np.stack([exact(x, y) for x, y in zip(m, b, strict=True)]), noise=1e-3
+        skin_model(), np.stack([exact(x, y) for x, y in zip(m, b, strict=True)]), relative_noise=1e-3
     )
     np.testing.assert_allclose(found.melanin, m, rtol=0.01)
     np.testing.assert_allclose(found.blood, b, rtol=0.02)
@@ -64,7 +64,7 @@ def test_errors_with_noise_match_the_stated_deviations() -> None:
     plain = skin_model().colours(m, b)
     random = np.random.default_rng(0)
     noisy = plain * (1.0 + 0.01 * random.standard_normal((60, *plain.shape)))
-    found = solve_pigments(skin_model(), noisy.reshape(-1, 3), noise=0.01)
+    found = solve_pigments(skin_model(), noisy.reshape(-1, 3), relative_noise=0.01)
     for known, one, sd in ((m, found.melanin, found.melanin_sd), (b, found.blood, found.blood_sd)):
         off = np.sqrt(((one.reshape(60, -1) - known) ** 2).mean(axis=0))
         ratio = np.median(off / np.median(sd.reshape(60, -1), axis=0))

@@ -72,12 +72,14 @@ def shared_bytes(byte_count: int) -> ctypes.Array[ctypes.c_ubyte]:
     return _SPAWN_CONTEXT.RawArray(ctypes.c_ubyte, byte_count)
 
 
-def _run_in_child(target: Callable[..., None], pipe: Connection, args: tuple[object, ...]) -> None:
+def _run_in_child(
+    child_function: Callable[..., None], pipe: Connection, child_arguments: tuple[object, ...]
+) -> None:
     parent = multiprocessing.parent_process()
     assert parent is not None
     threading.Thread(target=_exit_with_parent, args=(parent.sentinel,), daemon=True).start()
     try:
-        target(pipe, *args)
+        child_function(pipe, *child_arguments)
     except (EOFError, ConnectionError):
         if connection.wait([parent.sentinel], _PARENT_EXIT_TIMEOUT_S):
             os._exit(1)  # the pipe broke because the parent exited

@@ -144,9 +144,9 @@ def process_task(plugin_name: str, task: Shard) -> WorkerEvent:
     return event
 
 
-def path_exists(path: str) -> bool:
+def path_exists(file_path: str) -> bool:
     """Return whether a file exists on the worker's disk."""
-    return Path(path).exists()
+    return Path(file_path).exists()
 
 
 @contextmanager

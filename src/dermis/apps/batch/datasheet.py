@@ -131,8 +131,8 @@ def _software_table(manifests: Sequence[ShardManifest]) -> str:
     return _markdown_table(("shards", "rendered with"), rows)
 
 
-def _markdown_table(column_names: Sequence[str], rows: TableRows) -> str:
-    lines = [column_names, ["---"] * len(column_names), *rows]
+def _markdown_table(column_names: Sequence[str], table_rows: TableRows) -> str:
+    lines = [column_names, ["---"] * len(column_names), *table_rows]
     cells = [[str(cell).replace("|", "\\|").replace("\n", " ") for cell in line] for line in lines]
     return "".join(f"| {' | '.join(line)} |\n" for line in cells)
 

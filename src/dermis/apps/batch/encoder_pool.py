@@ -128,7 +128,7 @@ def _run_encoder(
 ) -> None:
     """Encode the jobs whose offsets arrive through the pipe; an encoder process runs this function.
 
-    shared_memory : shared memory that holds the jobs
+    shared_memory : memory shared with the parent process, which holds the jobs
     """
     view = memoryview(shared_memory).cast("B")
     while True:

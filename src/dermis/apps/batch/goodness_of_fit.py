@@ -175,7 +175,7 @@ def _text_test(
     """Return the chi-square test of sampled texts.
 
     expected_probabilities : probability of each text
-    sampled_texts : sampled texts
+    sampled_texts : texts that were sampled for the parameter
     """
     count, counts = len(sampled_texts), Counter(sampled_texts)
     distance = max(

@@ -140,11 +140,11 @@ def _column_type(value_types: set[type]) -> pyarrow.DataType:
     return arrow.list_(arrow.float64()) if value_types <= {list} else arrow.string()
 
 
-def _arrow_table(rows: list[IndexRow], schema: pyarrow.Schema) -> pyarrow.Table:
+def _arrow_table(index_rows: list[IndexRow], schema: pyarrow.Schema) -> pyarrow.Table:
     arrow = import_extra("pyarrow", "the index of a data set")
     columns = []
     for field in schema:
-        values = [row.get(field.name) for row in rows]
+        values = [row.get(field.name) for row in index_rows]
         if arrow.types.is_string(field.type):
             values = [None if one is None else str(one) for one in values]
         columns.append(arrow.array(values, field.type))

@@ -152,13 +152,15 @@ def _parameter_row(spec: Spec, parameter: str, samples: Sequence[Parameters]) ->
     return {**row, "min": min(numbers), "mean": float(np.mean(numbers)), "max": max(numbers)}
 
 
-def _table_cells(row: ParameterRow) -> tuple[str, ...]:
-    text = row["drawn"]
+def _table_cells(parameter_row: ParameterRow) -> tuple[str, ...]:
+    text = parameter_row["drawn"]
     if len(text) > _MAX_COLUMN_CHARACTERS:
         text = f"{text[: _MAX_COLUMN_CHARACTERS - 4]} ..."
-    fields = row["parameter"], text, str(row["images"])
-    if "counts" not in row:
-        return *fields, *(f"{number:.4g}" for number in (row["min"], row["mean"], row["max"]))
-    counts = [f"{name} {count}" for name, count in row["counts"].items()]
+    fields = parameter_row["parameter"], text, str(parameter_row["images"])
+    if "counts" not in parameter_row:
+        return *fields, *(
+            f"{number:.4g}" for number in (parameter_row["min"], parameter_row["mean"], parameter_row["max"])
+        )
+    counts = [f"{name} {count}" for name, count in parameter_row["counts"].items()]
     more = f", and {len(counts) - _MAX_LISTED_TEXTS} more" if len(counts) > _MAX_LISTED_TEXTS else ""
     return *fields, ", ".join(counts[:_MAX_LISTED_TEXTS]) + more

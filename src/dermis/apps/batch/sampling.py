@@ -109,7 +109,7 @@ def load_movements() -> Mapping[str, tuple[Movement, ...]]:
 def random_expression(sample_uniform: Callable[[str], float]) -> dict[str, float]:
     """Return random weights of morph targets, with at most one movement in each part of the face.
 
-    sample_uniform : function that returns a uniform random number in (0, 1) for a name
+    sample_uniform : function that returns a uniform random number in (0, 1) for the name of a parameter
     """
     weights: dict[str, float] = {}
     jaw_factor = 1.0
@@ -183,7 +183,7 @@ class Sampler:
     expressions: Mapping[str, Weights]
 
     def parameters(self, image_number: int) -> Parameters:
-        """Return the sampled parameters of image k by dotted name, independently of other images."""
+        """Return the sampled parameters of one image by dotted name, independently of other images."""
         person = image_number // self.images_per_person
         sampled: Parameters = {"person.number": person}
         if "person.head" not in self.distributions:

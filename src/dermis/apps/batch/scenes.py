@@ -116,7 +116,7 @@ class SceneBuilder:
         return _Person(head, face_points(head), find_rotation_bones(head.control.skeleton).head, skin)
 
     def _resolve_file(self, head_or_panorama: float | str) -> str:
-        """Return the path of a file in the spec's folder, or the name itself if there is no such file."""
+        """Return the path of a head or panorama in the spec's folder, or the name if there is no file."""
         file = self.spec.folder / str(head_or_panorama)
         return str(file) if is_file(file) else str(head_or_panorama)
 

@@ -272,13 +272,13 @@ def plain_values(spec_table: FrozenModel) -> dict[str, object]:
     return {name: value for name, value in values.items() if value is not None}
 
 
-def _toml_lines(table_name: str, values: Mapping[str, object]) -> list[str]:
+def _toml_lines(table_name: str, table_values: Mapping[str, object]) -> list[str]:
     """Return a table and its subtables as lines of TOML.
 
     table_name : dotted name of the table
     """
     own_values, sub_lines = dict[str, object](), list[str]()
-    for name, value in values.items():
+    for name, value in table_values.items():
         path = f"{table_name}.{key_text(name)}" if table_name else key_text(name)
         if isinstance(value, FrozenModel | Mapping):
             sub_lines += _toml_lines(path, plain_values(value) if isinstance(value, FrozenModel) else value)

@@ -42,7 +42,7 @@ class DistributionField:
         """Raise ValueError if the distribution can give samples that the field does not allow."""
 
     def __get_pydantic_core_schema__(
-        self, source: object, handler: GetCoreSchemaHandler
+        self, source_type: object, handler: GetCoreSchemaHandler
     ) -> core_schema.CoreSchema:
         """Return the pydantic schema that parses and serialises a distribution."""
         serialise = core_schema.plain_serializer_function_ser_schema(

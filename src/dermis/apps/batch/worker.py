@@ -271,13 +271,13 @@ class Worker:
                 landmarks=spec.landmark_tables.values(),
             )
 
-    def _previous_scene(self, number: int) -> Scene | None:
+    def _previous_scene(self, image_number: int) -> Scene | None:
         """Return the previous image's scene for motion vectors; None if that image shows another person."""
         spec = self._options.spec
-        if "motion" not in spec.outputs or number % spec.images_per_person == 0:
+        if "motion" not in spec.outputs or image_number % spec.images_per_person == 0:
             return None
         try:
-            return self._builder.build(spec.parameters(number - 1))[0]
+            return self._builder.build(spec.parameters(image_number - 1))[0]
         except DermisError:  # that image is left out of the data set
             return None
 

@@ -63,14 +63,14 @@ def fit_burley_width(curve: CumulativeProfile) -> Floats:
     )
 
 
-def gaussian_curve(variance_mm2: Floats, weight: Floats, energy: Floats) -> CumulativeProfile:
+def gaussian_curve(variance_mm2: Floats, gaussian_weight: Floats, energy: Floats) -> CumulativeProfile:
     """Return the cumulative profile of a sum of Gaussians.
 
     variance_mm2 : (n,) variances of the Gaussians [mm2]
-    weight : (n, 3) weight of each Gaussian in red, green and blue; only their ratios matter [-]
+    gaussian_weight : (n, 3) weight of each Gaussian in red, green and blue; only their ratios matter [-]
     energy : (3,) total energy of the curve: emerging light per incident light [-]
     """
-    fraction = weight / weight.sum(axis=0)
+    fraction = gaussian_weight / gaussian_weight.sum(axis=0)
 
     def fraction_within(radius_mm: Floats) -> Floats:
         with np.errstate(under="ignore"):

@@ -57,16 +57,16 @@ def encode_ply(
     positions: ArrayLike,
     normals: ArrayLike | None = None,
     uv: ArrayLike | None = None,
-    colour: ArrayLike | None = None,
+    vertex_colours: ArrayLike | None = None,
 ) -> bytes:
     """Return a triangle mesh as a binary PLY file.
 
     triangles : (t, 3) vertex indices
     positions, normals : (v, 3) positions and unit normals of the vertices
     uv : (v, 2) texture coordinates of the vertices
-    colour : (v, 3) linear colour of the vertices
+    vertex_colours : (v, 3) linear colour of the vertices
     """
-    attributes = {"x y z": positions, "nx ny nz": normals, "u v": uv, "r g b": colour}
+    attributes = {"x y z": positions, "nx ny nz": normals, "u v": uv, "r g b": vertex_colours}
     columns = {names: values for names, values in attributes.items() if values is not None}
     vertices = np.concatenate([np.asarray(values, "<f4") for values in columns.values()], axis=1)
     header = [

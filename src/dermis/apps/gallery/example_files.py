@@ -204,7 +204,7 @@ def _normalise(vectors: Doubles) -> Doubles:
 def _hair_card_picture(
     colour: tuple[float, float, float],
     hair_count: int,
-    size: tuple[int, int],
+    picture_size: tuple[int, int],
     seed: int,
     taper_fraction: float = 0.15,
 ) -> Bytes:
@@ -212,10 +212,10 @@ def _hair_card_picture(
 
     colour : mean colour of the hairs, linear Rec. 709
     hair_count : number of hairs in each hair card
-    size : height and width of the picture [pixel]
+    picture_size : height and width of the picture [pixel]
     taper_fraction : part of the picture height over which a hair becomes thinner towards the tip [-]
     """
-    rng, (height, width) = np.random.default_rng(seed), size
+    rng, (height, width) = np.random.default_rng(seed), picture_size
     picture = np.zeros((height, width, 4), np.uint8)
     picture[..., :3] = encode_srgb8(colour)
     card, y = width // _HAIR_CARD_COLUMNS, np.linspace(0.0, 1.0, height)
@@ -303,9 +303,9 @@ def _sweater(head: Head) -> _Surface:
     return _Surface(points, normals, uv, triangles[whole])
 
 
-def _sweater_picture(size: tuple[int, int] = (1024, 2048)) -> Bytes:
+def _sweater_picture(picture_size: tuple[int, int] = (1024, 2048)) -> Bytes:
     """Return striped knitwear (h, w, 4) that is cut out at the neck."""
-    y, x = np.mgrid[0 : size[0], 0 : size[1]] / np.array(size).reshape(2, 1, 1)
+    y, x = np.mgrid[0 : picture_size[0], 0 : picture_size[1]] / np.array(picture_size).reshape(2, 1, 1)
     y_mm, angle = -90.0 - 260.0 * y, 2.0 * np.pi * (x - 0.5)
     neck_mm = -128.0 - 24.0 * np.maximum(np.cos(angle), 0.0)
     is_stripe = (np.mod(y_mm, _SWEATER_STRIPE_MM) < 0.35 * _SWEATER_STRIPE_MM) & (y_mm < -185.0)

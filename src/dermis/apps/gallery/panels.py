@@ -125,7 +125,7 @@ def output_image(output_name: str, output_array: NDArray[Any]) -> NDArray[np.uin
 
     Other outputs, such as depth, are scaled from black at a low quantile to white at a high quantile.
 
-    output_name : name of the output
+    output_name : name of the render output, such as "depth"
     output_array : (h, w) or (h, w, c) array of the output
     """
     if output_name in _LIGHT_OUTPUT_FACTORS:

@@ -213,7 +213,7 @@ def set_world(description: dict[str, Any], panorama: Any) -> None:
 
 
 def set_camera(description: dict[str, Any]) -> None:
-    """Add the camera and make it the active one."""
+    """Add the camera, and make this camera the active camera of the scene."""
     camera = bpy.data.cameras.new("camera")
     camera.sensor_fit = "VERTICAL"
     camera.sensor_height = 24.0

@@ -219,8 +219,8 @@ def _target_distance_mm(light: PointLight) -> float:
     return float(np.linalg.norm(np.subtract(light.target, light.position)))
 
 
-def _smoothstep(t: Floats) -> Floats:
-    x = np.clip(t, 0.0, 1.0)
+def _smoothstep(fraction: Floats) -> Floats:
+    x = np.clip(fraction, 0.0, 1.0)
     return x * x * (3.0 - 2.0 * x)
 
 

@@ -85,7 +85,7 @@ def check_traceable(medium: Medium | Lambertian) -> None:
 
 
 def radiance_scene(
-    mi: Mitsuba, scene: Scene, medium: Medium | Lambertian, size: tuple[int, int]
+    mi: Mitsuba, scene: Scene, medium: Medium | Lambertian, picture_size: tuple[int, int]
 ) -> tuple[MitsubaObject, tuple[str, ...]]:
     """Return the Mitsuba scene of the radiance image, and notes on changes made to the head."""
     shapes, notes = _head_shapes(mi, scene.head, medium)
@@ -97,35 +97,37 @@ def radiance_scene(
         "hide_emitters": True,
         **depth_limit,
     }
-    return mitsuba_scene(mi, scene, integrator, shapes, size), notes
+    return mitsuba_scene(mi, scene, integrator, shapes, picture_size), notes
 
 
 def mitsuba_scene(
-    mi: Mitsuba, scene: Scene, integrator: SceneDict, shapes: SceneDict, size: tuple[int, int]
+    mi: Mitsuba, scene: Scene, integrator: SceneDict, shapes: SceneDict, picture_size: tuple[int, int]
 ) -> MitsubaObject:
     """Return a Mitsuba scene of given shapes with the lights, environment and camera of a dermis scene."""
     lights = {f"light_{k}": mitsuba_emitter(mi, light, k) for k, light in enumerate(scene.lights, start=1)}
     if scene.environment is not None:
         lights["environment"] = mitsuba_environment(mi, scene.environment)
-    sensor = mitsuba_sensor(mi, scene.camera, size)
+    sensor = mitsuba_sensor(mi, scene.camera, picture_size)
     return mi.load_dict({"type": "scene", "integrator": integrator, "sensor": sensor, **shapes, **lights})
 
 
-def coverage_scene(mi: Mitsuba, camera: Camera, size: tuple[int, int], shapes: SceneDict) -> MitsubaObject:
+def coverage_scene(
+    mi: Mitsuba, camera: Camera, picture_size: tuple[int, int], shapes: SceneDict
+) -> MitsubaObject:
     """Return a Mitsuba scene whose image is the fraction of each pixel that the skin covers.
 
     shapes : head whose skin emits radiance 1, see `emissive_skin`
     """
-    sensor = mitsuba_sensor(mi, camera, size, sampler="multijitter")
+    sensor = mitsuba_sensor(mi, camera, picture_size, sampler="multijitter")
     integrator = {"type": "path", "max_depth": 1}
     return mi.load_dict({"type": "scene", "integrator": integrator, "sensor": sensor, **shapes})
 
 
 def mitsuba_sensor(
-    mi: Mitsuba, camera: Camera, size: Sequence[int], sampler: str = "independent"
+    mi: Mitsuba, camera: Camera, picture_size: Sequence[int], sampler: str = "independent"
 ) -> SceneDict:
     """Return Mitsuba's description of a camera, with a box filter over each pixel."""
-    width, height = size
+    width, height = picture_size
     check_camera(camera, "Mitsuba")
     view = ([float(c) for c in v] for v in (camera.position, camera.target, camera.up))
     film = {"width": width, "height": height, "pixel_format": "rgb", "component_format": "float32"}

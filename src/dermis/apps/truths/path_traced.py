@@ -115,7 +115,7 @@ def render_passes(
     mi: Mitsuba,
     variant: MitsubaVariant,
     min_pass_count: int,
-    size: tuple[int, int],
+    picture_size: tuple[int, int],
     cache_key: str | None,
     build_radiance: Callable[[], tuple[MitsubaObject, tuple[str, ...]]],
     build_coverage: Callable[[], MitsubaObject],
@@ -127,7 +127,7 @@ def render_passes(
     build_radiance, build_coverage : functions that build Mitsuba's scenes of the radiance, with notes, and of
         the skin's coverage of each pixel
     """
-    passes = load_passes(cache_key, size) if cache_key else None
+    passes = load_passes(cache_key, picture_size) if cache_key else None
     if passes is None or passes.count < min_pass_count:
         with mitsuba_variant(mi, variant):
             built_scene, notes = build_radiance()
@@ -135,7 +135,7 @@ def render_passes(
                 mask = np.array(mi.render(build_coverage(), spp=_COVERAGE_SAMPLES_PER_PIXEL), np.float32)[
                     ..., 0
                 ]
-                passes = PassStatistics.empty(size, np.clip(mask, 0.0, 1.0), notes)
+                passes = PassStatistics.empty(picture_size, np.clip(mask, 0.0, 1.0), notes)
             add_passes(mi, built_scene, passes, min_pass_count, cache_key, progress)
     return PathTraced(
         passes.mean.astype(np.float32),
@@ -214,13 +214,13 @@ class PassStatistics:
 
     @classmethod
     def empty(
-        cls, size: tuple[int, int], mask: NDArray[np.floating], notes: tuple[str, ...]
+        cls, picture_size: tuple[int, int], mask: NDArray[np.floating], notes: tuple[str, ...]
     ) -> PassStatistics:
         """Return the state before the first pass.
 
-        size : width and height of the image [pixel]
+        picture_size : width and height of the image [pixel]
         """
-        shape = (size[1], size[0], 3)
+        shape = (picture_size[1], picture_size[0], 3)
         return cls(np.zeros(shape), np.zeros(shape), np.asarray(mask, np.float32), notes)
 
     @property
@@ -253,12 +253,16 @@ def hash_medium(digest: hashlib._Hash, medium: Medium) -> None:
         digest.update(np.ascontiguousarray([layer.sigma_a, layer.sigma_s_prime], np.float64).tobytes())
 
 
-def scene_key(scene: Scene, medium: Medium | Lambertian, size: tuple[int, int], trace_settings: str) -> str:
+def scene_key(
+    scene: Scene, medium: Medium | Lambertian, picture_size: tuple[int, int], trace_settings: str
+) -> str:
     """Return a hash of all inputs of a path-traced image, used as the name of its cached passes.
 
     trace_settings : versions and settings of the path tracer
     """
-    digest = hashlib.sha256(f"{_CACHE_VERSION} {trace_settings} {size} {scene.head.centre_mm}".encode())
+    digest = hashlib.sha256(
+        f"{_CACHE_VERSION} {trace_settings} {picture_size} {scene.head.centre_mm}".encode()
+    )
     hash_lighting(digest, scene)
     mesh = scene.head.mesh
     digest.update(repr([(material.kind, material.colour) for material in mesh.materials]).encode())
@@ -271,10 +275,10 @@ def scene_key(scene: Scene, medium: Medium | Lambertian, size: tuple[int, int], 
     return digest.hexdigest()[:40]
 
 
-def load_passes(cache_key: str, size: tuple[int, int]) -> PassStatistics | None:
-    """Return cached passes, or None if none have this key and size."""
+def load_passes(cache_key: str, picture_size: tuple[int, int]) -> PassStatistics | None:
+    """Return the cached passes with a key and picture size; None if the cache has no such passes."""
     found = load_arrays(_CACHE_FOLDER, cache_key, ("mean", "spread", "mask", "notes", "count", "seconds"))
-    if found is None or found["mean"].shape != (size[1], size[0], 3):
+    if found is None or found["mean"].shape != (picture_size[1], picture_size[0], 3):
         return None
     notes = tuple(str(note) for note in found["notes"])
     moments = found["mean"], found["spread"], found["mask"]

@@ -77,9 +77,9 @@ def trace_medium(
     check_anisotropy(g)
     results: list[SlabResult] = []
 
-    def report_channel(done: int, total: int) -> None:
+    def report_channel(traced_photons: int, channel_photons: int) -> None:
         if progress is not None:
-            progress(len(results) * total + done, medium.channels * total)
+            progress(len(results) * channel_photons + traced_photons, medium.channels * channel_photons)
 
     for i in range(medium.channels):
         layers = [_scattering_layer(layer, i, g, medium.eta) for layer in medium.layers]

@@ -154,8 +154,8 @@ def _checked_surface(positions: ArrayLike, triangles: ArrayLike) -> tuple[Floats
     return vertices, corners
 
 
-def _checked_values(values: ArrayLike, vertex_count: int) -> Floats:
-    vertex_values = np.asarray(values, dtype=np.float64)
+def _checked_values(values_at_vertices: ArrayLike, vertex_count: int) -> Floats:
+    vertex_values = np.asarray(values_at_vertices, dtype=np.float64)
     if not (
         vertex_values.ndim == 2 and len(vertex_values) == vertex_count and np.isfinite(vertex_values).all()
     ):
@@ -171,9 +171,9 @@ def _checked_variances(variances_mm2: ArrayLike) -> Floats:
     return variances
 
 
-def _check_resolution(vertices: Floats, corners: Index, variances: ArrayLike, steps: int) -> None:
-    if steps < 1:
-        refuse("surface diffusion", "at least one time step", f"got {steps}", "Choose 8 or more")
+def _check_resolution(vertices: Floats, corners: Index, variances: ArrayLike, step_count: int) -> None:
+    if step_count < 1:
+        refuse("surface diffusion", "at least one time step", f"got {step_count}", "Choose 8 or more")
     longest = longest_edge_mm(vertices, corners)
     allowed = resolved_levels(variances, longest)
     if not allowed.all():

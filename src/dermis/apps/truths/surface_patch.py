@@ -40,7 +40,7 @@ class SurfacePatch:
         return np.asarray(np.linalg.norm(positions - self.centre_mm, axis=1) <= self.radius_mm)
 
     def vertex_barycentrics(self) -> tuple[Index, Floats]:
-        """Return a mesh triangle (n,) that contains each vertex, and its barycentric weights there (n, 3)."""
+        """Return a mesh triangle (n,) that contains each vertex, and the barycentric weights in it (n, 3)."""
         triangle, weights = np.zeros(len(self.positions), np.int64), np.zeros((len(self.positions), 3))
         triangle[self.triangles] = self.parent[:, None]
         # A vertex shared by several parents gets its weights in the parent that it was assigned to.
@@ -49,7 +49,7 @@ class SurfacePatch:
         return triangle, weights
 
     def locate(self, triangle: Index, barycentric: Floats) -> tuple[Index, Floats]:
-        """Return the small triangle (m,) at each point, -1 outside the patch, and its weights there (m, 3).
+        """Return the small triangle (m,) at each point, -1 outside the patch, and barycentric weights (m, 3).
 
         triangle : (m,) mesh triangles of the points
         barycentric : (m, 3) weights in the mesh triangles
@@ -72,15 +72,15 @@ class SurfacePatch:
             pending = pending[count[pending] > candidate]
         return fine_triangle, weights
 
-    def interpolate(self, vertex_values: Floats, small_triangles: Index, weights: Floats) -> Floats:
+    def interpolate(self, vertex_values: Floats, small_triangles: Index, barycentric: Floats) -> Floats:
         """Return vertex values interpolated at points from `locate`, (..., m, c).
 
         vertex_values : (..., n, c) vertex values
-        small_triangles, weights : (m,) small triangles and (m, 3) weights of the points
+        small_triangles, barycentric : (m,) small triangles and (m, 3) weights of the points
         """
         corners = self.triangles[small_triangles]
         return sum(
-            (weights[:, k, None] * vertex_values[..., corners[:, k], :] for k in range(3)), np.zeros(())
+            (barycentric[:, k, None] * vertex_values[..., corners[:, k], :] for k in range(3)), np.zeros(())
         )
 
 

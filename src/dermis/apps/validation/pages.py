@@ -56,11 +56,11 @@ def data_file(file_name: str) -> Path:
     return path
 
 
-def write_page(page: Path, text: str) -> None:
+def write_page(page: Path, page_text: str) -> None:
     """Write a page of the documentation atomically."""
     in_checkout(page.parent)
     with atomic_file(page) as file:
-        file.write_text(text, encoding="utf-8")
+        file.write_text(page_text, encoding="utf-8")
 
 
 def template_path(page: Path) -> Path:

@@ -42,26 +42,26 @@ class Controls:
         self._pointer_position = (0.0, 0.0)
         self._pinch: tuple[float, float, float] | None = None
 
-    def handle(self, event: Event, size: Point) -> None:
+    def handle(self, event: Event, picture_size: Point) -> None:
         """Process an event over the picture.
 
-        size : logical size of the picture
+        picture_size : logical size of the picture
         """
         kind = event["event_type"]
         if kind == "pointer_down":
             self._press(event)
         elif kind == "pointer_move" and self._pressed_button:
-            self._drag(event, size)
+            self._drag(event, picture_size)
         elif kind == "pointer_up":
-            self._release(event, size)
+            self._release(event, picture_size)
         elif kind == "wheel":
             wheel_step = max(
                 -_MAX_LOG_DISTANCE_STEP,
                 min(_MAX_LOG_DISTANCE_STEP, _LOG_DISTANCE_PER_WHEEL_UNIT * event["dy"]),
             )
-            self._zoom(math.exp(wheel_step), (event["x"], event["y"]), size, "wheel")
+            self._zoom(math.exp(wheel_step), (event["x"], event["y"]), picture_size, "wheel")
         elif kind == "double_click":
-            self._focus(event, size)
+            self._focus(event, picture_size)
         elif kind == "key_down":
             self._on_key(str(event["key"]), event.get("modifiers", ()))
 
@@ -149,14 +149,14 @@ class Controls:
         if point is not None:
             self.history.change(state.with_camera(focus(state.scene.camera, point)))
 
-    def _on_key(self, key: str, modifiers: Iterable[str]) -> None:
+    def _on_key(self, key_name: str, modifiers: Iterable[str]) -> None:
         if "Control" in modifiers or "Meta" in modifiers:
-            if key.lower() == "z":
+            if key_name.lower() == "z":
                 self.history.redo() if "Shift" in modifiers else self.history.undo()
-            elif key.lower() == "y":
+            elif key_name.lower() == "y":
                 self.history.redo()
-        elif key.isdigit() and 0 < int(key) <= len(PRESET_NAMES):
-            self.set_camera_preset(PRESET_NAMES[int(key) - 1])
+        elif key_name.isdigit() and 0 < int(key_name) <= len(PRESET_NAMES):
+            self.set_camera_preset(PRESET_NAMES[int(key_name) - 1])
 
 
 class SplitView:
@@ -206,14 +206,14 @@ def picture_event(event: Event, picture_left: float) -> Event:
     return shifted
 
 
-def _pan(state: ViewerState, right: float, down: float) -> ViewerState:
+def _pan(state: ViewerState, right_shift: float, down_shift: float) -> ViewerState:
     """Return the state with the camera, or the displayed part of the atlas, moved along with the pointer.
 
-    right, down : motion of the pointer, divided by `Controls._drag_unit`
+    right_shift, down_shift : motion of the pointer, divided by `Controls._drag_unit`
     """
     if state.view == ATLAS_VIEW_NAME:
-        return state.with_atlas_view(state.atlas_view.panned(right, down))
-    return state.with_camera(pan(state.scene.camera, -right, down))
+        return state.with_atlas_view(state.atlas_view.panned(right_shift, down_shift))
+    return state.with_camera(pan(state.scene.camera, -right_shift, down_shift))
 
 
 def _measure_pinch(event: Event) -> tuple[float, float, float] | None:

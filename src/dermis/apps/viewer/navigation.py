@@ -174,28 +174,33 @@ def drag_light(state: ViewerState, light_index: int, right: float, up: float) ->
     return state.with_environment(validated_copy(environment, rotation_degrees=degrees))
 
 
-def orbit_light(light: Light, camera: Camera, right: float, up: float) -> Light:
+def orbit_light(light: Light, camera: Camera, right_rad: float, up_rad: float) -> Light:
     """Rotate a light around its target, about the right and up axes of the camera.
 
     The rotation changes the direction of a directional light, and the position of any other light.
 
-    right, up : angles [rad]; positive angles move a light between target and camera to the right and up on
-        screen
+    right_rad, up_rad : angles [rad]; positive angles move a light between target and camera to the right and
+        up on screen
     """
     x, y, _ = camera_axes(camera)
-    rotation = _rotation_matrix(y, right) @ _rotation_matrix(x, -up)
+    rotation = _rotation_matrix(y, right_rad) @ _rotation_matrix(x, -up_rad)
     if isinstance(light, DirectionalLight):
         return validated_copy(light, direction=_clamped_tuple(rotation @ np.array(light.direction)))
     offset = rotation @ np.subtract(light.position, light.target)
     return validated_copy(light, position=_clamped_tuple(np.array(light.target) + offset))
 
 
-def _cameras_nearly_equal(first: Camera, second: Camera) -> bool:
+def _cameras_nearly_equal(first_camera: Camera, second_camera: Camera) -> bool:
     """Return whether the difference of two cameras is too small to see."""
-    shifts = np.subtract(first.position, second.position), np.subtract(first.target, second.target)
-    principal_shift = np.subtract(first.principal_point, second.principal_point) * second.frame_mm
-    differences = np.concatenate([*shifts, principal_shift, [first.frame_mm - second.frame_mm]])
-    return bool(np.abs(differences).max() < 5e-4 * second.frame_mm)
+    shifts = (
+        np.subtract(first_camera.position, second_camera.position),
+        np.subtract(first_camera.target, second_camera.target),
+    )
+    principal_shift = (
+        np.subtract(first_camera.principal_point, second_camera.principal_point) * second_camera.frame_mm
+    )
+    differences = np.concatenate([*shifts, principal_shift, [first_camera.frame_mm - second_camera.frame_mm]])
+    return bool(np.abs(differences).max() < 5e-4 * second_camera.frame_mm)
 
 
 def _with_position_and_target(
@@ -213,14 +218,14 @@ def _interpolate(start: ArrayLike, end: ArrayLike, fraction: float) -> Floats:
     return (1.0 - fraction) * np.array(start, dtype=np.float64) + fraction * np.array(end, dtype=np.float64)
 
 
-def _rotation_matrix(axis: Floats, angle: float) -> Floats:
+def _rotation_matrix(axis: Floats, angle_rad: float) -> Floats:
     """Return the (3, 3) matrix of a rotation around a unit axis.
 
-    angle : angle of the rotation [rad]
+    angle_rad : angle of the rotation [rad]
     """
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * (cross @ cross))
+    return np.asarray(np.eye(3) + math.sin(angle_rad) * cross + (1.0 - math.cos(angle_rad)) * (cross @ cross))
 
 
 def _normalise(vector: Floats) -> Floats:

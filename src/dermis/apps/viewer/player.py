@@ -20,8 +20,8 @@ class MotionFile:
     fps : frame rate of files without times [1/s]
     """
 
-    def __init__(self, path: str | Path, fps: float | None = None) -> None:
-        self.path, self._fps = str(path), fps
+    def __init__(self, motion_path: str | Path, fps: float | None = None) -> None:
+        self.path, self._fps = str(motion_path), fps
         self._last: tuple[Head, Clip] | None = None
 
     def load_clip(self, head: Head) -> Clip:

@@ -22,12 +22,12 @@ def target_weight(scene: Scene, target_name: str) -> float:
     return float(_pose_or_rest(scene).weights.get(target_name, _rest_weight(scene.head, target_name)))
 
 
-def with_target_weight(scene: Scene, target_name: str, weight: float) -> Pose | None:
+def with_target_weight(scene: Scene, target_name: str, new_weight: float) -> Pose | None:
     """Return the pose of a scene with a new weight of one morph target; None for the rest pose."""
     weights = dict(_pose_or_rest(scene).weights)
     weights.pop(target_name, None)
-    if weight != _rest_weight(scene.head, target_name):
-        weights[target_name] = weight
+    if new_weight != _rest_weight(scene.head, target_name):
+        weights[target_name] = new_weight
     return _none_if_rest(replace(_pose_or_rest(scene), weights=weights))
 
 

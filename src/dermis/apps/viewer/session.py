@@ -242,31 +242,37 @@ class Session:
             self.player.stop()
             self.change(state)
 
-    def open_motion(self, path: str) -> None:
+    def open_motion(self, motion_path: str) -> None:
         """Open a motion file and play it.
 
         Raises DermisError if the file cannot be read, or if the motion moves no morph target or bone of the
         head.
         """
-        self.player.open(MotionFile(path))
-        self.message = f"opened {path}"
+        self.player.open(MotionFile(motion_path))
+        self.message = f"opened {motion_path}"
 
-    def screenshot(self, path: Path, size: tuple[int, int]) -> None:
+    def screenshot(self, picture_path: Path, picture_size: tuple[int, int]) -> None:
         """Write the displayed view as .png (tone-mapped) or .exr (linear), or offer the file as a download.
 
-        size : width and height of the picture [pixel]
+        picture_size : width and height of the picture [pixel]
 
         Raises DermisError if the picture cannot be rendered or written.
         """
-        suffix, view = path.suffix.lower(), self.displayed_state.view
+        suffix, view = picture_path.suffix.lower(), self.displayed_state.view
         if suffix not in (".png", ".exr"):
-            refuse(f"picture {path}", "a name that ends in .png or .exr", f"got {path.name!r}", "Rename it")
+            refuse(
+                f"picture {picture_path}",
+                "a name that ends in .png or .exr",
+                f"got {picture_path.name!r}",
+                "Rename it",
+            )
         if suffix == ".exr" and view not in (PICTURE_VIEW_NAME, *PART_VIEWS):
             refuse(f"view {view} as .exr", "a view of linear light", "it shows display colours", "Use .png")
         self._write_or_offer(
-            path, lambda target: self.view_renderer.screenshot(target, self.displayed_state, size)
+            picture_path,
+            lambda target: self.view_renderer.screenshot(target, self.displayed_state, picture_size),
         )
-        self.message = f"wrote {path}, {size[0]} x {size[1]}"
+        self.message = f"wrote {picture_path}, {picture_size[0]} x {picture_size[1]}"
 
     def _write_or_offer(self, path: Path, write_file: Callable[[Path], None]) -> None:
         if self.offer_download is None:

@@ -99,13 +99,13 @@ class QualityController:
             self._level = max(self._best_level, min(len(QUALITY_LEVELS) - 1, self._level + step))
             self._streak = 0
 
-    def limited_settings(self, settings: Settings, size: tuple[int, int], is_moving: bool) -> Settings:
+    def limited_settings(self, settings: Settings, view_size: tuple[int, int], is_moving: bool) -> Settings:
         """Return the settings of a frame for a window size, with quality limits while the picture changes.
 
         is_moving : whether the picture is changing
         """
         quality = self.quality if is_moving else QUALITY_LEVELS[0]
-        width, height = (max(1, round(quality.scale * side)) for side in size)
+        width, height = (max(1, round(quality.scale * side)) for side in view_size)
         return validated_copy(
             settings,
             size=(width, height),
@@ -181,7 +181,7 @@ class ViewRenderer:
         state: ViewerState,
         frozen_state: ViewerState | None,
         camera: Camera,
-        size: tuple[int, int],
+        view_size: tuple[int, int],
         is_moving: bool,
     ) -> Images:
         """Return the image of the live state, and the image of the frozen state or None.
@@ -192,22 +192,22 @@ class ViewRenderer:
         """
         if frozen_state is None:
             self._frozen = None
-            return self.render_image(state, camera, size, is_moving), None
-        image = self._frozen_image(frozen_state, camera, size, is_moving)
-        return self.render_image(state, camera, size, is_moving), image
+            return self.render_image(state, camera, view_size, is_moving), None
+        image = self._frozen_image(frozen_state, camera, view_size, is_moving)
+        return self.render_image(state, camera, view_size, is_moving), image
 
     def render_image(
-        self, state: ViewerState, camera: Camera, size: tuple[int, int], is_moving: bool
+        self, state: ViewerState, camera: Camera, view_size: tuple[int, int], is_moving: bool
     ) -> Texture:
         """Return a texture of sRGB bytes for a state; the last texture is reused if nothing has changed.
 
-        size : size of the view; in motion the texture may be smaller [pixel]
+        view_size : size of the view; in motion the texture may be smaller [pixel]
         is_moving : whether the picture is changing, which limits its quality
 
         Raises DermisError if the state cannot be rendered or the device fails.
         """
-        self._size = size
-        settings = self._settings(state, size, is_moving)
+        self._size = view_size
+        settings = self._settings(state, view_size, is_moving)
         inputs = self._image_inputs
         is_cached = inputs and inputs[0] is state and inputs[1:] == (camera, settings)
         if is_cached and self.last_image is not None:
@@ -251,24 +251,28 @@ class ViewRenderer:
         state, _, settings = self._image_inputs
         return self._settings(state, self._size, is_moving=False) == settings
 
-    def screenshot(self, path: Path, state: ViewerState, size: tuple[int, int]) -> None:
+    def screenshot(self, picture_path: Path, state: ViewerState, picture_size: tuple[int, int]) -> None:
         """Render the view of a state to a file: .png (tone-mapped) or .exr (linear).
 
-        size : width and height of the picture [pixel]
+        picture_size : width and height of the picture [pixel]
 
         Raises DermisError if the picture cannot be rendered or written.
         """
         if self.is_preparing:
             refuse("picture", "a head that is ready", "it is being prepared", "Try again in a moment")
-        image = self._draw(state.with_settings(size=size))
+        image = self._draw(state.with_settings(size=picture_size))
         self._image_inputs = None
-        is_linear, rendered = path.suffix.lower() == ".exr", self.rendered
+        is_linear, rendered = picture_path.suffix.lower() == ".exr", self.rendered
         if not rendered or state.view not in (PICTURE_VIEW_NAME, *PART_VIEWS):
-            write_png(path, self.read(image))
+            write_png(picture_path, self.read(image))
         elif state.settings.background == "none":
-            write_image(path, rendered.linear_rgba()) if is_linear else write_png(path, rendered.rgba8())
+            write_image(picture_path, rendered.linear_rgba()) if is_linear else write_png(
+                picture_path, rendered.rgba8()
+            )
         else:
-            write_image(path, rendered.linear()) if is_linear else write_png(path, self.read(image))
+            write_image(picture_path, rendered.linear()) if is_linear else write_png(
+                picture_path, self.read(image)
+            )
 
     @property
     def exposure(self) -> float:
@@ -303,17 +307,19 @@ class ViewRenderer:
         return states_equal(replace(self._atlas_state[0], atlas_view=state.atlas_view), state)
 
 
-def copy_texture(device: Device, image: Texture, target: Texture | None = None) -> Texture:
+def copy_texture(device: Device, source_texture: Texture, target_texture: Texture | None = None) -> Texture:
     """Return a copy of a texture of bytes.
 
-    target : texture to reuse if its size matches
+    target_texture : texture to reuse if its size matches
     """
-    if target is None or target.size != image.size:
-        target = make_texture(device, image.size[:2], "rgba8uint")
+    if target_texture is None or target_texture.size != source_texture.size:
+        target_texture = make_texture(device, source_texture.size[:2], "rgba8uint")
     encoder = device.handle.create_command_encoder()
-    encoder.copy_texture_to_texture({"texture": image}, {"texture": target}, image.size)
+    encoder.copy_texture_to_texture(
+        {"texture": source_texture}, {"texture": target_texture}, source_texture.size
+    )
     device.handle.queue.submit([encoder.finish()])
-    return target
+    return target_texture
 
 
 T = TypeVar("T")

@@ -188,13 +188,13 @@ class Viewer:
         return max(1, width - self._panel_width()), max(1, height)
 
     def _patches(
-        self, live_image: Texture, frozen_image: Texture | None, size: tuple[int, int]
+        self, live_image: Texture, frozen_image: Texture | None, canvas_size: tuple[int, int]
     ) -> list[Patch]:
         """Return patches that show the live image, and the frozen image left of the divider.
 
-        size : width and height of the picture [pixel]
+        canvas_size : width and height of the picture [pixel]
         """
-        left, (width, height) = self._panel_width(), size
+        left, (width, height) = self._panel_width(), canvas_size
         viewport = left, 0, width, height
         if frozen_image is None:
             return [Patch(live_image, viewport, viewport)]
@@ -206,7 +206,7 @@ class Viewer:
         return [patch for patch in patches if patch.scissor[2]]
 
     def _render_images(
-        self, state: ViewerState, camera: Camera, size: tuple[int, int], is_moving: bool
+        self, state: ViewerState, camera: Camera, picture_size: tuple[int, int], is_moving: bool
     ) -> Images:
         """Return the live and frozen images, or the last image and None if `state` cannot be rendered."""
         import wgpu
@@ -217,7 +217,9 @@ class Viewer:
                 if held_image := self._preparation.prepare_head(session.view_renderer, state):
                     return held_image, None
                 frozen_state = session.split.frozen_state
-                images = session.view_renderer.render_images(state, frozen_state, camera, size, is_moving)
+                images = session.view_renderer.render_images(
+                    state, frozen_state, camera, picture_size, is_moving
+                )
                 if self._rejected_state:
                     self._rejected_state, session.message = None, ""
                 return images

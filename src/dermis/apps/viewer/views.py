@@ -100,14 +100,14 @@ class IntermediateViews:
         record = self._atlas_shader.record("AtlasView", quantity=quantity, **values)
         return self._render(self._atlas_shader, {"atlas_view": record, "layer": layer}, settings.size)
 
-    def _render(self, shader: ComputeProgram, bindings: Bindings, size: tuple[int, int]) -> Texture:
+    def _render(self, shader: ComputeProgram, bindings: Bindings, image_size: tuple[int, int]) -> Texture:
         """Run a shader that writes an image to its binding `bytes`, and return the texture bound there."""
         device = self._renderer.device
-        if self._image is None or self._image.size[:2] != size:
-            self._image = make_texture(device, size, "rgba8uint")
+        if self._image is None or self._image.size[:2] != image_size:
+            self._image = make_texture(device, image_size, "rgba8uint")
         with gpu_failures(device):
             frame = CommandList(device)
-            frame.compute("view", shader, {**bindings, "bytes": self._image}, size)
+            frame.compute("view", shader, {**bindings, "bytes": self._image}, image_size)
             frame.submit()
         return self._image
 
@@ -163,13 +163,13 @@ class IntermediateViews:
         return self._density[stretch]
 
 
-def draw_thickness(device: Device, translucency: Translucency, target: Texture) -> Texture:
+def draw_thickness(device: Device, translucency: Translucency, target_texture: Texture) -> Texture:
     """Compute the least tissue thickness below each cell of the coarse atlas; return it in a texture [mm].
 
     The thickness is the least depth of a cell below the tangent planes of the cell's source cells, and at
     most the radius within which source cells are searched.
 
-    target : texture to fill, with one texel per cell; cells without pairs are unchanged
+    target_texture : texture to fill, with one texel per cell; cells without pairs are unchanged
     """
     pairs, shader = translucency.pairs, program(device, Path(__file__).parent / "thickness.wgsl")
     count = pairs.receivers[1]
@@ -179,9 +179,9 @@ def draw_thickness(device: Device, translucency: Translucency, target: Texture) 
         "pairs": pairs.pairs,
         "receiver_points": translucency.receiver_points,
         "source_points": translucency.source_points,
-        "thickness": target,
+        "thickness": target_texture,
     }
     frame = CommandList(device, timed=False)
     frame.dispatch("view", shader, bindings, workgroup_grid(count))
     frame.submit()
-    return target
+    return target_texture

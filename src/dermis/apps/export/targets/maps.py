@@ -192,20 +192,20 @@ def check_side(map_side: object) -> int:
     return map_side
 
 
-def bake_maps(renderer: Renderer, scene: Scene, settings: Settings, side: int) -> BakedMaps:
+def bake_maps(renderer: Renderer, scene: Scene, settings: Settings, map_side: int) -> BakedMaps:
     """Return the skin's maps with the scene's light baked, including the height map if the head has one.
 
-    side : side of the maps [texel]
+    map_side : side of the maps [texel]
     """
-    baked = bake(renderer, scene, settings, side)
+    baked = bake(renderer, scene, settings, map_side)
     painted = renderer.reopening_device.run(
-        lambda: with_painted_maps(renderer.device, scene.head, min(max(side, MIN_SIDE), MAX_SIDE))
+        lambda: with_painted_maps(renderer.device, scene.head, min(max(map_side, MIN_SIDE), MAX_SIDE))
     )
     height = painted.maps.height
     if height is None:
         baked.absent["height"] = "the head has no height map"
     else:
-        baked.maps["height"] = resample(height, side)
+        baked.maps["height"] = resample(height, map_side)
     return baked
 
 

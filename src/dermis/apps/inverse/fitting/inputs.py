@@ -90,20 +90,20 @@ def read_photograph(source: str | Path | EmbeddedPicture | ArrayLike) -> Photogr
     return Photograph(space.linear(colours).astype(np.float64), usable.astype(np.float64))
 
 
-def _area_average(image: Floats, new_size: tuple[int, int]) -> Floats:
+def _area_average(picture: Floats, new_size: tuple[int, int]) -> Floats:
     """Downsample a picture (h, w, c): each pixel of the result is the mean over the area that it covers.
 
     new_size : width and height of the result [pixel]
     """
     for axis, count in ((0, new_size[1]), (1, new_size[0])):
-        sums = np.cumsum(image, axis=axis)
+        sums = np.cumsum(picture, axis=axis)
         sums = np.concatenate([np.zeros_like(np.take(sums, [0], axis)), sums], axis=axis)
-        edges = np.linspace(0.0, image.shape[axis], count + 1)
-        index = np.minimum(edges.astype(int), image.shape[axis] - 1)
+        edges = np.linspace(0.0, picture.shape[axis], count + 1)
+        index = np.minimum(edges.astype(int), picture.shape[axis] - 1)
         fraction = (edges - index).reshape([-1 if k == axis else 1 for k in range(3)])
-        cumulative = np.take(sums, index, axis) + fraction * np.take(image, index, axis)
-        image = np.diff(cumulative, axis=axis) * (count / image.shape[axis])
-    return image
+        cumulative = np.take(sums, index, axis) + fraction * np.take(picture, index, axis)
+        picture = np.diff(cumulative, axis=axis) * (count / picture.shape[axis])
+    return picture
 
 
 _POSITION_TOLERANCE_MM = 0.01
@@ -125,23 +125,23 @@ class FitSubject:
     known: tuple[str, ...] = ()
 
 
-def fit_subject(source: object, camera: object = None) -> FitSubject:
+def fit_subject(head_or_scene: object, camera: object = None) -> FitSubject:
     """Return the head, camera and pose to fit, from a scene, a head or a person.
 
-    source : a scene or its file (.toml), a head or anything that `load_head` accepts, or a `Human`
+    head_or_scene : a scene or its file (.toml), a head or anything that `load_head` accepts, or a `Human`
     camera : a camera, the name of a preset or a file; None for the scene's own
 
     Raises DermisError for sources and cameras of other types.
     """
     table: Mapping[str, object] = {}
-    if isinstance(source, str | os.PathLike) and Path(source).suffix.lower() == ".toml":
-        table = head_table(Path(source))
-        scene = load_scene(Path(source))[0]
+    if isinstance(head_or_scene, str | os.PathLike) and Path(head_or_scene).suffix.lower() == ".toml":
+        table = head_table(Path(head_or_scene))
+        scene = load_scene(Path(head_or_scene))[0]
     else:
-        scene = source if isinstance(source, Scene) else Scene(as_head(source))
+        scene = head_or_scene if isinstance(head_or_scene, Scene) else Scene(as_head(head_or_scene))
     if camera is not None:
         scene = replace(scene, camera=_as_camera(camera, scene.head))  # type: ignore[arg-type]
-    person = source if isinstance(source, Human) else _painted_person(scene.head)
+    person = head_or_scene if isinstance(head_or_scene, Human) else _painted_person(scene.head)
     name = scene.head.name
     if not table and (person is not None or not is_person_name(name)):
         table = {"name": str(Path(name).resolve()) if Path(name).is_file() else name}
@@ -149,13 +149,13 @@ def fit_subject(source: object, camera: object = None) -> FitSubject:
     return FitSubject(_without_light(scene), person, table, known)
 
 
-def _as_camera(source: object, head: Head) -> Camera | Callable[[Head], Camera]:
-    if isinstance(source, str | os.PathLike):
-        return load_camera(str(source), head)
-    if not (isinstance(source, Camera) or callable(source)):
-        actual = f"got {format_value(source)}"
+def _as_camera(camera_source: object, head: Head) -> Camera | Callable[[Head], Camera]:
+    if isinstance(camera_source, str | os.PathLike):
+        return load_camera(str(camera_source), head)
+    if not (isinstance(camera_source, Camera) or callable(camera_source)):
+        actual = f"got {format_value(camera_source)}"
         refuse("camera", "a camera, a preset or a file", actual, 'Write camera="portrait", or camera.toml')
-    return source
+    return camera_source
 
 
 def _painted_person(head: Head) -> Human | None:

@@ -89,14 +89,14 @@ def read_landmarks(path: str | Path, photo_size: tuple[int, int]) -> tuple[str, 
     return name, pixels
 
 
-def _identify_landmarks(path: str | Path, points: _Points) -> tuple[str, Sequence[str]]:
+def _identify_landmarks(path: str | Path, file_landmarks: _Points) -> tuple[str, Sequence[str]]:
     """Return the name of the landmark set of a file, and the names of its landmarks in the set."""
-    count, names = len(points.pixels), points.names
-    if points.set_name is not None:
-        if points.set_name not in LANDMARK_SETS:
+    count, names = len(file_landmarks.pixels), file_landmarks.names
+    if file_landmarks.set_name is not None:
+        if file_landmarks.set_name not in LANDMARK_SETS:
             expected = f"landmarks of a known set ({', '.join(LANDMARK_SETS)})"
-            refuse(path, expected, f"got {points.set_name!r}", "Give one of these")
-        return points.set_name, names or ()
+            refuse(path, expected, f"got {file_landmarks.set_name!r}", "Give one of these")
+        return file_landmarks.set_name, names or ()
     if count != 5 and count not in _SETS_BY_LANDMARK_COUNT:
         expected = f"as many landmarks as a known set ({_KNOWN_LANDMARK_COUNTS}), or JSON that names the set"
         refuse(path, expected, f"got {count}", "Give all landmarks of one of these sets")
@@ -105,7 +105,7 @@ def _identify_landmarks(path: str | Path, points: _Points) -> tuple[str, Sequenc
     set_name, numbers = (
         _SETS_BY_LANDMARK_COUNT[count]
         if count in _SETS_BY_LANDMARK_COUNT
-        else _identify_five_landmarks(points.pixels)
+        else _identify_five_landmarks(file_landmarks.pixels)
     )
     known = [str(number) for number in numbers]
     if names is None or (count > 5 and set(names) == set(known)):
@@ -121,7 +121,7 @@ def _identify_landmarks(path: str | Path, points: _Points) -> tuple[str, Sequenc
 
 
 def _identify_five_landmarks(pixels: Floats) -> tuple[str, Sequence[int]]:
-    """Return the name of the set of five landmarks, and their numbers in it, found from their arrangement.
+    """Return the landmark set to which five points belong by their arrangement, and their numbers in the set.
 
     They are those of dlib if the first four are on a line, as the corners of the eyes are. Left and right are
     exchanged if the file starts with the other side.
@@ -168,15 +168,15 @@ def _from_table(path: str | Path, lines: list[str], photo_size: tuple[int, int])
 
 
 def _from_named_columns(
-    path: str | Path, header: Sequence[str], rows: list[list[str]], photo_size: tuple[int, int]
+    path: str | Path, header: Sequence[str], table_rows: list[list[str]], photo_size: tuple[int, int]
 ) -> _Points:
     """Return the landmarks of a table with columns name, x, y or, as by OpenFace, x_0, y_0 and so on."""
     if "x_0" in header:
-        if len(rows) > 1:
-            notify(f"{path}: the first of its {len(rows)} rows is used")
+        if len(table_rows) > 1:
+            notify(f"{path}: the first of its {len(table_rows)} rows is used")
         count = sum(re.fullmatch(r"x_\d+", name) is not None for name in header)
         columns = [[header.index(f"{axis}_{k}") for axis in "xy"] for k in range(count)]
-        pixels = np.array([[_parse_number(rows[0][column]) for column in pair] for pair in columns])
+        pixels = np.array([[_parse_number(table_rows[0][column]) for column in pair] for pair in columns])
         return _Points(_to_pixels(path, pixels, photo_size))
     keys = [plain_key(name) for name in header]
     if not {"x", "y"} <= set(keys):
@@ -188,9 +188,9 @@ def _from_named_columns(
     unused = [header[k] for k in range(len(header)) if k not in (x, y, name)]
     if unused:
         notify(f"{path}: its columns {', '.join(unused)} are not used")
-    pixels = np.array([[_parse_number(row[x]), _parse_number(row[y])] for row in rows])
+    pixels = np.array([[_parse_number(row[x]), _parse_number(row[y])] for row in table_rows])
     return _Points(
-        _to_pixels(path, pixels, photo_size), None if name is None else [row[name] for row in rows]
+        _to_pixels(path, pixels, photo_size), None if name is None else [row[name] for row in table_rows]
     )
 
 
@@ -210,12 +210,12 @@ def _parse_number(cell: str) -> float:
     return float(cell.replace(",", ".") or "nan")
 
 
-def _to_pixels(path: str | Path, points: Floats, photo_size: tuple[int, int]) -> Floats:
+def _to_pixels(path: str | Path, coordinates: Floats, photo_size: tuple[int, int]) -> Floats:
     """Return coordinates (n, 2) in pixels; convert coordinates relative to the photograph, with a note."""
-    if points.ndim != 2 or not np.nanmax(np.abs(points), initial=0.0) <= _MAX_RELATIVE_COORDINATE:
-        return points
+    if coordinates.ndim != 2 or not np.nanmax(np.abs(coordinates), initial=0.0) <= _MAX_RELATIVE_COORDINATE:
+        return coordinates
     notify(f"{path}: its coordinates are taken as relative to the size of the photograph")
-    return np.asarray(points * photo_size - 0.5)
+    return np.asarray(coordinates * photo_size - 0.5)
 
 
 def _from_json(path: str | Path, json_value: Any, photo_size: tuple[int, int]) -> _Points:

@@ -111,9 +111,10 @@ def mixing_matrix(sun_count: int) -> Floats:
 def squared_residual(
     gram: Floats, right_side: Floats, target_square_sum: float, light_strengths: Floats
 ) -> float:
-    """Return |A x - b|^2 from the normal equations.
+    """Return the squared residual |A x - b|^2 of light strengths x from the normal equations.
 
-    gram, right_side, target_square_sum : A' A, A' b and b' b
+    gram, right_side, target_square_sum : A' A, A' b and b' b, see `solve_strengths`
+    light_strengths : (9 + k,) strengths x
     """
     return float(
         target_square_sum - 2.0 * right_side @ light_strengths + light_strengths @ gram @ light_strengths

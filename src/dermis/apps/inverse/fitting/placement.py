@@ -105,9 +105,9 @@ class _LandmarkModel:
         targets = (one for one in human_targets() if one.startswith(_SHAPE_TARGET_FOLDERS))
         details = tuple(one for one in targets if one.endswith(_SHAPE_TARGET_SUFFIXES))
 
-        def person_landmarks(other: Human) -> Floats:
+        def person_landmarks(changed_person: Human) -> Floats:
             return np.asarray(
-                _landmark_positions(points, indices, other.positions_mm.astype(np.float64)) - centre
+                _landmark_positions(points, indices, changed_person.positions_mm.astype(np.float64)) - centre
             )
 
         model = cls(names, person_landmarks(person), np.zeros((0, 0, 3)), person, details)
@@ -143,7 +143,7 @@ class _LandmarkModel:
 def _derivative(
     model: _LandmarkModel, person_landmarks: Callable[[Human], Floats], unknown_index: int
 ) -> Floats:
-    """Return the derivative (n, 3) of landmark positions by the k-th unknown of the identity.
+    """Return the derivative (n, 3) of landmark positions by one unknown of the identity.
 
     The finite difference steps upwards, or downwards if the prior is at the upper limit of the unknown.
 
@@ -176,8 +176,12 @@ def _macro_limits(parameter: str) -> tuple[float, float]:
     )
 
 
-def _landmark_positions(points: LandmarkPoints, indices: NDArray[np.int64], positions: Floats) -> Floats:
-    return np.asarray(np.einsum("nk,nkc->nc", points.weight[indices], positions[points.point[indices]]))
+def _landmark_positions(
+    landmark_points: LandmarkPoints, indices: NDArray[np.int64], positions: Floats
+) -> Floats:
+    return np.asarray(
+        np.einsum("nk,nkc->nc", landmark_points.weight[indices], positions[landmark_points.point[indices]])
+    )
 
 
 def _fit_camera_and_identity(

@@ -87,13 +87,13 @@ class FitProblem:
         """Render the face at a point, and return the state with the best light strengths there."""
         return self._state(point, self.frames.basis(point) * light_tint(point), pixel_weight)
 
-    def reweighted_state(self, state: FitState) -> FitState:
-        """Return the state with new weights: those of the model's brightness, reduced for outliers."""
-        weights = self.weights(np.maximum(self.target - state.residual, 0.0))
-        scaled = np.abs(state.residual * weights)
+    def reweighted_state(self, fit_state: FitState) -> FitState:
+        """Return the state with pixel weights for the brightness of the model, reduced for outliers."""
+        weights = self.weights(np.maximum(self.target - fit_state.residual, 0.0))
+        scaled = np.abs(fit_state.residual * weights)
         limit = self.robust * max(_MAD_TO_SD * float(np.median(scaled)), 1.0)
         weights *= np.sqrt(limit / np.maximum(scaled, limit))
-        return self._state(state.point, state.basis, weights)
+        return self._state(fit_state.point, fit_state.basis, weights)
 
     def _state(self, point: FitPoint, basis: Floats, pixel_weight: Floats) -> FitState:
         A = (basis * pixel_weight).reshape(len(basis), -1).T
@@ -103,19 +103,19 @@ class FitProblem:
         cost = float(((residual * pixel_weight) ** 2).sum()) + float(prior.sum())
         return FitState(point, x, basis, residual, pixel_weight, cost)
 
-    def derivatives(self, state: FitState, frame_name: str) -> Floats:
+    def derivatives(self, fit_state: FitState, frame_name: str) -> Floats:
         """Return derivatives of the radiance by the u unknowns, (p, 3, u), from finite differences of frames.
 
         frame_name : file name of the ambient light's panorama, without suffix
         """
-        point, count = state.point, 2 * len(state.point.suns)
-        centre = self.frames.combined(point, state.strengths, frame_name)
+        point, count = fit_state.point, 2 * len(fit_state.point.suns)
+        centre = self.frames.combined(point, fit_state.strengths, frame_name)
         shifted = []
         for k, step in enumerate(self.steps(count)):
             change = np.zeros(len(SKIN_UNKNOWNS) + count + 2)
             limited = k < len(SKIN_UNKNOWNS) and point.logs[k] + step >= np.log(SKIN_UNKNOWNS[k].high)
             change[k] = -step if limited else step
-            neighbour = self.frames.combined(point.stepped(change), state.strengths, frame_name)
+            neighbour = self.frames.combined(point.stepped(change), fit_state.strengths, frame_name)
             shifted.append((neighbour - centre) / change[k])
         radiance, white = centre * light_tint(point), np.zeros((2, *centre.shape))
         white[0, :, 0], white[1, :, 2] = radiance[:, 0], radiance[:, 2]
@@ -146,7 +146,7 @@ class FitProblem:
 
 
 def light_tint(point: FitPoint) -> Floats:
-    """Return the ratio (3,) of the fitted colour of the light to that given by the user; 1 for green."""
+    """Return the ratio (3,) of the fitted light colour to the light colour from the user; 1 for green."""
     return np.array([np.exp(point.white[0]), 1.0, np.exp(point.white[1])])
 
 
@@ -174,41 +174,41 @@ def solve_fit(
 
 
 def _try_steps(
-    problem: FitProblem, state: FitState, derivatives: Floats, damping: float
+    problem: FitProblem, fit_state: FitState, derivatives: Floats, damping: float
 ) -> tuple[FitState | None, Floats, float]:
-    """Try damped steps; return a state of lower cost or None, the step to it, and the next damping."""
-    H, g = _normal_equations(problem, state, derivatives)
+    """Try damped steps; return a state of lower cost or None, the step to this state, and the new damping."""
+    H, g = _normal_equations(problem, fit_state, derivatives)
     for _ in range(_MAX_DAMPING_TRIALS):
         step = np.asarray(np.linalg.solve(H + damping * np.diag(np.diag(H)), g), np.float64)
         step *= min(1.0, _MAX_UNKNOWN_STEP / max(float(np.abs(step).max()), 1e-12))
         if np.abs(step).max() < 0.1 * _STEP_TOLERANCE:
             break
-        trial = problem.state(state.point.stepped(step), state.weight)
-        if trial.cost < state.cost:
+        trial = problem.state(fit_state.point.stepped(step), fit_state.weight)
+        if trial.cost < fit_state.cost:
             return trial, step, max(0.2 * damping, 1e-6)
         damping = max(30.0 * damping, 0.03)
     return None, np.zeros(len(g)), damping
 
 
-def _normal_equations(problem: FitProblem, state: FitState, derivatives: Floats) -> tuple[Floats, Floats]:
+def _normal_equations(problem: FitProblem, fit_state: FitState, derivatives: Floats) -> tuple[Floats, Floats]:
     """Return the Gauss-Newton matrix and the negative gradient of half the cost, without light strengths."""
-    J = (derivatives * state.weight[..., None]).reshape(-1, derivatives.shape[-1])
-    J, r = _eliminate_lights(state, J)
-    prior_sd = problem.prior_sd(2 * len(state.point.suns))
+    J = (derivatives * fit_state.weight[..., None]).reshape(-1, derivatives.shape[-1])
+    J, r = _eliminate_lights(fit_state, J)
+    prior_sd = problem.prior_sd(2 * len(fit_state.point.suns))
     H = J.T @ J + np.diag(prior_sd**-2.0)
-    return H, J.T @ r - problem.prior_offsets(state.point) / prior_sd**2
+    return H, J.T @ r - problem.prior_offsets(fit_state.point) / prior_sd**2
 
 
-def _eliminate_lights(state: FitState, J: Floats) -> tuple[Floats, Floats]:
-    """Return the weighted derivatives, less what light strengths can compensate, and the weighted residual.
+def _eliminate_lights(fit_state: FitState, J: Floats) -> tuple[Floats, Floats]:
+    """Return weighted derivatives without the part that light strengths compensate, and weighted residuals.
 
     Suns of strength 0 cannot become weaker and are not eliminated.
 
     J : (3 p, u) derivatives of the radiance, multiplied by the weights
     """
-    free = [k for k in range(len(state.basis)) if k < AMBIENT_LOBE_COUNT or state.strengths[k] > 0.0]
-    Q = np.linalg.qr((state.basis[free] * state.weight).reshape(len(free), -1).T)[0]
-    return J - Q @ (Q.T @ J), (state.residual * state.weight).ravel()
+    free = [k for k in range(len(fit_state.basis)) if k < AMBIENT_LOBE_COUNT or fit_state.strengths[k] > 0.0]
+    Q = np.linalg.qr((fit_state.basis[free] * fit_state.weight).reshape(len(free), -1).T)[0]
+    return J - Q @ (Q.T @ J), (fit_state.residual * fit_state.weight).ravel()
 
 
 _BLOCKS_PER_SIDE = 16
@@ -243,19 +243,22 @@ class Uncertainty:
 
 
 def fit_uncertainty(
-    problem: FitProblem, state: FitState, derivatives: Floats, assumed_sd: Mapping[str, float] = NO_ASSUMED_SD
+    problem: FitProblem,
+    fit_state: FitState,
+    derivatives: Floats,
+    assumed_sd: Mapping[str, float] = NO_ASSUMED_SD,
 ) -> Uncertainty:
     """Return the uncertainty of all unknowns, with residuals correlated within blocks of pixels [White1980].
 
     derivatives : (p, 3, u) derivatives of the radiance by the unknowns
     assumed_sd : standard deviations of the logarithms of pigments due to assumed parameters of the skin
     """
-    sun_angles = 2 * len(state.point.suns)
+    sun_angles = 2 * len(fit_state.point.suns)
     suns = [f"sun {k + 1} {axis}" for k in range(sun_angles // 2) for axis in ("across", "along")]
     names = [*(one.name for one in SKIN_UNKNOWNS), *suns, "white red", "white blue"]
     count = len(names) if problem.free_white else len(names) - 2
-    J = (derivatives * state.weight[..., None]).reshape(-1, len(names))[:, :count]
-    J, r = _eliminate_lights(state, J)
+    J = (derivatives * fit_state.weight[..., None]).reshape(-1, len(names))[:, :count]
+    J, r = _eliminate_lights(fit_state, J)
     prior_sd = problem.prior_sd(sun_angles)[:count]
     H = np.linalg.inv(J.T @ J + np.diag(prior_sd**-2.0))
     block = np.repeat(_pixel_blocks(problem.frames), 3)
@@ -267,7 +270,7 @@ def fit_uncertainty(
     covariance += np.diag(systematic[:count] ** 2)
     sd = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(sd, sd)
-    values, e = state.point.values(), _PARAMETER_LIMIT_TOLERANCE
+    values, e = fit_state.point.values(), _PARAMETER_LIMIT_TOLERANCE
     free = {one.name: one.low * (1 + e) < values[one.name] < one.high * (1 - e) for one in SKIN_UNKNOWNS}
     uncertain = zip(names, sd > _MIN_UNDETERMINED_SD_RATIO * prior_sd, strict=False)
     undetermined = tuple(name for name, large in uncertain if large or not free.get(name, True))
@@ -282,12 +285,12 @@ def fit_uncertainty(
     return Uncertainty(sd_by_name, undetermined, correlated, tuple(map(float, singular_values)))
 
 
-def block_residual(problem: FitProblem, state: FitState) -> float:
+def block_residual(problem: FitProblem, fit_state: FitState) -> float:
     """Return the median relative residual of blocks of the picture, which hardly depends on noise [-]."""
     block = _pixel_blocks(problem.frames)
     residual, target = (
         np.stack([np.bincount(block, column) for column in values.T])
-        for values in (state.residual, problem.target)
+        for values in (fit_state.residual, problem.target)
     )
     lit = target > 0.0
     return float(np.median(np.abs(residual[lit]) / target[lit]))

@@ -36,10 +36,12 @@ class SkinUnknown:
     step: float
 
 
-def _measured_unknown(pigment_name: str, low: float, high: float, step: float) -> SkinUnknown:
+def _measured_unknown(
+    pigment_name: str, lower_limit: float, upper_limit: float, log_step: float
+) -> SkinUnknown:
     """Return an unknown pigment whose prior is its distribution among measured people of all groups."""
     mean, sd = skin_prior().moments(pigment_name)
-    return SkinUnknown(pigment_name, float(np.exp(mean)), sd, low, high, step)
+    return SkinUnknown(pigment_name, float(np.exp(mean)), sd, lower_limit, upper_limit, log_step)
 
 
 SKIN_UNKNOWNS = (

@@ -44,8 +44,8 @@ class Unmixer:
     noise : relative standard deviation of a channel [-]
     """
 
-    def __init__(self, device: Device, model: SkinModel, noise: float) -> None:
-        self.device, self.model, self.noise = device, model, noise
+    def __init__(self, device: Device, model: SkinModel, relative_noise: float) -> None:
+        self.device, self.model, self.noise = device, model, relative_noise
         self._table = _table_texture(device, model)
         self._outputs: tuple[Texture, Texture] | None = None
         self._guesses = device.storage_buffer(8 * _GUESS_GRID_SIDE**2, "initial guesses")
@@ -167,11 +167,13 @@ def _unmixing_program(device: Device, shader_name: str, model: SkinModel) -> Com
     return cached_program(device, ("unmixing", shader_name), tuple(constants.items()), make)
 
 
-def _model_record(shader: ComputeProgram, model: SkinModel, noise: float, step_count: int) -> UniformRecord:
+def _model_record(
+    shader: ComputeProgram, model: SkinModel, relative_noise: float, step_count: int
+) -> UniformRecord:
     priors = {"prior_mean": model.prior_mean, "prior_sd": model.prior_sd}
     priors |= {"blood_mean": skins.BLOOD_ROOT_MEAN, "blood_sd": skins.BLOOD_ROOT_SD}
     limits = {"floor": skins.COLOUR_FLOOR, "min_reflectance": skins.MIN_REFLECTANCE}
-    numbers = {"third_range": model.third_range, "noise": noise, "steps": step_count}
+    numbers = {"third_range": model.third_range, "noise": relative_noise, "steps": step_count}
     return shader.record("Model", **numbers, **priors, **limits)
 
 
@@ -179,15 +181,15 @@ _SHADING_MAP_SIDE = 256  # longer side of the downsampled picture [texel]
 _RELATIVE_SHADING_BLUR = 1.0 / 24.0  # standard deviation of the blur, relative to the longer side
 
 
-def estimate_shading(device: Device, colours: Pixels, skin: SkinParameters, noise: float) -> Pixels:
+def estimate_shading(device: Device, colours: Pixels, skin: SkinParameters, relative_noise: float) -> Pixels:
     """Return the low-frequency shading of each texel (h, w), with mean 1 over the skin [-].
 
     It is the part of the brightness that melanin and blood do not explain, in a downsampled picture that is
     then low-pass filtered. The weights of the filter are larger where a colour is close to that of a skin.
     """
     small = _block_means(colours)
-    estimate, _, residual = Unmixer(device, skin_model(skin, "shade"), noise).unmix(small)
-    misfit = (np.log(np.maximum(residual, 1e-6)) ** 2).sum(axis=-1) / noise**2
+    estimate, _, residual = Unmixer(device, skin_model(skin, "shade"), relative_noise).unmix(small)
+    misfit = (np.log(np.maximum(residual, 1e-6)) ** 2).sum(axis=-1) / relative_noise**2
     weight = (1.0 / (1.0 + misfit)) * (small.min(axis=-1) > 0.0)
     smooth = _weighted_blur(estimate[..., 2].astype(np.float64), weight.astype(np.float64))
     mean = float((smooth * weight).sum() / max(float(weight.sum()), 1e-12))

@@ -138,17 +138,19 @@ def _rms_error(mixed_fractions: Floats, node_fractions: Floats) -> Floats:
     return np.asarray(np.sqrt(squares.mean(axis=0)))
 
 
-def _interpolate_map(weights: Floats, axes: Sequence[Floats], unmixed: UnmixResult) -> Pixels:
+def _interpolate_map(node_weights: Floats, pigment_axes: Sequence[Floats], unmixed: UnmixResult) -> Pixels:
     """Interpolate mixture weights from the grid of pigments to each texel, (h, w, 2).
 
     The grid is regular in the logarithms of melanin and blood.
     """
     from scipy.interpolate import RegularGridInterpolator
 
-    logarithms = [np.log(axis) for axis in axes]
-    interpolator = RegularGridInterpolator(logarithms, weights, bounds_error=False, fill_value=None)
+    logarithms = [np.log(axis) for axis in pigment_axes]
+    interpolator = RegularGridInterpolator(logarithms, node_weights, bounds_error=False, fill_value=None)
     result = np.empty((*unmixed.melanin.shape, 2), np.float32)
     for row, row_values in enumerate(zip(unmixed.melanin, unmixed.blood, strict=True)):
-        coordinates = [np.log(np.clip(one, a[0], a[-1])) for one, a in zip(row_values, axes, strict=True)]
+        coordinates = [
+            np.log(np.clip(one, a[0], a[-1])) for one, a in zip(row_values, pigment_axes, strict=True)
+        ]
         result[row] = interpolator(np.stack(coordinates, axis=-1))
     return result

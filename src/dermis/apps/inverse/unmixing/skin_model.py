@@ -161,17 +161,17 @@ class PigmentEstimate:
     residual: Floats
 
 
-def inverse_variances(colours: Floats, noise: float) -> Floats:
+def inverse_variances(colours: Floats, relative_noise: float) -> Floats:
     """Return the inverse variances (t, 3) of the logarithms of noisy colours.
 
     colours : (t, 3) diffuse reflectance, linear Rec. 709 [-]
-    noise : relative standard deviation of a channel [-]
+    relative_noise : relative standard deviation of a channel [-]
     """
-    return np.asarray(1.0 / (noise**2 + (COLOUR_FLOOR / np.maximum(colours, MIN_REFLECTANCE)) ** 2))
+    return np.asarray(1.0 / (relative_noise**2 + (COLOUR_FLOOR / np.maximum(colours, MIN_REFLECTANCE)) ** 2))
 
 
 def solve_pigments(
-    model: SkinModel, colours: Floats, noise: float = 0.01, start: Floats | None = None
+    model: SkinModel, colours: Floats, relative_noise: float = 0.01, start: Floats | None = None
 ) -> PigmentEstimate:
     """Estimate the most probable melanin, blood and third unknown of colours, in float64.
 
@@ -180,11 +180,11 @@ def solve_pigments(
     with Levenberg's damping; unknowns at a limit are fixed there.
 
     colours : (t, 3) diffuse reflectance, linear Rec. 709 [-]
-    noise : relative standard deviation of a channel [-]
+    relative_noise : relative standard deviation of a channel [-]
     start : (t, 3) unknowns to start from, as in `SkinModel.evaluate`; None for a search on a coarse grid
     """
     logs = np.log(np.maximum(colours, MIN_REFLECTANCE))
-    weights = inverse_variances(colours, noise)
+    weights = inverse_variances(colours, relative_noise)
     x = _initial_guess(model, logs) if start is None else start.copy()
     damping = np.full(len(x), 1e-3)
     cost = _cost(model, x, logs, weights)
@@ -213,8 +213,8 @@ def _initial_guess(model: SkinModel, log_colours: Floats) -> Floats:
     return np.asarray(x[nearest])
 
 
-def _cost(model: SkinModel, unknowns: Floats, log_colours: Floats, weights: Floats) -> Floats:
-    residual_cost = weights * (log_colours - model.evaluate(unknowns)[0]) ** 2
+def _cost(model: SkinModel, unknowns: Floats, log_colours: Floats, colour_weights: Floats) -> Floats:
+    residual_cost = colour_weights * (log_colours - model.evaluate(unknowns)[0]) ** 2
     blood_cost = ((unknowns[:, 1] - BLOOD_ROOT_MEAN) / BLOOD_ROOT_SD) ** 2
     third_cost = ((unknowns[:, 2] - model.prior_mean) / model.prior_sd) ** 2
     return np.asarray(residual_cost.sum(axis=1) + (blood_cost + third_cost))
@@ -225,10 +225,10 @@ def _clip_unknowns(model: SkinModel, unknowns: Floats) -> Floats:
 
 
 def _damped_step(
-    model: SkinModel, unknowns: Floats, log_colours: Floats, weights: Floats, damping: Floats
+    model: SkinModel, unknowns: Floats, log_colours: Floats, colour_weights: Floats, damping: Floats
 ) -> Floats:
     """Return the damped Gauss-Newton step of each colour's unknowns (t, 3), 0 for unknowns at a limit."""
-    H, g = _normal_equations(model, unknowns, log_colours, weights)
+    H, g = _normal_equations(model, unknowns, log_colours, colour_weights)
     diagonal = np.einsum("tii->ti", H)
     diagonal *= 1.0 + damping[:, None]
     step = np.linalg.solve(H, g[..., None])[..., 0]
@@ -241,11 +241,11 @@ def _damped_step(
 
 
 def _normal_equations(
-    model: SkinModel, unknowns: Floats, log_colours: Floats, weights: Floats
+    model: SkinModel, unknowns: Floats, log_colours: Floats, colour_weights: Floats
 ) -> tuple[Floats, Floats]:
     """Return the Gauss-Newton matrix (t, 3, 3) and the negative gradient (t, 3) of half the cost."""
     result, J = model.evaluate(unknowns)
-    weighted = weights[:, :, None] * J
+    weighted = colour_weights[:, :, None] * J
     H = np.einsum("tci,tcj->tij", weighted, J)
     g = np.einsum("tci,tc->ti", weighted, log_colours - result)
     H[:, [0, 1], [0, 1]] += _MIN_CURVATURE
@@ -257,9 +257,9 @@ def _normal_equations(
 
 
 def _pigment_estimate(
-    model: SkinModel, unknowns: Floats, log_colours: Floats, weights: Floats
+    model: SkinModel, unknowns: Floats, log_colours: Floats, colour_weights: Floats
 ) -> PigmentEstimate:
-    covariance = np.linalg.inv(_normal_equations(model, unknowns, log_colours, weights)[0])
+    covariance = np.linalg.inv(_normal_equations(model, unknowns, log_colours, colour_weights)[0])
     p, q = unknowns[:, 0], unknowns[:, 1]
     sd = np.sqrt(np.maximum(np.einsum("tii->ti", covariance)[:, :2], 0.0))
     residual = np.exp(log_colours - model.evaluate(unknowns)[0])

@@ -45,15 +45,15 @@ class SpectralUnknown:
     start: float
     scale: Literal["root", "log", "linear"] = "linear"
 
-    def coordinates(self, values: Floats | np.float64) -> Floats:
+    def coordinates(self, parameter_values: Floats | np.float64) -> Floats:
         """Return the coordinates of values."""
         if self.scale == "log":
-            return np.asarray(np.log(values))
-        return np.asarray(np.sqrt(values) if self.scale == "root" else values)
+            return np.asarray(np.log(parameter_values))
+        return np.asarray(np.sqrt(parameter_values) if self.scale == "root" else parameter_values)
 
-    def coordinate(self, value: float) -> float:
+    def coordinate(self, parameter_value: float) -> float:
         """Return the coordinate of a value."""
-        return float(self.coordinates(np.float64(value)))
+        return float(self.coordinates(np.float64(parameter_value)))
 
     def values(self, coordinates: Floats) -> Floats:
         """Return the values (n,) of coordinates (n,)."""
@@ -105,21 +105,21 @@ class SpectralFit:
         """Return the residuals whose squares a fit minimises: (n, 31) for spectra, (n, 1) for colours."""
         return self.residual if criterion == "spectrum" else self.delta_e()[:, None]
 
-    def delta_e(self, weights: Floats | None = None) -> Floats:
+    def delta_e(self, colour_weights: Floats | None = None) -> Floats:
         """Return the CIEDE2000 difference (n,) of the model's colour from the measured one.
 
-        weights : (3, 31) weights from spectra to linear Rec. 709, by default those of D65
+        colour_weights : (3, 31) weights from spectra to linear Rec. 709, by default those of D65
         """
-        w = rgb_weights() if weights is None else weights
+        w = rgb_weights() if colour_weights is None else colour_weights
         return delta_e_2000(self.model @ w.T, self.measured @ w.T)
 
 
 def skin_model_spectra(skin: SkinParameters = DEFAULT_SKIN) -> SpectralModel:
-    """Return the package's spectral model; parameters that its caller omits are those of `skin`."""
+    """Return the package's spectral model of skin; `skin` gives the parameters that a call omits."""
 
-    def reflectance(values: ParameterValues) -> Floats:
+    def reflectance(parameter_values: ParameterValues) -> Floats:
         def parameter(name: str) -> Floats:
-            return np.asarray(values.get(name, getattr(skin, name)))
+            return np.asarray(parameter_values.get(name, getattr(skin, name)))
 
         return skin_reflectance(
             parameter("melanin"),
@@ -128,7 +128,7 @@ def skin_model_spectra(skin: SkinParameters = DEFAULT_SKIN) -> SpectralModel:
             eumelanin_fraction=parameter("eumelanin"),
             epidermis_mm=parameter("epidermis_mm"),
             baseline=parameter("baseline"),
-            scattering=values.get("scattering", np.float64(1.0)),
+            scattering=parameter_values.get("scattering", np.float64(1.0)),
         )
 
     return reflectance
@@ -176,16 +176,18 @@ def invert_spectra(
 
 def fit_skin(
     spectra: Floats,
-    names: Sequence[str] = TWO_UNKNOWNS,
+    unknown_names: Sequence[str] = TWO_UNKNOWNS,
     criterion: Criterion = "spectrum",
     skin: SkinParameters = DEFAULT_SKIN,
 ) -> SpectralFit:
     """Fit parameters of the package's skin to each of n spectra, see `invert_spectra`.
 
-    names : parameters that vary, of `UNKNOWNS`
+    unknown_names : parameters that vary, of `UNKNOWNS`
     skin : parameters that do not vary
     """
-    return invert_spectra(spectra, skin_model_spectra(skin), [UNKNOWNS[name] for name in names], criterion)
+    return invert_spectra(
+        spectra, skin_model_spectra(skin), [UNKNOWNS[name] for name in unknown_names], criterion
+    )
 
 
 def least_squares(

@@ -32,7 +32,7 @@ def unknown_skin_sd(
 
     Skins sampled from the prior are unmixed as if they had the parameters of `skin`. The result is the root
     mean square of the logarithm of the ratio of found to true pigments, over those samples whose found
-    pigments are near the given ones.
+    pigments are near the given pigments.
 
     melanin, blood : pigments that were found
     skin : parameters that the inversion assumes

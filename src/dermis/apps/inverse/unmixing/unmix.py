@@ -303,7 +303,10 @@ UNMIX_SUMMARY_FILE = "unmixed.json"
 
 
 def save_maps(
-    folder: Path, result: UnmixResult, recoloured: NDArray[np.float32] | None = None, linear: bool = False
+    folder: Path,
+    unmix_result: UnmixResult,
+    recoloured: NDArray[np.float32] | None = None,
+    linear: bool = False,
 ) -> list[Path]:
     """Write all maps as EXR files, the summary, and the recoloured picture, each file atomically.
 
@@ -315,7 +318,7 @@ def save_maps(
     Raises DermisError when the disk is full, or the folder cannot be written to.
     """
     written = []
-    for name, values in result.maps().items():
+    for name, values in unmix_result.maps().items():
         path = folder / f"{name}.exr"
         with atomic_file(path) as file:
             file.write_bytes(encode_exr(values if values.ndim == 3 else values[..., None]))
@@ -325,7 +328,7 @@ def save_maps(
         write_image(path, recoloured)
         written.append(path)
     with atomic_file(folder / UNMIX_SUMMARY_FILE) as file:
-        file.write_text(json.dumps(result.summary(), indent=2) + "\n", encoding="utf-8")
+        file.write_text(json.dumps(unmix_result.summary(), indent=2) + "\n", encoding="utf-8")
     return [*written, folder / UNMIX_SUMMARY_FILE]
 
 

@@ -95,7 +95,7 @@ def person_scene(
     scene: Scene,
     person: Person,
     medium: Medium | None,
-    size: tuple[int, int],
+    picture_size: tuple[int, int],
     max_depth: int | None = None,
 ) -> tuple[MitsubaObject, tuple[str, ...]]:
     """Return the Mitsuba scene of a person's radiance image, and notes on changes made to the head.
@@ -114,7 +114,7 @@ def person_scene(
     integrator = {"type": "volpathmis", "rr_depth": RUSSIAN_ROULETTE_DEPTH, "hide_emitters": True}
     if max_depth is not None:
         integrator["max_depth"] = max_depth
-    return mitsuba_scene(mi, scene, integrator, shapes, size), notes
+    return mitsuba_scene(mi, scene, integrator, shapes, picture_size), notes
 
 
 def _opaque_parts(mi: Mitsuba, person: Person) -> SceneDict:

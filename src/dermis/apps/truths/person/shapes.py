@@ -30,9 +30,9 @@ _NEARLY_SMOOTH_ROUGHNESS = 0.02
 _ROUGHNESS_RANGE = MIN_ROUGHNESS, MAX_ROUGHNESS
 
 
-def mitsuba_texture(mi: Mitsuba, values: NDArray[np.floating]) -> SceneDict:
+def mitsuba_texture(mi: Mitsuba, texels: NDArray[np.floating]) -> SceneDict:
     """Return Mitsuba's description of a texture from linear texels (h, w) or (h, w, 3)."""
-    bitmap = mi.Bitmap(np.ascontiguousarray(values, np.float32))
+    bitmap = mi.Bitmap(np.ascontiguousarray(texels, np.float32))
     return {"type": "bitmap", "bitmap": bitmap, "raw": True, "wrap_mode": "clamp"}
 
 

@@ -66,13 +66,15 @@ def point_tables(device: Device) -> dict[str, object]:
     }
 
 
-def blurred_levels(device: Device, mesh: Mesh, light: Array, stretch_mode: str = "full") -> list[Array]:
+def blurred_levels(device: Device, mesh: Mesh, irradiance: Array, stretch_mode: str = "full") -> list[Array]:
     """Return all pyramid levels (n, n) of light blurred on the atlas of a mesh, at full resolution.
 
-    light : (n, n) irradiance
+    irradiance : (n, n) irradiance
     stretch_mode : stretch map of the blur, "full" or "axes" (without the angle between u and v)
     """
-    levels, blur = blur_light(device, mesh, build_atlas(mesh, len(light)), light[..., None], stretch_mode)
+    levels, blur = blur_light(
+        device, mesh, build_atlas(mesh, len(irradiance)), irradiance[..., None], stretch_mode
+    )
     return [resampled_level(device, levels, blur, k + 1) for k in range(len(blur.variance_mm2))]
 
 
@@ -97,13 +99,13 @@ def point_row(device: Device, texels_per_mm: float) -> str:
     return f"| {texels_per_mm:g} | {100 * shape:.2f} % | {100 * energy:+.4f} % |"
 
 
-def sheared_row(device: Device, degrees: float) -> str:
+def sheared_row(device: Device, shear_degrees: float) -> str:
     """Return a Markdown row with the ratios of a blurred point's two principal widths to the exact width.
 
-    degrees : angle between the uv axes on the flat surface [degrees]
+    shear_degrees : angle between the uv axes on the flat surface [degrees]
     """
     flat = plane(FLAT_PATCH_SIDE / 3.0)
-    shear = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    shear = np.cos(np.radians(shear_degrees)), np.sin(np.radians(shear_degrees))
     positions = flat.positions.copy()
     positions[:, 0] += shear[0] * positions[:, 1]
     positions[:, 1] *= shear[1]
@@ -118,7 +120,7 @@ def sheared_row(device: Device, degrees: float) -> str:
         spot = blurred_levels(device, mesh, light, stretch)[-1].astype(float)
         covariance = np.einsum("iyx,jyx,yx->ij", position, position, spot) / spot.sum()
         cells += [f"{width:.3f}" for width in np.sqrt(np.linalg.eigvalsh(covariance) / target_variance)]
-    return f"| {degrees:g}° | {' | '.join(cells)} |"
+    return f"| {shear_degrees:g}° | {' | '.join(cells)} |"
 
 
 def constant_light_error(device: Device) -> float:
@@ -159,7 +161,7 @@ def harmonic_row(renderer: Renderer, radius_mm: float) -> str:
 
 
 def blur_light(
-    device: Device, mesh: Mesh, atlas: Atlas, light: Array, stretch_mode: str = "full"
+    device: Device, mesh: Mesh, atlas: Atlas, irradiance: Array, stretch_mode: str = "full"
 ) -> tuple[PyramidLevels, Blur]:
     """Blur grey light (n, n, 1) on the atlas of a mesh by all Gaussians of `BLUR_PROFILE` but the narrowest.
 
@@ -169,8 +171,10 @@ def blur_light(
     max_halvings = len(textures.mips_for("repeated")) - 1
     halvings = choose_halvings(variance, textures.median_texels_per_mm, max_halvings)
     blur = Blur(variance, BLUR_PROFILE.weight[1:], halvings)
-    levels = make_levels(device, len(light), (halvings,), level_format(device))
-    upload(device, levels.stacks[0], np.dstack([light, light, light, np.ones_like(light)]))
+    levels = make_levels(device, len(irradiance), (halvings,), level_format(device))
+    upload(
+        device, levels.stacks[0], np.dstack([irradiance, irradiance, irradiance, np.ones_like(irradiance)])
+    )
     frame = CommandList(device)
     head = Head("", mesh, Maps())
     shape = evaluate_rest_shape(device, shape_tables(device, head), head.positions_mm)
@@ -181,7 +185,7 @@ def blur_light(
 
 
 def resampled_level(device: Device, levels: PyramidLevels, blur: Blur, level_index: int) -> Array:
-    """Return pyramid level k (n, n), resampled bilinearly to the full resolution of the atlas."""
+    """Return a pyramid level (n, n), resampled bilinearly to the full resolution of the atlas."""
     halvings = blur.halvings[level_index]
     layer = download(device, levels.stacks[halvings], layer=level_index - levels.first[halvings])[..., 0]
     return np.asarray(zoom(layer, 2**halvings, order=1, mode="nearest", grid_mode=True))

@@ -85,40 +85,40 @@ def motion(adapter: str = "auto") -> None:
     )
 
 
-def rebuilt_head(head: Head, points: Points) -> Head:
+def rebuilt_head(head: Head, point_positions: Points) -> Head:
     """Return the head that results from loading the mesh with its points at given positions.
 
-    points : (p, 3) positions [mm]
+    point_positions : (p, 3) positions [mm]
     """
     mesh = head.mesh
-    arrays = points[mesh.point], mesh.uv, mesh.triangles, mesh.material, mesh.materials
+    arrays = point_positions[mesh.point], mesh.uv, mesh.triangles, mesh.material, mesh.materials
     return Head("rebuilt", build_mesh(*arrays, point=mesh.point, quads=mesh.quads), head.maps)
 
 
-def posed_points(head: Head, person: Points, weights: Mapping[str, float]) -> Points:
+def posed_points(head: Head, person_points: Points, target_weights: Mapping[str, float]) -> Points:
     """Return the positions of a person's points with an expression [mm].
 
-    person : (p, 3) positions in the rest pose [mm]
-    weights : morph target weights of the expression
+    person_points : (p, 3) positions in the rest pose [mm]
+    target_weights : morph target weights of the expression
     """
-    motion = Pose(weights, positions_mm=person).motion(head.control)
+    motion = Pose(target_weights, positions_mm=person_points).motion(head.control)
     return head.control.points_mm(motion).astype(np.float32)
 
 
 def picture_error(
-    renderer: Renderer, head: Head, person: Points, weights: Mapping[str, float], view_name: str
+    renderer: Renderer, head: Head, person_points: Points, target_weights: Mapping[str, float], view_name: str
 ) -> float:
     """Return the relative RMSE between pictures of a posed head and of a head loaded in that shape.
 
-    person : (p, 3) positions in the rest pose [mm]
-    weights : morph target weights of the expression
+    person_points : (p, 3) positions in the rest pose [mm]
+    target_weights : morph target weights of the expression
     view_name : key of `LIGHT_AND_CAMERA`
     """
-    rebuilt = rebuilt_head(head, posed_points(head, person, weights))
+    rebuilt = rebuilt_head(head, posed_points(head, person_points, target_weights))
     lights, camera = LIGHT_AND_CAMERA[view_name]
     scene = Scene(rebuilt, load_lights(lights), load_camera(camera, rebuilt))
     posed_head = _with_centre(replace(head), rebuilt)
-    pose = Pose(weights, positions_mm=person)
+    pose = Pose(target_weights, positions_mm=person_points)
     posed = renderer.draw(replace(scene, head=posed_head, pose=pose), SETTINGS).linear()
     reference = renderer.draw(scene, SETTINGS).linear()
     return float(np.sqrt(((posed - reference) ** 2).mean() / (reference**2).mean()))
@@ -158,10 +158,10 @@ def deformation_rows(renderer: Renderer, head: Head) -> Iterator[str]:
         yield f"| {name} | {100 * gauge.strain(points):.0f} | {100 * front:.2f} | {100 * back:.2f} |"
 
 
-def _with_thinner_ears(points: Points, fraction: float) -> Points:
+def _with_thinner_ears(point_positions: Points, thickness_fraction: float) -> Points:
     """Return points (p, 3) of the scan with thinner ears: points at its sides are scaled along z."""
-    ear = np.clip((np.abs(points[:, :1]) - 65.0) / 10.0, 0.0, 1.0)
-    return (points * (1.0 - ear * [0.0, 0.0, fraction])).astype(np.float32)
+    ear = np.clip((np.abs(point_positions[:, :1]) - 65.0) / 10.0, 0.0, 1.0)
+    return (point_positions * (1.0 - ear * [0.0, 0.0, thickness_fraction])).astype(np.float32)
 
 
 def seam_rows(renderer: Renderer, head: Head, persons: Mapping[str, Points]) -> Iterator[str]:
@@ -269,6 +269,6 @@ def frame_occlusion(renderer: Renderer, scene: Scene, occlusion_mode: str) -> Fl
     return download(renderer.device, texture)[:OCCLUSION_ATLAS_SIDE].astype(float)
 
 
-def root_mean_square(error: Floats) -> float:
+def root_mean_square(errors: Floats) -> float:
     """Return the root mean square of errors."""
-    return float(np.sqrt(np.mean(error**2)))
+    return float(np.sqrt(np.mean(errors**2)))

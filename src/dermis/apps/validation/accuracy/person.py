@@ -159,12 +159,12 @@ class Measuring:
                 save_panels(measurement.view, pair)
         return figures
 
-    def _person(self, name: PersonName) -> tuple[Head, Any]:
-        if name not in self._people:
-            head = _PEOPLE[name]()
+    def _person(self, person_name: PersonName) -> tuple[Head, Any]:
+        if person_name not in self._people:
+            head = _PEOPLE[person_name]()
             textures = person_textures(self.renderer, view_scene(head, VIEWS["portrait"]))
-            self._people[name] = head, textures
-        return self._people[name]
+            self._people[person_name] = head, textures
+        return self._people[person_name]
 
     def _shared_skin(self, person: PersonName, head: Head, truth: TruthName) -> SharedSkin:
         key = person, truth

@@ -66,15 +66,17 @@ def techniques(adapter: str = "auto") -> None:
 
 
 def _compare(
-    head: Head, reference_name: str, techniques: Sequence[str], light: str, adapter: str, **options: Any
+    head: Head, reference_name: str, techniques: Sequence[str], light_name: str, adapter: str, **options: Any
 ) -> Comparison:
     """Return a comparison whose region and number of samples suit the light, unless `options` sets them.
 
     reference_name : name of the reference
     """
-    defaults: dict[str, Any] = {"region": default_region(light), "samples": SAMPLES_BY_LIGHT[light]}
+    defaults: dict[str, Any] = {"region": default_region(light_name), "samples": SAMPLES_BY_LIGHT[light_name]}
     defaults["settings"] = SETTINGS
-    return compare(head, reference_name, techniques, light=light, adapter=adapter, **(defaults | options))
+    return compare(
+        head, reference_name, techniques, light=light_name, adapter=adapter, **(defaults | options)
+    )
 
 
 def technique_row(first_cell: str, comparison_row: ComparisonRow) -> str:
@@ -183,18 +185,23 @@ def direction_rows(head: Head, lights: dict[str, int], settings: Settings, adapt
 
 
 def _direction_rows(
-    head: Head, light: str, region: str, samples: int, settings: Settings, adapter: str
+    head: Head, light_name: str, region: str, samples_per_pixel: int, settings: Settings, adapter: str
 ) -> list[str]:
     prefix = "ball, " if head is BALL else ""
     lines = []
     for medium in ("skin1", "skin2"):
         for direction in ("lambertian", "half-space"):
-            values = {"region": region, "medium": medium, "direction": direction, "samples": samples}
+            values = {
+                "region": region,
+                "medium": medium,
+                "direction": direction,
+                "samples": samples_per_pixel,
+            }
             comparison = _compare(
                 head,
                 "path-traced",
                 ("texture-space",),
-                light,
+                light_name,
                 adapter,
                 settings=settings,
                 model="layered",
@@ -204,15 +211,19 @@ def _direction_rows(
             image, reference = comparison.images["texture-space"], comparison.reference
             errors, energies = errors_by_channel(image, reference, reference.mask)
             figures = (error, errors, flip, energy, energies)
-            lines.append(f"| {prefix}{light} | {medium} | {direction} | " + " | ".join(figures) + " |")
+            lines.append(f"| {prefix}{light_name} | {medium} | {direction} | " + " | ".join(figures) + " |")
     return lines
 
 
-def errors_by_channel(image: Floats, reference: ReferenceImage, mask: NDArray[np.bool_]) -> list[str]:
+def errors_by_channel(
+    rendered_image: Floats, reference: ReferenceImage, mask: NDArray[np.bool_]
+) -> list[str]:
     """Return table cells with relative RMSE and energy ratio, each in red, green and blue.
 
     mask : (h, w) pixels to compare
     """
-    parts = [(image[..., c], reference.image[..., c], mask, reference.variance[..., c]) for c in range(3)]
+    parts = [
+        (rendered_image[..., c], reference.image[..., c], mask, reference.variance[..., c]) for c in range(3)
+    ]
     measures = (relative_rmse, energy_ratio)
     return [" / ".join(f"{measure(*part).value:.3f}" for part in parts) for measure in measures]

@@ -75,7 +75,10 @@ def render(subject: ComparisonSubject, technique: str, **changed_settings: objec
 
 
 def atlas_rows(
-    subject: ComparisonSubject, integral_image: ReferenceImage, normalised_image: ReferenceImage, light: str
+    subject: ComparisonSubject,
+    integral_image: ReferenceImage,
+    normalised_image: ReferenceImage,
+    light_name: str,
 ) -> list[str]:
     """Return Markdown rows with errors of texture space by atlas size, against two references.
 
@@ -86,7 +89,7 @@ def atlas_rows(
     """
     unscattered, rows = render(subject, "none"), []
     for side in ATLAS_SIDES:
-        image, cells = render(subject, "texture-space", atlas=side), [light, str(side)]
+        image, cells = render(subject, "texture-space", atlas=side), [light_name, str(side)]
         for reference in (integral_image, normalised_image):
             pair = reference.image, reference.mask
             error, worst = (relative_rmse(one, *pair).value for one in (image, unscattered))
@@ -95,7 +98,7 @@ def atlas_rows(
     return rows
 
 
-def zero_width_row(subject: ComparisonSubject, light: str) -> str:
+def zero_width_row(subject: ComparisonSubject, light_name: str) -> str:
     """Return a Markdown row with the sampling error of the surface integral.
 
     It is the difference between the integral of a very narrow profile and the irradiance.
@@ -104,7 +107,7 @@ def zero_width_row(subject: ComparisonSubject, light: str) -> str:
     reference = surface_integral(replace(subject, profile=narrow_profile), 0)
     incident = render(subject, "none") / subject.profile.albedo
     pair = (incident, reference.image, reference.mask)
-    return f"| {light} | {relative_rmse(*pair).value:.4f} | {energy_ratio(*pair).value:.4f} |"
+    return f"| {light_name} | {relative_rmse(*pair).value:.4f} | {energy_ratio(*pair).value:.4f} |"
 
 
 def uniform_light_integral(subject: ComparisonSubject) -> Floats:
@@ -127,7 +130,7 @@ def mean_and_percentile(uniform_light: Floats) -> str:
     return ", ".join(f"{mean:.3f} ({high:.3f})" for mean, high in pairs)
 
 
-def region_rows(subject: ComparisonSubject, integral_image: ReferenceImage, light: str) -> list[str]:
+def region_rows(subject: ComparisonSubject, integral_image: ReferenceImage, light_name: str) -> list[str]:
     """Return Markdown rows by region of the face: errors of texture space, and of a perfect map.
 
     Diffusion on the surface itself, by the heat equation, represents a perfect map.
@@ -141,7 +144,7 @@ def region_rows(subject: ComparisonSubject, integral_image: ReferenceImage, ligh
         ((ours - integral_image.image)[integral_image.mask] ** 2).sum(),
     )
     rows = []
-    for region, names in LANDMARKS_BY_REGION[light].items():
+    for region, names in LANDMARKS_BY_REGION[light_name].items():
         centre = tuple(np.mean([landmarks[name] for name in names], axis=0))
         heat = surface_heat_around(subject, centre, REGION_RADIUS_MM, samples, MIN_VARIANCE_MM2)
         fraction = ((ours - integral_image.image)[heat.mask] ** 2).sum() / total
@@ -152,5 +155,5 @@ def region_rows(subject: ComparisonSubject, integral_image: ReferenceImage, ligh
             for image in images
         ]
         cells = " | ".join(f"{error:.3f}" for error in errors)
-        rows.append(f"| {light} | {region} | {100 * pixels:.1f} % | {100 * fraction:.0f} % | {cells} |")
+        rows.append(f"| {light_name} | {region} | {100 * pixels:.1f} % | {100 * fraction:.0f} % | {cells} |")
     return rows

@@ -151,9 +151,9 @@ def _spot_lights(light_count: int) -> list[PointLight]:
     ]
 
 
-def _rotate_light(light: PointLight, degrees: float) -> PointLight:
+def _rotate_light(light: PointLight, turn_degrees: float) -> PointLight:
     x, y, z = light.position
-    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    c, s = math.cos(math.radians(turn_degrees)), math.sin(math.radians(turn_degrees))
     return light.model_copy(update={"position": (c * x + s * z, y, c * z - s * x)})
 
 
@@ -211,16 +211,16 @@ def pose_at_moment(head: Head, moment_index: int) -> Pose:
     return Pose(weights, bones)
 
 
-def _synthetic_targets(points: Doubles, target_count: int) -> MorphTargets:
+def _synthetic_targets(point_positions: Doubles, target_count: int) -> MorphTargets:
     """Return synthetic morph targets: smooth bumps that each displace a sixth of the points.
 
-    points : (p, 3) positions of the points in the rest pose [mm]
+    point_positions : (p, 3) positions of the points in the rest pose [mm]
     """
-    centres = points[np.linspace(0, len(points) - 1, target_count).astype(int)]
-    nearest = max(1, int(_TARGET_POINT_FRACTION * len(points)))
+    centres = point_positions[np.linspace(0, len(point_positions) - 1, target_count).astype(int)]
+    nearest = max(1, int(_TARGET_POINT_FRACTION * len(point_positions)))
     moved, deltas = [], []
     for centre in centres:
-        distance = np.linalg.norm(points - centre, axis=1)
+        distance = np.linalg.norm(point_positions - centre, axis=1)
         indices = np.sort(np.argpartition(distance, nearest - 1)[:nearest])
         falloff = 1.0 - (distance[indices] / max(float(distance[indices].max()), 1e-9)) ** 2
         moved.append(indices)
@@ -231,19 +231,22 @@ def _synthetic_targets(points: Doubles, target_count: int) -> MorphTargets:
     return MorphTargets(names, first.astype(np.int32), point, np.concatenate(deltas).astype(np.float32))
 
 
-def _bone_chain(points: Doubles) -> Skeleton:
+def _bone_chain(point_positions: Doubles) -> Skeleton:
     """Return a vertical chain of bones; each point is weighted between the two nearest ones in height.
 
-    points : (p, 3) positions of the points in the rest pose [mm]
+    point_positions : (p, 3) positions of the points in the rest pose [mm]
     """
-    low, high = points[:, 1].min(), points[:, 1].max()
+    low, high = point_positions[:, 1].min(), point_positions[:, 1].max()
     step = (high - low) / BONE_COUNT
     local, bind = np.tile(np.eye(4), (2, BONE_COUNT, 1, 1))
     local[:, 1, 3] = [low, *([step] * (BONE_COUNT - 1))]
     bind[:, 1, 3] = -(low + step * np.arange(BONE_COUNT))
-    position = np.clip((points[:, 1] - low) / step, 0.0, BONE_COUNT - 1.001)
+    position = np.clip((point_positions[:, 1] - low) / step, 0.0, BONE_COUNT - 1.001)
     below = position.astype(np.int32)
-    bone, weight = np.zeros((len(points), 4), np.int32), np.zeros((len(points), 4), np.float32)
+    bone, weight = (
+        np.zeros((len(point_positions), 4), np.int32),
+        np.zeros((len(point_positions), 4), np.float32),
+    )
     bone[:, 0], bone[:, 1] = below, below + 1
     weight[:, 1] = position - below
     weight[:, 0] = 1.0 - weight[:, 1]

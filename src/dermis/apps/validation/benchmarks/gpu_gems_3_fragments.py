@@ -96,10 +96,15 @@ class FragmentPasses(GpuGems3):
         graph.fill("diffuse", shader, bound, into)
 
     def _light(
-        self, graph: Graph, layout: LitAtlas, constants: Constants, target: TextureOrView, scale: float
+        self,
+        graph: Graph,
+        layout: LitAtlas,
+        constants: Constants,
+        target: TextureOrView,
+        radiance_scale: float,
     ) -> None:
         shader = _fragment_program(graph.device, "gpu_gems_3_irradiance.wgsl", constants, [HALF_FORMAT])
-        entering = shader.record("Entering", scale=scale)
+        entering = shader.record("Entering", scale=radiance_scale)
         bound = {**layout.bindings, "surfaces": layout.surfaces, "entering": entering}
         graph.fill("irradiance", shader, bound, [target])
 

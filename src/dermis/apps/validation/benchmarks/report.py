@@ -45,8 +45,12 @@ def _case_json(case: BenchmarkCase) -> JsonObject:
     return asdict(case) | {"image": list(case.image)}
 
 
-def _row_json(row: BenchmarkRow) -> JsonObject:
-    parts = {**_case_json(row.case), **asdict(row), "floor_ratio": row.floor_ratio}
+def _row_json(benchmark_row: BenchmarkRow) -> JsonObject:
+    parts = {
+        **_case_json(benchmark_row.case),
+        **asdict(benchmark_row),
+        "floor_ratio": benchmark_row.floor_ratio,
+    }
     del parts["case"]
     return parts
 
@@ -57,9 +61,12 @@ _TIME_COLUMNS = ("frame [ms]", "device [ms]", "floor [ms]", "ratio", "Python [ms
 COLUMNS = (*_CASE_COLUMNS, *_TIME_COLUMNS, "memory [MB]")
 
 
-def cells(row: BenchmarkRow) -> tuple[str, ...]:
+def cells(benchmark_row: BenchmarkRow) -> tuple[str, ...]:
     """Return a row's parameters and measurements as table cells, in the order of COLUMNS."""
-    case, device = row.case, (row.gpu_ms["total"], row.floor_ms["total"], row.floor_ratio)
+    case, device = (
+        benchmark_row.case,
+        (benchmark_row.gpu_ms["total"], benchmark_row.floor_ms["total"], benchmark_row.floor_ratio),
+    )
     return (
         f"{case.image[0]}x{case.image[1]}",
         str(case.atlas),
@@ -67,10 +74,12 @@ def cells(row: BenchmarkRow) -> tuple[str, ...]:
         str(case.lights),
         case.environment or "-",
         str(case.targets or "-"),
-        str(row.triangles),
+        str(benchmark_row.triangles),
         case.technique,
-        *map(three_digits, (row.frame_ms, *device, row.python_ms, row.image_ms)),
-        f"{row.memory_mb:.0f}",
+        *map(
+            three_digits, (benchmark_row.frame_ms, *device, benchmark_row.python_ms, benchmark_row.image_ms)
+        ),
+        f"{benchmark_row.memory_mb:.0f}",
     )
 
 
@@ -187,14 +196,20 @@ def scaling_plots(benchmark: Benchmark) -> str:
     return _figure_svg(figure)
 
 
-def stage_bars(row: BenchmarkRow) -> str:
+def stage_bars(benchmark_row: BenchmarkRow) -> str:
     """Return an SVG bar chart of device time and its lower bound by stage."""
-    names = [stage for stage in row.gpu_ms if stage != "total"]
+    names = [stage for stage in benchmark_row.gpu_ms if stage != "total"]
     figure, (axes,) = _figure(width_inches=7.0, height_inches=0.34 * len(names) + 0.9, columns=1)
     positions = range(len(names))
-    axes.barh(positions, [row.gpu_ms[name] for name in names], 0.7, color=_TOTAL_COLOUR, label="device")
     axes.barh(
-        positions, [row.floor_ms.get(name, 0.0) for name in names], 0.3, color=_FLOOR_COLOUR, label="floor"
+        positions, [benchmark_row.gpu_ms[name] for name in names], 0.7, color=_TOTAL_COLOUR, label="device"
+    )
+    axes.barh(
+        positions,
+        [benchmark_row.floor_ms.get(name, 0.0) for name in names],
+        0.3,
+        color=_FLOOR_COLOUR,
+        label="floor",
     )
     axes.set_yticks(positions, names)
     axes.invert_yaxis()

@@ -141,13 +141,13 @@ def comparison_subject(
         yield ComparisonSubject(Renderer(adapter), scene, profile, index_matched, settings)
 
 
-def check_names(against: str, light: str, region: str, medium: str) -> None:
+def check_names(reference_name: str, light_name: str, region_name: str, medium_name: str) -> None:
     """Raise DermisError for unknown names, before any long computation."""
     choices: dict[str, tuple[str, Collection[str]]] = {
-        "against": (against, REFERENCES),
-        "light": (light, LIGHTS),
-        "region": (region, REGIONS),
-        "medium": (medium, media()),
+        "against": (reference_name, REFERENCES),
+        "light": (light_name, LIGHTS),
+        "region": (region_name, REGIONS),
+        "medium": (medium_name, media()),
     }
     for option, (name, known) in choices.items():
         if name not in known:

@@ -102,7 +102,7 @@ CAUSES: tuple[Cause, ...] = get_args(Cause)
 
 @dataclass(frozen=True, eq=False)
 class SharedSkin:
-    """Skin that frame and path tracer share: the layers, and the profile that the frame makes of them.
+    """Skin that frame and path tracer share: its layers, and the profile that is computed from the layers.
 
     medium : layers of skin of the mean colour
     profile : file with the Gaussians that fit photon counts of these layers
@@ -113,7 +113,7 @@ class SharedSkin:
 
 
 def shared_skin(renderer: Renderer, head: Head, truth: TruthName, folder: Path) -> SharedSkin:
-    """Return the skin of a person for a truth, with its profile in a file.
+    """Return the skin of a person for a kind of path-traced reference, with the profile in a file.
 
     In homogeneous skin, light exits at the same mean distance from its entry as by the published profile.
 
@@ -135,7 +135,7 @@ def shared_skin(renderer: Renderer, head: Head, truth: TruthName, folder: Path) 
 
 @dataclass(frozen=True, eq=False)
 class PersonSubject:
-    """Scene of a person with its textures, as frame and path tracer get it.
+    """Scene of a person, and the person's textures, as input of frame and path tracer.
 
     cause : cause of error that both leave out, or None
     """
@@ -146,7 +146,7 @@ class PersonSubject:
 
 
 def without_cause(subject: PersonSubject, cause: Cause) -> PersonSubject:
-    """Return a subject that lacks a cause of error on both sides."""
+    """Return a subject without a cause of error, in the frame and in the path-traced reference."""
     scene, textures, head = subject.scene, subject.textures, subject.scene.head
     maps, flat = head.maps, np.ones((1, 1), np.float32)
     assert isinstance(maps, PaintedMaps)
@@ -168,7 +168,7 @@ def without_cause(subject: PersonSubject, cause: Cause) -> PersonSubject:
 def render_subject_frame(
     renderer: Renderer, subject: PersonSubject, skin: SharedSkin | None, settings: Settings
 ) -> Floats:
-    """Return the linear radiance (h, w, 3) of the frame with the model of a truth.
+    """Return the linear radiance (h, w, 3) of the frame, with the skin of a path-traced reference.
 
     Without refraction, the light from below is that of skin without a surface, and the reflection is added.
 
@@ -249,7 +249,7 @@ def render_frame(renderer: Renderer, scene: Scene, settings: Settings) -> Floats
 def path_trace_subject(
     subject: PersonSubject,
     skin: SharedSkin,
-    size: tuple[int, int],
+    picture_size: tuple[int, int],
     samples: int,
     use_cache: bool = True,
     variant: MitsubaVariant = "scalar_rgb",
@@ -257,7 +257,7 @@ def path_trace_subject(
 ) -> PathTraced:
     """Path-trace a person with the skin that the frame has.
 
-    size : width and height of the picture [pixel]
+    picture_size : width and height of the picture [pixel]
     samples : paths per pixel
     variant : variant of Mitsuba, as in `path_trace`
     """
@@ -269,7 +269,7 @@ def path_trace_subject(
         scene,
         textures,
         medium,
-        size,
+        picture_size,
         samples,
         max_depth=_DIRECT_LIGHT_DEPTH if subject.cause == "bounces" else None,
         variant=variant,
@@ -282,7 +282,7 @@ def path_trace_view(
     renderer: Renderer,
     scene: Scene,
     textures: SkinTextures,
-    size: tuple[int, int],
+    picture_size: tuple[int, int],
     samples: int,
     *,
     variant: MitsubaVariant = "scalar_rgb",
@@ -292,7 +292,7 @@ def path_trace_view(
     In the medium, light exits at the same mean distance from its entry as by the profile of the scene's skin.
 
     textures : maps of the skin as dermis paints them, but with colours under uniform light
-    size : width and height of the picture [pixel]
+    picture_size : width and height of the picture [pixel]
     samples : paths per pixel
     variant : variant of Mitsuba, as in `path_trace`
     """
@@ -301,7 +301,7 @@ def path_trace_view(
     medium = uniform_skin(at_normal_incidence(mean), mean_distance_mm(renderer.skin_profile(scene.skin)), 1.0)
     colour = at_normal_incidence(textures.colour).astype(np.float32)
     textures = replace(textures, colour=colour, strength=np.ones((1, 1), np.float32))
-    return path_trace_person(scene, textures, medium, size, samples, variant=variant)
+    return path_trace_person(scene, textures, medium, picture_size, samples, variant=variant)
 
 
 def mean_distance_mm(profile: GaussianSum) -> Floats:
@@ -311,7 +311,7 @@ def mean_distance_mm(profile: GaussianSum) -> Floats:
 
 
 def at_normal_incidence(diffuse_reflectance: ArrayLike) -> Floats:
-    """Return reflectances at normal incidence of half-spaces of index 1, by those for uniform light [-]."""
+    """Convert reflectances of half-spaces of index 1 from uniform light to light at normal incidence [-]."""
     albedo = 1.0 - np.linspace(1.0, 0.01, 48) ** 2
     uniform, normal = (
         [float(f(one)) for one in albedo] for f in (diffuse_albedo, partial(directional_albedo, 1.0))
@@ -319,7 +319,9 @@ def at_normal_incidence(diffuse_reflectance: ArrayLike) -> Floats:
     return np.asarray(np.interp(np.asarray(diffuse_reflectance, float), uniform, normal))
 
 
-def person_comparison(name: str, dermis_image: Floats, reference: PathTraced, mask: Mask) -> PersonComparison:
+def person_comparison(
+    comparison_name: str, dermis_image: Floats, reference: PathTraced, mask: Mask
+) -> PersonComparison:
     """Return the comparison of a frame with a path-traced picture.
 
     dermis_image : (h, w, 3) linear radiance by dermis
@@ -327,7 +329,7 @@ def person_comparison(name: str, dermis_image: Floats, reference: PathTraced, ma
     """
     image, variance = reference.image.astype(np.float64), reference.variance.astype(np.float64)
     return PersonComparison(
-        name,
+        comparison_name,
         dermis_image,
         image,
         variance,
@@ -493,13 +495,13 @@ def _without_highlights(image: Floats, iris_ring: Mask) -> Mask:
 
 
 def _image_shift(
-    dermis_image: Floats, reference: Floats, noise: Floats, region_mask: Mask
+    dermis_image: Floats, reference: Floats, noise_variance: Floats, region_mask: Mask
 ) -> tuple[Estimate, Estimate]:
     """Return the shift of the reference relative to the picture by dermis, to the right and down [pixel].
 
     Shift and brightness are fitted together by least squares.
 
-    noise : (h, w) variance of the reference
+    noise_variance : (h, w) variance of the reference
     region_mask : (h, w) mask of the pixels to compare
     """
     down, right = (np.asarray(slope) for slope in np.gradient(dermis_image))
@@ -509,11 +511,13 @@ def _image_shift(
     )
     inverse = np.linalg.inv(columns.T @ columns) @ columns.T
     gain, x, y, _ = (float(one) for one in inverse @ reference[region_mask])
-    error: Floats = np.sqrt((inverse**2 * noise[region_mask]).sum(axis=1)) / abs(gain)
+    error: Floats = np.sqrt((inverse**2 * noise_variance[region_mask]).sum(axis=1)) / abs(gain)
     return Estimate(x / gain, float(error[1])), Estimate(y / gain, float(error[2]))
 
 
-def _brightness_ratio(dermis_image: Floats, reference: Floats, noise: Floats, region_mask: Mask) -> Estimate:
+def _brightness_ratio(
+    dermis_image: Floats, reference: Floats, noise_variance: Floats, region_mask: Mask
+) -> Estimate:
     total = float(reference[region_mask].sum())
     ratio = float(dermis_image[region_mask].sum()) / total
-    return Estimate(ratio, ratio * float(np.sqrt(noise[region_mask].sum())) / total)
+    return Estimate(ratio, ratio * float(np.sqrt(noise_variance[region_mask].sum())) / total)

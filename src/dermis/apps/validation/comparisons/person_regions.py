@@ -42,7 +42,7 @@ class Regions:
     masks: dict[str, Mask]
 
     def light_ratios(self, pair: PersonComparison) -> dict[str, Estimate]:
-        """Return the light of the frame divided by that of the reference in each large region [-]."""
+        """Return the frame's light divided by the reference's light, for each large region [-]."""
         found = {}
         for name, mask in self.masks.items():
             inside = mask & pair.mask

@@ -188,20 +188,20 @@ def _irradiance(subject: ComparisonSubject, triangle: NDArray[np.int64], barycen
 
 
 def _integrate_gaussians(
-    points: Floats, light: IrradianceSamples, weight: Floats, variance_mm2: Floats
+    points: Floats, light: IrradianceSamples, gaussian_weight: Floats, variance_mm2: Floats
 ) -> Floats:
     """Return the radiant exitance (n, 3) at points by integrating Gaussians of the Euclidean distance.
 
     points : (n, 3) positions [mm]
     light : irradiance on the surface
-    weight, variance_mm2 : (k, 3) weights and (k,) variances of the Gaussians
+    gaussian_weight, variance_mm2 : (k, 3) weights and (k,) variances of the Gaussians
     """
     from dermis.apps.truths.radial_table import GaussianSum as Profile
     from dermis.apps.truths.surface_integral import integrate_exitance
 
     if not len(variance_mm2):
         return np.zeros_like(points)
-    return integrate_exitance(points, light, Profile(weight, variance_mm2))
+    return integrate_exitance(points, light, Profile(gaussian_weight, variance_mm2))
 
 
 def hit_positions(subject: ComparisonSubject, visible: SurfacePoints) -> Floats:

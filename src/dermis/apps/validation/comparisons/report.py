@@ -42,15 +42,15 @@ def write_report(path: Path, comparison: Comparison) -> None:
         file.write_text(page, encoding="utf-8")
 
 
-def cells(row: ComparisonRow) -> tuple[str, ...]:
+def cells(comparison_row: ComparisonRow) -> tuple[str, ...]:
     """Return the errors of a technique as table cells, with standard errors if the reference has noise."""
-    flip = "-" if row.flip is None else f"{row.flip:.3f}"
+    flip = "-" if comparison_row.flip is None else f"{comparison_row.flip:.3f}"
     return (
-        row.technique,
-        _with_error(row.relrmse, row.relrmse_se),
+        comparison_row.technique,
+        _with_error(comparison_row.relrmse, comparison_row.relrmse_se),
         flip,
-        _with_error(row.energy_ratio, row.energy_ratio_se),
-        f"{row.ms:.3g}",
+        _with_error(comparison_row.energy_ratio, comparison_row.energy_ratio_se),
+        f"{comparison_row.ms:.3g}",
     )
 
 
@@ -64,12 +64,15 @@ def _errors_table(rows: tuple[ComparisonRow, ...]) -> str:
     return f"<table><tr>{head}</tr>" + "".join(f"<tr>{row}</tr>" for row in body) + "</table>"
 
 
-def _technique_figures(comparison: Comparison, row: ComparisonRow) -> str:
-    image, reference = comparison.images[row.technique], comparison.reference
+def _technique_figures(comparison: Comparison, comparison_row: ComparisonRow) -> str:
+    image, reference = comparison.images[comparison_row.technique], comparison.reference
     ours, exact = (np.maximum(comparison.exposure * one, 0.0) for one in (image, reference.image))
     difference = signed_difference(ours, exact)
     difference = np.where(reference.mask[..., None], difference, ZERO_DIFFERENCE_GREY)
-    pictures = {row.technique: comparison.tone_mapped(image), f"{row.technique}: difference": difference}
+    pictures = {
+        comparison_row.technique: comparison.tone_mapped(image),
+        f"{comparison_row.technique}: difference": difference,
+    }
     return "\n".join(_figure(caption, picture) for caption, picture in pictures.items())
 
 

@@ -113,9 +113,9 @@ def medium_scene(
         yield comparison_scene(head, light, region, str(file)), profile
 
 
-def default_region(light: str) -> str:
+def default_region(light_name: str) -> str:
     """Return the region of the face in which a light of the comparisons has the largest effect."""
-    return {"back": "ear", "laser": "three-quarter"}.get(light, "portrait")
+    return {"back": "ear", "laser": "three-quarter"}.get(light_name, "portrait")
 
 
 ModelName = Literal["counted", "layered", "montecarlo"]

@@ -69,19 +69,19 @@ def set_channel(shader: Any, description: dict[str, Any], channel: int) -> None:
     shader.inputs["Subsurface Radius"].default_value = [radius] * 3
 
 
-def add_rectangle(skin: Any, material: Any, left: float, right: float, height: float) -> Any:
+def add_rectangle(skin: Any, material: Any, left_m: float, right_m: float, height_m: float) -> Any:
     """Add a horizontal rectangle between two x coordinates at a height, all in metres.
 
     skin : module of the exported script
     """
     mesh = bpy.data.meshes.new("rectangle")
     corners = [
-        (left, -PLANE_HALF_SIDE_M),
-        (right, -PLANE_HALF_SIDE_M),
-        (right, PLANE_HALF_SIDE_M),
-        (left, PLANE_HALF_SIDE_M),
+        (left_m, -PLANE_HALF_SIDE_M),
+        (right_m, -PLANE_HALF_SIDE_M),
+        (right_m, PLANE_HALF_SIDE_M),
+        (left_m, PLANE_HALF_SIDE_M),
     ]
-    mesh.from_pydata([(x, y, height) for x, y in corners], [], [(0, 1, 2, 3)])
+    mesh.from_pydata([(x, y, height_m) for x, y in corners], [], [(0, 1, 2, 3)])
     mesh.materials.append(material)
     return skin.add_object("rectangle", mesh)
 
@@ -96,7 +96,9 @@ def black_material() -> Any:
     return material
 
 
-def column_radiance(skin: Any, camera: Any, path: Path, width_m: float, size: Any, **parameters: int) -> Any:
+def column_radiance(
+    skin: Any, camera: Any, path: Path, width_m: float, picture_size: Any, **parameters: int
+) -> Any:
     """Render a picture across the edge of the light, and return the mean radiance of each pixel column.
 
     skin : module of the exported script
@@ -104,13 +106,13 @@ def column_radiance(skin: Any, camera: Any, path: Path, width_m: float, size: An
     """
     camera.ortho_scale = width_m
     scene = bpy.context.scene
-    scene.render.resolution_x, scene.render.resolution_y = size
+    scene.render.resolution_x, scene.render.resolution_y = picture_size
     arguments = [word for name, value in parameters.items() for word in (f"--{name}", str(value))]
     skin.finish(skin.parse_options(["--", "--render", str(path), *arguments]))
     picture = bpy.data.images.load(str(path))
-    pixels = np.empty(size[0] * size[1] * 4, np.float32)
+    pixels = np.empty(picture_size[0] * picture_size[1] * 4, np.float32)
     picture.pixels.foreach_get(pixels)
-    return pixels.reshape(size[1], size[0], 4)[..., :3].mean(axis=0).tolist()
+    return pixels.reshape(picture_size[1], picture_size[0], 4)[..., :3].mean(axis=0).tolist()
 
 
 if __name__ == "__main__":

@@ -128,10 +128,10 @@ def over_grey(picture: Floats) -> Floats:
     return np.asarray(picture[..., :3] * (picture[..., 3:] > 0) + 0.05 * (1.0 - picture[..., 3:]))
 
 
-def render_dermis(subject: Subject, side: int) -> Floats:
+def render_dermis(subject: Subject, picture_side: int) -> Floats:
     """Return the linear picture (h, w, 4) of the subject by dermis."""
     assert subject.scene is not None
-    settings = Settings(size=(side, side), atlas=EXPORTED_MAP_SIDE, samples=16)
+    settings = Settings(size=(picture_side, picture_side), atlas=EXPORTED_MAP_SIDE, samples=16)
     return np.asarray(Renderer().draw(subject.scene, settings).linear_rgba(), np.float64)
 
 
@@ -140,7 +140,7 @@ def render_cycles(
     subsurface_method: str,
     version: str,
     python: Path,
-    side: int,
+    picture_side: int,
     samples: int,
     seed_count: int,
 ) -> list[Floats]:
@@ -154,7 +154,10 @@ def render_cycles(
         export_skin(subject, "blender", folder, version=version, variant=subsurface_method)
         script = folder / "skin.py"
         text = script.read_text(encoding="utf-8")
-        script.write_text(text.replace("'size': [1024, 1024]", f"'size': [{side}, {side}]"), encoding="utf-8")
+        script.write_text(
+            text.replace("'size': [1024, 1024]", f"'size': [{picture_side}, {picture_side}]"),
+            encoding="utf-8",
+        )
         result = []
         for seed in range(seed_count):
             picture = folder / f"{seed}.exr"

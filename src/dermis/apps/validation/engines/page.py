@@ -38,7 +38,7 @@ def page() -> None:
     print_lines(blender_tables())
 
 
-def fill_tables(text: str) -> str:
+def fill_tables(page_text: str) -> str:
     """Return the text of the page with new tables between its markers, such as <!-- mitsuba -->."""
     for name, table in {
         "predicted": predicted_table,
@@ -46,9 +46,9 @@ def fill_tables(text: str) -> str:
         "babylon": babylon_table,
         "heads": heads_table,
     }.items():
-        before, rest = text.split(f"<!-- {name} -->")
-        text = f"{before}<!-- {name} -->\n{table()}<!-- /{name} -->{rest.split(f'<!-- /{name} -->')[1]}"
-    return text
+        before, rest = page_text.split(f"<!-- {name} -->")
+        page_text = f"{before}<!-- {name} -->\n{table()}<!-- /{name} -->{rest.split(f'<!-- /{name} -->')[1]}"
+    return page_text
 
 
 def predicted_table() -> str:
@@ -66,9 +66,11 @@ def predicted_table() -> str:
     return markdown_table(_COLUMN_TITLES, lines)
 
 
-def markdown_table(column_titles: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+def markdown_table(column_titles: Sequence[str], table_rows: Iterable[Sequence[str]]) -> str:
     """Return a Markdown table with column titles and rows of cells."""
-    return "".join(f"| {' | '.join(row)} |\n" for row in (column_titles, ["---"] * len(column_titles), *rows))
+    return "".join(
+        f"| {' | '.join(row)} |\n" for row in (column_titles, ["---"] * len(column_titles), *table_rows)
+    )
 
 
 def rgb_cell(rgb: Sequence[float]) -> str:
@@ -103,10 +105,14 @@ def heads_table() -> str:
     return markdown_table(titles, map(_head_row, read_results(RESULTS / "engines_heads.json")["heads"]))
 
 
-def _head_row(row: JsonObject) -> list[str]:
-    outline = "that of dermis" if row["pixels_apart"] == 0 else f"{row['outline_px']:.1f}"
-    figures = rgb_cell(row["lit_colour"]), f"{row['relative_rmse']:.3f}", str(row["pixels"])
-    return [row["program"], outline, *figures]
+def _head_row(comparison: JsonObject) -> list[str]:
+    outline = "that of dermis" if comparison["pixels_apart"] == 0 else f"{comparison['outline_px']:.1f}"
+    figures = (
+        rgb_cell(comparison["lit_colour"]),
+        f"{comparison['relative_rmse']:.3f}",
+        str(comparison["pixels"]),
+    )
+    return [comparison["program"], outline, *figures]
 
 
 def blender_tables() -> str:

@@ -119,15 +119,17 @@ def pass_noise(
     return float(np.sqrt(0.5 * (difference**2).sum() / _signal_energy(mean, mask)))
 
 
-def samples_for_noise(noise: float, samples: Sequence[int], noise_by_samples: Sequence[float]) -> float:
+def samples_for_noise(
+    target_noise: float, samples: Sequence[int], noise_by_samples: Sequence[float]
+) -> float:
     """Return the number of paths per pixel at which the noise reaches a given value.
 
     Noise is assumed proportional to 1 / sqrt(N), from the measured N whose noise is most similar.
 
     samples, noise_by_samples : measured numbers of paths N, and their noise
     """
-    nearest = int(np.abs(np.log(np.divide(noise_by_samples, noise))).argmin())
-    return float(samples[nearest] * (noise_by_samples[nearest] / noise) ** 2)
+    nearest = int(np.abs(np.log(np.divide(noise_by_samples, target_noise))).argmin())
+    return float(samples[nearest] * (noise_by_samples[nearest] / target_noise) ** 2)
 
 
 def _signal_energy(mean: MeanImage, mask: Mask) -> float:
@@ -147,12 +149,14 @@ def _dermis_row(renders: PeerRenders, variant_name: str, mask: Mask) -> Renderer
     return RendererRow("dermis", variant_name, *times, 0.0, *error, *energy)
 
 
-def _time_ratios(row: RendererRow, dermis_row: RendererRow) -> dict[str, float]:
+def _time_ratios(renderer_row: RendererRow, dermis_row: RendererRow) -> dict[str, float]:
     """Return the ratios of the elapsed and CPU times of a row to those of the row `dermis_row` [-]."""
-    assert row.seconds and row.core_seconds and dermis_row.seconds and dermis_row.core_seconds
+    assert (
+        renderer_row.seconds and renderer_row.core_seconds and dermis_row.seconds and dermis_row.core_seconds
+    )
     return {
-        "ratio": row.seconds / dermis_row.seconds,
-        "core_ratio": row.core_seconds / dermis_row.core_seconds,
+        "ratio": renderer_row.seconds / dermis_row.seconds,
+        "core_ratio": renderer_row.core_seconds / dermis_row.core_seconds,
     }
 
 
@@ -165,10 +169,12 @@ def _mitsuba_row(renders: PeerRenders, mask: Mask) -> RendererRow:
     return RendererRow("Mitsuba, volpathmis", setting, *times, noise, None, None, None, None)
 
 
-def _cycles_rows(renders: PeerRenders, method: str, mean: MeanImage, mask: Mask) -> list[RendererRow]:
+def _cycles_rows(
+    renders: PeerRenders, subsurface_method: str, mean: MeanImage, mask: Mask
+) -> list[RendererRow]:
     """Return rows of Cycles: one for each number of paths, and one for the mean of all, without noise."""
     reference, rows = renders.reference, []
-    for level in zip(*renders.cycles[method], strict=True):
+    for level in zip(*renders.cycles[subsurface_method], strict=True):
         pairs = [(one.image, reference.image, mask, reference.variance) for one in level]
         error = np.mean([relative_rmse(*one) for one in pairs], axis=0).tolist()
         energy = np.mean([energy_ratio(*one) for one in pairs], axis=0).tolist()
@@ -176,10 +182,17 @@ def _cycles_rows(renders: PeerRenders, method: str, mean: MeanImage, mask: Mask)
         core_seconds = statistics.mean(one.core_seconds for one in level)
         noise = pass_noise(level[0].image, level[1].image, mean, mask)
         setting = _samples_text(level[0].samples)
-        rows.append(RendererRow(CYCLES_NAMES[method], setting, seconds, core_seconds, noise, *error, *energy))
+        rows.append(
+            RendererRow(
+                CYCLES_NAMES[subsurface_method], setting, seconds, core_seconds, noise, *error, *energy
+            )
+        )
     error = relative_rmse(mean.image, reference.image, mask, reference.variance, mean.variance)
     energy = energy_ratio(mean.image, reference.image, mask, reference.variance)
-    return [*rows, RendererRow(CYCLES_NAMES[method], "noise subtracted", None, None, 0.0, *error, *energy)]
+    return [
+        *rows,
+        RendererRow(CYCLES_NAMES[subsurface_method], "noise subtracted", None, None, 0.0, *error, *energy),
+    ]
 
 
 def _equal_error_costs(

@@ -150,15 +150,20 @@ def machine_text(report: JsonObject) -> str:
     return f"{report['date']}, {side}x{side}, {machine}; {versions}"
 
 
-def _table_line(row: JsonObject) -> str:
-    seconds = "-" if row["seconds"] is None else f"{row['seconds']:.3g}"
-    noise = f"{row['noise']:.1%}" if row["noise"] > 0 else "-"
-    cells = row["renderer"], row["setting"], seconds, noise
-    return f"| {' | '.join((*cells, _estimate_cell(row, 'relrmse'), _estimate_cell(row, 'energy_ratio')))} |"
+def _table_line(renderer_row: JsonObject) -> str:
+    seconds = "-" if renderer_row["seconds"] is None else f"{renderer_row['seconds']:.3g}"
+    noise = f"{renderer_row['noise']:.1%}" if renderer_row["noise"] > 0 else "-"
+    cells = renderer_row["renderer"], renderer_row["setting"], seconds, noise
+    errors = [_estimate_cell(renderer_row, name) for name in ("relrmse", "energy_ratio")]
+    return f"| {' | '.join((*cells, *errors))} |"
 
 
-def _estimate_cell(row: JsonObject, error_name: str) -> str:
-    return "-" if row[error_name] is None else f"{row[error_name]:.4f} ± {row[error_name + '_se']:.4f}"
+def _estimate_cell(renderer_row: JsonObject, error_name: str) -> str:
+    return (
+        "-"
+        if renderer_row[error_name] is None
+        else f"{renderer_row[error_name]:.4f} ± {renderer_row[error_name + '_se']:.4f}"
+    )
 
 
 def _scene_sentences(scene: JsonObject) -> list[str]:

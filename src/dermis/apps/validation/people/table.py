@@ -266,14 +266,14 @@ def _drawn_cheeks(document: dict[str, Any], group: str, people: _Population) -> 
     return found, found.variables(weights, people.sexes, people.ages, scores)
 
 
-def _matching_shift(variables: Doubles, target_colour: Doubles, count: int) -> tuple[Doubles, Doubles]:
-    """Return the shift (4,) of variables that moves a median colour to a target, and the error (3,) left.
+def _matching_shift(variables: Doubles, target_colour: Doubles, people_count: int) -> tuple[Doubles, Doubles]:
+    """Return the shift (4,) of variables that moves a median colour to a target, and the error left (3,).
 
     variables : (n, 4) variables of people
     target_colour : (3,) median colour to reach [CIELAB]
-    count : number of variables that may be shifted
+    people_count : number of variables that may be shifted
     """
-    shift, used = np.zeros(4), np.arange(4) < count
+    shift, used = np.zeros(4), np.arange(4) < people_count
 
     def median(offset: Doubles) -> Doubles:
         return np.asarray(np.median(model_lab(variables + offset), axis=0))

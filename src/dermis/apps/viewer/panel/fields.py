@@ -67,7 +67,7 @@ _COLOUR_TYPE: Any = Colour
 
 def draw_fields(
     session: Session,
-    values: FrozenModel,
+    model: FrozenModel,
     make_state: FieldsToState,
     styles: Mapping[str, FieldStyle],
     field_names: Iterable[str] | None = None,
@@ -80,8 +80,8 @@ def draw_fields(
     field_names : names of the fields to draw, None for all
     label_suffix : "##id" that distinguishes controls with equal labels
     """
-    for name in type(values).model_fields if field_names is None else field_names:
-        _draw_field(session, values, name, make_state, styles.get(name, _DEFAULT_STYLE), label_suffix)
+    for name in type(model).model_fields if field_names is None else field_names:
+        _draw_field(session, model, name, make_state, styles.get(name, _DEFAULT_STYLE), label_suffix)
 
 
 def _draw_field(
@@ -314,8 +314,8 @@ def record_position(session: Session, label: str) -> None:
     session.positions[_label_key(label)] = x, 0.5 * float(low.y + high.y)
 
 
-def _label_key(label: str) -> str:
-    return label.rpartition("###")[2]
+def _label_key(control_label: str) -> str:
+    return control_label.rpartition("###")[2]
 
 
 def run_action(session: Session, action: Callable[[], None]) -> None:

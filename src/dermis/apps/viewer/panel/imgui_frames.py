@@ -80,14 +80,14 @@ class ImguiFrames:
         imgui.set_current_context(self._context)
         implot.set_current_context(self._plot_context)
 
-    def lay_out(self, size: tuple[float, float], draw: Callable[[], None]) -> None:
+    def lay_out(self, window_size: tuple[float, float], draw: Callable[[], None]) -> None:
         """Process pending input and lay out the next frame; `render` draws this frame.
 
-        size : logical size of the window
+        window_size : logical size of the window
         draw : function that declares the windows and controls
         """
         try:
-            imgui.get_io().display_size = imgui.ImVec2(*size)
+            imgui.get_io().display_size = imgui.ImVec2(*window_size)
             for _ in range(2 if self._is_new else 1):  # the first frame of a context only measures the window
                 self._is_new = False
                 imgui.new_frame()
@@ -99,12 +99,12 @@ class ImguiFrames:
             self._report_error(error)
             self._recreate_context()
 
-    def render(self, target: TextureView) -> None:
+    def render(self, target_view: TextureView) -> None:
         """Draw the last layout over the target; draw nothing if that layout failed."""
         if not self._has_layout:
             return
         encoder = self._device.handle.create_command_encoder()
-        attachment = {"view": target, "load_op": "load", "store_op": "store"}
+        attachment = {"view": target_view, "load_op": "load", "store_op": "store"}
         render_pass = encoder.begin_render_pass(label="panel", color_attachments=[attachment])
         self._imgui_backend.render(imgui.get_draw_data(), render_pass)
         render_pass.end()

@@ -51,7 +51,7 @@ def draw_divider(split: SplitView, picture_left: float, window_size: tuple[float
     """Draw the divider between before and after, with a handle in its centre.
 
     picture_left : left edge of the picture
-    window_size : logical size of the window
+    window_size : width and height of the window [logical pixel]
     """
     if split.frozen_state is None:
         return
@@ -78,7 +78,7 @@ def draw_messages(
     """Draw lines of text on a dark background along the lower edge of the picture.
 
     picture_left : left edge of the picture
-    window_size : logical size of the window
+    window_size : width and height of the window [logical pixel]
     """
     if not message_lines:
         return
@@ -102,7 +102,7 @@ def draw_help(picture_left: float, window_size: tuple[float, float]) -> None:
     """Draw the list of shortcuts in the centre of the picture; pointer events pass through the list.
 
     picture_left : left edge of the picture
-    window_size : logical size of the window
+    window_size : width and height of the window [logical pixel]
     """
     width = min(_HELP_WIDTH, window_size[0] - picture_left - 2.0 * _MESSAGE_MARGIN)
     imgui.set_next_window_pos(
@@ -163,14 +163,14 @@ class Panel:
     def width(self, window_size: tuple[float, float]) -> float:
         """Return the width by which the panel narrows the picture, 0 for a drawer [logical pixel].
 
-        window_size : logical size of the window
+        window_size : width and height of the window [logical pixel]
         """
         return 0.0 if is_drawer(window_size) else self._covered_width(window_size)
 
     def _covered_width(self, window_size: tuple[float, float]) -> float:
         """Return the width of the window that the panel covers, 0 for a hidden panel [logical pixel].
 
-        window_size : logical size of the window
+        window_size : width and height of the window [logical pixel]
         """
         fraction, is_shown = _MAX_PANEL_WIDTH_FRACTION, self.is_visible
         if is_drawer(window_size):
@@ -187,7 +187,7 @@ class Panel:
     def handle_event(self, event: Event, window_size: tuple[float, float]) -> bool:
         """Process an input event of the panel; return False for an event that is for the picture.
 
-        window_size : logical size of the window
+        window_size : width and height of the window [logical pixel]
         """
         self._frames.enter()
         self._size = window_size
@@ -208,15 +208,15 @@ class Panel:
         feed_key(event, lambda: self._lay_out_frame(window_size))
         return bool(imgui.get_io().want_text_input)  # of the current context, which the frame may replace
 
-    def draw(self, target: TextureView, window_size: tuple[float, float], pixel_ratio: float) -> None:
+    def draw(self, target_view: TextureView, window_size: tuple[float, float], pixel_ratio: float) -> None:
         """Draw the panel over the target.
 
-        window_size : logical size of the window
+        window_size : width and height of the window [logical pixel]
         """
         self._frames.enter()
         imgui.get_io().display_framebuffer_scale = imgui.ImVec2(pixel_ratio, pixel_ratio)
         self._lay_out_frame(window_size)
-        self._frames.render(target)
+        self._frames.render(target_view)
 
     def _lay_out_frame(self, window_size: tuple[float, float]) -> None:
         self._size = window_size
@@ -258,7 +258,7 @@ class Panel:
         """Return whether a position is over the panel; Dear ImGui could answer this only one frame later.
 
         x, y : position of the pointer in the window
-        window_size : logical size of the window
+        window_size : width and height of the window [logical pixel]
         """
         width = self._covered_width(window_size)
         on_button = not width and x < self._button_end[0] and y < self._button_end[1]

@@ -74,13 +74,17 @@ class SkinAppearance(NamedTuple):
 
 
 def scene_files(
-    scene: Scene, appearance: SkinAppearance, boundary: Boundary, size: tuple[int, int], samples: int
+    scene: Scene,
+    appearance: SkinAppearance,
+    boundary: Boundary,
+    picture_size: tuple[int, int],
+    samples_per_pixel: int,
 ) -> Iterator[tuple[str, bytes]]:
     """Yield name and content of each file of the scene, with scene.xml first.
 
     boundary : surface model of the skin that scene.xml selects by default
-    size : width and height of the picture [pixel]
-    samples : samples per pixel
+    picture_size : width and height of the picture [pixel]
+    samples_per_pixel : number of paths that Mitsuba traces for each pixel
 
     Raises DermisError if the scene has lights without shadows, a camera with a shifted lens, or skin that
     does not enclose a volume, which Mitsuba does not support.
@@ -89,7 +93,9 @@ def scene_files(
     meshes = skin_meshes(backend, scene.head)
     yield (
         "scene.xml",
-        xml.scene_document(_scene_elements(backend, scene, appearance, boundary, (*size, samples))),
+        xml.scene_document(
+            _scene_elements(backend, scene, appearance, boundary, (*picture_size, samples_per_pixel))
+        ),
     )
     for each in BOUNDARIES:
         yield f"boundary_{each}.xml", xml.scene_document(_skin_elements(backend, each, appearance, meshes))

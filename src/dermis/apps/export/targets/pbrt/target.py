@@ -143,19 +143,21 @@ def _sample_depths() -> Floats:
     return np.asarray(-np.log1p(-(np.arange(_SAMPLE_DEPTH_COUNT) + 0.5) / _SAMPLE_DEPTH_COUNT))
 
 
-def _integrate_spline(x: Floats, values: Floats) -> Floats:
+def _integrate_spline(knot_positions: Floats, knot_values: Floats) -> Floats:
     """Return the running integrals (n, m) of Catmull-Rom splines, from x[0] to each x.
 
-    x : (m,) increasing knots
-    values : (n, m) values of each spline at the knots
+    knot_positions : (m,) increasing knots
+    knot_values : (n, m) values of each spline at the knots
     """
-    slope = np.empty_like(values)
-    slope[:, 1:-1] = (values[:, 2:] - values[:, :-2]) / (x[2:] - x[:-2])
-    slope[:, 0] = (values[:, 1] - values[:, 0]) / (x[1] - x[0])
-    slope[:, -1] = (values[:, -1] - values[:, -2]) / (x[-1] - x[-2])
-    width = np.diff(x)
-    areas = width * (0.5 * (values[:, 1:] + values[:, :-1]) + width * (slope[:, :-1] - slope[:, 1:]) / 12.0)
-    return np.concatenate([np.zeros((len(values), 1)), np.cumsum(areas, axis=1)], axis=1)
+    slope = np.empty_like(knot_values)
+    slope[:, 1:-1] = (knot_values[:, 2:] - knot_values[:, :-2]) / (knot_positions[2:] - knot_positions[:-2])
+    slope[:, 0] = (knot_values[:, 1] - knot_values[:, 0]) / (knot_positions[1] - knot_positions[0])
+    slope[:, -1] = (knot_values[:, -1] - knot_values[:, -2]) / (knot_positions[-1] - knot_positions[-2])
+    width = np.diff(knot_positions)
+    areas = width * (
+        0.5 * (knot_values[:, 1:] + knot_values[:, :-1]) + width * (slope[:, :-1] - slope[:, 1:]) / 12.0
+    )
+    return np.concatenate([np.zeros((len(knot_values), 1)), np.cumsum(areas, axis=1)], axis=1)
 
 
 class Pbrt(Target):

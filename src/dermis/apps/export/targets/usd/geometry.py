@@ -205,13 +205,13 @@ def _bind_joints(binding: UsdSkel.BindingAPI, deformable: DeformableMesh) -> Non
 
 
 def _add_blend_shapes(
-    stage: Usd.Stage, mesh: Usd.Prim, deformable: DeformableMesh, names: Sequence[str]
+    stage: Usd.Stage, mesh: Usd.Prim, deformable: DeformableMesh, shape_names: Sequence[str]
 ) -> None:
     vertex = point_vertices(deformable.head.mesh)
     point = np.full(len(deformable.head.mesh.positions), -1, np.int32)
     point[vertex] = np.arange(len(vertex))
     titles = deformable.rig.targets.names
-    for name, title, target in zip(names, titles, deformable.targets(), strict=True):
+    for name, title, target in zip(shape_names, titles, deformable.targets(), strict=True):
         shape = UsdSkel.BlendShape.Define(stage, mesh.GetPath().AppendChild(name))
         points = point[target.vertex]
         order = np.flatnonzero(points >= 0)

@@ -56,17 +56,21 @@ class PageContent:
     picture_entries: dict[PictureKey, tuple[int, int, int]] = field(default_factory=dict)
     poster: NDArray[np.uint8] | None = None
 
-    def add_picture(self, key: PictureKey) -> tuple[int, int, int]:
+    def add_picture(self, picture_key: PictureKey) -> tuple[int, int, int]:
         """Add the picture and value curves of a map layer unless present; return the layer's picture entry.
 
-        key : role, mip level and layer
+        picture_key : role, mip level and layer
         """
-        if key not in self.picture_entries:
-            picture = self.maps.pictures[key]
+        if picture_key not in self.picture_entries:
+            picture = self.maps.pictures[picture_key]
             curves = self.byte_runs.add(np.ascontiguousarray(picture.curves).view(np.uint8).reshape(-1))
-            self.picture_entries[key] = len(self.pictures), curves, 3 if key[0] == "colour_map" else 0
+            self.picture_entries[picture_key] = (
+                len(self.pictures),
+                curves,
+                3 if picture_key[0] == "colour_map" else 0,
+            )
             self.pictures.append(picture.data)
-        return self.picture_entries[key]
+        return self.picture_entries[picture_key]
 
 
 @dataclass(frozen=True)
@@ -165,7 +169,7 @@ def _frame_changes(
     request: PageRequest,
     settings: Settings,
     default_inputs: FrameInputs,
-    frame: NamedFrame,
+    named_frame: NamedFrame,
 ) -> Json:
     """Return, by slider name, how a frame's records and buffers change at each node of the slider.
 
@@ -176,8 +180,8 @@ def _frame_changes(
     def node_json(inputs: FrameInputs | None) -> Json | None:
         if inputs is None:
             return None
-        node = reduce_hair(capture_frame(capture, inputs), frame.merged_hairs)
-        return node_changes(frame.captured, node, byte_runs)
+        node = reduce_hair(capture_frame(capture, inputs), named_frame.merged_hairs)
+        return node_changes(named_frame.captured, node, byte_runs)
 
     return {
         slider.name: [

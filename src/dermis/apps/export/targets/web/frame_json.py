@@ -111,16 +111,18 @@ def _mip_bytes(capture: FrameCapture, resource_index: int) -> list[Bytes]:
     return [np.concatenate(parts[k : k + count]) for k in range(0, len(parts), count)]
 
 
-def _frame_json(frame: NamedFrame, picture: list[int], byte_runs: ByteRunCollector) -> Json:
-    records = [(struct, byte_runs.add(record.tobytes())) for struct, record in frame.captured.records]
+def _frame_json(named_frame: NamedFrame, picture_entry: list[int], byte_runs: ByteRunCollector) -> Json:
+    records = [(struct, byte_runs.add(record.tobytes())) for struct, record in named_frame.captured.records]
     return {
-        "name": frame.name,
-        "size": frame.size,
-        "moving": frame.merged_hairs > 0,
-        "picture": picture[0],
-        "linear": picture[1],
-        "views": {stage: _view_record_index(frame.captured, stage) for stage in ("visibility", "shadows")},
-        "passes": _passes_json(frame.captured, byte_runs),
+        "name": named_frame.name,
+        "size": named_frame.size,
+        "moving": named_frame.merged_hairs > 0,
+        "picture": picture_entry[0],
+        "linear": picture_entry[1],
+        "views": {
+            stage: _view_record_index(named_frame.captured, stage) for stage in ("visibility", "shadows")
+        },
+        "passes": _passes_json(named_frame.captured, byte_runs),
         "records": records,
     }
 

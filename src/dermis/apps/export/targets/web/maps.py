@@ -147,7 +147,7 @@ class MapPictures:
         """Add the pictures of a mip level, and return the (l, h, w, c) texels decoded from the pictures.
 
         resource_index : index of the texture or buffer in the capture
-        mip_level : mip level
+        mip_level : mip level, 0 for the full resolution
         """
         layers = read_texels(capture, resource_index, mip_level)
         for layer, texels in enumerate(layers):

@@ -74,16 +74,16 @@ class ExtendedModel:
 
     constants: dict[str, float]
 
-    def __call__(self, values: ParameterValues) -> Floats:
+    def __call__(self, parameter_values: ParameterValues) -> Floats:
         """Return the diffuse reflectances (n, 31) of skins.
 
-        values : parameters of the skins by name
+        parameter_values : parameters of the skins by name
         """
         defaults = {"vessel_mm": 0.0, "bandwidth_nm": 0.0, "scattering": 1.0}
 
         def parameter(name: str) -> Floats:
             fallback = self.constants.get(name, defaults.get(name, CONSTANTS[name].start))
-            return np.asarray(values.get(name, np.float64(fallback)))[..., None]
+            return np.asarray(parameter_values.get(name, np.float64(fallback)))[..., None]
 
         wavelength = WAVELENGTHS_NM
         bloodless = parameter("baseline") * baseline_absorption(wavelength)

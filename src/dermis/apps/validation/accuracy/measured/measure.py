@@ -113,7 +113,7 @@ def measured_page() -> None:
 
 
 def _default_skin_errors(archive: Archive) -> JsonObject:
-    """Return errors of the former and the present default skin, and two between; also by group and site."""
+    """Return fit errors of the former default skin, of the present one, and of two skins between them."""
     skins = {
         "former": FORMER_SKIN,
         "half": replace(FORMER_SKIN, baseline=0.5),
@@ -197,9 +197,10 @@ def _surface_distances(archive_part: Archive) -> Floats:
 
 
 def _limit_fractions(archive: Archive) -> JsonObject:
-    """Return three fractions of the colour fits with three unknowns.
+    """Return fractions of the colour fits with three unknowns, by kind of failure.
 
-    The first two have oxygenation 0 and 1; the last do not reproduce the measured colour.
+    none, all : fractions of the fits with oxygenation 0 and 1
+    unmatched : fraction of the fits that do not reproduce the measured colour
     """
     fit = fit_skin(archive.spectra, THREE_UNKNOWNS, "colour")
     oxygen = fit.values["oxygen"]
@@ -236,7 +237,7 @@ def _illuminant_errors(fits: dict[str, SpectralFit]) -> JsonObject:
 
 
 def _fold_errors(archive: Archive) -> list[JsonObject]:
-    """Return, for each fold of people, constants fitted to the other folds, and its errors with them."""
+    """Return, for each fold of people, constants fitted to the other folds, and the errors of the fold."""
     rows = []
     for fold in range(FOLD_COUNT):
         known = archive.rows(archive.fold != fold).sample(_CONSTANTS_SAMPLE_COUNT, fold)
@@ -292,12 +293,12 @@ def _published_model_errors(archive: Archive, bioskin: Path | None) -> JsonObjec
     return results
 
 
-def _jacques_model(values: ParameterValues) -> Floats:
+def _jacques_model(parameter_values: ParameterValues) -> Floats:
     """Return the reflectance (n, 31) of skins with the baseline and scattering of [Jacques1998]."""
     bloodless, sigma_s_prime = baseline_absorption(WAVELENGTHS_NM), jacques_1998(WAVELENGTHS_NM)
 
     def parameter(name: str, default: float) -> Floats:
-        return np.asarray(values.get(name, np.float64(default)))[..., None]
+        return np.asarray(parameter_values.get(name, np.float64(default)))[..., None]
 
     m, b, oxygen = parameter("melanin", 0.0), parameter("blood", 0.0), parameter("oxygen", 0.75)
     vessels = oxygen * blood(WAVELENGTHS_NM, 1.0) + (1.0 - oxygen) * blood(WAVELENGTHS_NM, 0.0)
@@ -376,7 +377,7 @@ def _site_fold_errors(archive: Archive) -> JsonObject:
 
 
 def _edge_loss_errors(sample: Archive) -> JsonObject:
-    """Return the light that apertures miss, and the constants fitted to spectra corrected for it."""
+    """Return the light that apertures miss, and the constants fitted to spectra corrected for this loss."""
     skins = [replace(DEFAULT_SKIN, melanin=m, blood=0.008) for m in _EDGE_LOSS_MELANIN]
     losses = [edge_loss(one, _EDGE_LOSS_WAVELENGTHS_NM) for one in skins]
     model = ExtendedModel({"baseline": DEFAULT_SKIN.baseline, "oxygen": DEFAULT_SKIN.oxygen})
@@ -405,16 +406,16 @@ def _edge_loss_errors(sample: Archive) -> JsonObject:
     return _arrays_to_lists(results)
 
 
-def _percentiles(values: Floats, percentiles: Sequence[float] = _ERROR_PERCENTILES) -> list[float]:
-    return [float(one) for one in np.percentile(values, percentiles)]
+def _percentiles(errors: Floats, percentiles: Sequence[float] = _ERROR_PERCENTILES) -> list[float]:
+    return [float(one) for one in np.percentile(errors, percentiles)]
 
 
-def _arrays_to_lists(value: object) -> JsonObject:
+def _arrays_to_lists(nested_value: object) -> JsonObject:
     """Return nested dictionaries in which lists replace arrays."""
-    if isinstance(value, np.ndarray):
-        return value.tolist()  # type: ignore[no-any-return]
-    if isinstance(value, dict):
-        return {str(key): _arrays_to_lists(one) for key, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [_arrays_to_lists(one) for one in value]  # type: ignore[return-value]
-    return value  # type: ignore[return-value]
+    if isinstance(nested_value, np.ndarray):
+        return nested_value.tolist()  # type: ignore[no-any-return]
+    if isinstance(nested_value, dict):
+        return {str(key): _arrays_to_lists(one) for key, one in nested_value.items()}
+    if isinstance(nested_value, list | tuple):
+        return [_arrays_to_lists(one) for one in nested_value]  # type: ignore[return-value]
+    return nested_value  # type: ignore[return-value]

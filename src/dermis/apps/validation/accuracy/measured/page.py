@@ -188,11 +188,11 @@ def _residual_table(models: JsonObject) -> str:
 
 
 def _category_table(
-    category_title: str, category_names: Sequence[str], rows: Sequence[Sequence[float]]
+    category_title: str, category_names: Sequence[str], category_rows: Sequence[Sequence[float]]
 ) -> str:
     cells = [
         [name, f"{count:.0f}", f"{two:.2f}", f"{three:.2f}", f"{five:.4f}"]
-        for name, (count, two, three, five) in zip(category_names, rows, strict=True)
+        for name, (count, two, three, five) in zip(category_names, category_rows, strict=True)
     ]
     return _markdown_table((category_title, "spectra", "two", "three", "five, RMS"), cells)
 
@@ -262,6 +262,6 @@ def _joined_numbers(numbers: Sequence[float], digits: int = 2) -> str:
     return " / ".join(f"{one:.{digits}f}" for one in numbers)
 
 
-def _markdown_table(column_titles: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    lines = [column_titles, ["---"] * len(column_titles), *rows]
+def _markdown_table(column_titles: Sequence[str], table_rows: Iterable[Sequence[str]]) -> str:
+    lines = [column_titles, ["---"] * len(column_titles), *table_rows]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
