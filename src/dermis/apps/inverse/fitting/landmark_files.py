@@ -121,7 +121,7 @@ def _identify_landmarks(path: str | Path, file_landmarks: _Points) -> tuple[str,
 
 
 def _identify_five_landmarks(pixels: Floats) -> tuple[str, Sequence[int]]:
-    """Return the landmark set to which five points belong by their arrangement, and their numbers in the set.
+    """Return the landmark set to which five points belong by their arrangement, and the landmark numbers.
 
     They are those of dlib if the first four are on a line, as the corners of the eyes are. Left and right are
     exchanged if the file starts with the other side.

@@ -150,7 +150,7 @@ def _dermis_row(renders: PeerRenders, variant_name: str, mask: Mask) -> Renderer
 
 
 def _time_ratios(renderer_row: RendererRow, dermis_row: RendererRow) -> dict[str, float]:
-    """Return the ratios of the elapsed and CPU times of a row to those of the row `dermis_row` [-]."""
+    """Return the ratios of a renderer's elapsed and CPU times to the times of dermis [-]."""
     assert (
         renderer_row.seconds and renderer_row.core_seconds and dermis_row.seconds and dermis_row.core_seconds
     )

@@ -193,7 +193,7 @@ def resources_read_first(capture: FrameCapture, frames: Frames) -> list[int]:
 def resources_bound_as(
     capture: FrameCapture, frames: Frames, binding_names: tuple[str, ...]
 ) -> dict[int, str]:
-    """Return the name under which shaders bind each resource by index, for names in `binding_names`."""
+    """Return, by resource index, the name of `binding_names` under which shaders bind the resource."""
     found: dict[int, str] = {}
     for one in (one for frame in frames for one in frame.passes if one.program is not None):
         bound_names = [name for _, name, _ in capture.programs[one.program or 0]["bindings"]]

@@ -113,7 +113,7 @@ def measured_page() -> None:
 
 
 def _default_skin_errors(archive: Archive) -> JsonObject:
-    """Return fit errors of the former default skin, of the present one, and of two skins between them."""
+    """Return fit errors of the former default skin, the present default skin, and two skins between them."""
     skins = {
         "former": FORMER_SKIN,
         "half": replace(FORMER_SKIN, baseline=0.5),
