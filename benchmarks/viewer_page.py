@@ -292,7 +292,7 @@ def _encoding_times_ms(still: Picture) -> dict[str, float]:
         runs = []
         for _ in range(9):
             began = time.perf_counter()
-            encode_image(array, lossless=lossless)
+            encode_image(array, is_lossless=lossless)
             runs.append(1e3 * (time.perf_counter() - began))
         times[name] = float(np.median(runs))
     return times

@@ -86,7 +86,7 @@ def test_a_worker_without_the_shared_disk_is_refused(tmp_path: Path) -> None:
         run=lambda path_exists, marker: {"tcp://a": path_exists(marker), "tcp://b": False}
     )
     with (
-        module._shared_marker(tmp_path) as marker,
+        module._create_marker_file(tmp_path) as marker,
         pytest.raises(DermisError, match=r"a disk that all workers share.*tcp://b"),
     ):
         module._check_shared_disk(client, marker)

@@ -59,7 +59,7 @@ def test_the_exit_status_is_2_if_all_workers_fail(
 ) -> None:
     out, lost = incomplete_set
     before = contents(out)
-    monkeypatch.setattr("dermis.apps.batch.worker_pool.MAX_ATTEMPTS", ATTEMPTS)
+    monkeypatch.setattr("dermis.apps.batch.worker_pool.MAX_TASK_ATTEMPTS", ATTEMPTS)
     monkeypatch.setenv(losing_worker.WORKERS, "9")
     arguments = ["batch", str(small_folder / "spec.toml"), "-o", str(out), "--adapter", HERE.adapter]
     monkeypatch.setattr(sys, "argv", ["dermis", *arguments, "--workers", "1", "--encoders", "0"])

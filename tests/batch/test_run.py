@@ -163,7 +163,7 @@ def test_killed_workers_lose_nothing(small_spec: Spec, undisturbed: Files, tmp_p
 def test_a_shard_that_no_worker_survives_is_given_up(
     small_spec: Spec, undisturbed: Files, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("dermis.apps.batch.worker_pool.MAX_ATTEMPTS", 2)
+    monkeypatch.setattr("dermis.apps.batch.worker_pool.MAX_TASK_ATTEMPTS", 2)
     put(undisturbed, tmp_path)
     lost = next(name for name in sorted(undisturbed) if name.startswith("shard-"))
     (tmp_path / lost).unlink()

@@ -30,7 +30,7 @@ from dermis.apps.batch.shards import (
     shard_exists,
     shard_path,
 )
-from dermis.apps.batch.spec import COUNT_LINE, GENERATOR_LINE, Spec
+from dermis.apps.batch.spec import COUNT_LINE_PATTERN, GENERATOR_LINE_PATTERN, Spec
 from dermis.apps.batch.worker import RunOptions, Worker, WorkerEvent
 from dermis.base.errors import DermisError
 
@@ -152,9 +152,9 @@ def test_images_of_a_smaller_shard_are_kept(tmp_path: Path, spec: Spec) -> None:
     [
         (lambda text: text, COUNT - 1, r"count of at least the 50 images .* got 49\. Use --count 50"),
         (lambda text: text.replace("generator = 2", "generator = 7"), COUNT, "generator number 2.* number 7"),
-        (lambda text: GENERATOR_LINE.sub("", text), COUNT, "generator number 2.* number 1"),
+        (lambda text: GENERATOR_LINE_PATTERN.sub("", text), COUNT, "generator number 2.* number 1"),
         (lambda text: text.replace("seed = 0", "seed = 5"), COUNT + 1, r"its spec\.toml differs"),
-        (lambda text: COUNT_LINE.sub("", text), COUNT, r"its spec\.toml differs"),
+        (lambda text: COUNT_LINE_PATTERN.sub("", text), COUNT, r"its spec\.toml differs"),
     ],
 )
 def test_other_sets_are_refused(tmp_path: Path, known: Any, count: int, message: str) -> None:

@@ -80,8 +80,8 @@ def test_failures_are_reported_and_leave_no_files(
 
 
 def test_an_endless_run_is_stopped(compare: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cycles, "_MAX_START_S", 0.1)
-    monkeypatch.setattr(cycles, "_MAX_PATH_S", 0.0)
+    monkeypatch.setattr(cycles, "_MAX_STARTUP_S", 0.1)
+    monkeypatch.setattr(cycles, "_MAX_SECONDS_PER_PATH", 0.0)
     ended = compare("exec sleep 60", "--json")
     assert (ended.code, ended.stdout) == (2, "")
     assert "it was ended after 0 s. Take fewer samples" in ended.stderr

@@ -74,7 +74,7 @@ def test_fit_recovers_skin_and_light(fitted: FitResult) -> None:
     true = np.array([0.5, 0.4, 0.77])
     assert towards @ true / np.linalg.norm(true) > np.cos(np.radians(3.0))
     assert strength == pytest.approx(2.0, rel=0.1)
-    assert light_basis.panorama(fitted.strengths[: light_basis.BASIS_SIZE]).mean() == pytest.approx(
+    assert light_basis.panorama(fitted.strengths[: light_basis.AMBIENT_LOBE_COUNT]).mean() == pytest.approx(
         0.3, rel=0.2
     )
     assert fitted.residual < 0.02

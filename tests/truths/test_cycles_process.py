@@ -70,7 +70,7 @@ def test_crash_reports_the_signal(python: Path) -> None:
 
 
 def test_endless_run_is_stopped(python: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cycles, "_MAX_START_S", 0.2)
+    monkeypatch.setattr(cycles, "_MAX_STARTUP_S", 0.2)
     with pytest.raises(DermisError, match=r"it was ended after 0 s\. Take fewer samples or a smaller image"):
         render(python, "exec sleep 60")
 

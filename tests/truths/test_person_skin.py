@@ -130,7 +130,7 @@ def test_the_grid_has_the_colour_of_the_nearest_skin() -> None:
     person = ball()
     person = replace(person, textures=replace(person.textures, colour=halves))
     box = np.full(3, 22.0)
-    grid = colour_grid(person, -box, box, voxels=22)
+    grid = colour_grid(person, -box, box, voxels_per_side=22)
     above, below = grid[11, 20, 11], grid[11, 1, 11]
     assert above[0] > above[2] and below[2] > below[0]
     np.testing.assert_allclose(grid[11, 11, 11], grid.reshape(-1, 3).mean(axis=0), atol=0.1)

@@ -9,7 +9,7 @@ from scipy.special import eval_legendre
 from surface_areas import vertex_areas
 
 from dermis.apps.truths.surface_diffusion import (
-    STEPS_PER_LEVEL,
+    TIME_STEPS_PER_LEVEL,
     diffuse_on_surface,
     longest_edge_mm,
     max_edge_mm,
@@ -51,7 +51,7 @@ def point_of_light(surface: Surface) -> tuple[Floats, Floats]:
 
 
 def harmonic_decay(
-    radius_mm: float, degree: int, variance: float, segments: int, steps: int = STEPS_PER_LEVEL
+    radius_mm: float, degree: int, variance: float, segments: int, steps: int = TIME_STEPS_PER_LEVEL
 ) -> float:
     """Return the remaining fraction of a spherical harmonic."""
     surface = welded_surface(uv_sphere(radius_mm, segments, segments // 2))

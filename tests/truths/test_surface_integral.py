@@ -83,7 +83,7 @@ def test_edge_of_light_is_smoothed(profile: GaussianSum) -> None:
     def half(places: MeshPoints) -> Floats:
         return white((places.positions[:, 0] > 0.123).astype(np.float64))
 
-    samples = sample_irradiance(plane(40.0), half, 3.0, finest_mm=0.02)
+    samples = sample_irradiance(plane(40.0), half, 3.0, min_spacing_mm=0.02)
     x = np.linspace(-4.0, 4.0, 161)
     exitance = integrate_exitance(np.column_stack((x, 0.0 * x, 0.0 * x)), samples, profile)
     reached = ndtr((x[:, None] - 0.123) / np.sqrt(profile.variance_mm2)) @ profile.weight

@@ -63,7 +63,7 @@ def test_samples_are_denser_where_light_changes() -> None:
         inside = np.hypot(mesh_points.positions[:, 0], mesh_points.positions[:, 1]) < 3.0
         return np.repeat(inside[:, None].astype(np.float64), 3, axis=1)
 
-    samples = sample_irradiance(plane(20.0), disc, 2.0, finest_mm=0.1)
+    samples = sample_irradiance(plane(20.0), disc, 2.0, min_spacing_mm=0.1)
     assert sum(asked) == len(samples.positions) and len(asked) > 3
     r = np.linalg.norm(samples.positions, axis=1)
     np.testing.assert_array_equal(samples.irradiance[:, 0], r < 3.0)
@@ -82,7 +82,7 @@ def test_refinement_ends_at_a_single_bright_corner() -> None:
         at = np.linalg.norm(mesh_points.positions - np.array([5.0, 5.0, 0.0]), axis=1) < 1e-6
         return np.repeat(at[:, None].astype(np.float64), 3, axis=1)
 
-    samples = sample_irradiance(plane(10.0), corner, 10.0, finest_mm=0.05)
+    samples = sample_irradiance(plane(10.0), corner, 10.0, min_spacing_mm=0.05)
     corners = samples.positions[samples.triangles]
     sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
     assert len(samples.triangles) < 200

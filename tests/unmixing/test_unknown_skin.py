@@ -58,7 +58,7 @@ def test_two_thirds_of_people_are_within_one_stated_deviation() -> None:
 
 def test_known_parameters_leave_less_deviation() -> None:
     nothing = unknown_skin_sd(0.05, 0.01)
-    thickness = unknown_skin_sd(0.05, 0.01, known=["epidermis_mm"])
+    thickness = unknown_skin_sd(0.05, 0.01, known_parameters=["epidermis_mm"])
     assert thickness["melanin"] < 0.5 * nothing["melanin"] and thickness["blood"] < nothing["blood"]
-    everything = unknown_skin_sd(0.05, 0.01, known=["epidermis_mm", "oxygen"])
+    everything = unknown_skin_sd(0.05, 0.01, known_parameters=["epidermis_mm", "oxygen"])
     assert everything == {"melanin": 0.0, "blood": 0.0}

@@ -52,7 +52,7 @@ def colours() -> Pixels:
 def test_known_skins_are_recovered_without_noise() -> None:
     m, b = random_fractions(24)
     found = solve_pigments(
-        skin_model(), np.stack([exact(x, y) for x, y in zip(m, b, strict=True)]), noise=1e-3
+        skin_model(), np.stack([exact(x, y) for x, y in zip(m, b, strict=True)]), relative_noise=1e-3
     )
     np.testing.assert_allclose(found.melanin, m, rtol=0.01)
     np.testing.assert_allclose(found.blood, b, rtol=0.02)
@@ -64,7 +64,7 @@ def test_errors_with_noise_match_the_stated_deviations() -> None:
     plain = skin_model().colours(m, b)
     random = np.random.default_rng(0)
     noisy = plain * (1.0 + 0.01 * random.standard_normal((60, *plain.shape)))
-    found = solve_pigments(skin_model(), noisy.reshape(-1, 3), noise=0.01)
+    found = solve_pigments(skin_model(), noisy.reshape(-1, 3), relative_noise=0.01)
     for known, one, sd in ((m, found.melanin, found.melanin_sd), (b, found.blood, found.blood_sd)):
         off = np.sqrt(((one.reshape(60, -1) - known) ** 2).mean(axis=0))
         ratio = np.median(off / np.median(sd.reshape(60, -1), axis=0))
@@ -73,7 +73,7 @@ def test_errors_with_noise_match_the_stated_deviations() -> None:
 
 def test_jacobian_matches_the_colours() -> None:
     for third in ("none", "oxygen", "shade"):
-        model = skin_model(third=third)
+        model = skin_model(third_unknown=third)
         x = np.random.default_rng(1).uniform(0.11, 0.89, (30, 3))
         log_colours, slopes = model.evaluate(x)
         for k in range(3):
@@ -86,7 +86,7 @@ def test_jacobian_matches_the_colours() -> None:
 def test_device_result_matches_float64(device: Device, colours: Pixels, third: ThirdUnknown) -> None:
     noisy = colours * (1.0 + 0.01 * np.random.default_rng(2).standard_normal(colours.shape))
     noisy = noisy.astype(np.float32)
-    model = skin_model(third=third)
+    model = skin_model(third_unknown=third)
     estimate, sd, residual = Unmixer(device, model, 0.01).unmix(noisy)
     twin = solve_pigments(model, noisy.reshape(-1, 3).astype(np.float64), 0.01)
     pairs = [(estimate[..., 0], twin.melanin), (estimate[..., 1], twin.blood), (estimate[..., 2], twin.third)]
@@ -108,7 +108,7 @@ def test_invisible_blood_stays_at_its_prior() -> None:
 def test_oxygen_is_recovered_where_blood_is_visible() -> None:
     pale = replace(DEFAULT_SKIN, oxygen=0.4)
     colour = skin_model(pale).colours(np.array([0.01]), np.array([0.03]))
-    fixed, free = (solve_pigments(skin_model(third=one), colour) for one in ("none", "oxygen"))
+    fixed, free = (solve_pigments(skin_model(third_unknown=one), colour) for one in ("none", "oxygen"))
     assert 0.35 < free.third[0] < 0.6
     assert abs(np.log(free.residual)).max() < 0.3 * abs(np.log(fixed.residual)).max()
 

@@ -23,7 +23,7 @@ BODY = media()["skin1"].with_eta(1.0)
 def profiles() -> dict[ModelName, GaussianSum]:
     found: dict[ModelName, GaussianSum] = {}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(profile_models, "_PHOTONS", 100_000)
+        patch.setattr(profile_models, "_PHOTONS_PER_CHANNEL", 100_000)
         models: tuple[ModelName, ...] = ("layered", "montecarlo", "counted")
         for model in models:
             with medium_scene(BALL, "laser", "ear", BODY, model) as (_, found[model]):

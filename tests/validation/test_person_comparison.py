@@ -105,7 +105,9 @@ def test_an_eye_is_close_to_its_path_traced_image(
     monkeypatch.setattr(medium, "GRID_VOXELS", 8)
     subject = PersonSubject(view_scene(head(), VIEWS["eye"]), paint)
     skin = shared_skin(renderer, head(), "matched", tmp_path)
-    pair = compare_person(renderer, subject, skin, "eye", side=32, samples=16, atlas=256, use_cache=False)
+    pair = compare_person(
+        renderer, subject, skin, "eye", picture_side=32, samples=16, atlas=256, use_cache=False
+    )
     assert pair.samples == 16
     assert 0.6 < pair.energy.value < 1.6 and pair.energy.standard_error > 0.0
     assert pair.tone_mapped(pair.ours).shape == (32, 32, 3)

@@ -200,11 +200,11 @@ def test_frames_are_jpeg_while_moving_and_exact_when_still() -> None:
     from dermis.apps.viewer.browser.canvas import encode_image
 
     array = np.random.default_rng(1).integers(0, 255, (8, 12, 4), dtype=np.uint8)
-    exact = np.array(Image.open(io.BytesIO(encode_image(array, lossless=True))))
+    exact = np.array(Image.open(io.BytesIO(encode_image(array, is_lossless=True))))
     assert (exact == array[..., :3]).all()
-    assert Image.open(io.BytesIO(encode_image(array, lossless=False))).format == "JPEG"
+    assert Image.open(io.BytesIO(encode_image(array, is_lossless=False))).format == "JPEG"
     shades = np.linspace(0.0, 255.0, 40)
     smooth = np.stack(np.broadcast_arrays(shades[:, None], shades, 90.0, 7.0), axis=-1).astype(np.uint8)
     for one in (smooth, smooth[3:, 5:]):  # of which the last one has gaps between its rows
-        close = np.array(Image.open(io.BytesIO(encode_image(one, lossless=False))), dtype=int)
+        close = np.array(Image.open(io.BytesIO(encode_image(one, is_lossless=False))), dtype=int)
         assert np.abs(close - one[..., :3]).max() < 12

@@ -69,7 +69,7 @@ def test_lossless_frame_does_not_delay_others(viewer: Any, monkeypatch: pytest.M
         if lossless:
             begun.set()
             gate.wait(PATIENCE_S)
-        return encode_image(array, lossless=lossless)
+        return encode_image(array, is_lossless=lossless)
 
     with visit(viewer) as socket:
         page = Page(socket)

@@ -132,7 +132,7 @@ def test_truncated_upload_leaves_nothing(server: Server, tmp_path: Path) -> None
 
 
 def test_stalled_upload_is_cancelled(server: Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(uploads, "IDLE_TIMEOUT_S", 0.05)
+    monkeypatch.setattr(uploads, "UPLOAD_IDLE_TIMEOUT_S", 0.05)
 
     async def never() -> Any:
         await asyncio.sleep(60.0)

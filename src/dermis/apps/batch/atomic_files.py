@@ -12,43 +12,43 @@ from pathlib import Path
 
 from dermis.base.atomic_write import refuse_output
 
-_MAX_ATTEMPTS = 5
+_MAX_RENAME_ATTEMPTS = 5
 _UNFINISHED_NAME_PATTERN = re.compile(r"\.(.+)-[0-9a-f]{12}\.unfinished")
 
 
-def temporary_path(target: Path) -> Path:
-    """Return an unused hidden path beside `target`, for a file or folder that will be renamed to `target`."""
-    return target.with_name(f".{target.name}-{secrets.token_hex(6)}.unfinished")
+def temporary_path(final_path: Path) -> Path:
+    """Return an unused hidden path beside `final_path`, for a file or folder that will be renamed."""
+    return final_path.with_name(f".{final_path.name}-{secrets.token_hex(6)}.unfinished")
 
 
-def atomic_write(target: Path, write: Callable[[Path], object]) -> None:
+def atomic_write(final_path: Path, write_content: Callable[[Path], object]) -> None:
     """Write a file completely or not at all, through a temporary file that is renamed.
 
     Another process may remove the temporary file during a cleanup; the file is then written again.
 
-    write : function that writes the content to the path that it receives
+    write_content : function that writes the content to the path that it receives
 
     Raises DermisError if the file cannot be written.
     """
-    for attempts_left in reversed(range(_MAX_ATTEMPTS)):
-        temporary = temporary_path(target)
+    for attempts_left in reversed(range(_MAX_RENAME_ATTEMPTS)):
+        temporary = temporary_path(final_path)
         try:
-            write(temporary)
+            write_content(temporary)
             flush_to_disk(temporary)
-            temporary.replace(target)
-            flush_to_disk(target.parent)
+            temporary.replace(final_path)
+            flush_to_disk(final_path.parent)
         except FileNotFoundError as fault:
-            if not attempts_left or not target.parent.is_dir():
-                refuse_output(target, fault)
+            if not attempts_left or not final_path.parent.is_dir():
+                refuse_output(final_path, fault)
             continue
         except OSError as fault:
-            refuse_output(target, fault)
+            refuse_output(final_path, fault)
         finally:
             remove_path(temporary)
         return
 
 
-def move_into_place(temporary: Path, target: Path, replaces_folder: bool = True) -> None:
+def move_into_place(temporary_file: Path, final_path: Path, replaces_folder: bool = True) -> None:
     """Rename a temporary file or folder to its final path, and replace a file or folder at this path.
 
     replaces_folder : whether to replace a folder that is not empty; if False, such a folder is kept and
@@ -56,20 +56,20 @@ def move_into_place(temporary: Path, target: Path, replaces_folder: bool = True)
 
     Raises OSError if the file or folder cannot be renamed.
     """
-    if replaces_folder and target.is_dir() and not target.is_symlink():
-        replaced = temporary_path(target)
-        target.rename(replaced)
+    if replaces_folder and final_path.is_dir() and not final_path.is_symlink():
+        replaced = temporary_path(final_path)
+        final_path.rename(replaced)
         try:
-            temporary.rename(target)
+            temporary_file.rename(final_path)
         except OSError:
             with contextlib.suppress(OSError):  # another process has moved a folder there
-                replaced.rename(target)
+                replaced.rename(final_path)
             raise
         finally:
             remove_path(replaced)
     else:
-        temporary.replace(target)
-    flush_to_disk(target.parent)
+        temporary_file.replace(final_path)
+    flush_to_disk(final_path.parent)
 
 
 def flush_to_disk(path: Path) -> None:

@@ -15,8 +15,8 @@ from dermis.mesh.rig import Motion
 from dermis.scene.camera import Camera
 
 _SENSOR_HEIGHT_MM = 24.0
-_MAX_FACE_EXTENT = 0.96  # largest distance of the face from the picture's centre; 1 is the edge
-_BISECTIONS = 12
+_MAX_FACE_COORDINATE = 0.96  # largest distance of the face from the picture's centre; 1 is the edge
+_AIM_BISECTION_STEPS = 12
 _FACE_BOX_MM = ((-90.0, -95.0, 5.0), (90.0, 100.0, 130.0))
 """Bounding box of a face: its two corners, relative to the head's centre at rest."""
 Doubles = NDArray[np.float64]
@@ -41,18 +41,18 @@ def face_points(head: Head, direction_count: int = 64) -> NDArray[np.int32]:
 
 
 def sampled_camera(
-    parameters: Parameters, head: Head, points: NDArray[np.int32], motion: Motion, aspect: float
+    parameters: Parameters, head: Head, face_point_indices: NDArray[np.int32], motion: Motion, aspect: float
 ) -> Camera:
     """Return the camera with an image's sampled parameters, moved so that the whole face is in the picture.
 
     If the picture would cut off the face, the visible frame is enlarged and the offset of the face is
     reduced.
 
-    points : control points of the face, from `face_points`
+    face_point_indices : control points of the face, from `face_points`
     motion : displacement of the control points by the pose
     aspect : ratio of the picture's width to its height [-]
     """
-    face = head.control.pose_points(points, motion) - np.array(head.centre_mm)
+    face = head.control.pose_points(face_point_indices, motion) - np.array(head.centre_mm)
     values = table_numbers(parameters, "camera")
     distance = values["distance_mm"]
     frame = values.get("frame_mm") or distance * _SENSOR_HEIGHT_MM / values["focal_mm"]
@@ -61,17 +61,17 @@ def sampled_camera(
     in_view = (face - centre) @ axes.T  # right, up and towards the camera, relative to the face's centre
     offset = values["offset_x"] * aspect, values["offset_y"]
     frame *= max(
-        _max_projected_coordinate(in_view, distance, (0.0, 0.0), frame, aspect) / _MAX_FACE_EXTENT, 1.0
+        _max_projected_coordinate(in_view, distance, (0.0, 0.0), frame, aspect) / _MAX_FACE_COORDINATE, 1.0
     )
 
-    def aim(fraction: float) -> AimOffset:
+    def aim(offset_fraction: float) -> AimOffset:
         """Return the aim offset of the camera for a fraction of the sampled offset of the face."""
-        return -0.5 * frame * fraction * offset[0], -0.5 * frame * fraction * offset[1]
+        return -0.5 * frame * offset_fraction * offset[0], -0.5 * frame * offset_fraction * offset[1]
 
     fraction, low, high = 1.0, 0.0, 1.0
-    for _ in range(_BISECTIONS):  # the first step tries the full offset
+    for _ in range(_AIM_BISECTION_STEPS):  # the first step tries the full offset
         inside = (
-            _max_projected_coordinate(in_view, distance, aim(fraction), frame, aspect) <= _MAX_FACE_EXTENT
+            _max_projected_coordinate(in_view, distance, aim(fraction), frame, aspect) <= _MAX_FACE_COORDINATE
         )
         low, high = (fraction, high) if inside else (low, fraction)
         fraction = 0.5 * (low + high)
@@ -79,7 +79,7 @@ def sampled_camera(
 
 
 def _aim_camera(
-    centre: Doubles, axes: Doubles, distance_mm: float, frame_mm: float, aim: AimOffset
+    centre: Doubles, axes: Doubles, distance_mm: float, frame_mm: float, aim_offset: AimOffset
 ) -> Camera:
     """Return a camera that looks at a point beside the centre of the face.
 
@@ -87,31 +87,31 @@ def _aim_camera(
     axes : (3, 3) rows: directions to the right, upwards, and back towards the camera
     distance_mm : distance of the camera from the centre of the face [mm]
     frame_mm : visible height at the centre of the face, for a camera that looks at this centre [mm]
-    aim : offset of the point from the centre of the face, to the right and upwards [mm]
+    aim_offset : offset of the point from the centre of the face, to the right and upwards [mm]
     """
-    scale = math.hypot(distance_mm, *aim) / distance_mm  # keeps the angle of view
+    scale = math.hypot(distance_mm, *aim_offset) / distance_mm  # keeps the angle of view
     return Camera(
         position=_as_tuple(centre + distance_mm * axes[2]),
-        target=_as_tuple(centre + aim[0] * axes[0] + aim[1] * axes[1]),
+        target=_as_tuple(centre + aim_offset[0] * axes[0] + aim_offset[1] * axes[1]),
         up=_as_tuple(axes[1]),
         frame_mm=frame_mm * scale,
     )
 
 
 def _max_projected_coordinate(
-    positions_mm: Doubles, distance_mm: float, aim: AimOffset, frame_mm: float, aspect: float
+    positions_mm: Doubles, distance_mm: float, aim_offset: AimOffset, frame_mm: float, aspect: float
 ) -> float:
     """Return the largest coordinate of projected points, 0 at the picture's centre and 1 at an edge.
 
     positions_mm : (n, 3) positions to the right, upwards and towards the camera, relative to the face's
         centre [mm]
     distance_mm : distance of the camera from the face's centre [mm]
-    aim : offset of the camera's target to the right and upwards [mm]
+    aim_offset : offset of the camera's target to the right and upwards [mm]
     frame_mm : visible height at the face's centre [mm]
     aspect : ratio of the picture's width to its height [-]
     """
     x, y, z = positions_mm.T
-    back = np.array([-aim[0], -aim[1], distance_mm])
+    back = np.array([-aim_offset[0], -aim_offset[1], distance_mm])
     back /= math.hypot(*back)
     right = np.array([back[2], 0.0, -back[0]]) / math.hypot(back[0], back[2])
     up = back[1] * right[2], back[2] * right[0] - back[0] * right[2], -back[1] * right[0]
@@ -142,8 +142,8 @@ def _as_tuple(vector: Doubles) -> tuple[float, float, float]:
 
 
 @cache
-def _sphere_directions(count: int) -> NDArray[np.float32]:
+def _sphere_directions(direction_count: int) -> NDArray[np.float32]:
     """Return unit vectors (n, 3) evenly distributed over the sphere, on a golden-angle spiral."""
-    pitches = np.degrees(np.arcsin(1.0 - 2.0 * (np.arange(count) + 0.5) / count))
-    yaws = 137.50776405 * np.arange(count)  # golden angle
+    pitches = np.degrees(np.arcsin(1.0 - 2.0 * (np.arange(direction_count) + 0.5) / direction_count))
+    yaws = 137.50776405 * np.arange(direction_count)  # golden angle
     return np.array(list(map(direction_from_angles, yaws.tolist(), pitches.tolist())), np.float32)

@@ -58,39 +58,41 @@ def start_process(target: Callable[..., None], *args: object) -> ChildProcess:
     """
     parent_pipe, child_pipe = _SPAWN_CONTEXT.Pipe()
     process = _SPAWN_CONTEXT.Process(target=_run_in_child, args=(target, child_pipe, args))
-    with _children_allowed(), _sigint_blocked(), _single_threaded_blas():
+    with _allow_children(), _block_sigint(), _limit_blas_to_one_thread():
         process.start()
     child_pipe.close()  # the parent's end now breaks when the child dies
     return ChildProcess(process, parent_pipe)
 
 
-def shared_bytes(size: int) -> ctypes.Array[ctypes.c_ubyte]:
+def shared_bytes(byte_count: int) -> ctypes.Array[ctypes.c_ubyte]:
     """Return memory to share with a process from `start_process`, freed when both processes have exited.
 
-    size : size of the memory [bytes]
+    byte_count : size of the memory [bytes]
     """
-    return _SPAWN_CONTEXT.RawArray(ctypes.c_ubyte, size)
+    return _SPAWN_CONTEXT.RawArray(ctypes.c_ubyte, byte_count)
 
 
-def _run_in_child(target: Callable[..., None], pipe: Connection, args: tuple[object, ...]) -> None:
+def _run_in_child(
+    child_function: Callable[..., None], pipe: Connection, child_arguments: tuple[object, ...]
+) -> None:
     parent = multiprocessing.parent_process()
     assert parent is not None
     threading.Thread(target=_exit_with_parent, args=(parent.sentinel,), daemon=True).start()
     try:
-        target(pipe, *args)
+        child_function(pipe, *child_arguments)
     except (EOFError, ConnectionError):
         if connection.wait([parent.sentinel], _PARENT_EXIT_TIMEOUT_S):
             os._exit(1)  # the pipe broke because the parent exited
         raise
 
 
-def _exit_with_parent(sentinel: int) -> None:
-    connection.wait([sentinel])
+def _exit_with_parent(parent_sentinel: int) -> None:
+    connection.wait([parent_sentinel])
     os._exit(1)
 
 
 @contextmanager
-def _children_allowed() -> Iterator[None]:
+def _allow_children() -> Iterator[None]:
     """Allow a daemon process, such as a dask worker, to start children, which multiprocessing forbids."""
     current = multiprocessing.current_process()
     was_daemon = current.daemon
@@ -104,7 +106,7 @@ def _children_allowed() -> Iterator[None]:
 
 
 @contextmanager
-def _single_threaded_blas() -> Iterator[None]:
+def _limit_blas_to_one_thread() -> Iterator[None]:
     """Limit BLAS in child processes to one thread, unless the user has set a number of threads.
 
     By default each process starts a thread per core, and for small linear systems these threads spend most of
@@ -120,7 +122,7 @@ def _single_threaded_blas() -> Iterator[None]:
 
 
 @contextmanager
-def _sigint_blocked() -> Iterator[None]:
+def _block_sigint() -> Iterator[None]:
     """Block SIGINT (Ctrl-C) within a with block; children started in the block ignore SIGINT permanently."""
     if not _CAN_BLOCK_SIGNALS:
         yield

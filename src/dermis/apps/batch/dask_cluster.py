@@ -19,7 +19,7 @@ from dermis.base.extras import import_extra
 if TYPE_CHECKING:
     from distributed import Client
 
-_MAX_RETRIES = 2  # of a part whose worker reports a lost process; dask itself counts workers that die
+_MAX_TASK_RETRIES = 2  # of a part whose worker reports a lost process; dask itself counts workers that die
 _MAX_TASKS_IN_FLIGHT = 1000  # submitted to the scheduler; far more than there are workers
 _CONNECTION_TIMEOUT_S = 60.0  # for the scheduler, and for its first worker
 
@@ -52,7 +52,7 @@ class DaskCluster:
         with self._client() as client:
             client.register_plugin(PartPlugin.for_run(options, self.adapter), name=name)
             try:
-                with _shared_marker(options.out) as marker:
+                with _create_marker_file(options.out) as marker:
                     _check_shared_disk(client, marker)
                 yield from _submit_tasks(client, name, tasks)
             finally:
@@ -80,7 +80,7 @@ class DaskCluster:
 
 
 @contextmanager
-def _shared_marker(out: Path) -> Iterator[Path]:
+def _create_marker_file(out: Path) -> Iterator[Path]:
     """Yield a new marker file in the output folder, which every worker that shares the disk can see.
 
     The file is removed at the end of the block.
@@ -93,14 +93,14 @@ def _shared_marker(out: Path) -> Iterator[Path]:
         marker.unlink()
 
 
-def _check_shared_disk(client: Client, marker: Path) -> None:
+def _check_shared_disk(client: Client, marker_file: Path) -> None:
     """Raise DermisError if some dask workers do not see the marker file in the output folder."""
     from dermis.apps.batch.dask_worker import path_exists
 
-    failing = [address for address, found in client.run(path_exists, str(marker)).items() if not found]
+    failing = [address for address, found in client.run(path_exists, str(marker_file)).items() if not found]
     if failing:
         actual = f"{failing[0]} does not see it"
-        refuse(marker.parent, "a folder on a disk that all workers share", actual, "Choose another one")
+        refuse(marker_file.parent, "a folder on a disk that all workers share", actual, "Choose another one")
 
 
 def _submit_tasks(client: Client, plugin_name: str, tasks: Sequence[Shard]) -> Iterator[WorkerEvent]:
@@ -119,7 +119,7 @@ def _submit_tasks(client: Client, plugin_name: str, tasks: Sequence[Shard]) -> I
         while queue and len(submitted) < _MAX_TASKS_IN_FLIGHT:
             task = queue.popleft()
             future = client.submit(
-                process_task, plugin_name, task, key=f"{plugin_name}-{next(keys)}", retries=_MAX_RETRIES
+                process_task, plugin_name, task, key=f"{plugin_name}-{next(keys)}", retries=_MAX_TASK_RETRIES
             )
             submitted[future] = task
             completed.add(future)

@@ -24,7 +24,7 @@ from dermis.base.errors import DermisError, DermisWarning
 from dermis.base.private import cache_folder, make_private_folder
 from dermis.gpu.adapters import similar_adapters
 
-_TRIM_VARIABLE = "MALLOC_TRIM_THRESHOLD_"
+_MALLOC_TRIM_VARIABLE = "MALLOC_TRIM_THRESHOLD_"
 """Environment variable by which dask's nannies make workers return freed memory to the system at once; large
 arrays are then slow to allocate."""
 
@@ -76,7 +76,7 @@ class PartPlugin(WorkerPlugin):  # type: ignore[misc]
 
     def setup(self, worker: object) -> None:
         """Initialise the state; dask calls this when the plugin is registered with a worker."""
-        os.environ.pop(_TRIM_VARIABLE, None)
+        os.environ.pop(_MALLOC_TRIM_VARIABLE, None)
         self._state = _PluginState()
 
     def teardown(self, worker: object) -> None:
@@ -144,9 +144,9 @@ def process_task(plugin_name: str, task: Shard) -> WorkerEvent:
     return event
 
 
-def path_exists(path: str) -> bool:
+def path_exists(file_path: str) -> bool:
     """Return whether a file exists on the worker's disk."""
-    return Path(path).exists()
+    return Path(file_path).exists()
 
 
 @contextmanager

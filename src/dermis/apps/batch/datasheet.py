@@ -40,7 +40,9 @@ def write_datasheet(out: Path, spec: Spec) -> None:
     nothing can be written.
     """
     existing = [shard for shard in list_shards(spec) if shard_exists(out, shard, spec)]
-    text = _readme(out, spec, [read_manifest(shard_path(out, shard, spec)) for shard in existing]).encode()
+    text = _readme_text(
+        out, spec, [read_manifest(shard_path(out, shard, spec)) for shard in existing]
+    ).encode()
     description = {
         "spec": spec.digest(),
         "count": spec.count,
@@ -55,7 +57,7 @@ def write_datasheet(out: Path, spec: Spec) -> None:
     atomic_write(out / README_FILE, lambda path: path.write_bytes(text))
 
 
-def _readme(out: Path, spec: Spec, manifests: Sequence[ShardManifest]) -> str:
+def _readme_text(out: Path, spec: Spec, manifests: Sequence[ShardManifest]) -> str:
     width, height = spec.size
     left_out = [image for manifest in manifests for image in manifest.left_out]
     images = sum(manifest.stop - manifest.first for manifest in manifests) - len(left_out)
@@ -129,8 +131,8 @@ def _software_table(manifests: Sequence[ShardManifest]) -> str:
     return _markdown_table(("shards", "rendered with"), rows)
 
 
-def _markdown_table(column_names: Sequence[str], rows: TableRows) -> str:
-    lines = [column_names, ["---"] * len(column_names), *rows]
+def _markdown_table(column_names: Sequence[str], table_rows: TableRows) -> str:
+    lines = [column_names, ["---"] * len(column_names), *table_rows]
     cells = [[str(cell).replace("|", "\\|").replace("\n", " ") for cell in line] for line in lines]
     return "".join(f"| {' | '.join(line)} |\n" for line in cells)
 

@@ -15,18 +15,18 @@ from scipy.special import ndtr, ndtri
 SampleValue = float | str
 SpecValue = float | str | dict[str, object]
 """Distribution as a TOML value."""
-_MAX_DEVIATIONS = 6.0  # limit of normal samples in standard deviations
-_MIN_PROBABILITY = 1e-6  # smallest probability of the untruncated normal between the limits
+_MAX_STANDARD_DEVIATIONS = 6.0  # limit of normal samples in standard deviations
+_MIN_INTERVAL_PROBABILITY = 1e-6  # smallest probability of the untruncated normal between the limits
 _MAX_CHOICES = 100_000
 
 
-def require(condition: bool, expected: str) -> None:
+def require(condition: bool, expected_text: str) -> None:
     """Raise ValueError unless a condition is true.
 
-    expected : description of the valid values, for the message
+    expected_text : description of the valid values, for the message
     """
     if not condition:
-        raise ValueError(expected)
+        raise ValueError(expected_text)
 
 
 class Distribution(ABC):
@@ -110,11 +110,13 @@ class Normal(Distribution):
     @property
     def support(self) -> tuple[SampleValue, ...]:
         """Return the numbers six standard deviations below and above the mean."""
-        return self.mean - _MAX_DEVIATIONS * self.sd, self.mean + _MAX_DEVIATIONS * self.sd
+        return self.mean - _MAX_STANDARD_DEVIATIONS * self.sd, self.mean + _MAX_STANDARD_DEVIATIONS * self.sd
 
     def quantile(self, probability: float) -> float:
         """Return the number at a cumulative probability between 0 and 1."""
-        return self.mean + self.sd * min(max(float(ndtri(probability)), -_MAX_DEVIATIONS), _MAX_DEVIATIONS)
+        return self.mean + self.sd * min(
+            max(float(ndtri(probability)), -_MAX_STANDARD_DEVIATIONS), _MAX_STANDARD_DEVIATIONS
+        )
 
     def spec_value(self) -> SpecValue:
         """Return the TOML table with the key `normal`."""
@@ -136,8 +138,8 @@ class TruncatedNormal(Distribution):
         require(self.low < self.high, "a lower limit that is less than the upper limit")
         below, above = self._limit_probabilities
         require(
-            above - below >= _MIN_PROBABILITY,
-            f"limits that contain at least {_MIN_PROBABILITY:g} of the normal distribution",
+            above - below >= _MIN_INTERVAL_PROBABILITY,
+            f"limits that contain at least {_MIN_INTERVAL_PROBABILITY:g} of the normal distribution",
         )
 
     @property
@@ -239,17 +241,17 @@ class FileChoice(Distribution):
         return repr(self.spec_value())
 
 
-def _float_list(*values: float) -> list[float]:
-    return list(map(float, values))
+def _float_list(*numbers: float) -> list[float]:
+    return list(map(float, numbers))
 
 
-_MAX_NUMBER = 1e9  # largest magnitude of a number in a spec
-_EXPECTED_FORMS = (
+_MAX_SPEC_NUMBER = 1e9  # largest magnitude of a number in a spec
+_EXPECTED_DISTRIBUTION_FORMS = (
     "a number, a text, or one of {uniform = [low, high]}, {log_uniform = [low, high]}, "
     "{normal = [mean, sd]}, {truncated = [mean, sd, low, high]}, {choice = [...], weights = [...]} "
     "and {files = PATTERN}"
 )
-_NUMERIC_FORMS: Mapping[str, tuple[int, Callable[..., Distribution]]] = {
+_NUMERIC_DISTRIBUTIONS: Mapping[str, tuple[int, Callable[..., Distribution]]] = {
     "uniform": (2, Uniform),
     "log_uniform": (2, lambda low, high: Uniform(low, high, True)),
     "normal": (2, Normal),
@@ -257,27 +259,27 @@ _NUMERIC_FORMS: Mapping[str, tuple[int, Callable[..., Distribution]]] = {
 }
 
 
-def parse_distribution(value: object, nested: bool = False) -> Distribution:
+def parse_distribution(spec_value: object, is_nested: bool = False) -> Distribution:
     """Return the distribution that a TOML value of a spec describes.
 
-    nested : whether the value is an alternative of a choice; an alternative must not itself be a choice or a
-        file pattern
+    is_nested : whether the value is an alternative of a choice; an alternative must not itself be a
+        choice or a file pattern
 
     Raises ValueError with a description of the valid values.
     """
-    if isinstance(value, Distribution):
-        return value
-    if isinstance(value, str):
-        return Constant(value)
-    if _is_number(value):
-        return Constant(float(value))
-    table: Mapping[str, object] = value if isinstance(value, Mapping) else {}
+    if isinstance(spec_value, Distribution):
+        return spec_value
+    if isinstance(spec_value, str):
+        return Constant(spec_value)
+    if _is_number(spec_value):
+        return Constant(float(spec_value))
+    table: Mapping[str, object] = spec_value if isinstance(spec_value, Mapping) else {}
     kind = next(iter(table), "")
-    if kind in _NUMERIC_FORMS and len(table) == 1:
-        count, make = _NUMERIC_FORMS[kind]
+    if kind in _NUMERIC_DISTRIBUTIONS and len(table) == 1:
+        count, make = _NUMERIC_DISTRIBUTIONS[kind]
         return make(*_number_list(table[kind], f"{count} numbers in {kind}", count))
-    if nested:
-        raise ValueError(_EXPECTED_FORMS)
+    if is_nested:
+        raise ValueError(_EXPECTED_DISTRIBUTION_FORMS)
     if kind == "files" and len(table) == 1 and isinstance(table[kind], str):
         return FileChoice(str(table[kind]))
     if "choice" in table and table.keys() <= {"choice", "weights"}:
@@ -286,23 +288,25 @@ def parse_distribution(value: object, nested: bool = False) -> Distribution:
             raise ValueError("a list in choice")
         weights = _number_list(table.get("weights", [1.0] * len(values)), "a list of numbers in weights")
         return Choice(tuple(parse_distribution(one, True) for one in values), tuple(weights))
-    raise ValueError(_EXPECTED_FORMS)
+    raise ValueError(_EXPECTED_DISTRIBUTION_FORMS)
 
 
-def _number_list(values: object, expected: str, count: int | None = None) -> list[float]:
-    """Return a list of numbers as floats; raise ValueError with `expected` for other values.
+def _number_list(spec_value: object, expected_text: str, number_count: int | None = None) -> list[float]:
+    """Return a list of numbers as floats; raise ValueError with `expected_text` for other values.
 
-    count : required length of the list; None for any length
+    number_count : required length of the list; None for any length
     """
-    if not isinstance(values, list | tuple) or count not in (None, len(values)):
-        raise ValueError(expected)
-    numbers = [float(one) for one in values if _is_number(one)]
-    if len(numbers) != len(values):
-        raise ValueError(f"{expected}, none beyond {_MAX_NUMBER:g}" if count else expected)
+    if not isinstance(spec_value, list | tuple) or number_count not in (None, len(spec_value)):
+        raise ValueError(expected_text)
+    numbers = [float(one) for one in spec_value if _is_number(one)]
+    if len(numbers) != len(spec_value):
+        raise ValueError(
+            f"{expected_text}, none beyond {_MAX_SPEC_NUMBER:g}" if number_count else expected_text
+        )
     return numbers
 
 
 def _is_number(value: object) -> TypeGuard[float]:
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
-    return isfinite(value) and abs(value) <= _MAX_NUMBER
+    return isfinite(value) and abs(value) <= _MAX_SPEC_NUMBER

@@ -13,9 +13,9 @@ from dermis.base.errors import DermisError
 
 EncodedImage = tuple[int, dict[str, bytes]]
 EncoderJob = tuple[object, ...]
-_JOBS_IN_FLIGHT = 2  # per process
-_PAGE_BYTES = 4096
-_SIZE_MARGIN = 1 << 18  # spare bytes, so that slightly larger jobs do not restart the processes
+_JOBS_IN_FLIGHT_PER_PROCESS = 2
+_MEMORY_PAGE_BYTES = 4096
+_SPARE_MEMORY_BYTES = 1 << 18  # spare bytes, so that slightly larger jobs do not restart the processes
 
 
 class EncoderPool:
@@ -44,12 +44,12 @@ class EncoderPool:
         try:
             for index, job in enumerate(jobs):
                 parts = _job_buffers(job)
-                size = sum(_page_aligned(part.nbytes) for part in parts)
+                size = sum(_round_up_to_page(part.nbytes) for part in parts)
                 if size > self._size or not self._processes:
                     while pending:
                         yield pending.popleft().result()
-                    self._start_processes(size + _SIZE_MARGIN)
-                if len(pending) == _JOBS_IN_FLIGHT * self._count:
+                    self._start_processes(size + _SPARE_MEMORY_BYTES)
+                if len(pending) == _JOBS_IN_FLIGHT_PER_PROCESS * self._count:
                     yield pending.popleft().result()
                 process = self._processes[index % self._count]
                 pending.append(process)
@@ -65,12 +65,12 @@ class EncoderPool:
         while self._processes:
             self._processes.pop().child.kill()
 
-    def _start_processes(self, size: int) -> None:
-        """Start the processes with shared memory for jobs of up to `size` bytes."""
+    def _start_processes(self, job_bytes: int) -> None:
+        """Start the processes with shared memory for jobs of up to `job_bytes` bytes."""
         self.close()
-        self._size = size
+        self._size = job_bytes
         for _ in range(self._count):
-            self._processes.append(_EncoderProcess(size, self._encode))
+            self._processes.append(_EncoderProcess(job_bytes, self._encode))
 
 
 class _EncoderProcess:
@@ -82,18 +82,18 @@ class _EncoderProcess:
     size : largest size of a job [bytes]
     """
 
-    def __init__(self, size: int, encode: Callable[..., EncodedImage]) -> None:
-        memory = shared_bytes(_JOBS_IN_FLIGHT * size)
-        self._size, self._submitted, self._memory = size, 0, memoryview(memory).cast("B")
+    def __init__(self, memory_bytes: int, encode: Callable[..., EncodedImage]) -> None:
+        memory = shared_bytes(_JOBS_IN_FLIGHT_PER_PROCESS * memory_bytes)
+        self._size, self._submitted, self._memory = memory_bytes, 0, memoryview(memory).cast("B")
         self.child: ChildProcess = start_process(_run_encoder, memory, encode)
 
-    def submit(self, parts: list[memoryview]) -> None:
-        begin, spans = self._submitted % _JOBS_IN_FLIGHT * self._size, []
+    def submit(self, job_buffers: list[memoryview]) -> None:
+        begin, spans = self._submitted % _JOBS_IN_FLIGHT_PER_PROCESS * self._size, []
         self._submitted += 1
-        for part in parts:
+        for part in job_buffers:
             spans.append((begin, begin + part.nbytes))
             self._memory[begin : begin + part.nbytes] = part
-            begin += _page_aligned(part.nbytes)
+            begin += _round_up_to_page(part.nbytes)
         try:
             self.child.pipe.send(spans)
         except OSError as fault:
@@ -119,18 +119,18 @@ def _job_buffers(job: EncoderJob) -> list[memoryview]:
     return [memoryview(pickled), *(array.raw() for array in arrays)]
 
 
-def _page_aligned(size: int) -> int:
-    return -(-size // _PAGE_BYTES) * _PAGE_BYTES
+def _round_up_to_page(byte_count: int) -> int:
+    return -(-byte_count // _MEMORY_PAGE_BYTES) * _MEMORY_PAGE_BYTES
 
 
 def _run_encoder(
-    pipe: Connection, memory: ctypes.Array[ctypes.c_ubyte], encode: Callable[..., EncodedImage]
+    pipe: Connection, shared_memory: ctypes.Array[ctypes.c_ubyte], encode: Callable[..., EncodedImage]
 ) -> None:
     """Encode the jobs whose offsets arrive through the pipe; an encoder process runs this function.
 
-    memory : shared memory that holds the jobs
+    shared_memory : memory shared with the parent process, which holds the jobs
     """
-    view = memoryview(memory).cast("B")
+    view = memoryview(shared_memory).cast("B")
     while True:
         try:
             pickled, *arrays = [view[begin:end] for begin, end in pipe.recv()]

@@ -22,9 +22,9 @@ from dermis.human.expressions import expand_targets
 
 MIN_P_VALUE = 1e-6
 """p-value below which a test fails."""
-_MEAN_SCALED_DISTANCE = sqrt(np.pi / 2) * np.log(2)  # mean of the Kolmogorov distribution
+_MEAN_KOLMOGOROV_STATISTIC = sqrt(np.pi / 2) * np.log(2)  # mean of the Kolmogorov distribution
 _QUANTILE_COUNT = 10_000  # quantiles from which the moments of a distribution are computed
-_ROUNDING_ERROR = 5e-6  # largest relative error of rounding to six digits
+_RELATIVE_ROUNDING_ERROR = 5e-6  # largest relative error of rounding to six digits
 _MAX_LISTED_TEXTS = 12  # largest number of texts per distribution in the table
 _MIN_EXPECTED_COUNT = 5.0  # expected samples in a cell of the chi-square test; smaller cells are pooled
 
@@ -82,37 +82,39 @@ def fit_tests(out: Path, spec: Spec) -> Iterator[FitTest]:
                 yield _parameter_test(name, distribution, present, spec)
 
 
-def fit_test(parameter: str, distribution: Distribution, values: Samples) -> FitTest:
+def fit_test(parameter: str, distribution: Distribution, samples: Samples) -> FitTest:
     """Return the goodness-of-fit test of samples: Kolmogorov-Smirnov for numbers, chi-square for texts."""
     if any(isinstance(bound, str) for bound in distribution.support):
-        return _text_test(parameter, text_probabilities(distribution), [str(value) for value in values])
-    return _number_test(parameter, distribution, np.sort(np.array(values, np.float64)))
+        return _text_test(parameter, text_probabilities(distribution), [str(value) for value in samples])
+    return _number_test(parameter, distribution, np.sort(np.array(samples, np.float64)))
 
 
-def cumulative_probability(distribution: Distribution, x: Array, *, closed: bool) -> Array:
+def cumulative_probability(distribution: Distribution, numbers: Array, *, is_inclusive: bool) -> Array:
     """Return the cumulative probability of a numeric distribution at each x.
 
-    x : (n,) numbers
-    closed : whether to return P(X <= x) instead of P(X < x); the two differ where x is a constant of the
-        distribution
+    numbers : (n,) numbers
+    is_inclusive : whether to return P(X <= x) instead of P(X < x); the two differ where x is a constant of
+        the distribution
     """
     match distribution:
         case Constant(value):
-            return ((x >= float(value)) if closed else (x > float(value))).astype(np.float64)
+            return ((numbers >= float(value)) if is_inclusive else (numbers > float(value))).astype(
+                np.float64
+            )
         case distributions.Uniform(low, high, logarithmic):
             if logarithmic:
-                low, high, x = np.log(low), np.log(high), np.log(np.maximum(x, low))
-            return np.clip((x - low) / (high - low), 0.0, 1.0)
+                low, high, numbers = np.log(low), np.log(high), np.log(np.maximum(numbers, low))
+            return np.clip((numbers - low) / (high - low), 0.0, 1.0)
         case distributions.Normal(mean, sd):
-            return np.asarray(ndtr((x - mean) / sd))
+            return np.asarray(ndtr((numbers - mean) / sd))
         case distributions.TruncatedNormal(mean, sd, low, high):
-            z, first, last = ((one - mean) / sd for one in (np.clip(x, low, high), low, high))
+            z, first, last = ((one - mean) / sd for one in (np.clip(numbers, low, high), low, high))
             if first > 0:  # upper tails, as 1 minus the lower tail would cancel far above the mean
                 return np.asarray((ndtr(-first) - ndtr(-z)) / (ndtr(-first) - ndtr(-last)))
             return np.asarray((ndtr(z) - ndtr(first)) / (ndtr(last) - ndtr(first)))
         case Choice(parts, weights):
             terms = (
-                w * cumulative_probability(part, x, closed=closed)
+                w * cumulative_probability(part, numbers, is_inclusive=is_inclusive)
                 for part, w in zip(parts, weights, strict=True)
             )
             return np.asarray(sum(terms) / sum(weights))
@@ -134,45 +136,60 @@ def text_probabilities(distribution: Distribution) -> dict[str, float]:
     return {text: weight / total for text, weight in weights.items() if weight}
 
 
-def _parameter_test(parameter: str, distribution: Distribution, values: Samples, spec: Spec) -> FitTest:
+def _parameter_test(parameter: str, distribution: Distribution, samples: Samples, spec: Spec) -> FitTest:
     if parameter != "background.kind" or NO_ENVIRONMENT not in spec.distributions["environment.name"].support:
-        return fit_test(parameter, distribution, values)
+        return fit_test(parameter, distribution, samples)
     replacement = {"environment": "gradient"}  # in images without an environment, see `Sampler.parameters`
     expected = defaultdict[str, float](float)
     for text, probability in text_probabilities(distribution).items():
         expected[replacement.get(text, text)] += probability
-    return _text_test(parameter, expected, [replacement.get(str(value), str(value)) for value in values])
+    return _text_test(parameter, expected, [replacement.get(str(value), str(value)) for value in samples])
 
 
-def _number_test(parameter: str, distribution: Distribution, values: Array) -> FitTest:
+def _number_test(parameter: str, distribution: Distribution, sorted_samples: Array) -> FitTest:
     """Return the Kolmogorov-Smirnov test of sorted samples that were rounded to six digits."""
-    count, error = len(values), _ROUNDING_ERROR * np.abs(values)
-    up_to = np.searchsorted(values, values, "right") / count
-    below = np.searchsorted(values, values, "left") / count
-    above = up_to - cumulative_probability(distribution, values + error, closed=True)
-    under = cumulative_probability(distribution, values - error, closed=False) - below
+    count, error = len(sorted_samples), _RELATIVE_ROUNDING_ERROR * np.abs(sorted_samples)
+    up_to = np.searchsorted(sorted_samples, sorted_samples, "right") / count
+    below = np.searchsorted(sorted_samples, sorted_samples, "left") / count
+    above = up_to - cumulative_probability(distribution, sorted_samples + error, is_inclusive=True)
+    under = cumulative_probability(distribution, sorted_samples - error, is_inclusive=False) - below
     distance = float(max(above.max(), under.max(), 0.0))
     probabilities = (np.arange(_QUANTILE_COUNT) + 0.5) / _QUANTILE_COUNT
     quantiles: Array = np.array([distribution.quantile(p) for p in probabilities.tolist()], np.float64)
     p_value = float(kolmogorov(sqrt(count) * distance))
-    expected, observed = _format_moments(quantiles), _format_moments(values)
+    expected, observed = _format_moments(quantiles), _format_moments(sorted_samples)
     return FitTest(
-        parameter, count, expected, observed, distance, float(_MEAN_SCALED_DISTANCE / sqrt(count)), p_value
+        parameter,
+        count,
+        expected,
+        observed,
+        distance,
+        float(_MEAN_KOLMOGOROV_STATISTIC / sqrt(count)),
+        p_value,
     )
 
 
-def _text_test(parameter: str, expected: Mapping[str, float], values: Sequence[str]) -> FitTest:
+def _text_test(
+    parameter: str, expected_probabilities: Mapping[str, float], sampled_texts: Sequence[str]
+) -> FitTest:
     """Return the chi-square test of sampled texts.
 
-    expected : probability of each text
-    values : sampled texts
+    expected_probabilities : probability of each text
+    sampled_texts : texts that were sampled for the parameter
     """
-    count, counts = len(values), Counter(values)
-    distance = max(abs(counts[text] / count - expected.get(text, 0.0)) for text in {*expected, *counts})
-    expected_distance = max(sqrt(2 / np.pi * p * (1 - p) / count) for p in expected.values())
-    p_value = 0.0 if counts.keys() - expected.keys() else _chi_square(expected, counts, count)
-    probabilities = _format_probabilities(expected)
-    found = _format_probabilities({text: counts[text] / count for text in expected})
+    count, counts = len(sampled_texts), Counter(sampled_texts)
+    distance = max(
+        abs(counts[text] / count - expected_probabilities.get(text, 0.0))
+        for text in {*expected_probabilities, *counts}
+    )
+    expected_distance = max(sqrt(2 / np.pi * p * (1 - p) / count) for p in expected_probabilities.values())
+    p_value = (
+        0.0
+        if counts.keys() - expected_probabilities.keys()
+        else _chi_square(expected_probabilities, counts, count)
+    )
+    probabilities = _format_probabilities(expected_probabilities)
+    found = _format_probabilities({text: counts[text] / count for text in expected_probabilities})
     return FitTest(parameter, count, probabilities, found, distance, expected_distance, p_value)
 
 
@@ -205,8 +222,8 @@ def _chi_square(
     return float(chdtrc(len(cells) - 1, statistic))
 
 
-def _format_moments(values: Array) -> str:
-    return f"{round_significant(float(values.mean())):.5g}, {round_significant(float(values.std())):.5g}"
+def _format_moments(samples: Array) -> str:
+    return f"{round_significant(float(samples.mean())):.5g}, {round_significant(float(samples.std())):.5g}"
 
 
 def _index_column(parameter: str) -> str:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 INDEX_FILE = "index.parquet"
 MATRIX_COLUMNS = {"camera.K": 9, "camera.R": 9, "camera.t": 3, "head_pose": 12, "gaze": 6}
 """Columns of flattened matrices (row by row), with the number of elements."""
-_IDENTIFIERS = "number", "key", "shard"
+_IDENTIFIER_COLUMNS = "number", "key", "shard"
 _MAX_LISTED_TEXTS = 12
 
 IndexRow = dict[str, object]
@@ -70,7 +70,7 @@ def parameter_summaries(out: Path) -> Iterator[tuple[str, int, str]]:
     """
     with open_index(out, "the statistics of a data set") as file:
         for name in file.schema_arrow.names:
-            if name not in (*_IDENTIFIERS, *MATRIX_COLUMNS):
+            if name not in (*_IDENTIFIER_COLUMNS, *MATRIX_COLUMNS):
                 column = file.read(columns=[name]).column(0)
                 yield name, len(column) - column.null_count, _column_summary(column)
 
@@ -122,29 +122,29 @@ def _index_schema(out: Path, spec: Spec) -> pyarrow.Schema:
             for name, value in row.items():
                 if value is not None:
                     kinds.setdefault(name, set()).add(type(value))
-    parameters = sorted(kinds.keys() - MATRIX_COLUMNS.keys() - set(_IDENTIFIERS))
+    parameters = sorted(kinds.keys() - MATRIX_COLUMNS.keys() - set(_IDENTIFIER_COLUMNS))
     columns = [("number", arrow.int64()), ("key", arrow.string()), ("shard", arrow.string())]
     columns += [(name, arrow.list_(arrow.float64(), size)) for name, size in MATRIX_COLUMNS.items()]
     columns += [(name, _column_type(kinds[name])) for name in parameters]
     return arrow.schema(columns)
 
 
-def _column_type(kinds: set[type]) -> pyarrow.DataType:
+def _column_type(value_types: set[type]) -> pyarrow.DataType:
     arrow = import_extra("pyarrow", "the index of a data set")
-    if kinds <= {bool}:
+    if value_types <= {bool}:
         return arrow.bool_()
-    if kinds <= {int}:
+    if value_types <= {int}:
         return arrow.int64()
-    if kinds <= {int, float}:
+    if value_types <= {int, float}:
         return arrow.float64()
-    return arrow.list_(arrow.float64()) if kinds <= {list} else arrow.string()
+    return arrow.list_(arrow.float64()) if value_types <= {list} else arrow.string()
 
 
-def _arrow_table(rows: list[IndexRow], schema: pyarrow.Schema) -> pyarrow.Table:
+def _arrow_table(index_rows: list[IndexRow], schema: pyarrow.Schema) -> pyarrow.Table:
     arrow = import_extra("pyarrow", "the index of a data set")
     columns = []
     for field in schema:
-        values = [row.get(field.name) for row in rows]
+        values = [row.get(field.name) for row in index_rows]
         if arrow.types.is_string(field.type):
             values = [None if one is None else str(one) for one in values]
         columns.append(arrow.array(values, field.type))
@@ -171,5 +171,5 @@ def _column_summary(column: pyarrow.ChunkedArray) -> str:
     return f"{limits}, mean {mean:.4g}, standard deviation {deviation:.4g}"
 
 
-def _format_number(value: float) -> str:
-    return str(value) if isinstance(value, int) else f"{value:.6g}"
+def _format_number(number: float) -> str:
+    return str(number) if isinstance(number, int) else f"{number:.6g}"

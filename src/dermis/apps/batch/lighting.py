@@ -15,8 +15,8 @@ from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 from dermis.scene.lights import Light, RectangleLight, preset_lights
 
 _PLANCK_C2_NM_K = 1.438777e7  # second radiation constant, hc / k
-_WHITE_K = 6500.0
-_VECTOR_FIELDS = "position", "target", "direction", "up"
+_WHITE_TEMPERATURE_K = 6500.0
+_LIGHT_VECTOR_FIELDS = "position", "target", "direction", "up"
 _LAMP_NAMES = "key", "fill", "rim"
 _rgb_weights = cache(rgb_weights)
 
@@ -41,41 +41,47 @@ def direction_from_angles(yaw_deg: float, pitch_deg: float) -> tuple[float, floa
 
 
 @lru_cache(maxsize=64)
-def blackbody_colour(kelvin: float) -> tuple[float, float, float]:
+def blackbody_colour(temperature_k: float) -> tuple[float, float, float]:
     """Return the colour of a black body by Planck's law: linear Rec. 709 of luminance 1, white at 6500 K.
 
-    kelvin : temperature [K]
+    temperature_k : temperature [K]
     """
-    white, body = (np.expm1(_PLANCK_C2_NM_K / (WAVELENGTHS_NM * T)) for T in (_WHITE_K, kelvin))
+    white, body = (
+        np.expm1(_PLANCK_C2_NM_K / (WAVELENGTHS_NM * T)) for T in (_WHITE_TEMPERATURE_K, temperature_k)
+    )
     colour = np.maximum(_rgb_weights() @ (white / body), 0.0)
     red, green, blue = map(float, colour / luminance(colour))
     return red, green, blue
 
 
-def _area_lamp(lamp: Mapping[str, float], turn_deg: float, strength: float) -> Light:
+def _area_lamp(lamp_parameters: Mapping[str, float], rig_turn_deg: float, rig_strength: float) -> Light:
     """Return a square area light of a sampled rig, which faces the centre of the head.
 
-    lamp : sampled parameters of the lamp, by key of `LampTable`
-    turn_deg : rotation of the rig about the upward axis [degrees]
-    strength : factor of the irradiance, common to all lamps [-]
+    lamp_parameters : sampled parameters of the lamp, by key of `LampTable`
+    rig_turn_deg : rotation of the rig about the upward axis [degrees]
+    rig_strength : factor of the irradiance, common to all lamps [-]
     """
-    x, y, z = direction_from_angles(lamp["yaw_deg"] + turn_deg, lamp["pitch_deg"])
-    distance, size, irradiance = lamp["distance_mm"], lamp["size_mm"], pi * strength * lamp["strength"]
-    red, green, blue = (irradiance * one for one in blackbody_colour(lamp["kelvin"]))
+    x, y, z = direction_from_angles(lamp_parameters["yaw_deg"] + rig_turn_deg, lamp_parameters["pitch_deg"])
+    distance, size, irradiance = (
+        lamp_parameters["distance_mm"],
+        lamp_parameters["size_mm"],
+        pi * rig_strength * lamp_parameters["strength"],
+    )
+    red, green, blue = (irradiance * one for one in blackbody_colour(lamp_parameters["kelvin"]))
     position = distance * x, distance * y, distance * z
     return RectangleLight(position=position, irradiance=(red, green, blue), width_mm=size, height_mm=size)
 
 
 @cache
-def _preset_lights(preset: str) -> tuple[Light, ...]:
-    return preset_lights(preset)
+def _preset_lights(preset_name: str) -> tuple[Light, ...]:
+    return preset_lights(preset_name)
 
 
-def _rotate_light(light: Light, degrees: float, strength: float) -> Light:
+def _rotate_light(light: Light, turn_deg: float, rig_strength: float) -> Light:
     """Return a light of a preset rig, rotated about the upward axis and scaled by a strength."""
-    sine, cosine = sin(radians(degrees)), cos(radians(degrees))
-    values: dict[str, object] = {"irradiance": tuple(strength * one for one in light.irradiance)}
-    for name in _VECTOR_FIELDS:
+    sine, cosine = sin(radians(turn_deg)), cos(radians(turn_deg))
+    values: dict[str, object] = {"irradiance": tuple(rig_strength * one for one in light.irradiance)}
+    for name in _LIGHT_VECTOR_FIELDS:
         if hasattr(light, name):
             x, y, z = getattr(light, name)
             values[name] = (cosine * x + sine * z, y, cosine * z - sine * x)

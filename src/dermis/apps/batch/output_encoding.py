@@ -18,7 +18,7 @@ from dermis.scene.outputs import OUTPUTS, Output
 Array = NDArray[Any]
 Encoding = Literal["png", "exr", "npy"]
 _NPY_MAGIC = b"\x93NUMPY\x01\x00"
-_MAX_HALF = 65504.0
+_MAX_HALF_FLOAT = 65504.0
 
 
 def file_format(output_name: str, encoding: Encoding) -> str:
@@ -46,17 +46,19 @@ def storage_description(output_name: str, encoding: Encoding) -> str:
     return f"OpenEXR, {8 * dtype.itemsize}-bit floats" if kind == "exr" else f"NumPy, {dtype.name}"
 
 
-def encode_output(output_name: str, values: Array, encoding: Encoding) -> bytes:
+def encode_output(output_name: str, output_array: Array, encoding: Encoding) -> bytes:
     """Return the file of an output array (h, w) or (h, w, c), in the format given by `file_format`.
 
     Raises DermisError for numbers that are not finite.
     """
-    if not np.isfinite(values).all():
+    if not np.isfinite(output_array).all():
         refuse(f"output {output_name}", "finite numbers", "some are not", "Report this with the spec, please")
     kind, dtype = file_format(output_name, encoding), _stored_dtype(OUTPUTS[output_name], encoding)
     if kind == "png":
-        return encode_png(np.atleast_3d(quantise(output_name, values)), use_isal=True)
-    limited = np.clip(values, -_MAX_HALF, _MAX_HALF) if dtype.itemsize == 2 else values
+        return encode_png(np.atleast_3d(quantise(output_name, output_array)), use_isal=True)
+    limited = (
+        np.clip(output_array, -_MAX_HALF_FLOAT, _MAX_HALF_FLOAT) if dtype.itemsize == 2 else output_array
+    )
     if kind == "npy":
         file = io.BytesIO()
         np.save(file, np.ascontiguousarray(limited, dtype), allow_pickle=False)
@@ -66,14 +68,20 @@ def encode_output(output_name: str, values: Array, encoding: Encoding) -> bytes:
     return encode_exr(padded.astype(np.float32 if dtype.itemsize > 2 else np.float16))
 
 
-def decode_output(output_name: str, kind: str, data: bytes) -> Array:
+def decode_output(output_name: str, format_name: str, file_bytes: bytes) -> Array:
     """Return an output array (h, w) or (h, w, c) from the bytes of a file.
 
-    kind : file format: png, exr or npy
+    format_name : file format: png, exr or npy
 
     Raises ValueError and other exceptions for data that are damaged, too large, or of another format.
     """
-    picture = _decode_npy(data) if kind == "npy" else decode_exr(data) if kind == "exr" else decode_png(data)
+    picture = (
+        _decode_npy(file_bytes)
+        if format_name == "npy"
+        else decode_exr(file_bytes)
+        if format_name == "exr"
+        else decode_png(file_bytes)
+    )
     if not np.isfinite(picture).all():
         raise ValueError("it has numbers that are not finite")
     if output_name not in OUTPUTS:
@@ -82,7 +90,7 @@ def decode_output(output_name: str, kind: str, data: bytes) -> Array:
     if picture.shape[2] < output.channels:
         raise ValueError(f"it has {picture.shape[2]} channels, not {output.channels}")
     picture = picture[..., : output.channels or None]
-    if kind == "png" and output.quantisation is not None:
+    if format_name == "png" and output.quantisation is not None:
         step, zero = output.quantisation
         picture = (picture.astype(np.float32) - np.float32(zero)) * np.float32(step)
     if np.dtype(output.kind).kind in "iu" and picture.size:
@@ -93,10 +101,10 @@ def decode_output(output_name: str, kind: str, data: bytes) -> Array:
     return values[..., 0] if output.channels == 1 else values
 
 
-def decode_png(data: bytes) -> Array:
+def decode_png(png_bytes: bytes) -> Array:
     """Return the pixels (h, w, c) of a PNG file."""
-    picture = decode_up_filtered_png(data)
-    return decode_with_pillow(data) if picture is None else picture
+    picture = decode_up_filtered_png(png_bytes)
+    return decode_with_pillow(png_bytes) if picture is None else picture
 
 
 def _stored_dtype(output: Output, encoding: Encoding) -> np.dtype[Any]:
@@ -105,11 +113,11 @@ def _stored_dtype(output: Output, encoding: Encoding) -> np.dtype[Any]:
     return np.dtype(np.float16 if half else output.kind).newbyteorder("<")
 
 
-def _decode_npy(data: bytes) -> Array:
+def _decode_npy(npy_bytes: bytes) -> Array:
     """Return the array in a NumPy file; the array's shape is checked before memory is allocated."""
-    if not data.startswith(_NPY_MAGIC):
+    if not npy_bytes.startswith(_NPY_MAGIC):
         raise ValueError("it is not a NumPy array file of version 1.0")
-    file = io.BytesIO(data[len(_NPY_MAGIC) :])
+    file = io.BytesIO(npy_bytes[len(_NPY_MAGIC) :])
     shape, fortran_order, dtype = np.lib.format.read_array_header_1_0(file)
     if len(shape) not in (2, 3) or fortran_order or dtype.kind not in "fiu":
         raise ValueError(f"it contains {dtype} of shape {shape}, which is not a picture")

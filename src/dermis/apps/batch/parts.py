@@ -25,7 +25,7 @@ from dermis.apps.batch.shards import (
 from dermis.apps.batch.spec import Spec
 from dermis.base.errors import DermisError
 
-_MAX_ATTEMPTS = 3
+_MAX_JOIN_ATTEMPTS = 3
 
 
 class KeptImages(NamedTuple):
@@ -52,25 +52,25 @@ def kept_images(out: Path, part: Part, spec: Spec) -> KeptImages:
 
 
 @lru_cache(maxsize=2)  # one shard is read for many parts
-def _matches_sha256(path: Path, sha256: str) -> bool:
-    return shard_sha256(path) == sha256
+def _matches_sha256(path: Path, expected_sha256: str) -> bool:
+    return shard_sha256(path) == expected_sha256
 
 
-def copy_images(writer: ShardWriter, path: Path, first: int, stop: int) -> None:
+def copy_images(writer: ShardWriter, source_path: Path, first_image: int, stop_image: int) -> None:
     """Copy a range of images from a shard or part, and the reasons for images that were left out there.
 
-    first, stop : first image number, and the number after the last image
+    first_image, stop_image : first image number, and the number after the last image
 
     Raises DermisError if the shard or part cannot be read.
     """
-    manifest = read_manifest(path)
+    manifest = read_manifest(source_path)
     writer.add_versions(manifest.made_with)
     for number, reason in manifest.left_out:
-        if first <= number < stop:
+        if first_image <= number < stop_image:
             writer.leave_out(number, reason)
-    with shard_files(path) as images:
+    with shard_files(source_path) as images:
         for key, files in images.items():
-            if first <= int(key) < stop:
+            if first_image <= int(key) < stop_image:
                 writer.add(int(key), {suffix: read() for suffix, read in files.items()})
 
 
@@ -84,7 +84,7 @@ def join_parts(out: Path, shard: Shard, spec: Spec) -> tuple[Part, ...]:
     Raises DermisError if the shard cannot be written.
     """
     parts = {part: shard_path(out, part, spec) for part in list_parts(shard, spec)}
-    for attempts_left in reversed(range(_MAX_ATTEMPTS)):  # another process may remove files in between
+    for attempts_left in reversed(range(_MAX_JOIN_ATTEMPTS)):  # another process may remove files in between
         if not all(path.exists() for path in reversed(parts.values())):  # the last one is usually missing
             return ()
         damaged = tuple(part for part in parts if not is_intact(out, part, spec))

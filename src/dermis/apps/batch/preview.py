@@ -26,11 +26,11 @@ SHEET_IMAGES = 16
 """Number of images on the contact sheet."""
 MAX_COUNTED_IMAGES = 20_000
 """Largest number of images from which the statistics of the parameter table are computed."""
-_COLUMN_COUNT, _IMAGE_SIDE, _GAP = 4, 192, 4  # of the contact sheet; lengths in pixels
-_MAX_SIDES = {"atlas": 512, "shadow_size": 1024}  # upper limits of settings for the contact sheet
-_MAX_COLUMN_WIDTH = 60  # characters
-_MEASURED_IMAGES, _UNTIMED_IMAGES = 6, 2  # images of an estimate; the first of them are not timed
-_PERSON_IDS = "person.number", "person.seed"
+_SHEET_COLUMNS, _SHEET_IMAGE_SIDE, _SHEET_GAP = 4, 192, 4  # of the contact sheet; lengths in pixels
+_MAX_PREVIEW_SIDES = {"atlas": 512, "shadow_size": 1024}  # upper limits of settings for the contact sheet
+_MAX_COLUMN_CHARACTERS = 60  # characters
+_MEASURED_IMAGES, _WARM_UP_IMAGES = 6, 2  # images of an estimate; the first of them are not timed
+_PERSON_IDENTIFIERS = "person.number", "person.seed"
 _MAX_LISTED_TEXTS = 12  # largest number of listed values of a text parameter
 
 
@@ -86,7 +86,7 @@ def estimate(spec: Spec, adapter: str = "auto") -> Estimate:
         send = lambda event: times.extend([time.monotonic()] * event.images)  # noqa: E731
         worker.process([Part(0, 0, count)], send)
         size = sum(path.stat().st_size for path in Path(name).rglob("*") if path.is_file())
-    untimed = _UNTIMED_IMAGES if count > _UNTIMED_IMAGES else 0
+    untimed = _WARM_UP_IMAGES if count > _WARM_UP_IMAGES else 0
     seconds = (times[-1] - times[untimed]) / (count - untimed)
     hours = spec.count * seconds / 3600
     return {"images": spec.count, "measured": count, "bytes": spec.count * size // count, "hours": hours}
@@ -103,7 +103,7 @@ def parameter_rows(spec: Spec) -> list[ParameterRow]:
     samples = [spec.parameters(k) for k in range(min(spec.count, MAX_COUNTED_IMAGES))]
     names = dict.fromkeys(name for sample in samples for name in sample)
     varying = [name for name in names if not isinstance(spec.distributions.get(name), Constant)]
-    return [_parameter_row(spec, name, samples) for name in varying if name not in _PERSON_IDS]
+    return [_parameter_row(spec, name, samples) for name in varying if name not in _PERSON_IDENTIFIERS]
 
 
 def table_lines(rows: Sequence[ParameterRow]) -> list[str]:
@@ -122,19 +122,19 @@ def contact_sheet(spec: Spec, adapter: str = "auto") -> NDArray[np.uint8]:
     """Return an sRGB picture (h, w, 3) with the first 16 images at reduced quality, labelled by number."""
     from PIL import Image, ImageDraw
 
-    width, height = (max(_IMAGE_SIDE * side // max(spec.size), 1) for side in spec.size)
-    limited = {name: min(side, getattr(spec.render, name)) for name, side in _MAX_SIDES.items()}
+    width, height = (max(_SHEET_IMAGE_SIDE * side // max(spec.size), 1) for side in spec.size)
+    limited = {name: min(side, getattr(spec.render, name)) for name, side in _MAX_PREVIEW_SIDES.items()}
     spec = spec.replace(render=spec.render.replace(size=(width, height), **limited))
     count = min(spec.count, SHEET_IMAGES)
-    columns = min(count, _COLUMN_COUNT)
+    columns = min(count, _SHEET_COLUMNS)
     rows = -(-count // columns)
-    size = columns * (width + _GAP) - _GAP, rows * (height + _GAP) - _GAP
+    size = columns * (width + _SHEET_GAP) - _SHEET_GAP, rows * (height + _SHEET_GAP) - _SHEET_GAP
     sheet = Image.new("RGB", size, (20, 20, 20))
     draw = ImageDraw.Draw(sheet)
     builder, renderer = SceneBuilder(spec), Renderer(adapter)
     for k in range(count):
         picture = renderer.draw(*builder.build(spec.parameters(k)), timed=False).srgb8()
-        x, y = (k % columns) * (width + _GAP), (k // columns) * (height + _GAP)
+        x, y = (k % columns) * (width + _SHEET_GAP), (k // columns) * (height + _SHEET_GAP)
         sheet.paste(Image.fromarray(picture), (x, y))
         draw.text((x + 4, y + 2), str(k), fill=(255, 255, 255), stroke_width=1, stroke_fill=(0, 0, 0))
     return np.array(sheet)
@@ -152,13 +152,15 @@ def _parameter_row(spec: Spec, parameter: str, samples: Sequence[Parameters]) ->
     return {**row, "min": min(numbers), "mean": float(np.mean(numbers)), "max": max(numbers)}
 
 
-def _table_cells(row: ParameterRow) -> tuple[str, ...]:
-    text = row["drawn"]
-    if len(text) > _MAX_COLUMN_WIDTH:
-        text = f"{text[: _MAX_COLUMN_WIDTH - 4]} ..."
-    fields = row["parameter"], text, str(row["images"])
-    if "counts" not in row:
-        return *fields, *(f"{number:.4g}" for number in (row["min"], row["mean"], row["max"]))
-    counts = [f"{name} {count}" for name, count in row["counts"].items()]
+def _table_cells(parameter_row: ParameterRow) -> tuple[str, ...]:
+    text = parameter_row["drawn"]
+    if len(text) > _MAX_COLUMN_CHARACTERS:
+        text = f"{text[: _MAX_COLUMN_CHARACTERS - 4]} ..."
+    fields = parameter_row["parameter"], text, str(parameter_row["images"])
+    if "counts" not in parameter_row:
+        return *fields, *(
+            f"{number:.4g}" for number in (parameter_row["min"], parameter_row["mean"], parameter_row["max"])
+        )
+    counts = [f"{name} {count}" for name, count in parameter_row["counts"].items()]
     more = f", and {len(counts) - _MAX_LISTED_TEXTS} more" if len(counts) > _MAX_LISTED_TEXTS else ""
     return *fields, ", ".join(counts[:_MAX_LISTED_TEXTS]) + more

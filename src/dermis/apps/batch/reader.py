@@ -36,9 +36,9 @@ FileReaders = dict[str, Callable[[], bytes]]
 """Functions that read the files of an image, by name or suffix."""
 _RESTORE_ADVICE = "Copy or download it again, or render the shard again"
 _MAX_SHARD_NUMBER = 10**9
-_FILE_NAME = re.compile(r"(\d{9})\.([a-z0-9_]{1,40}(?:\.[a-z0-9]{1,10})?)")
-_OUTPUT_NAME = re.compile(r"([a-z0-9_]+)\.(png|exr|npy)")
-_RESERVED_NAMES = frozenset(
+_IMAGE_FILE_PATTERN = re.compile(r"(\d{9})\.([a-z0-9_]{1,40}(?:\.[a-z0-9]{1,10})?)")
+_OUTPUT_FILE_PATTERN = re.compile(r"([a-z0-9_]+)\.(png|exr|npy)")
+_RESERVED_IMAGE_KEYS = frozenset(
     ("number", "picture", "parameters", "camera", "head_pose", "gaze", "landmarks", "skin_tone")
 )
 
@@ -122,8 +122,8 @@ def decode_image(files: Mapping[str, object], culprit: object = "") -> Image:
     if picture.dtype != np.uint8:
         refuse(source, "an 8-bit picture", f"it has {picture.dtype}", "Copy or download it again")
     for suffix, content in sorted(data.items()):
-        match = _OUTPUT_NAME.fullmatch(suffix)
-        if match is None or match[1] in _RESERVED_NAMES:
+        match = _OUTPUT_FILE_PATTERN.fullmatch(suffix)
+        if match is None or match[1] in _RESERVED_IMAGE_KEYS:
             refuse(source, "files of outputs", f"found .{suffix}", "Remove it")
         values = _decode_picture(f"{source}.{suffix}", match[1], match[2], content)
         if values.shape[:2] != picture.shape[:2]:
@@ -133,16 +133,18 @@ def decode_image(files: Mapping[str, object], culprit: object = "") -> Image:
     return image
 
 
-def read_record(data: bytes, culprit: object) -> Record:
+def read_record(json_bytes: bytes, culprit: object) -> Record:
     """Return the record of an image from the bytes of its JSON file, without a check of the landmarks.
 
     culprit : name of the file in error messages
 
     Raises DermisError if the record is damaged.
     """
-    if len(data) > MAX_TEXT_BYTES:
-        refuse(culprit, "a record of an image", f"it has {len(data):,} bytes", "Copy or download it again")
-    record: Record = parse_json(data, culprit, "a record of an image")
+    if len(json_bytes) > MAX_TEXT_BYTES:
+        refuse(
+            culprit, "a record of an image", f"it has {len(json_bytes):,} bytes", "Copy or download it again"
+        )
+    record: Record = parse_json(json_bytes, culprit, "a record of an image")
     with _refuse_malformed_record(culprit):
         if type(record["number"]) is not int:
             raise ValueError("its number is not an integer")
@@ -178,7 +180,7 @@ def _group_by_image(path: Path, files: FileReaders) -> dict[str, FileReaders]:
         refuse(path, SHARD_DESCRIPTION, "its end is missing", _RESTORE_ADVICE)
     images: dict[str, FileReaders] = {}
     for name, read in files.items():
-        match = _FILE_NAME.fullmatch(name)
+        match = _IMAGE_FILE_PATTERN.fullmatch(name)
         if match:
             images.setdefault(match[1], {})[match[2]] = read
         elif name != MANIFEST_NAME:
@@ -191,12 +193,12 @@ def _read_folder_file(path: Path) -> bytes:
     return read_file(path, "a file of a shard", MAX_FILE_BYTES)
 
 
-def _read_tar_member(path: Path, file: BinaryIO, member: TarMember) -> bytes:
+def _read_tar_member(path: Path, tar_file: BinaryIO, member: TarMember) -> bytes:
     if member.size > MAX_FILE_BYTES:
         actual = f"{member.name} has {member.size:,} bytes"
         refuse(path, f"files of at most {MAX_FILE_BYTES:,} bytes", actual, "Render the shard again")
-    file.seek(member.offset)
-    data = file.read(member.size)
+    tar_file.seek(member.offset)
+    data = tar_file.read(member.size)
     if len(data) != member.size:
         refuse(path, SHARD_DESCRIPTION, "it is truncated", _RESTORE_ADVICE)
     return data
@@ -227,14 +229,14 @@ def _select_shards(path: Path, shards: Iterable[int] | None) -> list[Path]:
     return [by_number[number] for number in numbers]
 
 
-def _iterate_images(shards: list[Path], rng: Random | None) -> Iterator[Image]:
-    if rng:
-        rng.shuffle(shards)
+def _iterate_images(shards: list[Path], shuffle_rng: Random | None) -> Iterator[Image]:
+    if shuffle_rng:
+        shuffle_rng.shuffle(shards)
     for path in shards:
         with shard_files(path) as images:
             keys = list(images)
-            if rng:
-                rng.shuffle(keys)
+            if shuffle_rng:
+                shuffle_rng.shuffle(keys)
             for key in keys:
                 image = decode_image({suffix: read() for suffix, read in images[key].items()}, path / key)
                 if image["number"] != int(key):
@@ -250,8 +252,8 @@ def _pop_file(files: dict[str, object], suffix: str, culprit: object) -> bytes:
     return content
 
 
-def _decode_record(data: bytes, culprit: object) -> Image:
-    record = read_record(data, culprit)
+def _decode_record(json_bytes: bytes, culprit: object) -> Image:
+    record = read_record(json_bytes, culprit)
     with _refuse_malformed_record(culprit):
         landmarks = {name: _decode_landmarks(one) for name, one in record["landmarks"].items()}
     image = {"number": record["number"], "parameters": record["parameters"]}
@@ -278,14 +280,14 @@ def _decode_landmarks(record: LandmarksRecord) -> LandmarkPoints:
     return LandmarkPoints(pixels, _to_array(record["positions_mm"], (len(visible), 3)), visible)
 
 
-def _to_array(numbers: NestedNumbers, shape: tuple[int, ...]) -> NDArray[np.float64]:
+def _to_array(nested_numbers: NestedNumbers, shape: tuple[int, ...]) -> NDArray[np.float64]:
     """Return nested lists of numbers as an array, with NaN for null."""
-    flat: Sequence[object] = numbers if isinstance(numbers, list) else [numbers]
+    flat: Sequence[object] = nested_numbers if isinstance(nested_numbers, list) else [nested_numbers]
     while flat and isinstance(flat[0], list):
         flat = [one for row in flat if isinstance(row, list) for one in row]
     if any(isinstance(one, str | bool) for one in flat):
         raise ValueError("it has texts in place of numbers")
-    array = np.array(numbers, np.float64)
+    array = np.array(nested_numbers, np.float64)
     if array.shape != shape and (array.size or 0 not in shape):
         raise ValueError(f"an array has shape {array.shape}, not {shape}")
     return array.reshape(shape)
@@ -299,11 +301,15 @@ def _refuse_malformed_record(culprit: object) -> AbstractContextManager[None]:
     return parsing(culprit, "a record of an image", KeyError, TypeError, AttributeError)
 
 
-def _decode_picture(culprit: object, output_name: str, picture_format: str, data: object) -> Array:
+def _decode_picture(culprit: object, output_name: str, picture_format: str, file_content: object) -> Array:
     try:
-        if not isinstance(data, bytes):
+        if not isinstance(file_content, bytes):
             raise TypeError("its content is not of type bytes")
-        return decode_output(output_name, picture_format, data) if output_name else decode_png(data)
+        return (
+            decode_output(output_name, picture_format, file_content)
+            if output_name
+            else decode_png(file_content)
+        )
     except DermisError as fault:  # a package is missing
         raise DermisError(f"{culprit}: {fault}") from fault
     except Exception as fault:  # decoders raise anything for damaged data

@@ -53,17 +53,17 @@ class Record(TypedDict):
 
 
 def encode_record(
-    number: int,
+    image_number: int,
     observation: Observation,
     parameters: Parameters,
     spec: Spec,
-    tone: SkinTone | None = None,
+    skin_tone: SkinTone | None = None,
 ) -> dict[str, bytes]:
-    """Return the files of image `number` by suffix; equal arguments give equal bytes.
+    """Return the files of image `image_number` by suffix; equal arguments give equal bytes.
 
     observation : sRGB picture and output arrays of the image
     parameters : sampled parameters of the image
-    tone : description of the colour of the skin; None if this colour is unknown
+    skin_tone : description of the colour of the skin; None if this colour is unknown
 
     The suffixes are "png" for the picture, with an alpha channel if the picture has no background;
     "NAME.png", "NAME.exr" or "NAME.npy" for each output, see `output_encoding.storage_description`; and
@@ -73,21 +73,25 @@ def encode_record(
     for name in spec.outputs:
         suffix = f"{name}.{file_format(name, spec.encoding)}"
         files[suffix] = encode_output(name, observation.outputs[name], spec.encoding)
-    record = _make_record(number, observation, parameters, spec, tone)
+    record = _make_record(image_number, observation, parameters, spec, skin_tone)
     text = json.dumps(record, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     files[RECORD_SUFFIX] = f"{text}\n".encode()
     return files
 
 
 def _make_record(
-    image_number: int, observation: Observation, parameters: Parameters, spec: Spec, tone: SkinTone | None
+    image_number: int,
+    observation: Observation,
+    parameters: Parameters,
+    spec: Spec,
+    skin_tone: SkinTone | None,
 ) -> Record:
     camera, gaze = observation.camera, observation.gaze
     names = {path: name for name, path in spec.landmark_tables.items()}  # records hold no absolute paths
     return {
         "number": image_number,
         "parameters": dict(parameters),
-        "skin_tone": None if tone is None else tone.as_json(),
+        "skin_tone": None if skin_tone is None else skin_tone.as_json(),
         "camera": {
             "K": _rounded_list(camera.K, _MM_DIGITS),
             "R": _rounded_list(camera.R, _DIRECTION_DIGITS),
@@ -106,9 +110,9 @@ def _make_record(
     }
 
 
-def _rounded_list(values: ArrayLike, digits: int) -> NestedNumbers:
+def _rounded_list(unrounded: ArrayLike, decimal_digits: int) -> NestedNumbers:
     """Return rounded numbers as nested lists, with null for numbers that are not finite and 0 for -0."""
-    numbers = np.round(np.asarray(values, np.float64), digits) + 0.0
+    numbers = np.round(np.asarray(unrounded, np.float64), decimal_digits) + 0.0
     nullable = numbers.astype(object)
     nullable[~np.isfinite(numbers)] = None
     return list(nullable.tolist())

@@ -22,7 +22,7 @@ from dermis.apps.batch.shards import (
     shard_exists,
     shard_path,
 )
-from dermis.apps.batch.spec import COUNT_LINE, GENERATOR, GENERATOR_LINE, Spec
+from dermis.apps.batch.spec import COUNT_LINE_PATTERN, GENERATOR, GENERATOR_LINE_PATTERN, Spec
 from dermis.apps.batch.worker import Failure, RunOptions, WorkerEvent
 from dermis.base.atomic_write import refuse_output
 from dermis.base.errors import notify, refuse
@@ -80,15 +80,15 @@ class RunReport:
 def run(
     options: RunOptions,
     pool: WorkerPool,
-    shards: tuple[int, int] = (0, 1),
-    parts: tuple[int, int] = (0, 1),
+    shard_selection: tuple[int, int] = (0, 1),
+    part_selection: tuple[int, int] = (0, 1),
     on_progress: Callable[[Progress], None] = lambda progress: None,
 ) -> RunReport:
     """Render missing parts of a data set; if the data set is then complete, write index and datasheet.
 
     pool : workers that render the parts
-    shards : (i, n) selects every n-th shard from shard i, so that n runs can share a data set
-    parts : (i, n) selects every n-th part of these shards, from part i
+    shard_selection : (i, n) selects every n-th shard from shard i, so that n runs can share a data set
+    part_selection : (i, n) selects every n-th part of these shards, from part i
     on_progress : function called whenever images were rendered or a shard was verified
 
     Raises DermisError for errors of the spec, the disk or the machine; complete parts are kept.
@@ -99,18 +99,20 @@ def run(
         import_extra(package, "a data set")
     claim_folder(out, spec)
     all_shards = list_shards(spec)
-    selected = all_shards[shards[0] :: shards[1]]
+    selected = all_shards[shard_selection[0] :: shard_selection[1]]
     existing = {shard for shard in selected if shard_exists(out, shard, spec)}
-    share = [part for shard in selected for part in list_parts(shard, spec)][parts[0] :: parts[1]]
+    share = [part for shard in selected for part in list_parts(shard, spec)][
+        part_selection[0] :: part_selection[1]
+    ]
     missing = [part for part in share if shard_at(part.index, spec) not in existing]
-    verified = [shard for shard in selected if shard in existing][parts[0] :: parts[1]]
+    verified = [shard for shard in selected if shard in existing][part_selection[0] :: part_selection[1]]
     removable_names = {
-        shard_path(out, one, spec).name for one in (*missing, *(selected if parts[1] == 1 else ()))
+        shard_path(out, one, spec).name for one in (*missing, *(selected if part_selection[1] == 1 else ()))
     }
     remove_unfinished(out, removable_names)
     _remove_joined_parts(out, spec, existing)
     try:
-        images, damaged, failed = _process(pool, options, [*missing, *verified], on_progress)
+        images, damaged, failed = _process_tasks(pool, options, [*missing, *verified], on_progress)
     finally:
         remove_unfinished(out, removable_names)
     complete_shards = {shard for shard in all_shards if shard_exists(out, shard, spec)}
@@ -151,13 +153,15 @@ def _must_grow(existing_toml: str, spec: Spec, out: Path) -> bool:
     """
     if existing_toml == spec.to_toml():
         return False
-    other_folder, count = "Choose another folder", COUNT_LINE.search(existing_toml)
-    generator = GENERATOR_LINE.search(existing_toml)
+    other_folder, count = "Choose another folder", COUNT_LINE_PATTERN.search(existing_toml)
+    generator = GENERATOR_LINE_PATTERN.search(existing_toml)
     number = int(generator[1]) if generator else 1  # earlier versions wrote none
     if number != GENERATOR:
         actual = f"it was made with number {number}, by another version of dermis"
         refuse(out, f"a data set of generator number {GENERATOR}", actual, f"{other_folder}, or that version")
-    if not count or COUNT_LINE.sub("", existing_toml, count=1) != COUNT_LINE.sub("", spec.to_toml(), count=1):
+    if not count or COUNT_LINE_PATTERN.sub("", existing_toml, count=1) != COUNT_LINE_PATTERN.sub(
+        "", spec.to_toml(), count=1
+    ):
         advice = f"{other_folder}, or use the spec that the folder was created with"
         refuse(out, "a folder for this data set", f"its {SPEC_FILE} differs from this spec", advice)
     if int(count[1]) > spec.count:
@@ -166,16 +170,16 @@ def _must_grow(existing_toml: str, spec: Spec, out: Path) -> bool:
     return True
 
 
-def _remove_joined_parts(out: Path, spec: Spec, complete: Iterable[Shard]) -> None:
+def _remove_joined_parts(out: Path, spec: Spec, complete_shards: Iterable[Shard]) -> None:
     """Remove parts whose shard exists, because a run was interrupted after it had joined the parts."""
     if files := part_files(out):
-        complete = set(complete)
+        complete_shards = set(complete_shards)
         for number, path in files.items():
-            if shard_at(number // spec.shard_size, spec) in complete:
+            if shard_at(number // spec.shard_size, spec) in complete_shards:
                 remove_path(path)
 
 
-def _process(
+def _process_tasks(
     pool: WorkerPool,
     options: RunOptions,
     tasks: Sequence[Shard],

@@ -22,12 +22,14 @@ from dermis.base.tables import read_rows
 from dermis.human.expressions import TARGET_SIDES, Weights, expand_sides, expand_targets
 
 Parameters = dict[str, float | int | str]
-_JAW_TARGET = "jawOpen"
-_WEIGHT_POWER = 1.5  # power of uniform numbers, so that small weights are more frequent
-_HASH_BITS = 52  # used bits of the hash; integers of so many bits plus one half are exact in double precision
+_JAW_MORPH_TARGET = "jawOpen"
+_MOVEMENT_WEIGHT_EXPONENT = 1.5  # power of uniform numbers, so that small weights are more frequent
+_UNIFORM_NUMBER_BITS = (
+    52  # used bits of the hash; integers of so many bits plus one half are exact in double precision
+)
 _PERSON_PREFIX = "person."
-_SEED_COUNT = 2**32
-_VARIATION_KEYS = "intensity", "asymmetry", "variation"
+_PERSON_SEED_COUNT = 2**32
+_EXPRESSION_VARIATION_KEYS = "intensity", "asymmetry", "variation"
 _LAMP_PREFIXES = tuple(f"light.{lamp}." for lamp in ("key", "fill", "rim"))
 _BACKGROUND_CHANNELS = "background.red", "background.green", "background.blue"
 _CONDITIONAL_PARAMETERS: tuple[tuple[str | tuple[str, ...], Callable[[Parameters], bool]], ...] = (
@@ -44,12 +46,14 @@ _CONDITIONAL_PARAMETERS: tuple[tuple[str | tuple[str, ...], Callable[[Parameters
 """Prefixes of parameters that only some images have, with the condition for having them."""
 
 
-def table_numbers(parameters: Mapping[str, float | int | str], table: str) -> dict[str, float]:
+def table_numbers(parameters: Mapping[str, float | int | str], table_name: str) -> dict[str, float]:
     """Return the numeric parameters of a spec table by key, without the table's name.
 
-    table : dotted name of the table, such as "light.key"
+    table_name : dotted name of the table, such as "light.key"
     """
-    return {name: one for name, one in table_values(parameters, table).items() if not isinstance(one, str)}
+    return {
+        name: one for name, one in table_values(parameters, table_name).items() if not isinstance(one, str)
+    }
 
 
 def hashed_uniform(seed: int, image_or_person: int, parameter: str) -> float:
@@ -62,16 +66,16 @@ def hashed_uniform(seed: int, image_or_person: int, parameter: str) -> float:
     parameter : name of the parameter
     """
     digest = hashlib.blake2b(f"{seed} {image_or_person} {parameter}".encode(), digest_size=8).digest()
-    step = int.from_bytes(digest, "little") >> (64 - _HASH_BITS)
-    return (step + 0.5) / float(1 << _HASH_BITS)
+    step = int.from_bytes(digest, "little") >> (64 - _UNIFORM_NUMBER_BITS)
+    return (step + 0.5) / float(1 << _UNIFORM_NUMBER_BITS)
 
 
-def round_significant(value: float) -> float:
+def round_significant(number: float) -> float:
     """Return a number with six significant digits.
 
     Later digits of logarithms and roots differ between machines.
     """
-    return float(f"{value:.6g}") + 0.0  # no -0.0
+    return float(f"{number:.6g}") + 0.0  # no -0.0
 
 
 @dataclass(frozen=True)
@@ -102,53 +106,62 @@ def load_movements() -> Mapping[str, tuple[Movement, ...]]:
     return by_part
 
 
-def random_expression(uniform: Callable[[str], float]) -> dict[str, float]:
+def random_expression(sample_uniform: Callable[[str], float]) -> dict[str, float]:
     """Return random weights of morph targets, with at most one movement in each part of the face.
 
-    uniform : function that returns a uniform random number in (0, 1) for a name
+    sample_uniform : function that returns a uniform random number in (0, 1) for the name of a parameter
     """
     weights: dict[str, float] = {}
     jaw_factor = 1.0
     for part, movements in load_movements().items():
-        remaining, amount = uniform(f"{part}.which"), uniform(f"{part}.weight") ** _WEIGHT_POWER
+        remaining, amount = (
+            sample_uniform(f"{part}.which"),
+            sample_uniform(f"{part}.weight") ** _MOVEMENT_WEIGHT_EXPONENT,
+        )
         for movement in movements:
             if 0 <= remaining < movement.probability:
                 scale = movement.max_weight * amount
                 weights |= {name: scale * weight for name, weight in movement.target_weights.items()}
                 jaw_factor *= 1.0 - movement.jaw_closing * amount
             remaining -= movement.probability
-    if _JAW_TARGET in weights:
-        weights[_JAW_TARGET] *= jaw_factor
+    if _JAW_MORPH_TARGET in weights:
+        weights[_JAW_MORPH_TARGET] *= jaw_factor
     return weights
 
 
 def expression_weights(
-    weights: Weights, intensity: float, asymmetry: float, variation: float, normal: Callable[[str], float]
+    target_weights: Weights,
+    intensity: float,
+    asymmetry: float,
+    variation: float,
+    sample_normal: Callable[[str], float],
 ) -> dict[str, float]:
     """Return the morph target weights (0 to 1) of a named expression, varied at random for one image.
 
-    weights : weights of the expression by name of the morph target; a name without Left or Right moves both
-        sides
+    target_weights : weights of the expression by name of the morph target; a name without Left or Right
+        moves both sides
     intensity : factor of all weights [-]
     asymmetry : relative increase of weights on the left and decrease on the right [-]
     variation : standard deviation of the logarithm of each weight [-]
-    normal : function that returns a standard normal random number for a target name
+    sample_normal : function that returns a standard normal random number for a target name
     """
     varied = {}
-    for name, weight in weights.items():
-        mean = weight * intensity * exp(variation * normal(name)) if weight else 0.0
+    for name, weight in target_weights.items():
+        mean = weight * intensity * exp(variation * sample_normal(name)) if weight else 0.0
         for target in expand_sides(name):
             side = 0.0 if target == name and not _is_one_sided(name) else 1.0 - 2.0 * target.endswith("Right")
             varied[target] = min(max(mean * (1.0 + asymmetry * side), 0.0), 1.0)
     return varied
 
 
-def _is_one_sided(name: str) -> bool:
+def _is_one_sided(target_name: str) -> bool:
     """Return whether a morph target acts on one side of the face and has a mirrored counterpart.
 
     False for targets such as mouthLeft and jawRight, which move the middle of the face sideways.
     """
-    return name.endswith(TARGET_SIDES) and not name.startswith(("jaw", "mouthLeft", "mouthRight"))
+    return target_name.endswith(TARGET_SIDES) and not target_name.startswith(
+        ("jaw", "mouthLeft", "mouthRight")
+    )
 
 
 @dataclass(frozen=True)
@@ -169,70 +182,78 @@ class Sampler:
     cholesky_rows: Mapping[str, Mapping[str, float]]
     expressions: Mapping[str, Weights]
 
-    def parameters(self, k: int) -> Parameters:
-        """Return the sampled parameters of image k by dotted name, independently of other images."""
-        person = k // self.images_per_person
+    def parameters(self, image_number: int) -> Parameters:
+        """Return the sampled parameters of one image by dotted name, independently of other images."""
+        person = image_number // self.images_per_person
         sampled: Parameters = {"person.number": person}
         if "person.head" not in self.distributions:
-            sampled["person.seed"] = int(hashed_uniform(self.seed, person, "person.seed") * _SEED_COUNT)
+            sampled["person.seed"] = int(
+                hashed_uniform(self.seed, person, "person.seed") * _PERSON_SEED_COUNT
+            )
         for name, distribution in self.distributions.items():
             if not name.startswith("pose."):
-                sampled[name] = self._sample(k, name, distribution)
+                sampled[name] = self._sample(image_number, name, distribution)
         if sampled["background.kind"] == "environment" and sampled["environment.name"] == NO_ENVIRONMENT:
             sampled["background.kind"] = "gradient"
         for prefixes, applies in _CONDITIONAL_PARAMETERS:
             if not applies(sampled):
                 sampled = {name: value for name, value in sampled.items() if not name.startswith(prefixes)}
-        return sampled | {f"pose.{name}": weight for name, weight in self._target_weights(k, sampled).items()}
+        return sampled | {
+            f"pose.{name}": weight for name, weight in self._target_weights(image_number, sampled).items()
+        }
 
-    def _sample(self, image: int, parameter: str, distribution: Distribution) -> float | str:
+    def _sample(self, image_number: int, parameter: str, distribution: Distribution) -> float | str:
         is_constant = isinstance(distribution, Constant)
-        value = distribution.quantile(0.5 if is_constant else self._probability(image, parameter))
+        value = distribution.quantile(0.5 if is_constant else self._probability(image_number, parameter))
         return value if isinstance(value, str) else round_significant(value)
 
-    def _probability(self, image: int, parameter: str) -> float:
+    def _probability(self, image_number: int, parameter: str) -> float:
         """Return the random cumulative probability in (0, 1) at which a parameter is sampled.
 
-        image : number of the image
+        image_number : number of the image
         """
         weights = self.cholesky_rows.get(parameter)
         if weights is None:
-            return self._uniform(image, parameter)
-        return float(ndtr(sum(weight * self._normal(image, other) for other, weight in weights.items())))
+            return self._uniform(image_number, parameter)
+        return float(
+            ndtr(sum(weight * self._normal(image_number, other) for other, weight in weights.items()))
+        )
 
-    def _uniform(self, image: int, parameter: str) -> float:
-        number = image // self.images_per_person if parameter.startswith(_PERSON_PREFIX) else image
+    def _uniform(self, image_number: int, parameter: str) -> float:
+        number = (
+            image_number // self.images_per_person if parameter.startswith(_PERSON_PREFIX) else image_number
+        )
         return hashed_uniform(self.seed, number, parameter)
 
-    def _normal(self, image: int, parameter: str) -> float:
-        return float(ndtri(self._uniform(image, parameter)))
+    def _normal(self, image_number: int, parameter: str) -> float:
+        return float(ndtri(self._uniform(image_number, parameter)))
 
-    def _target_weights(self, image: int, sampled_parameters: Parameters) -> dict[str, float]:
+    def _target_weights(self, image_number: int, sampled_parameters: Parameters) -> dict[str, float]:
         """Return the weights, in an image, of all morph targets that the spec can move.
 
-        image : number of the image
+        image_number : number of the image
         sampled_parameters : parameters of the image that have been sampled so far
         """
         name = str(sampled_parameters["expression.name"])
         if name == RANDOM_EXPRESSION:
             weights: Weights = random_expression(
-                lambda part: self._uniform(image, f"expression.mixture.{part}")
+                lambda part: self._uniform(image_number, f"expression.mixture.{part}")
             )
         else:
             weights = self.expressions[name]
         intensity, asymmetry, variation = (
-            float(sampled_parameters[f"expression.{key}"]) for key in _VARIATION_KEYS
+            float(sampled_parameters[f"expression.{key}"]) for key in _EXPRESSION_VARIATION_KEYS
         )
         varied = expression_weights(
             weights,
             intensity,
             asymmetry,
             variation,
-            lambda name: self._normal(image, f"expression.variation.{name}"),
+            lambda name: self._normal(image_number, f"expression.variation.{name}"),
         )
         target_weights: dict[str, float | str] = {**varied}
         for target, distribution in table_values(self.distributions, "pose").items():
-            weight = self._sample(image, f"pose.{target}", distribution)
+            weight = self._sample(image_number, f"pose.{target}", distribution)
             target_weights |= dict.fromkeys(expand_targets([target]), weight)
         return {target: round_significant(float(target_weights.get(target, 0.0))) for target in self.targets}
 

@@ -33,12 +33,12 @@ from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 from dermis.scene.smoothness import SmoothIn
 
-_FULL_HAIR_SIDE = 1000  # side from which pictures have all hairs [pixel]; a close-up shows 230 mm
+_FULL_HAIR_PICTURE_SIDE = 1000  # side from which pictures have all hairs [pixel]; a close-up shows 230 mm
 _MIN_HAIR_FRACTION = 0.2
 _GAZE_DISTANCE_MM = 1e4  # distance of the gaze target if the gaze is given by angles
 _SEED_PARAMETER, _HEAD_PARAMETER = "person.seed", "person.head"
 _CACHED_SAMPLED_PEOPLE, _CACHED_FILE_HEADS = 1, 8  # a sampled person is not used again, a named head is
-_NON_HUMAN_FIELDS = "number", "seed", "head"  # parameters of people that are not fields of `Human`
+_PARAMETERS_NOT_OF_HUMAN = "number", "seed", "head"  # parameters of people that are not fields of `Human`
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ class SceneBuilder:
         size = self.spec.size
         if _HEAD_PARAMETER not in parameters:
             human = sampled_person(parameters)
-            head = human.head(subdivide=_subdivision_levels(size), hairs=_hair_fraction(size))
+            head = human.head(subdivide=_subdivision_levels(size), hairs=_hair_count_fraction(size))
             skin = skin_of(human)
         elif Path(name := self._resolve_file(parameters[_HEAD_PARAMETER])).suffix.lower() == ".toml":
             scene, _ = load_scene(name, size=size)
@@ -115,10 +115,10 @@ class SceneBuilder:
             head, skin = load_head(name, subdivide=SmoothIn(size=size)), Skin()
         return _Person(head, face_points(head), find_rotation_bones(head.control.skeleton).head, skin)
 
-    def _resolve_file(self, name: float | str) -> str:
-        """Return the path of a file in the spec's folder, or the name itself if there is no such file."""
-        file = self.spec.folder / str(name)
-        return str(file) if is_file(file) else str(name)
+    def _resolve_file(self, head_or_panorama: float | str) -> str:
+        """Return the path of a head or panorama in the spec's folder, or the name if there is no file."""
+        file = self.spec.folder / str(head_or_panorama)
+        return str(file) if is_file(file) else str(head_or_panorama)
 
     def _pose_weights(self, parameters: Parameters, head: Head) -> dict[str, float]:
         """Return the sampled weights of morph targets that the head has or that the [pose] table names."""
@@ -145,26 +145,26 @@ def sampled_person(parameters: Parameters) -> Human:
         part, _, field = name.partition(".")
         if field:
             appearance.setdefault(part, {})[field] = value
-        elif name not in _NON_HUMAN_FIELDS:
+        elif name not in _PARAMETERS_NOT_OF_HUMAN:
             fields[name] = value
     return Human.drawn(int(parameters[_SEED_PARAMETER]), **fields, **appearance)
 
 
 @cache
-def _subdivision_levels(size: tuple[int, int]) -> int:
+def _subdivision_levels(picture_size: tuple[int, int]) -> int:
     """Return the number of times that heads are subdivided for a picture size [pixel].
 
     The number is equal for all sampled people, so that all their heads have the same topology.
     """
-    return max(MIN_HUMAN_LEVELS, SmoothIn(size=size)(Human().head(subdivide=0)))
+    return max(MIN_HUMAN_LEVELS, SmoothIn(size=picture_size)(Human().head(subdivide=0)))
 
 
-def _hair_fraction(size: tuple[int, int]) -> float:
+def _hair_count_fraction(picture_size: tuple[int, int]) -> float:
     """Return the fraction of the hairs to generate, which is smaller for small pictures.
 
-    size : width and height of the picture [pixel]
+    picture_size : width and height of the picture [pixel]
     """
-    return min(1.0, max(_MIN_HAIR_FRACTION, max(size) / _FULL_HAIR_SIDE))
+    return min(1.0, max(_MIN_HAIR_FRACTION, max(picture_size) / _FULL_HAIR_PICTURE_SIDE))
 
 
 def _head_rotation(parameters: Parameters) -> NDArray[np.float64]:
@@ -174,19 +174,19 @@ def _head_rotation(parameters: Parameters) -> NDArray[np.float64]:
 
 
 def _bone_angles(
-    rotation: NDArray[np.float64], bones: Mapping[str, float]
+    head_rotation: NDArray[np.float64], rotation_fractions: Mapping[str, float]
 ) -> dict[str, tuple[float, float, float]]:
     """Return the rotation angles of the bones that together rotate the head, by bone name [degrees].
 
-    rotation : (3, 3) rotation matrix of the head
-    bones : fraction of the rotation that each bone performs, by bone name
+    head_rotation : (3, 3) rotation matrix of the head
+    rotation_fractions : fraction of the rotation that each bone performs, by bone name
     """
-    vector = Rotation.from_matrix(rotation).as_rotvec()
+    vector = Rotation.from_matrix(head_rotation).as_rotvec()
     angles = {
         fraction: matrix_angles(Rotation.from_rotvec(fraction * vector).as_matrix())
-        for fraction in {*bones.values()}
+        for fraction in {*rotation_fractions.values()}
     }
-    return {name: angles[fraction] for name, fraction in bones.items()}
+    return {name: angles[fraction] for name, fraction in rotation_fractions.items()}
 
 
 def _with_gaze(parameters: Parameters, head: Head, pose: Pose, camera_mm: tuple[float, float, float]) -> Pose:

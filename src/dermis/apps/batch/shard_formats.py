@@ -52,14 +52,14 @@ class ShardManifest:
         return (json.dumps({**values, "check": check}, indent=1) + "\n").encode()
 
 
-def parse_manifest(data: bytes, culprit: object) -> ShardManifest:
+def parse_manifest(json_bytes: bytes, culprit: object) -> ShardManifest:
     """Return the manifest in the bytes of a manifest file.
 
     culprit : name of the shard in error messages
 
     Raises DermisError if the bytes are not a manifest, or do not match the hash in the manifest.
     """
-    values = parse_json(data, culprit, _MANIFEST_DESCRIPTION)
+    values = parse_json(json_bytes, culprit, _MANIFEST_DESCRIPTION)
     with parsing(culprit, _MANIFEST_DESCRIPTION, KeyError, TypeError, AttributeError):
         index, first, stop = (values[name] for name in ("index", "first", "stop"))
         left_out = tuple((number, reason) for number, reason in values["left_out"])
@@ -70,7 +70,7 @@ def parse_manifest(data: bytes, culprit: object) -> ShardManifest:
         if not valid or not all(isinstance(text, str) for text in texts):
             raise ValueError("its values have other types")
         manifest = ShardManifest(spec, index, first, stop, left_out, sha256, dict(made))
-        if manifest.to_bytes() != data:
+        if manifest.to_bytes() != json_bytes:
             raise ValueError("its hash does not match its content")
         return manifest
 
@@ -83,8 +83,8 @@ def software_versions(adapter: str) -> dict[str, str]:
 
 
 _TAR_BLOCK_BYTES = 512
-_END_OF_ARCHIVE = bytes(2 * _TAR_BLOCK_BYTES)
-_CHUNK_BYTES = 1 << 20
+_TAR_END_MARKER = bytes(2 * _TAR_BLOCK_BYTES)
+_READ_CHUNK_BYTES = 1 << 20
 
 
 class TarWriter:
@@ -94,9 +94,9 @@ class TarWriter:
         self._file = path.open("xb")
         self._hash = hashlib.sha256()
 
-    def add(self, name: str, data: bytes) -> None:
+    def add(self, file_name: str, content: bytes) -> None:
         """Append a file to the archive; raises OSError if the disk is full."""
-        for piece in _tar_entry(name, data):
+        for piece in _tar_entry(file_name, content):
             self._file.write(piece)
             self._hash.update(piece)
 
@@ -107,7 +107,7 @@ class TarWriter:
     def finish(self, manifest: bytes) -> None:
         """Append the manifest, flush the archive to the disk and close it."""
         self.add(MANIFEST_NAME, manifest)
-        self._file.write(_END_OF_ARCHIVE)
+        self._file.write(_TAR_END_MARKER)
         self._file.flush()
         os.fsync(self._file.fileno())
         self._file.close()
@@ -125,15 +125,15 @@ class TarMember(NamedTuple):
     size: int
 
 
-def tar_members(file: BinaryIO) -> Iterator[TarMember]:
+def tar_members(tar_file: BinaryIO) -> Iterator[TarMember]:
     """Yield the entries of a tar archive, without reading their content.
 
     Raises ValueError if the archive is damaged or truncated, or contains anything but regular files.
     """
-    length, offset = file.seek(0, os.SEEK_END), 0
+    length, offset = tar_file.seek(0, os.SEEK_END), 0
     while True:
-        file.seek(offset)
-        block = file.read(_TAR_BLOCK_BYTES)
+        tar_file.seek(offset)
+        block = tar_file.read(_TAR_BLOCK_BYTES)
         if block == bytes(_TAR_BLOCK_BYTES):
             return
         member = _parse_header(block, offset)
@@ -143,48 +143,48 @@ def tar_members(file: BinaryIO) -> Iterator[TarMember]:
         yield member
 
 
-def read_tar_manifest(file: BinaryIO) -> tuple[int, bytes]:
+def read_tar_manifest(tar_file: BinaryIO) -> tuple[int, bytes]:
     """Return the offset and the bytes of the manifest at the end of a tar file.
 
     Raises ValueError if there is no manifest, or if other bytes follow the manifest.
     """
-    length = file.seek(0, os.SEEK_END)
+    length = tar_file.seek(0, os.SEEK_END)
     start = max(0, length - MAX_MANIFEST_BYTES - 3 * _TAR_BLOCK_BYTES)
-    file.seek(start)
-    tail = file.read()
+    tar_file.seek(start)
+    tail = tar_file.read()
     header = tail.rfind(MANIFEST_NAME.encode() + b"\0")
     if header < 0 or (start + header) % _TAR_BLOCK_BYTES:
         raise ValueError("it is truncated")
     member = _parse_header(tail[header : header + _TAR_BLOCK_BYTES], start + header)
     manifest = tail[member.offset - start :][: member.size]
-    if tail[header:] != b"".join(_tar_entry(MANIFEST_NAME, manifest)) + _END_OF_ARCHIVE:
+    if tail[header:] != b"".join(_tar_entry(MANIFEST_NAME, manifest)) + _TAR_END_MARKER:
         raise ValueError("it is truncated or damaged")
     return start + header, manifest
 
 
-def tar_sha256(file: BinaryIO, stop: int) -> str:
+def tar_sha256(tar_file: BinaryIO, byte_count: int) -> str:
     """Return the SHA-256 of the first bytes of a tar file.
 
-    stop : offset at which the manifest starts [bytes]
+    byte_count : offset at which the manifest starts [bytes]
     """
     digest = hashlib.sha256()
-    file.seek(0)
-    while stop > 0 and (piece := file.read(min(_CHUNK_BYTES, stop))):
+    tar_file.seek(0)
+    while byte_count > 0 and (piece := tar_file.read(min(_READ_CHUNK_BYTES, byte_count))):
         digest.update(piece)
-        stop -= len(piece)
+        byte_count -= len(piece)
     return digest.hexdigest()
 
 
-def _tar_entry(name: str, data: bytes) -> tuple[bytes, bytes, bytes]:
+def _tar_entry(file_name: str, content: bytes) -> tuple[bytes, bytes, bytes]:
     """Return header, content, and padding to the block size, of a file in a tar archive."""
-    head = tarfile.TarInfo(name)
-    head.size = len(data)
-    return head.tobuf(tarfile.USTAR_FORMAT), data, bytes(-len(data) % _TAR_BLOCK_BYTES)
+    head = tarfile.TarInfo(file_name)
+    head.size = len(content)
+    return head.tobuf(tarfile.USTAR_FORMAT), content, bytes(-len(content) % _TAR_BLOCK_BYTES)
 
 
-def _parse_header(block: bytes, offset: int) -> TarMember:
+def _parse_header(header_block: bytes, offset: int) -> TarMember:
     try:
-        head = tarfile.TarInfo.frombuf(block, "utf-8", "strict")
+        head = tarfile.TarInfo.frombuf(header_block, "utf-8", "strict")
     except (tarfile.HeaderError, UnicodeDecodeError) as fault:
         raise ValueError(f"its header at byte {offset} is damaged") from fault
     if head.type not in (tarfile.REGTYPE, tarfile.AREGTYPE) or head.size < 0:
@@ -199,11 +199,11 @@ class FolderWriter:
         path.mkdir()
         self._path, self._hash = path, hashlib.sha256()
 
-    def add(self, name: str, data: bytes) -> None:
+    def add(self, file_name: str, content: bytes) -> None:
         """Write a file into the folder; raises OSError if the disk is full."""
-        with (self._path / name).open("xb") as file:
-            file.write(data)
-        self._hash.update(_file_hash_input(name, data))
+        with (self._path / file_name).open("xb") as file:
+            file.write(content)
+        self._hash.update(_file_hash_input(file_name, content))
 
     def sha256(self) -> str:
         """Return the SHA-256 of all names and contents written so far."""
@@ -219,17 +219,17 @@ class FolderWriter:
         """Do nothing, as no file is open."""
 
 
-def folder_sha256(path: Path, names: Iterable[str]) -> str:
+def folder_sha256(folder: Path, file_names: Iterable[str]) -> str:
     """Return the SHA-256 of the named files in a folder, computed as by `FolderWriter.sha256`.
 
     Raises DermisError if a file cannot be read.
     """
     digest = hashlib.sha256()
-    for name in names:
-        digest.update(_file_hash_input(name, read_file(path / name, "a file of a shard", MAX_FILE_BYTES)))
+    for name in file_names:
+        digest.update(_file_hash_input(name, read_file(folder / name, "a file of a shard", MAX_FILE_BYTES)))
     return digest.hexdigest()
 
 
-def _file_hash_input(name: str, data: bytes) -> bytes:
+def _file_hash_input(file_name: str, content: bytes) -> bytes:
     """Return the bytes with which a file contributes to the SHA-256 of its folder."""
-    return f"{name} {len(data)}\n".encode() + data
+    return f"{file_name} {len(content)}\n".encode() + content

@@ -18,9 +18,9 @@ from dermis.base.errors import DermisError, refuse, shorten
 from dermis.base.reading import open_regular_file, parsing, read_file
 
 SHARD_DESCRIPTION = "a shard of a data set"
-_SHARD_NAME = re.compile(r"shard-(\d{5,9})(\.tar)?")
-_PART_NAME = re.compile(r"part-(\d{9})(\.tar)?")
-_VALUE_SEPARATOR = " + "  # between the adapters, or versions, that rendered the parts of a shard
+_SHARD_NAME_PATTERN = re.compile(r"shard-(\d{5,9})(\.tar)?")
+_PART_NAME_PATTERN = re.compile(r"part-(\d{9})(\.tar)?")
+_VERSION_SEPARATOR = " + "  # between the adapters, or versions, that rendered the parts of a shard
 _MAX_REASON_LENGTH = 200  # characters
 _MIN_PART_IMAGES, _MAX_PART_IMAGES = 16, 32
 
@@ -57,10 +57,10 @@ def list_shards(spec: Spec) -> list[Shard]:
     return [shard_at(index, spec) for index in range(-(-spec.count // spec.shard_size))]
 
 
-def shard_at(index: int, spec: Spec) -> Shard:
+def shard_at(shard_number: int, spec: Spec) -> Shard:
     """Return the shard with a given number."""
-    first = index * spec.shard_size
-    return Shard(index, first, min(first + spec.shard_size, spec.count))
+    first = shard_number * spec.shard_size
+    return Shard(shard_number, first, min(first + spec.shard_size, spec.count))
 
 
 def list_parts(shard: Shard, spec: Spec) -> list[Part]:
@@ -84,13 +84,13 @@ def shard_path(out: Path, shard: Shard, spec: Spec) -> Path:
 
 def shard_index(path: Path) -> int | None:
     """Return the shard number in a file name such as shard-00012.tar; None for other names."""
-    found = _SHARD_NAME.fullmatch(path.name)
+    found = _SHARD_NAME_PATTERN.fullmatch(path.name)
     return int(found[1]) if found else None
 
 
-def image_key(number: int) -> str:
+def image_key(image_number: int) -> str:
     """Return the image number as 9 digits; the names of all files of the image begin with these digits."""
-    return f"{number:09d}"
+    return f"{image_number:09d}"
 
 
 class ShardWriter:
@@ -118,35 +118,37 @@ class ShardWriter:
             refuse_output(self._target, fault)
         return self
 
-    def add(self, number: int, entries: Mapping[str, bytes]) -> None:
+    def add(self, image_number: int, files_by_suffix: Mapping[str, bytes]) -> None:
         """Write the files of an image; images must come in the order of their numbers.
 
-        entries : content of each file, by suffix
+        files_by_suffix : content of each file, by suffix
         """
-        if not self._next_number <= number < self._shard.stop:
-            raise ValueError(f"image {number} was added after {self._next_number - 1}, in {self._shard}")
-        self._next_number, self._written = number + 1, self._written + 1
+        if not self._next_number <= image_number < self._shard.stop:
+            raise ValueError(
+                f"image {image_number} was added after {self._next_number - 1}, in {self._shard}"
+            )
+        self._next_number, self._written = image_number + 1, self._written + 1
         try:
-            for suffix in sorted(entries):
-                self._files.add(f"{image_key(number)}.{suffix}", entries[suffix])
+            for suffix in sorted(files_by_suffix):
+                self._files.add(f"{image_key(image_number)}.{suffix}", files_by_suffix[suffix])
         except OSError as fault:
             refuse_output(self._target, fault)
 
-    def leave_out(self, number: int, reason: str) -> None:
+    def leave_out(self, image_number: int, reason: str) -> None:
         """Record in the manifest that an image could not be rendered."""
-        self._left_out[number] = shorten(reason, _MAX_REASON_LENGTH)
+        self._left_out[image_number] = shorten(reason, _MAX_REASON_LENGTH)
 
     def add_versions(self, made_with: Mapping[str, str]) -> None:
         """Record in the manifest the adapter and the versions with which copied images were rendered."""
         for name, value in made_with.items():
-            known = self._made_with.get(name, value).split(_VALUE_SEPARATOR)
-            merged = sorted({*known, *value.split(_VALUE_SEPARATOR)})
-            self._made_with = {**self._made_with, name: _VALUE_SEPARATOR.join(merged)}
+            known = self._made_with.get(name, value).split(_VERSION_SEPARATOR)
+            merged = sorted({*known, *value.split(_VERSION_SEPARATOR)})
+            self._made_with = {**self._made_with, name: _VERSION_SEPARATOR.join(merged)}
 
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+    def __exit__(self, exception_type: type[BaseException] | None, *_: object) -> None:
         """Write the manifest and rename the shard to its final path; after an error, remove the shard."""
         try:
-            if kind is None:
+            if exception_type is None:
                 self._files.finish(self._manifest_bytes())
                 move_into_place(self._temporary, self._target, self._replaces_folder)
         except OSError as fault:
@@ -215,7 +217,7 @@ def is_intact(out: Path, shard: Shard, spec: Spec) -> bool:
 
 def part_files(out: Path) -> dict[int, Path]:
     """Return the file or folder of each complete part in a data set, by the part's first image number."""
-    found = {path: _PART_NAME.fullmatch(path.name) for path in out.iterdir()}
+    found = {path: _PART_NAME_PATTERN.fullmatch(path.name) for path in out.iterdir()}
     return {int(match[1]): path for path, match in found.items() if match}
 
 
@@ -226,7 +228,7 @@ def remove_unfinished(out: Path, removable_names: Collection[str] | None = None)
         and parts are kept. None if there is no other run
     """
     for path, name in unfinished_files(out).items():
-        is_images = _SHARD_NAME.fullmatch(name) or _PART_NAME.fullmatch(name)
+        is_images = _SHARD_NAME_PATTERN.fullmatch(name) or _PART_NAME_PATTERN.fullmatch(name)
         if removable_names is None or name in removable_names or not is_images:
             remove_path(path)
 

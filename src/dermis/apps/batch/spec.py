@@ -34,9 +34,9 @@ GENERATOR = 2
 
 Number 1 stands for the people of version 0.1, number 2 for people with the skin of measured people.
 """
-COUNT_LINE = re.compile(r"(?m)^count = (\d+)\n")
+COUNT_LINE_PATTERN = re.compile(r"(?m)^count = (\d+)\n")
 """Line of a canonical spec with the number of images, which may be raised to let a data set grow."""
-GENERATOR_LINE = re.compile(r"(?m)^generator = (\d+)\n")
+GENERATOR_LINE_PATTERN = re.compile(r"(?m)^generator = (\d+)\n")
 """Line of a canonical spec with the generator number; earlier versions wrote none."""
 RENDER_DEFAULTS: Mapping[str, Any] = {"atlas": 1024, "exposure": "auto"}
 """Render settings of a spec without [render]."""
@@ -47,7 +47,7 @@ NON_RENDER_SETTINGS = {
     "background_blur": _BACKGROUND_TABLE,
 }
 """Settings that are not keys of [render], and where a spec states them instead."""
-_Weight = Annotated[float, Field(ge=0, le=1)]
+_TargetWeight = Annotated[float, Field(ge=0, le=1)]
 _TOML_HEADER = "# A data set of dermis: lengths in mm, colours linear Rec. 709."
 _MAX_MATCHING_FILES = 100_000
 _MAX_HASHED_BYTES = 4 << 30
@@ -85,7 +85,7 @@ class Spec(FrozenModel):
     """People."""
     expression: tables.ExpressionTable = tables.ExpressionTable()
     """Facial expression."""
-    expressions: dict[str, dict[str, _Weight]] = Field(default_factory=dict)
+    expressions: dict[str, dict[str, _TargetWeight]] = Field(default_factory=dict)
     """Expressions of this spec: weights of morph targets; a name without Left or Right sets both sides."""
     pose: dict[str, Annotated[Distribution, tables.DistributionField()]] = Field(default_factory=dict)
     """Weights of morph targets, or of left and right pairs, that replace those of the expression."""
@@ -167,20 +167,20 @@ class Spec(FrozenModel):
     def digest(self) -> str:
         """Return the SHA-256 of the canonical TOML without `count`; this hash identifies the data set."""
         if not self._digest:
-            text = COUNT_LINE.sub("", self.to_toml(), count=1)
+            text = COUNT_LINE_PATTERN.sub("", self.to_toml(), count=1)
             digest = hashlib.sha256(text.encode()).hexdigest()
             BaseModel.__setattr__(self, "_digest", digest)
         return self._digest
 
 
-def _table_distributions(table_name: str, value: object) -> dict[str, Distribution]:
+def _table_distributions(table_name: str, table_value: object) -> dict[str, Distribution]:
     """Return the distributions in a TOML table and in the table's subtables, by dotted name.
 
     table_name : name of the table
     """
-    if isinstance(value, Distribution):
-        return {table_name: value}
-    parts = plain_values(value) if isinstance(value, FrozenModel) else value
+    if isinstance(table_value, Distribution):
+        return {table_name: table_value}
+    parts = plain_values(table_value) if isinstance(table_value, FrozenModel) else table_value
     if not isinstance(parts, Mapping):
         return {}
     found: dict[str, Distribution] = {}
@@ -202,20 +202,20 @@ def load_spec(path: str | Path, **values: object) -> Spec:
         return parse_spec({**data, **values}, path.parent)
 
 
-def parse_spec(data: Mapping[str, object], folder: Path = Path()) -> Spec:
+def parse_spec(toml_data: Mapping[str, object], folder: Path = Path()) -> Spec:
     """Return the spec for parsed TOML.
 
     folder : folder to which file names in the spec are relative
 
     Raises DermisError as `load_spec` does.
     """
-    if "folder" in data:
+    if "folder" in toml_data:
         refuse("folder", "no such key", "it is given", "Paths are relative to the folder of the spec")
-    if data.get("generator", GENERATOR) != GENERATOR:
-        actual = f"got {format_value(data['generator'])}"
+    if toml_data.get("generator", GENERATOR) != GENERATOR:
+        actual = f"got {format_value(toml_data['generator'])}"
         advice = "Remove it to start another data set, or use the version of dermis that wrote it"
         refuse("generator", f"{GENERATOR}, the generator number of this version", actual, advice)
-    fields = {k: v if k == "files" else _expand_patterns(v, folder, k) for k, v in data.items()}
+    fields = {k: v if k == "files" else _expand_patterns(v, folder, k) for k, v in toml_data.items()}
     fields["render"] = _parse_render(fields.pop("size", (512, 512)), fields.get("render", {}))
     if isinstance(groups := fields.get("correlated", ()), list | tuple):
         fields["correlated"] = tuple(_build_model(tables.CorrelationGroup, "correlated", g) for g in groups)
@@ -234,27 +234,27 @@ def example_toml() -> str:
     return resources.files(__package__).joinpath("example.toml").read_text("utf-8")
 
 
-def _parse_render(size: object, table: object) -> Settings:
-    if not isinstance(table, Mapping):
-        return _build_model(Settings, "render", table)
-    for key in NON_RENDER_SETTINGS.keys() & table.keys():
+def _parse_render(picture_size: object, render_table: object) -> Settings:
+    if not isinstance(render_table, Mapping):
+        return _build_model(Settings, "render", render_table)
+    for key in NON_RENDER_SETTINGS.keys() & render_table.keys():
         advice = f"Write it as {NON_RENDER_SETTINGS[key]}"
         refuse(f"render: {key}", "no such key in [render]", "it is given here", advice)
-    return _build_model(Settings, "render", {**RENDER_DEFAULTS, **table, "size": size})
+    return _build_model(Settings, "render", {**RENDER_DEFAULTS, **render_table, "size": picture_size})
 
 
-def _build_model(model_class: type[P], table_name: str, table: object) -> P:
+def _build_model(model_class: type[P], table_name: str, toml_table: object) -> P:
     """Return the model of a spec table, including its subtables.
 
     model_class : pydantic class of the table
     table_name : name of the table in error messages
     """
-    if isinstance(table, model_class):
-        return table
-    if not isinstance(table, Mapping):
+    if isinstance(toml_table, model_class):
+        return toml_table
+    if not isinstance(toml_table, Mapping):
         expected = f"a table with {', '.join(model_class.model_fields)}"
-        refuse(table_name, expected, f"got {format_value(table)}", "Correct it")
-    values = dict(table)
+        refuse(table_name, expected, f"got {format_value(toml_table)}", "Correct it")
+    values = dict(toml_table)
     for name, info in model_class.model_fields.items():
         if name in values and isinstance(info.annotation, type) and issubclass(info.annotation, FrozenModel):
             values[name] = _build_model(
@@ -266,19 +266,19 @@ def _build_model(model_class: type[P], table_name: str, table: object) -> P:
         raise InvalidFieldsError(table_name or "spec", error.messages) from None
 
 
-def plain_values(table: FrozenModel) -> dict[str, object]:
+def plain_values(spec_table: FrozenModel) -> dict[str, object]:
     """Return the fields of a spec table that are not None, by name."""
-    values = {name: getattr(table, name) for name in type(table).model_fields}
+    values = {name: getattr(spec_table, name) for name in type(spec_table).model_fields}
     return {name: value for name, value in values.items() if value is not None}
 
 
-def _toml_lines(table_name: str, values: Mapping[str, object]) -> list[str]:
+def _toml_lines(table_name: str, table_values: Mapping[str, object]) -> list[str]:
     """Return a table and its subtables as lines of TOML.
 
     table_name : dotted name of the table
     """
     own_values, sub_lines = dict[str, object](), list[str]()
-    for name, value in values.items():
+    for name, value in table_values.items():
         path = f"{table_name}.{key_text(name)}" if table_name else key_text(name)
         if isinstance(value, FrozenModel | Mapping):
             sub_lines += _toml_lines(path, plain_values(value) if isinstance(value, FrozenModel) else value)
@@ -339,17 +339,19 @@ def _file_hashes(file_names: Iterable[str], folder: Path) -> dict[str, str]:
     return found
 
 
-def _check_hashes(expected: Mapping[str, str], actual: Mapping[str, str]) -> None:
+def _check_hashes(expected_hashes: Mapping[str, str], actual_hashes: Mapping[str, str]) -> None:
     """Raise DermisError if files have changed since the spec was written.
 
-    expected : SHA-256 by file name, as stored in the spec
-    actual : SHA-256 of the present files, by file name
+    expected_hashes : SHA-256 by file name, as stored in the spec
+    actual_hashes : SHA-256 of the present files, by file name
     """
-    for name in sorted(expected.keys() | actual.keys()):
-        if expected.get(name) != actual.get(name):
+    for name in sorted(expected_hashes.keys() | actual_hashes.keys()):
+        if expected_hashes.get(name) != actual_hashes.get(name):
             refuse(
                 f"files: {name}",
-                f"a file with SHA-256 {expected[name][:16]}..." if name in expected else "no such file",
-                f"it has {actual[name][:16]}..." if name in actual else "there is none",
+                f"a file with SHA-256 {expected_hashes[name][:16]}..."
+                if name in expected_hashes
+                else "no such file",
+                f"it has {actual_hashes[name][:16]}..." if name in actual_hashes else "there is none",
                 "Restore the file, or remove [files] to start another data set",
             )

@@ -31,40 +31,40 @@ _LOOK_MODELS: Mapping[str, type] = {"skin": SkinLook, "eyes": EyeLook, "hair": H
 _ANCESTRY_PARAMETERS = "person.african", "person.asian", "person.caucasian"
 _ITA_PARAMETER, _MELANIN_PARAMETER = "person.ita", "person.skin.melanin"
 _HEAD_PARAMETER = "person.head"
-_MAX_NAME_LENGTH = 100  # characters
+_MAX_FILE_NAME_LENGTH = 100  # characters
 
 
 def check_spec(
     distributions: Mapping[str, Distribution],
     expressions: Mapping[str, Weights],
-    groups: Sequence[CorrelationGroup],
+    correlation_groups: Sequence[CorrelationGroup],
     folder: Path,
 ) -> None:
     """Raise DermisError for distributions whose samples cannot be rendered; the message states table and key.
 
     distributions : distribution of each parameter by its dotted name
     expressions : weights of morph targets by name of the expression
-    groups : groups of correlated parameters
+    correlation_groups : groups of correlated parameters
     folder : folder to which file names in the spec are relative
     """
     _check_looks(distributions)
     _check_person(distributions)
     _check_expression(distributions["expression.name"], expressions)
-    _check_correlations(groups, distributions)
+    _check_correlations(correlation_groups, distributions)
     _check_light(distributions)
-    _check_names(distributions, folder)
+    _check_heads_and_environments(distributions, folder)
 
 
-def check_landmarks(names: Sequence[str], folder: Path) -> None:
+def check_landmarks(set_names: Sequence[str], folder: Path) -> None:
     """Raise DermisError for names that are neither a preset landmark set nor a readable landmark table."""
-    for name in names:
+    for name in set_names:
         if name in LANDMARK_SETS:
             continue
         if not name.endswith(".csv") or not is_file(folder / name):
             expected = (
                 f"any of {', '.join(LANDMARK_SETS)}, or tables of name,vertex (.csv) in the spec's folder"
             )
-            refuse("landmarks", expected, f"got {shorten(name, _MAX_NAME_LENGTH)!r}", "Correct it")
+            refuse("landmarks", expected, f"got {shorten(name, _MAX_FILE_NAME_LENGTH)!r}", "Correct it")
         read_landmark_table(str(folder / name))
 
 
@@ -84,19 +84,19 @@ def _check_person(distributions: Mapping[str, Distribution]) -> None:
         refuse("person", "a fraction of african, asian or caucasian above 0", actual, advice)
 
 
-def _check_expression(names: Distribution, expressions: Mapping[str, Weights]) -> None:
+def _check_expression(expression_names: Distribution, expressions: Mapping[str, Weights]) -> None:
     known = [*expressions, RANDOM_EXPRESSION]
-    for value in names.support:
+    for value in expression_names.support:
         if value not in known:
             advice = f"Add [expressions.{value}], or correct it"
             refuse("expression: name", f"one of {', '.join(known)}", f"got {value!r}", advice)
 
 
 def _check_correlations(
-    groups: Sequence[CorrelationGroup], distributions: Mapping[str, Distribution]
+    correlation_groups: Sequence[CorrelationGroup], distributions: Mapping[str, Distribution]
 ) -> None:
     seen: set[str] = set()
-    for group in groups:
+    for group in correlation_groups:
         people = [name.startswith("person.") for name in group.of]
         for name in group.of:
             if name not in distributions:
@@ -121,7 +121,7 @@ def _check_light(distributions: Mapping[str, Distribution]) -> None:
         refuse("light", "light in each image", actual, 'Exclude "none" and 0 from lights or environment')
 
 
-def _check_names(distributions: Mapping[str, Distribution], folder: Path) -> None:
+def _check_heads_and_environments(distributions: Mapping[str, Distribution], folder: Path) -> None:
     """Raise DermisError for heads and environments that are neither part of the package nor in the folder.
 
     folder : folder to which file names in the spec are relative
@@ -155,7 +155,7 @@ def _check_looks(distributions: Mapping[str, Distribution]) -> None:
 
 
 def _check_table(
-    table: str,
+    table_name: str,
     distributions: Mapping[str, Distribution],
     allowed_keys: Sequence[str],
     make_model: Callable[..., object],
@@ -165,14 +165,14 @@ def _check_table(
     allowed_keys : allowed keys of the table
     make_model : class or function that makes the model; called with each limit of a distribution
     """
-    for name, distribution in table_values(distributions, table).items():
+    for name, distribution in table_values(distributions, table_name).items():
         if name not in allowed_keys:
             listed = (
                 ", ".join(allowed_keys) if len(allowed_keys) < 40 else "those of dermis head --list-targets"
             )
-            refuse(f"{table}: {name}", f"one of {listed}", "this name is unknown", "Correct it")
+            refuse(f"{table_name}: {name}", f"one of {listed}", "this name is unknown", "Correct it")
         for bound in distribution.support:
             try:
                 make_model(**{name: bound})
             except DermisError as error:
-                raise DermisError(f"{table}: {error}") from None
+                raise DermisError(f"{table_name}: {error}") from None

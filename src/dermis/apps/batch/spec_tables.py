@@ -19,22 +19,22 @@ LAMP_RIG = "rig"
 RANDOM_EXPRESSION = "mixture"
 NO_ENVIRONMENT = "none"
 GAZE_CAMERA, GAZE_ANGLES = "camera", "angles"
-BACKGROUNDS = "none", "gradient", "environment", "colour"
-_SUPPORT_NOTE = "; normal extends 6 sd to both sides, truncated to its limits"
+BACKGROUND_KINDS = "none", "gradient", "environment", "colour"
+_DISTRIBUTION_RANGE_NOTE = "; normal extends 6 sd to both sides, truncated to its limits"
 
 
 class DistributionField:
     """Annotation with which pydantic parses a field of a spec table as a distribution."""
 
-    def check(self, value: object) -> Distribution | None:
+    def check(self, spec_value: object) -> Distribution | None:
         """Return the distribution that a value describes; None for an omitted field.
 
         Raises ValueError for a value that is not a distribution, and for a distribution out of bounds; the
         message states the valid values.
         """
-        if value is None:
+        if spec_value is None:
             return None
-        distribution = parse_distribution(value)
+        distribution = parse_distribution(spec_value)
         self.check_support(distribution)
         return distribution
 
@@ -42,7 +42,7 @@ class DistributionField:
         """Raise ValueError if the distribution can give samples that the field does not allow."""
 
     def __get_pydantic_core_schema__(
-        self, source: object, handler: GetCoreSchemaHandler
+        self, source_type: object, handler: GetCoreSchemaHandler
     ) -> core_schema.CoreSchema:
         """Return the pydantic schema that parses and serialises a distribution."""
         serialise = core_schema.plain_serializer_function_ser_schema(
@@ -58,14 +58,14 @@ class NumberField(DistributionField):
     reason : unit or reason of the bounds, shown in messages
     """
 
-    def __init__(self, low: float, high: float, reason: str = "") -> None:
-        self.ge, self.le, self.reason = low, high, reason
+    def __init__(self, lower_bound: float, upper_bound: float, reason: str = "") -> None:
+        self.ge, self.le, self.reason = lower_bound, upper_bound, reason
 
     def check_support(self, distribution: Distribution) -> None:
         """Raise ValueError if the distribution can give texts or numbers out of bounds."""
         if any(isinstance(bound, str) or not self.ge <= bound <= self.le for bound in distribution.support):
             reason = f" ({self.reason})" if self.reason else ""
-            note = "" if isinstance(distribution, Constant) else _SUPPORT_NOTE
+            note = "" if isinstance(distribution, Constant) else _DISTRIBUTION_RANGE_NOTE
             raise ValueError(f"numbers from {self.ge:.10g} to {self.le:.10g}{reason}{note}")
 
 
@@ -88,8 +88,8 @@ class NameField(DistributionField):
             raise ValueError(f"one of {', '.join(names)}, no files")
 
 
-_MAX_GROUP_SIZE = 50
-_Coefficient = Annotated[float, Field(ge=-1, le=1)]
+_MAX_CORRELATED_PARAMETERS = 50
+_CorrelationCoefficient = Annotated[float, Field(ge=-1, le=1)]
 
 
 class CorrelationGroup(FrozenModel):
@@ -102,14 +102,15 @@ class CorrelationGroup(FrozenModel):
 
     of: tuple[str, ...]
     """Names of parameters, such as ["camera.yaw_deg", "head.yaw_deg"]; those of [person] first."""
-    correlation: _Coefficient | tuple[tuple[_Coefficient, ...], ...]
+    correlation: _CorrelationCoefficient | tuple[tuple[_CorrelationCoefficient, ...], ...]
     """Correlation of all pairs, or a symmetric matrix with one row per name."""
 
     @model_validator(mode="after")
     def _check_matrix(self) -> CorrelationGroup:
         count = len(self.of)
         require(
-            2 <= len(set(self.of)) == count <= _MAX_GROUP_SIZE, f"2 to {_MAX_GROUP_SIZE} names, each once"
+            2 <= len(set(self.of)) == count <= _MAX_CORRELATED_PARAMETERS,
+            f"2 to {_MAX_CORRELATED_PARAMETERS} names, each once",
         )
         if isinstance(self.correlation, tuple):
             square = [len(row) for row in self.correlation] == [count] * count
@@ -146,14 +147,16 @@ class CorrelationGroup(FrozenModel):
 T = TypeVar("T")
 
 
-def table_values(values: Mapping[str, T], table: str) -> dict[str, T]:
+def table_values(values_by_dotted_name: Mapping[str, T], table_name: str) -> dict[str, T]:
     """Return the entries of one spec table, by key without the name of the table.
 
-    values : entries of all tables by dotted name, such as "light.key.size_mm"
-    table : dotted name of the table, such as "light.key"
+    values_by_dotted_name : entries of all tables by dotted name, such as "light.key.size_mm"
+    table_name : dotted name of the table, such as "light.key"
     """
-    start = f"{table}."
-    return {name.removeprefix(start): one for name, one in values.items() if name.startswith(start)}
+    start = f"{table_name}."
+    return {
+        name.removeprefix(start): one for name, one in values_by_dotted_name.items() if name.startswith(start)
+    }
 
 
 _ANGLE_FIELD = NumberField(-180, 180, "degrees")
@@ -161,10 +164,10 @@ _ELEVATION_FIELD = NumberField(-85, 85, "degrees: straight above, the yaw is und
 _FRACTION_FIELD = NumberField(0, 1)
 _AGE_FIELD = NumberField(YOUNG_AGE, OLD_AGE, "years: the ages that the human model covers")
 _ITA_FIELD = NumberField(*ITA_RANGE, "degrees: of measured people")
-_SIGNED_FIELD = NumberField(-1, 1, "0 is the average")
-_MELANIN_FIELD = NumberField(0, 10, "0.3 is blond, 8 black")
-_DISTANCE_FIELD = NumberField(150, 20_000, "mm: from close-up to telephoto")
-_STRENGTH_FIELD = NumberField(0, 100, "light cannot be negative")
+_SIGNED_FRACTION_FIELD = NumberField(-1, 1, "0 is the average")
+_HAIR_MELANIN_FIELD = NumberField(0, 10, "0.3 is blond, 8 black")
+_CAMERA_DISTANCE_FIELD = NumberField(150, 20_000, "mm: from close-up to telephoto")
+_LIGHT_STRENGTH_FIELD = NumberField(0, 100, "light cannot be negative")
 _Distributions = dict[str, Annotated[Distribution, DistributionField()]]
 
 
@@ -189,13 +192,13 @@ class PersonTable(FrozenModel):
     ita: Annotated[Distribution | None, _ITA_FIELD] = None
     """Individual typology angle of the cheek, from -65 (darkest) to 70 (lightest) [degrees]; the other
     pigments are typical of measured people with this angle."""
-    weight: Annotated[Distribution | None, _SIGNED_FIELD] = None
+    weight: Annotated[Distribution | None, _SIGNED_FRACTION_FIELD] = None
     """Body weight, from -1 (lowest) to 1 (highest)."""
-    muscle: Annotated[Distribution | None, _SIGNED_FIELD] = None
+    muscle: Annotated[Distribution | None, _SIGNED_FRACTION_FIELD] = None
     """Muscle mass, from -1 (lowest) to 1 (highest)."""
-    hair_eumelanin: Annotated[Distribution | None, _MELANIN_FIELD] = None
+    hair_eumelanin: Annotated[Distribution | None, _HAIR_MELANIN_FIELD] = None
     """Eumelanin of the hair before greying: 0.3 is blond, 1.3 brown, 8 black."""
-    hair_pheomelanin: Annotated[Distribution | None, _MELANIN_FIELD] = None
+    hair_pheomelanin: Annotated[Distribution | None, _HAIR_MELANIN_FIELD] = None
     """Pheomelanin of the hair before greying: 2 with little eumelanin is red."""
     skin: _Distributions = Field(default_factory=dict)
     """Fields of `SkinLook`: melanin, blood, freckles, spots, oil ..."""
@@ -246,7 +249,7 @@ class GazeTable(FrozenModel):
 class CameraTable(FrozenModel):
     """Spec table of the camera; the complete face is always in the picture."""
 
-    distance_mm: Annotated[Distribution, _DISTANCE_FIELD] = Constant(1100.0)
+    distance_mm: Annotated[Distribution, _CAMERA_DISTANCE_FIELD] = Constant(1100.0)
     """Distance to the centre of the face [mm]."""
     yaw_deg: Annotated[Distribution, _ANGLE_FIELD] = Constant(0.0)
     """Angle around the head, to its left [degrees]."""
@@ -258,9 +261,9 @@ class CameraTable(FrozenModel):
     """Visible height at the head [mm]."""
     focal_mm: Annotated[Distribution | None, NumberField(8, 1200, "mm")] = None
     """Focal length for a sensor 24 mm high, in place of frame_mm [mm]."""
-    offset_x: Annotated[Distribution, _SIGNED_FIELD] = Constant(0.0)
+    offset_x: Annotated[Distribution, _SIGNED_FRACTION_FIELD] = Constant(0.0)
     """Offset of the face to the right of the picture's centre, relative to half its width [-]."""
-    offset_y: Annotated[Distribution, _SIGNED_FIELD] = Constant(0.0)
+    offset_y: Annotated[Distribution, _SIGNED_FRACTION_FIELD] = Constant(0.0)
     """Offset of the face above the picture's centre, relative to half its height [-]."""
 
 
@@ -275,7 +278,7 @@ class LampTable(FrozenModel):
     """Distance to the centre of the head [mm]."""
     size_mm: Annotated[Distribution, NumberField(10, 3000, "mm: from a torch to a wall")] = Constant(500.0)
     """Side length [mm]."""
-    strength: Annotated[Distribution, _STRENGTH_FIELD] = Constant(1.0)
+    strength: Annotated[Distribution, _LIGHT_STRENGTH_FIELD] = Constant(1.0)
     """Irradiance at the head, divided by pi."""
     kelvin: Annotated[Distribution, NumberField(1700, 20_000, "K: candle to blue sky")] = Constant(6500.0)
     """Colour temperature; 6500 is white [K]."""
@@ -288,7 +291,7 @@ class LightTable(FrozenModel):
     """Rig of the package, or "rig" for the key, fill and rim lamps of the tables below."""
     turn_deg: Annotated[Distribution, _ANGLE_FIELD] = Constant(0.0)
     """Rotation of all lamps about the upward axis, to the head's left [degrees]."""
-    strength: Annotated[Distribution, _STRENGTH_FIELD] = Constant(1.0)
+    strength: Annotated[Distribution, _LIGHT_STRENGTH_FIELD] = Constant(1.0)
     """Factor of all lamps' irradiance."""
     key: LampTable = LampTable(yaw_deg=Uniform(-70, 70), pitch_deg=Uniform(-5, 60))
     """Key lamp, the main light."""
@@ -306,14 +309,14 @@ class EnvironmentTable(FrozenModel):
     .exr)."""
     turn_deg: Annotated[Distribution, _ANGLE_FIELD] = Uniform(-180, 180)
     """Rotation about the upward axis, counter-clockwise as seen from above [degrees]."""
-    strength: Annotated[Distribution, _STRENGTH_FIELD] = Constant(1.0)
+    strength: Annotated[Distribution, _LIGHT_STRENGTH_FIELD] = Constant(1.0)
     """Factor of its radiance."""
 
 
 class BackgroundTable(FrozenModel):
     """Spec table of the picture's background, which emits no light."""
 
-    kind: Annotated[Distribution, NameField(lambda: BACKGROUNDS)] = Constant("gradient")
+    kind: Annotated[Distribution, NameField(lambda: BACKGROUND_KINDS)] = Constant("gradient")
     """"none" for alpha, "gradient", "colour", or "environment", which is a gradient if the image has none."""
     red: Annotated[Distribution, _FRACTION_FIELD] = Uniform(0, 0.6)
     """Red of the colour, linear Rec. 709."""

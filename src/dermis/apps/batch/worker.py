@@ -42,7 +42,7 @@ from dermis.mesh.head import Head
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
-_CACHED_FRAMES = 16  # occlusion stays cached for this many images without an environment
+_MAX_CACHED_FRAMES = 16  # occlusion stays cached for this many images without an environment
 
 
 class Failure(NamedTuple):
@@ -128,27 +128,27 @@ class Worker:
     def __init__(self, adapter: str, options: RunOptions) -> None:
         self._options, self._adapter = options, adapter
         self._builder = SceneBuilder(options.spec)
-        self._encoders = EncoderPool(options.encoders, partial(_encode, options.spec))
+        self._encoders = EncoderPool(options.encoders, partial(_encode_image, options.spec))
 
     @cached_property
     def _renderer(self) -> Renderer:
-        renderer = Renderer(self._adapter, cache_ttl=_CACHED_FRAMES)
+        renderer = Renderer(self._adapter, cache_ttl=_MAX_CACHED_FRAMES)
         gc.freeze()  # excludes the objects created so far from collections, which would scan them each time
         return renderer
 
-    def process(self, tasks: Iterable[Shard], send: Callable[[WorkerEvent], None]) -> None:
+    def process(self, tasks: Iterable[Shard], send_event: Callable[[WorkerEvent], None]) -> None:
         """Render the parts among the tasks, join the parts of complete shards, and verify the shards.
 
         The next task is requested while frames of the previous task are in flight. Without the option
         `keep_going`, a failed image raises DermisError.
 
-        send : function called with each event
+        send_event : function called with each event
 
         Raises DermisError for errors of the spec or the disk, DeviceError if the device was lost twice, and
         LostProcessError if an encoder process died.
         """
         planned, failed = deque[tuple[Part, KeptImages]](), list[Failure]()
-        numbers = self._image_numbers(tasks, planned, send)
+        numbers = self._image_numbers(tasks, planned, send_event)
         images = self._encoders.encode_all(self._encoder_jobs(numbers, failed))
         image = next(images, None)
         while planned:
@@ -161,12 +161,12 @@ class Worker:
                 while image is not None and part.first <= image[0] < part.stop:
                     writer.add(*image)
                     rendered += 1
-                    send(WorkerEvent(images=1))
+                    send_event(WorkerEvent(images=1))
                     image = next(images, None)  # all failures before it are known then
                 part_failures = tuple(sorted(one for one in failed if part.first <= one.number < part.stop))
                 for failure in part_failures:
                     writer.leave_out(*failure)
-            send(
+            send_event(
                 WorkerEvent(
                     done=part, rendered=rendered, failed=part_failures, missing=self._join_shard(part)
                 )
@@ -180,7 +180,7 @@ class Worker:
         self,
         tasks: Iterable[Shard],
         unwritten_parts: deque[tuple[Part, KeptImages]],
-        send: Callable[[WorkerEvent], None],
+        send_event: Callable[[WorkerEvent], None],
     ) -> Iterator[int]:
         """Yield the numbers of the images to render; process at once the tasks that need no rendering.
 
@@ -192,9 +192,9 @@ class Worker:
                 intact = is_intact(out, task, spec)
                 if not intact:
                     remove_path(shard_path(out, task, spec))
-                send(WorkerEvent(done=task, missing=() if intact else tuple(list_parts(task, spec))))
+                send_event(WorkerEvent(done=task, missing=() if intact else tuple(list_parts(task, spec))))
             elif is_intact(out, task, spec) or shard_exists(out, shard_at(task.index, spec), spec):
-                send(WorkerEvent(done=task, missing=self._join_shard(task)))
+                send_event(WorkerEvent(done=task, missing=self._join_shard(task)))
             else:
                 kept = kept_images(out, task, spec)
                 unwritten_parts.append((task, kept))
@@ -271,13 +271,13 @@ class Worker:
                 landmarks=spec.landmark_tables.values(),
             )
 
-    def _previous_scene(self, number: int) -> Scene | None:
+    def _previous_scene(self, image_number: int) -> Scene | None:
         """Return the previous image's scene for motion vectors; None if that image shows another person."""
         spec = self._options.spec
-        if "motion" not in spec.outputs or number % spec.images_per_person == 0:
+        if "motion" not in spec.outputs or image_number % spec.images_per_person == 0:
             return None
         try:
-            return self._builder.build(spec.parameters(number - 1))[0]
+            return self._builder.build(spec.parameters(image_number - 1))[0]
         except DermisError:  # that image is left out of the data set
             return None
 
@@ -305,15 +305,17 @@ def available_tasks(pipe: Connection) -> Iterator[Shard]:
         yield pipe.recv()
 
 
-def _forward_notes(forward: Callable[[str], None]) -> None:
+def _forward_notes(forward_note: Callable[[str], None]) -> None:
     """Redirect the package's warnings to a function; other warnings are shown as usual."""
     default = warnings.showwarning
 
-    def forward_or_show(message: Warning | str, category: type[Warning], *more: Any, **named: Any) -> None:
+    def forward_or_show(
+        message: Warning | str, category: type[Warning], *warning_arguments: Any, **warning_options: Any
+    ) -> None:
         if issubclass(category, DermisWarning):
-            forward(str(message))
+            forward_note(str(message))
         else:
-            default(message, category, *more, **named)
+            default(message, category, *warning_arguments, **warning_options)
 
     warnings.simplefilter("default", DermisWarning)
     warnings.showwarning = forward_or_show
@@ -325,7 +327,7 @@ def _head_tone(head: Head) -> SkinTone | None:
     return None if colour is None else skin_tone(colour)
 
 
-def _encode(
+def _encode_image(
     spec: Spec, image_number: int, observation: Observation, parameters: Parameters, tone: SkinTone | None
 ) -> EncodedImage:
     return image_number, encode_record(image_number, observation, parameters, spec, tone)

@@ -15,7 +15,7 @@ from dermis.apps.batch.worker import RunOptions, WorkerEvent, WorkerSlot, run_wo
 from dermis.base.errors import DermisError
 from dermis.gpu.adapters import Adapter, similar_adapters
 
-MAX_ATTEMPTS = 3
+MAX_TASK_ATTEMPTS = 3
 """Attempts to render a part before the run fails."""
 _MAX_ENCODERS_PER_WORKER = 8  # per worker: more would wait for the renderer
 
@@ -122,7 +122,7 @@ class _PoolState:
     def receive(self, worker: _WorkerProcess) -> WorkerEvent:
         """Return the next event of a worker; then send the worker a task, replace the worker, or stop it.
 
-        Raises DermisError for a refusal, and for a part that failed `MAX_ATTEMPTS` times.
+        Raises DermisError for a refusal, and for a part that failed `MAX_TASK_ATTEMPTS` times.
         """
         try:
             event: WorkerEvent = worker.child.pipe.recv()
@@ -162,9 +162,9 @@ class _PoolState:
     def _return_tasks(self, worker: _WorkerProcess, reason: str) -> None:
         """Put the tasks of a worker that exits back into the queue."""
         current, *unstarted = worker.tasks
-        if self._attempts[current] >= MAX_ATTEMPTS:
+        if self._attempts[current] >= MAX_TASK_ATTEMPTS:
             raise DermisError(
-                f"{current}: expected a worker to render it, but {MAX_ATTEMPTS} failed; "
+                f"{current}: expected a worker to render it, but {MAX_TASK_ATTEMPTS} failed; "
                 f"the last one reported: {reason}. "
                 "Complete parts are kept; run the command again to continue."
             )

@@ -15,13 +15,22 @@ from dermis.optics.media import Floats
 from dermis.optics.radial import SMALLEST_FLOAT
 
 _BURLEY_MEDIAN_RADIUS = 1.58  # radius within which half of the light leaves, in units of Burley's width d
-_LOG_LENGTH_RANGE = np.log(30.0)  # search range of lengths, around the length that gives equal median radii
-_BISECTIONS, _MEDIUM_BISECTIONS = 40, 30
+_LOG_LENGTH_SEARCH_RANGE = np.log(
+    30.0
+)  # search range of lengths, around the length that gives equal median radii
+_LENGTH_BISECTION_STEPS, _MEDIUM_BISECTION_STEPS = 40, 30
 _MIN_WIDTH_MM = 1e-9
-_MAX_EDGE_DISTANCE, _EDGE_SAMPLES = 12.0, 97  # largest distance from a shadow edge, in median radii
-_MIN_RADIUS, _MAX_RADIUS, _RADIUS_SAMPLES = 1e-2, 60.0, 400  # of least squares fits, in median radii
-_CDF_RADII = np.geomspace(1e-4, 1e4, 2000)
-_LOG_BOUND, _LOG_TOLERANCE = 2.0, 1e-4  # search range and tolerance of least squares fits
+_MAX_RELATIVE_EDGE_DISTANCE, _EDGE_SAMPLE_COUNT = (
+    12.0,
+    97,
+)  # largest distance from a shadow edge, in median radii
+_MIN_RELATIVE_RADIUS, _MAX_RELATIVE_RADIUS, _RADIUS_SAMPLE_COUNT = (
+    1e-2,
+    60.0,
+    400,
+)  # of least squares fits, in median radii
+_RELATIVE_CDF_RADII = np.geomspace(1e-4, 1e4, 2000)
+_LOG_LENGTH_BOUND, _LOG_LENGTH_TOLERANCE = 2.0, 1e-4  # search range and tolerance of least squares fits
 
 
 def burley_curve(d_mm: ArrayLike, energy: ArrayLike) -> CumulativeProfile:
@@ -47,18 +56,21 @@ def fit_burley_width(curve: CumulativeProfile) -> Floats:
         return BurleyProfile(np.ones(3), np.exp(-log_d)).energy_within(curve.radii_mm) - curve.fraction
 
     return _bisect_minimax(
-        cdf_difference, middle - _LOG_LENGTH_RANGE, middle + _LOG_LENGTH_RANGE, _BISECTIONS
+        cdf_difference,
+        middle - _LOG_LENGTH_SEARCH_RANGE,
+        middle + _LOG_LENGTH_SEARCH_RANGE,
+        _LENGTH_BISECTION_STEPS,
     )
 
 
-def gaussian_curve(variance_mm2: Floats, weight: Floats, energy: Floats) -> CumulativeProfile:
+def gaussian_curve(variance_mm2: Floats, gaussian_weight: Floats, energy: Floats) -> CumulativeProfile:
     """Return the cumulative profile of a sum of Gaussians.
 
     variance_mm2 : (n,) variances of the Gaussians [mm2]
-    weight : (n, 3) weight of each Gaussian in red, green and blue; only their ratios matter [-]
+    gaussian_weight : (n, 3) weight of each Gaussian in red, green and blue; only their ratios matter [-]
     energy : (3,) total energy of the curve: emerging light per incident light [-]
     """
-    fraction = weight / weight.sum(axis=0)
+    fraction = gaussian_weight / gaussian_weight.sum(axis=0)
 
     def fraction_within(radius_mm: Floats) -> Floats:
         with np.errstate(under="ignore"):
@@ -67,27 +79,29 @@ def gaussian_curve(variance_mm2: Floats, weight: Floats, energy: Floats) -> Cumu
     return CumulativeProfile.from_function(fraction_within, energy)
 
 
-def scale_lengths(unit: CumulativeProfile, scale_mm: ArrayLike) -> CumulativeProfile:
-    """Return the cumulative profile `unit` with the radii of each channel multiplied by a length.
+def scale_lengths(unit_profile: CumulativeProfile, scale_mm: ArrayLike) -> CumulativeProfile:
+    """Return the cumulative profile `unit_profile` with the radii of each channel multiplied by a length.
 
-    unit : cumulative profile whose radii are in units of `scale_mm`
+    unit_profile : cumulative profile whose radii are in units of `scale_mm`
     scale_mm : (3,) length by which the radii of each channel are multiplied [mm]
     """
     scale = np.maximum(np.asarray(scale_mm, np.float64), _MIN_WIDTH_MM)
 
     def fraction_within(radius_mm: Floats) -> Floats:
-        return np.stack([unit.fraction_within(radius_mm / scale[i])[:, i] for i in range(3)], axis=-1)
+        return np.stack([unit_profile.fraction_within(radius_mm / scale[i])[:, i] for i in range(3)], axis=-1)
 
-    return CumulativeProfile.from_function(fraction_within, unit.energy)
+    return CumulativeProfile.from_function(fraction_within, unit_profile.energy)
 
 
-def fit_scale(curve: CumulativeProfile, unit: CumulativeProfile) -> Floats:
-    """Return the lengths (3,) by which the radii of `unit` are multiplied to match `curve` [mm].
+def fit_scale(curve: CumulativeProfile, unit_profile: CumulativeProfile) -> Floats:
+    """Return the lengths (3,) by which the radii of `unit_profile` are multiplied to match `curve` [mm].
 
     In each channel, the largest difference between the two cumulative profiles is minimised.
     """
-    middle = np.log(curve.radius_at_fraction(0.5) / unit.radius_at_fraction(0.5))
-    return _fit_scale_in_range(curve, unit, middle, _LOG_LENGTH_RANGE, _BISECTIONS - 1)
+    middle = np.log(curve.radius_at_fraction(0.5) / unit_profile.radius_at_fraction(0.5))
+    return _fit_scale_in_range(
+        curve, unit_profile, middle, _LOG_LENGTH_SEARCH_RANGE, _LENGTH_BISECTION_STEPS - 1
+    )
 
 
 @dataclass(frozen=True)
@@ -105,32 +119,41 @@ class HomogeneousMedium:
 
 
 def fit_homogeneous_medium(
-    curve: CumulativeProfile, energy: Floats | None = None, kind: HalfSpaceKind = "skin"
+    curve: CumulativeProfile, energy: Floats | None = None, half_space_kind: HalfSpaceKind = "skin"
 ) -> HomogeneousMedium:
     """Return the homogeneous medium whose cumulative profile is closest to a reference profile.
 
     curve : reference profile
     energy : (3,) emerging light per incident light of the medium, by default the energy of `curve` [-]
-    kind : surface and illumination of the half-space, see `half_space`
+    half_space_kind : surface and illumination of the half-space, see `half_space`
     """
-    albedo = tabulated_albedo(kind, curve.energy if energy is None else energy)
-    unit = half_space(kind, albedo, np.ones(3))
+    albedo = tabulated_albedo(half_space_kind, curve.energy if energy is None else energy)
+    unit = half_space(half_space_kind, albedo, np.ones(3))
     middle = np.log(fit_burley_width(curve) / fit_burley_width(unit))  # ratio of Burley widths
-    mfp = _fit_scale_in_range(curve, unit, middle, 2.0, _MEDIUM_BISECTIONS)
-    return HomogeneousMedium(albedo, mfp, half_space(kind, albedo, mfp))
+    mfp = _fit_scale_in_range(curve, unit, middle, 2.0, _MEDIUM_BISECTION_STEPS)
+    return HomogeneousMedium(albedo, mfp, half_space(half_space_kind, albedo, mfp))
 
 
 def _fit_scale_in_range(
-    curve: CumulativeProfile, unit: CumulativeProfile, middle: Floats, log_range: float, bisections: int
+    curve: CumulativeProfile,
+    unit_profile: CumulativeProfile,
+    middle_log_length: Floats,
+    log_range: float,
+    bisection_steps: int,
 ) -> Floats:
     def cdf_difference(log_scale: Floats) -> Floats:
-        return scale_lengths(unit, np.exp(log_scale)).fraction - curve.fraction
+        return scale_lengths(unit_profile, np.exp(log_scale)).fraction - curve.fraction
 
-    return _bisect_minimax(cdf_difference, middle - log_range, middle + log_range, bisections)
+    return _bisect_minimax(
+        cdf_difference, middle_log_length - log_range, middle_log_length + log_range, bisection_steps
+    )
 
 
 def _bisect_minimax(
-    cdf_difference: Callable[[Floats], Floats], low: Floats, high: Floats, bisections: int
+    cdf_difference: Callable[[Floats], Floats],
+    min_log_length: Floats,
+    max_log_length: Floats,
+    bisection_steps: int,
 ) -> Floats:
     """Return the lengths (3,) that scale a cumulative profile closest to a reference profile, per channel.
 
@@ -141,39 +164,44 @@ def _bisect_minimax(
 
     cdf_difference : function that takes the logarithms of the lengths (3,) and returns, at n radii, the
         fraction of light within the radius (n, 3): scaled profile minus reference profile
-    low, high : (3,) bounds of the logarithms of the lengths
-    bisections : number of times that the interval is halved
+    min_log_length, max_log_length : (3,) bounds of the logarithms of the lengths
+    bisection_steps : number of times that the interval is halved
     """
-    for _ in range(bisections):
-        middle = 0.5 * (low + high)
+    for _ in range(bisection_steps):
+        middle = 0.5 * (min_log_length + max_log_length)
         difference = cdf_difference(middle)
         too_narrow = difference.max(axis=0) > -difference.min(axis=0)
-        low, high = np.where(too_narrow, middle, low), np.where(too_narrow, high, middle)
-    return np.asarray(np.exp(0.5 * (low + high)))
+        min_log_length, max_log_length = (
+            np.where(too_narrow, middle, min_log_length),
+            np.where(too_narrow, max_log_length, middle),
+        )
+    return np.asarray(np.exp(0.5 * (min_log_length + max_log_length)))
 
 
-def fit_length_scale(curve: CumulativeProfile, channel: int, unit_cdf: Callable[[Floats], Floats]) -> float:
+def fit_length_scale(
+    curve: CumulativeProfile, colour_channel: int, unit_cdf: Callable[[Floats], Floats]
+) -> float:
     """Return the length that multiplies a profile's radii to match one channel of `curve` [mm].
 
     The sum of squared differences is minimised, at radii spaced evenly in log r.
 
-    channel : index of the channel of `curve`, 0 for red
+    colour_channel : index of the channel of `curve`, 0 for red
     unit_cdf : cumulative profile for a length of 1: a function that takes radii (n,) and returns the fraction
         of light (n,) within each radius
     """
     from scipy.optimize import minimize_scalar
 
-    median = float(curve.radius_at_fraction(0.5)[channel])
-    r = median * np.geomspace(_MIN_RADIUS, _MAX_RADIUS, _RADIUS_SAMPLES)
-    reference = curve.fraction_within(r)[:, channel]
-    middle = np.log(median / float(np.interp(0.5, unit_cdf(_CDF_RADII), _CDF_RADII)))
+    median = float(curve.radius_at_fraction(0.5)[colour_channel])
+    r = median * np.geomspace(_MIN_RELATIVE_RADIUS, _MAX_RELATIVE_RADIUS, _RADIUS_SAMPLE_COUNT)
+    reference = curve.fraction_within(r)[:, colour_channel]
+    middle = np.log(median / float(np.interp(0.5, unit_cdf(_RELATIVE_CDF_RADII), _RELATIVE_CDF_RADII)))
 
     def squared_error(log_length: float) -> float:
         return float(((unit_cdf(r / np.exp(log_length)) - reference) ** 2).sum())
 
-    bounds = middle - _LOG_BOUND, middle + _LOG_BOUND
+    bounds = middle - _LOG_LENGTH_BOUND, middle + _LOG_LENGTH_BOUND
     result = minimize_scalar(
-        squared_error, bounds=bounds, method="bounded", options={"xatol": _LOG_TOLERANCE}
+        squared_error, bounds=bounds, method="bounded", options={"xatol": _LOG_LENGTH_TOLERANCE}
     )
     return float(np.exp(result.x))
 
@@ -198,8 +226,10 @@ class CurveError:
 
 def curve_error(reference: CumulativeProfile, curve: CumulativeProfile) -> CurveError:
     """Return the errors of a cumulative profile relative to a reference profile."""
-    steps = np.geomspace(1e-3, 1.0, _EDGE_SAMPLES)
-    widest = _MAX_EDGE_DISTANCE * np.maximum(reference.radius_at_fraction(0.5), curve.radius_at_fraction(0.5))
+    steps = np.geomspace(1e-3, 1.0, _EDGE_SAMPLE_COUNT)
+    widest = _MAX_RELATIVE_EDGE_DISTANCE * np.maximum(
+        reference.radius_at_fraction(0.5), curve.radius_at_fraction(0.5)
+    )
     edge = np.zeros(3)
     for i in range(3):
         x = widest[i] * steps

@@ -17,7 +17,7 @@ from dermis.base.atomic_write import atomic_file, atomic_folder, check_output, t
 from dermis.base.errors import notify, refuse
 from dermis.optics.media import Floats
 
-_NOTABLE_ERROR = 0.05  # fraction of the light that leaves at the wrong radius
+_NOTABLE_PROFILE_ERROR = 0.05  # fraction of the light that leaves at the wrong radius
 _CHANNEL_NAMES = "red", "green", "blue"
 _ERROR_MEANINGS = {
     "cdf": "largest fraction of the light that leaves at the wrong radius",
@@ -81,17 +81,17 @@ class ExportReport:
             "files": [str(file) for file in self.files],
         }
 
-    def lines(self, naive: bool = False) -> list[str]:
+    def lines(self, with_naive_parameters: bool = False) -> list[str]:
         """Return the report as lines of plain text for the terminal.
 
-        naive : whether to list the naive parameters too
+        with_naive_parameters : whether to list the naive parameters too
         """
         target = " ".join(filter(None, (self.title, self.version, self.variant)))
         lines = [f"{self.subject}, profile by {self.model}, for {target}"]
         lines += ["not tested: parameters follow published documentation"] if self.untested else []
-        lines += ["", *_parameter_lines(self.parameters)]
-        if naive:
-            lines += ["", "naive parameters", *_parameter_lines(self.naive_parameters)]
+        lines += ["", *_parameter_table_lines(self.parameters)]
+        if with_naive_parameters:
+            lines += ["", "naive parameters", *_parameter_table_lines(self.naive_parameters)]
         lines += ["", f"{'':12}" + "".join(f"{name:>9}" for name in _CHANNEL_NAMES)]
         lines.append(f"{'d [mm]':12}{_format_channels(self.d_mm)}  width of the fitted Burley profile")
         for name, meaning in _ERROR_MEANINGS.items():
@@ -105,7 +105,7 @@ class ExportReport:
         """Return sentences on the remaining error of this skin and on the program's limitations."""
         worst = int(self.error.cdf.argmax())
         error = float(self.error.cdf[worst])
-        if error < _NOTABLE_ERROR:
+        if error < _NOTABLE_PROFILE_ERROR:
             return [self.limitations]
         text = (
             f"No parameters reproduce this profile: {error:.0%} of the {_CHANNEL_NAMES[worst]} light leaves"
@@ -115,11 +115,14 @@ class ExportReport:
     def markdown(self) -> str:
         """Return the report as a Markdown page."""
         lines = [f"# {_as_single_line(self.subject)} for {self.title} {self.version}".rstrip(), ""]
-        lines += [f"```\n{chr(10).join(map(_as_single_line, self.lines(naive=True)))}\n```", ""]
+        lines += [
+            f"```\n{chr(10).join(map(_as_single_line, self.lines(with_naive_parameters=True)))}\n```",
+            "",
+        ]
         return "\n".join(lines)
 
 
-def _parameter_lines(parameters: Parameters) -> Sequence[str]:
+def _parameter_table_lines(parameters: Parameters) -> Sequence[str]:
     rows = [(one.name, format_parameter(one.value), one.unit, one.meaning) for one in parameters]
     widths = [max((len(row[i]) for row in rows), default=0) for i in range(3)]
     return ["  ".join([*map(str.ljust, row[:3], widths), row[3]]) for row in rows]
@@ -132,8 +135,8 @@ def format_parameter(value: ParameterValue) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
-def _format_channels(values: Floats) -> str:
-    return "".join(f"{x:9.4f}" for x in values)
+def _format_channels(channel_values: Floats) -> str:
+    return "".join(f"{x:9.4f}" for x in channel_values)
 
 
 def _as_single_line(text: str) -> str:
@@ -273,14 +276,14 @@ def _staging_path(output: Path) -> Iterator[Path]:
             _move_into_place(file, output.with_name(file.name))
 
 
-def _move_into_place(source: Path, target: Path) -> None:
-    if source.is_dir():
-        with atomic_folder(target, REPORT_FILE) as folder:
+def _move_into_place(staged_path: Path, output_path: Path) -> None:
+    if staged_path.is_dir():
+        with atomic_folder(output_path, REPORT_FILE) as folder:
             folder.rmdir()
-            source.replace(folder)
+            staged_path.replace(folder)
         return
-    with atomic_file(target) as temporary:
-        source.replace(temporary)
+    with atomic_file(output_path) as temporary:
+        staged_path.replace(temporary)
 
 
 def _write_report(report: ExportReport, output: Path) -> list[Path]:

@@ -35,7 +35,7 @@ from dermis.scene.people import skin_of
 from dermis.scene.skin import Skin
 from dermis.scene.tissue import skin_tissue
 
-BALL_MM = 100.0
+BALL_DIAMETER_MM = 100.0
 """Diameter of the ball that is exported with a skin that has no head [mm]."""
 
 ModelName = Literal["montecarlo", "layered", "multipole", "dipole", "better-dipole"]
@@ -43,7 +43,7 @@ PROFILE_MODELS: tuple[ModelName, ...] = get_args(ModelName)
 _PHOTON_COUNT = 1_000_000
 _MAP_ROLES = "colour", "normal", "roughness", "specular", "height"
 _MIN_ALBEDO = 1e-9
-_MAX_NAME_LENGTH = 40
+_MAX_IDENTIFIER_LENGTH = 40
 
 
 @dataclass(frozen=True)
@@ -73,8 +73,8 @@ class Subject:
 
     @cached_property
     def head_or_ball(self) -> Head:
-        """Return the head, or a ball of diameter `BALL_MM` if there is no head."""
-        return self.head or Head("ball", uv_sphere(0.5 * BALL_MM), Maps())
+        """Return the head, or a ball of diameter `BALL_DIAMETER_MM` if there is no head."""
+        return self.head or Head("ball", uv_sphere(0.5 * BALL_DIAMETER_MM), Maps())
 
     @cached_property
     def part_pictures(self) -> PartPictures | None:
@@ -84,7 +84,9 @@ class Subject:
     @property
     def identifier(self) -> str:
         """Return the name in ASCII letters, digits and underscores, for names of files and materials."""
-        name = re.sub(r"[^A-Za-z0-9]+", "_", Path(self.name).stem or self.name).strip("_")[:_MAX_NAME_LENGTH]
+        name = re.sub(r"[^A-Za-z0-9]+", "_", Path(self.name).stem or self.name).strip("_")[
+            :_MAX_IDENTIFIER_LENGTH
+        ]
         return f"skin_{name}" if not name or name[0].isdigit() else name
 
     @property
@@ -92,9 +94,9 @@ class Subject:
         """Return the skin of the scene, or the default skin if there is no scene."""
         return Skin() if self.scene is None else self.scene.skin
 
-    def clipped_albedo(self, low: float = 0.0) -> Floats:
-        """Return the albedo (3,) clipped to the interval from `low` to 1."""
-        return np.clip(self.albedo, low, 1.0)
+    def clipped_albedo(self, min_albedo: float = 0.0) -> Floats:
+        """Return the albedo (3,) clipped to the interval from `min_albedo` to 1."""
+        return np.clip(self.albedo, min_albedo, 1.0)
 
     def rescale_energy(self, curve: CumulativeProfile) -> CumulativeProfile:
         """Return `curve` with an energy that can be compared with the energy of the reference profile.
@@ -115,12 +117,12 @@ class Subject:
         eyes = self.head_or_ball.eyes
         return None if eyes is None else run_on_device("auto", lambda device: paint_eye(device, eyes.look))
 
-    def with_painted_maps(self, side: int, adapter: str) -> Subject:
+    def with_painted_maps(self, map_side: int, adapter: str) -> Subject:
         """Return a copy in which the head's procedural maps are painted as arrays.
 
         If the head has no procedural maps, the subject itself is returned.
 
-        side : side of the maps, a power of two from 256 to 4096 [texel]
+        map_side : side of the maps, a power of two from 256 to 4096 [texel]
         adapter : adapter that paints the maps
         """
         head = self.head
@@ -129,7 +131,7 @@ class Subject:
         from dermis.frame.features.surface.painting.painted_head import with_painted_maps
         from dermis.gpu.failures import run_on_device
 
-        painted = run_on_device(adapter, lambda device: with_painted_maps(device, head, side))
+        painted = run_on_device(adapter, lambda device: with_painted_maps(device, head, map_side))
         return replace(self, scene=replace(self.scene, head=painted))
 
     def encode_maps(self) -> dict[str, bytes]:

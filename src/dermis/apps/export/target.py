@@ -39,25 +39,25 @@ class Parameter:
 Parameters = tuple[Parameter, ...]
 
 
-def get_value(parameters: Parameters, name: str) -> ParameterValue:
+def get_value(parameters: Parameters, parameter_name: str) -> ParameterValue:
     """Return the value of the parameter with a given name."""
-    return next(one.value for one in parameters if one.name == name)
+    return next(one.value for one in parameters if one.name == parameter_name)
 
 
-def get_numbers(parameters: Parameters, name: str) -> tuple[float, ...]:
+def get_numbers(parameters: Parameters, parameter_name: str) -> tuple[float, ...]:
     """Return the value of a named parameter as a tuple of floats: one for a scalar, three for a colour."""
-    value = get_value(parameters, name)
+    value = get_value(parameters, parameter_name)
     return value if isinstance(value, tuple) else (float(value),)
 
 
-def replace_values(parameters: Parameters, values: Mapping[str, ParameterValue]) -> Parameters:
-    """Return a copy of `parameters` with new values, given by parameter name in `values`."""
-    return tuple(replace(one, value=values.get(one.name, one.value)) for one in parameters)
+def replace_values(parameters: Parameters, new_values: Mapping[str, ParameterValue]) -> Parameters:
+    """Return a copy of `parameters` with new values, given by parameter name in `new_values`."""
+    return tuple(replace(one, value=new_values.get(one.name, one.value)) for one in parameters)
 
 
-def flat_tuple(values: ArrayLike) -> tuple[float, ...]:
+def flat_tuple(numbers: ArrayLike) -> tuple[float, ...]:
     """Return an array as a flat tuple of Python floats, for parameters and text files."""
-    return tuple(np.ravel(np.asarray(values, np.float64)).tolist())
+    return tuple(np.ravel(np.asarray(numbers, np.float64)).tolist())
 
 
 def write_files(folder: Path, contents: Iterable[tuple[str, bytes]]) -> list[Path]:

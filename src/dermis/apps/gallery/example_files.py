@@ -24,11 +24,14 @@ from dermis.images.colour import encode_srgb8
 from dermis.mesh.head import Head
 from dermis.mesh.strands import Roots, root_frames
 
-_MESHES = Path(__file__).parent / "meshes"
-_STRIPE_MM, _STITCH_MM = 22.0, 2.6  # period of the sweater's stripes, and size of its stitches
-_HAIR_CARD_COUNT, _HAIR_KNOT_COUNT, _HAIR_MM = 2600, 20, 230.0  # cards, points along each, and length
-_PARTING_MM, _EAR_MM, _NEIGHBOURS = 15.0, 70.0, 40
-_CARD_COLUMNS = 8  # number of cards side by side in a picture of hairs
+_MESH_FOLDER = Path(__file__).parent / "meshes"
+_SWEATER_STRIPE_MM, _SWEATER_STITCH_MM = (
+    22.0,
+    2.6,
+)  # period of the sweater's stripes, and size of its stitches
+_HAIR_CARD_COUNT, _HAIR_KNOT_COUNT, _HAIR_LENGTH_MM = 2600, 20, 230.0  # cards, points along each, and length
+_HAIR_PARTING_X_MM, _MIN_EAR_X_MM, _SURFACE_NEIGHBOUR_COUNT = 15.0, 70.0, 40
+_HAIR_CARD_COLUMNS = 8  # number of cards side by side in a picture of hairs
 
 
 class _Surface(NamedTuple):
@@ -50,7 +53,7 @@ class _Glb:
     data : content of an existing file; empty for a new file
     """
 
-    def __init__(self, data: bytes = b"") -> None:
+    def __init__(self, encoded_glb: bytes = b"") -> None:
         lists = ("accessors", "bufferViews", "images", "materials", "meshes", "nodes", "textures")
         empty = {
             "asset": {"version": "2.0"},
@@ -58,13 +61,13 @@ class _Glb:
             "scenes": [{"nodes": []}],
             **{key: [] for key in lists},
         }
-        data = data or glb_bytes(empty, b"")
-        length = struct.unpack_from("<I", data, 12)[0]
-        self._tree: dict[str, Any] = json.loads(data[20 : 20 + length])
+        encoded_glb = encoded_glb or glb_bytes(empty, b"")
+        length = struct.unpack_from("<I", encoded_glb, 12)[0]
+        self._tree: dict[str, Any] = json.loads(encoded_glb[20 : 20 + length])
         views, accessors = self._tree["bufferViews"], self._tree["accessors"]
-        self._buffer = BufferBuilder(bytearray(data[28 + length :]), views, accessors)
+        self._buffer = BufferBuilder(bytearray(encoded_glb[28 + length :]), views, accessors)
 
-    def add(self, name: str, surface: _Surface, picture: Bytes, roughness: float) -> None:
+    def add(self, mesh_name: str, surface: _Surface, picture: Bytes, roughness: float) -> None:
         """Add a mesh with a picture (h, w, 4), which hides parts of the mesh where alpha is low."""
         add_rows = self._buffer.add_accessor
         attributes = {
@@ -80,10 +83,10 @@ class _Glb:
         primitive = {
             "attributes": attributes,
             "indices": self._buffer.add_triangles(surface.triangles, len(surface.points_mm)),
-            "material": self._append("materials", name=name, pbrMetallicRoughness=model, **options),
+            "material": self._append("materials", name=mesh_name, pbrMetallicRoughness=model, **options),
         }
-        mesh = self._append("meshes", name=name, primitives=[primitive])
-        self._tree["scenes"][0]["nodes"].append(self._append("nodes", name=name, mesh=mesh))
+        mesh = self._append("meshes", name=mesh_name, primitives=[primitive])
+        self._tree["scenes"][0]["nodes"].append(self._append("nodes", name=mesh_name, mesh=mesh))
 
     def write(self, path: Path) -> Path:
         """Write the file and return its path."""
@@ -91,12 +94,12 @@ class _Glb:
         path.write_bytes(glb_bytes(self._tree, self._buffer.data))
         return path
 
-    def _append(self, list_name: str, **entry: Any) -> int:
+    def _append(self, list_name: str, **json_entry: Any) -> int:
         """Append an entry to a list of the file's JSON, and return the index of the entry.
 
         list_name : name of the list, such as "meshes"
         """
-        self._tree[list_name].append(entry)
+        self._tree[list_name].append(json_entry)
         return len(self._tree[list_name]) - 1
 
 
@@ -110,7 +113,7 @@ def write_avatar(studio: Studio, folder: Path) -> Path:
     file = _Glb(encode_head(replace(painted, strands=None, hair=None), roughness=0.3, eyes=eyes))
     hair = _hair_card_picture((0.045, 0.022, 0.012), 26, (512, 1024), seed=1)
     file.add("hair", _hair_cards(*_scalp_hair_paths(plain), width_mm=7.0), hair, roughness=0.9)
-    fringe = _hair_card_picture((0.02, 0.01, 0.006), 4, (128, 256), seed=2, taper=0.7)
+    fringe = _hair_card_picture((0.02, 0.01, 0.006), 4, (128, 256), seed=2, taper_fraction=0.7)
     file.add("lashes", _hair_cards(*_brow_and_lash_paths(plain), width_mm=0.5), fringe, roughness=0.6)
     file.add("sweater", _sweater(plain), _sweater_picture(), roughness=0.9)
     return file.write(folder / "avatar.glb")
@@ -152,13 +155,13 @@ def write_vertex_colours(head: Head, folder: Path) -> Path:
     return path
 
 
-def unpack_mesh(name: str, folder: Path) -> Path:
+def unpack_mesh(mesh_name: str, folder: Path) -> Path:
     """Write the mesh of a hand or of a body as an .obj file and return its path.
 
-    name : "hand" or "body"
+    mesh_name : "hand" or "body"
     """
-    path = folder / f"{name}.obj"
-    path.write_bytes(gzip.decompress((_MESHES / f"{path.name}.gz").read_bytes()))
+    path = folder / f"{mesh_name}.obj"
+    path.write_bytes(gzip.decompress((_MESH_FOLDER / f"{path.name}.gz").read_bytes()))
     return path
 
 
@@ -184,8 +187,8 @@ def _hair_cards(paths: Doubles, outward: Doubles, width_mm: float) -> _Surface:
     side = _normalise(np.cross(along, outward))
     normals = _normalise(np.cross(side, along))
     edges = np.stack([paths - 0.5 * width_mm * side, paths + 0.5 * width_mm * side], axis=2)
-    column = np.random.default_rng(0).integers(_CARD_COLUMNS, size=(count, 1))
-    u = (column + np.array([0.02, 0.98])) / _CARD_COLUMNS
+    column = np.random.default_rng(0).integers(_HAIR_CARD_COLUMNS, size=(count, 1))
+    u = (column + np.array([0.02, 0.98])) / _HAIR_CARD_COLUMNS
     uv = np.stack(np.broadcast_arrays(u[:, None, :], np.linspace(0.01, 0.99, knots)[None, :, None]), axis=3)
     first = (np.arange(count)[:, None] * knots + np.arange(knots - 1)) * 2
     corners = [first, first + 1, first + 2, first + 2, first + 1, first + 3]
@@ -200,26 +203,30 @@ def _normalise(vectors: Doubles) -> Doubles:
 
 
 def _hair_card_picture(
-    colour: tuple[float, float, float], hair_count: int, size: tuple[int, int], seed: int, taper: float = 0.15
+    colour: tuple[float, float, float],
+    hair_count: int,
+    picture_size: tuple[int, int],
+    seed: int,
+    taper_fraction: float = 0.15,
 ) -> Bytes:
     """Return a picture (h, w, 4) of hair cards side by side, with hairs that end at different lengths.
 
     colour : mean colour of the hairs, linear Rec. 709
     hair_count : number of hairs in each hair card
-    size : height and width of the picture [pixel]
-    taper : part of the picture height over which a hair becomes thinner towards the tip [-]
+    picture_size : height and width of the picture [pixel]
+    taper_fraction : part of the picture height over which a hair becomes thinner towards the tip [-]
     """
-    rng, (height, width) = np.random.default_rng(seed), size
+    rng, (height, width) = np.random.default_rng(seed), picture_size
     picture = np.zeros((height, width, 4), np.uint8)
     picture[..., :3] = encode_srgb8(colour)
-    card, y = width // _CARD_COLUMNS, np.linspace(0.0, 1.0, height)
+    card, y = width // _HAIR_CARD_COLUMNS, np.linspace(0.0, 1.0, height)
     x = np.arange(card)
-    for column in range(_CARD_COLUMNS):
+    for column in range(_HAIR_CARD_COLUMNS):
         for _ in range(hair_count):
             middle, length = rng.uniform(0.06, 0.94) * card, rng.uniform(0.6, 1.0)
             bend, thickness = rng.normal(0.0, 0.05) * card, rng.uniform(0.7, 1.3) * card / hair_count
             tone = encode_srgb8(np.array(colour) * rng.lognormal(0.0, 0.25))
-            half = 0.5 * thickness * np.clip((length - y) / taper, 0.0, 1.0)
+            half = 0.5 * thickness * np.clip((length - y) / taper_fraction, 0.0, 1.0)
             drawn = np.abs(x - middle - bend * np.sin(3.0 * y)[:, None]) < half[:, None]
             picture[:, column * card : (column + 1) * card][drawn] = (*tone, 255)
     return picture
@@ -242,18 +249,21 @@ def _scalp_hair_paths(head: Head) -> tuple[Doubles, Doubles]:
     some = rng.permutation(len(roots.quad))[:_HAIR_CARD_COUNT]
     point = root_frames(mesh, Roots(roots.quad[some], roots.position[some]), mesh.points_mm)[0]
     skin = np.unique(mesh.triangles[mesh.material == 0])
-    is_ear = (np.abs(mesh.positions[skin, 0]) > _EAR_MM) & (mesh.positions[skin, 1] > -100.0)
+    is_ear = (np.abs(mesh.positions[skin, 0]) > _MIN_EAR_X_MM) & (mesh.positions[skin, 1] > -100.0)
     skin = skin[~is_ear][::4]
-    tree, step_mm = cKDTree(mesh.positions[skin]), _HAIR_MM / (_HAIR_KNOT_COUNT - 1)
+    tree, step_mm = cKDTree(mesh.positions[skin]), _HAIR_LENGTH_MM / (_HAIR_KNOT_COUNT - 1)
     clearance_mm = rng.uniform(2.0, 11.0, len(point))
-    side = np.where(point[:, 0] < _PARTING_MM, -1.0, 1.0)
+    side = np.where(point[:, 0] < _HAIR_PARTING_X_MM, -1.0, 1.0)
     front = np.clip((point[:, 2] + 90.0) / 90.0, 0.0, 1.0)
     course = np.column_stack([side, 0.1 + 0 * side, 0.25 - 1.1 * front]) + rng.normal(0.0, 0.06, point.shape)
     away = np.column_stack([side, 0 * side, -1.5 + 0 * side])
     paths, facings = [], []
     for knot in range(_HAIR_KNOT_COUNT):
         attachment = min(1.0, knot / 3.0)
-        for neighbours in (_NEIGHBOURS, 1):  # a smooth surface that spans the ears; on top the skin itself
+        for neighbours in (
+            _SURFACE_NEIGHBOUR_COUNT,
+            1,
+        ):  # a smooth surface that spans the ears; on top the skin itself
             nearest = skin[tree.query(point, np.arange(1, neighbours + 1))[1]]
             normal = _normalise(mesh.normals[nearest].mean(axis=1))
             height_mm = np.einsum("nc,nc->n", point - mesh.positions[nearest].mean(axis=1), normal)
@@ -295,13 +305,13 @@ def _sweater(head: Head) -> _Surface:
     return _Surface(points, normals, uv, triangles[whole])
 
 
-def _sweater_picture(size: tuple[int, int] = (1024, 2048)) -> Bytes:
+def _sweater_picture(picture_size: tuple[int, int] = (1024, 2048)) -> Bytes:
     """Return striped knitwear (h, w, 4) that is cut out at the neck."""
-    y, x = np.mgrid[0 : size[0], 0 : size[1]] / np.array(size).reshape(2, 1, 1)
+    y, x = np.mgrid[0 : picture_size[0], 0 : picture_size[1]] / np.array(picture_size).reshape(2, 1, 1)
     y_mm, angle = -90.0 - 260.0 * y, 2.0 * np.pi * (x - 0.5)
     neck_mm = -128.0 - 24.0 * np.maximum(np.cos(angle), 0.0)
-    is_stripe = (np.mod(y_mm, _STRIPE_MM) < 0.35 * _STRIPE_MM) & (y_mm < -185.0)
-    stitch = np.sin(2 * np.pi * y_mm / _STITCH_MM + 1.2 * np.abs(np.sin(angle * 160.0)))
+    is_stripe = (np.mod(y_mm, _SWEATER_STRIPE_MM) < 0.35 * _SWEATER_STRIPE_MM) & (y_mm < -185.0)
+    stitch = np.sin(2 * np.pi * y_mm / _SWEATER_STITCH_MM + 1.2 * np.abs(np.sin(angle * 160.0)))
     colour = np.where(is_stripe[..., None], (0.03, 0.05, 0.14), (0.62, 0.59, 0.52))
     colour *= 1 + 0.12 * stitch[..., None]
     return np.dstack([encode_srgb8(colour), np.where(y_mm < neck_mm, 255, 0).astype(np.uint8)])

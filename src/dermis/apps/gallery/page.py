@@ -68,10 +68,10 @@ def _section_html(picture: GalleryPicture) -> str:
     )
 
 
-def _equation_html(text: str) -> str:
+def _equation_html(equation: str) -> str:
     """Convert a one-line equation to HTML, where _ begins a subscript and ^ begins a superscript."""
-    text = re.sub(r"_(\w+)", r"<sub>\1</sub>", html.escape(text))
-    return re.sub(r"\^\(([^)]*)\)|\^(\w+)", lambda found: f"<sup>{found[1] or found[2]}</sup>", text)
+    equation = re.sub(r"_(\w+)", r"<sub>\1</sub>", html.escape(equation))
+    return re.sub(r"\^\(([^)]*)\)|\^(\w+)", lambda found: f"<sup>{found[1] or found[2]}</sup>", equation)
 
 
 def _panels_html(picture: GalleryPicture) -> str:
@@ -119,8 +119,8 @@ def _picture_facts(picture: GalleryPicture) -> str:
     return " · ".join(facts)
 
 
-def _format_number(value: float) -> str:
-    return f"{value:.0f}" if value >= 100 else f"{value:.3g}"
+def _format_number(number: float) -> str:
+    return f"{number:.0f}" if number >= 100 else f"{number:.3g}"
 
 
 def _deck_rows(pictures: Sequence[GalleryPicture]) -> str:
@@ -149,16 +149,16 @@ def _bibliography_html(pictures: Sequence[GalleryPicture]) -> str:
     return "".join(f'<dt id="{key}">{key}</dt><dd>{html.escape(format_reference(key))}</dd>' for key in keys)
 
 
-def _read_resource(name: str) -> str:
-    return (resources.files("dermis.apps.gallery") / name).read_text(encoding="utf-8")
+def _read_resource(file_name: str) -> str:
+    return (resources.files("dermis.apps.gallery") / file_name).read_text(encoding="utf-8")
 
 
-def format_reference(key: str) -> str:
+def format_reference(bibliography_key: str) -> str:
     """Format a work of the bibliography in one line: authors, title, year.
 
     Raises DermisError for a key that is not in the bibliography.
     """
-    fields = dict(_bibtex_fields(cite.bibtex([key])))
+    fields = dict(_bibtex_fields(cite.bibtex([bibliography_key])))
     if "author" in fields:
         fields["author"] = "; ".join(re.split(r"\s+and\s+", fields["author"]))
     known = [_without_tex(fields[name]).rstrip(".") for name in ("author", "title", "year") if name in fields]

@@ -18,8 +18,8 @@ Panel = Image | list[Image]
 """A picture, or an animation as a list of frames."""
 Panels = Mapping[str, Panel]
 SrgbImage = NDArray[np.uint8]
-_FIGURE_INCHES = 4.4
-_CAPTION_HEIGHT, _FONT_SIZE, _TEXT_COLOUR, _BACKGROUND = 24, 14, (200, 200, 206), (22, 22, 26)
+_PLOT_SIDE_INCHES = 4.4
+_CAPTION_HEIGHT_PX, _CAPTION_FONT_SIZE, _TEXT_COLOUR, _BACKGROUND = 24, 14, (200, 200, 206), (22, 22, 26)
 
 
 def to_srgb8(image: Image) -> SrgbImage:
@@ -46,20 +46,20 @@ def panel_sheet(panels: Panels, columns: int = 0) -> SrgbImage:
     return np.vstack([_pad_image(row, row.shape[0], width) for row in rows])
 
 
-def plot_panel(plot: Callable[[Any], Any], side: int = 448) -> SrgbImage:
+def plot_panel(draw_plot: Callable[[Any], Any], side: int = 448) -> SrgbImage:
     """Draw a matplotlib plot as a square sRGB image.
 
-    plot : function that draws into matplotlib axes
+    draw_plot : function that draws into matplotlib axes
     side : side of the image [pixel]
     """
     canvases = import_extra("matplotlib.backends.backend_agg", "the gallery")
     figure = import_extra("matplotlib.figure", "the gallery").Figure(
-        figsize=(_FIGURE_INCHES, _FIGURE_INCHES),
-        dpi=side / _FIGURE_INCHES,
+        figsize=(_PLOT_SIDE_INCHES, _PLOT_SIDE_INCHES),
+        dpi=side / _PLOT_SIDE_INCHES,
         facecolor="#141417",
         layout="constrained",
     )
-    plot(figure.subplots())
+    draw_plot(figure.subplots())
     canvas: Any = canvases.FigureCanvasAgg(figure)
     canvas.draw()
     return np.array(canvas.buffer_rgba(), np.uint8)[..., :3]
@@ -69,15 +69,17 @@ def _captioned_panel(image: SrgbImage, caption: str) -> SrgbImage:
     from PIL import Image as Pillow
     from PIL import ImageDraw, ImageFont
 
-    bar = Pillow.new("RGB", (image.shape[1], _CAPTION_HEIGHT), _BACKGROUND)
-    centre = (image.shape[1] / 2, _CAPTION_HEIGHT / 2)
-    ImageDraw.Draw(bar).text(centre, caption, _TEXT_COLOUR, ImageFont.load_default(_FONT_SIZE), anchor="mm")
+    bar = Pillow.new("RGB", (image.shape[1], _CAPTION_HEIGHT_PX), _BACKGROUND)
+    centre = (image.shape[1] / 2, _CAPTION_HEIGHT_PX / 2)
+    ImageDraw.Draw(bar).text(
+        centre, caption, _TEXT_COLOUR, ImageFont.load_default(_CAPTION_FONT_SIZE), anchor="mm"
+    )
     return np.vstack([image, np.asarray(bar)])
 
 
-def _panel_row(cells: Sequence[SrgbImage]) -> SrgbImage:
-    height = max(cell.shape[0] for cell in cells)
-    return np.hstack([_pad_image(cell, height, cell.shape[1]) for cell in cells])
+def _panel_row(captioned_panels: Sequence[SrgbImage]) -> SrgbImage:
+    height = max(cell.shape[0] for cell in captioned_panels)
+    return np.hstack([_pad_image(cell, height, cell.shape[1]) for cell in captioned_panels])
 
 
 def _pad_image(image: SrgbImage, height: int, width: int) -> SrgbImage:
@@ -86,7 +88,7 @@ def _pad_image(image: SrgbImage, height: int, width: int) -> SrgbImage:
     return padded
 
 
-_DOT_RADIUS, _VISIBLE_COLOUR, _HIDDEN_COLOUR = 2.0, (90, 255, 120), (255, 70, 70)
+_LANDMARK_DOT_RADIUS, _VISIBLE_LANDMARK_COLOUR, _HIDDEN_LANDMARK_COLOUR = 2.0, (90, 255, 120), (255, 70, 70)
 
 
 def draw_landmarks(picture: NDArray[np.uint8], landmarks: Landmarks) -> NDArray[np.uint8]:
@@ -96,32 +98,43 @@ def draw_landmarks(picture: NDArray[np.uint8], landmarks: Landmarks) -> NDArray[
     image = Image.fromarray(np.ascontiguousarray(picture[..., :3]))
     draw = ImageDraw.Draw(image)
     for (x, y), visible in zip(landmarks.pixels.tolist(), landmarks.visible.tolist(), strict=True):
-        box = (x - _DOT_RADIUS, y - _DOT_RADIUS, x + _DOT_RADIUS, y + _DOT_RADIUS)
-        draw.ellipse(box, fill=_VISIBLE_COLOUR if visible else _HIDDEN_COLOUR)
+        box = (
+            x - _LANDMARK_DOT_RADIUS,
+            y - _LANDMARK_DOT_RADIUS,
+            x + _LANDMARK_DOT_RADIUS,
+            y + _LANDMARK_DOT_RADIUS,
+        )
+        draw.ellipse(box, fill=_VISIBLE_LANDMARK_COLOUR if visible else _HIDDEN_LANDMARK_COLOUR)
     return np.array(image)
 
 
-_LIGHT_FACTORS = {"albedo": 1.0, "irradiance": 1 / np.pi, "diffuse": 1.0, "specular": 1.0, "translucent": 4.0}
+_LIGHT_OUTPUT_FACTORS = {
+    "albedo": 1.0,
+    "irradiance": 1 / np.pi,
+    "diffuse": 1.0,
+    "specular": 1.0,
+    "translucent": 4.0,
+}
 """Factor by which each output that is light is multiplied for display."""
 _LABEL_COLOUR_COUNT = 8192
 _DISPLAY_QUANTILES = 0.02, 0.98  # quantiles of non-zero values that are shown as black and white
 
 
-def output_image(name: str, values: NDArray[Any]) -> NDArray[np.uint8]:
+def output_image(output_name: str, output_array: NDArray[Any]) -> NDArray[np.uint8]:
     """Convert a render output to an image (h, w, 3): light to sRGB, labels to random colours.
 
     Other outputs, such as depth, are scaled from black at a low quantile to white at a high quantile.
 
-    name : name of the output
-    values : (h, w) or (h, w, c) array of the output
+    output_name : name of the render output, such as "depth"
+    output_array : (h, w) or (h, w, c) array of the output
     """
-    if name in _LIGHT_FACTORS:
-        return encode_srgb8(_LIGHT_FACTORS[name] * values)
-    if OUTPUTS[name].kind != "float32":
+    if output_name in _LIGHT_OUTPUT_FACTORS:
+        return encode_srgb8(_LIGHT_OUTPUT_FACTORS[output_name] * output_array)
+    if OUTPUTS[output_name].kind != "float32":
         colours = np.random.default_rng(8).integers(40, 255, (_LABEL_COLOUR_COUNT, 3), np.uint8)
-        colours = colours[values.astype(int) % _LABEL_COLOUR_COUNT]
-        return np.where((values != OUTPUTS[name].background)[..., None], colours, np.uint8(0))
-    channels = values.reshape(*values.shape[:2], -1)[..., :3]
+        colours = colours[output_array.astype(int) % _LABEL_COLOUR_COUNT]
+        return np.where((output_array != OUTPUTS[output_name].background)[..., None], colours, np.uint8(0))
+    channels = output_array.reshape(*output_array.shape[:2], -1)[..., :3]
     nonzero = (channels != 0).any(axis=-1)
     low, high = np.quantile(channels[nonzero], _DISPLAY_QUANTILES, axis=0)
     levels = np.clip((channels - low) / np.maximum(high - low, 1e-6), 0.0, 1.0) * nonzero[..., None]

@@ -21,7 +21,7 @@ from dermis.base.atomic_write import atomic_file
 from dermis.base.errors import DermisError, refuse
 from dermis.base.extras import import_extra
 
-_METADATA = re.compile(r"^(Deck|Equation|Sources|Slider|Columns): *(.+)$", re.MULTILINE)
+_METADATA_PATTERN = re.compile(r"^(Deck|Equation|Sources|Slider|Columns): *(.+)$", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -65,8 +65,8 @@ class Script:
 def read_script(path: Path) -> Script:
     """Read the description of a script from its docstring, without running the script."""
     text = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
-    metadata: dict[str, str] = dict(_METADATA.findall(text))
-    title, _, caption = _METADATA.sub("", text).partition("\n")
+    metadata: dict[str, str] = dict(_METADATA_PATTERN.findall(text))
+    title, _, caption = _METADATA_PATTERN.sub("", text).partition("\n")
     before, _, after = (part.strip() for part in metadata.get("Slider", "").partition("|"))
     return Script(
         path=path,
@@ -80,20 +80,22 @@ def read_script(path: Path) -> Script:
     )
 
 
-def find_scripts(only: Sequence[str] = ()) -> list[Script]:
+def find_scripts(selection: Sequence[str] = ()) -> list[Script]:
     """Return the gallery scripts in the order of their numbers.
 
-    only : numbers, names or parts of names that select scripts; all scripts if empty
+    selection : numbers, names or parts of names that select scripts; all scripts if empty
 
     Raises DermisError for a selection that matches no script.
     """
     scripts = [read_script(path) for path in sorted(scripts_folder().glob("[0-9]*.py"))]
-    for wanted in only:
+    for wanted in selection:
         if not any(_matches_selection(script, wanted) for script in scripts):
             names = ", ".join(script.name for script in scripts)
             refuse("--only", "names of pictures", f"got {wanted!r}", f"Choose from: {names}")
     return [
-        script for script in scripts if not only or any(_matches_selection(script, name) for name in only)
+        script
+        for script in scripts
+        if not selection or any(_matches_selection(script, name) for name in selection)
     ]
 
 
@@ -125,11 +127,11 @@ def scripts_folder() -> Path:
     return installed if installed.is_dir() else Path(__file__).parents[4] / "gallery"
 
 
-def _split_list(text: str) -> tuple[str, ...]:
-    return tuple(part.strip() for part in text.split(",") if part.strip())
+def _split_list(comma_separated: str) -> tuple[str, ...]:
+    return tuple(part.strip() for part in comma_separated.split(",") if part.strip())
 
 
-_WEBP_QUALITY, _FRAME_MS = 86, 80
+_WEBP_QUALITY, _ANIMATION_FRAME_MS = 86, 80
 
 
 @dataclass(frozen=True)
@@ -177,7 +179,12 @@ def encode_webp(panel: Panel, quality: int = _WEBP_QUALITY) -> bytes:
     images = panel if isinstance(panel, list) else [panel]
     first, *others = (Pillow.fromarray(to_srgb8(image)) for image in images)
     file = io.BytesIO()
-    animation: dict[str, Any] = {"save_all": True, "append_images": others, "duration": _FRAME_MS, "loop": 0}
+    animation: dict[str, Any] = {
+        "save_all": True,
+        "append_images": others,
+        "duration": _ANIMATION_FRAME_MS,
+        "loop": 0,
+    }
     first.save(file, "webp", quality=quality, method=4, **(animation if others else {}))
     return file.getvalue()
 

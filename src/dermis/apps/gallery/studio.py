@@ -17,7 +17,7 @@ from dermis.scene.heads import HUMAN, load_head
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
-_SCAN_NAME = "lee_perry_smith"
+_SCANNED_HEAD_NAME = "lee_perry_smith"
 
 
 class Studio:
@@ -30,9 +30,9 @@ class Studio:
     """
 
     def __init__(
-        self, name: str | None = None, side: int = 448, adapter: str = "auto", **settings: Any
+        self, head_name: str | None = None, side: int = 448, adapter: str = "auto", **settings: Any
     ) -> None:
-        self.name = name or (_SCAN_NAME if is_available(_SCAN_NAME) else HUMAN)
+        self.name = head_name or (_SCANNED_HEAD_NAME if is_available(_SCANNED_HEAD_NAME) else HUMAN)
         self.side, self.adapter, self._settings = side, adapter, settings
         self.frames_ms: list[float] = []
         self._load = cache(load_head)
@@ -42,13 +42,13 @@ class Studio:
         """Return the renderer, which is opened on first use."""
         return Renderer(self.adapter)
 
-    def head(self, name: str | None = None, **options: Any) -> Head:
+    def head(self, head_name: str | None = None, **options: Any) -> Head:
         """Load a head and subdivide it once.
 
-        name : name of the head; by default the head of the gallery
+        head_name : name of the head; by default the head of the gallery
         options : arguments of `load_head`
         """
-        return self._load(name or self.name, subdivide=1, **options)
+        return self._load(head_name or self.name, subdivide=1, **options)
 
     def coloured_head(self) -> Head:
         """Return the gallery's head with a colour map, which is painted if the head has procedural maps."""
@@ -92,10 +92,10 @@ class Studio:
 
         return self.renderer.reopening_device.run(draw_view)
 
-    def light_map(self, scene: Scene, level: int, **settings: Any) -> NDArray[np.float32]:
+    def light_map(self, scene: Scene, pyramid_level: int, **settings: Any) -> NDArray[np.float32]:
         """Return the diffused irradiance on the atlas, divided by pi, (n, n, 3).
 
-        level : pyramid level: 0 for the light that enters, higher for light blurred by more Gaussians
+        pyramid_level : pyramid level: 0 for the light that enters, higher for light blurred by more Gaussians
         settings : fields of `Settings`
         """
         from dermis.gpu import download
@@ -104,7 +104,7 @@ class Studio:
             self._draw(scene, 1.0, settings)
             inputs = self.renderer.prepare(scene, self.settings(**settings))
             levels, blur = inputs.resources.diffusion.levels, inputs.blurs[0]
-            layer = blur.profile_levels[level]
+            layer = blur.profile_levels[pyramid_level]
             halved = blur.halvings[layer]
             light = download(self.renderer.device, levels.stacks[halved], layer=layer - levels.first[halved])
             return np.asarray(light, np.float32)[..., :3] / np.float32(blur.scale)

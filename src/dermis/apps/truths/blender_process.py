@@ -73,5 +73,5 @@ def _refuse_exit(python: Path, process: subprocess.CompletedProcess[bytes], task
     refuse(task.renderer, task.goal, f"{outcome} ({last_line})", task.advice)
 
 
-def _refuse_python(actual: str) -> NoReturn:
-    refuse("Cycles", "a Python that has Blender's module bpy", actual, _INSTALL_HINT)
+def _refuse_python(actual_python: str) -> NoReturn:
+    refuse("Cycles", "a Python that has Blender's module bpy", actual_python, _INSTALL_HINT)

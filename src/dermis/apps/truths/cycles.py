@@ -40,9 +40,11 @@ Floats = NDArray[np.float32]
 NumericArray = NDArray[np.generic]
 SubsurfaceMethod = Literal["random-walk", "burley"]
 _PASS_COUNT = 4
-_SCRIPT = Path(__file__).with_name("cycles_script.py")
-_TASK = BlenderTask("Cycles", "to render the scene", "Try bpy 5.0, the version that this is tested with")
-_MAX_START_S, _MAX_PATH_S = 300.0, 5e-4
+_CYCLES_SCRIPT = Path(__file__).with_name("cycles_script.py")
+_CYCLES_TASK = BlenderTask(
+    "Cycles", "to render the scene", "Try bpy 5.0, the version that this is tested with"
+)
+_MAX_STARTUP_S, _MAX_SECONDS_PER_PATH = 300.0, 5e-4
 """Time limits for the start of Blender and for each path: a hundred times the times on two cores."""
 
 
@@ -133,8 +135,8 @@ def cycles_passes(
     with tempfile.TemporaryDirectory(prefix="dermis-cycles-") as name:
         folder = Path(name)
         _write_scene(folder, scene_dict, arrays)
-        timeout_s = _MAX_START_S + _MAX_PATH_S * size[0] * size[1] * sum(samples)
-        run_blender(interpreter, _SCRIPT, [str(folder)], timeout_s, _TASK)
+        timeout_s = _MAX_STARTUP_S + _MAX_SECONDS_PER_PATH * size[0] * size[1] * sum(samples)
+        run_blender(interpreter, _CYCLES_SCRIPT, [str(folder)], timeout_s, _CYCLES_TASK)
         return read_passes(folder, samples, size)
 
 
@@ -148,11 +150,11 @@ def _write_scene(folder: Path, scene_dict: SceneDict, arrays: Mapping[str, Numer
     np.savez(folder / "arrays.npz", **arrays)  # type: ignore[arg-type]  # its parameter allow_pickle is no array
 
 
-def read_passes(folder: Path, samples: Sequence[int], size: tuple[int, int]) -> list[CyclesPass]:
+def read_passes(folder: Path, samples: Sequence[int], picture_size: tuple[int, int]) -> list[CyclesPass]:
     """Return the passes that Cycles wrote to a folder.
 
     samples : paths per pixel of each pass
-    size : width and height [pixel]
+    picture_size : width and height [pixel]
 
     Raises DermisError when files are missing or have another size.
     """
@@ -160,7 +162,7 @@ def read_passes(folder: Path, samples: Sequence[int], size: tuple[int, int]) -> 
         report = json.loads((folder / "done.json").read_text(encoding="utf-8"))
         files = [folder / f"pass_{k}.exr" for k in range(len(samples))]
         pixels = [read_image(file).astype(np.float32, copy=False) for file in files]
-        if any(p.shape != (size[1], size[0], 4) or not np.isfinite(p).all() for p in pixels):
+        if any(p.shape != (picture_size[1], picture_size[0], 4) or not np.isfinite(p).all() for p in pixels):
             raise ValueError("a pass of another size, or with values that are not finite")
         version = str(report["version"])
         results = zip(pixels, samples, report["times"], strict=True)
@@ -170,7 +172,7 @@ def read_passes(folder: Path, samples: Sequence[int], size: tuple[int, int]) -> 
         ]
     except (OSError, ValueError, KeyError, TypeError, DermisError) as fault:
         actual = f"its files are unusable ({str(fault) or type(fault).__name__})"
-        refuse(_TASK.renderer, _TASK.goal, actual, _TASK.advice)
+        refuse(_CYCLES_TASK.renderer, _CYCLES_TASK.goal, actual, _CYCLES_TASK.advice)
 
 
 @dataclass(frozen=True)
@@ -207,21 +209,21 @@ CYCLES_METHOD_NAMES = {"random-walk": "RANDOM_WALK", "burley": "BURLEY"}
 
 
 def describe_scene(
-    scene: Scene, medium: SkinMaterial, method: str, size: tuple[int, int]
+    scene: Scene, medium: SkinMaterial, subsurface_method: str, picture_size: tuple[int, int]
 ) -> tuple[SceneDict, dict[str, NumericArray]]:
     """Return the JSON description of a scene for Cycles, except its passes, and the scene's arrays by name.
 
     They are stored in scene.json and arrays.npz.
 
-    size : width and height of the picture [pixel]
+    picture_size : width and height of the picture [pixel]
     """
     world, panorama = cycles_world(scene.environment)
     scene_dict = {
-        "materials": _materials(scene.head, medium, method),
+        "materials": _materials(scene.head, medium, subsurface_method),
         "lights": [cycles_lamp(light, number) for number, light in enumerate(scene.lights, start=1)],
         "world": world,
         "camera": cycles_camera(scene),
-        "size": list(size),
+        "size": list(picture_size),
         "direct": isinstance(medium, Lambertian | BeckmannSurface),
     }
     mesh = scene.head.mesh
@@ -238,18 +240,18 @@ def describe_scene(
     return scene_dict, arrays | panorama
 
 
-def _normal_map(slopes: NDArray[np.float32]) -> NDArray[np.float32]:
+def _normal_map(uv_slopes: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return a normal map for Cycles: tangent-space normals (h, w, 3) encoded as colours.
 
-    slopes : (h, w, 2) slopes of the surface along u and v
+    uv_slopes : (h, w, 2) slopes of the surface along u and v
     """
-    normal = np.dstack([-slopes, np.ones(slopes.shape[:2], np.float32)])
+    normal = np.dstack([-uv_slopes, np.ones(uv_slopes.shape[:2], np.float32)])
     normal /= np.linalg.norm(normal, axis=2, keepdims=True)
     return np.asarray(0.5 + 0.5 * normal, np.float32)
 
 
-def _materials(head: Head, medium: SkinMaterial, method: str) -> list[SceneDict]:
-    skin = _skin_material(medium, method)
+def _materials(head: Head, medium: SkinMaterial, subsurface_method: str) -> list[SceneDict]:
+    skin = _skin_material(medium, subsurface_method)
     return [
         {"name": material.name, **(skin if material.kind == "skin" else _diffuse_material(material.colour))}
         for material in head.mesh.materials
@@ -260,7 +262,7 @@ def _diffuse_material(colour: Sequence[float]) -> SceneDict:
     return {"method": "DIFFUSE", "colour": [float(part) for part in colour]}
 
 
-def _skin_material(medium: SkinMaterial, method: str) -> SceneDict:
+def _skin_material(medium: SkinMaterial, subsurface_method: str) -> SceneDict:
     """Return the description of the skin's material for Cycles, with colour and subsurface radius.
 
     The colour is the diffuse reflectance of the medium, the radius 4 pi mean free paths. Cycles divides radii
@@ -285,7 +287,11 @@ def _skin_material(medium: SkinMaterial, method: str) -> SceneDict:
     (layer,) = medium.layers
     radius_cycles = 4.0 * np.pi * layer.mean_free_path_mm / UNIT_MM
     colour = [diffuse_albedo(float(alpha)) for alpha in layer.alpha_prime]
-    return {"method": CYCLES_METHOD_NAMES[method], "colour": colour, "radius": radius_cycles.tolist()}
+    return {
+        "method": CYCLES_METHOD_NAMES[subsurface_method],
+        "colour": colour,
+        "radius": radius_cycles.tolist(),
+    }
 
 
 def cycles_camera(scene: Scene) -> SceneDict:

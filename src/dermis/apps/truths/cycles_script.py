@@ -123,15 +123,15 @@ def connect_normal_map(nodes: Any, links: Any, maps: dict[str, Any], shader: Any
     links.new(node.outputs["Normal"], shader.inputs["Normal"])
 
 
-def pack_image(name: str, rows: Any) -> Any:
+def pack_image(image_name: str, texel_rows: Any) -> Any:
     """Return a Blender image that contains an array of linear colours.
 
-    rows : (h, w, 3) colours, top row first
+    texel_rows : (h, w, 3) colours, top row first
     """
-    height, width, _ = rows.shape
-    image = bpy.data.images.new(name, width, height, float_buffer=True)
+    height, width, _ = texel_rows.shape
+    image = bpy.data.images.new(image_name, width, height, float_buffer=True)
     image.colorspace_settings.name = "Non-Color"
-    pixels = np.concatenate((rows, np.ones((height, width, 1))), axis=2)[::-1]
+    pixels = np.concatenate((texel_rows, np.ones((height, width, 1))), axis=2)[::-1]
     image.pixels.foreach_set(np.ascontiguousarray(pixels, dtype=np.float32).ravel())
     image.pack()
     return image
@@ -213,7 +213,7 @@ def set_world(description: dict[str, Any], panorama: Any) -> None:
 
 
 def set_camera(description: dict[str, Any]) -> None:
-    """Add the camera and make it the active one."""
+    """Add the camera, and make this camera the active camera of the scene."""
     camera = bpy.data.cameras.new("camera")
     camera.sensor_fit = "VERTICAL"
     camera.sensor_height = 24.0
@@ -255,9 +255,9 @@ def render_pass(path: Path, samples: int, seed: int) -> tuple[float, float]:
     return time.perf_counter() - began, time.process_time() - worked
 
 
-def add_object(name: str, data: Any) -> Any:
+def add_object(object_name: str, data_block: Any) -> Any:
     """Add an object with the given data block to the scene and return it."""
-    result = bpy.data.objects.new(name, data)
+    result = bpy.data.objects.new(object_name, data_block)
     bpy.context.collection.objects.link(result)
     return result
 

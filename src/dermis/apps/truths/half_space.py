@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike, NDArray
 from dermis.base.errors import refuse
 
 Floats = NDArray[np.float64]
-_NODE_COUNT = 64
-_ITERATIONS = 500
+_QUADRATURE_NODE_COUNT = 64
+_H_FUNCTION_ITERATIONS = 500
 
 
 def h_function(cosine: ArrayLike, albedo: float) -> Floats:
@@ -24,8 +24,8 @@ def h_function(cosine: ArrayLike, albedo: float) -> Floats:
         refuse("half-space", "an albedo from 0 to below 1", f"got {albedo:g}", "Correct it")
     mu, weight = _gauss_legendre()
     kernel, root = 0.5 * albedo * weight * mu, np.sqrt(1.0 - albedo)
-    H = np.ones(_NODE_COUNT)
-    for _ in range(_ITERATIONS):
+    H = np.ones(_QUADRATURE_NODE_COUNT)
+    for _ in range(_H_FUNCTION_ITERATIONS):
         H = 0.5 * (H + 1.0 / (root + (kernel * H / (mu[:, None] + mu)).sum(axis=1)))
     mu_out = np.asarray(cosine, np.float64)[..., None]
     return np.asarray(1.0 / (root + (kernel * H / (mu_out + mu)).sum(axis=-1)))
@@ -64,5 +64,5 @@ def reflected_radiance(cosine_in: ArrayLike, cosine_out: ArrayLike, albedo: floa
 
 def _gauss_legendre() -> tuple[Floats, Floats]:
     """Return nodes and weights of Gauss-Legendre quadrature on [0, 1]."""
-    nodes, weights = np.polynomial.legendre.leggauss(_NODE_COUNT)
+    nodes, weights = np.polynomial.legendre.leggauss(_QUADRATURE_NODE_COUNT)
     return 0.5 * (nodes + 1.0), 0.5 * weights

@@ -26,12 +26,12 @@ class MeshPoints:
     face: Index
     barycentric: Floats
 
-    def interpolate(self, mesh: Mesh, values: NDArray[np.floating]) -> Floats:
+    def interpolate(self, mesh: Mesh, vertex_values: NDArray[np.floating]) -> Floats:
         """Return vertex values interpolated at the points, (n, k).
 
-        values : (v, k) values at the vertices of the mesh
+        vertex_values : (v, k) values at the vertices of the mesh
         """
-        return _interpolate(values[mesh.triangles[self.face]], self.barycentric)
+        return _interpolate(vertex_values[mesh.triangles[self.face]], self.barycentric)
 
 
 IrradianceFunction = Callable[[MeshPoints], Floats]
@@ -55,17 +55,17 @@ def sample_irradiance(
     mesh: Mesh,
     light: IrradianceFunction,
     spacing_mm: float,
-    finest_mm: float | None = None,
-    contrast: float = 0.05,
+    min_spacing_mm: float | None = None,
+    contrast_threshold: float = 0.05,
 ) -> IrradianceSamples:
     """Return irradiance samples on a mesh, whose triangles are subdivided without smoothing.
 
     light : function of `MeshPoints` that returns irradiance (n, 3); called for new points only
     spacing_mm : longest side of a small triangle [mm]
-    finest_mm : length down to which sides with a high contrast are halved further; None to stop at
+    min_spacing_mm : length down to which sides with a high contrast are halved further; None to stop at
         `spacing_mm` [mm]
-    contrast : threshold of a high contrast: difference of irradiance between the ends of a side, relative to
-        the largest irradiance [-]
+    contrast_threshold : least high contrast: difference of irradiance between the ends of a side, relative
+        to the largest irradiance [-]
 
     For equal numbers of samples, linear interpolation between triangle corners has a smaller error than
     random points, evenly distributed points [Turk1992] or triangle centroids. A sum over points without
@@ -73,19 +73,25 @@ def sample_irradiance(
 
     Source: [JensenBuhler2002] for sampling the irradiance on the surface.
     """
-    if not (spacing_mm > 0 and (finest_mm is None or 0 < finest_mm <= spacing_mm) and contrast > 0):
-        actual = f"got {spacing_mm}, {finest_mm} and {contrast}"
+    if not (
+        spacing_mm > 0
+        and (min_spacing_mm is None or 0 < min_spacing_mm <= spacing_mm)
+        and contrast_threshold > 0
+    ):
+        actual = f"got {spacing_mm}, {min_spacing_mm} and {contrast_threshold}"
         refuse("irradiance samples", "spacing >= finest > 0 and a contrast above 0", actual, "Correct them")
     subdivision = _subdivide_to(_skin_triangles(mesh), spacing_mm)
     irradiance = light(_sample_points(subdivision))
-    while finest_mm is not None:
+    while min_spacing_mm is not None:
         ends, side, length = _edge_lengths(subdivision)
         contrast_across = np.abs(irradiance[ends[:, 0]] - irradiance[ends[:, 1]]).max(axis=1)
-        high_contrast = (length >= 2 * finest_mm) & (contrast_across > contrast * irradiance.max())
+        high_contrast = (length >= 2 * min_spacing_mm) & (
+            contrast_across > contrast_threshold * irradiance.max()
+        )
         if not high_contrast.any():
             break
         known_count = len(irradiance)
-        subdivision = _bisect(subdivision, side, _add_longest_sides(side, length, high_contrast))
+        subdivision = _halve_edges(subdivision, side, _add_longest_sides(side, length, high_contrast))
         irradiance = np.vstack((irradiance, light(_sample_points(subdivision, known_count))))
     return IrradianceSamples(_sample_points(subdivision).positions, subdivision.corners, irradiance)
 
@@ -109,8 +115,8 @@ class _Subdivision:
         return int(self.corners.max()) + 1
 
 
-def _interpolate(corners: NDArray[np.floating], barycentric: Floats) -> Floats:
-    return np.asarray(np.einsum("nc,nck->nk", barycentric, corners.astype(np.float64)))
+def _interpolate(corner_values: NDArray[np.floating], barycentric: Floats) -> Floats:
+    return np.asarray(np.einsum("nc,nck->nk", barycentric, corner_values.astype(np.float64)))
 
 
 def _skin_triangles(mesh: Mesh) -> _Subdivision:
@@ -128,48 +134,52 @@ def _subdivide_to(subdivision: _Subdivision, spacing_mm: float) -> _Subdivision:
         _, side, length = _edge_lengths(subdivision)
         if not (length > spacing_mm).any():
             return subdivision
-        subdivision = _bisect(subdivision, side, length > spacing_mm)
+        subdivision = _halve_edges(subdivision, side, length > spacing_mm)
 
 
 def _edge_lengths(subdivision: _Subdivision) -> tuple[Index, Index, Floats]:
     return triangle_edges(_sample_points(subdivision).positions, subdivision.corners)
 
 
-def _add_longest_sides(side: Index, length: Floats, halved: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _add_longest_sides(
+    side_edges: Index, edge_lengths: Floats, halved_edges: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
     """Return a mask of edges to halve that includes the longest edge of each affected triangle.
 
     This avoids slivers.
 
-    side : (m, 3) edge index of each side of the triangles
-    length : (e,) lengths of the edges [mm]
-    halved : (e,) mask of edges to halve
+    side_edges : (m, 3) edge index of each side of the triangles
+    edge_lengths : (e,) lengths of the edges [mm]
+    halved_edges : (e,) mask of edges to halve
     """
-    longest = np.take_along_axis(side, length[side].argmax(axis=1)[:, None], axis=1)[:, 0]
-    halved = halved.copy()
-    while (missing := halved[side].any(axis=1) & ~halved[longest]).any():
-        halved[longest[missing]] = True
-    return halved
+    longest = np.take_along_axis(side_edges, edge_lengths[side_edges].argmax(axis=1)[:, None], axis=1)[:, 0]
+    halved_edges = halved_edges.copy()
+    while (missing := halved_edges[side_edges].any(axis=1) & ~halved_edges[longest]).any():
+        halved_edges[longest[missing]] = True
+    return halved_edges
 
 
-def _bisect(subdivision: _Subdivision, side: Index, halved: NDArray[np.bool_]) -> _Subdivision:
+def _halve_edges(
+    subdivision: _Subdivision, side_edges: Index, halved_edges: NDArray[np.bool_]
+) -> _Subdivision:
     """Return the subdivision with selected edges halved in all triangles that share them.
 
-    side : (m, 3) edge index of each side of the triangles
-    halved : (e,) mask of edges to halve
+    side_edges : (m, 3) edge index of each side of the triangles
+    halved_edges : (e,) mask of edges to halve
     """
-    new_index = subdivision.sample_count + np.cumsum(halved) - 1
+    new_index = subdivision.sample_count + np.cumsum(halved_edges) - 1
     corners, source, barycentric = split_triangles(
-        subdivision.corners, subdivision.barycentric, np.where(halved, new_index, -1)[side]
+        subdivision.corners, subdivision.barycentric, np.where(halved_edges, new_index, -1)[side_edges]
     )
     return _Subdivision(subdivision.mesh, corners, subdivision.face[source], barycentric)
 
 
-def _sample_points(subdivision: _Subdivision, first: int = 0) -> MeshPoints:
-    """Return the samples from index `first` on as points on the mesh."""
+def _sample_points(subdivision: _Subdivision, first_index: int = 0) -> MeshPoints:
+    """Return the samples from index `first_index` on as points on the mesh."""
     count = subdivision.sample_count
     face, barycentric = np.empty(count, np.int64), np.empty((count, 3))
     face[subdivision.corners] = subdivision.face[:, None]
     barycentric[subdivision.corners] = subdivision.barycentric
-    face, barycentric = face[first:], barycentric[first:]
+    face, barycentric = face[first_index:], barycentric[first_index:]
     mesh = subdivision.mesh
     return MeshPoints(_interpolate(mesh.positions[mesh.triangles[face]], barycentric), face, barycentric)

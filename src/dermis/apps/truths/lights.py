@@ -32,13 +32,13 @@ from dermis.scene.lights import (
 )
 
 Floats = NDArray[np.float64]
-_FAR_MM = 2e5
+_DISTANT_LIGHT_MM = 2e5
 """Distance of the source of nearly parallel light: irradiance changes by 0.1 % in 100 mm, and a stripe is
 positioned within 0.02 mm in single precision."""
-_SPOT_TEXELS = 1024
-_STRIPE_HALF_EXTENT = 1.25  # in widths; the Gaussian is 4e-6 there
-_STRIPE_TEXELS = 40, 64  # smallest numbers of texels across a width and along the length
-_MAX_STRIPE_TEXELS = 2**23
+_SPOT_SLIDE_SIDE = 1024
+_STRIPE_SLIDE_HALF_WIDTHS = 1.25  # in widths; the Gaussian is 4e-6 there
+_MIN_STRIPE_SLIDE_TEXELS = 40, 64  # smallest numbers of texels across a width and along the length
+_MAX_STRIPE_SLIDE_TEXELS = 2**23
 
 
 def mitsuba_emitter(mi: Mitsuba, light: Light, light_number: int) -> SceneDict:
@@ -80,7 +80,7 @@ def mitsuba_point(mi: Mitsuba, light: PointLight, label: str) -> SceneDict:
 def mitsuba_spot(mi: Mitsuba, light: SpotLight, label: str) -> SceneDict:
     """Return a Mitsuba projector for a spot light, whose smooth edge Mitsuba's spot light does not have."""
     tangent = np.tan(np.radians(light.outer_degrees))
-    along = tangent * ((np.arange(_SPOT_TEXELS) + 0.5) / _SPOT_TEXELS * 2.0 - 1.0)
+    along = tangent * ((np.arange(_SPOT_SLIDE_SIDE) + 0.5) / _SPOT_SLIDE_SIDE * 2.0 - 1.0)
     cosine = 1.0 / np.sqrt(1.0 + along[:, None] ** 2 + along[None, :] ** 2)
     outer, inner = (np.cos(np.radians(a)) for a in (light.outer_degrees, light.inner_degrees))
     falloff = _smoothstep((cosine - outer) / (inner - outer))
@@ -114,16 +114,18 @@ def mitsuba_directional(mi: Mitsuba, light: DirectionalLight, label: str) -> Sce
         return {"type": "directional", "direction": list(light.direction), "irradiance": irradiance}
     direction = np.array(light.direction) / np.linalg.norm(light.direction)
     half = 0.5 * np.radians(light.angle_degrees)
-    to_world = mitsuba_look_at(mi, -_FAR_MM * direction, (0.0, 0.0, 0.0)).scale(float(_FAR_MM * np.tan(half)))
+    to_world = mitsuba_look_at(mi, -_DISTANT_LIGHT_MM * direction, (0.0, 0.0, 0.0)).scale(
+        float(_DISTANT_LIGHT_MM * np.tan(half))
+    )
     return mitsuba_shape("disk", np.divide(light.irradiance, np.pi * np.sin(half) ** 2), to_world=to_world)
 
 
 def mitsuba_stripe(mi: Mitsuba, light: StripeLight, label: str) -> SceneDict:
     """Return Mitsuba's description of a stripe light: a distant slide projector whose slide is the stripe."""
     width, length = light.width_mm, light.length_mm
-    size = np.array([2.0 * _STRIPE_HALF_EXTENT * width, length])
-    texel = min(width / _STRIPE_TEXELS[0], length / _STRIPE_TEXELS[1])
-    texel = max(texel, float(np.sqrt(size.prod() / _MAX_STRIPE_TEXELS)))
+    size = np.array([2.0 * _STRIPE_SLIDE_HALF_WIDTHS * width, length])
+    texel = min(width / _MIN_STRIPE_SLIDE_TEXELS[0], length / _MIN_STRIPE_SLIDE_TEXELS[1])
+    texel = max(texel, float(np.sqrt(size.prod() / _MAX_STRIPE_SLIDE_TEXELS)))
     if width < 10.0 * texel:
         actual = f"it is {length:g} mm long and {width:g} mm wide"
         refuse(label, "a stripe less slender, for path tracing", actual, "Shorten it")
@@ -134,10 +136,12 @@ def mitsuba_stripe(mi: Mitsuba, light: StripeLight, label: str) -> SceneDict:
     with np.errstate(under="ignore"):
         profile = np.exp(-2.0 * across**2)
     falloff = (1.0 - _smoothstep((np.abs(along) - 0.95) / 0.05))[:, None] * profile[None, :]
-    slide = falloff[..., None] * np.multiply(light.irradiance, _FAR_MM**2)
+    slide = falloff[..., None] * np.multiply(light.irradiance, _DISTANT_LIGHT_MM**2)
     direction = np.array(light.direction) / np.linalg.norm(light.direction)
-    to_world = mitsuba_look_at(mi, light.position - _FAR_MM * direction, light.position, light.up)
-    return mitsuba_projector(mi, slide, np.ones((rows, columns)), to_world, 0.5 * columns * texel / _FAR_MM)
+    to_world = mitsuba_look_at(mi, light.position - _DISTANT_LIGHT_MM * direction, light.position, light.up)
+    return mitsuba_projector(
+        mi, slide, np.ones((rows, columns)), to_world, 0.5 * columns * texel / _DISTANT_LIGHT_MM
+    )
 
 
 def cycles_point(light: PointLight) -> SceneDict:
@@ -177,24 +181,26 @@ def cycles_directional(light: DirectionalLight) -> SceneDict:
 def cycles_stripe(light: StripeLight) -> SceneDict:
     """Return a distant point light, which cycles_script.py turns into a stripe light by shader nodes."""
     across, along, forward = camera_axes(light.direction, light.up)
-    power = 4.0 * np.pi * (_FAR_MM / UNIT_MM) ** 2
-    source = light.position - _FAR_MM * forward
+    power = 4.0 * np.pi * (_DISTANT_LIGHT_MM / UNIT_MM) ** 2
+    source = light.position - _DISTANT_LIGHT_MM * forward
     distant = cycles_light("POINT", light.irradiance, power, source, light.direction, shadow_soft_size=0.0)
     axes = {
         "forward": (-forward).tolist(),
         "across": (across / (0.5 * light.width_mm)).tolist(),
         "along": (along / (0.5 * light.length_mm)).tolist(),
     }
-    return distant | {"stripe": {**axes, "distance": _FAR_MM}}
+    return distant | {"stripe": {**axes, "distance": _DISTANT_LIGHT_MM}}
 
 
 def _cycles_point_light(
-    kind: str, light: PointLight, *, radius_mm: float = 0.0, **fields: float
+    lamp_type: str, light: PointLight, *, radius_mm: float = 0.0, **fields: float
 ) -> SceneDict:
     power = 4.0 * np.pi * (_target_distance_mm(light) / UNIT_MM) ** 2
     to_target = np.subtract(light.target, light.position)
     round_light = {"shadow_soft_size": radius_mm / UNIT_MM, "use_soft_falloff": False}
-    return cycles_light(kind, light.irradiance, power, light.position, to_target, **round_light, **fields)
+    return cycles_light(
+        lamp_type, light.irradiance, power, light.position, to_target, **round_light, **fields
+    )
 
 
 def facing_irradiance(width: float, height: float, distance: float) -> float:
@@ -213,8 +219,8 @@ def _target_distance_mm(light: PointLight) -> float:
     return float(np.linalg.norm(np.subtract(light.target, light.position)))
 
 
-def _smoothstep(t: Floats) -> Floats:
-    x = np.clip(t, 0.0, 1.0)
+def _smoothstep(fraction: Floats) -> Floats:
+    x = np.clip(fraction, 0.0, 1.0)
     return x * x * (3.0 - 2.0 * x)
 
 

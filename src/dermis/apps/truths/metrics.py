@@ -17,7 +17,7 @@ Mask = NDArray[np.bool_]
 
 PIXELS_PER_DEGREE = 67.0
 """FLIP's default: a 4K screen 0.7 m wide, seen from 0.7 m."""
-MID_GREY = 0.5
+ZERO_DIFFERENCE_GREY = 0.5
 """sRGB value that shows equality in `signed_difference`, near the middle of lightness (L* 53)."""
 
 
@@ -179,11 +179,11 @@ def _checked_picture(
     return values
 
 
-def signed_difference(image: ArrayLike, reference: ArrayLike, gain: float = 4.0) -> Floats:
+def signed_difference(image: ArrayLike, reference: ArrayLike, difference_gain: float = 4.0) -> Floats:
     """Return an sRGB picture (h, w, 3) of image minus reference, mid-grey where they are equal.
 
     image, reference : (h, w, 3) linear Rec. 709 of 0 or more; 1 is white
-    gain : factor of the difference, which is taken between sRGB values as these are perceptually even
+    difference_gain : factor of the difference between sRGB values, which are perceptually even
     """
     I, T = np.asarray(image, np.float64), np.asarray(reference, np.float64)
     if I.shape != T.shape or I.ndim != 3 or I.shape[2] != 3:
@@ -191,7 +191,7 @@ def signed_difference(image: ArrayLike, reference: ArrayLike, gain: float = 4.0)
         refuse("difference", "two pictures of one shape (h, w, 3)", actual, "Align them")
     if not (np.isfinite(I).all() and np.isfinite(T).all()):
         refuse("difference", "finite values", "got others", "Mask them out")
-    if not gain > 0:
-        refuse("gain", "a number above 0", f"got {gain}", "4 shows what the eye can just see")
+    if not difference_gain > 0:
+        refuse("gain", "a number above 0", f"got {difference_gain}", "4 shows what the eye can just see")
     difference = encode_srgb(np.maximum(I, 0)) - encode_srgb(np.maximum(T, 0))
-    return np.clip(MID_GREY + gain * difference, 0.0, 1.0)
+    return np.clip(ZERO_DIFFERENCE_GREY + difference_gain * difference, 0.0, 1.0)

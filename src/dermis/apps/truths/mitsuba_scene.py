@@ -29,16 +29,16 @@ from dermis.scene.model import Scene
 
 Doubles = NDArray[np.float64]
 NumericArray = NDArray[np.generic]
-ROULETTE_DEPTH = 100
+RUSSIAN_ROULETTE_DEPTH = 100
 """Scattering events before Russian roulette. Earlier roulette leaves few paths of high weight: red on skin2
 then has nearly twice the variance in the same time, and with few samples its mean is 1 % low."""
-_DIRECT_DEPTH = 2
-_RELATIVE_GAP = 0.97
+_DIRECT_LIGHT_DEPTH = 2
+_RELATIVE_INTERFACE_GAP = 0.97
 """Ratio of the distance between the two surfaces of an interface to the offset by which Mitsuba avoids a
 second hit of the same surface. That offset skips 0.01 mm of medium on a head, which makes skin with a mean
 free path of 1 mm up to 1 % darker. With two surfaces, an inward ray hits the upper one and skips the lower
 one, an outward ray hits the lower one and skips the upper one, so that only the gap is skipped."""
-_REPORTED_FOLD = 1e-3  # folded fraction of a surface above which a note reports it
+_REPORTED_FOLDED_FRACTION = 1e-3  # folded fraction of a surface above which a note reports it
 
 
 @dataclass(frozen=True)
@@ -60,10 +60,10 @@ def load_mitsuba() -> Mitsuba:
 
 
 @contextmanager
-def mitsuba_variant(mi: Mitsuba, name: str) -> Iterator[None]:
+def mitsuba_variant(mi: Mitsuba, variant_name: str) -> Iterator[None]:
     """Set a variant of Mitsuba during a context, and restore the previous variant afterwards."""
     before = mi.variant()
-    mi.set_variant(name)
+    mi.set_variant(variant_name)
     try:
         yield
     finally:
@@ -85,42 +85,49 @@ def check_traceable(medium: Medium | Lambertian) -> None:
 
 
 def radiance_scene(
-    mi: Mitsuba, scene: Scene, medium: Medium | Lambertian, size: tuple[int, int]
+    mi: Mitsuba, scene: Scene, medium: Medium | Lambertian, picture_size: tuple[int, int]
 ) -> tuple[MitsubaObject, tuple[str, ...]]:
     """Return the Mitsuba scene of the radiance image, and notes on changes made to the head."""
     shapes, notes = _head_shapes(mi, scene.head, medium)
-    depth_limit = {"max_depth": _DIRECT_DEPTH} if isinstance(medium, Lambertian) else {}
+    depth_limit = {"max_depth": _DIRECT_LIGHT_DEPTH} if isinstance(medium, Lambertian) else {}
     # Spectral MIS, because sampling by the extinction of one channel makes the others noisy.
-    integrator = {"type": "volpathmis", "rr_depth": ROULETTE_DEPTH, "hide_emitters": True, **depth_limit}
-    return mitsuba_scene(mi, scene, integrator, shapes, size), notes
+    integrator = {
+        "type": "volpathmis",
+        "rr_depth": RUSSIAN_ROULETTE_DEPTH,
+        "hide_emitters": True,
+        **depth_limit,
+    }
+    return mitsuba_scene(mi, scene, integrator, shapes, picture_size), notes
 
 
 def mitsuba_scene(
-    mi: Mitsuba, scene: Scene, integrator: SceneDict, shapes: SceneDict, size: tuple[int, int]
+    mi: Mitsuba, scene: Scene, integrator: SceneDict, shapes: SceneDict, picture_size: tuple[int, int]
 ) -> MitsubaObject:
     """Return a Mitsuba scene of given shapes with the lights, environment and camera of a dermis scene."""
     lights = {f"light_{k}": mitsuba_emitter(mi, light, k) for k, light in enumerate(scene.lights, start=1)}
     if scene.environment is not None:
         lights["environment"] = mitsuba_environment(mi, scene.environment)
-    sensor = mitsuba_sensor(mi, scene.camera, size)
+    sensor = mitsuba_sensor(mi, scene.camera, picture_size)
     return mi.load_dict({"type": "scene", "integrator": integrator, "sensor": sensor, **shapes, **lights})
 
 
-def coverage_scene(mi: Mitsuba, camera: Camera, size: tuple[int, int], shapes: SceneDict) -> MitsubaObject:
+def coverage_scene(
+    mi: Mitsuba, camera: Camera, picture_size: tuple[int, int], shapes: SceneDict
+) -> MitsubaObject:
     """Return a Mitsuba scene whose image is the fraction of each pixel that the skin covers.
 
     shapes : head whose skin emits radiance 1, see `emissive_skin`
     """
-    sensor = mitsuba_sensor(mi, camera, size, sampler="multijitter")
+    sensor = mitsuba_sensor(mi, camera, picture_size, sampler="multijitter")
     integrator = {"type": "path", "max_depth": 1}
     return mi.load_dict({"type": "scene", "integrator": integrator, "sensor": sensor, **shapes})
 
 
 def mitsuba_sensor(
-    mi: Mitsuba, camera: Camera, size: Sequence[int], sampler: str = "independent"
+    mi: Mitsuba, camera: Camera, picture_size: Sequence[int], sampler: str = "independent"
 ) -> SceneDict:
     """Return Mitsuba's description of a camera, with a box filter over each pixel."""
-    width, height = size
+    width, height = picture_size
     check_camera(camera, "Mitsuba")
     view = ([float(c) for c in v] for v in (camera.position, camera.target, camera.up))
     film = {"width": width, "height": height, "pixel_format": "rgb", "component_format": "float32"}
@@ -166,23 +173,25 @@ def emissive_skin(mi: Mitsuba, head: Head) -> SceneDict:
     return shapes
 
 
-def _materials_of_kind(head: Head, kind: str) -> list[int]:
+def _materials_of_kind(head: Head, material_kind: str) -> list[int]:
     kinds = [material.kind for material in head.mesh.materials]
-    return [k for k in np.unique(head.mesh.material).tolist() if kinds[k] == kind]
+    return [k for k in np.unique(head.mesh.material).tolist() if kinds[k] == material_kind]
 
 
 def _diffuse_bsdf(mi: Mitsuba, reflectance: SceneDict | float) -> MitsubaObject:
     return mi.load_dict({"type": "diffuse", "reflectance": reflectance})
 
 
-def _material_mesh(mi: Mitsuba, head: Head, index: int, **attributes: MitsubaObject) -> MitsubaObject:
+def _material_mesh(
+    mi: Mitsuba, head: Head, material_index: int, **attributes: MitsubaObject
+) -> MitsubaObject:
     """Return the triangles of a material as a Mitsuba mesh with the head's normals.
 
-    index : index of the material
+    material_index : index of the material
     attributes : BSDF, emitter and media
     """
     mesh = head.mesh
-    used, corners = np.unique(mesh.triangles[mesh.material == index], return_inverse=True)
+    used, corners = np.unique(mesh.triangles[mesh.material == material_index], return_inverse=True)
     vertices = mesh.positions[used] - np.array(head.centre_mm)
     return mesh_shape(mi, vertices, corners.reshape(-1, 3), mesh.normals[used], **attributes)
 
@@ -204,35 +213,37 @@ def layer_interfaces(mi: Mitsuba, head: Head, medium: Medium) -> tuple[SceneDict
 
 
 def inner_interfaces(
-    mi: Mitsuba, skin: ClosedSurface, medium: Medium, media: Sequence[MitsubaObject], name: str
+    mi: Mitsuba, skin_surface: ClosedSurface, medium: Medium, media: Sequence[MitsubaObject], head_name: str
 ) -> tuple[SceneDict, tuple[str, ...]]:
     """Return the closed surfaces below each layer of finite thickness, and notes on surfaces that fold over.
 
-    skin : closed skin surface relative to the head's centre
+    skin_surface : closed skin surface relative to the head's centre
     media : Mitsuba's media of the layers of `medium`
-    name : name of the head, for messages
+    head_name : name of the head, for messages
     """
-    gap, shapes, notes = interface_gap_mm(mi, skin), {}, []
+    gap, shapes, notes = interface_gap_mm(mi, skin_surface), {}, []
     depth = np.zeros(len(gap))
     for k, (layer, (above, below)) in enumerate(zip(medium.layers, pairwise([*media, None]), strict=True)):
         if np.isinf(layer.thickness_mm):
             break
         depth = depth + layer.thickness_mm
         for side, offset_mm in (("upper", depth), ("lower", depth + gap)):
-            surface, folded = offset_inwards(skin, offset_mm, name)
+            surface, folded = offset_inwards(skin_surface, offset_mm, head_name)
             shapes[f"below_{k}_{side}"] = interface_mesh(mi, surface, {"exterior": above, "interior": below})
         depth = depth + gap
-        if folded > _REPORTED_FOLD:
+        if folded > _REPORTED_FOLDED_FRACTION:
             notes.append(f"{folded:.1%} of the face under layer {k} is folded")
     return shapes, tuple(notes)
 
 
-def interface_gap_mm(mi: Mitsuba, skin: ClosedSurface) -> Doubles:
+def interface_gap_mm(mi: Mitsuba, skin_surface: ClosedSurface) -> Doubles:
     """Return the distance (p,) between the two surfaces that form an interface between media [mm].
 
-    skin : closed skin surface relative to the head's centre
+    skin_surface : closed skin surface relative to the head's centre
     """
-    return np.asarray(_RELATIVE_GAP * (1.0 + np.abs(skin.positions).max(axis=1)) * mi.math.RayEpsilon)
+    return np.asarray(
+        _RELATIVE_INTERFACE_GAP * (1.0 + np.abs(skin_surface.positions).max(axis=1)) * mi.math.RayEpsilon
+    )
 
 
 def homogeneous_medium(layer: Layer) -> SceneDict:
@@ -248,14 +259,16 @@ def homogeneous_medium(layer: Layer) -> SceneDict:
     }
 
 
-def interface_mesh(mi: Mitsuba, solid: ClosedSurface, media: SceneDict) -> MitsubaObject:
+def interface_mesh(mi: Mitsuba, closed_surface: ClosedSurface, media: SceneDict) -> MitsubaObject:
     """Return a closed surface as an invisible Mitsuba mesh between two media.
 
     media : exterior and interior medium; None for vacuum
     """
     non_vacuum = {side: medium for side, medium in media.items() if medium is not None}
     invisible = mi.load_dict({"type": "null"})
-    return mesh_shape(mi, solid.positions, solid.triangles, None, bsdf=invisible, **non_vacuum)
+    return mesh_shape(
+        mi, closed_surface.positions, closed_surface.triangles, None, bsdf=invisible, **non_vacuum
+    )
 
 
 def mesh_shape(
@@ -288,5 +301,5 @@ def mesh_shape(
     return mesh
 
 
-def _flatten_array(values: NumericArray, number_type: type[np.generic]) -> NumericArray:
-    return np.ascontiguousarray(values, dtype=number_type).ravel()
+def _flatten_array(array: NumericArray, number_type: type[np.generic]) -> NumericArray:
+    return np.ascontiguousarray(array, dtype=number_type).ravel()

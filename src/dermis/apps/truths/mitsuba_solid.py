@@ -14,8 +14,8 @@ from dermis.mesh.mesh import Mesh
 Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]
 Index = NDArray[np.int32]
-_MIN_DEPTH_MM = 0.05  # least 3 V / A for volume V and surface area A; for a ball, this is its radius
-_MAX_FOLDED = 0.02
+_MIN_INRADIUS_MM = 0.05  # least 3 V / A for volume V and surface area A; for a ball, this is its radius
+_MAX_FOLDED_FRACTION = 0.02
 
 
 @dataclass(frozen=True)
@@ -33,60 +33,66 @@ class ClosedSurface:
     cap_area: float = 0.0
 
 
-def closed_skin(mesh: Mesh, name: str) -> ClosedSurface:
+def closed_skin(mesh: Mesh, head_name: str) -> ClosedSurface:
     """Return the skin with welded uv seams, and each opening closed by a triangle fan around its centroid.
 
-    name : name of the head, for messages
+    head_name : name of the head, for messages
 
     Raises DermisError when the skin encloses no volume: an open surface, or one with inward normals.
     """
     skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
     if not skin.any():
-        refuse(name, "skin to trace", "all of its groups are opaque", "Leave a group out of opaque")
+        refuse(head_name, "skin to trace", "all of its groups are opaque", "Leave a group out of opaque")
     used, triangles = np.unique(mesh.point[mesh.triangles[skin]], return_inverse=True)
     positions = mesh.points_mm[used].astype(np.float32)
     solid = _close_openings(positions, triangles.reshape(-1, 3).astype(np.int32))
     corners = solid.positions[solid.triangles].astype(np.float64)
     depth = 3.0 * _enclosed_volume(corners) / float(triangle_areas(corners).sum())
-    if depth < _MIN_DEPTH_MM:
+    if depth < _MIN_INRADIUS_MM:
         actual = "it is a sheet or inside out" if depth < 0.0 else f"it is {depth:.2g} mm deep on average"
-        refuse(name, "a surface with a volume behind it", actual, "Close it, or reverse its triangles")
+        refuse(head_name, "a surface with a volume behind it", actual, "Close it, or reverse its triangles")
     return solid
 
 
-def offset_inwards(solid: ClosedSurface, depth_mm: Doubles, name: str) -> tuple[ClosedSurface, float]:
+def offset_inwards(
+    closed_surface: ClosedSurface, depth_mm: Doubles, head_name: str
+) -> tuple[ClosedSurface, float]:
     """Return a surface offset inwards by a depth at each point, and the fraction of it that folds over.
 
     depth_mm : (p,) depth of each point; negative for an offset outwards [mm]
-    name : name of the head, for messages
+    head_name : name of the head, for messages
 
     Raises DermisError when more than 2 % of the surface folds over, or no volume is left. Thin
     parts whose opposite sides intersect after the offset are not detected: all parts must be thicker than
     twice the depth.
     """
-    shifted = (solid.positions - depth_mm[:, None] * _mitre_vectors(solid)).astype(np.float32)
-    before, after = (_area_vectors(vertices[solid.triangles]) for vertices in (solid.positions, shifted))
+    shifted = (closed_surface.positions - depth_mm[:, None] * _mitre_vectors(closed_surface)).astype(
+        np.float32
+    )
+    before, after = (
+        _area_vectors(vertices[closed_surface.triangles]) for vertices in (closed_surface.positions, shifted)
+    )
     area = np.linalg.norm(before, axis=1)
     folded = float(area[(before * after).sum(axis=1) <= 0.0].sum() / area.sum())
-    is_empty = _enclosed_volume(shifted[solid.triangles].astype(np.float64)) <= 0.0
-    if is_empty or folded > _MAX_FOLDED:
+    is_empty = _enclosed_volume(shifted[closed_surface.triangles].astype(np.float64)) <= 0.0
+    if is_empty or folded > _MAX_FOLDED_FRACTION:
         actual = "nothing is left of it" if is_empty else f"{folded:.1%} of the surface folds over"
         advice = "Trace its layers as one medium"
         where = f"a body deeper than its layers, moved {depth_mm.mean():.2g} mm inwards"
-        refuse(name, where, actual, advice)
-    return replace(solid, positions=shifted), folded
+        refuse(head_name, where, actual, advice)
+    return replace(closed_surface, positions=shifted), folded
 
 
-def _mitre_vectors(solid: ClosedSurface) -> Doubles:
+def _mitre_vectors(closed_surface: ClosedSurface) -> Doubles:
     """Return for each point the outward vector (p, 3) that moves all faces around the point by 1.
 
     At sharp edges it is longer than 1, but at most 2.
     """
-    points = np.arange(len(solid.positions), dtype=np.int32)
-    normals = vertex_normals(solid.positions, points, solid.triangles).astype(np.float64)
-    face = _area_vectors(solid.positions[solid.triangles])
+    points = np.arange(len(closed_surface.positions), dtype=np.int32)
+    normals = vertex_normals(closed_surface.positions, points, closed_surface.triangles).astype(np.float64)
+    face = _area_vectors(closed_surface.positions[closed_surface.triangles])
     face /= np.maximum(np.linalg.norm(face, axis=1, keepdims=True), 1e-30)
-    corner = solid.triangles.ravel()
+    corner = closed_surface.triangles.ravel()
     along = (normals[corner] * np.repeat(face, 3, axis=0)).sum(axis=1)
     faces = np.bincount(corner, minlength=len(points))
     cosine = np.bincount(corner, along, minlength=len(points)) / np.maximum(faces, 1)
@@ -108,29 +114,29 @@ def _close_openings(positions: Floats, triangles: Index) -> ClosedSurface:
     return ClosedSurface(vertices, np.vstack((triangles, fan)), len(labels), area)
 
 
-def _boundary_edges(triangles: Index, count: int) -> NDArray[np.int64]:
+def _boundary_edges(triangles: Index, point_count: int) -> NDArray[np.int64]:
     """Return directed edges (n, 2) that lack an opposite edge, each repeated for every missing opposite edge.
 
-    count : number of points
+    point_count : number of points
     """
     sides = np.vstack((triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]])).astype(np.int64)
     low, high = sides.min(axis=1), sides.max(axis=1)
-    edge, edge_of_side = np.unique(low * count + high, return_inverse=True)
+    edge, edge_of_side = np.unique(low * point_count + high, return_inverse=True)
     surplus = np.bincount(edge_of_side, np.where(sides[:, 0] == low, 1.0, -1.0), len(edge)).astype(np.int64)
-    ends = np.column_stack((edge // count, edge % count))
+    ends = np.column_stack((edge // point_count, edge % point_count))
     directed = np.where((surplus > 0)[:, None], ends, ends[:, ::-1])
     return np.repeat(directed, np.abs(surplus), axis=0)
 
 
-def _edge_components(sides: NDArray[np.int64]) -> NDArray[np.int64]:
+def _edge_components(edges: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return the index (n,) of the connected component, here an opening, to which each edge belongs.
 
-    sides : (n, 2) point indices of the edges
+    edges : (n, 2) point indices of the edges
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    labels, ends = np.unique(sides, return_inverse=True)
+    labels, ends = np.unique(edges, return_inverse=True)
     a, b = ends.reshape(-1, 2).T
     graph = coo_array((np.ones(len(a)), (a, b)), shape=(len(labels), len(labels)))
     _, label = connected_components(graph, directed=False)

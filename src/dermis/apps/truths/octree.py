@@ -13,8 +13,8 @@ from dermis.mesh.geometry import triangle_areas
 Floats = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-_LEAF_TRIANGLES = 16  # a node with at most this many triangles is not split
-_MAX_DEPTH = 20  # levels of three bits each, so that keys have 60 bits
+_MAX_LEAF_TRIANGLES = 16  # a node with at most this many triangles is not split
+_MAX_OCTREE_DEPTH = 20  # levels of three bits each, so that keys have 60 bits
 
 
 class Octree(NamedTuple):
@@ -95,9 +95,9 @@ def _morton_keys(points: Floats) -> Index:
     """
     low = points.min(axis=0)
     size = max(float((points.max(axis=0) - low).max()), 1e-9)
-    cell = np.minimum((points - low) / size * 2**_MAX_DEPTH, 2**_MAX_DEPTH - 1).astype(np.int64)
+    cell = np.minimum((points - low) / size * 2**_MAX_OCTREE_DEPTH, 2**_MAX_OCTREE_DEPTH - 1).astype(np.int64)
     morton_keys = np.zeros(len(points), np.int64)
-    for level in range(_MAX_DEPTH):
+    for level in range(_MAX_OCTREE_DEPTH):
         for axis in range(3):
             morton_keys |= ((cell[:, axis] >> level) & 1) << (3 * level + axis)
     return morton_keys
@@ -109,11 +109,11 @@ def _octree_nodes(morton_keys: Index) -> tuple[Index, Index, Index]:
     morton_keys : (m,) sorted keys of the triangles
     """
     starts, ends = [np.array([0])], [np.array([len(morton_keys)])]
-    for level in range(_MAX_DEPTH - 1, -1, -1):
+    for level in range(_MAX_OCTREE_DEPTH - 1, -1, -1):
         bounds = np.flatnonzero(np.diff(morton_keys >> (3 * level), prepend=-1, append=-1))
         parent = np.searchsorted(starts[-1], bounds[:-1], side="right") - 1
         contained = (parent >= 0) & (bounds[:-1] < ends[-1][parent])
-        contained &= ends[-1][parent] - starts[-1][parent] > _LEAF_TRIANGLES
+        contained &= ends[-1][parent] - starts[-1][parent] > _MAX_LEAF_TRIANGLES
         if not contained.any():
             break
         starts.append(bounds[:-1][contained])
@@ -123,19 +123,19 @@ def _octree_nodes(morton_keys: Index) -> tuple[Index, Index, Index]:
     return first, end, np.searchsorted(first, end)
 
 
-def _bounding_radius(corners: Floats, centre: Floats, first: Index, end: Index) -> Floats:
+def _bounding_radius(corners: Floats, centre: Floats, first_triangle: Index, end_triangle: Index) -> Floats:
     """Return the distance (n,) from each node's centre to the farthest corner of its bounding box [mm].
 
     corners : (m, 3, 3) corners of the triangles [mm]
-    first, end : (n,) range of each node's triangles
+    first_triangle, end_triangle : (n,) range of each node's triangles
     """
-    low = _reduce_nodes(np.minimum, corners.min(axis=1), first, end)
-    high = _reduce_nodes(np.maximum, corners.max(axis=1), first, end)
+    low = _reduce_nodes(np.minimum, corners.min(axis=1), first_triangle, end_triangle)
+    high = _reduce_nodes(np.maximum, corners.max(axis=1), first_triangle, end_triangle)
     return np.asarray(np.linalg.norm(np.maximum(centre - low, high - centre), axis=1))
 
 
 def _point_approximation(
-    corners: Floats, irradiance: Floats, area: Floats, first: Index, end: Index
+    corners: Floats, irradiance: Floats, area: Floats, first_triangle: Index, end_triangle: Index
 ) -> tuple[Floats, Floats, Floats, Floats, Floats, Floats]:
     """Return centre, points, flux and the three error bounds of the nodes, as defined in `Octree`.
 
@@ -144,7 +144,9 @@ def _point_approximation(
     The points preserve each channel's flux and its centroid within their plane, and the second moments of the
     sum of all channels. For white light this is exact up to the second order.
     """
-    flux, first_moments, second_moments = _central_moments(corners, irradiance, area, first, end)
+    flux, first_moments, second_moments = _central_moments(
+        corners, irradiance, area, first_triangle, end_triangle
+    )
     centre, total = first_moments.pop(), np.maximum(flux.sum(axis=1), np.finfo(float).tiny)
     eigenvalues, axes = np.linalg.eigh(sum(second_moments) / total[:, None, None])
     # A patch of surface is nearly flat, so its two longer axes are enough.
@@ -168,7 +170,7 @@ _TRIANGLE_POINTS = np.sqrt(2) * np.column_stack((np.sin(_TRIANGLE_ANGLES), np.co
 
 
 def _central_moments(
-    corners: Floats, irradiance: Floats, area: Floats, first: Index, end: Index
+    corners: Floats, irradiance: Floats, area: Floats, first_triangle: Index, end_triangle: Index
 ) -> tuple[Floats, list[Floats], list[Floats]]:
     """Return moments of orders 0, 1 and 2 of the light in each node, by channel.
 
@@ -176,11 +178,14 @@ def _central_moments(
     centre itself; and the second moments about the centre (n, 3, 3) of each channel.
     """
     moments = [_triangle_moments(corners, irradiance[..., c], area) for c in range(3)]
-    sums = [[_reduce_nodes(np.add, values, first, end) for values in channel] for channel in moments]
+    sums = [
+        [_reduce_nodes(np.add, values, first_triangle, end_triangle) for values in channel]
+        for channel in moments
+    ]
     flux = np.column_stack([channel[0] for channel in sums])
     total = flux.sum(axis=1)[:, None]
     moment = sum(channel[1] for channel in sums)
-    centre = np.divide(moment, total, where=total > 0, out=corners[first].mean(axis=1))
+    centre = np.divide(moment, total, where=total > 0, out=corners[first_triangle].mean(axis=1))
     first_moments, second_moments = [], []
     for channel_flux, origin_moment, origin_outer in sums:
         cross = origin_moment[:, :, None] * centre[:, None]
@@ -210,24 +215,30 @@ def _triangle_moments(corners: Floats, irradiance: Floats, area: Floats) -> tupl
     return sum_light * area / 3, moment, second_moments
 
 
-def _point_flux(flux: Floats, first_moments: list[Floats], axis_lengths: Floats, axes: Floats) -> Floats:
+def _point_flux(
+    flux: Floats, first_moments: list[Floats], axis_lengths: Floats, principal_axes: Floats
+) -> Floats:
     """Return the flux (n, 3, 3) of each node's points by channel.
 
     It preserves each channel's flux, and its centroid in the plane of the points.
     """
-    moment = np.einsum("cna,naj->ncj", np.array(first_moments), axes)
+    moment = np.einsum("cna,naj->ncj", np.array(first_moments), principal_axes)
     lengths = axis_lengths[:, None]
     ratio = np.divide(moment, lengths, where=lengths > 1e-9, out=np.zeros_like(moment))
     return np.asarray((flux[:, None] + np.einsum("kj,ncj->nkc", _TRIANGLE_POINTS, ratio)) / 3)
 
 
-def _reduce_nodes(operation: np.ufunc, values: Floats, first: Index, end: Index) -> Floats:
+def _reduce_nodes(
+    operation: np.ufunc, triangle_values: Floats, first_triangle: Index, end_triangle: Index
+) -> Floats:
     """Return the values of each node's triangles reduced by a NumPy ufunc, such as np.add.
 
-    values : (m, ...) values of the triangles
-    first, end : (n,) range of each node's triangles
+    triangle_values : (m, ...) values of the triangles
+    first_triangle, end_triangle : (n,) range of each node's triangles
     """
     # `reduceat` reduces between consecutive indices, so every other result belongs to a node; it also needs a
     # row after the last one.
-    padded = np.concatenate((values, values[-1:]))
-    return np.asarray(operation.reduceat(padded, np.column_stack((first, end)).ravel(), axis=0)[::2])
+    padded = np.concatenate((triangle_values, triangle_values[-1:]))
+    return np.asarray(
+        operation.reduceat(padded, np.column_stack((first_triangle, end_triangle)).ravel(), axis=0)[::2]
+    )

@@ -19,7 +19,7 @@ from dermis.base.compiled import compiled
 
 Floats = NDArray[np.float64]
 
-_MAX_SUBDIVISIONS = 20
+_MAX_NESTED_SPLITS = 20
 """Nested splits of a triangle in four; 20 make a side a million times shorter."""
 
 
@@ -36,72 +36,87 @@ class TriangleStack(NamedTuple):
 
 
 @compiled
-def gather_exitance(points: Floats, tree: Octree, table: ProfileTable, bound: float, exitance: Floats) -> int:
+def gather_exitance(
+    points: Floats, tree: Octree, profile_table: ProfileTable, error_bound: float, exitance: Floats
+) -> int:
     """Add the exitance at each point to `exitance` (n, 3); return the number of visited nodes and triangles.
 
     points : (n, 3) positions [mm]
-    bound : largest total error, relative to the profile's energy times the irradiance near a point [-]
+    error_bound : largest total error, relative to the profile's energy times the irradiance near a point [-]
     """
-    size = 3 * _MAX_SUBDIVISIONS + 4
+    size = 3 * _MAX_NESTED_SPLITS + 4
     stack = TriangleStack(np.empty((size, 3, 3)), np.empty((size, 3, 3)), np.empty(size))
     visit_count = 0
     for i in range(len(points)):
         node = 0
         while node < len(tree.first):
             visit_count += 1
-            if _node_is_far(points[i], node, tree, table, bound):
-                _add_node(points[i], node, tree, table, exitance[i])
+            if _node_is_far(points[i], node, tree, profile_table, error_bound):
+                _add_node(points[i], node, tree, profile_table, exitance[i])
                 node = tree.next_node[node]
                 continue
             if tree.next_node[node] == node + 1:
                 for t in range(tree.first[node], tree.end[node]):
-                    visit_count += _gather_triangle(points[i], t, tree, table, bound, stack, exitance[i])
+                    visit_count += _gather_triangle(
+                        points[i], t, tree, profile_table, error_bound, stack, exitance[i]
+                    )
             node += 1
     return visit_count
 
 
 @compiled
-def _node_is_far(point: Floats, node: int, tree: Octree, table: ProfileTable, bound: float) -> bool:
+def _node_is_far(
+    point: Floats, node: int, tree: Octree, profile_table: ProfileTable, error_bound: float
+) -> bool:
     distance = _distance(point, tree.centre[node, 0], tree.centre[node, 1], tree.centre[node, 2])
-    near, far = _table_rows(distance, tree.radius[node], table)
-    error = table.curvature[near] * tree.second_moment[node] + table.slope[near] * tree.centroid_error[node]
-    return bool(error <= bound * table.error_density[far])
+    near, far = _table_rows(distance, tree.radius[node], profile_table)
+    error = (
+        profile_table.curvature[near] * tree.second_moment[node]
+        + profile_table.slope[near] * tree.centroid_error[node]
+    )
+    return bool(error <= error_bound * profile_table.error_density[far])
 
 
 @compiled
-def _add_node(point: Floats, node: int, tree: Octree, table: ProfileTable, exitance: Floats) -> None:
+def _add_node(point: Floats, node: int, tree: Octree, profile_table: ProfileTable, exitance: Floats) -> None:
     for k in range(3):
         distance = _distance(point, tree.points[node, k, 0], tree.points[node, k, 1], tree.points[node, k, 2])
         red, green, blue = tree.flux[node, k, 0], tree.flux[node, k, 1], tree.flux[node, k, 2]
-        _add_flux(distance, red, green, blue, table, exitance)
+        _add_flux(distance, red, green, blue, profile_table, exitance)
 
 
 @compiled
 def _gather_triangle(
     point: Floats,
-    t: int,
+    triangle_index: int,
     tree: Octree,
-    table: ProfileTable,
-    bound: float,
-    stack: TriangleStack,
+    profile_table: ProfileTable,
+    error_bound: float,
+    triangle_stack: TriangleStack,
     exitance: Floats,
 ) -> int:
-    """Add the light of triangle t, split until its parts are far enough; return the number of parts."""
-    stack.corners[0], stack.irradiance[0], stack.area[0] = (tree.corners[t], tree.irradiance[t], tree.area[t])
+    """Add the light of a triangle, split until its parts are far enough; return the number of parts."""
+    triangle_stack.corners[0], triangle_stack.irradiance[0], triangle_stack.area[0] = (
+        tree.corners[triangle_index],
+        tree.irradiance[triangle_index],
+        tree.area[triangle_index],
+    )
     count, visit_count = 1, 0
     while count > 0:
         count -= 1
         visit_count += 1
-        if _triangle_is_far(point, stack.corners[count], table, bound) or count + 4 > len(stack.area):
-            _add_side_midpoints(point, count, stack, table, exitance)
+        if _triangle_is_far(
+            point, triangle_stack.corners[count], profile_table, error_bound
+        ) or count + 4 > len(triangle_stack.area):
+            _add_side_midpoints(point, count, triangle_stack, profile_table, exitance)
         else:
-            _split_triangle(count, stack)
+            _split_triangle(count, triangle_stack)
             count += 4
     return visit_count
 
 
 @compiled
-def _triangle_is_far(point: Floats, corners: Floats, table: ProfileTable, bound: float) -> bool:
+def _triangle_is_far(point: Floats, corners: Floats, profile_table: ProfileTable, error_bound: float) -> bool:
     x = (corners[0, 0] + corners[1, 0] + corners[2, 0]) / 3.0
     y = (corners[0, 1] + corners[1, 1] + corners[2, 1]) / 3.0
     z = (corners[0, 2] + corners[1, 2] + corners[2, 2]) / 3.0
@@ -110,24 +125,30 @@ def _triangle_is_far(point: Floats, corners: Floats, table: ProfileTable, bound:
         distance2 = (corners[k, 0] - x) ** 2 + (corners[k, 1] - y) ** 2 + (corners[k, 2] - z) ** 2
         sum_distance2 += distance2
         max_distance2 = max(max_distance2, distance2)
-    near, far = _table_rows(_distance(point, x, y, z), math.sqrt(max_distance2), table)
+    near, far = _table_rows(_distance(point, x, y, z), math.sqrt(max_distance2), profile_table)
     # Upper bound of the mean square distances of linear light and of the midpoints from the centroid.
     second_moment = (sum_distance2 + 2.0 * max_distance2) / 20.0 + max_distance2 / 4.0
-    return bool(table.curvature[near] * second_moment <= bound * table.error_density[far])
+    return bool(
+        profile_table.curvature[near] * second_moment <= error_bound * profile_table.error_density[far]
+    )
 
 
 @compiled
 def _add_side_midpoints(
-    point: Floats, i: int, triangle_stack: TriangleStack, table: ProfileTable, exitance: Floats
+    point: Floats,
+    stack_index: int,
+    triangle_stack: TriangleStack,
+    profile_table: ProfileTable,
+    exitance: Floats,
 ) -> None:
-    """Add the light of sub-triangle i of the stack, evaluated at the midpoints of its sides.
+    """Add the light of one sub-triangle of the stack, evaluated at the midpoints of its sides.
 
     This quadrature is exact to second order in the product of irradiance and profile.
     """
     corners, irradiance, scale = (
-        triangle_stack.corners[i],
-        triangle_stack.irradiance[i],
-        triangle_stack.area[i] / 6.0,
+        triangle_stack.corners[stack_index],
+        triangle_stack.irradiance[stack_index],
+        triangle_stack.area[stack_index] / 6.0,
     )
     for a in range(3):
         b = (a + 1) % 3
@@ -137,21 +158,37 @@ def _add_side_midpoints(
         red = scale * (irradiance[a, 0] + irradiance[b, 0])
         green = scale * (irradiance[a, 1] + irradiance[b, 1])
         blue = scale * (irradiance[a, 2] + irradiance[b, 2])
-        _add_flux(_distance(point, x, y, z), red, green, blue, table, exitance)
+        _add_flux(_distance(point, x, y, z), red, green, blue, profile_table, exitance)
 
 
 @compiled
-def _split_triangle(i: int, stack: TriangleStack) -> None:
-    """Replace sub-triangle i of the stack by its four quarters, at i to i + 3."""
-    stack.area[i : i + 4] = 0.25 * stack.area[i]
-    for values in (stack.corners, stack.irradiance):
+def _split_triangle(stack_index: int, triangle_stack: TriangleStack) -> None:
+    """Replace a sub-triangle of the stack by its four quarters, at `stack_index` to `stack_index` + 3."""
+    triangle_stack.area[stack_index : stack_index + 4] = 0.25 * triangle_stack.area[stack_index]
+    for values in (triangle_stack.corners, triangle_stack.irradiance):
         for axis in range(3):
-            a, b, c = values[i, 0, axis], values[i, 1, axis], values[i, 2, axis]
+            a, b, c = values[stack_index, 0, axis], values[stack_index, 1, axis], values[stack_index, 2, axis]
             ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
-            values[i, 0, axis], values[i, 1, axis], values[i, 2, axis] = a, ab, ca
-            values[i + 1, 0, axis], values[i + 1, 1, axis], values[i + 1, 2, axis] = ab, b, bc
-            values[i + 2, 0, axis], values[i + 2, 1, axis], values[i + 2, 2, axis] = ca, bc, c
-            values[i + 3, 0, axis], values[i + 3, 1, axis], values[i + 3, 2, axis] = ab, bc, ca
+            values[stack_index, 0, axis], values[stack_index, 1, axis], values[stack_index, 2, axis] = (
+                a,
+                ab,
+                ca,
+            )
+            (
+                values[stack_index + 1, 0, axis],
+                values[stack_index + 1, 1, axis],
+                values[stack_index + 1, 2, axis],
+            ) = ab, b, bc
+            (
+                values[stack_index + 2, 0, axis],
+                values[stack_index + 2, 1, axis],
+                values[stack_index + 2, 2, axis],
+            ) = ca, bc, c
+            (
+                values[stack_index + 3, 0, axis],
+                values[stack_index + 3, 1, axis],
+                values[stack_index + 3, 2, axis],
+            ) = ab, bc, ca
 
 
 @compiled
@@ -160,27 +197,38 @@ def _distance(point: Floats, x: float, y: float, z: float) -> float:
 
 
 @compiled
-def _table_rows(distance: float, radius: float, table: ProfileTable) -> tuple[int, int]:
+def _table_rows(distance: float, ball_radius: float, profile_table: ProfileTable) -> tuple[int, int]:
     """Return the rows of the profile's table that bracket all radii to points of a ball.
 
     distance : distance of the ball's centre [mm]
-    radius : radius of the ball [mm]
+    ball_radius : radius of the ball [mm]
     """
-    last = len(table.error_density) - 1
-    near = int(math.sqrt(max(distance - radius, 0.0)) * table.rows_per_root)
-    far = int(math.sqrt(distance + radius) * table.rows_per_root) + 1
+    last = len(profile_table.error_density) - 1
+    near = int(math.sqrt(max(distance - ball_radius, 0.0)) * profile_table.rows_per_root)
+    far = int(math.sqrt(distance + ball_radius) * profile_table.rows_per_root) + 1
     return min(near, last), min(far, last)
 
 
 @compiled
 def _add_flux(
-    distance: float, red: float, green: float, blue: float, table: ProfileTable, exitance: Floats
+    distance: float,
+    red_flux: float,
+    green_flux: float,
+    blue_flux: float,
+    profile_table: ProfileTable,
+    exitance: Floats,
 ) -> None:
     """Add each channel's flux times the profile at a distance, interpolated in its table, to `exitance`."""
-    row_position = math.sqrt(distance) * table.rows_per_root
+    row_position = math.sqrt(distance) * profile_table.rows_per_root
     row = int(row_position)
-    if row < len(table.R) - 1:
+    if row < len(profile_table.R) - 1:
         fraction = row_position - row
-        exitance[0] += red * (table.R[row, 0] + fraction * (table.R[row + 1, 0] - table.R[row, 0]))
-        exitance[1] += green * (table.R[row, 1] + fraction * (table.R[row + 1, 1] - table.R[row, 1]))
-        exitance[2] += blue * (table.R[row, 2] + fraction * (table.R[row + 1, 2] - table.R[row, 2]))
+        exitance[0] += red_flux * (
+            profile_table.R[row, 0] + fraction * (profile_table.R[row + 1, 0] - profile_table.R[row, 0])
+        )
+        exitance[1] += green_flux * (
+            profile_table.R[row, 1] + fraction * (profile_table.R[row + 1, 1] - profile_table.R[row, 1])
+        )
+        exitance[2] += blue_flux * (
+            profile_table.R[row, 2] + fraction * (profile_table.R[row + 1, 2] - profile_table.R[row, 2])
+        )

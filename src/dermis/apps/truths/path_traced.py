@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.truths.mitsuba_scene import (
-    ROULETTE_DEPTH,
+    RUSSIAN_ROULETTE_DEPTH,
     Lambertian,
     check_traceable,
     coverage_scene,
@@ -36,10 +36,10 @@ ProgressCallback = Callable[[int, int], None]
 MitsubaVariant = Literal["scalar_rgb", "llvm_ad_rgb", "cuda_ad_rgb"]
 
 SAMPLES_PER_PASS = 4
-_MIN_PASSES = 2
-_MAX_SAMPLES = 2**20
-_COVERAGE_SAMPLES = 64
-_SAVE_INTERVAL_S = 30.0
+_MIN_PASS_COUNT = 2
+_MAX_SAMPLES_PER_PIXEL = 2**20
+_COVERAGE_SAMPLES_PER_PIXEL = 64
+_CACHE_SAVE_INTERVAL_S = 30.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +97,7 @@ def path_trace(
     target_count = pass_count(samples)
     check_traceable(medium)
     mi, size = load_mitsuba(), (settings or Settings()).size
-    trace_settings = f"{mi.__version__} {variant} {SAMPLES_PER_PASS} {ROULETTE_DEPTH}"
+    trace_settings = f"{mi.__version__} {variant} {SAMPLES_PER_PASS} {RUSSIAN_ROULETTE_DEPTH}"
     key = scene_key(scene, medium, size, trace_settings) if use_cache else None
     return render_passes(
         mi,
@@ -114,27 +114,29 @@ def path_trace(
 def render_passes(
     mi: Mitsuba,
     variant: MitsubaVariant,
-    target_count: int,
-    size: tuple[int, int],
-    key: str | None,
+    min_pass_count: int,
+    picture_size: tuple[int, int],
+    cache_key: str | None,
     build_radiance: Callable[[], tuple[MitsubaObject, tuple[str, ...]]],
     build_coverage: Callable[[], MitsubaObject],
     progress: ProgressCallback | None,
 ) -> PathTraced:
-    """Return the mean of at least `target_count` passes of Mitsuba, including cached ones.
+    """Return the mean of at least `min_pass_count` passes of Mitsuba, including cached ones.
 
-    key : name of the cached passes; None for no cache
+    cache_key : name of the cached passes; None for no cache
     build_radiance, build_coverage : functions that build Mitsuba's scenes of the radiance, with notes, and of
         the skin's coverage of each pixel
     """
-    passes = load_passes(key, size) if key else None
-    if passes is None or passes.count < target_count:
+    passes = load_passes(cache_key, picture_size) if cache_key else None
+    if passes is None or passes.count < min_pass_count:
         with mitsuba_variant(mi, variant):
             built_scene, notes = build_radiance()
             if passes is None:
-                mask = np.array(mi.render(build_coverage(), spp=_COVERAGE_SAMPLES), np.float32)[..., 0]
-                passes = PassStatistics.empty(size, np.clip(mask, 0.0, 1.0), notes)
-            add_passes(mi, built_scene, passes, target_count, key, progress)
+                mask = np.array(mi.render(build_coverage(), spp=_COVERAGE_SAMPLES_PER_PIXEL), np.float32)[
+                    ..., 0
+                ]
+                passes = PassStatistics.empty(picture_size, np.clip(mask, 0.0, 1.0), notes)
+            add_passes(mi, built_scene, passes, min_pass_count, cache_key, progress)
     return PathTraced(
         passes.mean.astype(np.float32),
         passes.variance.astype(np.float32),
@@ -150,38 +152,40 @@ def pass_count(samples: int) -> int:
 
     Raises DermisError for a number below 1 or too large.
     """
-    if not (isinstance(samples, int | np.integer) and 1 <= samples <= _MAX_SAMPLES):
-        refuse("samples", f"a whole number from 1 to {_MAX_SAMPLES}", f"got {samples}", "Correct it")
-    return max(_MIN_PASSES, -(-samples // SAMPLES_PER_PASS))
+    if not (isinstance(samples, int | np.integer) and 1 <= samples <= _MAX_SAMPLES_PER_PIXEL):
+        refuse(
+            "samples", f"a whole number from 1 to {_MAX_SAMPLES_PER_PIXEL}", f"got {samples}", "Correct it"
+        )
+    return max(_MIN_PASS_COUNT, -(-samples // SAMPLES_PER_PASS))
 
 
 def add_passes(
     mi: Mitsuba,
     built_scene: MitsubaObject,
     passes: PassStatistics,
-    target_count: int,
-    key: str | None,
+    min_pass_count: int,
+    cache_key: str | None,
     progress: ProgressCallback | None,
 ) -> None:
-    """Render passes of a Mitsuba scene until there are `target_count`, and cache them.
+    """Render passes of a Mitsuba scene until there are `min_pass_count`, and cache them.
 
-    key : name of the cached passes; None for no cache
+    cache_key : name of the cached passes; None for no cache
     """
     last_save = time.perf_counter()
     try:
-        while passes.count < target_count:
+        while passes.count < min_pass_count:
             started = time.perf_counter()
             image = np.array(mi.render(built_scene, spp=SAMPLES_PER_PASS, seed=passes.count), np.float64)
             ended = time.perf_counter()
             passes.add(image, ended - started)
             if progress is not None:
-                progress(passes.count, target_count)
-            if key and ended - last_save > _SAVE_INTERVAL_S and passes.count < target_count:
-                save_passes(key, passes)
+                progress(passes.count, min_pass_count)
+            if cache_key and ended - last_save > _CACHE_SAVE_INTERVAL_S and passes.count < min_pass_count:
+                save_passes(cache_key, passes)
                 last_save = ended
     finally:
-        if key and passes.count > 0:
-            save_passes(key, passes)
+        if cache_key and passes.count > 0:
+            save_passes(cache_key, passes)
 
 
 Doubles = NDArray[np.float64]
@@ -210,13 +214,13 @@ class PassStatistics:
 
     @classmethod
     def empty(
-        cls, size: tuple[int, int], mask: NDArray[np.floating], notes: tuple[str, ...]
+        cls, picture_size: tuple[int, int], mask: NDArray[np.floating], notes: tuple[str, ...]
     ) -> PassStatistics:
         """Return the state before the first pass.
 
-        size : width and height of the image [pixel]
+        picture_size : width and height of the image [pixel]
         """
-        shape = (size[1], size[0], 3)
+        shape = (picture_size[1], picture_size[0], 3)
         return cls(np.zeros(shape), np.zeros(shape), np.asarray(mask, np.float32), notes)
 
     @property
@@ -249,12 +253,16 @@ def hash_medium(digest: hashlib._Hash, medium: Medium) -> None:
         digest.update(np.ascontiguousarray([layer.sigma_a, layer.sigma_s_prime], np.float64).tobytes())
 
 
-def scene_key(scene: Scene, medium: Medium | Lambertian, size: tuple[int, int], trace_settings: str) -> str:
+def scene_key(
+    scene: Scene, medium: Medium | Lambertian, picture_size: tuple[int, int], trace_settings: str
+) -> str:
     """Return a hash of all inputs of a path-traced image, used as the name of its cached passes.
 
     trace_settings : versions and settings of the path tracer
     """
-    digest = hashlib.sha256(f"{_CACHE_VERSION} {trace_settings} {size} {scene.head.centre_mm}".encode())
+    digest = hashlib.sha256(
+        f"{_CACHE_VERSION} {trace_settings} {picture_size} {scene.head.centre_mm}".encode()
+    )
     hash_lighting(digest, scene)
     mesh = scene.head.mesh
     digest.update(repr([(material.kind, material.colour) for material in mesh.materials]).encode())
@@ -267,16 +275,18 @@ def scene_key(scene: Scene, medium: Medium | Lambertian, size: tuple[int, int], 
     return digest.hexdigest()[:40]
 
 
-def load_passes(key: str, size: tuple[int, int]) -> PassStatistics | None:
-    """Return cached passes, or None if none have this key and size."""
-    found = load_arrays(_CACHE_FOLDER, key, ("mean", "spread", "mask", "notes", "count", "seconds"))
-    if found is None or found["mean"].shape != (size[1], size[0], 3):
+def load_passes(cache_key: str, picture_size: tuple[int, int]) -> PassStatistics | None:
+    """Return the cached passes with a key and picture size; None if the cache has no such passes."""
+    found = load_arrays(_CACHE_FOLDER, cache_key, ("mean", "spread", "mask", "notes", "count", "seconds"))
+    if found is None or found["mean"].shape != (picture_size[1], picture_size[0], 3):
         return None
     notes = tuple(str(note) for note in found["notes"])
     moments = found["mean"], found["spread"], found["mask"]
     return PassStatistics(*moments, notes, int(found["count"]), float(found["seconds"]))
 
 
-def save_passes(key: str, passes: PassStatistics) -> None:
+def save_passes(cache_key: str, passes: PassStatistics) -> None:
     """Write passes to the cache, ignoring errors of the disk."""
-    try_save_arrays(_CACHE_FOLDER, key, {name: np.asarray(value) for name, value in vars(passes).items()})
+    try_save_arrays(
+        _CACHE_FOLDER, cache_key, {name: np.asarray(value) for name, value in vars(passes).items()}
+    )

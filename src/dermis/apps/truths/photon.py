@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 Counts = NDArray[np.int64]
 RandomState = NDArray[np.uint64]
 
-MAX_EVENTS = 100_000
+MAX_PHOTON_EVENTS = 100_000
 """Scatterings and face crossings after which a photon is dropped; without absorption some never end."""
 
 
@@ -42,7 +42,7 @@ class PhotonTally(NamedTuple):
         last entry is beyond the last ring
     unscattered : (2,) left above and below without scattering
     absorbed : (layers,) absorbed in each layer
-    unfinished : (1,) dropped after `MAX_EVENTS` events
+    unfinished : (1,) dropped after `MAX_PHOTON_EVENTS` events
     """
 
     reflected: Counts
@@ -125,61 +125,63 @@ def scatter_direction(x: float, y: float, z: float, g: float, rng: RandomState) 
 
 
 @compiled
-def _ring_index(x: float, y: float, edges2: Floats) -> int:
+def _ring_index(x: float, y: float, squared_ring_edges: Floats) -> int:
     """Return the index of the ring around the axis that contains a point (x, y); n beyond the last ring.
 
-    edges2 : (n + 1,) squared radii of the ring edges
+    squared_ring_edges : (n + 1,) squared radii of the ring edges
     """
-    return int(np.searchsorted(edges2, x * x + y * y, side="right")) - 1
+    return int(np.searchsorted(squared_ring_edges, x * x + y * y, side="right")) - 1
 
 
 @compiled
 def _tally_exit(
-    x: float, y: float, upward: bool, scatterings: int, edges2: Floats, tally: PhotonTally
+    x: float, y: float, upward: bool, scatterings: int, squared_ring_edges: Floats, tally: PhotonTally
 ) -> None:
     if scatterings == 0:
         tally.unscattered[0 if upward else 1] += 1
     elif upward:
-        tally.reflected[_ring_index(x, y, edges2)] += 1
+        tally.reflected[_ring_index(x, y, squared_ring_edges)] += 1
     else:
-        tally.transmitted[_ring_index(x, y, edges2)] += 1
+        tally.transmitted[_ring_index(x, y, squared_ring_edges)] += 1
 
 
 @compiled
-def _trace_photon(stack: LayerStack, edges2: Floats, rng: RandomState, tally: PhotonTally) -> None:
+def _trace_photon(
+    layer_stack: LayerStack, squared_ring_edges: Floats, rng: RandomState, tally: PhotonTally
+) -> None:
     """Trace one photon, which enters on the axis at normal incidence, until it leaves or is absorbed.
 
-    edges2 : (n + 1,) squared radii of the ring edges
+    squared_ring_edges : (n + 1,) squared radii of the ring edges
     """
     x = y = z = ux = uy = 0.0
     uz = 1.0
-    layer, bottom = 1, len(stack.eta) - 2
+    layer, bottom = 1, len(layer_stack.eta) - 2
     scatterings = 0
     depth = -math.log(random_uniform(rng))  # optical depth to the next scattering
-    for _ in range(MAX_EVENTS):
+    for _ in range(MAX_PHOTON_EVENTS):
         upward = uz < 0.0
-        path = depth / stack.sigma_t[layer]
-        to_face = (stack.face_mm[layer - 1 if upward else layer] - z) / uz
+        path = depth / layer_stack.sigma_t[layer]
+        to_face = (layer_stack.face_mm[layer - 1 if upward else layer] - z) / uz
         if path < to_face:
             x, y, z = x + path * ux, y + path * uy, z + path * uz
-            if random_uniform(rng) > stack.albedo[layer]:
+            if random_uniform(rng) > layer_stack.albedo[layer]:
                 tally.absorbed[layer - 1] += 1
                 return
-            ux, uy, uz = scatter_direction(ux, uy, uz, stack.g[layer], rng)
+            ux, uy, uz = scatter_direction(ux, uy, uz, layer_stack.g[layer], rng)
             depth = -math.log(random_uniform(rng))
             scatterings += 1
             continue
         x, y = x + to_face * ux, y + to_face * uy
-        z = stack.face_mm[layer - 1 if upward else layer]
-        depth -= to_face * stack.sigma_t[layer]
+        z = layer_stack.face_mm[layer - 1 if upward else layer]
+        depth -= to_face * layer_stack.sigma_t[layer]
         beyond = layer - 1 if upward else layer + 1
-        eta = stack.eta[layer] / stack.eta[beyond]
+        eta = layer_stack.eta[layer] / layer_stack.eta[beyond]
         F, cosine = refract(abs(uz), eta)
         if F > 0.0 and random_uniform(rng) < F:
             uz = -uz
             continue
         if beyond == 0 or beyond > bottom:
-            _tally_exit(x, y, upward, scatterings, edges2, tally)
+            _tally_exit(x, y, upward, scatterings, squared_ring_edges, tally)
             return
         ux, uy, uz = eta * ux, eta * uy, math.copysign(cosine, uz)
         layer = beyond
@@ -188,16 +190,20 @@ def _trace_photon(stack: LayerStack, edges2: Floats, rng: RandomState, tally: Ph
 
 @compiled
 def trace_photons(
-    photons: int, stack: LayerStack, edges2: Floats, rng: RandomState, tally: PhotonTally
+    photon_count: int,
+    layer_stack: LayerStack,
+    squared_ring_edges: Floats,
+    rng: RandomState,
+    tally: PhotonTally,
 ) -> None:
     """Trace a number of photons and add them to the tally by how their walks end.
 
-    edges2 : (n + 1,) squared radii of the ring edges
+    squared_ring_edges : (n + 1,) squared radii of the ring edges
 
     Source: [Wang1995], except that absorption removes a photon completely or not at all.
     """
     # Weights that shrink at each scattering, as in the source, hardly reduce the variance of R(r) in equal
     # time for skin. Whole photons are integer counts: they conserve energy exactly, their sums do not depend
     # on the order, and their errors are binomial.
-    for _ in range(photons):
-        _trace_photon(stack, edges2, rng, tally)
+    for _ in range(photon_count):
+        _trace_photon(layer_stack, squared_ring_edges, rng, tally)

@@ -15,8 +15,8 @@ Floats = NDArray[np.float64]
 TABLE_ROWS = 8192
 """Rows evenly spaced in the square root of the radius; linear interpolation has an error of 5e-6."""
 
-_GAUSSIAN_CUTOFF = 1e-12  # relative to the peak of a Gaussian
-_FAR_ERROR_FRACTION = 0.2
+_RELATIVE_GAUSSIAN_CUTOFF = 1e-12  # relative to the peak of a Gaussian
+_FAR_RADII_ERROR_FRACTION = 0.2
 """Fraction of the permitted error that is spread widely over the radii, so that distant nodes of the octree
 need not be opened."""
 
@@ -37,7 +37,7 @@ class GaussianSum:
     @property
     def end_mm(self) -> float:
         """Return the radius beyond which the profile is taken as 0 [mm]."""
-        return float(np.sqrt(-2 * np.log(_GAUSSIAN_CUTOFF) * np.max(self.variance_mm2)))
+        return float(np.sqrt(-2 * np.log(_RELATIVE_GAUSSIAN_CUTOFF) * np.max(self.variance_mm2)))
 
     def derivatives(self, radius_mm: Floats) -> tuple[Floats, Floats, Floats]:
         """Return R(r), dR/dr and d²R/dr² at radii (n,), each (n, 3) [mm^-2, mm^-3, mm^-4]."""
@@ -115,9 +115,9 @@ def tabulate_profile(profile: Profile) -> ProfileTable:
     nonzero = energy > 0
     if not nonzero.any():
         refuse("profile", "light in at least one channel", "it is 0 everywhere", "Correct it")
-    slope = _upper_bound(np.abs(dR), energy, nonzero)
+    slope = _bound_from_radius_on(np.abs(dR), energy, nonzero)
     bend = np.maximum(np.abs(ddR), np.abs(dR) / off_axis[:, None])
-    curvature = _upper_bound(0.5 * bend, energy, nonzero)
+    curvature = _bound_from_radius_on(0.5 * bend, energy, nonzero)
     R[-1] = 0.0
     return ProfileTable(
         (TABLE_ROWS - 1) / np.sqrt(end),
@@ -128,14 +128,14 @@ def tabulate_profile(profile: Profile) -> ProfileTable:
     )
 
 
-def _upper_bound(values: Floats, energy: Floats, nonzero: NDArray[np.bool_]) -> Floats:
+def _bound_from_radius_on(radial_values: Floats, energy: Floats, has_energy: NDArray[np.bool_]) -> Floats:
     """Return the largest value (rows,) of any channel from each radius on, after division by its energy.
 
-    values : (rows, 3) function of the radius by channel
+    radial_values : (rows, 3) function of the radius by channel
     energy : (3,) energy of the profile by channel, by which its values are divided
-    nonzero : (3,) mask of channels with energy
+    has_energy : (3,) mask of channels with energy
     """
-    largest = np.max(values[:, nonzero] / energy[nonzero], axis=1)
+    largest = np.max(radial_values[:, has_energy] / energy[has_energy], axis=1)
     bound: Floats = np.maximum.accumulate(largest[::-1])[::-1].copy()
     bound[-1] = 0.0
     return bound
@@ -146,13 +146,13 @@ def _error_density(curvature: Floats, r: Floats) -> Floats:
     ideal /= _plane_integral(ideal[:, None], r)[0]
     falloff_mm = r[-1] / 4
     far_density = 1 / (np.pi * falloff_mm**2 * (1 + (r / falloff_mm) ** 2) ** 2)
-    return np.asarray((1 - _FAR_ERROR_FRACTION) * ideal + _FAR_ERROR_FRACTION * far_density)
+    return np.asarray((1 - _FAR_RADII_ERROR_FRACTION) * ideal + _FAR_RADII_ERROR_FRACTION * far_density)
 
 
-def _plane_integral(values: Floats, r: Floats) -> Floats:
+def _plane_integral(radial_values: Floats, r: Floats) -> Floats:
     """Return the integral of radial functions over the plane: of 2 pi r f(r) dr, for each column.
 
-    values : (rows, k) functions f at the radii r
+    radial_values : (rows, k) functions f at the radii r
     """
     rings = np.pi * np.diff(r**2)[:, None]
-    return np.asarray((0.5 * (values[1:] + values[:-1]) * rings).sum(axis=0))
+    return np.asarray((0.5 * (radial_values[1:] + radial_values[:-1]) * rings).sum(axis=0))

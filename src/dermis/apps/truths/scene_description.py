@@ -24,8 +24,8 @@ Vector = Sequence[float] | Floats
 """Vector of three components: a position, direction or colour."""
 UNIT_MM = 100.0
 """Length of Cycles' unit; a head is a few units in size, as its sampling expects."""
-_Y_AXIS = 0.0, 1.0, 0.0
-_TO_CYCLES = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+_UP_AXIS = 0.0, 1.0, 0.0
+_CYCLES_FROM_DERMIS_AXES = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
 
 def check_camera(camera: Camera, renderer: str) -> None:
@@ -39,12 +39,12 @@ def check_camera(camera: Camera, renderer: str) -> None:
         refuse("camera", expected, actual, "Render with such a camera, and crop or resample the picture")
 
 
-def mitsuba_rgb(components: Iterable[float]) -> SceneDict:
+def mitsuba_rgb(colour: Iterable[float]) -> SceneDict:
     """Return Mitsuba's description of a linear Rec. 709 colour."""
-    return {"type": "rgb", "value": [float(value) for value in components]}
+    return {"type": "rgb", "value": [float(value) for value in colour]}
 
 
-def mitsuba_look_at(mi: Mitsuba, origin: Vector, target: Vector, up: Vector = _Y_AXIS) -> MitsubaObject:
+def mitsuba_look_at(mi: Mitsuba, origin: Vector, target: Vector, up: Vector = _UP_AXIS) -> MitsubaObject:
     """Return Mitsuba's transform of an object at `origin` that looks along +Z towards `target`, Y upwards."""
     forward = np.subtract(target, origin)
     if np.linalg.norm(np.cross(forward, up)) < 1e-6 * np.linalg.norm(forward) * np.linalg.norm(up):
@@ -52,14 +52,14 @@ def mitsuba_look_at(mi: Mitsuba, origin: Vector, target: Vector, up: Vector = _Y
     return mi.ScalarTransform4f().look_at(*([float(c) for c in v] for v in (origin, target, up)))
 
 
-def mitsuba_shape(kind: str, radiance: Vector, **shape: MitsubaObject) -> SceneDict:
+def mitsuba_shape(shape_type: str, radiance: Vector, **shape_properties: MitsubaObject) -> SceneDict:
     """Return Mitsuba's description of an emitting shape that neither casts shadows nor reflects.
 
-    kind : Mitsuba's name of the shape
-    shape : further properties of the shape
+    shape_type : Mitsuba's name of the shape
+    shape_properties : further properties of the shape
     """
     emitter = {"type": "area", "radiance": mitsuba_rgb(radiance)}
-    return {"type": kind, **shape, "bsdf": {"type": "null"}, "emitter": emitter}
+    return {"type": shape_type, **shape_properties, "bsdf": {"type": "null"}, "emitter": emitter}
 
 
 def mitsuba_projector(
@@ -88,7 +88,7 @@ def mitsuba_projector(
     }
 
 
-def cycles_look_at(position: Vector, forward: Vector, up: Vector = _Y_AXIS) -> list[list[float]]:
+def cycles_look_at(position: Vector, forward: Vector, up: Vector = _UP_AXIS) -> list[list[float]]:
     """Return the world matrix, in Cycles' units, of an object that looks along -Z with Y upwards."""
     right, upwards, view_direction = camera_axes(forward, up)
     matrix = np.eye(4)
@@ -107,21 +107,30 @@ def camera_axes(forward: Vector, up: Vector) -> tuple[Floats, Floats, Floats]:
 
 
 def cycles_light(
-    kind: str, irradiance: Vector, factor: float, position: Vector, forward: Vector, **properties: float | str
+    lamp_type: str,
+    irradiance: Vector,
+    energy_per_irradiance: float,
+    position: Vector,
+    forward: Vector,
+    **lamp_properties: float | str,
 ) -> SceneDict:
     """Return Cycles' description of a light.
 
-    kind : Cycles' type of the light
+    lamp_type : Cycles' type of the light
     irradiance : (3,) irradiance of the light in dermis
-    factor : factor from irradiance to Cycles' energy of the light
-    properties : further properties of the light
+    energy_per_irradiance : factor from irradiance to Cycles' energy of the light
+    lamp_properties : further properties of the light
     """
     brightest = float(max(irradiance))
     colour = [float(component) / brightest if brightest > 0.0 else 0.0 for component in irradiance]
-    fields: SceneDict = {"color": colour, "energy": brightest * float(factor), **properties}
-    for name, value in properties.items():  # NumPy's numbers are not valid JSON
+    fields: SceneDict = {
+        "color": colour,
+        "energy": brightest * float(energy_per_irradiance),
+        **lamp_properties,
+    }
+    for name, value in lamp_properties.items():  # NumPy's numbers are not valid JSON
         fields[name] = value if isinstance(value, str) else float(value)
-    return {"type": kind, "set": fields, "to_world": cycles_look_at(position, forward)}
+    return {"type": lamp_type, "set": fields, "to_world": cycles_look_at(position, forward)}
 
 
 def mitsuba_environment(mi: Mitsuba, environment: Environment) -> SceneDict:
@@ -131,7 +140,7 @@ def mitsuba_environment(mi: Mitsuba, environment: Environment) -> SceneDict:
     panorama = environment.exposure * load_panorama(environment.name)
     # Mitsuba's panoramas begin at the middle column of ours.
     to_world = np.eye(4)
-    to_world[:3, :3] = (np.diag([-1.0, 1.0, -1.0]) @ _rotation(environment)).T
+    to_world[:3, :3] = (np.diag([-1.0, 1.0, -1.0]) @ _environment_rotation(environment)).T
     return {
         "type": "envmap",
         "bitmap": mi.Bitmap(_move_rows_to_poles(panorama).astype(np.float32)),
@@ -147,11 +156,11 @@ def cycles_world(environment: Environment | None) -> tuple[SceneDict, dict[str, 
     if environment.name == UNIFORM:
         return world, {}
     # Cycles' panoramas have their middle at +X and their top at +Z, ours at -Z and +Y.
-    world["turn"] = (_TO_CYCLES @ _rotation(environment)).tolist()
+    world["turn"] = (_CYCLES_FROM_DERMIS_AXES @ _environment_rotation(environment)).tolist()
     return world, {"panorama": load_panorama(environment.name).astype(np.float32)}
 
 
-def _rotation(environment: Environment) -> Floats:
+def _environment_rotation(environment: Environment) -> Floats:
     angle = np.radians(environment.rotation_degrees)
     cosine, sine = np.cos(angle), np.sin(angle)
     return np.array([[cosine, 0, -sine], [0, 1, 0], [sine, 0, cosine]])

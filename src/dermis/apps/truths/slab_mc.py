@@ -23,14 +23,14 @@ if TYPE_CHECKING:
 
 ProgressCallback = Callable[[int, int], None]
 
-BATCH_COUNT = 64
+PHOTON_BATCH_COUNT = 64
 """Number of batches with their own random numbers, so the result does not depend on the number of threads."""
 
 MAX_PHOTONS = 10**10
 
 _MAX_SEED = 2**63 - 1
 _PHOTONS_PER_CALL = 20_000  # between two checks for Ctrl-C
-_REPORTED_LOSS = 1e-3  # fraction of dropped photons from which on a warning reports it
+_REPORTED_PHOTON_LOSS = 1e-3  # fraction of dropped photons from which on a warning reports it
 
 
 def default_ring_edges() -> Floats:
@@ -77,9 +77,9 @@ def trace_medium(
     check_anisotropy(g)
     results: list[SlabResult] = []
 
-    def report_channel(done: int, total: int) -> None:
+    def report_channel(traced_photons: int, channel_photons: int) -> None:
         if progress is not None:
-            progress(len(results) * total + done, medium.channels * total)
+            progress(len(results) * channel_photons + traced_photons, medium.channels * channel_photons)
 
     for i in range(medium.channels):
         layers = [_scattering_layer(layer, i, g, medium.eta) for layer in medium.layers]
@@ -130,9 +130,9 @@ def monte_carlo_profile(
     )
 
 
-def _unfinished_warnings(runs: Sequence[SlabResult]) -> list[str]:
-    lost = max(run.relative_to_entering.unfinished for run in runs)
-    if lost < _REPORTED_LOSS:
+def _unfinished_warnings(channel_results: Sequence[SlabResult]) -> list[str]:
+    lost = max(run.relative_to_entering.unfinished for run in channel_results)
+    if lost < _REPORTED_PHOTON_LOSS:
         return []
     return [f"{lost:.1%} of the light was dropped after very many scatterings and is missing from the total"]
 
@@ -163,8 +163,8 @@ def _checked_edges(edges_mm: ArrayLike) -> Floats:
 def _layer_stack(layers: Sequence[ScatteringLayer]) -> LayerStack:
     from dermis.apps.truths.photon import LayerStack
 
-    def between_air(air: float, values: list[float]) -> Floats:
-        return np.array([air, *values, air])
+    def between_air(air_value: float, layer_values: list[float]) -> Floats:
+        return np.array([air_value, *layer_values, air_value])
 
     return LayerStack(
         eta=between_air(1.0, [layer.eta for layer in layers]),
@@ -176,7 +176,7 @@ def _layer_stack(layers: Sequence[ScatteringLayer]) -> LayerStack:
 
 
 def _trace_batches(
-    stack: LayerStack, photons: int, seed: int, edges: Floats, progress: ProgressCallback | None
+    layer_stack: LayerStack, photons: int, seed: int, edges: Floats, progress: ProgressCallback | None
 ) -> PhotonTally:
     from numba import config
 
@@ -184,25 +184,28 @@ def _trace_batches(
 
     stop = Event()
 
-    def trace_batch(size: int, seeds: np.random.SeedSequence) -> PhotonTally:
-        lengths = (len(edges), len(edges), 2, len(stack.eta) - 2, 1)
+    def trace_batch(photon_count: int, seeds: np.random.SeedSequence) -> PhotonTally:
+        lengths = (len(edges), len(edges), 2, len(layer_stack.eta) - 2, 1)
         tally = PhotonTally(*(np.zeros(length, np.int64) for length in lengths))
         rng = seeds.generate_state(4, np.uint64).astype(np.uint64)
-        for done in range(0, size, _PHOTONS_PER_CALL):
+        for done in range(0, photon_count, _PHOTONS_PER_CALL):
             if stop.is_set():
                 break
-            trace_photons(min(_PHOTONS_PER_CALL, size - done), stack, edges**2, rng, tally)
+            trace_photons(min(_PHOTONS_PER_CALL, photon_count - done), layer_stack, edges**2, rng, tally)
         return tally
 
-    sizes = [photons * (i + 1) // BATCH_COUNT - photons * i // BATCH_COUNT for i in range(BATCH_COUNT)]
+    sizes = [
+        photons * (i + 1) // PHOTON_BATCH_COUNT - photons * i // PHOTON_BATCH_COUNT
+        for i in range(PHOTON_BATCH_COUNT)
+    ]
     tallies = []
     # The compiled function releases the GIL, so threads run in parallel.
     with ThreadPoolExecutor(config.NUMBA_NUM_THREADS) as pool:
         try:
-            for tally in pool.map(trace_batch, sizes, np.random.SeedSequence(seed).spawn(BATCH_COUNT)):
+            for tally in pool.map(trace_batch, sizes, np.random.SeedSequence(seed).spawn(PHOTON_BATCH_COUNT)):
                 tallies.append(tally)
                 if progress is not None:
-                    progress(len(tallies), BATCH_COUNT)
+                    progress(len(tallies), PHOTON_BATCH_COUNT)
         finally:
             stop.set()  # otherwise the pool would wait for the remaining batches
     return PhotonTally(*(np.sum(parts, axis=0) for parts in zip(*tallies, strict=True)))
@@ -214,11 +217,11 @@ def _slab_result(tally: PhotonTally, photons: int, edges: Floats, eta: float) ->
     specular = refract(1.0, 1.0 / eta)[0]
     ring_areas = np.pi * np.diff(edges**2)
 
-    def fraction(count: Counts) -> Floats:
-        return (1.0 - specular) * count / photons
+    def fraction(photon_counts: Counts) -> Floats:
+        return (1.0 - specular) * photon_counts / photons
 
-    def error(count: Counts) -> Floats:
-        p = count / photons
+    def error(photon_counts: Counts) -> Floats:
+        p = photon_counts / photons
         return (1.0 - specular) * np.sqrt(p * (1.0 - p) / photons)
 
     reflected, transmitted = tally.reflected, tally.transmitted
@@ -307,7 +310,7 @@ class SlabResult:
     overflow_reflectance, overflow_transmittance : the part of these totals beyond the last ring
     unscattered_reflectance, unscattered_transmittance : light that left on the axis without scattering
     absorbed : (layers,) fraction absorbed in each layer
-    unfinished : fraction dropped after `MAX_EVENTS` events; above 0 only where almost nothing absorbs
+    unfinished : fraction dropped after `MAX_PHOTON_EVENTS` events; above 0 only where almost nothing absorbs
     """
 
     photons: int

@@ -21,14 +21,14 @@ from dermis.mesh.mesh import Mesh
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
 
-STEPS_PER_LEVEL = 12
+TIME_STEPS_PER_LEVEL = 12
 """Time steps per level; the peak of a diffused point is then within 0.2 % of the limit."""
 EDGES_PER_SIGMA = 2.0
 """Smallest ratio of the standard deviation that a level adds to the length of an edge [-]."""
-MARGIN_SIGMAS = 4.0
+PATCH_MARGIN_SIGMAS = 4.0
 """Standard deviations beyond which a Gaussian has 0.03 % of its energy."""
 
-_TRAPEZOIDAL_FRACTION = 2 - np.sqrt(2)
+_TRAPEZOIDAL_STEP_FRACTION = 2 - np.sqrt(2)
 """Fraction of a time step that the trapezoidal stage covers; this value gives both stages one matrix."""
 
 
@@ -37,7 +37,7 @@ def diffuse_on_surface(
     triangles: ArrayLike,
     values: ArrayLike,
     variances_mm2: ArrayLike,
-    steps: int = STEPS_PER_LEVEL,
+    steps: int = TIME_STEPS_PER_LEVEL,
 ) -> Floats:
     """Return vertex values blurred along the surface by a Gaussian of each variance, (k, n, c).
 
@@ -111,21 +111,23 @@ def patch_margin_mm(variances_mm2: ArrayLike) -> float:
 
     variances_mm2 : (k,) increasing variances [mm2]
     """
-    return MARGIN_SIGMAS * float(np.sqrt(_checked_variances(variances_mm2)[-1]))
+    return PATCH_MARGIN_SIGMAS * float(np.sqrt(_checked_variances(variances_mm2)[-1]))
 
 
-def _diffuse(mass: csc_array, stiffness: csc_array, values: Floats, variance: float, steps: int) -> Floats:
+def _diffuse(
+    mass: csc_array, stiffness: csc_array, values: Floats, variance: float, step_count: int
+) -> Floats:
     """Return vertex values after diffusion by the heat equation for the time variance/2.
 
     mass, stiffness : matrices from `mass_and_stiffness`
-    steps : number of time steps
+    step_count : number of time steps
     """
-    step = variance / 2 / steps
-    solve = _lu_solver((mass + (_TRAPEZOIDAL_FRACTION / 2 * step) * stiffness).tocsc())
-    explicit = (mass - (_TRAPEZOIDAL_FRACTION / 2 * step) * stiffness).tocsr()
-    intermediate_weight = 1 / (_TRAPEZOIDAL_FRACTION * (2 - _TRAPEZOIDAL_FRACTION))
+    step = variance / 2 / step_count
+    solve = _lu_solver((mass + (_TRAPEZOIDAL_STEP_FRACTION / 2 * step) * stiffness).tocsc())
+    explicit = (mass - (_TRAPEZOIDAL_STEP_FRACTION / 2 * step) * stiffness).tocsr()
+    intermediate_weight = 1 / (_TRAPEZOIDAL_STEP_FRACTION * (2 - _TRAPEZOIDAL_STEP_FRACTION))
     mass_rows = mass.tocsr()
-    for _ in range(steps):
+    for _ in range(step_count):
         intermediate = solve(explicit @ values)
         values = solve(mass_rows @ (intermediate_weight * intermediate + (1 - intermediate_weight) * values))
     return values
@@ -152,8 +154,8 @@ def _checked_surface(positions: ArrayLike, triangles: ArrayLike) -> tuple[Floats
     return vertices, corners
 
 
-def _checked_values(values: ArrayLike, vertex_count: int) -> Floats:
-    vertex_values = np.asarray(values, dtype=np.float64)
+def _checked_values(values_at_vertices: ArrayLike, vertex_count: int) -> Floats:
+    vertex_values = np.asarray(values_at_vertices, dtype=np.float64)
     if not (
         vertex_values.ndim == 2 and len(vertex_values) == vertex_count and np.isfinite(vertex_values).all()
     ):
@@ -169,9 +171,9 @@ def _checked_variances(variances_mm2: ArrayLike) -> Floats:
     return variances
 
 
-def _check_resolution(vertices: Floats, corners: Index, variances: ArrayLike, steps: int) -> None:
-    if steps < 1:
-        refuse("surface diffusion", "at least one time step", f"got {steps}", "Choose 8 or more")
+def _check_resolution(vertices: Floats, corners: Index, variances: ArrayLike, step_count: int) -> None:
+    if step_count < 1:
+        refuse("surface diffusion", "at least one time step", f"got {step_count}", "Choose 8 or more")
     longest = longest_edge_mm(vertices, corners)
     allowed = resolved_levels(variances, longest)
     if not allowed.all():
@@ -181,13 +183,13 @@ def _check_resolution(vertices: Floats, corners: Index, variances: ArrayLike, st
         refuse("surface diffusion", expected, actual, "Refine the surface (refine_patch) or use wider levels")
 
 
-_MIN_TRIANGLE_SLACK = 1e-5
+_MIN_RELATIVE_TRIANGLE_SLACK = 1e-5
 """Smallest excess of two sides of a triangle over the third, relative to the mean edge; flatter triangles
 have unusable angles."""
-_FLIP_TOLERANCE = 1e-6
+_COTANGENT_FLIP_TOLERANCE = 1e-6
 """An edge is flipped if the cotangents of its two opposite angles sum to less than minus this; for four
 points on a circle they sum to 0."""
-_MAX_SWEEPS = 1000
+_MAX_FLIP_SWEEPS = 1000
 
 
 @dataclass(frozen=True)
@@ -228,7 +230,7 @@ def intrinsic_triangulation(positions: Floats, triangles: Index) -> IntrinsicTri
     """
     _, side, length = triangle_edges(positions, triangles)
     slack = length[side].sum(axis=1) - 2 * length[side].max(axis=1)
-    missing = max(0.0, _MIN_TRIANGLE_SLACK * float(length.mean()) - float(slack.min()))
+    missing = max(0.0, _MIN_RELATIVE_TRIANGLE_SLACK * float(length.mean()) - float(slack.min()))
     return IntrinsicTriangulation(triangles, side, length + missing)
 
 
@@ -245,76 +247,89 @@ def intrinsic_delaunay(surface: IntrinsicTriangulation) -> IntrinsicTriangulatio
     flipped = IntrinsicTriangulation(corners, side, length)
     flippable = _interior_edges(corners, side, len(length))
     # Each flip lowers the Dirichlet energy of every function on the surface, so the loop ends.
-    for _ in range(_MAX_SWEEPS):
+    for _ in range(_MAX_FLIP_SWEEPS):
         weight = sum_by_index(side.ravel(), flipped.cotangents().reshape(-1, 1), len(length))[:, 0]
-        illegal = flippable & (weight < -_FLIP_TOLERANCE)
+        illegal = flippable & (weight < -_COTANGENT_FLIP_TOLERANCE)
         if not illegal.any():
             break
         _flip_edges(flipped, _independent_flips(side, illegal, weight))
     return flipped
 
 
-def _interior_edges(corners: Index, side: Index, count: int) -> NDArray[np.bool_]:
+def _interior_edges(corners: Index, side_edges: Index, edge_count: int) -> NDArray[np.bool_]:
     """Return the mask (e,) of edges shared by exactly two triangles of equal orientation.
 
-    corners, side : vertex and edge indices of the triangles' sides, as in `IntrinsicTriangulation`
-    count : number of edges
+    corners, side_edges : vertex and edge indices of the triangles' sides, as in `IntrinsicTriangulation`
+    edge_count : number of edges
     """
     forward = (corners < np.roll(corners, -1, axis=1)).ravel()
-    uses = np.bincount(side.ravel(), minlength=count)
-    along = np.bincount(side.ravel()[forward], minlength=count)
+    uses = np.bincount(side_edges.ravel(), minlength=edge_count)
+    along = np.bincount(side_edges.ravel()[forward], minlength=edge_count)
     return np.asarray((uses == 2) & (along == 1))
 
 
-def _independent_flips(side: Index, illegal: NDArray[np.bool_], weight: Floats) -> Index:
+def _independent_flips(side_edges: Index, non_delaunay: NDArray[np.bool_], cotangent_weight: Floats) -> Index:
     """Return non-Delaunay edges that can be flipped together, as no two share a triangle.
 
     The result (2, m) has the indices of their two sides in `side.ravel()`. Each triangle votes for its worst
     edge; edges with both votes are taken. The worst of all edges is among them.
 
-    side : (f, 3) edge index of each side
-    illegal : (e,) mask of non-Delaunay edges
-    weight : (e,) cotangent weight of each edge; the smallest is worst
+    side_edges : (f, 3) edge index of each side
+    non_delaunay : (e,) mask of non-Delaunay edges
+    cotangent_weight : (e,) cotangent weight of each edge; the smallest is worst
     """
-    worst_first = np.flatnonzero(illegal)[np.argsort(weight[illegal], kind="stable")]
-    rank = np.full(len(illegal), len(illegal), dtype=np.int64)
+    worst_first = np.flatnonzero(non_delaunay)[np.argsort(cotangent_weight[non_delaunay], kind="stable")]
+    rank = np.full(len(non_delaunay), len(non_delaunay), dtype=np.int64)
     rank[worst_first] = np.arange(len(worst_first))
-    side_rank = rank[side]
+    side_rank = rank[side_edges]
     worst_side = side_rank.argmin(axis=1)
-    side_index = np.arange(len(side)) * 3 + worst_side
-    side_index = side_index[side_rank.ravel()[side_index] < len(illegal)]
-    edge = side.ravel()[side_index]
-    mutual = side_index[np.bincount(edge, minlength=len(illegal))[edge] == 2]
-    return np.asarray(mutual[np.argsort(side.ravel()[mutual], kind="stable")].reshape(-1, 2).T)
+    side_index = np.arange(len(side_edges)) * 3 + worst_side
+    side_index = side_index[side_rank.ravel()[side_index] < len(non_delaunay)]
+    edge = side_edges.ravel()[side_index]
+    mutual = side_index[np.bincount(edge, minlength=len(non_delaunay))[edge] == 2]
+    return np.asarray(mutual[np.argsort(side_edges.ravel()[mutual], kind="stable")].reshape(-1, 2).T)
 
 
-def _flip_edges(flipped: IntrinsicTriangulation, pairs: Index) -> None:
+def _flip_edges(triangulation: IntrinsicTriangulation, side_pairs: Index) -> None:
     """Replace each edge ab, between triangles abc and bad, by the edge cd, in place.
 
-    pairs : (2, m) indices of the sides of these edges
+    side_pairs : (2, m) indices of the sides of these edges
     """
-    (left, i), (right, j) = (np.divmod(side_index, 3) for side_index in pairs)
-    a, b, c = (flipped.corners[left, (i + k) % 3] for k in range(3))
-    d = flipped.corners[right, (j + 2) % 3]
-    ab, bc, ca = (flipped.side[left, (i + k) % 3] for k in range(3))
-    ad, db = (flipped.side[right, (j + k) % 3] for k in (1, 2))
-    along_c, up_c = _apex_coordinates(flipped.length[ab], flipped.length[ca], flipped.length[bc])
-    along_d, down_d = _apex_coordinates(flipped.length[ab], flipped.length[ad], flipped.length[db])
-    flipped.length[ab] = np.hypot(along_c - along_d, up_c + down_d)
-    flipped.corners[left], flipped.side[left] = np.column_stack((c, d, b)), np.column_stack((ab, db, bc))
-    flipped.corners[right], flipped.side[right] = np.column_stack((d, c, a)), np.column_stack((ab, ca, ad))
+    (left, i), (right, j) = (np.divmod(side_index, 3) for side_index in side_pairs)
+    a, b, c = (triangulation.corners[left, (i + k) % 3] for k in range(3))
+    d = triangulation.corners[right, (j + 2) % 3]
+    ab, bc, ca = (triangulation.side[left, (i + k) % 3] for k in range(3))
+    ad, db = (triangulation.side[right, (j + k) % 3] for k in (1, 2))
+    along_c, up_c = _apex_coordinates(
+        triangulation.length[ab], triangulation.length[ca], triangulation.length[bc]
+    )
+    along_d, down_d = _apex_coordinates(
+        triangulation.length[ab], triangulation.length[ad], triangulation.length[db]
+    )
+    triangulation.length[ab] = np.hypot(along_c - along_d, up_c + down_d)
+    triangulation.corners[left], triangulation.side[left] = (
+        np.column_stack((c, d, b)),
+        np.column_stack((ab, db, bc)),
+    )
+    triangulation.corners[right], triangulation.side[right] = (
+        np.column_stack((d, c, a)),
+        np.column_stack((ab, ca, ad)),
+    )
 
 
-def _apex_coordinates(base: Floats, first: Floats, second: Floats) -> tuple[Floats, Floats]:
+def _apex_coordinates(
+    base_length: Floats, start_side_length: Floats, end_side_length: Floats
+) -> tuple[Floats, Floats]:
     """Return the apex of triangles as its position along the base and its height above it [mm].
 
-    base, first, second : lengths of the base, and of the sides from its start and its end to the apex [mm]
+    base_length : length of the base [mm]
+    start_side_length, end_side_length : lengths of the sides from start and end of the base to the apex [mm]
     """
-    along = (base**2 + first**2 - second**2) / (2 * base)
-    return along, np.sqrt(np.maximum(first**2 - along**2, 0))
+    along = (base_length**2 + start_side_length**2 - end_side_length**2) / (2 * base_length)
+    return along, np.sqrt(np.maximum(start_side_length**2 - along**2, 0))
 
 
-def mass_and_stiffness(surface: IntrinsicTriangulation, count: int) -> tuple[csc_array, csc_array]:
+def mass_and_stiffness(surface: IntrinsicTriangulation, vertex_count: int) -> tuple[csc_array, csc_array]:
     """Return mass matrix M [mm2] and stiffness matrix K [-] of linear finite elements, each (n, n).
 
     The heat equation is M du/dt = -K u for vertex values u. M is the mean of the lumped and the consistent
@@ -322,7 +337,7 @@ def mass_and_stiffness(surface: IntrinsicTriangulation, count: int) -> tuple[csc
     order in the edge length. The rows of M sum to the vertices' areas, those of K to 0. A vertex without
     triangles keeps its value.
 
-    count : number n of vertices
+    vertex_count : number n of vertices
 
     Source: [PinkallPolthier1993] for the cotangents.
     """
@@ -342,9 +357,9 @@ def mass_and_stiffness(surface: IntrinsicTriangulation, count: int) -> tuple[csc
         rows = np.concatenate([index.ravel() for index in (start, end, start)])
         columns = np.concatenate([index.ravel() for index in (end, start, start)])
         values = np.concatenate([entry.ravel() for entry in (off_diagonal, off_diagonal, diagonal)])
-        return coo_array((values, (rows, columns)), shape=(count, count)).tocsc()
+        return coo_array((values, (rows, columns)), shape=(vertex_count, vertex_count)).tocsc()
 
     stiffness = assemble(-conductance, conductance + np.roll(conductance, 1, axis=1))
-    isolated = np.bincount(start.ravel(), minlength=count) == 0
+    isolated = np.bincount(start.ravel(), minlength=vertex_count) == 0
     identity = diags_array(isolated.astype(np.float64))
     return (assemble(corner_area / 24, corner_area / 4) + identity).tocsc(), stiffness

@@ -15,10 +15,10 @@ from dermis.base.errors import refuse
 Floats = NDArray[np.float64]
 
 _POINTS_PER_CALL = 1024  # between two checks for Ctrl-C
-_ERROR_AT_UNIT_BOUND = 1e-3
+_OBSERVED_ERROR_PER_BOUND = 1e-3
 """Actual error where the error bound is 1, measured on waves, spheres, bumps and the scan. The errors of
 three points are of third order in the size of a patch, their bound is of second order."""
-_UNCANCELLED_FACTOR = 50.0
+_UNCANCELLED_ERROR_WEIGHT = 50.0
 """Factor for errors caused by different light in the channels; they are of second order and cancel less."""
 
 
@@ -48,8 +48,8 @@ def integrate_exitance(
 
     from dermis.apps.truths.octree_gather import gather_exitance
 
-    bound = (error / _ERROR_AT_UNIT_BOUND) ** (2 / 3)
-    tree = _weight_error_bounds(build_octree(samples), bound / (_UNCANCELLED_FACTOR * error))
+    bound = (error / _OBSERVED_ERROR_PER_BOUND) ** (2 / 3)
+    tree = _weight_error_bounds(build_octree(samples), bound / (_UNCANCELLED_ERROR_WEIGHT * error))
     table = tabulate_profile(profile)
     exitance = np.zeros_like(positions)
     slices = [slice(i, i + _POINTS_PER_CALL) for i in range(0, len(positions), _POINTS_PER_CALL)]
@@ -67,12 +67,12 @@ def integrate_exitance(
     return exitance
 
 
-def _weight_error_bounds(tree: Octree, factor: float) -> Octree:
+def _weight_error_bounds(tree: Octree, error_weight: float) -> Octree:
     """Return the octree with a larger weight of `moment_error` and `centroid_error`, which do not cancel.
 
     The weighted `moment_error` is added to `second_moment`.
 
-    factor : factor of both bounds
+    error_weight : factor of both bounds
     """
-    second_moment = tree.second_moment + factor * tree.moment_error
-    return tree._replace(second_moment=second_moment, centroid_error=factor * tree.centroid_error)
+    second_moment = tree.second_moment + error_weight * tree.moment_error
+    return tree._replace(second_moment=second_moment, centroid_error=error_weight * tree.centroid_error)

@@ -40,7 +40,7 @@ class SurfacePatch:
         return np.asarray(np.linalg.norm(positions - self.centre_mm, axis=1) <= self.radius_mm)
 
     def vertex_barycentrics(self) -> tuple[Index, Floats]:
-        """Return a mesh triangle (n,) that contains each vertex, and its barycentric weights there (n, 3)."""
+        """Return a mesh triangle (n,) that contains each vertex, and the barycentric weights in it (n, 3)."""
         triangle, weights = np.zeros(len(self.positions), np.int64), np.zeros((len(self.positions), 3))
         triangle[self.triangles] = self.parent[:, None]
         # A vertex shared by several parents gets its weights in the parent that it was assigned to.
@@ -49,7 +49,7 @@ class SurfacePatch:
         return triangle, weights
 
     def locate(self, triangle: Index, barycentric: Floats) -> tuple[Index, Floats]:
-        """Return the small triangle (m,) at each point, -1 outside the patch, and its weights there (m, 3).
+        """Return the small triangle (m,) at each point, -1 outside the patch, and barycentric weights (m, 3).
 
         triangle : (m,) mesh triangles of the points
         barycentric : (m, 3) weights in the mesh triangles
@@ -72,14 +72,16 @@ class SurfacePatch:
             pending = pending[count[pending] > candidate]
         return fine_triangle, weights
 
-    def interpolate(self, values: Floats, fine: Index, weights: Floats) -> Floats:
+    def interpolate(self, vertex_values: Floats, small_triangles: Index, barycentric: Floats) -> Floats:
         """Return vertex values interpolated at points from `locate`, (..., m, c).
 
-        values : (..., n, c) vertex values
-        fine, weights : (m,) small triangles and (m, 3) weights of the points
+        vertex_values : (..., n, c) vertex values
+        small_triangles, barycentric : (m,) small triangles and (m, 3) weights of the points
         """
-        corners = self.triangles[fine]
-        return sum((weights[:, k, None] * values[..., corners[:, k], :] for k in range(3)), np.zeros(()))
+        corners = self.triangles[small_triangles]
+        return sum(
+            (barycentric[:, k, None] * vertex_values[..., corners[:, k], :] for k in range(3)), np.zeros(())
+        )
 
 
 def mesh_patch(mesh: Mesh, centre_mm: ArrayLike, radius_mm: float, variances_mm2: ArrayLike) -> SurfacePatch:
@@ -100,10 +102,10 @@ def refine_patch(
     triangles: ArrayLike,
     centre_mm: ArrayLike,
     radius_mm: float,
-    edge_mm: float,
+    max_edge_mm: float,
     margin_mm: float,
 ) -> SurfacePatch:
-    """Return the surface within radius plus margin of a centre, with edges of at most `edge_mm`.
+    """Return the surface within radius plus margin of a centre, with edges of at most `max_edge_mm`.
 
     Edges that are too long are halved in both of their triangles, so no crack opens. New vertices lie on the
     old flat triangles, so the surface keeps its shape.
@@ -111,23 +113,23 @@ def refine_patch(
     positions, triangles : (n, 3) positions [mm] and (f, 3) vertex indices of the surface, with welded seams
     centre_mm : (3,) centre of the ball; Euclidean distances never exceed those along the surface [mm]
     radius_mm : radius of the ball inside which results are valid; infinite for the whole surface [mm]
-    edge_mm, margin_mm : edge length and margin, from `max_edge_mm` and `patch_margin_mm` [mm]
+    max_edge_mm, margin_mm : edge length and margin, from `max_edge_mm` and `patch_margin_mm` [mm]
 
     Raises DermisError when there is no surface in reach, or when there would be more than 8 million
     triangles.
     """
     vertices, corners = np.asarray(positions, np.float64), np.asarray(triangles, np.int64)
     centre = np.asarray(centre_mm, np.float64)
-    if not (edge_mm > 0 and radius_mm > 0 and margin_mm >= 0):
-        actual = f"got {edge_mm:g}, {radius_mm:g} and {margin_mm:g}"
+    if not (max_edge_mm > 0 and radius_mm > 0 and margin_mm >= 0):
+        actual = f"got {max_edge_mm:g}, {radius_mm:g} and {margin_mm:g}"
         refuse("patch", "edge and radius above 0, margin not below", actual, "Correct them")
     parent = np.arange(len(corners))
     weights = np.broadcast_to(np.eye(3), (len(corners), 3, 3)).copy()
     while True:
-        in_reach = _triangles_in_reach(vertices[corners], centre, radius_mm + margin_mm, edge_mm)
+        in_reach = _triangles_in_reach(vertices[corners], centre, radius_mm + margin_mm, max_edge_mm)
         corners, parent, weights = corners[in_reach], parent[in_reach], weights[in_reach]
         edge_ends, side, length = triangle_edges(vertices, corners)
-        too_long = length > edge_mm
+        too_long = length > max_edge_mm
         if not too_long.any():
             break
         midpoint = np.full(len(edge_ends), -1)
@@ -139,22 +141,24 @@ def refine_patch(
     return SurfacePatch(vertices[used], compact.reshape(-1, 3), parent, weights, centre, float(radius_mm))
 
 
-def _triangles_in_reach(corners: Floats, centre: Floats, reach: float, edge_mm: float) -> NDArray[np.bool_]:
+def _triangles_in_reach(
+    corners: Floats, centre: Floats, reach_mm: float, edge_mm: float
+) -> NDArray[np.bool_]:
     """Return the mask (f,) of triangles whose bounding balls are within reach of the centre.
 
     Raises DermisError when there is none, or when splitting those entirely within reach would give too many
     triangles. The estimate assumes equilateral triangles with edges of `edge_mm`, the largest ones possible.
 
     corners : (f, 3, 3) corner positions [mm]
-    reach : distance from the centre [mm]
+    reach_mm : distance from the centre [mm]
     """
     midpoint = corners.mean(axis=1)
     size = np.linalg.norm(corners - midpoint[:, None], axis=2).max(axis=1)
     distance = np.linalg.norm(midpoint - centre, axis=1)
-    in_reach: NDArray[np.bool_] = distance <= reach + size
+    in_reach: NDArray[np.bool_] = distance <= reach_mm + size
     if not in_reach.any():
         refuse("patch", "surface around its centre", f"there is none at {centre.tolist()}", "Move the centre")
-    within = triangle_areas(corners[distance + size <= reach]).sum()
+    within = triangle_areas(corners[distance + size <= reach_mm]).sum()
     count = within / (np.sqrt(3) / 4 * edge_mm**2)
     if count > MAX_TRIANGLES:
         actual = f"edges of {edge_mm:g} mm make more than {MAX_TRIANGLES}"

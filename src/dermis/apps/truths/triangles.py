@@ -35,25 +35,25 @@ def triangle_edges(positions: Floats, corners: Index) -> tuple[Index, Index, Flo
 
 
 def split_triangles(
-    corners: Index, weights: Floats, midpoint: Index, positions: Floats | None = None
+    corners: Index, barycentric: Floats, side_midpoints: Index, positions: Floats | None = None
 ) -> tuple[Index, Index, Floats]:
     """Split triangles at halved sides; return new triangles (m, 3), their parents (m,) and weights.
 
     The weights (m, 3, 3) are barycentric weights of the new corners in the coarse triangle.
 
     corners : (f, 3) vertex indices
-    weights : (f, 3, 3) barycentric weights of the corners in a coarse triangle
-    midpoint : (f, 3) index of the vertex at the middle of each side; -1 for sides that are not halved
+    barycentric : (f, 3, 3) barycentric weights of the corners in a coarse triangle
+    side_midpoints : (f, 3) index of the vertex at the middle of each side; -1 for sides that are not halved
     positions : (n, 3) positions of all vertices; quadrilaterals are then split along the shorter diagonal
         [mm]
     """
-    halved = midpoint >= 0
+    halved = side_midpoints >= 0
     count = halved.sum(axis=1)
     # Rotate each triangle so that a single halved side comes first, or a single other one last.
     first = np.select([count == 1, count == 2], [halved.argmax(axis=1), halved.argmin(axis=1) + 1], 0)
     rotation = (np.arange(len(corners))[:, None], (first[:, None] + np.arange(3)) % 3)
-    vertices = np.hstack((corners[rotation], midpoint[rotation]))
-    corner_weights = weights[rotation]
+    vertices = np.hstack((corners[rotation], side_midpoints[rotation]))
+    corner_weights = barycentric[rotation]
     midpoint_weights = (corner_weights + np.roll(corner_weights, -1, axis=1)) / 2
     vertex_weights = np.concatenate((corner_weights, midpoint_weights), axis=1)
     pattern_index = count

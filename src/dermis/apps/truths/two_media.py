@@ -10,7 +10,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.truths.photon import MAX_EVENTS, RandomState, random_uniform, refract, scatter_direction
+from dermis.apps.truths.photon import (
+    MAX_PHOTON_EVENTS,
+    RandomState,
+    random_uniform,
+    refract,
+    scatter_direction,
+)
 from dermis.base.compiled import compiled
 
 Floats = NDArray[np.float64]
@@ -29,7 +35,7 @@ def _trace_photon(x: float, sigma_t: Floats, albedo: Floats, eta: float, rng: Ra
     uz = 1.0
     medium = 0 if x < 0.0 else 1
     depth = -math.log(random_uniform(rng))  # optical depth to the next scattering
-    for _ in range(MAX_EVENTS):
+    for _ in range(MAX_PHOTON_EVENTS):
         path = depth / sigma_t[medium]
         to_face = -z / uz if uz < 0.0 else math.inf
         to_side = -x / ux if (ux > 0.0 if medium == 0 else ux < 0.0) else math.inf
@@ -54,7 +60,7 @@ def _trace_photon(x: float, sigma_t: Floats, albedo: Floats, eta: float, rng: Ra
 
 @compiled
 def tally_exits(
-    photons: int,
+    photon_count: int,
     sigma_t: Floats,
     albedo: Floats,
     eta: float,
@@ -64,14 +70,14 @@ def tally_exits(
 ) -> None:
     """Trace photons, and add to `tally` (n, n) how many of those entering each strip leave from each strip.
 
-    photons : number of photons that enter each strip
+    photon_count : number of photons that enter each strip
     sigma_t, albedo : (2,) extinction coefficient and single-scattering albedo of the two media
     edges_mm : (n + 1,) x of the strips' edges, evenly spaced [mm]
     """
     strip_count = len(edges_mm) - 1
     width = (edges_mm[-1] - edges_mm[0]) / strip_count
     for start in range(strip_count):
-        for _ in range(photons):
+        for _ in range(photon_count):
             end = _trace_photon(
                 edges_mm[0] + (start + random_uniform(rng)) * width, sigma_t, albedo, eta, rng
             )
@@ -80,7 +86,12 @@ def tally_exits(
 
 
 def strip_transfer(
-    sigma_a: Floats, sigma_s_prime: Floats, edges_mm: Floats, photons: int, seed: int = 0, eta: float = 1.4
+    sigma_a: Floats,
+    sigma_s_prime: Floats,
+    edges_mm: Floats,
+    photon_count: int,
+    seed: int = 0,
+    eta: float = 1.4,
 ) -> Floats:
     """Return the fraction (n, n) of light entering strip i at normal incidence that leaves from strip j [-].
 
@@ -88,12 +99,12 @@ def strip_transfer(
 
     sigma_a, sigma_s_prime : (2,) absorption and reduced scattering coefficient of the two media [1/mm]
     edges_mm : (n + 1,) x of the strips' edges, evenly spaced [mm]
-    photons : number of photons that enter each strip
+    photon_count : number of photons that enter each strip
 
     Source: [Wang1995], with a second medium.
     """
     sigma_t = np.asarray(sigma_a, np.float64) + sigma_s_prime
     tally = np.zeros((len(edges_mm) - 1,) * 2, np.int64)
     rng = np.random.SeedSequence(seed).generate_state(4, np.uint64).astype(np.uint64)
-    tally_exits(photons, sigma_t, sigma_s_prime / sigma_t, eta, edges_mm, rng, tally)
-    return np.asarray(tally / photons)
+    tally_exits(photon_count, sigma_t, sigma_s_prime / sigma_t, eta, edges_mm, rng, tally)
+    return np.asarray(tally / photon_count)

@@ -45,22 +45,22 @@ def add_tests_to_path() -> None:
         sys.path.append(folder)
 
 
-def data_file(name: str) -> Path:
+def data_file(file_name: str) -> Path:
     """Return the path of a published data file in the folder DERMIS_DATA.
 
     Raises DermisError when the file is missing.
     """
-    path = Path(os.environ.get("DERMIS_DATA", "../shared")) / name
+    path = Path(os.environ.get("DERMIS_DATA", "../shared")) / file_name
     if not path.is_file():
         refuse(str(path), "a file of the published data", "there is none", "Name its folder by DERMIS_DATA")
     return path
 
 
-def write_page(page: Path, text: str) -> None:
+def write_page(page: Path, page_text: str) -> None:
     """Write a page of the documentation atomically."""
     in_checkout(page.parent)
     with atomic_file(page) as file:
-        file.write_text(text, encoding="utf-8")
+        file.write_text(page_text, encoding="utf-8")
 
 
 def template_path(page: Path) -> Path:
@@ -68,12 +68,12 @@ def template_path(page: Path) -> Path:
     return page.parent / "templates" / page.name
 
 
-def fill_page(page: Path, **parts: object) -> None:
+def fill_page(page: Path, **placeholder_texts: object) -> None:
     """Write docs/NAME.md from docs/templates/NAME.md.
 
-    parts : text or number for each placeholder of the template
+    placeholder_texts : text or number for each placeholder of the template
     """
-    write_page(page, in_checkout(template_path(page)).read_text(encoding="utf-8").format(**parts))
+    write_page(page, in_checkout(template_path(page)).read_text(encoding="utf-8").format(**placeholder_texts))
 
 
 def print_tables(tables: Mapping[str, str]) -> None:
@@ -97,12 +97,16 @@ def read_results(path: Path) -> Any:
     return json.loads(in_checkout(path).read_text(encoding="utf-8"))
 
 
-def _rounded(value: object, digits: int) -> object:
-    if isinstance(value, float):
-        return float(f"{value:.{digits}g}")
-    if isinstance(value, Mapping):
-        return {str(key): _rounded(one, digits) for key, one in value.items()}
-    return [_rounded(one, digits) for one in value] if isinstance(value, list | tuple) else value
+def _rounded(nested_value: object, digits: int) -> object:
+    if isinstance(nested_value, float):
+        return float(f"{nested_value:.{digits}g}")
+    if isinstance(nested_value, Mapping):
+        return {str(key): _rounded(one, digits) for key, one in nested_value.items()}
+    return (
+        [_rounded(one, digits) for one in nested_value]
+        if isinstance(nested_value, list | tuple)
+        else nested_value
+    )
 
 
 if TYPE_CHECKING:
@@ -110,15 +114,15 @@ if TYPE_CHECKING:
 
 
 @contextmanager
-def chromium_page(side: int, flags: Sequence[str] = SOFTWARE_WEBGL) -> Iterator[Page]:
+def chromium_page(page_side: int, flags: Sequence[str] = SOFTWARE_WEBGL) -> Iterator[Page]:
     """Open an empty page in headless Chromium without a network, for the duration of a context.
 
-    side : side of the square page [pixel]
+    page_side : side of the square page [pixel]
     flags : command-line flags of Chromium
 
     Raises DermisError when the package playwright is not installed.
     """
     with import_extra("playwright.sync_api", "a page in Chromium").sync_playwright() as play:
         browser = play.chromium.launch(executable_path=shutil.which("chromium"), args=list(flags))
-        yield browser.new_page(viewport={"width": side, "height": side}, offline=True)
+        yield browser.new_page(viewport={"width": page_side, "height": page_side}, offline=True)
         browser.close()

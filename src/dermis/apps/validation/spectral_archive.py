@@ -11,19 +11,19 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.inverse.unmixing.spectral_inversion import SPECULAR_INCLUDED
+from dermis.apps.inverse.unmixing.spectral_inversion import SPECULAR_INCLUDED_REFLECTANCE
 from dermis.apps.validation.pages import data_file
 from dermis.base.arrays import Doubles
 from dermis.base.tables import float_columns
 from dermis.images.colour import lab
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 
-FOLDS = 5  # number of parts of the people for cross-validation
+FOLD_COUNT = 5  # number of parts of the people for cross-validation
 AGE_MIDDLES: Final = {1: 17.0, 2: 25.0, 3: 35.0, 4: 45.0, 5: 55.0, 6: 65.0}
 """Age in the middle of each age group of the archive [years]."""
-_FILE = "reference/measured/issa_skin_spectra.csv.gz"
-_SEXES = {"F": 0.0, "M": 1.0}
-_NO_VALUE = float("nan")
+_ARCHIVE_FILE = "reference/measured/issa_skin_spectra.csv.gz"
+_SEX_BY_CODE = {"F": 0.0, "M": 1.0}
+_MISSING_VALUE = float("nan")
 
 
 class Archive(NamedTuple):
@@ -31,7 +31,7 @@ class Archive(NamedTuple):
 
     spectra : (n, 31) diffuse reflectance at `WAVELENGTHS_NM`, without surface reflection [-]
     person : (n,) index of the person
-    fold : (n,) index of the cross-validation fold that contains the person, 0 to `FOLDS` - 1
+    fold : (n,) index of the cross-validation fold that contains the person, 0 to `FOLD_COUNT` - 1
     group : (n,) key of `dermis.human.skin.measured.GROUP_OF_CODE`
     site : (n,) index in `dermis.human.skin.measured.SITES`
     sex : (n,) 0 for female, 1 for male, NaN where unknown
@@ -53,9 +53,9 @@ class Archive(NamedTuple):
         """Return the colours (n, 3) under D65, CIELAB."""
         return lab(self.spectra @ rgb_weights(WAVELENGTHS_NM).T)
 
-    def rows(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Archive:
+    def rows(self, selection: NDArray[np.bool_] | NDArray[np.int64]) -> Archive:
         """Return selected measurements, by a mask or by indices."""
-        columns: Any = (column[chosen] for column in self)
+        columns: Any = (column[selection] for column in self)
         return Archive(*columns)
 
     def sample(self, count: int, seed: int = 0) -> Archive:
@@ -69,19 +69,20 @@ def read_archive() -> Archive:
 
     Raises DermisError when the file is missing.
     """
-    with gzip.open(data_file(_FILE), "rt", encoding="utf-8") as file:
+    with gzip.open(data_file(_ARCHIVE_FILE), "rt", encoding="utf-8") as file:
         rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
     # Subjects are numbered separately for each origin. The hash spreads people over folds independently of
     # their order.
     names = [f"{row['origin']}/{row['subject']}" for row in rows]
     number = {name: index for index, name in enumerate(dict.fromkeys(names))}
-    ages = (AGE_MIDDLES[int(float(row["age_group"]))] if row["age_group"] else _NO_VALUE for row in rows)
+    ages = (AGE_MIDDLES[int(float(row["age_group"]))] if row["age_group"] else _MISSING_VALUE for row in rows)
     return Archive(
-        spectra=float_columns(rows, " ".join(f"r{nm:.0f}" for nm in WAVELENGTHS_NM)) - SPECULAR_INCLUDED,
+        spectra=float_columns(rows, " ".join(f"r{nm:.0f}" for nm in WAVELENGTHS_NM))
+        - SPECULAR_INCLUDED_REFLECTANCE,
         person=np.array([number[name] for name in names]),
-        fold=np.array([crc32(name.encode()) % FOLDS for name in names]),
+        fold=np.array([crc32(name.encode()) % FOLD_COUNT for name in names]),
         group=np.array([row["group"] for row in rows]),
         site=np.array([int(row["site"]) - 1 for row in rows]),
-        sex=np.array([_SEXES.get(row["sex"].strip(), _NO_VALUE) for row in rows]),
+        sex=np.array([_SEX_BY_CODE.get(row["sex"].strip(), _MISSING_VALUE) for row in rows]),
         age=np.array(list(ages)),
     )

@@ -15,10 +15,12 @@ Point = tuple[float, float]
 PRESET_NAMES = tuple(CAMERA_PRESETS)
 """Names of the camera presets, in the order of the digit keys that select them, from 1."""
 LIGHT_DRAG_KEY = "Shift"
-_WHEEL_SPEED = 1e-3  # change of the logarithm of the distance per unit of the wheel
-_MAX_WHEEL_STEP = 10.0  # maximum change of that logarithm per event; an event sums all rotations in a frame
+_LOG_DISTANCE_PER_WHEEL_UNIT = 1e-3  # change of the logarithm of the distance per unit of the wheel
+_MAX_LOG_DISTANCE_STEP = (
+    10.0  # maximum change of that logarithm per event; an event sums all rotations in a frame
+)
 _LEFT_BUTTON = 1
-_GRAB_RADIUS_PX = 8.0  # distance from the divider within which a pointer grabs it [logical pixel]
+_DIVIDER_GRAB_RADIUS_PX = 8.0  # distance from the divider within which a pointer grabs it [logical pixel]
 
 
 class Controls:
@@ -40,31 +42,34 @@ class Controls:
         self._pointer_position = (0.0, 0.0)
         self._pinch: tuple[float, float, float] | None = None
 
-    def handle(self, event: Event, size: Point) -> None:
+    def handle(self, event: Event, picture_size: Point) -> None:
         """Process an event over the picture.
 
-        size : logical size of the picture
+        picture_size : logical size of the picture
         """
         kind = event["event_type"]
         if kind == "pointer_down":
             self._press(event)
         elif kind == "pointer_move" and self._pressed_button:
-            self._drag(event, size)
+            self._drag(event, picture_size)
         elif kind == "pointer_up":
-            self._release(event, size)
+            self._release(event, picture_size)
         elif kind == "wheel":
-            wheel_step = max(-_MAX_WHEEL_STEP, min(_MAX_WHEEL_STEP, _WHEEL_SPEED * event["dy"]))
-            self._zoom(math.exp(wheel_step), (event["x"], event["y"]), size, "wheel")
+            wheel_step = max(
+                -_MAX_LOG_DISTANCE_STEP,
+                min(_MAX_LOG_DISTANCE_STEP, _LOG_DISTANCE_PER_WHEEL_UNIT * event["dy"]),
+            )
+            self._zoom(math.exp(wheel_step), (event["x"], event["y"]), picture_size, "wheel")
         elif kind == "double_click":
-            self._focus(event, size)
+            self._focus(event, picture_size)
         elif kind == "key_down":
             self._on_key(str(event["key"]), event.get("modifiers", ()))
 
-    def set_camera_preset(self, name: str) -> None:
+    def set_camera_preset(self, preset_name: str) -> None:
         """Set the camera to a preset such as "portrait" or "profile"."""
         state = self.history.state
         self.history.end_gesture()
-        self.history.change(state.with_camera(camera_preset(name, state.scene.head)))
+        self.history.change(state.with_camera(camera_preset(preset_name, state.scene.head)))
 
     def _press(self, event: Event) -> None:
         self.history.end_gesture()
@@ -86,7 +91,7 @@ class Controls:
         if pinch or self._pinch:
             self._pan_and_zoom(pinch, picture_size)
             return
-        state, side = self.history.state, self._drag_unit(picture_size)
+        state, side = self.history.state, self._drag_unit_length(picture_size)
         right, down = (event["x"] - x0) / side, (event["y"] - y0) / side
         if state.view == ATLAS_VIEW_NAME or self._pressed_button != _LEFT_BUTTON:
             new_state = _pan(state, right, down)
@@ -104,30 +109,30 @@ class Controls:
         """
         if pinch and self._pinch:
             (x, y, spread), (x0, y0, spread0) = pinch, self._pinch
-            side = self._drag_unit(picture_size)
+            side = self._drag_unit_length(picture_size)
             new_state = _pan(self.history.state, (x - x0) / side, (y - y0) / side)
             self.history.change(new_state, f"drag {self._gesture_count}")
             self._zoom(spread0 / spread, (x, y), picture_size, f"drag {self._gesture_count}")
         self._pinch = pinch
 
-    def _zoom(self, factor: float, pointer: Point, picture_size: Point, gesture: str) -> None:
+    def _zoom(self, distance_factor: float, pointer: Point, picture_size: Point, gesture_name: str) -> None:
         """Move the camera nearer or farther, or scale the atlas around the pointer.
 
-        factor : factor by which the visible height is multiplied; a factor below 1 zooms in
-        gesture : name of the gesture, which is undone in one step
+        distance_factor : factor by which the visible height is multiplied; a factor below 1 zooms in
+        gesture_name : name of the gesture, which is undone in one step
         """
         state = self.history.state
         if state.view == ATLAS_VIEW_NAME:
             x, y = (
-                (a - 0.5 * b) / self._drag_unit(picture_size)
+                (a - 0.5 * b) / self._drag_unit_length(picture_size)
                 for a, b in zip(pointer, picture_size, strict=True)
             )
-            new_state = state.with_atlas_view(state.atlas_view.zoomed(factor, x, y))
+            new_state = state.with_atlas_view(state.atlas_view.zoomed(distance_factor, x, y))
         else:
-            new_state = state.with_camera(dolly(state.scene.camera, factor))
-        self.history.change(new_state, gesture)
+            new_state = state.with_camera(dolly(state.scene.camera, distance_factor))
+        self.history.change(new_state, gesture_name)
 
-    def _drag_unit(self, picture_size: Point) -> float:
+    def _drag_unit_length(self, picture_size: Point) -> float:
         """Return the length by which drags are divided [logical pixel].
 
         The length is the height of the picture, or, in the atlas view, the shorter side of the picture.
@@ -144,14 +149,14 @@ class Controls:
         if point is not None:
             self.history.change(state.with_camera(focus(state.scene.camera, point)))
 
-    def _on_key(self, key: str, modifiers: Iterable[str]) -> None:
+    def _on_key(self, key_name: str, modifiers: Iterable[str]) -> None:
         if "Control" in modifiers or "Meta" in modifiers:
-            if key.lower() == "z":
+            if key_name.lower() == "z":
                 self.history.redo() if "Shift" in modifiers else self.history.undo()
-            elif key.lower() == "y":
+            elif key_name.lower() == "y":
                 self.history.redo()
-        elif key.isdigit() and 0 < int(key) <= len(PRESET_NAMES):
-            self.set_camera_preset(PRESET_NAMES[int(key) - 1])
+        elif key_name.isdigit() and 0 < int(key_name) <= len(PRESET_NAMES):
+            self.set_camera_preset(PRESET_NAMES[int(key_name) - 1])
 
 
 class SplitView:
@@ -182,7 +187,7 @@ class SplitView:
         """
         kind = event["event_type"]
         if kind == "pointer_down" and self.frozen_state:
-            self.is_dragged = abs(event["x"] - self.divider_position * width) <= _GRAB_RADIUS_PX
+            self.is_dragged = abs(event["x"] - self.divider_position * width) <= _DIVIDER_GRAB_RADIUS_PX
         elif kind in ("pointer_move", "pointer_up") and self.is_dragged:
             self.divider_position = min(1.0, max(0.0, event["x"] / max(1.0, width)))
             self.is_dragged = kind == "pointer_move"
@@ -190,25 +195,25 @@ class SplitView:
         return self.is_dragged
 
 
-def picture_event(event: Event, left: float) -> Event:
+def picture_event(event: Event, picture_left: float) -> Event:
     """Convert an event from window to picture coordinates, by subtracting the left edge of the picture."""
     shifted = dict(event)
     if "x" in shifted:
-        shifted["x"] -= left
+        shifted["x"] -= picture_left
     if shifted.get("touches"):
         touches = shifted["touches"].items()
-        shifted["touches"] = {key: touch | {"x": touch["x"] - left} for key, touch in touches}
+        shifted["touches"] = {key: touch | {"x": touch["x"] - picture_left} for key, touch in touches}
     return shifted
 
 
-def _pan(state: ViewerState, right: float, down: float) -> ViewerState:
+def _pan(state: ViewerState, right_shift: float, down_shift: float) -> ViewerState:
     """Return the state with the camera, or the displayed part of the atlas, moved along with the pointer.
 
-    right, down : motion of the pointer, divided by `Controls._drag_unit`
+    right_shift, down_shift : motion of the pointer, divided by `Controls._drag_unit`
     """
     if state.view == ATLAS_VIEW_NAME:
-        return state.with_atlas_view(state.atlas_view.panned(right, down))
-    return state.with_camera(pan(state.scene.camera, -right, down))
+        return state.with_atlas_view(state.atlas_view.panned(right_shift, down_shift))
+    return state.with_camera(pan(state.scene.camera, -right_shift, down_shift))
 
 
 def _measure_pinch(event: Event) -> tuple[float, float, float] | None:

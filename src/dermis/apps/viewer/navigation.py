@@ -15,9 +15,9 @@ from dermis.scene.lights import DirectionalLight, Light
 from dermis.scene.model import Scene
 
 Floats = NDArray[np.float64]
-_MAX_ELEVATION = math.radians(85.0)
-_MIN_DISTANCE_MM = 90.0  # distance from the target; nearer cameras would enter the head
-_FRAME_RANGE_MM = (4.0, 3000.0)  # height of the visible frame at the target
+_MAX_ELEVATION_RAD = math.radians(85.0)
+_MIN_TARGET_DISTANCE_MM = 90.0  # distance from the target; nearer cameras would enter the head
+_FRAME_HEIGHT_RANGE_MM = (4.0, 3000.0)  # height of the visible frame at the target
 _EASING_TIME_S = 0.05  # time constant with which the displayed camera approaches its target
 
 
@@ -28,18 +28,18 @@ def camera_axes(camera: Camera) -> tuple[Floats, Floats, Floats]:
     return right, np.cross(right, forward), forward
 
 
-def orbit(camera: Camera, yaw: float, pitch: float) -> Camera:
+def orbit(camera: Camera, yaw_rad: float, pitch_rad: float) -> Camera:
     """Orbit the camera around its target, without passing over the top or bottom.
 
-    yaw, pitch : angles by which the camera moves to the right and up [rad]
+    yaw_rad, pitch_rad : angles by which the camera moves to the right and up [rad]
     """
     up = _normalise(np.array(camera.up, dtype=np.float64))
     offset = np.subtract(camera.position, camera.target)
     distance = float(np.linalg.norm(offset))
     elevation = math.asin(max(-1.0, min(1.0, float(offset @ up) / distance)))
-    limit = max(_MAX_ELEVATION, abs(elevation))
-    horizontal = _rotation_matrix(up, yaw) @ _normalise(offset - (offset @ up) * up)
-    elevation = max(-limit, min(limit, elevation + pitch))
+    limit = max(_MAX_ELEVATION_RAD, abs(elevation))
+    horizontal = _rotation_matrix(up, yaw_rad) @ _normalise(offset - (offset @ up) * up)
+    elevation = max(-limit, min(limit, elevation + pitch_rad))
     offset = distance * (math.cos(elevation) * horizontal + math.sin(elevation) * up)
     return _with_position_and_target(camera, np.array(camera.target) + offset, camera.target)
 
@@ -54,16 +54,18 @@ def pan(camera: Camera, right: float, up: float) -> Camera:
     return _with_position_and_target(camera, camera.position + shift, camera.target + shift)
 
 
-def dolly(camera: Camera, factor: float) -> Camera:
+def dolly(camera: Camera, distance_factor: float) -> Camera:
     """Move the camera nearer (factor below 1) or farther; closer than 90 mm, zoom the lens instead.
 
-    factor : factor by which the visible height at the target is multiplied [-]
+    distance_factor : factor by which the visible height at the target is multiplied [-]
     """
-    frame_mm = max(_FRAME_RANGE_MM[0], min(_FRAME_RANGE_MM[1], factor * camera.frame_mm))
+    frame_mm = max(
+        _FRAME_HEIGHT_RANGE_MM[0], min(_FRAME_HEIGHT_RANGE_MM[1], distance_factor * camera.frame_mm)
+    )
     offset = np.subtract(camera.position, camera.target)
     old_distance = float(np.linalg.norm(offset))
     requested = old_distance * frame_mm / camera.frame_mm
-    distance = max(min(requested, MAX_COORDINATE_MM / 10), min(old_distance, _MIN_DISTANCE_MM))
+    distance = max(min(requested, MAX_COORDINATE_MM / 10), min(old_distance, _MIN_TARGET_DISTANCE_MM))
     position = np.array(camera.target) + offset * (distance / old_distance)
     return _with_position_and_target(camera, position, camera.target, frame_mm=frame_mm)
 
@@ -91,33 +93,38 @@ class CameraEasing:
         return self.camera
 
 
-def interpolate_cameras(a: Camera, b: Camera, t: float) -> Camera:
-    """Interpolate from camera `a` to camera `b`; return `b` itself when the difference is invisible.
+def interpolate_cameras(start_camera: Camera, end_camera: Camera, fraction: float) -> Camera:
+    """Interpolate between two cameras; return `end_camera` itself when the difference is invisible.
 
     Directions are rotated, distances and frame sizes are scaled.
 
-    t : position between the cameras, from 0 to 1
+    fraction : position between the cameras, from 0 to 1
     """
-    if t >= 1.0:
-        return b
-    target = _interpolate(a.target, b.target, t)
-    offset_a, offset_b = np.subtract(a.position, a.target), np.subtract(b.position, b.target)
+    if fraction >= 1.0:
+        return end_camera
+    target = _interpolate(start_camera.target, end_camera.target, fraction)
+    offset_a, offset_b = (
+        np.subtract(start_camera.position, start_camera.target),
+        np.subtract(end_camera.position, end_camera.target),
+    )
     lengths = [float(np.linalg.norm(offset)) for offset in (offset_a, offset_b)]
-    direction = _interpolate(offset_a / lengths[0], offset_b / lengths[1], t)
+    direction = _interpolate(offset_a / lengths[0], offset_b / lengths[1], fraction)
     if np.linalg.norm(direction) < 1e-3:  # opposite sides: the path is undefined
-        return b
-    up = _interpolate(a.up, b.up, t)
-    distance = lengths[0] * (lengths[1] / lengths[0]) ** t
-    frame = a.frame_mm * (b.frame_mm / a.frame_mm) ** t
+        return end_camera
+    up = _interpolate(start_camera.up, end_camera.up, fraction)
+    distance = lengths[0] * (lengths[1] / lengths[0]) ** fraction
+    frame = start_camera.frame_mm * (end_camera.frame_mm / start_camera.frame_mm) ** fraction
     camera = validated_copy(
-        b,
+        end_camera,
         position=_clamped_tuple(target + distance * _normalise(direction)),
         target=_clamped_tuple(target),
-        up=_clamped_tuple(up) if np.linalg.norm(np.cross(up, direction)) > 1e-3 else b.up,
+        up=_clamped_tuple(up) if np.linalg.norm(np.cross(up, direction)) > 1e-3 else end_camera.up,
         frame_mm=frame,
-        principal_point=tuple(_interpolate(a.principal_point, b.principal_point, t).tolist()),
+        principal_point=tuple(
+            _interpolate(start_camera.principal_point, end_camera.principal_point, fraction).tolist()
+        ),
     )
-    return b if _cameras_nearly_equal(camera, b) else camera
+    return end_camera if _cameras_nearly_equal(camera, end_camera) else camera
 
 
 def pick(scene: Scene, camera: Camera, x: float, y: float, aspect: float) -> Floats | None:
@@ -150,15 +157,15 @@ def pick(scene: Scene, camera: Camera, x: float, y: float, aspect: float) -> Flo
     return np.asarray(origin + t[hit].min() * ray - head.centre_mm)
 
 
-def drag_light(state: ViewerState, index: int, right: float, up: float) -> ViewerState:
+def drag_light(state: ViewerState, light_index: int, right: float, up: float) -> ViewerState:
     """Orbit a light around its target in the direction of a drag, or rotate the environment.
 
-    index : index of the light; an index after the last light means the environment
+    light_index : index of the light; an index after the last light means the environment
     right, up : angles of the drag, to the right and up on screen [rad]
     """
-    if index < len(state.scene.lights):
+    if light_index < len(state.scene.lights):
         lights = list(state.scene.lights)
-        lights[index] = orbit_light(lights[index], state.scene.camera, right, up)
+        lights[light_index] = orbit_light(lights[light_index], state.scene.camera, right, up)
         return state.with_lights(lights)
     environment = state.scene.environment
     if environment is None:
@@ -167,28 +174,33 @@ def drag_light(state: ViewerState, index: int, right: float, up: float) -> Viewe
     return state.with_environment(validated_copy(environment, rotation_degrees=degrees))
 
 
-def orbit_light(light: Light, camera: Camera, right: float, up: float) -> Light:
+def orbit_light(light: Light, camera: Camera, right_rad: float, up_rad: float) -> Light:
     """Rotate a light around its target, about the right and up axes of the camera.
 
     The rotation changes the direction of a directional light, and the position of any other light.
 
-    right, up : angles [rad]; positive angles move a light between target and camera to the right and up on
-        screen
+    right_rad, up_rad : angles [rad]; positive angles move a light between target and camera to the right and
+        up on screen
     """
     x, y, _ = camera_axes(camera)
-    rotation = _rotation_matrix(y, right) @ _rotation_matrix(x, -up)
+    rotation = _rotation_matrix(y, right_rad) @ _rotation_matrix(x, -up_rad)
     if isinstance(light, DirectionalLight):
         return validated_copy(light, direction=_clamped_tuple(rotation @ np.array(light.direction)))
     offset = rotation @ np.subtract(light.position, light.target)
     return validated_copy(light, position=_clamped_tuple(np.array(light.target) + offset))
 
 
-def _cameras_nearly_equal(first: Camera, second: Camera) -> bool:
+def _cameras_nearly_equal(first_camera: Camera, second_camera: Camera) -> bool:
     """Return whether the difference of two cameras is too small to see."""
-    shifts = np.subtract(first.position, second.position), np.subtract(first.target, second.target)
-    principal_shift = np.subtract(first.principal_point, second.principal_point) * second.frame_mm
-    differences = np.concatenate([*shifts, principal_shift, [first.frame_mm - second.frame_mm]])
-    return bool(np.abs(differences).max() < 5e-4 * second.frame_mm)
+    shifts = (
+        np.subtract(first_camera.position, second_camera.position),
+        np.subtract(first_camera.target, second_camera.target),
+    )
+    principal_shift = (
+        np.subtract(first_camera.principal_point, second_camera.principal_point) * second_camera.frame_mm
+    )
+    differences = np.concatenate([*shifts, principal_shift, [first_camera.frame_mm - second_camera.frame_mm]])
+    return bool(np.abs(differences).max() < 5e-4 * second_camera.frame_mm)
 
 
 def _with_position_and_target(
@@ -197,8 +209,8 @@ def _with_position_and_target(
     return validated_copy(camera, position=_clamped_tuple(position), target=_clamped_tuple(target), **fields)
 
 
-def _clamped_tuple(vector: ArrayLike) -> tuple[float, float, float]:
-    x, y, z = (float(c) for c in np.clip(vector, -MAX_COORDINATE_MM, MAX_COORDINATE_MM))
+def _clamped_tuple(position_mm: ArrayLike) -> tuple[float, float, float]:
+    x, y, z = (float(c) for c in np.clip(position_mm, -MAX_COORDINATE_MM, MAX_COORDINATE_MM))
     return x, y, z
 
 
@@ -206,14 +218,14 @@ def _interpolate(start: ArrayLike, end: ArrayLike, fraction: float) -> Floats:
     return (1.0 - fraction) * np.array(start, dtype=np.float64) + fraction * np.array(end, dtype=np.float64)
 
 
-def _rotation_matrix(axis: Floats, angle: float) -> Floats:
+def _rotation_matrix(axis: Floats, angle_rad: float) -> Floats:
     """Return the (3, 3) matrix of a rotation around a unit axis.
 
-    angle : angle of the rotation [rad]
+    angle_rad : angle of the rotation [rad]
     """
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * (cross @ cross))
+    return np.asarray(np.eye(3) + math.sin(angle_rad) * cross + (1.0 - math.cos(angle_rad)) * (cross @ cross))
 
 
 def _normalise(vector: Floats) -> Floats:

@@ -20,8 +20,8 @@ class MotionFile:
     fps : frame rate of files without times [1/s]
     """
 
-    def __init__(self, path: str | Path, fps: float | None = None) -> None:
-        self.path, self._fps = str(path), fps
+    def __init__(self, motion_path: str | Path, fps: float | None = None) -> None:
+        self.path, self._fps = str(motion_path), fps
         self._last: tuple[Head, Clip] | None = None
 
     def load_clip(self, head: Head) -> Clip:
@@ -121,14 +121,14 @@ class MotionPlayer:
         self._motion, self._head = motion, None
         self.play(0.0)
 
-    def play(self, seconds: float | None = None) -> None:
+    def play(self, start_s: float | None = None) -> None:
         """Play the motion from a given time; at the end of the motion, start from the beginning.
 
-        seconds : time to start from; None for the current time [s]
+        start_s : time to start from; None for the current time [s]
         """
         if self.clip is None:
             return
-        start = self.seconds if seconds is None else seconds
+        start = self.seconds if start_s is None else start_s
         self._seconds = 0.0 if start >= self.clip.duration_s else start
         self.is_playing, self._starting, self._start_time = True, True, None
 

@@ -17,45 +17,45 @@ Angles = tuple[float, float, float]
 REST_POSE = Pose()
 
 
-def target_weight(scene: Scene, target: str) -> float:
+def target_weight(scene: Scene, target_name: str) -> float:
     """Return the weight of a morph target in a scene: the weight in the pose, or else the rest weight."""
-    return float(_pose_or_rest(scene).weights.get(target, _rest_weight(scene.head, target)))
+    return float(_pose_or_rest(scene).weights.get(target_name, _rest_weight(scene.head, target_name)))
 
 
-def with_target_weight(scene: Scene, target: str, weight: float) -> Pose | None:
+def with_target_weight(scene: Scene, target_name: str, new_weight: float) -> Pose | None:
     """Return the pose of a scene with a new weight of one morph target; None for the rest pose."""
     weights = dict(_pose_or_rest(scene).weights)
-    weights.pop(target, None)
-    if weight != _rest_weight(scene.head, target):
-        weights[target] = weight
+    weights.pop(target_name, None)
+    if new_weight != _rest_weight(scene.head, target_name):
+        weights[target_name] = new_weight
     return _none_if_rest(replace(_pose_or_rest(scene), weights=weights))
 
 
-def bone_angles(scene: Scene, bone: str) -> Angles:
+def bone_angles(scene: Scene, bone_name: str) -> Angles:
     """Return the angles by which a bone is rotated about the head's x, y and z axes [degrees].
 
     A rotation that the pose stores as a matrix is converted.
     """
-    rotation, skeleton = _pose_or_rest(scene).bones.get(bone), scene.head.control.skeleton
+    rotation, skeleton = _pose_or_rest(scene).bones.get(bone_name), scene.head.control.skeleton
     if rotation is None or skeleton is None:
         return 0.0, 0.0, 0.0
     values = np.asarray(rotation, np.float64)
     if values.shape == (3,):
         x, y, z = values.tolist()
         return x, y, z
-    matrix = skeleton.head_space_transforms([skeleton.index[bone]], values[None])[0, :3, :3]
+    matrix = skeleton.head_space_transforms([skeleton.index[bone_name]], values[None])[0, :3, :3]
     return matrix_angles(matrix / np.linalg.norm(matrix, axis=0))
 
 
-def with_bone_angles(scene: Scene, bone: str, degrees: Angles) -> Pose | None:
+def with_bone_angles(scene: Scene, bone_name: str, angles_degrees: Angles) -> Pose | None:
     """Return the pose of a scene with new angles of one bone; None if this is the rest pose.
 
-    degrees : rotation about the head's x, y and z axes [degrees]
+    angles_degrees : rotation about the head's x, y and z axes [degrees]
     """
     bones = dict(_pose_or_rest(scene).bones)
-    bones.pop(bone, None)
-    if any(degrees):
-        bones[bone] = degrees
+    bones.pop(bone_name, None)
+    if any(angles_degrees):
+        bones[bone_name] = angles_degrees
     return _none_if_rest(replace(_pose_or_rest(scene), bones=bones))
 
 
@@ -67,11 +67,13 @@ def rest_pose(scene: Scene) -> Pose | None:
     return _none_if_rest(replace(_pose_or_rest(scene), weights={}, bones={}))
 
 
-def poses_equal(a: Pose | Mapping[str, float] | None, b: Pose | Mapping[str, float] | None) -> bool:
+def poses_equal(
+    first_pose: Pose | Mapping[str, float] | None, second_pose: Pose | Mapping[str, float] | None
+) -> bool:
     """Return whether two poses are equal; arrays of vertex positions must be the same object."""
-    if a is b:
+    if first_pose is second_pose:
         return True
-    first, second = Pose.coerce(a) or REST_POSE, Pose.coerce(b) or REST_POSE
+    first, second = Pose.coerce(first_pose) or REST_POSE, Pose.coerce(second_pose) or REST_POSE
     return (
         first.positions_mm is second.positions_mm
         and dict(first.weights) == dict(second.weights)
@@ -92,9 +94,9 @@ def posed_positions(scene: Scene) -> NDArray[np.floating]:
     return np.asarray(points[mesh.point])
 
 
-def filter_names(names: Sequence[str], text: str) -> list[str]:
+def filter_names(names: Sequence[str], search_text: str) -> list[str]:
     """Return the names that contain a search text, ignoring case."""
-    query = text.strip().casefold()
+    query = search_text.strip().casefold()
     return [name for name in names if query in name.casefold()]
 
 
@@ -107,10 +109,10 @@ def _none_if_rest(pose: Pose) -> Pose | None:
     return pose if pose.weights or pose.bones or pose.positions_mm is not None else None
 
 
-def _rest_weight(head: Head, target: str) -> float:
+def _rest_weight(head: Head, target_name: str) -> float:
     targets = head.control.targets
-    return 0.0 if targets.rest is None else float(targets.rest[targets.index[target]])
+    return 0.0 if targets.rest is None else float(targets.rest[targets.index[target_name]])
 
 
-def _arrays_equal(a: ArrayLike, b: ArrayLike) -> bool:
-    return a is b or np.array_equal(np.asarray(a), np.asarray(b))
+def _arrays_equal(first_array: ArrayLike, second_array: ArrayLike) -> bool:
+    return first_array is second_array or np.array_equal(np.asarray(first_array), np.asarray(second_array))

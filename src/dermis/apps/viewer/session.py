@@ -33,7 +33,7 @@ from dermis.scene.skin import Skin
 HEAD_FILE_SUFFIXES = (".glb", ".vrm", ".usdz", ".obj", ".ply", ".stl", ".json", ".toml")
 """Suffixes of files that a page may upload: meshes, people and scenes."""
 
-_MAX_RECENT = 8
+_MAX_RECENT_HEADS = 8
 LoadedHead = Head | ViewerState
 
 
@@ -57,23 +57,23 @@ class HeadLoader:
         """Return a message that names the head being loaded; empty if no head is being loaded."""
         return f"opening {self.display_name(self._name)} ..." if self._future else ""
 
-    def display_name(self, name: str) -> str:
+    def display_name(self, name_or_path: str) -> str:
         """Return the name of a head for display; files are shown without their folder."""
-        return Path(self.uploaded_name(name)).name
+        return Path(self.uploaded_name(name_or_path)).name
 
-    def uploaded_name(self, name: str) -> str:
+    def uploaded_name(self, name_or_path: str) -> str:
         """Return the original name of an uploaded file from its path; other names are returned unchanged."""
-        return self._original_names.get(name, name)
+        return self._original_names.get(name_or_path, name_or_path)
 
-    def open(self, name: str, uploaded_as: str = "") -> None:
+    def open(self, name_or_path: str, uploaded_as: str = "") -> None:
         """Start to load a head or a scene; a load that has not started yet is cancelled.
 
-        name : name of a built-in head or sample, or path of a mesh or scene file
+        name_or_path : name of a built-in head or sample, or path of a mesh or scene file
         uploaded_as : original name of an uploaded file
         """
         if self._future:
             self._future.cancel()
-        self._name = str(Path(name).resolve()) if Path(name).is_file() else name
+        self._name = str(Path(name_or_path).resolve()) if Path(name_or_path).is_file() else name_or_path
         if uploaded_as:
             self._original_names[self._name] = uploaded_as
         self._future = self._executor.submit(_load_head_or_scene, self._name)
@@ -94,7 +94,9 @@ class HeadLoader:
         except DermisError as error:
             raise DermisError(str(error).replace(self._name, self.display_name(self._name))) from error
         if Path(self._name).is_file():
-            self.recent = [self._name, *(path for path in self.recent if path != self._name)][:_MAX_RECENT]
+            self.recent = [self._name, *(path for path in self.recent if path != self._name)][
+                :_MAX_RECENT_HEADS
+            ]
         return loaded if isinstance(loaded, ViewerState) else _with_head(state, loaded, self._name)
 
 
@@ -127,7 +129,7 @@ def built_in_heads() -> tuple[str, ...]:
     return (HUMAN, *samples)
 
 
-_MAX_REASON_LENGTH = 160
+_MAX_REASON_CHARACTERS = 160
 _log = logging.getLogger(__name__)
 
 
@@ -240,31 +242,37 @@ class Session:
             self.player.stop()
             self.change(state)
 
-    def open_motion(self, path: str) -> None:
+    def open_motion(self, motion_path: str) -> None:
         """Open a motion file and play it.
 
         Raises DermisError if the file cannot be read, or if the motion moves no morph target or bone of the
         head.
         """
-        self.player.open(MotionFile(path))
-        self.message = f"opened {path}"
+        self.player.open(MotionFile(motion_path))
+        self.message = f"opened {motion_path}"
 
-    def screenshot(self, path: Path, size: tuple[int, int]) -> None:
+    def screenshot(self, picture_path: Path, picture_size: tuple[int, int]) -> None:
         """Write the displayed view as .png (tone-mapped) or .exr (linear), or offer the file as a download.
 
-        size : width and height of the picture [pixel]
+        picture_size : width and height of the picture [pixel]
 
         Raises DermisError if the picture cannot be rendered or written.
         """
-        suffix, view = path.suffix.lower(), self.displayed_state.view
+        suffix, view = picture_path.suffix.lower(), self.displayed_state.view
         if suffix not in (".png", ".exr"):
-            refuse(f"picture {path}", "a name that ends in .png or .exr", f"got {path.name!r}", "Rename it")
+            refuse(
+                f"picture {picture_path}",
+                "a name that ends in .png or .exr",
+                f"got {picture_path.name!r}",
+                "Rename it",
+            )
         if suffix == ".exr" and view not in (PICTURE_VIEW_NAME, *PART_VIEWS):
             refuse(f"view {view} as .exr", "a view of linear light", "it shows display colours", "Use .png")
         self._write_or_offer(
-            path, lambda target: self.view_renderer.screenshot(target, self.displayed_state, size)
+            picture_path,
+            lambda target: self.view_renderer.screenshot(target, self.displayed_state, picture_size),
         )
-        self.message = f"wrote {path}, {size[0]} x {size[1]}"
+        self.message = f"wrote {picture_path}, {picture_size[0]} x {picture_size[1]}"
 
     def _write_or_offer(self, path: Path, write_file: Callable[[Path], None]) -> None:
         if self.offer_download is None:
@@ -276,15 +284,17 @@ class Session:
             self.offer_download(path.name, target.read_bytes())
 
 
-def _shorten(text: str) -> str:
-    line = " ".join(text.split())
-    return line if len(line) <= _MAX_REASON_LENGTH else f"{line[:_MAX_REASON_LENGTH]} ..."
+def _shorten(message: str) -> str:
+    line = " ".join(message.split())
+    return line if len(line) <= _MAX_REASON_CHARACTERS else f"{line[:_MAX_REASON_CHARACTERS]} ..."
 
 
-def apply_regions(state: ViewerState, name: str, known_states: Iterable[ViewerState] = ()) -> ViewerState:
+def apply_regions(
+    state: ViewerState, table_name: str, known_states: Iterable[ViewerState] = ()
+) -> ViewerState:
     """Return the state with roughness and specular maps from a table of face regions, or without such maps.
 
-    name : name of the table, "auto" or "none"
+    table_name : name of the table, "auto" or "none"
     known_states : states whose heads are reused if the heads already have these maps
 
     Raises DermisError for heads without known regions and for heads created in memory.
@@ -293,8 +303,8 @@ def apply_regions(state: ViewerState, name: str, known_states: Iterable[ViewerSt
         expected = "a head from a file or a sample"
         refuse("regions", expected, "it was created in memory", "Write it to a file first")
     table = {key: value for key, value in state.head_table.items() if key != "regions"}
-    if name != AUTO:
-        table["regions"] = name
+    if table_name != AUTO:
+        table["regions"] = table_name
     for other in known_states:
         if dict(other.head_table) == table:
             return state.with_head(other.scene.head, table, other.scene.skin.rho_s)

@@ -29,7 +29,7 @@ from dermis.scene.skin import Pigments
 
 ATLAS_VIEW_NAME = "atlas"
 """Name of the view that shows the atlas as a flat image."""
-_MIN_SPAN, _MAX_SPAN = 2.0**-10, 2.0
+_MIN_ATLAS_SPAN, _MAX_ATLAS_SPAN = 2.0**-10, 2.0
 
 
 @dataclass(frozen=True)
@@ -53,14 +53,14 @@ class AtlasView:
         u, v = self.centre
         return self._with_centre(u - self.span * right, v - self.span * down)
 
-    def zoomed(self, factor: float, x: float, y: float) -> AtlasView:
+    def zoomed(self, span_factor: float, x: float, y: float) -> AtlasView:
         """Return the view zoomed around the cursor.
 
-        factor : factor by which the visible extent is multiplied; a factor below 1 zooms in
+        span_factor : factor by which the visible extent is multiplied; a factor below 1 zooms in
         x, y : cursor relative to the centre of the picture, right and down, in fractions of the picture's
             shorter side
         """
-        span = min(_MAX_SPAN, max(_MIN_SPAN, factor * self.span))
+        span = min(_MAX_ATLAS_SPAN, max(_MIN_ATLAS_SPAN, span_factor * self.span))
         (u, v), reduction = self.centre, self.span - span
         return replace(self, span=span)._with_centre(u + reduction * x, v + reduction * y)
 
@@ -128,23 +128,23 @@ class ViewerState:
         """
         return replace(self._with_scene(lights=tuple(lights)), rig=rig)
 
-    def with_rig(self, name: str) -> ViewerState:
+    def with_rig(self, rig_name: str) -> ViewerState:
         """Return a copy with the lights of a preset."""
-        return self.with_lights(load_lights(name, self.scene.head), name)
+        return self.with_lights(load_lights(rig_name, self.scene.head), rig_name)
 
-    def with_light(self, index: int, **fields: object) -> ViewerState:
+    def with_light(self, light_index: int, **fields: object) -> ViewerState:
         """Return a copy with new values of some fields of one light."""
         lights = list(self.scene.lights)
-        lights[index] = validated_copy(lights[index], **fields)
+        lights[light_index] = validated_copy(lights[light_index], **fields)
         return self.with_lights(lights)
 
     def with_environment(self, environment: Environment | None) -> ViewerState:
         """Return a copy with another environment; None removes the environment."""
         return self._with_scene(environment=environment)
 
-    def with_view(self, name: str) -> ViewerState:
+    def with_view(self, view_name: str) -> ViewerState:
         """Return a copy that shows another view, one of `views.VIEW_NAMES`."""
-        return replace(self, view=name)
+        return replace(self, view=view_name)
 
     def with_atlas_view(self, atlas_view: AtlasView) -> ViewerState:
         """Return a copy that shows another part of the atlas."""
@@ -164,20 +164,20 @@ class ViewerState:
         pose = merge_poses(clip.pose_at(seconds), self.scene.pose)
         return replace(self.with_pose(pose), seconds=seconds)
 
-    def with_head(self, head: Head, table: Table, rho_s: float) -> ViewerState:
+    def with_head(self, head: Head, head_table: Table, rho_s: float) -> ViewerState:
         """Return a copy with another head, or with other maps of the head.
 
-        table : [head] table of a scene file from which the head was loaded
+        head_table : [head] table of a scene file from which the head was loaded
         rho_s : mean specular strength [-]
         """
         skin = validated_copy(self.scene.skin, rho_s=rho_s)
-        return replace(self._with_scene(head=head, skin=skin), head=table)
+        return replace(self._with_scene(head=head, skin=skin), head=head_table)
 
     def _with_scene(self, **fields: Any) -> ViewerState:
         return replace(self, scene=replace(self.scene, **fields))
 
 
-def states_equal(a: ViewerState, b: ViewerState) -> bool:
+def states_equal(first_state: ViewerState, second_state: ViewerState) -> bool:
     """Return whether two states are equal; their heads must be the same object."""
 
     def compared_values(state: ViewerState) -> tuple[object, ...]:
@@ -186,8 +186,10 @@ def states_equal(a: ViewerState, b: ViewerState) -> bool:
         view_values = state.view, state.rig, state.atlas_view, state.seconds
         return *scene_values, state.settings, state.head_table, *view_values
 
-    is_head_same = a.scene.head is b.scene.head and poses_equal(a.scene.pose, b.scene.pose)
-    return is_head_same and compared_values(a) == compared_values(b)
+    is_head_same = first_state.scene.head is second_state.scene.head and poses_equal(
+        first_state.scene.pose, second_state.scene.pose
+    )
+    return is_head_same and compared_values(first_state) == compared_values(second_state)
 
 
 def validated_copy(values: P, **fields: object) -> P:
@@ -207,12 +209,12 @@ def save_state(path: Path, state: ViewerState) -> None:
     save_scene(path, state.scene, validated_copy(state.settings, parts=parts), state.head_table)
 
 
-def _load_named_state(name: str) -> ViewerState:
+def _load_named_state(name_or_path: str) -> ViewerState:
     """Return the state of a built-in head, sample or mesh file in studio light, or of a scene file."""
-    if Path(name).suffix.lower() == ".toml":
-        return load_state(Path(name))
-    path = str(Path(name).resolve()) if Path(name).is_file() else name
-    return ViewerState(Scene(load_head(name)), Settings(**PHOTOGRAPHIC_SETTINGS), {"name": path})
+    if Path(name_or_path).suffix.lower() == ".toml":
+        return load_state(Path(name_or_path))
+    path = str(Path(name_or_path).resolve()) if Path(name_or_path).is_file() else name_or_path
+    return ViewerState(Scene(load_head(name_or_path)), Settings(**PHOTOGRAPHIC_SETTINGS), {"name": path})
 
 
 def make_state(subject: Head | Human | Scene | ViewerState | str | os.PathLike[str]) -> ViewerState:
@@ -249,17 +251,17 @@ def load_state(path: Path, current: ViewerState | None = None) -> ViewerState:
     known_head = current.scene.head if current and same_table and not has_region_table(table) else None
     scene, scene_settings = load_scene(path, known_head)
     settings = Settings(**{**PHOTOGRAPHIC_SETTINGS, **scene_settings.model_dump(exclude_unset=True)})
-    return initial_state(scene, settings, table, rig="" if scene.lights else NO_LIGHTS)
+    return initial_state(scene, settings, table, rig_name="" if scene.lights else NO_LIGHTS)
 
 
-def initial_state(scene: Scene, settings: Settings, head: Table, rig: str) -> ViewerState:
+def initial_state(scene: Scene, settings: Settings, head_table: Table, rig_name: str) -> ViewerState:
     """Return the initial state of a scene; `Settings.parts` becomes the view "diffuse" or "specular".
 
-    head : [head] table of a scene file from which the head was loaded
-    rig : name of the light preset, empty for custom lights
+    head_table : [head] table of a scene file from which the head was loaded
+    rig_name : name of the light preset, empty for custom lights
     """
     view = settings.parts if settings.parts in PART_VIEWS else PICTURE_VIEW_NAME
-    return ViewerState(scene, validated_copy(settings, parts="all"), head, view, rig)
+    return ViewerState(scene, validated_copy(settings, parts="all"), head_table, view, rig_name)
 
 
 _MAX_UNDO_STEPS = 200

@@ -32,8 +32,13 @@ from dermis.scene.camera import Camera
 from dermis.scene.settings import MAX_SAMPLE_COUNT, Settings
 
 _FRAME_BUDGET_MS = {True: 100.0, False: 33.0}  # time of a frame in motion on a software adapter and on a GPU
-_SLOW_RATIO, _FAST_RATIO = 1.25, 0.45  # ratios of frame time to budget at which the quality changes
-_STREAK_LENGTH = 2  # consecutive slow or fast frames before a change; a single one may have relit the atlas
+_SLOW_FRAME_RATIO, _FAST_FRAME_RATIO = (
+    1.25,
+    0.45,
+)  # ratios of frame time to budget at which the quality changes
+_FRAME_STREAK_LENGTH = (
+    2  # consecutive slow or fast frames before a change; a single one may have relit the atlas
+)
 
 
 @dataclass(frozen=True)
@@ -50,16 +55,16 @@ class Quality:
     shadow_size: int
 
 
-_NO_LIMIT = 1 << 14
+_UNLIMITED_SIZE = 1 << 14
 QUALITY_LEVELS = (
-    Quality(1.0, _NO_LIMIT, _NO_LIMIT, _NO_LIMIT),
+    Quality(1.0, _UNLIMITED_SIZE, _UNLIMITED_SIZE, _UNLIMITED_SIZE),
     Quality(1.0, 2, 1024, 1024),
     Quality(1.0, 1, 512, 512),
     Quality(0.75, 1, 512, 512),
     Quality(0.5, 1, 256, 512),
     Quality(0.35, 1, 256, 256),
 )
-_BEST_LEVEL_ON_CPU = 2
+_BEST_QUALITY_LEVEL_ON_CPU = 2
 
 
 class QualityController:
@@ -68,10 +73,10 @@ class QualityController:
     software : whether the adapter renders on the CPU
     """
 
-    def __init__(self, software: bool) -> None:
-        self.software = software
-        self._budget_ms = _FRAME_BUDGET_MS[software]
-        self._level = self._best_level = _BEST_LEVEL_ON_CPU if software else 0
+    def __init__(self, is_software_adapter: bool) -> None:
+        self.software = is_software_adapter
+        self._budget_ms = _FRAME_BUDGET_MS[is_software_adapter]
+        self._level = self._best_level = _BEST_QUALITY_LEVEL_ON_CPU if is_software_adapter else 0
         self._streak = 0
 
     @property
@@ -84,23 +89,23 @@ class QualityController:
 
         frame_ms : time of the frame without setup [ms]
         """
-        is_slow = frame_ms > _SLOW_RATIO * self._budget_ms
-        is_fast = frame_ms < _FAST_RATIO * self._budget_ms
+        is_slow = frame_ms > _SLOW_FRAME_RATIO * self._budget_ms
+        is_fast = frame_ms < _FAST_FRAME_RATIO * self._budget_ms
         step = is_slow - is_fast
         self._streak = self._streak + step if step * self._streak >= 0 else step
         if not step:
             self._streak = 0
-        if abs(self._streak) >= _STREAK_LENGTH:
+        if abs(self._streak) >= _FRAME_STREAK_LENGTH:
             self._level = max(self._best_level, min(len(QUALITY_LEVELS) - 1, self._level + step))
             self._streak = 0
 
-    def limited_settings(self, settings: Settings, size: tuple[int, int], is_moving: bool) -> Settings:
+    def limited_settings(self, settings: Settings, view_size: tuple[int, int], is_moving: bool) -> Settings:
         """Return the settings of a frame for a window size, with quality limits while the picture changes.
 
         is_moving : whether the picture is changing
         """
         quality = self.quality if is_moving else QUALITY_LEVELS[0]
-        width, height = (max(1, round(quality.scale * side)) for side in size)
+        width, height = (max(1, round(quality.scale * side)) for side in view_size)
         return validated_copy(
             settings,
             size=(width, height),
@@ -112,10 +117,12 @@ class QualityController:
 
 Images = tuple[Texture, Texture | None]
 """Image of the live state, and image of the frozen state; None if no state is frozen."""
-_CACHED_RESOURCES = 2  # resources for frames in motion and for still frames
-_PREPARATION_SIZE = (96, 64)  # size of small frames that use all shaders [pixel]
+_CACHED_FRAME_RESOURCES = 2  # resources for frames in motion and for still frames
+_PREPARATION_FRAME_SIZE = (96, 64)  # size of small frames that use all shaders [pixel]
 _TIMED_FRAMES = 120
-_FROZEN_SIDE = "before"  # name of its atlas light, kept apart so that a moving camera relights neither side
+_FROZEN_DIVIDER_SIDE = (
+    "before"  # name of its atlas light, kept apart so that a moving camera relights neither side
+)
 
 
 @dataclass(frozen=True)
@@ -138,8 +145,10 @@ class ViewRenderer:
 
     def __init__(self, adapter: str = "auto") -> None:
         self.is_preparing = False
-        self.renderer = Renderer(adapter, cache_size=_CACHED_RESOURCES, reopens=False)
-        self.quality_controller = QualityController(software=self.renderer.device.adapter.kind == "CPU")
+        self.renderer = Renderer(adapter, cache_size=_CACHED_FRAME_RESOURCES, reopens=False)
+        self.quality_controller = QualityController(
+            is_software_adapter=self.renderer.device.adapter.kind == "CPU"
+        )
         self.rendered: RenderedFrame | None = None
         self.settings: Settings | None = None
         self._views = IntermediateViews(self.renderer)
@@ -160,10 +169,10 @@ class ViewRenderer:
         self.is_preparing = True
         try:
             for moving in (True, False):
-                self.renderer.prepare(state.scene, self._settings(state, _PREPARATION_SIZE, moving))
+                self.renderer.prepare(state.scene, self._settings(state, _PREPARATION_FRAME_SIZE, moving))
             on_resources_ready()
             for moving in (True, False):
-                self.render_image(state, state.scene.camera, _PREPARATION_SIZE, moving)
+                self.render_image(state, state.scene.camera, _PREPARATION_FRAME_SIZE, moving)
         finally:
             self.is_preparing = False
 
@@ -172,7 +181,7 @@ class ViewRenderer:
         state: ViewerState,
         frozen_state: ViewerState | None,
         camera: Camera,
-        size: tuple[int, int],
+        view_size: tuple[int, int],
         is_moving: bool,
     ) -> Images:
         """Return the image of the live state, and the image of the frozen state or None.
@@ -183,22 +192,22 @@ class ViewRenderer:
         """
         if frozen_state is None:
             self._frozen = None
-            return self.render_image(state, camera, size, is_moving), None
-        image = self._frozen_image(frozen_state, camera, size, is_moving)
-        return self.render_image(state, camera, size, is_moving), image
+            return self.render_image(state, camera, view_size, is_moving), None
+        image = self._frozen_image(frozen_state, camera, view_size, is_moving)
+        return self.render_image(state, camera, view_size, is_moving), image
 
     def render_image(
-        self, state: ViewerState, camera: Camera, size: tuple[int, int], is_moving: bool
+        self, state: ViewerState, camera: Camera, view_size: tuple[int, int], is_moving: bool
     ) -> Texture:
         """Return a texture of sRGB bytes for a state; the last texture is reused if nothing has changed.
 
-        size : size of the view; in motion the texture may be smaller [pixel]
+        view_size : size of the view; in motion the texture may be smaller [pixel]
         is_moving : whether the picture is changing, which limits its quality
 
         Raises DermisError if the state cannot be rendered or the device fails.
         """
-        self._size = size
-        settings = self._settings(state, size, is_moving)
+        self._size = view_size
+        settings = self._settings(state, view_size, is_moving)
         inputs = self._image_inputs
         is_cached = inputs and inputs[0] is state and inputs[1:] == (camera, settings)
         if is_cached and self.last_image is not None:
@@ -222,7 +231,7 @@ class ViewRenderer:
         is_cached = frozen and frozen.state is frozen_state and frozen.camera == camera
         if frozen and is_cached and frozen.settings in (settings, still_settings):
             return frozen.image
-        image = self._draw(replace(frozen_state, settings=settings).with_camera(camera), _FROZEN_SIDE)
+        image = self._draw(replace(frozen_state, settings=settings).with_camera(camera), _FROZEN_DIVIDER_SIDE)
         self._image_inputs = None  # the texture held the image of the live state
         image_copy = copy_texture(self.renderer.device, image, frozen.image if frozen else None)
         self._frozen = FrozenImage(frozen_state, camera, settings, image_copy)
@@ -242,24 +251,28 @@ class ViewRenderer:
         state, _, settings = self._image_inputs
         return self._settings(state, self._size, is_moving=False) == settings
 
-    def screenshot(self, path: Path, state: ViewerState, size: tuple[int, int]) -> None:
+    def screenshot(self, picture_path: Path, state: ViewerState, picture_size: tuple[int, int]) -> None:
         """Render the view of a state to a file: .png (tone-mapped) or .exr (linear).
 
-        size : width and height of the picture [pixel]
+        picture_size : width and height of the picture [pixel]
 
         Raises DermisError if the picture cannot be rendered or written.
         """
         if self.is_preparing:
             refuse("picture", "a head that is ready", "it is being prepared", "Try again in a moment")
-        image = self._draw(state.with_settings(size=size))
+        image = self._draw(state.with_settings(size=picture_size))
         self._image_inputs = None
-        is_linear, rendered = path.suffix.lower() == ".exr", self.rendered
+        is_linear, rendered = picture_path.suffix.lower() == ".exr", self.rendered
         if not rendered or state.view not in (PICTURE_VIEW_NAME, *PART_VIEWS):
-            write_png(path, self.read(image))
+            write_png(picture_path, self.read(image))
         elif state.settings.background == "none":
-            write_image(path, rendered.linear_rgba()) if is_linear else write_png(path, rendered.rgba8())
+            write_image(picture_path, rendered.linear_rgba()) if is_linear else write_png(
+                picture_path, rendered.rgba8()
+            )
         else:
-            write_image(path, rendered.linear()) if is_linear else write_png(path, self.read(image))
+            write_image(picture_path, rendered.linear()) if is_linear else write_png(
+                picture_path, self.read(image)
+            )
 
     @property
     def exposure(self) -> float:
@@ -294,17 +307,19 @@ class ViewRenderer:
         return states_equal(replace(self._atlas_state[0], atlas_view=state.atlas_view), state)
 
 
-def copy_texture(device: Device, image: Texture, target: Texture | None = None) -> Texture:
+def copy_texture(device: Device, source_texture: Texture, target_texture: Texture | None = None) -> Texture:
     """Return a copy of a texture of bytes.
 
-    target : texture to reuse if its size matches
+    target_texture : texture to reuse if its size matches
     """
-    if target is None or target.size != image.size:
-        target = make_texture(device, image.size[:2], "rgba8uint")
+    if target_texture is None or target_texture.size != source_texture.size:
+        target_texture = make_texture(device, source_texture.size[:2], "rgba8uint")
     encoder = device.handle.create_command_encoder()
-    encoder.copy_texture_to_texture({"texture": image}, {"texture": target}, image.size)
+    encoder.copy_texture_to_texture(
+        {"texture": source_texture}, {"texture": target_texture}, source_texture.size
+    )
     device.handle.queue.submit([encoder.finish()])
-    return target
+    return target_texture
 
 
 T = TypeVar("T")

@@ -43,13 +43,13 @@ class BlitProgram(Program):
 
     stages = "VERTEX", "FRAGMENT"
 
-    def __init__(self, device: Device, target: str) -> None:
+    def __init__(self, device: Device, target_format: str) -> None:
         super().__init__(device, Path(__file__).parent / "blit.wgsl")
         fragment = {
             "module": self._module,
             "entry_point": "fragment",
-            "constants": {"DECODED": target.endswith("-srgb")},
-            "targets": [{"format": target}],
+            "constants": {"DECODED": target_format.endswith("-srgb")},
+            "targets": [{"format": target_format}],
         }
         self._pipeline = device.handle.create_render_pipeline(
             layout=self._layout,
@@ -58,13 +58,18 @@ class BlitProgram(Program):
             primitive={"topology": "triangle-list", "cull_mode": "none"},
         )
 
-    def draw(self, patches: Sequence[Patch], view: TextureView) -> None:
+    def draw(self, patches: Sequence[Patch], target_view: TextureView) -> None:
         """Draw images over a black background.
 
-        view : view of the target texture
+        target_view : view of the target texture
         """
         encoder = self.device.handle.create_command_encoder()
-        attachment = {"view": view, "load_op": "clear", "store_op": "store", "clear_value": (0, 0, 0, 1)}
+        attachment = {
+            "view": target_view,
+            "load_op": "clear",
+            "store_op": "store",
+            "clear_value": (0, 0, 0, 1),
+        }
         render_pass = encoder.begin_render_pass(label="blit", color_attachments=[attachment])
         render_pass.set_pipeline(self._pipeline)
         for patch in patches:
@@ -78,7 +83,7 @@ class BlitProgram(Program):
         self.device.handle.queue.submit([encoder.finish()])
 
 
-_STILL_AFTER_S = 0.25  # time since the last change after which the picture is refined
+_STILL_FRAME_DELAY_S = 0.25  # time since the last change after which the picture is refined
 _MAX_EASING_STEP_S = 0.2  # largest time step of the camera easing in a frame
 _MAX_DEVICE_FAILURES = 1  # consecutive failures of the device
 _PANEL_SETTLING_FRAMES = 3  # frames that the panel needs to settle after an event
@@ -183,13 +188,13 @@ class Viewer:
         return max(1, width - self._panel_width()), max(1, height)
 
     def _patches(
-        self, live_image: Texture, frozen_image: Texture | None, size: tuple[int, int]
+        self, live_image: Texture, frozen_image: Texture | None, canvas_size: tuple[int, int]
     ) -> list[Patch]:
         """Return patches that show the live image, and the frozen image left of the divider.
 
-        size : width and height of the picture [pixel]
+        canvas_size : width and height of the picture [pixel]
         """
-        left, (width, height) = self._panel_width(), size
+        left, (width, height) = self._panel_width(), canvas_size
         viewport = left, 0, width, height
         if frozen_image is None:
             return [Patch(live_image, viewport, viewport)]
@@ -201,7 +206,7 @@ class Viewer:
         return [patch for patch in patches if patch.scissor[2]]
 
     def _render_images(
-        self, state: ViewerState, camera: Camera, size: tuple[int, int], is_moving: bool
+        self, state: ViewerState, camera: Camera, picture_size: tuple[int, int], is_moving: bool
     ) -> Images:
         """Return the live and frozen images, or the last image and None if `state` cannot be rendered."""
         import wgpu
@@ -212,7 +217,9 @@ class Viewer:
                 if held_image := self._preparation.prepare_head(session.view_renderer, state):
                     return held_image, None
                 frozen_state = session.split.frozen_state
-                images = session.view_renderer.render_images(state, frozen_state, camera, size, is_moving)
+                images = session.view_renderer.render_images(
+                    state, frozen_state, camera, picture_size, is_moving
+                )
                 if self._rejected_state:
                     self._rejected_state, session.message = None, ""
                 return images
@@ -235,7 +242,7 @@ class Viewer:
         self.session.message = message
 
     def _is_moving(self, now: float) -> bool:
-        return self.session.player.is_playing or now - self._last_change < _STILL_AFTER_S
+        return self.session.player.is_playing or now - self._last_change < _STILL_FRAME_DELAY_S
 
     def _status_text(self, picture_size: tuple[int, int]) -> str:
         view_renderer = self.session.view_renderer

@@ -40,13 +40,13 @@ VIEW_NAMES = ("picture", *PART_VIEWS, *ATLAS_LAYERS, "shadow", "normals", ATLAS_
 """Names of all views."""
 
 _INTERMEDIATE_SHADER = Path(__file__).parent / "intermediate.wgsl"
-_QUANTITY_NUMBERS = {
+_SHADER_QUANTITY_NUMBERS = {
     "stretch": 1,
     "thickness": 2,
     "shadow": 3,
     "normals": 4,
 }  # as in the shaders; irradiance is 0
-_ATLAS_ADVICE = "Choose a narrower blur, or the technique texture-space"
+_MISSING_LEVEL_ADVICE = "Choose a narrower blur, or the technique texture-space"
 
 
 class IntermediateViews:
@@ -60,22 +60,22 @@ class IntermediateViews:
         self._thickness_maps: weakref.WeakKeyDictionary[PairBuffers, Texture] = weakref.WeakKeyDictionary()
         self._density: weakref.WeakKeyDictionary[Texture, float] = weakref.WeakKeyDictionary()
 
-    def draw(self, scene: Scene, settings: Settings, view: str, side: str = "") -> Texture:
+    def draw(self, scene: Scene, settings: Settings, view_name: str, divider_side: str = "") -> Texture:
         """Return an image of sRGB bytes that shows an intermediate result of the last frame on the head.
 
-        view : name of the view, one of `VIEW_NAMES`
-        side : name of the side of the divider, empty for the live side
+        view_name : name of the view, one of `VIEW_NAMES`
+        divider_side : name of the side of the divider, empty for the live side
 
         Raises DermisError if the technique does not compute the intermediate result.
         """
-        inputs = self._renderer.prepare(scene, settings, side)
+        inputs = self._renderer.prepare(scene, settings, divider_side)
         unused = ("ENVIRONMENT", "HALF_SPACE", "INTERREFLECTION", "STRANDS")  # not declared by the shader
         constants = tuple(switch for switch in inputs.light_constants if switch[0] not in unused)
         shader = program(self._renderer.device, _INTERMEDIATE_SHADER, constants)
-        layer, scale = self._atlas_layer(inputs, view, settings)
+        layer, scale = self._atlas_layer(inputs, view_name, settings)
         view_fields = ("eye", "forward", "right", "up", "shift", "samples", "jitter")
         record = shader.record("ViewParameters", **{name: inputs.view[name] for name in view_fields})
-        record["quantity"], record["scale"] = _QUANTITY_NUMBERS.get(view, 0), scale
+        record["quantity"], record["scale"] = _SHADER_QUANTITY_NUMBERS.get(view_name, 0), scale
         bindings = {
             **inputs.bindings,
             "view_parameters": record,
@@ -84,49 +84,58 @@ class IntermediateViews:
         }
         return self._render(shader, bindings, settings.size)
 
-    def draw_atlas(self, scene: Scene, settings: Settings, atlas_view: AtlasView, side: str = "") -> Texture:
+    def draw_atlas(
+        self, scene: Scene, settings: Settings, atlas_view: AtlasView, divider_side: str = ""
+    ) -> Texture:
         """Return an image of sRGB bytes that shows a part of the atlas of the last frame.
 
-        side : name of the side of the divider, empty for the live side
+        divider_side : name of the side of the divider, empty for the live side
 
         Raises DermisError if the technique does not compute the displayed map.
         """
-        inputs = self._renderer.prepare(scene, settings, side)
+        inputs = self._renderer.prepare(scene, settings, divider_side)
         layer, scale = self._atlas_layer(inputs, atlas_view.layer, settings)
         values = {"centre": atlas_view.centre, "span": atlas_view.span, "scale": scale}
-        quantity = _QUANTITY_NUMBERS.get(atlas_view.layer, 0)
+        quantity = _SHADER_QUANTITY_NUMBERS.get(atlas_view.layer, 0)
         record = self._atlas_shader.record("AtlasView", quantity=quantity, **values)
         return self._render(self._atlas_shader, {"atlas_view": record, "layer": layer}, settings.size)
 
-    def _render(self, shader: ComputeProgram, bindings: Bindings, size: tuple[int, int]) -> Texture:
+    def _render(self, shader: ComputeProgram, bindings: Bindings, image_size: tuple[int, int]) -> Texture:
         """Run a shader that writes an image to its binding `bytes`, and return the texture bound there."""
         device = self._renderer.device
-        if self._image is None or self._image.size[:2] != size:
-            self._image = make_texture(device, size, "rgba8uint")
+        if self._image is None or self._image.size[:2] != image_size:
+            self._image = make_texture(device, image_size, "rgba8uint")
         with gpu_failures(device):
             frame = CommandList(device)
-            frame.compute("view", shader, {**bindings, "bytes": self._image}, size)
+            frame.compute("view", shader, {**bindings, "bytes": self._image}, image_size)
             frame.submit()
         return self._image
 
-    def _atlas_layer(self, inputs: FrameInputs, view: str, settings: Settings) -> tuple[TextureOrView, float]:
+    def _atlas_layer(
+        self, inputs: FrameInputs, layer_name: str, settings: Settings
+    ) -> tuple[TextureOrView, float]:
         """Return the atlas texture that a view shows, and a scale for the display of the texture.
 
         For light, the scale is the factor by which texels are multiplied for display. For stretch, it is the
         mean number of texels per mm, and for thickness 1.
         """
-        if view in LEVEL_VIEWS:
-            level, blur = LEVEL_VIEWS[view], next(iter(inputs.blurs), None)
+        if layer_name in LEVEL_VIEWS:
+            level, blur = LEVEL_VIEWS[layer_name], next(iter(inputs.blurs), None)
             count = len(blur.profile_levels) if blur else 0
             if blur is None or level >= count:
-                refuse(f"view {view}", "a pyramid level of the atlas", f"there are {count}", _ATLAS_ADVICE)
+                refuse(
+                    f"view {layer_name}",
+                    "a pyramid level of the atlas",
+                    f"there are {count}",
+                    _MISSING_LEVEL_ADVICE,
+                )
             layer = blur.profile_levels[level]
             texture = inputs.resources.diffusion.levels.layer(layer, blur.halvings[layer])
             return texture, self._exposure(inputs) / blur.scale
-        if view == "stretch":
+        if layer_name == "stretch":
             stretch = inputs.layouts[0].atlas.resources["stretch_map"]
             return stretch, self._mean_density(stretch)
-        return self._thickness(inputs) if view == "thickness" else self._empty_texture, 1.0
+        return self._thickness(inputs) if layer_name == "thickness" else self._empty_texture, 1.0
 
     def _exposure(self, inputs: FrameInputs) -> float:
         """Return the exposure factor of the last frame, metered or fixed [-]."""
@@ -154,13 +163,13 @@ class IntermediateViews:
         return self._density[stretch]
 
 
-def draw_thickness(device: Device, translucency: Translucency, target: Texture) -> Texture:
+def draw_thickness(device: Device, translucency: Translucency, target_texture: Texture) -> Texture:
     """Compute the least tissue thickness below each cell of the coarse atlas; return it in a texture [mm].
 
     The thickness is the least depth of a cell below the tangent planes of the cell's source cells, and at
     most the radius within which source cells are searched.
 
-    target : texture to fill, with one texel per cell; cells without pairs are unchanged
+    target_texture : texture to fill, with one texel per cell; cells without pairs are unchanged
     """
     pairs, shader = translucency.pairs, program(device, Path(__file__).parent / "thickness.wgsl")
     count = pairs.receivers[1]
@@ -170,9 +179,9 @@ def draw_thickness(device: Device, translucency: Translucency, target: Texture) 
         "pairs": pairs.pairs,
         "receiver_points": translucency.receiver_points,
         "source_points": translucency.source_points,
-        "thickness": target,
+        "thickness": target_texture,
     }
     frame = CommandList(device, timed=False)
     frame.dispatch("view", shader, bindings, workgroup_grid(count))
     frame.submit()
-    return target
+    return target_texture

@@ -26,10 +26,12 @@ _WINDOW_TITLE = "dermis"
 _MAX_FPS = 60
 
 
-def show_window(state: ViewerState, adapter: str, size: Size, *, motion: MotionFile | None = None) -> None:
+def show_window(
+    state: ViewerState, adapter: str, window_size: Size, *, motion: MotionFile | None = None
+) -> None:
     """Show the viewer in a desktop window, and return when the window is closed.
 
-    size : width and height of the window [logical pixel]
+    window_size : width and height of the window [logical pixel]
     motion : motion to play
 
     Raises DermisError without a display, a device or the extra `viewer`.
@@ -40,7 +42,7 @@ def show_window(state: ViewerState, adapter: str, size: Size, *, motion: MotionF
         if not backend.glfw.init():
             _raise_no_display("; ".join(str(warning.message) for warning in caught))
     try:
-        canvas = backend.RenderCanvas(size=size, title=_WINDOW_TITLE, max_fps=_MAX_FPS)
+        canvas = backend.RenderCanvas(size=window_size, title=_WINDOW_TITLE, max_fps=_MAX_FPS)
     except Exception as error:  # glfw has no exception class for a missing display
         _raise_no_display(error)
     viewer = Viewer(state, canvas, adapter, motion=motion)
@@ -61,12 +63,12 @@ def _without_signal_handlers() -> Iterator[None]:
 
 
 def serve(
-    load: Callable[[], tuple[ViewerState, MotionFile | None]],
+    load_state: Callable[[], tuple[ViewerState, MotionFile | None]],
     adapter: str,
-    size: Size,
+    window_size: Size,
     host: str,
     port: int,
-    announce: Callable[[str, bool], None],
+    announce_url: Callable[[str, bool], None],
     *,
     require_token: bool = False,
 ) -> None:
@@ -74,13 +76,13 @@ def serve(
 
     Pages show the progress of the preparation until the first picture.
 
-    load : function that loads the initial state and motion, called in a thread
-    size : width and height of the canvas until a page reports the size of its window [logical pixel]
+    load_state : function that loads the initial state and motion, called in a thread
+    window_size : width and height of the canvas until a page reports the size of its window [logical pixel]
     port : port number, 0 for any free port
-    announce : function called first, with the URL and whether other machines can reach the URL
+    announce_url : function called first, with the URL and whether other machines can reach the URL
     require_token : whether the URL has a token even if only this machine can reach it
 
-    Raises every exception of `load`, and DermisError if the address cannot be used, without a device or
+    Raises every exception of `load_state`, and DermisError if the address cannot be used, without a device or
     without the extra `viewer`.
     """
     _load_backend("http", ("uvicorn", "websockets"), "viewer")
@@ -90,13 +92,15 @@ def serve(
 
     listener, address = bind(host, port, require_token=require_token)
     with listener, TemporaryDirectory(prefix="dermis-") as folder:
-        canvas = PageCanvas(size=size, title=_WINDOW_TITLE, max_fps=_MAX_FPS)
-        canvas._size_info.set_physical_size(*size, 1.0)
+        canvas = PageCanvas(size=window_size, title=_WINDOW_TITLE, max_fps=_MAX_FPS)
+        canvas._size_info.set_physical_size(*window_size, 1.0)
         http_server = make_server(address, canvas, Path(folder))
         # rendercanvas handles Ctrl+C by closing the canvas; the server must stop too.
         canvas.add_event_handler(lambda event: setattr(http_server, "should_exit", True), "close")
-        announce(address.url, not is_local(host))
-        viewer = run_server(http_server, listener, lambda: prepare_viewer(http_server, canvas, load, adapter))
+        announce_url(address.url, not is_local(host))
+        viewer = run_server(
+            http_server, listener, lambda: prepare_viewer(http_server, canvas, load_state, adapter)
+        )
     if viewer:
         _raise_failure(viewer)
 
@@ -168,7 +172,7 @@ def _notebook_canvas(backend: Any) -> Any:
     return NotebookCanvas
 
 
-def _load_backend(name: str, required_packages: tuple[str, ...], extra: str) -> Any:
+def _load_backend(module_name: str, required_packages: tuple[str, ...], extra: str) -> Any:
     """Import and return a module of rendercanvas; raise DermisError if packages are missing.
 
     required_packages : import names of the packages that the module needs
@@ -180,7 +184,7 @@ def _load_backend(name: str, required_packages: tuple[str, ...], extra: str) -> 
         except ImportError:
             advice = f'Install it: pip install "dermis[{extra}]"'
             refuse("viewer", f"the package {package.replace('_', '-')}", "it is not installed", advice)
-    return importlib.import_module(f"rendercanvas.{name}")
+    return importlib.import_module(f"rendercanvas.{module_name}")
 
 
 def _raise_no_display(reason: object) -> NoReturn:

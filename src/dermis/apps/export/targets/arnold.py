@@ -34,11 +34,11 @@ class Arnold(JsonTarget):
     def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the mean free paths of the homogeneous medium whose profile is closest to the reference."""
         colour = subject.clipped_albedo(_MIN_ALBEDO)
-        return _parameters(colour, fit_homogeneous_medium(subject.curve, colour, "walk").mfp_mm)
+        return _material_parameters(colour, fit_homogeneous_medium(subject.curve, colour, "walk").mfp_mm)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """Return Burley widths as the radius, where Arnold expects mean free paths."""
-        return _parameters(subject.clipped_albedo(_MIN_ALBEDO), fit_burley_width(subject.curve))
+        return _material_parameters(subject.clipped_albedo(_MIN_ALBEDO), fit_burley_width(subject.curve))
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the profile of a random walk whose single-scattering albedo is derived from the colour."""
@@ -52,7 +52,7 @@ class Arnold(JsonTarget):
         return curve.with_energy(curve.energy / subject.clipped_albedo(_MIN_ALBEDO) * subject.curve.energy)
 
 
-def _parameters(colour: Floats, mean_free_path_mm: Floats) -> Parameters:
+def _material_parameters(colour: Floats, mean_free_path_mm: Floats) -> Parameters:
     return (
         Parameter("subsurface", 1.0, "-", "all diffuse light is scattered below the surface"),
         Parameter("subsurface_type", "randomwalk", "-", "not diffusion, whose profile differs"),

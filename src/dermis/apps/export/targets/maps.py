@@ -42,8 +42,8 @@ PngEncoding = Literal["colour", "light", "normal", "fraction", "range", "root", 
 percentile; "normal": a normal n as (n + 1) / 2 in 16 bits; "fraction": a value from 0 to 1 in 16 bits;
 "range": the interval from minimum to maximum in 16 bits; "root": the square root in 16 bits; "none": no PNG
 is written."""
-_SCATTERED_NAME = "scattered"
-_MAX_ATLAS_SIDE = 2048  # of the map in which light is diffused [texel]
+_SCATTERING_PARAMETER_NAME = "scattered"
+_MAX_DIFFUSION_ATLAS_SIDE = 2048  # of the map in which light is diffused [texel]
 
 
 @dataclass(frozen=True)
@@ -100,17 +100,22 @@ class MapFolder(Target):
             Parameter(
                 "normal_green", self._normal_y, "-", "direction of green: towards row 0, or away from it"
             ),
-            Parameter(_SCATTERED_NAME, True, "-", "the light to display is the diffused one, scattered.exr"),
+            Parameter(
+                _SCATTERING_PARAMETER_NAME,
+                True,
+                "-",
+                "the light to display is the diffused one, scattered.exr",
+            ),
         )
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the parameters for an ordinary light map, without diffusion."""
-        return replace_values(self.parameters(subject, version), {_SCATTERED_NAME: False})
+        return replace_values(self.parameters(subject, version), {_SCATTERING_PARAMETER_NAME: False})
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the profile of the renderer's sum of Gaussians, or a step at radius 0 without diffusion."""
         energy = subject.curve.energy
-        if not get_value(parameters, _SCATTERED_NAME) or subject.scene is None:
+        if not get_value(parameters, _SCATTERING_PARAMETER_NAME) or subject.scene is None:
             return CumulativeProfile.from_function(lambda r: np.tile(r[:, None] > 0.0, 3), energy)
         profile = SkinProfiles().profile(subject.scene.skin)
         return gaussian_curve(profile.variance_mm2, profile.weight, energy)
@@ -121,7 +126,7 @@ class MapFolder(Target):
             actual = f"got the skin {subject.name}"
             refuse("maps", "a head", actual, "Name a head, and the skin with --profile")
         scene, side = subject.scene, check_side(self.side)
-        settings = Settings(atlas=min(max(side, MAP_SIDES[0]), _MAX_ATLAS_SIDE))
+        settings = Settings(atlas=min(max(side, MAP_SIDES[0]), _MAX_DIFFUSION_ATLAS_SIDE))
         baked = bake_maps(Renderer(self.adapter), scene, settings, side)
         return write_files(output, map_files(baked, scene, self._normal_y))
 
@@ -130,77 +135,77 @@ class MapFolder(Target):
         return "down" if self.variant == "directx" else "up"
 
 
-def encode_map_exr(map_name: str, values: Floats) -> bytes:
+def encode_map_exr(map_name: str, texels: Floats) -> bytes:
     """Return a map as OpenEXR, with channels R, G, B for colours and vectors, and Y for scalars."""
-    names = "Y" if values.ndim == 2 else "RGB"
-    channels = [values] if values.ndim == 2 else list(np.moveaxis(values, -1, 0))
+    names = "Y" if texels.ndim == 2 else "RGB"
+    channels = [texels] if texels.ndim == 2 else list(np.moveaxis(texels, -1, 0))
     return encode_exr_parts({map_name: dict(zip(names, channels, strict=True))}, fast=True)
 
 
-def quantise_map(values: Floats, encoding: PngEncoding) -> tuple[NDArray[np.uint8 | np.uint16], Ranges]:
+def quantise_map(texels: Floats, encoding: PngEncoding) -> tuple[NDArray[np.uint8 | np.uint16], Ranges]:
     """Return the integer levels of a map for PNG, and the JSON entries by which they are decoded."""
     if encoding == "colour":
-        return encode_srgb8(np.clip(values, 0.0, 1.0)), {"png": "sRGB"}
+        return encode_srgb8(np.clip(texels, 0.0, 1.0)), {"png": "sRGB"}
     if encoding == "light":
-        white = float(np.percentile(values, _WHITE_PERCENTILE)) or 1.0
-        return encode_srgb8(np.clip(values / white, 0.0, 1.0)), {"png": "sRGB", "white": white}
+        white = float(np.percentile(texels, _WHITE_PERCENTILE)) or 1.0
+        return encode_srgb8(np.clip(texels / white, 0.0, 1.0)), {"png": "sRGB", "white": white}
     if encoding == "normal":
-        return _to_uint16(0.5 * values + 0.5), {"png": "value = 2 level / 65535 - 1"}
+        return _to_uint16(0.5 * texels + 0.5), {"png": "value = 2 level / 65535 - 1"}
     if encoding == "root":
-        return _to_uint16(np.sqrt(values)), {"png": "value = (level / 65535)^2"}
+        return _to_uint16(np.sqrt(texels)), {"png": "value = (level / 65535)^2"}
     if encoding == "fraction":
-        return _to_uint16(values), {"png": "value = level / 65535"}
-    low, high = float(values.min()), float(values.max())
+        return _to_uint16(texels), {"png": "value = level / 65535"}
+    low, high = float(texels.min()), float(texels.max())
     span = high - low or 1.0
     formula = "value = black + level / 65535 (white - black)"
-    return _to_uint16((values - low) / span), {"png": formula, "black": low, "white": low + span}
+    return _to_uint16((texels - low) / span), {"png": formula, "black": low, "white": low + span}
 
 
-def orient_green(normal: Floats, normal_y: NormalY) -> Floats:
+def orient_green(normals: Floats, normal_y: NormalY) -> Floats:
     """Return normals whose y, the green channel, points towards row 0 of the map or away from row 0.
 
     normal_y : "up" for row 0, as in OpenGL, or "down" for the opposite, as in DirectX
     """
     if normal_y == "up":
-        return normal
-    return normal * np.array([1.0, -1.0, 1.0], np.float32)
+        return normals
+    return normals * np.array([1.0, -1.0, 1.0], np.float32)
 
 
 def _to_uint16(fraction: Floats) -> NDArray[np.uint16]:
     return np.rint(np.clip(fraction, 0.0, 1.0) * _MAX_PNG_LEVEL).astype(np.uint16)
 
 
-def check_side(side: object) -> int:
+def check_side(map_side: object) -> int:
     """Return the requested side of the maps [texel] after checking that the side is supported.
 
     Raises DermisError for a side that is not one of `MAP_SIDES`.
     """
-    if side not in MAP_SIDES or isinstance(side, bool):
-        actual = f"got {side!r}"
+    if map_side not in MAP_SIDES or isinstance(map_side, bool):
+        actual = f"got {map_side!r}"
         refuse(
             "size of the maps",
             f"a power of two from {MAP_SIDES[0]} to {MAP_SIDES[-1]}",
             actual,
             "Choose 2048",
         )
-    assert isinstance(side, int)
-    return side
+    assert isinstance(map_side, int)
+    return map_side
 
 
-def bake_maps(renderer: Renderer, scene: Scene, settings: Settings, side: int) -> BakedMaps:
+def bake_maps(renderer: Renderer, scene: Scene, settings: Settings, map_side: int) -> BakedMaps:
     """Return the skin's maps with the scene's light baked, including the height map if the head has one.
 
-    side : side of the maps [texel]
+    map_side : side of the maps [texel]
     """
-    baked = bake(renderer, scene, settings, side)
+    baked = bake(renderer, scene, settings, map_side)
     painted = renderer.reopening_device.run(
-        lambda: with_painted_maps(renderer.device, scene.head, min(max(side, MIN_SIDE), MAX_SIDE))
+        lambda: with_painted_maps(renderer.device, scene.head, min(max(map_side, MIN_SIDE), MAX_SIDE))
     )
     height = painted.maps.height
     if height is None:
         baked.absent["height"] = "the head has no height map"
     else:
-        baked.maps["height"] = resample(height, side)
+        baked.maps["height"] = resample(height, map_side)
     return baked
 
 
@@ -252,28 +257,28 @@ def _maps_description(
     }
 
 
-def resample(values: Floats, side: int) -> Floats:
+def resample(texels: Floats, new_side: int) -> Floats:
     """Return a map (h, w) resampled to a square: halved by averaging if possible, then interpolated linearly.
 
-    side : side of the returned map [texel]
+    new_side : side of the returned map [texel]
     """
-    height, width = values.shape
-    while min(height, width) >= 2 * side and not (height | width) & 1:
-        values = 0.25 * (values[0::2, 0::2] + values[1::2, 0::2] + values[0::2, 1::2] + values[1::2, 1::2])
-        height, width = values.shape
-    if (height, width) == (side, side):
-        return np.ascontiguousarray(values, np.float32)
+    height, width = texels.shape
+    while min(height, width) >= 2 * new_side and not (height | width) & 1:
+        texels = 0.25 * (texels[0::2, 0::2] + texels[1::2, 0::2] + texels[0::2, 1::2] + texels[1::2, 1::2])
+        height, width = texels.shape
+    if (height, width) == (new_side, new_side):
+        return np.ascontiguousarray(texels, np.float32)
     for axis, length in enumerate((height, width)):
-        position = np.clip((np.arange(side) + 0.5) / side * length - 0.5, 0.0, length - 1.0)
+        position = np.clip((np.arange(new_side) + 0.5) / new_side * length - 0.5, 0.0, length - 1.0)
         low = np.minimum(position.astype(np.int64), max(length - 2, 0))
         fraction = np.expand_dims((position - low).astype(np.float32), 1 - axis)
         high = np.minimum(low + 1, length - 1)
-        values = (1.0 - fraction) * values.take(low, axis) + fraction * values.take(high, axis)
-    return np.ascontiguousarray(values, np.float32)
+        texels = (1.0 - fraction) * texels.take(low, axis) + fraction * texels.take(high, axis)
+    return np.ascontiguousarray(texels, np.float32)
 
 
-def _to_lists(value: Floats) -> float | list[float]:
-    rounded: float | list[float] = np.round(np.asarray(value, np.float64), 6).tolist()
+def _to_lists(numbers: Floats) -> float | list[float]:
+    rounded: float | list[float] = np.round(np.asarray(numbers, np.float64), 6).tolist()
     return rounded
 
 

@@ -35,11 +35,11 @@ class RenderMan(JsonTarget):
     def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the diffuse mean free paths for which Burley's profile is closest to the reference."""
         albedo = subject.clipped_albedo(_MIN_ALBEDO)
-        return _parameters(albedo, fit_burley_width(subject.curve) * shape_factor_diffuse(albedo))
+        return _material_parameters(albedo, fit_burley_width(subject.curve) * shape_factor_diffuse(albedo))
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the widths d of the closest Burley profiles in place of diffuse mean free paths."""
-        return _parameters(subject.clipped_albedo(_MIN_ALBEDO), fit_burley_width(subject.curve))
+        return _material_parameters(subject.clipped_albedo(_MIN_ALBEDO), fit_burley_width(subject.curve))
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative Burley profile whose width follows from the diffuse mean free paths."""
@@ -50,7 +50,7 @@ class RenderMan(JsonTarget):
         return burley_curve(path * path_colour * unit / shape_factor_diffuse(colour), subject.curve.energy)
 
 
-def _parameters(albedo: Floats, diffuse_mean_free_path_mm: Floats) -> Parameters:
+def _material_parameters(albedo: Floats, diffuse_mean_free_path_mm: Floats) -> Parameters:
     longest = float(diffuse_mean_free_path_mm.max())
     return (
         Parameter("subsurfaceGain", 1.0, "-", "all diffuse light is scattered below the surface"),

@@ -15,7 +15,11 @@ from numpy.typing import ArrayLike
 
 from dermis.apps.inverse.fitting.frames import FaceRenderer
 from dermis.apps.inverse.fitting.inputs import FitSubject, Photograph, fit_subject, read_photograph
-from dermis.apps.inverse.fitting.light_basis import BASIS_SIZE, solve_normal_equations, squared_residual
+from dermis.apps.inverse.fitting.light_basis import (
+    AMBIENT_LOBE_COUNT,
+    solve_normal_equations,
+    squared_residual,
+)
 from dermis.apps.inverse.fitting.placement import align_to_landmarks
 from dermis.apps.inverse.fitting.result import FitResult
 from dermis.apps.inverse.fitting.solve import (
@@ -37,44 +41,44 @@ from dermis.optics.media import Floats
 from dermis.optics.pigments.parameters import DEFAULT_SKIN
 from dermis.scene.settings import Settings
 
-_SUN_COUNT = 28
+_CANDIDATE_SUN_COUNT = 28
 _MIN_SUN_COSINE = -0.35  # smallest cosine between sun and camera directions
 _MELANIN_GRID, _BLOOD_GRID = np.geomspace(0.002, 0.4, 14), np.geomspace(0.002, 0.06, 8)
-_STRENGTH_GRID = 0.5, 0.75, 1.0
-_RIVAL_RATIO, _RIVAL_NODES = 2.0, 2
+_SPECULAR_STRENGTH_GRID = 0.5, 0.75, 1.0
+_MAX_RIVAL_RESIDUAL_RATIO, _GRID_NODES_BESIDE_MINIMUM = 2.0, 2
 """Ratio of the squared residual of a local minimum of the coarse search to the smallest one, up to which a
 fit also starts there, and half width of the range of melanin around it in nodes of the grid."""
-_RING_DEGREES, _RING_DIRECTIONS = (9.0, 18.0), 6
+_SUN_RING_DEGREES, _SUNS_PER_RING = (9.0, 18.0), 6
 """Angular radii of rings around a sun of the coarse search, and number of directions on each ring. The suns
 of the coarse search are 35 degrees apart."""
 DEFAULT_NOISE = 0.02
 DEFAULT_SIDE, DEFAULT_ATLAS, SHADOW_SIZE = 128, 256, 512
-_MIN_PIXELS = 200
+_MIN_SKIN_PIXELS = 200
 _MAX_BLOCK_RESIDUAL = 0.1
 """Median relative residual of blocks above which a picture probably does not show the head, see docs/fit.md
 [-]."""
 WhitePoint = Sequence[float] | Literal["specular"]
 
 
-def candidate_suns(towards_camera: Floats) -> Floats:
+def candidate_suns(camera_direction: Floats) -> Floats:
     """Return directions (k, 3) towards suns that light the side of the face that a camera sees.
 
-    towards_camera : (3,) unit vector from the face to the camera
+    camera_direction : (3,) unit vector from the face to the camera
     """
-    grid = fibonacci_sphere(_SUN_COUNT)
-    return grid[grid @ towards_camera > _MIN_SUN_COSINE]
+    grid = fibonacci_sphere(_CANDIDATE_SUN_COUNT)
+    return grid[grid @ camera_direction > _MIN_SUN_COSINE]
 
 
-def neighbouring_suns(towards: Floats) -> Floats:
+def neighbouring_suns(sun_directions: Floats) -> Floats:
     """Return the given sun directions (k, 3) and two rings of directions around each, (n, 3).
 
     They are the candidates of a finer search.
     """
-    azimuth = np.linspace(0.0, 2.0 * np.pi, _RING_DIRECTIONS, endpoint=False)
+    azimuth = np.linspace(0.0, 2.0 * np.pi, _SUNS_PER_RING, endpoint=False)
     ring = np.stack([np.cos(azimuth), np.sin(azimuth)], axis=-1)
-    rings = (np.tan(np.radians(angle)) * ring for angle in _RING_DEGREES)
+    rings = (np.tan(np.radians(angle)) * ring for angle in _SUN_RING_DEGREES)
     offsets = np.concatenate([[[0.0, 0.0]], *rings])
-    suns = towards[:, None] + np.einsum("nt,ktc->knc", offsets, tangents(towards))
+    suns = sun_directions[:, None] + np.einsum("nt,ktc->knc", offsets, tangents(sun_directions))
     return np.asarray((suns / np.linalg.norm(suns, axis=2, keepdims=True)).reshape(-1, 3))
 
 
@@ -90,11 +94,13 @@ class InitialGuess:
     weight : (p, 3) inverse standard deviations of the pixels
     """
 
-    def __init__(self, frames: FaceRenderer, point: FitPoint, target: Floats, weight: Floats) -> None:
+    def __init__(
+        self, frames: FaceRenderer, point: FitPoint, photo_radiance: Floats, pixel_weight: Floats
+    ) -> None:
         self.point = point
         diffuse, specular = frames.diffuse_and_specular(point)
-        weighted = np.concatenate([diffuse, specular]) * weight
-        weighted_target = target * weight
+        weighted = np.concatenate([diffuse, specular]) * pixel_weight
+        weighted_target = photo_radiance * pixel_weight
         self._grams = np.einsum("apc,bpc->cab", weighted, weighted, optimize=True)
         self._rights = np.einsum("apc,pc->ca", weighted, weighted_target)
         self._total = float((weighted_target**2).sum())
@@ -104,14 +110,14 @@ class InitialGuess:
         fixed = pigments.overrides()
         self._table = skin_colour_table(fixed["eumelanin"], fixed["oxygen"], fixed["epidermis_mm"])
 
-    def best(self, sun_count: int, melanin: Floats = _MELANIN_GRID) -> FitPoint:
+    def best(self, sun_count: int, melanin_grid: Floats = _MELANIN_GRID) -> FitPoint:
         """Return the pigments, specular strength and `sun_count` suns with the smallest residual.
 
-        melanin : melanin fractions to try
+        melanin_grid : melanin fractions to try
         """
         log_skin, suns = self.point.logs, self._select_suns(self.point.logs, sun_count)
         for _ in range(2):
-            trials, residuals = self._trials(log_skin, suns, melanin)
+            trials, residuals = self._trials(log_skin, suns, melanin_grid)
             log_skin = trials[int(np.argmin(residuals))]
             suns = self._select_suns(log_skin, sun_count)
         return replace(self.point, logs=log_skin, suns=self.point.suns[suns])
@@ -129,43 +135,48 @@ class InitialGuess:
         profile = residuals.reshape(len(_MELANIN_GRID), -1).min(axis=1)
         padded = np.concatenate([[np.inf], profile, [np.inf]])
         is_minimum = (profile <= padded[:-2]) & (profile <= padded[2:])
-        usable = np.flatnonzero(is_minimum & (profile < _RIVAL_RATIO * profile.min()))
+        usable = np.flatnonzero(is_minimum & (profile < _MAX_RIVAL_RESIDUAL_RATIO * profile.min()))
         if len(usable) == 1:
             return [_MELANIN_GRID]
         ordered = usable[np.argsort(profile[usable])]
-        return [_MELANIN_GRID[max(k - _RIVAL_NODES, 0) : k + _RIVAL_NODES + 1] for k in ordered]
+        return [
+            _MELANIN_GRID[max(k - _GRID_NODES_BESIDE_MINIMUM, 0) : k + _GRID_NODES_BESIDE_MINIMUM + 1]
+            for k in ordered
+        ]
 
-    def _trials(self, logs: Floats, suns: list[int], melanin: Floats) -> tuple[list[Floats], Floats]:
+    def _trials(
+        self, log_skin: Floats, sun_indices: list[int], melanin_grid: Floats
+    ) -> tuple[list[Floats], Floats]:
         """Return skins (n lists of 4 logarithms) with all pigments of the grid, and their squared residuals.
 
-        logs : (4,) logarithms of the skin unknowns, whose roughness is kept
+        log_skin : (4,) logarithms of the skin unknowns, whose roughness is kept
         """
-        grid = product(np.log(melanin), np.log(_BLOOD_GRID), np.log(_STRENGTH_GRID))
-        trials = [np.array([m, b, logs[2], s]) for m, b, s in grid]
-        return trials, np.array([self._squared_residual(one, suns) for one in trials])
+        grid = product(np.log(melanin_grid), np.log(_BLOOD_GRID), np.log(_SPECULAR_STRENGTH_GRID))
+        trials = [np.array([m, b, log_skin[2], s]) for m, b, s in grid]
+        return trials, np.array([self._squared_residual(one, sun_indices) for one in trials])
 
-    def _select_suns(self, logs: Floats, sun_count: int) -> list[int]:
+    def _select_suns(self, log_skin: Floats, sun_count: int) -> list[int]:
         """Return the indices of the suns with the smallest residual, selected greedily.
 
-        logs : (4,) logarithms of the skin unknowns
+        log_skin : (4,) logarithms of the skin unknowns
         """
         selected: list[int] = []
         for _ in range(sun_count):
             remaining = [k for k in range(len(self.point.suns)) if k not in selected]
-            selected.append(min(remaining, key=lambda k: self._squared_residual(logs, [*selected, k])))
+            selected.append(min(remaining, key=lambda k: self._squared_residual(log_skin, [*selected, k])))
         return selected
 
-    def _squared_residual(self, logs: Floats, suns: list[int]) -> float:
+    def _squared_residual(self, log_skin: Floats, sun_indices: list[int]) -> float:
         """Return the squared residual of the best light strengths for a skin and a set of suns.
 
         Diffuse radiance is scaled by the skin's colour, specular radiance by its specular strength.
 
-        logs : (4,) logarithms of the skin unknowns
-        suns : indices of the candidate suns
+        log_skin : (4,) logarithms of the skin unknowns
+        sun_indices : indices of the candidate suns
         """
-        lights = np.array([*range(BASIS_SIZE), *(BASIS_SIZE + k for k in suns)])
-        n, strength = self._lights, float(np.exp(logs[3] - self.point.logs[3]))
-        ratio = self._skin_colour(logs) / self._skin_colour(self.point.logs)
+        lights = np.array([*range(AMBIENT_LOBE_COUNT), *(AMBIENT_LOBE_COUNT + k for k in sun_indices)])
+        n, strength = self._lights, float(np.exp(log_skin[3] - self.point.logs[3]))
+        ratio = self._skin_colour(log_skin) / self._skin_colour(self.point.logs)
         gram, right = np.zeros((len(lights),) * 2), np.zeros(len(lights))
         for c in range(3):
             G, r, s = self._grams[c], self._rights[c], ratio[c]
@@ -175,8 +186,8 @@ class InitialGuess:
             right += s * r[lights] + strength * r[n + lights]
         return squared_residual(gram, right, self._total, solve_normal_equations(gram, right))
 
-    def _skin_colour(self, logs: Floats) -> Floats:
-        melanin, blood = np.exp(logs[:1]), np.exp(logs[1:2])
+    def _skin_colour(self, log_skin: Floats) -> Floats:
+        melanin, blood = np.exp(log_skin[:1]), np.exp(log_skin[1:2])
         return np.asarray(self._table.lookup(melanin, blood)[0], np.float64)
 
 
@@ -304,16 +315,17 @@ def _assumed_sd(subject: FitSubject, point: FitPoint) -> dict[str, float]:
     return unknown_skin_sd(values["melanin"], values["blood"], skin, subject.known)
 
 
-def note_residual(photo: object, residual: float) -> None:
+def note_residual(photo_source: object, residual: float) -> None:
     """Issue a note if the residual of a fit is so large that the picture does not show the head.
 
-    photo : name of the photograph, for the note
+    photo_source : name of the photograph, for the note
     residual : median relative residual of blocks of the picture [-]
     """
     if residual > _MAX_BLOCK_RESIDUAL:
         notify(
-            f"{photo}: the fit differs from it by {100 * residual:.0f} % (median of blocks); 1 % is usual, "
-            "up to 10 % for the shape of another person. It probably does not show the head in this place, "
+            f"{photo_source}: the fit differs from it by {100 * residual:.0f} % (median of blocks); "
+            "1 % is usual, up to 10 % for the shape of another person. It probably does not show the head in "
+            "this place, "
             "and the results mean nothing: check the camera and that it is upright, or use landmarks"
         )
 
@@ -325,7 +337,7 @@ def _find_skin(frames: FaceRenderer, photo: Photograph) -> FitPoint:
     candidate = prior_point(candidate_suns(view_direction / np.linalg.norm(view_direction)))
     frames.find_mask(candidate, photo.unclipped)
     frames.mask &= photo.linear.max(axis=2) > 0.0
-    if frames.mask.sum() < _MIN_PIXELS:
+    if frames.mask.sum() < _MIN_SKIN_PIXELS:
         actual = f"only {int(frames.mask.sum())} of its pixels are neither clipped nor black"
         refuse(
             "photo", "skin at the head's position", actual, "Check camera and exposure, or take a larger side"
@@ -333,30 +345,30 @@ def _find_skin(frames: FaceRenderer, photo: Photograph) -> FitPoint:
     return candidate
 
 
-def _initial_points(problem: FitProblem, candidate: FitPoint, suns: int) -> list[FitPoint]:
+def _initial_points(problem: FitProblem, candidate: FitPoint, sun_count: int) -> list[FitPoint]:
     """Return the points at which fits start: local minima of a coarse search, with suns of a finer one."""
     frames, target, weight = problem.frames, problem.target, problem.initial_weights()
     coarse = InitialGuess(frames, candidate, target, weight)
-    best = coarse.best(suns)
+    best = coarse.best(sun_count)
     starts = []
     for melanin in coarse.minima(best):
-        start = coarse.best(suns, melanin)
-        if suns:
+        start = coarse.best(sun_count, melanin)
+        if sun_count:
             nearer = replace(start, suns=neighbouring_suns(start.suns))
-            start = InitialGuess(frames, nearer, target, weight).best(suns, melanin)
+            start = InitialGuess(frames, nearer, target, weight).best(sun_count, melanin)
         starts.append(start)
     return starts
 
 
-def _checked_white(white: WhitePoint) -> Floats:
+def _checked_white(white_point: WhitePoint) -> Floats:
     """Return the user's colour of the light (3,), scaled so that green is 1.
 
     For "specular" it is (1, 1, 1).
     """
-    if isinstance(white, str):
-        if white != "specular":
-            actual = f"got {format_value(white)}"
+    if isinstance(white_point, str):
+        if white_point != "specular":
+            actual = f"got {format_value(white_point)}"
             refuse("white", '"specular" or red, green and blue', actual, "Write white=(1, 1, 1)")
         return np.ones(3)
-    colour = checked_array("white", white, (3,), 0.01, 100.0)
+    colour = checked_array("white", white_point, (3,), 0.01, 100.0)
     return np.asarray(colour / colour[1], np.float64)

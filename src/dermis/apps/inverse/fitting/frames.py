@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.inverse.fitting.light_basis import BASIS_SIZE, panorama
+from dermis.apps.inverse.fitting.light_basis import AMBIENT_LOBE_COUNT, panorama
 from dermis.apps.inverse.fitting.unknowns import FitPoint, sun_lights, with_skin
 from dermis.base.atomic_write import atomic_file
 from dermis.frame.rendered_frame import RenderedFrame
@@ -46,10 +46,10 @@ class FaceRenderer:
     mask: Mask = field(init=False)
     frame_count: int = 0
 
-    def find_mask(self, point: FitPoint, unclipped: Floats) -> None:
+    def find_mask(self, point: FitPoint, unclipped_pixels: Floats) -> None:
         """Set the mask to the skin pixels (h, w) that are neither clipped nor seen at grazing angles.
 
-        unclipped : (h, w) fraction of each pixel of the photograph in which no channel is clipped
+        unclipped_pixels : (h, w) fraction of each pixel of the photograph in which no channel is clipped
         """
         scene = with_skin(self._with_lights(()), point)
         scene = replace(scene, lights=sun_lights(np.array([[0.0, 0.0, 1.0]]), [1.0], np.ones(3)))
@@ -57,7 +57,7 @@ class FaceRenderer:
         label, alpha = rendered.output("label"), rendered.output("alpha")
         view_cosine = np.abs(rendered.output("normal_camera")[..., 2])
         skin = np.isin(label, _SKIN_LABELS) & (alpha > _FULL_COVERAGE) & (view_cosine > _MIN_VIEW_COSINE)
-        self.mask = _erode(skin) & (unclipped > _FULL_COVERAGE)
+        self.mask = _erode(skin) & (unclipped_pixels > _FULL_COVERAGE)
 
     def basis(self, point: FitPoint) -> Floats:
         """Render the face under each light alone; return the radiance (9 + k, p, 3) of the p masked pixels.
@@ -77,24 +77,24 @@ class FaceRenderer:
         both = np.asarray(scenes, np.float64)
         return both[:, 0], both[:, 1]
 
-    def combined(self, point: FitPoint, strengths: Floats, name: str) -> Floats:
+    def combined(self, point: FitPoint, light_strengths: Floats, frame_name: str) -> Floats:
         """Render the face under all lights together; return the radiance (p, 3) of the masked pixels.
 
-        strengths : (9 + k,) strengths of ambient lobes and suns
-        name : file name of the ambient light's panorama, without suffix
+        light_strengths : (9 + k,) strengths of ambient lobes and suns
+        frame_name : file name of the ambient light's panorama, without suffix
         """
-        return self._masked_radiance(self.lit_scene(point, strengths, name), "together")
+        return self._masked_radiance(self.lit_scene(point, light_strengths, frame_name), "together")
 
-    def lit_scene(self, point: FitPoint, strengths: Floats, name: str = "light") -> Scene:
+    def lit_scene(self, point: FitPoint, light_strengths: Floats, panorama_name: str = "light") -> Scene:
         """Return the scene with the skin of `point` and all lights, and write the ambient light's panorama.
 
-        strengths : (9 + k,) strengths of ambient lobes and suns
-        name : file name of the panorama in the folder, without suffix
+        light_strengths : (9 + k,) strengths of ambient lobes and suns
+        panorama_name : file name of the panorama in the folder, without suffix
         """
-        suns = sun_lights(point.suns, strengths[BASIS_SIZE:], np.ones(3))
-        radiance = panorama(strengths[:BASIS_SIZE])
+        suns = sun_lights(point.suns, light_strengths[AMBIENT_LOBE_COUNT:], np.ones(3))
+        radiance = panorama(light_strengths[:AMBIENT_LOBE_COUNT])
         lights = [one for one in suns if max(one.irradiance) > 0.0]
-        ambient = self._environment(name, radiance) if radiance.max() > 0.0 else None
+        ambient = self._environment(panorama_name, radiance) if radiance.max() > 0.0 else None
         return with_skin(replace(self._with_lights(lights), environment=ambient), point)
 
     def picture(self, scene: Scene) -> Floats:
@@ -105,17 +105,17 @@ class FaceRenderer:
         """Return a scene for each light alone, with the name under which the renderer caches its frame."""
         base = with_skin(self._with_lights(()), point)
         scenes = []
-        for k in range(BASIS_SIZE):
+        for k in range(AMBIENT_LOBE_COUNT):
             path = self.folder / f"lobe_{k}.exr"
             existing = Environment(name=str(path)) if path.exists() else None
-            ambient = existing or self._environment(path.stem, panorama(np.eye(BASIS_SIZE)[k]))
+            ambient = existing or self._environment(path.stem, panorama(np.eye(AMBIENT_LOBE_COUNT)[k]))
             scenes.append((replace(base, environment=ambient), f"lobe {k}"))
         for k, sun in enumerate(sun_lights(point.suns, np.ones(len(point.suns)), np.ones(3))):
             scenes.append((replace(base, lights=(sun,)), f"sun {k}"))
         return scenes
 
-    def _environment(self, name: str, radiance: Floats) -> Environment:
-        path = self.folder / f"{name}.exr"
+    def _environment(self, panorama_name: str, radiance: Floats) -> Environment:
+        path = self.folder / f"{panorama_name}.exr"
         with atomic_file(path) as file:
             file.write_bytes(encode_exr(np.repeat(radiance[..., None], 3, axis=2).astype(np.float32)))
         return Environment(name=str(path))
@@ -123,12 +123,12 @@ class FaceRenderer:
     def _with_lights(self, lights: Sequence[object]) -> Scene:
         return replace(self.scene, lights=tuple(lights), environment=None)  # type: ignore[arg-type]
 
-    def _masked_radiance(self, scene: Scene, view: str) -> Floats:
-        return np.asarray(self._draw(scene, view).linear()[self.mask], np.float64)
+    def _masked_radiance(self, scene: Scene, view_name: str) -> Floats:
+        return np.asarray(self._draw(scene, view_name).linear()[self.mask], np.float64)
 
-    def _draw(self, scene: Scene, view: str, outputs: tuple[str, ...] = ()) -> RenderedFrame:
+    def _draw(self, scene: Scene, view_name: str, outputs: tuple[str, ...] = ()) -> RenderedFrame:
         self.frame_count += 1
-        return self.renderer.draw(scene, self.settings, timed=False, view=view, outputs=outputs)
+        return self.renderer.draw(scene, self.settings, timed=False, view=view_name, outputs=outputs)
 
 
 def _erode(mask: Mask) -> Mask:

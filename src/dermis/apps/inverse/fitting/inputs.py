@@ -25,8 +25,8 @@ from dermis.scene.heads import is_person_name, load_person
 from dermis.scene.model import Scene
 from dermis.scene.skin import Pigments, Skin
 
-_CLIP_LEVEL = 0.985  # fraction of the largest level from which a channel counts as clipped
-_MIN_SIDE = 16
+_CLIPPED_LEVEL_FRACTION = 0.985  # fraction of the largest level from which a channel counts as clipped
+_MIN_PHOTO_SIDE = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,12 +45,12 @@ class Photograph:
         """Return the width and height of the photograph [pixel]."""
         return self.linear.shape[1], self.linear.shape[0]
 
-    def within(self, side: int) -> Photograph:
-        """Return the photograph reduced by area averaging to a longer side of at most `side` pixels."""
+    def within(self, max_side: int) -> Photograph:
+        """Return the photograph reduced by area averaging to a longer side of at most `max_side` pixels."""
         width, height = self.size
-        if max(width, height) <= side:
+        if max(width, height) <= max_side:
             return self
-        scale = side / max(width, height)
+        scale = max_side / max(width, height)
         size = max(1, round(width * scale)), max(1, round(height * scale))
         unclipped = _area_average(self.unclipped[..., None], size)[..., 0]
         return Photograph(_area_average(self.linear, size), unclipped)
@@ -71,8 +71,8 @@ def read_photograph(source: str | Path | EmbeddedPicture | ArrayLike) -> Photogr
         image, space = read_colours(source, upright=True)
     else:
         image = np.asarray(source)
-    if image.ndim != 3 or image.shape[2] not in (1, 3, 4) or min(image.shape[:2]) < _MIN_SIDE:
-        expected = f"a picture (h, w, 3) of at least {_MIN_SIDE} pixels a side"
+    if image.ndim != 3 or image.shape[2] not in (1, 3, 4) or min(image.shape[:2]) < _MIN_PHOTO_SIDE:
+        expected = f"a picture (h, w, 3) of at least {_MIN_PHOTO_SIDE} pixels a side"
         refuse(name, expected, f"got shape {image.shape}", "Save it as RGB")
     if image.dtype.kind != "f" and image.dtype not in (np.uint8, np.uint16):
         refuse(name, "sRGB bytes or linear floats", f"got {image.dtype}", "Convert it")
@@ -86,24 +86,24 @@ def read_photograph(source: str | Path | EmbeddedPicture | ArrayLike) -> Photogr
     if is_linear:
         colours = repaired_radiance(name, np.asarray(colours, np.float32))
     else:
-        usable &= colours.max(axis=2) < _CLIP_LEVEL * full
+        usable &= colours.max(axis=2) < _CLIPPED_LEVEL_FRACTION * full
     return Photograph(space.linear(colours).astype(np.float64), usable.astype(np.float64))
 
 
-def _area_average(image: Floats, size: tuple[int, int]) -> Floats:
+def _area_average(picture: Floats, new_size: tuple[int, int]) -> Floats:
     """Downsample a picture (h, w, c): each pixel of the result is the mean over the area that it covers.
 
-    size : width and height of the result [pixel]
+    new_size : width and height of the result [pixel]
     """
-    for axis, count in ((0, size[1]), (1, size[0])):
-        sums = np.cumsum(image, axis=axis)
+    for axis, count in ((0, new_size[1]), (1, new_size[0])):
+        sums = np.cumsum(picture, axis=axis)
         sums = np.concatenate([np.zeros_like(np.take(sums, [0], axis)), sums], axis=axis)
-        edges = np.linspace(0.0, image.shape[axis], count + 1)
-        index = np.minimum(edges.astype(int), image.shape[axis] - 1)
+        edges = np.linspace(0.0, picture.shape[axis], count + 1)
+        index = np.minimum(edges.astype(int), picture.shape[axis] - 1)
         fraction = (edges - index).reshape([-1 if k == axis else 1 for k in range(3)])
-        cumulative = np.take(sums, index, axis) + fraction * np.take(image, index, axis)
-        image = np.diff(cumulative, axis=axis) * (count / image.shape[axis])
-    return image
+        cumulative = np.take(sums, index, axis) + fraction * np.take(picture, index, axis)
+        picture = np.diff(cumulative, axis=axis) * (count / picture.shape[axis])
+    return picture
 
 
 _POSITION_TOLERANCE_MM = 0.01
@@ -125,23 +125,23 @@ class FitSubject:
     known: tuple[str, ...] = ()
 
 
-def fit_subject(source: object, camera: object = None) -> FitSubject:
+def fit_subject(head_or_scene: object, camera: object = None) -> FitSubject:
     """Return the head, camera and pose to fit, from a scene, a head or a person.
 
-    source : a scene or its file (.toml), a head or anything that `load_head` accepts, or a `Human`
+    head_or_scene : a scene or its file (.toml), a head or anything that `load_head` accepts, or a `Human`
     camera : a camera, the name of a preset or a file; None for the scene's own
 
     Raises DermisError for sources and cameras of other types.
     """
     table: Mapping[str, object] = {}
-    if isinstance(source, str | os.PathLike) and Path(source).suffix.lower() == ".toml":
-        table = head_table(Path(source))
-        scene = load_scene(Path(source))[0]
+    if isinstance(head_or_scene, str | os.PathLike) and Path(head_or_scene).suffix.lower() == ".toml":
+        table = head_table(Path(head_or_scene))
+        scene = load_scene(Path(head_or_scene))[0]
     else:
-        scene = source if isinstance(source, Scene) else Scene(as_head(source))
+        scene = head_or_scene if isinstance(head_or_scene, Scene) else Scene(as_head(head_or_scene))
     if camera is not None:
         scene = replace(scene, camera=_as_camera(camera, scene.head))  # type: ignore[arg-type]
-    person = source if isinstance(source, Human) else _painted_person(scene.head)
+    person = head_or_scene if isinstance(head_or_scene, Human) else _painted_person(scene.head)
     name = scene.head.name
     if not table and (person is not None or not is_person_name(name)):
         table = {"name": str(Path(name).resolve()) if Path(name).is_file() else name}
@@ -149,13 +149,13 @@ def fit_subject(source: object, camera: object = None) -> FitSubject:
     return FitSubject(_without_light(scene), person, table, known)
 
 
-def _as_camera(source: object, head: Head) -> Camera | Callable[[Head], Camera]:
-    if isinstance(source, str | os.PathLike):
-        return load_camera(str(source), head)
-    if not (isinstance(source, Camera) or callable(source)):
-        actual = f"got {format_value(source)}"
+def _as_camera(camera_source: object, head: Head) -> Camera | Callable[[Head], Camera]:
+    if isinstance(camera_source, str | os.PathLike):
+        return load_camera(str(camera_source), head)
+    if not (isinstance(camera_source, Camera) or callable(camera_source)):
+        actual = f"got {format_value(camera_source)}"
         refuse("camera", "a camera, a preset or a file", actual, 'Write camera="portrait", or camera.toml')
-    return source
+    return camera_source
 
 
 def _painted_person(head: Head) -> Human | None:

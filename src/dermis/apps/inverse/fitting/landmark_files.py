@@ -17,8 +17,10 @@ from dermis.base.tables import column_separator, plain_key
 from dermis.human.landmarks.sets import LANDMARK_SETS
 from dermis.optics.media import Floats
 
-_EXPECTED = "landmarks as a table of name,x,y or x,y, iBUG's .pts, or JSON of MediaPipe or dermis render"
-_SETS: Mapping[int, tuple[str, range]] = {
+_EXPECTED_FILE_FORMATS = (
+    "landmarks as a table of name,x,y or x,y, iBUG's .pts, or JSON of MediaPipe or dermis render"
+)
+_SETS_BY_LANDMARK_COUNT: Mapping[int, tuple[str, range]] = {
     51: ("ibug-68", range(17, 68)),
     68: ("ibug-68", range(68)),
     70: ("face-synthetics-70", range(70)),
@@ -27,18 +29,18 @@ _SETS: Mapping[int, tuple[str, range]] = {
 }
 """By the number of landmarks in a file: the name of the landmark set, and the numbers of the landmarks in
 that set, in the order of the file."""
-_FIVE_OF_DETECTORS = ("face-synthetics-70", (68, 69, 30, 48, 54))
+_DETECTOR_FIVE_LANDMARKS = ("face-synthetics-70", (68, 69, 30, 48, 54))
 """Landmark set and numbers of the five landmarks of face detectors: the eyes, the tip of the nose and the
 corners of the mouth; eyes and corners from left to right in the picture."""
-_FIVE_OF_DLIB = ("ibug-68", (45, 42, 36, 39, 33))
+_DLIB_FIVE_LANDMARKS = ("ibug-68", (45, 42, 36, 39, 33))
 """Landmark set and numbers of the five landmarks of dlib: outer and inner corner of the eye on the right of
 the picture, outer and inner corner of the other eye, and base of the nose."""
-_MAX_EYE_LINE = 0.2  # largest distance of dlib's eye corners from a line, relative to their spread
-_KNOWN_COUNTS = ", ".join(map(str, (5, *_SETS)))
-_LIST_KEYS = ("facelandmarks", "multifacelandmarks", "landmarks", "landmark", "value")
+_MAX_EYE_LINE_DEVIATION = 0.2  # largest distance of dlib's eye corners from a line, relative to their spread
+_KNOWN_LANDMARK_COUNTS = ", ".join(map(str, (5, *_SETS_BY_LANDMARK_COUNT)))
+_JSON_LIST_KEYS = ("facelandmarks", "multifacelandmarks", "landmarks", "landmark", "value")
 _NAME_COLUMNS = ("name", "landmark", "index", "id", "point", "number", "")
 _PTS_LINE = re.compile(r"(version|n_points)\s*:\s*(\S+)", re.IGNORECASE)
-_MAX_RELATIVE = 2.0  # largest coordinate that is taken as relative to the size of the photograph
+_MAX_RELATIVE_COORDINATE = 2.0  # largest coordinate that is taken as relative to the size of the photograph
 
 
 class _Points(NamedTuple):
@@ -54,25 +56,25 @@ class _Points(NamedTuple):
     set_name: str | None = None
 
 
-def read_landmarks(path: str | Path, size: tuple[int, int]) -> tuple[str, dict[str, Floats]]:
+def read_landmarks(path: str | Path, photo_size: tuple[int, int]) -> tuple[str, dict[str, Floats]]:
     """Read landmarks in a photograph; return the name of the landmark set, and each landmark's pixel (2,).
 
     Pixel coordinates are 0 at the centre of the first pixel; in .pts files they are 1 there.
 
-    size : width and height of the photograph, by which relative coordinates are multiplied [pixel]
+    photo_size : width and height of the photograph, by which relative coordinates are multiplied [pixel]
 
     Raises DermisError for files without landmarks, for unknown sets, and for landmarks of another picture.
     """
-    text = read_text(path, _EXPECTED)
+    text = read_text(path, _EXPECTED_FILE_FORMATS)
     lines = [line.strip() for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
-    with parsing(path, _EXPECTED, KeyError, TypeError, IndexError, AttributeError, csv.Error):
+    with parsing(path, _EXPECTED_FILE_FORMATS, KeyError, TypeError, IndexError, AttributeError, csv.Error):
         if re.match(r'\s*(\[|\{\s*["}])', text):
-            points = _from_json(path, parse_json(text, path, _EXPECTED), size)
+            points = _from_json(path, parse_json(text, path, _EXPECTED_FILE_FORMATS), photo_size)
         elif any(_PTS_LINE.fullmatch(line) for line in lines[:3]) or "{" in lines[:3]:
             points = _from_pts(path, lines)
         else:
-            points = _from_table(path, lines, size)
-    name, names = _identify(path, points)
+            points = _from_table(path, lines, photo_size)
+    name, names = _identify_landmarks(path, points)
     found = np.asarray(np.isfinite(points.pixels).all(axis=1))
     if not found.all():
         notify(f"{path}: {len(found) - found.sum()} of {len(found)} landmarks have no position")
@@ -80,27 +82,31 @@ def read_landmarks(path: str | Path, size: tuple[int, int]) -> tuple[str, dict[s
     if len(pixels) < 5:
         refuse(path, "at least 5 landmarks with positions", f"got {len(pixels)}", "Correct the file")
     middle = np.median(list(pixels.values()), axis=0)
-    if not ((middle >= 0) & (middle < size)).all():
+    if not ((middle >= 0) & (middle < photo_size)).all():
         actual = f"their middle is at {middle[0]:.0f}, {middle[1]:.0f}"
-        expected = f"landmarks in the photograph, of {size[0]} x {size[1]} pixels"
+        expected = f"landmarks in the photograph, of {photo_size[0]} x {photo_size[1]} pixels"
         refuse(path, expected, actual, "Use the landmarks of this photograph at this size")
     return name, pixels
 
 
-def _identify(path: str | Path, points: _Points) -> tuple[str, Sequence[str]]:
+def _identify_landmarks(path: str | Path, file_landmarks: _Points) -> tuple[str, Sequence[str]]:
     """Return the name of the landmark set of a file, and the names of its landmarks in the set."""
-    count, names = len(points.pixels), points.names
-    if points.set_name is not None:
-        if points.set_name not in LANDMARK_SETS:
+    count, names = len(file_landmarks.pixels), file_landmarks.names
+    if file_landmarks.set_name is not None:
+        if file_landmarks.set_name not in LANDMARK_SETS:
             expected = f"landmarks of a known set ({', '.join(LANDMARK_SETS)})"
-            refuse(path, expected, f"got {points.set_name!r}", "Give one of these")
-        return points.set_name, names or ()
-    if count != 5 and count not in _SETS:
-        expected = f"as many landmarks as a known set ({_KNOWN_COUNTS}), or JSON that names the set"
+            refuse(path, expected, f"got {file_landmarks.set_name!r}", "Give one of these")
+        return file_landmarks.set_name, names or ()
+    if count != 5 and count not in _SETS_BY_LANDMARK_COUNT:
+        expected = f"as many landmarks as a known set ({_KNOWN_LANDMARK_COUNTS}), or JSON that names the set"
         refuse(path, expected, f"got {count}", "Give all landmarks of one of these sets")
     if count == 5:
         notify(f"{path}: five landmarks place the camera, but say little about the shape of the face")
-    set_name, numbers = _SETS[count] if count in _SETS else _identify_five(points.pixels)
+    set_name, numbers = (
+        _SETS_BY_LANDMARK_COUNT[count]
+        if count in _SETS_BY_LANDMARK_COUNT
+        else _identify_five_landmarks(file_landmarks.pixels)
+    )
     known = [str(number) for number in numbers]
     if names is None or (count > 5 and set(names) == set(known)):
         return set_name, names or known
@@ -114,17 +120,17 @@ def _identify(path: str | Path, points: _Points) -> tuple[str, Sequence[str]]:
     return set_name, [known[int(name) - start] for name in names]
 
 
-def _identify_five(pixels: Floats) -> tuple[str, Sequence[int]]:
-    """Return the name of the set of five landmarks, and their numbers in it, found from their arrangement.
+def _identify_five_landmarks(pixels: Floats) -> tuple[str, Sequence[int]]:
+    """Return the landmark set to which five points belong by their arrangement, and the landmark numbers.
 
     They are those of dlib if the first four are on a line, as the corners of the eyes are. Left and right are
     exchanged if the file starts with the other side.
     """
     spread = np.linalg.svd(pixels[:4] - pixels[:4].mean(axis=0), compute_uv=False)
-    is_dlib = bool(spread[1] < _MAX_EYE_LINE * spread[0])
+    is_dlib = bool(spread[1] < _MAX_EYE_LINE_DEVIATION * spread[0])
     right, down = pixels[0] - pixels[2] if is_dlib else pixels[1] - pixels[0], pixels[4] - pixels[0]
     is_mirrored = bool(right[0] * down[1] < right[1] * down[0])
-    name, numbers = _FIVE_OF_DLIB if is_dlib else _FIVE_OF_DETECTORS
+    name, numbers = _DLIB_FIVE_LANDMARKS if is_dlib else _DETECTOR_FIVE_LANDMARKS
     order = ((2, 3, 0, 1, 4) if is_dlib else (1, 0, 2, 4, 3)) if is_mirrored else range(5)
     return name, [numbers[k] for k in order]
 
@@ -139,17 +145,17 @@ def _from_pts(path: str | Path, lines: Sequence[str]) -> _Points:
     return _Points(pixels - 1.0)
 
 
-def _from_table(path: str | Path, lines: list[str], size: tuple[int, int]) -> _Points:
+def _from_table(path: str | Path, lines: list[str], photo_size: tuple[int, int]) -> _Points:
     """Return the landmarks of a table with commas, semicolons, tabs or spaces; a header is optional."""
     if not lines:
-        refuse(path, _EXPECTED, "it is empty", "Find the landmarks again")
+        refuse(path, _EXPECTED_FILE_FORMATS, "it is empty", "Find the landmarks again")
     has_separator = re.search("[,;\t]", lines[0]) is not None
     cells = (
         csv.reader(lines, delimiter=column_separator(lines[0])) if has_separator else map(str.split, lines)
     )
     rows = [[cell.strip() for cell in row] for row in cells]
     if not any(map(_is_number, rows[0][1:])):
-        return _from_named_columns(path, rows[0], rows[1:], size)
+        return _from_named_columns(path, rows[0], rows[1:], photo_size)
     if len(rows) == 1:  # all coordinates in one line
         rows = [rows[0][k : k + 2] for k in range(0, len(rows[0]), 2)]
     first = [row[0] for row in rows]
@@ -158,30 +164,34 @@ def _from_table(path: str | Path, lines: list[str], size: tuple[int, int]) -> _P
     if len(rows[0]) > start + 2:
         notify(f"{path}: of its {len(rows[0])} columns those from {start + 3} on are not used")
     pixels = np.array([[_parse_number(cell) for cell in row[start : start + 2]] for row in rows])
-    return _Points(_to_pixels(path, pixels, size), first if has_names else None)
+    return _Points(_to_pixels(path, pixels, photo_size), first if has_names else None)
 
 
 def _from_named_columns(
-    path: str | Path, header: Sequence[str], rows: list[list[str]], size: tuple[int, int]
+    path: str | Path, header: Sequence[str], table_rows: list[list[str]], photo_size: tuple[int, int]
 ) -> _Points:
     """Return the landmarks of a table with columns name, x, y or, as by OpenFace, x_0, y_0 and so on."""
     if "x_0" in header:
-        if len(rows) > 1:
-            notify(f"{path}: the first of its {len(rows)} rows is used")
+        if len(table_rows) > 1:
+            notify(f"{path}: the first of its {len(table_rows)} rows is used")
         count = sum(re.fullmatch(r"x_\d+", name) is not None for name in header)
         columns = [[header.index(f"{axis}_{k}") for axis in "xy"] for k in range(count)]
-        pixels = np.array([[_parse_number(rows[0][column]) for column in pair] for pair in columns])
-        return _Points(_to_pixels(path, pixels, size))
+        pixels = np.array([[_parse_number(table_rows[0][column]) for column in pair] for pair in columns])
+        return _Points(_to_pixels(path, pixels, photo_size))
     keys = [plain_key(name) for name in header]
     if not {"x", "y"} <= set(keys):
-        refuse(path, _EXPECTED, f"its columns are {', '.join(header)}", "Name two columns x and y")
+        refuse(
+            path, _EXPECTED_FILE_FORMATS, f"its columns are {', '.join(header)}", "Name two columns x and y"
+        )
     x, y = keys.index("x"), keys.index("y")
     name = next((keys.index(key) for key in _NAME_COLUMNS if key in keys), None)
     unused = [header[k] for k in range(len(header)) if k not in (x, y, name)]
     if unused:
         notify(f"{path}: its columns {', '.join(unused)} are not used")
-    pixels = np.array([[_parse_number(row[x]), _parse_number(row[y])] for row in rows])
-    return _Points(_to_pixels(path, pixels, size), None if name is None else [row[name] for row in rows])
+    pixels = np.array([[_parse_number(row[x]), _parse_number(row[y])] for row in table_rows])
+    return _Points(
+        _to_pixels(path, pixels, photo_size), None if name is None else [row[name] for row in table_rows]
+    )
 
 
 def _is_number(cell: str) -> bool:
@@ -200,40 +210,50 @@ def _parse_number(cell: str) -> float:
     return float(cell.replace(",", ".") or "nan")
 
 
-def _to_pixels(path: str | Path, points: Floats, size: tuple[int, int]) -> Floats:
+def _to_pixels(path: str | Path, coordinates: Floats, photo_size: tuple[int, int]) -> Floats:
     """Return coordinates (n, 2) in pixels; convert coordinates relative to the photograph, with a note."""
-    if points.ndim != 2 or not np.nanmax(np.abs(points), initial=0.0) <= _MAX_RELATIVE:
-        return points
+    if coordinates.ndim != 2 or not np.nanmax(np.abs(coordinates), initial=0.0) <= _MAX_RELATIVE_COORDINATE:
+        return coordinates
     notify(f"{path}: its coordinates are taken as relative to the size of the photograph")
-    return np.asarray(points * size - 0.5)
+    return np.asarray(coordinates * photo_size - 0.5)
 
 
-def _from_json(path: str | Path, data: Any, size: tuple[int, int]) -> _Points:
+def _from_json(path: str | Path, json_value: Any, photo_size: tuple[int, int]) -> _Points:
     """Return the landmarks of JSON written by `dermis render --landmarks` or by an API of MediaPipe."""
-    if isinstance(data, Mapping) and isinstance(data.get("landmarks"), Mapping) and data["landmarks"]:
-        name, rows = next(iter(data["landmarks"].items()))
+    if (
+        isinstance(json_value, Mapping)
+        and isinstance(json_value.get("landmarks"), Mapping)
+        and json_value["landmarks"]
+    ):
+        name, rows = next(iter(json_value["landmarks"].items()))
         pixels = np.array([row["pixel"] for row in rows], np.float64)
         return _Points(pixels, [str(row["name"]) for row in rows], name)
-    while not (isinstance(data, list) and data and _is_point(data[0])):
-        fields = {plain_key(key): value for key, value in data.items()} if isinstance(data, Mapping) else {}
-        key = next((key for key in _LIST_KEYS if key in fields), None)
+    while not (isinstance(json_value, list) and json_value and _is_point(json_value[0])):
+        fields = (
+            {plain_key(key): value for key, value in json_value.items()}
+            if isinstance(json_value, Mapping)
+            else {}
+        )
+        key = next((key for key in _JSON_LIST_KEYS if key in fields), None)
         if key is not None:
-            data = fields[key]
-        elif isinstance(data, list) and data:
-            if len(data) > 1:
-                notify(f"{path}: the first of its {len(data)} faces is used")
-            data = data[0]
+            json_value = fields[key]
+        elif isinstance(json_value, list) and json_value:
+            if len(json_value) > 1:
+                notify(f"{path}: the first of its {len(json_value)} faces is used")
+            json_value = json_value[0]
         else:
-            refuse(path, _EXPECTED, "no face was found in it", "Find the landmarks again")
-    if isinstance(data[0], list):
-        return _Points(_to_pixels(path, np.array([point[:2] for point in data], np.float64), size))
-    points = np.array([[point["x"], point["y"]] for point in data], np.float64)
-    is_relative = np.abs(points).max() <= _MAX_RELATIVE
-    return _Points(points * size - 0.5 if is_relative else points)
+            refuse(path, _EXPECTED_FILE_FORMATS, "no face was found in it", "Find the landmarks again")
+    if isinstance(json_value[0], list):
+        return _Points(
+            _to_pixels(path, np.array([point[:2] for point in json_value], np.float64), photo_size)
+        )
+    points = np.array([[point["x"], point["y"]] for point in json_value], np.float64)
+    is_relative = np.abs(points).max() <= _MAX_RELATIVE_COORDINATE
+    return _Points(points * photo_size - 0.5 if is_relative else points)
 
 
-def _is_point(value: object) -> bool:
+def _is_point(json_value: object) -> bool:
     """Return whether a value is a point: an object with x and y, or a list of numbers."""
-    if isinstance(value, list):
-        return len(value) in (2, 3) and all(type(number) in (int, float) for number in value)
-    return isinstance(value, Mapping) and "x" in value and "y" in value
+    if isinstance(json_value, list):
+        return len(json_value) in (2, 3) and all(type(number) in (int, float) for number in json_value)
+    return isinstance(json_value, Mapping) and "x" in json_value and "y" in json_value

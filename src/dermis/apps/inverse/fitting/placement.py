@@ -19,40 +19,40 @@ from dermis.mesh.head import Head
 from dermis.optics.media import Floats
 from dermis.scene.camera import Camera
 
-_LANDMARK_NOISE = 0.004
+_LANDMARK_SD_FRACTION = 0.004
 """Standard deviation of a landmark's position, relative to the height of the photograph [-]."""
-_FOCAL_SD = 0.3
+_LOG_FOCAL_SD = 0.3
 """Prior standard deviation of the logarithm of the focal length; the prior mean is that of a portrait."""
-_MACRO_NAMES = ("african", "asian", "caucasian", "sex", "age", "weight", "muscle")
-_MACRO_SD = 0.3
-_TARGET_SD = 0.15
-_TARGET_FOLDERS = ("head/", "forehead/", "eyes/", "nose/", "mouth/", "cheek/", "chin/")
-_TARGET_SUFFIXES = ("-incr", "-up", "-out", "-forward", "-convex")
-_ITERATIONS = 2
+_MACRO_PARAMETERS = ("african", "asian", "caucasian", "sex", "age", "weight", "muscle")
+_MACRO_PARAMETER_SD = 0.3
+_SHAPE_TARGET_SD = 0.15
+_SHAPE_TARGET_FOLDERS = ("head/", "forehead/", "eyes/", "nose/", "mouth/", "cheek/", "chin/")
+_SHAPE_TARGET_SUFFIXES = ("-incr", "-up", "-out", "-forward", "-convex")
+_LINEARISATION_COUNT = 2
 _IDENTITY_STEP = 0.2  # step of finite differences, in standard deviations of the prior
 _PORTRAIT_DISTANCE_MM = 1100.0
 _PORTRAIT_HEIGHT_MM = 300.0
 
 
-def align_to_landmarks(subject: FitSubject, landmarks: str | Path, size: tuple[int, int]) -> FitSubject:
+def align_to_landmarks(subject: FitSubject, landmarks: str | Path, photo_size: tuple[int, int]) -> FitSubject:
     """Fit the camera, and the identity of a human, to landmarks in a photograph; return the changed subject.
 
     For a human, ancestry, sex, age, weight, muscle and details of the face are unknowns, with priors centred
     on the given person. Other heads keep their shape and need a file with landmarks of the head.
 
     landmarks : file with landmarks in the photograph
-    size : width and height of the photograph [pixel]
+    photo_size : width and height of the photograph [pixel]
 
     Raises DermisError for files without landmarks, and for heads without landmarks.
     """
-    name, pixels_by_name = read_landmarks(landmarks, size)
+    name, pixels_by_name = read_landmarks(landmarks, photo_size)
     person, head = subject.person, subject.scene.head
     model = _LandmarkModel.for_head(person, head, name, pixels_by_name)
     pixels = np.array([pixels_by_name[one] for one in model.names])
-    solution = np.concatenate([np.zeros(6), [_log_focal(size)], np.zeros(model.unknown_count)])
+    solution = np.concatenate([np.zeros(6), [_log_focal(photo_size)], np.zeros(model.unknown_count)])
     solution[:3], solution[5] = (np.pi, 0.0, 0.0), _PORTRAIT_DISTANCE_MM
-    for _ in range(_ITERATIONS if person else 1):
-        solution = _fit_camera_and_identity(model, pixels, size, solution)
+    for _ in range(_LINEARISATION_COUNT if person else 1):
+        solution = _fit_camera_and_identity(model, pixels, photo_size, solution)
         if person is not None:
             person = model.person(solution[7:])
             model = _LandmarkModel.for_head(person, head, name, pixels_by_name)
@@ -60,9 +60,9 @@ def align_to_landmarks(subject: FitSubject, landmarks: str | Path, size: tuple[i
     if person is not None:
         subject = fit_subject(person)
         solution = _fit_camera_and_identity(
-            replace(model, derivatives=model.derivatives[:0]), pixels, size, solution[:7]
+            replace(model, derivatives=model.derivatives[:0]), pixels, photo_size, solution[:7]
         )
-    return replace(subject, scene=replace(subject.scene, camera=_fitted_camera(solution, size)))
+    return replace(subject, scene=replace(subject.scene, camera=_fitted_camera(solution, photo_size)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,15 +85,15 @@ class _LandmarkModel:
 
     @classmethod
     def for_head(
-        cls, person: Human | None, head: Head, name: str, pixels_by_name: dict[str, Floats]
+        cls, person: Human | None, head: Head, set_name: str, pixels_by_name: dict[str, Floats]
     ) -> _LandmarkModel:
         """Return the model of a person, or of a head of fixed shape, for the landmarks in a photograph.
 
-        name : name of the landmark set
+        set_name : name of the landmark set
         pixels_by_name : pixel (2,) of each landmark
         """
         plain = head if person is None else replace(person, targets={}).head(subdivide=0)
-        points = landmark_points(plain, name)
+        points = landmark_points(plain, set_name)
         indices = np.array([k for k, one in enumerate(points.names) if one in pixels_by_name])
         names = tuple(points.names[k] for k in indices)
         if person is None:
@@ -102,16 +102,16 @@ class _LandmarkModel:
             )
             return cls(names, positions, np.zeros((0, *positions.shape)), None, ())
         centre = np.array(person.head(subdivide=0).centre_mm)
-        targets = (one for one in human_targets() if one.startswith(_TARGET_FOLDERS))
-        details = tuple(one for one in targets if one.endswith(_TARGET_SUFFIXES))
+        targets = (one for one in human_targets() if one.startswith(_SHAPE_TARGET_FOLDERS))
+        details = tuple(one for one in targets if one.endswith(_SHAPE_TARGET_SUFFIXES))
 
-        def person_landmarks(other: Human) -> Floats:
+        def person_landmarks(changed_person: Human) -> Floats:
             return np.asarray(
-                _landmark_positions(points, indices, other.positions_mm.astype(np.float64)) - centre
+                _landmark_positions(points, indices, changed_person.positions_mm.astype(np.float64)) - centre
             )
 
         model = cls(names, person_landmarks(person), np.zeros((0, 0, 3)), person, details)
-        unknowns = range(len(_MACRO_NAMES) + len(details))
+        unknowns = range(len(_MACRO_PARAMETERS) + len(details))
         return replace(
             model, derivatives=np.stack([_derivative(model, person_landmarks, k) for k in unknowns])
         )
@@ -132,40 +132,42 @@ class _LandmarkModel:
             name: float(
                 np.clip(getattr(self.prior, name) + _macro_prior_sd(name) * step, *_macro_limits(name))
             )
-            for name, step in zip(_MACRO_NAMES, identity, strict=False)
+            for name, step in zip(_MACRO_PARAMETERS, identity, strict=False)
         }
         targets = dict(self.prior.targets)
-        for name, step in zip(self.details, identity[len(_MACRO_NAMES) :], strict=True):
-            targets[name] = float(np.clip(targets.get(name, 0.0) + _TARGET_SD * step, -1.0, 1.0))
+        for name, step in zip(self.details, identity[len(_MACRO_PARAMETERS) :], strict=True):
+            targets[name] = float(np.clip(targets.get(name, 0.0) + _SHAPE_TARGET_SD * step, -1.0, 1.0))
         return replace(self.prior, **macro, targets=targets, skin=self.prior.look)
 
 
-def _derivative(model: _LandmarkModel, person_landmarks: Callable[[Human], Floats], k: int) -> Floats:
-    """Return the derivative (n, 3) of landmark positions by the k-th unknown of the identity.
+def _derivative(
+    model: _LandmarkModel, person_landmarks: Callable[[Human], Floats], unknown_index: int
+) -> Floats:
+    """Return the derivative (n, 3) of landmark positions by one unknown of the identity.
 
     The finite difference steps upwards, or downwards if the prior is at the upper limit of the unknown.
 
     person_landmarks : function that returns the landmark positions (n, 3) of a person [mm]
     """
     for step in _IDENTITY_STEP, -_IDENTITY_STEP:
-        identity = np.zeros(len(_MACRO_NAMES) + len(model.details))
-        identity[k] = step
+        identity = np.zeros(len(_MACRO_PARAMETERS) + len(model.details))
+        identity[unknown_index] = step
         change = person_landmarks(model.person(identity)) - model.positions
         if change.any():
             break
     return np.asarray(change / step)
 
 
-def _log_focal(size: tuple[int, int]) -> float:
+def _log_focal(photo_size: tuple[int, int]) -> float:
     """Return the logarithm of the focal length of a usual portrait [pixel], the mean of the prior.
 
-    size : width and height of the photograph [pixel]
+    photo_size : width and height of the photograph [pixel]
     """
-    return float(np.log(size[1] * _PORTRAIT_DISTANCE_MM / _PORTRAIT_HEIGHT_MM))
+    return float(np.log(photo_size[1] * _PORTRAIT_DISTANCE_MM / _PORTRAIT_HEIGHT_MM))
 
 
 def _macro_prior_sd(parameter: str) -> float:
-    return _MACRO_SD * (OLD_AGE - YOUNG_AGE if parameter == "age" else 1.0)
+    return _MACRO_PARAMETER_SD * (OLD_AGE - YOUNG_AGE if parameter == "age" else 1.0)
 
 
 def _macro_limits(parameter: str) -> tuple[float, float]:
@@ -174,46 +176,58 @@ def _macro_limits(parameter: str) -> tuple[float, float]:
     )
 
 
-def _landmark_positions(points: LandmarkPoints, indices: NDArray[np.int64], positions: Floats) -> Floats:
-    return np.asarray(np.einsum("nk,nkc->nc", points.weight[indices], positions[points.point[indices]]))
+def _landmark_positions(
+    landmark_points: LandmarkPoints, indices: NDArray[np.int64], positions: Floats
+) -> Floats:
+    return np.asarray(
+        np.einsum("nk,nkc->nc", landmark_points.weight[indices], positions[landmark_points.point[indices]])
+    )
 
 
 def _fit_camera_and_identity(
-    model: _LandmarkModel, pixels: Floats, size: tuple[int, int], start: Floats
+    model: _LandmarkModel, pixels: Floats, photo_size: tuple[int, int], start: Floats
 ) -> Floats:
     """Fit camera and identity to landmarks; return rotation, translation, log focal length and identity.
 
     pixels : (n, 2) landmarks in the photograph
-    size : width and height of the photograph [pixel]
+    photo_size : width and height of the photograph [pixel]
     start : (7 + u,) unknowns to start from, in the order of the result
     """
     from scipy.optimize import least_squares
 
-    prior_median = _log_focal(size)
+    prior_median = _log_focal(photo_size)
 
     def residuals(x: Floats) -> Floats:
         positions = model.positions + np.einsum("u,unc->nc", x[7:], model.derivatives)
-        error = (_project_landmarks(x, positions, size) - pixels) / (_LANDMARK_NOISE * size[1])
-        return np.concatenate([error.ravel(), [(x[6] - prior_median) / _FOCAL_SD], x[7:]])
+        error = (_project_landmarks(x, positions, photo_size) - pixels) / (
+            _LANDMARK_SD_FRACTION * photo_size[1]
+        )
+        return np.concatenate([error.ravel(), [(x[6] - prior_median) / _LOG_FOCAL_SD], x[7:]])
 
     scale = np.concatenate([np.full(3, 0.1), (10.0, 10.0, 100.0), [0.1], np.ones(model.unknown_count)])
     return np.asarray(least_squares(residuals, start, x_scale=scale, loss="soft_l1").x, np.float64)
 
 
-def _project_landmarks(x: Floats, positions: Floats, size: tuple[int, int]) -> Floats:
+def _project_landmarks(camera_unknowns: Floats, positions: Floats, photo_size: tuple[int, int]) -> Floats:
     """Project positions (n, 3) into the photograph; return pixels (n, 2).
 
-    x : (7 + u,) unknowns in the order of `_fit_camera_and_identity`, of which the camera's seven are used
+    camera_unknowns : (7 + u,) unknowns in the order of `_fit_camera_and_identity`, of which the camera's
+        seven are used
     """
     from scipy.spatial.transform import Rotation
 
-    camera_space = positions @ Rotation.from_rotvec(x[:3]).as_matrix().T + x[3:6]
-    return np.asarray(np.exp(x[6]) * camera_space[:, :2] / camera_space[:, 2:] + (np.array(size) - 1.0) / 2.0)
+    camera_space = positions @ Rotation.from_rotvec(camera_unknowns[:3]).as_matrix().T + camera_unknowns[3:6]
+    return np.asarray(
+        np.exp(camera_unknowns[6]) * camera_space[:, :2] / camera_space[:, 2:]
+        + (np.array(photo_size) - 1.0) / 2.0
+    )
 
 
-def _fitted_camera(x: Floats, size: tuple[int, int]) -> Camera:
+def _fitted_camera(camera_unknowns: Floats, photo_size: tuple[int, int]) -> Camera:
     from scipy.spatial.transform import Rotation
 
-    focal, (cx, cy) = float(np.exp(x[6])), (np.array(size) - 1.0) / 2.0
+    focal, (cx, cy) = float(np.exp(camera_unknowns[6])), (np.array(photo_size) - 1.0) / 2.0
     K = [[focal, 0.0, cx], [0.0, focal, cy], [0.0, 0.0, 1.0]]
-    return Camera.from_opencv(K, Rotation.from_rotvec(x[:3]).as_matrix(), x[3:6], size)
+    return Camera.from_opencv(
+        K, Rotation.from_rotvec(camera_unknowns[:3]).as_matrix(), camera_unknowns[3:6], photo_size
+    )

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.inverse.fitting.inputs import FitSubject
-from dermis.apps.inverse.fitting.light_basis import BASIS_SIZE, panorama
+from dermis.apps.inverse.fitting.light_basis import AMBIENT_LOBE_COUNT, panorama
 from dermis.apps.inverse.fitting.solve import Uncertainty
 from dermis.apps.inverse.fitting.unknowns import (
     SKIN_UNKNOWNS,
-    SUN_SD,
-    WHITE_SD,
+    SUN_PRIOR_SD,
+    WHITE_PRIOR_SD,
     FitPoint,
     sun_lights,
     with_skin,
@@ -80,7 +80,7 @@ class FitResult:
     @property
     def suns(self) -> list[tuple[Floats, float]]:
         """Return the unit vector towards each sun, and the sun's irradiance at normal incidence."""
-        return list(zip(self.point.suns, map(float, self.strengths[BASIS_SIZE:]), strict=True))
+        return list(zip(self.point.suns, map(float, self.strengths[AMBIENT_LOBE_COUNT:]), strict=True))
 
     def summary(self) -> dict[str, Any]:
         """Return the fitted unknowns with uncertainties and priors, as they are written to fit.json.
@@ -101,7 +101,7 @@ class FitResult:
         return {
             "skin": skin,
             "suns": suns,
-            "around": {"mean_radiance": float(panorama(self.strengths[:BASIS_SIZE]).mean())},
+            "around": {"mean_radiance": float(panorama(self.strengths[:AMBIENT_LOBE_COUNT]).mean())},
             "white": self.white.tolist(),
             "white_sd": [sd[name] for name in ("white red", "white blue") if name in sd],
             "exposure": self.exposure,
@@ -119,8 +119,8 @@ class FitResult:
         """Return sentences that describe the priors of the unknowns and the fixed parameters."""
         skin = self.subject.scene.skin.pigments
         assert skin is not None
-        sun = f"directions of suns: within {np.degrees(SUN_SD):.0f} degrees of the initial guess"
-        white = f"neutral within {100 * WHITE_SD:.0f} %"
+        sun = f"directions of suns: within {np.degrees(SUN_PRIOR_SD):.0f} degrees of the initial guess"
+        white = f"neutral within {100 * WHITE_PRIOR_SD:.0f} %"
         if "white red" not in self.uncertainty.sd:
             white = f"given, {', '.join(f'{one:.3g}' for one in self.white)}"
         assumed = [name for name in FIXED_PARAMETERS if name not in self.subject.known]
@@ -138,56 +138,59 @@ class FitResult:
         ]
 
 
-def save_fit(folder: Path, result: FitResult) -> list[Path]:
+def save_fit(folder: Path, fit_result: FitResult) -> list[Path]:
     """Write scene.toml with the files that it needs, fit.json, and pictures, each file atomically.
 
     Returns the paths of the written files.
 
     Raises DermisError when the disk is full, or the folder cannot be written to.
     """
-    person, table = result.subject.person, result.subject.table
+    person, table = fit_result.subject.person, fit_result.subject.table
     if person is None and not table:
         actual = "got a head without a name or file"
         refuse("head", "a Human or a head with a name, for scene.toml", actual, "Fit the Human itself")
     written = []
-    radiance = panorama(result.strengths[:BASIS_SIZE])
+    radiance = panorama(fit_result.strengths[:AMBIENT_LOBE_COUNT])
     if radiance.max() > 0.0:
         written.append(folder / "light.exr")
         with atomic_file(written[-1]) as file:
-            file.write_bytes(encode_exr((radiance[..., None] * result.white).astype(np.float32)))
+            file.write_bytes(encode_exr((radiance[..., None] * fit_result.white).astype(np.float32)))
     if person is not None:
         written.append(folder / "person.json")
-        look = replace(person.look, melanin=result.values["melanin"], blood=result.values["blood"])
+        look = replace(person.look, melanin=fit_result.values["melanin"], blood=fit_result.values["blood"])
         write_person_json(written[-1], replace(person, skin=look))
         table = {"name": "person.json"}
     written.append(folder / "scene.toml")
-    settings = Settings(size=result.size, exposure=result.exposure)
-    save_scene(written[-1], fitted_scene(result, folder), settings, table)
-    for name, image in result_pictures(result).items():
+    settings = Settings(size=fit_result.size, exposure=fit_result.exposure)
+    save_scene(written[-1], fitted_scene(fit_result, folder), settings, table)
+    for name, image in result_pictures(fit_result).items():
         written.append(folder / f"{name}.png")
         write_image(written[-1], image)
     written.append(folder / FIT_SUMMARY_FILE)
     with atomic_file(written[-1]) as file:
-        file.write_text(json.dumps(result.summary(), indent=2) + "\n", encoding="utf-8")
+        file.write_text(json.dumps(fit_result.summary(), indent=2) + "\n", encoding="utf-8")
     return written
 
 
-def fitted_scene(result: FitResult, folder: Path) -> Scene:
+def fitted_scene(fit_result: FitResult, folder: Path) -> Scene:
     """Return the scene with the fitted skin and lights; the ambient light is read from `folder`/light.exr."""
-    suns = sun_lights(result.point.suns, result.strengths[BASIS_SIZE:], result.white)
-    has_sky = panorama(result.strengths[:BASIS_SIZE]).max() > 0.0
+    suns = sun_lights(fit_result.point.suns, fit_result.strengths[AMBIENT_LOBE_COUNT:], fit_result.white)
+    has_sky = panorama(fit_result.strengths[:AMBIENT_LOBE_COUNT]).max() > 0.0
     ambient = Environment(name=str(folder / "light.exr")) if has_sky else None
     lights = [one for one in suns if max(one.irradiance) > 0.0]
-    return with_skin(replace(result.subject.scene, lights=lights, environment=ambient), result.point)
+    return with_skin(replace(fit_result.subject.scene, lights=lights, environment=ambient), fit_result.point)
 
 
-def result_pictures(result: FitResult) -> dict[str, Floats]:
+def result_pictures(fit_result: FitResult) -> dict[str, Floats]:
     """Return the photograph, the fitted picture, and their difference within the mask, linear, by name.
 
     In the difference, grey means equal.
     """
-    peak = max(float(np.percentile(result.photo[result.mask], 99.5)), 1e-9)
-    difference = np.where(result.mask[..., None], (result.photo - result.picture) / peak, 0.0)
-    pictures_by_name = {"photo": result.photo / max(peak, 1.0), "fit": result.picture / max(peak, 1.0)}
+    peak = max(float(np.percentile(fit_result.photo[fit_result.mask], 99.5)), 1e-9)
+    difference = np.where(fit_result.mask[..., None], (fit_result.photo - fit_result.picture) / peak, 0.0)
+    pictures_by_name = {
+        "photo": fit_result.photo / max(peak, 1.0),
+        "fit": fit_result.picture / max(peak, 1.0),
+    }
     pictures_by_name = {name: np.clip(image, 0.0, 1.0) for name, image in pictures_by_name.items()}
     return pictures_by_name | {"difference": np.clip(_ZERO_DIFFERENCE_GREY + difference, 0.0, 1.0) ** 2.2}

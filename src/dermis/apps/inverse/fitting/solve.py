@@ -10,24 +10,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.inverse.fitting.frames import FaceRenderer
-from dermis.apps.inverse.fitting.light_basis import BASIS_SIZE, solve_strengths
-from dermis.apps.inverse.fitting.unknowns import SKIN_UNKNOWNS, SUN_SD, SUN_STEP, WHITE_SD, FitPoint
+from dermis.apps.inverse.fitting.light_basis import AMBIENT_LOBE_COUNT, solve_strengths
+from dermis.apps.inverse.fitting.unknowns import (
+    SKIN_UNKNOWNS,
+    SUN_PRIOR_SD,
+    SUN_STEP_RAD,
+    WHITE_PRIOR_SD,
+    FitPoint,
+)
 from dermis.base.renamed import renamed_attribute
 from dermis.optics.media import Floats
 
-_NOISE_FLOOR = 0.03
+_NOISE_FLOOR_FRACTION = 0.03
 """Radiance that is added to that of a pixel before its standard deviation is computed, relative to the
 photograph's median; it limits the weight of dark pixels [-]."""
 ROBUST_LIMIT = 3.0
 """Number of standard deviations above which the weight of a residual decreases [Huber1964]."""
-NO_SD: Mapping[str, float] = MappingProxyType({})
+NO_ASSUMED_SD: Mapping[str, float] = MappingProxyType({})
 _MAD_TO_SD = 1.4826
-_MAX_STEPS = 8
+_MAX_ITERATIONS = 8
 _STEP_TOLERANCE = 0.01
-_MIN_GAIN = 1e-4
-_DAMPING = 1e-3
-_MAX_TRIALS = 3
-_MAX_STEP = 0.7  # largest step of a logarithm or of a direction [rad]
+_MIN_RELATIVE_COST_DECREASE = 1e-4
+_INITIAL_DAMPING = 1e-3
+_MAX_DAMPING_TRIALS = 3
+_MAX_UNKNOWN_STEP = 0.7  # largest step of a logarithm or of a direction [rad]
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,65 +75,69 @@ class FitProblem:
 
     def weights(self, radiance: Floats) -> Floats:
         """Return the inverse standard deviations (p, 3) of pixels with a given radiance."""
-        return np.asarray(1.0 / (self.noise * (radiance + _NOISE_FLOOR * float(np.median(self.target)))))
+        return np.asarray(
+            1.0 / (self.noise * (radiance + _NOISE_FLOOR_FRACTION * float(np.median(self.target))))
+        )
 
     def initial_weights(self) -> Floats:
         """Return the inverse standard deviations (p, 3) of pixels, by the brightness of the photograph."""
         return self.weights(self.target.mean(axis=1, keepdims=True) * np.ones(3))
 
-    def state(self, point: FitPoint, weight: Floats) -> FitState:
+    def state(self, point: FitPoint, pixel_weight: Floats) -> FitState:
         """Render the face at a point, and return the state with the best light strengths there."""
-        return self._state(point, self.frames.basis(point) * light_tint(point), weight)
+        return self._state(point, self.frames.basis(point) * light_tint(point), pixel_weight)
 
-    def reweighted_state(self, state: FitState) -> FitState:
-        """Return the state with new weights: those of the model's brightness, reduced for outliers."""
-        weights = self.weights(np.maximum(self.target - state.residual, 0.0))
-        scaled = np.abs(state.residual * weights)
+    def reweighted_state(self, fit_state: FitState) -> FitState:
+        """Return the state with pixel weights for the brightness of the model, reduced for outliers."""
+        weights = self.weights(np.maximum(self.target - fit_state.residual, 0.0))
+        scaled = np.abs(fit_state.residual * weights)
         limit = self.robust * max(_MAD_TO_SD * float(np.median(scaled)), 1.0)
         weights *= np.sqrt(limit / np.maximum(scaled, limit))
-        return self._state(state.point, state.basis, weights)
+        return self._state(fit_state.point, fit_state.basis, weights)
 
-    def _state(self, point: FitPoint, basis: Floats, weight: Floats) -> FitState:
-        A = (basis * weight).reshape(len(basis), -1).T
-        x = solve_strengths(A, (self.target * weight).ravel())
+    def _state(self, point: FitPoint, basis: Floats, pixel_weight: Floats) -> FitState:
+        A = (basis * pixel_weight).reshape(len(basis), -1).T
+        x = solve_strengths(A, (self.target * pixel_weight).ravel())
         residual = self.target - np.einsum("a,apc->pc", x, basis)
         prior = (self.prior_offsets(point) / self.prior_sd(2 * len(point.suns))) ** 2
-        cost = float(((residual * weight) ** 2).sum()) + float(prior.sum())
-        return FitState(point, x, basis, residual, weight, cost)
+        cost = float(((residual * pixel_weight) ** 2).sum()) + float(prior.sum())
+        return FitState(point, x, basis, residual, pixel_weight, cost)
 
-    def derivatives(self, state: FitState, name: str) -> Floats:
+    def derivatives(self, fit_state: FitState, frame_name: str) -> Floats:
         """Return derivatives of the radiance by the u unknowns, (p, 3, u), from finite differences of frames.
 
-        name : file name of the ambient light's panorama, without suffix
+        frame_name : file name of the ambient light's panorama, without suffix
         """
-        point, count = state.point, 2 * len(state.point.suns)
-        centre = self.frames.combined(point, state.strengths, name)
+        point, count = fit_state.point, 2 * len(fit_state.point.suns)
+        centre = self.frames.combined(point, fit_state.strengths, frame_name)
         shifted = []
         for k, step in enumerate(self.steps(count)):
             change = np.zeros(len(SKIN_UNKNOWNS) + count + 2)
             limited = k < len(SKIN_UNKNOWNS) and point.logs[k] + step >= np.log(SKIN_UNKNOWNS[k].high)
             change[k] = -step if limited else step
-            neighbour = self.frames.combined(point.stepped(change), state.strengths, name)
+            neighbour = self.frames.combined(point.stepped(change), fit_state.strengths, frame_name)
             shifted.append((neighbour - centre) / change[k])
         radiance, white = centre * light_tint(point), np.zeros((2, *centre.shape))
         white[0, :, 0], white[1, :, 2] = radiance[:, 0], radiance[:, 2]
         derivatives = np.concatenate([np.asarray(shifted) * light_tint(point), white])
         return np.moveaxis(derivatives, 0, -1)
 
-    def steps(self, sun_angles: int) -> list[float]:
+    def steps(self, sun_angle_count: int) -> list[float]:
         """Return the steps of the finite differences, for the skin unknowns and the directions of suns.
 
-        sun_angles : number of angles that describe the directions of all suns
+        sun_angle_count : number of angles that describe the directions of all suns
         """
-        return [one.step for one in SKIN_UNKNOWNS] + [SUN_STEP] * sun_angles
+        return [one.step for one in SKIN_UNKNOWNS] + [SUN_STEP_RAD] * sun_angle_count
 
-    def prior_sd(self, sun_angles: int) -> Floats:
+    def prior_sd(self, sun_angle_count: int) -> Floats:
         """Return the standard deviations of the priors of all unknowns (u,).
 
-        sun_angles : number of angles that describe the directions of all suns
+        sun_angle_count : number of angles that describe the directions of all suns
         """
-        white = WHITE_SD if self.free_white else 1e-6
-        return np.array([one.prior_sd for one in SKIN_UNKNOWNS] + [SUN_SD] * sun_angles + [white] * 2)
+        white = WHITE_PRIOR_SD if self.free_white else 1e-6
+        return np.array(
+            [one.prior_sd for one in SKIN_UNKNOWNS] + [SUN_PRIOR_SD] * sun_angle_count + [white] * 2
+        )
 
     def prior_offsets(self, point: FitPoint) -> Floats:
         """Return the differences of the unknowns from the means of their priors (u,), 0 for suns."""
@@ -136,7 +146,7 @@ class FitProblem:
 
 
 def light_tint(point: FitPoint) -> Floats:
-    """Return the ratio (3,) of the fitted colour of the light to that given by the user; 1 for green."""
+    """Return the ratio (3,) of the fitted light colour to the light colour from the user; 1 for green."""
     return np.array([np.exp(point.white[0]), 1.0, np.exp(point.white[1])])
 
 
@@ -149,56 +159,56 @@ def solve_fit(
     projection [GolubPereyra1973] with Kaufman's derivative [Kaufman1975].
     """
     state = problem.reweighted_state(problem.state(start, problem.initial_weights()))
-    damping = _DAMPING
-    for iteration in range(_MAX_STEPS):
-        progress(iteration, _MAX_STEPS)
+    damping = _INITIAL_DAMPING
+    for iteration in range(_MAX_ITERATIONS):
+        progress(iteration, _MAX_ITERATIONS)
         derivatives = problem.derivatives(state, f"light_{problem.frames.frame_count}")
         improved, step, damping = _try_steps(problem, state, derivatives, damping)
         if improved is None:
             return state, derivatives
         gain = 1.0 - improved.cost / state.cost
         state = problem.reweighted_state(improved)
-        if np.abs(step).max() < _STEP_TOLERANCE or gain < _MIN_GAIN:
+        if np.abs(step).max() < _STEP_TOLERANCE or gain < _MIN_RELATIVE_COST_DECREASE:
             break
     return state, derivatives
 
 
 def _try_steps(
-    problem: FitProblem, state: FitState, derivatives: Floats, damping: float
+    problem: FitProblem, fit_state: FitState, derivatives: Floats, damping: float
 ) -> tuple[FitState | None, Floats, float]:
-    """Try damped steps; return a state of lower cost or None, the step to it, and the next damping."""
-    H, g = _normal_equations(problem, state, derivatives)
-    for _ in range(_MAX_TRIALS):
+    """Try damped steps; return a state of lower cost or None, the step to this state, and the new damping."""
+    H, g = _normal_equations(problem, fit_state, derivatives)
+    for _ in range(_MAX_DAMPING_TRIALS):
         step = np.asarray(np.linalg.solve(H + damping * np.diag(np.diag(H)), g), np.float64)
-        step *= min(1.0, _MAX_STEP / max(float(np.abs(step).max()), 1e-12))
+        step *= min(1.0, _MAX_UNKNOWN_STEP / max(float(np.abs(step).max()), 1e-12))
         if np.abs(step).max() < 0.1 * _STEP_TOLERANCE:
             break
-        trial = problem.state(state.point.stepped(step), state.weight)
-        if trial.cost < state.cost:
+        trial = problem.state(fit_state.point.stepped(step), fit_state.weight)
+        if trial.cost < fit_state.cost:
             return trial, step, max(0.2 * damping, 1e-6)
         damping = max(30.0 * damping, 0.03)
     return None, np.zeros(len(g)), damping
 
 
-def _normal_equations(problem: FitProblem, state: FitState, derivatives: Floats) -> tuple[Floats, Floats]:
+def _normal_equations(problem: FitProblem, fit_state: FitState, derivatives: Floats) -> tuple[Floats, Floats]:
     """Return the Gauss-Newton matrix and the negative gradient of half the cost, without light strengths."""
-    J = (derivatives * state.weight[..., None]).reshape(-1, derivatives.shape[-1])
-    J, r = _eliminate_lights(state, J)
-    prior_sd = problem.prior_sd(2 * len(state.point.suns))
+    J = (derivatives * fit_state.weight[..., None]).reshape(-1, derivatives.shape[-1])
+    J, r = _eliminate_lights(fit_state, J)
+    prior_sd = problem.prior_sd(2 * len(fit_state.point.suns))
     H = J.T @ J + np.diag(prior_sd**-2.0)
-    return H, J.T @ r - problem.prior_offsets(state.point) / prior_sd**2
+    return H, J.T @ r - problem.prior_offsets(fit_state.point) / prior_sd**2
 
 
-def _eliminate_lights(state: FitState, J: Floats) -> tuple[Floats, Floats]:
-    """Return the weighted derivatives, less what light strengths can compensate, and the weighted residual.
+def _eliminate_lights(fit_state: FitState, J: Floats) -> tuple[Floats, Floats]:
+    """Return weighted derivatives without the part that light strengths compensate, and weighted residuals.
 
     Suns of strength 0 cannot become weaker and are not eliminated.
 
     J : (3 p, u) derivatives of the radiance, multiplied by the weights
     """
-    free = [k for k in range(len(state.basis)) if k < BASIS_SIZE or state.strengths[k] > 0.0]
-    Q = np.linalg.qr((state.basis[free] * state.weight).reshape(len(free), -1).T)[0]
-    return J - Q @ (Q.T @ J), (state.residual * state.weight).ravel()
+    free = [k for k in range(len(fit_state.basis)) if k < AMBIENT_LOBE_COUNT or fit_state.strengths[k] > 0.0]
+    Q = np.linalg.qr((fit_state.basis[free] * fit_state.weight).reshape(len(free), -1).T)[0]
+    return J - Q @ (Q.T @ J), (fit_state.residual * fit_state.weight).ravel()
 
 
 _BLOCKS_PER_SIDE = 16
@@ -206,9 +216,9 @@ _BLOCKS_PER_SIDE = 16
 SYSTEMATIC_SD = {"melanin": 0.11, "blood": 0.1}
 """Standard deviations of the logarithms of pigments due to errors of the renderer. They are chosen so that
 68 % of the errors of fits to path-traced faces are within one stated standard deviation, see docs/fit.md."""
-_LIMIT_TOLERANCE = 1e-6
-_MIN_PRIOR_RATIO = 0.5
-_MIN_CORRELATION = 0.95
+_PARAMETER_LIMIT_TOLERANCE = 1e-6
+_MIN_UNDETERMINED_SD_RATIO = 0.5
+_MIN_NOTABLE_CORRELATION = 0.95
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,19 +243,22 @@ class Uncertainty:
 
 
 def fit_uncertainty(
-    problem: FitProblem, state: FitState, derivatives: Floats, assumed_sd: Mapping[str, float] = NO_SD
+    problem: FitProblem,
+    fit_state: FitState,
+    derivatives: Floats,
+    assumed_sd: Mapping[str, float] = NO_ASSUMED_SD,
 ) -> Uncertainty:
     """Return the uncertainty of all unknowns, with residuals correlated within blocks of pixels [White1980].
 
     derivatives : (p, 3, u) derivatives of the radiance by the unknowns
     assumed_sd : standard deviations of the logarithms of pigments due to assumed parameters of the skin
     """
-    sun_angles = 2 * len(state.point.suns)
+    sun_angles = 2 * len(fit_state.point.suns)
     suns = [f"sun {k + 1} {axis}" for k in range(sun_angles // 2) for axis in ("across", "along")]
     names = [*(one.name for one in SKIN_UNKNOWNS), *suns, "white red", "white blue"]
     count = len(names) if problem.free_white else len(names) - 2
-    J = (derivatives * state.weight[..., None]).reshape(-1, len(names))[:, :count]
-    J, r = _eliminate_lights(state, J)
+    J = (derivatives * fit_state.weight[..., None]).reshape(-1, len(names))[:, :count]
+    J, r = _eliminate_lights(fit_state, J)
     prior_sd = problem.prior_sd(sun_angles)[:count]
     H = np.linalg.inv(J.T @ J + np.diag(prior_sd**-2.0))
     block = np.repeat(_pixel_blocks(problem.frames), 3)
@@ -257,27 +270,27 @@ def fit_uncertainty(
     covariance += np.diag(systematic[:count] ** 2)
     sd = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(sd, sd)
-    values, e = state.point.values(), _LIMIT_TOLERANCE
+    values, e = fit_state.point.values(), _PARAMETER_LIMIT_TOLERANCE
     free = {one.name: one.low * (1 + e) < values[one.name] < one.high * (1 - e) for one in SKIN_UNKNOWNS}
-    uncertain = zip(names, sd > _MIN_PRIOR_RATIO * prior_sd, strict=False)
+    uncertain = zip(names, sd > _MIN_UNDETERMINED_SD_RATIO * prior_sd, strict=False)
     undetermined = tuple(name for name, large in uncertain if large or not free.get(name, True))
     correlated = tuple(
         (names[a], names[b], float(correlation[a, b]))
         for a in range(count)
         for b in range(a)
-        if abs(correlation[a, b]) > _MIN_CORRELATION and names[a][:5] != names[b][:5]
+        if abs(correlation[a, b]) > _MIN_NOTABLE_CORRELATION and names[a][:5] != names[b][:5]
     )
     singular_values = np.linalg.svd(J * prior_sd, compute_uv=False)
     sd_by_name = dict(zip(names, map(float, sd), strict=False))
     return Uncertainty(sd_by_name, undetermined, correlated, tuple(map(float, singular_values)))
 
 
-def block_residual(problem: FitProblem, state: FitState) -> float:
+def block_residual(problem: FitProblem, fit_state: FitState) -> float:
     """Return the median relative residual of blocks of the picture, which hardly depends on noise [-]."""
     block = _pixel_blocks(problem.frames)
     residual, target = (
         np.stack([np.bincount(block, column) for column in values.T])
-        for values in (state.residual, problem.target)
+        for values in (fit_state.residual, problem.target)
     )
     lit = target > 0.0
     return float(np.median(np.abs(residual[lit]) / target[lit]))

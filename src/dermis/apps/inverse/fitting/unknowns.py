@@ -14,7 +14,7 @@ from dermis.scene.lights import DirectionalLight
 from dermis.scene.model import Scene
 from dermis.scene.skin import Pigments, Skin
 
-SUN_DEGREES = 0.53
+SUN_DIAMETER_DEGREES = 0.53
 """Angular diameter of the sun, which determines the penumbra of its shadows [degrees]."""
 
 
@@ -36,10 +36,12 @@ class SkinUnknown:
     step: float
 
 
-def _measured_unknown(name: str, low: float, high: float, step: float) -> SkinUnknown:
+def _measured_unknown(
+    pigment_name: str, lower_limit: float, upper_limit: float, log_step: float
+) -> SkinUnknown:
     """Return an unknown pigment whose prior is its distribution among measured people of all groups."""
-    mean, sd = skin_prior().moments(name)
-    return SkinUnknown(name, float(np.exp(mean)), sd, low, high, step)
+    mean, sd = skin_prior().moments(pigment_name)
+    return SkinUnknown(pigment_name, float(np.exp(mean)), sd, lower_limit, upper_limit, log_step)
 
 
 SKIN_UNKNOWNS = (
@@ -50,12 +52,12 @@ SKIN_UNKNOWNS = (
 )
 """Unknown parameters of the skin. The priors of pigments are those of measured people; the others are wide:
 roughness covers all regions of a face, and `rho_s` the range from dry skin to a smooth boundary."""
-_PROFILE_STEP = 0.25
+_PROFILE_LOG_STEP = 0.25
 """Step to which logarithms of pigments are rounded for the diffusion profile, as profiles are slow to fit."""
-SUN_STEP = 0.02
+SUN_STEP_RAD = 0.02
 """Step of finite differences of a sun's direction [rad]."""
-SUN_SD = 1.0
-WHITE_SD = 0.2
+SUN_PRIOR_SD = 1.0
+WHITE_PRIOR_SD = 0.2
 """Prior standard deviation of the logarithms of the ratios red/green and blue/green of the light's colour."""
 
 
@@ -76,37 +78,37 @@ class FitPoint:
         """Return the parameters of the skin by name."""
         return {one.name: float(np.exp(log)) for one, log in zip(SKIN_UNKNOWNS, self.logs, strict=True)}
 
-    def stepped(self, step: Floats) -> FitPoint:
+    def stepped(self, unknowns_step: Floats) -> FitPoint:
         """Return the point after a step, with the skin clipped to its limits.
 
-        step : (4 + 2 k + 2,) steps of the skin's logarithms, of the suns along two tangents each, and of the
-            light's colour
+        unknowns_step : (4 + 2 k + 2,) steps of the skin's logarithms, of the suns along two tangents each,
+            and of the light's colour
         """
         skin, count = len(SKIN_UNKNOWNS), len(self.suns)
         low, high = np.log([one.low for one in SKIN_UNKNOWNS]), np.log([one.high for one in SKIN_UNKNOWNS])
-        sun_steps = step[skin : skin + 2 * count].reshape(count, 2)
+        sun_steps = unknowns_step[skin : skin + 2 * count].reshape(count, 2)
         stepped = self.suns + np.einsum("kt,ktc->kc", sun_steps, tangents(self.suns))
         return FitPoint(
-            np.clip(self.logs + step[:skin], low, high),
+            np.clip(self.logs + unknowns_step[:skin], low, high),
             stepped / np.linalg.norm(stepped, axis=1, keepdims=True),
-            self.white + step[skin + 2 * count :],
+            self.white + unknowns_step[skin + 2 * count :],
         )
 
 
-def prior_point(suns: Floats) -> FitPoint:
+def prior_point(sun_directions: Floats) -> FitPoint:
     """Return the point at the medians of the priors, with given suns (k, 3)."""
-    return FitPoint(np.log([one.prior_median for one in SKIN_UNKNOWNS]), suns, np.zeros(2))
+    return FitPoint(np.log([one.prior_median for one in SKIN_UNKNOWNS]), sun_directions, np.zeros(2))
 
 
-def tangents(towards: Floats) -> Floats:
+def tangents(directions: Floats) -> Floats:
     """Return two unit vectors (k, 2, 3) that are perpendicular to each direction and to each other.
 
-    towards : (k, 3) directions, unit vectors
+    directions : (k, 3) directions, unit vectors
     """
-    helper = np.where(np.abs(towards[:, 1:2]) < 0.9, (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))
-    first = np.cross(helper, towards)
+    helper = np.where(np.abs(directions[:, 1:2]) < 0.9, (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))
+    first = np.cross(helper, directions)
     first /= np.linalg.norm(first, axis=1, keepdims=True)
-    return np.stack([first, np.cross(towards, first)], axis=1)
+    return np.stack([first, np.cross(directions, first)], axis=1)
 
 
 def with_skin(scene: Scene, point: FitPoint) -> Scene:
@@ -122,7 +124,7 @@ def with_skin(scene: Scene, point: FitPoint) -> Scene:
     if isinstance(maps := scene.head.maps, PaintedMaps):
         look = replace(maps.look, melanin=numbers["melanin"], blood=numbers["blood"])
         head = replace(scene.head, maps=replace(maps, look=look))
-        melanin, blood = np.exp(_PROFILE_STEP * np.rint(point.logs[:2] / _PROFILE_STEP))
+        melanin, blood = np.exp(_PROFILE_LOG_STEP * np.rint(point.logs[:2] / _PROFILE_LOG_STEP))
     else:
         head, melanin, blood = scene.head, numbers["melanin"], numbers["blood"]
         skin_values["albedo"] = "profile"
@@ -132,14 +134,20 @@ def with_skin(scene: Scene, point: FitPoint) -> Scene:
     return replace(scene, head=head, skin=skin)
 
 
-def sun_lights(towards: Floats, strengths: Sequence[float] | Floats, white: Floats) -> list[DirectionalLight]:
+def sun_lights(
+    sun_directions: Floats, irradiances: Sequence[float] | Floats, light_colour: Floats
+) -> list[DirectionalLight]:
     """Return directional lights with given directions, irradiance at normal incidence, and colour.
 
-    towards : (k, 3) unit vectors towards the suns
-    strengths : (k,) irradiance of each sun
-    white : (3,) colour of all suns, by which the irradiance is multiplied
+    sun_directions : (k, 3) unit vectors towards the suns
+    irradiances : (k,) irradiance of each sun
+    light_colour : (3,) colour of all suns, by which the irradiance is multiplied
     """
     return [
-        DirectionalLight(direction=tuple(-sun), irradiance=tuple(float(s) * white), angle_degrees=SUN_DEGREES)
-        for sun, s in zip(towards, strengths, strict=True)
+        DirectionalLight(
+            direction=tuple(-sun),
+            irradiance=tuple(float(s) * light_colour),
+            angle_degrees=SUN_DIAMETER_DEGREES,
+        )
+        for sun, s in zip(sun_directions, irradiances, strict=True)
     ]

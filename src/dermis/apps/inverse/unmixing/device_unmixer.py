@@ -29,10 +29,10 @@ from dermis.optics.pigments.parameters import SkinParameters
 
 Pixels = NDArray[np.float32]
 ProgressCallback = Callable[[int, int], None]
-_FOLDER = Path(__file__).parent
-_GUESS_SIDE = 96  # number of nodes along each side of the grid of initial guesses
+_SHADER_FOLDER = Path(__file__).parent
+_GUESS_GRID_SIDE = 96  # number of nodes along each side of the grid of initial guesses
 _MAX_STEPS = 8
-_STRIP_TEXELS = 1 << 22  # texels of a strip, of 16 bytes each in five textures
+_MAX_STRIP_TEXELS = 1 << 22  # texels of a strip, of 16 bytes each in five textures
 _TEXTURE_FORMAT = "rgba32float"
 
 
@@ -44,14 +44,14 @@ class Unmixer:
     noise : relative standard deviation of a channel [-]
     """
 
-    def __init__(self, device: Device, model: SkinModel, noise: float) -> None:
-        self.device, self.model, self.noise = device, model, noise
+    def __init__(self, device: Device, model: SkinModel, relative_noise: float) -> None:
+        self.device, self.model, self.noise = device, model, relative_noise
         self._table = _table_texture(device, model)
         self._outputs: tuple[Texture, Texture] | None = None
-        self._guesses = device.storage_buffer(8 * _GUESS_SIDE**2, "initial guesses")
+        self._guesses = device.storage_buffer(8 * _GUESS_GRID_SIDE**2, "initial guesses")
         shader = _unmixing_program(device, "unmix_start", model)
         frame = CommandList(device, timed=False)
-        frame.compute("start", shader, self._shader_bindings(shader, 0), (_GUESS_SIDE, _GUESS_SIDE))
+        frame.compute("start", shader, self._shader_bindings(shader, 0), (_GUESS_GRID_SIDE, _GUESS_GRID_SIDE))
         frame.submit()
 
     def unmix(
@@ -69,7 +69,9 @@ class Unmixer:
         estimate, sd, residual = (np.empty((height, width, n), np.float32) for n in (3, 2, 3))
         for rows in row_strips(height, width):
             frame = CommandList(self.device, timed=False)
-            strip = texture_from_array(self.device, _rgba(colours[rows]), _TEXTURE_FORMAT, "colours")
+            strip = texture_from_array(
+                self.device, _with_alpha_channel(colours[rows]), _TEXTURE_FORMAT, "colours"
+            )
             textures = self.record(frame, strip)
             frame.submit()
             fractions, residual_and_third = (download(self.device, texture) for texture in textures)
@@ -78,7 +80,7 @@ class Unmixer:
             progress(rows.stop, height)
         return estimate, sd, residual
 
-    def record(self, frame: CommandList, colours: Texture) -> tuple[Texture, Texture]:
+    def record(self, command_list: CommandList, colours: Texture) -> tuple[Texture, Texture]:
         """Record the pass that unmixes a texture of colours into two textures, and return these.
 
         The first texture has melanin, blood and their standard deviations, the second one the residual and
@@ -93,29 +95,34 @@ class Unmixer:
             )
         fractions, residual = self._outputs
         bound = {"colours": colours, "fractions": fractions, "residual": residual}
-        frame.compute("unmix", shader, bound | self._shader_bindings(shader, _MAX_STEPS), size)
+        command_list.compute("unmix", shader, bound | self._shader_bindings(shader, _MAX_STEPS), size)
         return fractions, residual
 
-    def _shader_bindings(self, shader: ComputeProgram, steps: int) -> MutableBindings:
-        record = _model_record(shader, self.model, self.noise, steps)
+    def _shader_bindings(self, shader: ComputeProgram, step_count: int) -> MutableBindings:
+        record = _model_record(shader, self.model, self.noise, step_count)
         return {"model": record, "table": self._table, "guesses": self._guesses}
 
 
 def recolour(
-    device: Device, model: SkinModel, estimate: Pixels, residual: Pixels, factors: Floats, added: Floats
+    device: Device,
+    model: SkinModel,
+    estimate: Pixels,
+    residual: Pixels,
+    factors: Floats,
+    added_fractions: Floats,
 ) -> Pixels:
     """Return the model's colours (h, w, 3) for changed pigments, times the residual of the original colours.
 
     estimate : (h, w, 3) melanin, blood and the third unknown
     residual : (h, w, 3) original colour divided by the model's colour
     factors : (3,) factors of melanin, blood and the third unknown
-    added : (3,) constants that are added to the three products
+    added_fractions : (3,) constants that are added to the three products
     """
     table, shader = _table_texture(device, model), _unmixing_program(device, "recolour", model)
-    change = shader.record("Change", factors=factors, added=added)
+    change = shader.record("Change", factors=factors, added=added_fractions)
     output = np.empty(residual.shape, np.float32)
     for rows in row_strips(*estimate.shape[:2]):
-        maps = (_rgba(one[rows]) for one in (estimate, residual))
+        maps = (_with_alpha_channel(one[rows]) for one in (estimate, residual))
         inputs = [texture_from_array(device, one, _TEXTURE_FORMAT, "maps") for one in maps]
         size = inputs[0].size[:2]
         texture = make_texture(device, size, _TEXTURE_FORMAT)
@@ -130,16 +137,16 @@ def recolour(
 
 def row_strips(height: int, width: int) -> Iterator[slice]:
     """Return slices of rows of a picture, each small enough for the device's memory."""
-    rows = max(1, _STRIP_TEXELS // width)
+    rows = max(1, _MAX_STRIP_TEXELS // width)
     return (slice(first, min(first + rows, height)) for first in range(0, height, rows))
 
 
-def _rgba(colours: Pixels) -> Pixels:
-    return np.pad(colours, ((0, 0), (0, 0), (0, 1)), constant_values=1.0)
+def _with_alpha_channel(pixels: Pixels) -> Pixels:
+    return np.pad(pixels, ((0, 0), (0, 0), (0, 1)), constant_values=1.0)
 
 
 def _table_texture(device: Device, model: SkinModel) -> Texture:
-    layers = [_rgba(layer.astype(np.float32)) for layer in model.log_colours]
+    layers = [_with_alpha_channel(layer.astype(np.float32)) for layer in model.log_colours]
     texture = make_texture(device, layers[0].shape[1::-1], _TEXTURE_FORMAT, layers=len(layers), use="map")
     for index, layer in enumerate(layers):
         upload(device, texture, layer, layer=index)
@@ -148,34 +155,41 @@ def _table_texture(device: Device, model: SkinModel) -> Texture:
 
 def _unmixing_program(device: Device, shader_name: str, model: SkinModel) -> ComputeProgram:
     thirds, nodes = model.log_colours.shape[:2]
-    numbers = {"NODES": nodes, "THIRDS": thirds, "SHADE": int(model.third == "shade"), "SIDE": _GUESS_SIDE}
-    path = _FOLDER / f"{shader_name}.wgsl"
+    numbers = {
+        "NODES": nodes,
+        "THIRDS": thirds,
+        "SHADE": int(model.third == "shade"),
+        "SIDE": _GUESS_GRID_SIDE,
+    }
+    path = _SHADER_FOLDER / f"{shader_name}.wgsl"
     constants = used_constants(path, (), tuple(numbers.items()))
     make = partial(ComputeProgram, device, path, (), constants)
     return cached_program(device, ("unmixing", shader_name), tuple(constants.items()), make)
 
 
-def _model_record(shader: ComputeProgram, model: SkinModel, noise: float, steps: int) -> UniformRecord:
+def _model_record(
+    shader: ComputeProgram, model: SkinModel, relative_noise: float, step_count: int
+) -> UniformRecord:
     priors = {"prior_mean": model.prior_mean, "prior_sd": model.prior_sd}
     priors |= {"blood_mean": skins.BLOOD_ROOT_MEAN, "blood_sd": skins.BLOOD_ROOT_SD}
     limits = {"floor": skins.COLOUR_FLOOR, "min_reflectance": skins.MIN_REFLECTANCE}
-    numbers = {"third_range": model.third_range, "noise": noise, "steps": steps}
+    numbers = {"third_range": model.third_range, "noise": relative_noise, "steps": step_count}
     return shader.record("Model", **numbers, **priors, **limits)
 
 
-_SHADING_SIDE = 256  # longer side of the downsampled picture [texel]
-_SHADING_SIGMA = 1.0 / 24.0  # standard deviation of the blur, relative to the longer side
+_SHADING_MAP_SIDE = 256  # longer side of the downsampled picture [texel]
+_RELATIVE_SHADING_BLUR = 1.0 / 24.0  # standard deviation of the blur, relative to the longer side
 
 
-def estimate_shading(device: Device, colours: Pixels, skin: SkinParameters, noise: float) -> Pixels:
+def estimate_shading(device: Device, colours: Pixels, skin: SkinParameters, relative_noise: float) -> Pixels:
     """Return the low-frequency shading of each texel (h, w), with mean 1 over the skin [-].
 
     It is the part of the brightness that melanin and blood do not explain, in a downsampled picture that is
     then low-pass filtered. The weights of the filter are larger where a colour is close to that of a skin.
     """
     small = _block_means(colours)
-    estimate, _, residual = Unmixer(device, skin_model(skin, "shade"), noise).unmix(small)
-    misfit = (np.log(np.maximum(residual, 1e-6)) ** 2).sum(axis=-1) / noise**2
+    estimate, _, residual = Unmixer(device, skin_model(skin, "shade"), relative_noise).unmix(small)
+    misfit = (np.log(np.maximum(residual, 1e-6)) ** 2).sum(axis=-1) / relative_noise**2
     weight = (1.0 / (1.0 + misfit)) * (small.min(axis=-1) > 0.0)
     smooth = _weighted_blur(estimate[..., 2].astype(np.float64), weight.astype(np.float64))
     mean = float((smooth * weight).sum() / max(float(weight.sum()), 1e-12))
@@ -184,28 +198,32 @@ def estimate_shading(device: Device, colours: Pixels, skin: SkinParameters, nois
 
 def _block_means(colours: Pixels) -> Pixels:
     """Downsample a picture to at most about 256 texels along the longer side by means over blocks."""
-    block = max(1, max(colours.shape[:2]) // _SHADING_SIDE)
+    block = max(1, max(colours.shape[:2]) // _SHADING_MAP_SIDE)
     height, width = (max(1, side // block) for side in colours.shape[:2])
     cropped = colours[: height * block, : width * block] if block > 1 else colours
     rows, columns = min(block, colours.shape[0]), min(block, colours.shape[1])
     return np.asarray(cropped.reshape(height, rows, width, columns, 3).mean(axis=(1, 3)), np.float32)
 
 
-def _weighted_blur(values: NDArray[np.float64], weight: NDArray[np.float64]) -> NDArray[np.float64]:
+def _weighted_blur(
+    block_means: NDArray[np.float64], block_weights: NDArray[np.float64]
+) -> NDArray[np.float64]:
     from scipy.ndimage import gaussian_filter
 
-    sigma = _SHADING_SIGMA * max(values.shape)
-    blurred = [gaussian_filter(one, sigma, mode="nearest") for one in (values * weight, weight)]
+    sigma = _RELATIVE_SHADING_BLUR * max(block_means.shape)
+    blurred = [
+        gaussian_filter(one, sigma, mode="nearest") for one in (block_means * block_weights, block_weights)
+    ]
     return np.asarray(blurred[0] / np.maximum(blurred[1], 1e-6))
 
 
-def _upsample(values: NDArray[np.float64], shape: tuple[int, int]) -> Pixels:
+def _upsample(block_means: NDArray[np.float64], picture_shape: tuple[int, int]) -> Pixels:
     """Upsample a picture of block means bilinearly to a given height and width."""
     from scipy.ndimage import map_coordinates
 
-    output = np.empty(shape, np.float32)
-    across = (np.arange(shape[1]) + 0.5) * values.shape[1] / shape[1] - 0.5
-    for row in range(shape[0]):
-        down = np.full(shape[1], (row + 0.5) * values.shape[0] / shape[0] - 0.5)
-        output[row] = map_coordinates(values, [down, across], order=1, mode="nearest")
+    output = np.empty(picture_shape, np.float32)
+    across = (np.arange(picture_shape[1]) + 0.5) * block_means.shape[1] / picture_shape[1] - 0.5
+    for row in range(picture_shape[0]):
+        down = np.full(picture_shape[1], (row + 0.5) * block_means.shape[0] / picture_shape[0] - 0.5)
+        output[row] = map_coordinates(block_means, [down, across], order=1, mode="nearest")
     return output

@@ -26,11 +26,11 @@ PROFILE_CORNERS = {"profile": (0, 0), "profile_blood": (0, -1), "profile_dark": 
 """File name of each profile, with its indices on the grid of melanin and blood: pale skin without blood, pale
 skin with blood, and dark skin with blood."""
 MAP_NAME = "profile_map"
-_NODES_PER_AXIS = 4  # number of grid nodes along the logarithms of melanin and of blood
-_PERCENTILES = 0.5, 99.5  # percentiles of the pigments of the skin texels, which bound the grid
+_GRID_NODES_PER_AXIS = 4  # number of grid nodes along the logarithms of melanin and of blood
+_GRID_PERCENTILES = 0.5, 99.5  # percentiles of the pigments of the skin texels, which bound the grid
 # Smallest volume fraction of a grid axis, and smallest ratio of its ends.
-_MIN_FRACTION, _MIN_RATIO = 1e-3, 1.02
-_SUM_WEIGHT = 1e4  # weight of the equation by which the mixture weights sum to 1
+_MIN_VOLUME_FRACTION, _MIN_AXIS_RATIO = 1e-3, 1.02
+_UNIT_SUM_EQUATION_WEIGHT = 1e4  # weight of the equation by which the mixture weights sum to 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,17 +62,20 @@ def profile_mixture(unmixed: UnmixResult) -> ProfileMixture:
     skin = unmixed.skin_texels()
     if not skin.any():
         refuse("widths", "a picture of skin", "no texel is like skin", "Give the skin's albedo")
-    axes = [_fraction_axis(one[skin]) for one in (unmixed.melanin, unmixed.blood)]
+    axes = [_pigment_axis(one[skin]) for one in (unmixed.melanin, unmixed.blood)]
     tissues = [_spectral_tissue(unmixed.skin, m, b) for m, b in product(*axes)]
     nodes = np.array([_ring_fractions(one) for one in tissues])
     corners = [
-        (m % _NODES_PER_AXIS) * _NODES_PER_AXIS + b % _NODES_PER_AXIS for m, b in PROFILE_CORNERS.values()
+        (m % _GRID_NODES_PER_AXIS) * _GRID_NODES_PER_AXIS + b % _GRID_NODES_PER_AXIS
+        for m, b in PROFILE_CORNERS.values()
     ]
     weights = _mixture_weights(nodes, nodes[corners])
-    middle = nodes[(_NODES_PER_AXIS // 2) * _NODES_PER_AXIS + _NODES_PER_AXIS // 2]
+    middle = nodes[(_GRID_NODES_PER_AXIS // 2) * _GRID_NODES_PER_AXIS + _GRID_NODES_PER_AXIS // 2]
     mixed = np.einsum("nk,krc->nrc", weights, nodes[corners])
     profiles = [fit_profile(tissues[k], name) for k, name in zip(corners, PROFILE_CORNERS, strict=True)]
-    weight_map = _interpolate_map(weights[:, 1:].reshape(_NODES_PER_AXIS, _NODES_PER_AXIS, 2), axes, unmixed)
+    weight_map = _interpolate_map(
+        weights[:, 1:].reshape(_GRID_NODES_PER_AXIS, _GRID_NODES_PER_AXIS, 2), axes, unmixed
+    )
     errors = _rms_error(mixed, nodes), _rms_error(middle[None], nodes)
     return ProfileMixture(shared_gaussians(profiles), weight_map, *errors)
 
@@ -91,9 +94,9 @@ def save_mixture(folder: Path, mixture: ProfileMixture) -> list[Path]:
     return [*written, path]
 
 
-def _fraction_axis(fractions: Pixels) -> Floats:
-    low, high = np.maximum(np.percentile(fractions, _PERCENTILES), _MIN_FRACTION)
-    return np.geomspace(low, max(high, _MIN_RATIO * low), _NODES_PER_AXIS)
+def _pigment_axis(volume_fractions: Pixels) -> Floats:
+    low, high = np.maximum(np.percentile(volume_fractions, _GRID_PERCENTILES), _MIN_VOLUME_FRACTION)
+    return np.geomspace(low, max(high, _MIN_AXIS_RATIO * low), _GRID_NODES_PER_AXIS)
 
 
 def _spectral_tissue(skin: SkinParameters, melanin: float, blood: float) -> Tissue:
@@ -107,37 +110,47 @@ def _ring_fractions(tissue: Tissue) -> Floats:
     return np.asarray(rings.energy / rings.total)
 
 
-def _mixture_weights(nodes: Floats, corners: Floats) -> Floats:
+def _mixture_weights(node_fractions: Floats, corner_fractions: Floats) -> Floats:
     """Return the weights (n, k) with which mixtures of k corner profiles fit the ring fractions of n nodes.
 
     The weights are non-negative and sum to 1 for each node.
 
-    nodes, corners : ring fractions of n pigment mixtures, and of the k profiles that are mixed
+    node_fractions : ring fractions of n pigment mixtures
+    corner_fractions : ring fractions of the k profiles that are mixed
     """
     from scipy.optimize import nnls
 
-    equations = np.vstack([corners.reshape(len(corners), -1).T, np.full((1, len(corners)), _SUM_WEIGHT)])
-    weights = np.array([nnls(equations, np.append(node.ravel(), _SUM_WEIGHT))[0] for node in nodes])
+    equations = np.vstack(
+        [
+            corner_fractions.reshape(len(corner_fractions), -1).T,
+            np.full((1, len(corner_fractions)), _UNIT_SUM_EQUATION_WEIGHT),
+        ]
+    )
+    weights = np.array(
+        [nnls(equations, np.append(node.ravel(), _UNIT_SUM_EQUATION_WEIGHT))[0] for node in node_fractions]
+    )
     return np.asarray(weights / weights.sum(axis=1, keepdims=True))
 
 
-def _rms_error(result: Floats, nodes: Floats) -> Floats:
+def _rms_error(mixed_fractions: Floats, node_fractions: Floats) -> Floats:
     """Return the relative root-mean-square error of ring fractions over all nodes, by channel (3,)."""
-    squares = ((result - nodes) ** 2).sum(axis=1) / (nodes**2).sum(axis=1)
+    squares = ((mixed_fractions - node_fractions) ** 2).sum(axis=1) / (node_fractions**2).sum(axis=1)
     return np.asarray(np.sqrt(squares.mean(axis=0)))
 
 
-def _interpolate_map(weights: Floats, axes: Sequence[Floats], unmixed: UnmixResult) -> Pixels:
+def _interpolate_map(node_weights: Floats, pigment_axes: Sequence[Floats], unmixed: UnmixResult) -> Pixels:
     """Interpolate mixture weights from the grid of pigments to each texel, (h, w, 2).
 
     The grid is regular in the logarithms of melanin and blood.
     """
     from scipy.interpolate import RegularGridInterpolator
 
-    logarithms = [np.log(axis) for axis in axes]
-    interpolator = RegularGridInterpolator(logarithms, weights, bounds_error=False, fill_value=None)
+    logarithms = [np.log(axis) for axis in pigment_axes]
+    interpolator = RegularGridInterpolator(logarithms, node_weights, bounds_error=False, fill_value=None)
     result = np.empty((*unmixed.melanin.shape, 2), np.float32)
     for row, row_values in enumerate(zip(unmixed.melanin, unmixed.blood, strict=True)):
-        coordinates = [np.log(np.clip(one, a[0], a[-1])) for one, a in zip(row_values, axes, strict=True)]
+        coordinates = [
+            np.log(np.clip(one, a[0], a[-1])) for one, a in zip(row_values, pigment_axes, strict=True)
+        ]
         result[row] = interpolator(np.stack(coordinates, axis=-1))
     return result

@@ -21,10 +21,10 @@ MIN_REFLECTANCE = 1e-4
 BLOOD_ROOT_MEAN, BLOOD_ROOT_SD = 0.1, 0.1
 """Mean and standard deviation of the prior of the blood fraction's square root. The prior only matters where
 melanin hides the blood."""
-_TABLE_NODES = 129  # number of table nodes along melanin and along blood
-_OXYGEN_COUNT = 5
-_SHADE_SD, _FIXED_SD = 0.3, 1e-3
-_SHADE_RANGE = -3.0, 1.5  # limits of the logarithm of the shading
+_TABLE_NODES_PER_AXIS = 129  # number of table nodes along melanin and along blood
+_OXYGEN_NODE_COUNT = 5
+_LOG_SHADE_SD, _FIXED_UNKNOWN_SD = 0.3, 1e-3
+_LOG_SHADE_RANGE = -3.0, 1.5  # limits of the logarithm of the shading
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,20 +46,20 @@ class SkinModel:
     prior_mean: float
     prior_sd: float
 
-    def evaluate(self, x: Floats) -> tuple[Floats, Floats]:
+    def evaluate(self, unknowns: Floats) -> tuple[Floats, Floats]:
         """Return the logarithms (t, 3) of colours, and their derivatives by the unknowns (t, 3, 3).
 
         The second axis of the derivatives is the channel, the third the unknown. The table is interpolated
         linearly.
 
-        x : (t, 3) square roots of the melanin and blood fractions, and the third unknown
+        unknowns : (t, 3) square roots of the melanin and blood fractions, and the third unknown
         """
         third_count, nodes = len(self.log_colours), self.log_colours.shape[1]
         low, high = self.third_range
-        i, u = _node_below(x[:, 0], nodes)
-        j, v = _node_below(x[:, 1], nodes)
-        fraction = (x[:, 2] - low) / (high - low)
-        k, w = _node_below(fraction if third_count > 1 else np.zeros(len(x)), third_count)
+        i, u = _node_below(unknowns[:, 0], nodes)
+        j, v = _node_below(unknowns[:, 1], nodes)
+        fraction = (unknowns[:, 2] - low) / (high - low)
+        k, w = _node_below(fraction if third_count > 1 else np.zeros(len(unknowns)), third_count)
         next_k = min(1, third_count - 1)
         corners = [(k + (d & next_k), i + (e >> 1), j + (e & 1)) for d in (0, 1) for e in range(4)]
         c = np.array([self.log_colours[corner] for corner in corners])
@@ -72,58 +72,66 @@ class SkinModel:
         by_t = (layers[1] - layers[0]) * max(third_count - 1, 1) / (high - low)
         result = _lerp(layers, w)
         if self.third == "shade":
-            result, by_t = result + x[:, 2:], np.ones_like(result)
+            result, by_t = result + unknowns[:, 2:], np.ones_like(result)
         return result, np.stack([by_p, by_q, by_t], axis=-1)
 
-    def colours(self, melanin: Floats, blood: Floats, third: Floats | float | None = None) -> Floats:
+    def colours(self, melanin: Floats, blood: Floats, third_unknown: Floats | float | None = None) -> Floats:
         """Return the diffuse reflectance (t, 3) of skins, linear Rec. 709 [-].
 
         melanin, blood : (t,) volume fractions [-]
-        third : third unknown; by default the mean of its prior
+        third_unknown : third unknown; by default the mean of its prior
         """
-        last = np.broadcast_to(self.prior_mean if third is None else third, np.shape(melanin))
+        last = np.broadcast_to(self.prior_mean if third_unknown is None else third_unknown, np.shape(melanin))
         x = np.stack([np.sqrt(melanin), np.sqrt(blood), last], axis=-1)
         return np.asarray(np.exp(self.evaluate(x)[0]))
 
 
-def _node_below(fraction: Floats, nodes: int) -> tuple[NDArray[np.int64], Floats]:
+def _node_below(axis_fraction: Floats, node_count: int) -> tuple[NDArray[np.int64], Floats]:
     """Return the table node below each position in [0, 1], and the fraction of the way to the next node."""
-    position = np.clip(fraction, 0.0, 1.0) * (nodes - 1)
-    node = np.clip(position.astype(np.int64), 0, max(nodes - 2, 0))
+    position = np.clip(axis_fraction, 0.0, 1.0) * (node_count - 1)
+    node = np.clip(position.astype(np.int64), 0, max(node_count - 2, 0))
     return node, position - node
 
 
-def _lerp(pair: Floats, fraction: Floats) -> Floats:
-    return np.asarray(pair[0] + fraction * (pair[1] - pair[0]))
+def _lerp(node_values: Floats, fraction: Floats) -> Floats:
+    return np.asarray(node_values[0] + fraction * (node_values[1] - node_values[0]))
 
 
-def skin_model(skin: SkinParameters = DEFAULT_SKIN, third: ThirdUnknown = "none") -> SkinModel:
+def skin_model(skin: SkinParameters = DEFAULT_SKIN, third_unknown: ThirdUnknown = "none") -> SkinModel:
     """Return the model of skins with any melanin and blood, computed by layered diffusion.
 
     skin : parameters of the skins that do not vary; its melanin and blood are ignored
-    third : unknown besides melanin and blood; "none" keeps the oxygenation of `skin`
+    third_unknown : unknown besides melanin and blood; "none" keeps the oxygenation of `skin`
 
     Raises DermisError for other names of the third unknown.
     """
-    if third not in get_args(ThirdUnknown):
-        refuse("third", ", ".join(get_args(ThirdUnknown)), f"got {format_value(third)}", "Take one of them")
-    return _cached_skin_model(replace(skin, melanin=0.0, blood=0.0, epidermal_blood=0.0), third)
+    if third_unknown not in get_args(ThirdUnknown):
+        refuse(
+            "third",
+            ", ".join(get_args(ThirdUnknown)),
+            f"got {format_value(third_unknown)}",
+            "Take one of them",
+        )
+    return _cached_skin_model(replace(skin, melanin=0.0, blood=0.0, epidermal_blood=0.0), third_unknown)
 
 
 @lru_cache(maxsize=8)
 def _cached_skin_model(skin: SkinParameters, third: ThirdUnknown) -> SkinModel:
     if third == "oxygen":
-        oxygens = np.linspace(0.0, 1.0, _OXYGEN_COUNT)
+        oxygens = np.linspace(0.0, 1.0, _OXYGEN_NODE_COUNT)
         sd = skin_prior().moments("oxygen")[1]
         return SkinModel(_log_colour_tables(skin, oxygens), third, (0.0, 1.0), skin.oxygen, sd)
     logs = _log_colour_tables(skin, [skin.oxygen])
     if third == "shade":
-        return SkinModel(logs, third, _SHADE_RANGE, 0.0, _SHADE_SD)
-    return SkinModel(logs, third, (-1.0, 1.0), 0.0, _FIXED_SD)
+        return SkinModel(logs, third, _LOG_SHADE_RANGE, 0.0, _LOG_SHADE_SD)
+    return SkinModel(logs, third, (-1.0, 1.0), 0.0, _FIXED_UNKNOWN_SD)
 
 
-def _log_colour_tables(skin: SkinParameters, oxygens: Floats | list[float]) -> Floats:
-    tables = [colour_table(replace(skin, oxygen=float(one)), _TABLE_NODES).colours for one in oxygens]
+def _log_colour_tables(skin: SkinParameters, oxygen_fractions: Floats | list[float]) -> Floats:
+    tables = [
+        colour_table(replace(skin, oxygen=float(one)), _TABLE_NODES_PER_AXIS).colours
+        for one in oxygen_fractions
+    ]
     return np.log(np.maximum(np.stack(tables), MIN_REFLECTANCE))
 
 
@@ -153,17 +161,17 @@ class PigmentEstimate:
     residual: Floats
 
 
-def inverse_variances(colours: Floats, noise: float) -> Floats:
+def inverse_variances(colours: Floats, relative_noise: float) -> Floats:
     """Return the inverse variances (t, 3) of the logarithms of noisy colours.
 
     colours : (t, 3) diffuse reflectance, linear Rec. 709 [-]
-    noise : relative standard deviation of a channel [-]
+    relative_noise : relative standard deviation of a channel [-]
     """
-    return np.asarray(1.0 / (noise**2 + (COLOUR_FLOOR / np.maximum(colours, MIN_REFLECTANCE)) ** 2))
+    return np.asarray(1.0 / (relative_noise**2 + (COLOUR_FLOOR / np.maximum(colours, MIN_REFLECTANCE)) ** 2))
 
 
 def solve_pigments(
-    model: SkinModel, colours: Floats, noise: float = 0.01, start: Floats | None = None
+    model: SkinModel, colours: Floats, relative_noise: float = 0.01, start: Floats | None = None
 ) -> PigmentEstimate:
     """Estimate the most probable melanin, blood and third unknown of colours, in float64.
 
@@ -172,11 +180,11 @@ def solve_pigments(
     with Levenberg's damping; unknowns at a limit are fixed there.
 
     colours : (t, 3) diffuse reflectance, linear Rec. 709 [-]
-    noise : relative standard deviation of a channel [-]
+    relative_noise : relative standard deviation of a channel [-]
     start : (t, 3) unknowns to start from, as in `SkinModel.evaluate`; None for a search on a coarse grid
     """
     logs = np.log(np.maximum(colours, MIN_REFLECTANCE))
-    weights = inverse_variances(colours, noise)
+    weights = inverse_variances(colours, relative_noise)
     x = _initial_guess(model, logs) if start is None else start.copy()
     damping = np.full(len(x), 1e-3)
     cost = _cost(model, x, logs, weights)
@@ -192,63 +200,69 @@ def solve_pigments(
     return _pigment_estimate(model, x, logs, weights)
 
 
-def _initial_guess(model: SkinModel, logs: Floats) -> Floats:
+def _initial_guess(model: SkinModel, log_colours: Floats) -> Floats:
     """Return the unknowns (t, 3) of the skin on a coarse grid whose colour is nearest.
 
-    logs : (t, 3) logarithms of the colours
+    log_colours : (t, 3) logarithms of the colours
     """
     from scipy.spatial import cKDTree
 
     roots = np.linspace(0.0, 1.0, 65)
     x = np.stack(np.meshgrid(roots, roots, [model.prior_mean], indexing="ij"), axis=-1).reshape(-1, 3)
-    nearest = cKDTree(model.evaluate(x)[0]).query(logs)[1]
+    nearest = cKDTree(model.evaluate(x)[0]).query(log_colours)[1]
     return np.asarray(x[nearest])
 
 
-def _cost(model: SkinModel, x: Floats, logs: Floats, weights: Floats) -> Floats:
-    residual_cost = weights * (logs - model.evaluate(x)[0]) ** 2
-    blood_cost = ((x[:, 1] - BLOOD_ROOT_MEAN) / BLOOD_ROOT_SD) ** 2
-    third_cost = ((x[:, 2] - model.prior_mean) / model.prior_sd) ** 2
+def _cost(model: SkinModel, unknowns: Floats, log_colours: Floats, colour_weights: Floats) -> Floats:
+    residual_cost = colour_weights * (log_colours - model.evaluate(unknowns)[0]) ** 2
+    blood_cost = ((unknowns[:, 1] - BLOOD_ROOT_MEAN) / BLOOD_ROOT_SD) ** 2
+    third_cost = ((unknowns[:, 2] - model.prior_mean) / model.prior_sd) ** 2
     return np.asarray(residual_cost.sum(axis=1) + (blood_cost + third_cost))
 
 
-def _clip_unknowns(model: SkinModel, x: Floats) -> Floats:
-    return np.clip(x, (0.0, 0.0, model.third_range[0]), (1.0, 1.0, model.third_range[1]))
+def _clip_unknowns(model: SkinModel, unknowns: Floats) -> Floats:
+    return np.clip(unknowns, (0.0, 0.0, model.third_range[0]), (1.0, 1.0, model.third_range[1]))
 
 
-def _damped_step(model: SkinModel, x: Floats, logs: Floats, weights: Floats, damping: Floats) -> Floats:
+def _damped_step(
+    model: SkinModel, unknowns: Floats, log_colours: Floats, colour_weights: Floats, damping: Floats
+) -> Floats:
     """Return the damped Gauss-Newton step of each colour's unknowns (t, 3), 0 for unknowns at a limit."""
-    H, g = _normal_equations(model, x, logs, weights)
+    H, g = _normal_equations(model, unknowns, log_colours, colour_weights)
     diagonal = np.einsum("tii->ti", H)
     diagonal *= 1.0 + damping[:, None]
     step = np.linalg.solve(H, g[..., None])[..., 0]
-    at_limit = (x + step != _clip_unknowns(model, x + step)) & (
-        _clip_unknowns(model, x + 1e-12 * np.sign(step)) == x
+    at_limit = (unknowns + step != _clip_unknowns(model, unknowns + step)) & (
+        _clip_unknowns(model, unknowns + 1e-12 * np.sign(step)) == unknowns
     )
     H = np.where(at_limit[:, :, None] | at_limit[:, None, :], np.eye(3), H)
     step = np.linalg.solve(H, np.where(at_limit, 0.0, g)[..., None])[..., 0]
     return np.asarray(np.where(at_limit, 0.0, step))
 
 
-def _normal_equations(model: SkinModel, x: Floats, logs: Floats, weights: Floats) -> tuple[Floats, Floats]:
+def _normal_equations(
+    model: SkinModel, unknowns: Floats, log_colours: Floats, colour_weights: Floats
+) -> tuple[Floats, Floats]:
     """Return the Gauss-Newton matrix (t, 3, 3) and the negative gradient (t, 3) of half the cost."""
-    result, J = model.evaluate(x)
-    weighted = weights[:, :, None] * J
+    result, J = model.evaluate(unknowns)
+    weighted = colour_weights[:, :, None] * J
     H = np.einsum("tci,tcj->tij", weighted, J)
-    g = np.einsum("tci,tc->ti", weighted, logs - result)
+    g = np.einsum("tci,tc->ti", weighted, log_colours - result)
     H[:, [0, 1], [0, 1]] += _MIN_CURVATURE
     H[:, 1, 1] += BLOOD_ROOT_SD**-2
-    g[:, 1] -= (x[:, 1] - BLOOD_ROOT_MEAN) / BLOOD_ROOT_SD**2
+    g[:, 1] -= (unknowns[:, 1] - BLOOD_ROOT_MEAN) / BLOOD_ROOT_SD**2
     H[:, 2, 2] += model.prior_sd**-2
-    g[:, 2] -= (x[:, 2] - model.prior_mean) / model.prior_sd**2
+    g[:, 2] -= (unknowns[:, 2] - model.prior_mean) / model.prior_sd**2
     return H, g
 
 
-def _pigment_estimate(model: SkinModel, x: Floats, logs: Floats, weights: Floats) -> PigmentEstimate:
-    covariance = np.linalg.inv(_normal_equations(model, x, logs, weights)[0])
-    p, q = x[:, 0], x[:, 1]
+def _pigment_estimate(
+    model: SkinModel, unknowns: Floats, log_colours: Floats, colour_weights: Floats
+) -> PigmentEstimate:
+    covariance = np.linalg.inv(_normal_equations(model, unknowns, log_colours, colour_weights)[0])
+    p, q = unknowns[:, 0], unknowns[:, 1]
     sd = np.sqrt(np.maximum(np.einsum("tii->ti", covariance)[:, :2], 0.0))
-    residual = np.exp(logs - model.evaluate(x)[0])
+    residual = np.exp(log_colours - model.evaluate(unknowns)[0])
     # A fraction is the square of its root r: its standard deviation is 2 r sd + sd^2.
     melanin_sd, blood_sd = (2.0 * root * one + one**2 for root, one in zip((p, q), sd.T, strict=True))
-    return PigmentEstimate(p**2, q**2, x[:, 2], melanin_sd, blood_sd, residual)
+    return PigmentEstimate(p**2, q**2, unknowns[:, 2], melanin_sd, blood_sd, residual)

@@ -16,7 +16,7 @@ import numpy as np
 
 from dermis.apps.inverse.unmixing.spectral_inversion import (
     FIVE_UNKNOWNS,
-    SPECULAR_INCLUDED,
+    SPECULAR_INCLUDED_REFLECTANCE,
     THREE_UNKNOWNS,
     TWO_UNKNOWNS,
     SpectralFit,
@@ -32,12 +32,12 @@ from dermis.optics.pigments.spectra import WAVELENGTHS_NM
 
 SPECTRAL_SETS = {"none": TWO_UNKNOWNS, "oxygen": THREE_UNKNOWNS, "all": FIVE_UNKNOWNS}
 """Names of the unknown parameters, by the name of those that are fitted besides melanin and blood."""
-_EXPECTED = "a table of reflectance spectra (CSV), a spectrum in each row or in each column"
-_WAVELENGTH = re.compile(r"[^\d.]{0,20}?(\d{3,4}(?:\.\d+)?)\s*(?:nm)?", re.IGNORECASE)
-_MAX_BYTES = 32 << 20
-_MIN_BANDS, _MAX_STEP_NM, _MAX_END_NM = 16, 21.0, 5.0
-_BATCH = 10_000  # spectra that are fitted together
-_PERCENT_FROM = 1.5  # largest reflectance above which a table is in percent
+_EXPECTED_TABLE = "a table of reflectance spectra (CSV), a spectrum in each row or in each column"
+_WAVELENGTH_PATTERN = re.compile(r"[^\d.]{0,20}?(\d{3,4}(?:\.\d+)?)\s*(?:nm)?", re.IGNORECASE)
+_MAX_FILE_BYTES = 32 << 20
+_MIN_BAND_COUNT, _MAX_STEP_NM, _MAX_END_NM = 16, 21.0, 5.0
+_SPECTRA_PER_BATCH = 10_000  # spectra that are fitted together
+_MAX_FRACTIONAL_REFLECTANCE = 1.5  # largest reflectance above which a table is in percent
 _MAX_REFLECTANCE = 1.5
 
 
@@ -62,18 +62,18 @@ def read_spectra(path: str | Path) -> SpectraTable:
     Raises DermisError for files that are not such tables, and for wavelengths that do not cover the range.
     """
     rows = _read_cells(path)
-    columns = {k: nm for k, cell in enumerate(rows[0]) if (nm := _wavelength(cell)) is not None}
-    if len(columns) < _MIN_BANDS:
+    columns = {k: nm for k, cell in enumerate(rows[0]) if (nm := _parse_wavelength_nm(cell)) is not None}
+    if len(columns) < _MIN_BAND_COUNT:
         rows = [list(column) for column in zip(*rows, strict=True)]
-        columns = {k: nm for k, cell in enumerate(rows[0]) if (nm := _wavelength(cell)) is not None}
+        columns = {k: nm for k, cell in enumerate(rows[0]) if (nm := _parse_wavelength_nm(cell)) is not None}
     order = sorted(columns, key=lambda k: columns[k])
     grid = np.array([columns[k] for k in order])
-    _check_grid(path, grid)
+    _check_wavelengths(path, grid)
     body = rows[1:]
-    values = np.array([[_number(row[k]) for k in order] for row in body]).reshape(len(body), len(grid))
+    values = np.array([[_parse_number(row[k]) for k in order] for row in body]).reshape(len(body), len(grid))
     if not np.isfinite(values).any():
-        refuse(path, _EXPECTED, "there are no numbers below the wavelengths", "Check the file")
-    if np.nanmedian(values) > _PERCENT_FROM:
+        refuse(path, _EXPECTED_TABLE, "there are no numbers below the wavelengths", "Check the file")
+    if np.nanmedian(values) > _MAX_FRACTIONAL_REFLECTANCE:
         notify(f"{path}: reflectances are read in percent")
         values = values / 100.0
     outside = np.nanmax(values) > _MAX_REFLECTANCE or np.nanmin(values) < -0.1
@@ -88,19 +88,19 @@ def read_spectra(path: str | Path) -> SpectraTable:
 
 def _read_cells(path: str | Path) -> list[list[str]]:
     """Return the cells of a table, all rows as long as the first one."""
-    with open_regular_file(path, _EXPECTED) as file:
+    with open_regular_file(path, _EXPECTED_TABLE) as file:
         packed = file.read(2) == b"\x1f\x8b"
         file.seek(0)
-        with parsing(path, _EXPECTED, OSError, EOFError, UnicodeDecodeError, zlib.error):
-            data = (gzip.GzipFile(fileobj=file) if packed else file).read(_MAX_BYTES + 1)
-            if len(data) > _MAX_BYTES:
+        with parsing(path, _EXPECTED_TABLE, OSError, EOFError, UnicodeDecodeError, zlib.error):
+            data = (gzip.GzipFile(fileobj=file) if packed else file).read(_MAX_FILE_BYTES + 1)
+            if len(data) > _MAX_FILE_BYTES:
                 refuse(path, "at most 32 MB of text", "it has more", "Split the table")
             text = data.decode("utf-8-sig")
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
     if len(lines) < 2:
-        refuse(path, _EXPECTED, f"it has {len(lines)} rows", "Give headings and spectra")
+        refuse(path, _EXPECTED_TABLE, f"it has {len(lines)} rows", "Give headings and spectra")
     separator = column_separator(lines[0])
-    with parsing(path, _EXPECTED, csv.Error):
+    with parsing(path, _EXPECTED_TABLE, csv.Error):
         rows = list(csv.reader(lines, delimiter=separator))
     width = len(rows[0])
     for number, row in enumerate(rows[1:], 2):
@@ -111,13 +111,13 @@ def _read_cells(path: str | Path) -> list[list[str]]:
     return [[cell.strip() for cell in row] for row in rows]
 
 
-def _wavelength(cell: str) -> float | None:
+def _parse_wavelength_nm(cell: str) -> float | None:
     """Return the wavelength of a heading [nm]; None for other headings."""
-    match = _WAVELENGTH.fullmatch(cell)
+    match = _WAVELENGTH_PATTERN.fullmatch(cell)
     return float(match[1]) if match and 200.0 <= float(match[1]) <= 3000.0 else None
 
 
-def _number(cell: str) -> float:
+def _parse_number(cell: str) -> float:
     try:
         value = float(cell)
     except ValueError:
@@ -125,15 +125,23 @@ def _number(cell: str) -> float:
     return value if math.isfinite(value) else math.nan
 
 
-def _check_grid(path: str | Path, grid: Floats) -> None:
+def _check_wavelengths(path: str | Path, wavelengths_nm: Floats) -> None:
     """Refuse wavelengths that do not cover 400 to 700 nm at steps of at most 20 nm."""
     expected = "wavelengths from 400 to 700 nm, at most 20 nm apart, as headings or in the first column"
-    if len(grid) < _MIN_BANDS:
-        refuse(path, expected, f"it has {len(grid)}", "Write headings such as 400 or r400")
-    inside = grid[(grid > WAVELENGTHS_NM[0] - _MAX_STEP_NM) & (grid < WAVELENGTHS_NM[-1] + _MAX_STEP_NM)]
+    if len(wavelengths_nm) < _MIN_BAND_COUNT:
+        refuse(path, expected, f"it has {len(wavelengths_nm)}", "Write headings such as 400 or r400")
+    inside = wavelengths_nm[
+        (wavelengths_nm > WAVELENGTHS_NM[0] - _MAX_STEP_NM)
+        & (wavelengths_nm < WAVELENGTHS_NM[-1] + _MAX_STEP_NM)
+    ]
     covered = len(inside) > 1 and inside[0] <= 400.0 + _MAX_END_NM and inside[-1] >= 700.0 - _MAX_END_NM
-    if not covered or np.diff(inside).max() > _MAX_STEP_NM or (np.diff(grid) <= 0.0).any():
-        refuse(path, expected, f"got {grid[0]:g} to {grid[-1]:g} nm", "Give the missing ones once each")
+    if not covered or np.diff(inside).max() > _MAX_STEP_NM or (np.diff(wavelengths_nm) <= 0.0).any():
+        refuse(
+            path,
+            expected,
+            f"got {wavelengths_nm[0]:g} to {wavelengths_nm[-1]:g} nm",
+            "Give the missing ones once each",
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,7 +189,7 @@ def unmix_spectra(
     path: str | Path,
     find: str = "none",
     skin: SkinParameters = DEFAULT_SKIN,
-    surface: float = SPECULAR_INCLUDED,
+    surface: float = SPECULAR_INCLUDED_REFLECTANCE,
 ) -> UnmixedSpectra:
     """Estimate the pigments of each reflectance spectrum of a table.
 
@@ -204,12 +212,12 @@ def unmix_spectra(
         refuse(path, "a complete spectrum", "all have missing values", "Fill the missing cells")
     names: Sequence[str] = SPECTRAL_SETS[find]
     spectra = table.reflectance[complete] - surface
-    parts = [fit_skin(part, names, "spectrum", skin) for part in _batches(spectra)]
+    parts = [fit_skin(part, names, "spectrum", skin) for part in _spectra_batches(spectra)]
     values = {name: np.concatenate([part.values[name] for part in parts]) for name in names}
     fit = SpectralFit(values, spectra, np.concatenate([part.model for part in parts]))
     return UnmixedSpectra(table.labels, tuple(names), fit, complete.tolist())
 
 
-def _batches(spectra: Floats) -> list[Floats]:
+def _spectra_batches(spectra: Floats) -> list[Floats]:
     """Return spectra in batches whose fits need little memory."""
-    return np.array_split(spectra, -(-len(spectra) // _BATCH))
+    return np.array_split(spectra, -(-len(spectra) // _SPECTRA_PER_BATCH))

@@ -16,14 +16,17 @@ from dermis.optics.skin_spectra import skin_reflectance
 
 Criterion = Literal["spectrum", "colour"]
 """What a fit minimises: the RMS difference of the spectra, or the colour difference under D65."""
-Values = Mapping[str, Floats]
-SpectralModel = Callable[[Values], Floats]
+ParameterValues = Mapping[str, Floats]
+SpectralModel = Callable[[ParameterValues], Floats]
 """Function from the parameters (n,) by name to diffuse reflectances (n, 31) at `WAVELENGTHS_NM`."""
-SPECULAR_INCLUDED = 0.0278
+SPECULAR_INCLUDED_REFLECTANCE = 0.0278
 """Reflectance of the smooth surface of skin, which spectrophotometers include [-]."""
-_STEP = 1e-4  # of finite differences
+_DERIVATIVE_STEP = 1e-4  # of finite differences
 _MAX_STEPS = 30
-_MIN_GAIN, _NEGLIGIBLE = 1e-3, 1e-10  # least decrease of the sum of squares: relative, and absolute
+_MIN_RELATIVE_DECREASE, _MIN_ABSOLUTE_DECREASE = (
+    1e-3,
+    1e-10,
+)  # least decrease of the sum of squares: relative, and absolute
 _MIN_CURVATURE = 1e-10
 
 
@@ -42,21 +45,21 @@ class SpectralUnknown:
     start: float
     scale: Literal["root", "log", "linear"] = "linear"
 
-    def coordinates(self, values: Floats | np.float64) -> Floats:
+    def coordinates(self, parameter_values: Floats | np.float64) -> Floats:
         """Return the coordinates of values."""
         if self.scale == "log":
-            return np.asarray(np.log(values))
-        return np.asarray(np.sqrt(values) if self.scale == "root" else values)
+            return np.asarray(np.log(parameter_values))
+        return np.asarray(np.sqrt(parameter_values) if self.scale == "root" else parameter_values)
 
-    def coordinate(self, value: float) -> float:
+    def coordinate(self, parameter_value: float) -> float:
         """Return the coordinate of a value."""
-        return float(self.coordinates(np.float64(value)))
+        return float(self.coordinates(np.float64(parameter_value)))
 
-    def values(self, coordinate: Floats) -> Floats:
+    def values(self, coordinates: Floats) -> Floats:
         """Return the values (n,) of coordinates (n,)."""
         if self.scale == "log":
-            return np.exp(coordinate)
-        return np.asarray(coordinate**2 if self.scale == "root" else coordinate)
+            return np.exp(coordinates)
+        return np.asarray(coordinates**2 if self.scale == "root" else coordinates)
 
 
 UNKNOWNS = {
@@ -102,21 +105,21 @@ class SpectralFit:
         """Return the residuals whose squares a fit minimises: (n, 31) for spectra, (n, 1) for colours."""
         return self.residual if criterion == "spectrum" else self.delta_e()[:, None]
 
-    def delta_e(self, weights: Floats | None = None) -> Floats:
+    def delta_e(self, colour_weights: Floats | None = None) -> Floats:
         """Return the CIEDE2000 difference (n,) of the model's colour from the measured one.
 
-        weights : (3, 31) weights from spectra to linear Rec. 709, by default those of D65
+        colour_weights : (3, 31) weights from spectra to linear Rec. 709, by default those of D65
         """
-        w = rgb_weights() if weights is None else weights
+        w = rgb_weights() if colour_weights is None else colour_weights
         return delta_e_2000(self.model @ w.T, self.measured @ w.T)
 
 
 def skin_model_spectra(skin: SkinParameters = DEFAULT_SKIN) -> SpectralModel:
-    """Return the package's spectral model; parameters that its caller omits are those of `skin`."""
+    """Return the package's spectral model of skin; `skin` gives the parameters that a call omits."""
 
-    def reflectance(values: Values) -> Floats:
+    def reflectance(parameter_values: ParameterValues) -> Floats:
         def parameter(name: str) -> Floats:
-            return np.asarray(values.get(name, getattr(skin, name)))
+            return np.asarray(parameter_values.get(name, getattr(skin, name)))
 
         return skin_reflectance(
             parameter("melanin"),
@@ -125,7 +128,7 @@ def skin_model_spectra(skin: SkinParameters = DEFAULT_SKIN) -> SpectralModel:
             eumelanin_fraction=parameter("eumelanin"),
             epidermis_mm=parameter("epidermis_mm"),
             baseline=parameter("baseline"),
-            scattering=values.get("scattering", np.float64(1.0)),
+            scattering=parameter_values.get("scattering", np.float64(1.0)),
         )
 
     return reflectance
@@ -136,8 +139,8 @@ def invert_spectra(
     model: SpectralModel,
     unknowns: Sequence[SpectralUnknown],
     criterion: Criterion = "spectrum",
-    start: Values | None = None,
-    steps: int = _MAX_STEPS,
+    start: ParameterValues | None = None,
+    max_steps: int = _MAX_STEPS,
 ) -> SpectralFit:
     """Fit the unknowns of a model to each of n spectra by damped least squares.
 
@@ -147,7 +150,7 @@ def invert_spectra(
     criterion : "spectrum" minimises the RMS difference, "colour" the difference of colours under D65 in a
         space whose small distances are those of CIEDE2000
     start : (n,) values to start from, by name
-    steps : largest number of steps
+    max_steps : largest number of steps
     """
     first = {} if start is None else start
     columns = (one.coordinates(first.get(one.name, np.array(one.start))) for one in unknowns)
@@ -167,88 +170,103 @@ def invert_spectra(
             return np.asarray(reflectance - spectra)
         return np.asarray(np.einsum("nij,nj->ni", metric, lab(reflectance @ weights.T) - target))
 
-    found = values(least_squares(residual, x, low, high, steps))
+    found = values(least_squares(residual, x, low, high, max_steps))
     return SpectralFit(found, spectra, model(found))
 
 
 def fit_skin(
     spectra: Floats,
-    names: Sequence[str] = TWO_UNKNOWNS,
+    unknown_names: Sequence[str] = TWO_UNKNOWNS,
     criterion: Criterion = "spectrum",
     skin: SkinParameters = DEFAULT_SKIN,
 ) -> SpectralFit:
     """Fit parameters of the package's skin to each of n spectra, see `invert_spectra`.
 
-    names : parameters that vary, of `UNKNOWNS`
+    unknown_names : parameters that vary, of `UNKNOWNS`
     skin : parameters that do not vary
     """
-    return invert_spectra(spectra, skin_model_spectra(skin), [UNKNOWNS[name] for name in names], criterion)
+    return invert_spectra(
+        spectra, skin_model_spectra(skin), [UNKNOWNS[name] for name in unknown_names], criterion
+    )
 
 
 def least_squares(
-    residual: Callable[[Floats], Floats], x: Floats, low: Floats, high: Floats, steps: int = _MAX_STEPS
+    residual: Callable[[Floats], Floats],
+    start_unknowns: Floats,
+    lower_limits: Floats,
+    upper_limits: Floats,
+    max_steps: int = _MAX_STEPS,
 ) -> Floats:
     """Minimise n sums of squares at once by Gauss-Newton steps with Levenberg's damping.
 
     residual : function from points (n, u) to residuals (n, r)
-    x : (n, u) points to start from
-    low, high : (u,) limits; coordinates at a limit are fixed while the step points outwards
+    start_unknowns : (n, u) points to start from
+    lower_limits, upper_limits : (u,) limits; coordinates at a limit are fixed while the step points outwards
 
     Returns the points (n, u).
     """
-    count = x.shape[1]
-    damping = np.full(len(x), 1e-2)
-    r = residual(x)
+    count = start_unknowns.shape[1]
+    damping = np.full(len(start_unknowns), 1e-2)
+    r = residual(start_unknowns)
     cost = (r**2).sum(axis=1)
-    for step_number in range(steps):
-        J = _derivatives(residual, x, r, high)
+    for step_number in range(max_steps):
+        J = _derivatives(residual, start_unknowns, r, upper_limits)
         H = np.einsum("nri,nrj->nij", J, J)
         g = -np.einsum("nri,nr->ni", J, r)
         H += (damping[:, None] * np.einsum("nii->ni", H) + _MIN_CURVATURE)[:, :, None] * np.eye(count)
         step = np.linalg.solve(H, g[..., None])[..., 0]
-        fixed = ((x <= low) & (step < 0.0)) | ((x >= high) & (step > 0.0))
+        fixed = ((start_unknowns <= lower_limits) & (step < 0.0)) | (
+            (start_unknowns >= upper_limits) & (step > 0.0)
+        )
         H = np.where(fixed[:, :, None] | fixed[:, None, :], np.eye(count), H)
         step = np.linalg.solve(H, np.where(fixed, 0.0, g)[..., None])[..., 0]
-        trial = np.clip(x + step, low, high)
+        trial = np.clip(start_unknowns + step, lower_limits, upper_limits)
         trial_r = residual(trial)
         trial_cost = (trial_r**2).sum(axis=1)
         better = trial_cost <= cost
         gain = np.where(better, cost - trial_cost, 0.0)
-        x, r = np.where(better[:, None], trial, x), np.where(better[:, None], trial_r, r)
+        start_unknowns, r = (
+            np.where(better[:, None], trial, start_unknowns),
+            np.where(better[:, None], trial_r, r),
+        )
         cost = np.where(better, trial_cost, cost)
         damping = np.clip(np.where(better, 0.2 * damping, 6.0 * damping), 1e-7, 1e6)
-        if step_number > 4 and (gain <= _MIN_GAIN * cost + _NEGLIGIBLE).all():
+        if step_number > 4 and (gain <= _MIN_RELATIVE_DECREASE * cost + _MIN_ABSOLUTE_DECREASE).all():
             break
-    return x
+    return start_unknowns
 
 
-def _derivatives(residual: Callable[[Floats], Floats], x: Floats, r: Floats, high: Floats) -> Floats:
+def _derivatives(
+    residual: Callable[[Floats], Floats], unknowns: Floats, residuals: Floats, upper_limits: Floats
+) -> Floats:
     """Return the derivatives (n, r, u) of residuals by finite differences that stay within the limits."""
     columns = []
-    for i in range(x.shape[1]):
-        step = np.where(x[:, i] + _STEP > high[i], -_STEP, _STEP)
-        moved = x.copy()
+    for i in range(unknowns.shape[1]):
+        step = np.where(
+            unknowns[:, i] + _DERIVATIVE_STEP > upper_limits[i], -_DERIVATIVE_STEP, _DERIVATIVE_STEP
+        )
+        moved = unknowns.copy()
         moved[:, i] += step
-        columns.append((residual(moved) - r) / step[:, None])
+        columns.append((residual(moved) - residuals) / step[:, None])
     return np.stack(columns, axis=-1)
 
 
-def colour_metric(colours: Floats) -> Floats:
+def colour_metric(lab_colours: Floats) -> Floats:
     """Return matrices (n, 3, 3) that turn small L*a*b* differences into vectors whose length is CIEDE2000.
 
     The rotation term, which only blue colours have, is left out.
 
-    colours : (n, 3) L*a*b* of the colours
+    lab_colours : (n, 3) L*a*b* of the colours
 
     Source: [Sharma2005].
     """
-    L, a, b = colours.T
+    L, a, b = lab_colours.T
     chroma = np.hypot(a, b) ** 7
     stretch = 1.5 - 0.5 * np.sqrt(chroma / (chroma + 25.0**7))
     C, hue = np.hypot(stretch * a, b), np.arctan2(b, stretch * a)
     terms = ((-0.17, 1.0, -30.0), (0.24, 2.0, 0.0), (0.32, 3.0, 6.0), (-0.20, 4.0, -63.0))
     weight = 1.0 + sum(k * np.cos(n * hue + np.radians(shift)) for k, n, shift in terms)
-    metric = np.zeros((len(colours), 3, 3))
+    metric = np.zeros((len(lab_colours), 3, 3))
     metric[:, 0, 0] = 1.0 / (1.0 + 0.015 * (L - 50.0) ** 2 / np.sqrt(20.0 + (L - 50.0) ** 2))
     radial, across = 1.0 / (1.0 + 0.045 * C), 1.0 / (1.0 + 0.015 * C * weight)
     metric[:, 1, 1], metric[:, 1, 2] = radial * np.cos(hue) * stretch, radial * np.sin(hue)

@@ -16,50 +16,50 @@ from dermis.optics.skin_spectra import skin_reflectance
 
 FIXED_PARAMETERS = ("oxygen", "epidermis_mm")
 """Parameters that an inversion of colours assumes, and that differ between people."""
-_SAMPLES = 2000
-_KERNEL_SD = 0.35  # standard deviation of weights over the logarithms of melanin and blood
-_MAX_LOG_ERROR = 2.5  # largest error of a logarithm that counts, for blood that melanin hides
+_SAMPLE_COUNT = 2000
+_LOG_PIGMENT_KERNEL_SD = 0.35  # standard deviation of weights over the logarithms of melanin and blood
+_MAX_COUNTED_LOG_ERROR = 2.5  # largest error of a logarithm that counts, for blood that melanin hides
 
 
 def unknown_skin_sd(
     melanin: float,
     blood: float,
     skin: SkinParameters = DEFAULT_SKIN,
-    known: Collection[str] = (),
-    oxygen_found: bool = False,
+    known_parameters: Collection[str] = (),
+    is_oxygen_fitted: bool = False,
 ) -> dict[str, float]:
     """Return the relative standard deviations of melanin and blood that result from assumed skin parameters.
 
     Skins sampled from the prior are unmixed as if they had the parameters of `skin`. The result is the root
     mean square of the logarithm of the ratio of found to true pigments, over those samples whose found
-    pigments are near the given ones.
+    pigments are near the given pigments.
 
     melanin, blood : pigments that were found
     skin : parameters that the inversion assumes
-    known : names of `FIXED_PARAMETERS` that are known of the person
-    oxygen_found : whether the inversion also estimates oxygen
+    known_parameters : names of `FIXED_PARAMETERS` that are known of the person
+    is_oxygen_fitted : whether the inversion also estimates oxygen
     """
-    if set(FIXED_PARAMETERS) <= set(known):
+    if set(FIXED_PARAMETERS) <= set(known_parameters):
         return {"melanin": 0.0, "blood": 0.0}
-    found, error = _unmixed_sample(skin, tuple(sorted(known)), oxygen_found)
+    found, error = _unmixed_sample(skin, tuple(sorted(known_parameters)), is_oxygen_fitted)
     target = np.log(np.maximum([melanin, blood], 1e-4))
     distance = ((found - target) ** 2).sum(axis=1)
     # Relative to the nearest sample, so that results outside the prior have weights too.
-    weight = np.exp(-0.5 * (distance - distance.min()) / _KERNEL_SD**2)
+    weight = np.exp(-0.5 * (distance - distance.min()) / _LOG_PIGMENT_KERNEL_SD**2)
     square = weight @ error**2 / weight.sum()
     return dict(zip(("melanin", "blood"), map(float, np.sqrt(square)), strict=True))
 
 
 @lru_cache(maxsize=8)
 def _unmixed_sample(
-    skin: SkinParameters, known: tuple[str, ...], oxygen_found: bool
+    skin: SkinParameters, known_parameters: tuple[str, ...], is_oxygen_fitted: bool
 ) -> tuple[Floats, Floats]:
     """Return the logarithms (n, 2) of pigments found for samples of the prior, and their errors (n, 2).
 
     The pigments are melanin and blood.
     """
-    true = skin_prior().sample(_SAMPLES)
-    values = true | {name: np.full(_SAMPLES, getattr(skin, name)) for name in known}
+    true = skin_prior().sample(_SAMPLE_COUNT)
+    values = true | {name: np.full(_SAMPLE_COUNT, getattr(skin, name)) for name in known_parameters}
     spectra = skin_reflectance(
         np.minimum(values["melanin"], 1.0),
         np.minimum(values["blood"], 1.0),
@@ -68,8 +68,8 @@ def _unmixed_sample(
         epidermis_mm=values["epidermis_mm"],
         baseline=skin.baseline,
     )
-    model: SkinModel = skin_model(skin, "oxygen" if oxygen_found else "none")
+    model: SkinModel = skin_model(skin, "oxygen" if is_oxygen_fitted else "none")
     estimate = solve_pigments(model, np.maximum(spectra @ rgb_weights().T, 0.0))
     found = np.log(np.maximum(np.stack([estimate.melanin, estimate.blood], axis=-1), 1e-4))
     error = found - np.log(np.maximum(np.stack([values["melanin"], values["blood"]], axis=-1), 1e-4))
-    return found, np.clip(error, -_MAX_LOG_ERROR, _MAX_LOG_ERROR)
+    return found, np.clip(error, -_MAX_COUNTED_LOG_ERROR, _MAX_COUNTED_LOG_ERROR)

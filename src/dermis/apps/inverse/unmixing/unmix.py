@@ -32,12 +32,12 @@ Pixels = NDArray[np.float32]
 DEFAULT_NOISE = 0.01
 MAX_SKIN_DELTA_E = 5.0
 """Largest CIEDE2000 difference from the model's nearest colour at which a texel counts as skin."""
-_DELTA_E_LIMITS = 1.0, 2.0, MAX_SKIN_DELTA_E
+_REPORTED_DELTA_E_LIMITS = 1.0, 2.0, MAX_SKIN_DELTA_E
 _SUMMARY_SIDE = 512  # largest number of texels along the longer side that the summary reads
-_NOISE_RANGE = 1e-4, 0.5
-_BLACK_LEVEL = 1e-3  # largest channel of texels between the charts of a map
+_RELATIVE_NOISE_RANGE = 1e-4, 0.5
+_MAX_BACKGROUND_CHANNEL = 1e-3  # largest channel of texels between the charts of a map
 _MAX_LOG_RESIDUAL = 0.15  # largest logarithm of the residual of a skin texel
-_FACTOR_RANGE = 0.0, 100.0
+_RECOLOUR_FACTOR_RANGE = 0.0, 100.0
 
 
 @dataclass(frozen=True)
@@ -54,13 +54,13 @@ class FractionChange:
     factor: float = 1.0
     median: float | None = None
 
-    def scale_and_offset(self, median: float) -> tuple[float, float]:
+    def scale_and_offset(self, map_median: float) -> tuple[float, float]:
         """Return the factor for a map with a given median, and the constant that is added afterwards."""
         if self.median is None:
             return self.factor, 0.0
-        if self.median < median:
-            return self.median / median, 0.0
-        return 1.0, self.median - median
+        if self.median < map_median:
+            return self.median / map_median, 0.0
+        return 1.0, self.median - map_median
 
 
 @dataclass(frozen=True)
@@ -91,19 +91,24 @@ class PigmentChange:
         return factors, added
 
 
-def parse_fraction_change(option: str, text: str) -> FractionChange:
+def parse_fraction_change(option_name: str, option_text: str) -> FractionChange:
     """Parse the text of an option: "x2" multiplies the fraction by 2, "0.1" sets its median to 0.1.
 
     Raises DermisError for any other text.
     """
-    is_factor = text[:1] in "x×*" and bool(text)
+    is_factor = option_text[:1] in "x×*" and bool(option_text)
     try:
-        value = float(text[1:] if is_factor else text)
+        value = float(option_text[1:] if is_factor else option_text)
     except ValueError:
-        refuse(option, "a factor, such as x2, or a median, such as 0.1", f"got {text!r}", "Correct it")
+        refuse(
+            option_name,
+            "a factor, such as x2, or a median, such as 0.1",
+            f"got {option_text!r}",
+            "Correct it",
+        )
     if is_factor:
-        return FractionChange(factor=checked_number(option, value, *_FACTOR_RANGE, "a factor"))
-    return FractionChange(median=checked_number(option, value, 0.0, 1.0, "a volume fraction"))
+        return FractionChange(factor=checked_number(option_name, value, *_RECOLOUR_FACTOR_RANGE, "a factor"))
+    return FractionChange(median=checked_number(option_name, value, 0.0, 1.0, "a volume fraction"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,10 +157,12 @@ class UnmixResult:
         model_colours = self.model.colours(fractions["melanin"], fractions["blood"], fractions.get("oxygen"))
         colours = model_colours * maps["residual"].reshape(-1, 3)
         delta_e = delta_e_2000(model_colours, colours)
-        skin = (delta_e <= MAX_SKIN_DELTA_E) & (colours.max(axis=-1) > _BLACK_LEVEL)
+        skin = (delta_e <= MAX_SKIN_DELTA_E) & (colours.max(axis=-1) > _MAX_BACKGROUND_CHANNEL)
         result: dict[str, Any] = {"texels": int(delta_e.size), "skin": float(skin.mean())}
         if skin.any():
-            above = {f"above_{limit:g}": float((delta_e > limit).mean()) for limit in _DELTA_E_LIMITS}
+            above = {
+                f"above_{limit:g}": float((delta_e > limit).mean()) for limit in _REPORTED_DELTA_E_LIMITS
+            }
             result["delta_e"] = _percentiles(delta_e[skin]) | above
             result["skin_tone"] = skin_tone(np.median(colours[skin], axis=0)).as_json()
             for name, fraction in fractions.items():
@@ -163,7 +170,7 @@ class UnmixResult:
                 result[name] = _percentiles(fraction[skin]) | sd
             median = {name: result[name]["median"] for name in ("melanin", "blood")}
             found = self.third is not None
-            spread = unknown_skin_sd(**median, skin=self.skin, oxygen_found=found)
+            spread = unknown_skin_sd(**median, skin=self.skin, is_oxygen_fitted=found)
             for pigment, relative in spread.items():
                 result[pigment]["skin_sd"] = relative * median[pigment]
         return result
@@ -194,13 +201,13 @@ class UnmixResult:
 
     def skin_texels(self) -> NDArray[np.bool_]:
         """Return the mask (h, w) of texels whose colour is close to a colour of the model."""
-        logs = np.log(np.maximum(self.residual, _BLACK_LEVEL))
+        logs = np.log(np.maximum(self.residual, _MAX_BACKGROUND_CHANNEL))
         return np.asarray(np.abs(logs).max(axis=-1) < _MAX_LOG_RESIDUAL)
 
-    def _skin_median(self, fraction: Pixels) -> float:
+    def _skin_median(self, fraction_map: Pixels) -> float:
         """Return the median of a map over the skin texels."""
         skin = self.skin_texels()
-        return float(np.median(fraction[skin] if skin.any() else fraction))
+        return float(np.median(fraction_map[skin] if skin.any() else fraction_map))
 
 
 def _percentiles(values: Floats) -> dict[str, float]:
@@ -260,7 +267,7 @@ def unmix(
     >>> found.melanin.shape  # doctest: +SKIP
     (1, 1)
     """
-    noise = checked_number("noise", noise, *_NOISE_RANGE, "relative to each channel")
+    noise = checked_number("noise", noise, *_RELATIVE_NOISE_RANGE, "relative to each channel")
     model = skin_model(skin, third)
     if third == "shade":
         refuse("third", '"none" or "oxygen"', "got 'shade'", "Set shading=True instead")
@@ -296,7 +303,10 @@ UNMIX_SUMMARY_FILE = "unmixed.json"
 
 
 def save_maps(
-    folder: Path, result: UnmixResult, recoloured: NDArray[np.float32] | None = None, linear: bool = False
+    folder: Path,
+    unmix_result: UnmixResult,
+    recoloured: NDArray[np.float32] | None = None,
+    linear: bool = False,
 ) -> list[Path]:
     """Write all maps as EXR files, the summary, and the recoloured picture, each file atomically.
 
@@ -308,7 +318,7 @@ def save_maps(
     Raises DermisError when the disk is full, or the folder cannot be written to.
     """
     written = []
-    for name, values in result.maps().items():
+    for name, values in unmix_result.maps().items():
         path = folder / f"{name}.exr"
         with atomic_file(path) as file:
             file.write_bytes(encode_exr(values if values.ndim == 3 else values[..., None]))
@@ -318,7 +328,7 @@ def save_maps(
         write_image(path, recoloured)
         written.append(path)
     with atomic_file(folder / UNMIX_SUMMARY_FILE) as file:
-        file.write_text(json.dumps(result.summary(), indent=2) + "\n", encoding="utf-8")
+        file.write_text(json.dumps(unmix_result.summary(), indent=2) + "\n", encoding="utf-8")
     return [*written, folder / UNMIX_SUMMARY_FILE]
 
 

@@ -29,15 +29,15 @@ COAT_TRANSMITTANCE = 0.98
 COAT_INDEX = SKIN_ETA
 GRID_VOXELS = 96
 """Number of cells along the longest side of the albedo grid."""
-_GRID_MARGIN, _MIN_HALF_SIDE_MM = 0.75, 25.0
+_HALF_SIDE_PER_FRAME_HEIGHT, _MIN_HALF_SIDE_MM = 0.75, 25.0
 """Half the side of the albedo grid, relative to the height that the picture shows, and its lower limit."""
 _COLOUR_DEPTH_MM = 3.0  # depth to which the medium has the colour of the surface
 _SAMPLES_PER_VOXEL = 3.0  # samples per area of one voxel face
 _MAX_COLOUR = 0.97
-_MIN_ROOT = 0.02  # smallest tabulated square root of 1 - albedo
-_PHOTONS, _TABLE_PHOTONS = 40_000, 40_000
-_HALF_SPACE_STEPS = 48
-_ALBEDO_STEPS = 20
+_MIN_ABSORPTION_ROOT = 0.02  # smallest tabulated square root of 1 - albedo
+_DISTANCE_PHOTON_COUNT, _TABLE_PHOTON_COUNT = 40_000, 40_000
+_HALF_SPACE_TABLE_STEPS = 48
+_STACK_TABLE_STEPS = 20
 """Number of tabulated albedos of the last of several layers."""
 
 
@@ -49,7 +49,7 @@ def uniform_skin(colour: ArrayLike, distance_mm: ArrayLike, eta: float) -> Mediu
     eta : index of refraction, 1 or `SKIN_ETA` [-]
     """
     albedo = _half_space_albedo(colour, eta)
-    offsets = [_mean_offset(round(float(one), 4), eta) for one in albedo]
+    offsets = [_mean_exit_distance(round(float(one), 4), eta) for one in albedo]
     extinction = np.array(offsets) / np.asarray(distance_mm, np.float64)
     return Medium("uniform", (Layer((1.0 - albedo) * extinction, albedo * extinction, name="skin"),), eta)
 
@@ -106,16 +106,16 @@ def deepest_albedo(medium: Medium, colour: ArrayLike) -> Doubles:
         )
         for one in medium.layers
     )
-    roots = np.linspace(1.0, _MIN_ROOT, _ALBEDO_STEPS)
+    roots = np.linspace(1.0, _MIN_ABSORPTION_ROOT, _STACK_TABLE_STEPS)
     found = [
-        np.interp(wanted[..., c], _totals_by_root(tuple(one[c] for one in layers), medium.eta), roots)
+        np.interp(wanted[..., c], _reflectance_table(tuple(one[c] for one in layers), medium.eta), roots)
         for c in range(3)
     ]
     return np.asarray(1.0 - np.stack(found, axis=-1) ** 2)
 
 
 @cache
-def _totals_by_root(layers: tuple[tuple[float, float, float], ...], eta: float) -> Doubles:
+def _reflectance_table(layers: tuple[tuple[float, float, float], ...], eta: float) -> Doubles:
     """Return the reflectance of a stack for each tabulated albedo of its last layer, by photon counts [-].
 
     layers : absorption and scattering [1/mm] and thickness [mm] of each layer
@@ -123,37 +123,37 @@ def _totals_by_root(layers: tuple[tuple[float, float, float], ...], eta: float) 
     above = [ScatteringLayer(a, s, thickness, eta=eta) for a, s, thickness in layers[:-1]]
     extinction = layers[-1][0] + layers[-1][1]
     totals = []
-    for root in np.linspace(1.0, _MIN_ROOT, _ALBEDO_STEPS):
+    for root in np.linspace(1.0, _MIN_ABSORPTION_ROOT, _STACK_TABLE_STEPS):
         last = ScatteringLayer(root**2 * extinction, (1.0 - root**2) * extinction, eta=eta)
-        totals.append(trace_slab([*above, last], _TABLE_PHOTONS).relative_to_entering.total_reflectance)
+        totals.append(trace_slab([*above, last], _TABLE_PHOTON_COUNT).relative_to_entering.total_reflectance)
     return np.maximum.accumulate(totals)
 
 
 def _half_space_albedo(colour: ArrayLike, eta: float) -> Doubles:
     """Return single-scattering albedos of half-spaces that have given colours [-]."""
-    totals, roots = _half_space_totals(eta)
+    totals, roots = _half_space_reflectance_table(eta)
     wanted = np.clip(np.asarray(colour, np.float64), 0.0, _MAX_COLOUR)
     return np.asarray(1.0 - np.interp(wanted, totals, roots) ** 2)
 
 
 @cache
-def _half_space_totals(eta: float) -> tuple[Doubles, Doubles]:
+def _half_space_reflectance_table(eta: float) -> tuple[Doubles, Doubles]:
     """Return reflectances of half-spaces at normal incidence, and sqrt(1 - single-scattering albedo) of each.
 
     They are exact for an index of refraction of 1, and counted photons for `SKIN_ETA`.
     """
-    roots = np.linspace(1.0, _MIN_ROOT, _HALF_SPACE_STEPS)
+    roots = np.linspace(1.0, _MIN_ABSORPTION_ROOT, _HALF_SPACE_TABLE_STEPS)
     if eta == 1.0:
         return np.array([float(directional_albedo(1.0, float(1.0 - root**2))) for root in roots]), roots
     if eta != SKIN_ETA:
         refuse("skin", f"an index of refraction of 1 or {SKIN_ETA}", f"got {eta:g}", "Choose one of them")
     layers = (ScatteringLayer(root**2, 1.0 - root**2, eta=eta) for root in roots.tolist())
-    runs = (trace_slab([layer], _TABLE_PHOTONS).relative_to_entering for layer in layers)
+    runs = (trace_slab([layer], _TABLE_PHOTON_COUNT).relative_to_entering for layer in layers)
     return np.maximum.accumulate([run.total_reflectance for run in runs]), roots
 
 
 @cache
-def _mean_offset(albedo: float, eta: float) -> float:
+def _mean_exit_distance(albedo: float, eta: float) -> float:
     """Return the mean lateral distance between entry and exit in a half-space, in mean free paths.
 
     albedo : single-scattering albedo [-]
@@ -161,7 +161,9 @@ def _mean_offset(albedo: float, eta: float) -> float:
     """
     edges = np.concatenate([[0.0], np.geomspace(1e-3, 400.0, 120)])
     layer = ScatteringLayer(1.0 - albedo, albedo, eta=eta)
-    energy = trace_slab([layer], _PHOTONS, edges_mm=edges).reflectance * np.pi * np.diff(edges**2)
+    energy = (
+        trace_slab([layer], _DISTANCE_PHOTON_COUNT, edges_mm=edges).reflectance * np.pi * np.diff(edges**2)
+    )
     return float((energy * 0.5 * (edges[1:] + edges[:-1])).sum() / energy.sum())
 
 
@@ -173,7 +175,7 @@ def skin_media(mi: Mitsuba, person: Person, camera: Camera, medium: Medium) -> l
     medium : layers of skin of the mean colour
     """
     *above, last = medium.layers
-    low, high = _grid_box(person, camera)
+    low, high = _voxel_box(person, camera)
     transmittance = COAT_TRANSMITTANCE if medium.eta == 1.0 else 1.0
     colours = colour_grid(person, low, high, GRID_VOXELS) / transmittance
     grid = deepest_albedo(medium, colours).astype(np.float32)
@@ -188,12 +190,12 @@ def skin_media(mi: Mitsuba, person: Person, camera: Camera, medium: Medium) -> l
     return [mi.load_dict(one) for one in (*map(homogeneous_medium, above), deepest)]
 
 
-def _grid_box(person: Person, camera: Camera) -> tuple[Doubles, Doubles]:
+def _voxel_box(person: Person, camera: Camera) -> tuple[Doubles, Doubles]:
     """Return the low and high corner (3,) of a box around the visible part of the head [mm].
 
     Albedos vary inside this box, and are constant outside.
     """
-    half_side = max(_GRID_MARGIN * camera.frame_mm, _MIN_HALF_SIDE_MM)
+    half_side = max(_HALF_SIDE_PER_FRAME_HEIGHT * camera.frame_mm, _MIN_HALF_SIDE_MM)
     skin = person.mesh.positions[np.unique(_skin_triangles(person))]
     middle = np.array(camera.target, np.float64)
     low = np.maximum(skin.min(axis=0) - _COLOUR_DEPTH_MM, middle - half_side)
@@ -208,46 +210,51 @@ def _skin_triangles(person: Person) -> NDArray[np.int32]:
     return np.asarray(mesh.triangles[kinds[mesh.material]])
 
 
-def colour_grid(person: Person, low: Doubles, high: Doubles, voxels: int) -> Doubles:
+def colour_grid(person: Person, low_corner: Doubles, high_corner: Doubles, voxels_per_side: int) -> Doubles:
     """Return the colour (z, y, x, 3) of each cell of a box, averaged over the nearest points of the skin.
 
     Cells farther from the skin than the colour reaches have the mean colour.
 
-    low, high : (3,) corners of the box [mm]
-    voxels : number of cells along the longest side
+    low_corner, high_corner : (3,) corners of the box [mm]
+    voxels_per_side : number of cells along the longest side
     """
     from scipy.ndimage import binary_dilation
     from scipy.spatial import cKDTree
 
-    cell_mm = float((high - low).max()) / voxels
-    cell_count = np.maximum(np.ceil((high - low) / cell_mm).astype(int), 1)
-    positions, colour = _skin_samples(person, low, high, cell_mm)
+    cell_mm = float((high_corner - low_corner).max()) / voxels_per_side
+    cell_count = np.maximum(np.ceil((high_corner - low_corner) / cell_mm).astype(int), 1)
+    positions, colour = _skin_samples(person, low_corner, high_corner, cell_mm)
     grid = np.tile(colour.mean(axis=0) if len(colour) else np.full(3, 0.5), (*cell_count[::-1], 1))
     if not len(positions):
         return grid
-    cell = np.clip(((positions - low) / (high - low) * cell_count).astype(int), 0, cell_count - 1)
+    cell = np.clip(
+        ((positions - low_corner) / (high_corner - low_corner) * cell_count).astype(int), 0, cell_count - 1
+    )
     is_near = np.zeros(cell_count[::-1], bool)
     is_near[cell[:, 2], cell[:, 1], cell[:, 0]] = True
     is_near = binary_dilation(is_near, iterations=max(2, int(np.ceil(_COLOUR_DEPTH_MM / cell_mm))))
     near_cells = np.argwhere(is_near)
-    cell_centres = low + (near_cells[:, ::-1] + 0.5) / cell_count * (high - low)
+    cell_centres = low_corner + (near_cells[:, ::-1] + 0.5) / cell_count * (high_corner - low_corner)
     _, nearest = cKDTree(positions).query(cell_centres, k=min(4, len(positions)))
     grid[is_near] = colour[nearest.reshape(len(cell_centres), -1)].mean(axis=1)
     return grid
 
 
-def _skin_samples(person: Person, low: Doubles, high: Doubles, cell_mm: float) -> tuple[Doubles, Doubles]:
+def _skin_samples(
+    person: Person, low_corner: Doubles, high_corner: Doubles, cell_mm: float
+) -> tuple[Doubles, Doubles]:
     """Return random positions (n, 3) on the skin in a box, and the skin's colours (n, 3) there.
 
     The random seed is fixed.
 
-    low, high : (3,) corners of the box [mm]
+    low_corner, high_corner : (3,) corners of the box [mm]
     cell_mm : size of a cell, which determines the number of samples [mm]
     """
     mesh, triangles = person.mesh, _skin_triangles(person)
     corners = mesh.positions[triangles].astype(np.float64)
     inside = (
-        (corners.max(axis=1) >= low - _COLOUR_DEPTH_MM) & (corners.min(axis=1) <= high + _COLOUR_DEPTH_MM)
+        (corners.max(axis=1) >= low_corner - _COLOUR_DEPTH_MM)
+        & (corners.min(axis=1) <= high_corner + _COLOUR_DEPTH_MM)
     ).all(axis=1)
     triangles, corners = triangles[inside], corners[inside]
     rng = np.random.default_rng(0)

@@ -7,7 +7,7 @@ import hashlib
 import numpy as np
 
 from dermis.apps.truths.mitsuba_scene import (
-    ROULETTE_DEPTH,
+    RUSSIAN_ROULETTE_DEPTH,
     coverage_scene,
     load_mitsuba,
     mesh_shape,
@@ -39,7 +39,7 @@ from dermis.scene.model import Scene
 
 _CACHE_VERSION = "person 2"  # change when the result for the same person changes
 _SALIVA_ROUGHNESS, _TONGUE_ROUGHNESS = 0.12, 0.25
-_SALIVA_INDEX = 1.4
+_SALIVA_IOR = 1.4
 
 
 def path_trace_person(
@@ -75,7 +75,7 @@ def path_trace_person(
     """
     target_count, mi = pass_count(samples), load_mitsuba()
     person = posed_person(scene, textures)
-    constants = f"{SAMPLES_PER_PASS} {ROULETTE_DEPTH} {COAT_TRANSMITTANCE} {GRID_VOXELS} {max_depth}"
+    constants = f"{SAMPLES_PER_PASS} {RUSSIAN_ROULETTE_DEPTH} {COAT_TRANSMITTANCE} {GRID_VOXELS} {max_depth}"
     trace_settings = f"{_CACHE_VERSION} {mi.__version__} {variant} {constants} {size}"
     key = person_key(scene, person, medium, trace_settings) if use_cache else None
     return render_passes(
@@ -95,7 +95,7 @@ def person_scene(
     scene: Scene,
     person: Person,
     medium: Medium | None,
-    size: tuple[int, int],
+    picture_size: tuple[int, int],
     max_depth: int | None = None,
 ) -> tuple[MitsubaObject, tuple[str, ...]]:
     """Return the Mitsuba scene of a person's radiance image, and notes on changes made to the head.
@@ -111,10 +111,10 @@ def person_scene(
     shapes |= eye_shapes(mi, person) | _opaque_parts(mi, person)
     for number, hairs in enumerate(person.hairs):
         shapes |= hair_shapes(mi, hairs, f"hairs_{number}")
-    integrator = {"type": "volpathmis", "rr_depth": ROULETTE_DEPTH, "hide_emitters": True}
+    integrator = {"type": "volpathmis", "rr_depth": RUSSIAN_ROULETTE_DEPTH, "hide_emitters": True}
     if max_depth is not None:
         integrator["max_depth"] = max_depth
-    return mitsuba_scene(mi, scene, integrator, shapes, size), notes
+    return mitsuba_scene(mi, scene, integrator, shapes, picture_size), notes
 
 
 def _opaque_parts(mi: Mitsuba, person: Person) -> SceneDict:
@@ -146,7 +146,7 @@ def _opaque_bsdf(mi: Mitsuba, person: Person, material: Material) -> SceneDict:
         "type": "roughplastic",
         "distribution": "beckmann",
         "alpha": _TONGUE_ROUGHNESS if tongue else _SALIVA_ROUGHNESS,
-        "int_ior": _SALIVA_INDEX,
+        "int_ior": _SALIVA_IOR,
         "diffuse_reflectance": colour,
     }
 

@@ -24,15 +24,15 @@ from dermis.mesh.eyeball import LIMBUS_MM, SCLERA_MM, cornea_centre_mm, iris_mm,
 from dermis.optics.media import Medium
 from dermis.specular.two_lobe import MAX_ROUGHNESS, MIN_ROUGHNESS, NARROW_FACTOR, NARROW_WEIGHT, WIDE_FACTOR
 
-_MIRROR_FRACTION = 0.1
+_REFLECTION_PATH_FRACTION = 0.1
 """Fraction of the paths that meet the rough lobes of a refracting surface."""
-_NEARLY_SMOOTH = 0.02
+_NEARLY_SMOOTH_ROUGHNESS = 0.02
 _ROUGHNESS_RANGE = MIN_ROUGHNESS, MAX_ROUGHNESS
 
 
-def mitsuba_texture(mi: Mitsuba, values: NDArray[np.floating]) -> SceneDict:
+def mitsuba_texture(mi: Mitsuba, texels: NDArray[np.floating]) -> SceneDict:
     """Return Mitsuba's description of a texture from linear texels (h, w) or (h, w, 3)."""
-    bitmap = mi.Bitmap(np.ascontiguousarray(values, np.float32))
+    bitmap = mi.Bitmap(np.ascontiguousarray(texels, np.float32))
     return {"type": "bitmap", "bitmap": bitmap, "raw": True, "wrap_mode": "clamp"}
 
 
@@ -44,18 +44,22 @@ def coat_bsdf(mi: Mitsuba, textures: SkinTextures) -> MitsubaObject:
     fraction. The reflection is added to the light from below, which loses only the small fraction.
     """
     mirror_fraction = 1.0 - COAT_TRANSMITTANCE
-    coat = {"type": "mask", "opacity": mirror_fraction, "bsdf": _mirror(mi, textures, mirror_fraction)}
+    coat = {
+        "type": "mask",
+        "opacity": mirror_fraction,
+        "bsdf": _reflection_lobes_bsdf(mi, textures, mirror_fraction),
+    }
     return mi.load_dict(coat)
 
 
-def _mirror(mi: Mitsuba, textures: SkinTextures, fraction: float) -> SceneDict:
+def _reflection_lobes_bsdf(mi: Mitsuba, textures: SkinTextures, path_fraction: float) -> SceneDict:
     """Return the two lobes of `specular.two_lobe` in relief, with their reflectance divided by a fraction."""
     lobe = {
         "distribution": "beckmann",
         "type": "roughconductor",
         "eta": COAT_INDEX,
         "k": 0.0,  # with a real index it reflects like a dielectric
-        "specular_reflectance": mitsuba_texture(mi, textures.strength / fraction),
+        "specular_reflectance": mitsuba_texture(mi, textures.strength / path_fraction),
     }
     narrow, wide = (
         lobe | {"alpha": mitsuba_texture(mi, np.clip(factor * textures.roughness, *_ROUGHNESS_RANGE))}
@@ -75,12 +79,12 @@ def refracting_bsdfs(mi: Mitsuba, textures: SkinTextures) -> tuple[MitsubaObject
     """
     indices = {"int_ior": COAT_INDEX, "ext_ior": 1.0}
     # A blend with a perfectly smooth dielectric would be up to 20 % too bright in Mitsuba 3.9.
-    below = {"type": "roughdielectric", "distribution": "beckmann", "alpha": _NEARLY_SMOOTH}
-    below |= {"specular_reflectance": 0.0, "specular_transmittance": 1.0 / (1.0 - _MIRROR_FRACTION)}
-    mirror = _mirror(mi, textures, _MIRROR_FRACTION)
+    below = {"type": "roughdielectric", "distribution": "beckmann", "alpha": _NEARLY_SMOOTH_ROUGHNESS}
+    below |= {"specular_reflectance": 0.0, "specular_transmittance": 1.0 / (1.0 - _REFLECTION_PATH_FRACTION)}
+    mirror = _reflection_lobes_bsdf(mi, textures, _REFLECTION_PATH_FRACTION)
     outside = {
         "type": "blendbsdf",
-        "weight": _MIRROR_FRACTION,
+        "weight": _REFLECTION_PATH_FRACTION,
         "below": indices | below,
         "mirror": mirror,
     }
@@ -94,7 +98,7 @@ def painted_diffuse_bsdf(mi: Mitsuba, textures: SkinTextures) -> MitsubaObject:
         "type": "diffuse",
         "reflectance": mitsuba_texture(mi, np.clip(textures.colour / COAT_TRANSMITTANCE, 0.0, 1.0)),
     }
-    mirror = _mirror(mi, textures, fraction)
+    mirror = _reflection_lobes_bsdf(mi, textures, fraction)
     return mi.load_dict({"type": "blendbsdf", "weight": fraction, "base": base, "mirror": mirror})
 
 
@@ -175,9 +179,9 @@ LIMBUS_BLUR_MM = 0.55
 """Half the width of the transition from white to cornea [mm]."""
 EYE_UV_RADIUS = 0.49
 """Distance in uv from the middle of the texture that corresponds to 180 degrees from the eye's axis."""
-_STEPS_AROUND, _CORNEA_STEPS, _SCLERA_STEPS = 192, 96, 96
+_EYEBALL_STEPS_AROUND, _CORNEA_STEPS, _SCLERA_STEPS = 192, 96, 96
 """Steps of the eyeball mesh around the axis, and from the apex over cornea and sclera."""
-_TEXTURE_SIDE = 1024
+_CORNEA_TEXTURE_SIDE = 1024
 _IRIS_GAP_MM = 0.02  # between the edge of the disc and the eyeball [mm]
 
 
@@ -187,7 +191,7 @@ def eyeball_mesh() -> tuple[Doubles, Index, Doubles, Doubles]:
     angle = np.concatenate(
         [np.linspace(0.0, limbus, _CORNEA_STEPS, endpoint=False), np.linspace(limbus, np.pi, _SCLERA_STEPS)]
     )
-    azimuth = 2.0 * np.pi * np.arange(_STEPS_AROUND + 1) / _STEPS_AROUND
+    azimuth = 2.0 * np.pi * np.arange(_EYEBALL_STEPS_AROUND + 1) / _EYEBALL_STEPS_AROUND
     a, t = (grid.ravel() for grid in np.meshgrid(angle, azimuth, indexing="ij"))
     outwards = np.stack([np.sin(a) * np.cos(t), np.sin(a) * np.sin(t), np.cos(a)], axis=-1)
     positions = profile_mm(a)[:, None] * outwards
@@ -197,17 +201,17 @@ def eyeball_mesh() -> tuple[Doubles, Index, Doubles, Doubles]:
     normals = outwards + clear * (cornea - outwards)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     uv = 0.5 + EYE_UV_RADIUS * (a / np.pi)[:, None] * np.stack([np.cos(t), -np.sin(t)], axis=-1)
-    return positions, _grid_triangles(len(angle), _STEPS_AROUND + 1), normals, uv
+    return positions, _grid_triangles(len(angle), _EYEBALL_STEPS_AROUND + 1), normals, uv
 
 
-def _grid_triangles(rows: int, columns: int) -> Index:
+def _grid_triangles(row_count: int, column_count: int) -> Index:
     """Return the triangles of a grid of points on a surface of revolution.
 
-    rows : number of angles from the axis
-    columns : number of azimuths
+    row_count : number of angles from the axis
+    column_count : number of azimuths
     """
-    first = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
-    a, b, c, d = first, first + columns, first + columns + 1, first + 1
+    first = (np.arange(row_count - 1)[:, None] * column_count + np.arange(column_count - 1)).ravel()
+    a, b, c, d = first, first + column_count, first + column_count + 1, first + 1
     return np.concatenate([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)])
 
 
@@ -222,7 +226,7 @@ def cornea_weight(axis_distance_mm: Doubles, z_mm: Doubles) -> Doubles:
 
 def cornea_weight_map() -> Doubles:
     """Return `cornea_weight` as a texture (n, n) by the polar uv of the eyeball."""
-    u = (np.arange(_TEXTURE_SIDE) + 0.5) / _TEXTURE_SIDE - 0.5
+    u = (np.arange(_CORNEA_TEXTURE_SIDE) + 0.5) / _CORNEA_TEXTURE_SIDE - 0.5
     angle = np.minimum(np.hypot(*np.meshgrid(u, u)) / EYE_UV_RADIUS, 1.0) * np.pi
     radius = profile_mm(angle)
     return cornea_weight(radius * np.sin(angle), radius * np.cos(angle))
@@ -231,12 +235,15 @@ def cornea_weight_map() -> Doubles:
 def iris_disc() -> tuple[Doubles, Index, float]:
     """Return the iris as a disc in its plane: positions, triangles and radius, up to the eyeball [mm]."""
     radius = float(np.sqrt(SCLERA_MM**2 - iris_mm() ** 2)) - _IRIS_GAP_MM
-    azimuth = 2.0 * np.pi * np.arange(_STEPS_AROUND) / _STEPS_AROUND
+    azimuth = 2.0 * np.pi * np.arange(_EYEBALL_STEPS_AROUND) / _EYEBALL_STEPS_AROUND
     rim = np.stack(
-        [radius * np.cos(azimuth), radius * np.sin(azimuth), np.full(_STEPS_AROUND, iris_mm())], axis=-1
+        [radius * np.cos(azimuth), radius * np.sin(azimuth), np.full(_EYEBALL_STEPS_AROUND, iris_mm())],
+        axis=-1,
     )
-    k = np.arange(_STEPS_AROUND)
-    triangles = np.stack([np.full(_STEPS_AROUND, _STEPS_AROUND), k, (k + 1) % _STEPS_AROUND], axis=-1)
+    k = np.arange(_EYEBALL_STEPS_AROUND)
+    triangles = np.stack(
+        [np.full(_EYEBALL_STEPS_AROUND, _EYEBALL_STEPS_AROUND), k, (k + 1) % _EYEBALL_STEPS_AROUND], axis=-1
+    )
     return np.concatenate([rim, [[0.0, 0.0, iris_mm()]]]), triangles, radius
 
 
@@ -284,13 +291,13 @@ LONGITUDINAL_ROUGHNESS, AZIMUTHAL_ROUGHNESS = 0.22, 0.5
 """Roughness in the parametrisation for artists [Chiang2016]."""
 MAX_HAIR_GROUPS = 12
 """Largest number of hair groups; all fibres of a group have the mean absorption coefficient."""
-_MIN_RADIUS_MM = 1e-3
+_MIN_HAIR_RADIUS_MM = 1e-3
 
 
-def hair_shapes(mi: Mitsuba, hairs: HairFibres, name: str = "hairs") -> SceneDict:
+def hair_shapes(mi: Mitsuba, hairs: HairFibres, shape_name: str = "hairs") -> SceneDict:
     """Return hair fibres as Mitsuba shapes, one for each group of fibres with similar absorption.
 
-    name : prefix of the shapes' names, before their numbers
+    shape_name : prefix of the shapes' names, before their numbers
     """
     shapes = {}
     # Mitsuba's unit of length is the radius.
@@ -308,7 +315,7 @@ def hair_shapes(mi: Mitsuba, hairs: HairFibres, name: str = "hairs") -> SceneDic
                 "int_ior": KERATIN_INDEX,
             }
             curves = {"type": "bsplinecurve", "filename": str(file), "bsdf": fibre}
-            shapes[f"{name}_{k}"] = mi.load_dict(curves)
+            shapes[f"{shape_name}_{k}"] = mi.load_dict(curves)
     return shapes
 
 
@@ -330,7 +337,7 @@ def write_curves(path: Path, knots_mm: Doubles, radius_mm: NDArray[np.floating])
     """
     rows = np.concatenate([knots_mm, radius_mm[..., None].astype(np.float64)], axis=-1)
     points = bspline_control_points(rows)
-    points[..., 3] = np.maximum(points[..., 3], _MIN_RADIUS_MM)
+    points[..., 3] = np.maximum(points[..., 3], _MIN_HAIR_RADIUS_MM)
     with path.open("w", encoding="ascii") as file:
         for curve in points:
             np.savetxt(file, curve, "%.5f")

@@ -38,11 +38,11 @@ from dermis.scene.lights import DirectionalLight, Light, StripeLight
 if TYPE_CHECKING:
     from atlas_reading import Points  # in the folder tests, like other modules that functions import
 
-PROFILE = load_profile("gpu-gems-3")
+BLUR_PROFILE = load_profile("gpu-gems-3")
 Array = NDArray[np.floating]
 Flags = NDArray[np.bool_]
 PointFilter = Callable[[Array], Flags]
-PATCH_SIDE = 256  # side of flat patches [texels]
+FLAT_PATCH_SIDE = 256  # side of flat patches [texels]
 HUMAN_FILE = "heads/makehuman/head_young_male_light.obj"
 SPHERE_RADII_MM = (5.0, 10.0, 20.0, 50.0, 100.0)
 BALL_SIDE, HEAD_SIDE = 320, 1024
@@ -66,13 +66,15 @@ def point_tables(device: Device) -> dict[str, object]:
     }
 
 
-def blurred_levels(device: Device, mesh: Mesh, light: Array, stretch: str = "full") -> list[Array]:
+def blurred_levels(device: Device, mesh: Mesh, irradiance: Array, stretch_mode: str = "full") -> list[Array]:
     """Return all pyramid levels (n, n) of light blurred on the atlas of a mesh, at full resolution.
 
-    light : (n, n) irradiance
-    stretch : stretch map of the blur, "full" or "axes" (without the angle between u and v)
+    irradiance : (n, n) irradiance
+    stretch_mode : stretch map of the blur, "full" or "axes" (without the angle between u and v)
     """
-    levels, blur = blur_light(device, mesh, build_atlas(mesh, len(light)), light[..., None], stretch)
+    levels, blur = blur_light(
+        device, mesh, build_atlas(mesh, len(irradiance)), irradiance[..., None], stretch_mode
+    )
     return [resampled_level(device, levels, blur, k + 1) for k in range(len(blur.variance_mm2))]
 
 
@@ -82,11 +84,11 @@ def point_row(device: Device, texels_per_mm: float) -> str:
     The reference is the analytic sum of Gaussians.
     """
     profile = load_profile("gpu-gems-3")
-    light = np.zeros((PATCH_SIDE, PATCH_SIDE), np.float32)
-    middle = PATCH_SIDE // 2
+    light = np.zeros((FLAT_PATCH_SIDE, FLAT_PATCH_SIDE), np.float32)
+    middle = FLAT_PATCH_SIDE // 2
     light[middle, middle] = 1.0
-    levels = blurred_levels(device, plane(PATCH_SIDE / texels_per_mm), light)
-    y, x = np.mgrid[:PATCH_SIDE, :PATCH_SIDE] - middle
+    levels = blurred_levels(device, plane(FLAT_PATCH_SIDE / texels_per_mm), light)
+    y, x = np.mgrid[:FLAT_PATCH_SIDE, :FLAT_PATCH_SIDE] - middle
     r2 = (x**2 + y**2) / texels_per_mm**2
     blurred = GaussianSum("blurred levels", profile.variance_mm2[1:], profile.weight[1:])
     exact = blurred.radiant_exitance(np.sqrt(r2))[..., 0] / texels_per_mm**2
@@ -97,20 +99,20 @@ def point_row(device: Device, texels_per_mm: float) -> str:
     return f"| {texels_per_mm:g} | {100 * shape:.2f} % | {100 * energy:+.4f} % |"
 
 
-def sheared_row(device: Device, degrees: float) -> str:
+def sheared_row(device: Device, shear_degrees: float) -> str:
     """Return a Markdown row with the ratios of a blurred point's two principal widths to the exact width.
 
-    degrees : angle between the uv axes on the flat surface [degrees]
+    shear_degrees : angle between the uv axes on the flat surface [degrees]
     """
-    flat = plane(PATCH_SIDE / 3.0)
-    shear = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    flat = plane(FLAT_PATCH_SIDE / 3.0)
+    shear = np.cos(np.radians(shear_degrees)), np.sin(np.radians(shear_degrees))
     positions = flat.positions.copy()
     positions[:, 0] += shear[0] * positions[:, 1]
     positions[:, 1] *= shear[1]
     mesh = build_mesh(positions, flat.uv, flat.triangles, flat.material, flat.materials)
-    light = np.zeros((PATCH_SIDE, PATCH_SIDE), np.float32)
-    light[PATCH_SIDE // 2, PATCH_SIDE // 2] = 1.0
-    y, x = np.mgrid[:PATCH_SIDE, :PATCH_SIDE] - PATCH_SIDE // 2
+    light = np.zeros((FLAT_PATCH_SIDE, FLAT_PATCH_SIDE), np.float32)
+    light[FLAT_PATCH_SIDE // 2, FLAT_PATCH_SIDE // 2] = 1.0
+    y, x = np.mgrid[:FLAT_PATCH_SIDE, :FLAT_PATCH_SIDE] - FLAT_PATCH_SIDE // 2
     position = np.stack([x - shear[0] * y, -shear[1] * y]) / 3.0  # v points down
     target_variance = load_profile("gpu-gems-3").variance_mm2[-1]
     cells = []
@@ -118,12 +120,12 @@ def sheared_row(device: Device, degrees: float) -> str:
         spot = blurred_levels(device, mesh, light, stretch)[-1].astype(float)
         covariance = np.einsum("iyx,jyx,yx->ij", position, position, spot) / spot.sum()
         cells += [f"{width:.3f}" for width in np.sqrt(np.linalg.eigvalsh(covariance) / target_variance)]
-    return f"| {degrees:g}° | {' | '.join(cells)} |"
+    return f"| {shear_degrees:g}° | {' | '.join(cells)} |"
 
 
 def constant_light_error(device: Device) -> float:
     """Return the largest error of blurred constant light on the atlas of a sphere, over all levels [-]."""
-    atlas = build_atlas(uv_sphere(100.0), PATCH_SIDE)
+    atlas = build_atlas(uv_sphere(100.0), FLAT_PATCH_SIDE)
     levels = blurred_levels(device, uv_sphere(100.0), atlas.coverage.astype(np.float32))
     return max(float(np.abs(level[atlas.coverage] - 1).max()) for level in levels)
 
@@ -152,25 +154,27 @@ def harmonic_row(renderer: Renderer, radius_mm: float) -> str:
     density = np.maximum(atlas.stretch.astype(float).prod(axis=-1, keepdims=True), 1e-6)
     area = atlas.lit[..., None] / density
     map_fraction = (area * remaining * light).sum() / (area * light**2).sum()
-    v = PROFILE.variance_mm2[-1] / radius_mm**2
+    v = BLUR_PROFILE.variance_mm2[-1] / radius_mm**2
     decay = np.exp(-2 / v)
     chords = (1 - decay) - v * (1 - (1 + 2 / v) * decay)
     return f"| {radius_mm:g} | {map_fraction:.3f} | {np.exp(-v):.3f} | {chords:.3f} |"
 
 
 def blur_light(
-    device: Device, mesh: Mesh, atlas: Atlas, light: Array, stretch: str = "full"
+    device: Device, mesh: Mesh, atlas: Atlas, irradiance: Array, stretch_mode: str = "full"
 ) -> tuple[PyramidLevels, Blur]:
-    """Blur grey light (n, n, 1) on the atlas of a mesh by all Gaussians of PROFILE but the narrowest.
+    """Blur grey light (n, n, 1) on the atlas of a mesh by all Gaussians of `BLUR_PROFILE` but the narrowest.
 
-    stretch : stretch map of the blur, "full" or "axes" (without the angle between u and v)
+    stretch_mode : stretch map of the blur, "full" or "axes" (without the angle between u and v)
     """
-    textures, variance = upload_atlas(device, atlas, stretch), PROFILE.variance_mm2[1:]
+    textures, variance = upload_atlas(device, atlas, stretch_mode), BLUR_PROFILE.variance_mm2[1:]
     max_halvings = len(textures.mips_for("repeated")) - 1
     halvings = choose_halvings(variance, textures.median_texels_per_mm, max_halvings)
-    blur = Blur(variance, PROFILE.weight[1:], halvings)
-    levels = make_levels(device, len(light), (halvings,), level_format(device))
-    upload(device, levels.stacks[0], np.dstack([light, light, light, np.ones_like(light)]))
+    blur = Blur(variance, BLUR_PROFILE.weight[1:], halvings)
+    levels = make_levels(device, len(irradiance), (halvings,), level_format(device))
+    upload(
+        device, levels.stacks[0], np.dstack([irradiance, irradiance, irradiance, np.ones_like(irradiance)])
+    )
     frame = CommandList(device)
     head = Head("", mesh, Maps())
     shape = evaluate_rest_shape(device, shape_tables(device, head), head.positions_mm)
@@ -180,10 +184,10 @@ def blur_light(
     return levels, blur
 
 
-def resampled_level(device: Device, levels: PyramidLevels, blur: Blur, k: int) -> Array:
-    """Return pyramid level k (n, n), resampled bilinearly to the full resolution of the atlas."""
-    halvings = blur.halvings[k]
-    layer = download(device, levels.stacks[halvings], layer=k - levels.first[halvings])[..., 0]
+def resampled_level(device: Device, levels: PyramidLevels, blur: Blur, level_index: int) -> Array:
+    """Return a pyramid level (n, n), resampled bilinearly to the full resolution of the atlas."""
+    halvings = blur.halvings[level_index]
+    layer = download(device, levels.stacks[halvings], layer=level_index - levels.first[halvings])[..., 0]
     return np.asarray(zoom(layer, 2**halvings, order=1, mode="nearest", grid_mode=True))
 
 
@@ -236,31 +240,35 @@ def hidden_points(positions: Array) -> Flags:
     return ~visible_points(positions)
 
 
-def seam_row(renderer: Renderer, name: str, head: Head, side: int, where: PointFilter) -> str:
+def seam_row(
+    renderer: Renderer, row_title: str, head: Head, atlas_side: int, point_filter: PointFilter
+) -> str:
     """Return a Markdown row with the discontinuities across seams, with a column for each seam method.
 
-    side : side of the atlas [texel]
-    where : function that returns the mask of the seam points to use, given their positions
+    atlas_side : side of the atlas [texel]
+    point_filter : function that returns the mask of the seam points to use, given their positions
     """
-    first, second = seam_side_points(head, where)
+    first, second = seam_side_points(head, point_filter)
     cells = []
     for method in SEAM_METHODS:
-        jumps = seam_jumps(renderer, striped_scene(head), method, side, first, second)
+        jumps = seam_jumps(renderer, striped_scene(head), method, atlas_side, first, second)
         cells.append(f"{100 * jumps.mean():.1f} / {100 * np.percentile(jumps, 95):.1f}")
-    return f"| {name} | {len(first.triangle)} | {' | '.join(cells)} |"
+    return f"| {row_title} | {len(first.triangle)} | {' | '.join(cells)} |"
 
 
-def seam_side_points(head: Head, where: PointFilter) -> tuple[Points, Points]:
+def seam_side_points(head: Head, point_filter: PointFilter) -> tuple[Points, Points]:
     """Return corresponding points on the two sides of seams, where they face the lights.
 
-    where : function that returns the mask of the seam points to use, given their positions
+    point_filter : function that returns the mask of the seam points to use, given their positions
     """
     from atlas_reading import Points, seam_points
 
     mesh = head.mesh
     first, second = seam_points(mesh)
     positions = first.on(mesh.positions[mesh.triangles]) - head.centre_mm
-    selected = where(positions) & (np.abs(first.on(mesh.normals[mesh.triangles])[:, 2]) > MIN_FACING_COSINE)
+    selected = point_filter(positions) & (
+        np.abs(first.on(mesh.normals[mesh.triangles])[:, 2]) > MIN_FACING_COSINE
+    )
     for size in (BALL_SIDE, HEAD_SIDE):
         for layout in ("mesh", "stitched"):
             mapped = cached_atlas(head.topology.mesh, size, layout).mapped
@@ -283,21 +291,26 @@ def striped_scene(head: Head) -> Scene:
 
 
 def seam_jumps(
-    renderer: Renderer, scene: Scene, method: str, side: int, first: Points, second: Points
+    renderer: Renderer,
+    scene: Scene,
+    seam_method: str,
+    atlas_side: int,
+    first_side: Points,
+    second_side: Points,
 ) -> Array:
     """Return the relative difference of scattered red light between the two sides of each seam.
 
-    method : seam method
-    side : side of the atlas [texel]
-    first, second : corresponding points on the two sides
+    seam_method : seam method
+    atlas_side : side of the atlas [texel]
+    first_side, second_side : corresponding points on the two sides
     """
     from atlas_reading import lit_at
 
-    values = {"size": (16, 16), "atlas": side, "seams": method, "transmission": "none"}
+    values = {"size": (16, 16), "atlas": atlas_side, "seams": seam_method, "transmission": "none"}
     settings = Settings.model_validate(values | {"interreflection": False})
     renderer.draw(scene, settings)
     scattered = renderer.prepare(scene, settings).resources.scattered
     light = download(renderer.device, scattered).astype(float)[..., :3]
-    atlas = cached_atlas(scene.head.topology.mesh, side, SEAM_METHODS[method].layouts[0])
-    a, b = (lit_at(light, atlas, points)[:, 0] for points in (first, second))
+    atlas = cached_atlas(scene.head.topology.mesh, atlas_side, SEAM_METHODS[seam_method].layouts[0])
+    a, b = (lit_at(light, atlas, points)[:, 0] for points in (first_side, second_side))
     return np.abs(a - b) / np.maximum((a + b) / 2, 1e-9)

@@ -124,13 +124,13 @@ def scan_with_normal_map() -> Head:
     return replace(head, maps=Maps(normal=relief_slopes(head.mesh, head.maps.height)))
 
 
-def relief_slopes(mesh: Mesh, height: Picture) -> Picture:
+def relief_slopes(mesh: Mesh, height_map: Picture) -> Picture:
     """Return the slopes (n, n, 2) along u and v of a height map, in the form of a normal map.
 
-    height : (n, n) height map [mm]
+    height_map : (n, n) height map [mm]
     """
-    down, right = np.gradient(height)
-    stretch = build_atlas(mesh, len(height)).stretch.astype(np.float32)
+    down, right = np.gradient(height_map)
+    stretch = build_atlas(mesh, len(height_map)).stretch.astype(np.float32)
     return np.asarray(np.stack([right, -down], axis=-1) * stretch, np.float32)
 
 
@@ -200,13 +200,13 @@ def render_cycles_skin(scene: Scene, skin: PrincipledSkin) -> SkinRender:
     return SkinRender(image_pass.image, float(surface_pass.image.sum() / image_pass.image.sum()))
 
 
-def downsample_map(values: Picture) -> Picture:
+def downsample_map(texels: Picture) -> Picture:
     """Return a map averaged over blocks of texels, to at most `MAX_MAP_SIDE` rows.
 
-    values : (h, w) or (h, w, c) map
+    texels : (h, w) or (h, w, c) map
     """
-    step = max(1, len(values) // MAX_MAP_SIDE)
-    blocks = values.reshape(len(values) // step, step, values.shape[1] // step, step, *values.shape[2:])
+    step = max(1, len(texels) // MAX_MAP_SIDE)
+    blocks = texels.reshape(len(texels) // step, step, texels.shape[1] // step, step, *texels.shape[2:])
     return np.asarray(blocks.mean(axis=(1, 3)), np.float32)
 
 
@@ -232,12 +232,12 @@ def principled_skin(head: Head) -> PrincipledSkin:
     return PrincipledSkin(downsample_map(head.maps.colour), (red, green, blue), SKIN_ROUGHNESS)
 
 
-def skin_renders(renderer: dermis.Renderer, title: str) -> dict[str, list[SkinRender]]:
+def skin_renders(renderer: dermis.Renderer, head_title: str) -> dict[str, list[SkinRender]]:
     """Render a head with the skin of the 2007 talk, the default skin and Cycles; return them by view.
 
-    title : key of `HEAD_NAMES`
+    head_title : key of `HEAD_NAMES`
     """
-    name = HEAD_NAMES[title]
+    name = HEAD_NAMES[head_title]
     painted, one_lobe = (dermis.load_head(name, subdivide=1, regions=regions) for regions in ("auto", "none"))
     mapped = with_normal_map(with_painted_maps(renderer.device, painted, MAX_MAP_SIDE))
     skin, renders = principled_skin(mapped), dict[str, list[SkinRender]]()
@@ -246,5 +246,5 @@ def skin_renders(renderer: dermis.Renderer, title: str) -> dict[str, list[SkinRe
         preset_2007 = render_skin(renderer, Scene(one_lobe, camera=camera, skin=Skin.preset("deck-2007")))
         ours = render_skin(renderer, Scene(painted, camera=camera))
         renders[view] = [preset_2007, ours, render_cycles_skin(Scene(mapped, camera=camera), skin)]
-        print_lines(f"{title} {view} {' '.join(f'{one.reflected:.3f}' for one in renders[view])}")
+        print_lines(f"{head_title} {view} {' '.join(f'{one.reflected:.3f}' for one in renders[view])}")
     return renders

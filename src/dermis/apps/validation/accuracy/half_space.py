@@ -26,11 +26,11 @@ from dermis.scene import Scene, Settings, Skin
 from dermis.scene.heads import load_head
 
 Floats = NDArray[np.float64]
-ETA, OBLIQUE_COSINE = 1.4, 0.15  # cosine of 81 degrees
-PHOTONS = 200_000
+SKIN_IOR, OBLIQUE_COSINE = 1.4, 0.15  # cosine of 81 degrees
+PHOTON_COUNT = 200_000
 FORWARD_G = 0.8  # mean cosine of scattering in real skin
-_MIN_WEIGHT = 0.01
-_NODE_COUNT = 48
+_MIN_PHOTON_WEIGHT = 0.01
+_QUADRATURE_NODE_COUNT = 48
 
 
 def half_space(adapter: str = "auto") -> None:
@@ -48,9 +48,9 @@ def direction_table(head: Head, adapter: str) -> str:
     photons = f"photons of mean cosine {FORWARD_G:g}"
     rows: dict[str, Sequence[float]] = {
         f"{oblique}, index-matched": [_oblique_ratio(one, 1.0) for one in albedo],
-        f"{oblique}, index {ETA:g}": [_oblique_ratio(one, ETA) for one in albedo],
-        "the same, photons": [_monte_carlo_ratio(one, 0.0, ETA) for one in albedo],
-        f"the same, {photons}": [_monte_carlo_ratio(one, FORWARD_G, ETA) for one in forward],
+        f"{oblique}, index {SKIN_IOR:g}": [_oblique_ratio(one, SKIN_IOR) for one in albedo],
+        "the same, photons": [_monte_carlo_ratio(one, 0.0, SKIN_IOR) for one in albedo],
+        f"the same, {photons}": [_monte_carlo_ratio(one, FORWARD_G, SKIN_IOR) for one in forward],
         f"index-matched, {photons}": [_monte_carlo_ratio(one, FORWARD_G, 1.0) for one in forward],
         f"{errors}, lambertian": [_direction_errors(one)[0] for one in albedo],
         f"{errors}, half-space": [_direction_errors(one)[1] for one in albedo],
@@ -76,26 +76,28 @@ def _direction_errors(albedo: float) -> tuple[float, float]:
 
     albedo : single-scattering albedo [-]
     """
-    critical = critical_cosine(ETA)
-    trapped, escaping = (gauss_legendre(*ends, _NODE_COUNT) for ends in ((0.0, critical), (critical, 1.0)))
+    critical = critical_cosine(SKIN_IOR)
+    trapped, escaping = (
+        gauss_legendre(*ends, _QUADRATURE_NODE_COUNT) for ends in ((0.0, critical), (critical, 1.0))
+    )
     mu, weight = (np.concatenate(both) for both in zip(trapped, escaping, strict=True))
-    reflectance, flux = internal_reflectance(mu, ETA), 2.0 * weight * mu
+    reflectance, flux = internal_reflectance(mu, SKIN_IOR), 2.0 * weight * mu
     index_matched = np.pi * reflected_radiance(mu[None], mu[:, None], albedo)
     inside = np.linalg.solve(np.eye(len(mu)) - index_matched * flux * reflectance, index_matched)
-    free = slice(_NODE_COUNT, None)  # nodes of directions that leave, of both light and view
+    free = slice(_QUADRATURE_NODE_COUNT, None)  # nodes of directions that leave, of both light and view
     transmittance, area = (1.0 - reflectance)[free], flux[free] / flux[free].sum()
-    exact = inside[free, free] * transmittance[:, None] / ETA**2
-    above = float(directional_reflectance(1.0, albedo, ETA))
-    lambertian = np.outer(transmittance / (area @ transmittance), np.full(_NODE_COUNT, above))
-    response = angular_response([above], ETA)
-    cosine = np.sqrt(1.0 - ETA**2 * (1.0 - mu[free] ** 2))
-    entering = directional_reflectance(cosine, albedo, ETA) / above
-    single = 1.0 / (mu[free, None] + mu[free]) - mean_single_scattering_kernel(cosine, ETA)
+    exact = inside[free, free] * transmittance[:, None] / SKIN_IOR**2
+    above = float(directional_reflectance(1.0, albedo, SKIN_IOR))
+    lambertian = np.outer(transmittance / (area @ transmittance), np.full(_QUADRATURE_NODE_COUNT, above))
+    response = angular_response([above], SKIN_IOR)
+    cosine = np.sqrt(1.0 - SKIN_IOR**2 * (1.0 - mu[free] ** 2))
+    entering = directional_reflectance(cosine, albedo, SKIN_IOR) / above
+    single = 1.0 / (mu[free, None] + mu[free]) - mean_single_scattering_kernel(cosine, SKIN_IOR)
     half_space = lambertian * (entering + response.single_scattering[0] * single)
     importance = np.outer(area, area)
 
-    def error(one: Floats) -> float:
-        return float(np.sqrt((importance * (one - exact) ** 2).sum() / (importance * exact**2).sum()))
+    def error(radiance: Floats) -> float:
+        return float(np.sqrt((importance * (radiance - exact) ** 2).sum() / (importance * exact**2).sum()))
 
     return error(lambertian), error(half_space)
 
@@ -118,8 +120,8 @@ def _reflected_fraction(cosine: float, albedo: float, mean_cosine: float, eta: f
     eta : index of refraction
     """
     rng = np.random.default_rng(1)
-    depth, weight, reflected = np.zeros(PHOTONS), np.ones(PHOTONS), 0.0
-    down = np.full(PHOTONS, float(refracted_cosine(cosine, eta)))
+    depth, weight, reflected = np.zeros(PHOTON_COUNT), np.ones(PHOTON_COUNT), 0.0
+    down = np.full(PHOTON_COUNT, float(refracted_cosine(cosine, eta)))
     while len(depth):
         depth = depth - np.log(rng.random(len(depth))) * down
         leaves = (depth < 0.0) & (rng.random(len(depth)) > internal_reflectance(np.abs(down), eta))
@@ -128,24 +130,24 @@ def _reflected_fraction(cosine: float, albedo: float, mean_cosine: float, eta: f
         inside = ~leaves
         depth, down, weight = np.abs(depth[inside]), down[inside], albedo * weight[inside]
         down = _scattered_cosines(down, mean_cosine, rng)
-        survives = (weight > _MIN_WEIGHT) | (rng.random(len(weight)) < 0.1)
-        weight = np.where(weight > _MIN_WEIGHT, weight, 10.0 * weight)
+        survives = (weight > _MIN_PHOTON_WEIGHT) | (rng.random(len(weight)) < 0.1)
+        weight = np.where(weight > _MIN_PHOTON_WEIGHT, weight, 10.0 * weight)
         depth, down, weight = depth[survives], down[survives], weight[survives]
-    return reflected / PHOTONS
+    return reflected / PHOTON_COUNT
 
 
-def _scattered_cosines(down: Floats, g: float, rng: np.random.Generator) -> Floats:
+def _scattered_cosines(downward_cosines: Floats, g: float, rng: np.random.Generator) -> Floats:
     """Return the cosines (n,) to the downward axis after scattering, by [HenyeyGreenstein1941].
 
-    down : (n,) cosines before scattering
+    downward_cosines : (n,) cosines before scattering
     g : mean cosine of the scattering angle [-]
     """
-    uniform = rng.random(len(down))
+    uniform = rng.random(len(downward_cosines))
     if g == 0.0:
         return 2.0 * uniform - 1.0
     cosine = (1.0 + g**2 - ((1.0 - g**2) / (1.0 - g + 2.0 * g * uniform)) ** 2) / (2.0 * g)
-    sines = np.sqrt(np.maximum((1.0 - cosine**2) * (1.0 - down**2), 0.0))
-    deflected = down * cosine + sines * np.cos(2.0 * np.pi * rng.random(len(down)))
+    sines = np.sqrt(np.maximum((1.0 - cosine**2) * (1.0 - downward_cosines**2), 0.0))
+    deflected = downward_cosines * cosine + sines * np.cos(2.0 * np.pi * rng.random(len(downward_cosines)))
     return np.asarray(np.clip(deflected, -1.0, 1.0))
 
 

@@ -30,7 +30,7 @@ PANORAMAS = ("royal_esplanade", "lebombo")
 VIEW_DEGREES = (0, 15, 30, 45, 60, 70, 75, 80, 85)  # angle between view and normal [degrees]
 FINE_ROUGHNESS = 0.25  # below this roughness, lobes are summed over smaller texels
 Array = NDArray[np.floating]
-UP = np.array([0.0, 1.0, 0.0])
+UP_AXIS = np.array([0.0, 1.0, 0.0])
 
 
 def light(adapter: str = "auto") -> None:
@@ -38,17 +38,17 @@ def light(adapter: str = "auto") -> None:
     print_tables(tables(adapter))
 
 
-def sample_panorama(layer: Array, towards: Array) -> Array:
+def sample_panorama(layer: Array, directions: Array) -> Array:
     """Return the radiance (n, 3) of a panorama in given directions, interpolated as by the shader.
 
     layer : (h, w, 3) panorama
-    towards : (n, 3) directions
+    directions : (n, 3) directions
     """
     height, width = layer.shape[:2]
-    x = (0.5 + np.arctan2(towards[:, 0], -towards[:, 2]) / (2 * np.pi)) * width - 0.5
-    y = np.arccos(np.clip(towards[:, 1], -1, 1)) / np.pi * height - 0.5
+    x = (0.5 + np.arctan2(directions[:, 0], -directions[:, 2]) / (2 * np.pi)) * width - 0.5
+    y = np.arccos(np.clip(directions[:, 1], -1, 1)) / np.pi * height - 0.5
     left, top = np.floor(x).astype(int), np.floor(y).astype(int)
-    total = np.zeros((len(towards), 3))
+    total = np.zeros((len(directions), 3))
     for i in (0, 1):
         for j in (0, 1):
             weight = np.abs(1 - i - (y - top)) * np.abs(1 - j - (x - left))
@@ -56,113 +56,119 @@ def sample_panorama(layer: Array, towards: Array) -> Array:
     return total
 
 
-def normalise(v: Array) -> Array:
+def normalise(vectors: Array) -> Array:
     """Return vectors (..., 3) scaled to length 1."""
-    return np.asarray(v / np.linalg.norm(v, axis=-1, keepdims=True))
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
 
 
 @cache
-def panorama(name: str, rows: int = 256) -> tuple[Array, Array, Prefiltered]:
+def panorama(panorama_name: str, row_count: int = 256) -> tuple[Array, Array, Prefiltered]:
     """Return directions (n, 3) and light (n, 3) of a panorama's texels, and its prefiltered form.
 
     Light is radiance times solid angle, without suns.
     """
-    radiance = resample(split_suns(load_panorama(name))[0], rows)
+    radiance = resample(split_suns(load_panorama(panorama_name))[0], row_count)
     light = radiance * solid_angles(*radiance.shape[:2])[..., None]
-    return directions(*radiance.shape[:2]).reshape(-1, 3), light.reshape(-1, 3), prefilter(name)
+    return directions(*radiance.shape[:2]).reshape(-1, 3), light.reshape(-1, 3), prefilter(panorama_name)
 
 
-def irradiance_error(name: str, count: int = 200) -> float:
+def irradiance_error(panorama_name: str, normal_count: int = 200) -> float:
     """Return the largest relative error of the irradiance of a panorama, over random normals.
 
-    count : number of normals
+    normal_count : number of normals
     """
-    towards, light, prefiltered = panorama(name)
-    normals = normalise(np.random.default_rng(1).normal(size=(count, 3)))
+    towards, light, prefiltered = panorama(panorama_name)
+    normals = normalise(np.random.default_rng(1).normal(size=(normal_count, 3)))
     exact = np.array([np.maximum(towards @ normal, 0) @ light for normal in normals])
     return float(np.abs(sample_panorama(prefiltered.layers[0], normals) / exact - 1).max())
 
 
-def reflection_error(name: str, m: float, angle: float, count: int = 320) -> float:
+def reflection_error(
+    panorama_name: str, roughness_m: float, view_degrees: float, normal_count: int = 320
+) -> float:
     """Return the relative RMS error of the radiance that a lobe reflects of a panorama, over random normals.
 
-    m : roughness of the lobe
-    angle : angle between view and normal [degrees]
-    count : number of normals
+    roughness_m : roughness of the lobe
+    view_degrees : angle between view and normal [degrees]
+    normal_count : number of normals
     """
-    cosine = float(np.cos(np.radians(angle)))
-    towards, light, prefiltered = panorama(name, 512 if m < FINE_ROUGHNESS else 256)
+    cosine = float(np.cos(np.radians(view_degrees)))
+    towards, light, prefiltered = panorama(panorama_name, 512 if roughness_m < FINE_ROUGHNESS else 256)
     rng = np.random.default_rng(2)
-    normals = normalise(rng.normal(size=(count, 3)))
-    along = normalise(np.cross(normals, rng.normal(size=(count, 3))))
+    normals = normalise(rng.normal(size=(normal_count, 3)))
+    along = normalise(np.cross(normals, rng.normal(size=(normal_count, 3))))
     views = cosine * normals - np.sqrt(1 - cosine**2) * along
     pairs = zip(normals, views, strict=True)
-    exact = [reflected_radiance(towards, light, normal, view, m) for normal, view in pairs]
+    exact = [reflected_radiance(towards, light, normal, view, roughness_m) for normal, view in pairs]
     mirror_direction = 2 * cosine * normals - views
     tangent = cosine * along - np.sqrt(1 - cosine**2) * normals
-    bitangent, sampled = np.cross(normals, along), np.zeros((count, 3))
-    for x, y, lobe_roughness, weight in lobe_parameters(cosine, m):
+    bitangent, sampled = np.cross(normals, along), np.zeros((normal_count, 3))
+    for x, y, lobe_roughness, weight in lobe_parameters(cosine, roughness_m):
         direction = normalise(2 * (x * tangent + y * bitangent) + (1 - x**2 - y**2) * mirror_direction)
         sampled += weight * lobe_radiance(prefiltered.layers, direction, lobe_roughness)
-    error = directional_albedo(cosine, m) * sampled - np.array(exact)
+    error = directional_albedo(cosine, roughness_m) * sampled - np.array(exact)
     return float(np.sqrt((error**2).mean()) / np.mean(exact))
 
 
-def reflected_radiance(towards: Array, light: Array, normal: Array, view: Array, m: float) -> Array:
+def reflected_radiance(
+    directions: Array, light: Array, normal: Array, view: Array, roughness_m: float
+) -> Array:
     """Return the radiance that a specular lobe reflects, as a sum over all texels of a panorama.
 
     Texels where the lobe is below 1e-10 of its peak are skipped.
 
-    towards, light : (n, 3) directions of the texels, and their radiance times solid angle
+    directions, light : (n, 3) directions of the texels, and their radiance times solid angle
     normal, view : (3,) unit vectors
-    m : roughness of the lobe
+    roughness_m : roughness of the lobe
     """
-    n_l, n_v, v_l = towards @ normal, float(normal @ view), towards @ view
+    n_l, n_v, v_l = directions @ normal, float(normal @ view), directions @ view
     n_h = (n_l + n_v) / np.sqrt(np.maximum(2 + 2 * v_l, 1e-12))
-    near = np.flatnonzero((n_l > 0) & (n_h > 1 / np.sqrt(1 + (4.8 * m) ** 2)))
+    near = np.flatnonzero((n_l > 0) & (n_h > 1 / np.sqrt(1 + (4.8 * roughness_m) ** 2)))
     v_h = np.sqrt(0.5 + 0.5 * v_l[near])
     angles = Cosines(n_l[near], np.full(len(near), n_v), n_h[near], v_h)
-    return np.asarray((kelemen(angles, m) * n_l[near]) @ light[near])
+    return np.asarray((kelemen(angles, roughness_m) * n_l[near]) @ light[near])
 
 
-def lobe_parameters(cosine: float, m: float) -> Array:
+def lobe_parameters(cosine: float, roughness_m: float) -> Array:
     """Return directions, roughness and weights of the isotropic lobes that approximate a specular lobe.
 
     cosine : cosine between view and normal
-    m : roughness of the specular lobe
+    roughness_m : roughness of the specular lobe
     """
     x = np.sqrt(cosine) * (VIEW_COUNT - 1)
-    y = np.interp(np.log(m), np.log(LOBE_TABLE_ROUGHNESSES), np.arange(ROUGHNESS_COUNT))
+    y = np.interp(np.log(roughness_m), np.log(LOBE_TABLE_ROUGHNESSES), np.arange(ROUGHNESS_COUNT))
     j, i = min(int(x), VIEW_COUNT - 2), min(int(y), ROUGHNESS_COUNT - 2)
     rows = isotropic_lobe_table()[i : i + 2, j : j + 2]
     return np.asarray(np.einsum("i,j,ijlk->lk", [1 - (y - i), y - i], [1 - (x - j), x - j], rows))
 
 
-def lobe_radiance(layers: Array, towards: Array, m: float) -> Array:
+def lobe_radiance(layers: Array, directions: Array, roughness_m: float) -> Array:
     """Return the prefiltered radiance under isotropic lobes, interpolated by roughness.
 
     layers : (n, h, w, 3) panorama at each prefiltered roughness
-    towards : (k, 3) directions of the lobes
-    m : roughness of the lobes
+    directions : (k, 3) directions of the lobes
+    roughness_m : roughness of the lobes
     """
-    level = (len(ROUGHNESSES) - 1) * np.log(m / SMOOTHEST) / np.log(ROUGHEST / SMOOTHEST)
+    level = (len(ROUGHNESSES) - 1) * np.log(roughness_m / SMOOTHEST) / np.log(ROUGHEST / SMOOTHEST)
     low = int(np.clip(level, 0, len(ROUGHNESSES) - 2))
     f = float(np.clip(level - low, 0, 1))
-    below, above = (sample_panorama(layers[1 + k], towards) for k in (low, low + 1))
+    below, above = (sample_panorama(layers[1 + k], directions) for k in (low, low + 1))
     return np.asarray((1 - f) * below + f * above)
 
 
-def furnace_extremes(renderer: dermis.Renderer, head: Head, energy: str, **values: str) -> Array:
+def furnace_extremes(
+    renderer: dermis.Renderer, head: Head, energy_scheme: str, **setting_values: str
+) -> Array:
     """Return minimum, mean and maximum ratio of outgoing to incoming radiance on a white head.
 
     The light is uniform.
 
-    energy : energy conservation scheme
+    energy_scheme : energy conservation scheme
     """
     white_head = replace(head, maps=replace(head.maps, colour=np.ones((4, 4, 3), np.float32)))
-    skin = Skin.preset("deck-2007").replace(energy=energy)
+    skin = Skin.preset("deck-2007").replace(energy=energy_scheme)
     scene = Scene(white_head, environment=Environment(name="uniform"), skin=skin)
-    settings = Settings.model_validate({"size": (384, 384), "atlas": 1024, "samples": 1, **values})
+    settings = Settings.model_validate({"size": (384, 384), "atlas": 1024, "samples": 1, **setting_values})
     picture = renderer.draw(scene, settings).linear_rgba()
     covered = picture[picture[..., 3] == 1][:, 1]
     return np.array([covered.min(), covered.mean(), covered.max()])
@@ -190,19 +196,19 @@ def furnace_rows(renderer: dermis.Renderer) -> str:
     return "\n".join(rows)
 
 
-def as_point_lights(light: RectangleLight, side: int = 8) -> list[PointLight]:
+def as_point_lights(light: RectangleLight, lights_per_side: int = 8) -> list[PointLight]:
     """Return a grid of point lights, each with its own shadow map, that replaces a rectangle light.
 
-    side : number of point lights along each side
+    lights_per_side : number of point lights along each side
     """
     position, target = np.array(light.position), np.array(light.target)
     distance = float(np.linalg.norm(target - position))
-    right, up, forward = view_axes_array(target - position, UP)
-    area = light.width_mm * light.height_mm / side**2
+    right, up, forward = view_axes_array(target - position, UP_AXIS)
+    area = light.width_mm * light.height_mm / lights_per_side**2
     radiance = np.array(light.irradiance) / facing_irradiance(light.width_mm, light.height_mm, distance)
     points = []
-    for index in range(side**2):
-        x, y = ((2 * k + 1) / side - 1 for k in divmod(index, side))
+    for index in range(lights_per_side**2):
+        x, y = ((2 * k + 1) / lights_per_side - 1 for k in divmod(index, lights_per_side))
         point = position + 0.5 * (x * light.width_mm * right + y * light.height_mm * up)
         to_target = target - point
         irradiance = radiance * area * (normalise(to_target) @ forward) / (to_target @ to_target)
@@ -210,14 +216,14 @@ def as_point_lights(light: RectangleLight, side: int = 8) -> list[PointLight]:
     return points
 
 
-def soft_shadow_error(renderer: dermis.Renderer, rig: str) -> tuple[float, float]:
+def soft_shadow_error(renderer: dermis.Renderer, light_preset: str) -> tuple[float, float]:
     """Return bias and RMS error of an area light's shadows against those of 64 point lights [-].
 
     Both are divided by the mean radiance.
 
-    rig : light preset
+    light_preset : light preset
     """
-    light = load_lights(rig)[0]
+    light = load_lights(light_preset)[0]
     assert isinstance(light, RectangleLight)
     head = dermis.load_head("lee_perry_smith", subdivide=0)
     settings = Settings(size=(384, 384), atlas=256, samples=1, technique="none", shadow_size=1024)

@@ -59,8 +59,8 @@ LIGHT_AND_CAMERA = {"front": ("studio", "portrait"), "back": ("rim", "ear")}
 SETTINGS = Settings(size=(384, 384), atlas=1024, samples=4)
 OCCLUSION_ATLAS_SIDE = 512
 BAKE_SETTINGS = Settings(size=(16, 16), atlas=OCCLUSION_ATLAS_SIDE, samples=1)
-_REFERENCE_SIZE = 1024  # number of directions, and side of their depth maps [texels]
-_MIN_OCCLUSION_CHANGE = 0.02
+_REFERENCE_DIRECTION_COUNT = 1024  # number of directions, and side of their depth maps [texels]
+_MIN_VISIBILITY_CHANGE = 0.02
 
 
 def motion(adapter: str = "auto") -> None:
@@ -85,49 +85,49 @@ def motion(adapter: str = "auto") -> None:
     )
 
 
-def rebuilt_head(head: Head, points: Points) -> Head:
+def rebuilt_head(head: Head, point_positions: Points) -> Head:
     """Return the head that results from loading the mesh with its points at given positions.
 
-    points : (p, 3) positions [mm]
+    point_positions : (p, 3) positions [mm]
     """
     mesh = head.mesh
-    arrays = points[mesh.point], mesh.uv, mesh.triangles, mesh.material, mesh.materials
+    arrays = point_positions[mesh.point], mesh.uv, mesh.triangles, mesh.material, mesh.materials
     return Head("rebuilt", build_mesh(*arrays, point=mesh.point, quads=mesh.quads), head.maps)
 
 
-def posed_points(head: Head, person: Points, weights: Mapping[str, float]) -> Points:
+def posed_points(head: Head, person_points: Points, target_weights: Mapping[str, float]) -> Points:
     """Return the positions of a person's points with an expression [mm].
 
-    person : (p, 3) positions in the rest pose [mm]
-    weights : morph target weights of the expression
+    person_points : (p, 3) positions in the rest pose [mm]
+    target_weights : morph target weights of the expression
     """
-    motion = Pose(weights, positions_mm=person).motion(head.control)
+    motion = Pose(target_weights, positions_mm=person_points).motion(head.control)
     return head.control.points_mm(motion).astype(np.float32)
 
 
 def picture_error(
-    renderer: Renderer, head: Head, person: Points, weights: Mapping[str, float], view: str
+    renderer: Renderer, head: Head, person_points: Points, target_weights: Mapping[str, float], view_name: str
 ) -> float:
     """Return the relative RMSE between pictures of a posed head and of a head loaded in that shape.
 
-    person : (p, 3) positions in the rest pose [mm]
-    weights : morph target weights of the expression
-    view : key of `LIGHT_AND_CAMERA`
+    person_points : (p, 3) positions in the rest pose [mm]
+    target_weights : morph target weights of the expression
+    view_name : key of `LIGHT_AND_CAMERA`
     """
-    rebuilt = rebuilt_head(head, posed_points(head, person, weights))
-    lights, camera = LIGHT_AND_CAMERA[view]
+    rebuilt = rebuilt_head(head, posed_points(head, person_points, target_weights))
+    lights, camera = LIGHT_AND_CAMERA[view_name]
     scene = Scene(rebuilt, load_lights(lights), load_camera(camera, rebuilt))
     posed_head = _with_centre(replace(head), rebuilt)
-    pose = Pose(weights, positions_mm=person)
+    pose = Pose(target_weights, positions_mm=person_points)
     posed = renderer.draw(replace(scene, head=posed_head, pose=pose), SETTINGS).linear()
     reference = renderer.draw(scene, SETTINGS).linear()
     return float(np.sqrt(((posed - reference) ** 2).mean() / (reference**2).mean()))
 
 
-def _with_centre(head: Head, shape: Head) -> Head:
+def _with_centre(head: Head, shaped_head: Head) -> Head:
     """Set a head's centre, to which lights and cameras are relative, to that of a shape; return the head."""
     for one in (head, head.bare):
-        vars(one)["centre_mm"] = shape.centre_mm
+        vars(one)["centre_mm"] = shaped_head.centre_mm
     return head
 
 
@@ -158,10 +158,10 @@ def deformation_rows(renderer: Renderer, head: Head) -> Iterator[str]:
         yield f"| {name} | {100 * gauge.strain(points):.0f} | {100 * front:.2f} | {100 * back:.2f} |"
 
 
-def _with_thinner_ears(points: Points, fraction: float) -> Points:
+def _with_thinner_ears(point_positions: Points, thickness_fraction: float) -> Points:
     """Return points (p, 3) of the scan with thinner ears: points at its sides are scaled along z."""
-    ear = np.clip((np.abs(points[:, :1]) - 65.0) / 10.0, 0.0, 1.0)
-    return (points * (1.0 - ear * [0.0, 0.0, fraction])).astype(np.float32)
+    ear = np.clip((np.abs(point_positions[:, :1]) - 65.0) / 10.0, 0.0, 1.0)
+    return (point_positions * (1.0 - ear * [0.0, 0.0, thickness_fraction])).astype(np.float32)
 
 
 def seam_rows(renderer: Renderer, head: Head, persons: Mapping[str, Points]) -> Iterator[str]:
@@ -180,19 +180,19 @@ def seam_rows(renderer: Renderer, head: Head, persons: Mapping[str, Points]) -> 
         yield _seam_row(renderer, f"{name}, rebuilt", shape, shape, None)
 
 
-def _seam_row(renderer: Renderer, name: str, head: Head, shape: Head, pose: Pose | None) -> str:
+def _seam_row(renderer: Renderer, row_title: str, head: Head, shaped_head: Head, pose: Pose | None) -> str:
     """Return a Markdown row with the discontinuity of light across the seams of a posed head.
 
-    shape : head loaded in the shape of the pose, whose points define the seams
+    shaped_head : head loaded in the shape of the pose, whose points define the seams
     """
     cells = []
     for where in (blur.neck_points, blur.back_points):
-        sides = blur.seam_side_points(shape, where)
+        sides = blur.seam_side_points(shaped_head, where)
         scene = replace(blur.striped_scene(head), pose=pose)
-        _with_centre(scene.head, shape)
+        _with_centre(scene.head, shaped_head)
         errors = blur.seam_jumps(renderer, scene, "stitch", blur.HEAD_SIDE, *sides)
         cells.append(f"{100 * errors.mean():.1f} / {100 * np.percentile(errors, 95):.1f}")
-    return f"| {name} | {' | '.join(cells)} |"
+    return f"| {row_title} | {' | '.join(cells)} |"
 
 
 def occlusion_table(renderer: Renderer, head: Head) -> Iterator[str]:
@@ -207,21 +207,26 @@ def occlusion_table(renderer: Renderer, head: Head) -> Iterator[str]:
     yield from occlusion_rows(renderer, head, shapes)
 
 
-def occlusion_rows(renderer: Renderer, head: Head, shapes: Mapping[str, tuple[Pose, Head]]) -> Iterator[str]:
+def occlusion_rows(
+    renderer: Renderer, head: Head, poses_and_shaped_heads: Mapping[str, tuple[Pose, Head]]
+) -> Iterator[str]:
     """Yield Markdown rows with RMS errors of the visible sky fraction in poses.
 
     Errors are over all texels, and over texels where the fraction changes between rest and pose.
 
-    shapes : poses by name, each with the head loaded in its shape
+    poses_and_shaped_heads : poses by name, each with the head loaded in its shape
     """
-    scene, fine = Scene(head, environment=Environment(name="uniform")), (_REFERENCE_SIZE, _REFERENCE_SIZE)
+    scene, fine = (
+        Scene(head, environment=Environment(name="uniform")),
+        (_REFERENCE_DIRECTION_COUNT, _REFERENCE_DIRECTION_COUNT),
+    )
     rest = baked_occlusion(renderer, head, head, *fine)
-    for name, (pose, shape) in shapes.items():
+    for name, (pose, shape) in poses_and_shaped_heads.items():
         reference, posed = baked_occlusion(renderer, head, shape, *fine), replace(scene, pose=pose)
         maps = [frame_occlusion(renderer, posed, mode) for mode in ("rest", "baked")]
         errors = [one - reference for one in (*maps, baked_occlusion(renderer, head, shape))]
         surface = np.isfinite(reference) & np.isfinite(rest)
-        changed = surface & (np.abs(np.where(surface, reference - rest, 0.0)) > _MIN_OCCLUSION_CHANGE)
+        changed = surface & (np.abs(np.where(surface, reference - rest, 0.0)) > _MIN_VISIBILITY_CHANGE)
         cells = (
             f"{root_mean_square(error[surface]):.3f} / {root_mean_square(error[changed]):.3f}"
             for error in errors
@@ -229,12 +234,12 @@ def occlusion_rows(renderer: Renderer, head: Head, shapes: Mapping[str, tuple[Po
         yield f"| {name} | {changed.sum() / surface.sum():.1%} | {' | '.join(cells)} |"
 
 
-def baked_occlusion(renderer: Renderer, head: Head, shape: Head, *sampling: int) -> Floats:
+def baked_occlusion(renderer: Renderer, head: Head, shaped_head: Head, *directions_and_side: int) -> Floats:
     """Return the visible sky fraction (n, n) of a shape, baked in the atlas of a head; NaN off the surface.
 
     head : head whose atlas is used
-    shape : head loaded in the shape of a pose
-    sampling : number of directions and side of depth maps [texel]; by default, those that frames use
+    shaped_head : head loaded in the shape of a pose
+    directions_and_side : number of directions and side of depth maps [texel]; by default, those of frames
     """
     inputs = renderer.prepare(Scene(head), BAKE_SETTINGS)
     texels, atlas = (
@@ -242,22 +247,28 @@ def baked_occlusion(renderer: Renderer, head: Head, shape: Head, *sampling: int)
         cached_atlas(head.mesh, OCCLUSION_ATLAS_SIDE, "stitched"),
     )
     occlusion = bake_occlusion(
-        renderer.device, shape, atlas, inputs.bindings, texels, OCCLUSION_ATLAS_SIDE, *sampling
+        renderer.device,
+        shaped_head,
+        atlas,
+        inputs.bindings,
+        texels,
+        OCCLUSION_ATLAS_SIDE,
+        *directions_and_side,
     )
     return occlusion[:OCCLUSION_ATLAS_SIDE].astype(float)
 
 
-def frame_occlusion(renderer: Renderer, scene: Scene, mode: str) -> Floats:
+def frame_occlusion(renderer: Renderer, scene: Scene, occlusion_mode: str) -> Floats:
     """Return the visible sky fraction (n, n) on the atlas that a frame of the scene uses.
 
-    mode : occlusion mode of the settings
+    occlusion_mode : occlusion mode of the settings
     """
-    settings = BAKE_SETTINGS.model_copy(update={"occlusion": mode})
+    settings = BAKE_SETTINGS.model_copy(update={"occlusion": occlusion_mode})
     renderer.draw(scene, settings)
     texture = cast(Texture, renderer.prepare(scene, settings).bindings["occlusion_map"])
     return download(renderer.device, texture)[:OCCLUSION_ATLAS_SIDE].astype(float)
 
 
-def root_mean_square(error: Floats) -> float:
+def root_mean_square(errors: Floats) -> float:
     """Return the root mean square of errors."""
-    return float(np.sqrt(np.mean(error**2)))
+    return float(np.sqrt(np.mean(errors**2)))

@@ -26,7 +26,7 @@ from dermis.optics.radial import RadialProfile
 from dermis.optics.tissue import Tissue, load_tissue
 
 Floats = NDArray[np.float64]
-PHOTONS, SPECTRAL_PHOTONS = 4_000_000, 400_000
+PHOTON_COUNT, SPECTRAL_PHOTON_COUNT = 4_000_000, 400_000
 COMPARED_TISSUES = ("skin1", "skin2", "dj3", "light", "medium", "dark")
 COMPARED_MODELS: tuple[tuple[DiffusionModel, Clamp], ...] = (
     ("dipole", "layer"),
@@ -44,10 +44,10 @@ def optics() -> None:
     print_tables(tables())
 
 
-def tissue_by_name(name: str) -> Tissue:
+def tissue_by_name(tissue_name: str) -> Tissue:
     """Return a tissue by name; homogeneous skin has the index of refraction assumed by [Jensen2001]."""
-    tissue = load_tissue(name)
-    return Tissue(media()[name].with_eta(1.3)) if name.startswith("skin") else tissue
+    tissue = load_tissue(tissue_name)
+    return Tissue(media()[tissue_name].with_eta(1.3)) if tissue_name.startswith("skin") else tissue
 
 
 def models_table() -> str:
@@ -55,13 +55,13 @@ def models_table() -> str:
     return "\n".join(row for name in COMPARED_TISSUES for row in _model_rows(name, tissue_by_name(name)))
 
 
-def _model_rows(name: str, tissue: Tissue) -> Iterator[str]:
-    photons = PHOTONS if tissue.rgb is None else SPECTRAL_PHOTONS
+def _model_rows(tissue_name: str, tissue: Tissue) -> Iterator[str]:
+    photons = PHOTON_COUNT if tissue.rgb is None else SPECTRAL_PHOTON_COUNT
     reference = monte_carlo_profile(tissue.medium, tissue.rgb, photons, seed=1)
     assert reference.total_error is not None
     totals = " ".join(f"{value:.4f}" for value in reference.total)
     relative_error = float((reference.total_error / reference.total).max())
-    yield f"| **{name}** | Monte Carlo | {totals} | ± {relative_error:.2%} |"
+    yield f"| **{tissue_name}** | Monte Carlo | {totals} | ± {relative_error:.2%} |"
     layers = tissue.medium.layers
     thin = any(np.any(layer.thickness_mm < layer.mean_free_path_mm) for layer in layers)
     for model, clamp in COMPARED_MODELS:
@@ -73,8 +73,8 @@ def _model_rows(name: str, tissue: Tissue) -> Iterator[str]:
         profile = tissue.profile(model, clamp)
         source = {"none": ", source as printed", "layer": ", source clamped"}[clamp]
         label = model + (source if model == "multipole" else "")
-        total = _percent(profile.total / reference.total - 1.0)
-        rings = _percent(ring_error(reference.rings(), profile.ring_energy), sign=False)
+        total = _percentages_text(profile.total / reference.total - 1.0)
+        rings = _percentages_text(ring_error(reference.rings(), profile.ring_energy), with_sign=False)
         yield f"| | {label} | {total} | {rings} |"
 
 
@@ -84,11 +84,11 @@ def counted_table() -> str:
     for name in ("skin1", "skin2"):
         for eta in (1.0, SKIN_ETA):
             tissue = Tissue(media()[name].with_eta(eta))
-            reference = monte_carlo_profile(tissue.medium, photons=PHOTONS, seed=1)
+            reference = monte_carlo_profile(tissue.medium, photons=PHOTON_COUNT, seed=1)
             for model in ("counted", "layered"):
                 profile = tissue.profile(model)
                 total = " ".join(f"{100 * one:+.2f}" for one in profile.total / reference.total - 1.0)
-                rings = _percent(ring_error(reference.rings(), profile.ring_energy), sign=False)
+                rings = _percentages_text(ring_error(reference.rings(), profile.ring_energy), with_sign=False)
                 rows.append(f"| {name}, index {eta:g} | {model} | {total} % | {rings} |")
     return "\n".join(rows)
 
@@ -102,8 +102,8 @@ def fits_table() -> str:
     for name in COMPARED_TISSUES:
         profile = tissue_by_name(name).profile()
         rings = profile.rings()
-        cells = [_percent(fit_gaussians(rings, n).error, sign=False) for n in (2, 4, 6, 8)]
-        cells += [_percent(fit(rings).error, sign=False) for fit in (fit_burley, fit_separable)]
+        cells = [_percentages_text(fit_gaussians(rings, n).error, with_sign=False) for n in (2, 4, 6, 8)]
+        cells += [_percentages_text(fit(rings).error, with_sign=False) for fit in (fit_burley, fit_separable)]
         rows.append(f"| {name} | {' | '.join(cells)} |")
     return "\n".join(rows)
 
@@ -125,8 +125,8 @@ def pointwise_table() -> str:
         points = profile.points()
         free, conserved = (fit_gaussians(points, 6, keep_energy=keep) for keep in (False, True))
         label = f"{name}, {model}" + (", source as printed" if clamp == "none" else "")
-        cells = [_percent(one.error, sign=False) for one in (free, conserved)]
-        cells.insert(1, _percent(free.energy_error))
+        cells = [_percentages_text(one.error, with_sign=False) for one in (free, conserved)]
+        cells.insert(1, _percentages_text(free.energy_error))
         rows.append(f"| {label} | {' | '.join(cells)} |")
     return "\n".join(rows)
 
@@ -139,7 +139,7 @@ def transmission_table() -> str:
         gaussian_sum = fit_gaussians(tissue.profile().rings(), 6).profile
         for thickness in THICKNESSES_MM:
             slab = truncated_medium(tissue.medium, thickness)
-            runs = trace_medium(slab, PHOTONS // 4, seed=2)
+            runs = trace_medium(slab, PHOTON_COUNT // 4, seed=2)
             reference = np.array([run.total_transmittance + run.unscattered_transmittance for run in runs])
             reference = reference / (1.0 - runs[0].specular)
             variants = [
@@ -173,7 +173,7 @@ def published_errors() -> str:
     cells = []
     for label, model, clamp in variants:
         error = error_against_published_sum(load_tissue("dj3").profile(model, clamp))
-        cells.append(f"{label} {_percent(error, sign=False)}")
+        cells.append(f"{label} {_percentages_text(error, with_sign=False)}")
     return ", ".join(cells)
 
 
@@ -186,14 +186,16 @@ def tables() -> dict[str, str]:
         "pointwise": pointwise_table(),
         "transmission": transmission_table(),
         "published": published_errors(),
-        "photons": f"{PHOTONS:,}",
-        "spectral_photons": f"{SPECTRAL_PHOTONS:,}",
+        "photons": f"{PHOTON_COUNT:,}",
+        "spectral_photons": f"{SPECTRAL_PHOTON_COUNT:,}",
     }
 
 
-def _percent(values: Floats, sign: bool = True) -> str:
-    return " ".join(f"{100 * value:+.1f}" if sign else f"{100 * value:.1f}" for value in values) + " %"
+def _percentages_text(fractions: Floats, with_sign: bool = True) -> str:
+    return (
+        " ".join(f"{100 * value:+.1f}" if with_sign else f"{100 * value:.1f}" for value in fractions) + " %"
+    )
 
 
-def _cells(values: Floats) -> str:
-    return " ".join(f"{value:.3f}" for value in values)
+def _cells(fractions: Floats) -> str:
+    return " ".join(f"{value:.3f}" for value in fractions)

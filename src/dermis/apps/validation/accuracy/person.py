@@ -32,9 +32,9 @@ from dermis.apps.validation.comparisons.person import (
     SharedSkin,
     TruthName,
     compare_person,
-    frame_of,
     iris_errors,
     render_frame,
+    render_subject_frame,
     shared_skin,
     without_cause,
 )
@@ -72,13 +72,13 @@ _PEOPLE: dict[PersonName, Callable[[], Head]] = {
 _PEOPLE_VIEWS = "portrait", "three-quarter, lebombo", "moved"
 _MOVED = {"moved": View(VIEWS["three-quarter"].camera, "window", "surprise")}
 ALL_VIEWS: Mapping[str, View] = VIEWS | _MOVED
-_HEADS = {
+_HEAD_FILES = {
     "scan": "lee_perry_smith",
     "old man": "heads/makehuman/head_old_male_dark.obj",
     "young man": "heads/makehuman/head_young_male_light.obj",
 }
 _HEAD_LIGHTS = "front", "back", "laser"
-_MEDIA = "dj3", "skin1"
+_HEAD_MEDIA = "dj3", "skin1"
 
 
 @dataclass(frozen=True)
@@ -130,40 +130,40 @@ class Measuring:
         self._people: dict[str, tuple[Head, Any]] = {}
         self._skins: dict[tuple[str, str], SharedSkin] = {}
 
-    def measure(self, one: Measurement) -> Figures:
+    def measure(self, measurement: Measurement) -> Figures:
         """Return the figures of a comparison, and keep its pictures in the cache."""
-        head, textures = self._person(one.person)
-        skin = self._skin(one.person, head, one.truth)
-        subject = PersonSubject(view_scene(head, ALL_VIEWS[one.view]), textures)
-        if one.cause is not None:
-            subject = without_cause(subject, one.cause)
-        samples = round(self.samples * ALL_VIEWS[one.view].sample_factor)
+        head, textures = self._person(measurement.person)
+        skin = self._shared_skin(measurement.person, head, measurement.truth)
+        subject = PersonSubject(view_scene(head, ALL_VIEWS[measurement.view]), textures)
+        if measurement.cause is not None:
+            subject = without_cause(subject, measurement.cause)
+        samples = round(self.samples * ALL_VIEWS[measurement.view].sample_factor)
         options: dict[str, Any] = {"side": self.side, "samples": samples, "variant": self.variant}
-        pair = compare_person(self.renderer, subject, skin, one.view, **options)
+        pair = compare_person(self.renderer, subject, skin, measurement.view, **options)
         figures = pair_figures(pair)
-        if one.truth == "matched":
+        if measurement.truth == "matched":
             regions = picture_regions(self.renderer, subject.scene, self.side)
             figures["regions"] = {name: list(ratio) for name, ratio in regions.light_ratios(pair).items()}
-        if one.truth == "matched" and one.cause is None:
+        if measurement.truth == "matched" and measurement.cause is None:
             settings = Settings(size=(self.side, self.side), samples=4)
-            shipped = frame_of(self.renderer, subject, None, settings)
+            shipped = render_subject_frame(self.renderer, subject, None, settings)
             error = relative_rmse(shipped, pair.reference, pair.mask, pair.variance)
             figures["default"] = [*error, *energy_ratio(shipped, pair.reference, pair.mask, pair.variance)]
-            if one.view == "eye":
+            if measurement.view == "eye":
                 iris = iris_errors(pair, EYE_FRAME_MM)._asdict()
                 figures["iris"] = {name: list(value) for name, value in iris.items()}
-            if one.person == "human":
-                save_panels(one.view, pair)
+            if measurement.person == "human":
+                save_panels(measurement.view, pair)
         return figures
 
-    def _person(self, name: PersonName) -> tuple[Head, Any]:
-        if name not in self._people:
-            head = _PEOPLE[name]()
+    def _person(self, person_name: PersonName) -> tuple[Head, Any]:
+        if person_name not in self._people:
+            head = _PEOPLE[person_name]()
             textures = person_textures(self.renderer, view_scene(head, VIEWS["portrait"]))
-            self._people[name] = head, textures
-        return self._people[name]
+            self._people[person_name] = head, textures
+        return self._people[person_name]
 
-    def _skin(self, person: PersonName, head: Head, truth: TruthName) -> SharedSkin:
+    def _shared_skin(self, person: PersonName, head: Head, truth: TruthName) -> SharedSkin:
         key = person, truth
         if key not in self._skins:
             folder = self.folder / person
@@ -171,14 +171,17 @@ class Measuring:
             self._skins[key] = shared_skin(self.renderer, head, truth, folder)
         return self._skins[key]
 
-    def measure_head(self, name: str, light: str, medium: Medium) -> Figures:
+    def measure_head(self, head_name: str, light_name: str, medium: Medium) -> Figures:
         """Return the figures of a head without maps or surface reflection, of an index-matched medium.
 
-        name : key of `_HEADS`
-        light : key of `scenes.LIGHTS`
+        head_name : key of `_HEAD_FILES`
+        light_name : key of `scenes.LIGHTS`
         """
         settings = Settings(size=(self.side, self.side), samples=4)
-        with medium_scene(_head(name), light, default_region(light), medium) as (scene, _):
+        with medium_scene(_load_named_head(head_name), light_name, default_region(light_name), medium) as (
+            scene,
+            _,
+        ):
             traced = path_trace(scene, medium, self.samples, settings, variant=self.variant)
             frame = render_frame(
                 self.renderer, scene.replace(skin=scene.skin.replace(direction="half-space")), settings
@@ -190,41 +193,45 @@ class Measuring:
 
 
 @cache
-def _head(name: str) -> Head:
+def _load_named_head(head_name: str) -> Head:
     from dermis.apps.validation.pages import data_file
 
-    file = _HEADS[name]
+    file = _HEAD_FILES[head_name]
     return load_head(str(data_file(file)) if "/" in file else file)
 
 
-def pair_figures(pair: PersonComparison) -> Figures:
+def pair_figures(comparison: PersonComparison) -> Figures:
     """Return errors of a comparison as JSON-compatible figures."""
     return {
-        "error": list(pair.relrmse),
-        "energy": list(pair.energy),
-        "channels": [one.value for one in pair.energy_by_channel],
-        "paths": pair.samples,
-        "seconds": pair.seconds,
+        "error": list(comparison.relrmse),
+        "energy": list(comparison.energy),
+        "channels": [one.value for one in comparison.energy_by_channel],
+        "paths": comparison.samples,
+        "seconds": comparison.seconds,
     }
 
 
-def save_panels(view: str, pair: PersonComparison) -> None:
+def save_panels(view_name: str, comparison: PersonComparison) -> None:
     """Keep the pictures of a view in the cache: frame, path-traced picture, and their signed difference."""
     from scipy.ndimage import uniform_filter
 
     ours, reference = (
-        uniform_filter(np.maximum(pair.exposure * image, 0.0), (3, 3, 1))
-        for image in (pair.ours, pair.reference)
+        uniform_filter(np.maximum(comparison.exposure * image, 0.0), (3, 3, 1))
+        for image in (comparison.ours, comparison.reference)
     )
     difference = np.rint(255 * signed_difference(ours, reference)).astype(np.uint8)
-    pictures = pair.tone_mapped(pair.ours), pair.tone_mapped(pair.reference), difference
-    try_save_arrays(_PANEL_FOLDER, _panel_key(view), dict(zip(_PANEL_NAMES, pictures, strict=True)))
+    pictures = (
+        comparison.tone_mapped(comparison.ours),
+        comparison.tone_mapped(comparison.reference),
+        difference,
+    )
+    try_save_arrays(_PANEL_FOLDER, _panel_key(view_name), dict(zip(_PANEL_NAMES, pictures, strict=True)))
 
 
-def picture_sheet(views: Sequence[str]) -> bytes:
+def picture_sheet(view_names: Sequence[str]) -> bytes:
     """Return a sheet of views from the cache as a WebP file: frame, path-traced picture and difference."""
     panels: dict[str, NDArray[np.uint8]] = {}
-    for view in views:
+    for view in view_names:
         found = load_arrays(_PANEL_FOLDER, _panel_key(view), _PANEL_NAMES)
         if found is not None:
             panels[view] = found["frame"]
@@ -233,8 +240,8 @@ def picture_sheet(views: Sequence[str]) -> bytes:
     return sheet_bytes(panels, SHEET_COLUMNS)
 
 
-def _panel_key(view: str) -> str:
-    return "".join(letter for letter in view if letter.isalnum())
+def _panel_key(view_name: str) -> str:
+    return "".join(letter for letter in view_name if letter.isalnum())
 
 
 def sheet_bytes(panels: Panels, columns: int) -> bytes:
@@ -253,13 +260,15 @@ def fastest_variant() -> MitsubaVariant:
     Each variant is probed in a separate process, because some versions of LLVM abort the process.
     """
     for variant in ("cuda_ad_rgb", "llvm_ad_rgb"):
-        done = subprocess.run([sys.executable, "-c", _PROBE, variant], capture_output=True, check=False)
+        done = subprocess.run(
+            [sys.executable, "-c", _VARIANT_PROBE_SCRIPT, variant], capture_output=True, check=False
+        )
         if done.returncode == 0:
             return variant
     return "scalar_rgb"
 
 
-_PROBE = """
+_VARIANT_PROBE_SCRIPT = """
 import sys
 import mitsuba as mi
 mi.set_variant(sys.argv[1])
@@ -304,7 +313,7 @@ def person(
     figures |= {"adapter": device, "variant": chosen}
     with tempfile.TemporaryDirectory() as folder:
         measuring = Measuring(renderer, side, samples, chosen, Path(folder))
-        for group, key, measure in _jobs(measuring):
+        for group, key, measure in _measurement_jobs(measuring):
             if key in figures[group] or (seconds and time.perf_counter() - started > seconds):
                 continue
             figures[group][key] = measure()
@@ -317,7 +326,7 @@ def person(
 _Job = tuple[str, str, Callable[[], Figures]]
 
 
-def _jobs(measuring: Measuring) -> list[_Job]:
+def _measurement_jobs(measuring: Measuring) -> list[_Job]:
     """Return group, key and function of all comparisons; the human with everything first, then heads."""
     people: list[_Job] = [("people", one.key, partial(measuring.measure, one)) for one in measurements()]
     heads: list[_Job] = [
@@ -326,8 +335,8 @@ def _jobs(measuring: Measuring) -> list[_Job]:
             f"{name} / {light} / {medium}",
             partial(measuring.measure_head, name, light, media()[medium].with_eta(1.0)),
         )
-        for medium in _MEDIA
-        for name in _HEADS
+        for medium in _HEAD_MEDIA
+        for name in _HEAD_FILES
         for light in _HEAD_LIGHTS
     ]
     first = len(ALL_VIEWS) + len(VIEWS)
@@ -359,9 +368,9 @@ def with_error(estimate: Sequence[float] | Estimate | None, digits: int = 3) -> 
     return f"{value:.{digits}f} ± {error:.{digits}f}"
 
 
-def _cells(row: Figures | None) -> str:
+def _error_cells(figures: Figures | None) -> str:
     """Return the cells of relative RMSE and energy of a comparison."""
-    return f"{with_error(row['error'])} | {row['energy'][0]:.3f}" if row else f"{NOT_MEASURED} | "
+    return f"{with_error(figures['error'])} | {figures['energy'][0]:.3f}" if figures else f"{NOT_MEASURED} | "
 
 
 def view_rows(people: Figures) -> str:
@@ -372,7 +381,7 @@ def view_rows(people: Figures) -> str:
         matched = rows["matched"]
         shipped = matched["default"] if matched else None
         default = f"{with_error(shipped[:2])} | {shipped[2]:.3f}" if shipped else f"{NOT_MEASURED} | "
-        cells = " | ".join(_cells(rows[truth]) for truth in TRUTHS)
+        cells = " | ".join(_error_cells(rows[truth]) for truth in TRUTHS)
         paths = matched["paths"] if matched else ""
         lines.append(f"| {view} | {where.light} | {paths} | {cells} | {default} |")
     return "\n".join(lines)
@@ -382,15 +391,17 @@ def people_rows(people: Figures) -> str:
     """Return Markdown rows of the other people."""
     keys = [(one, view) for one in get_args(PersonName)[1:] for view in _PEOPLE_VIEWS]
     rows = ((one, view, people.get(Measurement(one, view, "matched").key)) for one, view in keys)
-    return "\n".join(f"| {one} | {view} | {_cells(row)} |" for one, view, row in rows)
+    return "\n".join(f"| {one} | {view} | {_error_cells(row)} |" for one, view, row in rows)
 
 
 def head_rows(heads: Figures) -> str:
     """Return Markdown rows of heads without maps."""
     lines = []
-    for medium in _MEDIA:
-        for name in _HEADS:
-            cells = " | ".join(_cells(heads.get(f"{name} / {light} / {medium}")) for light in _HEAD_LIGHTS)
+    for medium in _HEAD_MEDIA:
+        for name in _HEAD_FILES:
+            cells = " | ".join(
+                _error_cells(heads.get(f"{name} / {light} / {medium}")) for light in _HEAD_LIGHTS
+            )
             lines.append(f"| {name} | {medium} | {cells} |")
     return "\n".join(lines)
 
@@ -415,7 +426,7 @@ def cause_table(people: Figures) -> str:
     ]
     for cause in (None, *CAUSES):
         rows = (people.get(Measurement("human", view, "matched", cause).key) for view in _ABLATED_VIEWS)
-        lines.append(f"| {cause or 'nothing'} | {' | '.join(_cells(row) for row in rows)} |")
+        lines.append(f"| {cause or 'nothing'} | {' | '.join(_error_cells(row) for row in rows)} |")
     return "\n".join(lines)
 
 

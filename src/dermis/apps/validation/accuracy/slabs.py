@@ -33,7 +33,7 @@ from dermis.scene import Skin
 Array = NDArray[np.float64]
 THICKNESSES_MM = (0.5, 1.0, 2.0, 3.0, 5.0, 10.0)
 INCIDENT_DEGREES = (0.0, 40.0, 60.0, 80.0)
-PHOTONS = 100_000
+PHOTON_COUNT = 100_000
 FORWARD_G = 0.8  # mean cosine of scattering in real skin
 SLAB_MEDIA = (("skin1", 1.0), ("skin2", 1.0), ("skin1", 1.4), ("skin2", 1.4))
 
@@ -43,28 +43,28 @@ def slabs(adapter: str = "auto") -> None:
     print_tables(tables(adapter))
 
 
-def exact_response(medium: Medium, thickness: float, g: float = 0.0) -> Array:
+def exact_response(medium: Medium, thickness_mm: float, g: float = 0.0) -> Array:
     """Return reflectance and transmittance of a slab by adding and doubling, (2, angles, 3).
 
-    thickness : thickness of the slab [mm]
+    thickness_mm : thickness of the slab [mm]
     g : mean cosine of the scattering angle; the medium's scattering coefficient already has the factor 1 - g
     """
     layer, response = medium.layers[0], np.empty((2, len(INCIDENT_DEGREES), 3))
     inner_cosine = refracted_cosine(np.cos(np.radians(INCIDENT_DEGREES)), medium.eta)
     for c in range(3):
-        albedo, depth = float(layer.alpha_prime[c]), float(layer.sigma_t_prime[c]) * thickness
+        albedo, depth = float(layer.alpha_prime[c]), float(layer.sigma_t_prime[c]) * thickness_mm
         slab = adding_doubling.solve_slabs(albedo, depth, medium.eta, g=g)
         sides = slab.reflected[0], slab.transmitted[0]
         response[..., c] = [np.interp(inner_cosine, slab.cosine, side) for side in sides]
     return response
 
 
-def rendered_response(renderer: dermis.Renderer, skin: Skin, thickness: float) -> Array:
+def rendered_response(renderer: dermis.Renderer, skin: Skin, thickness_mm: float) -> Array:
     """Return reflectance and transmittance (2, angles, 3) of a slab as rendered by dermis.
 
-    thickness : thickness of the slab [mm]
+    thickness_mm : thickness of the slab [mm]
     """
-    mesh, response = wedge(60.0, thickness, thickness), np.empty((2, len(INCIDENT_DEGREES), 3))
+    mesh, response = wedge(60.0, thickness_mm, thickness_mm), np.empty((2, len(INCIDENT_DEGREES), 3))
     for k, angle in enumerate(np.radians(INCIDENT_DEGREES)):
         beam = np.array([np.sin(angle), 0.0, np.cos(angle)])
         positions, normals, exitance = scattered_light(renderer, mesh, beam, skin, 256)
@@ -171,7 +171,7 @@ def forward_rows() -> str:
             cells = []
             for g in (0.0, FORWARD_G):
                 slab = ScatteringLayer(absorbed, scattered / (1.0 - g), thickness, g, eta)
-                run = trace_slab([slab], PHOTONS).relative_to_entering
+                run = trace_slab([slab], PHOTON_COUNT).relative_to_entering
                 cells += [f"{run.total_transmittance:.3f}", f"{run.unscattered_transmittance:.3f}"]
                 cells.append(f"{run.total_reflectance:.3f}")
             rows.append(f"| {eta:g} | {thickness:g} mm | {' | '.join(cells)} |")

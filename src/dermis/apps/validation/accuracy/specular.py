@@ -24,7 +24,7 @@ ENERGY_MODELS = {
     "full": ENERGY_SCHEMES["full"],
 }
 ROUGHNESS_AND_STRENGTH = ((0.1, 0.18), (0.3, 0.18), (0.5, 0.18), (0.3, 1.0))
-REFERENCE_NODES = (96, 96)
+REFERENCE_NODE_COUNTS = (96, 96)
 
 
 def specular() -> None:
@@ -32,11 +32,11 @@ def specular() -> None:
     print_tables(tables())
 
 
-def read_albedo(model: str, cosine: Floats, m: Floats) -> Floats:
+def read_albedo(lobe_model: str, cosine: Floats, roughness_m: Floats) -> Floats:
     """Return directional and mean albedo (..., 2) of a lobe, interpolated in its table as by the shader."""
     axes = np.sqrt(TABLE_ROUGHNESSES), np.sqrt(TABLE_COSINES)
-    coordinates = np.stack(np.broadcast_arrays(np.sqrt(m), np.sqrt(cosine)), axis=-1)
-    return np.asarray(RegularGridInterpolator(axes, albedo_table(model).astype(float))(coordinates))
+    coordinates = np.stack(np.broadcast_arrays(np.sqrt(roughness_m), np.sqrt(cosine)), axis=-1)
+    return np.asarray(RegularGridInterpolator(axes, albedo_table(lobe_model).astype(float))(coordinates))
 
 
 def albedo_rows() -> str:
@@ -46,7 +46,7 @@ def albedo_rows() -> str:
     for name, model in MODELS.items():
         if name == "kelemen-direct":
             continue
-        dense = directional_albedo(c, m, model.lobe, nodes=REFERENCE_NODES)
+        dense = directional_albedo(c, m, model.lobe, nodes=REFERENCE_NODE_COUNTS)
         ms = 1e3 * min(timeit.repeat(partial(albedo_table.__wrapped__, name), number=1, repeat=5))
         errors = (directional_albedo(c, m, model.lobe), read_albedo(name, c, m)[..., 0])
         cells = [f"{100 * np.abs(one / dense - 1).max():.1g} %" for one in errors]
@@ -65,18 +65,18 @@ def beckmann_table_error() -> float:
     return float(np.abs(peak[visible] / exact[visible] - 1).max())
 
 
-def furnace_cell(model: EnergyScheme, m: float, rho_s: float) -> str:
+def furnace_cell(energy_scheme: EnergyScheme, roughness_m: float, rho_s: float) -> str:
     """Return a table cell with minimum, mean and maximum of the ratio of outgoing to incoming light.
 
     The light is uniform, and the surface a white sphere.
 
-    model : energy conservation scheme
-    m, rho_s : roughness and specular strength of the surface
+    energy_scheme : energy conservation scheme
+    roughness_m, rho_s : roughness and specular strength of the surface
     """
-    albedo, mean = (read_albedo("kelemen", VIEW_COSINES, np.array(m))[..., k] for k in (0, 1))
-    exact = directional_albedo(VIEW_COSINES, m)
-    entered = model.entering_fraction(mean, rho_s)
-    out = rho_s * exact + entered * model.exitance_factor(albedo, mean, rho_s)
+    albedo, mean = (read_albedo("kelemen", VIEW_COSINES, np.array(roughness_m))[..., k] for k in (0, 1))
+    exact = directional_albedo(VIEW_COSINES, roughness_m)
+    entered = energy_scheme.entering_fraction(mean, rho_s)
+    out = rho_s * exact + entered * energy_scheme.exitance_factor(albedo, mean, rho_s)
     return f"{out.min():.3f} {(out * VIEW_COSINES).sum() / VIEW_COSINES.sum():.3f} {out.max():.3f}"
 
 

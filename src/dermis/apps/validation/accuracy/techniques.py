@@ -66,37 +66,39 @@ def techniques(adapter: str = "auto") -> None:
 
 
 def _compare(
-    head: Head, against: str, techniques: Sequence[str], light: str, adapter: str, **options: Any
+    head: Head, reference_name: str, techniques: Sequence[str], light_name: str, adapter: str, **options: Any
 ) -> Comparison:
     """Return a comparison whose region and number of samples suit the light, unless `options` sets them.
 
-    against : name of the reference
+    reference_name : name of the reference
     """
-    defaults: dict[str, Any] = {"region": default_region(light), "samples": SAMPLES_BY_LIGHT[light]}
+    defaults: dict[str, Any] = {"region": default_region(light_name), "samples": SAMPLES_BY_LIGHT[light_name]}
     defaults["settings"] = SETTINGS
-    return compare(head, against, techniques, light=light, adapter=adapter, **(defaults | options))
+    return compare(
+        head, reference_name, techniques, light=light_name, adapter=adapter, **(defaults | options)
+    )
 
 
-def technique_row(first: str, row: ComparisonRow) -> str:
+def technique_row(first_cell: str, comparison_row: ComparisonRow) -> str:
     """Return a Markdown row with a given first cell and the errors of a technique."""
-    return f"| {first} | " + " | ".join(cells(row)) + " |"
+    return f"| {first_cell} | " + " | ".join(cells(comparison_row)) + " |"
 
 
 def technique_rows(
-    head: Head, against: str, medium: str, adapter: str, model: ModelName | None = None
+    head: Head, reference_name: str, medium: str, adapter: str, model: ModelName | None = None
 ) -> tuple[str, dict[str, Comparison]]:
     """Return Markdown rows of all techniques under each light, and the comparisons by light.
 
-    against : name of the reference
+    reference_name : name of the reference
     medium : name of the medium
     model : scattering model of the medium's profile
     """
     rows, comparison = [TABLE_HEADER], {}
     for light in SAMPLES_BY_LIGHT:
-        region = "ear" if against == "heat" else default_region(light)
-        techniques = ("none", "gpu-gems-3", "texture-space") if against == "heat" else TECHNIQUES.names
+        region = "ear" if reference_name == "heat" else default_region(light)
+        techniques = ("none", "gpu-gems-3", "texture-space") if reference_name == "heat" else TECHNIQUES.names
         comparison[light] = _compare(
-            head, against, techniques, light, adapter, region=region, medium=medium, model=model
+            head, reference_name, techniques, light, adapter, region=region, medium=medium, model=model
         )
         rows += [technique_row(light, row) for row in comparison[light].rows]
     return "\n".join(rows), comparison
@@ -124,16 +126,16 @@ def profile_model_rows(head: Head, path_traced: dict[str, dict[str, Comparison]]
             )
             for model, comparison in (("layered", layered), ("counted", by_photons[light])):
                 compared = (row for row in comparison.rows if row.technique in techniques)
-                cells = " | ".join(_error_and_energy(comparison, row) for row in compared)
+                cells = " | ".join(_error_and_energy_cells(comparison, row) for row in compared)
                 rows.append(f"| {light} | {medium} | {model} | {cells} |")
     return "\n".join(rows)
 
 
-def _error_and_energy(comparison: Comparison, row: ComparisonRow) -> str:
+def _error_and_energy_cells(comparison: Comparison, comparison_row: ComparisonRow) -> str:
     """Return table cells with the relative RMSE, and the energy ratio in red, green and blue."""
     reference = comparison.reference
-    _, energy = errors_by_channel(comparison.images[row.technique], reference, reference.mask)
-    return f"{row.relrmse:.4f} | {energy}"
+    _, energy = errors_by_channel(comparison.images[comparison_row.technique], reference, reference.mask)
+    return f"{comparison_row.relrmse:.4f} | {energy}"
 
 
 def lambertian_limit(head: Head, medium: str, path_traced: Comparison, adapter: str) -> str:
@@ -183,18 +185,23 @@ def direction_rows(head: Head, lights: dict[str, int], settings: Settings, adapt
 
 
 def _direction_rows(
-    head: Head, light: str, region: str, samples: int, settings: Settings, adapter: str
+    head: Head, light_name: str, region: str, samples_per_pixel: int, settings: Settings, adapter: str
 ) -> list[str]:
     prefix = "ball, " if head is BALL else ""
     lines = []
     for medium in ("skin1", "skin2"):
         for direction in ("lambertian", "half-space"):
-            values = {"region": region, "medium": medium, "direction": direction, "samples": samples}
+            values = {
+                "region": region,
+                "medium": medium,
+                "direction": direction,
+                "samples": samples_per_pixel,
+            }
             comparison = _compare(
                 head,
                 "path-traced",
                 ("texture-space",),
-                light,
+                light_name,
                 adapter,
                 settings=settings,
                 model="layered",
@@ -204,15 +211,19 @@ def _direction_rows(
             image, reference = comparison.images["texture-space"], comparison.reference
             errors, energies = errors_by_channel(image, reference, reference.mask)
             figures = (error, errors, flip, energy, energies)
-            lines.append(f"| {prefix}{light} | {medium} | {direction} | " + " | ".join(figures) + " |")
+            lines.append(f"| {prefix}{light_name} | {medium} | {direction} | " + " | ".join(figures) + " |")
     return lines
 
 
-def errors_by_channel(image: Floats, reference: ReferenceImage, mask: NDArray[np.bool_]) -> list[str]:
+def errors_by_channel(
+    rendered_image: Floats, reference: ReferenceImage, mask: NDArray[np.bool_]
+) -> list[str]:
     """Return table cells with relative RMSE and energy ratio, each in red, green and blue.
 
     mask : (h, w) pixels to compare
     """
-    parts = [(image[..., c], reference.image[..., c], mask, reference.variance[..., c]) for c in range(3)]
+    parts = [
+        (rendered_image[..., c], reference.image[..., c], mask, reference.variance[..., c]) for c in range(3)
+    ]
     measures = (relative_rmse, energy_ratio)
     return [" / ".join(f"{measure(*part).value:.3f}" for part in parts) for measure in measures]

@@ -61,33 +61,36 @@ def tables(head: Head, settings: Settings, adapter: str) -> dict[str, str]:
     return {name: "\n".join(lines) for name, lines in rows.items()}
 
 
-def render(subject: ComparisonSubject, technique: str, **changes: object) -> Floats:
+def render(subject: ComparisonSubject, technique: str, **changed_settings: object) -> Floats:
     """Return the linear radiance (h, w, 3) of a technique, sampled like the references.
 
     They have one sample per pixel and no interreflection.
 
-    changes : further settings
+    changed_settings : further settings
     """
     fixed_settings = {"technique": technique, "samples": 1, "interreflection": False}
-    values = subject.settings.model_dump() | fixed_settings | changes
+    values = subject.settings.model_dump() | fixed_settings | changed_settings
     image = subject.renderer.draw(subject.scene, Settings(**values)).linear()
     return np.asarray(image, np.float64)
 
 
 def atlas_rows(
-    subject: ComparisonSubject, integral: ReferenceImage, normalised: ReferenceImage, light: str
+    subject: ComparisonSubject,
+    integral_image: ReferenceImage,
+    normalised_image: ReferenceImage,
+    light_name: str,
 ) -> list[str]:
     """Return Markdown rows with errors of texture space by atlas size, against two references.
 
     Each error is also given as a ratio to the error of an image without scattering.
 
-    integral : surface integral
-    normalised : surface integral divided by the surface integral under uniform light
+    integral_image : surface integral
+    normalised_image : surface integral divided by the surface integral under uniform light
     """
     unscattered, rows = render(subject, "none"), []
     for side in ATLAS_SIDES:
-        image, cells = render(subject, "texture-space", atlas=side), [light, str(side)]
-        for reference in (integral, normalised):
+        image, cells = render(subject, "texture-space", atlas=side), [light_name, str(side)]
+        for reference in (integral_image, normalised_image):
             pair = reference.image, reference.mask
             error, worst = (relative_rmse(one, *pair).value for one in (image, unscattered))
             cells += [f"{error:.4f}", f"{error / worst:.2f}", f"{energy_ratio(image, *pair).value:.4f}"]
@@ -95,7 +98,7 @@ def atlas_rows(
     return rows
 
 
-def zero_width_row(subject: ComparisonSubject, light: str) -> str:
+def zero_width_row(subject: ComparisonSubject, light_name: str) -> str:
     """Return a Markdown row with the sampling error of the surface integral.
 
     It is the difference between the integral of a very narrow profile and the irradiance.
@@ -104,7 +107,7 @@ def zero_width_row(subject: ComparisonSubject, light: str) -> str:
     reference = surface_integral(replace(subject, profile=narrow_profile), 0)
     incident = render(subject, "none") / subject.profile.albedo
     pair = (incident, reference.image, reference.mask)
-    return f"| {light} | {relative_rmse(*pair).value:.4f} | {energy_ratio(*pair).value:.4f} |"
+    return f"| {light_name} | {relative_rmse(*pair).value:.4f} | {energy_ratio(*pair).value:.4f} |"
 
 
 def uniform_light_integral(subject: ComparisonSubject) -> Floats:
@@ -118,16 +121,16 @@ def uniform_light_integral(subject: ComparisonSubject) -> Floats:
     return image
 
 
-def mean_and_percentile(uniform: Floats) -> str:
+def mean_and_percentile(uniform_light: Floats) -> str:
     """Return the mean and the 95th percentile of each channel as text.
 
-    uniform : (n, 3) surface integral in uniform light
+    uniform_light : (n, 3) surface integral in uniform light
     """
-    pairs = zip(uniform.mean(axis=0), np.percentile(uniform, 95, axis=0), strict=True)
+    pairs = zip(uniform_light.mean(axis=0), np.percentile(uniform_light, 95, axis=0), strict=True)
     return ", ".join(f"{mean:.3f} ({high:.3f})" for mean, high in pairs)
 
 
-def region_rows(subject: ComparisonSubject, integral: ReferenceImage, light: str) -> list[str]:
+def region_rows(subject: ComparisonSubject, integral_image: ReferenceImage, light_name: str) -> list[str]:
     """Return Markdown rows by region of the face: errors of texture space, and of a perfect map.
 
     Diffusion on the surface itself, by the heat equation, represents a perfect map.
@@ -136,18 +139,21 @@ def region_rows(subject: ComparisonSubject, integral: ReferenceImage, light: str
     assert landmarks is not None
     none, ours = render(subject, "none"), render(subject, "texture-space")
     opaque = render(subject, "texture-space", transmission="none")
-    samples, total = irradiance_samples(subject), ((ours - integral.image)[integral.mask] ** 2).sum()
+    samples, total = (
+        irradiance_samples(subject),
+        ((ours - integral_image.image)[integral_image.mask] ** 2).sum(),
+    )
     rows = []
-    for region, names in LANDMARKS_BY_REGION[light].items():
+    for region, names in LANDMARKS_BY_REGION[light_name].items():
         centre = tuple(np.mean([landmarks[name] for name in names], axis=0))
         heat = surface_heat_around(subject, centre, REGION_RADIUS_MM, samples, MIN_VARIANCE_MM2)
-        fraction = ((ours - integral.image)[heat.mask] ** 2).sum() / total
-        pixels = heat.mask.sum() / integral.mask.sum()
+        fraction = ((ours - integral_image.image)[heat.mask] ** 2).sum() / total
+        pixels = heat.mask.sum() / integral_image.mask.sum()
         errors = [
             relative_rmse(image, reference.image, heat.mask).value
-            for reference, images in ((integral, (none, ours, heat.image)), (heat, (none, opaque)))
+            for reference, images in ((integral_image, (none, ours, heat.image)), (heat, (none, opaque)))
             for image in images
         ]
         cells = " | ".join(f"{error:.3f}" for error in errors)
-        rows.append(f"| {light} | {region} | {100 * pixels:.1f} % | {100 * fraction:.0f} % | {cells} |")
+        rows.append(f"| {light_name} | {region} | {100 * pixels:.1f} % | {100 * fraction:.0f} % | {cells} |")
     return rows

@@ -42,17 +42,24 @@ def thin(adapter: str = "auto") -> None:
 
 
 def scattered_light(
-    renderer: dermis.Renderer, mesh: Mesh, beam: Array, skin: Skin, atlas: int, **values: str
+    renderer: dermis.Renderer,
+    mesh: Mesh,
+    light_direction: Array,
+    skin: Skin,
+    atlas_side: int,
+    **setting_values: str,
 ) -> tuple[Array, Array, Array]:
     """Return positions, normals and scattered light (n, 3) of a mesh's texels in parallel light.
 
-    beam : (3,) direction of the light, which casts no shadows
-    atlas : side of the atlas [texel]
-    values : further settings of the frame
+    light_direction : (3,) direction of the light, which casts no shadows
+    atlas_side : side of the atlas [texel]
+    setting_values : further settings of the frame
     """
-    light = DirectionalLight(direction=tuple(beam), irradiance=(1.0, 1.0, 1.0), shadows=False)
+    light = DirectionalLight(direction=tuple(light_direction), irradiance=(1.0, 1.0, 1.0), shadows=False)
     scene = Scene(Head("thin", mesh, Maps()), lights=[light], skin=skin)
-    settings = Settings.model_validate({"size": (16, 16), "atlas": atlas, "samples": 1, **values})
+    settings = Settings.model_validate(
+        {"size": (16, 16), "atlas": atlas_side, "samples": 1, **setting_values}
+    )
     renderer.draw(scene, settings)
     inputs = renderer.prepare(scene, settings)
     texels = download(renderer.device, inputs.layouts[0].atlas.resources["atlas"])
@@ -65,22 +72,22 @@ def scattered_light(
     return points, normals, light_map[has_surface][:, :3].astype(float)
 
 
-def integrated_light(mesh: Mesh, beam: Array, points: Array, spacing: float) -> Array:
+def integrated_light(mesh: Mesh, light_direction: Array, points: Array, spacing_mm: float) -> Array:
     """Return the scattered light (n, 3) at points by integrating the profile over the surface.
 
     The profile is a function of Euclidean distance.
 
-    beam : (3,) direction of the light
-    spacing : largest distance of the irradiance samples [mm]
+    light_direction : (3,) direction of the light
+    spacing_mm : largest distance of the irradiance samples [mm]
     """
 
     def light(samples: MeshPoints) -> Array:
         normals = samples.interpolate(mesh, mesh.normals)
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
-        return np.repeat(np.maximum(normals @ -beam, 0.0)[:, None], 3, axis=1)
+        return np.repeat(np.maximum(normals @ -light_direction, 0.0)[:, None], 3, axis=1)
 
     profile = ReferenceProfile(BLURRED_PROFILE.weight, BLURRED_PROFILE.variance_mm2)
-    samples = sample_irradiance(mesh, light, spacing)
+    samples = sample_irradiance(mesh, light, spacing_mm)
     return integrate_exitance(points, samples, profile, 0.002)
 
 
@@ -98,17 +105,17 @@ def slab_rows(renderer: dermis.Renderer) -> str:
     return "\n".join(rows)
 
 
-def light_across_air(mesh: Mesh, beam: Array, points: Array, normals: Array) -> Array:
+def light_across_air(mesh: Mesh, light_direction: Array, points: Array, normals: Array) -> Array:
     """Return the red light (n,) that the surface integral carries to each point across air.
 
     Light crosses air if the straight path between source and point leaves the body.
 
-    beam : (3,) direction of the light
+    light_direction : (3,) direction of the light
     points, normals : (n, 3) positions and surface normals
     """
 
     def light(points: MeshPoints) -> Array:
-        cosine = points.interpolate(mesh, mesh.normals) @ -beam
+        cosine = points.interpolate(mesh, mesh.normals) @ -light_direction
         return np.repeat(np.maximum(cosine, 0.0)[:, None], 3, axis=1)
 
     samples = sample_irradiance(mesh, light, 0.5)
@@ -135,33 +142,35 @@ def light_across_air(mesh: Mesh, beam: Array, points: Array, normals: Array) -> 
 def comparison_cells(
     renderer: dermis.Renderer,
     mesh: Mesh,
-    beam: Array,
+    light_direction: Array,
     point_filter: PointFilter,
-    atlas: int,
-    spacing: float,
+    atlas_side: int,
+    spacing_mm: float,
     *,
-    air: bool,
+    compares_without_air: bool,
 ) -> str:
     """Return table cells with energy ratio and relative RMSE against the surface integral.
 
     Frames without light through thin parts come first, then frames with it.
 
     point_filter : selects the compared points by position and normal
-    spacing : largest distance of the irradiance samples [mm]
-    air : whether to add the energy ratio against an integral without the light that crosses air
+    spacing_mm : largest distance of the irradiance samples [mm]
+    compares_without_air : whether to add the energy ratio against an integral without light across air
     """
     cells = []
     for transmission in ("none", "thin"):
-        lit = scattered_light(renderer, mesh, beam, MATTE_SKIN, atlas, transmission=transmission)
+        lit = scattered_light(
+            renderer, mesh, light_direction, MATTE_SKIN, atlas_side, transmission=transmission
+        )
         points, normals, light = lit
         selected = np.flatnonzero(point_filter(points, normals))
         selected = np.random.default_rng(5).permutation(selected)[:3000]
-        exact = integrated_light(mesh, beam, points[selected], spacing)[:, 0]
+        exact = integrated_light(mesh, light_direction, points[selected], spacing_mm)[:, 0]
         red = light[selected, 0]
         error = red - exact
         cells += [f"{red.sum() / exact.sum():.3f}", f"{np.sqrt((error**2).mean() / (exact**2).mean()):.1%}"]
-    if air:
-        inside = exact - light_across_air(mesh, beam, points[selected], normals[selected])
+    if compares_without_air:
+        inside = exact - light_across_air(mesh, light_direction, points[selected], normals[selected])
         cells.append(f"{red.sum() / inside.sum():.3f}")
     return " | ".join(cells)
 
@@ -176,7 +185,9 @@ def wedge_rows(renderer: dermis.Renderer) -> str:
             facing = normals @ [-np.sin(np.radians(half)), 0.0, np.cos(np.radians(half))] > 0.99
             return np.asarray(facing & (points[:, 0] < -15.0) & (np.abs(points[:, 1]) < 15.0))
 
-        cells = comparison_cells(renderer, mesh, np.array([0.0, 0.0, 1.0]), dark, 512, 0.7, air=False)
+        cells = comparison_cells(
+            renderer, mesh, np.array([0.0, 0.0, 1.0]), dark, 512, 0.7, compares_without_air=False
+        )
         rows.append(f"| {angle:g}° | {cells} |")
     return "\n".join(rows)
 
@@ -195,7 +206,7 @@ def ear_rows(renderer: dermis.Renderer) -> str:
                 ear = (np.abs(local[:, 0]) > EAR_DISTANCE_MM) & (np.abs(local[:, 1]) < 45.0)
                 return np.asarray(ear & (z * normals[:, 2] > 0.3))
 
-            cells = comparison_cells(renderer, mesh, beam, dark, ATLAS_SIDE, 1.5, air=True)
+            cells = comparison_cells(renderer, mesh, beam, dark, ATLAS_SIDE, 1.5, compares_without_air=True)
             rows.append(f"| {name} | {side} | {cells} |")
     return "\n".join(rows)
 

@@ -24,8 +24,8 @@ from dermis.scene.skin import Skin
 GPU_GEMS_3 = "gpu-gems-3"
 FRAGMENT_TECHNIQUE = "published-fragments"
 """Technique with the passes of GPU Gems 3 in the graphics pipeline; `GPU_GEMS_3` has compute passes."""
-_SHIFT_MM = 2.0  # largest movement of camera and lights
-_MIN_WEIGHT = 1e-3
+_MAX_MOVEMENT_MM = 2.0  # largest movement of camera and lights
+_MIN_GAUSSIAN_WEIGHT = 1e-3
 _RIG_ROTATION_DEGREES = 25.0  # between two copies of the studio's lights
 
 
@@ -115,21 +115,21 @@ def case_settings(case: BenchmarkCase) -> Settings:
     return Settings(size=case.image, atlas=case.atlas, samples=case.samples, technique=case.technique)
 
 
-def case_scenes(case: BenchmarkCase, head: Head, folder: Path, count: int) -> list[Scene]:
+def case_scenes(case: BenchmarkCase, head: Head, folder: Path, scene_count: int) -> list[Scene]:
     """Return consecutive scenes of a case, so that no frame can reuse results of the frame before.
 
     Camera and lights move in each scene, and so does the head if the case has morph targets.
 
     folder : folder for the file of the profile
-    count : number of scenes
+    scene_count : number of scenes
     """
     skin, camera = Skin(profile=str(_profile_file(case.gaussians, folder))), portrait(head)
     lights = _spot_lights(case.lights)
     environment = Environment(name=case.environment) if case.environment else None
     head = with_test_rig(head, case.targets) if case.targets else head
     scenes = []
-    for k in range(count):
-        shift = _SHIFT_MM * math.sin(1.0 + k)
+    for k in range(scene_count):
+        shift = _MAX_MOVEMENT_MM * math.sin(1.0 + k)
         moved = [
             light.model_copy(update={"position": _shift_along_x(light.position, shift)}) for light in lights
         ]
@@ -139,105 +139,114 @@ def case_scenes(case: BenchmarkCase, head: Head, folder: Path, count: int) -> li
     return scenes
 
 
-def _shift_along_x(position: tuple[float, float, float], shift: float) -> tuple[float, float, float]:
-    return position[0] + shift, *position[1:]
+def _shift_along_x(position: tuple[float, float, float], shift_mm: float) -> tuple[float, float, float]:
+    return position[0] + shift_mm, *position[1:]
 
 
-def _spot_lights(count: int) -> list[PointLight]:
+def _spot_lights(light_count: int) -> list[PointLight]:
     """Return a given number of spot lights: those of the studio preset, then copies turned about the head."""
     rig = [light for light in studio() if isinstance(light, PointLight)]
-    return [_rotate_light(rig[k % len(rig)], _RIG_ROTATION_DEGREES * (k // len(rig))) for k in range(count)]
+    return [
+        _rotate_light(rig[k % len(rig)], _RIG_ROTATION_DEGREES * (k // len(rig))) for k in range(light_count)
+    ]
 
 
-def _rotate_light(light: PointLight, degrees: float) -> PointLight:
+def _rotate_light(light: PointLight, turn_degrees: float) -> PointLight:
     x, y, z = light.position
-    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    c, s = math.cos(math.radians(turn_degrees)), math.sin(math.radians(turn_degrees))
     return light.model_copy(update={"position": (c * x + s * z, y, c * z - s * x)})
 
 
-def _profile_file(count: int, folder: Path) -> Path:
-    path = folder / f"{count}.csv"
-    profile = with_gaussian_count(load_profile("gpu-gems-3"), count)
+def _profile_file(gaussian_count: int, folder: Path) -> Path:
+    path = folder / f"{gaussian_count}.csv"
+    profile = with_gaussian_count(load_profile("gpu-gems-3"), gaussian_count)
     rows = np.column_stack([profile.variance_mm2, profile.weight])
     lines = [",".join(repr(float(number)) for number in row) for row in rows]
     path.write_text("\n".join(["variance_mm2,red,green,blue", *lines]) + "\n", encoding="utf-8")
     return path
 
 
-def with_gaussian_count(profile: GaussianSum, count: int) -> GaussianSum:
-    """Return a profile resampled to `count` Gaussians, with its albedo and its widest Gaussian unchanged."""
-    if count == len(profile.variance_mm2):
+def with_gaussian_count(profile: GaussianSum, gaussian_count: int) -> GaussianSum:
+    """Return a profile resampled to `gaussian_count` Gaussians, with unchanged albedo and widest Gaussian."""
+    if gaussian_count == len(profile.variance_mm2):
         return profile
     known = np.log(profile.variance_mm2)
-    log_variance = np.linspace(known[0], known[-1], count) if count > 1 else known[-1:]
-    channels = [np.interp(log_variance, known, channel) + _MIN_WEIGHT for channel in profile.weight.T]
+    log_variance = np.linspace(known[0], known[-1], gaussian_count) if gaussian_count > 1 else known[-1:]
+    channels = [
+        np.interp(log_variance, known, channel) + _MIN_GAUSSIAN_WEIGHT for channel in profile.weight.T
+    ]
     weight = np.stack(channels, axis=1)
     weight *= profile.albedo / weight.sum(axis=0)
-    return GaussianSum(f"{count} Gaussians", np.exp(log_variance), weight)
+    return GaussianSum(f"{gaussian_count} Gaussians", np.exp(log_variance), weight)
 
 
 BONE_COUNT = 4
-_TARGET_FRACTION = 1 / 6  # of the points that a target moves, as in targets of faces
-_LIFT_MM = 2.0
+_TARGET_POINT_FRACTION = 1 / 6  # of the points that a target moves, as in targets of faces
+_TARGET_LIFT_MM = 2.0
 _BONE_ROTATION_DEGREES = 4.0
 
 Doubles = NDArray[np.float64]
 
 
-def with_test_rig(head: Head, targets: int) -> Head:
+def with_test_rig(head: Head, target_count: int) -> Head:
     """Return the head with synthetic morph targets and bones in place of its own rig.
 
-    targets : number of morph targets
+    target_count : number of morph targets
     """
     points = head.positions_mm.astype(np.float64)
-    rig = replace(head.control, targets=_synthetic_targets(points, targets), skeleton=_bone_chain(points))
+    rig = replace(
+        head.control, targets=_synthetic_targets(points, target_count), skeleton=_bone_chain(points)
+    )
     return replace(head, rig=rig)
 
 
-def pose_at_moment(head: Head, moment: int) -> Pose:
+def pose_at_moment(head: Head, moment_index: int) -> Pose:
     """Return a pose of the synthetic rig in which every target and bone differs from the previous moment.
 
-    moment : index of the frame
+    moment_index : index of the frame
     """
-    weights = {name: 0.5 + 0.5 * math.sin(k + 0.3 * moment) for k, name in enumerate(head.targets)}
-    angles = [_BONE_ROTATION_DEGREES * math.sin(0.2 * moment + k) for k in range(BONE_COUNT)]
+    weights = {name: 0.5 + 0.5 * math.sin(k + 0.3 * moment_index) for k, name in enumerate(head.targets)}
+    angles = [_BONE_ROTATION_DEGREES * math.sin(0.2 * moment_index + k) for k in range(BONE_COUNT)]
     bones = {name: (0.3 * angle, angle, 0.0) for name, angle in zip(head.bones, angles, strict=True)}
     return Pose(weights, bones)
 
 
-def _synthetic_targets(points: Doubles, count: int) -> MorphTargets:
+def _synthetic_targets(point_positions: Doubles, target_count: int) -> MorphTargets:
     """Return synthetic morph targets: smooth bumps that each displace a sixth of the points.
 
-    points : (p, 3) positions of the points in the rest pose [mm]
+    point_positions : (p, 3) positions of the points in the rest pose [mm]
     """
-    centres = points[np.linspace(0, len(points) - 1, count).astype(int)]
-    nearest = max(1, int(_TARGET_FRACTION * len(points)))
+    centres = point_positions[np.linspace(0, len(point_positions) - 1, target_count).astype(int)]
+    nearest = max(1, int(_TARGET_POINT_FRACTION * len(point_positions)))
     moved, deltas = [], []
     for centre in centres:
-        distance = np.linalg.norm(points - centre, axis=1)
+        distance = np.linalg.norm(point_positions - centre, axis=1)
         indices = np.sort(np.argpartition(distance, nearest - 1)[:nearest])
         falloff = 1.0 - (distance[indices] / max(float(distance[indices].max()), 1e-9)) ** 2
         moved.append(indices)
-        deltas.append(falloff[:, None] * np.array([0.0, 0.0, _LIFT_MM / count]))
-    first = nearest * np.arange(count + 1)
-    names = tuple(f"target {k}" for k in range(count))
+        deltas.append(falloff[:, None] * np.array([0.0, 0.0, _TARGET_LIFT_MM / target_count]))
+    first = nearest * np.arange(target_count + 1)
+    names = tuple(f"target {k}" for k in range(target_count))
     point = np.concatenate(moved).astype(np.int32)
     return MorphTargets(names, first.astype(np.int32), point, np.concatenate(deltas).astype(np.float32))
 
 
-def _bone_chain(points: Doubles) -> Skeleton:
+def _bone_chain(point_positions: Doubles) -> Skeleton:
     """Return a vertical chain of bones; each point is weighted between the two nearest ones in height.
 
-    points : (p, 3) positions of the points in the rest pose [mm]
+    point_positions : (p, 3) positions of the points in the rest pose [mm]
     """
-    low, high = points[:, 1].min(), points[:, 1].max()
+    low, high = point_positions[:, 1].min(), point_positions[:, 1].max()
     step = (high - low) / BONE_COUNT
     local, bind = np.tile(np.eye(4), (2, BONE_COUNT, 1, 1))
     local[:, 1, 3] = [low, *([step] * (BONE_COUNT - 1))]
     bind[:, 1, 3] = -(low + step * np.arange(BONE_COUNT))
-    position = np.clip((points[:, 1] - low) / step, 0.0, BONE_COUNT - 1.001)
+    position = np.clip((point_positions[:, 1] - low) / step, 0.0, BONE_COUNT - 1.001)
     below = position.astype(np.int32)
-    bone, weight = np.zeros((len(points), 4), np.int32), np.zeros((len(points), 4), np.float32)
+    bone, weight = (
+        np.zeros((len(point_positions), 4), np.int32),
+        np.zeros((len(point_positions), 4), np.float32),
+    )
     bone[:, 0], bone[:, 1] = below, below + 1
     weight[:, 1] = position - below
     weight[:, 0] = 1.0 - weight[:, 1]

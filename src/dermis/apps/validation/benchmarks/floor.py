@@ -22,10 +22,10 @@ from dermis.gpu.textures import FORMAT_BYTES, texel_bytes
 _MAP_BINDINGS = ("colour_map", "slope_map", "relief_map", "specular_map", "roughness_map")
 _TRIANGLE_BYTES, _VERTEX_BYTES = 16, 16  # in the buffers of triangles and of positions
 _GUTTER_ENTRY_BYTES = 16
-_INDEX_BYTES = 4  # of a source's index
-_BILINEAR_TEXELS = 4  # texels read by bilinear interpolation
-_TEXTURE_SIDE, _TEXTURE_SIDE_ON_CPU = 4096, 1024  # larger than caches
-_COPIES_PER_PASS, _REPEATS, _WARMUP_REPEATS = 8, 5, 20
+_SOURCE_INDEX_BYTES = 4  # of a source's index
+_TEXELS_PER_BILINEAR_READ = 4  # texels read by bilinear interpolation
+_COPIED_TEXTURE_SIDE, _COPIED_TEXTURE_SIDE_ON_CPU = 4096, 1024  # larger than caches
+_COPIES_PER_PASS, _TIMED_REPEATS, _WARMUP_REPEATS = 8, 5, 20
 
 
 @dataclass(frozen=True)
@@ -45,16 +45,16 @@ class FrameTraffic:
     vertices: int
 
 
-def frame_traffic(device: Device, inputs: FrameInputs, vertices: int) -> FrameTraffic:
+def frame_traffic(device: Device, inputs: FrameInputs, vertex_count: int) -> FrameTraffic:
     """Return the inputs of a frame that has been drawn, with the counts that its memory traffic depends on.
 
-    vertices : number of vertices of the mesh
+    vertex_count : number of vertices of the mesh
     """
     texels = np.count_nonzero(download(device, inputs.layouts[0].atlas.resources["atlas"])[..., 0])
     head_pixels = np.count_nonzero(download(device, inputs.resources.post.picture.bytes)[..., 3])
     maps, layers = inputs.resources.shadow_maps.texture, range(len(inputs.shadow_views.clips))
     shadow_texels = sum(int(np.count_nonzero(download(device, maps, layer=layer))) for layer in layers)
-    return FrameTraffic(inputs, int(texels), int(head_pixels), shadow_texels, vertices)
+    return FrameTraffic(inputs, int(texels), int(head_pixels), shadow_texels, vertex_count)
 
 
 def stage_bytes(traffic: FrameTraffic) -> dict[str, float]:
@@ -103,39 +103,39 @@ def _scattering_bytes(traffic: FrameTraffic, shadow_bytes: int) -> dict[str, flo
     return stages
 
 
-def _blur_surface_bytes(inputs: FrameInputs, texels: int) -> float:
+def _blur_surface_bytes(inputs: FrameInputs, texel_count: int) -> float:
     """Return the bytes that blurs read about the surface: stretch, extent of charts, and gutters.
 
     The passes of GPU Gems 3 blur the stretch map along with the light instead.
 
-    texels : number of atlas texels that show the surface
+    texel_count : number of atlas texels that show the surface
     """
     levels, finest, blur = inputs.resources.diffusion.levels, inputs.layouts[0].atlas, inputs.blurs[0]
     if isinstance(levels, StretchedLevels):
         stretch = texel_bytes(finest.resources["stretch_map"])
-        return 2.0 * stretch * texels * len(blur.halvings[1:])
+        return 2.0 * stretch * texel_count * len(blur.halvings[1:])
     atlases = (finest, *finest.coarser)
     traffic = 0.0
     for source, halving in pairwise(blur.halvings):
         maps = (atlases[halving].resources[name] for name in ("stretch_map", "reach_map"))
-        traffic += sum(map(texel_bytes, maps)) * texels / 4**halving
+        traffic += sum(map(texel_bytes, maps)) * texel_count / 4**halving
         if blur.edge == "repeated" and (gutter := atlases[source].gutter):
             traffic += gutter.size * (1 + 2 * FORMAT_BYTES[levels.texel] / _GUTTER_ENTRY_BYTES)
     return traffic
 
 
-def _translucency_bytes(thin: Translucency, levels: PyramidLevels, blur: Blur) -> float:
+def _translucency_bytes(translucency: Translucency, levels: PyramidLevels, blur: Blur) -> float:
     """Return the memory traffic of translucency: pairs with their texels, source light, transmitted light.
 
     Tables of slabs depend on the direction of the light at the sources, so they also read the surface there.
     """
-    pairs, halving = thin.pairs, blur.halvings[blur.profile_levels[1 + thin.source_level]]
+    pairs, halving = translucency.pairs, blur.halvings[blur.profile_levels[1 + translucency.source_level]]
     receivers, sources = pairs.receivers[1], pairs.sources[1]
-    lists = thin.weights.size + pairs.receiver_ranges.size
-    lists += (_INDEX_BYTES + SURFACE_TEXEL_BYTES * thin.uses_tables) * sources
+    lists = translucency.weights.size + pairs.receiver_ranges.size
+    lists += (_SOURCE_INDEX_BYTES + SURFACE_TEXEL_BYTES * translucency.uses_tables) * sources
     level = (levels.size >> halving) ** 2
-    source_texels = min(_BILINEAR_TEXELS * sources, level) * FORMAT_BYTES[levels.texel]
-    return float(lists + source_texels + receivers * texel_bytes(thin.pairs.transmitted))
+    source_texels = min(_TEXELS_PER_BILINEAR_READ * sources, level) * FORMAT_BYTES[levels.texel]
+    return float(lists + source_texels + receivers * texel_bytes(translucency.pairs.transmitted))
 
 
 def _map_bytes(inputs: FrameInputs, point_count: int) -> int:
@@ -150,14 +150,15 @@ def copy_rate(device: Device) -> float:
     Raises DermisError when the device has no timestamps.
     """
     software = device.adapter.kind == "CPU"
-    side = _TEXTURE_SIDE_ON_CPU if software else _TEXTURE_SIDE
+    side = _COPIED_TEXTURE_SIDE_ON_CPU if software else _COPIED_TEXTURE_SIDE
     program = ComputeProgram(device, Path(__file__).parent / "copy.wgsl")
     textures = [make_texture(device, (side, side), "rgba32float") for _ in range(2)]
     times = [
-        _copy_ms(device, program, textures) for _ in range(_REPEATS + (0 if software else _WARMUP_REPEATS))
+        _copy_ms(device, program, textures)
+        for _ in range(_TIMED_REPEATS + (0 if software else _WARMUP_REPEATS))
     ]
     traffic = 2 * _COPIES_PER_PASS * side * side * texel_bytes(textures[0])
-    return traffic / (1e-3 * statistics.median(times[-_REPEATS:]))
+    return traffic / (1e-3 * statistics.median(times[-_TIMED_REPEATS:]))
 
 
 def _copy_ms(device: Device, program: ComputeProgram, textures: list[Any]) -> float:

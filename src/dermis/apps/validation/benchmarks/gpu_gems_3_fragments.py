@@ -36,7 +36,7 @@ from dermis.gpu import (
 )
 from dermis.optics.gaussians import MAX_GAUSSIANS
 
-_FOLDER = Path(__file__).parent
+_SHADER_FOLDER = Path(__file__).parent
 
 
 class FragmentPasses(GpuGems3):
@@ -96,10 +96,15 @@ class FragmentPasses(GpuGems3):
         graph.fill("diffuse", shader, bound, into)
 
     def _light(
-        self, graph: Graph, layout: LitAtlas, constants: Constants, target: TextureOrView, scale: float
+        self,
+        graph: Graph,
+        layout: LitAtlas,
+        constants: Constants,
+        target: TextureOrView,
+        radiance_scale: float,
     ) -> None:
         shader = _fragment_program(graph.device, "gpu_gems_3_irradiance.wgsl", constants, [HALF_FORMAT])
-        entering = shader.record("Entering", scale=scale)
+        entering = shader.record("Entering", scale=radiance_scale)
         bound = {**layout.bindings, "surfaces": layout.surfaces, "entering": entering}
         graph.fill("irradiance", shader, bound, [target])
 
@@ -109,30 +114,34 @@ class FragmentPasses(GpuGems3):
         levels: PyramidLevels,
         blur: Blur,
         target: Texture,
-        transmitted: Texture | None,
-        lost: Texture | None,
+        transmitted_light: Texture | None,
+        lost_light: Texture | None,
     ) -> None:
         shader = _fragment_program(graph.device, "gpu_gems_3_sum.wgsl", (), [FLOAT_FORMAT])
         padded = np.zeros((MAX_GAUSSIANS, 4), np.float32)
         padded[: len(blur.weight), :3] = blur.weight / blur.scale
         padded[0, 3] = 1.0
-        counts = {"count": len(blur.weight), "through": transmitted is not None}
+        counts = {"count": len(blur.weight), "through": transmitted_light is not None}
         bound: MutableBindings = {
             "weights": shader.record("Weights", weight=padded, **counts),
             "levels": levels.stacks[0],
-            "transmitted": placeholder_light(graph.device) if transmitted is None else transmitted,
-            "lost": placeholder_light(graph.device) if lost is None else lost,
+            "transmitted": placeholder_light(graph.device)
+            if transmitted_light is None
+            else transmitted_light,
+            "lost": placeholder_light(graph.device) if lost_light is None else lost_light,
         }
         graph.fill("combine", shader, bound, [target])
 
 
-def _fragment_program(device: Device, name: str, constants: Constants, targets: list[str]) -> RenderProgram:
+def _fragment_program(
+    device: Device, shader_name: str, constants: Constants, targets: list[str]
+) -> RenderProgram:
     def make() -> RenderProgram:
-        path, folders = _FOLDER / name, shader_folders()
+        path, folders = _SHADER_FOLDER / shader_name, shader_folders()
         all_constants = program_constants(device, path, folders, constants)
         return RenderProgram(device, path, folders, all_constants, targets=targets)
 
-    return cached_program(device, (name, registry_version()), constants, make)
+    return cached_program(device, (shader_name, registry_version()), constants, make)
 
 
 FRAGMENT_PASSES = FragmentPasses()

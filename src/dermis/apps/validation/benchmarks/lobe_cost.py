@@ -17,8 +17,8 @@ from dermis.specular.beckmann import beckmann_table
 from dermis.specular.fresnel import FRESNEL, SKIN_ETA, SKIN_F0
 from dermis.specular.models import MODELS
 
-_REPEATS = 5
-_WARMUP_S = 0.5  # because an idle GPU has a reduced clock rate
+_TIMED_REPEATS = 5
+_WARM_UP_S = 0.5  # because an idle GPU has a reduced clock rate
 _SHADER = Path(__file__).with_suffix(".wgsl")
 _POINTS_PER_SIDE, _LIGHTS_PER_POINT = 1024, 64  # points along each side, and lights per point
 _POINTS_PER_SIDE_ON_CPU, _LIGHTS_PER_POINT_ON_CPU = 256, 16
@@ -48,9 +48,9 @@ def lobe_cost_ns(device: Device) -> dict[tuple[str, str], float]:
         "sums": make_texture(device, (side, side), "r32float"),
     }
     started = time.perf_counter()
-    while time.perf_counter() - started < _WARMUP_S:
+    while time.perf_counter() - started < _WARM_UP_S:
         _pass_ms(device, programs[0], bound, side)
-    repeats = [[_pass_ms(device, one, bound, side) for one in programs] for _ in range(_REPEATS)]
+    repeats = [[_pass_ms(device, one, bound, side) for one in programs] for _ in range(_TIMED_REPEATS)]
     loop, *lobe_times = (statistics.median(times) for times in zip(*repeats, strict=True))
     return {
         (skin.specular, skin.fresnel): 1e6 * max(0.0, ms - loop) / (side**2 * lights)

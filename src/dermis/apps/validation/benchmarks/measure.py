@@ -85,24 +85,24 @@ class BenchmarkRow:
 
 
 def measure_case(
-    renderer: Renderer, case: BenchmarkCase, head: Head, folder: Path, rate: float, counts: FrameCounts
+    renderer: Renderer, case: BenchmarkCase, head: Head, folder: Path, bytes_per_s: float, counts: FrameCounts
 ) -> BenchmarkRow:
     """Draw many frames of a case with moving camera and lights, and return its measurements.
 
     A slow device draws fewer frames.
 
     folder : folder for the file of the profile
-    rate : memory bandwidth of a copy [byte/s]
+    bytes_per_s : memory bandwidth of a copy [byte/s]
     counts : numbers of frames to draw
 
     Raises DermisError for frames that the device cannot hold.
     """
     with gpu_failures(renderer.device), TECHNIQUES.including(FRAGMENT_TECHNIQUE, FRAGMENT_PASSES):
-        return _measure_case(renderer, case, head, folder, rate, counts)
+        return _measure_case(renderer, case, head, folder, bytes_per_s, counts)
 
 
 def _measure_case(
-    renderer: Renderer, case: BenchmarkCase, head: Head, folder: Path, rate: float, counts: FrameCounts
+    renderer: Renderer, case: BenchmarkCase, head: Head, folder: Path, bytes_per_s: float, counts: FrameCounts
 ) -> BenchmarkRow:
     settings = case_settings(case)
     first, *other_scenes = case_scenes(case, head, folder, max(counts.sequence, counts.timed, 2))
@@ -120,22 +120,22 @@ def _measure_case(
         len(head.mesh.triangles),
         frame_ms,
         gpu_ms,
-        _floor_ms(stage_bytes(traffic), gpu_ms, rate),
+        _floor_ms(stage_bytes(traffic), gpu_ms, bytes_per_s),
         python_ms,
         image_ms,
         allocated_bytes() / 1e6,
     )
 
 
-def sequence_ms(renderer: Renderer, scenes: Iterator[Scene], count: int, settings: Settings) -> float:
+def sequence_ms(renderer: Renderer, scenes: Iterator[Scene], frame_count: int, settings: Settings) -> float:
     """Return the elapsed time of drawing consecutive frames until the last one is done [ms].
 
     scenes : scenes that all differ, so that no result that depends on camera and lights is reused
-    count : number of frames
+    frame_count : number of frames
     """
 
     def draw() -> None:
-        for scene in islice(scenes, count):
+        for scene in islice(scenes, frame_count):
             renderer.draw(scene, settings, timed=False)
         renderer.device.wait()
 
@@ -176,18 +176,20 @@ def _host_times_ms(
     return statistics.median(before), statistics.median(after)
 
 
-def _elapsed_ms(work: Callable[[], object]) -> float:
+def _elapsed_ms(timed_function: Callable[[], object]) -> float:
     started = time.perf_counter()
-    work()
+    timed_function()
     return 1e3 * (time.perf_counter() - started)
 
 
-def _floor_ms(traffic: dict[str, float], gpu_ms: dict[str, float], rate: float) -> dict[str, float]:
+def _floor_ms(
+    stage_bytes: dict[str, float], gpu_ms: dict[str, float], bytes_per_s: float
+) -> dict[str, float]:
     """Return the lower bound of each drawn stage's time, and their sum as "total" [ms].
 
-    traffic : memory traffic by stage [byte]
+    stage_bytes : memory traffic by stage [byte]
     gpu_ms : measured device time by stage
-    rate : memory bandwidth of a copy [byte/s]
+    bytes_per_s : memory bandwidth of a copy [byte/s]
     """
-    floor = {stage: 1e3 * traffic[stage] / rate for stage in gpu_ms if stage in traffic}
+    floor = {stage: 1e3 * stage_bytes[stage] / bytes_per_s for stage in gpu_ms if stage in stage_bytes}
     return floor | {"total": sum(floor.values())}

@@ -45,8 +45,12 @@ def _case_json(case: BenchmarkCase) -> JsonObject:
     return asdict(case) | {"image": list(case.image)}
 
 
-def _row_json(row: BenchmarkRow) -> JsonObject:
-    parts = {**_case_json(row.case), **asdict(row), "floor_ratio": row.floor_ratio}
+def _row_json(benchmark_row: BenchmarkRow) -> JsonObject:
+    parts = {
+        **_case_json(benchmark_row.case),
+        **asdict(benchmark_row),
+        "floor_ratio": benchmark_row.floor_ratio,
+    }
     del parts["case"]
     return parts
 
@@ -57,9 +61,12 @@ _TIME_COLUMNS = ("frame [ms]", "device [ms]", "floor [ms]", "ratio", "Python [ms
 COLUMNS = (*_CASE_COLUMNS, *_TIME_COLUMNS, "memory [MB]")
 
 
-def cells(row: BenchmarkRow) -> tuple[str, ...]:
+def cells(benchmark_row: BenchmarkRow) -> tuple[str, ...]:
     """Return a row's parameters and measurements as table cells, in the order of COLUMNS."""
-    case, device = row.case, (row.gpu_ms["total"], row.floor_ms["total"], row.floor_ratio)
+    case, device = (
+        benchmark_row.case,
+        (benchmark_row.gpu_ms["total"], benchmark_row.floor_ms["total"], benchmark_row.floor_ratio),
+    )
     return (
         f"{case.image[0]}x{case.image[1]}",
         str(case.atlas),
@@ -67,10 +74,12 @@ def cells(row: BenchmarkRow) -> tuple[str, ...]:
         str(case.lights),
         case.environment or "-",
         str(case.targets or "-"),
-        str(row.triangles),
+        str(benchmark_row.triangles),
         case.technique,
-        *map(three_digits, (row.frame_ms, *device, row.python_ms, row.image_ms)),
-        f"{row.memory_mb:.0f}",
+        *map(
+            three_digits, (benchmark_row.frame_ms, *device, benchmark_row.python_ms, benchmark_row.image_ms)
+        ),
+        f"{benchmark_row.memory_mb:.0f}",
     )
 
 
@@ -133,9 +142,9 @@ def write_report(path: Path, benchmark: Benchmark) -> None:
     page = text.substitute(
         summary=html.escape(summary_line(benchmark)),
         published=published_text(benchmark),
-        rows=_html_table([COLUMNS, *(cells(row) for row in benchmark.rows)]),
+        rows=_table_html([COLUMNS, *(cells(row) for row in benchmark.rows)]),
         skipped="".join(f"<p>{html.escape(line)}</p>" for line in skipped_lines(benchmark)),
-        stages=_html_table(stage_table(benchmark)),
+        stages=_table_html(stage_table(benchmark)),
         bars=stage_bars(benchmark.base_row) if benchmark.base_row else "",
         scaling=scaling_plots(benchmark),
     )
@@ -143,7 +152,7 @@ def write_report(path: Path, benchmark: Benchmark) -> None:
         output.write_text(page, encoding="utf-8")
 
 
-def _html_table(lines: Sequence[tuple[str, ...]]) -> str:
+def _table_html(lines: Sequence[tuple[str, ...]]) -> str:
     """Return an HTML table whose first row has the column titles."""
     rows = []
     for index, line in enumerate(lines):
@@ -162,9 +171,9 @@ _SCALING_AXES: dict[str, tuple[str, Callable[[BenchmarkRow], float]]] = {
 }
 
 
-def three_digits(number: float) -> str:
+def three_digits(value: float) -> str:
     """Return a number as text with three significant digits, without an exponent."""
-    return f"{number:.0f}" if number >= 1000 else f"{number:.3g}"
+    return f"{value:.0f}" if value >= 1000 else f"{value:.3g}"
 
 
 def scaling_plots(benchmark: Benchmark) -> str:
@@ -172,7 +181,7 @@ def scaling_plots(benchmark: Benchmark) -> str:
     axes_names = [name for name in _SCALING_AXES if any(row.case.varies == name for row in benchmark.rows)]
     if not axes_names:
         return ""
-    figure, panels = _figure(width=3.4 * len(axes_names), height=2.9, columns=len(axes_names))
+    figure, panels = _figure(width_inches=3.4 * len(axes_names), height_inches=2.9, columns=len(axes_names))
     for axes, name in zip(panels, axes_names, strict=True):
         label, value = _SCALING_AXES[name]
         rows = sorted((row for row in benchmark.rows if row.case.varies in ("", name)), key=value)
@@ -184,27 +193,35 @@ def scaling_plots(benchmark: Benchmark) -> str:
         _set_ticks(axes.yaxis, None)
     panels[0].set_ylabel("ms per frame")
     panels[0].legend(frameon=False, labelcolor=_TEXT_COLOUR, fontsize=8)
-    return _svg(figure)
+    return _figure_svg(figure)
 
 
-def stage_bars(row: BenchmarkRow) -> str:
+def stage_bars(benchmark_row: BenchmarkRow) -> str:
     """Return an SVG bar chart of device time and its lower bound by stage."""
-    names = [stage for stage in row.gpu_ms if stage != "total"]
-    figure, (axes,) = _figure(width=7.0, height=0.34 * len(names) + 0.9, columns=1)
+    names = [stage for stage in benchmark_row.gpu_ms if stage != "total"]
+    figure, (axes,) = _figure(width_inches=7.0, height_inches=0.34 * len(names) + 0.9, columns=1)
     positions = range(len(names))
-    axes.barh(positions, [row.gpu_ms[name] for name in names], 0.7, color=_TOTAL_COLOUR, label="device")
     axes.barh(
-        positions, [row.floor_ms.get(name, 0.0) for name in names], 0.3, color=_FLOOR_COLOUR, label="floor"
+        positions, [benchmark_row.gpu_ms[name] for name in names], 0.7, color=_TOTAL_COLOUR, label="device"
+    )
+    axes.barh(
+        positions,
+        [benchmark_row.floor_ms.get(name, 0.0) for name in names],
+        0.3,
+        color=_FLOOR_COLOUR,
+        label="floor",
     )
     axes.set_yticks(positions, names)
     axes.invert_yaxis()
     axes.set_xlabel("ms")
     axes.legend(frameon=False, labelcolor=_TEXT_COLOUR, fontsize=8)
-    return _svg(figure)
+    return _figure_svg(figure)
 
 
-def _figure(width: float, height: float, columns: int) -> tuple[Figure, list[Axes]]:
-    figure = import_extra("matplotlib.figure", "plots").Figure(figsize=(width, height), layout="constrained")
+def _figure(width_inches: float, height_inches: float, columns: int) -> tuple[Figure, list[Axes]]:
+    figure = import_extra("matplotlib.figure", "plots").Figure(
+        figsize=(width_inches, height_inches), layout="constrained"
+    )
     figure.patch.set_alpha(0.0)
     panels = list(figure.subplots(1, columns, squeeze=False)[0])
     for axes in panels:
@@ -227,7 +244,7 @@ def _set_ticks(axis: Axis, positions: list[float] | None) -> None:
     axis.set_major_formatter(FuncFormatter(lambda value, _: three_digits(value)))
 
 
-def _svg(figure: Figure) -> str:
+def _figure_svg(figure: Figure) -> str:
     from matplotlib import rc_context
 
     svg = StringIO()

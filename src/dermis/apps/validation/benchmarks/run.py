@@ -26,7 +26,7 @@ from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head
 from dermis.scene.heads import load_head
 
-_LIBRARIES = ("dermis", "wgpu", "numpy")
+_REPORTED_LIBRARIES = ("dermis", "wgpu", "numpy")
 ProgressCallback = Callable[[int, int], None]
 
 
@@ -101,7 +101,7 @@ def run_benchmark(
         head,
         device.adapter.name,
         device.adapter.driver,
-        {name: version(name) for name in _LIBRARIES} | {"python": platform.python_version()},
+        {name: version(name) for name in _REPORTED_LIBRARIES} | {"python": platform.python_version()},
         started.isoformat(timespec="seconds"),
         rate,
         (datetime.now(UTC) - started).total_seconds(),
@@ -112,18 +112,18 @@ def run_benchmark(
 
 def _measure_cases(
     cases: list[BenchmarkCase],
-    load: Callable[..., Head],
+    load_case_head: Callable[..., Head],
     renderer: Renderer,
-    rate: float,
+    bytes_per_s: float,
     progress: ProgressCallback,
 ) -> tuple[list[BenchmarkRow], list[SkippedCase]]:
     """Return the measurements of cases that the device can draw, and the other cases with the reasons.
 
-    load : function that returns the head for a subdivision level
-    rate : memory bandwidth of a copy [byte/s]
+    load_case_head : function that returns the head for a subdivision level
+    bytes_per_s : memory bandwidth of a copy [byte/s]
     """
     counts = CPU_FRAME_COUNTS if renderer.device.adapter.kind == "CPU" else FrameCounts()
-    subdivided = lru_cache(1)(lambda levels: load(subdivide=levels))
+    subdivided = lru_cache(1)(lambda levels: load_case_head(subdivide=levels))
     rows: list[BenchmarkRow] = []
     skipped: list[SkippedCase] = []
     subdivided(cases[0].subdivide)  # a missing head fails all cases
@@ -132,7 +132,7 @@ def _measure_cases(
             progress(index, len(cases))
             try:
                 loaded = subdivided(case.subdivide)
-                rows.append(measure_case(renderer, case, loaded, Path(folder), rate, counts))
+                rows.append(measure_case(renderer, case, loaded, Path(folder), bytes_per_s, counts))
             except DermisError as fault:
                 skipped.append(SkippedCase(case, str(fault)))
                 renderer.clear_cache()  # frees the resources of the failed case

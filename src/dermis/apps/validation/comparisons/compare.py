@@ -28,7 +28,7 @@ from dermis.scene.skin import DirectionName, Skin
 from dermis.scene.sources import scattering_sources
 
 Floats = NDArray[np.float64]
-_WHITE_PERCENTILE = 99.0
+_EXPOSURE_PERCENTILE = 99.0
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class Comparison:
     @property
     def exposure(self) -> float:
         """Return the exposure factor that makes bright pixels of the reference nearly white."""
-        bright = np.percentile(self.reference.image[self.reference.mask], _WHITE_PERCENTILE)
+        bright = np.percentile(self.reference.image[self.reference.mask], _EXPOSURE_PERCENTILE)
         return 0.8 / max(float(bright), 1e-9)
 
     def tone_mapped(self, image: Floats) -> Floats:
@@ -141,13 +141,13 @@ def comparison_subject(
         yield ComparisonSubject(Renderer(adapter), scene, profile, index_matched, settings)
 
 
-def check_names(against: str, light: str, region: str, medium: str) -> None:
+def check_names(reference_name: str, light_name: str, region_name: str, medium_name: str) -> None:
     """Raise DermisError for unknown names, before any long computation."""
     choices: dict[str, tuple[str, Collection[str]]] = {
-        "against": (against, REFERENCES),
-        "light": (light, LIGHTS),
-        "region": (region, REGIONS),
-        "medium": (medium, media()),
+        "against": (reference_name, REFERENCES),
+        "light": (light_name, LIGHTS),
+        "region": (region_name, REGIONS),
+        "medium": (medium_name, media()),
     }
     for option, (name, known) in choices.items():
         if name not in known:

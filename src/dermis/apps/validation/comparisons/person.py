@@ -34,8 +34,8 @@ from dermis.scene.skin import DEFAULT_ROUGHNESS, Skin
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 _FULL_COVERAGE = 0.999  # fraction of a pixel from which it counts as covered
-_WHITE_PERCENTILE = 98.0
-_DIRECT_DEPTH = 2
+_EXPOSURE_PERCENTILE = 98.0
+_DIRECT_LIGHT_DEPTH = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +67,7 @@ class PersonComparison:
     @property
     def exposure(self) -> float:
         """Return the exposure factor that makes bright pixels of the reference nearly white."""
-        bright = np.percentile(self.reference[self.mask], _WHITE_PERCENTILE)
+        bright = np.percentile(self.reference[self.mask], _EXPOSURE_PERCENTILE)
         return 0.8 / max(float(bright), 1e-9)
 
     def tone_mapped(self, image: Floats) -> NDArray[np.uint8]:
@@ -96,7 +96,7 @@ CAUSES: tuple[Cause, ...] = get_args(Cause)
 
 @dataclass(frozen=True, eq=False)
 class SharedSkin:
-    """Skin that frame and path tracer share: the layers, and the profile that the frame makes of them.
+    """Skin that frame and path tracer share: its layers, and the profile that is computed from the layers.
 
     medium : layers of skin of the mean colour
     profile : file with the Gaussians that fit photon counts of these layers
@@ -107,7 +107,7 @@ class SharedSkin:
 
 
 def shared_skin(renderer: Renderer, head: Head, truth: TruthName, folder: Path) -> SharedSkin:
-    """Return the skin of a person for a truth, with its profile in a file.
+    """Return the skin of a person for a kind of path-traced reference, with the profile in a file.
 
     In homogeneous skin, light exits at the same mean distance from its entry as by the published profile.
 
@@ -129,7 +129,7 @@ def shared_skin(renderer: Renderer, head: Head, truth: TruthName, folder: Path) 
 
 @dataclass(frozen=True, eq=False)
 class PersonSubject:
-    """Scene of a person with its textures, as frame and path tracer get it.
+    """Scene of a person, and the person's textures, as input of frame and path tracer.
 
     cause : cause of error that both leave out, or None
     """
@@ -140,7 +140,7 @@ class PersonSubject:
 
 
 def without_cause(subject: PersonSubject, cause: Cause) -> PersonSubject:
-    """Return a subject that lacks a cause of error on both sides."""
+    """Return a subject without a cause of error, in the frame and in the path-traced reference."""
     scene, textures, head = subject.scene, subject.textures, subject.scene.head
     maps, flat = head.maps, np.ones((1, 1), np.float32)
     assert isinstance(maps, PaintedMaps)
@@ -159,10 +159,10 @@ def without_cause(subject: PersonSubject, cause: Cause) -> PersonSubject:
     return PersonSubject(scene.replace(head=replace(head, maps=maps)), textures, cause)
 
 
-def frame_of(
+def render_subject_frame(
     renderer: Renderer, subject: PersonSubject, skin: SharedSkin | None, settings: Settings
 ) -> Floats:
-    """Return the linear radiance (h, w, 3) of the frame with the model of a truth.
+    """Return the linear radiance (h, w, 3) of the frame, with the skin of a path-traced reference.
 
     Without refraction, the light from below is that of skin without a surface, and the reflection is added.
 
@@ -184,13 +184,13 @@ def frame_of(
     if skin is None or skin.medium.eta != 1.0:
         return render_frame(renderer, scene.replace(skin=own), settings)
     parts = {"diffuse": matte, "specular": own}
-    return sum_of(
+    return sum_images(
         render_frame(renderer, scene.replace(skin=one), settings.model_copy(update={"parts": part}))
         for part, one in parts.items()
     )
 
 
-def sum_of(images: Iterable[Floats]) -> Floats:
+def sum_images(images: Iterable[Floats]) -> Floats:
     """Return the sum of images of one shape."""
     return np.asarray(np.sum(list(images), axis=0))
 
@@ -199,9 +199,9 @@ def compare_person(
     renderer: Renderer,
     subject: PersonSubject,
     skin: SharedSkin,
-    name: str,
+    comparison_name: str,
     *,
-    side: int = 256,
+    picture_side: int = 256,
     samples: int = 64,
     atlas: int = 2048,
     use_cache: bool = True,
@@ -211,19 +211,21 @@ def compare_person(
     """Render a person by dermis and by path tracing with the same model of the skin.
 
     skin : model of the skin, from `shared_skin`
-    name : name of the view
-    side : side of the pictures [pixel]
+    comparison_name : name of the view
+    picture_side : side of the pictures [pixel]
     samples : paths per pixel
     atlas : side of dermis's atlas [texel]
     variant, use_cache, progress : as in `path_trace`
 
     Raises DermisError for heads without modelled eyes.
     """
-    settings = Settings(size=(side, side), atlas=atlas, samples=4)
+    settings = Settings(size=(picture_side, picture_side), atlas=atlas, samples=4)
     reference = path_trace_subject(subject, skin, settings.size, samples, use_cache, variant, progress)
     mask = reference.mask > _FULL_COVERAGE
     check_visible(mask)
-    return person_comparison(name, frame_of(renderer, subject, skin, settings), reference, mask)
+    return person_comparison(
+        comparison_name, render_subject_frame(renderer, subject, skin, settings), reference, mask
+    )
 
 
 def render_frame(renderer: Renderer, scene: Scene, settings: Settings) -> Floats:
@@ -241,7 +243,7 @@ def render_frame(renderer: Renderer, scene: Scene, settings: Settings) -> Floats
 def path_trace_subject(
     subject: PersonSubject,
     skin: SharedSkin,
-    size: tuple[int, int],
+    picture_size: tuple[int, int],
     samples: int,
     use_cache: bool = True,
     variant: MitsubaVariant = "scalar_rgb",
@@ -249,7 +251,7 @@ def path_trace_subject(
 ) -> PathTraced:
     """Path-trace a person with the skin that the frame has.
 
-    size : width and height of the picture [pixel]
+    picture_size : width and height of the picture [pixel]
     samples : paths per pixel
     variant : variant of Mitsuba, as in `path_trace`
     """
@@ -261,9 +263,9 @@ def path_trace_subject(
         scene,
         textures,
         medium,
-        size,
+        picture_size,
         samples,
-        max_depth=_DIRECT_DEPTH if subject.cause == "bounces" else None,
+        max_depth=_DIRECT_LIGHT_DEPTH if subject.cause == "bounces" else None,
         variant=variant,
         use_cache=use_cache,
         progress=progress,
@@ -274,7 +276,7 @@ def path_trace_view(
     renderer: Renderer,
     scene: Scene,
     textures: SkinTextures,
-    size: tuple[int, int],
+    picture_size: tuple[int, int],
     samples: int,
     *,
     variant: MitsubaVariant = "scalar_rgb",
@@ -284,7 +286,7 @@ def path_trace_view(
     In the medium, light exits at the same mean distance from its entry as by the profile of the scene's skin.
 
     textures : maps of the skin as dermis paints them, but with colours under uniform light
-    size : width and height of the picture [pixel]
+    picture_size : width and height of the picture [pixel]
     samples : paths per pixel
     variant : variant of Mitsuba, as in `path_trace`
     """
@@ -293,7 +295,7 @@ def path_trace_view(
     medium = uniform_skin(at_normal_incidence(mean), mean_distance_mm(renderer.skin_profile(scene.skin)), 1.0)
     colour = at_normal_incidence(textures.colour).astype(np.float32)
     textures = replace(textures, colour=colour, strength=np.ones((1, 1), np.float32))
-    return path_trace_person(scene, textures, medium, size, samples, variant=variant)
+    return path_trace_person(scene, textures, medium, picture_size, samples, variant=variant)
 
 
 def mean_distance_mm(profile: GaussianSum) -> Floats:
@@ -302,39 +304,41 @@ def mean_distance_mm(profile: GaussianSum) -> Floats:
     return np.asarray((weight * width[:, None]).sum(axis=0) / weight.sum(axis=0))
 
 
-def at_normal_incidence(colour: ArrayLike) -> Floats:
-    """Return reflectances at normal incidence of half-spaces of index 1, by those for uniform light [-]."""
+def at_normal_incidence(diffuse_reflectance: ArrayLike) -> Floats:
+    """Convert reflectances of half-spaces of index 1 from uniform light to light at normal incidence [-]."""
     albedo = 1.0 - np.linspace(1.0, 0.01, 48) ** 2
     uniform, normal = (
         [float(f(one)) for one in albedo] for f in (diffuse_albedo, partial(directional_albedo, 1.0))
     )
-    return np.asarray(np.interp(np.asarray(colour, float), uniform, normal))
+    return np.asarray(np.interp(np.asarray(diffuse_reflectance, float), uniform, normal))
 
 
-def person_comparison(name: str, ours: Floats, reference: PathTraced, mask: Mask) -> PersonComparison:
+def person_comparison(
+    comparison_name: str, dermis_image: Floats, reference: PathTraced, mask: Mask
+) -> PersonComparison:
     """Return the comparison of a frame with a path-traced picture.
 
-    ours : (h, w, 3) linear radiance by dermis
+    dermis_image : (h, w, 3) linear radiance by dermis
     mask : (h, w) pixels to compare
     """
     image, variance = reference.image.astype(np.float64), reference.variance.astype(np.float64)
     return PersonComparison(
-        name,
-        ours,
+        comparison_name,
+        dermis_image,
         image,
         variance,
         mask,
-        relative_rmse(ours, image, mask, variance),
-        energy_ratio(ours, image, mask, variance),
-        tuple(energy_ratio(ours[..., c], image[..., c], mask, variance[..., c]) for c in range(3)),
+        relative_rmse(dermis_image, image, mask, variance),
+        energy_ratio(dermis_image, image, mask, variance),
+        tuple(energy_ratio(dermis_image[..., c], image[..., c], mask, variance[..., c]) for c in range(3)),
         reference.samples,
         reference.seconds,
     )
 
 
 _PUPIL_RADIUS_MM = 4.0  # around the middle, for the position of the pupil
-_IRIS_INNER_MM, _IRIS_OUTER_MM = 2.6, 5.0  # ring of the iris, as seen from the front
-_HIGHLIGHT_FACTOR = 1.6  # least brightness of highlights, relative to the median of the ring
+_IRIS_INNER_RADIUS_MM, _IRIS_OUTER_RADIUS_MM = 2.6, 5.0  # ring of the iris, as seen from the front
+_MIN_RELATIVE_HIGHLIGHT = 1.6  # least brightness of highlights, relative to the median of the ring
 
 
 class IrisErrors(NamedTuple):
@@ -353,52 +357,59 @@ class IrisErrors(NamedTuple):
     right_half: Estimate
 
 
-def iris_errors(pair: PersonComparison, frame_mm: float) -> IrisErrors:
+def iris_errors(comparison: PersonComparison, frame_mm: float) -> IrisErrors:
     """Return the errors of an iris, in pictures whose centre shows an eye from the front.
 
     frame_mm : visible height [mm]
     """
-    ours, reference = pair.ours.mean(axis=2), pair.reference.mean(axis=2)
-    noise = pair.variance.mean(axis=2)  # an upper bound, since channels may share paths
+    ours, reference = comparison.ours.mean(axis=2), comparison.reference.mean(axis=2)
+    noise = comparison.variance.mean(axis=2)  # an upper bound, since channels may share paths
     side = len(ours)
     along = (np.arange(side) + 0.5 - 0.5 * side) * frame_mm / side
     x, y = np.meshgrid(along, along)
     radius = np.hypot(x, y)
-    ring = (radius > _IRIS_INNER_MM) & (radius < _IRIS_OUTER_MM)
+    ring = (radius > _IRIS_INNER_RADIUS_MM) & (radius < _IRIS_OUTER_RADIUS_MM)
     dull = _without_highlights(ours, ring) & _without_highlights(reference, ring)
     right, down = _image_shift(ours, reference, noise, dull & (radius < _PUPIL_RADIUS_MM))
     masks = (ring & dull & half for half in (radius > 0, x < 0, x >= 0))
     return IrisErrors(right, down, *(_brightness_ratio(ours, reference, noise, mask) for mask in masks))
 
 
-def _without_highlights(image: Floats, ring: Mask) -> Mask:
+def _without_highlights(image: Floats, iris_ring: Mask) -> Mask:
     """Return the mask (h, w) of pixels outside highlights, which are found in a blurred picture.
 
-    ring : (h, w) mask of the iris, whose median brightness determines the threshold
+    iris_ring : (h, w) mask of the iris, whose median brightness determines the threshold
     """
     from scipy.ndimage import gaussian_filter
 
     smooth = gaussian_filter(image, 2.0)
-    return np.asarray(smooth < _HIGHLIGHT_FACTOR * np.median(smooth[ring]))
+    return np.asarray(smooth < _MIN_RELATIVE_HIGHLIGHT * np.median(smooth[iris_ring]))
 
 
-def _image_shift(ours: Floats, reference: Floats, noise: Floats, region: Mask) -> tuple[Estimate, Estimate]:
+def _image_shift(
+    dermis_image: Floats, reference: Floats, noise_variance: Floats, region_mask: Mask
+) -> tuple[Estimate, Estimate]:
     """Return the shift of the reference relative to the picture by dermis, to the right and down [pixel].
 
     Shift and brightness are fitted together by least squares.
 
-    noise : (h, w) variance of the reference
-    region : (h, w) mask of the pixels to compare
+    noise_variance : (h, w) variance of the reference
+    region_mask : (h, w) mask of the pixels to compare
     """
-    down, right = (np.asarray(slope) for slope in np.gradient(ours))
-    columns = np.stack([ours[region], -right[region], -down[region], np.ones(int(region.sum()))], axis=-1)
+    down, right = (np.asarray(slope) for slope in np.gradient(dermis_image))
+    columns = np.stack(
+        [dermis_image[region_mask], -right[region_mask], -down[region_mask], np.ones(int(region_mask.sum()))],
+        axis=-1,
+    )
     inverse = np.linalg.inv(columns.T @ columns) @ columns.T
-    gain, x, y, _ = (float(one) for one in inverse @ reference[region])
-    error: Floats = np.sqrt((inverse**2 * noise[region]).sum(axis=1)) / abs(gain)
+    gain, x, y, _ = (float(one) for one in inverse @ reference[region_mask])
+    error: Floats = np.sqrt((inverse**2 * noise_variance[region_mask]).sum(axis=1)) / abs(gain)
     return Estimate(x / gain, float(error[1])), Estimate(y / gain, float(error[2]))
 
 
-def _brightness_ratio(ours: Floats, reference: Floats, noise: Floats, region: Mask) -> Estimate:
-    total = float(reference[region].sum())
-    ratio = float(ours[region].sum()) / total
-    return Estimate(ratio, ratio * float(np.sqrt(noise[region].sum())) / total)
+def _brightness_ratio(
+    dermis_image: Floats, reference: Floats, noise_variance: Floats, region_mask: Mask
+) -> Estimate:
+    total = float(reference[region_mask].sum())
+    ratio = float(dermis_image[region_mask].sum()) / total
+    return Estimate(ratio, ratio * float(np.sqrt(noise_variance[region_mask].sum())) / total)

@@ -31,8 +31,8 @@ ZONES: dict[str, tuple[str, ...]] = {
 """Zones of human/skin/zones.csv that form each region of the skin."""
 _LID_RANGE_MM = -0.6, 7.0  # distances from the edges of the lids
 _RIM_COSINE, _TERMINATOR_COSINE = 0.35, 0.2
-_LIPS, _LIDS = 8, 10  # columns of `PaintedSurface.vertices`
-_PLACES, _MIN_PIXELS = slice(2, 5), 12
+_LIPS_COLUMN, _LIDS_COLUMN = 8, 10  # columns of `PaintedSurface.vertices`
+_POSITION_COLUMNS, _MIN_REGION_PIXELS = slice(2, 5), 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,26 +42,28 @@ class Regions:
     masks: dict[str, Mask]
 
     def light_ratios(self, pair: PersonComparison) -> dict[str, Estimate]:
-        """Return the light of the frame divided by that of the reference in each large region [-]."""
+        """Return the frame's light divided by the reference's light, for each large region [-]."""
         found = {}
         for name, mask in self.masks.items():
             inside = mask & pair.mask
-            if inside.sum() >= _MIN_PIXELS:
+            if inside.sum() >= _MIN_REGION_PIXELS:
                 found[name] = energy_ratio(pair.ours, pair.reference, inside, pair.variance)
         return found
 
 
-def picture_regions(renderer: Renderer, scene: Scene, side: int) -> Regions:
+def picture_regions(renderer: Renderer, scene: Scene, picture_side: int) -> Regions:
     """Return the regions of the skin that a square picture of a parametric human shows.
 
     Regions by light follow the first light of the scene: "rim" is skin seen at a grazing angle, "terminator"
     skin that the light grazes, "shadowed side" skin that faces away from the light. Normals are those of the
     rest pose.
 
-    side : side of the picture [pixel]
+    picture_side : side of the picture [pixel]
     """
     head, mesh = scene.head, scene.head.mesh
-    visible = surface_points(renderer, scene, Settings(size=(side, side), atlas=256, samples=1))
+    visible = surface_points(
+        renderer, scene, Settings(size=(picture_side, picture_side), atlas=256, samples=1)
+    )
     corners = mesh.triangles[visible.triangle]
     on_skin = np.array([one.kind == "skin" for one in mesh.materials])[mesh.material[visible.triangle]]
     attributes = painted_surface(mesh, head.control.stencils).vertices.astype(np.float64)
@@ -70,9 +72,9 @@ def picture_regions(renderer: Renderer, scene: Scene, side: int) -> Regions:
         for values in (attributes, mesh.normals.astype(np.float64), mesh.positions.astype(np.float64))
     )
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    lips = placed[:, _LIPS] > 0.0
-    lids = (placed[:, _LIDS] > _LID_RANGE_MM[0]) & (placed[:, _LIDS] < _LID_RANGE_MM[1])
-    zone = _nearest_zone(placed[:, _PLACES])
+    lips = placed[:, _LIPS_COLUMN] > 0.0
+    lids = (placed[:, _LIDS_COLUMN] > _LID_RANGE_MM[0]) & (placed[:, _LIDS_COLUMN] < _LID_RANGE_MM[1])
+    zone = _nearest_zone(placed[:, _POSITION_COLUMNS])
     found = {name: on_skin & (zone == k) & ~lips & ~lids for k, name in enumerate(ZONES)}
     found |= {"lips": on_skin & lips, "lids": on_skin & lids, "eyes and mouth": ~on_skin}
     centre = np.array(head.centre_mm)
@@ -87,11 +89,11 @@ def picture_regions(renderer: Renderer, scene: Scene, side: int) -> Regions:
     return Regions({name: _picture_mask(visible.mask, inside) for name, inside in found.items()})
 
 
-def _nearest_zone(places_mm: Floats) -> NDArray[np.int64]:
+def _nearest_zone(positions_mm: Floats) -> NDArray[np.int64]:
     """Return the index of the region whose zone has the largest weight at points (n, 3)."""
     rows = {row["zone"]: row for row in read_rows("dermis.human.skin", "zones")}
-    mirrored = np.abs(places_mm[:, :1])
-    points = np.concatenate([mirrored, places_mm[:, 1:]], axis=1)
+    mirrored = np.abs(positions_mm[:, :1])
+    points = np.concatenate([mirrored, positions_mm[:, 1:]], axis=1)
     distances = []
     for names in ZONES.values():
         zones = [rows[name] for name in names]
@@ -104,7 +106,7 @@ def _cosines(normals: Floats, directions: Floats) -> Floats:
     return np.asarray((normals * directions).sum(axis=1) / np.linalg.norm(directions, axis=1))
 
 
-def _picture_mask(visible: Mask, inside: Mask) -> Mask:
+def _picture_mask(visible: Mask, region_points: Mask) -> Mask:
     mask = np.zeros(visible.shape, bool)
-    mask[visible] = inside
+    mask[visible] = region_points
     return mask

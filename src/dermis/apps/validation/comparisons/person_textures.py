@@ -24,31 +24,33 @@ from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
 Floats = NDArray[np.float32]
-_TEXTURE_SIDE = 1024
+_PART_TEXTURE_SIDE = 1024
 """Side of the textures of eyes and teeth [texels]."""
 _TEXTURED_PARTS = ("iris", "white", "upper teeth", "lower teeth")  # in the order of person_textures.wgsl
 _MIN_ROUGHNESS = 0.05
-_DENSITY_RANGE = 5.0, 14.0  # binary logarithms of mm per unit of uv
+_LOG2_MM_PER_UV_RANGE = 5.0, 14.0  # binary logarithms of mm per unit of uv
 _SETTINGS = Settings(size=(16, 16), atlas=64, samples=1, shadow_size=64)
 
 
-def person_textures(renderer: Renderer, scene: Scene, side: int = 2048) -> SkinTextures:
+def person_textures(renderer: Renderer, scene: Scene, texture_side: int = 2048) -> SkinTextures:
     """Return the colours, roughness and relief that frames of the scene show in the rest pose.
 
-    side : side of the skin's maps, a power of two from 256 to 4096 [texel]
+    texture_side : side of the skin's maps, a power of two from 256 to 4096 [texel]
 
     Raises DermisError for heads without painted skin.
     """
     head = scene.head
     if not isinstance(head.maps, PaintedMaps) or head.eyes is None:
         refuse(head.name, "a parametric human with painted skin", "it is another head", "Load human")
-    return renderer.reopening_device.run(partial(_paint_textures, renderer, scene, head.maps.look, side))
+    return renderer.reopening_device.run(
+        partial(_paint_textures, renderer, scene, head.maps.look, texture_side)
+    )
 
 
-def _paint_textures(renderer: Renderer, scene: Scene, look: SkinLook, side: int) -> SkinTextures:
+def _paint_textures(renderer: Renderer, scene: Scene, look: SkinLook, texture_side: int) -> SkinTextures:
     head = scene.head
     surface, device = painted_surface(head.mesh, head.control.stencils), renderer.device
-    colour, gloss, rough, height = paint.paint_raw_arrays(device, surface, look, side)
+    colour, gloss, rough, height = paint.paint_raw_arrays(device, surface, look, texture_side)
     height = height + _detail_heights_mm(gloss[..., 1], rough[..., 1], gloss[..., 2])
     roughness = np.maximum(scene.skin.smoothing * rough[..., 0], _MIN_ROUGHNESS)
     strength = np.ascontiguousarray(scene.skin.strength * gloss[..., 0])
@@ -67,7 +69,7 @@ def _detail_heights_mm(pores: Floats, furrows: Floats, density: Floats) -> Float
     density : (n, n) binary logarithm of mm per unit of uv
     """
     side = len(pores)
-    density = np.clip(density, *_DENSITY_RANGE)  # undefined outside the charts
+    density = np.clip(density, *_LOG2_MM_PER_UV_RANGE)  # undefined outside the charts
     level = density - np.log2(TILE_LENGTH_MM)
     octave = np.floor(level)
     blend = np.clip((level - octave - 0.4) / 0.2, 0.0, 1.0)
@@ -84,34 +86,34 @@ def _detail_heights_mm(pores: Floats, furrows: Floats, density: Floats) -> Float
     return heights
 
 
-def _sample_tile(tile: Floats, u: Any, v: Any) -> Floats:
+def _sample_tile(periodic_pattern: Floats, u: Any, v: Any) -> Floats:
     """Return a periodic pattern at coordinates u, v (n, n), interpolated bilinearly.
 
-    tile : one period of the pattern
+    periodic_pattern : one period of the pattern
     u, v : coordinates in units of the period
     """
     from scipy.ndimage import map_coordinates
 
-    rows, columns = tile.shape
+    rows, columns = periodic_pattern.shape
     coordinates = np.stack([np.mod(v, 1.0) * rows - 0.5, np.mod(u, 1.0) * columns - 0.5])
-    return np.asarray(map_coordinates(tile, coordinates, order=1, mode="grid-wrap"), np.float32)
+    return np.asarray(map_coordinates(periodic_pattern, coordinates, order=1, mode="grid-wrap"), np.float32)
 
 
-def _part_texture(renderer: Renderer, scene: Scene, part: int, iris_radius_mm: float) -> Floats:
+def _part_texture(renderer: Renderer, scene: Scene, part_index: int, iris_radius_mm: float) -> Floats:
     """Return the painted texture (n, n, 3) of one part of the eyes or teeth.
 
-    part : index of the part in person_textures.wgsl
+    part_index : index of the part in person_textures.wgsl
     """
     inputs, device = renderer.prepare(scene, _SETTINGS), renderer.device
     shader = program(device, Path(__file__).parent / "person_textures.wgsl")
-    texture = make_texture(device, (_TEXTURE_SIDE, _TEXTURE_SIDE), "rgba32float")
+    texture = make_texture(device, (_PART_TEXTURE_SIDE, _PART_TEXTURE_SIDE), "rgba32float")
     radii = {"iris_radius_mm": iris_radius_mm, "eyeball_radius_mm": SCLERA_MM}
-    request = shader.record("PartRequest", part=part, **radii)
+    request = shader.record("PartRequest", part=part_index, **radii)
     eye = inputs.view["eyes"][0]
     for name in ("eumelanin", "pupil_mm", "redness", "seed"):
         request["eye"][name] = eye[name]
     frame = CommandList(device, timed=False)
     bindings = {**inputs.bindings, "part_request": request, "part_texture": texture}
-    frame.compute("paint", shader, bindings, (_TEXTURE_SIDE, _TEXTURE_SIDE))
+    frame.compute("paint", shader, bindings, (_PART_TEXTURE_SIDE, _PART_TEXTURE_SIDE))
     frame.submit()
     return np.ascontiguousarray(download(device, texture)[..., :3], np.float32)

@@ -27,8 +27,8 @@ Floats = NDArray[np.float64]
 
 # Spacing of irradiance samples, and the least spacing, at sharp edges. At twice the spacing, a laser's stripe
 # loses 1.5 % of its light.
-_SPACING_MM, _FINEST_MM = 3.0, 0.2
-_HEAT_RADIUS_MM = 10.0
+_SAMPLE_SPACING_MM, _MIN_SAMPLE_SPACING_MM = 3.0, 0.2
+_HEAT_PATCH_RADIUS_MM = 10.0
 _MIN_VARIANCE_MM2 = 0.25  # for narrower Gaussians the surface is nearly flat
 _FULL_COVERAGE = 0.999  # fraction of a pixel from which it counts as covered
 PIXEL_SAMPLES = 16
@@ -92,7 +92,7 @@ def surface_heat(subject: ComparisonSubject, samples: int) -> ReferenceImage:
     samples : ignored, as there is no noise
     """
     target = subject.scene.camera.target
-    return surface_heat_around(subject, target, _HEAT_RADIUS_MM, irradiance_samples(subject))
+    return surface_heat_around(subject, target, _HEAT_PATCH_RADIUS_MM, irradiance_samples(subject))
 
 
 def surface_heat_around(
@@ -100,7 +100,7 @@ def surface_heat_around(
     target_mm: tuple[float, float, float],
     radius_mm: float,
     light: IrradianceSamples,
-    min_mm2: float = _MIN_VARIANCE_MM2,
+    min_variance_mm2: float = _MIN_VARIANCE_MM2,
 ) -> ReferenceImage:
     """Return the reference image by the heat equation on the surface, around a visible point.
 
@@ -109,13 +109,13 @@ def surface_heat_around(
     target_mm : point relative to the head's centre; the nearest visible point is the centre of the patch [mm]
     radius_mm : radius of the patch in which pixels are compared [mm]
     light : irradiance on the whole head, see `irradiance_samples`
-    min_mm2 : variance below which Gaussians are integrated by Euclidean distance instead [mm2]
+    min_variance_mm2 : variance below which Gaussians are integrated by Euclidean distance instead [mm2]
     """
     from dermis.apps.truths.surface_diffusion import diffuse_on_surface
     from dermis.apps.truths.surface_patch import mesh_patch
 
     started = time.perf_counter()
-    narrow = subject.profile.variance_mm2 < min_mm2
+    narrow = subject.profile.variance_mm2 < min_variance_mm2
     variances, weight = subject.profile.variance_mm2, subject.profile.weight
     visible = surface_points(subject.renderer, subject.scene, subject.settings)
     points = hit_positions(subject, visible)
@@ -132,7 +132,7 @@ def surface_heat_around(
     mask = visible.mask.copy()
     mask[visible.mask] = inside
     compared = SurfacePoints(mask, visible.triangle[inside], visible.barycentric[inside])
-    note = f"{radius_mm:g} mm around the middle; {narrow.sum()} Gaussians under {min_mm2:g} mm2 "
+    note = f"{radius_mm:g} mm around the middle; {narrow.sum()} Gaussians under {min_variance_mm2:g} mm2 "
     note += "by Euclidean distance"
     return replace(_image_of_points(compared, exitance, started, note), has_translucency=False)
 
@@ -144,7 +144,7 @@ def irradiance_samples(subject: ComparisonSubject) -> IrradianceSamples:
     def light(points: MeshPoints) -> Floats:
         return _irradiance(subject, points.face, points.barycentric)
 
-    return sample_irradiance(subject.scene.head.mesh, light, _SPACING_MM, _FINEST_MM)
+    return sample_irradiance(subject.scene.head.mesh, light, _SAMPLE_SPACING_MM, _MIN_SAMPLE_SPACING_MM)
 
 
 def path_traced_reference(subject: ComparisonSubject, samples: int) -> ReferenceImage:
@@ -188,20 +188,20 @@ def _irradiance(subject: ComparisonSubject, triangle: NDArray[np.int64], barycen
 
 
 def _integrate_gaussians(
-    points: Floats, light: IrradianceSamples, weight: Floats, variance_mm2: Floats
+    points: Floats, light: IrradianceSamples, gaussian_weight: Floats, variance_mm2: Floats
 ) -> Floats:
     """Return the radiant exitance (n, 3) at points by integrating Gaussians of the Euclidean distance.
 
     points : (n, 3) positions [mm]
     light : irradiance on the surface
-    weight, variance_mm2 : (k, 3) weights and (k,) variances of the Gaussians
+    gaussian_weight, variance_mm2 : (k, 3) weights and (k,) variances of the Gaussians
     """
     from dermis.apps.truths.radial_table import GaussianSum as Profile
     from dermis.apps.truths.surface_integral import integrate_exitance
 
     if not len(variance_mm2):
         return np.zeros_like(points)
-    return integrate_exitance(points, light, Profile(weight, variance_mm2))
+    return integrate_exitance(points, light, Profile(gaussian_weight, variance_mm2))
 
 
 def hit_positions(subject: ComparisonSubject, visible: SurfacePoints) -> Floats:
@@ -214,11 +214,13 @@ def hit_positions(subject: ComparisonSubject, visible: SurfacePoints) -> Floats:
     return np.asarray(np.einsum("nk,nkc->nc", visible.barycentric, corners))
 
 
-def _image_of_points(visible: SurfacePoints, exitance: Floats, started: float, note: str) -> ReferenceImage:
+def _image_of_points(
+    visible: SurfacePoints, exitance: Floats, start_time_s: float, assumption: str
+) -> ReferenceImage:
     image = np.zeros((*visible.mask.shape, 3))
     image[visible.mask] = exitance / np.pi
-    seconds, noise = time.perf_counter() - started, np.zeros_like(image)
-    return ReferenceImage(image, noise, visible.mask, 1, seconds, (note,), has_interreflection=False)
+    seconds, noise = time.perf_counter() - start_time_s, np.zeros_like(image)
+    return ReferenceImage(image, noise, visible.mask, 1, seconds, (assumption,), has_interreflection=False)
 
 
 def check_visible(mask: NDArray[np.bool_]) -> None:

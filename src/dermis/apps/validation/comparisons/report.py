@@ -11,13 +11,13 @@ from string import Template
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.truths.metrics import MID_GREY, signed_difference
+from dermis.apps.truths.metrics import ZERO_DIFFERENCE_GREY, signed_difference
 from dermis.apps.validation.comparisons.compare import Comparison, ComparisonRow, comparison_sources
 from dermis.base.atomic_write import atomic_file
 from dermis.images.codecs import encode_png
 
 Floats = NDArray[np.float64]
-_COLUMNS = ("technique", "relative RMSE", "FLIP", "energy ratio", "ms per frame")
+_COLUMN_TITLES = ("technique", "relative RMSE", "FLIP", "energy ratio", "ms per frame")
 
 
 def write_report(path: Path, comparison: Comparison) -> None:
@@ -27,14 +27,14 @@ def write_report(path: Path, comparison: Comparison) -> None:
     """
     text = Template((resources.files(__package__) / "report.html").read_text(encoding="utf-8"))
     reference = _figure("reference", comparison.tone_mapped(comparison.reference.image))
-    figures = [_figures(comparison, row) for row in comparison.rows]
+    figures = [_technique_figures(comparison, row) for row in comparison.rows]
     page = text.substitute(
         title=html.escape(comparison.title),
         against=html.escape(comparison.against),
         seconds=f"{comparison.reference.seconds:.0f}",
         notes=html.escape("; ".join(comparison.reference.notes)),
         adapter=html.escape(comparison.adapter),
-        table=_table(comparison.rows),
+        table=_errors_table(comparison.rows),
         keys=" ".join(comparison_sources(comparison.against, comparison.images)),
         figures="\n".join([reference, *figures]),
     )
@@ -42,34 +42,37 @@ def write_report(path: Path, comparison: Comparison) -> None:
         file.write_text(page, encoding="utf-8")
 
 
-def cells(row: ComparisonRow) -> tuple[str, ...]:
+def cells(comparison_row: ComparisonRow) -> tuple[str, ...]:
     """Return the errors of a technique as table cells, with standard errors if the reference has noise."""
-    flip = "-" if row.flip is None else f"{row.flip:.3f}"
+    flip = "-" if comparison_row.flip is None else f"{comparison_row.flip:.3f}"
     return (
-        row.technique,
-        _with_error(row.relrmse, row.relrmse_se),
+        comparison_row.technique,
+        _with_error(comparison_row.relrmse, comparison_row.relrmse_se),
         flip,
-        _with_error(row.energy_ratio, row.energy_ratio_se),
-        f"{row.ms:.3g}",
+        _with_error(comparison_row.energy_ratio, comparison_row.energy_ratio_se),
+        f"{comparison_row.ms:.3g}",
     )
 
 
-def _with_error(value: float, error: float) -> str:
-    return f"{value:.4f}" + (f" ± {error:.4f}" if error > 0 else "")
+def _with_error(value: float, standard_error: float) -> str:
+    return f"{value:.4f}" + (f" ± {standard_error:.4f}" if standard_error > 0 else "")
 
 
-def _table(rows: tuple[ComparisonRow, ...]) -> str:
-    head = "".join(f"<th>{name}</th>" for name in _COLUMNS)
+def _errors_table(rows: tuple[ComparisonRow, ...]) -> str:
+    head = "".join(f"<th>{name}</th>" for name in _COLUMN_TITLES)
     body = ["".join(f"<td>{html.escape(cell)}</td>" for cell in cells(row)) for row in rows]
     return f"<table><tr>{head}</tr>" + "".join(f"<tr>{row}</tr>" for row in body) + "</table>"
 
 
-def _figures(comparison: Comparison, row: ComparisonRow) -> str:
-    image, reference = comparison.images[row.technique], comparison.reference
+def _technique_figures(comparison: Comparison, comparison_row: ComparisonRow) -> str:
+    image, reference = comparison.images[comparison_row.technique], comparison.reference
     ours, exact = (np.maximum(comparison.exposure * one, 0.0) for one in (image, reference.image))
     difference = signed_difference(ours, exact)
-    difference = np.where(reference.mask[..., None], difference, MID_GREY)
-    pictures = {row.technique: comparison.tone_mapped(image), f"{row.technique}: difference": difference}
+    difference = np.where(reference.mask[..., None], difference, ZERO_DIFFERENCE_GREY)
+    pictures = {
+        comparison_row.technique: comparison.tone_mapped(image),
+        f"{comparison_row.technique}: difference": difference,
+    }
     return "\n".join(_figure(caption, picture) for caption, picture in pictures.items())
 
 

@@ -25,7 +25,7 @@ from dermis.scene.skin import Skin
 
 _WHITE_IRRADIANCE = (3.14, 3.14, 3.14)
 _NOSE_POINT_MM = (14.0, -28.0, 90.0)  # between tip, wing and lip, relative to the head's centre [mm]
-_EAR_RANGE_MM = 60.0  # largest height above or below the centre at which ears are sought
+_MAX_EAR_HEIGHT_MM = 60.0  # largest height above or below the centre at which ears are sought
 
 
 def _front_lights(head: Head) -> tuple[Light, ...]:
@@ -57,7 +57,7 @@ def _ear_position(head: Head) -> tuple[float, float, float]:
     """Return the leftmost point of the head at the height of its ears, relative to its centre [mm]."""
     points = head.mesh.positions - head.centre_mm
     height_offset = np.abs(points[:, 1])
-    at_ear_height = points[height_offset <= max(_EAR_RANGE_MM, float(height_offset.min()))]
+    at_ear_height = points[height_offset <= max(_MAX_EAR_HEIGHT_MM, float(height_offset.min()))]
     x, y, z = (float(c) for c in at_ear_height[at_ear_height[:, 0].argmax()])
     return (x, y, z)
 
@@ -113,14 +113,14 @@ def medium_scene(
         yield comparison_scene(head, light, region, str(file)), profile
 
 
-def default_region(light: str) -> str:
+def default_region(light_name: str) -> str:
     """Return the region of the face in which a light of the comparisons has the largest effect."""
-    return {"back": "ear", "laser": "three-quarter"}.get(light, "portrait")
+    return {"back": "ear", "laser": "three-quarter"}.get(light_name, "portrait")
 
 
 ModelName = Literal["counted", "layered", "montecarlo"]
 """Source of a profile: table of Monte Carlo profiles, layered diffusion, or a new Monte Carlo simulation."""
-_PHOTONS = 2_000_000  # per channel
+_PHOTONS_PER_CHANNEL = 2_000_000  # per channel
 
 
 def medium_gaussians(medium: Medium, model: ModelName | None = None) -> GaussianSum:
@@ -132,5 +132,5 @@ def medium_gaussians(medium: Medium, model: ModelName | None = None) -> Gaussian
     Raises DermisError if photon counts are requested for a medium that no table covers.
     """
     if model == "montecarlo":
-        return fit_radial(monte_carlo_profile(medium, photons=_PHOTONS), medium.name)
+        return fit_radial(monte_carlo_profile(medium, photons=_PHOTONS_PER_CHANNEL), medium.name)
     return fit_radial(Tissue(medium).profile(model), medium.name)

@@ -19,7 +19,7 @@ from dermis.apps.export.fitting import burley_curve, fit_burley_width
 from dermis.apps.export.registry import TARGETS
 from dermis.apps.export.subject import load_subject
 from dermis.apps.export.target import get_numbers
-from dermis.apps.export.targets.babylon.target import WIDTH_ERROR, spiral_samples
+from dermis.apps.export.targets.babylon.target import RENDERED_WIDTH_RATIO, spiral_samples
 from dermis.apps.validation.pages import RESULTS, JsonObject, chromium_page, write_results
 from dermis.base.errors import refuse
 
@@ -29,9 +29,9 @@ if TYPE_CHECKING:
 PAGE = Path(__file__).with_name("babylon.html")
 RESULTS_FILE = RESULTS / "engines_babylon.json"
 LIBRARY_VARIABLE = "DERMIS_BABYLON"
-CANVAS_SIDE, LIT_RADIANCE = 640, 0.9
-PIXELS_PER_WIDTH = 14.0  # number of pixels that the largest Burley width covers
-DIRECTION_COUNT = 5
+CANVAS_SIDE, FULLY_LIT_RADIANCE = 640, 0.9
+PIXELS_PER_BURLEY_WIDTH = 14.0  # number of pixels that the largest Burley width covers
+AZIMUTH_COUNT = 5
 Floats = NDArray[np.floating]
 
 
@@ -63,34 +63,43 @@ def babylon_page(library: Path) -> Iterator[Page]:
         yield page
 
 
-def measured_radiance(page: Page, colour: Floats, metres: float, pixel: float, azimuth: float) -> Floats:
+def measured_radiance(
+    page: Page, profile_colour: Floats, meters_per_unit: float, pixel_mm: float, azimuth: float
+) -> Floats:
     """Return the radiance (side, side, 3) that Babylon.js draws, relative to that far inside the light.
 
     Row 0 is at the bottom.
 
-    colour : diffusion profile, which Babylon.js expresses as a colour
-    metres : metersPerUnit of the scene, in which a unit is a millimetre
-    pixel : size of a pixel [mm]
+    profile_colour : diffusion profile, which Babylon.js expresses as a colour
+    meters_per_unit : metersPerUnit of the scene, in which a unit is a millimetre
+    pixel_mm : size of a pixel [mm]
     azimuth : direction across the edge of the light [rad]
     """
-    edge = {"colour": list(map(float, colour)), "metersPerUnit": metres, "pixel": pixel, "turn": azimuth}
+    edge = {
+        "colour": list(map(float, profile_colour)),
+        "metersPerUnit": meters_per_unit,
+        "pixel": pixel_mm,
+        "turn": azimuth,
+    }
     data = base64.b64decode(page.evaluate("(edge) => drawEdge(edge)", edge))
     levels = np.frombuffer(data, np.uint8).reshape(CANVAS_SIDE, CANVAS_SIDE, 4)[..., :3]
-    return levels / (255.0 * LIT_RADIANCE)
+    return levels / (255.0 * FULLY_LIT_RADIANCE)
 
 
-def predicted_radiance(colour: Floats, metres: float, pixel: float, azimuth: float) -> Floats:
+def predicted_radiance(
+    profile_colour: Floats, meters_per_unit: float, pixel_mm: float, azimuth: float
+) -> Floats:
     """Return the radiance (side, side, 3) predicted from the shader's sample positions.
 
     Positions are rounded to whole pixels.
 
-    colour : diffusion profile, which Babylon.js expresses as a colour
-    metres : metersPerUnit of the scene, in which a unit is a millimetre
-    pixel : size of a pixel [mm]
+    profile_colour : diffusion profile, which Babylon.js expresses as a colour
+    meters_per_unit : metersPerUnit of the scene, in which a unit is a millimetre
+    pixel_mm : size of a pixel [mm]
     azimuth : direction across the edge of the light [rad]
     """
-    r, angle, weight = spiral_samples(colour)
-    distance = WIDTH_ERROR * 1e-3 * r / metres / pixel
+    r, angle, weight = spiral_samples(profile_colour)
+    distance = RENDERED_WIDTH_RATIO * 1e-3 * r / meters_per_unit / pixel_mm
     right, upwards = np.round(distance * np.cos(angle)), np.round(distance * np.sin(angle))
     middle = np.arange(CANVAS_SIDE) + 0.5 - 0.5 * CANVAS_SIDE
     radiance = np.zeros((CANVAS_SIDE, CANVAS_SIDE, 3))
@@ -100,16 +109,18 @@ def predicted_radiance(colour: Floats, metres: float, pixel: float, azimuth: flo
     return radiance
 
 
-def edge_profile(picture: Floats, pixel: float, azimuth: float, x_mm: Floats, half_width_mm: float) -> Floats:
+def edge_profile(
+    picture: Floats, pixel_mm: float, azimuth: float, x_mm: Floats, half_width_mm: float
+) -> Floats:
     """Return the mean radiance (n, 3) at distances from the edge of the light, within a strip across it.
 
     picture : (side, side, 3) radiance
-    pixel : size of a pixel [mm]
+    pixel_mm : size of a pixel [mm]
     azimuth : direction across the edge [rad]
     x_mm : (n,) evenly spaced distances from the edge, positive in the light
     half_width_mm : half the width of the strip [mm]
     """
-    middle = (np.arange(CANVAS_SIDE) + 0.5 - 0.5 * CANVAS_SIDE) * pixel
+    middle = (np.arange(CANVAS_SIDE) + 0.5 - 0.5 * CANVAS_SIDE) * pixel_mm
     x, y = middle[None, :], middle[:, None]
     across = x * np.cos(azimuth) + y * np.sin(azimuth)
     strip = np.abs(y * np.cos(azimuth) - x * np.sin(azimuth)) < half_width_mm
@@ -120,21 +131,21 @@ def edge_profile(picture: Floats, pixel: float, azimuth: float, x_mm: Floats, ha
     return np.stack(sums, axis=-1) / np.maximum(count, 1)[:, None]
 
 
-def edge_responses(page: Page, colour: Floats, metres: float, d_mm: Floats) -> JsonObject:
+def edge_responses(page: Page, profile_colour: Floats, meters_per_unit: float, d_mm: Floats) -> JsonObject:
     """Return the measured and predicted edge responses of a diffusion profile, averaged over azimuths.
 
     The result also has the largest errors against the prediction and against exact Burley profiles.
 
-    colour : diffusion profile, which Babylon.js expresses as a colour
-    metres : metersPerUnit of the scene, in which a unit is a millimetre
+    profile_colour : diffusion profile, which Babylon.js expresses as a colour
+    meters_per_unit : metersPerUnit of the scene, in which a unit is a millimetre
     d_mm : (3,) widths of the Burley profiles, by channel [mm]
     """
     widest = float(d_mm.max())
-    pixel = widest / PIXELS_PER_WIDTH
+    pixel = widest / PIXELS_PER_BURLEY_WIDTH
     x = np.arange(-84, 85) * pixel  # to 6 d
     profiles = []
-    for azimuth in np.arange(DIRECTION_COUNT) * 2.0 * np.pi / DIRECTION_COUNT + 0.1:
-        canvas = colour, metres, pixel, azimuth
+    for azimuth in np.arange(AZIMUTH_COUNT) * 2.0 * np.pi / AZIMUTH_COUNT + 0.1:
+        canvas = profile_colour, meters_per_unit, pixel, azimuth
         pictures = measured_radiance(page, *canvas), predicted_radiance(*canvas)
         profiles.append([edge_profile(one, pixel, azimuth, x, 3.0 * widest) for one in pictures])
     largest = max(float(np.abs(one - other).max()) for one, other in profiles)
@@ -143,8 +154,8 @@ def edge_responses(page: Page, colour: Floats, metres: float, d_mm: Floats) -> J
     near = np.abs(x)[:, None] <= 6.0 * d_mm
     step = slice(0, None, 7)
     return {
-        "colour": np.round(colour, 5).tolist(),
-        "metersPerUnit_mm": round(1e3 * metres, 5),
+        "colour": np.round(profile_colour, 5).tolist(),
+        "metersPerUnit_mm": round(1e3 * meters_per_unit, 5),
         "expected_d_mm": np.round(d_mm, 5).tolist(),
         "fitted_d_mm": fitted_widths(x, measured),
         "x_mm": np.round(x[step], 4).tolist(),
@@ -156,25 +167,25 @@ def edge_responses(page: Page, colour: Floats, metres: float, d_mm: Floats) -> J
     }
 
 
-def _max_by_channel(difference: Floats, near: NDArray[np.bool_]) -> list[float]:
-    return [round(float(x), 4) for x in np.abs(difference * near).max(axis=0)]
+def _max_by_channel(difference: Floats, is_near_edge: NDArray[np.bool_]) -> list[float]:
+    return [round(float(x), 4) for x in np.abs(difference * is_near_edge).max(axis=0)]
 
 
-def fitted_widths(x_mm: Floats, edge: Floats) -> list[float]:
+def fitted_widths(x_mm: Floats, edge_response: Floats) -> list[float]:
     """Return the width of the Burley profile that fits the measured edge response best, by channel [mm].
 
     x_mm : (n,) distances from the edge
-    edge : (n, 3) measured edge responses
+    edge_response : (n, 3) measured edge responses
     """
     widths = np.geomspace(x_mm[-1] / 600.0, x_mm[-1], 241)
     curves = [burley_curve(np.full(3, d), np.ones(3)).edge_response(x_mm)[:, 0] for d in widths]
-    error = ((np.stack(curves)[:, :, None] - edge) ** 2).sum(axis=1)
+    error = ((np.stack(curves)[:, :, None] - edge_response) ** 2).sum(axis=1)
     return [round(float(d), 4) for d in widths[error.argmin(axis=0)]]
 
 
-def exported_skin(page: Page, name: str) -> JsonObject:
+def exported_skin(page: Page, skin_name: str) -> JsonObject:
     """Return the edge responses of a skin with exported parameters, and their errors against its profile."""
-    subject, target = load_subject(name), TARGETS["babylon"].with_variant(None)
+    subject, target = load_subject(skin_name), TARGETS["babylon"].with_variant(None)
     rows = target.parameters(subject, target.resolve_version(None))
     colour = np.array(get_numbers(rows, "subSurface.scatteringDiffusionProfile"))
     metres = 1e-3 * get_numbers(rows, "subSurfaceConfiguration.metersPerUnit")[0]
@@ -197,10 +208,10 @@ def babylon() -> None:
     """
     with babylon_page(babylon_library()) as page:
         plain = {
-            name: edge_responses(page, np.array(colour), 1e-3, WIDTH_ERROR / np.array(colour))
+            name: edge_responses(page, np.array(colour), 1e-3, RENDERED_WIDTH_RATIO / np.array(colour))
             for name, colour in DIFFUSION_COLOURS.items()
         }
         skins = {name: exported_skin(page, name) for name in ("skin1", "skin2", "dj3")}
         engine = "babylonjs " + page.evaluate("BABYLON.Engine.Version")
-    settings = {"engine": engine, "turns": DIRECTION_COUNT, "samples": 40, "noise": 0.002}
+    settings = {"engine": engine, "turns": AZIMUTH_COUNT, "samples": 40, "noise": 0.002}
     write_results(RESULTS_FILE, settings | {"plain": plain, "skins": skins})

@@ -34,7 +34,7 @@ SCRIPT = Path(__file__).with_name("blender_script.py")
 Measurement = Literal["edges", "heads", "picture"]
 COMPARED_SKINS = "skin1", "skin2", "dj3"
 SUBSURFACE_METHODS = "random-walk-skin", "random-walk", "burley"
-BIN_COUNT, BIN_COLUMNS, PIXEL_ROWS = (
+EDGE_BIN_COUNT, PIXELS_PER_BIN, PIXEL_ROWS = (
     12,
     8,
     8,
@@ -63,7 +63,7 @@ def blender(python_45: Path, python_52: Path, *parts: Measurement) -> None:
     pythons = {"4.5": blender_python(python_45), "5.2": blender_python(python_52)}
     parts = parts or get_args(Measurement)
     results: JsonObject = read_results(RESULTS_FILE) if RESULTS_FILE.exists() else {}
-    results["columns_in_d"] = column_positions().reshape(BIN_COUNT, BIN_COLUMNS).mean(axis=1).tolist()
+    results["columns_in_d"] = column_positions().reshape(EDGE_BIN_COUNT, PIXELS_PER_BIN).mean(axis=1).tolist()
     if "edges" in parts:
         results["edges"] = list(measure_edges(pythons))
         write_results(RESULTS_FILE, results)
@@ -85,21 +85,21 @@ def measure_edges(pythons: dict[str, Path]) -> Iterator[JsonObject]:
 
 def column_positions() -> Floats:
     """Return the distance of each pixel column from the edge of the light, in units of the Burley width d."""
-    return 12.0 * (np.arange(BIN_COUNT * BIN_COLUMNS) + 0.5) / (BIN_COUNT * BIN_COLUMNS) - 6.0
+    return 12.0 * (np.arange(EDGE_BIN_COUNT * PIXELS_PER_BIN) + 0.5) / (EDGE_BIN_COUNT * PIXELS_PER_BIN) - 6.0
 
 
-def measure_edge(python: Path, version: str, method: str, name: str) -> JsonObject:
+def measure_edge(python: Path, version: str, subsurface_method: str, skin_name: str) -> JsonObject:
     """Return the measured and the predicted edge response of a skin, and their errors.
 
     python : Python with Blender's module bpy
-    name : name of the skin
+    skin_name : name of the skin
     """
-    subject, target = load_subject(name), TARGET.with_variant(method)
+    subject, target = load_subject(skin_name), TARGET.with_variant(subsurface_method)
     rows, d = target.parameters(subject, version), fit_burley_width(subject.curve)
     predicted_curve = target.predicted_curve(rows, subject, version)
     naive = target.predicted_curve(target.naive_parameters(subject, version), subject, version)
-    samples = SAMPLES_BY_METHOD.get(method, DEFAULT_SAMPLES)
-    shared = {"size": [BIN_COUNT * BIN_COLUMNS, PIXEL_ROWS], "samples": samples}
+    samples = SAMPLES_BY_METHOD.get(subsurface_method, DEFAULT_SAMPLES)
+    shared = {"size": [EDGE_BIN_COUNT * PIXELS_PER_BIN, PIXEL_ROWS], "samples": samples}
     channels = [(k, c) for k in range(SEED_COUNT) for c in range(3)]
     passes = [{"channel": c, "width_m": 12e-3 * d[c], "seed": k, **shared} for k, c in channels]
     with TemporaryDirectory() as folder_name:
@@ -109,16 +109,16 @@ def measure_edge(python: Path, version: str, method: str, name: str) -> JsonObje
         run_blender(python, SCRIPT, [str(folder)], 3600.0, PLANE_TASK)
         output = json.loads((folder / "done.json").read_text(encoding="utf-8"))
     columns = np.array([[output["columns"][3 * k + c] for c in range(3)] for k in range(SEED_COUNT)])[..., 0]
-    means = columns.reshape(SEED_COUNT, 3, BIN_COUNT, BIN_COLUMNS).mean(axis=-1)
+    means = columns.reshape(SEED_COUNT, 3, EDGE_BIN_COUNT, PIXELS_PER_BIN).mean(axis=-1)
     predicted, true = (binned_response(curve, d) for curve in (predicted_curve, subject.curve))
     radiance = (means.mean(axis=0) * predicted).sum(axis=1) / (predicted**2).sum(axis=1)
     measured = means.mean(axis=0) / radiance[:, None]
     noise = np.abs(means[0] - means[1]) / (2.0 * radiance[:, None])
     return {
         "version": output["version"],
-        "method": method,
-        "skin": name,
-        "samples": SEED_COUNT * BIN_COLUMNS * PIXEL_ROWS * samples,
+        "method": subsurface_method,
+        "skin": skin_name,
+        "samples": SEED_COUNT * PIXELS_PER_BIN * PIXEL_ROWS * samples,
         "d_mm": d.round(4).tolist(),
         "measured": measured.round(4).tolist(),
         "predicted": predicted.round(4).tolist(),
@@ -132,12 +132,12 @@ def measure_edge(python: Path, version: str, method: str, name: str) -> JsonObje
 
 
 def binned_response(curve: CumulativeProfile, d_mm: Floats) -> Floats:
-    """Return the edge response (3, BIN_COUNT) of a cumulative profile, averaged over the pixels in each bin.
+    """Return the edge response (3, n) of a cumulative profile, averaged over the pixels in each bin.
 
     d_mm : (3,) Burley widths of the channels, which set the width of the bins [mm]
     """
     columns = [curve.edge_response(column_positions() * d_mm[c])[:, c] for c in range(3)]
-    return np.asarray(np.array(columns).reshape(3, BIN_COUNT, BIN_COLUMNS).mean(axis=-1))
+    return np.asarray(np.array(columns).reshape(3, EDGE_BIN_COUNT, PIXELS_PER_BIN).mean(axis=-1))
 
 
 def measure_heads(pythons: dict[str, Path]) -> Iterator[JsonObject]:

@@ -19,7 +19,10 @@ with suppress(ImportError):  # only Blender's Python has these modules
     import bpy  # type: ignore[import-not-found,unused-ignore]
     from mathutils import Matrix  # type: ignore[import-not-found,unused-ignore]
 
-SIDE_M, CARD_HEIGHT_M = 1.0, 0.002  # half side of the plane, and height of the card that shades half of it
+PLANE_HALF_SIDE_M, CARD_HEIGHT_M = (
+    1.0,
+    0.002,
+)  # half side of the plane, and height of the card that shades half of it
 
 
 def main(folder: Path) -> None:
@@ -33,8 +36,8 @@ def main(folder: Path) -> None:
     material = skin.make_skin()
     shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
     shader.inputs["Specular IOR Level"].default_value = 0.0  # light below the surface only
-    add_rectangle(skin, material, -SIDE_M, SIDE_M, 0.0)
-    card = add_rectangle(skin, black_material(), -SIDE_M, 0.0, CARD_HEIGHT_M)
+    add_rectangle(skin, material, -PLANE_HALF_SIDE_M, PLANE_HALF_SIDE_M, 0.0)
+    card = add_rectangle(skin, black_material(), -PLANE_HALF_SIDE_M, 0.0, CARD_HEIGHT_M)
     card.visible_camera = False
     sun = bpy.data.lights.new("sun", "SUN")
     sun.energy, sun.angle = 1.0, 0.0
@@ -66,14 +69,19 @@ def set_channel(shader: Any, description: dict[str, Any], channel: int) -> None:
     shader.inputs["Subsurface Radius"].default_value = [radius] * 3
 
 
-def add_rectangle(skin: Any, material: Any, left: float, right: float, height: float) -> Any:
+def add_rectangle(skin: Any, material: Any, left_m: float, right_m: float, height_m: float) -> Any:
     """Add a horizontal rectangle between two x coordinates at a height, all in metres.
 
     skin : module of the exported script
     """
     mesh = bpy.data.meshes.new("rectangle")
-    corners = [(left, -SIDE_M), (right, -SIDE_M), (right, SIDE_M), (left, SIDE_M)]
-    mesh.from_pydata([(x, y, height) for x, y in corners], [], [(0, 1, 2, 3)])
+    corners = [
+        (left_m, -PLANE_HALF_SIDE_M),
+        (right_m, -PLANE_HALF_SIDE_M),
+        (right_m, PLANE_HALF_SIDE_M),
+        (left_m, PLANE_HALF_SIDE_M),
+    ]
+    mesh.from_pydata([(x, y, height_m) for x, y in corners], [], [(0, 1, 2, 3)])
     mesh.materials.append(material)
     return skin.add_object("rectangle", mesh)
 
@@ -88,7 +96,9 @@ def black_material() -> Any:
     return material
 
 
-def column_radiance(skin: Any, camera: Any, path: Path, width_m: float, size: Any, **parameters: int) -> Any:
+def column_radiance(
+    skin: Any, camera: Any, path: Path, width_m: float, picture_size: Any, **parameters: int
+) -> Any:
     """Render a picture across the edge of the light, and return the mean radiance of each pixel column.
 
     skin : module of the exported script
@@ -96,13 +106,13 @@ def column_radiance(skin: Any, camera: Any, path: Path, width_m: float, size: An
     """
     camera.ortho_scale = width_m
     scene = bpy.context.scene
-    scene.render.resolution_x, scene.render.resolution_y = size
+    scene.render.resolution_x, scene.render.resolution_y = picture_size
     arguments = [word for name, value in parameters.items() for word in (f"--{name}", str(value))]
     skin.finish(skin.parse_options(["--", "--render", str(path), *arguments]))
     picture = bpy.data.images.load(str(path))
-    pixels = np.empty(size[0] * size[1] * 4, np.float32)
+    pixels = np.empty(picture_size[0] * picture_size[1] * 4, np.float32)
     picture.pixels.foreach_get(pixels)
-    return pixels.reshape(size[1], size[0], 4)[..., :3].mean(axis=0).tolist()
+    return pixels.reshape(picture_size[1], picture_size[0], 4)[..., :3].mean(axis=0).tolist()
 
 
 if __name__ == "__main__":

@@ -10,16 +10,16 @@ from dermis.apps.validation.pages import RESULTS, JsonObject, write_results
 
 RESULTS_FILE = RESULTS / "engines_gltf.json"
 COMPARED_SKINS = "skin1", "skin2", "marble", "dj3", "gpu-gems-3"
-VERSION = TARGET.versions[-1]
+GLTF_TARGET_VERSION = TARGET.versions[-1]
 
 
-def skin_results(name: str) -> JsonObject:
+def skin_results(skin_name: str) -> JsonObject:
     """Return the fitted glTF parameters of a skin, and the predicted errors of several choices.
 
     The choices are fitted parameters, parameters set without a fit, and fitted parameters in which the albedo
     replaces the multiple-scattering colour.
     """
-    subject = load_subject(name)
+    subject = load_subject(skin_name)
     volume = fit_volume(subject.curve, subject.albedo)
     coloured = volume_curve(volume._replace(multiscatter=subject.curve.energy))
     results: JsonObject = {
@@ -31,8 +31,11 @@ def skin_results(name: str) -> JsonObject:
     for variant in (SCATTER_VARIANT, TRANSMISSION_VARIANT):
         target = TARGET.with_variant(variant)
         best, naive = (
-            curve_error(subject.curve, target.predicted_curve(rows, subject, VERSION)).as_json()
-            for rows in (target.parameters(subject, VERSION), target.naive_parameters(subject, VERSION))
+            curve_error(subject.curve, target.predicted_curve(rows, subject, GLTF_TARGET_VERSION)).as_json()
+            for rows in (
+                target.parameters(subject, GLTF_TARGET_VERSION),
+                target.naive_parameters(subject, GLTF_TARGET_VERSION),
+            )
         )
         results[variant] = {"error": best, "naive_error": naive}
     return results
@@ -41,7 +44,7 @@ def skin_results(name: str) -> JsonObject:
 def gltf() -> None:
     """Predict the errors of skins in glTF's draft and write benchmarks/results/engines_gltf.json."""
     figures = {
-        "version": VERSION,
+        "version": GLTF_TARGET_VERSION,
         "draft": DRAFT_NOTICE,
         "skins": {name: skin_results(name) for name in COMPARED_SKINS},
     }

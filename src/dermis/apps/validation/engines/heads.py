@@ -39,7 +39,7 @@ HEAD_LIGHTS = (
     DirectionalLight(direction=(0.8, -0.5, -0.7), irradiance=(3.4, 3.3, 3.1)),
     DirectionalLight(direction=(-0.9, -0.2, -0.3), irradiance=(0.8, 0.85, 0.95)),
 )
-LIT_THRESHOLD = 0.25  # fraction of the mean light; darker pixels are in shadow
+LIT_FRACTION_OF_MEAN = 0.25  # fraction of the mean light; darker pixels are in shadow
 HIGHLIGHT_RADIANCE = 0.75  # radiance above which a pixel is a highlight; white skin has 1
 HIGHLIGHT_WIDTH_PX = 9  # width of the square around a highlight that is excluded
 Floats = NDArray[np.float64]
@@ -70,10 +70,10 @@ def heads() -> None:
     Image.fromarray(np.rint(255.0 * levels).astype(np.uint8)).save(PICTURE, quality=90)
 
 
-def available_renderers(subject: Subject, ours: Floats) -> dict[str, Callable[[], list[Floats]]]:
+def available_renderers(subject: Subject, dermis_picture: Floats) -> dict[str, Callable[[], list[Floats]]]:
     """Return, by name of each installed program, a function that renders linear pictures (h, w, 4).
 
-    ours : (h, w, 4) picture by dermis, whose alpha replaces that of programs without alpha
+    dermis_picture : (h, w, 4) picture by dermis, whose alpha replaces that of programs without alpha
     """
     result: dict[str, Callable[[], list[Floats]]] = {}
     named = [one for one in os.environ.get("DERMIS_BLENDER_PYTHONS", "").split(",") if one]
@@ -83,15 +83,15 @@ def available_renderers(subject: Subject, ours: Floats) -> dict[str, Callable[[]
         )
     if os.environ.get(LIBRARY_VARIABLE):
         library = babylon_library()
-        result["Babylon.js 9.28"] = lambda: [render_babylon(subject, library, ours)] * 2
-    result["Mitsuba 3"] = lambda: render_mitsuba(subject, ours)
+        result["Babylon.js 9.28"] = lambda: [render_babylon(subject, library, dermis_picture)] * 2
+    result["Mitsuba 3"] = lambda: render_mitsuba(subject, dermis_picture)
     return result
 
 
-def render_babylon(subject: Subject, library: Path, ours: Floats) -> Floats:
+def render_babylon(subject: Subject, library: Path, dermis_picture: Floats) -> Floats:
     """Return the canvas of the exported page in Chromium as linear light (h, w, 4).
 
-    ours : (h, w, 4) picture by dermis, whose alpha is used
+    dermis_picture : (h, w, 4) picture by dermis, whose alpha is used
     """
     with TemporaryDirectory() as folder_name, chromium_page(HEAD_PICTURE_SIDE) as page:
         file = Path(folder_name) / "head.html"
@@ -101,13 +101,13 @@ def render_babylon(subject: Subject, library: Path, ours: Floats) -> Floats:
         page.evaluate("document.querySelectorAll('body > :not(canvas)').forEach((one) => one.remove())")
         canvas = Image.open(io.BytesIO(page.locator("canvas").screenshot())).convert("RGB")
     light = decode_srgb(np.asarray(canvas) / 255.0)
-    return np.dstack([light, np.where(light.any(axis=-1), ours[..., 3], 0.0)])
+    return np.dstack([light, np.where(light.any(axis=-1), dermis_picture[..., 3], 0.0)])
 
 
-def render_mitsuba(subject: Subject, ours: Floats) -> list[Floats]:
+def render_mitsuba(subject: Subject, dermis_picture: Floats) -> list[Floats]:
     """Return linear pictures (h, w, 4) of the exported scene by Mitsuba, one per random seed.
 
-    ours : (h, w, 4) picture by dermis, whose alpha is used
+    dermis_picture : (h, w, 4) picture by dermis, whose alpha is used
     """
     mi = load_mitsuba()
     with TemporaryDirectory() as folder_name, mitsuba_variant(mi, "scalar_rgb"):
@@ -120,7 +120,7 @@ def render_mitsuba(subject: Subject, ours: Floats) -> list[Floats]:
             samples=MITSUBA_SAMPLES,
         )
         frames = [np.array(mi.render(scene, seed=k, spp=MITSUBA_SAMPLES))[..., :3] for k in range(SEED_COUNT)]
-    return [np.dstack([one, ours[..., 3]]).astype(np.float64) for one in frames]
+    return [np.dstack([one, dermis_picture[..., 3]]).astype(np.float64) for one in frames]
 
 
 def over_grey(picture: Floats) -> Floats:
@@ -128,29 +128,38 @@ def over_grey(picture: Floats) -> Floats:
     return np.asarray(picture[..., :3] * (picture[..., 3:] > 0) + 0.05 * (1.0 - picture[..., 3:]))
 
 
-def render_dermis(subject: Subject, side: int) -> Floats:
+def render_dermis(subject: Subject, picture_side: int) -> Floats:
     """Return the linear picture (h, w, 4) of the subject by dermis."""
     assert subject.scene is not None
-    settings = Settings(size=(side, side), atlas=EXPORTED_MAP_SIDE, samples=16)
+    settings = Settings(size=(picture_side, picture_side), atlas=EXPORTED_MAP_SIDE, samples=16)
     return np.asarray(Renderer().draw(subject.scene, settings).linear_rgba(), np.float64)
 
 
 def render_cycles(
-    subject: Subject, method: str, version: str, python: Path, side: int, samples: int, seeds: int
+    subject: Subject,
+    subsurface_method: str,
+    version: str,
+    python: Path,
+    picture_side: int,
+    samples: int,
+    seed_count: int,
 ) -> list[Floats]:
     """Return linear pictures (h, w, 4) of the exported scene by Cycles, one per random seed.
 
-    method : variant of the target "blender"
+    subsurface_method : variant of the target "blender"
     python : Python with Blender's module bpy
     """
     with TemporaryDirectory() as folder_name:
         folder = Path(folder_name) / "head"
-        export_skin(subject, "blender", folder, version=version, variant=method)
+        export_skin(subject, "blender", folder, version=version, variant=subsurface_method)
         script = folder / "skin.py"
         text = script.read_text(encoding="utf-8")
-        script.write_text(text.replace("'size': [1024, 1024]", f"'size': [{side}, {side}]"), encoding="utf-8")
+        script.write_text(
+            text.replace("'size': [1024, 1024]", f"'size': [{picture_side}, {picture_side}]"),
+            encoding="utf-8",
+        )
         result = []
-        for seed in range(seeds):
+        for seed in range(seed_count):
             picture = folder / f"{seed}.exr"
             options = ["--render", str(picture), "--samples", str(samples), "--seed", str(seed)]
             command = [str(python), "-I", str(script), "--", *options]
@@ -159,27 +168,32 @@ def render_cycles(
     return result
 
 
-def compare_pictures(ours: Floats, theirs: Floats) -> JsonObject:
+def compare_pictures(dermis_picture: Floats, other_picture: Floats) -> JsonObject:
     """Return the differences of another program from dermis in outline, colour and relative RMSE.
 
-    ours : (h, w, 4) picture by dermis
-    theirs : (seeds, h, w, 4) pictures of the other program with different random seeds
+    dermis_picture : (h, w, 4) picture by dermis
+    other_picture : (seeds, h, w, 4) pictures of the other program with different random seeds
     """
-    mean, variance = theirs.mean(axis=0), theirs.var(axis=0, ddof=1) / len(theirs)
-    a, b = ours[..., 3] > 0.5, mean[..., 3] > 0.5
+    mean, variance = other_picture.mean(axis=0), other_picture.var(axis=0, ddof=1) / len(other_picture)
+    a, b = dermis_picture[..., 3] > 0.5, mean[..., 3] > 0.5
     outline_distance = max(distance_transform_edt(~b)[a].max(), distance_transform_edt(~a)[b].max())
-    covered = (ours[..., 3] > 0.999) & (mean[..., 3] > 0.999)
-    light = ours[..., :3].mean(axis=-1)
-    lit = covered & (light > LIT_THRESHOLD * light[covered].mean())
-    bright = np.maximum(ours[..., :3], mean[..., :3]).max(axis=-1) > HIGHLIGHT_RADIANCE
+    covered = (dermis_picture[..., 3] > 0.999) & (mean[..., 3] > 0.999)
+    light = dermis_picture[..., :3].mean(axis=-1)
+    lit = covered & (light > LIT_FRACTION_OF_MEAN * light[covered].mean())
+    bright = np.maximum(dermis_picture[..., :3], mean[..., :3]).max(axis=-1) > HIGHLIGHT_RADIANCE
     matte = covered & ~maximum_filter(bright, HIGHLIGHT_WIDTH_PX)
-    errors = [relative_rmse(ours[..., :3], mean[..., :3], on, variance[..., :3]) for on in (covered, matte)]
+    errors = [
+        relative_rmse(dermis_picture[..., :3], mean[..., :3], on, variance[..., :3])
+        for on in (covered, matte)
+    ]
     return {
-        "side": ours.shape[0],
+        "side": dermis_picture.shape[0],
         "outline_px": float(outline_distance),
         "pixels_apart": int((a != b).sum()),
         "pixels": int(a.sum()),
-        "lit_colour": (mean[lit][:, :3].mean(axis=0) / ours[lit][:, :3].mean(axis=0)).round(4).tolist(),
+        "lit_colour": (mean[lit][:, :3].mean(axis=0) / dermis_picture[lit][:, :3].mean(axis=0))
+        .round(4)
+        .tolist(),
         "relative_rmse": round(float(errors[0].value), 4),
         "without_highlights": round(float(errors[1].value), 4),
         "share_without_highlights": round(float(matte.sum() / covered.sum()), 4),

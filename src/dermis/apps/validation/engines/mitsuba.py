@@ -20,7 +20,7 @@ from dermis.apps.export.targets.mitsuba.scene import (
     Boundary,
     IsotropicMedium,
     medium_description,
-    surface_description,
+    surface_bsdf,
 )
 from dermis.apps.export.targets.mitsuba.target import TARGET
 from dermis.apps.truths.mitsuba_scene import load_mitsuba, mitsuba_variant
@@ -37,14 +37,14 @@ COMPARED_SKINS: dict[str, tuple[Boundary, ...]] = {
 }
 """Surface models for which each skin is measured, by name of the skin."""
 # half the width of the view [Burley widths]; numbers of pixels, of rendering passes, and of samples per pixel
-_REACH_D, _PIXELS, _PASSES, _SUBSAMPLES = 3.0, 8, 8, 16
+_VIEW_HALF_WIDTH_D, _PIXEL_COUNT, _PASS_COUNT, _SAMPLES_PER_PIXEL_AVERAGE = 3.0, 8, 8, 16
 _LAMP_HEIGHT_D = 0.01
 _PLANE_HALF_SIDE_D = 500.0
 _BLACK_ALBEDO = 1e-9
 
 
 def half_lit_plane(
-    mi: Mitsuba, medium: IsotropicMedium, boundary: Boundary, d_mm: float, *, black: bool = False
+    mi: Mitsuba, medium: IsotropicMedium, boundary: Boundary, d_mm: float, *, is_black: bool = False
 ) -> MitsubaObject:
     """Return a scene of the plane z = 0, lit where x > 0, in an orthographic view around the edge.
 
@@ -52,18 +52,18 @@ def half_lit_plane(
     rough surface deflects it, so there the camera is above.
 
     d_mm : Burley width of the profile; the view spans 3 d on each side of the edge [mm]
-    black : whether the medium absorbs all light, so that only the surface reflects
+    is_black : whether the medium absorbs all light, so that only the surface reflects
     """
     transform = mi.ScalarTransform4f
     size, height = _PLANE_HALF_SIDE_D * d_mm, _LAMP_HEIGHT_D * d_mm
-    albedo = (_BLACK_ALBEDO,) * 3 if black else medium.albedo
+    albedo = (_BLACK_ALBEDO,) * 3 if is_black else medium.albedo
     inside = mi.load_dict(medium_description(IsotropicMedium(medium.sigma_t, albedo)))
     camera_below = boundary != "rough"
     eye = -1e-3 * height if camera_below else 0.5 * height
     lamp_to_world = transform().translate([size, 0.0, height]).rotate([1, 0, 0], 180).scale([size, size, 1.0])
-    scale = [_REACH_D * d_mm, _REACH_D * d_mm, 1.0]
+    scale = [_VIEW_HALF_WIDTH_D * d_mm, _VIEW_HALF_WIDTH_D * d_mm, 1.0]
     camera_to_world = transform().look_at([0, 0, eye], [0, 0, -1], [0, 1, 0]).scale(scale)
-    film = {"type": "hdrfilm", "width": _PIXELS, "height": 1, "pixel_format": "rgb"}
+    film = {"type": "hdrfilm", "width": _PIXEL_COUNT, "height": 1, "pixel_format": "rgb"}
     sensor = {
         "type": "orthographic",
         "near_clip": 1e-9,
@@ -80,7 +80,7 @@ def half_lit_plane(
             "type": "scene",
             "integrator": {"type": "volpath", "rr_depth": 400},
             "sensor": {**sensor, **({"medium": inside} if camera_below else {})},
-            "skin": {**skin, "bsdf": surface_description(boundary)},
+            "skin": {**skin, "bsdf": surface_bsdf(boundary)},
             "lamp": {**lamp, "emitter": {"type": "area", "radiance": mitsuba_rgb((1, 1, 1))}},
         }
     )
@@ -95,17 +95,17 @@ def measured_edge(
     samples : paths per pixel
     """
     plane = half_lit_plane(mi, medium, boundary, d_mm)
-    passes = [mi.render(plane, spp=samples // _PASSES, seed=k) for k in range(_PASSES)]
+    passes = [mi.render(plane, spp=samples // _PASS_COUNT, seed=k) for k in range(_PASS_COUNT)]
     images = np.array([np.array(image)[0].mean(axis=1) for image in passes])
     if boundary == "rough":  # subtract what the surface reflects
-        black_scene = half_lit_plane(mi, medium, boundary, d_mm, black=True)
+        black_scene = half_lit_plane(mi, medium, boundary, d_mm, is_black=True)
         lit = np.array(mi.render(black_scene, spp=samples, seed=99))[0].mean(axis=1)
-        images -= np.where(np.arange(_PIXELS) >= _PIXELS // 2, lit[_PIXELS // 2 :].mean(), 0.0)
+        images -= np.where(np.arange(_PIXEL_COUNT) >= _PIXEL_COUNT // 2, lit[_PIXEL_COUNT // 2 :].mean(), 0.0)
     # At every distance, the two sides of the edge add up to the same total.
     both_sides = images + images[:, ::-1]
     total = float(both_sides.mean())
     response = 0.5 + 0.5 * (images - images[:, ::-1]) / total
-    return response.mean(axis=0), response.std(axis=0, ddof=1) / np.sqrt(_PASSES), total
+    return response.mean(axis=0), response.std(axis=0, ddof=1) / np.sqrt(_PASS_COUNT), total
 
 
 def pixel_averages(curve: CumulativeProfile, channel: int, d_mm: float) -> Floats:
@@ -114,8 +114,11 @@ def pixel_averages(curve: CumulativeProfile, channel: int, d_mm: float) -> Float
     channel : index of the channel
     d_mm : Burley width of the profile, which sets the size of the view [mm]
     """
-    edges = np.linspace(-_REACH_D, _REACH_D, _PIXELS + 1) * d_mm
-    centres = edges[:-1, None] + np.diff(edges)[:, None] * (np.arange(_SUBSAMPLES) + 0.5) / _SUBSAMPLES
+    edges = np.linspace(-_VIEW_HALF_WIDTH_D, _VIEW_HALF_WIDTH_D, _PIXEL_COUNT + 1) * d_mm
+    centres = (
+        edges[:-1, None]
+        + np.diff(edges)[:, None] * (np.arange(_SAMPLES_PER_PIXEL_AVERAGE) + 0.5) / _SAMPLES_PER_PIXEL_AVERAGE
+    )
     return np.asarray(curve.edge_response(centres)[..., channel].mean(axis=1))
 
 
@@ -141,7 +144,7 @@ def measure_skin(mi: Mitsuba, subject: Subject, boundary: Boundary, samples: int
         results["rms"].append(float(np.sqrt((difference**2).mean())))
         # Radiance inside the medium is larger by the square of the index.
         results["energy"].append(total / (BOUNDARIES[boundary] ** 2 if boundary != "rough" else 1.0))
-        results["edge"].append([float(value) for value in edge[_PIXELS // 2 :]])
+        results["edge"].append([float(value) for value in edge[_PIXEL_COUNT // 2 :]])
     return {"skin": subject.name, "boundary": boundary, "d_mm": [float(x) for x in d], **results}
 
 
@@ -163,7 +166,7 @@ def mitsuba(*, samples: int = 32000, output: Path = RESULTS_FILE, variant: str =
         for name, boundaries in COMPARED_SKINS.items():
             subject = load_subject(name)
             edge += [measure_skin(mi, subject, boundary, samples) for boundary in boundaries]
-    half = _PIXELS // 2
-    centres = [(k + 0.5) * _REACH_D / half for k in range(half)]
-    settings = {"mitsuba": mi.__version__, "samples": samples, "pixels": _PIXELS, "at_d": centres}
+    half = _PIXEL_COUNT // 2
+    centres = [(k + 0.5) * _VIEW_HALF_WIDTH_D / half for k in range(half)]
+    settings = {"mitsuba": mi.__version__, "samples": samples, "pixels": _PIXEL_COUNT, "at_d": centres}
     write_results(output, {**settings, "edges": edge}, 4)

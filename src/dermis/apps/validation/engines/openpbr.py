@@ -81,9 +81,9 @@ def validate_files() -> JsonObject:
     }
 
 
-def float_list(values: ArrayLike) -> list[float]:
+def float_list(numbers: ArrayLike) -> list[float]:
     """Return an array as a flat list of Python floats, for JSON."""
-    return [float(one) for one in np.ravel(values)]
+    return [float(one) for one in np.ravel(numbers)]
 
 
 def error_table(results: JsonObject) -> list[str]:

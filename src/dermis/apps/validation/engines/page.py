@@ -13,7 +13,16 @@ from dermis.base.console import print_lines
 PAGE = DOCS / "engines.md"
 COMPARED_SKINS = "skin1", "skin2", "dj3", "medium"
 _EXCLUDED_TARGETS = ("maps",)  # a baked light map has no skin parameters
-_COLUMNS = "target", "version", "variant", "skin", "cdf", "edge", "energy", "edge, published values typed in"
+_COLUMN_TITLES = (
+    "target",
+    "version",
+    "variant",
+    "skin",
+    "cdf",
+    "edge",
+    "energy",
+    "edge, published values typed in",
+)
 _BLENDER_EDGE_HEADER = (
     "| method | skin | 4.5 against predicted | 5.2 against predicted | noise | 5.2 against the profile"
     " | typed in | light returned |\n|---|---|---|---|---|---|---|---|"
@@ -29,7 +38,7 @@ def page() -> None:
     print_lines(blender_tables())
 
 
-def fill_tables(text: str) -> str:
+def fill_tables(page_text: str) -> str:
     """Return the text of the page with new tables between its markers, such as <!-- mitsuba -->."""
     for name, table in {
         "predicted": predicted_table,
@@ -37,9 +46,9 @@ def fill_tables(text: str) -> str:
         "babylon": babylon_table,
         "heads": heads_table,
     }.items():
-        before, rest = text.split(f"<!-- {name} -->")
-        text = f"{before}<!-- {name} -->\n{table()}<!-- /{name} -->{rest.split(f'<!-- /{name} -->')[1]}"
-    return text
+        before, rest = page_text.split(f"<!-- {name} -->")
+        page_text = f"{before}<!-- {name} -->\n{table()}<!-- /{name} -->{rest.split(f'<!-- /{name} -->')[1]}"
+    return page_text
 
 
 def predicted_table() -> str:
@@ -54,17 +63,19 @@ def predicted_table() -> str:
                 errors = report.error.cdf, report.error.edge, report.error.energy, report.naive_error.edge
                 cells = [rgb_cell(error.round(3).tolist()) for error in errors]
                 lines.append([target.title, report.version, report.variant or "-", subject.name, *cells])
-    return markdown_table(_COLUMNS, lines)
+    return markdown_table(_COLUMN_TITLES, lines)
 
 
-def markdown_table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+def markdown_table(column_titles: Sequence[str], table_rows: Iterable[Sequence[str]]) -> str:
     """Return a Markdown table with column titles and rows of cells."""
-    return "".join(f"| {' | '.join(row)} |\n" for row in (heads, ["---"] * len(heads), *rows))
+    return "".join(
+        f"| {' | '.join(row)} |\n" for row in (column_titles, ["---"] * len(column_titles), *table_rows)
+    )
 
 
-def rgb_cell(values: Sequence[float]) -> str:
+def rgb_cell(rgb: Sequence[float]) -> str:
     """Return red, green and blue values as a table cell, such as "0.010 / 0.020 / 0.030"."""
-    return " / ".join(f"{value + 0.0:.3f}" for value in values)
+    return " / ".join(f"{value + 0.0:.3f}" for value in rgb)
 
 
 def mitsuba_table() -> str:
@@ -94,20 +105,24 @@ def heads_table() -> str:
     return markdown_table(titles, map(_head_row, read_results(RESULTS / "engines_heads.json")["heads"]))
 
 
-def _head_row(row: JsonObject) -> list[str]:
-    outline = "that of dermis" if row["pixels_apart"] == 0 else f"{row['outline_px']:.1f}"
-    figures = rgb_cell(row["lit_colour"]), f"{row['relative_rmse']:.3f}", str(row["pixels"])
-    return [row["program"], outline, *figures]
+def _head_row(comparison: JsonObject) -> list[str]:
+    outline = "that of dermis" if comparison["pixels_apart"] == 0 else f"{comparison['outline_px']:.1f}"
+    figures = (
+        rgb_cell(comparison["lit_colour"]),
+        f"{comparison['relative_rmse']:.3f}",
+        str(comparison["pixels"]),
+    )
+    return [comparison["program"], outline, *figures]
 
 
 def blender_tables() -> str:
     """Return Markdown tables of edge responses and heads in Blender, to be copied into the page by hand."""
     results = read_results(RESULTS / "engines_blender.json")
-    edges, heads = _blender_edges(results["edges"]), _blender_heads(results["heads"])
+    edges, heads = _blender_edges_table(results["edges"]), _blender_heads_table(results["heads"])
     return "\n".join([_BLENDER_EDGE_HEADER, *edges, "", _BLENDER_HEAD_HEADER, *heads]) + "\n"
 
 
-def _blender_edges(edges: list[JsonObject]) -> list[str]:
+def _blender_edges_table(edges: list[JsonObject]) -> list[str]:
     by_key = {(row["version"][:3], row["method"], row["skin"]): row for row in edges}
     lines = []
     for (version, method, skin), new in by_key.items():
@@ -120,7 +135,7 @@ def _blender_edges(edges: list[JsonObject]) -> list[str]:
     return lines
 
 
-def _blender_heads(heads: list[JsonObject]) -> list[str]:
+def _blender_heads_table(heads: list[JsonObject]) -> list[str]:
     return [
         f"| {row['version']} | {row['method']} | {row['outline_px']:.1f} | {rgb_cell(row['lit_colour'])} |"
         f" {row['relative_rmse']:.3f} | {row['without_highlights']:.3f} |"

@@ -18,7 +18,7 @@ from dermis.apps.validation.peers.rendering import DERMIS_VARIANTS, GPU_GEMS_3_V
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 CYCLES_NAMES = {"random-walk": "Cycles, random walk", "burley": "Cycles, Burley"}
-LOW_NOISE = 0.05
+LOW_NOISE_TARGET = 0.05
 """Relative noise of an image in which noise is hardly visible [-]."""
 
 
@@ -90,40 +90,46 @@ def common_mask(renders: PeerRenders) -> Mask:
     return mask
 
 
-def mean_of_passes(turns: Sequence[Sequence[CyclesPass]]) -> MeanImage:
+def mean_of_passes(passes_by_turn: Sequence[Sequence[CyclesPass]]) -> MeanImage:
     """Return the mean of all passes of a method, and the variance of its noise.
 
     The variance follows from the differences between passes with equal numbers of paths and different seeds.
 
-    turns : for each seed, one pass for each number of paths
+    passes_by_turn : for each seed, one pass for each number of paths
     """
-    levels = [level[0].samples for level in zip(*turns, strict=True)]
-    image, variance = np.zeros(turns[0][0].image.shape), np.zeros(turns[0][0].image.shape)
-    for fraction, (one, other) in zip(np.divide(levels, sum(levels)), zip(*turns, strict=True), strict=True):
+    levels = [level[0].samples for level in zip(*passes_by_turn, strict=True)]
+    image, variance = np.zeros(passes_by_turn[0][0].image.shape), np.zeros(passes_by_turn[0][0].image.shape)
+    for fraction, (one, other) in zip(
+        np.divide(levels, sum(levels)), zip(*passes_by_turn, strict=True), strict=True
+    ):
         first, second = (np.asarray(half.image, np.float64) for half in (one, other))
         image += fraction * 0.5 * (first + second)
         variance += fraction**2 * 0.25 * (first - second) ** 2
     return MeanImage(image, variance)
 
 
-def pass_noise(one: NDArray[np.floating], other: NDArray[np.floating], mean: MeanImage, mask: Mask) -> float:
+def pass_noise(
+    first_pass: NDArray[np.floating], second_pass: NDArray[np.floating], mean: MeanImage, mask: Mask
+) -> float:
     """Return the relative RMSE of the noise of a pass, estimated from a pass with another seed [-].
 
     mean : mean of all passes
     """
-    difference = np.subtract(one, other, dtype=np.float64)[mask]
+    difference = np.subtract(first_pass, second_pass, dtype=np.float64)[mask]
     return float(np.sqrt(0.5 * (difference**2).sum() / _signal_energy(mean, mask)))
 
 
-def samples_for_noise(noise: float, samples: Sequence[int], noises: Sequence[float]) -> float:
+def samples_for_noise(
+    target_noise: float, samples: Sequence[int], noise_by_samples: Sequence[float]
+) -> float:
     """Return the number of paths per pixel at which the noise reaches a given value.
 
     Noise is assumed proportional to 1 / sqrt(N), from the measured N whose noise is most similar.
 
-    samples, noises : measured numbers of paths N, and their noise
+    samples, noise_by_samples : measured numbers of paths N, and their noise
     """
-    nearest = int(np.abs(np.log(np.divide(noises, noise))).argmin())
-    return float(samples[nearest] * (noises[nearest] / noise) ** 2)
+    nearest = int(np.abs(np.log(np.divide(noise_by_samples, target_noise))).argmin())
+    return float(samples[nearest] * (noise_by_samples[nearest] / target_noise) ** 2)
 
 
 def _signal_energy(mean: MeanImage, mask: Mask) -> float:
@@ -135,18 +141,23 @@ def _reference_mean(reference: PathTraced) -> MeanImage:
     return MeanImage(reference.image.astype(np.float64), reference.variance.astype(np.float64))
 
 
-def _dermis_row(renders: PeerRenders, name: str, mask: Mask) -> RendererRow:
-    frames, reference = renders.ours[name], renders.reference
+def _dermis_row(renders: PeerRenders, variant_name: str, mask: Mask) -> RendererRow:
+    frames, reference = renders.ours[variant_name], renders.reference
     error = relative_rmse(frames.image, reference.image, mask, reference.variance)
     energy = energy_ratio(frames.image, reference.image, mask, reference.variance)
     times = statistics.median(frames.seconds), statistics.median(frames.core_seconds)
-    return RendererRow("dermis", name, *times, 0.0, *error, *energy)
+    return RendererRow("dermis", variant_name, *times, 0.0, *error, *energy)
 
 
-def _time_ratios(row: RendererRow, ours: RendererRow) -> dict[str, float]:
-    """Return the ratios of the elapsed and CPU times of a row to those of the row `ours` [-]."""
-    assert row.seconds and row.core_seconds and ours.seconds and ours.core_seconds
-    return {"ratio": row.seconds / ours.seconds, "core_ratio": row.core_seconds / ours.core_seconds}
+def _time_ratios(renderer_row: RendererRow, dermis_row: RendererRow) -> dict[str, float]:
+    """Return the ratios of a renderer's elapsed and CPU times to the times of dermis [-]."""
+    assert (
+        renderer_row.seconds and renderer_row.core_seconds and dermis_row.seconds and dermis_row.core_seconds
+    )
+    return {
+        "ratio": renderer_row.seconds / dermis_row.seconds,
+        "core_ratio": renderer_row.core_seconds / dermis_row.core_seconds,
+    }
 
 
 def _mitsuba_row(renders: PeerRenders, mask: Mask) -> RendererRow:
@@ -158,10 +169,12 @@ def _mitsuba_row(renders: PeerRenders, mask: Mask) -> RendererRow:
     return RendererRow("Mitsuba, volpathmis", setting, *times, noise, None, None, None, None)
 
 
-def _cycles_rows(renders: PeerRenders, method: str, mean: MeanImage, mask: Mask) -> list[RendererRow]:
+def _cycles_rows(
+    renders: PeerRenders, subsurface_method: str, mean: MeanImage, mask: Mask
+) -> list[RendererRow]:
     """Return rows of Cycles: one for each number of paths, and one for the mean of all, without noise."""
     reference, rows = renders.reference, []
-    for level in zip(*renders.cycles[method], strict=True):
+    for level in zip(*renders.cycles[subsurface_method], strict=True):
         pairs = [(one.image, reference.image, mask, reference.variance) for one in level]
         error = np.mean([relative_rmse(*one) for one in pairs], axis=0).tolist()
         energy = np.mean([energy_ratio(*one) for one in pairs], axis=0).tolist()
@@ -169,49 +182,60 @@ def _cycles_rows(renders: PeerRenders, method: str, mean: MeanImage, mask: Mask)
         core_seconds = statistics.mean(one.core_seconds for one in level)
         noise = pass_noise(level[0].image, level[1].image, mean, mask)
         setting = _samples_text(level[0].samples)
-        rows.append(RendererRow(CYCLES_NAMES[method], setting, seconds, core_seconds, noise, *error, *energy))
+        rows.append(
+            RendererRow(
+                CYCLES_NAMES[subsurface_method], setting, seconds, core_seconds, noise, *error, *energy
+            )
+        )
     error = relative_rmse(mean.image, reference.image, mask, reference.variance, mean.variance)
     energy = energy_ratio(mean.image, reference.image, mask, reference.variance)
-    return [*rows, RendererRow(CYCLES_NAMES[method], "noise subtracted", None, None, 0.0, *error, *energy)]
+    return [
+        *rows,
+        RendererRow(CYCLES_NAMES[subsurface_method], "noise subtracted", None, None, 0.0, *error, *energy),
+    ]
 
 
-def _equal_error_costs(renders: PeerRenders, mean: MeanImage, ours: RendererRow, mask: Mask) -> JsonObject:
+def _equal_error_costs(
+    renders: PeerRenders, mean: MeanImage, dermis_row: RendererRow, mask: Mask
+) -> JsonObject:
     """Return the paths and the time that a random walk needs for dermis's error, and for low noise.
 
-    ours : row of dermis, whose error against the reference is the goal
+    dermis_row : row of dermis, whose error against the reference is the goal
     """
     reference, levels = renders.reference, list(zip(*renders.cycles["random-walk"], strict=True))
     bias = relative_rmse(mean.image, reference.image, mask, reference.variance, mean.variance).value
     samples = [level[0].samples for level in levels]
     noises = [pass_noise(one.image, other.image, mean, mask) for one, other in levels]
-    sample_counts = {"clean": samples_for_noise(LOW_NOISE, samples, noises)}
-    assert ours.relrmse is not None
-    if ours.relrmse > bias:
+    sample_counts = {"clean": samples_for_noise(LOW_NOISE_TARGET, samples, noises)}
+    assert dermis_row.relrmse is not None
+    if dermis_row.relrmse > bias:
         # Errors are relative to the reference, noise to the method's own mean.
         to_mean = np.sqrt(_signal_energy(_reference_mean(reference), mask) / _signal_energy(mean, mask))
-        noise = float(to_mean * np.sqrt(ours.relrmse**2 - bias**2))
+        noise = float(to_mean * np.sqrt(dermis_row.relrmse**2 - bias**2))
         sample_counts["same_error"] = samples_for_noise(noise, samples, noises)
-    return {goal: _cycles_cost(count, levels[-1], ours) for goal, count in sample_counts.items()}
+    return {goal: _cycles_cost(count, levels[-1], dermis_row) for goal, count in sample_counts.items()}
 
 
-def _cycles_cost(paths: float, passes: Sequence[CyclesPass], ours: RendererRow) -> dict[str, float]:
+def _cycles_cost(
+    paths_per_pixel: float, passes: Sequence[CyclesPass], dermis_row: RendererRow
+) -> dict[str, float]:
     """Return the time of Cycles for a number of paths per pixel, and its ratio to a frame of dermis.
 
     passes : measured passes, from whose time per path the cost is extrapolated
     """
-    seconds = paths * statistics.mean(one.seconds / one.samples for one in passes)
-    core_seconds = paths * statistics.mean(one.core_seconds / one.samples for one in passes)
-    assert ours.seconds is not None and ours.core_seconds is not None
-    ratios = {"ratio": seconds / ours.seconds, "core_ratio": core_seconds / ours.core_seconds}
-    return {"samples": paths, "seconds": seconds, **ratios}
+    seconds = paths_per_pixel * statistics.mean(one.seconds / one.samples for one in passes)
+    core_seconds = paths_per_pixel * statistics.mean(one.core_seconds / one.samples for one in passes)
+    assert dermis_row.seconds is not None and dermis_row.core_seconds is not None
+    ratios = {"ratio": seconds / dermis_row.seconds, "core_ratio": core_seconds / dermis_row.core_seconds}
+    return {"samples": paths_per_pixel, "seconds": seconds, **ratios}
 
 
-def _corrected_error(renders: PeerRenders, name: str, mask: Mask) -> float:
+def _corrected_error(renders: PeerRenders, variant_name: str, mask: Mask) -> float:
     """Return the relative RMSE of dermis after scaling each channel to the reference's energy [-].
 
-    name : name of the variant
+    variant_name : name of the variant
     """
-    reference, image = renders.reference, renders.ours[name].image.astype(np.float64)
+    reference, image = renders.reference, renders.ours[variant_name].image.astype(np.float64)
     scale = reference.image[mask].sum(axis=0, dtype=np.float64) / image[mask].sum(axis=0)
     return relative_rmse(image * scale, reference.image, mask, reference.variance).value
 

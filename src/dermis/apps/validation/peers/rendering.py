@@ -52,9 +52,9 @@ GPU_GEMS_3_VARIANTS = {
     "passes of 2007 as fragments": RenderVariant(FRAGMENT_TECHNIQUE, direction="lambertian"),
 }
 """Passes of GPU Gems 3 (2007) in dermis, to compare with the first of `DERMIS_VARIANTS`."""
-FIRST_SEEDS = (100, 200)
+FIRST_SEED_BY_TURN = (100, 200)
 """Seeds of the first pass of each turn; further passes have the following seeds."""
-_PROGRESS_STEPS = {"ours": 35, "random-walk": 5, "burley": 2, "path-traced": 20}
+_PROGRESS_STEPS_BY_RENDERER = {"ours": 35, "random-walk": 5, "burley": 2, "path-traced": 20}
 """Relative durations, for the progress bar: a turn of dermis, and one path per pixel of other renderers."""
 
 
@@ -77,12 +77,12 @@ class PeerPlan:
     def work(self) -> int:
         """Return the number of steps of the progress bar for one scene."""
         cycles = (
-            len(FIRST_SEEDS)
+            len(FIRST_SEED_BY_TURN)
             * sum(self.samples)
-            * (_PROGRESS_STEPS["random-walk"] + _PROGRESS_STEPS["burley"])
+            * (_PROGRESS_STEPS_BY_RENDERER["random-walk"] + _PROGRESS_STEPS_BY_RENDERER["burley"])
         )
-        ours = (len(FIRST_SEEDS) * len(CYCLES_METHODS) + 2) * _PROGRESS_STEPS["ours"]
-        return ours + cycles + self.paths * _PROGRESS_STEPS["path-traced"]
+        ours = (len(FIRST_SEED_BY_TURN) * len(CYCLES_METHODS) + 2) * _PROGRESS_STEPS_BY_RENDERER["ours"]
+        return ours + cycles + self.paths * _PROGRESS_STEPS_BY_RENDERER["path-traced"]
 
 
 @dataclass
@@ -135,26 +135,26 @@ def render_peers(
     left_out: dict[str, str] = {}
 
     def report_pass(done: int, total: int) -> None:
-        on_progress(SAMPLES_PER_PASS * _PROGRESS_STEPS["path-traced"])
+        on_progress(SAMPLES_PER_PASS * _PROGRESS_STEPS_BY_RENDERER["path-traced"])
 
     scene_context = medium_scene(head, light, default_region(light), medium)
     with TECHNIQUES.including(FRAGMENT_TECHNIQUE, FRAGMENT_PASSES), scene_context as (scene, _):
-        for seed in FIRST_SEEDS:
+        for seed in FIRST_SEED_BY_TURN:
             for method in CYCLES_METHODS:
                 _add_frames(ours, renderer, scene, plan)
-                on_progress(_PROGRESS_STEPS["ours"])
+                on_progress(_PROGRESS_STEPS_BY_RENDERER["ours"])
                 try:
                     cycles[method].append(_cycles_passes(scene, medium, plan, settings, method, seed))
                 except DermisError as fault:
                     left_out[method] = str(fault)
-                on_progress(_PROGRESS_STEPS[method] * sum(plan.samples))
+                on_progress(_PROGRESS_STEPS_BY_RENDERER[method] * sum(plan.samples))
         _add_frames(ours, renderer, scene, plan)
-        on_progress(_PROGRESS_STEPS["ours"])
+        on_progress(_PROGRESS_STEPS_BY_RENDERER["ours"])
         cpu_started = time.process_time()
         reference = path_trace(scene, medium, plan.paths, settings, use_cache=False, progress=report_pass)
         core_seconds = time.process_time() - cpu_started
         _add_frames(ours, renderer, scene, plan)
-        on_progress(_PROGRESS_STEPS["ours"])
+        on_progress(_PROGRESS_STEPS_BY_RENDERER["ours"])
     complete = {method: turns for method, turns in cycles.items() if method not in left_out}
     return PeerRenders(light, default_region(light), ours, complete, left_out, reference, core_seconds)
 
@@ -169,10 +169,12 @@ def _cycles_passes(
     return cycles_passes(scene, medium, (1, *plan.samples), settings, method=method, seed=seed)[1:]
 
 
-def _add_frames(ours: dict[str, FrameTimes], renderer: Renderer, scene: Scene, plan: PeerPlan) -> None:
+def _add_frames(
+    dermis_frames: dict[str, FrameTimes], renderer: Renderer, scene: Scene, plan: PeerPlan
+) -> None:
     """Time further frames of each variant of dermis; each recomputes all stages, with warm caches.
 
-    ours : frames by variant, to which times are added
+    dermis_frames : frames by variant, to which times are added
     """
     for name, variant in (DERMIS_VARIANTS | GPU_GEMS_3_VARIANTS).items():
         values = {"technique": variant.technique, "atlas": variant.atlas}
@@ -180,7 +182,7 @@ def _add_frames(ours: dict[str, FrameTimes], renderer: Renderer, scene: Scene, p
         skin = Skin(**(scene.skin.model_dump() | {"direction": variant.direction}))
         variant_scene = replace(scene, skin=skin)
         drawn = renderer.draw(variant_scene, settings, force=True)
-        frames = ours.setdefault(name, FrameTimes(drawn.linear()))
+        frames = dermis_frames.setdefault(name, FrameTimes(drawn.linear()))
         for _ in range(plan.frames):
             started, cpu_started = time.perf_counter(), time.process_time()
             renderer.draw(variant_scene, settings, force=True)

@@ -26,9 +26,9 @@ from dermis.base.errors import DermisError, refuse
 RESULTS_FILE, PAGE = RESULTS / "peers.json", DOCS / "peers.md"
 DEFAULT_LIGHTS = ("front", "back")
 QUICK_PLAN = PeerPlan(side=160, samples=(4, 16), paths=16, frames=3)
-TARGET_RATIO = 50.0
+TARGET_TIME_RATIO = 50.0
 """Goal for the time of Cycles, relative to a frame of dermis with the same error [-]."""
-_COLUMNS = ("renderer", "", "seconds", "noise", "relative RMSE", "energy ratio")
+_COLUMN_TITLES = ("renderer", "", "seconds", "noise", "relative RMSE", "energy ratio")
 
 
 def peers(
@@ -137,9 +137,9 @@ def scenes_text(report: JsonObject) -> str:
 
 def scene_text(scene: JsonObject) -> str:
     """Return a Markdown table of the renderers in one scene, and sentences about it."""
-    head = f"| {' | '.join(_COLUMNS)} |\n|{'---|' * len(_COLUMNS)}"
+    head = f"| {' | '.join(_COLUMN_TITLES)} |\n|{'---|' * len(_COLUMN_TITLES)}"
     table = [head, *(_table_line(row) for row in scene["rows"])]
-    return "\n".join([*table, "", *(f"- {sentence}" for sentence in _sentences(scene))])
+    return "\n".join([*table, "", *(f"- {sentence}" for sentence in _scene_sentences(scene))])
 
 
 def machine_text(report: JsonObject) -> str:
@@ -150,18 +150,23 @@ def machine_text(report: JsonObject) -> str:
     return f"{report['date']}, {side}x{side}, {machine}; {versions}"
 
 
-def _table_line(row: JsonObject) -> str:
-    seconds = "-" if row["seconds"] is None else f"{row['seconds']:.3g}"
-    noise = f"{row['noise']:.1%}" if row["noise"] > 0 else "-"
-    cells = row["renderer"], row["setting"], seconds, noise
-    return f"| {' | '.join((*cells, _estimate_cell(row, 'relrmse'), _estimate_cell(row, 'energy_ratio')))} |"
+def _table_line(renderer_row: JsonObject) -> str:
+    seconds = "-" if renderer_row["seconds"] is None else f"{renderer_row['seconds']:.3g}"
+    noise = f"{renderer_row['noise']:.1%}" if renderer_row["noise"] > 0 else "-"
+    cells = renderer_row["renderer"], renderer_row["setting"], seconds, noise
+    errors = [_estimate_cell(renderer_row, name) for name in ("relrmse", "energy_ratio")]
+    return f"| {' | '.join((*cells, *errors))} |"
 
 
-def _estimate_cell(row: JsonObject, name: str) -> str:
-    return "-" if row[name] is None else f"{row[name]:.4f} ± {row[name + '_se']:.4f}"
+def _estimate_cell(renderer_row: JsonObject, error_name: str) -> str:
+    return (
+        "-"
+        if renderer_row[error_name] is None
+        else f"{renderer_row[error_name]:.4f} ± {renderer_row[error_name + '_se']:.4f}"
+    )
 
 
-def _sentences(scene: JsonObject) -> list[str]:
+def _scene_sentences(scene: JsonObject) -> list[str]:
     sentences = [_random_walk_sentence(setting, times) for setting, times in scene.get("as_near", {}).items()]
     corrected = "; ".join(f"{name} {error:.3f}" for name, error in scene["ours_energy_put_right"].items())
     sentences.append(f"Ours, each channel scaled to the reference's energy: {corrected}.")
@@ -180,8 +185,9 @@ def _random_walk_sentence(setting: str, times: dict[str, dict[str, float]]) -> s
     if "same_error" not in times:
         return f"{walk} never has as small an error, because its bias is larger; {clean}."
     same = times["same_error"]
-    reached = "reached" if same["ratio"] >= TARGET_RATIO else "not reached"
-    return f"{walk} has the same error after {_time_text(same)}, goal {TARGET_RATIO:.0f} {reached}; {clean}."
+    reached = "reached" if same["ratio"] >= TARGET_TIME_RATIO else "not reached"
+    goal = f"goal {TARGET_TIME_RATIO:.0f} {reached}"
+    return f"{walk} has the same error after {_time_text(same)}, {goal}; {clean}."
 
 
 def _time_text(times: dict[str, float]) -> str:

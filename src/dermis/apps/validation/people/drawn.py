@@ -21,11 +21,14 @@ from dermis.images.skin_tone import ita_degrees
 
 HEAD_SITES: Final = ("cheek", *(name.replace("_", " ") for name in FACE_SITES))
 """Sites of the archive that are painted on a head."""
-_SEEDS = 2000
-_PERMUTATIONS = 200
-_MANY_PEOPLE, _TOLERANCE = 50, 1.0  # people with whom medians should agree, and largest difference [CIELAB]
-_QUANTITIES = "L*", "a*", "b*", "ITA"
-_OLD = 55.0  # least age of the older people [years]
+_SEED_COUNT = 2000
+_PERMUTATION_COUNT = 200
+_MIN_COMPARED_PEOPLE, _MEDIAN_TOLERANCE_LAB = (
+    50,
+    1.0,
+)  # people with whom medians should agree, and largest difference [CIELAB]
+_COLOUR_QUANTITIES = "L*", "a*", "b*", "ITA"
+_MIN_OLD_AGE_YEARS = 55.0  # least age of the older people [years]
 
 
 class DrawnPeople(NamedTuple):
@@ -58,12 +61,12 @@ def draw_people(group: str, seeds: Sequence[int]) -> DrawnPeople:
     return DrawnPeople(colours, np.array([one.age for one in drawn]), np.array([one.sex for one in drawn]))
 
 
-def draw_all(seeds: int = _SEEDS) -> dict[str, DrawnPeople]:
+def draw_all(seed_count: int = _SEED_COUNT) -> dict[str, DrawnPeople]:
     """Return people of all groups, drawn with the same seeds."""
-    return {group: draw_people(group, range(seeds)) for group in GROUP_OF_CODE.values()}
+    return {group: draw_people(group, range(seed_count)) for group in GROUP_OF_CODE.values()}
 
 
-def people(seeds: int = _SEEDS) -> None:
+def people(seeds: int = _SEED_COUNT) -> None:
     """Print a comparison of drawn people with the archive.
 
     Parameters
@@ -71,10 +74,10 @@ def people(seeds: int = _SEEDS) -> None:
     seeds
         Number of drawn people of each group.
     """
-    print_tables(_tables(seeds))
+    print_tables(_people_tables(seeds))
 
 
-def page(seeds: int = _SEEDS) -> None:
+def page(seeds: int = _SEED_COUNT) -> None:
     """Measure the variation of people and write docs/measured.md.
 
     Parameters
@@ -82,11 +85,11 @@ def page(seeds: int = _SEEDS) -> None:
     seeds
         Number of drawn people of each group.
     """
-    write_results(PEOPLE_FILE, _tables(seeds))
+    write_results(PEOPLE_FILE, _people_tables(seeds))
     write_measured_page()
 
 
-def _tables(seeds: int) -> dict[str, str]:
+def _people_tables(seeds: int) -> dict[str, str]:
     archive, drawn = read_archive(), draw_all(seeds)
     return {
         "people_cheek": cheek_table(archive, drawn),
@@ -105,30 +108,34 @@ def cheek_table(archive: Archive, drawn: Mapping[str, DrawnPeople]) -> str:
         "|---|---|---|---|---|---|---|---|---|",
     ]
     for code, group in GROUP_OF_CODE.items():
-        measured = _measured(archive, code, "cheek")
+        measured = _measured_colours(archive, code, "cheek")
         both = [_with_ita(one) for one in (measured.cielab, drawn[group].cielab[:, 0])]
-        for k, name in enumerate(_QUANTITIES):
+        for k, name in enumerate(_COLOUR_QUANTITIES):
             a, b = both[0][:, k], both[1][:, k]
             distance, expected, limit = two_sample_distance(a, b)
             cells = [
-                f"{np.median(a):.1f}", _span(a), f"{np.median(b):.1f}", _span(b),
+                f"{np.median(a):.1f}", _range_text(a), f"{np.median(b):.1f}", _range_text(b),
                 f"{distance:.2f}", f"{expected:.2f}", f"{limit:.2f}",
             ]  # fmt: skip
             lines.append(f"| {group if k == 0 else ''} | {name} | {' | '.join(cells)} |")
     return "\n".join(lines)
 
 
-def two_sample_distance(a: Doubles, b: Doubles) -> tuple[float, float, float]:
+def two_sample_distance(first_sample: Doubles, second_sample: Doubles) -> tuple[float, float, float]:
     """Return the energy distance of two samples, and its mean and 95 % quantile for equal populations.
 
     The last two are estimated by permutation.
     """
-    rng, both = np.random.default_rng(0), np.concatenate([a, b])
+    rng, both = np.random.default_rng(0), np.concatenate([first_sample, second_sample])
     permuted = []
-    for _ in range(_PERMUTATIONS):
+    for _ in range(_PERMUTATION_COUNT):
         shuffled = rng.permutation(both)
-        permuted.append(energy_distance(shuffled[: len(a)], shuffled[len(a) :]))
-    return float(energy_distance(a, b)), float(np.mean(permuted)), float(np.quantile(permuted, 0.95))
+        permuted.append(energy_distance(shuffled[: len(first_sample)], shuffled[len(first_sample) :]))
+    return (
+        float(energy_distance(first_sample, second_sample)),
+        float(np.mean(permuted)),
+        float(np.quantile(permuted, 0.95)),
+    )
 
 
 def site_differences(
@@ -137,7 +144,7 @@ def site_differences(
     """Yield group, site, number of people, measured median (3,), and drawn minus measured median (3,)."""
     for code, group in GROUP_OF_CODE.items():
         for k, site in enumerate(HEAD_SITES):
-            measured = _measured(archive, code, site)
+            measured = _measured_colours(archive, code, site)
             if len(measured.person):
                 median = np.median(measured.cielab, axis=0)
                 difference = np.median(drawn[group].cielab[:, k], axis=0) - median
@@ -151,7 +158,7 @@ def sites_table(archive: Archive, drawn: Mapping[str, DrawnPeople]) -> str:
         "|---|---|---|---|---|---|",
     ]
     for group, site, count, median, difference in site_differences(archive, drawn):
-        outside = count >= _MANY_PEOPLE and np.abs(difference).max() > _TOLERANCE
+        outside = count >= _MIN_COMPARED_PEOPLE and np.abs(difference).max() > _MEDIAN_TOLERANCE_LAB
         texts = (
             ", ".join(f"{one:{form}}" for one in values)
             for values, form in ((median, ".1f"), (difference, "+.1f"))
@@ -170,10 +177,12 @@ def sex_age_table(archive: Archive, drawn: Mapping[str, DrawnPeople]) -> str:
         for is_drawn in (False, True):
             differences, counts = [], []
             for code, group in GROUP_OF_CODE.items():
-                measured, drawn_group = _measured(archive, code, "cheek"), drawn[group]
+                measured, drawn_group = _measured_colours(archive, code, "cheek"), drawn[group]
                 colours = drawn_group.cielab[:, 0] if is_drawn else measured.cielab
                 sex, age = (drawn_group.sex, drawn_group.age) if is_drawn else (measured.sex, measured.age)
-                first, second = (sex > 0.5, sex < 0.5) if "men" in name else (age >= _OLD, age < 45.0)
+                first, second = (
+                    (sex > 0.5, sex < 0.5) if "men" in name else (age >= _MIN_OLD_AGE_YEARS, age < 45.0)
+                )
                 if min(first.sum(), second.sum()) >= 5:
                     differences.append(np.median(colours[first], axis=0) - np.median(colours[second], axis=0))
                     counts.append(1.0 / (1.0 / first.sum() + 1.0 / second.sum()))
@@ -194,14 +203,14 @@ def empty_cells(archive: Archive) -> str:
     return "; ".join(parts)
 
 
-def _measured(archive: Archive, code: str, site: str) -> Archive:
-    return archive.rows((archive.group == code) & (archive.site == SITES.index(site)))
+def _measured_colours(archive: Archive, group_code: str, site: str) -> Archive:
+    return archive.rows((archive.group == group_code) & (archive.site == SITES.index(site)))
 
 
 def _with_ita(cielab: Doubles) -> Doubles:
     return np.column_stack([cielab, ita_degrees(cielab)])
 
 
-def _span(values: Doubles) -> str:
-    low, high = np.percentile(values, (5.0, 95.0))
+def _range_text(numbers: Doubles) -> str:
+    low, high = np.percentile(numbers, (5.0, 95.0))
     return f"{low:.1f} to {high:.1f}"

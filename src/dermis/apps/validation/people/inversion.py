@@ -12,17 +12,17 @@ from dermis.images.colour import lab
 from dermis.optics.pigments.parameters import DEFAULT_SKIN
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 
-_LOW: Final = np.array([-13.3, -13.3, 0.0, np.log2(0.02)])
-_HIGH: Final = np.array([-0.3, -1.5, 1.0, np.log2(0.2)])
+_MIN_VARIABLES: Final = np.array([-13.3, -13.3, 0.0, np.log2(0.02)])
+_MAX_VARIABLES: Final = np.array([-0.3, -1.5, 1.0, np.log2(0.2)])
 _START_MELANIN, _START_BLOOD = 0.04, 0.01
-_PRIOR: Final = np.array([0.7, np.log2(DEFAULT_SKIN.epidermis_mm)])
+_PRIOR_MEAN: Final = np.array([0.7, np.log2(DEFAULT_SKIN.epidermis_mm)])
 _PRIOR_SD: Final = np.array([0.3, 0.2])
 """Prior of oxygen and of log2 of the thickness. With a wide prior of thickness, skin that the model cannot
 match would get an epidermis of the least thickness, which melanin cannot darken enough for every tone."""
-_LAB_SD = 0.3
+_CIELAB_SD = 0.3
 """Standard deviation of colours in the fit [CIELAB]; small, so that colours take precedence over spectra."""
-_SPECTRUM_SD = 0.01
-_INDEPENDENT = 9.0  # number of wavelengths whose errors are independent; neighbours err together
+_REFLECTANCE_SD = 0.01
+_INDEPENDENT_WAVELENGTHS = 9.0  # number of wavelengths whose errors are independent; neighbours err together
 
 
 def model_spectra(variables: Doubles) -> Doubles:
@@ -30,7 +30,7 @@ def model_spectra(variables: Doubles) -> Doubles:
 
     variables : (n, 4) log2 of melanin and of blood, oxygen, log2 of the thickness [mm]
     """
-    melanin, blood, oxygen, mm = np.clip(variables, _LOW, _HIGH).T
+    melanin, blood, oxygen, mm = np.clip(variables, _MIN_VARIABLES, _MAX_VARIABLES).T
     values = {"melanin": np.exp2(melanin), "blood": np.exp2(blood), "oxygen": oxygen}
     return skin_model_spectra()(values | {"epidermis_mm": np.exp2(mm)})
 
@@ -46,13 +46,13 @@ def invert_spectra(reflectance: Doubles) -> Doubles:
     reflectance : (n, 31) at `WAVELENGTHS_NM`, without surface reflection [-]
     """
     target = lab(reflectance @ rgb_weights(WAVELENGTHS_NM).T)
-    spectrum_sd = _SPECTRUM_SD * np.sqrt(len(WAVELENGTHS_NM) / _INDEPENDENT)
+    spectrum_sd = _REFLECTANCE_SD * np.sqrt(len(WAVELENGTHS_NM) / _INDEPENDENT_WAVELENGTHS)
 
     def residual(x: Doubles) -> Doubles:
         spectra = model_spectra(x)
         colours = lab(spectra @ rgb_weights(WAVELENGTHS_NM).T) - target
-        prior = (x[:, 2:] - _PRIOR) / _PRIOR_SD
-        return np.hstack([(spectra - reflectance) / spectrum_sd, colours / _LAB_SD, prior])
+        prior = (x[:, 2:] - _PRIOR_MEAN) / _PRIOR_SD
+        return np.hstack([(spectra - reflectance) / spectrum_sd, colours / _CIELAB_SD, prior])
 
-    start = np.array([np.log2(_START_MELANIN), np.log2(_START_BLOOD), *_PRIOR])
-    return least_squares(residual, np.tile(start, (len(reflectance), 1)), _LOW, _HIGH)
+    start = np.array([np.log2(_START_MELANIN), np.log2(_START_BLOOD), *_PRIOR_MEAN])
+    return least_squares(residual, np.tile(start, (len(reflectance), 1)), _MIN_VARIABLES, _MAX_VARIABLES)

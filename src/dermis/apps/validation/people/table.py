@@ -30,27 +30,31 @@ from dermis.human.skin.measured import (
 )
 from dermis.images.skin_tone import ita_degrees
 
-DATA = CHECKOUT / "src" / "dermis" / "human" / "data"
+HUMAN_DATA_FOLDER = CHECKOUT / "src" / "dermis" / "human" / "data"
 TABLE_FILE, CELLS_FILE = "measured.json", "measured_cells.csv"
-_PROBABILITIES = (0.005, 0.025, 0.1, 0.25, 0.5, 0.75, 0.9, 0.975, 0.995)
-_CHEEK = SITES.index("cheek")
+_QUANTILE_PROBABILITIES = (0.005, 0.025, 0.1, 0.25, 0.5, 0.75, 0.9, 0.975, 0.995)
+_CHEEK_SITE_INDEX = SITES.index("cheek")
 _POOLING_PEOPLE = 30.0  # number of people of a group that weigh as much as the pooled correlation
-_MIN_PEOPLE = 20  # least number of people of a cell (group and site) that is not filled from the pooled model
+_MIN_CELL_PEOPLE = (
+    20  # least number of people of a cell (group and site) that is not filled from the pooled model
+)
 _SMALL_CELL_PEOPLE = 10.0  # number of people of a small cell that weigh as much as the pooled difference
-_POPULATION = 2000
-_SHIFT_SD: Final = np.array([0.5, 0.5, 0.15, 0.15])
+_POPULATION_SIZE = 2000
+_VARIABLE_SHIFT_SD: Final = np.array([0.5, 0.5, 0.15, 0.15])
 """Typical size of the corrections of the four variables by which median colours are made to agree."""
-_COLOUR_SD = 0.05
-_SOURCE = "Lu et al. 2025, International Skin Spectra Archive, CC BY 4.0, doi 10.6084/m9.figshare.28228571.v4"
-_THICKNESS_TRIALS = (-0.6, -0.4, -0.2, 0.0, 0.2)
+_MEDIAN_COLOUR_SD = 0.05
+_ARCHIVE_SOURCE = (
+    "Lu et al. 2025, International Skin Spectra Archive, CC BY 4.0, doi 10.6084/m9.figshare.28228571.v4"
+)
+_LOG_THICKNESS_TRIALS = (-0.6, -0.4, -0.2, 0.0, 0.2)
 """Changes of the thickness of the epidermis that are tried [doublings]."""
-_MAX_STEP = 1.0  # of a correction, in `_SHIFT_SD`
+_MAX_CORRECTION_STEP = 1.0  # of a correction, in `_VARIABLE_SHIFT_SD`
 _CALIBRATION_STEPS = 6
 _WINSOR_PERCENT = 5.0
-_TRUE_SPREAD = 0.5
+_TRUE_SPREAD_FRACTION = 0.5
 """Fraction of the measured spread of differences between sites that is due to people; pressure and placing of
 the probe cause the rest. With the whole spread, drawn foreheads, necks and hands would vary too much."""
-_HEADER = """\
+_CELLS_CSV_HEADER = """\
 # quantity: medians of measured skin by group, site, sex and age group: CIELAB under D65 without specular
 #   reflection, melanin, blood, oxygen and thickness by the package's own model; covariances of CIELAB and of
 #   log2 melanin, log2 blood, oxygen, log2 thickness as upper triangles by row; people 0: empty cell, filled
@@ -67,7 +71,7 @@ def table() -> None:
     archive = read_archive()
     variables = invert_spectra(archive.spectra)
     document = build_table(archive, variables)
-    folder = in_checkout(DATA)
+    folder = in_checkout(HUMAN_DATA_FOLDER)
     with atomic_file(folder / TABLE_FILE) as file:
         file.write_text(json.dumps(document, separators=(",", ":")) + "\n", "utf-8")
     text = cells_text(archive, variables, parse_table(document))
@@ -82,28 +86,28 @@ def build_table(archive: Archive, variables: Doubles) -> dict[str, Any]:
 
     variables : (n, 4) variables of the measurements, from `invert_spectra`
     """
-    cheek, y = person_medians(archive, variables, _CHEEK)
-    sex, age = _effects(cheek, y)
+    cheek, y = person_medians(archive, variables, _CHEEK_SITE_INDEX)
+    sex, age = _sex_age_effects(cheek, y)
     ages, sexes = _population()
     document: dict[str, Any] = {
-        "source": _SOURCE,
-        "probabilities": list(_PROBABILITIES),
+        "source": _ARCHIVE_SOURCE,
+        "probabilities": list(_QUANTILE_PROBABILITIES),
         "sex": _rounded(sex),
         "age": _rounded(age),
         "mean_age_term": round(float(age_term(ages).mean()), 4),
     }
     adjusted = y - _centred_terms(cheek, sex, age)
-    scores = {code: _scores(adjusted[rows], cheek.rows(rows)) for code, rows in _by_group(cheek)}
+    scores = {code: _normal_scores(adjusted[rows], cheek.rows(rows)) for code, rows in _by_group(cheek)}
     pooled = np.corrcoef(np.concatenate(list(scores.values())).T)
-    shifts, slope, spread = _sites(archive, variables)
+    shifts, slope, spread = _site_differences(archive, variables)
     document |= {"site_slope": _rounded(slope), "site_spread": _rounded(spread), "groups": {}}
     for code, rows in _by_group(cheek):
         n, own = int(rows.sum()), np.corrcoef(scores[code].T)
         mixed = (n * own + _POOLING_PEOPLE * pooled) / (n + _POOLING_PEOPLE)
         ita = ita_degrees(cheek.rows(rows).cielab)
         document["groups"][GROUP_OF_CODE[code]] = {
-            "quantiles": _rounded(np.quantile(adjusted[rows], _PROBABILITIES, axis=0).T),
-            "ita": _rounded(np.quantile(ita, _PROBABILITIES), 2),
+            "quantiles": _rounded(np.quantile(adjusted[rows], _QUANTILE_PROBABILITIES, axis=0).T),
+            "ita": _rounded(np.quantile(ita, _QUANTILE_PROBABILITIES), 2),
             "correlation": _rounded(mixed, 3),
             "sites": _rounded(shifts[list(GROUP_OF_CODE).index(code)]),
         }
@@ -111,9 +115,9 @@ def build_table(archive: Archive, variables: Doubles) -> dict[str, Any]:
     return document
 
 
-def person_medians(archive: Archive, variables: Doubles, site: int) -> tuple[Archive, Doubles]:
+def person_medians(archive: Archive, variables: Doubles, site_index: int) -> tuple[Archive, Doubles]:
     """Return one measurement for each person at a site: the one in the middle by lightness."""
-    rows = np.flatnonzero(archive.site == site)
+    rows = np.flatnonzero(archive.site == site_index)
     order = rows[np.lexsort((archive.cielab[rows, 0], archive.person[rows]))]
     people, first, counts = np.unique(archive.person[order], return_index=True, return_counts=True)
     middle = order[first + counts // 2]
@@ -126,13 +130,13 @@ def _by_group(archive: Archive) -> Iterator[tuple[str, NDArray[np.bool_]]]:
         yield code, archive.group == code
 
 
-def _effects(cheek: Archive, y: Doubles) -> tuple[Doubles, Doubles]:
+def _sex_age_effects(cheek: Archive, variables: Doubles) -> tuple[Doubles, Doubles]:
     """Return the effects (4,) of sex and of `age_term`, by least squares with an intercept for each group."""
     known = np.isfinite(cheek.sex) & np.isfinite(cheek.age)
     levels = (cheek.group[known, None] == np.array(list(GROUP_OF_CODE))).astype(np.float64)
     terms = np.column_stack([levels, cheek.sex[known], age_term(cheek.age[known])])
-    low, high = np.percentile(y, (1.0, 99.0), axis=0)
-    found = np.linalg.lstsq(terms, np.clip(y[known], low, high), rcond=None)[0]
+    low, high = np.percentile(variables, (1.0, 99.0), axis=0)
+    found = np.linalg.lstsq(terms, np.clip(variables[known], low, high), rcond=None)[0]
     return found[-2], found[-1]
 
 
@@ -147,13 +151,13 @@ def _centred_terms(cheek: Archive, sex: Doubles, age: Doubles) -> Doubles:
     return result
 
 
-def _scores(y: Doubles, rows: Archive) -> Doubles:
+def _normal_scores(variables: Doubles, archive_rows: Archive) -> Doubles:
     """Return standard normal scores (n, 5) of the ranks of the four variables and of the ITA."""
-    columns = np.column_stack([y, ita_degrees(rows.cielab)])
+    columns = np.column_stack([variables, ita_degrees(archive_rows.cielab)])
     return np.asarray(ndtri((rankdata(columns, axis=0) - 0.5) / len(columns)))
 
 
-def _sites(archive: Archive, variables: Doubles) -> tuple[Doubles, Doubles, Doubles]:
+def _site_differences(archive: Archive, variables: Doubles) -> tuple[Doubles, Doubles, Doubles]:
     """Return how sites differ from the cheek: medians (g, 12, 3), slopes (12, 2) and spreads (12, 2).
 
     A slope is the change of the difference with the deviation of the cheek from the median of its group.
@@ -161,8 +165,8 @@ def _sites(archive: Archive, variables: Doubles) -> tuple[Doubles, Doubles, Doub
     """
     shifts, counts = np.zeros((len(GROUP_OF_CODE), len(SITES), 3)), np.zeros((len(GROUP_OF_CODE), len(SITES)))
     slope, spread = np.zeros((len(SITES), 2)), np.zeros((len(SITES), 2))
-    cheek, y = person_medians(archive, variables, _CHEEK)
-    for site in (k for k in range(len(SITES)) if k != _CHEEK):
+    cheek, y = person_medians(archive, variables, _CHEEK_SITE_INDEX)
+    for site in (k for k in range(len(SITES)) if k != _CHEEK_SITE_INDEX):
         other, z = person_medians(archive, variables, site)
         _, here, there = np.intersect1d(cheek.person, other.person, return_indices=True)
         difference, deviation = z[there, :3] - y[here, :3], y[here].copy()
@@ -174,26 +178,28 @@ def _sites(archive: Archive, variables: Doubles) -> tuple[Doubles, Doubles, Doub
                 shifts[k, site] = np.median(difference[rows], axis=0)
                 deviation[rows] -= np.median(deviation[rows], axis=0)
                 difference[rows] -= shifts[k, site]
-        used = counts[group, site] >= _MIN_PEOPLE
+        used = counts[group, site] >= _MIN_CELL_PEOPLE
         x, d = (_winsorised(one[used, :2]) for one in (deviation, difference))
         slope[site] = (x * d).sum(axis=0) / (x * x).sum(axis=0)
-        spread[site] = _TRUE_SPREAD * np.std(d - slope[site] * x, axis=0)
-        filled = counts[:, site] >= _MIN_PEOPLE
+        spread[site] = _TRUE_SPREAD_FRACTION * np.std(d - slope[site] * x, axis=0)
+        filled = counts[:, site] >= _MIN_CELL_PEOPLE
         pooled = np.average(shifts[filled, site], axis=0, weights=counts[filled, site])
         weight = (counts[:, site] / (counts[:, site] + _SMALL_CELL_PEOPLE))[~filled, None]
         shifts[~filled, site] = weight * shifts[~filled, site] + (1.0 - weight) * pooled
     return shifts, slope, spread
 
 
-def _winsorised(values: Doubles) -> Doubles:
-    low, high = np.percentile(values, (_WINSOR_PERCENT, 100.0 - _WINSOR_PERCENT), axis=0)
-    return np.clip(values, low, high)
+def _winsorised(samples: Doubles) -> Doubles:
+    low, high = np.percentile(samples, (_WINSOR_PERCENT, 100.0 - _WINSOR_PERCENT), axis=0)
+    return np.clip(samples, low, high)
 
 
 def _population() -> tuple[Doubles, Doubles]:
     """Return ages and sexes (n,) of adults as `Human.drawn` samples them."""
     rng = np.random.default_rng(0)
-    return 25.0 + 65.0 * rng.beta(1.2, 2.2, _POPULATION), rng.integers(0, 2, _POPULATION).astype(np.float64)
+    return 25.0 + 65.0 * rng.beta(1.2, 2.2, _POPULATION_SIZE), rng.integers(0, 2, _POPULATION_SIZE).astype(
+        np.float64
+    )
 
 
 def _calibrate(document: dict[str, Any], archive: Archive, ages: Doubles, sexes: Doubles) -> None:
@@ -206,13 +212,13 @@ def _calibrate(document: dict[str, Any], archive: Archive, ages: Doubles, sexes:
     population = _Population(
         ages,
         sexes,
-        rng.standard_normal((_POPULATION, 4)),
-        rng.standard_normal((_POPULATION, len(SITES), 2)),
+        rng.standard_normal((_POPULATION_SIZE, 4)),
+        rng.standard_normal((_POPULATION_SIZE, len(SITES), 2)),
     )
     for code, rows in _by_group(archive):
         name, own = GROUP_OF_CODE[code], archive.rows(rows)
         trials = []
-        for thickness in _THICKNESS_TRIALS:
+        for thickness in _LOG_THICKNESS_TRIALS:
             group = dict(document["groups"][name])
             quantiles = np.array(group["quantiles"]) + np.array([0.0, 0.0, 0.0, thickness])[:, None]
             trial = {**document, "groups": {name: group | {"quantiles": quantiles.tolist()}}}
@@ -229,22 +235,24 @@ class _Population(NamedTuple):
     site_normals: Doubles
 
 
-def _calibrate_group(document: dict[str, Any], name: str, own: Archive, people: _Population) -> float:
+def _calibrate_group(
+    document: dict[str, Any], group_name: str, group_archive: Archive, people: _Population
+) -> float:
     """Calibrate one group in place, and return the sum of squared errors of medians of the head [CIELAB]."""
-    group = document["groups"][name]
-    target, loss = np.median(own.cielab[own.site == _CHEEK], axis=0), 0.0
-    shift, error = _matching_shift(_drawn_cheeks(document, name, people)[1], target, 3)
+    group = document["groups"][group_name]
+    target, loss = np.median(group_archive.cielab[group_archive.site == _CHEEK_SITE_INDEX], axis=0), 0.0
+    shift, error = _matching_shift(_drawn_cheeks(document, group_name, people)[1], target, 3)
     loss += float(error @ error)
     group["quantiles"] = _rounded(np.array(group["quantiles"]) + shift[:, None])
-    found, y = _drawn_cheeks(document, name, people)
-    differences = found.site_variables({name: 1.0}, y, people.site_normals)
+    found, y = _drawn_cheeks(document, group_name, people)
+    differences = found.site_variables({group_name: 1.0}, y, people.site_normals)
     sites = np.array(group["sites"])
     for site in range(len(SITES)):
-        measured = own.site == site
-        if site != _CHEEK and len(np.unique(own.person[measured])) >= _MIN_PEOPLE:
+        measured = group_archive.site == site
+        if site != _CHEEK_SITE_INDEX and len(np.unique(group_archive.person[measured])) >= _MIN_CELL_PEOPLE:
             z = y.copy()
             z[:, :3] += differences[:, site]
-            shift, error = _matching_shift(z, np.median(own.cielab[measured], axis=0), 3)
+            shift, error = _matching_shift(z, np.median(group_archive.cielab[measured], axis=0), 3)
             sites[site] += shift[:3]
             loss += float(error @ error) * (SITES[site].replace(" ", "_") in FACE_SITES)
     group["sites"] = _rounded(sites)
@@ -258,39 +266,39 @@ def _drawn_cheeks(document: dict[str, Any], group: str, people: _Population) -> 
     return found, found.variables(weights, people.sexes, people.ages, scores)
 
 
-def _matching_shift(y: Doubles, target: Doubles, count: int) -> tuple[Doubles, Doubles]:
-    """Return the shift (4,) of variables that moves a median colour to a target, and the error (3,) left.
+def _matching_shift(variables: Doubles, target_colour: Doubles, people_count: int) -> tuple[Doubles, Doubles]:
+    """Return the shift (4,) of variables that moves a median colour to a target, and the error left (3,).
 
-    y : (n, 4) variables of people
-    target : (3,) median colour to reach [CIELAB]
-    count : number of variables that may be shifted
+    variables : (n, 4) variables of people
+    target_colour : (3,) median colour to reach [CIELAB]
+    people_count : number of variables that may be shifted
     """
-    shift, used = np.zeros(4), np.arange(4) < count
+    shift, used = np.zeros(4), np.arange(4) < people_count
 
     def median(offset: Doubles) -> Doubles:
-        return np.asarray(np.median(model_lab(y + offset), axis=0))
+        return np.asarray(np.median(model_lab(variables + offset), axis=0))
 
     for _ in range(_CALIBRATION_STEPS):
-        error = target - median(shift)
-        steps = 0.1 * np.diag(_SHIFT_SD)
+        error = target_colour - median(shift)
+        steps = 0.1 * np.diag(_VARIABLE_SHIFT_SD)
         J = np.column_stack(
             [
                 (median(shift + one) - median(shift - one)) / (0.2 * sd)
-                for one, sd in zip(steps, _SHIFT_SD, strict=True)
+                for one, sd in zip(steps, _VARIABLE_SHIFT_SD, strict=True)
             ]
         )
         J[:, ~used] = 0.0
-        scaled = J * _SHIFT_SD / _COLOUR_SD
+        scaled = J * _VARIABLE_SHIFT_SD / _MEDIAN_COLOUR_SD
         normal = scaled.T @ scaled + np.eye(4)  # the prior of the shift is 0
-        step = np.linalg.solve(normal, scaled.T @ error / _COLOUR_SD - shift / _SHIFT_SD)
-        shift += _SHIFT_SD * np.clip(step, -_MAX_STEP, _MAX_STEP)
-    return shift, target - median(shift)
+        step = np.linalg.solve(normal, scaled.T @ error / _MEDIAN_COLOUR_SD - shift / _VARIABLE_SHIFT_SD)
+        shift += _VARIABLE_SHIFT_SD * np.clip(step, -_MAX_CORRECTION_STEP, _MAX_CORRECTION_STEP)
+    return shift, target_colour - median(shift)
 
 
-def cells_text(archive: Archive, variables: Doubles, found: MeasuredTable) -> str:
+def cells_text(archive: Archive, variables: Doubles, measured_table: MeasuredTable) -> str:
     """Return the CSV table of medians and covariances by group and site, and by sex and by age group."""
     out = StringIO()
-    out.write(_HEADER)
+    out.write(_CELLS_CSV_HEADER)
     writer = csv.writer(out, lineterminator="\n")
     names = "group site sex age people measurements L a b melanin blood oxygen thickness_mm"
     names += " lab_covariance covariance"
@@ -307,31 +315,31 @@ def cells_text(archive: Archive, variables: Doubles, found: MeasuredTable) -> st
                         "",
                         0,
                         0,
-                        *_pooled_cell(found, GROUP_OF_CODE[code], site),
+                        *_pooled_cell(measured_table, GROUP_OF_CODE[code], site),
                         "",
                         "",
                     ]
                 )
                 continue
-            writer.writerow(_cell(archive, variables, here, (GROUP_OF_CODE[code], name, "", ""), True))
+            writer.writerow(_cell_row(archive, variables, here, (GROUP_OF_CODE[code], name, "", ""), True))
             for sex, value in (("F", 0.0), ("M", 1.0)):
-                if (own := here & (archive.sex == value)).sum() >= _MIN_PEOPLE:
-                    writer.writerow(_cell(archive, variables, own, (GROUP_OF_CODE[code], name, sex, "")))
+                if (own := here & (archive.sex == value)).sum() >= _MIN_CELL_PEOPLE:
+                    writer.writerow(_cell_row(archive, variables, own, (GROUP_OF_CODE[code], name, sex, "")))
             for number, middle in AGE_MIDDLES.items():
-                if (own := here & (archive.age == middle)).sum() >= _MIN_PEOPLE:
-                    writer.writerow(_cell(archive, variables, own, (GROUP_OF_CODE[code], name, "", number)))
+                if (own := here & (archive.age == middle)).sum() >= _MIN_CELL_PEOPLE:
+                    writer.writerow(_cell_row(archive, variables, own, (GROUP_OF_CODE[code], name, "", number)))
     return out.getvalue()
 
 
-def _cell(
+def _cell_row(
     archive: Archive,
     variables: Doubles,
-    rows: NDArray[np.bool_],
-    names: tuple[object, ...],
-    full: bool = False,
+    row_mask: NDArray[np.bool_],
+    cell_names: tuple[object, ...],
+    has_covariance: bool = False,
 ) -> list[object]:
-    colours, y = archive.cielab[rows], variables[rows]
-    people = len(np.unique(archive.person[rows]))
+    colours, y = archive.cielab[row_mask], variables[row_mask]
+    people = len(np.unique(archive.person[row_mask]))
     melanin, blood, oxygen, thickness = np.median(y, axis=0)
     values = [f"{one:.2f}" for one in np.median(colours, axis=0)]
     values += [
@@ -340,14 +348,18 @@ def _cell(
         f"{oxygen:.3f}",
         f"{np.exp2(thickness):.4f}",
     ]
-    covariances = [_triangle(colours, 2), _triangle(y, 4)] if full and people > 2 else ["", ""]
-    return [*names, people, int(rows.sum()), *values, *covariances]
+    covariances = (
+        [_lower_triangle_text(colours, 2), _lower_triangle_text(y, 4)]
+        if has_covariance and people > 2
+        else ["", ""]
+    )
+    return [*cell_names, people, int(row_mask.sum()), *values, *covariances]
 
 
-def _pooled_cell(found: MeasuredTable, group: str, site: int) -> list[str]:
+def _pooled_cell(measured_table: MeasuredTable, group: str, site_index: int) -> list[str]:
     """Return median colour and pigments of a site without measurements by the pooled model."""
-    y = found.variables({group: 1.0}, 0.5, 30.0, np.zeros((1, 4)))
-    y[:, :3] += found.site_variables({group: 1.0}, y, np.zeros((1, len(SITES), 2)))[:, site]
+    y = measured_table.variables({group: 1.0}, 0.5, 30.0, np.zeros((1, 4)))
+    y[:, :3] += measured_table.site_variables({group: 1.0}, y, np.zeros((1, len(SITES), 2)))[:, site_index]
     colour, (melanin, blood, oxygen, thickness) = model_lab(y)[0], y[0]
     pigments = [
         f"{np.exp2(melanin):.4f}",
@@ -358,10 +370,10 @@ def _pooled_cell(found: MeasuredTable, group: str, site: int) -> list[str]:
     return [f"{one:.2f}" for one in colour] + pigments
 
 
-def _triangle(values: Doubles, digits: int) -> str:
-    covariance = np.cov(values.T)
+def _lower_triangle_text(matrix: Doubles, digits: int) -> str:
+    covariance = np.cov(matrix.T)
     return " ".join(f"{one:.{digits}f}" for one in covariance[np.triu_indices(len(covariance))])
 
 
-def _rounded(values: Doubles, digits: int = 4) -> Any:
-    return (np.round(np.asarray(values, np.float64), digits) + 0.0).tolist()
+def _rounded(numbers: Doubles, digits: int = 4) -> Any:
+    return (np.round(np.asarray(numbers, np.float64), digits) + 0.0).tolist()

@@ -19,8 +19,8 @@ from rendercanvas.http import HttpRenderCanvas, asgi
 from dermis.apps.viewer.session import HEAD_FILE_SUFFIXES
 
 _JPEG_QUALITY = 88
-_LOSSLESS_DELAY_S = 0.3
-_TICKET_BYTES = 18
+_LOSSLESS_FRAME_DELAY_S = 0.3
+_UPLOAD_TICKET_BYTES = 18
 _MAX_ENCODERS = 2  # frames encoded at the same time while the next one is rendered
 
 
@@ -38,18 +38,18 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
         self._startup_message: dict[str, object] | None = None  # shown by pages before the first frame
         super().__init__(**kwargs)
 
-    def send_stage(self, text: str, stage_number: int, stage_count: int) -> None:
+    def send_stage(self, stage_name: str, stage_number: int, stage_count: int) -> None:
         """Send the progress of the preparation to all pages, which display it until the first picture.
 
-        text : name of the stage, such as "compiling shaders"
+        stage_name : name of the stage, such as "compiling shaders"
         stage_number : position of the stage in the order of stages, from 1
         stage_count : number of all stages
         """
-        self._broadcast({"type": "stage", "text": text, "number": stage_number, "total": stage_count})
+        self._broadcast({"type": "stage", "text": stage_name, "number": stage_number, "total": stage_count})
 
-    def send_failure(self, text: str) -> None:
+    def send_failure(self, failure_text: str) -> None:
         """Send an error message to all pages, which display it instead of a picture."""
-        self._broadcast({"type": "failure", "text": text})
+        self._broadcast({"type": "failure", "text": failure_text})
 
     def _broadcast(self, message: dict[str, object]) -> None:
         self._startup_message = message
@@ -66,14 +66,17 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
     def _update_active_states(self) -> None:
         super()._update_active_states()
         if self._active_client != self._ticket_holder:
-            self.ticket, self._ticket_holder = secrets.token_urlsafe(_TICKET_BYTES), self._active_client
+            self.ticket, self._ticket_holder = (
+                secrets.token_urlsafe(_UPLOAD_TICKET_BYTES),
+                self._active_client,
+            )
             asgi.send_to({"type": "ticket", "value": self.ticket}, [], self._active_client)
         if self._startup_message and not self._sent_number:
             asgi.send_all(self._startup_message)
 
-    def offer_download(self, name: str, data: bytes) -> None:
+    def offer_download(self, file_name: str, content: bytes) -> None:
         """Send a file to the page that has control, which offers it as a download."""
-        asgi.send_to({"type": "download", "name": name, "nbuffers": 1}, [data], self._active_client)
+        asgi.send_to({"type": "download", "name": file_name, "nbuffers": 1}, [content], self._active_client)
 
     def _on_event(self, event: dict[str, Any], id: int) -> None:
         kind = str(event.get("type"))
@@ -96,7 +99,7 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
         else:
             super()._maybe_draw()
 
-    def _encode_frame(self, array: NDArray[np.uint8], is_lossless_redraw: bool = False) -> None:
+    def _encode_frame(self, pixels: NDArray[np.uint8], is_lossless_redraw: bool = False) -> None:
         """Encode a frame in a thread: as JPEG, or as PNG when the picture has stopped changing."""
         self._cancel_lossless_draw()
         self._drawn_number += 1
@@ -104,8 +107,8 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
             self._lossless_number = self._drawn_number
         else:
             self._encoding_count += 1
-            self._schedule_lossless_draw(array, _LOSSLESS_DELAY_S)
-        task = partial(encode_image, array, lossless=is_lossless_redraw)
+            self._schedule_lossless_draw(pixels, _LOSSLESS_FRAME_DELAY_S)
+        task = partial(encode_image, pixels, is_lossless=is_lossless_redraw)
         future = asyncio.get_running_loop().run_in_executor(self._encoders, task)
         future.add_done_callback(partial(self._send_frame, self._drawn_number, is_lossless_redraw))
 
@@ -114,25 +117,25 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
         self._lossless_number = 0
         super()._cancel_lossless_draw()
 
-    def _send_frame(self, frame_number: int, lossless: bool, future: asyncio.Future[bytes]) -> None:
+    def _send_frame(self, frame_number: int, is_lossless: bool, encoded_frame: asyncio.Future[bytes]) -> None:
         """Send an encoded frame to all pages, unless a newer frame has been sent.
 
         frame_number : number of the frame, in the order of drawing
-        lossless : whether the frame is encoded as PNG
-        future : result of `encode_image`
+        is_lossless : whether the frame is encoded as PNG
+        encoded_frame : result of `encode_image`
         """
-        self._encoding_count -= not lossless
+        self._encoding_count -= not is_lossless
         if self._is_closed:
             return
         self._schedule_maybe_draw()
-        data = future.result()
-        if frame_number < self._sent_number or (lossless and frame_number != self._lossless_number):
+        data = encoded_frame.result()
+        if frame_number < self._sent_number or (is_lossless and frame_number != self._lossless_number):
             return
         self._sent_number = frame_number
         message = {
             "type": "framebufferdata",
             "nbuffers": 1,
-            "mimetype": "image/png" if lossless else "image/jpeg",
+            "mimetype": "image/png" if is_lossless else "image/jpeg",
             "timestamp": time.time(),
             "index": 0,
         }
@@ -141,15 +144,15 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
         self._send_last_frame_to_ready_clients()
 
 
-def encode_image(array: NDArray[np.uint8], *, lossless: bool) -> bytes:
+def encode_image(pixels: NDArray[np.uint8], *, is_lossless: bool) -> bytes:
     """Encode an (h, w, 4) image without alpha as PNG (lossless) or JPEG."""
     from PIL import Image
 
-    height, width = array.shape[:2]
+    height, width = pixels.shape[:2]
     # RGBX is the internal layout of Pillow, so JPEG needs no copy.
-    image = Image.frombuffer("RGBX", (width, height), np.ascontiguousarray(array), "raw", "RGBX", 0, 1)
+    image = Image.frombuffer("RGBX", (width, height), np.ascontiguousarray(pixels), "raw", "RGBX", 0, 1)
     buffer = io.BytesIO()
-    if lossless:
+    if is_lossless:
         image.convert("RGB").save(buffer, "PNG", compress_level=1)
     else:
         image.save(buffer, "JPEG", quality=_JPEG_QUALITY, subsampling=0)

@@ -13,13 +13,13 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 from dermis.base.errors import DermisError
 from dermis.base.reading import parse_json
 
-_MAX_CHARACTERS = 4096  # of a message
-_MAX_SIDE = 4096  # of a page [pixel]
-_MAX_COORDINATE = 1e5  # of a pointer, relative to the corner of the picture [logical pixel]
+_MAX_MESSAGE_CHARACTERS = 4096  # of a message
+_MAX_PAGE_SIDE = 4096  # of a page [pixel]
+_MAX_POINTER_COORDINATE = 1e5  # of a pointer, relative to the corner of the picture [logical pixel]
 
 Seconds = Annotated[float, Field(ge=0.0, le=1e12)]
-Coordinate = Annotated[float, Field(ge=-_MAX_COORDINATE, le=_MAX_COORDINATE)]
-PixelCount = Annotated[int, Field(ge=0, le=_MAX_SIDE)]
+Coordinate = Annotated[float, Field(ge=-_MAX_POINTER_COORDINATE, le=_MAX_POINTER_COORDINATE)]
+PixelCount = Annotated[int, Field(ge=0, le=_MAX_PAGE_SIDE)]
 Button = Annotated[int, Field(ge=0, le=16)]
 ShortText = Annotated[str, Field(max_length=32)]
 
@@ -120,15 +120,15 @@ _MESSAGE_PARSER: TypeAdapter[Any] = TypeAdapter(
 )
 
 
-def checked_message(text: object) -> str | None:
+def checked_message(message_text: object) -> str | None:
     """Return a page's message without unknown fields, or None if the message is invalid.
 
-    text : untrusted message of any type
+    message_text : untrusted message of any type
     """
-    if not isinstance(text, str) or len(text) > _MAX_CHARACTERS:
+    if not isinstance(message_text, str) or len(message_text) > _MAX_MESSAGE_CHARACTERS:
         return None
     try:
-        message = _MESSAGE_PARSER.validate_python(parse_json(text, "message", "an event"))
+        message = _MESSAGE_PARSER.validate_python(parse_json(message_text, "message", "an event"))
         checked_text: str = message.model_dump_json()
     except (DermisError, ValueError):  # invalid JSON, a validation error, or half of a surrogate pair
         return None
@@ -202,8 +202,8 @@ class RequestFilter:
         pairs = (cookie.partition("=") for cookie in cookies)
         return any(self._equals_token(value) for name, _, value in pairs if name == self._cookie)
 
-    def _equals_token(self, candidate: str) -> bool:
-        return hmac.compare_digest(candidate.encode(), self._token.encode())
+    def _equals_token(self, received_token: str) -> bool:
+        return hmac.compare_digest(received_token.encode(), self._token.encode())
 
     def _add_cookie(self, send: Send) -> Send:
         """Return a `send` function that also sets the token cookie, hidden from scripts and other sites."""
@@ -227,8 +227,8 @@ def is_local(host: str) -> bool:
         return False
 
 
-def _header_values(scope: Message, header_name: bytes) -> list[str]:
-    return [value.decode("latin-1") for name, value in scope["headers"] if name == header_name]
+def _header_values(request_scope: Message, header_name: bytes) -> list[str]:
+    return [value.decode("latin-1") for name, value in request_scope["headers"] if name == header_name]
 
 
 def _host_name(host: str) -> str:

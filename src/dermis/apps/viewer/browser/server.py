@@ -90,16 +90,16 @@ _FAILURE_DISPLAY_S = 0.7  # time for pages to receive the reason of a failure
 
 
 async def prepare_viewer(
-    http_server: uvicorn.Server, canvas: PageCanvas, load: LoadState, adapter: str
+    http_server: uvicorn.Server, canvas: PageCanvas, load_state: LoadState, adapter: str
 ) -> Viewer:
     """Prepare the first frame in a thread and return the viewer; pages display the progress.
 
     If the preparation fails, pages show the reason and the server stops.
 
     http_server : running server of the pages
-    load : function that loads the initial state and motion, called in a thread
+    load_state : function that loads the initial state and motion, called in a thread
 
-    Raises every exception of `load`, and DermisError if no device can be opened.
+    Raises every exception of `load_state`, and DermisError if no device can be opened.
     """
     loop, stages = asyncio.get_running_loop(), iter(enumerate(PREPARATION_STAGES, 1))
 
@@ -111,7 +111,7 @@ async def prepare_viewer(
 
     def prepare() -> tuple[ViewerState, ViewRenderer, MotionFile | None]:
         begin_stage()
-        state, motion = load()
+        state, motion = load_state()
         begin_stage()
         view_renderer = ViewRenderer(adapter)
         begin_stage()
@@ -130,7 +130,7 @@ async def prepare_viewer(
 
 
 T = TypeVar("T")
-_TOKEN_BYTES = 18
+_ACCESS_TOKEN_BYTES = 18
 _MAX_MESSAGE_BYTES = 1 << 16
 _SHUTDOWN_TIMEOUT_S = 1
 _PAGE_FILES = {"page.css": "css", "page.js": "javascript", "files.js": "javascript", "stage.js": "javascript"}
@@ -182,7 +182,7 @@ def bind(host: str, port: int, *, require_token: bool = False) -> tuple[socket.s
     except OSError as error:
         listener.close()
         refuse(f"{host}:{port}", "an address to listen on", f"{error.strerror}", "Choose another --port")
-    token = "" if is_local(host) and not require_token else secrets.token_urlsafe(_TOKEN_BYTES)
+    token = "" if is_local(host) and not require_token else secrets.token_urlsafe(_ACCESS_TOKEN_BYTES)
     return listener, Address(host, int(listener.getsockname()[1]), token)
 
 
@@ -213,17 +213,19 @@ def make_server(address: Address, canvas: PageCanvas, upload_folder: Path) -> uv
 
 
 def run_server(
-    http_server: uvicorn.Server, listener: socket.socket, start: Callable[[], Coroutine[None, None, T]]
+    http_server: uvicorn.Server,
+    listener: socket.socket,
+    start_coroutine: Callable[[], Coroutine[None, None, T]],
 ) -> T | None:
     """Run the server until it exits, together with a coroutine; return the coroutine's result.
 
-    start : function that returns the coroutine
+    start_coroutine : function that returns the coroutine
 
     The result is None if the server exits before the coroutine ends. Raises the exceptions of the coroutine.
     """
 
     async def serve_and_run() -> T | None:
-        task = asyncio.create_task(start())
+        task = asyncio.create_task(start_coroutine())
         await http_server.serve(sockets=[listener])
         if task.done():  # not awaited: after Ctrl+C that would raise another interrupt
             return task.result()

@@ -23,12 +23,12 @@ MAX_TOTAL_BYTES = 1 << 30
 MAX_FILES = 200
 """Maximum number of files uploaded to a server."""
 
-IDLE_TIMEOUT_S = 20.0
+UPLOAD_IDLE_TIMEOUT_S = 20.0
 """Maximum time between two received chunks of a file [s]."""
 
 TICKET_HEADER = b"x-dermis-ticket"
 _UPLOAD_PATH = "upload"
-_MAX_CHARACTERS = 80
+_MAX_DISPLAYED_NAME_CHARACTERS = 80
 
 
 class Uploads:
@@ -137,9 +137,14 @@ class Uploads:
         more, size = True, 0
         while more:
             try:
-                message = await asyncio.wait_for(receive(), IDLE_TIMEOUT_S)
+                message = await asyncio.wait_for(receive(), UPLOAD_IDLE_TIMEOUT_S)
             except TimeoutError:
-                refuse(file_name, "a complete file", f"got no data for {IDLE_TIMEOUT_S:g} s", "Send it again")
+                refuse(
+                    file_name,
+                    "a complete file",
+                    f"got no data for {UPLOAD_IDLE_TIMEOUT_S:g} s",
+                    "Send it again",
+                )
             if message["type"] != "http.request":
                 refuse(file_name, "a complete file", "the connection was closed", "Send it again")
             size += len(message.get("body", b""))
@@ -151,5 +156,5 @@ class Uploads:
 def _printable_name(file_name: str) -> str:
     """Return a file name with printable characters only, shortened for messages."""
     return "".join(character if character.isprintable() else "_" for character in file_name)[
-        -_MAX_CHARACTERS:
+        -_MAX_DISPLAYED_NAME_CHARACTERS:
     ]

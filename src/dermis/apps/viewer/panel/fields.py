@@ -28,13 +28,13 @@ _LOG_SLIDER_FLAG = int(imgui.SliderFlags_.logarithmic)
 _HDR_COLOUR_FLAGS = int(imgui.ColorEditFlags_.float | imgui.ColorEditFlags_.hdr)
 _UNIT_FORMATS = {"_per_mm": "%.3g", "_mm": "%.4g mm", "_degrees": "%.4g°"}  # by unit suffix of the field name
 _TALL_LIST_FLAG = int(imgui.ComboFlags_.height_largest)
-_TOOLTIP_WIDTH = 260.0
-_NO_DISPLAY_NAMES: Mapping[str, str] = MappingProxyType({})
-_CUSTOM_CHOICE = "own"  # choice of a number or colour instead of a keyword
-_PLOT_HEIGHT = 130.0
+_TOOLTIP_WIDTH_PX = 260.0
+_EMPTY_DISPLAY_NAMES: Mapping[str, str] = MappingProxyType({})
+_CUSTOM_VALUE_CHOICE = "own"  # choice of a number or colour instead of a keyword
+_PLOT_HEIGHT_PX = 130.0
 _PLOT_BASE_FLAGS = implot.Flags_.no_menus | implot.Flags_.no_box_select | implot.Flags_.no_mouse_text
 _PLOT_FLAGS = int(_PLOT_BASE_FLAGS | implot.Flags_.no_inputs | implot.Flags_.no_legend)
-_MAX_VISIBLE_ROWS = 14
+_MAX_VISIBLE_LIST_ROWS = 14
 
 
 @dataclass(frozen=True)
@@ -67,21 +67,21 @@ _COLOUR_TYPE: Any = Colour
 
 def draw_fields(
     session: Session,
-    values: FrozenModel,
+    model: FrozenModel,
     make_state: FieldsToState,
     styles: Mapping[str, FieldStyle],
-    names: Iterable[str] | None = None,
-    suffix: str = "",
+    field_names: Iterable[str] | None = None,
+    label_suffix: str = "",
 ) -> None:
     """Draw a control for each field of a model; fields without a suitable control are skipped.
 
     make_state : function that returns a state, given the new value of a field as keyword argument
     styles : presentation of fields by their names
-    names : names of the fields to draw, None for all
-    suffix : "##id" that distinguishes controls with equal labels
+    field_names : names of the fields to draw, None for all
+    label_suffix : "##id" that distinguishes controls with equal labels
     """
-    for name in type(values).model_fields if names is None else names:
-        _draw_field(session, values, name, make_state, styles.get(name, _DEFAULT_STYLE), suffix)
+    for name in type(model).model_fields if field_names is None else field_names:
+        _draw_field(session, model, name, make_state, styles.get(name, _DEFAULT_STYLE), label_suffix)
 
 
 def _draw_field(
@@ -90,10 +90,10 @@ def _draw_field(
     field_name: str,
     make_state: FieldsToState,
     style: FieldStyle,
-    suffix: str,
+    label_suffix: str,
 ) -> None:
     kind, value = type(model), getattr(model, field_name)
-    label = (style.label or _field_label(field_name)) + suffix
+    label = (style.label or _field_label(field_name)) + label_suffix
     value_range = style.value_range or field_slider_range(kind, field_name) or SliderRange(0.0, 1.0)
 
     def with_value(new_value: object) -> ViewerState:
@@ -146,14 +146,16 @@ def _draw_keywords(
     custom_value = style.custom_value
 
     def with_keyword(keyword: str) -> ViewerState:
-        return with_value(custom_value(session) if custom_value and keyword == _CUSTOM_CHOICE else keyword)
+        return with_value(
+            custom_value(session) if custom_value and keyword == _CUSTOM_VALUE_CHOICE else keyword
+        )
 
-    chosen = value if isinstance(value, str) else _CUSTOM_CHOICE
+    chosen = value if isinstance(value, str) else _CUSTOM_VALUE_CHOICE
     draw_combo(
         session,
         f"{label} from",
         chosen,
-        (*keywords, _CUSTOM_CHOICE) if custom_value else keywords,
+        (*keywords, _CUSTOM_VALUE_CHOICE) if custom_value else keywords,
         with_keyword,
     )
 
@@ -165,31 +167,31 @@ def _field_label(field_name: str) -> str:
     return field_name.replace("_", " ")
 
 
-def draw_tooltip(text: str) -> None:
+def draw_tooltip(tooltip_text: str) -> None:
     """Draw a tooltip for the last control while the pointer rests on it."""
-    if not text or not imgui.is_item_hovered() or imgui.is_any_mouse_down():
+    if not tooltip_text or not imgui.is_item_hovered() or imgui.is_any_mouse_down():
         return
     imgui.begin_tooltip()
-    imgui.push_text_wrap_pos(_TOOLTIP_WIDTH)
-    imgui.text_unformatted(text)
+    imgui.push_text_wrap_pos(_TOOLTIP_WIDTH_PX)
+    imgui.text_unformatted(tooltip_text)
     imgui.pop_text_wrap_pos()
     imgui.end_tooltip()
 
 
-def draw_rows(label: str, count: int, draw: Callable[[int], None]) -> None:
+def draw_rows(label: str, row_count: int, draw_row: Callable[[int], None]) -> None:
     """Draw many controls in a scrollable area; only the visible rows are drawn.
 
-    count : number of rows
-    draw : function that draws a row, given its index
+    row_count : number of rows
+    draw_row : function that draws a row, given its index
     """
     width, line = imgui.calc_item_width(), imgui.get_frame_height_with_spacing()
-    imgui.begin_child(label, imgui.ImVec2(0.0, min(count, _MAX_VISIBLE_ROWS) * line))
+    imgui.begin_child(label, imgui.ImVec2(0.0, min(row_count, _MAX_VISIBLE_LIST_ROWS) * line))
     imgui.push_item_width(width)
     clipper = imgui.ListClipper()
-    clipper.begin(count, line)
+    clipper.begin(row_count, line)
     while clipper.step():
         for row in range(clipper.display_start, clipper.display_end):
-            draw(row)
+            draw_row(row)
     imgui.pop_item_width()
     imgui.end_child()
 
@@ -236,35 +238,35 @@ def draw_combo(
     session: Session,
     label: str,
     current: str,
-    names: Iterable[str],
+    choices: Iterable[str],
     with_value: ToState,
-    display_names: Mapping[str, str] = _NO_DISPLAY_NAMES,
+    display_names: Mapping[str, str] = _EMPTY_DISPLAY_NAMES,
 ) -> None:
     """Draw a drop-down list, and change the state when a name is chosen.
 
-    names : choices; "" is a separator
+    choices : choices; "" is a separator
     with_value : function that returns a state, given the chosen name
     display_names : text to show for each name whose text differs from the name
     """
-    chosen = choose_name(session, label, current, names, display_names)
+    chosen = choose_name(session, label, current, choices, display_names)
     if chosen is not None:
         run_action(session, lambda: session.change(with_value(chosen)))
 
 
 def choose_name(
-    session: Session, label: str, current: str, names: Iterable[str], display_names: Mapping[str, str]
+    session: Session, label: str, current: str, choices: Iterable[str], display_names: Mapping[str, str]
 ) -> str | None:
     """Draw a drop-down list; return the name that was clicked, or None if no name was clicked.
 
     current : name that is selected now
-    names : choices; "" is a separator
+    choices : choices; "" is a separator
     display_names : text to show for each name whose text differs from the name
     """
     chosen = None
     if not imgui.begin_combo(label, display_names.get(current, current), _TALL_LIST_FLAG):
         record_position(session, label)
         return None
-    for name in names:
+    for name in choices:
         if not name:
             imgui.separator()
             continue
@@ -283,17 +285,19 @@ def draw_button(session: Session, label: str) -> bool:
     return bool(pressed)
 
 
-def begin_plot(label: str, axes: tuple[str, str], x_range: tuple[float, float], highest_value: float) -> bool:
+def begin_plot(
+    label: str, axis_labels: tuple[str, str], x_range: tuple[float, float], highest_value: float
+) -> bool:
     """Begin a plot; return whether the plot is visible.
 
-    axes : labels of the horizontal and of the vertical axis
+    axis_labels : labels of the horizontal and of the vertical axis
     x_range : ends of the horizontal axis
     highest_value : value slightly above which the vertical axis ends
     """
-    if not implot.begin_plot(f"##{label}", imgui.ImVec2(-1.0, _PLOT_HEIGHT), _PLOT_FLAGS):
+    if not implot.begin_plot(f"##{label}", imgui.ImVec2(-1.0, _PLOT_HEIGHT_PX), _PLOT_FLAGS):
         return False
-    hidden = int(implot.AxisFlags_.no_tick_labels) if axes[0] == "frames" else 0
-    implot.setup_axes(*axes, hidden, 0)
+    hidden = int(implot.AxisFlags_.no_tick_labels) if axis_labels[0] == "frames" else 0
+    implot.setup_axes(*axis_labels, hidden, 0)
     implot.setup_axes_limits(*x_range, 0.0, 1.1 * highest_value, int(imgui.Cond_.always))
     return True
 
@@ -310,8 +314,8 @@ def record_position(session: Session, label: str) -> None:
     session.positions[_label_key(label)] = x, 0.5 * float(low.y + high.y)
 
 
-def _label_key(label: str) -> str:
-    return label.rpartition("###")[2]
+def _label_key(control_label: str) -> str:
+    return control_label.rpartition("###")[2]
 
 
 def run_action(session: Session, action: Callable[[], None]) -> None:

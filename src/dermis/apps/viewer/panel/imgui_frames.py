@@ -14,7 +14,7 @@ from dermis.apps.viewer.controls import Event
 from dermis.gpu import Device, TextureView
 
 _FONT_SIZE = 15.0
-_GREY_LEVELS = (  # no hues, because they would affect the perception of the skin beside them
+_GREY_LEVEL_BY_STYLE_COLOUR = (  # no hues, because they would affect the perception of the skin beside them
     ("window_bg", 0.08),
     ("frame_bg", 0.18),
     ("frame_bg_hovered", 0.26),
@@ -43,7 +43,7 @@ def set_style() -> None:
     imgui.style_colors_dark()
     io.fonts.flags |= int(imgui.ImFontAtlasFlags_.no_baked_lines)  # some backends cannot draw them
     style.window_rounding, style.frame_rounding, style.window_border_size = 0.0, 3.0, 0.0
-    for name, grey in _GREY_LEVELS:
+    for name, grey in _GREY_LEVEL_BY_STYLE_COLOUR:
         if hasattr(imgui.Col_, name):  # some names require a newer version
             style.set_color_(int(getattr(imgui.Col_, name)), imgui.ImVec4(grey, grey, grey, 1.0))
 
@@ -61,10 +61,10 @@ class ImguiFrames:
         self._report_error = report_error
         self._is_new = self._has_layout = False
 
-    def open(self, device: Device, target: str) -> None:
+    def open(self, device: Device, target_format: str) -> None:
         """Create the Dear ImGui context, and the GPU resources that draw the layouts.
 
-        target : format of the textures to draw into
+        target_format : format of the textures to draw into
         """
         # A context holds its font texture, which belongs to one device.
         self._context = imgui.create_context()
@@ -72,22 +72,22 @@ class ImguiFrames:
         self.enter()
         set_style()
         self._is_new = True
-        self._device, self._target = device, target
-        self._imgui_backend = ImguiWgpuBackend(device.handle, target)
+        self._device, self._target = device, target_format
+        self._imgui_backend = ImguiWgpuBackend(device.handle, target_format)
 
     def enter(self) -> None:
         """Make this the current context of Dear ImGui."""
         imgui.set_current_context(self._context)
         implot.set_current_context(self._plot_context)
 
-    def lay_out(self, size: tuple[float, float], draw: Callable[[], None]) -> None:
+    def lay_out(self, window_size: tuple[float, float], draw: Callable[[], None]) -> None:
         """Process pending input and lay out the next frame; `render` draws this frame.
 
-        size : logical size of the window
+        window_size : logical size of the window
         draw : function that declares the windows and controls
         """
         try:
-            imgui.get_io().display_size = imgui.ImVec2(*size)
+            imgui.get_io().display_size = imgui.ImVec2(*window_size)
             for _ in range(2 if self._is_new else 1):  # the first frame of a context only measures the window
                 self._is_new = False
                 imgui.new_frame()
@@ -99,12 +99,12 @@ class ImguiFrames:
             self._report_error(error)
             self._recreate_context()
 
-    def render(self, target: TextureView) -> None:
+    def render(self, target_view: TextureView) -> None:
         """Draw the last layout over the target; draw nothing if that layout failed."""
         if not self._has_layout:
             return
         encoder = self._device.handle.create_command_encoder()
-        attachment = {"view": target, "load_op": "load", "store_op": "store"}
+        attachment = {"view": target_view, "load_op": "load", "store_op": "store"}
         render_pass = encoder.begin_render_pass(label="panel", color_attachments=[attachment])
         self._imgui_backend.render(imgui.get_draw_data(), render_pass)
         render_pass.end()
@@ -135,38 +135,40 @@ def recover_imgui(report_error: ReportError) -> Iterator[None]:
 
 
 POINTER_EVENTS = ("pointer_down", "pointer_move", "pointer_up", "double_click", "wheel")
-_WHEEL_SPEED = 0.01
+_SCROLL_PER_WHEEL_UNIT = 0.01
 
 
-def feed_pointer(event: Event, frame: Callable[[], None]) -> None:
+def feed_pointer(event: Event, lay_out_frame: Callable[[], None]) -> None:
     """Pass a pointer event, one of the types in `POINTER_EVENTS`, to Dear ImGui.
 
-    frame : function that lays out the panel with the events so far
+    lay_out_frame : function that lays out the panel with the events so far
     """
     kind = event["event_type"]
     imgui.get_io().add_mouse_pos_event(event["x"], event["y"])
     if kind in ("pointer_down", "pointer_up"):
         # A slider ignores a move in the frame of its release, and a press uses the last move of its frame.
-        frame()  # may replace the context and its inputs
+        lay_out_frame()  # may replace the context and its inputs
         imgui.get_io().add_mouse_button_event(max(0, event["button"] - 1), kind == "pointer_down")
-        frame()
+        lay_out_frame()
     elif kind == "wheel":
-        imgui.get_io().add_mouse_wheel_event(-_WHEEL_SPEED * event["dx"], -_WHEEL_SPEED * event["dy"])
+        imgui.get_io().add_mouse_wheel_event(
+            -_SCROLL_PER_WHEEL_UNIT * event["dx"], -_SCROLL_PER_WHEEL_UNIT * event["dy"]
+        )
 
 
-def feed_key(event: Event, frame: Callable[[], None]) -> None:
+def feed_key(event: Event, lay_out_frame: Callable[[], None]) -> None:
     """Pass a key or character to Dear ImGui, and lay out the panel at once.
 
     Without this layout, a press and a release of a key between two frames would cancel out.
 
-    frame : function that lays out the panel with the events so far
+    lay_out_frame : function that lays out the panel with the events so far
     """
     io, kind = imgui.get_io(), event["event_type"]
     if kind == "char":
         io.add_input_characters_utf8(event.get("data") or event.get("char_str") or "")
     else:
         _change_key(io, str(event["key"]), kind == "key_down")
-    frame()
+    lay_out_frame()
 
 
 def _change_key(io: imgui.IO, key_name: str, is_down: bool) -> None:

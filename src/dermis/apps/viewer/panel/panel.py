@@ -42,70 +42,80 @@ SHORTCUTS = (
     ("Escape", "close a list or this help, clear the search"),
     ("? or H", "hide or show this help"),
 )
-_TEXT_MARGIN, _MIN_TEXT_WIDTH = 10.0, 80.0
-_HANDLE_RADIUS = 7.0  # of the divider
-_HELP_WIDTH, _FIRST_COLUMN_FRACTION = 460.0, 0.4
+_MESSAGE_MARGIN, _MIN_MESSAGE_WIDTH = 10.0, 80.0
+_DIVIDER_HANDLE_RADIUS = 7.0  # of the divider
+_HELP_WIDTH, _SHORTCUT_COLUMN_FRACTION = 460.0, 0.4
 
 
-def draw_divider(split: SplitView, left: float, size: tuple[float, float]) -> None:
+def draw_divider(split: SplitView, picture_left: float, window_size: tuple[float, float]) -> None:
     """Draw the divider between before and after, with a handle in its centre.
 
-    left : left edge of the picture
-    size : logical size of the window
+    picture_left : left edge of the picture
+    window_size : width and height of the window [logical pixel]
     """
     if split.frozen_state is None:
         return
-    draw_list, x = imgui.get_background_draw_list(), left + split.divider_position * (size[0] - left)
+    draw_list, x = (
+        imgui.get_background_draw_list(),
+        picture_left + split.divider_position * (window_size[0] - picture_left),
+    )
     light, dark = imgui.IM_COL32(230, 230, 230, 255), imgui.IM_COL32(0, 0, 0, 255)
-    draw_list.add_line(imgui.ImVec2(x, 0.0), imgui.ImVec2(x, size[1]), light, 1.0)
-    middle = imgui.ImVec2(x, 0.5 * size[1])
-    draw_list.add_circle_filled(middle, _HANDLE_RADIUS, light)
-    draw_list.add_circle(middle, _HANDLE_RADIUS, dark)
+    draw_list.add_line(imgui.ImVec2(x, 0.0), imgui.ImVec2(x, window_size[1]), light, 1.0)
+    middle = imgui.ImVec2(x, 0.5 * window_size[1])
+    draw_list.add_circle_filled(middle, _DIVIDER_HANDLE_RADIUS, light)
+    draw_list.add_circle(middle, _DIVIDER_HANDLE_RADIUS, dark)
     for text, start in (
-        ("before", x - imgui.calc_text_size("before").x - _TEXT_MARGIN),
-        ("after", x + _TEXT_MARGIN),
+        ("before", x - imgui.calc_text_size("before").x - _MESSAGE_MARGIN),
+        ("after", x + _MESSAGE_MARGIN),
     ):
-        draw_list.add_text(imgui.ImVec2(start + 1.0, _TEXT_MARGIN + 1.0), dark, text)
-        draw_list.add_text(imgui.ImVec2(start, _TEXT_MARGIN), light, text)
+        draw_list.add_text(imgui.ImVec2(start + 1.0, _MESSAGE_MARGIN + 1.0), dark, text)
+        draw_list.add_text(imgui.ImVec2(start, _MESSAGE_MARGIN), light, text)
 
 
-def draw_messages(lines: Sequence[str], left: float, size: tuple[float, float]) -> None:
+def draw_messages(
+    message_lines: Sequence[str], picture_left: float, window_size: tuple[float, float]
+) -> None:
     """Draw lines of text on a dark background along the lower edge of the picture.
 
-    left : left edge of the picture
-    size : logical size of the window
+    picture_left : left edge of the picture
+    window_size : width and height of the window [logical pixel]
     """
-    if not lines:
+    if not message_lines:
         return
     draw_list = imgui.get_foreground_draw_list()
-    left += _TEXT_MARGIN
-    wrap_width = max(_MIN_TEXT_WIDTH, size[0] - left - _TEXT_MARGIN)
-    text = "\n".join(lines)
+    picture_left += _MESSAGE_MARGIN
+    wrap_width = max(_MIN_MESSAGE_WIDTH, window_size[0] - picture_left - _MESSAGE_MARGIN)
+    text = "\n".join(message_lines)
     box = imgui.calc_text_size(text, False, wrap_width)
-    top = size[1] - box.y - _TEXT_MARGIN
+    top = window_size[1] - box.y - _MESSAGE_MARGIN
     background, white = imgui.IM_COL32(0, 0, 0, 150), imgui.IM_COL32(235, 235, 235, 255)
-    corners = imgui.ImVec2(left - 6, top - 4), imgui.ImVec2(left + box.x + 6, size[1] - 6)
+    corners = (
+        imgui.ImVec2(picture_left - 6, top - 4),
+        imgui.ImVec2(picture_left + box.x + 6, window_size[1] - 6),
+    )
     draw_list.add_rect_filled(*corners, background, 4.0)
-    font, start = imgui.get_font(), imgui.ImVec2(left, top)
+    font, start = imgui.get_font(), imgui.ImVec2(picture_left, top)
     draw_list.add_text(font, imgui.get_font_size(), start, white, text, wrap_width)
 
 
-def draw_help(left: float, size: tuple[float, float]) -> None:
+def draw_help(picture_left: float, window_size: tuple[float, float]) -> None:
     """Draw the list of shortcuts in the centre of the picture; pointer events pass through the list.
 
-    left : left edge of the picture
-    size : logical size of the window
+    picture_left : left edge of the picture
+    window_size : width and height of the window [logical pixel]
     """
-    width = min(_HELP_WIDTH, size[0] - left - 2.0 * _TEXT_MARGIN)
-    imgui.set_next_window_pos(imgui.ImVec2(0.5 * (left + size[0]), 0.5 * size[1]), 0, imgui.ImVec2(0.5, 0.5))
+    width = min(_HELP_WIDTH, window_size[0] - picture_left - 2.0 * _MESSAGE_MARGIN)
+    imgui.set_next_window_pos(
+        imgui.ImVec2(0.5 * (picture_left + window_size[0]), 0.5 * window_size[1]), 0, imgui.ImVec2(0.5, 0.5)
+    )
     imgui.set_next_window_size(imgui.ImVec2(width, 0.0))
     imgui.set_next_window_bg_alpha(0.88)
     flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_inputs | imgui.WindowFlags_.no_nav
     imgui.begin("shortcuts", None, int(flags))
     if imgui.begin_table("shortcuts", 2, int(imgui.TableFlags_.sizing_stretch_prop)):
         stretch = int(imgui.TableColumnFlags_.width_stretch)
-        imgui.table_setup_column("input", stretch, _FIRST_COLUMN_FRACTION)
-        imgui.table_setup_column("action", stretch, 1.0 - _FIRST_COLUMN_FRACTION)
+        imgui.table_setup_column("input", stretch, _SHORTCUT_COLUMN_FRACTION)
+        imgui.table_setup_column("action", stretch, 1.0 - _SHORTCUT_COLUMN_FRACTION)
         for text in (text for row in SHORTCUTS for text in row):
             imgui.table_next_column()
             imgui.text_wrapped(text)
@@ -114,15 +124,15 @@ def draw_help(left: float, size: tuple[float, float]) -> None:
 
 
 _PANEL_WIDTH = 330.0  # logical
-_CONTROL_FRACTION = 0.5  # of the panel's width
-_MAX_WIDTH_FRACTION = 0.5  # of the window
+_CONTROL_WIDTH_FRACTION = 0.5  # of the panel's width
+_MAX_PANEL_WIDTH_FRACTION = 0.5  # of the window
 _MIN_TEXT_SCALE = 0.8  # in a narrow panel
 _NARROW_WINDOW_WIDTH = 400.0  # width below which a window has a drawer
 _PHONE_WINDOW_WIDTH = 480.0  # width below which an upright phone has a drawer
-_PORTRAIT_ASPECT = 1.4  # least height over width of an upright phone
-_DRAWER_FRACTION = 0.86  # of the window's width
+_MIN_PORTRAIT_ASPECT = 1.4  # least height over width of an upright phone
+_DRAWER_WIDTH_FRACTION = 0.86  # of the window's width
 _TOUCH_PADDING = 8.0  # vertical padding of controls for fingers
-_BUTTON_MARGIN, _BUTTON_ALPHA = 8.0, 0.6  # of the button that opens the panel
+_PANEL_BUTTON_MARGIN, _PANEL_BUTTON_ALPHA = 8.0, 0.6  # of the button that opens the panel
 
 
 class Panel:
@@ -143,28 +153,28 @@ class Panel:
         self._frames = ImguiFrames(partial(session.report_error, "The panel cannot be drawn"))
         self.label_width = 0.0  # space right of the controls [logical pixel]
 
-    def open(self, device: Device, target: str) -> None:
+    def open(self, device: Device, target_format: str) -> None:
         """Create the resources that draw the panel.
 
-        target : format of the textures to draw into
+        target_format : format of the textures to draw into
         """
-        self._frames.open(device, target)
+        self._frames.open(device, target_format)
 
-    def width(self, size: tuple[float, float]) -> float:
+    def width(self, window_size: tuple[float, float]) -> float:
         """Return the width by which the panel narrows the picture, 0 for a drawer [logical pixel].
 
-        size : logical size of the window
+        window_size : width and height of the window [logical pixel]
         """
-        return 0.0 if is_drawer(size) else self._covered_width(size)
+        return 0.0 if is_drawer(window_size) else self._covered_width(window_size)
 
     def _covered_width(self, window_size: tuple[float, float]) -> float:
         """Return the width of the window that the panel covers, 0 for a hidden panel [logical pixel].
 
-        window_size : logical size of the window
+        window_size : width and height of the window [logical pixel]
         """
-        fraction, is_shown = _MAX_WIDTH_FRACTION, self.is_visible
+        fraction, is_shown = _MAX_PANEL_WIDTH_FRACTION, self.is_visible
         if is_drawer(window_size):
-            fraction, is_shown = _DRAWER_FRACTION, self.is_drawer_open
+            fraction, is_shown = _DRAWER_WIDTH_FRACTION, self.is_drawer_open
         return round(min(_PANEL_WIDTH, fraction * window_size[0])) if is_shown else 0.0
 
     def toggle(self) -> None:
@@ -174,39 +184,39 @@ class Panel:
         else:
             self.is_visible = not self.is_visible
 
-    def handle_event(self, event: Event, size: tuple[float, float]) -> bool:
+    def handle_event(self, event: Event, window_size: tuple[float, float]) -> bool:
         """Process an input event of the panel; return False for an event that is for the picture.
 
-        size : logical size of the window
+        window_size : width and height of the window [logical pixel]
         """
         self._frames.enter()
-        self._size = size
+        self._size = window_size
         io, kind = imgui.get_io(), event["event_type"]
         if kind == "key_down" and not io.want_text_input and self._run_shortcut(event):
             return True
-        if kind == "pointer_down" and event["x"] >= self._covered_width(size):
+        if kind == "pointer_down" and event["x"] >= self._covered_width(window_size):
             self.shows_help = False
         if kind in POINTER_EVENTS:
             is_on_panel = self._is_over_panel(
-                event["x"], event["y"], size
+                event["x"], event["y"], window_size
             )  # evaluated before a press closes a list
-            feed_pointer(event, lambda: self._lay_out_frame(size))
+            feed_pointer(event, lambda: self._lay_out_frame(window_size))
             return is_on_panel
         if kind == "pointer_leave":
             io.add_mouse_pos_event(-1e6, -1e6)
             return False
-        feed_key(event, lambda: self._lay_out_frame(size))
+        feed_key(event, lambda: self._lay_out_frame(window_size))
         return bool(imgui.get_io().want_text_input)  # of the current context, which the frame may replace
 
-    def draw(self, target: TextureView, size: tuple[float, float], pixel_ratio: float) -> None:
+    def draw(self, target_view: TextureView, window_size: tuple[float, float], pixel_ratio: float) -> None:
         """Draw the panel over the target.
 
-        size : logical size of the window
+        window_size : width and height of the window [logical pixel]
         """
         self._frames.enter()
         imgui.get_io().display_framebuffer_scale = imgui.ImVec2(pixel_ratio, pixel_ratio)
-        self._lay_out_frame(size)
-        self._frames.render(target)
+        self._lay_out_frame(window_size)
+        self._frames.render(target_view)
 
     def _lay_out_frame(self, window_size: tuple[float, float]) -> None:
         self._size = window_size
@@ -248,7 +258,7 @@ class Panel:
         """Return whether a position is over the panel; Dear ImGui could answer this only one frame later.
 
         x, y : position of the pointer in the window
-        window_size : logical size of the window
+        window_size : width and height of the window [logical pixel]
         """
         width = self._covered_width(window_size)
         on_button = not width and x < self._button_end[0] and y < self._button_end[1]
@@ -278,12 +288,12 @@ class Panel:
         self._has_popup = False
         imgui.set_next_window_pos(imgui.ImVec2(0.0, 0.0))
         flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_background
-        imgui.push_style_var(int(imgui.StyleVar_.alpha), _BUTTON_ALPHA)
+        imgui.push_style_var(int(imgui.StyleVar_.alpha), _PANEL_BUTTON_ALPHA)
         imgui.begin("corner", None, int(flags | imgui.WindowFlags_.always_auto_resize))
         if draw_button(self._session, "panel"):
             self.toggle()
         end = imgui.get_item_rect_max()
-        self._button_end = float(end.x) + _BUTTON_MARGIN, float(end.y) + _BUTTON_MARGIN
+        self._button_end = float(end.x) + _PANEL_BUTTON_MARGIN, float(end.y) + _PANEL_BUTTON_MARGIN
         imgui.end()
         imgui.pop_style_var()
 
@@ -295,9 +305,9 @@ class Panel:
         fixed = imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_resize | imgui.WindowFlags_.no_collapse
         imgui.begin("dermis", None, int(fixed | imgui.WindowFlags_.no_title_bar))
         self._draw_toolbar()
-        imgui.push_item_width(_CONTROL_FRACTION * width)
+        imgui.push_item_width(_CONTROL_WIDTH_FRACTION * width)
         gap = imgui.get_style().item_inner_spacing.x
-        self.label_width = imgui.get_content_region_avail().x - _CONTROL_FRACTION * width - gap
+        self.label_width = imgui.get_content_region_avail().x - _CONTROL_WIDTH_FRACTION * width - gap
         for section in filter(lambda section: section.applies(session), SECTIONS):
             flags = int(imgui.TreeNodeFlags_.default_open) if section.is_open else 0
             is_open = imgui.collapsing_header(section.title, flags)
@@ -334,7 +344,7 @@ class Panel:
             imgui.set_scroll_y(imgui.get_scroll_y() - imgui.get_io().mouse_delta.y)
 
 
-def is_drawer(size: tuple[float, float]) -> bool:
+def is_drawer(window_size: tuple[float, float]) -> bool:
     """Return whether a window is so narrow that the panel is a drawer over the picture."""
-    width, height = size
-    return width < (_PHONE_WINDOW_WIDTH if height > _PORTRAIT_ASPECT * width else _NARROW_WINDOW_WIDTH)
+    width, height = window_size
+    return width < (_PHONE_WINDOW_WIDTH if height > _MIN_PORTRAIT_ASPECT * width else _NARROW_WINDOW_WIDTH)

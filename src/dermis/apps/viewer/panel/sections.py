@@ -48,18 +48,18 @@ from dermis.scene.talk import COMPARISONS
 
 _CUSTOM_CHOICE = "custom"
 _NO_ENVIRONMENT = "none"
-_STOP_RANGE = SliderRange(-6.0, 4.0)
-_NEW_LIGHT_MM = (-500.0, 400.0, 800.0)  # position of a new light, at the upper left of the portrait
-_MIN_FADE_DEGREES = 0.5  # least difference of the cones of a spotlight
+_EXPOSURE_STOP_RANGE = SliderRange(-6.0, 4.0)
+_NEW_LIGHT_POSITION_MM = (-500.0, 400.0, 800.0)  # position of a new light, at the upper left of the portrait
+_MIN_CONE_DIFFERENCE_DEGREES = 0.5  # least difference of the cones of a spotlight
 _ENVIRONMENT_STYLES = {"exposure": FieldStyle("brightness")}
-_WEIGHT_RANGE, _ANGLE_RANGE = SliderRange(0.0, 1.0), SliderRange(-60.0, 60.0)
+_TARGET_WEIGHT_RANGE, _BONE_ANGLE_RANGE = SliderRange(0.0, 1.0), SliderRange(-60.0, 60.0)
 _MAX_LABEL_LENGTH = 16  # characters that fit into a narrow panel
 Floats = NDArray[np.float64]
-_TOTAL_LABEL = "total"
-_HUE_STEP = 0.618034  # golden ratio of the hue circle, so that colours of neighbouring stages differ
-_SEED_COUNT = 10_000
+_WHOLE_FRAME_LABEL = "total"
+_STAGE_HUE_STEP = 0.618034  # golden ratio of the hue circle, so that colours of neighbouring stages differ
+_PERSON_SEED_COUNT = 10_000
 _ON_ENTER_FLAG = int(imgui.InputTextFlags_.enter_returns_true)
-_BUTTONS_PER_ROW = 3
+_PRESET_BUTTONS_PER_ROW = 3
 _MAP_SIZES = (256, 512, 1024, 2048, 4096)
 _SETTING_STYLES = {
     **TECHNIQUE_STYLES,
@@ -86,7 +86,10 @@ def draw_lights(session: Session) -> None:
 
 def _add_light(session: Session, light_kind: str) -> ViewerState:
     """Return the state with a new light of the given kind, and select that light."""
-    values: dict[str, Any] = {"position": _NEW_LIGHT_MM, "direction": tuple(-x for x in _NEW_LIGHT_MM)}
+    values: dict[str, Any] = {
+        "position": _NEW_LIGHT_POSITION_MM,
+        "direction": tuple(-x for x in _NEW_LIGHT_POSITION_MM),
+    }
     fields = LIGHTS[light_kind].model_fields
     required = {name: values[name] for name in values.keys() & fields.keys() if fields[name].is_required()}
     lights = session.state.scene.lights
@@ -118,7 +121,9 @@ def _draw_light(session: Session, light_index: int, light: Light) -> None:
         return make_state(irradiance=tuple(factor * c for c in light.irradiance))
 
     imgui.text_disabled(f"{LIGHT_KIND_NAMES.get(light.kind, light.kind)}, Shift and drag to move")
-    draw_slider(session, "strength", math.log2(strength / math.pi), with_stops, _STOP_RANGE, "%.2f stops")
+    draw_slider(
+        session, "strength", math.log2(strength / math.pi), with_stops, _EXPOSURE_STOP_RANGE, "%.2f stops"
+    )
     draw_fields(session, light, make_state, LIGHT_STYLES | _cone_styles(light))
     if draw_button(session, "copy"):  # raises DermisError if there are too many lights
         lights = session.state.scene.lights
@@ -135,8 +140,8 @@ def _cone_styles(light: Light) -> dict[str, FieldStyle]:
     """Return slider ranges with which a spotlight's outer cone stays wider than the inner cone."""
     if not isinstance(light, SpotLight):
         return {}
-    inner = SliderRange(0.5, light.outer_degrees - _MIN_FADE_DEGREES)
-    outer = SliderRange(light.inner_degrees + _MIN_FADE_DEGREES, 88.0)
+    inner = SliderRange(0.5, light.outer_degrees - _MIN_CONE_DIFFERENCE_DEGREES)
+    outer = SliderRange(light.inner_degrees + _MIN_CONE_DIFFERENCE_DEGREES, 88.0)
     return {
         "inner_degrees": FieldStyle("inner cone", inner),
         "outer_degrees": FieldStyle("outer cone", outer),
@@ -147,8 +152,10 @@ def _draw_environment(session: Session) -> None:
     environment, with_environment = session.state.scene.environment, session.state.with_environment
     samples = [name for name, sample in SAMPLES.items() if sample.kind == "environment"]
 
-    def with_name(name: str) -> ViewerState:
-        return with_environment(None if name == _NO_ENVIRONMENT else Environment(name=name))
+    def with_name(environment_name: str) -> ViewerState:
+        return with_environment(
+            None if environment_name == _NO_ENVIRONMENT else Environment(name=environment_name)
+        )
 
     def make_state(**fields: object) -> ViewerState:
         assert environment is not None
@@ -229,7 +236,7 @@ def _draw_target_weight(session: Session, target_name: str, animated_names: froz
 
     weight = posing.target_weight(session.displayed_state.scene, target_name)
     imgui.begin_disabled(target_name in animated_names)
-    draw_slider(session, f"{target_name}##target", weight, with_value, _WEIGHT_RANGE, "%.2f")
+    draw_slider(session, f"{target_name}##target", weight, with_value, _TARGET_WEIGHT_RANGE, "%.2f")
     imgui.end_disabled()
     if len(target_name) > _MAX_LABEL_LENGTH:
         draw_tooltip(target_name)
@@ -245,12 +252,14 @@ def _draw_bone_angles(session: Session, bone_name: str, animated_names: frozense
     def with_value(new_angles: list[float]) -> ViewerState:
         axis = max(range(3), key=lambda k: abs(new_angles[k] - angles[k]))
         degrees = [*angles]
-        degrees[axis] = clamp(new_angles[axis], _ANGLE_RANGE)
+        degrees[axis] = clamp(new_angles[axis], _BONE_ANGLE_RANGE)
         x, y, z = degrees
         return session.state.with_pose(posing.with_bone_angles(session.state.scene, bone_name, (x, y, z)))
 
     imgui.begin_disabled(bone_name in animated_names)
-    result = imgui.slider_float3(f"{bone_name}##bone", [*angles], _ANGLE_RANGE.low, _ANGLE_RANGE.high, "%.0f")
+    result = imgui.slider_float3(
+        f"{bone_name}##bone", [*angles], _BONE_ANGLE_RANGE.low, _BONE_ANGLE_RANGE.high, "%.0f"
+    )
     imgui.end_disabled()
     edit_value(session, f"{bone_name}##bone", result, with_value)
     if len(bone_name) > _MAX_LABEL_LENGTH:
@@ -268,7 +277,7 @@ def draw_head(session: Session) -> None:
         session.heads.open(f"{HUMAN}:{max(0, new_seed)}")
     imgui.same_line()
     if draw_button(session, "dice"):
-        session.heads.open(f"{HUMAN}:{random.randrange(_SEED_COUNT)}")
+        session.heads.open(f"{HUMAN}:{random.randrange(_PERSON_SEED_COUNT)}")
     draw_tooltip("Another random person.")
     if session.request_file is None:
         hint = "path of a file"
@@ -318,13 +327,13 @@ def draw_view(session: Session) -> None:
     draw_combo(session, "show", state.view, VIEW_NAMES, state.with_view)
     if state.view == ATLAS_VIEW_NAME:
 
-        def with_layer(name: str) -> ViewerState:
-            return state.with_atlas_view(replace(state.atlas_view, layer=name))
+        def with_layer(layer_name: str) -> ViewerState:
+            return state.with_atlas_view(replace(state.atlas_view, layer=layer_name))
 
         draw_combo(session, "layer", state.atlas_view.layer, ATLAS_LAYERS, with_layer)
         imgui.text_disabled("wheel: zoom; double click: show all")
     for index, name in enumerate(PRESET_NAMES):
-        if index % _BUTTONS_PER_ROW:
+        if index % _PRESET_BUTTONS_PER_ROW:
             imgui.same_line()
         if draw_button(session, f"{name}##camera"):
             session.controls.set_camera_preset(name)
@@ -408,7 +417,7 @@ def draw_timing(session: Session) -> None:
         imgui.text_disabled("this adapter reports no times")
         return
     total = np.sum(list(series.values()), axis=0)
-    colours = [colorsys.hls_to_rgb((_HUE_STEP * k) % 1.0, 0.6, 0.5) for k in range(len(series))]
+    colours = [colorsys.hls_to_rgb((_STAGE_HUE_STEP * k) % 1.0, 0.6, 0.5) for k in range(len(series))]
     _plot_stacked_areas(series, colours, total)
     for (name, values), colour in zip(series.items(), colours, strict=True):
         imgui.text_colored(imgui.ImVec4(*colour, 1.0), f"{values[-1]:8.2f} ms")
@@ -417,15 +426,15 @@ def draw_timing(session: Session) -> None:
     imgui.text(f"{total[-1]:8.2f} ms in total, mean of {len(total)} frames {total.mean():.2f}")
 
 
-def stage_series(frames: Sequence[dict[str, float]]) -> dict[str, Floats]:
+def stage_series(frame_times_ms: Sequence[dict[str, float]]) -> dict[str, Floats]:
     """Return the times (n,) of each stage in n frames, by stage name [ms].
 
     The time is 0 in frames without the stage.
 
-    frames : times of the stages of each frame, by stage name [ms]
+    frame_times_ms : times of the stages of each frame, by stage name [ms]
     """
-    names = dict.fromkeys(name for frame in frames for name in frame if name != _TOTAL_LABEL)
-    return {name: np.array([frame.get(name, 0.0) for frame in frames], np.float64) for name in names}
+    names = dict.fromkeys(name for frame in frame_times_ms for name in frame if name != _WHOLE_FRAME_LABEL)
+    return {name: np.array([frame.get(name, 0.0) for frame in frame_times_ms], np.float64) for name in names}
 
 
 def _plot_stacked_areas(

@@ -49,17 +49,17 @@ _PIGMENT_STYLES = _PERCENT_STYLES | {
     "baseline": FieldStyle("other tissue###baseline", unit=0.01, number_format="%.0f %%"),
 }
 _SKIN_PROFILES = (PUBLISHED_PRESET, "skin1", "skin2", "dj3", *SKINS)
-_NEW_LAYER_MM = 0.2
+_NEW_LAYER_THICKNESS_MM = 0.2
 _CHANNEL_COLOURS = ((0.9, 0.35, 0.3), (0.35, 0.8, 0.4), (0.4, 0.55, 1.0))
-_RADII_MM = np.geomspace(0.01, 30.0, 160)
+_PLOTTED_RADII_MM = np.geomspace(0.01, 30.0, 160)
 
 
 def draw_profile(session: Session) -> None:
     """Draw the controls of the diffusion profile: its name, its colour, and its pigments or layers."""
     skin, with_skin = session.state.scene.skin, session.state.with_skin
 
-    def with_profile(name: str) -> ViewerState:
-        return with_skin(profile=name, pigments=None, layers=())
+    def with_profile(profile_name: str) -> ViewerState:
+        return with_skin(profile=profile_name, pigments=None, layers=())
 
     other_media = (name for name in preset_names() if name not in _SKIN_PROFILES)
     draw_combo(
@@ -133,7 +133,7 @@ def _plot_profile(session: Session) -> None:
         profile = session.view_renderer.renderer.skin_profile(session.state.scene.skin)
     except DermisError:  # reported by the message over the picture
         return
-    r, values = _RADII_MM, profile.radiant_exitance(_RADII_MM)
+    r, values = _PLOTTED_RADII_MM, profile.radiant_exitance(_PLOTTED_RADII_MM)
     highest = float((r[:, None] * values).max())
     if not begin_plot("profile", ("r [mm]", "r R(r) [1/mm]"), (r[0], r[-1]), max(highest, 1e-9)):
         return
@@ -146,10 +146,10 @@ def _plot_profile(session: Session) -> None:
 
 
 @lru_cache(maxsize=16)
-def _profile_layers(profile: str) -> tuple[TissueLayer, ...]:
+def _profile_layers(profile_name: str) -> tuple[TissueLayer, ...]:
     """Return the tissue layers of a named profile, or () for a sum of Gaussians; the results are cached."""
     try:
-        return tissue_layers(Skin(profile=profile))
+        return tissue_layers(Skin(profile=profile_name))
     except (
         DermisError
     ):  # a table of Gaussians, or an invalid file, which the message over the picture reports
@@ -173,10 +173,10 @@ def _draw_layer(session: Session, layers: Layers, layer_index: int) -> None:
     def make_state(**fields: object) -> ViewerState:
         return _replace_layer(session, layers, layer_index, validated_copy(layer, **fields))
 
-    draw_fields(session, layer, make_state, LAYER_STYLES, suffix=label_suffix)
+    draw_fields(session, layer, make_state, LAYER_STYLES, label_suffix=label_suffix)
     imgui.text_disabled("red, green, blue [1/mm]")
     if len(layers) < MAX_LAYERS and draw_button(session, f"add above{label_suffix}"):
-        copy = validated_copy(layer, thickness_mm=layer.thickness_mm or _NEW_LAYER_MM)
+        copy = validated_copy(layer, thickness_mm=layer.thickness_mm or _NEW_LAYER_THICKNESS_MM)
         run_action(session, lambda: session.change(_replace_layer(session, layers, layer_index, copy, layer)))
     imgui.same_line()
     if len(layers) > 1 and draw_button(session, f"remove{label_suffix}"):

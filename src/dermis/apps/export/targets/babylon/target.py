@@ -22,9 +22,9 @@ from dermis.apps.export.targets.pages.html import csp_hash, escape_script
 from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.media import Floats
 
-SAMPLE_COUNT = 40
+SHADER_SAMPLE_COUNT = 40
 """Number of samples that the shader takes for a pixel if the profile covers at least 160 pixels."""
-WIDTH_ERROR = 2.0
+RENDERED_WIDTH_RATIO = 2.0
 """Ratio of the rendered width of the profile to the width given by metersPerUnit [-]."""
 _GOLDEN_RATIO = 1.618033988749895
 _PROFILE_NAME = "subSurface.scatteringDiffusionProfile"
@@ -63,11 +63,11 @@ class Babylon(EnginePage):
         """
         d = fit_burley_width(subject.curve)
         k = float(np.sqrt(d.min() * d.max()))
-        return _parameters(subject, k / d, WIDTH_ERROR / k)
+        return _profile_parameters(subject, k / d, RENDERED_WIDTH_RATIO / k)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the Burley widths [mm] as the colour, and metersPerUnit 1, as the scene is in metres."""
-        return _parameters(subject, fit_burley_width(subject.curve), 1.0)
+        return _profile_parameters(subject, fit_burley_width(subject.curve), 1.0)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative profile of the discrete samples that the shader takes."""
@@ -83,7 +83,7 @@ class Babylon(EnginePage):
         return "\n".join(f"<script>{text}</script>" for text in texts), [csp_hash(text) for text in texts]
 
 
-def _parameters(subject: Subject, profile_colour: Floats, meters_per_unit: float) -> Parameters:
+def _profile_parameters(subject: Subject, profile_colour: Floats, meters_per_unit: float) -> Parameters:
     return (
         Parameter(
             _PROFILE_NAME, flat_tuple(profile_colour), "-", "inverse widths: smaller numbers diffuse farther"
@@ -98,15 +98,17 @@ def _parameters(subject: Subject, profile_colour: Floats, meters_per_unit: float
     )
 
 
-def spiral_samples(colour: ArrayLike, sample_count: int = SAMPLE_COUNT) -> tuple[Floats, Floats, Floats]:
+def spiral_samples(
+    profile_colour: ArrayLike, sample_count: int = SHADER_SAMPLE_COUNT
+) -> tuple[Floats, Floats, Floats]:
     """Return radii (n,), angles (n,) [rad] and normalised weights (n, 3) of the shader's samples.
 
     The radii are for metersPerUnit 1 and without the shader's width error: multiply the radii by
-    `WIDTH_ERROR` / metersPerUnit to get mm.
+    `RENDERED_WIDTH_RATIO` / metersPerUnit to get mm.
 
-    colour : (3,) diffusion profile as Babylon.js defines it: inverse widths
+    profile_colour : (3,) diffusion profile as Babylon.js defines it: inverse widths
     """
-    s = np.asarray(colour, np.float64)
+    s = np.asarray(profile_colour, np.float64)
     i = np.arange(sample_count)
     radius, area = burley_radii((i + 0.5) / sample_count)
     width = float(s.max())
@@ -115,27 +117,27 @@ def spiral_samples(colour: ArrayLike, sample_count: int = SAMPLE_COUNT) -> tuple
     return r[:, 0], 2.0 * np.pi * ((i / _GOLDEN_RATIO) % 1.0), weight / weight.sum(axis=0)
 
 
-def burley_radii(fraction: ArrayLike) -> tuple[Floats, Floats]:
+def burley_radii(enclosed_fraction: ArrayLike) -> tuple[Floats, Floats]:
     """Return the radii r within which given fractions of a Burley profile of width 1 lie, and 1 / (r p(r)).
 
     p(r) is the density of the light per radius. The weight of a sample at r is proportional to 1/(r p(r)).
     """
-    u = 1.0 - np.asarray(fraction, np.float64)
+    u = 1.0 - np.asarray(enclosed_fraction, np.float64)
     g = 1.0 + 4.0 * u * (2.0 * u + np.sqrt(1.0 + 4.0 * u * u))
     n = g ** (-1.0 / 3.0)
     c = 1.0 + g * n * n + n
     return 3.0 * np.log(c / (4.0 * u)), c**3 / (4.0 * u * (c * c + 16.0 * u * u))
 
 
-def spiral_curve(colour: ArrayLike, meters_per_unit: float, energy: ArrayLike) -> CumulativeProfile:
+def spiral_curve(profile_colour: ArrayLike, meters_per_unit: float, energy: ArrayLike) -> CumulativeProfile:
     """Return the cumulative profile of the shader's samples, averaged over all rotations of their spiral.
 
-    colour : (3,) diffusion profile as Babylon.js defines it: inverse widths
+    profile_colour : (3,) diffusion profile as Babylon.js defines it: inverse widths
     meters_per_unit : value of metersPerUnit
     energy : (3,) total energy of the profile [-]
     """
-    radii, _, weight = spiral_samples(colour)
-    radii_mm = WIDTH_ERROR * radii / meters_per_unit
+    radii, _, weight = spiral_samples(profile_colour)
+    radii_mm = RENDERED_WIDTH_RATIO * radii / meters_per_unit
     return CumulativeProfile.from_function(lambda r: (r[:, None] >= radii_mm).astype(float) @ weight, energy)
 
 

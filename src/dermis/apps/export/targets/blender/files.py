@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dermis.apps import truths
 from dermis.apps.export.scene_parts import supported_lights
-from dermis.apps.export.subject import BALL_MM, Subject
+from dermis.apps.export.subject import BALL_DIAMETER_MM, Subject
 from dermis.apps.export.target import Parameters, flat_tuple
 from dermis.apps.truths.blender_process import BlenderTask, blender_python, run_blender
 from dermis.apps.truths.cycles import cycles_camera
@@ -36,7 +36,7 @@ VersionRange = tuple[list[int], list[int] | None]
 SCRIPT_FILE, HEAD_FILE, PANORAMA_FILE = "skin.py", "head.glb", "panorama.npy"
 """Names of the files in an output folder."""
 METRES_PER_MM = 1e-3
-_UNIT_M = UNIT_MM * METRES_PER_MM
+_CYCLES_UNIT_M = UNIT_MM * METRES_PER_MM
 _Y_UP_TO_Z_UP = np.array(
     [[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
 )
@@ -47,31 +47,35 @@ _BLENDER_TASK = BlenderTask(
     "to create the scene",
     "Set it to a Python whose bpy has the requested version, or export a folder and run the script in it",
 )
-_TIMEOUT_S = 600.0
-_GGX_RATIO = 0.5
+_BLENDER_TIMEOUT_S = 600.0
+_GGX_PER_BECKMANN_ROUGHNESS = 0.5
 """Ratio of GGX roughness to Beckmann roughness, from a least squares fit of the lobes' square roots [-]."""
-_MAX_NAME_LENGTH = 60  # characters; Blender truncates names to 63
-_DATA_LINE = "EXPORT: dict[str, Any] = {}\n"
-_HELPER_IMPORT = re.compile(r"from dermis\.apps\.truths\.cycles_script import (.*)\n")
+_MAX_FILE_NAME_LENGTH = 60  # characters; Blender truncates names to 63
+_EXPORT_DATA_LINE = "EXPORT: dict[str, Any] = {}\n"
+_HELPER_IMPORT_PATTERN = re.compile(r"from dermis\.apps\.truths\.cycles_script import (.*)\n")
 _TYPE_COMMENT = "  # type: ignore[import-not-found,unused-ignore]"
 _MAIN_GUARD = 'if __name__ == "__main__":'
 
 
 def write_scene(
-    subject: Subject, parameters: Parameters, output: Path, method: str, versions: VersionRange
+    subject: Subject,
+    parameters: Parameters,
+    output: Path,
+    subsurface_method: str,
+    valid_versions: VersionRange,
 ) -> list[Path]:
     """Write a subject as a Python script or a .blend file, and return the paths of all written files.
 
     output : path that `Target.write` receives
-    method : subsurface method of the Principled BSDF, or "EEVEE"
-    versions : versions of Blender for which the parameters are valid, see `VersionRange`
+    subsurface_method : subsurface method of the Principled BSDF, or "EEVEE"
+    valid_versions : versions of Blender for which the parameters are valid, see `VersionRange`
     """
-    skin = _describe_skin(subject, parameters, method, versions)
+    skin = _describe_skin(subject, parameters, subsurface_method, valid_versions)
     if output.suffix == ".blend":
         python = blender_python()
         with TemporaryDirectory(prefix="dermis-blender-") as name:
             script = _write_script_files(subject, skin, Path(name) / SCRIPT_FILE, HEAD_FILE)[0]
-            run_blender(python, script, ["--", "--save", str(output)], _TIMEOUT_S, _BLENDER_TASK)
+            run_blender(python, script, ["--", "--save", str(output)], _BLENDER_TIMEOUT_S, _BLENDER_TASK)
         return [output]
     if output.suffix == ".py":
         return _write_script_files(subject, skin, output, f"{output.stem}.glb")
@@ -79,44 +83,46 @@ def write_scene(
 
 
 def _describe_skin(
-    subject: Subject, parameters: Parameters, method: str, versions: VersionRange
+    subject: Subject, parameters: Parameters, subsurface_method: str, valid_versions: VersionRange
 ) -> SceneDict:
     skin = subject.skin
     values = {one.name: one.value for one in parameters if one.name != "Subsurface Method"}
     inputs = {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
     name = "".join(letter if letter.isprintable() else " " for letter in Path(subject.name).name)
     return {
-        "name": name[:_MAX_NAME_LENGTH] or "skin",
-        "versions": list(versions),
-        "method": method,
+        "name": name[:_MAX_FILE_NAME_LENGTH] or "skin",
+        "versions": list(valid_versions),
+        "method": subsurface_method,
         "inputs": inputs | {"Specular IOR Level": 0.5 * skin.strength},
         "colour": list(flat_tuple(subject.clipped_albedo())),
         "roughness": float(np.sqrt(skin.roughness)),
-        "smoother": float(np.sqrt(skin.smoothing * _GGX_RATIO)),
-        "ball_m": BALL_MM * METRES_PER_MM,
+        "smoother": float(np.sqrt(skin.smoothing * _GGX_PER_BECKMANN_ROUGHNESS)),
+        "ball_m": BALL_DIAMETER_MM * METRES_PER_MM,
         "head": None,
         "skin_slots": skin_slots(subject.head_or_ball),
         "size": list(Settings().size),
     }
 
 
-def _write_script_files(subject: Subject, skin: SceneDict, script: Path, head_name: str) -> list[Path]:
+def _write_script_files(
+    subject: Subject, skin_description: SceneDict, script_path: Path, head_name: str
+) -> list[Path]:
     """Write the script, and beside it the files of the head and the panorama; return all written paths.
 
     head_name : name of the file of the head
     """
-    files, scene = [script], subject.scene
+    files, scene = [script_path], subject.scene
     if scene is None:
         scene_dict, panorama = describe_scene(_ball_scene(subject.head_or_ball), np.zeros(3))
     else:
         scene_dict, panorama = describe_scene(scene, scene.head.centre_mm)
         scene_dict["head"] = head_name
-        files.append(script.with_name(head_name))
+        files.append(script_path.with_name(head_name))
         files[-1].write_bytes(_encode_head(subject, scene))
     if panorama is not None:
-        files.append(script.with_name(PANORAMA_FILE))
+        files.append(script_path.with_name(PANORAMA_FILE))
         np.save(files[-1], panorama)
-    script.write_text(script_text(skin | scene_dict), encoding="utf-8")
+    script_path.write_text(script_text(skin_description | scene_dict), encoding="utf-8")
     return files
 
 
@@ -137,27 +143,27 @@ def skin_slots(head: Head) -> list[int]:
     return [slot for slot, kind in enumerate(used) if head.mesh.materials[kind].kind == "skin"]
 
 
-def script_text(export: Mapping[str, object]) -> str:
+def script_text(export_data: Mapping[str, object]) -> str:
     """Return the text of the Blender script with the exported parameters and scene as Python literals.
 
     Texts are written as literals, so that a name cannot inject code.
 
-    export : numbers, texts, and nested lists and dictionaries of numbers and texts
+    export_data : numbers, texts, and nested lists and dictionaries of numbers and texts
     """
     text = Path(__file__).with_name("blender_script.py").read_text(encoding="utf-8")
     source = (Path(*truths.__path__) / "cycles_script.py").read_text(encoding="utf-8")
     functions = {node.name: node for node in ast.parse(source).body if isinstance(node, ast.FunctionDef)}
-    imported = _HELPER_IMPORT.search(text)
+    imported = _HELPER_IMPORT_PATTERN.search(text)
     assert imported is not None
     names = imported[1].split(", ")
     for name in names:  # the list grows by the functions that these functions call
         called = {node.id for node in ast.walk(functions[name]) if isinstance(node, ast.Name)}
         names += sorted(called & functions.keys() - {*names})
     copied = "\n\n\n".join(str(ast.get_source_segment(source, functions[name])) for name in names)
-    literal = pformat(dict(export), width=110, sort_dicts=False)
-    text = _HELPER_IMPORT.sub("from mathutils import Matrix\n", text).replace(_TYPE_COMMENT, "")
+    literal = pformat(dict(export_data), width=110, sort_dicts=False)
+    text = _HELPER_IMPORT_PATTERN.sub("from mathutils import Matrix\n", text).replace(_TYPE_COMMENT, "")
     text = text.replace(_MAIN_GUARD, f"{copied}\n\n\n{_MAIN_GUARD}")
-    return text.replace(_DATA_LINE, f"EXPORT: dict[str, Any] = {literal}\n")
+    return text.replace(_EXPORT_DATA_LINE, f"EXPORT: dict[str, Any] = {literal}\n")
 
 
 def _ball_scene(ball: Head) -> Scene:
@@ -184,26 +190,26 @@ def describe_scene(scene: Scene, centre_mm: ArrayLike) -> tuple[SceneDict, NDArr
     return {"lights": lights, "camera": camera, "world": world}, panorama.get("panorama")
 
 
-def _convert_transform(to_world: ArrayLike, centre: Floats) -> list[list[float]]:
+def _convert_transform(to_world: ArrayLike, origin_m: Floats) -> list[list[float]]:
     """Convert a transformation from Y up, with lengths in `UNIT_MM`, to Blender's Z up, in metres.
 
-    centre : (3,) position of the input's origin in the exported scene, with Y up [m]
+    origin_m : (3,) position of the input's origin in the exported scene, with Y up [m]
     """
     matrix = np.array(to_world, np.float64)
-    matrix[:3, 3] = matrix[:3, 3] * _UNIT_M + centre
+    matrix[:3, 3] = matrix[:3, 3] * _CYCLES_UNIT_M + origin_m
     return [[float(value) for value in row] for row in _Y_UP_TO_Z_UP @ matrix]
 
 
-def _convert_lamp(lamp: SceneDict, centre: Floats) -> SceneDict:
+def _convert_lamp(lamp: SceneDict, origin_m: Floats) -> SceneDict:
     """Convert the description of a lamp from Y up, with lengths in `UNIT_MM`, to Blender's Z up, in metres.
 
-    centre : (3,) position of the input's origin in the exported scene, with Y up [m]
+    origin_m : (3,) position of the input's origin in the exported scene, with Y up [m]
     """
     fields = dict(lamp["set"])
-    fields |= {name: fields[name] * _UNIT_M for name in _LAMP_LENGTH_FIELDS if name in fields}
+    fields |= {name: fields[name] * _CYCLES_UNIT_M for name in _LAMP_LENGTH_FIELDS if name in fields}
     if lamp["type"] != "SUN":
-        fields["energy"] *= _UNIT_M**2  # radiant power is irradiance times area
-    converted = lamp | {"set": fields, "to_world": _convert_transform(lamp["to_world"], centre)}
+        fields["energy"] *= _CYCLES_UNIT_M**2  # radiant power is irradiance times area
+    converted = lamp | {"set": fields, "to_world": _convert_transform(lamp["to_world"], origin_m)}
     if "stripe" in lamp:
         stripe = lamp["stripe"]
         axes = {

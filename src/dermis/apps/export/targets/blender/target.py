@@ -28,8 +28,8 @@ BURLEY_CUTOFF, BURLEY_CUTOFF_CDF = 16.0, 0.9963790093708328
 """Radius at which Cycles truncates Burley's profile [d], and the fraction of light within it [-]."""
 MIN_ALBEDO, MAX_ALBEDO = 0.2, 0.999999
 """Range of single-scattering albedos in random walks; below, Cycles scales the result instead."""
-_BISECTIONS = 12
-_MIN_COLOUR, _MAX_COLOUR = 1e-4, 0.995  # range in which Cycles inverts the dipole
+_DIPOLE_BISECTION_STEPS = 12
+_MIN_BASE_COLOUR, _MAX_BASE_COLOUR = 1e-4, 0.995  # range in which Cycles inverts the dipole
 Cdf = Callable[[Floats], Floats]
 _RADIUS_NAME, _SCALE_NAME = "Subsurface Radius", "Subsurface Scale"
 _METRES_PER_MM = 1e-3
@@ -38,7 +38,7 @@ JENSEN_DMFP_MM = 3.67, 1.37, 0.68
 """Diffuse mean free paths of skin1 in [Jensen2001], widely used as the radii of skin [mm]."""
 _FIRST_SUPPORTED_VERSION = 4, 5
 _FIRST_MFP_VERSION = 5, 2  # first version in which the radius of a random walk is a mean free path
-_INFINITE_RADIUS = 1e9
+_EFFECTIVELY_INFINITE_RADIUS = 1e9
 
 
 def burley_cdf(radius: ArrayLike) -> Floats:
@@ -52,41 +52,41 @@ def burley_cdf(radius: ArrayLike) -> Floats:
     return np.asarray((1.0 - 0.25 * np.exp(-r) - 0.75 * np.exp(-r / 3.0)) / BURLEY_CUTOFF_CDF)
 
 
-def burley_shape_factor(colour: ArrayLike) -> Floats:
+def burley_shape_factor(base_colour: ArrayLike) -> Floats:
     """Return Burley's factor s(A) (3,); in EEVEE, the profile's width is the radius divided by s(A) [-].
 
-    colour : (3,) base colour; A is the colour divided by its brightest channel
+    base_colour : (3,) base colour; A is the colour divided by its brightest channel
 
     Source: [ChristensenBurley2015].
     """
-    A = np.asarray(colour, np.float64)
+    A = np.asarray(base_colour, np.float64)
     A = A / max(float(A.max()), 1e-5)
     return np.asarray(1.9 - A + 3.5 * (A - 0.8) ** 2)
 
 
-def legacy_albedo(colour: ArrayLike) -> Floats:
+def legacy_albedo(base_colour: ArrayLike) -> Floats:
     """Return the single-scattering albedo for a base colour, as fitted in Cycles before 5.2 [-]."""
-    A = np.asarray(colour, np.float64)
+    A = np.asarray(base_colour, np.float64)
     blend = A**0.25
     dim = 1.8260523782 * np.arctan(5.112467903288 * A) ** 1.09686102424
     bright = 0.496310210422 * np.arctan(4.2350090365 * A) ** 2.40602999408
     return np.asarray(np.clip((1.0 - blend) * dim + blend * bright, 0.0, MAX_ALBEDO))
 
 
-def hulst_albedo(colour: ArrayLike) -> Floats:
+def hulst_albedo(base_colour: ArrayLike) -> Floats:
     """Return the single-scattering albedo for a base colour by van de Hulst's formula, as in Cycles 5.2."""
-    C = np.asarray(colour, np.float64)
+    C = np.asarray(base_colour, np.float64)
     s = 4.20863 * C - np.sqrt(9.59217 + 41.6808 * C + 17.7126 * C**2) + 4.09712
     return np.asarray(np.clip(1.0 - s**2, 0.0, MAX_ALBEDO))
 
 
-def skin_path_ratio(colour: ArrayLike, eta: float) -> Floats:
+def skin_path_ratio(base_colour: ArrayLike, eta: float) -> Floats:
     """Return the ratio of mean free path to subsurface radius in Cycles' method RANDOM_WALK_SKIN [-].
 
     Cycles interprets the radius as a diffuse mean free path. Cycles derives the single-scattering albedo from
     the base colour: the albedo at which the diffuse reflectance of a dipole equals the colour.
 
-    colour : base colour [-]
+    base_colour : base colour [-]
     eta : value of Subsurface IOR
 
     Source: [Jensen2001].
@@ -94,13 +94,15 @@ def skin_path_ratio(colour: ArrayLike, eta: float) -> Floats:
     inverse = 1.0 / eta
     internal_reflectance = inverse * (0.710 - 1.440 * inverse) + 0.668 + 0.0636 * eta
     A = (1.0 + internal_reflectance) / (1.0 - internal_reflectance)
-    colours = np.asarray(colour, np.float64)
+    colours = np.asarray(base_colour, np.float64)
     low, high = np.zeros_like(colours), np.ones_like(colours)
-    for _ in range(_BISECTIONS):
+    for _ in range(_DIPOLE_BISECTION_STEPS):
         middle = 0.5 * (low + high)
         too_dark = _dipole_reflectance(middle, A) < colours
         low, high = np.where(too_dark, middle, low), np.where(too_dark, high, middle)
-    albedo = np.where(colours < _MIN_COLOUR, 0.0, np.where(colours >= _MAX_COLOUR, MAX_ALBEDO, middle))
+    albedo = np.where(
+        colours < _MIN_BASE_COLOUR, 0.0, np.where(colours >= _MAX_BASE_COLOUR, MAX_ALBEDO, middle)
+    )
     return np.asarray(np.sqrt(3.0 * (1.0 - albedo)))
 
 
@@ -109,15 +111,15 @@ def _dipole_reflectance(albedo: Floats, A: float) -> Floats:
     return np.asarray(0.5 * albedo * (1.0 + np.exp(-4.0 / 3.0 * A * root)) * np.exp(-root))
 
 
-def walk_cdf(radius: ArrayLike, albedo: float, entry: WalkEntry) -> Floats:
+def walk_cdf(radius: ArrayLike, albedo: float, walk_entry: WalkEntry) -> Floats:
     """Return the fraction of the incident light that Cycles' random walk returns within given radii [-].
 
     radius : radii [mean free paths]
     albedo : single-scattering albedo [-]
-    entry : direction in which light enters: "straight" for RANDOM_WALK, "skin" for RANDOM_WALK_SKIN
+    walk_entry : direction in which light enters: "straight" for RANDOM_WALK, "skin" for RANDOM_WALK_SKIN
     """
     walk_albedo = max(albedo, MIN_ALBEDO)
-    radii, fraction_within = _interpolate_walk_table(round(walk_albedo, 7), entry)
+    radii, fraction_within = _interpolate_walk_table(round(walk_albedo, 7), walk_entry)
     r = np.asarray(radius, np.float64)
     fraction = np.interp(np.log(np.maximum(r, 1e-12)), np.log(radii), fraction_within)
     near = np.minimum(r / radii[0], 1.0)  # linear in the radius below the first tabulated one
@@ -125,14 +127,14 @@ def walk_cdf(radius: ArrayLike, albedo: float, entry: WalkEntry) -> Floats:
 
 
 @cache
-def _interpolate_walk_table(albedo: float, quantity: WalkEntry) -> tuple[Floats, Floats]:
+def _interpolate_walk_table(albedo: float, walk_entry: WalkEntry) -> tuple[Floats, Floats]:
     """Return radii [mean free paths] and the fraction of light within each radius [-], for one albedo.
 
     The tabulated random walks are interpolated to this albedo, and to radii that are eight times as dense.
     """
     from scipy.interpolate import PchipInterpolator
 
-    roots, radii, fraction_within = _load_walk_table()[quantity]
+    roots, radii, fraction_within = _load_walk_table()[walk_entry]
     fraction = PchipInterpolator(roots, fraction_within, axis=0)(
         np.clip(np.sqrt(1.0 - albedo), roots[0], roots[-1])
     )
@@ -179,7 +181,7 @@ class RandomWalk(NamedTuple):
     @property
     def total(self) -> float:
         """Return the light that leaves the skin along the normal, per incident light [-]."""
-        return float(walk_cdf(np.array([_INFINITE_RADIUS]), self.albedo, self.entry)[0])
+        return float(walk_cdf(np.array([_EFFECTIVELY_INFINITE_RADIUS]), self.albedo, self.entry)[0])
 
 
 class Blender(Target):
@@ -215,8 +217,10 @@ class Blender(Target):
         lengths = np.maximum(metres / _METRES_PER_MM * self._unit_lengths(subject, version), 1e-9)
         units = self._unit_cdfs(subject, version)
 
-        def fraction_within(r: Floats) -> Floats:
-            return np.stack([unit(r / length) for unit, length in zip(units, lengths, strict=True)], axis=-1)
+        def fraction_within(radius_mm: Floats) -> Floats:
+            return np.stack(
+                [unit(radius_mm / length) for unit, length in zip(units, lengths, strict=True)], axis=-1
+            )
 
         energy = subject.curve.energy * self._energy_ratio(subject, version)
         return CumulativeProfile.from_function(fraction_within, energy)

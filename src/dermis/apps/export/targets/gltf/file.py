@@ -17,17 +17,17 @@ from dermis.scene.heads import is_person_name, load_person
 
 Extensions = Mapping[str, Mapping[str, object]]
 _MULTISCATTER_ROLE = "multiscatter"
-_TABLE_STEPS = 1024
+_MULTISCATTER_TABLE_STEPS = 1024
 
 
-def encode_glb(subject: Subject, extensions: Extensions, draft: str) -> bytes:
+def encode_glb(subject: Subject, extensions: Extensions, draft_notice: str) -> bytes:
     """Return the head with eyes, hairs, morph targets and bones, or a ball for a skin without head, as .glb.
 
     extensions : JSON of each extension of the skin's material, by name
-    draft : notice that an extension is a draft, to be stored in the file; "" if all extensions are ratified
+    draft_notice : notice that an extension is a draft, stored in the file; "" if all extensions are ratified
     """
     head = subject.head_or_ball
-    notes: dict[str, object] = {"draft": draft} if draft else {}
+    notes: dict[str, object] = {"draft": draft_notice} if draft_notice else {}
     if is_person_name(subject.name):
         notes["person"] = person_numbers(load_person(subject.name))
     elif head.eyes is not None:
@@ -38,23 +38,23 @@ def encode_glb(subject: Subject, extensions: Extensions, draft: str) -> bytes:
         slopes=relief_slopes(head),
         notes=notes,
         eyes=subject.eye_pictures(),
-        skin_additions=_skin_additions(subject, head, extensions, draft),
+        skin_additions=_skin_additions(subject, head, extensions, draft_notice),
     )
 
 
-def _skin_additions(subject: Subject, head: Head, extensions: Extensions, draft: str) -> SkinAdditions:
+def _skin_additions(subject: Subject, head: Head, extensions: Extensions, draft_notice: str) -> SkinAdditions:
     """Return the skin material's extensions, uniform colour and, if needed, map of multiscatter colours.
 
     The draft extension needs such a map for a head with a colour map: the map replaces the uniform
     multiscatter colour.
     """
-    if not draft:
+    if not draft_notice:
         colour = {"baseColorFactor": [*(float(x) for x in subject.albedo), 1.0]}
         return SkinAdditions({} if head.maps.colour is not None else colour, extensions)
-    white, extras = {"baseColorFactor": [1.0, 1.0, 1.0, 1.0]}, {"draft": draft}
+    white, extras = {"baseColorFactor": [1.0, 1.0, 1.0, 1.0]}, {"draft": draft_notice}
     if head.maps.colour is None:
         return SkinAdditions(white, extensions, extras)
-    steps = np.linspace(0.0, 1.0, _TABLE_STEPS)
+    steps = np.linspace(0.0, 1.0, _MULTISCATTER_TABLE_STEPS)
     scattered = np.interp(head.maps.colour, steps, multiscatter_for_reflectance(steps)).astype(np.float32)
     scatter = {**extensions["KHR_materials_scatter"], "multiscatterColorFactor": [1.0, 1.0, 1.0]}
     scatter["multiscatterColorTexture"] = {"index": _MULTISCATTER_ROLE}

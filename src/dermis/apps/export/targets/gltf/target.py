@@ -27,7 +27,7 @@ _BASE_COLOUR_NAME = "pbrMetallicRoughness.baseColorFactor"
 _IOR_PARAMETER = Parameter("KHR_materials_ior.ior", SKIN_ETA, "-", "reflectance 0.028 at normal incidence")
 _HEAD_THICKNESS_M = 0.1  # of a head; programs that trace no rays use it as path length
 _EAR_THICKNESS_MM = 4.0  # thickness at which the transmitted light is computed
-_NAIVE_TRANSMISSION = 0.5  # middle of the slider
+_NAIVE_TRANSMISSION_FACTOR = 0.5  # middle of the slider
 
 
 class Gltf(Target):
@@ -56,7 +56,7 @@ class Gltf(Target):
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the skin's colour for all colours, and the mean exit radius as attenuation distance."""
         if self.variant == TRANSMISSION_VARIANT:
-            return _diffuse_parameters(subject, _NAIVE_TRANSMISSION, subject.albedo)
+            return _diffuse_parameters(subject, _NAIVE_TRANSMISSION_FACTOR, subject.albedo)
         radius_m = 1e-3 * float(2.5 * fit_burley_width(subject.curve).max())
         colour = np.clip(subject.albedo, 1e-3, 1.0 - 1e-3)
         return _scatter_parameters(Volume(radius_m, colour, colour))

@@ -18,7 +18,7 @@ from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head
 from dermis.scene.model import Scene
 
-_SUBDIVISIONS = 4  # segments per edge
+_SEGMENTS_PER_EDGE = 4  # segments per edge
 
 
 def skin_meshes(backend: XmlBackend, head: Head) -> dict[str, bytes]:
@@ -60,21 +60,27 @@ class SubdividedTriangles(NamedTuple):
     corners: NDArray[np.int64]
 
 
-def subdivide_triangles(triangles: NDArray[np.integer], segments: int = _SUBDIVISIONS) -> SubdividedTriangles:
+def subdivide_triangles(
+    triangles: NDArray[np.integer], segments_per_edge: int = _SEGMENTS_PER_EDGE
+) -> SubdividedTriangles:
     """Divide each triangle into segments^2 smaller triangles; different original triangles share no vertices.
 
     triangles : (t,) indices of the original triangles
-    segments : number of segments per edge
+    segments_per_edge : number of segments per edge
     """
-    grid = [(i, j) for i in range(segments + 1) for j in range(segments + 1 - i)]
+    grid = [(i, j) for i in range(segments_per_edge + 1) for j in range(segments_per_edge + 1 - i)]
     at = {point: index for index, point in enumerate(grid)}
-    upward = [(at[i, j], at[i + 1, j], at[i, j + 1]) for i in range(segments) for j in range(segments - i)]
+    upward = [
+        (at[i, j], at[i + 1, j], at[i, j + 1])
+        for i in range(segments_per_edge)
+        for j in range(segments_per_edge - i)
+    ]
     downward = [
         (at[i + 1, j], at[i + 1, j + 1], at[i, j + 1])
-        for i in range(segments)
-        for j in range(segments - i - 1)
+        for i in range(segments_per_edge)
+        for j in range(segments_per_edge - i - 1)
     ]
-    second, third = np.array(grid, np.float64).T / segments
+    second, third = np.array(grid, np.float64).T / segments_per_edge
     weights = np.stack([1.0 - second - third, second, third], axis=1)
     first = len(grid) * np.arange(len(triangles))[:, None, None]
     corners = (first + np.array(upward + downward)).reshape(-1, 3)
@@ -99,10 +105,12 @@ def coloured_meshes(renderer: Renderer, scene: Scene, materials: Iterable[int]) 
     return {k: _encode_part(scene.head, part, colour) for (k, part), colour in coloured}
 
 
-def _encode_part(head: Head, part: SubdividedTriangles, colours: NDArray[np.float32]) -> bytes:
-    mesh, corners = head.mesh, head.mesh.triangles[part.triangle]
-    weights = part.weights[:, :, None]
+def _encode_part(
+    head: Head, subdivided_triangles: SubdividedTriangles, colours: NDArray[np.float32]
+) -> bytes:
+    mesh, corners = head.mesh, head.mesh.triangles[subdivided_triangles.triangle]
+    weights = subdivided_triangles.weights[:, :, None]
     positions = (weights * mesh.positions[corners]).sum(axis=1) - np.array(head.centre_mm)
     normals = (weights * mesh.normals[corners]).sum(axis=1)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    return encode_ply(part.corners, positions, normals, None, np.clip(colours, 0.0, 1.0))
+    return encode_ply(subdivided_triangles.corners, positions, normals, None, np.clip(colours, 0.0, 1.0))

@@ -16,7 +16,7 @@ from dermis.apps.export.targets.mitsuba import xml
 from dermis.apps.export.targets.mitsuba.meshes import skin_meshes
 from dermis.apps.export.targets.mitsuba.xml import XmlBackend
 from dermis.apps.truths.lights import MITSUBA, mitsuba_emitter
-from dermis.apps.truths.mitsuba_scene import ROULETTE_DEPTH, mitsuba_sensor
+from dermis.apps.truths.mitsuba_scene import RUSSIAN_ROULETTE_DEPTH, mitsuba_sensor
 from dermis.apps.truths.scene_description import SceneDict, mitsuba_environment, mitsuba_rgb
 from dermis.formats.part_pictures import PartRole
 from dermis.scene.model import Scene
@@ -28,7 +28,7 @@ BOUNDARIES: Mapping[Boundary, float] = {"matched": 1.0, "smooth": SKIN_ETA, "rou
 """Surface models of the skin, with their index of refraction."""
 MATCHED_REFLECTANCE = 0.03
 """Reflectance of an index-matched surface in all directions: the mean reflectance of rough skin [-]."""
-_OPAQUE_ROUGHNESS = 0.3  # square root of Beckmann's m
+_OPAQUE_PART_ROUGHNESS = 0.3  # square root of Beckmann's m
 _PART_IOR = 1.5  # of the metallic-roughness model
 _PART_INPUTS: Mapping[PartRole, str] = {
     "colour": "base_color",
@@ -74,13 +74,17 @@ class SkinAppearance(NamedTuple):
 
 
 def scene_files(
-    scene: Scene, appearance: SkinAppearance, boundary: Boundary, size: tuple[int, int], samples: int
+    scene: Scene,
+    appearance: SkinAppearance,
+    boundary: Boundary,
+    picture_size: tuple[int, int],
+    samples_per_pixel: int,
 ) -> Iterator[tuple[str, bytes]]:
     """Yield name and content of each file of the scene, with scene.xml first.
 
     boundary : surface model of the skin that scene.xml selects by default
-    size : width and height of the picture [pixel]
-    samples : samples per pixel
+    picture_size : width and height of the picture [pixel]
+    samples_per_pixel : number of paths that Mitsuba traces for each pixel
 
     Raises DermisError if the scene has lights without shadows, a camera with a shifted lens, or skin that
     does not enclose a volume, which Mitsuba does not support.
@@ -89,7 +93,9 @@ def scene_files(
     meshes = skin_meshes(backend, scene.head)
     yield (
         "scene.xml",
-        xml.scene_document(_scene_elements(backend, scene, appearance, boundary, (*size, samples))),
+        xml.scene_document(
+            _scene_elements(backend, scene, appearance, boundary, (*picture_size, samples_per_pixel))
+        ),
     )
     for each in BOUNDARIES:
         yield f"boundary_{each}.xml", xml.scene_document(_skin_elements(backend, each, appearance, meshes))
@@ -119,7 +125,7 @@ def medium_description(medium: IsotropicMedium) -> SceneDict:
     }
 
 
-def surface_description(
+def surface_bsdf(
     boundary: Boundary, transmittance: SceneDict | None = None, roughness: float | SceneDict = 0.3
 ) -> SceneDict:
     """Return Mitsuba's description of the skin's surface, or of the outer layer of an index-matched surface.
@@ -140,7 +146,7 @@ def surface_description(
     return {"type": "roughdielectric", "id": "skin_surface", **facets, **refraction}
 
 
-def _lower_surface(has_dimming: bool) -> SceneDict:
+def _lower_surface_bsdf(has_dimming: bool) -> SceneDict:
     """Return Mitsuba's description of the inner layer of an index-matched surface.
 
     This layer absorbs part of the light that leaves the skin, where the skin is darker than its medium.
@@ -170,20 +176,25 @@ def _scene_elements(
     sensor["film"] |= {"width": xml.Override("integer", "width"), "height": xml.Override("integer", "height")}
     sensor["sampler"]["sample_count"] = xml.Override("integer", "samples")
     # Spectral multiple importance sampling, as extinction differs between channels.
-    integrator = {"type": "volpathmis", "rr_depth": ROULETTE_DEPTH, "hide_emitters": True}
+    integrator = {"type": "volpathmis", "rr_depth": RUSSIAN_ROULETTE_DEPTH, "hide_emitters": True}
     parts: list[SceneDict] = [integrator, sensor]
     lights = supported_lights(scene.lights, MITSUBA, "Mitsuba")
     parts += [mitsuba_emitter(backend, light, k) for k, light in enumerate(lights, start=1)]
     if scene.environment is not None:
         parts.append(mitsuba_environment(backend, scene.environment))
     colour = {"type": "mesh_attribute", "name": "vertex_color"}
-    opaque = {"type": "principled", "roughness": _OPAQUE_ROUGHNESS, "eta": SKIN_ETA, "base_color": colour}
+    opaque = {
+        "type": "principled",
+        "roughness": _OPAQUE_PART_ROUGHNESS,
+        "eta": SKIN_ETA,
+        "base_color": colour,
+    }
     for role in appearance.pictures:
         texture = {"type": "bitmap", "id": _part_texture(role).name, "filename": _part_picture_file(role)}
         parts.append({**texture, "raw": role != "colour", "wrap_mode": "clamp"})
     for index in appearance.opaque:
         roles = appearance.pictured.get(index)
-        bsdf = opaque if roles is None else _part_surface(roles)
+        bsdf = opaque if roles is None else _part_bsdf(roles)
         parts.append({"type": "ply", "filename": _opaque_mesh_file(index), "bsdf": bsdf})
     defaults = [xml.default_element(*one) for one in (("boundary", boundary), *sizes)]
     elements = [xml.object_element(part, "", backend) for part in parts]
@@ -201,12 +212,12 @@ def _skin_elements(
     transmittance = None if appearance.transmittance is None else _exr_texture("passing")
     parts = [
         medium_description(appearance.media[boundary]),
-        surface_description(boundary, transmittance, roughness),
+        surface_bsdf(boundary, transmittance, roughness),
     ]
     shapes = dict.fromkeys(("skin", "caps"), "skin_surface")
     if boundary == "matched":
         # Inward rays hit the upper surface and skip the lower one, outward rays the reverse.
-        parts.append(_lower_surface(transmittance is not None))
+        parts.append(_lower_surface_bsdf(transmittance is not None))
         shapes = dict.fromkeys(("upper", "upper_caps"), "skin_surface")
         shapes |= dict.fromkeys(("skin", "caps"), "skin_below")
     for name in (name for name in shapes if name in meshes):
@@ -215,12 +226,12 @@ def _skin_elements(
     return [xml.object_element(part, "", backend) for part in parts]
 
 
-def _part_surface(roles: set[PartRole]) -> SceneDict:
+def _part_bsdf(roles: set[PartRole]) -> SceneDict:
     """Return Mitsuba's description of a surface that is not skin and has pictures.
 
     roles : roles of these pictures
     """
-    bsdf: SceneDict = {"type": "principled", "eta": _PART_IOR, "roughness": _OPAQUE_ROUGHNESS}
+    bsdf: SceneDict = {"type": "principled", "eta": _PART_IOR, "roughness": _OPAQUE_PART_ROUGHNESS}
     bsdf |= {name: _part_texture(role) for role, name in _PART_INPUTS.items() if role in roles}
     if "normal" in roles:
         bsdf = {"type": "normalmap", "normalmap": _part_texture("normal"), "bsdf": bsdf}
@@ -240,5 +251,5 @@ def _opaque_mesh_file(material_index: int) -> str:
     return f"meshes/material_{material_index}.ply"
 
 
-def _exr_texture(file_stem: str) -> SceneDict:
-    return {"type": "bitmap", "filename": f"textures/{file_stem}.exr", "raw": True}
+def _exr_texture(texture_name: str) -> SceneDict:
+    return {"type": "bitmap", "filename": f"textures/{texture_name}.exr", "raw": True}

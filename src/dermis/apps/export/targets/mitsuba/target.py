@@ -43,8 +43,8 @@ from dermis.scene.model import Scene
 from dermis.scene.skin import DEFAULT_ROUGHNESS
 
 _LUMINANCE_WEIGHTS = np.array([0.2126, 0.7152, 0.0722])
-_BRIGHT_PERCENTILE = 99.0  # of the colour map; brighter texels are clipped
-_MAX_SAMPLED_SIDE = 512  # of the map from which the percentile is computed [texel]
+_BRIGHT_TEXEL_PERCENTILE = 99.0  # of the colour map; brighter texels are clipped
+_MAX_SAMPLED_MAP_SIDE = 512  # of the map from which the percentile is computed [texel]
 Map = NDArray[np.float32]
 _SIGMA_NAME, _ALBEDO_NAME, _TRANSMITTANCE_NAME, _INDEX_NAME, _ALPHA_NAME = (
     "sigma_t",
@@ -173,7 +173,9 @@ def _opaque_meshes(scene: Scene, adapter: str, picture_materials: Container[int]
     mesh, centre = scene.head.mesh, scene.head.centre_mm
     opaque = [k for k in np.unique(mesh.material).tolist() if mesh.materials[k].kind != "skin"]
     meshes = {
-        k: mesh_ply(mesh, mesh.material == k, centre, v_up=False) for k in opaque if k in picture_materials
+        k: mesh_ply(mesh, mesh.material == k, centre, is_v_upwards=False)
+        for k in opaque
+        if k in picture_materials
     }
     if len(meshes) == len(opaque):
         return meshes
@@ -217,12 +219,12 @@ def skin_colours(subject: Subject) -> SkinColours:
     if texels is None:
         colour = np.asarray(subject.albedo, np.float64)
         return SkinColours(colour, colour, 1.0)
-    stride = max(min(texels.shape[:2]) // _MAX_SAMPLED_SIDE, 1)
+    stride = max(min(texels.shape[:2]) // _MAX_SAMPLED_MAP_SIDE, 1)
     samples = texels[::stride, ::stride].reshape(-1, 3).astype(np.float64)
     samples = samples[samples.sum(axis=1) > 0.0]
-    mean, brightest = samples.mean(axis=0), np.percentile(samples, _BRIGHT_PERCENTILE, axis=0)
+    mean, brightest = samples.mean(axis=0), np.percentile(samples, _BRIGHT_TEXEL_PERCENTILE, axis=0)
     ratio = float(
-        np.percentile(samples @ _LUMINANCE_WEIGHTS, _BRIGHT_PERCENTILE) / (mean @ _LUMINANCE_WEIGHTS)
+        np.percentile(samples @ _LUMINANCE_WEIGHTS, _BRIGHT_TEXEL_PERCENTILE) / (mean @ _LUMINANCE_WEIGHTS)
     )
     return SkinColours(mean, np.maximum(brightest, mean), max(ratio, 1.0))
 

@@ -96,41 +96,41 @@ class Override:
     name: str
 
 
-def object_element(description: Mapping[str, object], name: str, backend: XmlBackend) -> ET.Element:
+def object_element(description: Mapping[str, object], object_name: str, backend: XmlBackend) -> ET.Element:
     """Return the XML element of an object described by a dictionary.
 
     description : properties of the object; "type" is the plugin
-    name : name of the object in the parent element; "" for an object without a name
+    object_name : name of the object in the parent element; "" for an object without a name
     backend : collector of the images that the description contains
     """
     plugin = str(description["type"])
-    node = ET.Element(_KIND_BY_PLUGIN[plugin], {"type": plugin, **_name_attributes(name, description)})
+    node = ET.Element(_KIND_BY_PLUGIN[plugin], {"type": plugin, **_name_attributes(object_name, description)})
     for key, value in description.items():
         if key not in ("type", "id"):
             node.append(_property_element(key, value, backend))
     return node
 
 
-def bitmap_path(index: int) -> str:
+def bitmap_path(bitmap_index: int) -> str:
     """Return the path of an image relative to scene.xml.
 
-    index : index of the image in `XmlBackend.bitmaps`
+    bitmap_index : index of the image in `XmlBackend.bitmaps`
     """
-    return f"textures/light_{index}.exr"
+    return f"textures/light_{bitmap_index}.exr"
 
 
-def scene_document(parts: list[ET.Element]) -> bytes:
+def scene_document(elements: list[ET.Element]) -> bytes:
     """Return an XML file with a scene of the given elements."""
     root = ET.Element("scene", {"version": SCENE_FORMAT_VERSION})
-    root.extend(parts)
+    root.extend(elements)
     ET.indent(root)
     text: bytes = ET.tostring(root, encoding="utf-8", xml_declaration=True)
     return text + b"\n"
 
 
-def default_element(name: str, value: str) -> ET.Element:
+def default_element(parameter_name: str, default_value: str) -> ET.Element:
     """Return the element that sets the default of a parameter for `mitsuba -D`."""
-    return ET.Element("default", {"name": name, "value": value})
+    return ET.Element("default", {"name": parameter_name, "value": default_value})
 
 
 def include_element(filename: str) -> ET.Element:
@@ -138,51 +138,57 @@ def include_element(filename: str) -> ET.Element:
     return ET.Element("include", {"filename": filename})
 
 
-def _name_attributes(name: str, description: Mapping[str, object]) -> dict[str, str]:
-    return {"id": str(description["id"])} if "id" in description else ({"name": name} if name else {})
+def _name_attributes(object_name: str, description: Mapping[str, object]) -> dict[str, str]:
+    return (
+        {"id": str(description["id"])}
+        if "id" in description
+        else ({"name": object_name} if object_name else {})
+    )
 
 
-def _property_element(key: str, value: object, backend: XmlBackend) -> ET.Element:
-    if isinstance(value, Ref):
-        return ET.Element("ref", {"name": key, "id": value.name})
-    if isinstance(value, Override):
-        return ET.Element(value.kind, {"name": key, "value": f"${value.name}"})
-    if isinstance(value, Transform):
-        node = ET.Element("transform", {"name": key})
-        ET.SubElement(node, "matrix", {"value": _format_numbers(value.matrix)})
+def _property_element(property_name: str, property_value: object, backend: XmlBackend) -> ET.Element:
+    if isinstance(property_value, Ref):
+        return ET.Element("ref", {"name": property_name, "id": property_value.name})
+    if isinstance(property_value, Override):
+        return ET.Element(property_value.kind, {"name": property_name, "value": f"${property_value.name}"})
+    if isinstance(property_value, Transform):
+        node = ET.Element("transform", {"name": property_name})
+        ET.SubElement(node, "matrix", {"value": _format_numbers(property_value.matrix)})
         return node
-    if isinstance(value, Bitmap):
-        backend.bitmaps.append(value.values)
+    if isinstance(property_value, Bitmap):
+        backend.bitmaps.append(property_value.values)
         return _value_element("filename", bitmap_path(len(backend.bitmaps) - 1))
-    if isinstance(value, Mapping):
-        if value["type"] == "rgb":
-            return ET.Element("rgb", {"name": key, "value": _format_numbers(value["value"])})
-        return object_element(value, key, backend)
-    return _value_element(key, value)
+    if isinstance(property_value, Mapping):
+        if property_value["type"] == "rgb":
+            return ET.Element(
+                "rgb", {"name": property_name, "value": _format_numbers(property_value["value"])}
+            )
+        return object_element(property_value, property_name, backend)
+    return _value_element(property_name, property_value)
 
 
-def _value_element(key: str, value: object) -> ET.Element:
-    if key in _POINT_KEYS or key in _VECTOR_KEYS:
+def _value_element(property_name: str, property_value: object) -> ET.Element:
+    if property_name in _POINT_KEYS or property_name in _VECTOR_KEYS:
         kind, xyz = (
-            "point" if key in _POINT_KEYS else "vector",
-            map(_format_number, np.asarray(value, np.float64)),
+            "point" if property_name in _POINT_KEYS else "vector",
+            map(_format_number, np.asarray(property_value, np.float64)),
         )
-        return ET.Element(kind, {"name": key, **dict(zip("xyz", xyz, strict=True))})
-    if isinstance(value, bool):
-        return ET.Element("boolean", {"name": key, "value": str(value).lower()})
-    if isinstance(value, int | np.integer):
-        return ET.Element("integer", {"name": key, "value": str(int(value))})
-    if isinstance(value, float | np.floating):
-        return ET.Element("float", {"name": key, "value": _format_number(value)})
-    return ET.Element("string", {"name": key, "value": str(value)})
+        return ET.Element(kind, {"name": property_name, **dict(zip("xyz", xyz, strict=True))})
+    if isinstance(property_value, bool):
+        return ET.Element("boolean", {"name": property_name, "value": str(property_value).lower()})
+    if isinstance(property_value, int | np.integer):
+        return ET.Element("integer", {"name": property_name, "value": str(int(property_value))})
+    if isinstance(property_value, float | np.floating):
+        return ET.Element("float", {"name": property_name, "value": _format_number(property_value)})
+    return ET.Element("string", {"name": property_name, "value": str(property_value)})
 
 
-def _format_numbers(values: ArrayLike) -> str:
-    return " ".join(map(_format_number, np.ravel(values)))
+def _format_numbers(numbers: ArrayLike) -> str:
+    return " ".join(map(_format_number, np.ravel(numbers)))
 
 
-def _format_number(value: SupportsFloat) -> str:
-    return f"{float(value):.9g}"
+def _format_number(number: SupportsFloat) -> str:
+    return f"{float(number):.9g}"
 
 
 def _normalise(vector: NDArray[np.float64]) -> NDArray[np.float64]:

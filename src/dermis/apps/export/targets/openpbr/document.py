@@ -18,16 +18,16 @@ from dermis.apps.export.targets.openpbr.materials import (
 from dermis.base.errors import refuse
 
 
-def build_document(definitions: Sequence[OpenPbrMaterial], shader: str, prefix: str) -> MaterialX.Document:
+def build_document(materials: Sequence[OpenPbrMaterial], shader: str, file_prefix: str) -> MaterialX.Document:
     """Return a validated MaterialX document of materials; lengths are in metres, colours linear Rec. 709.
 
     shader : MaterialX node category of the surface shaders, `OPEN_PBR` or `STANDARD_SURFACE`
-    prefix : prefix of the file names of the maps beside the document
+    file_prefix : prefix of the file names of the maps beside the document
     """
     document = MaterialX.createDocument()
     document.setColorSpace("lin_rec709")
-    for definition in definitions:
-        _add_material(document, definition, shader, prefix)
+    for definition in materials:
+        _add_material(document, definition, shader, file_prefix)
     document.setDataLibrary(standard_library())
     valid, message = document.validate()
     if not valid:
@@ -45,7 +45,7 @@ def standard_library() -> MaterialX.Document:
 
 
 def _add_material(
-    document: MaterialX.Document, definition: OpenPbrMaterial, shader: str, prefix: str
+    document: MaterialX.Document, definition: OpenPbrMaterial, shader: str, file_prefix: str
 ) -> None:
     name = MaterialX.createValidName(definition.name) or "material"
     node = document.addNode(shader, document.createValidChildName(f"{name}_surface"), "surfaceshader")
@@ -57,7 +57,7 @@ def _add_material(
     if definition.maps:
         graph = document.addNodeGraph(document.createValidChildName(f"{name}_maps"))
         for key, role in definition.maps.items():
-            output = _add_map(graph, role, f"{prefix}{role}.png", shader)
+            output = _add_map(graph, role, f"{file_prefix}{role}.png", shader)
             mapped = node.addInput(input_name(shader, key), output.getType())
             mapped.setNodeGraphString(graph.getName())
             mapped.setOutputString(output.getName())
@@ -92,5 +92,5 @@ def _add_map(graph: MaterialX.NodeGraph, role: str, map_path: str, shader: str) 
     return output
 
 
-def _materialx_value(value: InputValue) -> MaterialX.Color3 | float:
-    return MaterialX.Color3(*value) if isinstance(value, tuple) else float(value)
+def _materialx_value(input_value: InputValue) -> MaterialX.Color3 | float:
+    return MaterialX.Color3(*input_value) if isinstance(input_value, tuple) else float(input_value)

@@ -45,10 +45,10 @@ _STANDARD_SURFACE_NAMES: Mapping[str, str] = {
     "emission_luminance": "emission",
 }
 _METRES_PER_MM = 1e-3
-_MAX_NAME_LENGTH = 40
-_EYE_IOR = 1.376
+_MAX_MATERIAL_NAME_LENGTH = 40
+_CORNEA_IOR = 1.376
 _ROUGHNESS_BY_KIND = {"eye": 0.1, "teeth": 0.3, "tongue": 0.4}  # by a part of the material's name
-_DEFAULT_ROUGHNESS = 0.8
+_DEFAULT_PART_ROUGHNESS = 0.8
 _PART_IOR = 1.5  # of the metallic-roughness model
 PART_PREFIX = "parts_"
 """Prefix of the roles of pictures of parts that are not skin."""
@@ -71,13 +71,13 @@ LENGTH_INPUTS = ("subsurface_radius",)
 """Inputs that are lengths [m]."""
 
 
-def input_name(shader: str, name: str) -> str:
+def input_name(shader: str, open_pbr_name: str) -> str:
     """Return the name that an input of OpenPBR has in a shader.
 
     shader : `OPEN_PBR` or `STANDARD_SURFACE`
-    name : name of the input in OpenPBR
+    open_pbr_name : name of the input in OpenPBR
     """
-    return name if shader == OPEN_PBR else _STANDARD_SURFACE_NAMES[name]
+    return open_pbr_name if shader == OPEN_PBR else _STANDARD_SURFACE_NAMES[open_pbr_name]
 
 
 class MapType(NamedTuple):
@@ -118,7 +118,7 @@ class OpenPbrMaterial:
 
 
 def skin_material(
-    name: str,
+    material_name: str,
     skin: Skin,
     radius_m: tuple[float, float, float],
     colour: tuple[float, ...],
@@ -143,19 +143,21 @@ def skin_material(
         "specular_roughness": float(np.sqrt(skin.roughness * skin.smoothing)),
     }
     mapped = {MAP_INPUTS[role]: role for role in roles}
-    return OpenPbrMaterial(name, {key: value for key, value in values.items() if key not in mapped}, mapped)
+    return OpenPbrMaterial(
+        material_name, {key: value for key, value in values.items() if key not in mapped}, mapped
+    )
 
 
 def opaque_material(material: Material) -> OpenPbrMaterial:
     """Return the OpenPBR material of teeth, tongue, lashes or another material of the head except skin."""
     name = material.name.casefold()
     roughness = next(
-        (value for part, value in _ROUGHNESS_BY_KIND.items() if part in name), _DEFAULT_ROUGHNESS
+        (value for part, value in _ROUGHNESS_BY_KIND.items() if part in name), _DEFAULT_PART_ROUGHNESS
     )
     values: dict[str, InputValue] = {
         "base_color": flat_tuple(material.colour),
         "specular_roughness": roughness,
-        "specular_ior": _EYE_IOR if "eye" in name else SKIN_ETA,
+        "specular_ior": _CORNEA_IOR if "eye" in name else SKIN_ETA,
     }
     return OpenPbrMaterial(material.name, values, {})
 
@@ -172,13 +174,13 @@ def part_material(material: Material, pictures: PartPictures) -> OpenPbrMaterial
     )
 
 
-def eye_material(name: str) -> OpenPbrMaterial:
+def eye_material(material_name: str) -> OpenPbrMaterial:
     """Return the OpenPBR material of an eyeball with a colour map."""
     values: dict[str, InputValue] = {
         "specular_roughness": _ROUGHNESS_BY_KIND["eye"],
-        "specular_ior": _EYE_IOR,
+        "specular_ior": _CORNEA_IOR,
     }
-    return OpenPbrMaterial(name, values, {"base_color": "eye"})
+    return OpenPbrMaterial(material_name, values, {"base_color": "eye"})
 
 
 def hair_material(absorption: Floats, radius_mm: float) -> OpenPbrMaterial:
@@ -229,7 +231,7 @@ def _encode_map_png(role: str, texels: Floats) -> bytes:
 
 def file_prefix(file: Path, subject: Subject) -> str:
     """Return the prefix of the names of map and mesh files beside a target's main file."""
-    identifier = re.sub(r"[^A-Za-z0-9]+", "_", file.stem).strip("_")[:_MAX_NAME_LENGTH]
+    identifier = re.sub(r"[^A-Za-z0-9]+", "_", file.stem).strip("_")[:_MAX_MATERIAL_NAME_LENGTH]
     return f"{identifier or subject.identifier}_"
 
 

@@ -114,7 +114,7 @@ class EnginePage(Target):
             note=f"{self.title} {version} ({self.licence}). {self.limitations}",
             script=escape_script(script),
             policy=_TEXTURE_POLICY,
-            sources=sources,
+            script_sources=sources,
             settings=html_safe_json(self._page_settings(subject, parameters, version)),
             head=base64.b64encode(encode_glb(subject, {"KHR_materials_ior": {"ior": SKIN_ETA}}, "")).decode(),
             libraries=libraries,
@@ -140,21 +140,21 @@ class EnginePage(Target):
         }
 
 
-def html_safe_json(value: Json) -> str:
+def html_safe_json(json_value: Json) -> str:
     """Return a value as JSON without characters that begin or end HTML elements."""
-    text = json.dumps(value, ensure_ascii=True)
+    text = json.dumps(json_value, ensure_ascii=True)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
-def module_url(text: str, names: Mapping[str, str]) -> str:
+def module_url(module_text: str, import_names: Mapping[str, str]) -> str:
     """Return a JavaScript module as a data URL, with its imports renamed to names that the page defines.
 
-    text : source of the module
-    names : names that the page defines, by the name in the import statements of the module
+    module_text : source of the module
+    import_names : names that the page defines, by the name in the import statements of the module
     """
-    for old, new in names.items():
-        text = re.sub(rf"(\bfrom\s*)(['\"]){re.escape(old)}\2", rf"\1\2{new}\2", text)
-    return f"data:text/javascript;base64,{base64.b64encode(text.encode()).decode()}"
+    for old, new in import_names.items():
+        module_text = re.sub(rf"(\bfrom\s*)(['\"]){re.escape(old)}\2", rf"\1\2{new}\2", module_text)
+    return f"data:text/javascript;base64,{base64.b64encode(module_text.encode()).decode()}"
 
 
 def material_parameters(subject: Subject) -> Parameters:

@@ -21,34 +21,34 @@ def render_page(
     note: str,
     script: str,
     policy: str,
-    sources: Sequence[str] = (),
-    **fields: str,
+    script_sources: Sequence[str] = (),
+    **placeholder_texts: str,
 ) -> str:
     """Return the HTML of a page from the template page.html and the style page.css of a folder.
 
     title, note : plain texts, which are escaped
     script : script from `escape_script`
     policy : directives of the Content-Security-Policy except script-src and style-src
-    sources : sources that script-src allows in addition to the embedded script
-    fields : HTML or data of the template's other placeholders, by name
+    script_sources : sources that script-src allows in addition to the embedded script
+    placeholder_texts : HTML or data of the template's other placeholders, by name
     """
     style = (folder / "page.css").read_text("utf-8")
-    allowed = " ".join([csp_hash(script), *sources])
+    allowed = " ".join([csp_hash(script), *script_sources])
     return Template((folder / "page.html").read_text("utf-8")).substitute(
         policy=html.escape(f"{_BASE_POLICY}; {policy}; style-src {csp_hash(style)}; script-src {allowed}"),
         title=html.escape(title),
         note=html.escape(note),
         style=style,
         script=script,
-        **fields,
+        **placeholder_texts,
     )
 
 
-def escape_script(text: str) -> str:
+def escape_script(script: str) -> str:
     """Return a script that can be placed in a <script> element without changing its strings."""
-    return _SCRIPT_END.sub(r"<\\/", text).replace("<!--", r"<\!--")
+    return _SCRIPT_END.sub(r"<\\/", script).replace("<!--", r"<\!--")
 
 
-def csp_hash(text: str) -> str:
+def csp_hash(inline_text: str) -> str:
     """Return the hash by which a Content-Security-Policy allows an inline script or style."""
-    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
+    return f"'sha256-{base64.b64encode(hashlib.sha256(inline_text.encode()).digest()).decode()}'"

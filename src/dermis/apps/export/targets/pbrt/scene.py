@@ -42,14 +42,14 @@ def directive(directive_name: str, implementation: str, parameters: DirectivePar
     return " ".join([directive_name, f'"{implementation}"', *texts])
 
 
-def _format_value(value: ArrayLike | Sequence[str]) -> str:
-    if isinstance(value, list) and isinstance(value[0], str):
-        return " ".join(map(_format_value, value))
-    if isinstance(value, str):
-        return '"' + value.replace("\\", "_").replace('"', "_") + '"'
-    if isinstance(value, bool):
-        return str(value).lower()
-    return " ".join(f"{number:.7g}" for number in np.ravel(np.asarray(value)).tolist())
+def _format_value(parameter_value: ArrayLike | Sequence[str]) -> str:
+    if isinstance(parameter_value, list) and isinstance(parameter_value[0], str):
+        return " ".join(map(_format_value, parameter_value))
+    if isinstance(parameter_value, str):
+        return '"' + parameter_value.replace("\\", "_").replace('"', "_") + '"'
+    if isinstance(parameter_value, bool):
+        return str(parameter_value).lower()
+    return " ".join(f"{number:.7g}" for number in np.ravel(np.asarray(parameter_value)).tolist())
 
 
 def camera_lines(camera: Camera, picture_name: str) -> Lines:

@@ -34,9 +34,12 @@ from dermis.scene.model import Scene
 
 Floats = NDArray[np.float64]
 
-_ALBEDO_COUNT, _RADIUS_COUNT, _DEPTH_COUNT = 100, 64, 100
-_FIRST_RADIUS, _RADIUS_RATIO = 2.5e-3, 1.2  # first radius [mean free paths] and ratio of successive radii
-_ALBEDO_DENSITY = 8.0  # larger values place more of the albedos near 1
+_TABLE_ALBEDO_COUNT, _TABLE_RADIUS_COUNT, _SAMPLE_DEPTH_COUNT = 100, 64, 100
+_FIRST_TABLE_RADIUS, _TABLE_RADIUS_RATIO = (
+    2.5e-3,
+    1.2,
+)  # first radius [mean free paths] and ratio of successive radii
+_ALBEDO_SPACING_EXPONENT = 8.0  # larger values place more of the albedos near 1
 _TEXTURES_BY_ROLE = {
     "colour": ("spectrum", "sRGB", "reflectance"),
     "roughness": ("float", "linear", "roughness"),
@@ -48,7 +51,7 @@ _PART_TEXTURES: Mapping[PartRole, tuple[str, str]] = {
     "opacity": ("float", "linear"),
 }
 _REFLECTANCE_NAME, _MFP_NAME = "reflectance", "mfp"
-_OPAQUE_ROUGHNESS = 0.3  # of materials other than skin
+_OPAQUE_PART_ROUGHNESS = 0.3  # of materials other than skin
 _RELATIVE_BALL_DISTANCE, _RELATIVE_BALL_FRAME = (
     10.0,
     1.4,
@@ -74,8 +77,8 @@ class DiffusionTable(NamedTuple):
 
         radius : radii [mean free paths]
         """
-        row = np.interp(reflectance, self.reflectance, np.arange(_ALBEDO_COUNT))
-        low = int(min(row, _ALBEDO_COUNT - 2))
+        row = np.interp(reflectance, self.reflectance, np.arange(_TABLE_ALBEDO_COUNT))
+        low = int(min(row, _TABLE_ALBEDO_COUNT - 2))
         first, second = self.reflectance_within[low : low + 2]
         reflectance_within = first + (row - low) * (second - first)
         return np.asarray(np.interp(np.asarray(radius, np.float64), self.radius, reflectance_within))
@@ -89,9 +92,11 @@ def diffusion_table(eta: float) -> DiffusionTable:
 
     Source: [Habel2013] in the form of [Pharr2023]; the moments of the Fresnel reflectance are exact here.
     """
-    radius = np.concatenate([[0.0], _FIRST_RADIUS * _RADIUS_RATIO ** np.arange(_RADIUS_COUNT - 1)])
-    steps = np.arange(_ALBEDO_COUNT) / (_ALBEDO_COUNT - 1)
-    albedo = np.expm1(-_ALBEDO_DENSITY * steps) / np.expm1(-_ALBEDO_DENSITY)
+    radius = np.concatenate(
+        [[0.0], _FIRST_TABLE_RADIUS * _TABLE_RADIUS_RATIO ** np.arange(_TABLE_RADIUS_COUNT - 1)]
+    )
+    steps = np.arange(_TABLE_ALBEDO_COUNT) / (_TABLE_ALBEDO_COUNT - 1)
+    albedo = np.expm1(-_ALBEDO_SPACING_EXPONENT * steps) / np.expm1(-_ALBEDO_SPACING_EXPONENT)
     multiple = np.stack([_multiple_scattering(radius, one, eta) for one in albedo])
     profile = 2.0 * np.pi * radius * (multiple + albedo[:, None] * _single_scattering(radius, eta))
     reflectance_within = _integrate_spline(radius, profile)
@@ -135,22 +140,24 @@ def _single_scattering(radius: Floats, eta: float) -> Floats:
 
 
 def _sample_depths() -> Floats:
-    return np.asarray(-np.log1p(-(np.arange(_DEPTH_COUNT) + 0.5) / _DEPTH_COUNT))
+    return np.asarray(-np.log1p(-(np.arange(_SAMPLE_DEPTH_COUNT) + 0.5) / _SAMPLE_DEPTH_COUNT))
 
 
-def _integrate_spline(x: Floats, values: Floats) -> Floats:
+def _integrate_spline(knot_positions: Floats, knot_values: Floats) -> Floats:
     """Return the running integrals (n, m) of Catmull-Rom splines, from x[0] to each x.
 
-    x : (m,) increasing knots
-    values : (n, m) values of each spline at the knots
+    knot_positions : (m,) increasing knots
+    knot_values : (n, m) values of each spline at the knots
     """
-    slope = np.empty_like(values)
-    slope[:, 1:-1] = (values[:, 2:] - values[:, :-2]) / (x[2:] - x[:-2])
-    slope[:, 0] = (values[:, 1] - values[:, 0]) / (x[1] - x[0])
-    slope[:, -1] = (values[:, -1] - values[:, -2]) / (x[-1] - x[-2])
-    width = np.diff(x)
-    areas = width * (0.5 * (values[:, 1:] + values[:, :-1]) + width * (slope[:, :-1] - slope[:, 1:]) / 12.0)
-    return np.concatenate([np.zeros((len(values), 1)), np.cumsum(areas, axis=1)], axis=1)
+    slope = np.empty_like(knot_values)
+    slope[:, 1:-1] = (knot_values[:, 2:] - knot_values[:, :-2]) / (knot_positions[2:] - knot_positions[:-2])
+    slope[:, 0] = (knot_values[:, 1] - knot_values[:, 0]) / (knot_positions[1] - knot_positions[0])
+    slope[:, -1] = (knot_values[:, -1] - knot_values[:, -2]) / (knot_positions[-1] - knot_positions[-2])
+    width = np.diff(knot_positions)
+    areas = width * (
+        0.5 * (knot_values[:, 1:] + knot_values[:, :-1]) + width * (slope[:, :-1] - slope[:, 1:]) / 12.0
+    )
+    return np.concatenate([np.zeros((len(knot_values), 1)), np.cumsum(areas, axis=1)], axis=1)
 
 
 class Pbrt(Target):
@@ -176,11 +183,13 @@ class Pbrt(Target):
     def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the reflectance, and the mean free paths with the profile closest to the reference."""
         path = fit_scale(subject.curve, _unit_curve(subject.albedo))
-        return _parameters(subject, path, "1 / (sigma_a + sigma_s); a unit is 1 mm")
+        return _material_parameters(subject, path, "1 / (sigma_a + sigma_s); a unit is 1 mm")
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the skin's colour as reflectance, and published diffuse mean free paths as parameter mfp."""
-        return _parameters(subject, published_mean_free_path_mm(subject), "as published, 1 / sigma_tr")
+        return _material_parameters(
+            subject, published_mean_free_path_mm(subject), "as published, 1 / sigma_tr"
+        )
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative profile that pbrt tabulates for the reflectance and mean free paths."""
@@ -210,7 +219,7 @@ def _unit_curve(reflectance: Floats) -> CumulativeProfile:
     return CumulativeProfile.from_function(fraction_within, total)
 
 
-def _parameters(subject: Subject, mean_free_path_mm: Floats, meaning: str) -> Parameters:
+def _material_parameters(subject: Subject, mean_free_path_mm: Floats, meaning: str) -> Parameters:
     skin, colour = subject.skin, flat_tuple(subject.clipped_albedo())
     return (
         Parameter(_REFLECTANCE_NAME, colour, "-", "of the light that enters, or a texture"),
@@ -236,27 +245,27 @@ def _ball_scene(ball: Head) -> Scene:
 
 
 def _scene_lines(
-    subject: Subject, parameters: Parameters, scene: Scene, prefix: str
+    subject: Subject, parameters: Parameters, scene: Scene, file_prefix: str
 ) -> tuple[Lines, dict[str, bytes]]:
     """Return the directives of the scene, and the contents of the mesh and image files by file name.
 
-    prefix : prefix of the names of mesh and image files
+    file_prefix : prefix of the names of mesh and image files
     """
     head = scene.head
-    textures = skin_textures(subject, prefix)
+    textures = skin_textures(subject, file_prefix)
     lines = ["# Written by dermis; lengths in mm relative to the head's centre"]
-    lines += [*camera_lines(scene.camera, f"{prefix}picture.exr"), "WorldBegin"]
-    part_lines, part_files = _part_textures(subject, prefix)
+    lines += [*camera_lines(scene.camera, f"{file_prefix}picture.exr"), "WorldBegin"]
+    part_lines, part_files = _part_textures(subject, file_prefix)
     lines += [*light_lines(scene.lights, scene.environment), *textures.lines, *part_lines]
     files = textures.files | part_files
     for index in np.unique(head.mesh.material).tolist():
-        material, name = head.mesh.materials[index], f"{prefix}part_{index}.ply"
-        files[name] = mesh_ply(head.mesh, head.mesh.material == index, head.centre_mm, v_up=True)
+        material, name = head.mesh.materials[index], f"{file_prefix}part_{index}.ply"
+        files[name] = mesh_ply(head.mesh, head.mesh.material == index, head.centre_mm, is_v_upwards=True)
         roles = subject.part_pictures.roles(material) if subject.part_pictures else set()
         if material.kind == "skin":
             texts = [_skin_material(parameters, textures.material_textures)]
         else:
-            texts = _opaque_materials(material, roles, f"part_{index}", prefix)
+            texts = _opaque_materials(material, roles, f"part_{index}", file_prefix)
         alpha = {"texture alpha": "parts_opacity"} if "opacity" in roles else {}
         shape = directive("Shape", "plymesh", {"string filename": name, **alpha})
         lines += ["AttributeBegin", *texts, shape, "AttributeEnd"]
@@ -278,11 +287,13 @@ def _skin_material(parameters: Parameters, material_textures: dict[str, tuple[st
     return directive("Material", "subsurface", values)
 
 
-def _opaque_materials(material: Material, roles: set[PartRole], name: str, prefix: str) -> Lines:
+def _opaque_materials(
+    material: Material, roles: set[PartRole], material_name: str, file_prefix: str
+) -> Lines:
     """Return the material directives for a part that is not skin, with references to the part's pictures.
 
-    name : prefix of the names of the two materials that are mixed for a metal part
-    prefix : prefix of the names of the image files
+    material_name : prefix of the names of the two materials that are mixed for a metal part
+    file_prefix : prefix of the names of the image files
     """
     values: dict[str, ArrayLike | Sequence[str]] = {"rgb reflectance": material.colour}
     if "colour" in roles:
@@ -290,37 +301,37 @@ def _opaque_materials(material: Material, roles: set[PartRole], name: str, prefi
     if "alpha" in roles:
         values["texture roughness"] = "parts_alpha"
     else:
-        values["float roughness"] = _OPAQUE_ROUGHNESS
+        values["float roughness"] = _OPAQUE_PART_ROUGHNESS
     values["bool remaproughness"] = False
     if "normal" in roles:
-        values["string normalmap"] = f"{prefix}{PART_PREFIX}normal.png"
+        values["string normalmap"] = f"{file_prefix}{PART_PREFIX}normal.png"
     if "metalness" not in roles:
         return [directive("Material", "coateddiffuse", values)]
-    names = {f"{name}_{kind}": kind for kind in ("coateddiffuse", "conductor")}
+    names = {f"{material_name}_{kind}": kind for kind in ("coateddiffuse", "conductor")}
     mix: dict[str, ArrayLike | Sequence[str]] = {"string materials": [*names]}
     mixed = directive("Material", "mix", {**mix, "texture amount": "parts_metalness"})
     named = [directive("MakeNamedMaterial", one, {"string type": names[one], **values}) for one in names]
     return [*named, mixed]
 
 
-def _part_textures(subject: Subject, prefix: str) -> tuple[Lines, dict[str, bytes]]:
+def _part_textures(subject: Subject, file_prefix: str) -> tuple[Lines, dict[str, bytes]]:
     """Return the texture directives for parts that are not skin, and the image files by name.
 
-    prefix : prefix of the names of the image files
+    file_prefix : prefix of the names of the image files
     """
     lines, files = Lines(), dict[str, bytes]()
     if subject.part_pictures is not None:
         for role, data in subject.part_pictures.encode([*_PART_TEXTURES, "normal"]).items():
-            file = f"{prefix}{PART_PREFIX}{role}.png"
+            file = f"{file_prefix}{PART_PREFIX}{role}.png"
             files[file] = data
             if role in _PART_TEXTURES:
                 lines.append(_image_directive(f"{PART_PREFIX}{role}", *_PART_TEXTURES[role], file))
     return lines, files
 
 
-def _image_directive(name: str, texture_type: str, encoding: str, file: str) -> str:
-    options = {"string filename": file, "string encoding": encoding, "string wrap": "clamp"}
-    return directive(f'Texture "{name}" "{texture_type}"', "imagemap", options)
+def _image_directive(texture_name: str, texture_type: str, encoding: str, file_name: str) -> str:
+    options = {"string filename": file_name, "string encoding": encoding, "string wrap": "clamp"}
+    return directive(f'Texture "{texture_name}" "{texture_type}"', "imagemap", options)
 
 
 class SkinTextures(NamedTuple):
@@ -337,10 +348,10 @@ class SkinTextures(NamedTuple):
     material_textures: dict[str, tuple[str, str]]
 
 
-def skin_textures(subject: Subject, prefix: str) -> SkinTextures:
+def skin_textures(subject: Subject, file_prefix: str) -> SkinTextures:
     """Return the textures for the maps of the subject's head; a skin without a head has none.
 
-    prefix : prefix of the names of the image files
+    file_prefix : prefix of the names of the image files
     """
     textures = SkinTextures([], {}, {})
     if subject.head is None:
@@ -350,7 +361,7 @@ def skin_textures(subject: Subject, prefix: str) -> SkinTextures:
     if "roughness" in arrays:
         arrays["roughness"] = arrays["roughness"] ** 2  # pbrt expects alpha, OpenPBR its square root
     for role, data in encode_map_files(arrays).items():
-        file = f"{prefix}{role}.png"
+        file = f"{file_prefix}{role}.png"
         textures.files[file] = data
         if role == "normal":
             textures.material_textures["normalmap"] = "string", file

@@ -30,7 +30,7 @@ from dermis.optics.media import Floats
 
 ALBEDO_NAME, COLOUR_NAME, DISTANCE_NAME = "surface_albedo", "mean_free_path_color", "mean_free_path_distance"
 SCALE_NAME, DEPTH_SCALE_NAME = "world_unit_scale", "distance_scale"
-_MIN_COLOUR, _MAX_DISTANCE_CM, _MIN_ALBEDO = 0.001, 50.0, 1e-3
+_MIN_MEAN_FREE_PATH_COLOUR, _MAX_DISTANCE_CM, _MIN_ALBEDO = 0.001, 50.0, 1e-3
 _MIN_ENGINE_COLOUR = 0.009  # lower limit that the engine applies
 _MM_PER_CM = 10.0
 _IMPORTED_MAPS = "colour", "normal", "roughness"
@@ -57,14 +57,14 @@ class Unreal(Target):
         albedo = subject.clipped_albedo(_MIN_ALBEDO)
         profile = unreal_parameters(BurleyProfile(albedo, 1.0 / fit_burley_width(subject.curve)))
         path_cm = np.array(profile.mean_free_path_colour) * profile.mean_free_path_distance_cm
-        return _parameters(albedo, path_cm, version)
+        return _profile_parameters(albedo, path_cm, version)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the reduced mean free path of the tissue, as the name of the parameter suggests."""
         path = fit_homogeneous_medium(subject.curve, subject.curve.energy).mfp_mm
         if subject.tissue is not None and subject.tissue.rgb is None:
             path = subject.tissue.medium.layers[-1].mean_free_path_mm
-        return _parameters(subject.clipped_albedo(_MIN_ALBEDO), path / _MM_PER_CM, version)
+        return _profile_parameters(subject.clipped_albedo(_MIN_ALBEDO), path / _MM_PER_CM, version)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative Burley profile that the engine's screen-space pass renders."""
@@ -87,9 +87,9 @@ class Unreal(Target):
         return [file, *write_files(file.parent, zip(names.values(), maps.values(), strict=True))]
 
 
-def _parameters(albedo: Floats, mean_free_path_cm: Floats, version: str) -> Parameters:
+def _profile_parameters(albedo: Floats, mean_free_path_cm: Floats, version: str) -> Parameters:
     distance = float(np.clip(mean_free_path_cm.max(), 0.1, _MAX_DISTANCE_CM))
-    colour = np.clip(mean_free_path_cm / distance, _MIN_COLOUR, 1.0)
+    colour = np.clip(mean_free_path_cm / distance, _MIN_MEAN_FREE_PATH_COLOUR, 1.0)
     depth = Parameter(
         DEPTH_SCALE_NAME, 0.1, "-", "for thin parts; its product with the unit scale must be 0.1"
     )
@@ -126,10 +126,10 @@ def _editor_script(
     return text
 
 
-def _python_literal(value: ParameterValue) -> str:
-    if isinstance(value, tuple):
-        return f"unreal.LinearColor({', '.join(f'{x:.6g}' for x in value)}, 1.0)"
-    return f"{value:.6g}" if isinstance(value, float) else repr(value)
+def _python_literal(parameter_value: ParameterValue) -> str:
+    if isinstance(parameter_value, tuple):
+        return f"unreal.LinearColor({', '.join(f'{x:.6g}' for x in parameter_value)}, 1.0)"
+    return f"{parameter_value:.6g}" if isinstance(parameter_value, float) else repr(parameter_value)
 
 
 TARGET = Unreal()

@@ -156,10 +156,10 @@ def add_motion(stage: Usd.Stage, root: Sdf.Path, mesh: Usd.Prim, deformable: Def
         rest.CreateBlendShapeWeightsAttr([0.0] * len(names) if weights is None else weights.tolist())
 
 
-def unique_usd_names(names: Sequence[str]) -> list[str]:
+def unique_usd_names(original_names: Sequence[str]) -> list[str]:
     """Return the names made unique, and reduced to letters, digits and underscores as USD requires."""
     valid: list[str] = []
-    for name in names:
+    for name in original_names:
         identifier = Tf.MakeValidIdentifier(name)
         number = sum(one == identifier or one.startswith(f"{identifier}_again") for one in valid)
         valid.append(f"{identifier}_again{number}" if number else identifier)
@@ -205,13 +205,13 @@ def _bind_joints(binding: UsdSkel.BindingAPI, deformable: DeformableMesh) -> Non
 
 
 def _add_blend_shapes(
-    stage: Usd.Stage, mesh: Usd.Prim, deformable: DeformableMesh, names: Sequence[str]
+    stage: Usd.Stage, mesh: Usd.Prim, deformable: DeformableMesh, shape_names: Sequence[str]
 ) -> None:
     vertex = point_vertices(deformable.head.mesh)
     point = np.full(len(deformable.head.mesh.positions), -1, np.int32)
     point[vertex] = np.arange(len(vertex))
     titles = deformable.rig.targets.names
-    for name, title, target in zip(names, titles, deformable.targets(), strict=True):
+    for name, title, target in zip(shape_names, titles, deformable.targets(), strict=True):
         shape = UsdSkel.BlendShape.Define(stage, mesh.GetPath().AppendChild(name))
         points = point[target.vertex]
         order = np.flatnonzero(points >= 0)

@@ -29,21 +29,23 @@ _PREVIEW_INPUTS = {
 _UV_PRIMVAR = "st"
 
 
-def build_stage(head: Head, name: str, definitions: Mapping[int, OpenPbrMaterial], prefix: str) -> Usd.Stage:
+def build_stage(
+    head: Head, head_name: str, materials: Mapping[int, OpenPbrMaterial], file_prefix: str
+) -> Usd.Stage:
     """Return the stage with a head's mesh, hairs, rig and materials.
 
-    name : display name of the head
-    definitions : OpenPBR materials by material index in the mesh
-    prefix : prefix of the file names of the maps, which are beside the stage
+    head_name : display name of the head
+    materials : OpenPBR materials by material index in the mesh
+    file_prefix : prefix of the file names of the maps, which are beside the stage
     """
     stage = Usd.Stage.CreateInMemory()
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
-    root = Sdf.Path("/" + unique_usd_names([name])[0])
+    root = Sdf.Path("/" + unique_usd_names([head_name])[0])
     deformable = DeformableMesh(head)
     root_type = UsdSkel.Root if _has_motion(deformable) else UsdGeom.Xform
     top = root_type.Define(stage, root).GetPrim()
-    top.SetDisplayName(name)
+    top.SetDisplayName(head_name)
     Usd.ModelAPI(top).SetKind("component")
     stage.SetDefaultPrim(top)
     if head.attribution:
@@ -52,7 +54,7 @@ def build_stage(head: Head, name: str, definitions: Mapping[int, OpenPbrMaterial
     subsets = add_mesh(stage, path, head, deformable)
     if _has_motion(deformable):
         add_motion(stage, root, stage.GetPrimAtPath(path), deformable)
-    _add_materials(stage, root.AppendChild("materials"), subsets, definitions, prefix)
+    _add_materials(stage, root.AppendChild("materials"), subsets, materials, file_prefix)
     _add_hairs(stage, root, head)
     return stage
 
@@ -75,13 +77,13 @@ def _add_materials(
         UsdShade.MaterialBindingAPI.Apply(subset.GetPrim()).Bind(material)
 
 
-def _add_hairs(stage: Usd.Stage, root: Sdf.Path, head: Head) -> None:
+def _add_hairs(stage: Usd.Stage, root_path: Sdf.Path, head: Head) -> None:
     for name, strands in (("lashes_and_brows", head.strands), ("hair", hair_strands(head))):
         if strands is None:
             continue
-        curves = add_hairs(stage, root.AppendChild(name), head, strands)
+        curves = add_hairs(stage, root_path.AppendChild(name), head, strands)
         definition = hair_material(strands.absorption, float(np.median(strands.radius_mm)))
-        material = _add_material(stage, root.AppendPath(f"materials/{name}"), definition, "")
+        material = _add_material(stage, root_path.AppendPath(f"materials/{name}"), definition, "")
         UsdShade.MaterialBindingAPI.Apply(curves.GetPrim()).Bind(material)
 
 
@@ -179,6 +181,8 @@ def _add_shader(material: UsdShade.Material, node_name: str, node_type: str) -> 
     return shader
 
 
-def _set_input(shader: UsdShade.Shader, input_name: str, value: InputValue) -> None:
+def _set_input(shader: UsdShade.Shader, input_name: str, input_value: InputValue) -> None:
     types = Sdf.ValueTypeNames
-    shader.CreateInput(input_name, types.Color3f if isinstance(value, tuple) else types.Float).Set(value)
+    shader.CreateInput(input_name, types.Color3f if isinstance(input_value, tuple) else types.Float).Set(
+        input_value
+    )

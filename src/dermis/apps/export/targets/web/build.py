@@ -56,17 +56,21 @@ class PageContent:
     picture_entries: dict[PictureKey, tuple[int, int, int]] = field(default_factory=dict)
     poster: NDArray[np.uint8] | None = None
 
-    def add_picture(self, key: PictureKey) -> tuple[int, int, int]:
+    def add_picture(self, picture_key: PictureKey) -> tuple[int, int, int]:
         """Add the picture and value curves of a map layer unless present; return the layer's picture entry.
 
-        key : role, mip level and layer
+        picture_key : role, mip level and layer
         """
-        if key not in self.picture_entries:
-            picture = self.maps.pictures[key]
+        if picture_key not in self.picture_entries:
+            picture = self.maps.pictures[picture_key]
             curves = self.byte_runs.add(np.ascontiguousarray(picture.curves).view(np.uint8).reshape(-1))
-            self.picture_entries[key] = len(self.pictures), curves, 3 if key[0] == "colour_map" else 0
+            self.picture_entries[picture_key] = (
+                len(self.pictures),
+                curves,
+                3 if picture_key[0] == "colour_map" else 0,
+            )
             self.pictures.append(picture.data)
-        return self.picture_entries[key]
+        return self.picture_entries[picture_key]
 
 
 @dataclass(frozen=True)
@@ -100,16 +104,16 @@ class PageRequest:
                 side, samples, merged_hairs = self.interactive[adapter_kind]
                 yield self.settings_for(side, technique).model_copy(update={"samples": samples}), merged_hairs
 
-    def settings_for(self, side: int, technique: str = PAGE_TECHNIQUES[0]) -> Settings:
+    def settings_for(self, picture_side: int, technique: str = PAGE_TECHNIQUES[0]) -> Settings:
         """Return the settings of a frame with a given picture side and technique.
 
         Interreflection is off without diffusion, as links for a second atlas layout would add 0.6 MB to the
         page.
 
-        side : side of the square picture [pixel]
+        picture_side : side of the square picture [pixel]
         """
         diffusion = {"technique": technique, "interreflection": technique == PAGE_TECHNIQUES[0]}
-        return self.settings.model_copy(update={"size": (side, side), **diffusion})
+        return self.settings.model_copy(update={"size": (picture_side, picture_side), **diffusion})
 
 
 def build_content(request: PageRequest, on_renderer: OnRenderer = lambda *_: None) -> PageContent:
@@ -165,7 +169,7 @@ def _frame_changes(
     request: PageRequest,
     settings: Settings,
     default_inputs: FrameInputs,
-    frame: NamedFrame,
+    named_frame: NamedFrame,
 ) -> Json:
     """Return, by slider name, how a frame's records and buffers change at each node of the slider.
 
@@ -176,8 +180,8 @@ def _frame_changes(
     def node_json(inputs: FrameInputs | None) -> Json | None:
         if inputs is None:
             return None
-        node = reduce_hair(capture_frame(capture, inputs), frame.merged_hairs)
-        return node_changes(frame.captured, node, byte_runs)
+        node = reduce_hair(capture_frame(capture, inputs), named_frame.merged_hairs)
+        return node_changes(named_frame.captured, node, byte_runs)
 
     return {
         slider.name: [
@@ -187,10 +191,13 @@ def _frame_changes(
     }
 
 
-def _mip_entries(content: PageContent, map_: PictureMap) -> list[list[tuple[int, int, int]]]:
+def _mip_entries(content: PageContent, picture_map: PictureMap) -> list[list[tuple[int, int, int]]]:
     """Return the entries in `PageContent.picture_entries` of each mip level and layer of a map."""
-    layers = 1 + max(layer for role, _, layer in content.maps.pictures if role == map_.role)
-    return [[content.add_picture((map_.role, mip, k)) for k in range(layers)] for mip in range(map_.mips)]
+    layers = 1 + max(layer for role, _, layer in content.maps.pictures if role == picture_map.role)
+    return [
+        [content.add_picture((picture_map.role, mip, k)) for k in range(layers)]
+        for mip in range(picture_map.mips)
+    ]
 
 
 def _colour_maps(content: PageContent, renderer: Renderer, request: PageRequest, maps: PictureMaps) -> Json:

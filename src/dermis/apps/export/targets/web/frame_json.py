@@ -13,7 +13,7 @@ from dermis.frame.features.post.picture import Picture
 from dermis.gpu.capture import CapturedFrame, CapturedPass, FrameCapture
 
 Json = dict[str, Any]
-_TRIANGLE_TABLES = "triangle_table", "triangle_buffer"
+_TRIANGLE_TABLE_BINDINGS = "triangle_table", "triangle_buffer"
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ def frames_json(
     """
     pictures = [[capture.resource(f.picture.bytes), capture.resource(f.picture.exposed)] for f in frames]
     captured_frames = [frame.captured for frame in frames]
-    contents, tables = {}, set(resources_bound_as(capture, captured_frames, _TRIANGLE_TABLES))
+    contents, tables = {}, set(resources_bound_as(capture, captured_frames, _TRIANGLE_TABLE_BINDINGS))
     for index in resources_read_first(capture, captured_frames):
         if index in quantisation_steps:
             floats = (
@@ -111,27 +111,29 @@ def _mip_bytes(capture: FrameCapture, resource_index: int) -> list[Bytes]:
     return [np.concatenate(parts[k : k + count]) for k in range(0, len(parts), count)]
 
 
-def _frame_json(frame: NamedFrame, picture: list[int], byte_runs: ByteRunCollector) -> Json:
-    records = [(struct, byte_runs.add(record.tobytes())) for struct, record in frame.captured.records]
+def _frame_json(named_frame: NamedFrame, picture_entry: list[int], byte_runs: ByteRunCollector) -> Json:
+    records = [(struct, byte_runs.add(record.tobytes())) for struct, record in named_frame.captured.records]
     return {
-        "name": frame.name,
-        "size": frame.size,
-        "moving": frame.merged_hairs > 0,
-        "picture": picture[0],
-        "linear": picture[1],
-        "views": {stage: _view_record(frame.captured, stage) for stage in ("visibility", "shadows")},
-        "passes": _passes_json(frame.captured, byte_runs),
+        "name": named_frame.name,
+        "size": named_frame.size,
+        "moving": named_frame.merged_hairs > 0,
+        "picture": picture_entry[0],
+        "linear": picture_entry[1],
+        "views": {
+            stage: _view_record_index(named_frame.captured, stage) for stage in ("visibility", "shadows")
+        },
+        "passes": _passes_json(named_frame.captured, byte_runs),
         "records": records,
     }
 
 
-def _view_record(captured: CapturedFrame, stage: str) -> int:
+def _view_record_index(captured: CapturedFrame, stage_name: str) -> int:
     """Return the index of the uniform record with a stage's view matrices; -1 if there is no such record.
 
-    stage : "visibility" or "shadows"
+    stage_name : "visibility" or "shadows"
     """
     views = [k for k, (struct, _) in enumerate(captured.records) if struct == "Views"]
-    records = (-1 - k for one in captured.passes if one.stage == stage for k in one.bound if k < 0)
+    records = (-1 - k for one in captured.passes if one.stage == stage_name for k in one.bound if k < 0)
     return next((k for k in records if k in views), -1)
 
 
@@ -141,10 +143,10 @@ def _passes_json(captured: CapturedFrame, byte_runs: ByteRunCollector) -> list[J
     return [{**vars(one), "written": data and (data[0], byte_runs.add(data[1]))} for one, data in writes]
 
 
-def _program_json(program: Json) -> Json:
+def _program_json(program_entry: Json) -> Json:
     return {
-        **program,
-        "bindings": [(index, name, _camel_keys(entry)) for index, name, entry in program["bindings"]],
+        **program_entry,
+        "bindings": [(index, name, _camel_keys(entry)) for index, name, entry in program_entry["bindings"]],
     }
 
 
@@ -161,11 +163,11 @@ def _member_json(dtype: np.dtype[Any], offset: int) -> list[int] | Json:
     return {"offset": offset // 4, "each": base.itemsize // 4, "members": _struct_json(base)["members"]}
 
 
-def _camel_keys(value: object) -> object:
+def _camel_keys(nested_value: object) -> object:
     """Return nested dictionaries with their keys in camel case, as WebGPU's JavaScript interface requires."""
-    if isinstance(value, dict):
-        return {_camel_case(name): _camel_keys(one) for name, one in value.items()}
-    return value
+    if isinstance(nested_value, dict):
+        return {_camel_case(name): _camel_keys(one) for name, one in nested_value.items()}
+    return nested_value
 
 
 def _camel_case(snake_case: str) -> str:
@@ -188,12 +190,18 @@ def resources_read_first(capture: FrameCapture, frames: Frames) -> list[int]:
     return sorted(found)
 
 
-def resources_bound_as(capture: FrameCapture, frames: Frames, names: tuple[str, ...]) -> dict[int, str]:
-    """Return the name under which shaders bind each resource, by resource index, for bindings in `names`."""
+def resources_bound_as(
+    capture: FrameCapture, frames: Frames, binding_names: tuple[str, ...]
+) -> dict[int, str]:
+    """Return, by resource index, the name of `binding_names` under which shaders bind the resource."""
     found: dict[int, str] = {}
     for one in (one for frame in frames for one in frame.passes if one.program is not None):
         bound_names = [name for _, name, _ in capture.programs[one.program or 0]["bindings"]]
-        found |= {k: name for k, name in zip(one.bound, bound_names, strict=True) if name in names and k >= 0}
+        found |= {
+            k: name
+            for k, name in zip(one.bound, bound_names, strict=True)
+            if name in binding_names and k >= 0
+        }
     return found
 
 

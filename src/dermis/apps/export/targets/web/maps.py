@@ -24,7 +24,7 @@ PictureKey = tuple[str, int, int]
 MIN_PICTURE_SIDE = 64
 """Minimum side of a map that is stored as a picture [texel]."""
 _WEBP_QUALITY = 88
-_VALUE_LEVELS = 256
+_CHANNEL_LEVELS = 256
 _COLOUR_CHANNELS = 3
 
 
@@ -42,18 +42,22 @@ class Picture:
     texels: Halves
 
 
-def encode_picture(texels: Halves, colours: bool) -> Picture:
+def encode_picture(texels: Halves, is_colour_map: bool) -> Picture:
     """Return one layer of a map encoded as a WebP picture.
 
     texels : (h, w, c) texels
-    colours : whether the first three channels are a colour; further channels are then constant
+    is_colour_map : whether the first three channels are a colour; further channels are then constant
     """
     curves = np.stack([_value_curve(texels[..., k].astype(np.float64)) for k in range(texels.shape[2])])
     steps = np.stack([_nearest_steps(texels[..., k], curves[k]) for k in range(len(curves))], axis=-1)
-    image = steps[..., :_COLOUR_CHANNELS] if colours else steps.transpose(2, 0, 1).reshape(-1, steps.shape[1])
+    image = (
+        steps[..., :_COLOUR_CHANNELS]
+        if is_colour_map
+        else steps.transpose(2, 0, 1).reshape(-1, steps.shape[1])
+    )
     data = _encode_webp(image)
     levels = _decode_webp(data)
-    if colours:
+    if is_colour_map:
         levels = np.concatenate([levels, steps[..., _COLOUR_CHANNELS:]], axis=-1)
         levels[..., _COLOUR_CHANNELS:] = steps[:1, :1, _COLOUR_CHANNELS:]  # constant channels
     else:
@@ -69,7 +73,7 @@ def _value_curve(texels: NDArray[np.float64]) -> NDArray[np.float64]:
     """
     limits = np.array([texels.min(), texels.max()])
     first, last = np.sign(limits) * np.sqrt(np.abs(limits))
-    root = np.linspace(first, last, _VALUE_LEVELS)
+    root = np.linspace(first, last, _CHANNEL_LEVELS)
     return np.asarray(np.sign(root) * root * root)
 
 
@@ -82,22 +86,22 @@ def _nearest_steps(texels: Halves, curve: NDArray[np.float64]) -> NDArray[np.uin
     return np.searchsorted(midpoints, texels.astype(np.float64)).astype(np.uint8)
 
 
-def _encode_webp(image: NDArray[np.uint8]) -> bytes:
+def _encode_webp(pixels: NDArray[np.uint8]) -> bytes:
     from PIL import Image
 
     file = io.BytesIO()
-    Image.fromarray(image).save(file, "WEBP", quality=_WEBP_QUALITY, method=4)
+    Image.fromarray(pixels).save(file, "WEBP", quality=_WEBP_QUALITY, method=4)
     return file.getvalue()
 
 
-def _decode_webp(data: bytes) -> NDArray[np.uint8]:
+def _decode_webp(webp_bytes: bytes) -> NDArray[np.uint8]:
     """Return the (h, w, 3) pixels of a WebP file."""
     from PIL import Image
 
-    return np.asarray(Image.open(io.BytesIO(data)).convert("RGB"))
+    return np.asarray(Image.open(io.BytesIO(webp_bytes)).convert("RGB"))
 
 
-_STORAGE_BINDING = 8  # WebGPU's texture usage flag
+_STORAGE_BINDING_USAGE = 8  # WebGPU's texture usage flag
 _KNOT_STEPS_MM = 2.0**-8, 2.0**-8, 2.0**-8, 2.0**-14  # steps of a knot's position and radius
 _COLOUR_ROLE = "colour_map"
 _MAP_ROLES = (_COLOUR_ROLE, "relief_map", "slope_map", "specular_map", "roughness_map", "detail_map")
@@ -126,7 +130,7 @@ class MapPictures:
         maps = {}
         for index, role in _picture_textures(capture, frames).items():
             texture, description = capture.resource_at(index), capture.resources[index]
-            side, storable = min(description["size"][:2]), description["usage"] & _STORAGE_BINDING
+            side, storable = min(description["size"][:2]), description["usage"] & _STORAGE_BINDING_USAGE
             mips = (
                 1 if storable else sum(side >> mip >= MIN_PICTURE_SIDE for mip in range(description["mips"]))
             )
@@ -138,19 +142,19 @@ class MapPictures:
         return maps
 
     def _add_pictures(
-        self, capture: FrameCapture, resource_index: int, role: str, mip: int
+        self, capture: FrameCapture, resource_index: int, role: str, mip_level: int
     ) -> NDArray[np.float16]:
         """Add the pictures of a mip level, and return the (l, h, w, c) texels decoded from the pictures.
 
         resource_index : index of the texture or buffer in the capture
-        mip : mip level
+        mip_level : mip level, 0 for the full resolution
         """
-        layers = read_texels(capture, resource_index, mip)
+        layers = read_texels(capture, resource_index, mip_level)
         for layer, texels in enumerate(layers):
-            if (role, mip, layer) not in self.pictures:
-                self.pictures[role, mip, layer] = encode_picture(texels, role == _COLOUR_ROLE)
+            if (role, mip_level, layer) not in self.pictures:
+                self.pictures[role, mip_level, layer] = encode_picture(texels, role == _COLOUR_ROLE)
                 self._encoded_texels.setdefault(role, texels)
-        return np.stack([self.pictures[role, mip, layer].texels for layer in range(len(layers))])
+        return np.stack([self.pictures[role, mip_level, layer].texels for layer in range(len(layers))])
 
 
 def with_reduced_maps(head: Head, max_side: int) -> Head:
@@ -182,14 +186,14 @@ def quantise_hairs(renderer: Renderer, capture: FrameCapture, frames: Frames) ->
     return dict.fromkeys(buffers, _KNOT_STEPS_MM)
 
 
-def read_texels(capture: FrameCapture, resource_index: int, mip: int) -> NDArray[np.float16]:
+def read_texels(capture: FrameCapture, resource_index: int, mip_level: int) -> NDArray[np.float16]:
     """Return the (l, h, w, c) texels of a mip level of a half-float texture.
 
     resource_index : index of the texture or buffer in the capture
     """
     width, height, layers = capture.resources[resource_index]["size"]
-    sides = max(1, height >> mip), max(1, width >> mip)
-    parts = capture.read_content(resource_index)[mip * layers : (mip + 1) * layers]
+    sides = max(1, height >> mip_level), max(1, width >> mip_level)
+    parts = capture.read_content(resource_index)[mip_level * layers : (mip_level + 1) * layers]
     return np.stack([one.view(np.float16).reshape(*sides, -1) for one in parts])
 
 

@@ -19,10 +19,10 @@ _ESCAPED_CHARACTERS = frozenset({0, 13, ord("<")})
 """Characters that HTML changes in a script element, or that end it."""
 _ROW_LENGTHS = (1, 2, 3, 4, 6, 8, 12, 16, 24)
 _DIFFERENCE_ORDERS = (0, 1, 2)
-_SAMPLE_BYTES, _SAMPLE_COUNT = 3 << 15, 3  # parts of a run on which layouts are compared
-_SAMPLE_ALIGNMENT = 192  # bytes; a multiple of the bytes of all rows
+_LAYOUT_SAMPLE_BYTES, _LAYOUT_SAMPLE_COUNT = 3 << 15, 3  # parts of a run on which layouts are compared
+_LAYOUT_SAMPLE_ALIGNMENT = 192  # bytes; a multiple of the bytes of all rows
 _TRIAL_ZLIB_LEVEL = 4  # zlib level for the comparison of layouts
-_WORD_TYPES = {1: np.uint8, 2: np.uint16, 4: np.uint32}
+_UNSIGNED_TYPE_BY_WORD_BYTES = {1: np.uint8, 2: np.uint16, 4: np.uint32}
 
 
 class ByteRunCollector:
@@ -37,38 +37,40 @@ class ByteRunCollector:
         self._data: list[bytes] = []
         self._end = 0
 
-    def add(self, data: Bytes | bytes, layouts: Iterable[tuple[int, int, int]] | None = None) -> int:
+    def add(self, raw_bytes: Bytes | bytes, layouts: Iterable[tuple[int, int, int]] | None = None) -> int:
         """Add a run of bytes, and return the run's index in `runs`.
 
         layouts : layouts to try: bytes per word, words per row, and order of the differences; the layout with
             the best compression is used
         """
-        raw = np.frombuffer(data, np.uint8)
+        raw = np.frombuffer(raw_bytes, np.uint8)
         return self._add_run(raw, list(layouts or _possible_layouts(len(raw))), ())
 
-    def add_parts(self, parts: Iterable[Bytes]) -> int:
+    def add_parts(self, encoded_parts: Iterable[Bytes]) -> int:
         """Add a run that concatenates separately encoded parts, and return the run's index in `runs`."""
-        numbers = tuple(self.add(one) for one in parts)
+        numbers = tuple(self.add(one) for one in encoded_parts)
         self.runs.append((0, sum(self.runs[k][1] for k in numbers), 0, 0, 0, numbers))
         return len(self.runs) - 1
 
-    def add_floats(self, values: NDArray[np.float32], steps: tuple[float, ...]) -> int:
+    def add_floats(self, floats: NDArray[np.float32], column_steps: tuple[float, ...]) -> int:
         """Add a run of floats as integer multiples of one step per column; return the run's index in `runs`.
 
-        values : (n, c) floats that are multiples of the steps
-        steps : (c,) steps, powers of two
+        floats : (n, c) floats that are multiples of the steps
+        column_steps : (c,) steps, powers of two
         """
-        words = np.rint(values / np.array(steps)).astype(np.int32)
-        layouts = [(4, len(steps), order) for order in _DIFFERENCE_ORDERS]
-        return self._add_run(words.view(np.uint8).reshape(-1), layouts, steps)
+        words = np.rint(floats / np.array(column_steps)).astype(np.int32)
+        layouts = [(4, len(column_steps), order) for order in _DIFFERENCE_ORDERS]
+        return self._add_run(words.view(np.uint8).reshape(-1), layouts, column_steps)
 
-    def _add_run(self, raw: Bytes, layouts: list[tuple[int, int, int]], steps: tuple[float, ...]) -> int:
-        key = hashlib.sha256(raw.tobytes()).digest() + repr(steps).encode()
+    def _add_run(
+        self, raw_bytes: Bytes, layouts: list[tuple[int, int, int]], column_steps: tuple[float, ...]
+    ) -> int:
+        key = hashlib.sha256(raw_bytes.tobytes()).digest() + repr(column_steps).encode()
         if key not in self._run_indices:
             self._run_indices[key] = len(self.runs)
-            layout = _best_layout(raw, layouts)
-            planes = byte_planes(raw, *layout)
-            self.runs.append((self._end, len(planes), *layout, steps))
+            layout = _best_layout(raw_bytes, layouts)
+            planes = byte_planes(raw_bytes, *layout)
+            self.runs.append((self._end, len(planes), *layout, column_steps))
             self._data.append(planes)
             self._end += len(planes)
         return self._run_indices[key]
@@ -78,33 +80,33 @@ class ByteRunCollector:
         return gzip.compress(b"".join(self._data), 9, mtime=0)
 
 
-def quantise(values: NDArray[np.float32], steps: tuple[float, ...]) -> NDArray[np.float32]:
+def quantise(floats: NDArray[np.float32], column_steps: tuple[float, ...]) -> NDArray[np.float32]:
     """Return floats (n, c) with each column rounded to multiples of a step.
 
-    steps : (c,) step of each column
+    column_steps : (c,) step of each column
     """
-    return np.asarray(np.rint(values / np.array(steps)) * np.array(steps), np.float32)
+    return np.asarray(np.rint(floats / np.array(column_steps)) * np.array(column_steps), np.float32)
 
 
-def encode_seven_bits(data: bytes) -> str:
+def encode_seven_bits(raw_bytes: bytes) -> str:
     """Return bytes as text with 7 bits per character, so that HTML can contain them.
 
     Code points that HTML would change are increased by 256.
     """
-    bits = np.unpackbits(np.frombuffer(data, np.uint8))
+    bits = np.unpackbits(np.frombuffer(raw_bytes, np.uint8))
     bits = np.concatenate([bits, np.zeros(-len(bits) % 7, np.uint8)])
     codes = np.packbits(bits.reshape(-1, 7), axis=1)[:, 0] >> 1
     return codes.tobytes().decode("ascii").translate({code: code + 256 for code in _ESCAPED_CHARACTERS})
 
 
-def byte_planes(raw: Bytes, bytes_per_word: int, words_per_row: int, difference_order: int) -> bytes:
+def byte_planes(raw_bytes: Bytes, bytes_per_word: int, words_per_row: int, difference_order: int) -> bytes:
     """Return the bytes of a table of words, one byte column after another, which improves compression.
 
-    raw : bytes of the table, row by row
+    raw_bytes : bytes of the table, row by row
     bytes_per_word, words_per_row : number of bytes per word, and number of words per row
     difference_order : number of times that rows are replaced by their differences from the previous rows
     """
-    words = raw.view(_WORD_TYPES[bytes_per_word]).copy()
+    words = raw_bytes.view(_UNSIGNED_TYPE_BY_WORD_BYTES[bytes_per_word]).copy()
     for _ in range(difference_order):
         words[words_per_row:] -= words[:-words_per_row].copy()
     return words.view(np.uint8).reshape(-1, bytes_per_word * words_per_row).T.tobytes()
@@ -113,21 +115,27 @@ def byte_planes(raw: Bytes, bytes_per_word: int, words_per_row: int, difference_
 def _possible_layouts(byte_count: int) -> Iterable[tuple[int, int, int]]:
     yield 1, 1, 0
     for word, row in (
-        (word, row) for word in _WORD_TYPES for row in _ROW_LENGTHS if byte_count % (word * row) == 0
+        (word, row)
+        for word in _UNSIGNED_TYPE_BY_WORD_BYTES
+        for row in _ROW_LENGTHS
+        if byte_count % (word * row) == 0
     ):
         yield from ((word, row, order) for order in _DIFFERENCE_ORDERS)
 
 
-def _best_layout(raw: Bytes, layouts: list[tuple[int, int, int]]) -> tuple[int, int, int]:
+def _best_layout(raw_bytes: Bytes, layouts: list[tuple[int, int, int]]) -> tuple[int, int, int]:
     """Return the layout with which a sample of the bytes compresses best.
 
     layouts : layouts to try: bytes per word, words per row, and order of the differences
     """
-    sample = raw
-    if len(raw) > _SAMPLE_COUNT * _SAMPLE_BYTES:
-        starts = [k * (len(raw) - _SAMPLE_BYTES) // (_SAMPLE_COUNT - 1) for k in range(_SAMPLE_COUNT)]
-        aligned = [start // _SAMPLE_ALIGNMENT * _SAMPLE_ALIGNMENT for start in starts]
-        sample = np.concatenate([raw[start : start + _SAMPLE_BYTES] for start in aligned])
+    sample = raw_bytes
+    if len(raw_bytes) > _LAYOUT_SAMPLE_COUNT * _LAYOUT_SAMPLE_BYTES:
+        starts = [
+            k * (len(raw_bytes) - _LAYOUT_SAMPLE_BYTES) // (_LAYOUT_SAMPLE_COUNT - 1)
+            for k in range(_LAYOUT_SAMPLE_COUNT)
+        ]
+        aligned = [start // _LAYOUT_SAMPLE_ALIGNMENT * _LAYOUT_SAMPLE_ALIGNMENT for start in starts]
+        sample = np.concatenate([raw_bytes[start : start + _LAYOUT_SAMPLE_BYTES] for start in aligned])
     return min(
         layouts, key=lambda layout: len(zlib.compress(byte_planes(sample, *layout), _TRIAL_ZLIB_LEVEL))
     )

@@ -46,39 +46,41 @@ class Slider:
 
 
 def node_inputs(
-    slider: Slider, prepare: Callable[[Scene], FrameInputs], base: FrameInputs
+    slider: Slider, prepare_inputs: Callable[[Scene], FrameInputs], default_inputs: FrameInputs
 ) -> Iterator[FrameInputs | None]:
     """Yield the frame inputs at each node of a slider; None at the node of the default value.
 
-    prepare : function that returns the frame inputs of a scene
-    base : frame inputs of the default scene
+    prepare_inputs : function that returns the frame inputs of a scene
+    default_inputs : frame inputs of the default scene
     """
     for scene in slider.scenes:
         if scene is None:
             yield None
         elif slider.changes_pose_only:
-            posed = prepare(scene)
-            yield replace(base, motion=posed.motion, view=posed.view)
+            posed = prepare_inputs(scene)
+            yield replace(default_inputs, motion=posed.motion, view=posed.view)
         else:
-            yield prepare(scene)
+            yield prepare_inputs(scene)
 
 
-def node_changes(base: CapturedFrame, node: CapturedFrame, byte_runs: ByteRunCollector) -> Json:
+def node_changes(
+    default_frame: CapturedFrame, node_frame: CapturedFrame, byte_runs: ByteRunCollector
+) -> Json:
     """Return how records and written buffers of a slider node's frame differ from the default frame.
 
     Each change is the index of the record or pass, the first word that differs, and the byte run of the
     differences. Integers, such as indices of interreflection links, are kept from the default frame.
 
-    base, node : captured frames at the default value and at the node
+    default_frame, node_frame : captured frames at the default value and at the node
 
     Raises DermisError if the node's frame has different passes.
     """
-    stages = [[one.stage for one in captured.passes] for captured in (base, node)]
+    stages = [[one.stage for one in captured.passes] for captured in (default_frame, node_frame)]
     if stages[0] != stages[1]:
         refuse("slider", "the same passes at each of its nodes", "they differ", "Remove the slider")
-    pairs = enumerate(zip(base.records, node.records, strict=True))
+    pairs = enumerate(zip(default_frame.records, node_frame.records, strict=True))
     records = [(k, (_record_floats(one), _record_floats(other))) for k, ((_, one), (_, other)) in pairs]
-    passes = enumerate(zip(base.passes, node.passes, strict=True))
+    passes = enumerate(zip(default_frame.passes, node_frame.passes, strict=True))
     written = [
         (k, (_written_floats(one), _written_floats(other))) for k, (one, other) in passes if one.written
     ]
@@ -110,10 +112,10 @@ def _written_floats(captured_pass: CapturedPass) -> Floats:
 
 
 def _node_differences(
-    pairs: list[tuple[int, tuple[Floats, Floats]]], byte_runs: ByteRunCollector
+    indexed_value_pairs: list[tuple[int, tuple[Floats, Floats]]], byte_runs: ByteRunCollector
 ) -> list[tuple[int, int, int]]:
     changes = []
-    for index, (before, after) in pairs:
+    for index, (before, after) in indexed_value_pairs:
         if before.tobytes() == after.tobytes():
             continue
         if len(before) != len(after):
@@ -164,10 +166,10 @@ def _pigment_sliders(scene: Scene) -> list[Slider]:
     return sliders
 
 
-def _with_pigment(scene: Scene, maps: PaintedMaps, pigment: str, value: float) -> Scene:
+def _with_pigment(scene: Scene, maps: PaintedMaps, pigment_name: str, pigment_value: float) -> Scene:
     assert scene.skin.pigments is not None
-    pigments = scene.skin.pigments.model_copy(update={pigment: value})
-    changed: Any = {pigment: value}
+    pigments = scene.skin.pigments.model_copy(update={pigment_name: pigment_value})
+    changed: Any = {pigment_name: pigment_value}
     painted = replace(maps, look=replace(maps.look, **changed))
     skin = scene.skin.model_copy(update={"pigments": pigments})
     return replace(scene, head=replace(scene.head, maps=painted), skin=skin)

@@ -9,35 +9,40 @@ from pathlib import Path
 
 import numpy as np
 
-from dermis.apps.inverse.unmixing.spectral_inversion import SpectralModel, SpectralUnknown, Values
+from dermis.apps.inverse.unmixing.spectral_inversion import ParameterValues, SpectralModel, SpectralUnknown
 from dermis.base.errors import refuse
 from dermis.optics.media import Floats
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM
 
-_FIRST_NM, _STEP_NM = 380.0, 2.0  # wavelengths of the decoder
-_INPUTS = ("melanin", "blood", "epidermis_mm", "oxygen", "eumelanin")
-_MIDDLE = {"melanin": 0.3, "blood": 0.3, "epidermis_mm": 0.4, "oxygen": 0.7, "eumelanin": 0.74}
-BIOSKIN_UNKNOWNS = {name: SpectralUnknown(name, 0.0, 1.0, _MIDDLE[name]) for name in _INPUTS}
+_FIRST_WAVELENGTH_NM, _WAVELENGTH_STEP_NM = 380.0, 2.0  # wavelengths of the decoder
+_DECODER_INPUTS = ("melanin", "blood", "epidermis_mm", "oxygen", "eumelanin")
+_MIDDLE_INPUT_VALUES = {"melanin": 0.3, "blood": 0.3, "epidermis_mm": 0.4, "oxygen": 0.7, "eumelanin": 0.74}
+BIOSKIN_UNKNOWNS = {
+    name: SpectralUnknown(name, 0.0, 1.0, _MIDDLE_INPUT_VALUES[name]) for name in _DECODER_INPUTS
+}
 """Inputs of the decoder, which its authors map to 0 to 1; fits start from plausible values."""
-BIOSKIN_SETS = (("melanin", "blood"), ("melanin", "blood", "oxygen"), _INPUTS)
+BIOSKIN_SETS = (("melanin", "blood"), ("melanin", "blood", "oxygen"), _DECODER_INPUTS)
 """Inputs to fit, with two, three and five unknowns."""
 
 
-def bioskin_model(weights: Path) -> SpectralModel:
+def bioskin_model(weights_path: Path) -> SpectralModel:
     """Return the decoder as a spectral model.
 
-    weights : the published file pretrained_models/BioSkin.pt
+    weights_path : the published file pretrained_models/BioSkin.pt
 
     Raises DermisError if the file is not that of BioSkin.
 
     Source: [Aliaga2023].
     """
-    layers = _read_layers(weights)
-    positions = (WAVELENGTHS_NM - _FIRST_NM) / _STEP_NM
+    layers = _read_layers(weights_path)
+    positions = (WAVELENGTHS_NM - _FIRST_WAVELENGTH_NM) / _WAVELENGTH_STEP_NM
 
-    def reflectance(values: Values) -> Floats:
+    def reflectance(values: ParameterValues) -> Floats:
         count = len(next(iter(values.values())))
-        columns = (np.broadcast_to(values.get(name, np.float64(_MIDDLE[name])), count) for name in _INPUTS)
+        columns = (
+            np.broadcast_to(values.get(name, np.float64(_MIDDLE_INPUT_VALUES[name])), count)
+            for name in _DECODER_INPUTS
+        )
         x = np.stack(list(columns), axis=-1)
         for name in ("fc_dec_in", "fc_dec"):
             x = np.tanh(x @ layers[f"{name}.weight"].T + layers[f"{name}.bias"])
@@ -50,24 +55,24 @@ def bioskin_model(weights: Path) -> SpectralModel:
 class _TensorReader(pickle.Unpickler):
     """Unpickler that loads a dictionary of tensors and refuses to construct any other object."""
 
-    def find_class(self, module: str, name: str) -> object:
+    def find_class(self, module_name: str, name: str) -> object:
         """Return the object for a name in files of weights; raise UnpicklingError for any other name."""
-        if (module, name) == ("torch._utils", "_rebuild_tensor_v2"):
+        if (module_name, name) == ("torch._utils", "_rebuild_tensor_v2"):
             return lambda storage, offset, size, *rest: (storage, offset, size)
-        if (module, name) == ("collections", "OrderedDict"):
+        if (module_name, name) == ("collections", "OrderedDict"):
             return OrderedDict
-        if module == "torch" and name.endswith("Storage"):
+        if module_name == "torch" and name.endswith("Storage"):
             return name
-        raise pickle.UnpicklingError(f"{module}.{name}")
+        raise pickle.UnpicklingError(f"{module_name}.{name}")
 
     def persistent_load(self, pid: object) -> object:
         """Return the description of a tensor's storage."""
         return pid
 
 
-def _read_layers(path: Path) -> dict[str, Floats]:
+def _read_layers(weights_path: Path) -> dict[str, Floats]:
     try:
-        with zipfile.ZipFile(path) as archive:
+        with zipfile.ZipFile(weights_path) as archive:
             root = archive.namelist()[0].split("/")[0]
             with archive.open(f"{root}/data.pkl") as file:
                 tensors = _TensorReader(file).load()
@@ -78,4 +83,4 @@ def _read_layers(path: Path) -> dict[str, Floats]:
                 layers[name.removeprefix("module.")] = values.astype(np.float64)
             return layers
     except (OSError, zipfile.BadZipFile, pickle.UnpicklingError, KeyError, ValueError) as fault:
-        refuse(str(path), "BioSkin.pt of facebookresearch/BioSkin", str(fault), "Give its path")
+        refuse(str(weights_path), "BioSkin.pt of facebookresearch/BioSkin", str(fault), "Give its path")

@@ -10,9 +10,9 @@ import numpy as np
 from dermis.apps.inverse.unmixing.spectral_inversion import (
     UNKNOWNS,
     Criterion,
+    ParameterValues,
     SpectralFit,
     SpectralUnknown,
-    Values,
     invert_spectra,
 )
 from dermis.optics.media import Floats
@@ -48,9 +48,13 @@ bandwidth_nm : half width of the instrument's triangular band
 bilirubin, carotene, methaemoglobin : absorption of the dermis at the peak of bands at 460, 480 and 630 nm
     [1/mm]
 """
-_BANDS = {"bilirubin": (460.0, 28.0), "carotene": (480.0, 20.0), "methaemoglobin": (630.0, 18.0)}
-_OUTER_STEPS = 6  # of the constants
-_INNER_STEPS = 4  # of the unknowns of spectra, in each outer step
+_ABSORPTION_BANDS_NM = {
+    "bilirubin": (460.0, 28.0),
+    "carotene": (480.0, 20.0),
+    "methaemoglobin": (630.0, 18.0),
+}
+_CONSTANT_STEPS = 6  # of the constants
+_UNKNOWN_STEPS = 4  # of the unknowns of spectra, in each outer step
 _DERIVATIVE_STEP = 0.02
 _MIN_GAIN = 1e-4
 _NOTABLE_CORRELATION = 0.85
@@ -70,16 +74,16 @@ class ExtendedModel:
 
     constants: dict[str, float]
 
-    def __call__(self, values: Values) -> Floats:
+    def __call__(self, parameter_values: ParameterValues) -> Floats:
         """Return the diffuse reflectances (n, 31) of skins.
 
-        values : parameters of the skins by name
+        parameter_values : parameters of the skins by name
         """
         defaults = {"vessel_mm": 0.0, "bandwidth_nm": 0.0, "scattering": 1.0}
 
         def parameter(name: str) -> Floats:
             fallback = self.constants.get(name, defaults.get(name, CONSTANTS[name].start))
-            return np.asarray(values.get(name, np.float64(fallback)))[..., None]
+            return np.asarray(parameter_values.get(name, np.float64(fallback)))[..., None]
 
         wavelength = WAVELENGTHS_NM
         bloodless = parameter("baseline") * baseline_absorption(wavelength)
@@ -93,7 +97,7 @@ class ExtendedModel:
         vessels = vessels * -np.expm1(-depth) / depth
         m, b = parameter("melanin"), parameter("blood")
         dermis = b * vessels + (1.0 - b) * bloodless
-        for name, (centre, width) in _BANDS.items():
+        for name, (centre, width) in _ABSORPTION_BANDS_NM.items():
             dermis = dermis + self.constants.get(name, 0.0) * np.exp(
                 -0.5 * ((wavelength - centre) / width) ** 2
             )
@@ -137,23 +141,23 @@ class SharedFit:
 def fit_constants(
     spectra: Floats,
     unknowns: Sequence[str],
-    free: Sequence[str],
+    free_constants: Sequence[str],
     criterion: Criterion = "spectrum",
-    fixed: Mapping[str, float] | None = None,
+    fixed_constants: Mapping[str, float] | None = None,
 ) -> SharedFit:
     """Fit shared constants and each spectrum's unknowns by least squares, in alternation.
 
     unknowns : names of the parameters that each spectrum has separately
-    free : names of the `CONSTANTS` to fit, which all spectra share
-    fixed : values of constants that are not fitted
+    free_constants : names of the `CONSTANTS` to fit, which all spectra share
+    fixed_constants : values of constants that are not fitted
     """
     separate = [UNKNOWNS[name] for name in unknowns]
-    shared = [CONSTANTS[name] for name in free]
-    z = np.array([one.coordinate(dict(fixed or {}).get(one.name, one.start)) for one in shared])
+    shared = [CONSTANTS[name] for name in free_constants]
+    z = np.array([one.coordinate(dict(fixed_constants or {}).get(one.name, one.start)) for one in shared])
 
     def constants(point: Floats) -> dict[str, float]:
         values = {one.name: float(one.values(point[i : i + 1])[0]) for i, one in enumerate(shared)}
-        return dict(fixed or {}) | values
+        return dict(fixed_constants or {}) | values
 
     def solve(point: Floats, start: SpectralFit | None, steps: int) -> tuple[SpectralFit, Floats]:
         model = extended_model(constants(point))
@@ -163,12 +167,12 @@ def fit_constants(
 
     fit, r = solve(z, None, 25)
     damping = 1e-2
-    for _ in range(_OUTER_STEPS):
+    for _ in range(_CONSTANT_STEPS):
         columns = []
         for i in range(len(z)):
             moved = z.copy()
             moved[i] += _DERIVATIVE_STEP
-            columns.append((solve(moved, fit, _INNER_STEPS)[1] - r) / _DERIVATIVE_STEP)
+            columns.append((solve(moved, fit, _UNKNOWN_STEPS)[1] - r) / _DERIVATIVE_STEP)
         J = np.stack(columns, axis=-1)
         H, g = J.T @ J, -J.T @ r
         for _ in range(5):
@@ -178,7 +182,7 @@ def fit_constants(
                 [one.coordinate(one.low) for one in shared],
                 [one.coordinate(one.high) for one in shared],
             )
-            trial_fit, trial_r = solve(trial, fit, 2 * _INNER_STEPS)
+            trial_fit, trial_r = solve(trial, fit, 2 * _UNKNOWN_STEPS)
             if trial_r @ trial_r < r @ r:
                 break
             damping *= 8.0
@@ -188,16 +192,16 @@ def fit_constants(
         z, fit, r, damping = trial, trial_fit, trial_r, 0.3 * damping
         if gain < _MIN_GAIN:
             break
-    return SharedFit(constants(z), fit, _confounded(free, H))
+    return SharedFit(constants(z), fit, _confounded_pairs(free_constants, H))
 
 
-def _confounded(names: Sequence[str], H: Floats) -> tuple[tuple[str, str, float], ...]:
+def _confounded_pairs(constant_names: Sequence[str], H: Floats) -> tuple[tuple[str, str, float], ...]:
     covariance = np.linalg.inv(H + 1e-12 * np.eye(len(H)))
     sd = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(sd, sd)
     return tuple(
-        (names[a], names[b], float(correlation[a, b]))
-        for a in range(len(names))
+        (constant_names[a], constant_names[b], float(correlation[a, b]))
+        for a in range(len(constant_names))
         for b in range(a)
         if abs(correlation[a, b]) > _NOTABLE_CORRELATION
     )

@@ -13,9 +13,9 @@ from dermis.apps.inverse.unmixing.spectral_inversion import (
     THREE_UNKNOWNS,
     TWO_UNKNOWNS,
     UNKNOWNS,
+    ParameterValues,
     SpectralFit,
     SpectralModel,
-    Values,
     colour_metric,
     fit_skin,
     invert_spectra,
@@ -26,7 +26,7 @@ from dermis.apps.validation.accuracy.measured.illuminants import ILLUMINANTS, co
 from dermis.apps.validation.accuracy.measured.page import GROUP_LABELS, RESULT_FILE, write_measured_page
 from dermis.apps.validation.accuracy.measured.probe import APERTURES_MM, edge_loss
 from dermis.apps.validation.pages import JsonObject, read_results, write_results
-from dermis.apps.validation.spectral_archive import FOLDS, Archive, read_archive
+from dermis.apps.validation.spectral_archive import FOLD_COUNT, Archive, read_archive
 from dermis.base.console import print_lines
 from dermis.human.skin.measured import SITES
 from dermis.images.colour import delta_e_2000, lab, linear_of_lab
@@ -46,15 +46,21 @@ CHEEK_AND_FOREHEAD = SITES.index("cheek"), SITES.index("forehead")
 """Indices of the two facial sites that most people have."""
 FORMER_SKIN = replace(DEFAULT_SKIN, baseline=1.0, epidermis_mm=0.05, oxygen=0.75)
 """Default skin before it was compared with the archive."""
-_SAMPLE, _CONSTANTS_SAMPLE = 1500, 600  # numbers of spectra, for published models and for fits of constants
-_SITE_SAMPLE = 300  # number of spectra of a site, for fits of its constants
-_AT_LIMIT, _MATCHED = 1e-6, 0.25  # tolerance of oxygen at a bound [-], and of a matched colour [CIEDE2000]
-_NEIGHBOURS = 80  # of other people, for the local regression of colours
-_PERCENTILES = 50.0, 95.0
-_DONNER_JENSEN = SkinParameters(baseline=1.0, epidermis_mm=0.25, oxygen=0.75)
-_EDGE_MELANIN = 0.01, 0.03, 0.1, 0.3
-_EDGE_NM = np.arange(400.0, 701.0, 50.0)
-_ADDITIONS: dict[str, tuple[str, ...]] = {
+_SPECTRA_SAMPLE_COUNT, _CONSTANTS_SAMPLE_COUNT = (
+    1500,
+    600,
+)  # numbers of spectra, for published models and for fits of constants
+_SITE_SAMPLE_COUNT = 300  # number of spectra of a site, for fits of its constants
+_OXYGEN_LIMIT_TOLERANCE, _MATCHED_DELTA_E = (
+    1e-6,
+    0.25,
+)  # tolerance of oxygen at a bound [-], and of a matched colour [CIEDE2000]
+_REGRESSION_NEIGHBOURS = 80  # of other people, for the local regression of colours
+_ERROR_PERCENTILES = 50.0, 95.0
+_DONNER_JENSEN_SKIN = SkinParameters(baseline=1.0, epidermis_mm=0.25, oxygen=0.75)
+_EDGE_LOSS_MELANIN = 0.01, 0.03, 0.1, 0.3
+_EDGE_LOSS_WAVELENGTHS_NM = np.arange(400.0, 701.0, 50.0)
+_CONSTANTS_BY_ADDITION: dict[str, tuple[str, ...]] = {
     "none": (),
     "scattering, both layers": ("scattering",),
     "scattering of the dermis": ("dermis",),
@@ -82,16 +88,16 @@ def measured(bioskin: Path | None = None, only: str | None = None) -> None:
     """
     archive = read_archive()
     parts: dict[str, Callable[[], object]] = {
-        "counts": lambda: {"spectra": len(archive.spectra), "folds": FOLDS},
-        "models": lambda: _models(archive),
-        "surface": lambda: _surface(archive),
-        "limits": lambda: _limits(archive),
-        "folds": lambda: _folds(archive),
-        "alternatives": lambda: _alternatives(archive.sample(_SAMPLE, 2), bioskin),
-        "additions": lambda: _additions(archive.sample(_CONSTANTS_SAMPLE, 3)),
-        "sites": lambda: _sites(archive),
-        "site_folds": lambda: _site_folds(archive),
-        "edge": lambda: _edge(archive.sample(_CONSTANTS_SAMPLE, 3)),
+        "counts": lambda: {"spectra": len(archive.spectra), "folds": FOLD_COUNT},
+        "models": lambda: _default_skin_errors(archive),
+        "surface": lambda: _smooth_surface_errors(archive),
+        "limits": lambda: _limit_fractions(archive),
+        "folds": lambda: _fold_errors(archive),
+        "alternatives": lambda: _published_model_errors(archive.sample(_SPECTRA_SAMPLE_COUNT, 2), bioskin),
+        "additions": lambda: _addition_errors(archive.sample(_CONSTANTS_SAMPLE_COUNT, 3)),
+        "sites": lambda: _site_fits(archive),
+        "site_folds": lambda: _site_fold_errors(archive),
+        "edge": lambda: _edge_loss_errors(archive.sample(_CONSTANTS_SAMPLE_COUNT, 3)),
     }
     results: JsonObject = {} if only is None else read_results(RESULT_FILE)
     for name in parts if only is None else [only]:
@@ -106,8 +112,8 @@ def measured_page() -> None:
     write_measured_page()
 
 
-def _models(archive: Archive) -> JsonObject:
-    """Return errors of the former and the present default skin, and two between; also by group and site."""
+def _default_skin_errors(archive: Archive) -> JsonObject:
+    """Return fit errors of the former default skin, the present default skin, and two skins between them."""
     skins = {
         "former": FORMER_SKIN,
         "half": replace(FORMER_SKIN, baseline=0.5),
@@ -140,21 +146,21 @@ def _models(archive: Archive) -> JsonObject:
                 "three": three_spectra.residual.mean(axis=0),
                 "five": five.residual.mean(axis=0),
             }
-            results[name]["lights"] = _lights({"two": two, "three": three, "five": five})
-            results[name]["groups"] = _by_category(
+            results[name]["lights"] = _illuminant_errors({"two": two, "three": three, "five": five})
+            results[name]["groups"] = _category_errors(
                 archive, list(GROUP_LABELS), archive.group, two, three, five
             )
-            results[name]["by_site"] = _by_category(
+            results[name]["by_site"] = _category_errors(
                 archive, range(len(SITES)), archive.site, two, three, five
             )
         if name == "present":
             results["medians"] = {
                 one: _percentiles(values, (5.0, 50.0, 95.0)) for one, values in five.values.items()
             }
-    return _lists(results)
+    return _arrays_to_lists(results)
 
 
-def _surface(archive: Archive) -> JsonObject:
+def _smooth_surface_errors(archive: Archive) -> JsonObject:
     """Return the differences between colours and a smooth surface through the colours of other people.
 
     Models with two unknowns per spectrum, and the same constants for all people, cannot do better. The third
@@ -170,56 +176,59 @@ def _surface(archive: Archive) -> JsonObject:
     }
 
 
-def _surface_distances(part: Archive) -> Floats:
+def _surface_distances(archive_part: Archive) -> Floats:
     """Return the difference (n,) of each colour from a surface through the colours of other people."""
     from scipy.spatial import cKDTree
 
-    colours = lab(part.spectra @ rgb_weights().T)
+    colours = lab(archive_part.spectra @ rgb_weights().T)
     mean, scale = colours.mean(axis=0), colour_metric(np.median(colours, axis=0)[None])[0]
     axes = np.linalg.svd((colours - mean) @ scale.T, full_matrices=False)[2]
     point = (colours - mean) @ scale.T @ axes.T
-    nearest = np.asarray(cKDTree(point[:, :2]).query(point[:, :2], k=_NEIGHBOURS + 40)[1])
+    nearest = np.asarray(cKDTree(point[:, :2]).query(point[:, :2], k=_REGRESSION_NEIGHBOURS + 40)[1])
     on_surface = point.copy()
     for k, neighbours in enumerate(nearest):
-        others = neighbours[part.person[neighbours] != part.person[k]][:_NEIGHBOURS]
+        others = neighbours[archive_part.person[neighbours] != archive_part.person[k]][
+            :_REGRESSION_NEIGHBOURS
+        ]
         A = np.column_stack([np.ones(len(others)), point[others, :2] - point[k, :2]])
         on_surface[k, 2] = np.linalg.lstsq(A, point[others, 2], rcond=None)[0][0]
     nearby = on_surface @ axes @ np.linalg.inv(scale).T + mean
     return delta_e_2000(linear_of_lab(nearby), linear_of_lab(colours))
 
 
-def _limits(archive: Archive) -> JsonObject:
-    """Return three fractions of the colour fits with three unknowns.
+def _limit_fractions(archive: Archive) -> JsonObject:
+    """Return fractions of the colour fits with three unknowns, by kind of failure.
 
-    The first two have oxygenation 0 and 1; the last do not reproduce the measured colour.
+    none, all : fractions of the fits with oxygenation 0 and 1
+    unmatched : fraction of the fits that do not reproduce the measured colour
     """
     fit = fit_skin(archive.spectra, THREE_UNKNOWNS, "colour")
     oxygen = fit.values["oxygen"]
     return {
-        "none": float((oxygen <= _AT_LIMIT).mean()),
-        "all": float((oxygen >= 1.0 - _AT_LIMIT).mean()),
-        "unmatched": float((fit.delta_e() > _MATCHED).mean()),
+        "none": float((oxygen <= _OXYGEN_LIMIT_TOLERANCE).mean()),
+        "all": float((oxygen >= 1.0 - _OXYGEN_LIMIT_TOLERANCE).mean()),
+        "unmatched": float((fit.delta_e() > _MATCHED_DELTA_E).mean()),
     }
 
 
-def _by_category(
+def _category_errors(
     archive: Archive,
     categories: Sequence[object],
     labels: np.ndarray,
-    two: SpectralFit,
-    three: SpectralFit,
-    five: SpectralFit,
+    two_unknown_fit: SpectralFit,
+    three_unknown_fit: SpectralFit,
+    five_unknown_fit: SpectralFit,
 ) -> list[list[float]]:
     """Return number of spectra, median colour errors and median RMS for each group or site."""
     rows = []
     for category in categories:
         chosen = labels == category
-        medians = [float(np.median(one.delta_e()[chosen])) for one in (two, three)]
-        rows.append([int(chosen.sum()), *medians, float(np.median(five.rms[chosen]))])
+        medians = [float(np.median(one.delta_e()[chosen])) for one in (two_unknown_fit, three_unknown_fit)]
+        rows.append([int(chosen.sum()), *medians, float(np.median(five_unknown_fit.rms[chosen]))])
     return rows
 
 
-def _lights(fits: dict[str, SpectralFit]) -> JsonObject:
+def _illuminant_errors(fits: dict[str, SpectralFit]) -> JsonObject:
     """Return the colour differences of fits under each illuminant."""
     return {
         name: {light: _percentiles(fit.delta_e(colour_weights(light))) for light in ILLUMINANTS}
@@ -227,11 +236,11 @@ def _lights(fits: dict[str, SpectralFit]) -> JsonObject:
     }
 
 
-def _folds(archive: Archive) -> list[JsonObject]:
-    """Return, for each fold of people, constants fitted to the other folds, and its errors with them."""
+def _fold_errors(archive: Archive) -> list[JsonObject]:
+    """Return, for each fold of people, constants fitted to the other folds, and the errors of the fold."""
     rows = []
-    for fold in range(FOLDS):
-        known = archive.rows(archive.fold != fold).sample(_CONSTANTS_SAMPLE, fold)
+    for fold in range(FOLD_COUNT):
+        known = archive.rows(archive.fold != fold).sample(_CONSTANTS_SAMPLE_COUNT, fold)
         held = archive.rows(archive.fold == fold)
         spectral = fit_constants(known.spectra, THREE_UNKNOWNS, ("baseline", "epidermis_mm"))
         colour = fit_constants(known.spectra, TWO_UNKNOWNS, ("oxygen",), "colour", spectral.constants)
@@ -251,7 +260,7 @@ def _folds(archive: Archive) -> list[JsonObject]:
     return rows
 
 
-def _alternatives(archive: Archive, bioskin: Path | None) -> JsonObject:
+def _published_model_errors(archive: Archive, bioskin: Path | None) -> JsonObject:
     """Return errors of published models of skin on a sample, with two, three and five unknowns."""
     sets = (TWO_UNKNOWNS, THREE_UNKNOWNS, FIVE_UNKNOWNS)
 
@@ -276,7 +285,7 @@ def _alternatives(archive: Archive, bioskin: Path | None) -> JsonObject:
     results = {
         "present": errors(None, DEFAULT_SKIN, sets),
         "former": errors(None, FORMER_SKIN, sets),
-        "donner": errors(None, _DONNER_JENSEN, sets),
+        "donner": errors(None, _DONNER_JENSEN_SKIN, sets),
         "jacques": errors(_jacques_model, FORMER_SKIN, sets),
     }
     if bioskin is not None:
@@ -284,12 +293,12 @@ def _alternatives(archive: Archive, bioskin: Path | None) -> JsonObject:
     return results
 
 
-def _jacques_model(values: Values) -> Floats:
+def _jacques_model(parameter_values: ParameterValues) -> Floats:
     """Return the reflectance (n, 31) of skins with the baseline and scattering of [Jacques1998]."""
     bloodless, sigma_s_prime = baseline_absorption(WAVELENGTHS_NM), jacques_1998(WAVELENGTHS_NM)
 
     def parameter(name: str, default: float) -> Floats:
-        return np.asarray(values.get(name, np.float64(default)))[..., None]
+        return np.asarray(parameter_values.get(name, np.float64(default)))[..., None]
 
     m, b, oxygen = parameter("melanin", 0.0), parameter("blood", 0.0), parameter("oxygen", 0.75)
     vessels = oxygen * blood(WAVELENGTHS_NM, 1.0) + (1.0 - oxygen) * blood(WAVELENGTHS_NM, 0.0)
@@ -302,10 +311,10 @@ def _jacques_model(values: Values) -> Floats:
     )
 
 
-def _additions(sample: Archive) -> list[JsonObject]:
+def _addition_errors(sample: Archive) -> list[JsonObject]:
     """Return the errors with each addition to the model, with three and with five unknowns per spectrum."""
     rows = []
-    for name, free in _ADDITIONS.items():
+    for name, free in _CONSTANTS_BY_ADDITION.items():
         row: JsonObject = {"name": name}
         for label, unknowns in (("three", THREE_UNKNOWNS), ("five", FIVE_UNKNOWNS)):
             shared = ("baseline", "epidermis_mm") if label == "three" else ("baseline",)
@@ -321,13 +330,13 @@ def _additions(sample: Archive) -> list[JsonObject]:
     return rows
 
 
-def _sites(archive: Archive) -> list[JsonObject]:
+def _site_fits(archive: Archive) -> list[JsonObject]:
     """Return thickness and oxygen that fit each site best, by colour with two unknowns and by spectrum."""
     rows = []
     for site in range(len(SITES)):
-        sample = archive.rows(archive.site == site).sample(_SITE_SAMPLE, site)
+        sample = archive.rows(archive.site == site).sample(_SITE_SAMPLE_COUNT, site)
         fixed = {"baseline": DEFAULT_SKIN.baseline}
-        spectral = fit_constants(sample.spectra, THREE_UNKNOWNS, ("epidermis_mm",), fixed=fixed)
+        spectral = fit_constants(sample.spectra, THREE_UNKNOWNS, ("epidermis_mm",), fixed_constants=fixed)
         colour = fit_constants(sample.spectra, TWO_UNKNOWNS, ("epidermis_mm", "oxygen"), "colour", fixed)
         oxygen = spectral.fit.values["oxygen"]
         rows.append(
@@ -342,18 +351,18 @@ def _sites(archive: Archive) -> list[JsonObject]:
     return rows
 
 
-def _site_folds(archive: Archive) -> JsonObject:
+def _site_fold_errors(archive: Archive) -> JsonObject:
     """Return errors with two unknowns by colour, where each site has its own thickness and oxygen.
 
     Both are fitted to samples of people of the other folds.
     """
     error = np.zeros(len(archive.spectra))
     fixed = {"baseline": DEFAULT_SKIN.baseline}
-    for fold in range(FOLDS):
+    for fold in range(FOLD_COUNT):
         for site in range(len(SITES)):
             here = archive.site == site
             held = here & (archive.fold == fold)
-            sample = archive.rows(here & (archive.fold != fold)).sample(_SITE_SAMPLE, site)
+            sample = archive.rows(here & (archive.fold != fold)).sample(_SITE_SAMPLE_COUNT, site)
             free = ("epidermis_mm", "oxygen")
             constants = fit_constants(sample.spectra, TWO_UNKNOWNS, free, "colour", fixed).constants
             unknowns = [UNKNOWNS[name] for name in TWO_UNKNOWNS]
@@ -367,18 +376,18 @@ def _site_folds(archive: Archive) -> JsonObject:
     }
 
 
-def _edge(sample: Archive) -> JsonObject:
-    """Return the light that apertures miss, and the constants fitted to spectra corrected for it."""
-    skins = [replace(DEFAULT_SKIN, melanin=m, blood=0.008) for m in _EDGE_MELANIN]
-    losses = [edge_loss(one, _EDGE_NM) for one in skins]
+def _edge_loss_errors(sample: Archive) -> JsonObject:
+    """Return the light that apertures miss, and the constants fitted to spectra corrected for this loss."""
+    skins = [replace(DEFAULT_SKIN, melanin=m, blood=0.008) for m in _EDGE_LOSS_MELANIN]
+    losses = [edge_loss(one, _EDGE_LOSS_WAVELENGTHS_NM) for one in skins]
     model = ExtendedModel({"baseline": DEFAULT_SKIN.baseline, "oxygen": DEFAULT_SKIN.oxygen})
     true = model(
-        {"melanin": np.array(_EDGE_MELANIN), "blood": np.full(len(skins), 0.008)}
+        {"melanin": np.array(_EDGE_LOSS_MELANIN), "blood": np.full(len(skins), 0.008)}
         | {"epidermis_mm": np.full(len(skins), DEFAULT_SKIN.epidermis_mm)}
     )
-    results: JsonObject = {"wavelength_nm": _EDGE_NM, "melanin": _EDGE_MELANIN}
+    results: JsonObject = {"wavelength_nm": _EDGE_LOSS_WAVELENGTHS_NM, "melanin": _EDGE_LOSS_MELANIN}
     for name in APERTURES_MM:
-        loss = np.array([np.interp(WAVELENGTHS_NM, _EDGE_NM, one[name]) for one in losses])
+        loss = np.array([np.interp(WAVELENGTHS_NM, _EDGE_LOSS_WAVELENGTHS_NM, one[name]) for one in losses])
         seen = true * (1.0 - loss)
         factor = np.stack(
             [1.0 - np.interp(sample.spectra[:, k], seen[::-1, k], loss[::-1, k]) for k in range(31)], axis=-1
@@ -394,19 +403,19 @@ def _edge(sample: Archive) -> JsonObject:
         "constants": uncorrected.constants,
         "rms": float(np.sqrt((uncorrected.fit.residual**2).mean())),
     }
-    return _lists(results)
+    return _arrays_to_lists(results)
 
 
-def _percentiles(values: Floats, at: Sequence[float] = _PERCENTILES) -> list[float]:
-    return [float(one) for one in np.percentile(values, at)]
+def _percentiles(errors: Floats, percentiles: Sequence[float] = _ERROR_PERCENTILES) -> list[float]:
+    return [float(one) for one in np.percentile(errors, percentiles)]
 
 
-def _lists(value: object) -> JsonObject:
+def _arrays_to_lists(nested_value: object) -> JsonObject:
     """Return nested dictionaries in which lists replace arrays."""
-    if isinstance(value, np.ndarray):
-        return value.tolist()  # type: ignore[no-any-return]
-    if isinstance(value, dict):
-        return {str(key): _lists(one) for key, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [_lists(one) for one in value]  # type: ignore[return-value]
-    return value  # type: ignore[return-value]
+    if isinstance(nested_value, np.ndarray):
+        return nested_value.tolist()  # type: ignore[no-any-return]
+    if isinstance(nested_value, dict):
+        return {str(key): _arrays_to_lists(one) for key, one in nested_value.items()}
+    if isinstance(nested_value, list | tuple):
+        return [_arrays_to_lists(one) for one in nested_value]  # type: ignore[return-value]
+    return nested_value  # type: ignore[return-value]

@@ -68,54 +68,54 @@ def measured_parts(results: JsonObject) -> dict[str, str]:
             f"{DEFAULT_SKIN.epidermis_mm:g} mm, {100 * DEFAULT_SKIN.oxygen:g} % oxygen, and "
             f"{DEFAULT_SKIN.baseline:g} of that absorption"
         ),
-        "models": _models(results["models"]),
+        "models": _models_table(results["models"]),
         **{f"oxygen_{name}": f"{100 * one:.0f} %" for name, one in results["limits"].items()},
         "surface_all": f"{results['surface']['all'][0]:.2f}",
         "surface_face": f"{results['surface']['cheek and forehead'][0]:.2f}",
         "surface_sites": f"{results['surface']['each site'][0]:.2f}",
-        "site_two": _joined(results["site_folds"]["all"]),
+        "site_two": _joined_numbers(results["site_folds"]["all"]),
         "site_above": f"{100 * results['site_folds']['above_2']:.0f} %",
         "site_face": f"{results['site_folds']['cheek and forehead'][0]:.2f}",
-        "folds": _folds(results["folds"]),
-        **_confounded(results),
-        "additions": _additions(results["additions"]),
-        "residual": _residual(results["models"]),
+        "folds": _folds_table(results["folds"]),
+        **_confounded_texts(results),
+        "additions": _additions_table(results["additions"]),
+        "residual": _residual_table(results["models"]),
         "groups": "\n\n".join(
             [
                 _category_table("group", list(GROUP_LABELS.values()), present["groups"]),
                 _category_table("site", SITES, present["by_site"]),
             ]
         ),
-        "sites": _sites(results["sites"]),
-        "lights": _lights(present["lights"]),
-        "alternatives": _alternatives(results["alternatives"]),
-        "edge": _edge(results["edge"]),
-        "corrected": _corrected(results["edge"]),
+        "sites": _sites_table(results["sites"]),
+        "lights": _illuminants_table(present["lights"]),
+        "alternatives": _published_models_table(results["alternatives"]),
+        "edge": _edge_loss_table(results["edge"]),
+        "corrected": _corrected_constants_text(results["edge"]),
         "red_loss": f"{100 * results['edge']['8 mm of 11 mm']['loss'][1][5]:.0f} %",
     }
 
 
-def _models(models: JsonObject) -> str:
+def _models_table(errors_by_model: JsonObject) -> str:
     heads = ["skin", "spectra", "two, by colour", "above 2", "three, by colour"]
     heads += ["two, RMS", "three, RMS", "five, RMS"]
     rows = []
     for name, label in _SKIN_NAMES.items():
         for subset in ("all", "cheek and forehead"):
-            one = models[name][subset]
+            one = errors_by_model[name][subset]
             rows.append(
                 [
                     f"**{label}**" if name == "present" else label,
                     subset,
-                    _joined(one["two"]),
+                    _joined_numbers(one["two"]),
                     f"{100 * one['above_2']:.0f} %",
-                    _joined(one["three"]),
-                    *(_joined(one[f"rms_{n}"], 4) for n in ("two", "three", "five")),
+                    _joined_numbers(one["three"]),
+                    *(_joined_numbers(one[f"rms_{n}"], 4) for n in ("two", "three", "five")),
                 ]
             )
-    return _table(heads, rows)
+    return _markdown_table(heads, rows)
 
 
-def _folds(folds: Sequence[JsonObject]) -> str:
+def _folds_table(folds: Sequence[JsonObject]) -> str:
     heads = ["part", "spectra", "bloodless tissue", "epidermis [mm]", "oxygen", "constants"]
     heads += ["two", "two, cheek and forehead", "three", "five, RMS"]
     rows = []
@@ -136,10 +136,10 @@ def _folds(folds: Sequence[JsonObject]) -> str:
                     f"{errors['five']:.4f}",
                 ]
             )
-    return _table(heads, rows)
+    return _markdown_table(heads, rows)
 
 
-def _confounded(results: JsonObject) -> dict[str, str]:
+def _confounded_texts(results: JsonObject) -> dict[str, str]:
     """Return pairs of constants that the spectra hardly distinguish, and constants of corrected spectra."""
     pairs = {}
     for row in results["additions"]:
@@ -159,23 +159,23 @@ def _confounded(results: JsonObject) -> dict[str, str]:
     }
 
 
-def _additions(additions: Sequence[JsonObject]) -> str:
+def _additions_table(additions: Sequence[JsonObject]) -> str:
     heads = ("addition", "three unknowns, RMS", "constants", "five unknowns, RMS", "constants")
     rows = []
     for row in additions:
         cells = [row["name"]]
         for label in ("three", "five"):
             one = row.get(label)
-            cells += ["", ""] if one is None else [f"{one['rms']:.4f}", _constants(one["constants"])]
+            cells += ["", ""] if one is None else [f"{one['rms']:.4f}", _constants_text(one["constants"])]
         rows.append(cells)
-    return _table(heads, rows)
+    return _markdown_table(heads, rows)
 
 
-def _constants(constants: dict[str, float]) -> str:
+def _constants_text(constants: dict[str, float]) -> str:
     return ", ".join(f"{_CONSTANT_NAMES[name]} {value:.3g}" for name, value in constants.items())
 
 
-def _residual(models: JsonObject) -> str:
+def _residual_table(models: JsonObject) -> str:
     """Return the table of mean residuals, measured minus model, by wavelength."""
     shown = range(0, 31, 2)
     heads = ("mean residual, 1e-4", *(f"{400 + 10 * k}" for k in shown))
@@ -184,18 +184,20 @@ def _residual(models: JsonObject) -> str:
         for name in ("former", "present")
         for count in ("two", "three", "five")
     ]
-    return _table(heads, rows)
+    return _markdown_table(heads, rows)
 
 
-def _category_table(kind: str, names: Sequence[str], rows: Sequence[Sequence[float]]) -> str:
+def _category_table(
+    category_title: str, category_names: Sequence[str], category_rows: Sequence[Sequence[float]]
+) -> str:
     cells = [
         [name, f"{count:.0f}", f"{two:.2f}", f"{three:.2f}", f"{five:.4f}"]
-        for name, (count, two, three, five) in zip(names, rows, strict=True)
+        for name, (count, two, three, five) in zip(category_names, category_rows, strict=True)
     ]
-    return _table((kind, "spectra", "two", "three", "five, RMS"), cells)
+    return _markdown_table((category_title, "spectra", "two", "three", "five, RMS"), cells)
 
 
-def _sites(sites: Sequence[JsonObject]) -> str:
+def _sites_table(sites: Sequence[JsonObject]) -> str:
     heads = ("site", "epidermis, by spectrum [mm]", "oxygen", "epidermis, by colour [mm]", "oxygen", "two")
     rows = []
     for name, site in zip(SITES, sites, strict=True):
@@ -210,38 +212,43 @@ def _sites(sites: Sequence[JsonObject]) -> str:
                 f"{site['two']:.2f}",
             ]
         )
-    return _table(heads, rows)
+    return _markdown_table(heads, rows)
 
 
-def _lights(lights: JsonObject) -> str:
+def _illuminants_table(lights: JsonObject) -> str:
     labels = {"two": "two, by colour", "three": "three, by colour", "five": "five, by spectrum"}
-    rows = [[label, *(_joined(lights[name][one]) for one in ILLUMINANTS)] for name, label in labels.items()]
-    return _table(("unknowns", *ILLUMINANTS), rows)
+    rows = [
+        [label, *(_joined_numbers(lights[name][one]) for one in ILLUMINANTS)]
+        for name, label in labels.items()
+    ]
+    return _markdown_table(("unknowns", *ILLUMINANTS), rows)
 
 
-def _alternatives(models: JsonObject) -> str:
+def _published_models_table(errors_by_model: JsonObject) -> str:
     heads = ("model", "two, by colour", "three, by colour", "two, RMS", "three, RMS", "five, RMS")
     rows = []
-    for name, errors in models.items():
-        cells = [_joined(errors[f"colour_{n}"]) for n in (2, 3)]
-        rows.append([_MODEL_NAMES[name], *cells, *(_joined(errors[f"spectrum_{n}"], 4) for n in (2, 3, 5))])
-    return _table(heads, rows)
+    for name, errors in errors_by_model.items():
+        cells = [_joined_numbers(errors[f"colour_{n}"]) for n in (2, 3)]
+        rows.append(
+            [_MODEL_NAMES[name], *cells, *(_joined_numbers(errors[f"spectrum_{n}"], 4) for n in (2, 3, 5))]
+        )
+    return _markdown_table(heads, rows)
 
 
-def _edge(edge: JsonObject) -> str:
+def _edge_loss_table(edge: JsonObject) -> str:
     heads = ("aperture, lit disc", "melanin", *(f"{nm:.0f} nm" for nm in edge["wavelength_nm"]))
     rows = [
         [name, f"{100 * melanin:g} %", *(f"{100 * one:.1f} %" for one in loss)]
         for name in APERTURES_MM
         for melanin, loss in zip(edge["melanin"], edge[name]["loss"], strict=True)
     ]
-    return _table(heads, rows)
+    return _markdown_table(heads, rows)
 
 
-def _corrected(edge: JsonObject) -> str:
+def _corrected_constants_text(edge: JsonObject) -> str:
     """Return text on constants fitted to spectra as measured, and to spectra corrected for lost light."""
     parts = [
-        f"{_constants(edge[name]['constants'])} (RMS {edge[name]['rms']:.4f}) {label}"
+        f"{_constants_text(edge[name]['constants'])} (RMS {edge[name]['rms']:.4f}) {label}"
         for name, label in (
             ("uncorrected", "as measured"),
             ("8 mm of 11 mm", "corrected for 8 mm"),
@@ -251,10 +258,10 @@ def _corrected(edge: JsonObject) -> str:
     return "; ".join(parts)
 
 
-def _joined(values: Sequence[float], digits: int = 2) -> str:
-    return " / ".join(f"{one:.{digits}f}" for one in values)
+def _joined_numbers(numbers: Sequence[float], digits: int = 2) -> str:
+    return " / ".join(f"{one:.{digits}f}" for one in numbers)
 
 
-def _table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    lines = [heads, ["---"] * len(heads), *rows]
+def _markdown_table(column_titles: Sequence[str], table_rows: Iterable[Sequence[str]]) -> str:
+    lines = [column_titles, ["---"] * len(column_titles), *table_rows]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)

@@ -15,11 +15,11 @@ from dermis.human.skin.measured import SITES
 from dermis.optics.media import Floats
 from dermis.optics.pigments.priors import PRIOR_COLUMNS, PRIOR_NAMES, SkinPrior, prior_points
 
-_COMPONENTS = 3
-_ITERATIONS = 300
+_MIXTURE_COMPONENTS = 3
+_EM_ITERATIONS = 300
 _CALLOUS_SITES = ("palm", "ring finger")
 """Sites with a thick stratum corneum, which is not part of the model."""
-_HEADER = """# quantity: mixture of normal distributions of log melanin, log blood, oxygen and
+_CSV_HEADER = """# quantity: mixture of normal distributions of log melanin, log blood, oxygen and
 #   log epidermis_mm
 # unit: fractions [-], mm; weight, mean and lower triangle of the covariance
 # source: [Lu2025], all sites but palm and fingers, inverted by spectrum with the package's model
@@ -32,14 +32,14 @@ def priors() -> None:
     archive = read_archive()
     living = archive.rows(~np.isin(archive.site, [SITES.index(name) for name in _CALLOUS_SITES]))
     fit = fit_skin(living.spectra, PRIOR_NAMES)
-    prior = fit_mixture(prior_points(fit.values), _COMPONENTS)
+    prior = fit_mixture(prior_points(fit.values), _MIXTURE_COMPONENTS)
     path = Path(str(files("dermis.optics"))) / "data" / "skin_priors.csv"
     with atomic_file(path) as file:
-        file.write_text(_HEADER + table(prior), encoding="utf-8")
+        file.write_text(_CSV_HEADER + prior_csv(prior), encoding="utf-8")
     print_lines(*(f"{name}: {prior.moments(name)}" for name in PRIOR_NAMES))
 
 
-def table(prior: SkinPrior) -> str:
+def prior_csv(prior: SkinPrior) -> str:
     """Return the CSV text of a distribution: column names, and one row per component."""
     lower = np.tril_indices(len(PRIOR_NAMES))
     lines = [",".join(PRIOR_COLUMNS)]
@@ -48,17 +48,17 @@ def table(prior: SkinPrior) -> str:
     return "\n".join(lines) + "\n"
 
 
-def fit_mixture(points: Floats, components: int) -> SkinPrior:
+def fit_mixture(points: Floats, component_count: int) -> SkinPrior:
     """Fit a mixture of normal distributions by expectation maximisation.
 
     points : (n, d) points
-    components : number of distributions; each starts from an equal part of the points, in order along the
-        first axis
+    component_count : number of distributions; each starts from an equal part of the points, in order along
+        the first axis
     """
     count, dimensions = points.shape
-    parts = np.argsort(np.argsort(points[:, 0])) * components // count
-    share = np.eye(components)[parts]
-    for _ in range(_ITERATIONS):
+    parts = np.argsort(np.argsort(points[:, 0])) * component_count // count
+    share = np.eye(component_count)[parts]
+    for _ in range(_EM_ITERATIONS):
         total = share.sum(axis=0)
         mean = share.T @ points / total[:, None]
         offset = points[:, None] - mean

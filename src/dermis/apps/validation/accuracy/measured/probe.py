@@ -15,22 +15,25 @@ _RADIUS_COUNT = 400  # number of points of the measured disc, by their radii
 
 
 def edge_loss(
-    skin: SkinParameters, wavelength_nm: Floats, photons: int = 60_000, seed: int = 1
+    skin: SkinParameters, wavelength_nm: Floats, photon_count: int = 60_000, seed: int = 1
 ) -> dict[str, Floats]:
     """Return the fraction of the reflected light that each aperture misses, by wavelength [-].
 
     A spectrophotometer compares skin with an opaque white tile. In skin, some light that enters near the edge
     of the lit disc leaves outside the disc, and no light returns from the dark surroundings in exchange.
 
-    photons : number of photons per wavelength
+    photon_count : number of photons per wavelength
 
     Source: [Wang1995].
     """
-    runs = trace_medium(spectral_medium("dj2006", skin, wavelength_nm), photons, seed)
-    return {name: np.array([_missing(run, *radii) for run in runs]) for name, radii in APERTURES_MM.items()}
+    runs = trace_medium(spectral_medium("dj2006", skin, wavelength_nm), photon_count, seed)
+    return {
+        name: np.array([_missed_fraction(run, *radii) for run in runs])
+        for name, radii in APERTURES_MM.items()
+    }
 
 
-def _missing(run: SlabResult, measured_mm: float, lit_mm: float) -> float:
+def _missed_fraction(run: SlabResult, measured_mm: float, lit_mm: float) -> float:
     """Return the fraction of the reflected light that an aperture misses [-]."""
     inner, outer = run.edges_mm[:-1], run.edges_mm[1:]
     energy = run.reflectance * np.pi * (outer**2 - inner**2)
