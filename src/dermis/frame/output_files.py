@@ -91,7 +91,7 @@ def _channels(output: Output, values: PlaneArray) -> dict[str, PlaneArray]:
 
 
 def _as_exr(name: str, values: PlaneArray) -> bytes:
-    return encode_exr_parts({name: _channels(OUTPUTS[name], values)}, fast=True)
+    return encode_exr_parts({name: _channels(OUTPUTS[name], values)}, run_length=True)
 
 
 def _as_png(name: str, values: PlaneArray) -> bytes:

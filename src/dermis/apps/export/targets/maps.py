@@ -134,7 +134,7 @@ def encode_map_exr(map_name: str, values: Floats) -> bytes:
     """Return a map as OpenEXR, with channels R, G, B for colours and vectors, and Y for scalars."""
     names = "Y" if values.ndim == 2 else "RGB"
     channels = [values] if values.ndim == 2 else list(np.moveaxis(values, -1, 0))
-    return encode_exr_parts({map_name: dict(zip(names, channels, strict=True))}, fast=True)
+    return encode_exr_parts({map_name: dict(zip(names, channels, strict=True))}, run_length=True)
 
 
 def quantise_map(values: Floats, encoding: PngEncoding) -> tuple[NDArray[np.uint8 | np.uint16], Ranges]:

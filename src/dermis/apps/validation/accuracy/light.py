@@ -13,8 +13,14 @@ from dermis.apps.validation.pages import print_tables
 from dermis.atlas.build import cached_atlas
 from dermis.environment.isotropic_fits import LOBE_TABLE_ROUGHNESSES, ROUGHNESS_COUNT, VIEW_COUNT
 from dermis.environment.isotropic_lobes import isotropic_lobe_table
-from dermis.environment.panorama import directions, load_panorama, resample, solid_angles, split_suns
-from dermis.environment.prefilter import ROUGHEST, ROUGHNESSES, SMOOTHEST, Prefiltered, prefilter
+from dermis.environment.panorama import (
+    load_panorama,
+    resample_panorama,
+    split_suns,
+    texel_directions,
+    texel_solid_angles,
+)
+from dermis.environment.prefilter import LAYER_ROUGHNESSES, ROUGHEST, SMOOTHEST, Prefiltered, prefilter
 from dermis.frame.features.occlusion.baked import DIRECTION_COUNT, bake_occlusion
 from dermis.frame.lights.rectangle import facing_irradiance
 from dermis.frame.projection import view_axes_array
@@ -67,9 +73,9 @@ def panorama(name: str, rows: int = 256) -> tuple[Array, Array, Prefiltered]:
 
     Light is radiance times solid angle, without suns.
     """
-    radiance = resample(split_suns(load_panorama(name))[0], rows)
-    light = radiance * solid_angles(*radiance.shape[:2])[..., None]
-    return directions(*radiance.shape[:2]).reshape(-1, 3), light.reshape(-1, 3), prefilter(name)
+    radiance = resample_panorama(split_suns(load_panorama(name))[0], rows)
+    light = radiance * texel_solid_angles(*radiance.shape[:2])[..., None]
+    return texel_directions(*radiance.shape[:2]).reshape(-1, 3), light.reshape(-1, 3), prefilter(name)
 
 
 def irradiance_error(name: str, count: int = 200) -> float:
@@ -145,8 +151,8 @@ def lobe_radiance(layers: Array, towards: Array, m: float) -> Array:
     towards : (k, 3) directions of the lobes
     m : roughness of the lobes
     """
-    level = (len(ROUGHNESSES) - 1) * np.log(m / SMOOTHEST) / np.log(ROUGHEST / SMOOTHEST)
-    low = int(np.clip(level, 0, len(ROUGHNESSES) - 2))
+    level = (len(LAYER_ROUGHNESSES) - 1) * np.log(m / SMOOTHEST) / np.log(ROUGHEST / SMOOTHEST)
+    low = int(np.clip(level, 0, len(LAYER_ROUGHNESSES) - 2))
     f = float(np.clip(level - low, 0, 1))
     below, above = (sample_panorama(layers[1 + k], towards) for k in (low, low + 1))
     return np.asarray((1 - f) * below + f * above)

@@ -19,7 +19,7 @@ from dermis.apps.truths.person.path_traced import path_trace_person
 from dermis.apps.truths.person.person import SkinTextures
 from dermis.apps.validation.comparisons.references import check_visible
 from dermis.apps.validation.comparisons.scenes import medium_gaussians
-from dermis.environment.panorama import UNIFORM
+from dermis.environment.panorama import UNIFORM_PANORAMA
 from dermis.frame.renderer import Renderer
 from dermis.human.expressions import expression
 from dermis.human.skin.painted import PaintedMaps, mean_colour
@@ -416,7 +416,7 @@ VIEWS: dict[str, View] = {
     "portrait, esplanade": View(portrait, "royal_esplanade"),
     "three-quarter, lebombo": View(three_quarter, "lebombo"),
 }
-PANORAMAS = ("royal_esplanade", "lebombo", UNIFORM)
+PANORAMAS = ("royal_esplanade", "lebombo", UNIFORM_PANORAMA)
 
 
 def view_scene(head: Head, view: View) -> Scene:
