@@ -73,7 +73,7 @@ def test_write_errors_are_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         with pytest.raises(DermisError, match="linear floats"):
             writer.write(tmp_path / "a.exr", picture)
 
-    def full(path: Path, levels: object, effort: int) -> None:
+    def full(path: Path, levels: object, zlib_level: int) -> None:
         raise DermisError("no space")
 
     monkeypatch.setattr(writing, "write_png", full)

@@ -130,7 +130,7 @@ def _shadow_maps(memo: Memo, device: Device, request: FrameRequest) -> ShadowMap
     layers = request.shadow_layers
     size = request.settings.shadow_size if layers else 1
     return memo.get(
-        _make_shadow_maps, device, request.topology, layers, size, owner=f"{layers} {request.view_name}"
+        _make_shadow_maps, device, request.topology, layers, size, caller_name=f"{layers} {request.view_name}"
     )
 
 
@@ -169,8 +169,10 @@ def _cached_sky_visibility(
 
 def _layout_atlas(memo: Memo, device: Device, request: FrameRequest, name: str, index: int) -> LayoutAtlas:
     stretch = request.technique.stretch(request.settings)
-    atlas = memo.get(cached_atlas, request.topology.mesh, request.atlas_plan.side, name, owner=str(index))
-    return atlas, memo.get(upload_atlas, device, atlas, stretch, request.seam_method, owner=str(index))
+    atlas = memo.get(
+        cached_atlas, request.topology.mesh, request.atlas_plan.side, name, caller_name=str(index)
+    )
+    return atlas, memo.get(upload_atlas, device, atlas, stretch, request.seam_method, caller_name=str(index))
 
 
 def _make_layout(
@@ -191,27 +193,33 @@ def _make_layout(
     """
     cached, layout_key, head, (atlas, textures) = memo.get, str(index), request.topology, layout_atlas
     geometry = cached(
-        upload_geometry, device, head.mesh, atlas, shapes.shape, request.head.maps.parts, owner=layout_key
+        upload_geometry,
+        device,
+        head.mesh,
+        atlas,
+        shapes.shape,
+        request.head.maps.parts,
+        caller_name=layout_key,
     )
     tables, settings = shapes.tables, request.settings
     at_rest = partial(rest_geometry, memo, device, geometry, tables, head)
     bindings: MutableBindings = {**geometry.resources, **shared}
     gutter_update = None
     if shapes.rest_shape and textures.gutter:
-        tracing = cached(make_gutter_tracing, device, head.mesh, atlas, textures, owner=layout_key)
-        textures = cached(with_separate_gutters, device, textures, owner=layout_key)
-        gutter_update = cached(_gutter_update, tracing, geometry, shapes.rest_shape, owner=layout_key)
+        tracing = cached(make_gutter_tracing, device, head.mesh, atlas, textures, caller_name=layout_key)
+        textures = cached(with_separate_gutters, device, textures, caller_name=layout_key)
+        gutter_update = cached(_gutter_update, tracing, geometry, shapes.rest_shape, caller_name=layout_key)
     if request.has_occlusion:
         inputs = bindings, textures.resources["atlas"]
         hair = request.head.hair if settings.strands else None
         occlusion = cached(
-            cached_occlusion_map, device, head, atlas, hair, untracked=inputs, owner=layout_key
+            cached_occlusion_map, device, head, atlas, hair, untracked=inputs, caller_name=layout_key
         )
     else:
         occlusion = placeholder_occlusion(device)
     moving_occlusion = translucency = None
     if request.occlusion_follows_shape:
-        occlusion, moving_occlusion = cached(make_moving_map, device, occlusion, owner=layout_key)
+        occlusion, moving_occlusion = cached(make_moving_map, device, occlusion, caller_name=layout_key)
     bindings["occlusion_map"] = occlusion
     if request.blur_count and settings.transmission == "thin" and request.technique.supports_translucency:
         searched = at_rest(pair_positions_mm(memo, request), index)
@@ -219,17 +227,17 @@ def _make_layout(
         blurred = request.split.blurred_mm2, request.split.weight
         tissue = thin_part_tables(memo, request), request.skin.overrides_tissue
         translucency = make_translucency(
-            memo, device, posed, rest, atlas, *blurred, *tissue, owner=layout_key
+            memo, device, posed, rest, atlas, *blurred, *tissue, layout_key=layout_key
         )
     interreflection = None
     if request.has_interreflection:
         light = request.split.total, request.has_occlusion, request.light_key
-        interreflection = make_interreflection(memo, device, head, atlas, *light, owner=layout_key)
+        interreflection = make_interreflection(memo, device, head, atlas, *light, layout_key=layout_key)
     bindings["from_skin"] = (
         interreflection.buffers.from_skin if interreflection else placeholder_interreflection(device)
     )
     side = settings.atlas if request.blur_count else 1
-    surfaces = cached(make_surface_texture, device, side, owner=layout_key)
+    surfaces = cached(make_surface_texture, device, side, caller_name=layout_key)
     scattered = _exitance_texture(memo, device, request, technique, side, layout_key)
     optional = gutter_update, translucency, moving_occlusion, interreflection
     return AtlasLayout(textures, geometry, bindings, surfaces, scattered, *optional)
@@ -243,7 +251,7 @@ def _exitance_texture(
     memo: Memo, device: Device, request: FrameRequest, technique: Technique, side: int, role: str
 ) -> Texture:
     owner = f"{role} {request.view_name}"
-    return memo.get(_make_exitance_texture, device, technique, side, request.light_key, owner=owner)
+    return memo.get(_make_exitance_texture, device, technique, side, request.light_key, caller_name=owner)
 
 
 def _make_shadow_maps(device: Device, _: Head, layers: int, size: int) -> ShadowMaps:

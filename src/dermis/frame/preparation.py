@@ -107,7 +107,7 @@ class Preparation:
         cached, device, head, environment = self.memo.get, self.device, scene.head.bare, scene.environment
         (profile, *others), blend_weights = self._profiles(scene.skin, technique)
         name, owner = (environment.name, "") if environment else (None, "none")
-        environment_map = cached(load_environment_map, device, name, owner=owner)
+        environment_map = cached(load_environment_map, device, name, caller_name=owner)
         scene = add_suns(self.memo, scene, environment_map)
         state = self._head_state(head, scene.motion)
         light_inputs = head, tuple(scene.lights), state.outline, settings.shadow_size
@@ -185,7 +185,7 @@ class Preparation:
             refuse("previous", "a scene of the same head", actual, advice)
         motion = self.memo.get(_rest_motion, head)
         if previous.motion is not None:
-            motion = self.memo.get(_motion_bytes, head, previous.motion, motion, owner="before")
+            motion = self.memo.get(_motion_bytes, head, previous.motion, motion, caller_name="before")
         camera = pinhole(previous.camera, head, inputs.settings)
         view = with_camera(inputs.resources.view, camera, None)
         return PreviousScene(None if motion == inputs.motion else motion, view)

@@ -42,7 +42,9 @@ def load_environment_map(device: Device, name: str | None) -> EnvironmentMap:
     Raises DermisError when there is no such environment.
     """
     if name is None:
-        return EnvironmentMap(make_texture(device, (1, 1), "rgba16float", layers=2, use="map"), ())
+        return EnvironmentMap(
+            make_texture(device, (1, 1), "rgba16float", layer_count=2, content_source="map"), ()
+        )
     prefiltered = prefilter(name)
     return EnvironmentMap(
         _upload_layers(device, prefiltered.layers), prefiltered.suns, float(prefiltered.layers[0].max())
@@ -58,7 +60,7 @@ def unfiltered_panorama(device: Device, name: str) -> Texture:
 def _upload_layers(device: Device, layers: Sequence[NDArray[np.float32]] | NDArray[np.float32]) -> Texture:
     height, width = layers[0].shape[:2]
     size = width + 2, height + 2
-    texture = make_texture(device, size, "rgba16float", layers=len(layers), use="map")
+    texture = make_texture(device, size, "rgba16float", layer_count=len(layers), content_source="map")
     for index, layer in enumerate(layers):
         texels = np.dstack([_with_border(layer), np.ones(size[::-1])])
         upload(device, texture, np.minimum(texels, _MAX_HALF), layer=index)

@@ -25,7 +25,7 @@ from dermis.gpu import (
     TextureOrView,
     make_texture,
 )
-from dermis.gpu.textures import FORMAT_BYTES
+from dermis.gpu.textures import TEXEL_FORMAT_BYTES
 
 TexturePair = tuple[TextureOrView, TextureOrView]
 
@@ -57,7 +57,7 @@ class GpuGems3(AtlasTechnique):
 
     def texel_bytes(self, levels: int) -> float:
         """Return the memory per atlas texel of the pyramid levels and the blurred stretch map [bytes]."""
-        return float(FORMAT_BYTES[HALF_FORMAT] * (levels + 4))
+        return float(TEXEL_FORMAT_BYTES[HALF_FORMAT] * (levels + 4))
 
     def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
         """Return how often the resolution of each level is halved: never, all levels have full resolution."""

@@ -82,7 +82,7 @@ class ScreenSpace(Technique):
 
     def make_subsurface_layers(self, memo: Memo, device: Device, settings: Settings) -> SubsurfaceLayers:
         """Return the textures in which the light of outputs is diffused, without a finished picture."""
-        return memo.get(make_subsurface_layers, device, settings.size, False, owner="outputs")
+        return memo.get(make_subsurface_layers, device, settings.size, False, caller_name="outputs")
 
     def subsurface_layers(self, resources: TechniqueResources | None) -> Texture | None:
         """Return texture layers: light below the skin, and its fraction that leaves towards the camera."""
@@ -119,7 +119,7 @@ def make_subsurface_layers(
 
     with_result : whether a texture for the finished picture is needed
     """
-    layers = make_texture(device, size, "rgba32float", layers=2)
+    layers = make_texture(device, size, "rgba32float", layer_count=2)
     subsurface, transmittance = (make_view(layers, layer=k) for k in range(2))
     scratch = make_texture(device, size, "rgba32float")
     result = make_texture(device, size, "rgba32float") if with_result else None

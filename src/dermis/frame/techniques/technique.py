@@ -28,7 +28,7 @@ from dermis.frame.inputs import FrameInputs
 from dermis.frame.programs import FLOAT_FORMAT, level_format
 from dermis.frame.technique import ProfileSplit, TechniqueResources, TechniqueTraits, channel_weights
 from dermis.gpu import ComputeProgram, Device, Graph, Memo, Recorder, Texture, TextureOrView, UniformRecord
-from dermis.gpu.textures import FORMAT_BYTES
+from dermis.gpu.textures import TEXEL_FORMAT_BYTES
 from dermis.optics.gaussians import GaussianSum
 from dermis.scene.settings import Settings
 
@@ -164,7 +164,9 @@ class AtlasTechnique(Technique):
     def texel_bytes(self, levels: int) -> float:
         """Return the peak memory per atlas texel on a software adapter, with temporary textures [bytes]."""
         mips = sum(0.25**halving for halving in range(MAX_HALVINGS + 1))
-        return FORMAT_BYTES[FLOAT_FORMAT] * (levels + 2 * mips)  # upper bound, as if no level were halved
+        return TEXEL_FORMAT_BYTES[FLOAT_FORMAT] * (
+            levels + 2 * mips
+        )  # upper bound, as if no level were halved
 
     def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
         """Return how often the resolution of each level is halved, starting with the unblurred level.

@@ -48,14 +48,16 @@ class FragmentPasses(GpuGems3):
     def make_levels(self, device: Device, side: int, halvings: Halvings) -> PyramidLevels:
         """Return textures for the irradiance and the pyramid levels, all in half precision."""
         count = max(map(len, halvings))
-        stack = make_texture(device, (side, side), HALF_FORMAT, layers=count, use="raster")
-        scratch, *stretch = (make_texture(device, (side, side), HALF_FORMAT, use="raster") for _ in range(3))
+        stack = make_texture(device, (side, side), HALF_FORMAT, layer_count=count, content_source="raster")
+        scratch, *stretch = (
+            make_texture(device, (side, side), HALF_FORMAT, content_source="raster") for _ in range(3)
+        )
         first, second = (texture.create_view() for texture in stretch)
         return StretchedLevels((stack,), (0,), scratch, side, HALF_FORMAT, stretch=(first, second))
 
     def make_sum(self, device: Device, side: int) -> Texture:
         """Return the texture for the weighted sum of the pyramid levels."""
-        return make_texture(device, (side, side), FLOAT_FORMAT, use="raster")
+        return make_texture(device, (side, side), FLOAT_FORMAT, content_source="raster")
 
     def scatter(self, graph: Graph, inputs: FrameInputs) -> Texture:
         """Record the passes that light the atlas, blur the light and sum the levels; return the sum."""

@@ -23,7 +23,7 @@ def draw_stretch(graph: Recorder, head: HeadGeometry, atlas: AtlasTextures) -> N
         beyond = program(device, "atlas/stretch_beyond.wgsl", constants)
         listed = bound | {"stretch_sources": atlas.stretch_sources}
         groups = workgroup_grid(atlas.stretch_sources.size // _STRETCH_SOURCE_BYTES)
-        graph.dispatch("stretch", beyond, listed, groups, in_place="stretch_map")
+        graph.dispatch("stretch", beyond, listed, groups, in_place_resource="stretch_map")
     draw_coarser_stretch_maps(graph, atlas)
 
 
@@ -39,7 +39,7 @@ def draw_coarser_stretch_maps(graph: Recorder, atlas: AtlasTextures) -> None:
 
 def _placeholder_edge_map(device: Device) -> Texture:
     """Return a 1 x 1 texture to bind as `edge_map` for shaders that do not read the distances to edges."""
-    return device.cached("no edges", lambda: make_texture(device, (1, 1), "r32float", use="map"))
+    return device.cached("no edges", lambda: make_texture(device, (1, 1), "r32float", content_source="map"))
 
 
 def draw_gutters(graph: Recorder, stage: str, atlas: AtlasTextures, light: TextureOrView, texel: str) -> None:
@@ -60,7 +60,7 @@ def draw_gutters(graph: Recorder, stage: str, atlas: AtlasTextures, light: Textu
     size = (_ENTRIES_PER_ROW, -(-atlas.gutter.size // (GUTTER_ENTRY_BYTES * _ENTRIES_PER_ROW)))
     lists = {"gutter": atlas.gutter, "gathered": atlas.gutter_light}
     graph.compute(stage, gather, {**lists, "source": light, "linear": linear}, size, TILE_SIDE)
-    graph.compute(stage, place, {**lists, "stored": light}, size, TILE_SIDE, in_place="stored")
+    graph.compute(stage, place, {**lists, "stored": light}, size, TILE_SIDE, in_place_resource="stored")
 
 
 def draw_blend(graph: Recorder, first: LitAtlas, second: LitAtlas, target: Texture) -> None:

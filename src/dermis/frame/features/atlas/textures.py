@@ -134,7 +134,7 @@ def _upload_mip(
     resources = resources | {
         "reach_map": texture_from_array(device, reach, "rgba16uint", _TEXTURE_NAME),
         "stretch_map": make_texture(
-            device, (reach.shape[1], reach.shape[0]), "rgba16float", name=_TEXTURE_NAME
+            device, (reach.shape[1], reach.shape[0]), "rgba16float", texture_name=_TEXTURE_NAME
         ),
     }
     if not len(mip.gutter):

@@ -12,7 +12,7 @@ from dermis.optics.gaussians import MAX_GAUSSIANS
 
 def make_sum(device: Device, side: int) -> Texture:
     """Allocate the texture for the weighted sum of blurred levels, side x side texels."""
-    return make_texture(device, (side, side), FLOAT_FORMAT, name="sum of blurred light")
+    return make_texture(device, (side, side), FLOAT_FORMAT, texture_name="sum of blurred light")
 
 
 def draw(
@@ -65,4 +65,6 @@ def draw(
 
 def placeholder_light(device: Device) -> Texture:
     """Return a 1 x 1 placeholder for a texture of light that the shader does not read."""
-    return device.cached("no light", lambda: make_texture(device, (1, 1), "rgba32float", use="map"))
+    return device.cached(
+        "no light", lambda: make_texture(device, (1, 1), "rgba32float", content_source="map")
+    )

@@ -59,10 +59,12 @@ def make_mixture(
     """
     side, texel = entering[0].size, entering[0].texel
     atlas_weights = tuple(
-        make_texture(device, (side, side), texel, name="shares of profiles") for _ in range(layouts)
+        make_texture(device, (side, side), texel, texture_name="shares of profiles") for _ in range(layouts)
     )
     layers = sum_layer_count(len(entering))
-    sums = make_texture(device, (side, side), FLOAT_FORMAT, layers=layers, name="light of mixed profiles")
+    sums = make_texture(
+        device, (side, side), FLOAT_FORMAT, layer_count=layers, texture_name="light of mixed profiles"
+    )
     return Mixture(uv_weights, entering, atlas_weights, sums)
 
 
@@ -78,7 +80,7 @@ def upload_blend_weights(device: Device, weights: NDArray[np.float32]) -> Textur
     """Upload the (h, w, 2) blend weights of two profiles as a texture with all its mip levels."""
     height, width = weights.shape[:2]
     mips = mip_chain(np.pad(weights, ((0, 0), (0, 0), (0, 2))))
-    texture = make_texture(device, (width, height), HALF_FORMAT, mips=len(mips), use="map")
+    texture = make_texture(device, (width, height), HALF_FORMAT, mip_count=len(mips), content_source="map")
     for mip, pixels in enumerate(mips):
         upload(device, texture, pixels, mip=mip)
     return texture

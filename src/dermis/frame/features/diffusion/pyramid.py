@@ -94,11 +94,16 @@ def make_levels(device: Device, size: int, halvings: Halvings, texel: str) -> Py
     """
     ranges = levels_by_resolution(halvings)
     stacks = tuple(
-        make_texture(device, (size >> times,) * 2, texel, layers=len(levels), name="blurred light")
+        make_texture(
+            device, (size >> times,) * 2, texel, layer_count=len(levels), texture_name="blurred light"
+        )
         for times, levels in enumerate(ranges)
     )
     between = mark_scratch(
-        device, make_texture(device, (size, size), texel, mips=len(ranges), name="light between two blurs")
+        device,
+        make_texture(
+            device, (size, size), texel, mip_count=len(ranges), texture_name="light between two blurs"
+        ),
     )
     return PyramidLevels(stacks, tuple(levels.start for levels in ranges), between, size, texel)
 

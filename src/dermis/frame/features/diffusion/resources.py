@@ -67,13 +67,18 @@ def make(
     blurs = tuple(_make_blur(request, scheme, one) for one in atlases) if request.blur_count else ()
     side, halvings = request.settings.atlas if blurs else 1, tuple(blur.halvings for blur in blurs) or ((0,),)
     args = device, scheme, side, halvings, request.light_key
-    levels = memo.get(_make_levels, *args, owner=request.view_name)
+    levels = memo.get(_make_levels, *args, caller_name=request.view_name)
     mixture = None
     if request.blend_weights is not None and blurs:
         names = (f"{request.view_name} other {k}" for k in range(len(request.other_profiles)))
-        entering = tuple(memo.get(_make_levels, *args, owner=name) for name in names)
+        entering = tuple(memo.get(_make_levels, *args, caller_name=name) for name in names)
         mixture = memo.get(
-            _cached_mixture, device, request.blend_weights, entering, len(atlases), owner=request.view_name
+            _cached_mixture,
+            device,
+            request.blend_weights,
+            entering,
+            len(atlases),
+            caller_name=request.view_name,
         )
     return Resources(levels, blurs, mixture)
 

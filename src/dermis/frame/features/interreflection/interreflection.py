@@ -77,21 +77,21 @@ def make_interreflection(
     albedo: NDArray[np.float64],
     has_occlusion: bool,
     light_key: str,
-    owner: str,
+    layout_key: str,
 ) -> Interreflection | None:
     """Return the interreflection of a head, None for a head where no skin sees other skin.
 
     albedo : (3,) albedo of the profile
     has_occlusion : whether there is a map of the visible fraction of the sky
     light_key : cache key of the light, for callers that draw several scenes in turn
-    owner : name of the atlas layout in the cache
+    layout_key : name of the atlas layout in the cache
     """
-    form_factors = memo.get(_form_factors, head, atlas, owner=owner)
+    form_factors = memo.get(_form_factors, head, atlas, caller_name=layout_key)
     if not len(form_factors.cell_factor):
         return None
-    uploaded = memo.get(_upload_links, device, form_factors, owner=owner)
-    key = f"{owner} {light_key}"
-    buffers = memo.get(_make_buffers, device, uploaded, has_occlusion, light_key, owner=key)
+    uploaded = memo.get(_upload_links, device, form_factors, caller_name=layout_key)
+    key = f"{layout_key} {light_key}"
+    buffers = memo.get(_make_buffers, device, uploaded, has_occlusion, light_key, caller_name=key)
     return Interreflection(buffers, albedo)
 
 

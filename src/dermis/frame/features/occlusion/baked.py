@@ -164,4 +164,6 @@ def _hair_transmittance(
 
 def placeholder_occlusion(device: Device) -> Texture:
     """Return a 1 x 1 placeholder for the occlusion map of scenes without occlusion."""
-    return device.cached("no occlusion", lambda: make_texture(device, (1, 1), "r32float", use="map"))
+    return device.cached(
+        "no occlusion", lambda: make_texture(device, (1, 1), "r32float", content_source="map")
+    )

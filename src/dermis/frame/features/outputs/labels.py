@@ -53,10 +53,10 @@ def make_label_buffers(memo: Memo, device: Device, request: FrameRequest) -> Lab
     labels = cached(mesh_labels, head)
     tables = cached(_upload_tables, device, labels)
     if not has_strands(request.head, settings):
-        unused = cached(_word_buffer, device, 1, owner="no hair labels")
+        unused = cached(_word_buffer, device, 1, caller_name="no hair labels")
         return LabelBuffers(tables, len(labels.classes), None, unused)
     pixels = settings.size[0] * settings.size[1]
-    hair_labels = cached(_word_buffer, device, pixels, owner="hair labels")
+    hair_labels = cached(_word_buffer, device, pixels, caller_name="hair labels")
     return LabelBuffers(tables, len(labels.classes), cached(_upload_hair_classes, device, head), hair_labels)
 
 

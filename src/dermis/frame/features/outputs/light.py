@@ -70,7 +70,7 @@ def make_light_outputs(
     if "translucent" in requested:
         roles = [*map(str, range(len(translucency))), *(["both"] if translucency[1:] else [])]
         side = request.settings.atlas
-        transmitted = tuple(cached(make_sum, device, side, owner=f"through {role}") for role in roles)
+        transmitted = tuple(cached(make_sum, device, side, caller_name=f"through {role}") for role in roles)
     return LightOutputs(
         light_part_counts=request.light_part_counts,
         transmitted=transmitted,
@@ -129,7 +129,7 @@ def make_thickness_map(device: Device, pairs: PairBuffers) -> Texture:
     surface = pairs.cells.receiver_mask
     texels = np.zeros((*surface.shape, 4), np.float32)
     texels[..., 0], texels[..., 3] = pairs.cells.radius_mm * surface, surface
-    texture = make_texture(device, surface.shape, "rgba32float", name="thickness")
+    texture = make_texture(device, surface.shape, "rgba32float", texture_name="thickness")
     upload(device, texture, texels)
     return texture
 

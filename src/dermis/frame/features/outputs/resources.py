@@ -71,11 +71,11 @@ def make(
     return Resources(
         names=request.outputs,
         planes=tuple(
-            cached(make_planes, device, stage, tuple(outputs), settings.size, owner=stage)
+            cached(make_planes, device, stage, tuple(outputs), settings.size, caller_name=stage)
             for stage, outputs in stages.items()
         ),
         centres=None if settings.samples == 1 else cached(_make_centres, device, settings.size),
-        previous=cached(make_shape, device, tables, owner="before") if "motion" in stages else None,
+        previous=cached(make_shape, device, tables, caller_name="before") if "motion" in stages else None,
         light=make_light_outputs(memo, device, request, translucency),
         labels=make_label_buffers(memo, device, request),
         landmarks=cached(make_landmark_buffers, device, bare, sets) if sets else None,

@@ -54,4 +54,4 @@ def draw(
 
 def placeholder_subsurface_layers(device: Device) -> Texture:
     """Return a placeholder for the layers of light below the skin, for techniques outside screen space."""
-    return device.cached("nothing apart", lambda: make_texture(device, (1, 1), "rgba32float", layers=2))
+    return device.cached("nothing apart", lambda: make_texture(device, (1, 1), "rgba32float", layer_count=2))

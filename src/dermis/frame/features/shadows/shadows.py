@@ -41,7 +41,7 @@ def make_shadow_maps(device: Device, layers: int, size: int) -> ShadowMaps:
     needed = SHADOW_TEXEL_BYTES * layers * size**2
     check_memory(device, needed, "shadow_size", f"{layers} maps of {size} texels")
     side = _square_count(size)
-    bounds = make_texture(device, (side + side // 2, side), "r32float", layers=max(2, layers))
+    bounds = make_texture(device, (side + side // 2, side), "r32float", layer_count=max(2, layers))
     return ShadowMaps(make_layers(device, (size, size), layers, triangles=False), bounds)
 
 

@@ -122,5 +122,5 @@ def rest_geometry(
     positions, owner = rest_positions_mm, "person"
     if positions is None:
         positions, owner = head.control.positions_mm, "head"
-    shape = memo.get(evaluate_rest_shape, device, tables, positions, owner=owner)
-    return memo.get(HeadGeometry.with_shape, geometry, shape, owner=f"{owner} {index}")
+    shape = memo.get(evaluate_rest_shape, device, tables, positions, caller_name=owner)
+    return memo.get(HeadGeometry.with_shape, geometry, shape, caller_name=f"{owner} {index}")

@@ -162,7 +162,7 @@ def _upload_grey(device: Device, values: NDArray[np.float32]) -> Texture:
     """
     levels = mip_chain(values)
     height, width = values.shape[:2]
-    texture = make_texture(device, (width, height), "r16float", mips=len(levels), use="map")
+    texture = make_texture(device, (width, height), "r16float", mip_count=len(levels), content_source="map")
     for index, level in enumerate(levels):
         upload(device, texture, level, mip=index)
     return texture

@@ -86,7 +86,13 @@ def upload_layers(device: Device, layers: Sequence[Floats], name: str) -> Textur
     height, width = layers[0].shape[:2]
     mips = max(height, width).bit_length()
     texture = make_texture(
-        device, (width, height), HALF_FORMAT, layers=len(layers), mips=mips, use="map", name=name
+        device,
+        (width, height),
+        HALF_FORMAT,
+        layer_count=len(layers),
+        mip_count=mips,
+        content_source="map",
+        texture_name=name,
     )
     for layer, texels in enumerate(layers):
         for mip, level in enumerate(mip_chain(texels)):
@@ -152,13 +158,15 @@ def _draw_slopes(recorder: Recorder, relief: MippedTexture, heights: Buffer, top
 
 
 def _flat_relief(device: Device) -> Texture:
-    return device.cached("no relief", lambda: make_texture(device, (1, 1), HALF_FORMAT, use="map"))
+    return device.cached("no relief", lambda: make_texture(device, (1, 1), HALF_FORMAT, content_source="map"))
 
 
 def empty_map(device: Device, shape: tuple[int, ...]) -> MippedTexture:
     """Allocate an (h, w) map of half floats with all mip levels."""
     mips = max(shape[:2]).bit_length()
-    texture = make_texture(device, (shape[1], shape[0]), HALF_FORMAT, mips=mips, name="painted map")
+    texture = make_texture(
+        device, (shape[1], shape[0]), HALF_FORMAT, mip_count=mips, texture_name="painted map"
+    )
     return with_mip_views(texture)
 
 

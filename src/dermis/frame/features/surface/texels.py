@@ -13,7 +13,8 @@ SURFACE_TEXEL_BYTES = 32
 def make_surface_texture(device: Device, side: int) -> Texture:
     """Allocate the texture of positions, normals, colours and gloss of texels, see packed_surface.wgsl."""
     return mark_scratch(
-        device, make_texture(device, (side, side), "rgba32uint", layers=2, name="atlas's surface")
+        device,
+        make_texture(device, (side, side), "rgba32uint", layer_count=2, texture_name="atlas's surface"),
     )
 
 

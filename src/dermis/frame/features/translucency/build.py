@@ -90,7 +90,7 @@ def make_translucency(
     weight: Floats,
     tables: ThinParts | None,
     shares_pairs: bool,
-    owner: str,
+    layout_key: str,
 ) -> Translucency:
     """Return the resources for light that is transmitted through thin parts of a head.
 
@@ -100,14 +100,14 @@ def make_translucency(
     tables : transmittance by thickness; None to weight pairs by the Gaussians of their straight distance
     shares_pairs : whether skins with similar profiles use the same pairs; true for skins that may change
         between frames
-    owner : name of the atlas layout in the cache
+    layout_key : name of the atlas layout in the cache
     """
     widest_mm = float(np.sqrt(variance_mm2[-1]))
     widest_mm = rounded_width(widest_mm) if shares_pairs else widest_mm
-    cells = memo.get(_cell_divisions, atlas, owner=owner)(widest_mm)
-    pairs = memo.get(PairCache, device, rest_surface, atlas, owner=owner).find(cells)
-    buffers = memo.get(make_buffers, device, surface, pairs, owner=owner)
-    return memo.get(with_profile, device, buffers, variance_mm2, weight, tables, owner=owner)
+    cells = memo.get(_cell_divisions, atlas, caller_name=layout_key)(widest_mm)
+    pairs = memo.get(PairCache, device, rest_surface, atlas, caller_name=layout_key).find(cells)
+    buffers = memo.get(make_buffers, device, surface, pairs, caller_name=layout_key)
+    return memo.get(with_profile, device, buffers, variance_mm2, weight, tables, caller_name=layout_key)
 
 
 def _cell_divisions(atlas: Atlas) -> Callable[[float], Cells]:

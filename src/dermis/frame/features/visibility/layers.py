@@ -99,7 +99,7 @@ def draw(graph: Recorder, visibility: ViewLayers, views: Views, head: HeadGeomet
 
 def _compute_layers(device: Device, size: tuple[int, int], count: int, triangles: bool) -> ViewLayers:
     texel, name = ("r32uint", "visibility buffer") if triangles else ("r32float", "shadow maps")
-    texture = make_texture(device, size, texel, layers=max(2, count), name=name)
+    texture = make_texture(device, size, texel, layer_count=max(2, count), texture_name=name)
     across, down = _tile_counts(size)
     counts = size[0] * size[1] * count, 1, across * down * count
     return ViewLayers(texture, size, count, triangles, [], [], *(_word_buffer(device, one) for one in counts))
@@ -113,7 +113,9 @@ def _raster_layers(device: Device, size: tuple[int, int], count: int, triangles:
     name = "visibility buffer" if triangles else "shadow maps"
 
     def layered(texel: str, layer_count: int) -> tuple[Texture, list[TextureView]]:
-        texture = make_texture(device, size, texel, layers=max(2, layer_count), use="raster", name=name)
+        texture = make_texture(
+            device, size, texel, layer_count=max(2, layer_count), content_source="raster", texture_name=name
+        )
         return texture, [make_view(texture, layer=k) for k in range(layer_count)]
 
     if not triangles:
@@ -172,7 +174,9 @@ def _draw_raster(graph: Recorder, stage: str, layers: ViewLayers, clips: Matrix,
     for layer, (depth, target) in enumerate(zip(layers.depth, layers.targets, strict=True)):
         indexed = not (layers.triangles or head.has_cutouts)  # else the shader finds the corners itself
         indices, into = head.indices if indexed else None, DrawTarget(depth, 0.0, target)
-        graph.draw(stage, shader, resources, 3 * head.triangles, into, indices=indices, layer=layer)
+        graph.draw(
+            stage, shader, resources, 3 * head.triangles, into, index_buffer=indices, instance_index=layer
+        )
 
 
 def _raster_program(device: Device, triangles: bool, has_cutouts: bool) -> RenderProgram:

@@ -195,7 +195,7 @@ def paint_rest_maps(device: Device, inputs: PaintInputs, side: int) -> RestMaps:
     surface: Bindings = {"paint": inputs.paint, **_surface_buffers(device, inputs, side)}
     maps = {name: map_mips.empty_map(device, (side, side)) for name in _MAP_NAMES}
     heights = device.storage_buffer(_WORD_BYTES * (side + 2) ** 2)
-    deltas = make_texture(device, (side, side), HALF_FORMAT, layers=2)
+    deltas = make_texture(device, (side, side), HALF_FORMAT, layer_count=2)
     outputs = {name: one.levels[0] for name, one in maps.items()}
     tables: Bindings = {
         "tables": inputs.tables,
@@ -231,7 +231,9 @@ def _surface_buffers(device: Device, inputs: PaintInputs, side: int) -> dict[str
 
 def _upload_colour_tables(device: Device, inputs: PaintInputs) -> Texture:
     nodes = inputs.colours.shape[1]
-    texture = make_texture(device, (nodes, nodes), "rgba32float", layers=len(inputs.colours), use="map")
+    texture = make_texture(
+        device, (nodes, nodes), "rgba32float", layer_count=len(inputs.colours), content_source="map"
+    )
     for layer, table in enumerate(inputs.colours):
         upload(device, texture, np.dstack([table, np.ones((nodes, nodes, 1), np.float32)]), layer=layer)
     return texture
@@ -251,7 +253,7 @@ def _upload_arrays(device: Device, arrays: Arrays, side: int) -> RestMaps:
         upload(device, one.texture, arrays[name])
     deltas = None
     if "deltas" in arrays:
-        deltas = make_texture(device, (side, side), HALF_FORMAT, layers=2)
+        deltas = make_texture(device, (side, side), HALF_FORMAT, layer_count=2)
         for layer, texels in enumerate(arrays["deltas"]):
             upload(device, deltas, texels, layer=layer)
     return RestMaps(**maps, heights=device.buffer(arrays["heights"], "STORAGE"), deltas=deltas)
