@@ -58,7 +58,7 @@ def gaussian_fit(
     if table is not None:
         return GaussianFit(table, np.zeros(3), np.zeros(3), "pointwise", shared=True)
     target = radial.points() if radial.finite_at_centre else radial.rings()
-    return fit_gaussians(target, terms, shared=shared, keep_energy=keep_energy, name=radial.name)
+    return fit_gaussians(target, terms, shared=shared, keep_energy=keep_energy, profile_name=radial.name)
 
 
 def additional_fit(radial: RadialProfile, kind: str) -> BurleyFit | SeparableFit | None:

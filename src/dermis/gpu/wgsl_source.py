@@ -188,7 +188,8 @@ class _Composer:
             if (folder / included_name).is_file():
                 return folder / included_name
         raise DermisError(
-            f'{source_file.name}: expected to find the include "{included_name}", but no shader folder has it.'
+            f'{source_file.name}: expected to find the include "{included_name}", but no shader folder has '
+            "it."
         )
 
     def _list_members(self, list_name: str, source_file: Path) -> Sequence[ShaderListMember]:

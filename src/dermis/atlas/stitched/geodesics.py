@@ -21,7 +21,7 @@ INNER_POINT_WEIGHTS = 0.3547, 0.3141, 0.3312
 The centroid would let more geodesics hit corners.
 """
 
-_MAX_STEPS = 4096
+_MAX_CROSSED_EDGES = 4096
 
 
 class Geodesics(NamedTuple):
@@ -62,19 +62,26 @@ class GeodesicEnds(NamedTuple):
     weights: Doubles
     complete: Mask
 
-    def set_ends(self, rays: Geodesics, first: Index, b: Doubles, c: Doubles, complete: bool) -> None:
+    def set_ends(
+        self,
+        rays: Geodesics,
+        first_corner: Index,
+        second_weight: Doubles,
+        third_weight: Doubles,
+        reached_target: bool,
+    ) -> None:
         """Store the ends of the selected geodesics.
 
         rays : geodesics that end in their current triangle
-        first : corner (0, 1, 2) of the triangle with the weight 1 - b - c
-        b, c : weights of the two corners that follow corner `first`
-        complete : whether the geodesics reached their target
+        first_corner : corner (0, 1, 2) of the triangle with the weight 1 - b - c
+        second_weight, third_weight : weights of the two corners that follow corner `first_corner`
+        reached_target : whether the geodesics reached their target
         """
-        weights = np.column_stack((1.0 - b - c, b, c))
-        order = (np.arange(3) - first[:, None]) % 3
+        weights = np.column_stack((1.0 - second_weight - third_weight, second_weight, third_weight))
+        order = (np.arange(3) - first_corner[:, None]) % 3
         self.triangle[rays.ray] = rays.triangle
         self.weights[rays.ray] = np.take_along_axis(weights, order, axis=1)[:, 1:]
-        self.complete[rays.ray] = complete
+        self.complete[rays.ray] = reached_target
 
 
 def trace_geodesics(
@@ -92,7 +99,7 @@ def trace_geodesics(
     rays = _leave_first_triangle(
         adjacency, np.asarray(triangle, np.int64), _as_complex(start), _as_complex(target), ends
     )
-    for _ in range(_MAX_STEPS):
+    for _ in range(_MAX_CROSSED_EDGES):
         if not len(rays.ray):
             break
         rays = _cross_edge(adjacency, rays, ends)
@@ -153,8 +160,8 @@ def _as_complex(points: Doubles) -> Complex:
     return np.ascontiguousarray(points, np.float64).view(np.complex128)[..., 0]
 
 
-def _cross(a: Complex, b: Complex) -> Doubles:
-    return np.asarray(a.real * b.imag - a.imag * b.real)
+def _cross(first_vector: Complex, second_vector: Complex) -> Doubles:
+    return np.asarray(first_vector.real * second_vector.imag - first_vector.imag * second_vector.real)
 
 
 def _exit_fraction(rays: Geodesics) -> Doubles:

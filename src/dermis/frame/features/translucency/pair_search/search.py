@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.atlas.translucency.cells import TILE_CELLS, TILE_MARGIN_TEXELS, Cells
+from dermis.atlas.translucency.cells import CELLS_PER_TILE_SIDE, TILE_MARGIN_TEXELS, Cells
 from dermis.frame.features.translucency.passes import (
     RECEIVER_BYTES,
     SOURCE_BYTES,
@@ -39,7 +39,7 @@ class SearchPasses:
         self._parameters = {
             "radius_mm": cells.radius_mm,
             "variance_mm2": cells.max_sigma_mm**2,
-            "tile": TILE_CELLS / cells.side,
+            "tile": CELLS_PER_TILE_SIDE / cells.side,
             "margin": TILE_MARGIN_TEXELS / cells.size,
             "tiles": cells.tiles_per_side,
             "blocks": self.blocks,
