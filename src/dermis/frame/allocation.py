@@ -167,12 +167,20 @@ def _cached_sky_visibility(
     return memo.get(make_vertex_sky_visibility, device, request.topology, untracked=(at_rest,))
 
 
-def _layout_atlas(memo: Memo, device: Device, request: FrameRequest, name: str, index: int) -> LayoutAtlas:
+def _layout_atlas(
+    memo: Memo, device: Device, request: FrameRequest, layout_name: str, layout_index: int
+) -> LayoutAtlas:
     stretch = request.technique.stretch(request.settings)
     atlas = memo.get(
-        cached_atlas, request.topology.mesh, request.atlas_plan.side, name, caller_name=str(index)
+        cached_atlas,
+        request.topology.mesh,
+        request.atlas_plan.side,
+        layout_name,
+        caller_name=str(layout_index),
     )
-    return atlas, memo.get(upload_atlas, device, atlas, stretch, request.seam_method, caller_name=str(index))
+    return atlas, memo.get(
+        upload_atlas, device, atlas, stretch, request.seam_method, caller_name=str(layout_index)
+    )
 
 
 def _make_layout(
@@ -183,15 +191,15 @@ def _make_layout(
     layout_atlas: LayoutAtlas,
     shapes: shape.Resources,
     shared: Bindings,
-    index: int,
+    layout_index: int,
 ) -> AtlasLayout:
     """Return the resources of one atlas layout, without the record of the lights, which each frame adds.
 
     layout_atlas : the atlas, and its textures on the device
     shared : result of `_shared_bindings`, with the maps of the head
-    index : index of the layout, which identifies its resources in the cache
+    layout_index : index of the layout, which identifies its resources in the cache
     """
-    cached, layout_key, head, (atlas, textures) = memo.get, str(index), request.topology, layout_atlas
+    cached, layout_key, head, (atlas, textures) = memo.get, str(layout_index), request.topology, layout_atlas
     geometry = cached(
         upload_geometry,
         device,
@@ -222,7 +230,7 @@ def _make_layout(
         occlusion, moving_occlusion = cached(make_moving_map, device, occlusion, caller_name=layout_key)
     bindings["occlusion_map"] = occlusion
     if request.blur_count and settings.transmission == "thin" and request.technique.supports_translucency:
-        searched = at_rest(pair_positions_mm(memo, request), index)
+        searched = at_rest(pair_positions_mm(memo, request), layout_index)
         posed, rest = ({**one.resources, **textures.resources} for one in (geometry, searched))
         blurred = request.split.blurred_mm2, request.split.weight
         tissue = thin_part_tables(memo, request), request.skin.overrides_tissue
@@ -248,23 +256,30 @@ def _gutter_update(tracing: GutterTracing, geometry: HeadGeometry, rest_shape: S
 
 
 def _exitance_texture(
-    memo: Memo, device: Device, request: FrameRequest, technique: Technique, side: int, role: str
+    memo: Memo,
+    device: Device,
+    request: FrameRequest,
+    technique: Technique,
+    atlas_side: int,
+    texture_role: str,
 ) -> Texture:
-    owner = f"{role} {request.view_name}"
-    return memo.get(_make_exitance_texture, device, technique, side, request.light_key, caller_name=owner)
+    owner = f"{texture_role} {request.view_name}"
+    return memo.get(
+        _make_exitance_texture, device, technique, atlas_side, request.light_key, caller_name=owner
+    )
 
 
-def _make_shadow_maps(device: Device, _: Head, layers: int, size: int) -> ShadowMaps:
-    return make_shadow_maps(device, layers, size)
+def _make_shadow_maps(device: Device, _: Head, layer_count: int, map_side: int) -> ShadowMaps:
+    return make_shadow_maps(device, layer_count, map_side)
 
 
-def _visibility_layers(device: Device, size: tuple[int, int], samples: int) -> ViewLayers:
-    return make_layers(device, size, samples, triangles=True)
+def _visibility_layers(device: Device, picture_size: tuple[int, int], sample_count: int) -> ViewLayers:
+    return make_layers(device, picture_size, sample_count, store_triangles=True)
 
 
-def _albedo_texture(device: Device, lobe: str, fresnel: str) -> Texture:
-    return texture_from_array(device, albedo_table(lobe, fresnel), "rg32float")
+def _albedo_texture(device: Device, lobe_name: str, fresnel_name: str) -> Texture:
+    return texture_from_array(device, albedo_table(lobe_name, fresnel_name), "rg32float")
 
 
-def _make_exitance_texture(device: Device, technique: Technique, side: int, _: str) -> Texture:
-    return technique.make_sum(device, side)
+def _make_exitance_texture(device: Device, technique: Technique, atlas_side: int, _: str) -> Texture:
+    return technique.make_sum(device, atlas_side)

@@ -67,7 +67,7 @@ def ring_edges(ring_count: int = 120) -> Floats:
 
 
 def radius_grid(radius_count: int = 600) -> Floats:
-    """Return the log-spaced radii at which profiles are sampled, (count,) [mm]."""
+    """Return the log-spaced radii at which profiles are sampled, (radius_count,) [mm]."""
     return np.geomspace(MIN_RADIUS_MM, MAX_RADIUS_MM, radius_count)
 
 

@@ -39,6 +39,12 @@ class _Face(NamedTuple):
 class _DownwardTransfer(NamedTuple):
     """Coefficients that yield the fluence at the lower face of a sublayer from the fluence at its upper face.
 
+    E : attenuation exp(-q d) across the thickness d of the sublayer [-]
+    rho : reflection coefficient of the lower face for the solution that decays downwards [-]
+    common : 1 / (1 + E^2 rho), the sum of the reflections between both faces [-]
+    beta : part of the fluence at the lower face that grows towards this face, caused by sources
+    lower : particular solution at the lower face, which is 0 at the upper face
+
     All coefficients are 0 for a semi-infinite sublayer. Only the last sublayer of a medium can be
     semi-infinite.
     """

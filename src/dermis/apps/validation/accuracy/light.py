@@ -21,7 +21,7 @@ from dermis.environment.panorama import (
     texel_solid_angles,
 )
 from dermis.environment.prefilter import LAYER_ROUGHNESSES, ROUGHEST, SMOOTHEST, Prefiltered, prefilter
-from dermis.frame.features.occlusion.baked import DIRECTION_COUNT, bake_occlusion
+from dermis.frame.features.occlusion.baked import SKY_DIRECTION_COUNT, bake_occlusion
 from dermis.frame.lights.rectangle import facing_irradiance
 from dermis.frame.projection import view_axes_array
 from dermis.mesh.head import Head
@@ -243,7 +243,7 @@ def occlusion_error(renderer: dermis.Renderer) -> float:
     texels, atlas = inputs.layouts[0].atlas.resources["atlas"], cached_atlas(head.mesh, 512, "stitched")
     ours, reference = (
         bake_occlusion(renderer.device, head, atlas, inputs.bindings, texels, 512, count)[:512]
-        for count in (DIRECTION_COUNT, 1024)
+        for count in (SKY_DIRECTION_COUNT, 1024)
     )
     return float(np.sqrt(np.nanmean((ours - reference) ** 2)))
 
@@ -264,5 +264,5 @@ def tables(adapter: str = "auto") -> dict[str, str]:
         "furnaces": furnace_rows(renderer),
         "soft_shadows": "\n".join(f"| {rig} | {bias:+.1%} | {rms:.1%} |" for rig, bias, rms in shadows),
         "occlusion": f"{occlusion_error(renderer):.3f}",
-        "directions": str(DIRECTION_COUNT),
+        "directions": str(SKY_DIRECTION_COUNT),
     }

@@ -34,14 +34,18 @@ class LabelBuffers:
     hair_classes: Buffer | None
     hair_labels: Buffer
 
-    def hair_bindings(self, centres: Texture) -> Bindings | None:
+    def hair_bindings(self, centre_triangles: Texture) -> Bindings | None:
         """Return the resources with which the hair pass labels pixels, None without hair.
 
-        centres : texture of the triangle at the centre of each pixel
+        centre_triangles : texture of the triangle at the centre of each pixel
         """
         if self.hair_classes is None:
             return None
-        return {"hair_classes": self.hair_classes, "hair_labels": self.hair_labels, "centres": centres}
+        return {
+            "hair_classes": self.hair_classes,
+            "hair_labels": self.hair_labels,
+            "centres": centre_triangles,
+        }
 
 
 def make_label_buffers(memo: Memo, device: Device, request: FrameRequest) -> LabelBuffers | None:
@@ -89,5 +93,5 @@ def _upload_hair_classes(device: Device, head: Head) -> Buffer:
     return device.buffer(hair_classes(head).astype(np.uint32), "STORAGE")
 
 
-def _word_buffer(device: Device, count: int) -> Buffer:
-    return device.storage_buffer(4 * count, "hair labels")
+def _word_buffer(device: Device, word_count: int) -> Buffer:
+    return device.storage_buffer(4 * word_count, "hair labels")

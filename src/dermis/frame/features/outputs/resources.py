@@ -43,9 +43,9 @@ class Resources:
         landmarks = [self.landmarks.results] if self.landmarks else []
         return [*(planes.buffer for planes in self.planes), *landmarks]
 
-    def planes_of_output(self, name: str) -> Planes:
+    def planes_of_output(self, output_name: str) -> Planes:
         """Return the planes of the stage that computes an output."""
-        return next(planes for planes in self.planes if name in planes.channels)
+        return next(planes for planes in self.planes if output_name in planes.channels)
 
 
 def make(
@@ -82,5 +82,5 @@ def make(
     )
 
 
-def _make_centres(device: Device, size: tuple[int, int]) -> ViewLayers:
-    return make_layers(device, size, 1, triangles=True)
+def _make_centres(device: Device, picture_size: tuple[int, int]) -> ViewLayers:
+    return make_layers(device, picture_size, 1, store_triangles=True)
