@@ -23,8 +23,8 @@ CACHED_COLUMN_COUNT = 256
 def interpolate_table(column_at: Callable[[float], Floats], table_position: float) -> Floats:
     """Interpolate a table over [0, 1] linearly at one position, between the two nearest columns.
 
-    column_at : function that returns the column, an array, at a multiple of 1 / TABLE_STEPS; the function
-        should cache its results
+    column_at : function that returns the column, an array, at a multiple of 1 / INTERPOLATION_STEPS; the
+        function should cache its results
     table_position : position in the table; values outside [0, 1] are clamped
     """
     scaled = min(max(table_position, 0.0), 1.0) * INTERPOLATION_STEPS
@@ -39,7 +39,8 @@ def interpolate_table(column_at: Callable[[float], Floats], table_position: floa
 def interpolate_columns(column_at: Callable[[float], Floats], table_positions: ArrayLike) -> Floats:
     """Interpolate a table over [0, 1] at c positions; the last axis of the result has one entry per position.
 
-    column_at : function that returns the column at a multiple of 1 / TABLE_STEPS, see `interpolate_table`
+    column_at : function that returns the column at a multiple of 1 / INTERPOLATION_STEPS, see
+        `interpolate_table`
     """
     values = np.atleast_1d(np.asarray(table_positions, np.float64)).tolist()
     return np.stack([interpolate_table(column_at, value) for value in values], axis=-1)

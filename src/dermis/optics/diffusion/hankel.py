@@ -19,7 +19,10 @@ NEAR_ZERO_FREQUENCY = np.array([1e-8])
 
 @cache
 def transform_frequencies() -> Floats:
-    """Return the log-spaced frequencies s of the input of `inverse_transform`, (SAMPLE_COUNT,) [1/mm]."""
+    """Return the log-spaced frequencies s of the input of `inverse_transform` [1/mm].
+
+    The shape is (TRANSFORM_SAMPLE_COUNT,).
+    """
     return np.asarray(
         _CENTRE_FREQUENCY_PER_MM
         * np.exp(
@@ -30,14 +33,17 @@ def transform_frequencies() -> Floats:
 
 @cache
 def transform_radii() -> Floats:
-    """Return the radii r at which `inverse_transform` returns R(r), (SAMPLE_COUNT,) log-spaced [mm]."""
+    """Return the log-spaced radii r at which `inverse_transform` returns R(r) [mm].
+
+    The shape is (TRANSFORM_SAMPLE_COUNT,).
+    """
     return np.asarray(np.exp(_log_radius_offset()) / transform_frequencies()[::-1])
 
 
 def inverse_transform(transform: Floats) -> Floats:
-    """Return R(r) at `transform_radii` from its Hankel transform, (SAMPLE_COUNT, c) [1/mm2].
+    """Return R(r) at `transform_radii` from its Hankel transform, (TRANSFORM_SAMPLE_COUNT, c) [1/mm2].
 
-    transform : (SAMPLE_COUNT, c) Hankel transform at `transform_frequencies` [-]
+    transform : (TRANSFORM_SAMPLE_COUNT, c) Hankel transform at `transform_frequencies` [-]
 
     The relative error is 1e-8 where R(r) is within six decades of its maximum; elsewhere the error is 1e-9 of
     the maximum.

@@ -44,10 +44,10 @@ class SeparableKernel:
         return np.asarray(0.5 * (self.weight * erf(x / np.sqrt(2.0 * self.variance_mm2))).sum(axis=-2))
 
     def sector_energy(self, edges_mm: Floats) -> Floats:
-        """Return the light through equal sectors of each ring, (n, SECTOR_COUNT, c) [-].
+        """Return the light through equal sectors of each ring, (n, SECTORS_PER_QUADRANT, c) [-].
 
-        A ring is divided into SECTOR_COUNT sectors in each quadrant; the light of the four quadrants is
-        added.
+        Each quadrant of a ring is divided into SECTORS_PER_QUADRANT sectors; the light of the four quadrants
+        is added.
 
         edges_mm : (n + 1,) radii of the ring edges [mm]
         """
@@ -122,7 +122,7 @@ def _fit_channel(target: RingTarget) -> Floats:
 
 
 def _sector_fractions(edges_mm: Floats, variance: Floats, weight: Floats) -> Floats:
-    """Return the fraction of a kernel's light in each ring and sector, for one channel, (n, SECTOR_COUNT).
+    """Return the fraction of one channel's light in each ring and sector, (n, SECTORS_PER_QUADRANT) [-].
 
     variance, weight : (k,) Gaussians of a(x)
     """
@@ -136,7 +136,7 @@ def _sector_fractions(edges_mm: Floats, variance: Floats, weight: Floats) -> Flo
 
 
 def _elliptic_sectors(edges_mm: Floats, variance_x_mm2: float, variance_y_mm2: float) -> Floats:
-    """Return the fraction of an elliptic Gaussian's light in each ring and sector, (n, SECTOR_COUNT).
+    """Return the fraction of an elliptic Gaussian's light in each ring and sector, (n, SECTORS_PER_QUADRANT).
 
     variance_x_mm2, variance_y_mm2 : variances along x and y [mm2]
     """
