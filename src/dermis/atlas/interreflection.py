@@ -227,7 +227,7 @@ def _cell_index(corner_uv: Floats, weights: Doubles) -> Index:
 
 
 def _hemisphere_directions(direction_count: int) -> Doubles:
-    """Return (count, 3) unit vectors that are evenly distributed over a hemisphere."""
+    """Return (direction_count, 3) unit vectors that are evenly distributed over a hemisphere."""
     index = np.arange(direction_count) + 0.5
     z, phi = index / direction_count, np.pi * (1.0 + np.sqrt(5.0)) * index
     r = np.sqrt(1.0 - z**2)

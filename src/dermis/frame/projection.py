@@ -246,7 +246,7 @@ def parallel_shadow_view(direction: Vectors, outline: Outline, map_side: int) ->
 
 @cache
 def pixel_samples(sample_count: int) -> NDArray[np.float64]:
-    """Return sample positions in a pixel, a (count, 2) Hammersley set in the unit square."""
+    """Return sample positions in a pixel, a (sample_count, 2) Hammersley set in the unit square."""
     index = np.arange(sample_count)
     y, digit, remaining = np.zeros(sample_count), 0.5, index.copy()
     while remaining.any():

@@ -266,7 +266,7 @@ class Graph(Recorder):
         self._declare_pass(stage, program, resources, (3,), program.access(resources), writes, run)
 
     def repeat(self, record_passes: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
-        """Declare the compute passes that `record(recorder, *args)` adds, recorded once per set of arguments.
+        """Declare the passes that `record_passes(recorder, *args)` adds, recorded once per set of arguments.
 
         Either all passes of the recording run, or none. Replaying a recording takes almost no time in Python.
         """

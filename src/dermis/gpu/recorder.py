@@ -64,7 +64,12 @@ class Recorder(ABC):
         tile_side: int = 8,
         in_place_resource: str = "",
     ) -> None:
-        """Add a dispatch that covers size[0] x size[1] invocations in workgroups of tile x tile."""
+        """Add a dispatch that covers a 2-D grid of invocations by square workgroups.
+
+        invocation_counts : number of invocations along x and y
+        tile_side : side of a workgroup [invocations]
+        in_place_resource : see `dispatch`
+        """
         self.dispatch(
             stage,
             program,
@@ -107,7 +112,7 @@ class Recorder(ABC):
         raise self._unsupported_error(stage)
 
     def repeat(self, record_passes: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
-        """Add the compute passes that `record(recorder, *args)` adds, which must depend only on `args`."""
+        """Add the passes that `record_passes(recorder, *args)` adds; the passes must depend only on `args`."""
         return record_passes(self, *args)
 
     def _unsupported_error(self, stage: str) -> NotImplementedError:

@@ -108,7 +108,7 @@ class RecordingCache:
     def get(
         self, device: Device, record_passes: Callable[[Recorder, *Ts], T], args: tuple[*Ts]
     ) -> tuple[Recording, T]:
-        """Return the recording of `record(recorder, *args)` and its result, from the cache if possible."""
+        """Return the recording of `record_passes(recorder, *args)` and its result, if possible cached."""
         known = self._recordings.setdefault(record_passes, [])
         found = next((one for one in known if one[1].is_valid and _matches_copy(one[0], args)), None)
         if found is None:

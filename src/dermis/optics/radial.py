@@ -62,7 +62,7 @@ class RadialProfile:
 
 
 def ring_edges(ring_count: int = 120) -> Floats:
-    """Return the radii that bound a disc and the log-spaced rings around it, (rings + 1,) [mm]."""
+    """Return the radii that bound a disc and the log-spaced rings around it, (ring_count + 1,) [mm]."""
     return np.concatenate([[0.0], np.geomspace(1e-3, MAX_RADIUS_MM, ring_count)])
 
 

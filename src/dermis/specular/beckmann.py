@@ -28,7 +28,7 @@ def beckmann(cos_h: ArrayLike, m: ArrayLike) -> NDArray[np.float64]:
 
 @cache
 def beckmann_table(table_side: int = BECKMANN_TABLE_SIZE) -> NDArray[np.float32]:
-    """Return beckmann(cos_h, m)^0.1 / 2 as a table (size, size) for the shader.
+    """Return beckmann(cos_h, m)^0.1 / 2 as a table (table_side, table_side) for the shader.
 
     Columns are cos_h from 0 to 1 inclusive, so that the peak of the highlight is in the table; rows are m at
     texel centres. The power flattens the peak for accurate interpolation; the shader decodes a value t as (2

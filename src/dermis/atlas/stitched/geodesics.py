@@ -73,7 +73,7 @@ class GeodesicEnds(NamedTuple):
         """Store the ends of the selected geodesics.
 
         rays : geodesics that end in their current triangle
-        first_corner : corner (0, 1, 2) of the triangle with the weight 1 - b - c
+        first_corner : corner (0, 1, 2) of the triangle with the weight 1 - second_weight - third_weight
         second_weight, third_weight : weights of the two corners that follow corner `first_corner`
         reached_target : whether the geodesics reached their target
         """

@@ -123,12 +123,12 @@ def _texel_mm(atlas: Atlas) -> float:
 
 
 def _centre_texels(atlas_side: int, cells_per_side: int) -> Index:
-    """Return the index of the texel at the centre of each cell along one axis (side,)."""
+    """Return the index of the texel at the centre of each cell along one axis (cells_per_side,)."""
     return np.asarray(((np.arange(cells_per_side) + 0.5) * atlas_side / cells_per_side).astype(np.int64))
 
 
 def _cells_with_texels(texel_mask: Mask, atlas_side: int, cells_per_side: int, stride: int) -> Mask:
-    """Return the (side, side) mask of cells that contain a marked texel.
+    """Return the mask (cells_per_side, cells_per_side) of cells that contain a marked texel.
 
     texel_mask : mask of every `stride`-th texel of the map along each axis
     """

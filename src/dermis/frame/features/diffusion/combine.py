@@ -11,7 +11,7 @@ from dermis.optics.gaussians import MAX_GAUSSIANS
 
 
 def make_blur_sum(device: Device, atlas_side: int) -> Texture:
-    """Allocate the texture for the weighted sum of blurred levels, side x side texels."""
+    """Allocate the texture for the weighted sum of blurred levels, as large as the atlas."""
     return make_texture(
         device, (atlas_side, atlas_side), FLOAT_TEXEL_FORMAT, texture_name="sum of blurred light"
     )

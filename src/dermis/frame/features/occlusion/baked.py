@@ -54,7 +54,7 @@ def bake_occlusion(
     direction_count: int = SKY_DIRECTION_COUNT,
     depth_map_side: int = DEPTH_MAP_SIDE,
 ) -> NDArray[np.float32]:
-    """Return the cosine-weighted visible fraction of the sky (rows, side), NaN where there is no surface [-].
+    """Return the cosine-weighted visible fraction of the sky (rows, result_side), NaN without a surface [-].
 
     Depth maps are drawn from directions all around. A point sums the directions in which it is visible. The
     first `result_side` rows are texels of the atlas, the other rows hold the vertices of the mesh.
@@ -111,7 +111,7 @@ def fill_gaps(baked_occlusion: NDArray[np.float32], result_side: int) -> NDArray
 
     The last row of the atlas is repeated, as a border for filters between texels and vertices.
 
-    baked_occlusion : (rows, side) result of `bake_occlusion`, NaN where there is no surface
+    baked_occlusion : (rows, result_side) result of `bake_occlusion`, NaN where there is no surface
     result_side : side of the atlas in the result [texels]
     """
     from scipy.ndimage import distance_transform_edt

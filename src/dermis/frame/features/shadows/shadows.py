@@ -34,7 +34,7 @@ class ShadowMaps:
 
 
 def make_shadow_maps(device: Device, layer_count: int, map_side: int) -> ShadowMaps:
-    """Allocate `layer_count` empty shadow maps of size x size texels.
+    """Allocate `layer_count` empty square shadow maps of `map_side` texels per side.
 
     Raises DermisError when the maps do not fit into memory.
     """
