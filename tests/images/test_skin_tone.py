@@ -33,4 +33,4 @@ def test_classes_follow_from_the_ita(reflectance: tuple[float, float, float], fi
     assert found.fitzpatrick == fitzpatrick
     assert found.ita_degrees == pytest.approx(float(ita_degrees(lab(reflectance))))
     assert found.as_json()["statement"] == SKIN_CLASS_DISCLAIMER
-    assert f"ITA {found.ita_degrees:.0f}" in found.line()
+    assert f"ITA {found.ita_degrees:.0f}" in found.as_text()

@@ -45,7 +45,7 @@ def chart_uv_area(mesh: Mesh, chart: Ints) -> Doubles:
 
 
 def usable_triangles(mesh: Mesh, map_side: int, min_texels: float = _MIN_BLURRED_CHART_TEXELS) -> Mask:
-    """Return the mask (f,) of triangles large enough in uv for the diffusion of light in texture space.
+    """Return the mask (f,) of triangles in whose texels light can be diffused.
 
     The mask excludes triangles without uv area and all triangles of charts with less than `min_texels`
     texels.

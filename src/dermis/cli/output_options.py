@@ -209,7 +209,7 @@ class AnimationOutput:
             return numbers
         files = FrameFiles(self.path)
         files.start(digest, force=self.overwrite)
-        return files.missing(numbers, size)
+        return files.missing_frames(numbers, size)
 
     @contextmanager
     def open_writer(self, size: tuple[int, int], rate: Fraction) -> Iterator[WriteFrame]:

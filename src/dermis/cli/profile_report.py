@@ -143,7 +143,7 @@ class ProfileReport:
         total = f"total      {_format_row(radial.total)}  {self._normalisation()}"
         lines = [f"{radial.name}, model {radial.model}", total]
         if self.tone is not None:
-            lines += [f"tone       {self.tone.line()}", f"           ({SKIN_CLASS_DISCLAIMER})"]
+            lines += [f"tone       {self.tone.as_text()}", f"           ({SKIN_CLASS_DISCLAIMER})"]
         if self.tissue is not None and self.tissue.rgb is None:
             for layer in self.tissue.medium.layers:
                 path = _format_row(layer.mean_free_path_mm)

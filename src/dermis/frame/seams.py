@@ -54,7 +54,7 @@ class AtlasPlan(NamedTuple):
 
 
 def plan_atlases(method: SeamMethod, settings: Settings, blur_count: int, has_occlusion: bool) -> AtlasPlan:
-    """Return the layouts and the size of the atlases; the size is minimal where an atlas stores nothing.
+    """Return the layouts and the size of the atlases; an atlas that stores nothing has the smallest size.
 
     blur_count : number of Gaussians that blur light over the atlas
     has_occlusion : whether the atlas stores occlusion of the environment

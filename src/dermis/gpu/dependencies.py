@@ -128,7 +128,7 @@ class Dependencies:
             for state in writes:
                 self._add_write(state, index, writers)
 
-    def versions(self, epoch: int, pass_keys: Iterable[Hashable]) -> list[int]:
+    def compute_versions(self, epoch: int, pass_keys: Iterable[Hashable]) -> list[int]:
         """Return the version of the output of each pass.
 
         epoch : number that changes when all content becomes unknown
@@ -140,7 +140,7 @@ class Dependencies:
             versions.append(hash((epoch, key, *inputs)))
         return versions
 
-    def stale(self, versions: Sequence[int]) -> list[bool]:
+    def find_stale_passes(self, versions: Sequence[int]) -> list[bool]:
         """Return for each pass whether it must run so that all resources get the versions `versions`."""
         current = [state.version == versions[last] for state, last in self._last_writer.items()]
         return self._cached_stale(tuple(current))

@@ -168,10 +168,10 @@ class Device:
         chunk_bytes : size of a new buffer [byte]
         """
         while len(self._uniform_chunks) <= chunk_index:
-            self._uniform_chunks.append(self.uniform_buffer(chunk_bytes))
+            self._uniform_chunks.append(self.make_uniform_buffer(chunk_bytes))
         return self._uniform_chunks[chunk_index]
 
-    def uniform_buffer(self, byte_count: int) -> Buffer:
+    def make_uniform_buffer(self, byte_count: int) -> Buffer:
         """Create a uniform buffer of `byte_count` bytes."""
         return self.buffer(np.zeros(byte_count, np.uint8), "UNIFORM")
 

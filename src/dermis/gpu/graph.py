@@ -289,8 +289,8 @@ class Graph(Recorder):
         frame = CommandList(self.device, timed=timed, uniforms=self._uniforms)
         try:
             dependencies = self._find_dependencies()
-            versions = dependencies.versions(self._epoch, [one.key for one in self._passes])
-            is_stale = dependencies.stale(versions)
+            versions = dependencies.compute_versions(self._epoch, [one.key for one in self._passes])
+            is_stale = dependencies.find_stale_passes(versions)
             stale = [one for one, now in zip(self._passes, is_stale, strict=True) if now]
             if self.listing is not None:
                 self.listing.finish(is_stale)

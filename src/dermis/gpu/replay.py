@@ -95,7 +95,7 @@ class Recording(Recorder):
 
 def _uniform_chunk(device: Device, chunks: list[Buffer], chunk_index: int) -> Buffer:
     if chunk_index == len(chunks):
-        chunks.append(device.uniform_buffer(CHUNK_BYTES))
+        chunks.append(device.make_uniform_buffer(CHUNK_BYTES))
     return chunks[chunk_index]
 
 

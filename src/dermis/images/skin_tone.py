@@ -54,7 +54,7 @@ class SkinTone(NamedTuple):
             "statement": SKIN_CLASS_DISCLAIMER,
         }
 
-    def line(self) -> str:
+    def as_text(self) -> str:
         """Return the description as a line of text."""
         numbers = f"L* {self.L:.1f}, a* {self.a:.1f}, b* {self.b:.1f}, hue {self.hue_degrees:.0f}°"
         nearest = f"nearest Monk {self.monk}, Fitzpatrick {self.fitzpatrick}"

@@ -143,7 +143,7 @@ class FrameFiles:
             with atomic_file(self._record_path) as temporary:
                 temporary.write_text(content_key, encoding="utf-8")
 
-    def missing(self, frame_numbers: Iterable[int], picture_size: tuple[int, int]) -> list[int]:
+    def missing_frames(self, frame_numbers: Iterable[int], picture_size: tuple[int, int]) -> list[int]:
         """Return the frame numbers whose pictures are missing, incomplete, or of another sequence.
 
         frame_numbers : frame numbers to check

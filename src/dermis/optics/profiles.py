@@ -115,7 +115,7 @@ def find_gaussians(name: str | Path) -> GaussianSum | None:
 
 @lru_cache(_MAX_CACHED_FILES)
 def _read_gaussians(path: Path, file_state: tuple[int, ...]) -> GaussianSum | None:
-    """Return the Gaussians of a file, or None for tissue; results are cached, as each frame requests them.
+    """Return the Gaussians of a file, or None for tissue; the result is cached for later frames.
 
     file_state : state of the file as returned by `_file_state`, so that a changed file is read again
     """

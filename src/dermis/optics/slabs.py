@@ -118,7 +118,7 @@ def solve_slabs(
     """
     tau = np.atleast_1d(np.asarray(optical_depth, np.float64))
     transport = _Transport.create(albedo, eta, direction_nodes, g)
-    doublings = transport.doublings(float(tau.max()))
+    doublings = transport.doubling_count(float(tau.max()))
     *_, (R, T, unscattered) = _doubling_steps(transport, tau / 2.0**doublings, doublings)
     return _slabs_in_air(transport, R, T, unscattered)
 
@@ -139,7 +139,7 @@ def solve_doubled_slabs(
         doublings, then by `smallest_depth`
     """
     transport = _Transport.create(albedo, eta, direction_nodes, g)
-    initial_doublings = transport.doublings(float(np.max(smallest_depth)))
+    initial_doublings = transport.doubling_count(float(np.max(smallest_depth)))
     tau = np.asarray(smallest_depth, np.float64) / 2.0**initial_doublings
     steps = list(_doubling_steps(transport, tau, initial_doublings + doubling_count))[initial_doublings:]
     R, T, unscattered = (np.concatenate(part) for part in zip(*steps, strict=True))
@@ -157,7 +157,7 @@ def half_space_radiance(
     reflectance.
     """
     transport = _Transport.create(albedo, eta, direction_nodes, g)
-    doublings = transport.doublings(DEEP_OPTICAL_DEPTH)
+    doublings = transport.doubling_count(DEEP_OPTICAL_DEPTH)
     tau = np.array([DEEP_OPTICAL_DEPTH / 2.0**doublings])
     *_, (R, T, unscattered) = _doubling_steps(transport, tau, doublings)
     reflected, _ = _add_faces(R * transport.flux, T * transport.flux, unscattered, transport.internal, R, T)
@@ -189,7 +189,7 @@ class _Transport:
         internal, escapes = internal_reflectance(mu, eta), mu > critical_cosine(eta)
         return cls(mu, 2.0 * weight * mu, internal, escapes, phase_matrices(albedo, g, mu, nodes))
 
-    def doublings(self, depth: float) -> int:
+    def doubling_count(self, depth: float) -> int:
         """Return how often a slab thin enough for single scattering must be doubled to reach a given depth.
 
         depth : thickness in reduced mean free paths [-]

@@ -31,17 +31,17 @@ class Geodesics(NamedTuple):
 
     ray : index of each geodesic in the arrays of `trace_geodesics`
     triangle : index of the current triangle
-    side : side (0, 1, 2) through which the geodesic leaves this triangle
-    a, b : end points of that side
+    exit_side : side (0, 1, 2) through which the geodesic leaves this triangle
+    side_start, side_end : end points of that side
     direction : vector from the start to the target
     orientation : 1, or -1 in triangles that face opposite to the first triangle
     """
 
     ray: Index
     triangle: Index
-    side: Index
-    a: Complex
-    b: Complex
+    exit_side: Index
+    side_start: Complex
+    side_end: Complex
     direction: Complex
     orientation: Doubles
 
@@ -128,17 +128,20 @@ def _leave_first_triangle(
 
 def _cross_edge(adjacency: Adjacency, rays: Geodesics, ends: GeodesicEnds) -> Geodesics:
     """Continue geodesics into the next triangle, and store the ends of the geodesics that end there."""
-    neighbour = adjacency.neighbour[rays.triangle, rays.side]
+    neighbour = adjacency.neighbour[rays.triangle, rays.exit_side]
     ended = (neighbour < 0) | ~adjacency.passable[neighbour]
     if ended.any():
         stopped = rays.select(ended)
-        ends.set_ends(stopped, stopped.side, _exit_fraction(stopped), np.zeros(len(stopped.ray)), False)
+        ends.set_ends(stopped, stopped.exit_side, _exit_fraction(stopped), np.zeros(len(stopped.ray)), False)
         rays, neighbour = rays.select(~ended), neighbour[~ended]
-    neighbour_side = adjacency.neighbour_side[rays.triangle, rays.side].astype(np.int64)
-    flipped = adjacency.flipped[rays.triangle, rays.side]
+    neighbour_side = adjacency.neighbour_side[rays.triangle, rays.exit_side].astype(np.int64)
+    flipped = adjacency.flipped[rays.triangle, rays.exit_side]
     orientation = np.where(flipped, -rays.orientation, rays.orientation)
     # positions of the corners at both ends of the shared edge, and of the apex, after unfolding
-    a, b = np.where(flipped, rays.a, rays.b), np.where(flipped, rays.b, rays.a)
+    a, b = (
+        np.where(flipped, rays.side_start, rays.side_end),
+        np.where(flipped, rays.side_end, rays.side_start),
+    )
     along, up = adjacency.apex[neighbour, neighbour_side].T
     apex = a + (along + 1j * orientation * up) * (b - a)
     # the geodesic leaves through one of the two edges at the apex
@@ -165,17 +168,17 @@ def _cross(first_vector: Complex, second_vector: Complex) -> Doubles:
 
 
 def _exit_fraction(rays: Geodesics) -> Doubles:
-    """Return the fraction of the way from a to b at which each geodesic crosses the side, 0 to 1 [-]."""
-    here, there = _cross(rays.direction, rays.a), _cross(rays.direction, rays.b)
+    """Return the position at which each geodesic crosses its exit side, from 0 (start) to 1 (end) [-]."""
+    here, there = _cross(rays.direction, rays.side_start), _cross(rays.direction, rays.side_end)
     return np.clip(here / np.where(here == there, np.inf, here - there), 0.0, 1.0)
 
 
 def _clipped_weights(
-    first: Complex, second: Complex, third: Complex, point: Complex
+    first_corner: Complex, second_corner: Complex, third_corner: Complex, point: Complex
 ) -> tuple[Doubles, Doubles]:
     """Return the barycentric weights of the second and third corner at a point, clipped to the triangle."""
-    area = _cross(second - first, third - first)
-    second_weight = np.clip(_cross(point - first, third - first) / area, 0.0, 1.0)
-    third_weight = np.clip(_cross(second - first, point - first) / area, 0.0, 1.0)
+    area = _cross(second_corner - first_corner, third_corner - first_corner)
+    second_weight = np.clip(_cross(point - first_corner, third_corner - first_corner) / area, 0.0, 1.0)
+    third_weight = np.clip(_cross(second_corner - first_corner, point - first_corner) / area, 0.0, 1.0)
     total = np.maximum(second_weight + third_weight, 1.0)
     return second_weight / total, third_weight / total

@@ -1,4 +1,4 @@
-"""Seams of charts: border edges, split vertices, and changes of charts that do not flatten well."""
+"""Seams of charts: border edges, split vertices, and repair of charts that overlap when flattened."""
 
 from __future__ import annotations
 
@@ -124,7 +124,10 @@ class ChartMesh(NamedTuple):
 
 
 def flatten_charts(mesh: ChartMesh, triangle_chart: Index) -> FlatCharts:
-    """Flatten charts (f,) so that no triangle is faulty; charts are changed where necessary."""
+    """Flatten charts so that no triangle is faulty; charts are divided differently where necessary.
+
+    triangle_chart : (f,) chart of each triangle
+    """
     flat = mesh.flatten(triangle_chart)
     while flat.faulty.any():
         flat = mesh.flatten(_repair_charts(mesh, flat, 0))
@@ -132,11 +135,11 @@ def flatten_charts(mesh: ChartMesh, triangle_chart: Index) -> FlatCharts:
 
 
 def _repair_charts(mesh: ChartMesh, flat: FlatCharts, change_count: int) -> Index:
-    """Return changed charts (f,) that flatten without faulty triangles.
+    """Return the chart of each triangle (f,) after charts were repaired, so that no triangle is faulty.
 
     Faulty triangles are first moved to adjacent charts; if that does not suffice, charts are split.
 
-    change_count : number of changes made so far
+    change_count : number of repairs made so far
     """
     if not flat.faulty.any():
         return flat.chart

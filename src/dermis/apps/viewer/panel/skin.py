@@ -98,7 +98,7 @@ def _draw_tone(session: Session) -> None:
     """Draw the description of the mean colour of the head's skin."""
     colour = session.state.scene.head.maps.mean_colour
     if colour is not None:
-        imgui.text_disabled(skin_tone(colour).line())
+        imgui.text_disabled(skin_tone(colour).as_text())
         draw_tooltip(SKIN_CLASS_DISCLAIMER)
 
 

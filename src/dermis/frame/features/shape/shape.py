@@ -245,7 +245,7 @@ def normals_in_vertex_frames(mesh: Mesh) -> Doubles:
 
 
 def _run_offsets(sorted_index: NDArray[np.integer], run_count: int) -> Words:
-    """Return (run_count + 1,) offsets: the starts of the runs of 0, 1, 2, ... in a sorted array, and its length."""
+    """Return (run_count + 1,) offsets: starts of the runs of 0, 1, ... in a sorted array, and its length."""
     return np.concatenate([[0], np.cumsum(np.bincount(sorted_index, minlength=run_count))]).astype(np.uint32)
 
 
