@@ -25,7 +25,7 @@ from dermis.apps.validation.comparisons.person_textures import person_textures
 from dermis.apps.validation.pages import JsonObject, write_results
 from dermis.base.command_line import run_script
 from dermis.base.console import print_lines
-from dermis.environment.panorama import directions, solid_angles
+from dermis.environment.panorama import texel_directions, texel_solid_angles
 from dermis.frame.renderer import Renderer
 from dermis.human.person import Human
 from dermis.human.skin.painted import PaintedMaps
@@ -100,7 +100,7 @@ def case(number: int, measured: bool = False) -> Case:
 
 def _sky(random: np.random.Generator) -> NDArray[np.float64]:
     """Return the (h, w) radiance of a sky: a constant and three wide lobes."""
-    towards = directions(_SKY_ROWS, 2 * _SKY_ROWS)
+    towards = texel_directions(_SKY_ROWS, 2 * _SKY_ROWS)
     radiance = np.full(towards.shape[:2], random.uniform(0.05, 0.2))
     for _ in range(3):
         middle = random.standard_normal(3) + np.array([0.0, 0.6, 0.6])
@@ -111,8 +111,8 @@ def _sky(random: np.random.Generator) -> NDArray[np.float64]:
 
 def _sky_irradiance(radiance: NDArray[np.float64], towards: NDArray[np.float64]) -> float:
     """Return the irradiance that the sky casts on a surface facing a direction."""
-    cosine = np.maximum(directions(_SKY_ROWS, 2 * _SKY_ROWS) @ towards, 0.0)
-    return float((radiance * cosine * solid_angles(_SKY_ROWS, 2 * _SKY_ROWS)).sum())
+    cosine = np.maximum(texel_directions(_SKY_ROWS, 2 * _SKY_ROWS) @ towards, 0.0)
+    return float((radiance * cosine * texel_solid_angles(_SKY_ROWS, 2 * _SKY_ROWS)).sum())
 
 
 def _panorama(number: int, radiance: NDArray[np.float64]) -> Path:

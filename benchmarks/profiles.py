@@ -49,7 +49,7 @@ def main() -> None:
         cells = (
             median_ms(tissue.profile),
             median_ms(partial(fit_gaussians, rings, 6)),
-            median_ms(partial(fit_gaussians, moved, 6, initial=near)),
+            median_ms(partial(fit_gaussians, moved, 6, similar_fit=near)),
         )
         rows.append(f"| {name} | {' | '.join(f'{ms:.1f}' for ms in cells)} |")
     sys.stdout.write("\n".join(rows) + "\n")

@@ -14,7 +14,7 @@ import numpy as np
 
 import dermis
 from dermis.apps.gallery.script import draw_script
-from dermis.frame.features.post.meter import METER_KEY
+from dermis.frame.features.post.meter import METERED_IRRADIANCE
 from dermis.human.skin.measured import measured_cells
 from dermis.images.colour import encode_srgb8, linear_of_lab
 
@@ -31,7 +31,7 @@ def draw(studio):
         person = replace(PERSON, skin=replace(PERSON.look, **cell.pigments._asdict(), sites=sites))
         scene = dermis.Scene(person.on(head), camera=dermis.portrait(head))
         face = studio.render(scene, 0.6, exposure="auto")
-        patch = encode_srgb8(METER_KEY * np.maximum(linear_of_lab(cell.cielab), 0.0))
+        patch = encode_srgb8(METERED_IRRADIANCE * np.maximum(linear_of_lab(cell.cielab), 0.0))
         panels[name] = np.hstack([face, np.broadcast_to(patch, (len(face), len(face) // 4, 3))])
     return panels
 

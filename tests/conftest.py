@@ -79,7 +79,7 @@ def few_form_factor_lines() -> Iterator[None]:
     from dermis.atlas import interreflection
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(interreflection, "LINE_BUNDLES", 24)
+        patch.setattr(interreflection, "LINE_BUNDLE_COUNT", 24)
         yield
 
 
@@ -88,7 +88,7 @@ def many_form_factor_lines(monkeypatch: pytest.MonkeyPatch) -> None:
     """Compute form factors as accurately as the package does."""
     from dermis.atlas import interreflection
 
-    monkeypatch.setattr(interreflection, "LINE_BUNDLES", 128)
+    monkeypatch.setattr(interreflection, "LINE_BUNDLE_COUNT", 128)
 
 
 @pytest.fixture(autouse=True)

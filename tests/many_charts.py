@@ -23,7 +23,7 @@ def many_charts_mesh(charts: int, subdivide: int = 0) -> Mesh:
     triangles = points[triangle_areas(positions[points]) > LEAST_MM2]
     chart = grow_charts(positions, triangles, charts)
     upright = np.random.default_rng(0).normal(size=(int(chart.max()) + 1, 3))
-    layout = unwrap(positions, triangles, chart, upright=upright[chart])
+    layout = unwrap(positions, triangles, chart, up_direction=upright[chart])
     places, smooth = positions[layout.point], normals[layout.point]
     kind = np.zeros(len(triangles))
     return build_mesh(places, layout.uv, layout.triangles, kind, mesh.materials[:1], smooth, layout.point)

@@ -7,7 +7,7 @@ import pytest
 
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
-from dermis.atlas.translucency.cells import TILE_CELLS, Cells, divide_into_cells
+from dermis.atlas.translucency.cells import CELLS_PER_TILE_SIDE, Cells, divide_into_cells
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.primitives import uv_sphere, wedge
 
@@ -49,8 +49,8 @@ def test_all_lit_texels_are_in_source_and_receiver_cells(divided: Divided) -> No
     tile = np.repeat(np.arange(cells.tiles_per_side**2), np.diff(cells.source_first))
     assert (
         tile
-        == cells.sources // cells.side // TILE_CELLS * cells.tiles_per_side
-        + cells.sources % cells.side // TILE_CELLS
+        == cells.sources // cells.side // CELLS_PER_TILE_SIDE * cells.tiles_per_side
+        + cells.sources % cells.side // CELLS_PER_TILE_SIDE
     ).all()
 
 
@@ -60,7 +60,7 @@ def test_tiles_list_all_triangles_that_they_show(divided: Divided) -> None:
     corners = atlas.corner_uv[atlas.triangle[y, x]].astype(float) * atlas.size - 0.5
     place = np.einsum("nk,nkc->nc", atlas.weights()[y, x], corners)
     inside = np.abs(place - np.stack([x, y], axis=-1)).max(axis=1) < 0.1
-    column, row = (axis[inside] * cells.side // atlas.size // TILE_CELLS for axis in (x, y))
+    column, row = (axis[inside] * cells.side // atlas.size // CELLS_PER_TILE_SIDE for axis in (x, y))
     shown = zip(
         (row * cells.tiles_per_side + column).tolist(), atlas.triangle[y, x][inside].tolist(), strict=True
     )
@@ -79,7 +79,7 @@ def test_receivers_are_in_the_tile_of_their_surface_point(divided: Divided) -> N
     )
     tile = np.repeat(np.arange(cells.tiles_per_side**2), np.diff(cells.receiver_first))
     at = np.stack([tile % cells.tiles_per_side, tile // cells.tiles_per_side], axis=-1)
-    assert (np.abs(place - TILE_CELLS * (at + 0.5)) < TILE_CELLS / 2 + 1e-2).all()
+    assert (np.abs(place - CELLS_PER_TILE_SIDE * (at + 0.5)) < CELLS_PER_TILE_SIDE / 2 + 1e-2).all()
 
 
 def test_gutter_copies_are_listed_by_cell(divided: Divided) -> None:

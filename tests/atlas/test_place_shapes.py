@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.atlas.stitched.pack import Span, place_shapes
+from dermis.atlas.stitched.pack import CellRun, place_shapes
 
 N = 24
 Flags = NDArray[np.bool_]
 
 
-def spans_of(mask: Flags) -> list[Span]:
+def spans_of(mask: Flags) -> list[CellRun]:
     """Return the runs of true cells, found cell by cell."""
-    found: list[Span] = []
+    found: list[CellRun] = []
     for y, x in np.argwhere(mask).tolist():
         if x > 0 and mask[y, x - 1]:
             row, first, _ = found.pop()

@@ -11,7 +11,7 @@ from dermis.atlas.atlas import GUTTER_MM
 from dermis.atlas.build import build_atlas
 from dermis.atlas.interreflection import FormFactors, compute_form_factors, form_factor_table
 from dermis.atlas.shipped import shipped_arrays
-from dermis.atlas.stitched.build import LAYOUT_NAMES, find_stitched_layout, layout_table
+from dermis.atlas.stitched.build import LAYOUT_ARRAY_NAMES, find_stitched_layout, layout_table
 from dermis.human.model import template
 from dermis.mesh.mesh import Mesh
 
@@ -25,7 +25,7 @@ def mesh() -> Mesh:
 
 
 def test_layout_is_that_of_the_package(mesh: Mesh) -> None:
-    shipped = shipped_arrays(mesh, layout_table(GUTTER_MM), LAYOUT_NAMES)
+    shipped = shipped_arrays(mesh, layout_table(GUTTER_MM), LAYOUT_ARRAY_NAMES)
     assert shipped is not None, ADVICE
     computed = find_stitched_layout(mesh, GUTTER_MM)
     np.testing.assert_array_equal(shipped["piece"], computed["piece"], ADVICE)
@@ -52,6 +52,9 @@ def test_other_shapes_of_the_topology_have_no_tables(mesh: Mesh) -> None:
     table = layout_table(GUTTER_MM)
     positions = mesh.positions.copy()
     positions[1001:1101] += 1.0
-    assert shipped_arrays(replace(mesh, positions=positions), table, LAYOUT_NAMES) is None
-    assert shipped_arrays(replace(mesh, triangles=mesh.triangles[:, [1, 2, 0]]), table, LAYOUT_NAMES) is None
-    assert shipped_arrays(mesh, layout_table(2 * GUTTER_MM), LAYOUT_NAMES) is None
+    assert shipped_arrays(replace(mesh, positions=positions), table, LAYOUT_ARRAY_NAMES) is None
+    assert (
+        shipped_arrays(replace(mesh, triangles=mesh.triangles[:, [1, 2, 0]]), table, LAYOUT_ARRAY_NAMES)
+        is None
+    )
+    assert shipped_arrays(mesh, layout_table(2 * GUTTER_MM), LAYOUT_ARRAY_NAMES) is None

@@ -9,7 +9,13 @@ import pytest
 from numpy.typing import NDArray
 
 from dermis.atlas.raster import rasterise
-from dermis.atlas.unwrap.charts import connected_pieces, grow_charts, merge_strays, neighbours, smooth_charts
+from dermis.atlas.unwrap.charts import (
+    connected_pieces,
+    grow_charts,
+    merge_strays,
+    neighbour_triangles,
+    smooth_charts,
+)
 from dermis.atlas.unwrap.flatten import flatten, singular_values, untangle
 from dermis.atlas.unwrap.seams import border_edges, crossing_edges, faulty_triangles, split_at_seams
 from dermis.atlas.unwrap.unwrap import CHART_PADDING, UvLayout, pack_charts, unwrap
@@ -92,7 +98,7 @@ def check_valid(layout: UvLayout, positions: Doubles) -> None:
 
 def test_flattening_a_plane_preserves_it() -> None:
     positions, triangles = square()
-    layout = unwrap(positions, triangles, one_chart(triangles), upright=(0, 1, 0))
+    layout = unwrap(positions, triangles, one_chart(triangles), up_direction=(0, 1, 0))
     check_valid(layout, positions)
     values = stretch(layout, positions)
     assert np.ptp(values) / values.mean() < ISOMETRIC
@@ -160,7 +166,7 @@ def test_triangles_with_a_large_weight_are_stretched_less() -> None:
 
 def test_charts_are_upright() -> None:
     positions, triangles = square()
-    layout = unwrap(positions, triangles, one_chart(triangles), upright=(0.8, 0, 0.6))
+    layout = unwrap(positions, triangles, one_chart(triangles), up_direction=(0.8, 0, 0.6))
     height = positions[layout.point] @ (0.8, 0, 0.6)
     assert np.corrcoef(height, layout.uv[:, 1])[0, 1] < -0.999
 
@@ -211,7 +217,7 @@ def test_each_chart_is_connected() -> None:
     positions, triangles = sphere()
     chart = grow_charts(positions, triangles, 20)
     assert chart.max() == 19
-    assert connected_pieces(chart, neighbours(triangles)).max() == 19
+    assert connected_pieces(chart, neighbour_triangles(triangles)).max() == 19
     two = np.vstack((triangles, triangles + len(positions)))
     assert grow_charts(np.vstack((positions, positions)), two, 1).max() == 1, (
         "each piece of a mesh has its own"
@@ -224,7 +230,7 @@ def test_smoothed_charts_have_short_borders() -> None:
     noisy = np.where(np.random.default_rng(2).random(len(side)) < 0.15, 1 - side, side)
     mended = smooth_charts(noisy, triangles)
     assert (mended == side).mean() > 0.97
-    assert connected_pieces(mended, neighbours(triangles)).max() == 1
+    assert connected_pieces(mended, neighbour_triangles(triangles)).max() == 1
 
 
 def test_stray_triangles_join_the_surrounding_chart() -> None:

@@ -211,7 +211,7 @@ def test_invalid_options_are_refused_before_rendering(
 def test_a_missing_encoder_is_reported_before_the_head_is_loaded(
     animate: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("dermis.images.movie._ENCODER", "no such encoder")
+    monkeypatch.setattr("dermis.images.movie._VIDEO_ENCODER", "no such encoder")
     ended = animate("nobody.glb", "-o", "a.mp4")
     assert ended.code == 2 and "Install av" in ended.stderr
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from conftest import Run
 
-from dermis.frame.features.post.meter import METER_KEY
+from dermis.frame.features.post.meter import METERED_IRRADIANCE
 from dermis.images.io import read_image
 
 pytestmark = pytest.mark.photographed
@@ -27,7 +27,7 @@ def test_render_meters_the_exposure_by_default(render: Run) -> None:
     assert report(render, "--exposure", "auto")["exposure"] == metered
     assert report(render, "--exposure", "2.5")["exposure"] == 2.5
     assert report(render, "--env", "uniform", "--occlusion", "none")["exposure"] == pytest.approx(
-        METER_KEY, rel=1e-3
+        METERED_IRRADIANCE, rel=1e-3
     )
 
 

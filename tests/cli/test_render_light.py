@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dermis.environment.panorama import directions
+from dermis.environment.panorama import texel_directions
 from dermis.images.io import read_image, write_exr
 
 Run = Callable[..., Any]
@@ -18,7 +18,7 @@ Run = Callable[..., Any]
 @pytest.fixture
 def sky(folder: Path) -> str:
     """Return the path of a panorama that is bright on the head's left, with a sun-like peak."""
-    towards = directions(64, 128)
+    towards = texel_directions(64, 128)
     radiance = np.full((64, 128, 3), 0.2, np.float32)
     radiance[towards[..., 0] > 0.5] = 2.0
     radiance[towards @ [0, 1, 0] > np.cos(np.radians(3.0))] = 2000.0

@@ -12,17 +12,17 @@ from tolerances import PREFILTERED
 from dermis.base.errors import DermisError, DermisWarning
 from dermis.environment.harmonics import analyse_panorama, synthesise_panoramas, zonal_factors
 from dermis.environment.panorama import (
-    directions,
     load_panorama,
     mean_radiance,
     panorama_file,
-    resample,
-    solid_angles,
+    resample_panorama,
     split_suns,
+    texel_directions,
+    texel_solid_angles,
 )
 from dermis.environment.prefilter import (
     LAYER_HEIGHT,
-    ROUGHNESSES,
+    LAYER_ROUGHNESSES,
     isotropic_kernel,
     isotropic_lobe,
     prefilter,
@@ -35,7 +35,7 @@ Floats = NDArray[np.float64]
 
 def room(height: int = 128) -> Floats:
     """Return a dim room with a bright window and a coloured floor."""
-    towards = directions(height, 2 * height)
+    towards = texel_directions(height, 2 * height)
     radiance = 0.3 + 0.2 * towards * [1, 0.5, -0.5]
     radiance[towards[..., 0] > 0.9] += [4.0, 5.0, 6.0]
     radiance[towards[..., 1] < -0.5] *= [1.5, 0.8, 0.4]
@@ -46,7 +46,7 @@ def with_lamp(radiance: Floats, towards: tuple[float, float, float], strength: f
     """Return the panorama with a lamp of 2 degrees radius."""
     unit = np.array(towards) / np.linalg.norm(towards)
     lit = radiance.copy()
-    lit[directions(*radiance.shape[:2]) @ unit > np.cos(np.radians(2.0))] += strength * np.array(
+    lit[texel_directions(*radiance.shape[:2]) @ unit > np.cos(np.radians(2.0))] += strength * np.array(
         [1.0, 0.8, 0.5]
     )
     return lit
@@ -54,31 +54,32 @@ def with_lamp(radiance: Floats, towards: tuple[float, float, float], strength: f
 
 def summed(radiance: Floats, normal: Floats, weight: Floats) -> Floats:
     """Return the integral (3,) of radiance times a weight per texel."""
-    area = solid_angles(*radiance.shape[:2])
+    area = texel_solid_angles(*radiance.shape[:2])
     return np.asarray((radiance * (weight * area)[..., None]).sum(axis=(0, 1)))
 
 
 def test_the_middle_lies_behind_the_head_and_the_right_at_its_left() -> None:
-    towards = directions(64, 128)
+    towards = texel_directions(64, 128)
     assert np.allclose(np.linalg.norm(towards, axis=-1), 1.0)
     assert np.allclose(towards[31:33, 63:65].mean(axis=(0, 1)), [0, 0, -1], atol=1e-3)
     assert towards[32, 96] @ [1, 0, 0] > 0.999 and towards[0, 0, 1] > 0.999
-    assert solid_angles(64, 128).sum() * 128 == pytest.approx(4 * np.pi)
+    assert texel_solid_angles(64, 128).sum() * 128 == pytest.approx(4 * np.pi)
 
 
 @pytest.mark.parametrize("height", [64, 100, 128, 300])
 def test_resampling_keeps_the_light(height: int) -> None:
     """Check the mean radiance and the mean of radiance times direction."""
     radiance = with_lamp(room(), (0.3, 0.8, 0.2), 50.0)
-    made = resample(radiance.astype(np.float32), height)
+    made = resample_panorama(radiance.astype(np.float32), height)
     assert made.shape == (height, 2 * height, 3)
     assert np.allclose(mean_radiance(made), mean_radiance(radiance), rtol=1e-6)
     for axis in range(3):
         pull, exact = (
-            mean_radiance(part * directions(*part.shape[:2])[..., axis, None]) for part in (made, radiance)
+            mean_radiance(part * texel_directions(*part.shape[:2])[..., axis, None])
+            for part in (made, radiance)
         )
         assert np.abs(pull - exact).max() < 2e-3 * mean_radiance(radiance).max()
-    assert np.array_equal(resample(made, height), made)
+    assert np.array_equal(resample_panorama(made, height), made)
 
 
 @pytest.mark.parametrize(("height", "kept"), [(1, 256), (127, 256), (300, 300), (521, 512)])
@@ -119,7 +120,9 @@ def test_bright_stars_do_not_prevent_a_sun() -> None:
 def test_a_glow_around_the_sun_does_not_widen_it() -> None:
     """Check that the radius is that of the disc with most of the light."""
     radiance = with_lamp(np.full((512, 1024, 3), 0.5), (0.3, 0.8, 0.2), 20000.0)
-    angle = np.degrees(np.arccos(directions(512, 1024) @ [0.3, 0.8, 0.2] / np.linalg.norm([0.3, 0.8, 0.2])))
+    angle = np.degrees(
+        np.arccos(texel_directions(512, 1024) @ [0.3, 0.8, 0.2] / np.linalg.norm([0.3, 0.8, 0.2]))
+    )
     _, (sun,) = split_suns(radiance + 400.0 * np.exp(-((angle / 4.0) ** 2))[..., None])
     assert np.degrees(sun.radius) == pytest.approx(2.0, rel=0.15)
 
@@ -131,7 +134,7 @@ def test_a_soft_room_has_no_sun() -> None:
 
 def test_harmonics_round_trip() -> None:
     """Check analysis and synthesis of a picture of low degree."""
-    x, y, z = np.moveaxis(directions(256, 512), -1, 0)
+    x, y, z = np.moveaxis(texel_directions(256, 512), -1, 0)
     picture = np.stack([1 + x * y, z**3 - 0.2 * z, x**2 - z**2 + 0.1 * y], axis=-1)
     (again,) = synthesise_panoramas(analyse_panorama(picture, 12), np.ones((1, 13)), 256)
     assert np.abs(again - picture).max() < PREFILTERED
@@ -156,7 +159,7 @@ def test_irradiance_matches_direct_summation(lamps: tuple[str, Floats]) -> None:
     name, radiance = lamps
     made = prefilter(name)
     assert made.suns == ()
-    towards, normals = directions(256, 512), directions(LAYER_HEIGHT, 2 * LAYER_HEIGHT)
+    towards, normals = texel_directions(256, 512), texel_directions(LAYER_HEIGHT, 2 * LAYER_HEIGHT)
     for y, x in [(0, 3), (20, 70), (64, 128), (90, 200), (127, 250)]:
         exact = summed(radiance, normals[y, x], np.maximum(towards @ normals[y, x], 0))
         assert np.allclose(made.layers[0, y, x], exact, rtol=PREFILTERED)
@@ -165,8 +168,8 @@ def test_irradiance_matches_direct_summation(lamps: tuple[str, Floats]) -> None:
 @pytest.mark.parametrize("layer", [1, 4, 7, 10])
 def test_reflections_match_direct_averaging(lamps: tuple[str, Floats], layer: int) -> None:
     name, radiance = lamps
-    made, m = prefilter(name), float(ROUGHNESSES[layer - 1])
-    towards, mirror = directions(256, 512), directions(LAYER_HEIGHT, 2 * LAYER_HEIGHT)
+    made, m = prefilter(name), float(LAYER_ROUGHNESSES[layer - 1])
+    towards, mirror = texel_directions(256, 512), texel_directions(LAYER_HEIGHT, 2 * LAYER_HEIGHT)
     for y, x in [(0, 3), (20, 70), (64, 128), (90, 200)]:
         cosine = np.clip(towards @ mirror[y, x], -1, 1)
         weight = np.where(cosine > 0, isotropic_lobe(np.arccos(np.maximum(cosine, 0)), m), 0.0)
@@ -186,7 +189,7 @@ def test_uniform_light_is_uniform() -> None:
 
 
 def test_kernels_are_too_smooth_to_ring() -> None:
-    for m in ROUGHNESSES:
+    for m in LAYER_ROUGHNESSES:
         factors = isotropic_kernel(float(m))
         assert (
             factors[0] == pytest.approx(1.0) and abs(factors[-1]) < 1e-3 and np.abs(factors).max() < 1 + 1e-9

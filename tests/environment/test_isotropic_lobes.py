@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from dermis.environment import isotropic_fits
 from dermis.environment.isotropic_fits import LOBE_TABLE_ROUGHNESSES
 from dermis.environment.isotropic_lobes import isotropic_lobe_table
-from dermis.environment.panorama import directions, solid_angles
-from dermis.environment.prefilter import LAYER_HEIGHT, ROUGHNESSES, isotropic_lobe, prefilter
+from dermis.environment.panorama import texel_directions, texel_solid_angles
+from dermis.environment.prefilter import LAYER_HEIGHT, LAYER_ROUGHNESSES, isotropic_lobe, prefilter
 from dermis.images.io import write_exr
 from dermis.specular.cosines import cosines
 from dermis.specular.models import MODELS
@@ -44,7 +44,7 @@ def test_at_most_five_lobes_and_three_at_steep_views_have_weight() -> None:
 @pytest.mark.parametrize("model", MODELS)
 def test_lobes_preserve_the_mean_direction(model: str) -> None:
     """Compare mean direction and width with samples of the hemisphere, at a node of the table."""
-    light, area = directions(256, 512)[:128], solid_angles(256, 512)[:128]
+    light, area = texel_directions(256, 512)[:128], texel_solid_angles(256, 512)[:128]
     cosine, m = (7 / 15) ** 2, LOBE_TABLE_ROUGHNESSES[6]
     view, up = np.array([-np.sqrt(1 - cosine**2), cosine, 0]), np.array([0.0, 1.0, 0.0])
     weight = MODELS[model].lobe(cosines(up, light, view), m) * light[..., 1] * area
@@ -82,7 +82,7 @@ def test_lobes_of_a_registered_model_are_fitted_on_demand(
 @pytest.fixture(scope="module")
 def lit_room(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Floats]:
     """Return the file of a dim room with a bright window and a coloured floor, and its radiance."""
-    towards = directions(256, 512)
+    towards = texel_directions(256, 512)
     radiance = 0.3 + 0.2 * towards * [1, 0.5, -0.5]
     radiance[towards[..., 0] > 0.9] += [4.0, 5.0, 6.0]
     radiance[towards[..., 1] < -0.5] *= [1.5, 0.8, 0.4]
@@ -130,7 +130,7 @@ def test_grazing_reflections_match_the_specular_lobe(
 def error_of(lit_room: tuple[str, Floats], pairs: Floats, cosine: float, m: float) -> float:
     """Return the RMS error of isotropic lobes relative to the mean, for (n, 2, 3) normals and tangents."""
     name, radiance = lit_room
-    layers, towards, area = prefilter(name).layers, directions(256, 512), solid_angles(256, 512)
+    layers, towards, area = prefilter(name).layers, texel_directions(256, 512), texel_solid_angles(256, 512)
     made, exact = [], []
     for normal, tangent in pairs:
         normal = normal / np.linalg.norm(normal)
@@ -166,8 +166,8 @@ def seen_in(layers: NDArray[np.float32], frame: Floats, lobe: Floats) -> Floats:
     direction = np.array([2 * x, 2 * y, 1 - x**2 - y**2]) / (1 + x**2 + y**2) @ frame
     row = np.arccos(direction[1]) / np.pi * LAYER_HEIGHT - 0.5
     column = (0.5 + np.arctan2(direction[0], -direction[2]) / (2 * np.pi)) * 2 * LAYER_HEIGHT - 0.5
-    at = np.interp(np.log(lobe[2]), np.log(ROUGHNESSES), np.arange(len(ROUGHNESSES)))
-    layer = min(int(at), len(ROUGHNESSES) - 2)
+    at = np.interp(np.log(lobe[2]), np.log(LAYER_ROUGHNESSES), np.arange(len(LAYER_ROUGHNESSES)))
+    layer = min(int(at), len(LAYER_ROUGHNESSES) - 2)
     seen = np.zeros(3)
     for k, j, i in np.ndindex(2, 2, 2):
         y, x = int(np.floor(row)) + j, int(np.floor(column)) + i

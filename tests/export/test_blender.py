@@ -31,7 +31,7 @@ from dermis.base.errors import DermisError
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere
-from dermis.optics.media import media
+from dermis.optics.media import published_media
 from dermis.scene import Camera, Scene
 from dermis.scene.lights import PointLight
 
@@ -60,7 +60,7 @@ def test_random_walk_albedo_reproduces_the_colour(formula: Any, tolerance: float
 
 def test_published_diffuse_mean_free_paths_equal_the_skin_walk_radius() -> None:
     """[Jensen2001] tabulates the diffuse path of skin1; its coefficients give the mean free path."""
-    (layer,) = media()["skin1"].layers
+    (layer,) = published_media()["skin1"].layers
     path = np.array([3.67, 1.37, 0.68]) * skin_path_ratio(np.array([0.44, 0.22, 0.13]), 1.3)
     assert path == pytest.approx(layer.mean_free_path_mm, rel=0.06)
 

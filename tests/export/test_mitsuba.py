@@ -18,7 +18,7 @@ from dermis.apps.export.targets.mitsuba.target import TARGET, SkinColours, fit_m
 from dermis.apps.export.targets.mitsuba.xml import Bitmap, Transform, XmlBackend, object_element
 from dermis.apps.truths.mitsuba_scene import mitsuba_variant
 from dermis.optics.cumulative_profile import CumulativeProfile
-from dermis.optics.media import media
+from dermis.optics.media import published_media
 
 EDGE_NOISE = 0.05
 """Of an edge response by 12,000 paths; its standard error is a third of this."""
@@ -40,7 +40,7 @@ def ball(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_homogeneous_skin_keeps_its_medium() -> None:
     subject = load_subject("skin1")
     rows = TARGET.with_variant("smooth").parameters(subject, "3")
-    layer = media()["skin1"].layers[0]
+    layer = published_media()["skin1"].layers[0]
     np.testing.assert_allclose(get_numbers(rows, "sigma_t"), layer.sigma_t_prime, rtol=0.02)
     np.testing.assert_allclose(get_numbers(rows, "albedo"), layer.alpha_prime, rtol=0.005)
 

@@ -9,7 +9,7 @@ from observed import observed
 from tolerances import HALVES, TWIN
 
 from dermis.frame.observation import Observation
-from dermis.frame.programs import FLOAT_FORMAT, level_format
+from dermis.frame.programs import FLOAT_TEXEL_FORMAT, level_format
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Device
 
@@ -22,7 +22,7 @@ def renderer() -> Renderer:
 @pytest.fixture(scope="session")
 def close(device: Device) -> float:
     """Return the tolerance of light after blurs against its reference, relative."""
-    return TWIN if level_format(device) == FLOAT_FORMAT else HALVES
+    return TWIN if level_format(device) == FLOAT_TEXEL_FORMAT else HALVES
 
 
 @pytest.fixture(scope="session")

@@ -14,7 +14,7 @@ from twins import surface
 
 from dermis.atlas.build import cached_atlas
 from dermis.base.errors import DermisError
-from dermis.frame.features.irradiance.irradiance import TEXEL_FILTER_SIGMA
+from dermis.frame.features.irradiance.irradiance import LIGHT_FILTER_SIGMA_TEXELS
 from dermis.frame.features.shading.shade import shade_program
 from dermis.frame.lights.records import light_records, light_shadow_views
 from dermis.frame.lights.rectangle import KIND, facing_irradiance
@@ -150,7 +150,7 @@ def test_stripe_has_the_given_width(renderer: Renderer, close: float) -> None:
     )
     made, points = entered(renderer, FLOOR, light)
     # As given, and as texels hold it.
-    variance = np.array([6.0**2, 6.0**2 + (TEXEL_FILTER_SIGMA * 200 / 64) ** 2])
+    variance = np.array([6.0**2, 6.0**2 + (LIGHT_FILTER_SIGMA_TEXELS * 200 / 64) ** 2])
     exact = 2 * np.sqrt(variance[0] / variance[1]) * np.exp(-0.5 * (points[..., 0] - 10) ** 2 / variance[1])
     exact *= np.abs(points[..., 1]) < 50
     inside = np.abs(np.abs(points[..., 1]) - 50) > 3

@@ -12,7 +12,7 @@ from strand_setups import hairy
 from tolerances import TWIN
 
 from dermis.base.errors import DermisError
-from dermis.environment.panorama import directions
+from dermis.environment.panorama import texel_directions
 from dermis.frame.rendered_frame import RenderedFrame
 from dermis.frame.renderer import Renderer
 from dermis.images.colour import encode_srgb8
@@ -47,7 +47,7 @@ def test_the_gradient_is_grey_and_falls_off_to_the_corners(renderer: Renderer) -
 @pytest.mark.parametrize("blur", [0.0, 0.3])
 def test_the_environment_is_sharp_or_blurred(renderer: Renderer, tmp_path: Any, blur: float) -> None:
     """An environment that is bright on its right half shows a step, or a soft edge."""
-    world = np.where(directions(256, 512)[..., :1] > 0, 1.0, 0.25) * np.ones(3)
+    world = np.where(texel_directions(256, 512)[..., :1] > 0, 1.0, 0.25) * np.ones(3)
     write_exr(tmp_path / "half.exr", world.astype(np.float32))
     around = Environment(name=str(tmp_path / "half.exr"), exposure=2.0)
     scene = Scene(BALL, (), front_camera(BALL, frame_mm=600.0), environment=around)

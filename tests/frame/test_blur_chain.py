@@ -14,7 +14,7 @@ from dermis.frame.features.diffusion import blur as diffuse
 from dermis.frame.features.diffusion import combine
 from dermis.frame.features.diffusion.kernels import add_intermediate_levels, chain_cost
 from dermis.frame.features.diffusion.pyramid import Blur, choose_halvings, make_levels
-from dermis.frame.programs import FLOAT_FORMAT
+from dermis.frame.programs import FLOAT_TEXEL_FORMAT
 from dermis.gpu import CommandList, Device, download, make_texture, upload
 from dermis.mesh.primitives import plane
 from dermis.optics.profiles import load_profile
@@ -59,8 +59,8 @@ def test_wide_gaussian_in_steps_equals_one_blur(device: Device, texels_per_mm: f
     weight[-1] = 1.0
     blur = Blur(led, weight, halvings, intermediate_levels=steps)
     space, into = (
-        make_levels(device, 256, (halvings,), FLOAT_FORMAT),
-        make_texture(device, (256, 256), FLOAT_FORMAT),
+        make_levels(device, 256, (halvings,), FLOAT_TEXEL_FORMAT),
+        make_texture(device, (256, 256), FLOAT_TEXEL_FORMAT),
     )
     upload(device, space.stacks[0], np.dstack([source, np.ones((256, 256))]))
     frame = CommandList(device)

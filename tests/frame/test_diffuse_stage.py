@@ -18,7 +18,7 @@ from dermis.frame.features.atlas.textures import AtlasTextures
 from dermis.frame.features.diffusion import blur as diffuse
 from dermis.frame.features.diffusion import combine
 from dermis.frame.features.diffusion.pyramid import Blur, choose_halvings, make_levels
-from dermis.frame.programs import FLOAT_FORMAT
+from dermis.frame.programs import FLOAT_TEXEL_FORMAT
 from dermis.gpu import CommandList, Device, download, make_texture, upload
 from dermis.mesh.primitives import plane, uv_sphere
 from dermis.optics.profiles import load_profile
@@ -35,7 +35,7 @@ def blur(
     size = len(source)
     most = len(atlas.mips_for(edge.get("edge", "repeated"))) - 1
     halvings = choose_halvings(variances, atlas.median_texels_per_mm, most)
-    space = make_levels(device, size, (halvings,), FLOAT_FORMAT)
+    space = make_levels(device, size, (halvings,), FLOAT_TEXEL_FORMAT)
     upload(device, space.stacks[0], np.dstack([source, np.ones((size, size))])[..., :4])
     frame = CommandList(device)
     diffuse.draw(frame, space, atlas, Blur(variances, np.zeros((len(variances), 3)), halvings, **edge))
@@ -90,7 +90,7 @@ def test_empty_texels_show_the_clear_colour(device: Device) -> None:
 
 def test_combined_blur_matches_numpy(device: Device) -> None:
     rng = np.random.default_rng(4)
-    space = make_levels(device, 64, ((0,) * 6,), FLOAT_FORMAT)
+    space = make_levels(device, 64, ((0,) * 6,), FLOAT_TEXEL_FORMAT)
     values = rng.random((5, 64, 64, 4)).astype(np.float32)
     for k, value in enumerate(values):
         upload(device, space.stacks[0], value, layer=k + 1)

@@ -17,7 +17,7 @@ from twins import DEFAULT_COLOUR, surface, surface_albedo
 from dermis.atlas.build import cached_atlas
 from dermis.base.errors import DermisError
 from dermis.environment.isotropic_lobes import isotropic_lobe_table
-from dermis.environment.panorama import directions, solid_angles
+from dermis.environment.panorama import texel_directions, texel_solid_angles
 from dermis.environment.prefilter import SMOOTHEST, prefilter
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
@@ -37,7 +37,7 @@ WHITE = head_of(BALL, colour=np.ones((4, 4, 3)))
 @pytest.fixture(scope="module")
 def room(tmp_path_factory: pytest.TempPathFactory) -> str:
     """Return a panorama with a coloured side, a window and a bright lamp that becomes a sun."""
-    towards = directions(64, 128)
+    towards = texel_directions(64, 128)
     radiance = 0.5 + 0.4 * towards * [1, 0.5, -0.5]
     radiance[towards[..., 0] > 0.85] += [2.0, 2.5, 3.0]
     radiance[towards @ [0.6, 0.64, 0.48] > np.cos(np.radians(5.0))] += [300.0, 250.0, 150.0]
@@ -109,11 +109,11 @@ def test_irradiance_matches_the_sum_over_all_directions(
     atlas = cached_atlas(BALL, 64)
     _, normals = surface(atlas, scene.head)
     radiance = 2.0 * np.asarray(_read(room))
-    towards = directions(64, 128).reshape(-1, 3)
+    towards = texel_directions(64, 128).reshape(-1, 3)
     turn = np.radians(rotation)
     c, s = np.cos(turn), np.sin(turn)
     towards = towards @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]).T
-    light = (radiance * solid_angles(64, 128)[..., None]).reshape(-1, 3)
+    light = (radiance * texel_solid_angles(64, 128)[..., None]).reshape(-1, 3)
     picked = [(y, x) for y in (12, 24, 40, 52) for x in (5, 20, 33, 50)]
     exact = np.array([np.maximum(towards @ normals[at], 0) @ light for at in picked])
     made = np.array([entered[at] for at in picked])
@@ -236,7 +236,7 @@ def test_background_is_a_colour_by_default(renderer: Renderer, room: str) -> Non
 
 def test_poles_have_no_seams(renderer: Renderer, tmp_path: Path) -> None:
     """With half of the sky bright, the reflection across the zenith changes gradually."""
-    radiance = np.where(directions(64, 128)[..., :1] > 0, [1.0, 1.0, 1.0], [0.0, 0.0, 0.0])
+    radiance = np.where(texel_directions(64, 128)[..., :1] > 0, [1.0, 1.0, 1.0], [0.0, 0.0, 0.0])
     write_exr(tmp_path / "half.exr", radiance.astype(np.float32))
     lit = run_frame(
         renderer, around(WHITE, Environment(name=str(tmp_path / "half.exr"))), occlusion="none"

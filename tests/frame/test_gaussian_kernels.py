@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from tolerances import KERNEL_VARIANCE
 
 from dermis.frame.features.diffusion.kernels import (
+    KERNEL_TRUNCATION_SIGMAS,
     MAX_TABLE_VARIANCE,
     ROWS_PER_UNIT,
-    TRUNCATION_SIGMAS,
     kernel_table,
     tap_count,
 )
@@ -41,7 +41,7 @@ def test_sum_and_variance(variance: float) -> None:
 
 @pytest.mark.parametrize("variance", VARIANCES)
 def test_taps_reach_the_truncation(variance: float) -> None:
-    assert tap_count(variance) == math.ceil(TRUNCATION_SIGMAS * math.sqrt(variance))
+    assert tap_count(variance) == math.ceil(KERNEL_TRUNCATION_SIGMAS * math.sqrt(variance))
     assert len(kernel(variance)) == 2 * tap_count(variance) + 1
 
 

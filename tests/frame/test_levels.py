@@ -31,7 +31,7 @@ from dermis.frame.features.diffusion.pyramid import (
     levels_by_resolution,
     make_levels,
 )
-from dermis.frame.programs import FLOAT_FORMAT
+from dermis.frame.programs import FLOAT_TEXEL_FORMAT
 from dermis.gpu import CommandList, Device, download, make_texture, upload
 from dermis.mesh.primitives import plane
 from dermis.optics.profiles import load_profile
@@ -90,7 +90,7 @@ def combined(
     )
     blur = Blur(BLURRED, WEIGHT, halvings, scale)
     space = make_levels(device, side, (halvings,), texel)
-    into = make_texture(device, (side, side), FLOAT_FORMAT)
+    into = make_texture(device, (side, side), FLOAT_TEXEL_FORMAT)
     upload(device, space.stacks[0], light * [scale, scale, scale, 1.0])
     frame = CommandList(device)
     diffuse.draw(frame, space, textures, blur)
@@ -104,23 +104,23 @@ def error(made: Floats, exact: Floats, own: NDArray[np.bool_]) -> float:
     return float(np.sqrt(((made - exact)[own] ** 2).mean() / (exact[own] ** 2).mean()))
 
 
-@pytest.mark.parametrize("texel", [FLOAT_FORMAT, HALF])
+@pytest.mark.parametrize("texel", [FLOAT_TEXEL_FORMAT, HALF])
 def test_coarser_levels_show_the_same(
     device: Device, atlas: Atlas, textures: AtlasTextures, stripes: Floats, texel: str
 ) -> None:
-    whole, once = combined(device, FLOAT_FORMAT, replace(textures, coarser=()), stripes)
+    whole, once = combined(device, FLOAT_TEXEL_FORMAT, replace(textures, coarser=()), stripes)
     made, halvings = combined(device, texel, textures, stripes)
     assert max(once) == 0 and max(halvings) == 2
     assert error(made, whole, atlas.lit) < HALVED
     assert made[atlas.lit].sum() == pytest.approx(whole[atlas.lit].sum(), rel=SPREAD_ENERGY)
 
 
-@pytest.mark.parametrize("texel", [FLOAT_FORMAT, HALF])
+@pytest.mark.parametrize("texel", [FLOAT_TEXEL_FORMAT, HALF])
 def test_constant_light_stays_constant_at_every_resolution(
     device: Device, atlas: Atlas, textures: AtlasTextures, texel: str
 ) -> None:
     made, _ = combined(device, texel, textures, np.ones((256, 256, 4)) * atlas.lit[..., None])
-    close = FLAT if texel == FLOAT_FORMAT else HALVES
+    close = FLAT if texel == FLOAT_TEXEL_FORMAT else HALVES
     assert np.abs(made[atlas.lit] / WEIGHT.sum(axis=0) - 1).max() < close
 
 
@@ -133,7 +133,7 @@ def test_excess_variance_of_halving_is_subtracted_from_the_next_level(device: De
     textures = resting(device, atlas, coarser=coarser, median_texels_per_mm=2.0)
     variances = np.array([0.5, 0.9, 3.0])
     halvings = choose_halvings(variances, 2.0, len(coarser))
-    space, light = make_levels(device, 256, (halvings,), FLOAT_FORMAT), np.zeros((256, 256, 4))
+    space, light = make_levels(device, 256, (halvings,), FLOAT_TEXEL_FORMAT), np.zeros((256, 256, 4))
     light[..., 3], light[128, 128, :3] = 1.0, 1.0
     upload(device, space.stacks[0], light)
     frame = CommandList(device)
@@ -165,7 +165,7 @@ def test_half_precision_keeps_the_light(
 ) -> None:
     """Half precision keeps the amount of light and its position, however bright it is."""
     light = stripes * [brightest, brightest, brightest, 1.0]
-    floats, _ = combined(device, FLOAT_FORMAT, textures, light)
+    floats, _ = combined(device, FLOAT_TEXEL_FORMAT, textures, light)
     halves, _ = combined(device, HALF, textures, light, half_precision_scale(HALF, brightest))
     assert error(halves, floats, atlas.lit) < HALVES
     assert halves[atlas.lit].sum() == pytest.approx(floats[atlas.lit].sum(), rel=HALVES / 4)
@@ -177,7 +177,7 @@ def test_scales_are_powers_of_two(brightest: float) -> None:
     scale = half_precision_scale(HALF, brightest)
     assert np.frexp(scale)[0] == 0.5 and scale * brightest <= 16
     assert scale < np.finfo(np.float32).max and 1 / scale > np.finfo(np.float32).tiny
-    assert half_precision_scale(FLOAT_FORMAT, brightest) == 1.0
+    assert half_precision_scale(FLOAT_TEXEL_FORMAT, brightest) == 1.0
 
 
 @pytest.mark.parametrize(("texels_per_mm", "most"), [(0.5, 3), (3.0, 3), (30.0, 3), (30.0, 1), (1e6, 3)])

@@ -20,7 +20,7 @@ from dermis.frame.renderer import Renderer
 from dermis.gpu import open_device
 from dermis.gpu.adapters import DEFAULT_LIMITS
 from dermis.gpu.shader_types import shader_bindings, struct_dtype
-from dermis.gpu.wgsl_source import compose
+from dermis.gpu.wgsl_source import compose_shader
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere
@@ -50,12 +50,12 @@ WHOLE = {"seams": "multi-uv", "bloom": 0.1, "tone": "filmic"}
 def _programs() -> list[Path]:
     """Return the shaders with an entry point."""
     entry = re.compile(r"^@(compute|vertex|fragment)\b", re.MULTILINE)
-    return [path for path in SHADERS if entry.search(compose(path, FOLDERS).text)]
+    return [path for path in SHADERS if entry.search(compose_shader(path, FOLDERS).text)]
 
 
 @pytest.mark.parametrize("path", _programs(), ids=lambda path: path.stem)
 def test_bindings_fit_any_device(path: Path) -> None:
-    text = compose(path, FOLDERS).text
+    text = compose_shader(path, FOLDERS).text
     found = shader_bindings(text)
     kinds = Counter(_kind(binding.entry) for binding in found)
     kinds["dynamic"] = kinds["uniform"]  # each has an offset of its own in every frame
@@ -68,7 +68,7 @@ def test_bindings_fit_any_device(path: Path) -> None:
 
 
 def test_uniforms_fit_64_kib() -> None:
-    text = compose(next(path for path in SHADERS if path.name == "shade.wgsl"), FOLDERS).text
+    text = compose_shader(next(path for path in SHADERS if path.name == "shade.wgsl"), FOLDERS).text
     for name in ("Skin", "Lights", "Shade"):
         assert struct_dtype(text, name).itemsize <= DEFAULT_LIMITS["max-uniform-buffer-binding-size"]
 
@@ -76,7 +76,7 @@ def test_uniforms_fit_64_kib() -> None:
 @pytest.mark.parametrize("path", _programs(), ids=lambda path: path.stem)
 def test_workgroups_fit_any_device(path: Path) -> None:
     """The wgpu library does not check the shared memory of workgroups."""
-    text = re.sub(r"//[^\n]*", "", compose(path, FOLDERS).text)
+    text = re.sub(r"//[^\n]*", "", compose_shader(path, FOLDERS).text)
     structs = set(re.findall(r"struct (\w+)", text))
     held = 0
     for kind, count in re.findall(r"var<workgroup> \w+: (?:array<(\w+), (\w+)>|atomic<u32>);", text):

@@ -61,7 +61,7 @@ def test_row_bands_leave_no_seams(device: Device, monkeypatch: pytest.MonkeyPatc
     """Large maps are uploaded a few rows at a time."""
     height = noise((150, 42)).astype(float)
     at_once = slopes_of(device, height)
-    monkeypatch.setattr(map_mips, "_BAND_BYTES", 64 * 4 * 44)
+    monkeypatch.setattr(map_mips, "_MAX_BAND_BYTES", 64 * 4 * 44)
     np.testing.assert_array_equal(slopes_of(device, height), at_once)
 
 

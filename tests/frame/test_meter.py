@@ -11,7 +11,12 @@ from numpy.typing import NDArray
 from setups import front_camera, frontal, head_of, joined, scene_of, settings_of
 from tolerances import HALVES
 
-from dermis.frame.features.post.meter import MAX_CLIPPED_FRACTION, METER_KEY, METER_SIDE, MIN_HIGHLIGHT_FACTOR
+from dermis.frame.features.post.meter import (
+    MAX_CLIPPED_FRACTION,
+    METER_SIDE,
+    METERED_IRRADIANCE,
+    MIN_HIGHLIGHT_FACTOR,
+)
 from dermis.frame.renderer import Renderer
 from dermis.mesh.primitives import plane, uv_sphere
 from dermis.scene.environment import Environment
@@ -38,9 +43,9 @@ def points(renderer: Renderer, scene: Scene) -> NDArray[np.float64]:
 def test_a_lit_plane_is_exposed_for_the_key(renderer: Renderer) -> None:
     """Irradiance 3 makes a white surface 3 / pi, which the exposure brings to the key."""
     scene = scene_of(FLAT, frontal(3.0), **DULL)
-    assert metered(renderer, scene) == pytest.approx(METER_KEY * np.pi / 3.0, rel=1e-5)
+    assert metered(renderer, scene) == pytest.approx(METERED_IRRADIANCE * np.pi / 3.0, rel=1e-5)
     assert metered(renderer, scene_of(FLAT, frontal(30.0), **DULL)) == pytest.approx(
-        METER_KEY * np.pi / 30, rel=1e-5
+        METERED_IRRADIANCE * np.pi / 30, rel=1e-5
     )
     assert metered(renderer, scene, exposure=0.4) == pytest.approx(0.4)
 
@@ -51,8 +56,10 @@ def test_uneven_light_is_metered_by_its_root_mean_square(renderer: Renderer) -> 
     found = metered(renderer, scene)
     light = points(renderer, scene)[:, 0]
     assert 500 < len(light) < METER_SIDE * METER_SIDE and light.std() > 0.1
-    assert found == pytest.approx(METER_KEY / np.sqrt((light**2).mean()), rel=1e-4)
-    assert found == pytest.approx(METER_KEY * np.sqrt(2.0), rel=0.05)  # the mean square cosine is 1/2
+    assert found == pytest.approx(METERED_IRRADIANCE / np.sqrt((light**2).mean()), rel=1e-4)
+    assert found == pytest.approx(
+        METERED_IRRADIANCE * np.sqrt(2.0), rel=0.05
+    )  # the mean square cosine is 1/2
 
 
 @pytest.mark.parametrize("technique", TECHNIQUES)
@@ -63,12 +70,12 @@ def test_meter_measures_incident_light(renderer: Renderer, technique: str) -> No
         metered(renderer, scene_of(head, frontal(3.0), **DULL), technique=technique) for head in (FLAT, dark)
     ]
     assert both[0] == pytest.approx(both[1], rel=1e-6)
-    assert both[0] == pytest.approx(METER_KEY * np.pi / 3.0, rel=1e-5)
+    assert both[0] == pytest.approx(METERED_IRRADIANCE * np.pi / 3.0, rel=1e-5)
 
 
 def test_environment_counts_as_incident_light(renderer: Renderer) -> None:
     scene = Scene(FLAT, (), front_camera(FLAT), environment=Environment(name="uniform", exposure=4.0))
-    assert metered(renderer, scene, occlusion="none") == pytest.approx(METER_KEY / 4.0, rel=HALVES)
+    assert metered(renderer, scene, occlusion="none") == pytest.approx(METERED_IRRADIANCE / 4.0, rel=HALVES)
 
 
 def glossy(irradiance: float, share: float) -> Scene:
@@ -81,7 +88,7 @@ def glossy(irradiance: float, share: float) -> Scene:
 
 def test_highlights_reduce_exposure_by_at_most_one_stop(renderer: Renderer) -> None:
     for irradiance in (1.0, 9.0):
-        usual, scene = METER_KEY * np.pi / irradiance, glossy(irradiance, 0.2)
+        usual, scene = METERED_IRRADIANCE * np.pi / irradiance, glossy(irradiance, 0.2)
         found = metered(renderer, scene, technique="none")
         bright = np.sort(points(renderer, scene)[:, 1])[::-1]
         limit = 1.0 / bright[int(MAX_CLIPPED_FRACTION * len(bright))]
@@ -98,7 +105,7 @@ def test_only_skin_is_metered(renderer: Renderer) -> None:
     for name, head in (("both", both), ("plain", head_of(joined(*parts, kinds=["opaque"] * 2)))):
         scene = scene_of(head, frontal(3.0), **DULL)
         count[name] = metered(renderer, scene), len(points(renderer, scene))
-    assert count["both"][0] == pytest.approx(METER_KEY * np.pi / 3.0, rel=1e-5)
+    assert count["both"][0] == pytest.approx(METERED_IRRADIANCE * np.pi / 3.0, rel=1e-5)
     assert 0.1 < count["both"][1] / METER_SIDE**2 < 0.6
     assert count["plain"] == (1.0, 0)
 

@@ -24,7 +24,7 @@ from dermis.frame.features.diffusion.pyramid import Blur, choose_halvings, make_
 from dermis.frame.features.shape import shape
 from dermis.frame.features.shape.mesh import upload_geometry
 from dermis.frame.features.shape.shape import MotionBytes, make_shape, shape_tables
-from dermis.frame.programs import FLOAT_FORMAT
+from dermis.frame.programs import FLOAT_TEXEL_FORMAT
 from dermis.frame.renderer import Renderer
 from dermis.gpu import CommandList, Device, download, upload
 from dermis.mesh.head import Head
@@ -51,7 +51,7 @@ def spread(device: Device, head: Head, atlas: Atlas, motion: MotionBytes, light:
     made, textures = make_shape(device, shape_tables(device, head)), upload_atlas(device, atlas)
     most = len(textures.mips_for("repeated")) - 1
     halvings = choose_halvings(BLURRED, textures.median_texels_per_mm, most)
-    space = make_levels(device, SIDE, (halvings,), FLOAT_FORMAT)
+    space = make_levels(device, SIDE, (halvings,), FLOAT_TEXEL_FORMAT)
     upload(device, space.stacks[0], np.dstack([light, light, light, atlas.lit[..., None]]))
     frame = CommandList(device)
     shape.draw(frame, made, motion)

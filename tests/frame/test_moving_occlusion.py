@@ -145,7 +145,7 @@ def test_both_depth_map_methods_agree(
     scene = posed(head, hinged(head, 60.0))
     (usual,) = open_maps(renderer, scene)
     renderer.clear_cache()
-    monkeypatch.setattr(moving_occlusion, "make_layers", partial(make_layers, compute=True))
+    monkeypatch.setattr(moving_occlusion, "make_layers", partial(make_layers, use_compute_pass=True))
     (computed,) = open_maps(renderer, scene)
     renderer.clear_cache()
     assert np.sqrt(np.mean((computed - usual) ** 2)) < 2 * STILL

@@ -107,4 +107,4 @@ def test_driver_errors_about_textures_are_reported(
 
     side = device.max_texture_size
     with pytest.raises(DermisError, match=rf"the sheet of {side}x{side}x256 rgba32float, [\d.]+ GB, but"):
-        make_texture(device, (side, side), "rgba32float", layers=256, name="sheet")
+        make_texture(device, (side, side), "rgba32float", layer_count=256, texture_name="sheet")

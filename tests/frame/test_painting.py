@@ -204,7 +204,7 @@ def test_the_finest_mesh_is_painted_as_the_coarsest(
 def test_more_triangles_than_have_numbers_are_refused(
     device: Device, surface: PaintedSurface, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(given, "_MAX_TRIANGLES", surface.count)
+    monkeypatch.setattr(given, "_MAX_PAINTED_TRIANGLES", surface.count)
     with pytest.raises(DermisError, match="Subdivide less"):
         painted(device, surface)
 

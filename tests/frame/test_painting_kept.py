@@ -85,7 +85,7 @@ def test_cache_key_contains_everything_that_changes_the_paint(
     ):
         cached_rest_maps(another(new), other, SIDE)
     cached_rest_maps(another(new), paint_inputs(surface, LOOK, 512), 512)
-    cached_rest_maps(another(new), given, SIDE, animated=True)
+    cached_rest_maps(another(new), given, SIDE, with_expressions=True)
     assert len(log) == 6
     cached_rest_maps(another(new), given, SIDE)  # which what movements add lies beside
     assert len(log) == 6

@@ -75,7 +75,7 @@ def test_pictures_are_those_of_pairs_of_the_shape(
 ) -> None:
     positions = scaled(disc, *factors)
     followed = drawn(Renderer(ADAPTER), disc, positions)
-    monkeypatch.setattr(pair_shape, "MAX_STRAIN", -1.0)
+    monkeypatch.setattr(pair_shape, "MAX_SHARED_PAIR_STRAIN", -1.0)
     searched = drawn(Renderer(ADAPTER), disc, positions)
     assert searched.max() > 0.0
     assert np.abs(followed - searched).max() < SEARCHED * searched.max()

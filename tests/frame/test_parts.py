@@ -62,7 +62,7 @@ def test_both_visibility_methods_cut_the_same_holes(renderer: Renderer, compute:
     inputs = renderer.prepare(
         scene_of(head, frontal(), camera=front_camera(head)), settings_of(size=(64, 64), atlas=64)
     )
-    layers = make_layers(renderer.device, (64, 64), 1, triangles=True, compute=compute)
+    layers = make_layers(renderer.device, (64, 64), 1, store_triangles=True, use_compute_pass=compute)
     frame = CommandList(renderer.device)
     shape.draw(frame, inputs.resources.shape.shape, inputs.motion)
     draw_layers(frame, "nearest", layers, replace_samples(inputs.camera_views), inputs.resources.head)

@@ -14,7 +14,7 @@ from tolerances import TWIN
 
 from dermis.frame.renderer import Renderer
 from dermis.frame.techniques.pre_integrated import (
-    MAX_CURVATURE,
+    MAX_CURVATURE_PER_MM,
     half_light_sigma_mm,
     penumbra_width_mm,
     scattered_cosine,
@@ -33,7 +33,7 @@ Floats = NDArray[np.float64]
 PROFILE = load_profile("gpu-gems-3")
 SPHERES = sphere_table(PROFILE)
 COSINES = np.linspace(-1, 1, SPHERES.shape[1])
-CURVATURES = np.linspace(0, MAX_CURVATURE, len(SPHERES))
+CURVATURES = np.linspace(0, MAX_CURVATURE_PER_MM, len(SPHERES))
 
 
 def on_sphere(cosine: float, radius_mm: float, profile: GaussianSum) -> Floats:
@@ -120,7 +120,7 @@ BALL = head_of(uv_sphere(RADIUS, 96, 48))
 
 def table(cosines: Floats, curvature: float) -> Floats:
     """Interpolate the (..., 3) table like the shader."""
-    row = curvature / MAX_CURVATURE * (len(SPHERES) - 1)
+    row = curvature / MAX_CURVATURE_PER_MM * (len(SPHERES) - 1)
     low = int(row)
     entries = SPHERES[low] + (row - low) * (SPHERES[low + 1] - SPHERES[low])
     return np.stack([np.interp(cosines, COSINES, entries[:, k]) for k in range(3)], axis=-1)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dermis.environment.panorama import directions
+from dermis.environment.panorama import texel_directions
 from dermis.frame.renderer import Renderer
 from dermis.images.io import write_exr
 from dermis.mesh.head import Head
@@ -24,7 +24,10 @@ SETTINGS = Settings(size=(24, 24), atlas=64, samples=1, technique="none", occlus
 @pytest.mark.parametrize("degrees", [0.0, 90.0])
 def test_relit_picture_equals_a_rendered_one(renderer: Renderer, tmp_path: Path, degrees: float) -> None:
     """In a sky that is brightest towards +X; the opposite rotation has ten times the error."""
-    sky = 1.0 + 0.9 * directions(256, 512) @ np.array([[0.9, 0.3, 0.0], [0.2, 0.8, 0.0], [-0.4, 0.1, 0.9]]).T
+    sky = (
+        1.0
+        + 0.9 * texel_directions(256, 512) @ np.array([[0.9, 0.3, 0.0], [0.2, 0.8, 0.0], [-0.4, 0.1, 0.9]]).T
+    )
     write_exr(tmp_path / "sky.exr", sky.astype(np.float32))
     around = Environment(name=str(tmp_path / "sky.exr"), rotation_degrees=degrees)
     camera = Camera(position=(300.0, 100.0, 900.0), frame_mm=160.0, target=(0.0, 20.0, 0.0))

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from setups import front_camera, frontal, head_of, scene_of, settings_of
 
-from dermis.frame.programs import HALF_FORMAT
+from dermis.frame.programs import HALF_TEXEL_FORMAT
 from dermis.frame.renderer import Renderer
 from dermis.frame.techniques import technique
 from dermis.mesh.primitives import uv_sphere
@@ -29,7 +29,7 @@ SEQUENCES: dict[str, list[dict[str, Any]]] = {
 def keeping() -> Iterator[Renderer]:
     """Return a renderer with two variants per resource, and half-float levels on any adapter."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(technique, "level_format", lambda _: HALF_FORMAT)
+        patch.setattr(technique, "level_format", lambda _: HALF_TEXEL_FORMAT)
         yield Renderer(os.environ.get("DERMIS_TEST_ADAPTER", "cpu"), cache_size=2)
 
 

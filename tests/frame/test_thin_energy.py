@@ -19,7 +19,7 @@ from dermis.mesh.primitives import wedge
 from dermis.optics.diffusion.models import diffusion_profile
 from dermis.optics.fits.gaussian import fit_gaussians
 from dermis.optics.gaussians import GaussianSum
-from dermis.optics.media import media
+from dermis.optics.media import published_media
 from dermis.optics.profiles import write_profile
 from dermis.optics.slabs import solve_slabs
 from dermis.scene.environment import Environment
@@ -27,14 +27,14 @@ from dermis.scene.lights import DirectionalLight
 
 Floats = NDArray[np.float64]
 WHITE = np.ones((4, 4, 3))
-BODY = media()["skin1"].with_eta(1.0)
+BODY = published_media()["skin1"].with_eta(1.0)
 
 
 @pytest.fixture(scope="module")
 def skin1(tmp_path_factory: pytest.TempPathFactory) -> str:
     """Return a file of the profile of skin1."""
     file: Path = tmp_path_factory.mktemp("profile") / "skin1.toml"
-    write_profile(file, fit_gaussians(diffusion_profile(BODY).rings(), 6, name="skin1").profile, {})
+    write_profile(file, fit_gaussians(diffusion_profile(BODY).rings(), 6, profile_name="skin1").profile, {})
     return str(file)
 
 

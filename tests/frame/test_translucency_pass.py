@@ -20,7 +20,7 @@ from dermis.frame.features.translucency import passes as translucency
 from dermis.frame.features.translucency import passes as translucency_weights
 from dermis.frame.features.translucency.build import make_buffers, with_profile
 from dermis.frame.features.translucency.resources import Translucency
-from dermis.frame.programs import FLOAT_FORMAT
+from dermis.frame.programs import FLOAT_TEXEL_FORMAT
 from dermis.gpu import CommandList, Constants, Device, download, make_texture, upload
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.primitives import uv_sphere, wedge
@@ -87,7 +87,7 @@ def summed(
     levels : (2, 64, 64, 3) blurred light
     """
     thin, side = weighed.thin, weighed.thin.pairs.cells.side
-    space = make_levels(device, 64, (BLUR.halvings,), FLOAT_FORMAT)
+    space = make_levels(device, 64, (BLUR.halvings,), FLOAT_TEXEL_FORMAT)
     for layer, level in enumerate(levels, start=1):
         upload(device, space.stacks[0], np.dstack([level, np.ones((64, 64))]), layer=layer)
     frame = CommandList(device)
@@ -112,7 +112,7 @@ def test_transmitted_light_matches_numpy(
     row: int,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(programs, "_GROUPS_PER_ROW", row)
+    monkeypatch.setattr(programs, "_WORKGROUPS_PER_ROW", row)
     levels = np.random.default_rng(8).random((2, 64, 64, 3)).astype(np.float32)
     twin, made = summed(device, weighed, levels, (("SIZE", 128), ("TEAM", team), ("ROUND", at_once)))
     assert twin.max() > 0.1
@@ -132,7 +132,7 @@ def test_head_without_thin_parts_transmits_nothing(device: Device) -> None:
     ball = weighed_of(device, uv_sphere(30.0, 24, 12))
     assert ball.thin.pairs.count == 0
     frame = CommandList(device)
-    translucency.draw(frame, make_levels(device, 64, (BLUR.halvings,), FLOAT_FORMAT), BLUR, ball.thin)
+    translucency.draw(frame, make_levels(device, 64, (BLUR.halvings,), FLOAT_TEXEL_FORMAT), BLUR, ball.thin)
     frame.submit()
     light = download(device, ball.thin.pairs.transmitted)
     assert (light[..., :3] == 0).all()

@@ -81,7 +81,7 @@ def nearest(
 ) -> list[NDArray[Any]]:
     """Return the layers for the samples of a pixel by one of the two implementations."""
     inputs = run_frame(renderer, scene, size=SIZE, samples=samples)
-    layers = make_layers(renderer.device, SIZE, samples, triangles=triangles, compute=compute)
+    layers = make_layers(renderer.device, SIZE, samples, store_triangles=triangles, use_compute_pass=compute)
     frame = CommandList(renderer.device)
     draw_layers(frame, "nearest", layers, inputs.camera_views, inputs.resources.head)
     frame.submit()

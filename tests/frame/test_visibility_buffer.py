@@ -94,9 +94,11 @@ def test_triangles_of_all_sizes_are_drawn(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch, what: str, groups: int, samples: int
 ) -> None:
     """Workgroups of few and of many triangles agree, with one or two words per sample."""
-    monkeypatch.setattr(visibility_buffer, "_TARGET_GROUPS", groups)
+    monkeypatch.setattr(visibility_buffer, "_TARGET_WORKGROUP_COUNT", groups)
     monkeypatch.setattr(visibility_buffer, "_MAX_DEPTH_STEP_MM", 0.0 if "after" in what else 0.1)
-    layers = make_layers(renderer.device, SIZE, samples, triangles=what != "depth", compute=True)
+    layers = make_layers(
+        renderer.device, SIZE, samples, store_triangles=what != "depth", use_compute_pass=True
+    )
     made, clips = shown(layers, renderer, SOUP, TURNED, samples)
     for layer, clip in zip(made, clips, strict=True):
         truth = truth_of_soup(clip.tobytes())
@@ -112,10 +114,10 @@ def test_more_blocks_than_a_workgroup_list_are_drawn(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A workgroup of 128 triangles with 11 blocks each exceeds its list of 1024."""
-    monkeypatch.setattr(visibility_buffer, "_TARGET_GROUPS", 1)
-    monkeypatch.setattr(visibility_buffer, "_RUN_TRIANGLES", 128)
+    monkeypatch.setattr(visibility_buffer, "_TARGET_WORKGROUP_COUNT", 1)
+    monkeypatch.setattr(visibility_buffer, "_CONSECUTIVE_TRIANGLES", 128)
     head = head_of(plane(80.0, 8))
-    layers = make_layers(renderer.device, SIZE, 1, triangles=True, compute=True)
+    layers = make_layers(renderer.device, SIZE, 1, store_triangles=True, use_compute_pass=True)
     (layer,), _ = shown(layers, renderer, head, front_camera(head, (0, 0, 0.1), frame_mm=31.0), 1)
     assert (layer > 0).all()
 
@@ -162,7 +164,7 @@ def test_corners_on_the_camera_plane_are_handled(renderer: Renderer, eye: Any, a
     camera = Camera(position=eye, target=target, up=(0.1, 1, 0.2), frame_mm=60.0)
     covered = []
     for compute in (True, False):
-        layers = make_layers(renderer.device, SIZE, 1, triangles=False, compute=compute)
+        layers = make_layers(renderer.device, SIZE, 1, store_triangles=False, use_compute_pass=compute)
         (layer,), _ = shown(layers, renderer, ball, camera, 1)
         covered.append(layer > 0)
     assert 0.1 < covered[1].mean() < 0.95

@@ -14,7 +14,7 @@ from dermis.base.errors import DermisError
 from dermis.gpu import CommandList, ComputeProgram, Device, download, make_texture
 from dermis.gpu.bind_groups import ResourceCache, resource_key
 from dermis.gpu.command_list import Timing
-from dermis.gpu.failures import gpu_failures
+from dermis.gpu.failures import converted_gpu_failures
 from dermis.gpu.textures import half_store_rounding, texture_from_array
 from dermis.gpu.uniforms import CHUNK_BYTES, Uniforms
 
@@ -213,7 +213,7 @@ def test_untimed_frames_report_no_times(device: Device, scale: ComputeProgram) -
 def test_driver_messages_become_package_errors(device: Device) -> None:
     import wgpu
 
-    with pytest.raises(DermisError, match=r"out of memory.*--adapter cpu"), gpu_failures(device):
+    with pytest.raises(DermisError, match=r"out of memory.*--adapter cpu"), converted_gpu_failures(device):
         raise wgpu.GPUOutOfMemoryError("out of memory")
 
 

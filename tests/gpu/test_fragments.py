@@ -18,8 +18,8 @@ def test_fragments_fill_every_texel_of_all_targets(device: Device) -> None:
         constants={"TIMES": 2.0},
         targets=["rgba32float", "rgba16float"],
     )
-    one = make_texture(device, SIZE, "rgba32float", use="raster")
-    layered = make_texture(device, SIZE, "rgba16float", layers=3, use="raster")
+    one = make_texture(device, SIZE, "rgba32float", content_source="raster")
+    layered = make_texture(device, SIZE, "rgba16float", layer_count=3, content_source="raster")
     view = layered.create_view(dimension="2d", base_array_layer=1, array_layer_count=1)
     frame = CommandList(device)
     frame.fill("places", program, {"added": program.record("Added", more=(0, 0, 5, 0))}, [one, view])

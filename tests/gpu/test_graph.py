@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dermis.gpu import CommandList, ComputeProgram, Device, Graph, download, make_texture, mark_scratch
-from dermis.gpu.shader_types import shader_bindings, struct_dtype, used_members
+from dermis.gpu.shader_types import shader_bindings, struct_dtype, used_member_selector
 from dermis.gpu.textures import texture_from_array
 
 SIZE = (9, 5)
@@ -138,7 +138,7 @@ def test_unneeded_stages_do_not_run(device: Device, scale: ComputeProgram) -> No
 
 
 def test_layers_are_tracked_separately_and_together(device: Device) -> None:
-    whole = make_texture(device, SIZE, "r32float", layers=2)
+    whole = make_texture(device, SIZE, "r32float", layer_count=2)
     options = {"dimension": "2d", "array_layer_count": 1}
     layers = [whole.create_view(base_array_layer=k, **options) for k in range(2)]
     program = ComputeProgram(device, Path(__file__).parent / "scale.wgsl")
@@ -208,7 +208,7 @@ STRUCT = "struct S { a: f32, b: vec3f, c: f32 }\n@group(0) @binding(0) var<unifo
     ],
 )
 def test_only_members_that_are_read_count(code: str, read: set[str]) -> None:
-    reader, dtype = used_members(STRUCT + code, "one"), struct_dtype(STRUCT, "S")
+    reader, dtype = used_member_selector(STRUCT + code, "one"), struct_dtype(STRUCT, "S")
     plain = np.zeros((), dtype)
     for member in ("a", "b", "c"):
         changed = np.zeros((), dtype)

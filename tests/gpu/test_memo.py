@@ -98,7 +98,7 @@ def test_clearing_recomputes_everything() -> None:
 def test_owners_have_separate_results() -> None:
     memo, log = Memo(), Log()
     for owner, key in (("left", "a"), ("right", "b"), ("left", "a"), ("right", "b")):
-        assert memo.get(log.make, key, owner=owner) == key.upper()
+        assert memo.get(log.make, key, caller_name=owner) == key.upper()
     assert log.made == "ab"
 
 

@@ -94,6 +94,6 @@ def test_control_group_limit_is_below_the_machine(monkeypatch: pytest.MonkeyPatc
     group.mkdir()
     (tmp_path / "memory.max").write_text("max\n")
     (group / "memory.max").write_text("1000000\n")
-    monkeypatch.setattr(memory, "_CGROUPS", tmp_path)
-    monkeypatch.setattr(memory, "_own_cgroups", lambda: ["job"])
+    monkeypatch.setattr(memory, "_CGROUP_FOLDER", tmp_path)
+    monkeypatch.setattr(memory, "_control_group_paths", lambda: ["job"])
     assert memory.main_memory() == 1e6 < machine < math.inf

@@ -49,7 +49,7 @@ class Made:
 @pytest.fixture
 def made(device: Device, monkeypatch: pytest.MonkeyPatch) -> Made:
     monkeypatch.setattr(device, "programs", {})
-    monkeypatch.setattr(program, "_CACHED_VARIANTS", 3)
+    monkeypatch.setattr(program, "_MAX_CACHED_VARIANTS", 3)
     return Made()
 
 

@@ -31,7 +31,7 @@ def test_upload_and_download_round_trip(device: Device, texel: str, size: tuple[
 
 @pytest.mark.parametrize("texel", ["rgba32float", "r16float", "rgba8unorm"])
 def test_every_mip_is_uploaded(device: Device, texel: str) -> None:
-    texture = make_texture(device, (37, 10), texel, mips=6, use="map")
+    texture = make_texture(device, (37, 10), texel, mip_count=6, content_source="map")
     sizes = [(10, 37), (5, 18), (2, 9), (1, 4), (1, 2), (1, 1)]
     levels = [noise(size, texel, seed) for seed, size in enumerate(sizes)]
     for mip, level in enumerate(levels):
@@ -40,7 +40,7 @@ def test_every_mip_is_uploaded(device: Device, texel: str) -> None:
 
 
 def test_every_layer_is_uploaded(device: Device) -> None:
-    texture = make_texture(device, (13, 7), "rgba16float", layers=3, use="map")
+    texture = make_texture(device, (13, 7), "rgba16float", layer_count=3, content_source="map")
     layers = [noise((7, 13), "rgba16float", seed) for seed in range(3)]
     for k in (2, 0, 1):
         upload(device, texture, layers[k], layer=k)

@@ -20,8 +20,8 @@ from dermis.environment.panorama import load_panorama
 from dermis.formats.maps import load_maps
 from dermis.images.hdr import EXR_PROPERTIES, RADIANCE_PROPERTIES
 from dermis.images.io import (
-    ODD_PIXELS,
-    OTHER_PICTURES,
+    ODD_PIXEL_PROPERTIES,
+    UNSUPPORTED_PICTURE_PROPERTIES,
     EmbeddedPicture,
     read_colours,
     read_image,
@@ -234,16 +234,16 @@ ODD = [
     Change("odd pixels in maps", odd(np.nan), odd(0.5), lambda path: load_maps(colour=path).colour),
 ]
 OTHERS = [
-    Change(OTHER_PICTURES[0].name, start + bytes(64), png())
+    Change(UNSUPPORTED_PICTURE_PROPERTIES[0].name, start + bytes(64), png())
     for start in (b"GIF89a", b"BM", b"8BPS", b"\xabKTX", b"DDS ", b"\xff\x0a", b"\0\0\0\x0cjP  ")
 ]
-OTHERS.append(Change(OTHER_PICTURES[0].name, exr(), png(), embedded))
+OTHERS.append(Change(UNSUPPORTED_PICTURE_PROPERTIES[0].name, exr(), png(), embedded))
 TABLES = {
     "pictures": (PICTURE_PROPERTIES, PICTURES),
-    "others": (OTHER_PICTURES, OTHERS),
+    "others": (UNSUPPORTED_PICTURE_PROPERTIES, OTHERS),
     "exr": (EXR_PROPERTIES, EXRS),
     "radiance": (RADIANCE_PROPERTIES, RADIANCE),
-    "odd": (ODD_PIXELS, ODD),
+    "odd": (ODD_PIXEL_PROPERTIES, ODD),
 }
 CASES = [(rows, change) for rows, changes in TABLES.values() for change in changes]
 EXERCISED_ELSEWHERE = {"alpha of photographs": "tests/fitting/test_photographs.py, by a fit"}

@@ -39,7 +39,7 @@ def test_invalid_patterns_are_refused(tmp_path: Path, name: str) -> None:
 def test_complete_frames_of_the_same_run_are_kept(tmp_path: Path, name: str) -> None:
     files = _files(tmp_path, name)
     files.start("a smile")
-    assert files.missing(range(4), SIZE) == [0, 1, 2, 3]
+    assert files.missing_frames(range(4), SIZE) == [0, 1, 2, 3]
     for k in range(4):
         if name.endswith("png"):
             write_png(files.path(k), PICTURE)
@@ -49,8 +49,8 @@ def test_complete_frames_of_the_same_run_are_kept(tmp_path: Path, name: str) -> 
     files.path(2).write_bytes(data[: 3 * len(data) // 4])
     files.path(0).write_bytes(b"")
     files.start("a smile")
-    assert files.missing(range(5), SIZE) == [0, 2, 4]
-    assert files.missing([1, 3], (4, 6)) == [1, 3]
+    assert files.missing_frames(range(5), SIZE) == [0, 2, 4]
+    assert files.missing_frames([1, 3], (4, 6)) == [1, 3]
 
 
 def test_frames_of_other_runs_are_drawn_again(tmp_path: Path) -> None:
@@ -60,14 +60,14 @@ def test_frames_of_other_runs_are_drawn_again(tmp_path: Path) -> None:
         write_png(files.path(k), PICTURE)
         os.utime(files.path(k), (1e9, 1e9 + k))
     os.utime(files.pattern.with_name(".%03d.png.made-of"), (1e9, 1e9))
-    assert files.missing(range(2), SIZE) == []
+    assert files.missing_frames(range(2), SIZE) == []
     files.start("a frown")
     write_png(files.path(1), PICTURE)
     files.start("a frown")
-    assert files.missing(range(2), SIZE) == [0]
+    assert files.missing_frames(range(2), SIZE) == [0]
     os.utime(files.path(1), (1e9, 1e9))
     files.start("a frown", force=True)
-    assert files.missing(range(2), SIZE) == [0, 1]
+    assert files.missing_frames(range(2), SIZE) == [0, 1]
 
 
 @pytest.mark.parametrize("damage", ["no text", "empty", "large", "a pipe"])
@@ -84,14 +84,14 @@ def test_damaged_record_is_ignored(tmp_path: Path, damage: str) -> None:
     files.start("a smile")
     assert record.read_bytes() == b"a smile"
     os.utime(files.path(0), (1e9, 1e9))
-    assert files.missing([0], SIZE) == [0]
+    assert files.missing_frames([0], SIZE) == [0]
 
 
 def test_pipe_is_not_a_frame(tmp_path: Path) -> None:
     files = _files(tmp_path)
     files.start("a smile")
     os.mkfifo(files.path(0))
-    assert files.missing([0], SIZE) == [0]
+    assert files.missing_frames([0], SIZE) == [0]
 
 
 def test_png_is_checked_without_decoding() -> None:

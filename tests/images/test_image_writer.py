@@ -29,7 +29,7 @@ def test_smooth_pictures_are_compressed() -> None:
 
 def test_many_pictures_are_all_written(tmp_path: Path) -> None:
     pictures = [np.full((20, 30, 3), k, np.uint8) for k in range(40)]
-    with ImageWriter(threads=2) as writer:
+    with ImageWriter(thread_count=2) as writer:
         for k, picture in enumerate(pictures):
             writer.write(tmp_path / f"{k:02}.png", picture)
         writer.write(tmp_path / "linear.exr", pictures[1].astype(np.float32) / 7)
@@ -45,7 +45,7 @@ def test_output_folder_is_checked_once(tmp_path: Path, monkeypatch: pytest.Monke
     check = writing.check_output
     monkeypatch.setattr(writing, "check_output", lambda path: tried.append(path) or check(path))
     picture = np.zeros((2, 2, 3), np.uint8)
-    with ImageWriter(threads=1) as writer:
+    with ImageWriter(thread_count=1) as writer:
         for name in ("a.png", "b.png", "c.exr"):
             writer.write(tmp_path / name, picture.astype(np.float32) if name[0] == "c" else picture)
         with pytest.raises(DermisError, match="no folder"):
@@ -56,7 +56,7 @@ def test_output_folder_is_checked_once(tmp_path: Path, monkeypatch: pytest.Monke
 def test_occupied_path_is_reported_later(tmp_path: Path) -> None:
     picture = np.zeros((2, 2, 3), np.uint8)
     (tmp_path / "b.png").mkdir()
-    with pytest.raises(DermisError, match=r"b\.png"), ImageWriter(threads=1) as writer:
+    with pytest.raises(DermisError, match=r"b\.png"), ImageWriter(thread_count=1) as writer:
         for name in ("a.png", "b.png"):
             writer.write(tmp_path / name, picture)
     assert {path.name for path in tmp_path.iterdir()} == {"a.png", "b.png"}  # and nothing half-written
@@ -64,7 +64,7 @@ def test_occupied_path_is_reported_later(tmp_path: Path) -> None:
 
 def test_write_errors_are_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     picture = np.zeros((2, 2, 3), np.uint8)
-    with ImageWriter(threads=1) as writer:
+    with ImageWriter(thread_count=1) as writer:
         with pytest.raises(DermisError, match=r"\.jpg: expected"):
             writer.write(tmp_path / "a.jpg", picture)
         for other in (picture.astype(np.float32), picture[..., :2], picture[..., 0]):
@@ -73,15 +73,15 @@ def test_write_errors_are_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         with pytest.raises(DermisError, match="linear floats"):
             writer.write(tmp_path / "a.exr", picture)
 
-    def full(path: Path, levels: object, effort: int) -> None:
+    def full(path: Path, levels: object, zlib_level: int) -> None:
         raise DermisError("no space")
 
     monkeypatch.setattr(writing, "write_png", full)
-    with pytest.raises(DermisError, match="no space"), ImageWriter(threads=1) as writer:
+    with pytest.raises(DermisError, match="no space"), ImageWriter(thread_count=1) as writer:
         writer.write(tmp_path / "a.png", picture)
 
 
 def test_an_error_of_the_caller_is_not_hidden(tmp_path: Path) -> None:
-    with pytest.raises(ZeroDivisionError), ImageWriter(threads=1) as writer:
+    with pytest.raises(ZeroDivisionError), ImageWriter(thread_count=1) as writer:
         writer.write(tmp_path / "a.png", np.zeros((2, 2, 3), np.uint8))
         raise ZeroDivisionError

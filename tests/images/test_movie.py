@@ -115,7 +115,7 @@ def test_invalid_movie_options_are_refused_at_once(tmp_path: Path, monkeypatch: 
         pass
     with pytest.raises(DermisError, match=r"pixels \(48, 64, 3\)"), MovieWriter(path, SIZE) as movie:
         movie.write(np.zeros((64, 48, 3), np.uint8))
-    monkeypatch.setattr("dermis.images.movie._ENCODER", "no such encoder")
+    monkeypatch.setattr("dermis.images.movie._VIDEO_ENCODER", "no such encoder")
     with pytest.raises(DermisError, match=r"no such encoder.*Install av"):
         check_movie(path, SIZE)
     assert list(tmp_path.iterdir()) == []

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from dermis.base.errors import DermisError, DermisWarning
 from dermis.images.colour_spaces import gamma_space
-from dermis.images.io import read_colours, read_image, read_size, repaired_radiance
+from dermis.images.io import read_colours, read_image, read_size, repair_radiance
 
 Floats = NDArray[np.float32]
 SHAPE = (6, 12)
@@ -208,25 +208,25 @@ def test_few_invalid_pixels_are_replaced_and_counted() -> None:
     radiance = np.full((4, 8, 3), 0.5, np.float32)
     radiance[0, 0, 1], radiance[1, 1], radiance[2, 2], radiance[3, 3, 0] = 7.0, np.inf, np.nan, -2.0
     with pytest.warns(DermisWarning, match="sky: 2 infinite or NaN and 1 negative pixels of 32") as notes:
-        mended = repaired_radiance("sky", radiance)
+        mended = repair_radiance("sky", radiance)
     assert "infinite values become 7, the largest finite one, others 0" in str(notes[0].message)
     assert (
         (mended[1, 1] == 7.0).all() and (mended[2, 2] == 0.0).all() and mended[3, 3].tolist() == [0, 0.5, 0.5]
     )
     assert (mended == radiance).sum() == 96 - 7
     sound = np.abs(np.nan_to_num(radiance[3:]))
-    assert repaired_radiance("sky", sound) is sound
+    assert repair_radiance("sky", sound) is sound
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -1.0, 0.0])
 def test_mostly_invalid_radiance_is_refused(value: float) -> None:
     radiance = np.full((4, 8, 3), value, np.float32)
     with pytest.raises(DermisError, match="sky: expected a picture of radiance above 0"):
-        repaired_radiance("sky", radiance)
+        repair_radiance("sky", radiance)
     radiance[:, 4:] = 1.0  # a half
     if value != 0.0:
         with pytest.warns(DermisWarning, match="16 "):
-            repaired_radiance("sky", radiance)
+            repair_radiance("sky", radiance)
 
 
 def test_an_exr_file_in_memory_has_no_name() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dermis.images.colour import decode_srgb, lab
-from dermis.images.skin_tone import CLASS_STATEMENT, hue_degrees, ita_degrees, skin_tone
+from dermis.images.skin_tone import SKIN_CLASS_DISCLAIMER, hue_degrees, ita_degrees, skin_tone
 
 
 def test_ita_and_hue_follow_their_definitions() -> None:
@@ -32,5 +32,5 @@ def test_classes_follow_from_the_ita(reflectance: tuple[float, float, float], fi
     found = skin_tone(reflectance)
     assert found.fitzpatrick == fitzpatrick
     assert found.ita_degrees == pytest.approx(float(ita_degrees(lab(reflectance))))
-    assert found.as_json()["statement"] == CLASS_STATEMENT
-    assert f"ITA {found.ita_degrees:.0f}" in found.line()
+    assert found.as_json()["statement"] == SKIN_CLASS_DISCLAIMER
+    assert f"ITA {found.ita_degrees:.0f}" in found.as_text()

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from dermis.optics.media import Floats, Layer, Medium, media
+from dermis.optics.media import Floats, Layer, Medium, published_media
 
 TWO_LAYER = Medium(
     "two_layer",
@@ -25,7 +25,7 @@ def case(name: str) -> Medium:
     """Return the one-channel medium of a row of the reference tables."""
     if name.startswith("two_layer"):
         return TWO_LAYER
-    medium = media()[name[:-2]]
+    medium = published_media()[name[:-2]]
     return medium.channel("RGB".index(name[-1])).with_eta(1.3 if name.startswith("skin1") else 1.4)
 
 

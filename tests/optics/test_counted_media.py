@@ -14,18 +14,18 @@ from dermis.apps.truths.slab_mc import monte_carlo_profile
 from dermis.base.errors import DermisError
 from dermis.optics.diffusion.models import diffusion_profile
 from dermis.optics.equivalent_medium import equivalent_medium
-from dermis.optics.media import Layer, Medium, media
+from dermis.optics.media import Layer, Medium, published_media
 from dermis.optics.profiles import fit_profile, fit_radial, load_profile, write_profile
 from dermis.optics.tissue import Tissue, load_tissue
 
 
 def of(name: str, eta: float = 1.4) -> Tissue:
-    return Tissue(media()[name].with_eta(eta))
+    return Tissue(published_media()[name].with_eta(eta))
 
 
 @pytest.mark.parametrize("name", ["skin1", "skin2", "chicken1", "marble"])
 def test_totals_are_those_of_h_functions(name: str) -> None:
-    single = media()[name].layers[0].alpha_prime
+    single = published_media()[name].layers[0].alpha_prime
     exact = [float(directional_albedo(1.0, float(one))) for one in single]
     assert of(name, 1.0).profile().total == pytest.approx(exact, rel=COUNTED_TOTAL)
 
@@ -46,7 +46,7 @@ def test_rings_are_those_of_photons_one_by_one(eta: float) -> None:
 
 def test_lengths_scale_with_the_mean_free_path() -> None:
     one = of("skin1").profile()
-    layer = media()["skin1"].layers[0]
+    layer = published_media()["skin1"].layers[0]
     dense = Tissue(Medium("dense", (Layer(10.0 * layer.sigma_a, 10.0 * layer.sigma_s_prime),))).profile()
     assert dense.total == pytest.approx(one.total)
     both = (one.radius_mm > 2e-3) & (one.radius_mm < 5.0)
@@ -64,7 +64,7 @@ def test_homogeneous_media_have_them_by_default_and_no_others() -> None:
 
 
 def test_layered_diffusion_can_still_be_asked_for() -> None:
-    layered, own = load_tissue("skin1").profile("layered"), diffusion_profile(media()["skin1"])
+    layered, own = load_tissue("skin1").profile("layered"), diffusion_profile(published_media()["skin1"])
     assert layered.model == "layered" and (layered.reflectance == own.reflectance).all()
 
 
@@ -72,7 +72,7 @@ def test_gaussians_keep_their_light_and_tell_that_they_are_of_photons() -> None:
     radial, profile = load_tissue("skin2").profile(), load_profile("skin2")
     assert profile.from_photons and profile.albedo == pytest.approx(radial.total, rel=1e-9)
     assert not load_profile("dj3").from_photons and not load_profile("gpu-gems-3").from_photons
-    own = fit_radial(radial, "skin2", initial=profile)
+    own = fit_radial(radial, "skin2", similar_fit=profile)
     assert own.from_photons and own.albedo == pytest.approx(radial.total, rel=1e-9)
 
 

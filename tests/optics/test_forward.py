@@ -15,7 +15,7 @@ from dermis.optics.angular_response import (
     directional_reflectance,
     mean_single_scattering_kernel,
 )
-from dermis.optics.media import media
+from dermis.optics.media import published_media
 from dermis.optics.slabs import (
     DIRECTION_NODES,
     anisotropic_response,
@@ -166,7 +166,7 @@ def test_all_pairs_of_directions(reduced: float, eta: float, most: float) -> Non
 @pytest.mark.parametrize("eta", [1.0, 1.4])
 def test_amounts_of_thin_parts_are_those_of_slabs_cut_one_by_one(eta: float) -> None:
     """Expected values use twice as many cosines, and one solution per thickness."""
-    body, reach, variance = media()["skin1"].with_eta(eta), 12.0, np.array([0.05, 0.5, 5.0, 20.0])
+    body, reach, variance = published_media()["skin1"].with_eta(eta), 12.0, np.array([0.05, 0.5, 5.0, 20.0])
     made, even = solve_thin_parts(body, variance, reach, G), solve_thin_parts(body, variance, reach)
     depth, layer = reach * np.linspace(0.0, 1.0, len(made.directionality))[1:] ** 2, body.layers[0]
     for c in range(3):

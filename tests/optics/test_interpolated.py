@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dermis.optics.angular_response import (
-    TABLE_STEPS,
+    INTERPOLATION_STEPS,
     angular_response,
     directional_reflectance,
     interpolate_table,
@@ -24,11 +24,11 @@ def test_only_the_two_beside_are_made() -> None:
     asked: list[float] = []
 
     def made(at: float) -> np.ndarray:
-        asked.append(at * TABLE_STEPS)
+        asked.append(at * INTERPOLATION_STEPS)
         return np.array([at])
 
-    interpolate_table(made, 0.5 + 0.25 / TABLE_STEPS)
-    assert asked == [TABLE_STEPS / 2, TABLE_STEPS / 2 + 1]
+    interpolate_table(made, 0.5 + 0.25 / INTERPOLATION_STEPS)
+    assert asked == [INTERPOLATION_STEPS / 2, INTERPOLATION_STEPS / 2 + 1]
 
 
 def test_beyond_the_ends_are_the_ends() -> None:

@@ -11,7 +11,7 @@ import pytest
 from dermis.base.errors import DermisError
 from dermis.base.reading import read_toml
 from dermis.optics.diffusion.models import diffusion_profile
-from dermis.optics.media import Layer, Medium, media, medium_from_toml
+from dermis.optics.media import Layer, Medium, medium_from_toml, published_media
 from dermis.optics.profiles import load_profile
 from dermis.optics.tissue import load_tissue
 
@@ -25,7 +25,7 @@ def parsed(tmp_path: Path, text: str) -> Medium:
 
 
 def test_published_media() -> None:
-    known = media()
+    known = published_media()
     assert {"dj3", "skin1", "skin2", "marble", "wholemilk", "spectralon", "ketchup"} <= set(known)
     assert known["marble"].layers[0].sigma_s_prime.tolist() == [2.19, 2.62, 3.00]
     assert known["skin1"].layers[0].sigma_a.tolist() == [0.032, 0.17, 0.48]
@@ -34,16 +34,16 @@ def test_published_media() -> None:
     assert 1.0 / known["dj3"].layers[0].sigma_s_prime[0] == pytest.approx(10 * 0.02083, rel=1e-3)
 
 
-@pytest.mark.parametrize("name", sorted(media()))
+@pytest.mark.parametrize("name", sorted(published_media()))
 def test_every_medium_has_a_profile(name: str) -> None:
-    profile = diffusion_profile(media()[name])
+    profile = diffusion_profile(published_media()[name])
     assert ((profile.total > 0.0) & (profile.total <= 1.0 + 1e-9)).all()
     assert profile.sources
 
 
 def test_quantities_of_a_layer() -> None:
     """Expected values are those of marble in the notebook of [dEonLuebke2007]."""
-    layer = media()["marble"].channel(1).layers[0]
+    layer = published_media()["marble"].channel(1).layers[0]
     assert layer.mean_free_path_mm[0] == pytest.approx(0.38108304, abs=1e-8)
     assert layer.D[0] == pytest.approx(layer.mean_free_path_mm[0] / 3.0)
     assert layer.alpha_prime[0] == pytest.approx(0.99843756, abs=1e-8)
@@ -108,8 +108,8 @@ def test_layers_must_agree() -> None:
 
 
 def test_warnings_name_the_reason() -> None:
-    assert any("absorbs" in text for text in diffusion_profile(media()["skin1"]).warnings)
-    assert not diffusion_profile(media()["marble"]).warnings
+    assert any("absorbs" in text for text in diffusion_profile(published_media()["skin1"]).warnings)
+    assert not diffusion_profile(published_media()["marble"]).warnings
     wide = Medium("thin air", (Layer(0.001 * ONE, 0.05 * ONE),))
     assert any("beyond the widest radius" in text for text in diffusion_profile(wide).warnings)
     printed = diffusion_profile(_thin(), "multipole", clamp="none")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dermis.optics.diffusion.boundary import normal_reflectance
-from dermis.optics.diffusion.hankel import ZERO_FREQUENCY
+from dermis.optics.diffusion.hankel import NEAR_ZERO_FREQUENCY
 from dermis.optics.diffusion.models import hankel_transform
 from dermis.optics.media import Floats
 from dermis.optics.pigments.parameters import DEFAULT_SKIN as FACE
@@ -28,7 +28,9 @@ def computed(parameters: SkinParameters, melanin: Floats, blood: Floats) -> Floa
         spectral_medium("dj2006", replace(parameters, melanin=m, blood=b))
         for m, b in zip(melanin, blood, strict=True)
     ]
-    spectra = np.array([hankel_transform(medium, "layered", "layer", ZERO_FREQUENCY)[0] for medium in media])
+    spectra = np.array(
+        [hankel_transform(medium, "layered", "layer", NEAR_ZERO_FREQUENCY)[0] for medium in media]
+    )
     return (1.0 - normal_reflectance(media[0].eta)) * spectra @ rgb_weights(WAVELENGTHS_NM).T
 
 

@@ -11,18 +11,18 @@ from dermis.optics.diffusion.models import diffusion_profile
 from dermis.optics.equivalent_medium import equivalent_medium
 from dermis.optics.fits.gaussian import fit_gaussians
 from dermis.optics.gaussians import GaussianSum
-from dermis.optics.media import Layer, Medium, media
+from dermis.optics.media import Layer, Medium, published_media
 from dermis.optics.slabs import solve_slabs
 from dermis.optics.thin_parts import THICKNESS_ROWS, oblique_transmittance, solve_thin_parts
 
-BODY = media()["skin1"].with_eta(1.0)
+BODY = published_media()["skin1"].with_eta(1.0)
 REACH = 12.0
 DEPTH = REACH * np.linspace(0.0, 1.0, THICKNESS_ROWS) ** 2
 
 
 @pytest.fixture(scope="module")
 def profile() -> GaussianSum:
-    return fit_gaussians(diffusion_profile(BODY).rings(), 6, name="skin1").profile
+    return fit_gaussians(diffusion_profile(BODY).rings(), 6, profile_name="skin1").profile
 
 
 def test_a_profile_tells_its_medium(profile: GaussianSum) -> None:
@@ -51,7 +51,7 @@ def test_what_passes_from_any_direction(profile: GaussianSum) -> None:
 @pytest.mark.parametrize("eta", [1.0, 1.4])
 def test_amounts_are_those_of_slabs_cut_one_by_one(profile: GaussianSum, eta: float) -> None:
     """Expected values use twice as many cosines, and one solution per thickness."""
-    body = media()["skin1"].with_eta(eta)
+    body = published_media()["skin1"].with_eta(eta)
     made, layer = solve_thin_parts(body, profile.variance_mm2, REACH), body.layers[0]
     for c in range(3):
         albedo, extinction = float(layer.alpha_prime[c]), float(layer.sigma_t_prime[c])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dermis.base.errors import DermisError
-from dermis.environment.panorama import solid_angles
+from dermis.environment.panorama import texel_solid_angles
 from dermis.images.io import write_exr
 from dermis.scene.environment import Environment
 from dermis.scene.light_stage import light_stage, light_stage_weights
@@ -29,7 +29,9 @@ def test_weights_match_the_rotated_environment(tmp_path: Path) -> None:
     around = Environment(name=str(tmp_path / "spot.exr"), rotation_degrees=90.0, exposure=2.0)
     lights = light_stage(32)
     weights = light_stage_weights(lights, around)
-    assert np.allclose(weights.sum(axis=0), 2.0 * (sky * solid_angles(256, 512)[..., None]).sum(axis=(0, 1)))
+    assert np.allclose(
+        weights.sum(axis=0), 2.0 * (sky * texel_solid_angles(256, 512)[..., None]).sum(axis=(0, 1))
+    )
     brightest = -np.array(lights[int(weights[:, 0].argmax())].direction)
     assert brightest @ (0.0, 0.0, -1.0) > 0.9  # counter-clockwise seen from above
 

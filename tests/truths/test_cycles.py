@@ -21,11 +21,11 @@ from dermis.apps.truths.cycles import (
 from dermis.apps.truths.half_space import diffuse_albedo
 from dermis.apps.truths.path_traced import Lambertian, path_trace
 from dermis.base.errors import DermisError
-from dermis.optics.media import media
+from dermis.optics.media import published_media
 from dermis.scene.environment import Environment
 from dermis.scene.settings import Settings
 
-SKIN1 = media()["skin1"].with_eta(1.0)
+SKIN1 = published_media()["skin1"].with_eta(1.0)
 GREY = Lambertian((0.8, 0.5, 0.2))
 blender = pytest.mark.skipif(not os.environ.get(PYTHON_VARIABLE), reason=f"{PYTHON_VARIABLE} is not set")
 
@@ -51,7 +51,7 @@ def test_missing_blender_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Pat
 def test_unsupported_features_of_cycles_are_refused() -> None:
     scene = ball_scene(LIGHTS["point"])
     with pytest.raises(DermisError, match="expected one layer, for Cycles, but it has 3"):
-        cycles_render(scene, media()["dj3"])
+        cycles_render(scene, published_media()["dj3"])
     with pytest.raises(DermisError, match="method: expected one of random-walk, burley"):
         cycles_render(scene, SKIN1, method="gaussian")  # type: ignore[arg-type]
     with pytest.raises(DermisError, match="samples: expected a whole number from 1, but got 0"):

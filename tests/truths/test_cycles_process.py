@@ -14,10 +14,10 @@ from dermis.apps.truths.cycles import cycles_render, read_passes
 from dermis.apps.truths.path_traced import PathTraced
 from dermis.base.errors import DermisError
 from dermis.images.io import write_image
-from dermis.optics.media import media
+from dermis.optics.media import published_media
 from dermis.scene.settings import Settings
 
-SKIN1 = media()["skin1"].with_eta(1.0)
+SKIN1 = published_media()["skin1"].with_eta(1.0)
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Mesh, build_mesh
 from dermis.mesh.primitives import SKIN
-from dermis.optics.media import media
+from dermis.optics.media import published_media
 
 pytest.importorskip("mitsuba")
 RADII_MM = 0.6, 1.0, 3.0, 8.0
@@ -60,7 +60,7 @@ def leaving_fractions() -> np.ndarray:
     Paths start at a camera above the middle of the slab; those that leave within the radius meet the disc.
     """
     mi, head = load_mitsuba(), Head("slab", cube(), Maps())
-    medium = media()["dj3"].with_eta(1.0)
+    medium = published_media()["dj3"].with_eta(1.0)
     found = []
     with mitsuba_variant(mi, "scalar_rgb"):
         shapes, _ = layer_interfaces(mi, head, medium)
@@ -89,7 +89,7 @@ def leaving_fractions() -> np.ndarray:
 def test_nested_layers_agree_with_photon_counts() -> None:
     paths = leaving_fractions()
     edges = np.array([0.0, *RADII_MM])
-    runs = trace_medium(media()["dj3"].with_eta(1.0), PHOTONS, edges_mm=edges)
+    runs = trace_medium(published_media()["dj3"].with_eta(1.0), PHOTONS, edges_mm=edges)
     rings = np.array([run.reflectance * np.pi * np.diff(edges**2) for run in runs])
     total = np.array([run.total_reflectance for run in runs])
     np.testing.assert_allclose(paths[-1], total, rtol=0.01)

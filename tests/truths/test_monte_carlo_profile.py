@@ -6,14 +6,17 @@ import numpy as np
 import pytest
 
 from dermis.apps.truths.slab_mc import monte_carlo_profile
-from dermis.optics.media import Layer, Medium, media
+from dermis.optics.media import Layer, Medium, published_media
 from dermis.optics.tissue import load_tissue
 
 
 def test_relative_to_entering_light_in_rings() -> None:
     monte_carlo: list[tuple[int, int]] = []
     profile = monte_carlo_profile(
-        media()["dj3"], photons=40_000, seed=3, progress=lambda done, total: monte_carlo.append((done, total))
+        published_media()["dj3"],
+        photons=40_000,
+        seed=3,
+        progress=lambda done, total: monte_carlo.append((done, total)),
     )
     assert profile.total_error is not None and profile.standard_error is not None
     reference = np.array([0.47244, 0.38236, 0.28576])  # from 12 million photons, per entering power
@@ -26,9 +29,9 @@ def test_relative_to_entering_light_in_rings() -> None:
 
 def test_dropped_light_is_reported() -> None:
     """Without absorption some photons would never leave."""
-    lost = monte_carlo_profile(media()["spectralon"].channel(1), photons=2_000)
+    lost = monte_carlo_profile(published_media()["spectralon"].channel(1), photons=2_000)
     assert any("dropped" in text for text in lost.warnings)
-    assert not monte_carlo_profile(media()["skin1"].channel(0), photons=2_000).warnings
+    assert not monte_carlo_profile(published_media()["skin1"].channel(0), photons=2_000).warnings
 
 
 def test_light_beyond_the_rings_is_reported() -> None:

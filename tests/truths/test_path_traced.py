@@ -17,14 +17,14 @@ from dermis.base.errors import DermisError
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import plane, uv_sphere
-from dermis.optics.media import Layer, Medium, media
+from dermis.optics.media import Layer, Medium, published_media
 from dermis.scene.camera import Camera
 from dermis.scene.lights import PointLight
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
 ALBEDO = np.array([0.5, 0.8, 0.95])
-SKIN1 = media()["skin1"].with_eta(1.0)
+SKIN1 = published_media()["skin1"].with_eta(1.0)
 
 
 @pytest.fixture
@@ -163,7 +163,7 @@ def test_other_scenes_have_other_files(tmp_path: Path, monkeypatch: pytest.Monke
     for scene in scenes:
         path_trace(scene, SKIN1, 8, Settings(size=(4, 4)))
         path_trace(scene, Lambertian((0.5, 0.5, 0.5)), 8, Settings(size=(4, 4)))
-    path_trace(scenes[0], media()["skin2"].with_eta(1.0), 8, Settings(size=(4, 4)))
+    path_trace(scenes[0], published_media()["skin2"].with_eta(1.0), 8, Settings(size=(4, 4)))
     path_trace(scenes[0], SKIN1, 8, Settings(size=(4, 5)))
     assert len(list((tmp_path / "path-traced").iterdir())) == 6
 
@@ -187,7 +187,7 @@ def test_missing_mitsuba_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_invalid_options_are_refused() -> None:
     scene = ball_scene()
     with pytest.raises(DermisError, match=r"index-matched .*with_eta\(1.0\)"):
-        path_trace(scene, media()["skin1"], 8, SMALL)
+        path_trace(scene, published_media()["skin1"], 8, SMALL)
     with pytest.raises(DermisError, match="three channels"):
         path_trace(scene, SKIN1.channel(0), 8, SMALL)
     with pytest.raises(DermisError, match="samples: expected a whole number"):

@@ -13,10 +13,10 @@ from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere
 from dermis.optics.gaussians import GaussianSum
-from dermis.optics.media import media
+from dermis.optics.media import published_media
 
 BALL = Head("ball", uv_sphere(100.0, 12, 6), Maps())
-BODY = media()["skin1"].with_eta(1.0)
+BODY = published_media()["skin1"].with_eta(1.0)
 
 
 @pytest.fixture(scope="module")
@@ -53,5 +53,5 @@ def test_less_light_travels_far(profiles: dict[ModelName, GaussianSum]) -> None:
 def test_tables_are_the_default_where_available() -> None:
     with medium_scene(BALL, "laser", "ear", BODY) as (_, usual):
         assert usual.from_photons
-    with medium_scene(BALL, "laser", "ear", media()["dj3"].with_eta(1.0)) as (_, usual):
+    with medium_scene(BALL, "laser", "ear", published_media()["dj3"].with_eta(1.0)) as (_, usual):
         assert not usual.from_photons

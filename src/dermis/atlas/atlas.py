@@ -87,10 +87,12 @@ class Atlas:
         bc = self.barycentric[rows] / 65535.0
         return np.concatenate([1.0 - bc.sum(axis=-1, keepdims=True), bc], axis=-1)
 
-    def interpolate(self, mesh: Mesh, values: NDArray[np.floating], rows: slice = _ALL_ROWS) -> Doubles:
+    def interpolate(
+        self, mesh: Mesh, vertex_values: NDArray[np.floating], rows: slice = _ALL_ROWS
+    ) -> Doubles:
         """Interpolate a vertex attribute (v, c) at the surface points of the texels, (n, n, c).
 
         rows : rows of the map for which the attribute is interpolated
         """
-        corners = values[mesh.triangles[np.maximum(self.triangle[rows], 0)]].astype(float)
+        corners = vertex_values[mesh.triangles[np.maximum(self.triangle[rows], 0)]].astype(float)
         return np.asarray(np.einsum("yxk,yxkc->yxc", self.weights(rows), corners))

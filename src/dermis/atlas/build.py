@@ -15,15 +15,15 @@ from dermis.base.errors import refuse
 from dermis.base.progress import logged_step
 from dermis.mesh.mesh import Mesh
 
-LAYOUTS = ("mesh", "stitched", "unwrapped")
+ATLAS_LAYOUTS = ("mesh", "stitched", "unwrapped")
 MIN_ATLAS_SIZE = 64
-_CACHE_VERSION = 7  # increment when the result of `build_atlas` for a mesh changes
+_ATLAS_CACHE_VERSION = 7  # increment when the result of `build_atlas` for a mesh changes
 
 
-def build_atlas(mesh: Mesh, size: int, layout: str = "mesh", gutter_mm: float = GUTTER_MM) -> Atlas:
+def build_atlas(mesh: Mesh, atlas_side: int, layout: str = "mesh", gutter_mm: float = GUTTER_MM) -> Atlas:
     """Build the atlas of a mesh in one of three uv layouts.
 
-    size : texels along each side of the map
+    atlas_side : texels along each side of the map
     layout : "mesh" is the mesh's own uv; "stitched" moves the mesh's charts apart and adds gutters that
         continue the surface across the seams, unless there are too many charts for that; "unwrapped" replaces
         the mesh's uv by new charts
@@ -31,47 +31,51 @@ def build_atlas(mesh: Mesh, size: int, layout: str = "mesh", gutter_mm: float = 
 
     Raises DermisError for a size under 64 and for an unknown layout.
     """
-    if size < MIN_ATLAS_SIZE:
+    if atlas_side < MIN_ATLAS_SIZE:
         expected = f"a size of {MIN_ATLAS_SIZE} texels or more"
-        refuse("atlas", expected, f"it is {size}", "Choose --atlas 1024 or 2048")
-    if layout not in LAYOUTS:
-        refuse("layout", f"one of {', '.join(LAYOUTS)}", f"got {layout}", "Choose one of these")
+        refuse("atlas", expected, f"it is {atlas_side}", "Choose --atlas 1024 or 2048")
+    if layout not in ATLAS_LAYOUTS:
+        refuse("layout", f"one of {', '.join(ATLAS_LAYOUTS)}", f"got {layout}", "Choose one of these")
     if layout == "stitched":
         from dermis.atlas.stitched.build import build_stitched
 
-        return build_stitched(mesh, size, gutter_mm) or build_mesh_layout(mesh, size)
+        return build_stitched(mesh, atlas_side, gutter_mm) or build_mesh_layout(mesh, atlas_side)
     if layout == "unwrapped":
         from dermis.atlas.unwrap.unwrap import unwrap_mesh
 
-        return build_mesh_layout(unwrap_mesh(mesh), size)
-    return build_mesh_layout(mesh, size)
+        return build_mesh_layout(unwrap_mesh(mesh), atlas_side)
+    return build_mesh_layout(mesh, atlas_side)
 
 
-def cached_atlas(mesh: Mesh, size: int, layout: str = "mesh", gutter_mm: float = GUTTER_MM) -> Atlas:
+def cached_atlas(mesh: Mesh, atlas_side: int, layout: str = "mesh", gutter_mm: float = GUTTER_MM) -> Atlas:
     """Return the atlas that `build_atlas` builds, cached on disk if a cache folder is writable."""
     names = [field.name for field in fields(Atlas)]
 
     @logged_step("mapping the skin to the atlas")
     def make() -> Arrays:
-        atlas = build_atlas(mesh, size, layout, gutter_mm)
+        atlas = build_atlas(mesh, atlas_side, layout, gutter_mm)
         return {name: getattr(atlas, name) for name in names}
 
-    return Atlas(**load_or_make("atlas", _atlas_key(mesh, size, layout, gutter_mm), names, make))
+    return Atlas(**load_or_make("atlas", _atlas_key(mesh, atlas_side, layout, gutter_mm), names, make))
 
 
-def cached_occlusion(mesh: Mesh, atlas: Atlas, key: str, bake: Callable[[], Array]) -> Array:
-    """Return the occlusion that `bake` computes for the texels of an atlas, cached on disk.
+def cached_occlusion(mesh: Mesh, atlas: Atlas, inputs_key: str, bake_occlusion: Callable[[], Array]) -> Array:
+    """Return the occlusion that `bake_occlusion` computes for the texels of an atlas, cached on disk.
 
-    key : text that identifies all inputs of `bake` except the mesh and the atlas
+    inputs_key : text that identifies all inputs of `bake_occlusion` except the mesh and the atlas
     """
-    digest = hashlib.sha256(f"{_atlas_key(mesh, atlas.size)} {key}".encode())
+    digest = hashlib.sha256(f"{_atlas_key(mesh, atlas.size)} {inputs_key}".encode())
     for array in (mesh.positions, mesh.normals, atlas.corner_uv, np.packbits(atlas.lit)):
         digest.update(np.ascontiguousarray(array).tobytes())
-    return load_or_make("occlusion", digest.hexdigest()[:40], ["open"], lambda: {"open": bake()})["open"]
+    return load_or_make("occlusion", digest.hexdigest()[:40], ["open"], lambda: {"open": bake_occlusion()})[
+        "open"
+    ]
 
 
-def _atlas_key(mesh: Mesh, size: int, layout: str = "mesh", gutter_mm: float = GUTTER_MM) -> str:
-    digest = hashlib.sha256(f"{_CACHE_VERSION} {GUTTER_TEXELS} {size} {layout} {gutter_mm}".encode())
+def _atlas_key(mesh: Mesh, atlas_side: int, layout: str = "mesh", gutter_mm: float = GUTTER_MM) -> str:
+    digest = hashlib.sha256(
+        f"{_ATLAS_CACHE_VERSION} {GUTTER_TEXELS} {atlas_side} {layout} {gutter_mm}".encode()
+    )
     digest.update(repr([material.kind for material in mesh.materials]).encode())
     for array in (mesh.material, mesh.positions, mesh.uv, mesh.triangles, mesh.dpdu, mesh.dpdv, mesh.point):
         digest.update(np.ascontiguousarray(array).tobytes())

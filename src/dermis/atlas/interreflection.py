@@ -24,16 +24,16 @@ CELLS_PER_SIDE = 128
 SAMPLES_PER_PATCH = 8
 """Number of sample points of a patch, at which its radiosity is computed."""
 # Number of directions of parallel lines; fewest and most lines along a bundle's side.
-LINE_BUNDLES, LINES_PER_SIDE = 128, (96, 256)
-_TRIAL_BUNDLES, _TRIAL_LINES = 12, 64  # for a test whether any skin faces other skin
-_CACHE_VERSION = 5  # increment when `compute_form_factors` gives other results
-_MAX_TRACED_TRIANGLES = 300_000  # above this, points closer than _MERGED_LINES are merged
-_MERGED_LINES = 1.5  # distance below which points are merged, in spacings of adjacent lines
+LINE_BUNDLE_COUNT, LINES_PER_SIDE_RANGE = 128, (96, 256)
+_TRIAL_BUNDLE_COUNT, _TRIAL_LINES_PER_SIDE = 12, 64  # for a test whether any skin faces other skin
+_FORM_FACTOR_CACHE_VERSION = 5  # increment when `compute_form_factors` gives other results
+_MAX_TRACED_TRIANGLES = 300_000  # above this, points closer than _MERGE_DISTANCE_LINES are merged
+_MERGE_DISTANCE_LINES = 1.5  # distance below which points are merged, in spacings of adjacent lines
 _MIN_FORM_FACTOR = 1e-3  # smaller form factors are dropped, and the remaining ones of a cell scaled up
-_SEED = 20
-_MAX_THREADS = 8
-_TRIANGLES_AT_ONCE = 1 << 14  # limits the memory of each thread
-_LINES_PER_ROW = 4096  # stride of line indices: more than the lines along a bundle's side
+_LINE_SEED = 20
+_MAX_TRACING_THREADS = 8
+_TRIANGLES_PER_BATCH = 1 << 14  # limits the memory of each thread
+_LINE_INDEX_STRIDE = 4096  # stride of line indices: more than the lines along a bundle's side
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,8 +78,8 @@ def cached_form_factors(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> FormFact
         return FormFactors(**shipped)
     cut_out = [np.packbits(mesh.cut_out)] if mesh.cut_out.any() else []
     digest = hashlib.sha256(
-        f"{_CACHE_VERSION} {CELLS_PER_SIDE} {SAMPLES_PER_PATCH} "
-        f"{LINE_BUNDLES} {LINES_PER_SIDE} {_MIN_FORM_FACTOR}".encode()
+        f"{_FORM_FACTOR_CACHE_VERSION} {CELLS_PER_SIDE} {SAMPLES_PER_PATCH} "
+        f"{LINE_BUNDLE_COUNT} {LINES_PER_SIDE_RANGE} {_MIN_FORM_FACTOR}".encode()
     )
     for array in (mesh.positions, mesh.triangles, corner_uv, np.packbits(mapped), *cut_out):
         digest.update(np.ascontiguousarray(array).tobytes())
@@ -97,7 +97,8 @@ def form_factor_table(mapped: Mask) -> str:
 
     mapped : (f,) mask of triangles that have texels
     """
-    return f"form factors {_CACHE_VERSION} {hashlib.sha256(np.packbits(mapped).tobytes()).hexdigest()[:16]}"
+    mapped_hash = hashlib.sha256(np.packbits(mapped).tobytes()).hexdigest()[:16]
+    return f"form factors {_FORM_FACTOR_CACHE_VERSION} {mapped_hash}"
 
 
 def compute_form_factors(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> FormFactors:
@@ -111,36 +112,39 @@ def compute_form_factors(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> FormFac
     mapped : (f,) mask of triangles that have texels; other triangles block light and emit none, but triangles
         with an opacity map, such as hair cards, are ignored
     """
-    facing, line_counts = _trace_lines(mesh, corner_uv, mapped, _TRIAL_BUNDLES, _TRIAL_LINES)
+    facing, line_counts = _trace_lines(mesh, corner_uv, mapped, _TRIAL_BUNDLE_COUNT, _TRIAL_LINES_PER_SIDE)
     if len(facing):
-        lines = int(np.clip(np.sqrt(len(mesh.triangles)), *LINES_PER_SIDE))
-        facing, line_counts = _trace_lines(mesh, corner_uv, mapped, LINE_BUNDLES, lines)
+        lines = int(np.clip(np.sqrt(len(mesh.triangles)), *LINES_PER_SIDE_RANGE))
+        facing, line_counts = _trace_lines(mesh, corner_uv, mapped, LINE_BUNDLE_COUNT, lines)
     return _form_factors(facing, line_counts, mesh, corner_uv, mapped)
 
 
 def _trace_lines(
-    mesh: Mesh, corner_uv: Floats, mapped: Mask, bundles: int, lines: int
+    mesh: Mesh, corner_uv: Floats, mapped: Mask, bundle_count: int, lines_per_side: int
 ) -> tuple[Index, Doubles]:
     """Return pairs of cells (m, 2) that lines connect through the air, and how many lines left each cell.
 
-    bundles : number of bundles of parallel lines, one per direction
-    lines : number of lines along each side of a bundle
+    bundle_count : number of bundles of parallel lines, one per direction
+    lines_per_side : number of lines along each side of a bundle
     """
     blocks = ~mesh.cut_out
     corner_uv, mapped = corner_uv[blocks], mapped[blocks]
     used, corner = np.unique(mesh.triangles[blocks], return_inverse=True)
     vertices, corner = mesh.positions[used].astype(np.float64), corner.reshape(-1, 3)
     vertices -= 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
-    per_mm = 0.5 * lines / (float(np.linalg.norm(vertices, axis=1).max()) or 1.0)
+    per_mm = 0.5 * lines_per_side / (float(np.linalg.norm(vertices, axis=1).max()) or 1.0)
     if len(corner) > _MAX_TRACED_TRIANGLES:
-        vertices, corner = merge_near_points(vertices, corner, _MERGED_LINES / per_mm)
+        vertices, corner = merge_near_points(vertices, corner, _MERGE_DISTANCE_LINES / per_mm)
         proper = np.flatnonzero((corner != np.roll(corner, 1, axis=1)).all(axis=1))
         corner, corner_uv, mapped = corner[proper], corner_uv[proper], mapped[proper]
     x, y, z = np.ascontiguousarray(vertices.T)[:, :, None]
-    rng = np.random.default_rng(_SEED)
+    rng = np.random.default_rng(_LINE_SEED)
     bundle_axes = [
-        (per_mm * _line_axes(direction, rng.uniform(0.0, 2.0 * np.pi)), lines + rng.uniform(-0.5, 0.5, 2))
-        for direction in _hemisphere_directions(bundles)
+        (
+            per_mm * _line_axes(direction, rng.uniform(0.0, 2.0 * np.pi)),
+            lines_per_side + rng.uniform(-0.5, 0.5, 2),
+        )
+        for direction in _hemisphere_directions(bundle_count)
     ]
 
     def trace(bundle: tuple[Doubles, Doubles]) -> tuple[Index, Index]:
@@ -148,8 +152,8 @@ def _trace_lines(
         # a matrix product would depend on the number of threads in its last bits
         points = x * axes[:, 0] + y * axes[:, 1] + z * axes[:, 2] + np.append(offset, 0.0)
         met = []
-        for first in range(0, max(len(corner), 1), _TRIANGLES_AT_ONCE):
-            part = slice(first, first + _TRIANGLES_AT_ONCE)
+        for first in range(0, max(len(corner), 1), _TRIANGLES_PER_BATCH):
+            part = slice(first, first + _TRIANGLES_PER_BATCH)
             line, depth, outward, triangle, weights = intersect_lines(points[corner[part]])
             cell = np.where(mapped[part][triangle], _cell_index(corner_uv[part][triangle], weights), -1)
             met.append((line, depth, outward, cell))
@@ -157,7 +161,7 @@ def _trace_lines(
         return _facing_cells(line, depth, outward, cell), cell[cell >= 0]
 
     line_counts, facing = np.zeros(CELLS_PER_SIDE * CELLS_PER_SIDE), [np.zeros((0, 2), np.int64)]
-    with ThreadPoolExecutor(min(os.cpu_count() or 1, _MAX_THREADS)) as pool:
+    with ThreadPoolExecutor(min(os.cpu_count() or 1, _MAX_TRACING_THREADS)) as pool:
         for pairs, cells in pool.map(trace, bundle_axes):
             facing.append(pairs)
             line_counts += np.bincount(cells, minlength=len(line_counts))
@@ -186,31 +190,33 @@ def intersect_lines(points: Doubles) -> tuple[Index, Doubles, Mask, Index, Doubl
     triangle, area = triangle[hit], area[hit]
     weights = np.stack([a[hit], b[hit], c[hit]], axis=1) / area[:, None]
     depth_a, depth_b, depth_c = weights.T * z[:, triangle]
-    line = (line_y[hit] * _LINES_PER_ROW + line_x[hit]).astype(np.int64)
+    line = (line_y[hit] * _LINE_INDEX_STRIDE + line_x[hit]).astype(np.int64)
     return line, depth_a + depth_b + depth_c, area > 0.0, triangle, weights
 
 
-def _integer_range(corner: Doubles) -> tuple[Doubles, Index]:
+def _integer_range(corner_coordinates: Doubles) -> tuple[Doubles, Index]:
     """Return the lowest integer in each triangle's extent along one axis, and the number of integers in it.
 
-    corner : (3, f) coordinate of the triangles' corners along this axis
+    corner_coordinates : (3, f) coordinate of the triangles' corners along this axis
     """
-    low = np.ceil(np.minimum(np.minimum(corner[0], corner[1]), corner[2]))
-    high = np.floor(np.maximum(np.maximum(corner[0], corner[1]), corner[2]))
+    low = np.ceil(np.minimum(np.minimum(corner_coordinates[0], corner_coordinates[1]), corner_coordinates[2]))
+    high = np.floor(
+        np.maximum(np.maximum(corner_coordinates[0], corner_coordinates[1]), corner_coordinates[2])
+    )
     return low, np.maximum(high - low + 1, 0).astype(np.int64)
 
 
-def _facing_cells(line: Index, depth: Doubles, outward: Mask, cell: Index) -> Index:
+def _facing_cells(line_index: Index, depth: Doubles, outward: Mask, cell_index: Index) -> Index:
     """Return pairs of cells (m, 2): the cell that a line leaves, and the cell that it meets next.
 
     Each line is followed in both directions; a segment that leads to no other surface is omitted. The second
     cell is -1 where the surface has no texels.
     """
-    order = np.lexsort((depth, line))
-    line, outward, cell = line[order], outward[order], cell[order]
+    order = np.lexsort((depth, line_index))
+    line_index, outward, cell_index = line_index[order], outward[order], cell_index[order]
     # Light leaves a body where the surface faces along the line, and meets the next one where it faces back.
-    through_air = (line[1:] == line[:-1]) & outward[:-1] & ~outward[1:]
-    pair = np.stack([cell[:-1][through_air], cell[1:][through_air]], axis=1)
+    through_air = (line_index[1:] == line_index[:-1]) & outward[:-1] & ~outward[1:]
+    pair = np.stack([cell_index[:-1][through_air], cell_index[1:][through_air]], axis=1)
     return np.concatenate([pair, pair[:, ::-1]])
 
 
@@ -220,38 +226,38 @@ def _cell_index(corner_uv: Floats, weights: Doubles) -> Index:
     return np.asarray(y * CELLS_PER_SIDE + x)
 
 
-def _hemisphere_directions(count: int) -> Doubles:
-    """Return (count, 3) unit vectors that are evenly distributed over a hemisphere."""
-    index = np.arange(count) + 0.5
-    z, phi = index / count, np.pi * (1.0 + np.sqrt(5.0)) * index
+def _hemisphere_directions(direction_count: int) -> Doubles:
+    """Return (direction_count, 3) unit vectors that are evenly distributed over a hemisphere."""
+    index = np.arange(direction_count) + 0.5
+    z, phi = index / direction_count, np.pi * (1.0 + np.sqrt(5.0)) * index
     r = np.sqrt(1.0 - z**2)
     return np.stack([r * np.cos(phi), r * np.sin(phi), z], axis=-1)
 
 
-def _line_axes(direction: Doubles, angle: float) -> Doubles:
+def _line_axes(direction: Doubles, roll_angle: float) -> Doubles:
     """Return the right, up and forward axes (3, 3) of a bundle of lines; forward is `direction`.
 
-    angle : angle by which right and up are rolled about `direction` [rad]
+    roll_angle : angle by which right and up are rolled about `direction` [rad]
     """
     right = np.cross(direction, np.eye(3)[np.abs(direction).argmin()])
     right /= np.linalg.norm(right)
     up = np.cross(direction, right)
-    c, s = np.cos(angle), np.sin(angle)
+    c, s = np.cos(roll_angle), np.sin(roll_angle)
     return np.stack([c * right + s * up, c * up - s * right, direction])
 
 
 def _form_factors(
-    facing: Index, line_counts: Doubles, mesh: Mesh, corner_uv: Floats, mapped: Mask
+    facing_cells: Index, line_counts: Doubles, mesh: Mesh, corner_uv: Floats, mapped: Mask
 ) -> FormFactors:
     """Return the form factors that result from counts of lines between cells.
 
-    facing : (m, 2) pairs of cells that lines connect
+    facing_cells : (m, 2) pairs of cells that lines connect
     line_counts : (CELLS_PER_SIDE^2,) number of lines that left each cell
     """
     patch_of, triangle, weights = _divide_into_patches(mesh, corner_uv, mapped)
     count = len(triangle) // SAMPLES_PER_PATCH
-    has_texels = (facing >= 0).all(axis=1)
-    cell, target = facing[has_texels, 0], patch_of[facing[has_texels, 1]]
+    has_texels = (facing_cells >= 0).all(axis=1)
+    cell, target = facing_cells[has_texels, 0], patch_of[facing_cells[has_texels, 1]]
     patch, known = patch_of[cell], target >= 0
     left_patch = np.bincount(patch_of[patch_of >= 0], line_counts[patch_of >= 0], count).astype(np.float64)
     usual = np.median(line_counts[line_counts > 0]) if (line_counts > 0).any() else 1.0
@@ -266,11 +272,11 @@ def _form_factors(
     )
 
 
-def _nearest_patch(patch_of: Index) -> Words:
+def _nearest_patch(patch_of_cell: Index) -> Words:
     """Return the patch that contains each cell (CELLS_PER_SIDE^2,), or the patch nearest to it in uv."""
     from scipy.ndimage import distance_transform_edt
 
-    known = patch_of.reshape(CELLS_PER_SIDE, CELLS_PER_SIDE)
+    known = patch_of_cell.reshape(CELLS_PER_SIDE, CELLS_PER_SIDE)
     if not (known >= 0).any():
         return np.zeros(CELLS_PER_SIDE * CELLS_PER_SIDE, np.uint32)
     nearest = distance_transform_edt(known < 0, return_distances=False, return_indices=True)
@@ -278,24 +284,24 @@ def _nearest_patch(patch_of: Index) -> Words:
 
 
 def _sparse_rows(
-    row: Index, target: Index, line_counts: Doubles, patches: int
+    row_index: Index, target_patch: Index, line_counts: Doubles, patch_count: int
 ) -> tuple[Words, Words, Floats]:
     """Return form factors as rows of a sparse matrix: start of each row, patch indices, and factors.
 
-    row : (m,) index of the cell or patch that each line left
-    target : (m,) index of the patch that the line met next
+    row_index : (m,) index of the cell or patch that each line left
+    target_patch : (m,) index of the patch that the line met next
     line_counts : (r,) number of lines that left each cell or patch
-    patches : number of patches
+    patch_count : number of patches
     """
-    entry, lines = np.unique(row * max(patches, 1) + target, return_counts=True)
-    row, column = entry // max(patches, 1), entry % max(patches, 1)
-    factor = lines / line_counts[row]
+    entry, lines = np.unique(row_index * max(patch_count, 1) + target_patch, return_counts=True)
+    row_index, column = entry // max(patch_count, 1), entry % max(patch_count, 1)
+    factor = lines / line_counts[row_index]
     large = factor >= _MIN_FORM_FACTOR
     total, total_large = (
-        np.bincount(row[some], factor[some], len(line_counts)) for some in (slice(None), large)
+        np.bincount(row_index[some], factor[some], len(line_counts)) for some in (slice(None), large)
     )
-    factor = factor[large] * (total / np.maximum(total_large, 1e-12))[row[large]]
-    first = np.concatenate([[0], np.cumsum(np.bincount(row[large], minlength=len(line_counts)))])
+    factor = factor[large] * (total / np.maximum(total_large, 1e-12))[row_index[large]]
+    first = np.concatenate([[0], np.cumsum(np.bincount(row_index[large], minlength=len(line_counts)))])
     return first.astype(np.uint32), column[large].astype(np.uint32), factor.astype(np.float32)
 
 
@@ -331,7 +337,7 @@ def _sample_points(mesh: Mesh, mapped: Mask) -> tuple[Index, Doubles, Doubles]:
         CELLS_PER_SIDE * CELLS_PER_SIDE * SAMPLES_PER_PATCH * area / max(area.sum(), 1e-30)
     ).astype(np.int64)
     triangle = np.repeat(np.flatnonzero(mapped), each[mapped])
-    rng, count = np.random.default_rng(_SEED), each[triangle]
+    rng, count = np.random.default_rng(_LINE_SEED), each[triangle]
     u, v = np.sqrt(rng.random(len(triangle))), rng.random(len(triangle))
     weights = np.stack([1.0 - u, u * (1.0 - v), u * v], axis=1)
     return triangle, weights, rng.exponential(size=len(triangle)) * count / np.maximum(area[triangle], 1e-30)

@@ -12,8 +12,8 @@ from dermis.base.arrays import Doubles, Index, Ints, Mask
 from dermis.mesh.geometry import MIN_UV_CROSS, cross_2d, edges, expand_runs, label_components, uv_cross, weld
 from dermis.mesh.mesh import Mesh
 
-_EDGE_TOLERANCE = 1e-6  # texel centres this far outside an edge still count as covered [texel]
-_MIN_CHART_TEXELS = 4.0  # area of the smallest chart in which light can be blurred
+_EDGE_TOLERANCE_TEXELS = 1e-6  # texel centres this far outside an edge still count as covered [texel]
+_MIN_BLURRED_CHART_TEXELS = 4.0  # area of the smallest chart in which light can be blurred
 
 
 def find_charts(mesh: Mesh) -> Ints:
@@ -44,49 +44,49 @@ def chart_uv_area(mesh: Mesh, chart: Ints) -> Doubles:
     return np.asarray(np.bincount(chart, weights=triangle_uv_area(mesh)), dtype=np.float64)
 
 
-def usable_triangles(mesh: Mesh, size: int, min_texels: float = _MIN_CHART_TEXELS) -> Mask:
-    """Return the mask (f,) of triangles large enough in uv for the diffusion of light in texture space.
+def usable_triangles(mesh: Mesh, map_side: int, min_texels: float = _MIN_BLURRED_CHART_TEXELS) -> Mask:
+    """Return the mask (f,) of triangles in whose texels light can be diffused.
 
     The mask excludes triangles without uv area and all triangles of charts with less than `min_texels`
     texels.
 
-    size : texels along each side of the map
+    map_side : texels along each side of the map
     min_texels : smallest uv area of a chart [texel]
     """
     chart = find_charts(mesh)
-    large_enough = chart_uv_area(mesh, chart) * size**2 >= min_texels
+    large_enough = chart_uv_area(mesh, chart) * map_side**2 >= min_texels
     return np.asarray(large_enough[chart] & (2 * triangle_uv_area(mesh) > MIN_UV_CROSS))
 
 
-def texel_corners(mesh: Mesh, size: int, triangle: NDArray[np.integer]) -> Doubles:
+def texel_corners(mesh: Mesh, map_side: int, triangle_index: NDArray[np.integer]) -> Doubles:
     """Return the uv of the selected triangles' corners in texels (t, 3, 2), integers at texel centres.
 
-    triangle : (t,) indices of the triangles
+    triangle_index : (t,) indices of the triangles
     """
-    return np.asarray(mesh.uv[mesh.triangles[triangle]].astype(np.float64) * size - 0.5)
+    return np.asarray(mesh.uv[mesh.triangles[triangle_index]].astype(np.float64) * map_side - 0.5)
 
 
-def rasterise(mesh: Mesh, size: int, triangle: NDArray[np.integer]) -> tuple[Index, Index]:
+def rasterise(mesh: Mesh, map_side: int, triangle_index: NDArray[np.integer]) -> tuple[Index, Index]:
     """Rasterise triangles in uv; return flat indices of covered texels, and the triangle that covers each.
 
-    size : texels along each side of the map
-    triangle : (t,) indices of the triangles
+    map_side : texels along each side of the map
+    triangle_index : (t,) indices of the triangles
     """
-    texel, which = covered_texels(texel_corners(mesh, size, triangle), (size, size))
-    return texel, triangle[which].astype(np.int64)
+    texel, which = covered_texels(texel_corners(mesh, map_side, triangle_index), (map_side, map_side))
+    return texel, triangle_index[which].astype(np.int64)
 
 
 def covered_texels(
-    corners: Doubles, shape: tuple[int, int], margin: float = -_EDGE_TOLERANCE
+    corners: Doubles, grid_shape: tuple[int, int], margin: float = -_EDGE_TOLERANCE_TEXELS
 ) -> tuple[Index, Index]:
     """Return the flat index of each texel centre in a triangle, and the row of that triangle in `corners`.
 
     corners : (t, 3, 2) corners of the triangles [texel], integers at texel centres
-    shape : height and width of the grid of texels
+    grid_shape : height and width of the grid of texels
     margin : smallest distance of a covered centre from the edges, along rows and columns; if negative,
         centres just outside count as covered [texel]
     """
-    height, width = shape
+    height, width = grid_shape
     low, high = corners[..., 1].min(axis=1), corners[..., 1].max(axis=1)
     top, bottom = _integers_between(low, high, height, margin)
     which, y = expand_runs(top, np.maximum(bottom - top + 1, 0))
@@ -95,10 +95,10 @@ def covered_texels(
     return y[span] * width + x, which[span]
 
 
-def _integers_between(low: Doubles, high: Doubles, size: int, margin: float) -> tuple[Index, Index]:
-    """Return the first and last integer from low + margin to high - margin, limited to 0 .. size - 1."""
-    first = np.clip(np.ceil(low + margin), 0, size).astype(np.int64)
-    return first, np.clip(np.floor(high - margin), -1, size - 1).astype(np.int64)
+def _integers_between(low: Doubles, high: Doubles, grid_side: int, margin: float) -> tuple[Index, Index]:
+    """Return the first and last integer from low + margin to high - margin, limited to the grid."""
+    first = np.clip(np.ceil(low + margin), 0, grid_side).astype(np.int64)
+    return first, np.clip(np.floor(high - margin), -1, grid_side - 1).astype(np.int64)
 
 
 def _row_interval(corners: Doubles, triangle: Index, y: Index) -> tuple[Doubles, Doubles]:
@@ -126,21 +126,21 @@ def _row_interval(corners: Doubles, triangle: Index, y: Index) -> tuple[Doubles,
     return np.where(np.isfinite(lowest), lowest, 1.0), np.where(np.isfinite(highest), highest, 0.0)
 
 
-def build_mesh_layout(mesh: Mesh, size: int) -> Atlas:
+def build_mesh_layout(mesh: Mesh, atlas_side: int) -> Atlas:
     """Build the atlas of a mesh in the mesh's own uv layout, the layout of the mesh's texture maps."""
     chart = find_charts(mesh)
     skin = np.array([material.kind == "skin" for material in mesh.materials])
-    usable = usable_triangles(mesh, size) & skin[mesh.material]
-    texel, triangle = rasterise(mesh, size, np.flatnonzero(usable))
-    mapped = usable & ~_overlapped_charts(chart, texel, triangle, size)
-    owner, hidden = _assign_texels(mesh, mapped, texel, triangle, size)
+    usable = usable_triangles(mesh, atlas_side) & skin[mesh.material]
+    texel, triangle = rasterise(mesh, atlas_side, np.flatnonzero(usable))
+    mapped = usable & ~_overlapped_charts(chart, texel, triangle, atlas_side)
+    owner, hidden = _assign_texels(mesh, mapped, texel, triangle, atlas_side)
     mapped &= ~hidden
     for _ in range(GUTTER_TEXELS):
-        owner = _dilate_owners(owner)
-    mapped &= _interpolable_triangles(mesh, size, owner)
-    barycentric = _texel_weights(mesh, size, owner)
+        owner = _dilate_texel_triangles(owner)
+    mapped &= _interpolable_triangles(mesh, atlas_side, owner)
+    barycentric = _texel_weights(mesh, atlas_side, owner)
     chart_map = np.where(owner >= 0, chart[np.maximum(owner, 0)], -1)
-    stretch, shear = _texel_metric(mesh, size, owner, barycentric)
+    stretch, shear = _texel_metric(mesh, atlas_side, owner, barycentric)
     corner_uv = mesh.uv[mesh.triangles]
     none = np.zeros((0, 2), np.uint16)
     return Atlas(
@@ -155,27 +155,33 @@ def build_mesh_layout(mesh: Mesh, size: int) -> Atlas:
         outside=none,
         border_triangle=np.zeros(0, np.int32),
         border_weights=none,
-        texels_per_uv=np.full(len(corner_uv), size, np.float32),
+        texels_per_uv=np.full(len(corner_uv), atlas_side, np.float32),
         mapped=mapped,
     )
 
 
-def _overlapped_charts(chart: NDArray[np.integer], texel: Index, triangle: Index, size: int) -> Mask:
+def _overlapped_charts(
+    triangle_chart: NDArray[np.integer], texel: Index, triangle: Index, atlas_side: int
+) -> Mask:
     """Return the mask (f,) of triangles in charts whose texels are mostly covered by a larger chart.
 
     texel, triangle : (k,) flat texel index and triangle index of each covered texel centre
     """
-    count = int(chart.max()) + 1
-    area = np.bincount(chart[triangle], minlength=count)
-    order = np.argsort(area[chart[triangle]], kind="stable")  # the largest chart writes last and wins
-    winner = np.full(size * size, -1, dtype=np.int64)
-    winner[texel[order]] = chart[triangle[order]]
-    own = np.bincount(chart[triangle][winner[texel] == chart[triangle]], minlength=count)
+    count = int(triangle_chart.max()) + 1
+    area = np.bincount(triangle_chart[triangle], minlength=count)
+    order = np.argsort(
+        area[triangle_chart[triangle]], kind="stable"
+    )  # the largest chart writes last and wins
+    winner = np.full(atlas_side * atlas_side, -1, dtype=np.int64)
+    winner[texel[order]] = triangle_chart[triangle[order]]
+    own = np.bincount(triangle_chart[triangle][winner[texel] == triangle_chart[triangle]], minlength=count)
     hidden: Mask = own < 0.5 * np.maximum(area, 1)
-    return np.asarray(hidden[chart])
+    return np.asarray(hidden[triangle_chart])
 
 
-def _assign_texels(mesh: Mesh, mapped: Mask, texel: Index, triangle: Index, size: int) -> tuple[Ints, Mask]:
+def _assign_texels(
+    mesh: Mesh, mapped: Mask, texel: Index, triangle: Index, atlas_side: int
+) -> tuple[Ints, Mask]:
     """Return the triangle that owns each texel, and the mask (f,) of triangles that own few of their texels.
 
     Where a chart is folded onto itself, the triangles that are not mirrored in uv own the texels.
@@ -185,7 +191,7 @@ def _assign_texels(mesh: Mesh, mapped: Mask, texel: Index, triangle: Index, size
     is_mapped = mapped[triangle]
     texel, triangle = texel[is_mapped], triangle[is_mapped]
     order = np.argsort(uv_cross(mesh.uv[mesh.triangles])[triangle] < 0, kind="stable")
-    owner: Ints = np.full((size, size), -1, dtype=np.int32)
+    owner: Ints = np.full((atlas_side, atlas_side), -1, dtype=np.int32)
     owner.ravel()[texel[order]] = triangle[order]
     count = len(mapped)
     area = np.bincount(triangle, minlength=count)
@@ -193,38 +199,40 @@ def _assign_texels(mesh: Mesh, mapped: Mask, texel: Index, triangle: Index, size
     return owner, own < 0.5 * area
 
 
-def _dilate_owners(owner: Ints) -> Ints:
+def _dilate_texel_triangles(texel_triangle: Ints) -> Ints:
     """Assign to each empty texel the triangle of one of its eight neighbours, direct neighbours first."""
-    dilated = owner.copy()
-    padded = np.pad(owner, 1, constant_values=-1)
-    n = len(owner)
+    dilated = texel_triangle.copy()
+    padded = np.pad(texel_triangle, 1, constant_values=-1)
+    n = len(texel_triangle)
     for dy, dx in ((0, -1), (0, 1), (-1, 0), (1, 0), (-1, -1), (-1, 1), (1, -1), (1, 1)):
         neighbour = padded[1 + dy : 1 + dy + n, 1 + dx : 1 + dx + n]
         np.copyto(dilated, neighbour, where=(dilated < 0) & (neighbour >= 0))
     return dilated
 
 
-def _interpolable_triangles(mesh: Mesh, size: int, owner: Ints) -> Mask:
+def _interpolable_triangles(mesh: Mesh, atlas_side: int, texel_triangle: Ints) -> Mask:
     """Return the mask (f,) of triangles around whose corners all texels have an owner.
 
     Bilinear interpolation at a corner reads the four texels around it, some of which may be empty at slivers.
     """
-    low = np.floor(texel_corners(mesh, size, np.arange(len(mesh.triangles)))).astype(np.int64)
+    low = np.floor(texel_corners(mesh, atlas_side, np.arange(len(mesh.triangles)))).astype(np.int64)
     found = np.ones(len(low), dtype=bool)
     for offset in ((0, 0), (1, 0), (0, 1), (1, 1)):
-        x, y = np.moveaxis(np.clip(low + offset, 0, size - 1), -1, 0)
-        found &= (owner[y, x] >= 0).all(axis=1)
+        x, y = np.moveaxis(np.clip(low + offset, 0, atlas_side - 1), -1, 0)
+        found &= (texel_triangle[y, x] >= 0).all(axis=1)
     return found
 
 
-def _texel_weights(mesh: Mesh, size: int, owner: Ints) -> NDArray[np.uint16]:
+def _texel_weights(mesh: Mesh, atlas_side: int, texel_triangle: Ints) -> NDArray[np.uint16]:
     """Return the barycentric weights at each texel centre, (n, n, 2) [1/65535].
 
     A gutter texel has the weights of the nearest point of its triangle.
     """
-    y, x = np.nonzero(owner >= 0)
-    weights = barycentric_weights(texel_corners(mesh, size, owner[y, x]), np.column_stack((x, y)))
-    packed = np.zeros((size, size, 2), dtype=np.uint16)
+    y, x = np.nonzero(texel_triangle >= 0)
+    weights = barycentric_weights(
+        texel_corners(mesh, atlas_side, texel_triangle[y, x]), np.column_stack((x, y))
+    )
+    packed = np.zeros((atlas_side, atlas_side, 2), dtype=np.uint16)
     packed[y, x] = np.floor(weights * 65535.0).astype(np.uint16)
     return packed
 
@@ -245,31 +253,31 @@ def barycentric_weights(corners: Doubles, points: NDArray[Any]) -> Doubles:
 
 
 def _texel_metric(
-    mesh: Mesh, size: int, owner: Ints, barycentric: NDArray[np.uint16]
+    mesh: Mesh, atlas_side: int, texel_triangle: Ints, barycentric: NDArray[np.uint16]
 ) -> tuple[NDArray[np.float16], NDArray[np.float16]]:
     """Return each texel's stretch (n, n, 2) along u and v [1/mm], and shear (n, n), as defined in `Atlas`.
 
     Both are interpolated from the derivatives dp/du and dp/dv at the vertices.
     """
-    y, x = np.nonzero(owner >= 0)
-    corners = mesh.triangles[owner[y, x]]
+    y, x = np.nonzero(texel_triangle >= 0)
+    corners = mesh.triangles[texel_triangle[y, x]]
     b = barycentric[y, x] / np.float32(65535)
     weights = np.stack([1 - b[:, 0] - b[:, 1], b[:, 0], b[:, 1]])
     du, dv = (np.linalg.norm(d, axis=1) for d in (mesh.dpdu, mesh.dpdv))
     cosine = (mesh.dpdu * mesh.dpdv).sum(axis=1) / np.maximum(du * dv, 1e-12)
     corner = np.stack([du, dv, cosine], axis=-1)
     interpolated = sum(weights[k][:, None] * corner[corners[:, k]] for k in range(3))
-    stretch = np.zeros((size, size, 2), dtype=np.float16)
-    stretch[y, x] = np.clip(size / np.maximum(interpolated[:, :2], 1e-3), 0.0, 6e4)
-    shear = np.zeros((size, size), dtype=np.float16)
+    stretch = np.zeros((atlas_side, atlas_side, 2), dtype=np.float16)
+    stretch[y, x] = np.clip(atlas_side / np.maximum(interpolated[:, :2], 1e-3), 0.0, 6e4)
+    shear = np.zeros((atlas_side, atlas_side), dtype=np.float16)
     shear[y, x] = np.clip(interpolated[:, 2], -MAX_SHEAR, MAX_SHEAR)
     return stretch, shear
 
 
-def _edge_distance(chart: Ints) -> NDArray[np.uint16]:
+def _edge_distance(texel_chart: Ints) -> NDArray[np.uint16]:
     """Return the distances (n, n, 4) to the left, right, top and bottom edge of the chart [texel]."""
-    left, right = run_lengths(np.pad(chart[:, 1:] == chart[:, :-1], ((0, 0), (1, 0))))
-    up, down = run_lengths(np.pad(chart.T[:, 1:] == chart.T[:, :-1], ((0, 0), (1, 0))))
+    left, right = run_lengths(np.pad(texel_chart[:, 1:] == texel_chart[:, :-1], ((0, 0), (1, 0))))
+    up, down = run_lengths(np.pad(texel_chart.T[:, 1:] == texel_chart.T[:, :-1], ((0, 0), (1, 0))))
     return np.stack((left, right, up.T, down.T), axis=-1).astype(np.uint16)
 
 

@@ -12,26 +12,28 @@ from numpy.typing import NDArray
 from dermis.base.arrays import Doubles
 from dermis.mesh.mesh import Mesh
 
-_FINGERPRINT = "fingerprint"
-_SAMPLED_VERTICES = 64  # vertices whose positions are compared
-_TOLERANCE_MM = 1e-4  # processors differ in the last bits of a position
+_FINGERPRINT_ARRAY_NAME = "fingerprint"
+_COMPARED_VERTEX_COUNT = 64  # vertices whose positions are compared
+_POSITION_TOLERANCE_MM = 1e-4  # processors differ in the last bits of a position
 
 
-def shipped_arrays(mesh: Mesh, table: str, names: Sequence[str]) -> dict[str, NDArray[Any]] | None:
+def shipped_arrays(mesh: Mesh, table_name: str, array_names: Sequence[str]) -> dict[str, NDArray[Any]] | None:
     """Return the arrays of a table that the package contains for a mesh; None if it contains none.
 
-    table : text with everything besides the mesh that the arrays depend on
-    names : names of the arrays
+    table_name : text with everything besides the mesh that the arrays depend on
+    array_names : names of the arrays
     """
     file = resources.files(__package__).joinpath("data", table_file(mesh))
     if not file.is_file():
         return None
     with resources.as_file(file) as path, np.load(path) as stored:
-        is_same = np.allclose(stored[_FINGERPRINT], position_fingerprint(mesh), rtol=0.0, atol=_TOLERANCE_MM)
-        members = [f"{table} {name}" for name in names]
+        is_same = np.allclose(
+            stored[_FINGERPRINT_ARRAY_NAME], position_fingerprint(mesh), rtol=0.0, atol=_POSITION_TOLERANCE_MM
+        )
+        members = [f"{table_name} {name}" for name in array_names]
         if not is_same or not all(member in stored for member in members):
             return None
-        return {name: stored[member] for name, member in zip(names, members, strict=True)}
+        return {name: stored[member] for name, member in zip(array_names, members, strict=True)}
 
 
 def table_file(mesh: Mesh) -> str:
@@ -45,7 +47,7 @@ def file_arrays(mesh: Mesh, tables: dict[str, dict[str, NDArray[Any]]]) -> dict[
     tables : arrays of each table, as `shipped_arrays` returns them
     """
     members = {f"{table} {name}": array for table, one in tables.items() for name, array in one.items()}
-    return {_FINGERPRINT: position_fingerprint(mesh), **members}
+    return {_FINGERPRINT_ARRAY_NAME: position_fingerprint(mesh), **members}
 
 
 def position_fingerprint(mesh: Mesh) -> Doubles:
@@ -54,5 +56,5 @@ def position_fingerprint(mesh: Mesh) -> Doubles:
     Heads of one topology have different fingerprints as soon as a few vertices differ by a millimetre.
     """
     positions = mesh.positions.astype(np.float64)
-    sample = positions[:: max(len(positions) // _SAMPLED_VERTICES, 1)]
+    sample = positions[:: max(len(positions) // _COMPARED_VERTEX_COUNT, 1)]
     return np.concatenate([positions.mean(axis=0), np.sqrt((positions**2).mean(axis=0)), sample.ravel()])

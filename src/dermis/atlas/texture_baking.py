@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dermis.atlas.raster import covered_texels
-from dermis.atlas.texture_tiles import PADDING, Tile, base_texture, file_uv, lay_out_tiles
+from dermis.atlas.texture_tiles import TILE_PADDING_TEXELS, Tile, base_texture, file_uv, lay_out_tiles
 from dermis.base.arrays import Doubles, Floats, Mask, Numbers
 from dermis.formats.load import FileSurface
 from dermis.formats.maps import colour_map, slope_map
@@ -18,7 +18,7 @@ from dermis.images.filters import mip_chain
 from dermis.images.io import read_image
 from dermis.mesh.mesh import Mesh
 
-_STRIP_TEXELS = 1 << 22  # texels that are sampled at a time, to limit memory
+_TEXELS_PER_STRIP = 1 << 22  # texels that are sampled at a time, to limit memory
 _ROLE_DEFAULTS: Mapping[Role, tuple[float, ...]] = {
     "colour": (1.0, 1.0, 1.0),
     "normal": (0.0, 0.0),
@@ -49,16 +49,16 @@ def pack_textures(
     mesh: Mesh,
     surface: FileSurface,
     materials: Sequence[FileMaterial],
-    members: Mask,
+    material_mask: Mask,
     required: Sequence[Role] = ("colour",),
 ) -> PackedTextures:
     """Bake one uv layout and one set of texture maps for selected materials of a mesh.
 
     surface, materials : surface data and materials of the mesh's file
-    members : (m,) mask of the mesh's materials that share the maps
+    material_mask : (m,) mask of the mesh's materials that share the maps
     required : roles for which a map is baked even if no material has a picture for the role
     """
-    tiles, side, scale = lay_out_tiles(mesh, surface, materials, members)
+    tiles, side, scale = lay_out_tiles(mesh, surface, materials, material_mask)
     baker = _Baker(mesh, surface, materials, tiles, side)
     notes = (f"its pictures are reduced to {scale:.0%} of their size to fit one map",) if scale < 0.99 else ()
     return PackedTextures(
@@ -91,8 +91,16 @@ class _Baker:
         baked = np.zeros((self.side, self.side, channels), np.float32)
         for tile in self.tiles:
             values = self._tile_values(tile, role)
-            padded = np.pad(values, ((PADDING, PADDING), (PADDING, PADDING), (0, 0)), mode="edge")
-            x, y = (corner - PADDING for corner in tile.corner)
+            padded = np.pad(
+                values,
+                (
+                    (TILE_PADDING_TEXELS, TILE_PADDING_TEXELS),
+                    (TILE_PADDING_TEXELS, TILE_PADDING_TEXELS),
+                    (0, 0),
+                ),
+                mode="edge",
+            )
+            x, y = (corner - TILE_PADDING_TEXELS for corner in tile.corner)
             baked[y : y + padded.shape[0], x : x + padded.shape[1]] = padded
         return baked
 
@@ -222,7 +230,7 @@ def sample_grid(picture: Floats, u: Doubles, v: Doubles, wrap: tuple[Wrap, Wrap]
     if not across.any() and not down.any():
         return np.asarray(picture[top[:, None], left[None, :]])
     sampled = np.empty((len(v), len(u), picture.shape[2]), np.float32)
-    rows = max(1, _STRIP_TEXELS // max(len(u), 1))
+    rows = max(1, _TEXELS_PER_STRIP // max(len(u), 1))
     weight = across[None, :, None].astype(np.float32)
     for start in range(0, len(v), rows):
         strip = slice(start, start + rows)
@@ -235,10 +243,12 @@ def sample_grid(picture: Floats, u: Doubles, v: Doubles, wrap: tuple[Wrap, Wrap]
     return sampled
 
 
-def sample_points(picture: Floats, position: Floats, wrap: tuple[Wrap, Wrap]) -> Floats:
+def sample_points(picture: Floats, uv_positions: Floats, wrap: tuple[Wrap, Wrap]) -> Floats:
     """Return bilinear samples (..., k) of a picture at positions (..., 2) in [0, 1]."""
-    left, right, across = _neighbour_texels(position[..., 0].astype(np.float64), picture.shape[1], wrap[0])
-    top, bottom, down = _neighbour_texels(position[..., 1].astype(np.float64), picture.shape[0], wrap[1])
+    left, right, across = _neighbour_texels(
+        uv_positions[..., 0].astype(np.float64), picture.shape[1], wrap[0]
+    )
+    top, bottom, down = _neighbour_texels(uv_positions[..., 1].astype(np.float64), picture.shape[0], wrap[1])
     x, y = across[..., None].astype(np.float32), down[..., None].astype(np.float32)
     upper = picture[top, left] * (1 - x) + picture[top, right] * x
     lower = picture[bottom, left] * (1 - x) + picture[bottom, right] * x
@@ -251,19 +261,19 @@ def _matching_mip(picture: Floats, texels_per_sample: float) -> Floats:
     return mip_chain(picture)[level] if level else picture
 
 
-def _neighbour_texels(position: Doubles, size: int, wrap: Wrap) -> tuple[Numbers, Numbers, Doubles]:
+def _neighbour_texels(position: Doubles, texel_count: int, wrap: Wrap) -> tuple[Numbers, Numbers, Doubles]:
     """Return the two texels around each position in [0, 1] along one axis, and the weight of the second."""
-    texel = position * size - 0.5
-    texel = np.where(np.abs(texel - np.rint(texel)) < 1e-6 * size, np.rint(texel), texel)
+    texel = position * texel_count - 0.5
+    texel = np.where(np.abs(texel - np.rint(texel)) < 1e-6 * texel_count, np.rint(texel), texel)
     first = np.floor(texel)
     index = first.astype(np.int64)
-    return _wrap_index(index, size, wrap), _wrap_index(index + 1, size, wrap), texel - first
+    return _wrap_index(index, texel_count, wrap), _wrap_index(index + 1, texel_count, wrap), texel - first
 
 
-def _wrap_index(index: Numbers, size: int, wrap: Wrap) -> Numbers:
+def _wrap_index(texel_index: Numbers, texel_count: int, wrap: Wrap) -> Numbers:
     if wrap == "clamp":
-        return np.clip(index, 0, size - 1)
+        return np.clip(texel_index, 0, texel_count - 1)
     if wrap == "repeat":
-        return index % size
-    folded = index % (2 * size)
-    return np.minimum(folded, 2 * size - 1 - folded)
+        return texel_index % texel_count
+    folded = texel_index % (2 * texel_count)
+    return np.minimum(folded, 2 * texel_count - 1 - folded)

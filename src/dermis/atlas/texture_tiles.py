@@ -18,11 +18,11 @@ from dermis.mesh.mesh import Mesh
 
 UV_TOLERANCE = 2e-2
 """Distance by which uv may lie outside [0, 1] without the picture being repeated there [-]."""
-PADDING = 8
+TILE_PADDING_TEXELS = 8
 """Texels around each tile that continue its border, so that mip levels do not mix materials."""
-_PLAIN_SIDE = 16  # side of a tile without pictures that is not skin [texel]
-_MIN_SKIN_SIDE = 256  # smallest side of a tile of skin without pictures [texel]
-_SIDE_GROWTH = 1.02  # step by which the side of the map grows until all tiles fit
+_PLAIN_TILE_SIDE = 16  # side of a tile without pictures that is not skin [texel]
+_MIN_SKIN_TILE_SIDE = 256  # smallest side of a tile of skin without pictures [texel]
+_MAP_SIDE_GROWTH_FACTOR = 1.02  # step by which the side of the map grows until all tiles fit
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,13 +46,13 @@ class Tile:
     size: tuple[int, int]
     corner: tuple[int, int] = (0, 0)
 
-    def layout_uv(self, side: int) -> Doubles:
+    def layout_uv(self, map_side: int) -> Doubles:
         """Return the uv (n, 2) of the tile's vertices in the shared map.
 
-        side : side of the map [texel]
+        map_side : side of the map [texel]
         """
         fraction = (self.uv - self.low) / np.maximum(self.high - self.low, 1e-12)
-        return np.asarray((np.array(self.corner) + fraction * self.size) / side)
+        return np.asarray((np.array(self.corner) + fraction * self.size) / map_side)
 
 
 def base_texture(material: FileMaterial) -> Texture | None:
@@ -67,7 +67,7 @@ def file_uv(mesh: Mesh, surface: FileSurface, uv_set: int, vertices: NDArray[np.
 
 
 def lay_out_tiles(
-    mesh: Mesh, surface: FileSurface, materials: Sequence[FileMaterial], members: Mask
+    mesh: Mesh, surface: FileSurface, materials: Sequence[FileMaterial], material_mask: Mask
 ) -> tuple[list[Tile], int, float]:
     """Return the tiles of selected materials, and the side of the map that they share [texel].
 
@@ -75,10 +75,10 @@ def lay_out_tiles(
     map.
 
     surface : surface data of the file that the mesh comes from
-    members : (m,) mask of the mesh's materials that share the map
+    material_mask : (m,) mask of the mesh's materials that share the map
     """
     of_file = np.array(surface.in_file)[mesh.material]
-    member = members[mesh.material]
+    member = material_mask[mesh.material]
     tiles = []
     for index in np.unique(of_file[member]).tolist():
         triangles = np.flatnonzero(member & (of_file == index))
@@ -92,7 +92,11 @@ def lay_out_tiles(
 
 
 def _unplaced_tile(
-    mesh: Mesh, surface: FileSurface, material: FileMaterial, index: int, triangles: NDArray[np.integer]
+    mesh: Mesh,
+    surface: FileSurface,
+    material: FileMaterial,
+    material_index: int,
+    triangles: NDArray[np.integer],
 ) -> Tile:
     vertices = np.unique(mesh.triangles[triangles])
     texture = base_texture(material)
@@ -104,7 +108,7 @@ def _unplaced_tile(
     low, high = np.where(inside, np.minimum(low, 0.0), low), np.where(inside, np.maximum(high, 1.0), high)
     width, height = _picture_size(material)
     size = (max(1, round(width * (high[0] - low[0]))), max(1, round(height * (high[1] - low[1]))))
-    return Tile(index, vertices, triangles, uv, low, high, size if width else (0, 0))
+    return Tile(material_index, vertices, triangles, uv, low, high, size if width else (0, 0))
 
 
 def _picture_size(material: FileMaterial) -> tuple[int, int]:
@@ -140,7 +144,9 @@ def _set_plain_sizes(mesh: Mesh, tiles: list[Tile], materials: Sequence[FileMate
         if tile.size == (0, 0):
             is_skin = mesh.materials[int(mesh.material[tile.triangles[0]])].kind == "skin"
             side = (
-                max(_MIN_SKIN_SIDE, round(float(np.sqrt(median_density * mm2)))) if is_skin else _PLAIN_SIDE
+                max(_MIN_SKIN_TILE_SIDE, round(float(np.sqrt(median_density * mm2))))
+                if is_skin
+                else _PLAIN_TILE_SIDE
             )
             tile = Tile(
                 tile.material, tile.vertices, tile.triangles, tile.uv, tile.low, tile.high, (side, side)
@@ -165,9 +171,9 @@ def _pack_tiles(tiles: list[Tile]) -> tuple[list[Tile], int, float]:
     return placed, side, scale
 
 
-def _pack_in_rows(sizes: Sequence[tuple[int, ...]]) -> tuple[int, list[tuple[int, int]]]:
+def _pack_in_rows(tile_sizes: Sequence[tuple[int, ...]]) -> tuple[int, list[tuple[int, int]]]:
     """Pack rectangles in rows; return the side of the smallest square that holds them, and their corners."""
-    padded = np.array(sizes) + 2 * PADDING
+    padded = np.array(tile_sizes) + 2 * TILE_PADDING_TEXELS
     order = np.argsort(-padded[:, 1], kind="stable")
     side = float(max(padded.max(), np.sqrt(padded.prod(axis=1).sum())))
     while True:
@@ -179,5 +185,7 @@ def _pack_in_rows(sizes: Sequence[tuple[int, ...]]) -> tuple[int, list[tuple[int
             corners[index] = x, y
             x, shelf = x + width, max(shelf, height)
         if y + shelf <= side:
-            return int(np.ceil(side)), [(int(x) + PADDING, int(y) + PADDING) for x, y in corners]
-        side *= _SIDE_GROWTH
+            return int(np.ceil(side)), [
+                (int(x) + TILE_PADDING_TEXELS, int(y) + TILE_PADDING_TEXELS) for x, y in corners
+            ]
+        side *= _MAP_SIDE_GROWTH_FACTOR

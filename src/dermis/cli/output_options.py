@@ -212,7 +212,7 @@ class AnimationOutput:
             return frame_numbers
         files = FrameFiles(self.path)
         files.start(frame_digest, force=self.overwrite)
-        return files.missing(frame_numbers, frame_size)
+        return files.missing_frames(frame_numbers, frame_size)
 
     @contextmanager
     def open_writer(self, frame_size: tuple[int, int], rate: Fraction) -> Iterator[WriteFrame]:

@@ -130,7 +130,7 @@ def profile(
         Print one JSON object with the profile, its fits and errors.
     """
     from dermis.cli.profile_report import ProfileReport, additional_fit, draw_plot, gaussian_fit
-    from dermis.optics.diffusion.models import error_against_photons, known_error
+    from dermis.optics.diffusion.models import error_against_photons, measured_model_error
     from dermis.optics.half_space import COUNTED_MODEL
     from dermis.optics.profiles import find_gaussians
     from dermis.optics.radial import gaussian_radial_profile
@@ -148,7 +148,7 @@ def profile(
     else:
         tissue = _load_tissue(name, tissue_options, eta)
         radial = _compute_profile(tissue, model, clamp, tracing)
-        monte_carlo, model_error = None, known_error(radial.model, "" if changed else name)
+        monte_carlo, model_error = None, measured_model_error(radial.model, "" if changed else name)
         if check and model != "montecarlo":
             monte_carlo = _compute_profile(tissue, "montecarlo", clamp, tracing)
             model_error = error_against_photons(radial, monte_carlo)

@@ -11,7 +11,7 @@ import numpy as np
 
 from dermis.base.atomic_write import atomic_file
 from dermis.base.extras import import_extra
-from dermis.images.skin_tone import CLASS_STATEMENT, SkinTone, skin_tone
+from dermis.images.skin_tone import SKIN_CLASS_DISCLAIMER, SkinTone, skin_tone
 from dermis.optics.diffusion.models import gaussian_transmittance
 from dermis.optics.fits.burley import BurleyFit, fit_burley, unity_parameters, unreal_parameters
 from dermis.optics.fits.gaussian import GaussianFit, fit_gaussians
@@ -64,7 +64,7 @@ def gaussian_fit(
         return GaussianFit(published_gaussians, np.zeros(3), np.zeros(3), "pointwise", shared=True)
     target = radial_profile.points() if radial_profile.finite_at_centre else radial_profile.rings()
     return fit_gaussians(
-        target, term_count, shared=shared_variances, keep_energy=keep_energy, name=radial_profile.name
+        target, term_count, shared=shared_variances, keep_energy=keep_energy, profile_name=radial_profile.name
     )
 
 
@@ -150,7 +150,7 @@ class ProfileReport:
         total = f"total      {_format_row(radial.total)}  {self._normalisation()}"
         lines = [f"{radial.name}, model {radial.model}", total]
         if self.tone is not None:
-            lines += [f"tone       {self.tone.line()}", f"           ({CLASS_STATEMENT})"]
+            lines += [f"tone       {self.tone.as_text()}", f"           ({SKIN_CLASS_DISCLAIMER})"]
         if self.tissue is not None and self.tissue.rgb is None:
             for layer in self.tissue.medium.layers:
                 path = _format_row(layer.mean_free_path_mm)

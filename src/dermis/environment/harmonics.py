@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-_KERNEL_NODES = 4096
+_KERNEL_QUADRATURE_NODES = 4096
 
 
 def legendre_functions(cosine: Floats, degree: int, order_count: int) -> list[Floats]:
@@ -67,7 +67,7 @@ def zonal_factors(kernel: Callable[[Floats], Floats], degree: int) -> Floats:
     Source: the Funk-Hecke theorem, as in [RamamoorthiHanrahan2001].
     """
     theta = _kernel_angles()
-    measure = np.pi**2 / _KERNEL_NODES * np.sin(theta)
+    measure = np.pi**2 / _KERNEL_QUADRATURE_NODES * np.sin(theta)
     return np.asarray(_kernel_polynomials(degree) @ (kernel(theta) * measure))
 
 
@@ -88,9 +88,9 @@ def synthesise_panoramas(coefficients: list[Complex], factors: Floats, height: i
     return np.moveaxis(np.fft.irfft(around, width, axis=1) * width, 2, 0)
 
 
-def _complex_product(matrix: Floats, values: Complex) -> Complex:
+def _complex_product(real_matrix: Floats, complex_matrix: Complex) -> Complex:
     """Return the product of a real and a complex matrix, without converting the real matrix to complex."""
-    return (matrix @ np.ascontiguousarray(values).view(np.float64)).view(np.complex128)
+    return (real_matrix @ np.ascontiguousarray(complex_matrix).view(np.float64)).view(np.complex128)
 
 
 @lru_cache(maxsize=2)  # sizes of input and output; at degree 112 a row takes 51 kB
@@ -108,7 +108,7 @@ def _kernel_polynomials(degree: int) -> Floats:
 
 def _kernel_angles() -> Floats:
     """Return the quadrature angles (n,) over which kernels are integrated: midpoints in 0..pi/2 [rad]."""
-    return np.asarray(0.5 * np.pi * (np.arange(_KERNEL_NODES) + 0.5) / _KERNEL_NODES)
+    return np.asarray(0.5 * np.pi * (np.arange(_KERNEL_QUADRATURE_NODES) + 0.5) / _KERNEL_QUADRATURE_NODES)
 
 
 def _polar_cosines(height: int) -> Floats:

@@ -33,12 +33,12 @@ LOBE_TABLE_COSINES = np.maximum(np.linspace(0.0, 1.0, VIEW_COUNT) ** 2, 0.02)
 """Cosines of the view angles, one for each column of the table, raised to at least 0.02."""
 _IN_PLANE_LOBES = (3,) * 10 + (2,) * 3 + (1,) * 3
 """Number of lobes in the plane of incidence for each view angle, without the pair (`fit_isotropic_lobes`)."""
-_MIN_ELONGATION = 1.8  # ratio of length to width above which the pair lies in the plane
-_FIT_PASSES = 2
-_REGULARISATION = 0.01  # strength of the pull of undetermined parameters to the mean of the neighbours
-_MAX_EVALUATIONS = 30
-_MAX_OFFSET = 5.0  # bound of positions [widths of the lobe] and of logarithms of weights
-_PAIR_SEPARATION = 0.4  # initial separation of a pair
+_MIN_LOBE_ELONGATION = 1.8  # ratio of length to width above which the pair lies in the plane
+_FIT_PASS_COUNT = 2
+_REGULARISATION_WEIGHT = 0.01  # strength of the pull of undetermined parameters to the mean of the neighbours
+_MAX_FIT_EVALUATIONS = 30
+_MAX_LOBE_OFFSET_DEVIATIONS = 5.0  # bound of positions [widths of the lobe] and of logarithms of weights
+_PAIR_SEPARATION_DEVIATIONS = 0.4  # initial separation of a pair
 _POSITION, _OUT_OF_PLANE, _LOG_WIDTH, _LOG_WEIGHT = range(4)
 _INITIAL_LOBES = np.array(
     [
@@ -70,7 +70,7 @@ def fit_isotropic_lobes(lobe: Lobe) -> Floats:
     found: dict[TableNode, Floats] = {}
     cosines, roughnesses = LOBE_TABLE_COSINES.tolist(), LOBE_TABLE_ROUGHNESSES.tolist()
     targets = {(i, j): lobe_target(lobe, cosines[j], roughnesses[i]) for i, j in _table_nodes()}
-    for _ in range(_FIT_PASSES):
+    for _ in range(_FIT_PASS_COUNT):
         for i, j in _table_nodes():
             adjacent = (i, j - 1), (i + 1, j), (i, j + 1), (i - 1, j)
             neighbours = [found[node] for node in adjacent if node in found]
@@ -96,15 +96,15 @@ def _active_lobes(view_index: int) -> NDArray[np.bool_]:
     return np.array([k < _IN_PLANE_LOBES[view_index] or k >= LOBE_COUNT - 2 for k in range(LOBE_COUNT)])
 
 
-def _parameter_direction(parameter: int, *amounts: tuple[int, float]) -> Floats:
+def _parameter_direction(parameter_kind: int, *lobe_amounts: tuple[int, float]) -> Floats:
     """Return a direction (20,) in the space of the lobe parameters: a change of one parameter in some lobes.
 
-    parameter : parameter that changes, such as `_POSITION`
-    amounts : pairs of the index of a lobe, and the change of the parameter of this lobe
+    parameter_kind : parameter that changes, such as `_POSITION`
+    lobe_amounts : pairs of the index of a lobe, and the change of the parameter of this lobe
     """
     change = np.zeros((4, LOBE_COUNT))
-    for lobe, amount in amounts:
-        change[parameter, lobe] = amount
+    for lobe, amount in lobe_amounts:
+        change[parameter_kind, lobe] = amount
     return change.ravel()
 
 
@@ -133,7 +133,7 @@ def _free_directions(target: LobeTarget, view_index: int) -> Floats:
 
 
 def _is_elongated(target: LobeTarget) -> bool:
-    return target.along_deviation > _MIN_ELONGATION * target.across_deviation
+    return target.along_deviation > _MIN_LOBE_ELONGATION * target.across_deviation
 
 
 def _arrange_pair(initial: Floats, target: LobeTarget, view_index: int) -> Floats:
@@ -146,10 +146,12 @@ def _arrange_pair(initial: Floats, target: LobeTarget, view_index: int) -> Float
     """
     lobes = initial.copy()
     separation = lobes[_POSITION, -1] - lobes[_POSITION, -2]
-    if _is_elongated(target) and abs(separation) < _PAIR_SEPARATION:
-        lobes[_POSITION, -2:] = lobes[_POSITION, -2:].mean() + np.array([-0.5, 0.5]) * _PAIR_SEPARATION
-    if not _is_elongated(target) and abs(lobes[_OUT_OF_PLANE, -2]) < _PAIR_SEPARATION:
-        lobes[_OUT_OF_PLANE, -2:] = _PAIR_SEPARATION, -_PAIR_SEPARATION
+    if _is_elongated(target) and abs(separation) < _PAIR_SEPARATION_DEVIATIONS:
+        lobes[_POSITION, -2:] = (
+            lobes[_POSITION, -2:].mean() + np.array([-0.5, 0.5]) * _PAIR_SEPARATION_DEVIATIONS
+        )
+    if not _is_elongated(target) and abs(lobes[_OUT_OF_PLANE, -2]) < _PAIR_SEPARATION_DEVIATIONS:
+        lobes[_OUT_OF_PLANE, -2:] = _PAIR_SEPARATION_DEVIATIONS, -_PAIR_SEPARATION_DEVIATIONS
     lobes[_OUT_OF_PLANE, :-2] = 0.0
     if _is_elongated(target) or view_index == VIEW_COUNT - 1:
         lobes[_OUT_OF_PLANE] = 0.0
@@ -180,7 +182,7 @@ def _fit_parameters(target: LobeTarget, view_index: int, initial: Floats, neighb
     fixed = np.where(free.any(axis=1), 0.0, initial)
     kinds = np.abs(free).argmax(axis=0) // LOBE_COUNT
     low, high = _parameter_bounds(target, kinds)
-    regularisation = _REGULARISATION * np.where(kinds == _LOG_WEIGHT, 0.5, 1.0)
+    regularisation = _REGULARISATION_WEIGHT * np.where(kinds == _LOG_WEIGHT, 0.5, 1.0)
 
     @lru_cache(maxsize=2)
     def reduced_system(vector: bytes) -> Floats:
@@ -206,22 +208,27 @@ def _fit_parameters(target: LobeTarget, view_index: int, initial: Floats, neighb
 
     inside = np.clip(first, low + 1e-4, high - 1e-4)
     solution = least_squares(
-        residual, inside, jacobian_at, (low, high), ftol=1e-4, xtol=1e-5, max_nfev=_MAX_EVALUATIONS
+        residual, inside, jacobian_at, (low, high), ftol=1e-4, xtol=1e-5, max_nfev=_MAX_FIT_EVALUATIONS
     )
     return np.asarray(fixed + free @ solution.x).reshape(4, LOBE_COUNT)
 
 
-def _parameter_bounds(target: LobeTarget, kinds: NDArray[np.intp]) -> tuple[Floats, Floats]:
+def _parameter_bounds(target: LobeTarget, parameter_kinds: NDArray[np.intp]) -> tuple[Floats, Floats]:
     smoothest, roughest = np.log([SMOOTHEST, ROUGHEST]) - np.log(target.across_deviation)
-    low, high = (np.full(4, side * _MAX_OFFSET) for side in (-1.0, 1.0))
-    low[_OUT_OF_PLANE], high[_OUT_OF_PLANE] = 0.0, min(_MAX_OFFSET, 0.45 * np.pi / target.across_deviation)
+    low, high = (np.full(4, side * _MAX_LOBE_OFFSET_DEVIATIONS) for side in (-1.0, 1.0))
+    low[_OUT_OF_PLANE], high[_OUT_OF_PLANE] = (
+        0.0,
+        min(_MAX_LOBE_OFFSET_DEVIATIONS, 0.45 * np.pi / target.across_deviation),
+    )
     low[_LOG_WIDTH], high[_LOG_WIDTH] = smoothest, max(roughest, smoothest + 0.1)
-    return low[kinds], high[kinds]
+    return low[parameter_kinds], high[parameter_kinds]
 
 
-def _to_isotropic_lobes(parameters: Floats, target: LobeTarget, active: NDArray[np.bool_]) -> IsotropicLobes:
+def _to_isotropic_lobes(
+    parameters: Floats, target: LobeTarget, active_lobes: NDArray[np.bool_]
+) -> IsotropicLobes:
     position, out_of_plane, log_width, log_weight = parameters
-    weight = np.where(active, np.exp(log_weight - log_weight[active].max()), 0.0)
+    weight = np.where(active_lobes, np.exp(log_weight - log_weight[active_lobes].max()), 0.0)
     return IsotropicLobes(
         target.mean_angle + position * target.along_deviation,
         out_of_plane * target.across_deviation,

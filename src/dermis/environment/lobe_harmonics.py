@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.environment.harmonics import legendre_functions
-from dermis.environment.prefilter import ROUGHNESSES, isotropic_kernel
+from dermis.environment.prefilter import LAYER_ROUGHNESSES, isotropic_kernel
 from dermis.specular.cosines import cosines
 from dermis.specular.models import Lobe
 
@@ -23,8 +23,11 @@ _FIT_DEGREES = (40, 80, 128)
 _DEGREE_TIMES_WIDTH = 10.0  # least product of a fit's degree and the lobe's deviation across the plane
 _SKY_POWER_FALLOFF = 1.0  # exponent by which light falls with the degree: 0 for lamps, 2 for smooth light
 _DEGREE_1_WEIGHT = 10.0  # additional weight of degree 1, which determines the mean direction
-_ALONG_NODES, _ACROSS_NODES = 160, 40  # quadrature nodes along the plane of incidence and across
-_TABLE_STEP = np.radians(0.25)  # step of the tabulated angles from the plane
+_NODES_ALONG_INCIDENCE, _NODES_ACROSS_INCIDENCE = (
+    160,
+    40,
+)  # quadrature nodes along the plane of incidence and across
+_LEGENDRE_TABLE_STEP_RADIANS = np.radians(0.25)  # step of the tabulated angles from the plane
 
 
 class LobeTarget(NamedTuple):
@@ -59,23 +62,23 @@ class IsotropicLobes(NamedTuple):
     weight: Floats
 
 
-def lobe_target(lobe: Lobe, cosine: float, m: float) -> LobeTarget:
+def lobe_target(lobe: Lobe, view_cosine: float, m: float) -> LobeTarget:
     """Expand a specular lobe in spherical harmonics, as a fitting target.
 
-    cosine : cosine of the angle between view and surface normal
+    view_cosine : cosine of the angle between view and surface normal
     m : roughness [-]
 
     The quadrature covers one side of the plane of incidence, as the lobe is symmetric about this plane.
     """
-    t = (np.arange(_ACROSS_NODES) + 0.5) / _ACROSS_NODES
+    t = (np.arange(_NODES_ACROSS_INCIDENCE) + 0.5) / _NODES_ACROSS_INCIDENCE
     widest = min(10.0 * m + 0.05, 0.5 * np.pi)
-    out_of_plane, steps = widest * t**2, 2.0 * widest * t / _ACROSS_NODES  # denser near the plane
-    mirror, reach = np.arccos(cosine), 12.0 * m + 0.1
+    out_of_plane, steps = widest * t**2, 2.0 * widest * t / _NODES_ACROSS_INCIDENCE  # denser near the plane
+    mirror, reach = np.arccos(view_cosine), 12.0 * m + 0.1
     low, high = max(mirror - reach, -0.5 * np.pi), min(mirror + reach, 0.5 * np.pi)
-    angles = low + (high - low) * (np.arange(_ALONG_NODES) + 0.5) / _ALONG_NODES
+    angles = low + (high - low) * (np.arange(_NODES_ALONG_INCIDENCE) + 0.5) / _NODES_ALONG_INCIDENCE
     a, y = np.meshgrid(angles, out_of_plane, indexing="ij")
     light = np.stack([np.sin(a) * np.cos(y), np.sin(y), np.cos(a) * np.cos(y)], axis=-1)
-    view = np.array([-np.sqrt(1.0 - cosine**2), 0.0, cosine])
+    view = np.array([-np.sqrt(1.0 - view_cosine**2), 0.0, view_cosine])
     with np.errstate(under="ignore"):
         weight = lobe(cosines(np.array([0.0, 0.0, 1.0]), light, view), m) * light[..., 2] * np.cos(y) * steps
     weight = weight / weight.sum()
@@ -144,7 +147,7 @@ def _legendre_at_nodes(roughness: float, degree: int) -> Floats:
 
     roughness : roughness of the lobe, which determines how far the nodes extend
     """
-    t = (np.arange(_ACROSS_NODES) + 0.5) / _ACROSS_NODES
+    t = (np.arange(_NODES_ACROSS_INCIDENCE) + 0.5) / _NODES_ACROSS_INCIDENCE
     return _legendre_from_plane(np.sin(min(10.0 * roughness + 0.05, 0.5 * np.pi) * t**2), degree)
 
 
@@ -152,7 +155,7 @@ def _legendre_at_nodes(roughness: float, degree: int) -> Floats:
 def _legendre_table(degree: int) -> Floats:
     """Return the associated Legendre functions (k, n) at k angles from the plane of incidence to the pole."""
     return _legendre_from_plane(
-        np.sin(np.append(np.arange(0.0, 0.5 * np.pi, _TABLE_STEP), 0.5 * np.pi)), degree
+        np.sin(np.append(np.arange(0.0, 0.5 * np.pi, _LEGENDRE_TABLE_STEP_RADIANS), 0.5 * np.pi)), degree
     ).T.copy()
 
 
@@ -161,11 +164,11 @@ def _interpolate_legendre(degree: int, out_of_plane: Floats) -> tuple[Floats, Fl
 
     out_of_plane : (k,) angles from the plane of incidence [rad]
     """
-    table, position = _legendre_table(degree), np.abs(out_of_plane) / _TABLE_STEP
+    table, position = _legendre_table(degree), np.abs(out_of_plane) / _LEGENDRE_TABLE_STEP_RADIANS
     low = np.minimum(position.astype(int), len(table) - 2)
     step = table[low + 1] - table[low]
     value = table[low] + (position - low)[:, None] * step
-    return value.T, (np.where(out_of_plane < 0.0, -1.0, 1.0)[:, None] * step / _TABLE_STEP).T
+    return value.T, (np.where(out_of_plane < 0.0, -1.0, 1.0)[:, None] * step / _LEGENDRE_TABLE_STEP_RADIANS).T
 
 
 def _layer_convolution_factors(log_roughness: float, degree: int) -> Floats:
@@ -176,7 +179,7 @@ def _layer_convolution_factors(log_roughness: float, degree: int) -> Floats:
 
     log_roughness : logarithm of the roughness
     """
-    layers, degrees = np.log(ROUGHNESSES), harmonic_terms(degree)[0]
+    layers, degrees = np.log(LAYER_ROUGHNESSES), harmonic_terms(degree)[0]
     step = layers[1] - layers[0]
     position = np.clip((log_roughness - layers[0]) / step, 0.0, len(layers) - 1.0)
     low = min(int(position), len(layers) - 2)
@@ -190,5 +193,5 @@ def _layer_factor_table() -> Floats:
 
     Factors for degrees above the highest degree of the layers are 0.
     """
-    kernels = np.stack([isotropic_kernel(float(m)) for m in ROUGHNESSES])
+    kernels = np.stack([isotropic_kernel(float(m)) for m in LAYER_ROUGHNESSES])
     return np.pad(kernels, ((0, 0), (0, max(_FIT_DEGREES[-1] + 1 - kernels.shape[1], 0))))

@@ -12,48 +12,54 @@ from dermis.base.errors import refuse
 from dermis.base.reading import is_file
 from dermis.formats.samples import SAMPLES, fetch_sample
 from dermis.images.colour import luminance
-from dermis.images.io import read_colours, repaired_radiance
+from dermis.images.io import read_colours, repair_radiance
 
 Floats = NDArray[np.float64]
-UNIFORM = "uniform"
+UNIFORM_PANORAMA = "uniform"
 """Name of the panorama with radiance 1 everywhere."""
-_MIN_ROWS, _MAX_ROWS = 256, 512
+_MIN_PANORAMA_ROWS, _MAX_PANORAMA_ROWS = 256, 512
 """Least and largest number of rows of a loaded panorama; others are resampled, for accuracy and for speed."""
 _MAX_RADIANCE = 1e12  # far above the radiance of the sun; prevents overflow of single precision
 MAX_SUNS = 4
-_PEAK_FACTOR = 32.0  # radiance above which a texel may belong to a sun, relative to the mean
-_CLUSTER_DEGREES = 8.0
-_MIN_SUN_FRACTION = 0.05  # least irradiance by a sun, relative to that by a uniform sky of mean radiance
+_SUN_PEAK_FACTOR = 32.0  # radiance above which a texel may belong to a sun, relative to the mean
+_SUN_CLUSTER_DEGREES = 8.0
+_MIN_SUN_IRRADIANCE_FRACTION = (
+    0.05  # least irradiance by a sun, relative to that by a uniform sky of mean radiance
+)
 
 
-def load_panorama(name: str, max_rows: int = _MAX_ROWS) -> Floats:
+def load_panorama(panorama_name: str, max_rows: int = _MAX_PANORAMA_ROWS) -> Floats:
     """Load a panorama of radiance (h, 2 h, 3), linear Rec. 709, with -Z at the centre, +X right and +Y up.
 
-    name : a sample, a file (.hdr, .exr), or "uniform"
+    panorama_name : a sample, a file (.hdr, .exr), or "uniform"
     max_rows : largest h; larger pictures are reduced by averaging
 
     A few infinite, NaN or negative pixels are repaired, with a note.
 
     Raises DermisError for any other name, and for a picture without radiance.
     """
-    path = panorama_file(name)
+    path = panorama_file(panorama_name)
     if path is None:
-        return np.ones((_MIN_ROWS, 2 * _MIN_ROWS, 3))
+        return np.ones((_MIN_PANORAMA_ROWS, 2 * _MIN_PANORAMA_ROWS, 3))
     image, space = read_colours(path)
     if image.dtype != np.float32:
         actual, advice = f"it is a picture of {image.dtype.name}", "Take its .hdr or .exr version"
-        refuse(name, "a picture of radiance (.hdr, .exr)", actual, advice)
-    rgb = space.linear(repaired_radiance(name, np.asarray(image[..., :3], np.float32)))
+        refuse(panorama_name, "a picture of radiance (.hdr, .exr)", actual, advice)
+    rgb = space.linear(repair_radiance(panorama_name, np.asarray(image[..., :3], np.float32)))
     if (highest := float(rgb.max())) > _MAX_RADIANCE:
-        refuse(name, f"radiance up to {_MAX_RADIANCE:g}", f"it is up to {highest:g}", "Export it again")
+        refuse(
+            panorama_name, f"radiance up to {_MAX_RADIANCE:g}", f"it is up to {highest:g}", "Export it again"
+        )
     height, width = rgb.shape[:2]
     if width != 2 * height:
         actual, advice = f"it is {width}x{height}", "Export it as latitude and longitude"
-        refuse(name, "a picture twice as wide as high", actual, advice)
-    return resample(rgb.astype(np.float32, copy=False), min(max(height, _MIN_ROWS), max_rows))
+        refuse(panorama_name, "a picture twice as wide as high", actual, advice)
+    return resample_panorama(
+        rgb.astype(np.float32, copy=False), min(max(height, _MIN_PANORAMA_ROWS), max_rows)
+    )
 
 
-def directions(height: int, width: int) -> Floats:
+def texel_directions(height: int, width: int) -> Floats:
     """Return the unit vectors (h, w, 3) towards the centres of a panorama's texels."""
     theta = np.pi * (np.arange(height) + 0.5) / height
     phi = 2.0 * np.pi * ((np.arange(width) + 0.5) / width - 0.5)
@@ -62,7 +68,7 @@ def directions(height: int, width: int) -> Floats:
     return np.stack(parts, axis=-1)
 
 
-def solid_angles(height: int, width: int) -> Floats:
+def texel_solid_angles(height: int, width: int) -> Floats:
     """Return the solid angle (h, 1) of a texel in each row [sr]."""
     edges = np.cos(np.pi * np.arange(height + 1) / height)
     return np.asarray((edges[:-1] - edges[1:])[:, None] * 2.0 * np.pi / width)
@@ -71,10 +77,12 @@ def solid_angles(height: int, width: int) -> Floats:
 def mean_radiance(radiance: Floats) -> Floats:
     """Return the mean radiance (3,) over all directions."""
     height, width = radiance.shape[:2]
-    return np.asarray((radiance * solid_angles(height, width)[..., None]).sum(axis=(0, 1)) / (4.0 * np.pi))
+    return np.asarray(
+        (radiance * texel_solid_angles(height, width)[..., None]).sum(axis=(0, 1)) / (4.0 * np.pi)
+    )
 
 
-def resample(radiance: NDArray[np.floating], height: int) -> Floats:
+def resample_panorama(radiance: NDArray[np.floating], height: int) -> Floats:
     """Resample a panorama to (height, 2 height, 3) by averaging over the solid angle of each new texel."""
     rows, columns = radiance.shape[:2]
     edges, target_edges = (-np.cos(np.linspace(0.0, np.pi, n + 1)) for n in (rows, height))
@@ -83,42 +91,42 @@ def resample(radiance: NDArray[np.floating], height: int) -> Floats:
     return _interval_means(upright.swapaxes(0, 1), edges, target_edges).swapaxes(0, 1)
 
 
-def _interval_means(values: NDArray[np.floating], edges: Floats, target_edges: Floats) -> Floats:
+def _interval_means(interval_values: NDArray[np.floating], edges: Floats, target_edges: Floats) -> Floats:
     """Return means of a piecewise constant function over other intervals, along the first axis.
 
-    values : (n, ...) values of the function between consecutive edges
+    interval_values : (n, ...) values of the function between consecutive edges
     edges : (n + 1,) increasing edges of these intervals
     target_edges : (k + 1,) edges of the intervals over which the k means are taken
     """
-    first = np.clip(np.searchsorted(edges, target_edges[:-1], "right") - 1, 0, len(values) - 1)
-    after = np.clip(np.searchsorted(edges, target_edges[1:], "left"), 1, len(values))
-    means = np.empty((len(first), *values.shape[1:]))
+    first = np.clip(np.searchsorted(edges, target_edges[:-1], "right") - 1, 0, len(interval_values) - 1)
+    after = np.clip(np.searchsorted(edges, target_edges[1:], "left"), 1, len(interval_values))
+    means = np.empty((len(first), *interval_values.shape[1:]))
     for k, (a, b) in enumerate(zip(first, after, strict=True)):
         overlap = np.diff(np.clip(edges[a : b + 1], target_edges[k], target_edges[k + 1]))
-        means[k] = np.tensordot(overlap / overlap.sum(), values[a:b], 1)
+        means[k] = np.tensordot(overlap / overlap.sum(), interval_values[a:b], 1)
     return means
 
 
-def panorama_file(name: str) -> Path | None:
+def panorama_file(panorama_name: str) -> Path | None:
     """Return the path of a panorama's picture, downloading a sample if necessary; None for "uniform".
 
-    name : see `load_panorama`
+    panorama_name : see `load_panorama`
 
     Raises DermisError for an unknown name.
     """
-    if name == UNIFORM:
+    if panorama_name == UNIFORM_PANORAMA:
         return None
-    sample = SAMPLES.get(name)
+    sample = SAMPLES.get(panorama_name)
     if sample is None:
-        if not is_file(name):
-            known = ", ".join([*_sample_names(), UNIFORM])
+        if not is_file(panorama_name):
+            known = ", ".join([*_sample_names(), UNIFORM_PANORAMA])
             expected, actual = f"an .hdr or .exr file or one of {known}", "it is neither"
-            refuse(f"environment {name!r}", expected, actual, "Check the name")
-        return Path(name)
+            refuse(f"environment {panorama_name!r}", expected, actual, "Check the name")
+        return Path(panorama_name)
     if sample.kind != "environment":
         known = ", ".join(_sample_names())
-        refuse(name, "an environment", f"this sample is a {sample.kind}", f"Use one of {known}")
-    return fetch_sample(name)["environment"]
+        refuse(panorama_name, "an environment", f"this sample is a {sample.kind}", f"Use one of {known}")
+    return fetch_sample(panorama_name)["environment"]
 
 
 def _sample_names() -> list[str]:
@@ -152,15 +160,18 @@ def split_suns(radiance: Floats) -> tuple[Floats, list[Sun]]:
     """
     mean = float(luminance(mean_radiance(radiance)))
     brightness = np.asarray(luminance(radiance), np.float64)
-    above = brightness > _PEAK_FACTOR * mean
-    towards = directions(*radiance.shape[:2])[above]
-    weight = np.broadcast_to(solid_angles(*radiance.shape[:2]), above.shape)[above]
-    kept_fraction = _PEAK_FACTOR * mean / brightness[above]
+    above = brightness > _SUN_PEAK_FACTOR * mean
+    towards = texel_directions(*radiance.shape[:2])[above]
+    weight = np.broadcast_to(texel_solid_angles(*radiance.shape[:2]), above.shape)[above]
+    kept_fraction = _SUN_PEAK_FACTOR * mean / brightness[above]
     light = radiance[above] * ((1.0 - kept_fraction) * weight)[:, None]
     remaining, suns = np.ones(len(kept_fraction)), list[Sun]()
     clusters = _bright_clusters(brightness[above], towards, weight)
     for inside in sorted(clusters, key=lambda cluster: -_luminance_sum(light[cluster])):
-        if len(suns) == MAX_SUNS or _luminance_sum(light[inside]) < _MIN_SUN_FRACTION * np.pi * mean:
+        if (
+            len(suns) == MAX_SUNS
+            or _luminance_sum(light[inside]) < _MIN_SUN_IRRADIANCE_FRACTION * np.pi * mean
+        ):
             break
         suns.append(_fit_sun(light[inside], towards[inside], weight[inside]))
         remaining[inside] = kept_fraction[inside]
@@ -169,8 +180,8 @@ def split_suns(radiance: Floats) -> tuple[Floats, list[Sun]]:
     return remainder, suns
 
 
-def _luminance_sum(light: Floats) -> float:
-    return float(luminance(light.sum(axis=0)))
+def _luminance_sum(colours: Floats) -> float:
+    return float(luminance(colours.sum(axis=0)))
 
 
 def _fit_sun(irradiances: Floats, unit_vectors: Floats, solid_angles: Floats) -> Sun:
@@ -195,7 +206,7 @@ def _bright_clusters(
     unit_vectors : (n, 3) unit vectors to the texels
     solid_angles : (n,) solid angles [sr]
     """
-    near = np.cos(np.radians(_CLUSTER_DEGREES))
+    near = np.cos(np.radians(_SUN_CLUSTER_DEGREES))
     remaining = np.ones(len(brightness), bool)
     clusters = []
     while remaining.any():

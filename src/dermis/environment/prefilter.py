@@ -14,10 +14,10 @@ from dermis.specular.beckmann import beckmann
 
 Floats = NDArray[np.float64]
 SMOOTHEST, ROUGHEST = 0.018, 1.0
-ROUGHNESSES = np.geomspace(SMOOTHEST, ROUGHEST, 13)
+LAYER_ROUGHNESSES = np.geomspace(SMOOTHEST, ROUGHEST, 13)
 """Roughnesses of the reflection layers, uniform in the logarithm; the shader interpolates between them."""
 LAYER_HEIGHT = 192
-_MAX_DEGREE = 160  # the factor of the smoothest lobe is 2e-4 here, so there is little ringing
+_MAX_HARMONIC_DEGREE = 160  # the factor of the smoothest lobe is 2e-4 here, so there is little ringing
 
 
 def isotropic_lobe(theta: Floats, m: float) -> Floats:
@@ -37,7 +37,7 @@ def isotropic_lobe(theta: Floats, m: float) -> Floats:
 def reflection_constants() -> dict[str, float]:
     """Return the values of environment.wgsl's `#fill` constants for the layers: count and roughness range."""
     return {
-        "reflections": len(ROUGHNESSES),
+        "reflections": len(LAYER_ROUGHNESSES),
         "smoothest_reflection": SMOOTHEST,
         "roughest_reflection": ROUGHEST,
     }
@@ -57,19 +57,22 @@ class Prefiltered:
 
 
 @logged_step("filtering the environment")
-def prefilter(name: str) -> Prefiltered:
+def prefilter(panorama_name: str) -> Prefiltered:
     """Load a panorama, split off its suns, and convolve the remainder with isotropic kernels.
 
-    name : see `load_panorama`
+    panorama_name : see `load_panorama`
 
     Convolution is exact multiplication of spherical harmonics up to degree 160, so there is no noise from
     sampling.
 
     Sources: [KautzMcCool2000] for reflections by roughness, [RamamoorthiHanrahan2001] for irradiance.
     """
-    radiance, suns = split_suns(load_panorama(name))
-    coefficients = analyse_panorama(radiance, _MAX_DEGREE)
-    kernels = [zonal_factors(np.cos, _MAX_DEGREE), *(isotropic_kernel(float(m)) for m in ROUGHNESSES)]
+    radiance, suns = split_suns(load_panorama(panorama_name))
+    coefficients = analyse_panorama(radiance, _MAX_HARMONIC_DEGREE)
+    kernels = [
+        zonal_factors(np.cos, _MAX_HARMONIC_DEGREE),
+        *(isotropic_kernel(float(m)) for m in LAYER_ROUGHNESSES),
+    ]
     layers = synthesise_panoramas(coefficients, np.stack(kernels), LAYER_HEIGHT)
     return Prefiltered(np.maximum(layers, 0.0).astype(np.float32), tuple(suns))
 
@@ -79,5 +82,5 @@ def isotropic_kernel(m: float) -> Floats:
 
     The lobe is normalised to unit integral.
     """
-    factors = zonal_factors(lambda theta: isotropic_lobe(theta, m), _MAX_DEGREE)
+    factors = zonal_factors(lambda theta: isotropic_lobe(theta, m), _MAX_HARMONIC_DEGREE)
     return np.asarray(factors / factors[0])

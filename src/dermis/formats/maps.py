@@ -13,7 +13,7 @@ import numpy as np
 
 from dermis.base.arrays import Bytes, Doubles, Floats, Numbers
 from dermis.base.errors import refuse
-from dermis.images.codecs import Pixels, strips
+from dermis.images.codecs import Pixels, row_strips
 from dermis.images.filters import smooth_quantisation
 from dermis.images.io import (
     EmbeddedPicture,
@@ -55,7 +55,7 @@ def _convert_in_strips(
 ) -> Floats:
     """Convert a picture (H, W, ...) to an array (H, W, *shape) in strips of rows, to limit memory."""
     converted = np.empty((*image.shape[:2], *texel_shape), np.float32)
-    for rows in strips(image):
+    for rows in row_strips(image):
         converted[rows] = convert_strip(image[rows])
     return converted
 
@@ -130,7 +130,7 @@ def slope_map(path: PathLike, normal_y: str) -> Floats:
     image = image[..., :3]
     signed = image.dtype == np.float32 and bool(image.min() < -0.01)
     slopes, statistics = np.empty((*image.shape[:2], 2), np.float32), np.zeros(4)
-    for rows in strips(image):
+    for rows in row_strips(image):
         value = _to_unit_range(image[rows])
         normals = value if signed else 2 * value - 1
         statistics += _normal_statistics(normals)
@@ -180,7 +180,7 @@ def _read_picture(path: PathLike, role: str) -> Pixels:
 def _grey_levels(path: PathLike, role: str, image: Pixels) -> Floats:
     """Return a grey picture (H, W) scaled to [0, 1]; RGB is accepted if its channels are equal."""
     if image.shape[2] > 1:
-        difference = max(_channel_difference(image[rows]) for rows in strips(image))
+        difference = max(_channel_difference(image[rows]) for rows in row_strips(image))
         if difference > _GREY_TOLERANCE:
             actual = f"its red, green and blue differ by up to {difference:.2f} of the full scale"
             refuse(path, f"{role} in grey", actual, "Check which map this is, or save it as grey")
@@ -275,6 +275,6 @@ def _cached_map(path: PathLike | None, parameters: str, load: MapLoader) -> Any:
         return check_finite(path, load(path))
     from dermis.base.disk import cached_array
 
-    note_properties(path, colours=load is colour_map)
+    note_properties(path, read_as_colours=load is colour_map)
     source = np.frombuffer(data, np.uint8)
     return cached_array(source, f"map {_CACHE_VERSION} {parameters}", lambda: check_finite(path, load(path)))

@@ -130,7 +130,7 @@ def _shadow_maps(memo: Memo, device: Device, request: FrameRequest) -> ShadowMap
     layers = request.shadow_layers
     size = request.settings.shadow_size if layers else 1
     return memo.get(
-        _make_shadow_maps, device, request.topology, layers, size, owner=f"{layers} {request.view_name}"
+        _make_shadow_maps, device, request.topology, layers, size, caller_name=f"{layers} {request.view_name}"
     )
 
 
@@ -167,10 +167,20 @@ def _cached_sky_visibility(
     return memo.get(make_vertex_sky_visibility, device, request.topology, untracked=(at_rest,))
 
 
-def _layout_atlas(memo: Memo, device: Device, request: FrameRequest, name: str, index: int) -> LayoutAtlas:
+def _layout_atlas(
+    memo: Memo, device: Device, request: FrameRequest, layout_name: str, layout_index: int
+) -> LayoutAtlas:
     stretch = request.technique.stretch(request.settings)
-    atlas = memo.get(cached_atlas, request.topology.mesh, request.atlas_plan.side, name, owner=str(index))
-    return atlas, memo.get(upload_atlas, device, atlas, stretch, request.seam_method, owner=str(index))
+    atlas = memo.get(
+        cached_atlas,
+        request.topology.mesh,
+        request.atlas_plan.side,
+        layout_name,
+        caller_name=str(layout_index),
+    )
+    return atlas, memo.get(
+        upload_atlas, device, atlas, stretch, request.seam_method, caller_name=str(layout_index)
+    )
 
 
 def _make_layout(
@@ -181,55 +191,61 @@ def _make_layout(
     layout_atlas: LayoutAtlas,
     shapes: shape.Resources,
     shared: Bindings,
-    index: int,
+    layout_index: int,
 ) -> AtlasLayout:
     """Return the resources of one atlas layout, without the record of the lights, which each frame adds.
 
     layout_atlas : the atlas, and its textures on the device
     shared : result of `_shared_bindings`, with the maps of the head
-    index : index of the layout, which identifies its resources in the cache
+    layout_index : index of the layout, which identifies its resources in the cache
     """
-    cached, layout_key, head, (atlas, textures) = memo.get, str(index), request.topology, layout_atlas
+    cached, layout_key, head, (atlas, textures) = memo.get, str(layout_index), request.topology, layout_atlas
     geometry = cached(
-        upload_geometry, device, head.mesh, atlas, shapes.shape, request.head.maps.parts, owner=layout_key
+        upload_geometry,
+        device,
+        head.mesh,
+        atlas,
+        shapes.shape,
+        request.head.maps.parts,
+        caller_name=layout_key,
     )
     tables, settings = shapes.tables, request.settings
     at_rest = partial(rest_geometry, memo, device, geometry, tables, head)
     bindings: MutableBindings = {**geometry.resources, **shared}
     gutter_update = None
     if shapes.rest_shape and textures.gutter:
-        tracing = cached(make_gutter_tracing, device, head.mesh, atlas, textures, owner=layout_key)
-        textures = cached(with_separate_gutters, device, textures, owner=layout_key)
-        gutter_update = cached(_gutter_update, tracing, geometry, shapes.rest_shape, owner=layout_key)
+        tracing = cached(make_gutter_tracing, device, head.mesh, atlas, textures, caller_name=layout_key)
+        textures = cached(with_separate_gutters, device, textures, caller_name=layout_key)
+        gutter_update = cached(_gutter_update, tracing, geometry, shapes.rest_shape, caller_name=layout_key)
     if request.has_occlusion:
         inputs = bindings, textures.resources["atlas"]
         hair = request.head.hair if settings.strands else None
         occlusion = cached(
-            cached_occlusion_map, device, head, atlas, hair, untracked=inputs, owner=layout_key
+            cached_occlusion_map, device, head, atlas, hair, untracked=inputs, caller_name=layout_key
         )
     else:
         occlusion = placeholder_occlusion(device)
     moving_occlusion = translucency = None
     if request.occlusion_follows_shape:
-        occlusion, moving_occlusion = cached(make_moving_map, device, occlusion, owner=layout_key)
+        occlusion, moving_occlusion = cached(make_moving_map, device, occlusion, caller_name=layout_key)
     bindings["occlusion_map"] = occlusion
     if request.blur_count and settings.transmission == "thin" and request.technique.supports_translucency:
-        searched = at_rest(pair_positions_mm(memo, request), index)
+        searched = at_rest(pair_positions_mm(memo, request), layout_index)
         posed, rest = ({**one.resources, **textures.resources} for one in (geometry, searched))
         blurred = request.split.blurred_mm2, request.split.weight
         tissue = thin_part_tables(memo, request), request.skin.overrides_tissue
         translucency = make_translucency(
-            memo, device, posed, rest, atlas, *blurred, *tissue, owner=layout_key
+            memo, device, posed, rest, atlas, *blurred, *tissue, layout_key=layout_key
         )
     interreflection = None
     if request.has_interreflection:
         light = request.split.total, request.has_occlusion, request.light_key
-        interreflection = make_interreflection(memo, device, head, atlas, *light, owner=layout_key)
+        interreflection = make_interreflection(memo, device, head, atlas, *light, layout_key=layout_key)
     bindings["from_skin"] = (
         interreflection.buffers.from_skin if interreflection else placeholder_interreflection(device)
     )
     side = settings.atlas if request.blur_count else 1
-    surfaces = cached(make_surface_texture, device, side, owner=layout_key)
+    surfaces = cached(make_surface_texture, device, side, caller_name=layout_key)
     scattered = _exitance_texture(memo, device, request, technique, side, layout_key)
     optional = gutter_update, translucency, moving_occlusion, interreflection
     return AtlasLayout(textures, geometry, bindings, surfaces, scattered, *optional)
@@ -240,23 +256,30 @@ def _gutter_update(tracing: GutterTracing, geometry: HeadGeometry, rest_shape: S
 
 
 def _exitance_texture(
-    memo: Memo, device: Device, request: FrameRequest, technique: Technique, side: int, role: str
+    memo: Memo,
+    device: Device,
+    request: FrameRequest,
+    technique: Technique,
+    atlas_side: int,
+    texture_role: str,
 ) -> Texture:
-    owner = f"{role} {request.view_name}"
-    return memo.get(_make_exitance_texture, device, technique, side, request.light_key, owner=owner)
+    owner = f"{texture_role} {request.view_name}"
+    return memo.get(
+        _make_exitance_texture, device, technique, atlas_side, request.light_key, caller_name=owner
+    )
 
 
-def _make_shadow_maps(device: Device, _: Head, layers: int, size: int) -> ShadowMaps:
-    return make_shadow_maps(device, layers, size)
+def _make_shadow_maps(device: Device, _: Head, layer_count: int, map_side: int) -> ShadowMaps:
+    return make_shadow_maps(device, layer_count, map_side)
 
 
-def _visibility_layers(device: Device, size: tuple[int, int], samples: int) -> ViewLayers:
-    return make_layers(device, size, samples, triangles=True)
+def _visibility_layers(device: Device, picture_size: tuple[int, int], sample_count: int) -> ViewLayers:
+    return make_layers(device, picture_size, sample_count, store_triangles=True)
 
 
-def _albedo_texture(device: Device, lobe: str, fresnel: str) -> Texture:
-    return texture_from_array(device, albedo_table(lobe, fresnel), "rg32float")
+def _albedo_texture(device: Device, lobe_name: str, fresnel_name: str) -> Texture:
+    return texture_from_array(device, albedo_table(lobe_name, fresnel_name), "rg32float")
 
 
-def _make_exitance_texture(device: Device, technique: Technique, side: int, _: str) -> Texture:
-    return technique.make_sum(device, side)
+def _make_exitance_texture(device: Device, technique: Technique, atlas_side: int, _: str) -> Texture:
+    return technique.make_sum(device, atlas_side)

@@ -27,10 +27,13 @@ Floats = NDArray[np.float32]
 LOGGER = logging.getLogger("dermis")
 # Surface points per pass, whose results fit in a buffer of the default size limit of WebGPU.
 _POINTS_PER_PASS = 1 << 20
-_PICTURE_SIZE = (64, 64)  # size of the picture, which is discarded: the frame only has to light the atlas
-_ALBEDO_ATLAS = 512  # side of the atlas where only albedo is baked [texels]
-_ALBEDO_SIDE = 2048  # side of the maps that sets the filter width where only albedo is baked [texels]
-_CONDITIONAL_OUTPUTS = {
+_DISCARDED_PICTURE_SIZE = (
+    64,
+    64,
+)  # size of the picture, which is discarded: the frame only has to light the atlas
+_ALBEDO_ATLAS_SIDE = 512  # side of the atlas where only albedo is baked [texels]
+_ALBEDO_MAP_SIDE = 2048  # side of the maps that sets the filter width where only albedo is baked [texels]
+_ABSENCE_REASONS_OF_OUTPUTS = {
     ("thickness",): "no light crosses thin parts: transmission is none, or no light is blurred",
     ("melanin", "blood"): "the skin is not made of pigments",
 }  # outputs that only some scenes have, and the reason why other scenes lack them
@@ -51,27 +54,27 @@ class BakedMaps:
     absent: dict[str, str]
 
 
-def bake(renderer: Renderer, scene: Scene, settings: Settings, side: int) -> BakedMaps:
+def bake(renderer: Renderer, scene: Scene, settings: Settings, map_side: int) -> BakedMaps:
     """Compute maps of the skin in its uv layout: its properties, and light before and after scattering.
 
     settings : settings of the lighting; size, samples, technique and `strands` are ignored
-    side : side of the maps, a power of two [texels]
+    map_side : side of the maps, a power of two [texels]
 
     Maps are evaluated at the centres of texels, with a filter as wide as a texel.
 
     Raises DermisError for sizes over the limits of the device, and when the device fails.
     """
-    changes = {"size": _PICTURE_SIZE, "samples": 1, "technique": "texture-space", "parts": "all"}
+    changes = {"size": _DISCARDED_PICTURE_SIZE, "samples": 1, "technique": "texture-space", "parts": "all"}
     settings = settings.model_copy(update=changes)
     absent: dict[str, str] = {}
     outputs = tuple(
         name
-        for names in _CONDITIONAL_OUTPUTS
+        for names in _ABSENCE_REASONS_OF_OUTPUTS
         for name in _available_outputs(renderer, scene, settings, names, absent)
     )
-    texel, points = layout_points(scene.head.mesh, side)
-    job = partial(_bake_points, renderer, scene, settings, outputs, points, side)
-    return _to_maps(side, texel, renderer.reopening_device.run(job), absent)
+    texel, points = layout_points(scene.head.mesh, map_side)
+    job = partial(_bake_points, renderer, scene, settings, outputs, points, map_side)
+    return _to_maps(map_side, texel, renderer.reopening_device.run(job), absent)
 
 
 def bake_albedo(
@@ -82,39 +85,39 @@ def bake_albedo(
     triangle : (n,) indices of the triangles on which the points lie
     weights : (n, 2) barycentric weights of the second and third corner
     """
-    settings = Settings(size=_PICTURE_SIZE, samples=1, atlas=_ALBEDO_ATLAS, strands=False)
+    settings = Settings(size=_DISCARDED_PICTURE_SIZE, samples=1, atlas=_ALBEDO_ATLAS_SIDE, strands=False)
     points = baking_pass.point_words(triangle, weights)
-    job = partial(_bake_points, renderer, scene, settings, (), points, _ALBEDO_SIDE)
+    job = partial(_bake_points, renderer, scene, settings, (), points, _ALBEDO_MAP_SIDE)
     values = renderer.reopening_device.run(job)
     return np.ascontiguousarray(values[:, : BAKED_CHANNELS["albedo"]])
 
 
-def layout_points(mesh: Mesh, side: int) -> tuple[NDArray[np.int64], NDArray[np.uint32]]:
+def layout_points(mesh: Mesh, map_side: int) -> tuple[NDArray[np.int64], NDArray[np.uint32]]:
     """Return the indices of texels whose centres are on skin, and their surface points packed for bake.wgsl.
 
     Where triangles overlap in uv, a triangle that is not mirrored takes precedence over a mirrored triangle,
     and a later triangle over an earlier triangle.
     """
     skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
-    texel, triangle = rasterise(mesh, side, np.flatnonzero(skin))
+    texel, triangle = rasterise(mesh, map_side, np.flatnonzero(skin))
     order = np.argsort(uv_cross(mesh.uv[mesh.triangles])[triangle] > 0, kind="stable")
-    owner = np.full(side * side, -1, np.int64)
+    owner = np.full(map_side * map_side, -1, np.int64)
     owner[texel[order]] = triangle[order]
     covered = np.flatnonzero(owner >= 0)
     return covered, baking_pass.point_words(
-        owner[covered], _texel_weights(mesh, side, covered, owner[covered])
+        owner[covered], _texel_weights(mesh, map_side, covered, owner[covered])
     )
 
 
 def _texel_weights(
-    mesh: Mesh, side: int, texel: NDArray[np.int64], triangle: NDArray[np.int64]
+    mesh: Mesh, map_side: int, texel_index: NDArray[np.int64], triangle_index: NDArray[np.int64]
 ) -> NDArray[np.float64]:
     """Return (n, 2) barycentric weights of texel centres for the second and third corner of a triangle.
 
-    texel, triangle : (n,) indices of the texels, row by row, and of the triangles that cover them
+    texel_index, triangle_index : (n,) indices of the texels, row by row, and of the triangles that cover them
     """
-    corners = texel_corners(mesh, side, triangle)
-    offset = np.stack([texel % side, texel // side], axis=1) - corners[:, 0]
+    corners = texel_corners(mesh, map_side, triangle_index)
+    offset = np.stack([texel_index % map_side, texel_index // map_side], axis=1) - corners[:, 0]
     second, third = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     area = cross_2d(second, third)
     area = np.where(area == 0.0, 1.0, area)
@@ -124,41 +127,47 @@ def _texel_weights(
 
 
 def _available_outputs(
-    renderer: Renderer, scene: Scene, settings: Settings, names: tuple[str, ...], absent: dict[str, str]
+    renderer: Renderer,
+    scene: Scene,
+    settings: Settings,
+    output_names: tuple[str, ...],
+    absence_reasons: dict[str, str],
 ) -> tuple[str, ...]:
-    """Return `names` if the scene has these outputs; else return () and add the reason to `absent`."""
+    """Return `output_names` if the scene has these outputs; else return () and add to `absence_reasons`."""
     try:
-        renderer.draw(scene, settings, timed=False, outputs=names)
+        renderer.draw(scene, settings, timed=False, outputs=output_names)
     except DermisError:
-        absent |= dict.fromkeys(names, _CONDITIONAL_OUTPUTS[names])
+        absence_reasons |= dict.fromkeys(output_names, _ABSENCE_REASONS_OF_OUTPUTS[output_names])
         return ()
-    return names
+    return output_names
 
 
 def _bake_points(
     renderer: Renderer,
     scene: Scene,
     settings: Settings,
-    outputs: tuple[str, ...],
-    points: NDArray[np.uint32],
-    side: int,
+    output_names: tuple[str, ...],
+    packed_points: NDArray[np.uint32],
+    map_side: int,
 ) -> Floats:
     """Render a frame to light the atlas, and return (n, BAKED_CHANNEL_COUNT) values at surface points.
 
-    outputs : names of outputs whose resources bake.wgsl needs
-    points : (n, 4) surface points, packed by `features.shading.bake.point_words`
-    side : side of the maps, which sets the width of filters [texels]
+    output_names : names of outputs whose resources bake.wgsl needs
+    packed_points : (n, 4) surface points, packed by `features.shading.bake.point_words`
+    map_side : side of the maps, which sets the width of filters [texels]
     """
-    renderer.draw(scene, settings, timed=False, outputs=outputs)
-    inputs = renderer.prepare(scene, settings, "", outputs)
+    renderer.draw(scene, settings, timed=False, outputs=output_names)
+    inputs = renderer.prepare(scene, settings, "", output_names)
     bindings, output_resources = _bake_bindings(renderer, inputs, scene), inputs.resources.outputs
-    pigments = output_resources.light.pigments if output_resources and "melanin" in outputs else (0.0, 0.0)
-    values = np.empty((len(points), BAKED_CHANNEL_COUNT), np.float32)
-    for start in range(0, len(points), _POINTS_PER_PASS):
+    pigments = (
+        output_resources.light.pigments if output_resources and "melanin" in output_names else (0.0, 0.0)
+    )
+    values = np.empty((len(packed_points), BAKED_CHANNEL_COUNT), np.float32)
+    for start in range(0, len(packed_points), _POINTS_PER_PASS):
         part = slice(start, start + _POINTS_PER_PASS)
-        options = bindings, points[part], 1.0 / side, pigments
+        options = bindings, packed_points[part], 1.0 / map_side, pigments
         values[part] = baking_pass.bake(renderer.device, inputs.constants, *options)
-        LOGGER.info("baking maps: %d of %d texels", min(part.stop, len(points)), len(points))
+        LOGGER.info("baking maps: %d of %d texels", min(part.stop, len(packed_points)), len(packed_points))
     return values
 
 
@@ -175,31 +184,36 @@ def _bake_bindings(renderer: Renderer, inputs: FrameInputs, scene: Scene) -> Mut
     return {**inputs.bindings, "shade": inputs.view, "scattered": resources.scattered, **added}
 
 
-def _to_maps(side: int, texel: NDArray[np.int64], values: Floats, absent: dict[str, str]) -> BakedMaps:
+def _to_maps(
+    map_side: int, texel_index: NDArray[np.int64], texel_values: Floats, absence_reasons: dict[str, str]
+) -> BakedMaps:
     """Arrange the channels of skin texels as maps, and fill all other texels from the nearest skin texel.
 
-    texel : (n,) indices of the skin texels, row by row
-    values : (n, BAKED_CHANNEL_COUNT) values at these texels, in the channels of `BAKED_CHANNELS`
+    texel_index : (n,) indices of the skin texels, row by row
+    texel_values : (n, BAKED_CHANNEL_COUNT) values at these texels, in the channels of `BAKED_CHANNELS`
     """
-    covered = np.zeros(side * side, np.bool_)
-    covered[texel] = True
-    uncovered, nearest = np.flatnonzero(~covered), _nearest_covered_texels(covered.reshape(side, side))
+    covered = np.zeros(map_side * map_side, np.bool_)
+    covered[texel_index] = True
+    uncovered, nearest = (
+        np.flatnonzero(~covered),
+        _nearest_covered_texels(covered.reshape(map_side, map_side)),
+    )
     maps, first = {}, 0
     for name, count in BAKED_CHANNELS.items():
-        channels = values[:, first : first + count]
+        channels = texel_values[:, first : first + count]
         first += count
-        if name in absent:
+        if name in absence_reasons:
             continue
-        image = np.zeros((side * side, count), np.float32)
-        image[texel] = channels
+        image = np.zeros((map_side * map_side, count), np.float32)
+        image[texel_index] = channels
         image[uncovered] = image[nearest]
-        maps[name] = image.reshape((side, side) if count == 1 else (side, side, count))
-    return BakedMaps(covered.reshape(side, side), maps, absent)
+        maps[name] = image.reshape((map_side, map_side) if count == 1 else (map_side, map_side, count))
+    return BakedMaps(covered.reshape(map_side, map_side), maps, absence_reasons)
 
 
-def _nearest_covered_texels(covered: NDArray[np.bool_]) -> NDArray[np.int64]:
+def _nearest_covered_texels(covered_mask: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Return, for each texel outside the mask in row order, the flat index of the nearest texel inside."""
     from scipy.ndimage import distance_transform_edt
 
-    y, x = distance_transform_edt(~covered, return_distances=False, return_indices=True)
-    return np.asarray((y.astype(np.int64) * covered.shape[1] + x)[~covered])
+    y, x = distance_transform_edt(~covered_mask, return_distances=False, return_indices=True)
+    return np.asarray((y.astype(np.int64) * covered_mask.shape[1] + x)[~covered_mask])

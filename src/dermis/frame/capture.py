@@ -15,7 +15,7 @@ from dermis.gpu import CommandList, Texture, upload
 from dermis.gpu.capture import CapturedFrame, FrameCapture
 from dermis.scene.techniques import TECHNIQUES
 
-_CACHE_SIZE = 32  # variants per resource, for all combinations of the player's controls
+_RENDERER_CACHE_SIZE = 32  # variants per resource, for all combinations of the player's controls
 ADAPTER_KINDS = {"gpu": "DiscreteGPU", "software": "CPU"}
 """Kinds of adapters for which frames can be captured, by the values of `device_kind`."""
 
@@ -26,7 +26,7 @@ def capture_renderer(device_kind: str, adapter: str) -> Renderer:
     device_kind : adapter on which the passes will be replayed, "gpu" or "software"
     adapter : selector of the adapter on which the renderer itself runs; it may be of another kind
     """
-    renderer = Renderer(adapter, cache_size=_CACHE_SIZE, cache_ttl=1000)
+    renderer = Renderer(adapter, cache_size=_RENDERER_CACHE_SIZE, cache_ttl=1000)
     if renderer.device.adapter.kind != ADAPTER_KINDS[device_kind]:
         device = renderer.device
         device.programs.clear()
@@ -40,16 +40,16 @@ def capture_frame(capture: FrameCapture, inputs: FrameInputs) -> CapturedFrame:
     return capture.capture(lambda graph: draw_frame(graph, inputs, technique))
 
 
-def reduce_hair(frame: CapturedFrame, factor: int) -> CapturedFrame:
-    """Return a captured frame that draws one in `factor` coarse hairs, widened to cover the same area.
+def reduce_hair(captured_frame: CapturedFrame, hair_divisor: int) -> CapturedFrame:
+    """Return a captured frame that draws one in `hair_divisor` coarse hairs, widened to cover the same area.
 
-    factor : divisor of the number of hairs; 0 keeps all hairs
+    hair_divisor : divisor of the number of hairs; 0 keeps all hairs
     """
-    for _, record in (one for one in frame.records if one[0] == "StrandView" and factor > 1):
-        count = int(record["coarse"]) // factor
+    for _, record in (one for one in captured_frame.records if one[0] == "StrandView" and hair_divisor > 1):
+        count = int(record["coarse"]) // hair_divisor
         record["width_scale"] *= record["coarse"] / max(1, count)
         record["coarse"] = count
-    return frame
+    return captured_frame
 
 
 def capture_mips(capture: FrameCapture, texture: Texture) -> CapturedFrame:
@@ -57,15 +57,16 @@ def capture_mips(capture: FrameCapture, texture: Texture) -> CapturedFrame:
     return capture.capture(lambda graph: map_mips.fill_mips(graph, map_mips.with_mip_views(texture)))
 
 
-def update_map(renderer: Renderer, texture: Texture, levels: list[NDArray[np.float16]]) -> None:
+def update_map(renderer: Renderer, texture: Texture, mip_levels: list[NDArray[np.float16]]) -> None:
     """Replace the texels of a map; if only the finest mip level is given, the other levels are computed.
 
-    levels : (l, h, w, c) texels of each mip level, the finest first, where l is the number of array layers
+    mip_levels : (l, h, w, c) texels of each mip level, the finest first, where l is the number of array
+        layers
     """
-    for mip, layers in enumerate(levels):
+    for mip, layers in enumerate(mip_levels):
         for layer, texels in enumerate(layers):
             upload(renderer.device, texture, texels, mip=mip, layer=layer)
-    if len(levels) < texture.mip_level_count:
+    if len(mip_levels) < texture.mip_level_count:
         frame = CommandList(renderer.device, timed=False)
         map_mips.fill_mips(frame, map_mips.with_mip_views(texture))
         frame.submit()

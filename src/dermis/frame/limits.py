@@ -19,15 +19,15 @@ from dermis.gpu import Device
 from dermis.gpu.memory import OutOfMemoryError, allocated_bytes, check_memory, format_bytes, probe_memory
 from dermis.scene.settings import Settings
 
-_DISTANCE_BYTES = 4  # bytes per texel: distance to the edge of the chart
-_TEXEL_BYTES = 16  # bytes per texel: four floats
-_GEOMETRY_BYTES = 8 + 8 + 8  # bytes per atlas texel: surface point, stretch, reach
-_PICTURE_BYTES = 36  # bytes per pixel
-_SAMPLE_BYTES = 8  # bytes per sample
-_CHANNEL_BYTES = 2 * 4  # bytes per pixel and channel of an output, its readback buffer included
-_FEW_SAMPLES = 4  # samples per pixel; with fewer, edges alias
-_BUDGET_FRACTION = 0.75  # fraction of free memory for a frame; the head and programs need the rest
-_MIN_SIDE = 64  # smaller sides save nothing
+_CHART_EDGE_DISTANCE_BYTES = 4  # bytes per texel: distance to the edge of the chart
+_FLOAT_TEXEL_BYTES = 16  # bytes per texel: four floats
+_GEOMETRY_TEXEL_BYTES = 8 + 8 + 8  # bytes per atlas texel: surface point, stretch, reach
+_PICTURE_PIXEL_BYTES = 36  # bytes per pixel
+_BYTES_PER_SAMPLE = 8  # bytes per sample
+_OUTPUT_CHANNEL_PIXEL_BYTES = 2 * 4  # bytes per pixel and channel of an output, its readback buffer included
+_MIN_SUGGESTED_SAMPLES = 4  # samples per pixel; with fewer, edges alias
+_MEMORY_BUDGET_FRACTION = 0.75  # fraction of free memory for a frame; the head and programs need the rest
+_MIN_SUGGESTED_SIDE = 64  # smaller sides save nothing
 
 
 def check_limits(device: Device, request: FrameRequest) -> None:
@@ -49,36 +49,43 @@ def check_limits(device: Device, request: FrameRequest) -> None:
     check_memory(device, total, "atlas and size", sizes, partial(suggest_settings, request))
 
 
-def out_of_memory_error(error: OutOfMemoryError, device: Device, request: FrameRequest) -> OutOfMemoryError:
+def out_of_memory_error(
+    allocation_error: OutOfMemoryError, device: Device, request: FrameRequest
+) -> OutOfMemoryError:
     """Return an error that suggests settings that fit, and release the memory of the failed frame.
 
-    error : error that the allocation raised
+    allocation_error : error that the allocation raised
     """
-    for raised in filter(None, (error, error.__cause__)):
+    for raised in filter(None, (allocation_error, allocation_error.__cause__)):
         traceback.clear_frames(raised.__traceback__)
     needed = sum(frame_bytes(request).values())
     free = probe_memory(device, needed)
-    budget = _BUDGET_FRACTION * (allocated_bytes() + free)
+    budget = _MEMORY_BUDGET_FRACTION * (allocated_bytes() + free)
     if needed <= budget:  # the estimate fits, so the process holds memory that cannot be counted
-        budget = _BUDGET_FRACTION * free
-    return OutOfMemoryError(error.expected, error.actual, error.size, suggest_settings(request, budget))
+        budget = _MEMORY_BUDGET_FRACTION * free
+    return OutOfMemoryError(
+        allocation_error.expected,
+        allocation_error.actual,
+        allocation_error.size,
+        suggest_settings(request, budget),
+    )
 
 
-def suggest_settings(request: FrameRequest, budget: float) -> str:
-    """Return advice on settings whose frame fits into `budget` bytes.
+def suggest_settings(request: FrameRequest, budget_bytes: float) -> str:
+    """Return advice on settings whose frame fits into `budget_bytes` bytes.
 
     The setting that needs most memory is halved until the frame fits.
     """
     smaller, changed = request, dict[str, str]()
     needed = frame_bytes(request)
-    while sum(needed.values()) > budget:
+    while sum(needed.values()) > budget_bytes:
         option = max(needed, key=lambda name: needed[name])
         halved = _halved_settings(smaller.settings, option)
         if halved is None:
             break
         smaller = replace(smaller, settings=halved)
         needed, changed = frame_bytes(smaller), changed | _command_line_options(halved, option)
-    if not changed or sum(needed.values()) > budget:
+    if not changed or sum(needed.values()) > budget_bytes:
         return "Close other programs that use the memory, or try --adapter cpu"
     return f"With {' '.join(changed.values())} it takes about {format_bytes(sum(needed.values()))}"
 
@@ -87,13 +94,13 @@ def frame_bytes(request: FrameRequest) -> dict[str, float]:
     """Return the memory that each size setting of a frame requires [bytes], without the head and its maps."""
     technique, settings, atlases = request.technique, request.settings, request.atlas_plan
     width, height = settings.size
-    pixel = _PICTURE_BYTES + _SAMPLE_BYTES * settings.samples + technique.pixel_bytes
-    pixel += _CHANNEL_BYTES * sum(request.output_channels.values())
+    pixel = _PICTURE_PIXEL_BYTES + _BYTES_PER_SAMPLE * settings.samples + technique.pixel_bytes
+    pixel += _OUTPUT_CHANNEL_PIXEL_BYTES * sum(request.output_channels.values())
     pixel += technique.subsurface_layer_bytes * ("diffuse" in request.outputs)
     texel = atlas_texel_bytes(technique, request.blur_count, len(atlases.layouts))
     texel += _mixing_bytes(request) if request.blur_count else 0.0
     if "translucent" in request.outputs:
-        texel += _TEXEL_BYTES * (2 * len(atlases.layouts) - 1)
+        texel += _FLOAT_TEXEL_BYTES * (2 * len(atlases.layouts) - 1)
     return {
         "atlas": texel * atlases.side**2,
         "size": float(pixel * width * height),
@@ -105,39 +112,43 @@ def _mixing_bytes(request: FrameRequest) -> float:
     """Return the memory per atlas texel that a blend of several profiles adds [bytes]."""
     others = len(request.other_profiles)
     maps = len(request.atlas_plan.layouts) + sum_layer_count(others)
-    return others * request.technique.texel_bytes(request.blur_count) + _TEXEL_BYTES * maps if others else 0.0
+    return (
+        others * request.technique.texel_bytes(request.blur_count) + _FLOAT_TEXEL_BYTES * maps
+        if others
+        else 0.0
+    )
 
 
-def _halved_settings(settings: Settings, option: str) -> Settings | None:
+def _halved_settings(settings: Settings, option_name: str) -> Settings | None:
     """Return settings with half the value of a size option, None if half the value is too small.
 
     For "size", the samples per pixel are halved first.
     """
-    if option == "size" and settings.samples > _FEW_SAMPLES:
+    if option_name == "size" and settings.samples > _MIN_SUGGESTED_SAMPLES:
         return settings.model_copy(update={"samples": settings.samples // 2})
-    value: Any = getattr(settings, option)
-    half: Any = tuple(side // 2 for side in value) if option == "size" else value // 2
-    return settings.model_copy(update={option: half}) if np.min(half) >= _MIN_SIDE else None
+    value: Any = getattr(settings, option_name)
+    half: Any = tuple(side // 2 for side in value) if option_name == "size" else value // 2
+    return settings.model_copy(update={option_name: half}) if np.min(half) >= _MIN_SUGGESTED_SIDE else None
 
 
-def _command_line_options(settings: Settings, option: str) -> dict[str, str]:
+def _command_line_options(settings: Settings, option_name: str) -> dict[str, str]:
     """Return the command line options for a size setting, by the name of the setting."""
-    if option != "size":
-        return {option: f"--{option.replace('_', '-')} {getattr(settings, option)}"}
+    if option_name != "size":
+        return {option_name: f"--{option_name.replace('_', '-')} {getattr(settings, option_name)}"}
     width, height = settings.size
     return {"size": f"--size {width}x{height} --samples {settings.samples}"}
 
 
-def atlas_texel_bytes(technique: TechniqueTraits, blur_count: int, layouts: int) -> float:
+def atlas_texel_bytes(technique: TechniqueTraits, blur_count: int, layout_count: int) -> float:
     """Return the memory per atlas texel on a software adapter [bytes].
 
     The memory covers geometry, pyramid levels, temporary textures of light, and the sum of the levels.
 
     blur_count : number of Gaussians that blur light
-    layouts : number of atlas layouts
+    layout_count : number of atlas layouts
     """
     if not blur_count:
-        return layouts * _GEOMETRY_BYTES
+        return layout_count * _GEOMETRY_TEXEL_BYTES
     blurs = technique.texel_bytes(blur_count)
-    blended = _TEXEL_BYTES + layouts * _DISTANCE_BYTES if layouts > 1 else 0
-    return blurs + blended + layouts * (_GEOMETRY_BYTES + SURFACE_TEXEL_BYTES + _TEXEL_BYTES)
+    blended = _FLOAT_TEXEL_BYTES + layout_count * _CHART_EDGE_DISTANCE_BYTES if layout_count > 1 else 0
+    return blurs + blended + layout_count * (_GEOMETRY_TEXEL_BYTES + SURFACE_TEXEL_BYTES + _FLOAT_TEXEL_BYTES)

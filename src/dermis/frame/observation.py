@@ -21,7 +21,7 @@ from dermis.scene.model import Scene
 from dermis.scene.opencv import OpenCvCamera
 from dermis.scene.settings import Settings
 
-_MISSING: Any = object()
+_NO_PREVIOUS_SCENE: Any = object()
 
 
 class Landmarks(NamedTuple):
@@ -78,19 +78,19 @@ class Observation(ShortRepr):
 
 
 def observation_jobs(
-    submit: Callable[..., Readback],
+    submit_frame: Callable[..., Readback],
     scenes: Iterable[Scene],
     previous: Scene | Iterable[Scene | None] | None,
     settings: Iterable[Settings],
 ) -> Iterator[tuple[Callable[[], Readback], Callable[[Readback], Observation]]]:
     """Yield two functions for each scene: the first submits a frame, the second reads back the observation.
 
-    submit : function that submits a frame, given a scene, the previous scene and `settings`
+    submit_frame : function that submits a frame, given a scene, the previous scene and `settings`
     previous : previous scenes for motion vectors, see `pair_with_previous`
     settings : settings of each scene
     """
     for (scene, before), chosen in zip(pair_with_previous(scenes, previous), settings, strict=False):
-        yield partial(submit, scene, before, settings=chosen), partial(_read_observation, scene, chosen)
+        yield partial(submit_frame, scene, before, settings=chosen), partial(_read_observation, scene, chosen)
 
 
 def _read_observation(scene: Scene, settings: Settings, readback: Readback) -> Observation:
@@ -100,11 +100,13 @@ def _read_observation(scene: Scene, settings: Settings, readback: Readback) -> O
     return Observation(picture, outputs, camera, landmarks, head_pose(scene), gaze_directions(scene))
 
 
-def _landmarks(camera: OpenCvCamera, names: tuple[str, ...], rows: NDArray[np.float32]) -> Landmarks:
-    projected = (rows[:, :3].astype(np.float64) @ camera.R.T + camera.t) @ camera.K.T
+def _landmarks(
+    camera: OpenCvCamera, landmark_names: tuple[str, ...], landmark_rows: NDArray[np.float32]
+) -> Landmarks:
+    projected = (landmark_rows[:, :3].astype(np.float64) @ camera.R.T + camera.t) @ camera.K.T
     with np.errstate(divide="ignore", invalid="ignore"):  # points in the plane of the pinhole
         pixels = projected[:, :2] / projected[:, 2:]
-    return Landmarks(names, rows[:, :3].copy(), pixels, rows[:, 3] > 0)
+    return Landmarks(landmark_names, landmark_rows[:, :3].copy(), pixels, landmark_rows[:, 3] > 0)
 
 
 def pair_with_previous(
@@ -116,8 +118,8 @@ def pair_with_previous(
         it, or with None if the head changes. Alternatively an iterable with the previous scene of each scene
     """
     if isinstance(previous, Iterable):
-        for one, before in zip_longest(scenes, previous, fillvalue=_MISSING):
-            if one is _MISSING or before is _MISSING:
+        for one, before in zip_longest(scenes, previous, fillvalue=_NO_PREVIOUS_SCENE):
+            if one is _NO_PREVIOUS_SCENE or before is _NO_PREVIOUS_SCENE:
                 expected, actual = "one scene or None per scene", "their number is different"
                 refuse("previous", expected, actual, "Write None for scenes without a previous one")
             yield Scene.coerce(one), before and Scene.coerce(before)

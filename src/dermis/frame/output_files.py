@@ -18,90 +18,92 @@ from dermis.images.io import encode_exr_parts
 from dermis.scene.outputs import OUTPUTS, Output
 
 Format = Literal["exr", "png", "npy"]
-_PNG_MAX = 65535
-_PICTURE_PART = "rgba"  # name of the first part, a convention of compositing programs
+_MAX_PNG_LEVEL = 65535
+_PICTURE_PART_NAME = "rgba"  # name of the first part, a convention of compositing programs
 
 
-def check_formats(names: Iterable[str], kind: Format) -> None:
+def check_formats(output_names: Iterable[str], file_format: Format) -> None:
     """Raise DermisError for an output that a file format cannot store.
 
-    names : names of outputs
-    kind : file format
+    output_names : names of outputs
+    file_format : file format
     """
-    for name in names:
-        if kind == "png" and OUTPUTS[name].quantisation is None and OUTPUTS[name].kind != "uint8":
+    for name in output_names:
+        if file_format == "png" and OUTPUTS[name].quantisation is None and OUTPUTS[name].kind != "uint8":
             refuse(f"output {name}", "exr or npy", "got png, which cannot hold it", "Choose one of these")
 
 
-def output_path(path: Path, name: str, kind: Format) -> Path:
+def output_path(picture_path: Path, output_name: str, file_format: Format) -> Path:
     """Return the path of an output's file beside a picture, such as face.depth.exr beside face.png."""
-    return path.with_name(f"{path.stem}.{name}.{kind}")
+    return picture_path.with_name(f"{picture_path.stem}.{output_name}.{file_format}")
 
 
-def encode_output(name: str, values: PlaneArray, kind: Format) -> bytes:
+def encode_output(output_name: str, output_array: PlaneArray, file_format: Format) -> bytes:
     """Return the bytes of a file with one output; equal arrays give equal bytes.
 
-    name : name of the output
-    values : (h, w) or (h, w, c) array of the output
-    kind : file format
+    output_name : name of the output
+    output_array : (h, w) or (h, w, c) array of the output
+    file_format : file format
     """
-    return _ENCODERS[kind](name, values)
+    return _ENCODERS[file_format](output_name, output_array)
 
 
-def write_output(path: Path, name: str, values: PlaneArray) -> None:
+def write_output(path: Path, output_name: str, output_array: PlaneArray) -> None:
     """Write an output as .exr, .png or .npy, atomically.
 
-    name : name of the output
-    values : (h, w) or (h, w, c) array of the output
+    output_name : name of the output
+    output_array : (h, w) or (h, w, c) array of the output
     """
     kinds: dict[str, Format] = {".exr": "exr", ".png": "png", ".npy": "npy"}
-    _write_atomically(path, encode_output(name, values, kinds[path.suffix.lower()]))
+    _write_atomically(path, encode_output(output_name, output_array, kinds[path.suffix.lower()]))
 
 
-def write_multipart(path: Path, picture: PlaneArray, values: Mapping[str, PlaneArray]) -> None:
+def write_multipart(path: Path, picture: PlaneArray, output_arrays: Mapping[str, PlaneArray]) -> None:
     """Write a linear picture and outputs as the parts of one OpenEXR file.
 
     picture : (h, w, 3 or 4) linear floats
-    values : arrays of the outputs by name
+    output_arrays : arrays of the outputs by name
     """
-    parts = {_PICTURE_PART: dict(zip("RGBA", np.moveaxis(picture, -1, 0), strict=False))}
-    parts |= {name: _channels(OUTPUTS[name], one) for name, one in values.items()}
+    parts = {_PICTURE_PART_NAME: dict(zip("RGBA", np.moveaxis(picture, -1, 0), strict=False))}
+    parts |= {name: _channels(OUTPUTS[name], one) for name, one in output_arrays.items()}
     _write_atomically(path, encode_exr_parts(parts))
 
 
-def quantise(name: str, values: PlaneArray) -> NDArray[np.uint8 | np.uint16]:
+def quantise(output_name: str, output_array: PlaneArray) -> NDArray[np.uint8 | np.uint16]:
     """Return an output as integers for a PNG file, (h, w) or (h, w, 3).
 
     Outputs with two channels get a third channel of zeros, because PNG has no format with two colour
     channels.
     """
-    if values.dtype == np.uint8:
-        return values
-    quantisation = OUTPUTS[name].quantisation
+    if output_array.dtype == np.uint8:
+        return output_array
+    quantisation = OUTPUTS[output_name].quantisation
     assert quantisation is not None, "check_formats accepts only quantised outputs"
-    words = np.clip(np.rint(values / quantisation.step + quantisation.zero), 0, _PNG_MAX).astype(np.uint16)
+    words = np.clip(np.rint(output_array / quantisation.step + quantisation.zero), 0, _MAX_PNG_LEVEL).astype(
+        np.uint16
+    )
     return words if words.ndim == 2 or words.shape[2] > 2 else np.pad(words, ((0, 0), (0, 0), (0, 1)))
 
 
-def _channels(output: Output, values: PlaneArray) -> dict[str, PlaneArray]:
+def _channels(output: Output, output_array: PlaneArray) -> dict[str, PlaneArray]:
     """Return the channels of an output by their names in an OpenEXR file: depth.Z, normal.X, ..."""
-    channels = np.atleast_3d(values)
+    channels = np.atleast_3d(output_array)
     names = output.channel_names or [str(k) for k in range(channels.shape[2])]
     return {f"{output.name}.{name}": channels[..., k] for k, name in enumerate(names)}
 
 
-def _as_exr(name: str, values: PlaneArray) -> bytes:
-    return encode_exr_parts({name: _channels(OUTPUTS[name], values)}, fast=True)
+def _as_exr(output_name: str, output_array: PlaneArray) -> bytes:
+    return encode_exr_parts({output_name: _channels(OUTPUTS[output_name], output_array)}, run_length=True)
 
 
-def _as_png(name: str, values: PlaneArray) -> bytes:
-    words = quantise(name, values)
+def _as_png(output_name: str, output_array: PlaneArray) -> bytes:
+    words = quantise(output_name, output_array)
     return encode_png(words[..., None] if words.ndim == 2 else words, 6)
 
 
-def _as_npy(name: str, values: PlaneArray) -> bytes:
+def _as_npy(output_name: str, output_array: PlaneArray) -> bytes:
     stream = io.BytesIO()
-    np.save(stream, values, allow_pickle=False)
+    np.save(stream, output_array, allow_pickle=False)
     return stream.getvalue()
 
 
@@ -112,6 +114,6 @@ _ENCODERS: Mapping[Format, Callable[[str, PlaneArray], bytes]] = {
 }
 
 
-def _write_atomically(path: Path, data: bytes) -> None:
+def _write_atomically(path: Path, content: bytes) -> None:
     with files.atomic_file(path) as temporary:
-        temporary.write_bytes(data)
+        temporary.write_bytes(content)

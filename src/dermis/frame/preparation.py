@@ -107,7 +107,7 @@ class Preparation:
         cached, device, head, environment = self.memo.get, self.device, scene.head.bare, scene.environment
         (profile, *others), blend_weights = self._profiles(scene.skin, technique)
         name, owner = (environment.name, "") if environment else (None, "none")
-        environment_map = cached(load_environment_map, device, name, owner=owner)
+        environment_map = cached(load_environment_map, device, name, caller_name=owner)
         scene = add_suns(self.memo, scene, environment_map)
         state = self._head_state(head, scene.motion)
         light_inputs = head, tuple(scene.lights), state.outline, settings.shadow_size
@@ -185,7 +185,7 @@ class Preparation:
             refuse("previous", "a scene of the same head", actual, advice)
         motion = self.memo.get(_rest_motion, head)
         if previous.motion is not None:
-            motion = self.memo.get(_motion_bytes, head, previous.motion, motion, owner="before")
+            motion = self.memo.get(_motion_bytes, head, previous.motion, motion, caller_name="before")
         camera = pinhole(previous.camera, head, inputs.settings)
         view = with_camera(inputs.resources.view, camera, None)
         return PreviousScene(None if motion == inputs.motion else motion, view)
@@ -247,21 +247,21 @@ def _sky_view(
     return views, sky_record(device, views, len(head.mesh.positions))
 
 
-def with_lights(layout: AtlasLayout, lights: UniformRecord) -> AtlasLayout:
+def with_lights(layout: AtlasLayout, lights_record: UniformRecord) -> AtlasLayout:
     """Return a copy of the layout with the uniform record of these lights in its shader bindings."""
-    return replace(layout, bindings=layout.bindings | {"lights": lights})
+    return replace(layout, bindings=layout.bindings | {"lights": lights_record})
 
 
-def _scaled_blurs(blurs: tuple[Blur, ...], scale: float) -> tuple[Blur, ...]:
-    return tuple(replace(blur, scale=scale) for blur in blurs)
+def _scaled_blurs(blurs: tuple[Blur, ...], irradiance_scale: float) -> tuple[Blur, ...]:
+    return tuple(replace(blur, scale=irradiance_scale) for blur in blurs)
 
 
 def _light_resources(
-    _: Head, __: Lights, outline: Outline, size: int, device: Device, scene: Scene
+    _: Head, __: Lights, outline: Outline, map_side: int, device: Device, scene: Scene
 ) -> tuple[UniformRecord, Views, tuple[int, ...]]:
     """Return the uniform record of the lights, the views of shadow maps, and the part count of each light.
 
     The first two parameters only serve as cache keys.
     """
-    views, part_counts = light_shadow_views(scene, outline, size), light_part_counts(scene)
+    views, part_counts = light_shadow_views(scene, outline, map_side), light_part_counts(scene)
     return light_records(shade_program(device), scene, views), shadow_map_views(views), part_counts

@@ -20,12 +20,12 @@ from dermis.gpu.wgsl_source import Folder, ShaderFolder, ShaderListMember
 from dermis.scene.outputs import OUTPUTS
 from dermis.specular.models import MODELS
 
-FLOAT_FORMAT = "rgba32float"
+FLOAT_TEXEL_FORMAT = "rgba32float"
 """Texture format of light in full precision."""
-HALF_FORMAT = "rgba16float"
+HALF_TEXEL_FORMAT = "rgba16float"
 """Texture format of light in half precision."""
 FRAME_FOLDER = Path(__file__).parent
-OPTIONAL_BINDINGS = ("PARTS", "CUTOUTS")
+OPTIONAL_BINDING_CONSTANTS = ("PARTS", "CUTOUTS")
 """Pipeline constants that are conditions of `//#if` as well, because bindings depend on them."""
 FEATURES_FOLDER = FRAME_FOLDER / "features"
 """Folder to which shader paths such as "shading/shade.wgsl" are relative."""
@@ -34,8 +34,8 @@ TILE_SIDE = 16
 """Side of the square workgroups of short shaders; smaller ones take a GPU longer to start than to run."""
 WORKGROUP_SIZE = 64
 """Invocations per workgroup of shaders that process lists, the constant EACH of each.wgsl."""
-_GROUPS_PER_ROW = 32768  # workgroups along x, at most 65535
-_STRIP_PIXELS = 16  # pixels per invocation of shade.wgsl on software adapters
+_WORKGROUPS_PER_ROW = 32768  # workgroups along x, at most 65535
+_PIXELS_PER_COLUMN = 16  # pixels per invocation of shade.wgsl on software adapters
 _SPLAT_STEP_TEXELS = 2.0  # step along hairs in shadow maps on software adapters [texels]
 _MAX_SAMPLES = 64  # limit of samples per invocation, as a driver ends loops after 65,535 iterations
 
@@ -50,16 +50,16 @@ _COMMON_SHADERS = (  # shaders of most frames
 )
 
 
-def shader_folders(*options: str) -> tuple[Folder, ...]:
+def shader_folders(*option_names: str) -> tuple[Folder, ...]:
     """Return the folders from which shaders include files, with the lists and constants of all features.
 
     A feature is a package in `features`. Its functions `shader_constants` and `shader_lists` are discovered
     here, so that features need no registration.
 
-    options : names of the `//#if` conditions that hold
+    option_names : names of the `//#if` conditions that hold
     """
     lists, constants = _feature_definitions(registry_version())
-    shared = ShaderFolder(FEATURES_FOLDER, lists, lambda: constants, frozenset(options))
+    shared = ShaderFolder(FEATURES_FOLDER, lists, lambda: constants, frozenset(option_names))
     return (shared, FRAME_FOLDER / "wgsl", FRAME_FOLDER / "techniques", SPECULAR_FOLDER)
 
 
@@ -84,8 +84,8 @@ def program(
     device: Device,
     path: str | Path,
     constants: Constants = (),
-    source: str = FLOAT_FORMAT,
-    store: str = FLOAT_FORMAT,
+    source: str = FLOAT_TEXEL_FORMAT,
+    store: str = FLOAT_TEXEL_FORMAT,
     labels: bool = False,
 ) -> ComputeProgram:
     """Return the compiled program of a shader; programs are cached per device.
@@ -110,12 +110,12 @@ def program(
 def shader_options(source: str, store: str, labels: bool, constants: Constants = ()) -> tuple[str, ...]:
     """Return the names of the `//#if` conditions that hold for the options of `program`."""
     values = {
-        "FILTERED_SOURCE": source == HALF_FORMAT,
-        "STORED_HALVES": store == HALF_FORMAT,
+        "FILTERED_SOURCE": source == HALF_TEXEL_FORMAT,
+        "STORED_HALVES": store == HALF_TEXEL_FORMAT,
         "HAIR_LABELS": labels,
     }
     options = [name for name, value in values.items() if value]
-    return (*options, *(name for name, value in constants if name in OPTIONAL_BINDINGS and value))
+    return (*options, *(name for name, value in constants if name in OPTIONAL_BINDING_CONSTANTS and value))
 
 
 def program_constants(
@@ -125,14 +125,14 @@ def program_constants(
     return used_constants(path, folders, device_constants(device)) | dict(constants)
 
 
-def workgroup_grid(count: int, workgroup: int = WORKGROUP_SIZE) -> tuple[int, int, int]:
+def workgroup_grid(entry_count: int, workgroup_size: int = WORKGROUP_SIZE) -> tuple[int, int, int]:
     """Return the grid of workgroups for a shader with one invocation per list entry, see each.wgsl.
 
-    count : number of entries
-    workgroup : entries per workgroup
+    entry_count : number of entries
+    workgroup_size : entries per workgroup
     """
-    groups = max(1, -(-count // workgroup))
-    return min(groups, _GROUPS_PER_ROW), -(-groups // _GROUPS_PER_ROW), 1
+    groups = max(1, -(-entry_count // workgroup_size))
+    return min(groups, _WORKGROUPS_PER_ROW), -(-groups // _WORKGROUPS_PER_ROW), 1
 
 
 def registry_version() -> int:
@@ -151,23 +151,23 @@ def device_constants(device: Device) -> Constants:
     lighting.wgsl, shade.wgsl and strands_shadow.wgsl.
     """
     if device.adapter.kind == "CPU":
-        return (("SKIPS_UNLIT", 1), ("STRIP", _STRIP_PIXELS), ("SPLAT_STEP", _SPLAT_STEP_TEXELS))
+        return (("SKIPS_UNLIT", 1), ("STRIP", _PIXELS_PER_COLUMN), ("SPLAT_STEP", _SPLAT_STEP_TEXELS))
     return (("MESH_IN_BUFFERS", 1),)
 
 
-def strip_constants(device: Device, samples: int) -> Constants:
+def strip_constants(device: Device, sample_count: int) -> Constants:
     """Return the pipeline constant that shortens the column of pixels per invocation, for many samples.
 
     On software adapters an invocation shades a column of pixels, and a driver limits its loop iterations. The
     result is empty where no limit is reached.
     """
-    strip = max(1, _MAX_SAMPLES // samples)
-    return (("STRIP", strip),) if device.adapter.kind == "CPU" and strip < _STRIP_PIXELS else ()
+    strip = max(1, _MAX_SAMPLES // sample_count)
+    return (("STRIP", strip),) if device.adapter.kind == "CPU" and strip < _PIXELS_PER_COLUMN else ()
 
 
 def level_format(device: Device) -> str:
     """Return the faster texture format of pyramid levels: half floats on GPUs, floats in software."""
-    return FLOAT_FORMAT if device.adapter.kind == "CPU" else HALF_FORMAT
+    return FLOAT_TEXEL_FORMAT if device.adapter.kind == "CPU" else HALF_TEXEL_FORMAT
 
 
 def warm_up(device: Device) -> None:

@@ -15,16 +15,16 @@ from dermis.mesh.outline import Outline
 from dermis.scene.camera import Window
 from dermis.scene.lights import PointLight
 
-Vec = NDArray[np.float64]
+Vectors = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 Triple = tuple[float, float, float]
 Axes = tuple[Triple, Triple, Triple]
 Row = tuple[float, float, float, float]
 Rows = tuple[Row, Row, Row]
 _MAX_LIGHT_TANGENT = math.tan(math.radians(80.0))
-_MIN_DISTANCE_MM = 1.0
-_UP = 0.0, 1.0, 0.0
-_CENTRED = 0.0, 0.0
+_MIN_LIGHT_DISTANCE_MM = 1.0
+_UP_DIRECTION = 0.0, 1.0, 0.0
+_NO_WINDOW_SHIFT = 0.0, 0.0
 PIXEL_CENTRE = np.full((1, 2), 0.5)
 """Sample position of views with one sample per pixel."""
 
@@ -39,12 +39,12 @@ class Views(NamedTuple):
     clips: Matrix
     sample_positions: Matrix
 
-    def matrices(self, size: tuple[int, int]) -> Matrix:
+    def matrices(self, layer_size: tuple[int, int]) -> Matrix:
         """Return (k n, 4, 4) matrices to clip space, shifted so that pixel centres fall on sample positions.
 
-        size : (width, height) of a layer [pixels]
+        layer_size : (width, height) of a layer [pixels]
         """
-        shift = (self.sample_positions - 0.5) * (-2.0 / size[0], 2.0 / size[1])  # in clip space
+        shift = (self.sample_positions - 0.5) * (-2.0 / layer_size[0], 2.0 / layer_size[1])  # in clip space
         matrices = np.repeat(self.clips[:, None], len(shift), axis=1)
         matrices[:, :, :2] += shift[..., None] * self.clips[:, None, 3:]
         return matrices.reshape(-1, 4, 4)
@@ -74,13 +74,13 @@ def shadow_map_views(views: Sequence[ShadowView | None]) -> Views:
     return Views(np.array([view.clip for view in views if view]).reshape(-1, 4, 4), PIXEL_CENTRE)
 
 
-def view_axes_array(forward: Vec, up: Vec) -> tuple[Vec, Vec, Vec]:
+def view_axes_array(forward: Vectors, up: Vectors) -> tuple[Vectors, Vectors, Vectors]:
     """Return the unit vectors right, up and forward of a view direction, as NumPy arrays."""
     right, upward, ahead = view_axes(forward.tolist(), up.tolist())
     return np.array(right), np.array(upward), np.array(ahead)
 
 
-def view_axes(forward: Sequence[float], up: Sequence[float] = _UP) -> Axes:
+def view_axes(forward: Sequence[float], up: Sequence[float] = _UP_DIRECTION) -> Axes:
     """Return the unit vectors right, up and forward of a view direction, as tuples.
 
     For single vectors this is faster than NumPy. Where `up` is parallel to `forward`, a horizontal axis takes
@@ -103,24 +103,28 @@ def world_position(position: Sequence[float], centre: Sequence[float]) -> Triple
     return position[0] + centre[0], position[1] + centre[1], position[2] + centre[2]
 
 
-def vector_between(start: Sequence[float], end: Sequence[float]) -> Triple:
-    """Return the vector from `start` to `end`."""
-    return end[0] - start[0], end[1] - start[1], end[2] - start[2]
+def vector_between(start_point: Sequence[float], end_point: Sequence[float]) -> Triple:
+    """Return the vector from `start_point` to `end_point`."""
+    return end_point[0] - start_point[0], end_point[1] - start_point[1], end_point[2] - start_point[2]
 
 
-def unit_vector(v: Sequence[float]) -> Triple:
+def unit_vector(vector: Sequence[float]) -> Triple:
     """Return a vector scaled to unit length."""
-    x, y, z = v
+    x, y, z = vector
     length = math.hypot(x, y, z)
     return x / length, y / length, z / length
 
 
-def _dot(a: Sequence[float], b: Sequence[float]) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+def _dot(first_vector: Sequence[float], second_vector: Sequence[float]) -> float:
+    return (
+        first_vector[0] * second_vector[0]
+        + first_vector[1] * second_vector[1]
+        + first_vector[2] * second_vector[2]
+    )
 
 
-def _cross(a: Sequence[float], b: Sequence[float]) -> Triple:
-    (ax, ay, az), (bx, by, bz) = a, b
+def _cross(first_vector: Sequence[float], second_vector: Sequence[float]) -> Triple:
+    (ax, ay, az), (bx, by, bz) = first_vector, second_vector
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
@@ -159,14 +163,14 @@ def depth_range(outline: Outline, rows: Rows) -> tuple[float, float]:
 
 
 def point_shadow_views(
-    lights: Sequence[tuple[str, PointLight]], centre: Triple, outline: Outline, size: int
+    lights: Sequence[tuple[str, PointLight]], centre: Triple, outline: Outline, map_side: int
 ) -> list[ShadowView]:
     """Return for each point light the narrowest view from its position that contains the whole mesh.
 
     lights : each light with its name for error messages
     centre : centre of the head, the origin of light positions [mm]
     outline : outline of the head's shape
-    size : side of the shadow maps [texels]
+    map_side : side of the shadow maps [texels]
 
     All views are computed at once.
 
@@ -182,7 +186,7 @@ def point_shadow_views(
     view_points = (stacked @ outline.homogeneous).reshape(3, len(rows), -1)
     depth = view_points[2]
     near, far = depth.min(axis=1).tolist(), depth.max(axis=1).tolist()
-    _check_outside(lights, [one > _MIN_DISTANCE_MM for one in near])
+    _check_outside(lights, [one > _MIN_LIGHT_DISTANCE_MM for one in near])
     steepest = _largest_tangents(view_points[:2], depth)
     _check_outside(lights, [one <= _MAX_LIGHT_TANGENT for one in steepest])
     slack = outline.margin_mm
@@ -191,40 +195,41 @@ def point_shadow_views(
         for h, n, f in zip(steepest, near, far, strict=True)
     ]
     clips = [
-        perspective(r, Window((h, h), _CENTRED), n, f) for r, (h, n, f) in zip(rows, bounds, strict=True)
+        perspective(r, Window((h, h), _NO_WINDOW_SHIFT), n, f)
+        for r, (h, n, f) in zip(rows, bounds, strict=True)
     ]
     return [
-        ShadowView(clip, 2.0 * h / size, eye, right, up, n, f)
+        ShadowView(clip, 2.0 * h / map_side, eye, right, up, n, f)
         for clip, eye, (right, up, _), (h, n, f) in zip(np.array(clips), eyes, axes, bounds, strict=True)
     ]
 
 
-def _check_outside(lights: Sequence[tuple[str, PointLight]], outside: Sequence[bool]) -> None:
-    if not all(outside):
-        culprit, light = lights[outside.index(False)]
+def _check_outside(lights: Sequence[tuple[str, PointLight]], outside_flags: Sequence[bool]) -> None:
+    if not all(outside_flags):
+        culprit, light = lights[outside_flags.index(False)]
         actual = f"it is at {[round(c) for c in light.position]} mm"
         refuse(culprit, "a position outside the head", actual, "Move it away or set shadows = false")
 
 
-def _largest_tangents(sides: NDArray[np.floating], depth: NDArray[np.floating]) -> list[float]:
+def _largest_tangents(side_coordinates: NDArray[np.floating], depth: NDArray[np.floating]) -> list[float]:
     """Return, for each view, the tangent of half the square field of view that contains all points [-].
 
-    sides : (2, k, n) x and y of points in k views; the array is overwritten to avoid allocations
+    side_coordinates : (2, k, n) x and y of points in k views; the array is overwritten to avoid allocations
     depth : (k, n) depths of the points
     """
-    for side in sides:
+    for side in side_coordinates:
         side /= depth  # one by one: NumPy allocates buffers when it divides both at once
-    largest: list[float] = np.abs(sides, out=sides).max(axis=(0, 2)).tolist()
+    largest: list[float] = np.abs(side_coordinates, out=side_coordinates).max(axis=(0, 2)).tolist()
     return largest
 
 
-def parallel_shadow_view(direction: Vec, outline: Outline, size: int) -> ShadowView:
+def parallel_shadow_view(direction: Vectors, outline: Outline, map_side: int) -> ShadowView:
     """Return the narrowest view along the direction of parallel light that contains the whole mesh.
 
-    size : side of the shadow map [texels]
+    map_side : side of the shadow map [texels]
     """
     points = outline.points_mm
-    axes = view_axes_array(direction, np.array(_UP))
+    axes = view_axes_array(direction, np.array(_UP_DIRECTION))
     local = points @ np.stack(axes, axis=1)
     margin = 1.0 + np.array([0.0, 0.0, outline.margin_mm])
     low, high = local.min(axis=0) - margin, local.max(axis=0) + margin
@@ -236,18 +241,18 @@ def parallel_shadow_view(direction: Vec, outline: Outline, size: int) -> ShadowV
     clip[2, 3] = high[2] / (high[2] - low[2])
     middle = 0.5 * (low[0] + high[0]) * axes[0] + 0.5 * (low[1] + high[1]) * axes[1]
     origin, right, up = ((float(x), float(y), float(z)) for x, y, z in (middle, axes[0], axes[1]))
-    return ShadowView(clip, 2.0 * half / size, origin, right, up, float(low[2]), float(high[2]))
+    return ShadowView(clip, 2.0 * half / map_side, origin, right, up, float(low[2]), float(high[2]))
 
 
 @cache
-def pixel_samples(count: int) -> NDArray[np.float64]:
-    """Return sample positions in a pixel, a (count, 2) Hammersley set in the unit square."""
-    index = np.arange(count)
-    y, digit, remaining = np.zeros(count), 0.5, index.copy()
+def pixel_samples(sample_count: int) -> NDArray[np.float64]:
+    """Return sample positions in a pixel, a (sample_count, 2) Hammersley set in the unit square."""
+    index = np.arange(sample_count)
+    y, digit, remaining = np.zeros(sample_count), 0.5, index.copy()
     while remaining.any():
         y += digit * (remaining & 1)
         remaining >>= 1
         digit /= 2
-    points = np.stack([(index + 0.5) / count, y + 0.5 / count], axis=-1) % 1.0
+    points = np.stack([(index + 0.5) / sample_count, y + 0.5 / sample_count], axis=-1) % 1.0
     points.flags.writeable = False
     return points

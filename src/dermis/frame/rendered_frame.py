@@ -21,7 +21,7 @@ from dermis.scene.outputs import OUTPUTS
 from dermis.scene.settings import Settings
 
 T = TypeVar("T")
-_WHITE = 255  # largest byte of a picture
+_MAX_BYTE_LEVEL = 255  # largest byte of a picture
 
 
 @dataclass(eq=False)
@@ -114,8 +114,8 @@ class RenderedFrame(ShortRepr):
     def clipped(self) -> float:
         """Return the fraction of the head's pixels that are overexposed in any channel [-]."""
         levels = self._read(lambda frame: download(frame.device, frame.picture.bytes))
-        head = levels[levels[..., 3] == _WHITE]
-        return float((head[:, :3].max(axis=1) == _WHITE).mean()) if len(head) else 0.0
+        head = levels[levels[..., 3] == _MAX_BYTE_LEVEL]
+        return float((head[:, :3].max(axis=1) == _MAX_BYTE_LEVEL).mean()) if len(head) else 0.0
 
     def _download_exposed(self) -> NDArray[np.float32]:
         return self._read(lambda frame: download(frame.device, frame.picture.exposed))

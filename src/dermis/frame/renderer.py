@@ -186,7 +186,7 @@ class Renderer:
         """Submit a frame together with the readback of its picture and outputs."""
         inputs = self.prepare(scene, settings, "", outputs, previous, landmarks)
         coverage, extra = settings if alpha else None, inputs.resources.outputs
-        read_back = partial(start_readback, linear=linear, alpha=coverage, outputs=extra)
+        read_back = partial(start_readback, as_linear=linear, alpha_settings=coverage, outputs=extra)
         _, readback = self._submit(inputs, False, False, read_back)
         assert readback is not None
         return readback

@@ -17,7 +17,7 @@ class SeamMethod:
 
     layouts : names of layouts: "stitched", "mesh" for the uv layout of the mesh, or "unwrapped" for a layout
         with other seams
-    edge : filter mode at the edges of charts, one of `features.diffusion.blur.EDGE_MODES`
+    edge : filter mode at the edges of charts, one of `features.diffusion.blur.CHART_EDGE_MODES`
     feathered : whether the stretch map is changed near edges so that blurs become narrower there
     coloured : whether empty texels have the colour `Settings.seam_colour`; otherwise they are black
     """
@@ -38,12 +38,12 @@ SEAM_METHODS = {
 }
 
 
-def seam_method(name: str, can_stitch: bool) -> SeamMethod:
+def seam_method(method_name: str, can_stitch: bool) -> SeamMethod:
     """Return the seam method with a name; "clear-colour" replaces "stitch" for techniques that cannot stitch.
 
     can_stitch : whether the technique can carry light across seams
     """
-    return SEAM_METHODS["clear-colour" if name == "stitch" and not can_stitch else name]
+    return SEAM_METHODS["clear-colour" if method_name == "stitch" and not can_stitch else method_name]
 
 
 class AtlasPlan(NamedTuple):
@@ -54,7 +54,7 @@ class AtlasPlan(NamedTuple):
 
 
 def plan_atlases(method: SeamMethod, settings: Settings, blur_count: int, has_occlusion: bool) -> AtlasPlan:
-    """Return the layouts and the size of the atlases; the size is minimal where an atlas stores nothing.
+    """Return the layouts and the size of the atlases; an atlas that stores nothing has the smallest size.
 
     blur_count : number of Gaussians that blur light over the atlas
     has_occlusion : whether the atlas stores occlusion of the environment

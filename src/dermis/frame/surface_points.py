@@ -63,15 +63,17 @@ def _surface_points(renderer: Renderer, scene: Scene, settings: Settings) -> Sur
     return SurfacePoints(mask, triangle, _barycentric(scene, inputs.view, triangle, mask))
 
 
-def _barycentric(scene: Scene, view: NDArray[np.void], triangle: Index, mask: NDArray[np.bool_]) -> Floats:
+def _barycentric(
+    scene: Scene, view: NDArray[np.void], triangle_index: Index, head_mask: NDArray[np.bool_]
+) -> Floats:
     """Return (n, 3) barycentric weights where the camera rays of pixels meet their triangles, see shade.wgsl.
 
     view : uniform record of the shading pass
-    triangle : (n,) indices of the triangles in the pixels of the mask
-    mask : (h, w) mask of the pixels that show the head
+    triangle_index : (n,) indices of the triangles in the pixels of the mask
+    head_mask : (h, w) mask of the pixels that show the head
     """
-    height, width = mask.shape
-    rows, columns = np.nonzero(mask)
+    height, width = head_mask.shape
+    rows, columns = np.nonzero(head_mask)
     x, y = 2.0 * (columns + 0.5) / width - 1.0, 1.0 - 2.0 * (rows + 0.5) / height
     names = ("forward", "right", "up", "eye", "shift")
     forward, right, up, eye, shift = (view[name].astype(np.float64) for name in names)
@@ -79,7 +81,7 @@ def _barycentric(scene: Scene, view: NDArray[np.void], triangle: Index, mask: ND
     ray = forward + x[:, None] * right + y[:, None] * up
     mesh, motion = scene.head.mesh, scene.motion
     points = mesh.positions if motion is None else scene.head.control.points_mm(motion)[mesh.point]
-    a, b, c = (points[mesh.triangles[triangle, k]].astype(np.float64) - eye for k in range(3))
+    a, b, c = (points[mesh.triangles[triangle_index, k]].astype(np.float64) - eye for k in range(3))
     sides = (np.cross(b, c), np.cross(c, a), np.cross(a, b))
     weights = np.stack([(side * ray).sum(axis=1) for side in sides], axis=-1)
     weights *= np.sign(weights.sum(axis=1, keepdims=True))  # negative on back faces
@@ -108,15 +110,17 @@ def irradiance_at(
     ]
 
 
-def _irradiance(renderer: Renderer, scene: Scene, settings: Settings, records: NDArray[np.uint32]) -> Floats:
+def _irradiance(
+    renderer: Renderer, scene: Scene, settings: Settings, packed_points: NDArray[np.uint32]
+) -> Floats:
     """Return the (n * n, 3) irradiance at surface points, one in each texel of an n x n atlas [-].
 
-    records : (n, n, 2) packed surface points
+    packed_points : (n, n, 2) packed surface points
     """
-    device, side = renderer.device, len(records)
+    device, side = renderer.device, len(packed_points)
     inputs = renderer.prepare(scene, settings.model_copy(update={"interreflection": False}))
     first = inputs.layouts[0]
-    point_atlas = AtlasTextures({"atlas": texture_from_array(device, records, "rg32uint")})
+    point_atlas = AtlasTextures({"atlas": texture_from_array(device, packed_points, "rg32uint")})
     entering = make_texture(device, (side, side), "rgba32float")
     frame = CommandList(device)
     resources = inputs.resources

@@ -94,6 +94,6 @@ class TechniqueTraits:
         return 0.0
 
 
-def channel_weights(profile: GaussianSum, normalise: bool) -> Floats:
-    """Return the (k, 3) weights of the Gaussians, scaled to a sum of 1 per channel by `normalise` [-]."""
-    return profile.weight / profile.albedo if normalise else profile.weight
+def channel_weights(profile: GaussianSum, normalise_weights: bool) -> Floats:
+    """Return the (k, 3) weights of the Gaussians, on request scaled to a sum of 1 per channel [-]."""
+    return profile.weight / profile.albedo if normalise_weights else profile.weight

@@ -17,11 +17,11 @@ from dermis.base.errors import refuse
 from dermis.gpu.memory import check_driver_address_space
 from dermis.gpu.types import Untyped
 
-_TYPEDEF = "typedef "
-_INTEGER_TYPES = ("char", "uint8_t", "uint32_t", "uintptr_t", "intptr_t")
+_C_TYPEDEF_PREFIX = "typedef "
+_C_INTEGER_TYPES = ("char", "uint8_t", "uint32_t", "uintptr_t", "intptr_t")
 OPTIONAL_FEATURES = ("timestamp-query",)
 """Optional features of WebGPU that are requested where the adapter has them."""
-INSTALL_HINT = "On Debian or Ubuntu: sudo apt-get install mesa-vulkan-drivers"
+DRIVER_INSTALL_HINT = "On Debian or Ubuntu: sudo apt-get install mesa-vulkan-drivers"
 DEFAULT_LIMITS = {
     "max-texture-dimension-1d": 8192,
     "max-texture-dimension-2d": 8192,
@@ -60,7 +60,7 @@ _REQUIRED_LIMITS = tuple(
     name for name in DEFAULT_LIMITS if any(word in name for word in ("stage", "compute", "group", "layout"))
 )
 """Limits that programs rely on; the limits of texture and buffer sizes may be lower."""
-_RANKED_KINDS = ("DiscreteGPU", "IntegratedGPU", "VirtualGPU", "Unknown", "CPU")
+_ADAPTER_KINDS_BEST_FIRST = ("DiscreteGPU", "IntegratedGPU", "VirtualGPU", "Unknown", "CPU")
 
 
 def register_wgpu_types() -> None:
@@ -79,7 +79,10 @@ def register_types(ffi: Any) -> int:
     try:
         with ffi._lock:  # cffi's own callers take it too
             declared = ffi._parser._declarations
-            types = {name: (ffi._get_cached_btype(kind), False) for name, kind in _named_types(declared)}
+            types = {
+                name: (ffi._get_cached_btype(kind), False)
+                for name, kind in _pointer_and_array_types(declared)
+            }
             types |= {name: (ffi._get_cached_btype(kind), True) for name, kind in _callback_types(declared)}
         for name, parsed in types.items():
             ffi._parsed_types.setdefault(name, parsed)
@@ -88,7 +91,7 @@ def register_types(ffi: Any) -> int:
     return len(types)
 
 
-def _named_types(declarations: Any) -> Iterator[tuple[str, Any]]:
+def _pointer_and_array_types(declarations: Any) -> Iterator[tuple[str, Any]]:
     """Yield the C type names of pointers and arrays as wgpu spells them, with their cffi models.
 
     declarations : declarations that cffi parsed from wgpu's header, by name
@@ -96,14 +99,16 @@ def _named_types(declarations: Any) -> Iterator[tuple[str, Any]]:
     from cffi import model  # type: ignore[import-untyped]
 
     named = {
-        name.removeprefix(_TYPEDEF): kind for name, (kind, _) in declarations.items() if _TYPEDEF in name
+        name.removeprefix(_C_TYPEDEF_PREFIX): kind
+        for name, (kind, _) in declarations.items()
+        if _C_TYPEDEF_PREFIX in name
     }
     for name, kind in named.items():
         if isinstance(kind, model.StructType | model.PrimitiveType):
             yield from ((f"{name} *{space}", model.PointerType(kind)) for space in ("", " "))
         if isinstance(kind, model.StructType | model.PointerType | model.EnumType):
             yield f"{name}[]", model.ArrayType(kind, None)
-    for name in _INTEGER_TYPES:
+    for name in _C_INTEGER_TYPES:
         yield name, model.PrimitiveType(name)
         yield f"{name} *", model.PointerType(model.PrimitiveType(name))
         yield f"{name} []", model.ArrayType(model.PrimitiveType(name), None)
@@ -117,7 +122,9 @@ def _callback_types(declarations: Any) -> Iterator[tuple[str, Any]]:
     from cffi import model
 
     named = {
-        name.removeprefix(_TYPEDEF): kind for name, (kind, _) in declarations.items() if _TYPEDEF in name
+        name.removeprefix(_C_TYPEDEF_PREFIX): kind
+        for name, (kind, _) in declarations.items()
+        if _C_TYPEDEF_PREFIX in name
     }
     handles = {kind.get_c_name(): name for name, kind in named.items() if isinstance(kind, model.PointerType)}
     for name, kind in named.items():
@@ -164,8 +171,8 @@ def list_adapters() -> list[Adapter]:
         with _silenced_stderr():
             adapters = [_describe_adapter(handle) for handle in wgpu.gpu.enumerate_adapters_sync()]
     except Exception as error:  # a broken driver may raise anything
-        refuse("graphics drivers", "a list of adapters", f"they fail: {error}", INSTALL_HINT)
-    adapters.sort(key=lambda a: (_kind_rank(a.kind), -len(a.features), a.backend == "OpenGL"))
+        refuse("graphics drivers", "a list of adapters", f"they fail: {error}", DRIVER_INSTALL_HINT)
+    adapters.sort(key=lambda a: (_adapter_kind_rank(a.kind), -len(a.features), a.backend == "OpenGL"))
     return [replace(one, number=number) for number, one in enumerate(adapters)]
 
 
@@ -181,7 +188,7 @@ def select_adapters(selector: str) -> tuple[list[Adapter], str]:
     reliable = [a for a in adapters if a.backend != "OpenGL"]
     if not adapters or (selector in ("auto", "cpu") and not reliable):
         actual = "this machine shows only OpenGL's" if adapters else "this machine shows none"
-        refuse("adapter", "a Vulkan, Metal or DX12 adapter", actual, INSTALL_HINT)
+        refuse("adapter", "a Vulkan, Metal or DX12 adapter", actual, DRIVER_INSTALL_HINT)
     if match := re.fullmatch(r"#(\d{1,4})", selector):
         number = int(match[1])
         fitting, reason = adapters[number : number + 1], f"it is the one with the number {number}"
@@ -194,7 +201,11 @@ def select_adapters(selector: str) -> tuple[list[Adapter], str]:
         reason = f"its name contains {selector!r}"
     if not fitting:
         names = ", ".join(f"#{a.number} {a.name} ({a.backend})" for a in adapters)
-        advice = INSTALL_HINT if selector == "cpu" else "Choose auto, cpu, part of one of these names, or #0"
+        advice = (
+            DRIVER_INSTALL_HINT
+            if selector == "cpu"
+            else "Choose auto, cpu, part of one of these names, or #0"
+        )
         refuse(f"adapter {selector!r}", "one of this machine's adapters", f"it has {names}", advice)
     return fitting, reason
 
@@ -213,17 +224,17 @@ def similar_adapters(selector: str) -> list[Adapter]:
     return [best, *(one for one in others if (one.kind, one.backend) == (best.kind, best.backend))]
 
 
-def check_limits(adapter: str, adapter_limits: Mapping[str, int]) -> None:
+def check_limits(adapter_name: str, adapter_limits: Mapping[str, int]) -> None:
     """Raise DermisError for an adapter whose limits are too low for the shaders of a frame.
 
-    adapter, adapter_limits : name of the adapter, and its limits by name
+    adapter_name, adapter_limits : name of the adapter, and its limits by name
     """
     for name in _REQUIRED_LIMITS:
         minimum = DEFAULT_LIMITS[name]
         if adapter_limits.get(name, minimum) < minimum:
             expected = f"{name} of at least {minimum}, as WebGPU promises"
             advice = "Choose another adapter, which dermis doctor lists, or update its driver"
-            refuse(f"adapter {adapter}", expected, f"it has {adapter_limits[name]}", advice)
+            refuse(f"adapter {adapter_name}", expected, f"it has {adapter_limits[name]}", advice)
 
 
 def device_limits(adapter_limits: Mapping[str, int], full_limits: Sequence[str]) -> dict[str, int]:
@@ -239,20 +250,22 @@ def device_limits(adapter_limits: Mapping[str, int], full_limits: Sequence[str])
     return limits | {name: adapter_limits[name] for name in full_limits}
 
 
-def _describe_adapter(handle: Untyped) -> Adapter:
-    info = handle.info
+def _describe_adapter(wgpu_adapter: Untyped) -> Adapter:
+    info = wgpu_adapter.info
     return Adapter(
         name=info["device"],
         driver=info["description"],
         kind=info["adapter_type"],
         backend=info["backend_type"],
-        features=tuple(f for f in OPTIONAL_FEATURES if f in handle.features),
-        handle=handle,
+        features=tuple(f for f in OPTIONAL_FEATURES if f in wgpu_adapter.features),
+        handle=wgpu_adapter,
     )
 
 
-def _kind_rank(kind: str) -> int:
-    return _RANKED_KINDS.index(kind if kind in _RANKED_KINDS else "Unknown")
+def _adapter_kind_rank(adapter_kind: str) -> int:
+    return _ADAPTER_KINDS_BEST_FIRST.index(
+        adapter_kind if adapter_kind in _ADAPTER_KINDS_BEST_FIRST else "Unknown"
+    )
 
 
 @contextlib.contextmanager

@@ -13,11 +13,11 @@ from dermis.gpu.types import NativeObject, Texture, TextureOrView, Untyped, is_t
 
 UNIFORM_BUFFER = {"type": "uniform"}
 
-_VIEW_DIMENSIONS = {"2d": 2, "2d-array": 3}  # WGPUTextureViewDimension
+_NATIVE_VIEW_DIMENSIONS = {"2d": 2, "2d-array": 3}  # WGPUTextureViewDimension
 
-_ALL_LEVELS = _ALL_LAYERS = 0xFFFFFFFF
+_ALL_MIP_LEVELS = _ALL_LAYERS = 0xFFFFFFFF
 
-_ASPECT_ALL = 1  # WGPUTextureAspect_All
+_ALL_TEXTURE_ASPECTS = 1  # WGPUTextureAspect_All
 
 ResourceKey = tuple[int, ...]
 
@@ -32,9 +32,13 @@ class BindGroup:
 
     __slots__ = ("__weakref__", "_internal")
 
-    def __init__(self, device: Device, layout: NativeObject, entries: Sized) -> None:
+    def __init__(self, device: Device, layout: NativeObject, native_entries: Sized) -> None:
         descriptor = device.ffi.new("WGPUBindGroupDescriptor *")
-        descriptor.layout, descriptor.entries, descriptor.entryCount = layout._internal, entries, len(entries)
+        descriptor.layout, descriptor.entries, descriptor.entryCount = (
+            layout._internal,
+            native_entries,
+            len(native_entries),
+        )
         handle = device.checked.wgpuDeviceCreateBindGroup(device.handle._internal, descriptor)
         self._internal = device.ffi.gc(handle, device.lib.wgpuBindGroupRelease)
 
@@ -43,17 +47,17 @@ def make_bind_group(
     device: Device,
     layout: NativeObject,
     bindings: Sequence[Binding],
-    values: Sequence[Untyped],
+    bound_objects: Sequence[Untyped],
     record_sizes: Sequence[int],
 ) -> BindGroup:
     """Create the bind group of a program.
 
-    values : buffer, texture, texture view or sampler for each binding, the uniform buffers last
+    bound_objects : buffer, texture, texture view or sampler for each binding, the uniform buffers last
     record_sizes : size of the record in each of these uniform buffers [byte]
     """
-    entries = device.ffi.new("WGPUBindGroupEntry[]", len(values))
-    first_uniform = len(values) - len(record_sizes)
-    for k, (binding, value) in enumerate(zip(bindings, values, strict=True)):
+    entries = device.ffi.new("WGPUBindGroupEntry[]", len(bound_objects))
+    first_uniform = len(bound_objects) - len(record_sizes)
+    for k, (binding, value) in enumerate(zip(bindings, bound_objects, strict=True)):
         entry, kind = entries[k], binding.entry
         entry.binding = binding.index
         if "buffer" in kind:
@@ -87,15 +91,15 @@ class ResourceCache(Generic[T]):
         """Return the number of resources whose release the cache watches."""
         return len(self._keys)
 
-    def find(self, key: ResourceKey) -> T | None:
+    def find(self, cache_key: ResourceKey) -> T | None:
         """Return the cached entry for a key of `resource_key`, or None without an entry."""
-        return self._entries.get(key)
+        return self._entries.get(cache_key)
 
-    def add(self, key: ResourceKey, resources: Sequence[object], entry: T) -> None:
+    def add(self, cache_key: ResourceKey, resources: Sequence[object], cached_object: T) -> None:
         """Add an entry that is kept until one of its resources is released."""
-        self._entries[key] = entry
+        self._entries[cache_key] = cached_object
         for resource in resources:
-            self._keys_of(resource).add(key)
+            self._keys_of(resource).add(cache_key)
 
     def _keys_of(self, resource: object) -> set[ResourceKey]:
         """Return the cache keys that contain a resource, and start to watch its release if it is new."""
@@ -111,8 +115,8 @@ class ResourceCache(Generic[T]):
             self._keys[identity] = weakref.ref(resource, on_release), set()
         return self._keys[identity][1]
 
-    def _drop_entries(self, identity: int) -> None:
-        _, keys = self._keys.pop(identity)
+    def _drop_entries(self, resource_id: int) -> None:
+        _, keys = self._keys.pop(resource_id)
         for key in keys:
             self._entries.pop(key, None)
             for other in set(key) & self._keys.keys():
@@ -124,25 +128,28 @@ def resource_key(resources: Sequence[object]) -> ResourceKey:
     return tuple(map(id, resources))
 
 
-def _view_handle(device: Device, value: TextureOrView, texture: LayoutEntry) -> object:
+def _view_handle(device: Device, texture_or_view: TextureOrView, texture_layout: LayoutEntry) -> object:
     """Return the native handle of a view; for a texture, the handle of its default view, which is cached.
 
-    texture : layout entry of the binding, which contains the view dimension
+    texture_layout : layout entry of the binding, which contains the view dimension
     """
-    if is_texture(value):
-        return _default_view(device, value, texture["view_dimension"])
-    return value._internal
+    if is_texture(texture_or_view):
+        return _default_view(device, texture_or_view, texture_layout["view_dimension"])
+    return texture_or_view._internal
 
 
-def _default_view(device: Device, texture: Texture, dimension: str) -> object:
+def _default_view(device: Device, texture: Texture, view_dimension: str) -> object:
     views = device.cached("default views", WeakKeyDictionary[Texture, dict[str, object]]).setdefault(
         texture, {}
     )
-    if dimension not in views:
+    if view_dimension not in views:
         descriptor = device.ffi.new("WGPUTextureViewDescriptor *")
-        descriptor.dimension, descriptor.aspect = _VIEW_DIMENSIONS[dimension], _ASPECT_ALL
-        descriptor.mipLevelCount = _ALL_LEVELS
-        descriptor.arrayLayerCount = 1 if dimension == "2d" else _ALL_LAYERS
+        descriptor.dimension, descriptor.aspect = (
+            _NATIVE_VIEW_DIMENSIONS[view_dimension],
+            _ALL_TEXTURE_ASPECTS,
+        )
+        descriptor.mipLevelCount = _ALL_MIP_LEVELS
+        descriptor.arrayLayerCount = 1 if view_dimension == "2d" else _ALL_LAYERS
         handle = device.checked.wgpuTextureCreateView(texture._internal, descriptor)
-        views[dimension] = device.ffi.gc(handle, device.lib.wgpuTextureViewRelease)
-    return views[dimension]
+        views[view_dimension] = device.ffi.gc(handle, device.lib.wgpuTextureViewRelease)
+    return views[view_dimension]

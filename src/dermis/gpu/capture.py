@@ -76,20 +76,21 @@ class CapturedFrame:
     records: list[tuple[str, UniformRecord]] = field(default_factory=list)
     _record_index: dict[int, int] = field(default_factory=dict)
 
-    def add(self, captured_pass: CapturedPass, unit: int | None) -> None:
+    def add(self, captured_pass: CapturedPass, unit_index: int | None) -> None:
         """Append a pass.
 
-        unit : index of the recording to which the pass belongs; None for a pass that is a unit by itself
+        unit_index : index of the recording to which the pass belongs; None for a pass that is a unit by
+            itself
         """
         last = self.passes[-1].unit if self.passes else -1
-        captured_pass.unit = last + 1 if unit is None else unit
+        captured_pass.unit = last + 1 if unit_index is None else unit_index
         self.passes.append(captured_pass)
 
-    def record(self, struct: str, record: UniformRecord) -> int:
+    def record(self, struct_name: str, record: UniformRecord) -> int:
         """Return the index of a uniform record in `records`, appending it on first use."""
         if id(record) not in self._record_index:
             self._record_index[id(record)] = len(self.records)
-            self.records.append((struct, record))  # kept alive, so that its id stays unique
+            self.records.append((struct_name, record))  # kept alive, so that its id stays unique
         return self._record_index[id(record)]
 
 
@@ -116,74 +117,79 @@ class FrameCapture(Graph):
         self._program_index: dict[int, int] = {}
         self._program_objects: list[Program] = []  # kept alive, so that their ids stay unique
 
-    def capture(self, declare: Callable[[FrameCapture], object]) -> CapturedFrame:
-        """Return the passes and records of the frame that `declare` declares on this recorder."""
+    def capture(self, declare_frame: Callable[[FrameCapture], object]) -> CapturedFrame:
+        """Return the passes and records of the frame that `declare_frame` declares on this recorder."""
         self._frame = frame = CapturedFrame()
         self._unit = None
-        declare(self)
+        declare_frame(self)
         return frame
 
-    def read_content(self, index: int) -> list[NDArray[np.uint8]]:
+    def read_content(self, resource_index: int) -> list[NDArray[np.uint8]]:
         """Download a resource: return the bytes of a buffer, or of each image of a texture.
 
         A texture has one image per layer and mip level; all layers of a mip level come before the next mip
         level.
         """
-        value = self._objects[index]
+        value = self._objects[resource_index]
         if not is_texture(value):
             return [np.frombuffer(self.device.handle.queue.read_buffer(value), np.uint8)]
         parts = product(range(value.mip_level_count), range(value.size[2]))
         texels = [download(self.device, value, mip=mip, layer=layer) for mip, layer in parts]
         return [np.ascontiguousarray(one).view(np.uint8).reshape(-1) for one in texels]
 
-    def resource_at(self, index: int) -> Untyped:
+    def resource_at(self, resource_index: int) -> Untyped:
         """Return the texture, view, buffer or sampler with an index in `resources`."""
-        return self._objects[index]
+        return self._objects[resource_index]
 
-    def resource(self, value: Bindable) -> int:
+    def resource(self, bound_object: Bindable) -> int:
         """Return the index of a texture, view, buffer or sampler in `resources`, adding it on first use."""
-        if id(value) not in self._resource_index:
-            if is_view(value):
+        if id(bound_object) not in self._resource_index:
+            if is_view(bound_object):
                 found: PlainData = {
                     "kind": "view",
-                    "part": value.layer_and_mip,
-                    "of": self.resource(value.texture),
+                    "part": bound_object.layer_and_mip,
+                    "of": self.resource(bound_object.texture),
                 }
             else:
-                found = describe_resource(self.device, value)
-            self._resource_index[id(value)] = len(self.resources)
+                found = describe_resource(self.device, bound_object)
+            self._resource_index[id(bound_object)] = len(self.resources)
             self.resources.append(found)
-            self._objects.append(value)
-        return self._resource_index[id(value)]
+            self._objects.append(bound_object)
+        return self._resource_index[id(bound_object)]
 
     def dispatch(
-        self, stage: str, program: ComputeProgram, resources: Bindings, groups: Workgroups, in_place: str = ""
+        self,
+        stage: str,
+        program: ComputeProgram,
+        resources: Bindings,
+        workgroups: Workgroups,
+        in_place_resource: str = "",
     ) -> None:
         """Capture a compute pass instead of running it."""
-        captured = self._add_pass(stage, program, resources, groups)
-        captured.completes = self.resource(resources[in_place]) if in_place else -1
+        captured = self._add_pass(stage, program, resources, workgroups)
+        captured.completes = self.resource(resources[in_place_resource]) if in_place_resource else -1
 
-    def write(self, stage: str, buffer: Buffer, data: bytes) -> None:
+    def write(self, stage: str, buffer: Buffer, content: bytes) -> None:
         """Capture a write of bytes from the host to a buffer."""
-        written = self.resource(buffer), data
-        self._frame.add(CapturedPass(stage, None, [], (len(data),), written=written), self._unit)
+        written = self.resource(buffer), content
+        self._frame.add(CapturedPass(stage, None, [], (len(content),), written=written), self._unit)
 
     def draw(
         self,
         stage: str,
         program: RenderProgram,
         resources: Bindings,
-        vertices: int,
+        vertex_count: int,
         target: DrawTarget,
         *,
-        indices: Buffer | None = None,
-        layer: int = 0,
+        index_buffer: Buffer | None = None,
+        instance_index: int = 0,
     ) -> None:
         """Capture a render pass of triangles instead of running it."""
-        attachments = {"indices": indices, "depth": target.depth, "target": target.colour}
+        attachments = {"indices": index_buffer, "depth": target.depth, "target": target.colour}
         indices_of = {name: -1 if one is None else self.resource(one) for name, one in attachments.items()}
-        captured = self._add_pass(stage, program, resources, (vertices,))
-        captured.raster = {"layer": layer, "far": target.clear_depth, **indices_of}
+        captured = self._add_pass(stage, program, resources, (vertex_count,))
+        captured.raster = {"layer": instance_index, "far": target.clear_depth, **indices_of}
 
     def fill(
         self, stage: str, program: RenderProgram, resources: Bindings, targets: Sequence[TextureOrView]
@@ -191,31 +197,31 @@ class FrameCapture(Graph):
         """Raise NotImplementedError, as players of captured frames have no passes that fill targets."""
         raise NotImplementedError(f"{stage}: passes that fill targets cannot be captured")
 
-    def repeat(self, record: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
-        """Capture the passes that `record` adds as one unit, which players run or skip as a whole."""
+    def repeat(self, record_passes: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
+        """Capture the passes that `record_passes` adds as one unit, which players run or skip as a whole."""
         if self._unit is not None:
-            return record(self, *args)
+            return record_passes(self, *args)
         passes = self._frame.passes
         self._unit = passes[-1].unit + 1 if passes else 0
         try:
-            return record(self, *args)
+            return record_passes(self, *args)
         finally:
             self._unit = None
 
     def _add_pass(
-        self, stage: str, program: Program, resources: Bindings, groups: tuple[int, ...]
+        self, stage: str, program: Program, resources: Bindings, workgroups: tuple[int, ...]
     ) -> CapturedPass:
         bound = [self._binding_index(program, one, resources[one.name]) for one in program.bindings]
-        captured = CapturedPass(stage, self._index_of_program(program), bound, groups)
+        captured = CapturedPass(stage, self._index_of_program(program), bound, workgroups)
         self._frame.add(captured, self._unit)
         return captured
 
-    def _binding_index(self, program: Program, binding: Binding, value: Bindable) -> int:
-        if not isinstance(value, np.ndarray):
-            return self.resource(value)
+    def _binding_index(self, program: Program, binding: Binding, bound_object: Bindable) -> int:
+        if not isinstance(bound_object, np.ndarray):
+            return self.resource(bound_object)
         struct = uniform_type(program.source.text, binding.name)
-        self.structs[struct] = value.dtype
-        return -1 - self._frame.record(struct, cast("UniformRecord", value))
+        self.structs[struct] = bound_object.dtype
+        return -1 - self._frame.record(struct, cast("UniformRecord", bound_object))
 
     def _index_of_program(self, program: Program) -> int:
         if id(program) not in self._program_index:
@@ -232,23 +238,23 @@ class FrameCapture(Graph):
             )
         return self._program_index[id(program)]
 
-    def _index_of_shader(self, text: str) -> int:
-        if text not in self.shaders:
-            self.shaders.append(text)
-        return self.shaders.index(text)
+    def _index_of_shader(self, wgsl_text: str) -> int:
+        if wgsl_text not in self.shaders:
+            self.shaders.append(wgsl_text)
+        return self.shaders.index(wgsl_text)
 
 
-def describe_resource(device: Device, value: Bindable) -> PlainData:
+def describe_resource(device: Device, resource: Bindable) -> PlainData:
     """Return the parameters with which a resource can be created again, as plain data for JSON.
 
     The parameters of a texture or buffer are sizes, format and usage flags; the parameters of a sampler are
     its options.
     """
-    if is_texture(value):
-        size, mips = list(value.size), value.mip_level_count
-        sizes = {"format": value.format, "size": size, "mips": mips, "usage": int(value.usage)}
+    if is_texture(resource):
+        size, mips = list(resource.size), resource.mip_level_count
+        sizes = {"format": resource.format, "size": size, "mips": mips, "usage": int(resource.usage)}
         return {"kind": "texture", **sizes}
-    if is_buffer(value):
-        return {"kind": "buffer", "size": value.size, "usage": int(value.usage)}
-    assert is_sampler(value)
-    return {"kind": "sampler", "options": device.sampler_options(value)}
+    if is_buffer(resource):
+        return {"kind": "buffer", "size": resource.size, "usage": int(resource.usage)}
+    assert is_sampler(resource)
+    return {"kind": "sampler", "options": device.sampler_options(resource)}

@@ -21,7 +21,7 @@ Timing = bool | Literal["whole"]
 
 TimestampWrites = dict[str, object]
 """The member `timestamp_writes` of wgpu's pass descriptors."""
-_CACHED_DISPATCHES = 16  # for each pass: its record positions depend on which passes run before it
+_MAX_CACHED_DISPATCHES = 16  # for each pass: its record positions depend on which passes run before it
 
 
 class CommandList(Recorder):
@@ -54,24 +54,24 @@ class CommandList(Recorder):
         stage: str,
         program: ComputeProgram,
         resources: Bindings,
-        groups: Workgroups,
-        in_place: str = "",
+        workgroups: Workgroups,
+        in_place_resource: str = "",
         access: Access | None = None,
     ) -> None:
         """Add a dispatch of a compute program, see `Recorder.dispatch`.
 
-        in_place : ignored, as only the search for stale passes needs it
+        in_place_resource : ignored, as only the search for stale passes needs it
         access : `Access` of the program to these resources, in which the native dispatch is cached for later
             frames
         """
-        key = stage, groups, program.record_positions(resources, self._uniforms)
+        key = stage, workgroups, program.record_positions(resources, self._uniforms)
         known = access.dispatches if access else {}
         found = known.get(key)
         if found is None:
-            if len(known) == _CACHED_DISPATCHES:
+            if len(known) == _MAX_CACHED_DISPATCHES:
                 known.clear()
             group, offsets = program.bind_group(resources, self._uniforms)
-            found = known[key] = [make_dispatch(stage, program, group, offsets, groups)], group
+            found = known[key] = [make_dispatch(stage, program, group, offsets, workgroups)], group
         self.run(found[0])
 
     def run(self, dispatches: Sequence[Dispatch]) -> None:
@@ -82,27 +82,27 @@ class CommandList(Recorder):
         elif dispatches:
             self._compute_pass(dispatches[0].stage).run(dispatches)
 
-    def write(self, stage: str, buffer: Buffer, data: bytes) -> None:
+    def write(self, stage: str, buffer: Buffer, content: bytes) -> None:
         """Write bytes from the host to the start of a buffer, before the next submission runs."""
-        self.device.write(buffer, data, len(data))
+        self.device.write(buffer, content, len(content))
 
     def clear(self, buffer: Buffer) -> None:
         """Add a command that sets all bytes of a buffer to zero."""
         self._end_pass()
         self._encoder.clear_buffer(buffer, 0, buffer.size)
 
-    def copy(self, buffer: Buffer, texture: Texture, *, pitch: int, layers: int) -> None:
+    def copy(self, buffer: Buffer, texture: Texture, *, row_texels: int, layer_count: int) -> None:
         """Add a copy from a buffer to all texels of a texture with 4 bytes per texel.
 
-        pitch : row length in the buffer [texel]
-        layers : number of texture layers to copy
+        row_texels : row length in the buffer [texel]
+        layer_count : number of texture layers to copy
         """
         width, height = texture.size[:2]
         self._end_pass()
         self._encoder.copy_buffer_to_texture(
-            {"buffer": buffer, "offset": 0, "bytes_per_row": 4 * pitch, "rows_per_image": height},
+            {"buffer": buffer, "offset": 0, "bytes_per_row": 4 * row_texels, "rows_per_image": height},
             {"texture": texture, "mip_level": 0, "origin": (0, 0, 0)},
-            (width, height, layers),
+            (width, height, layer_count),
         )
 
     def read_back(self, buffers: Sequence[Buffer], readback: BufferReadback) -> None:
@@ -119,11 +119,11 @@ class CommandList(Recorder):
         stage: str,
         program: RenderProgram,
         resources: Bindings,
-        vertices: int,
+        vertex_count: int,
         target: DrawTarget,
         *,
-        indices: Buffer | None = None,
-        layer: int = 0,
+        index_buffer: Buffer | None = None,
+        instance_index: int = 0,
     ) -> None:
         """Add a render pass of triangles, see `Recorder.draw`."""
         depth = {
@@ -134,11 +134,11 @@ class CommandList(Recorder):
         }
         targets = [] if target.colour is None else [target.colour]
         render_pass = self._render_pass(stage, program, resources, targets, depth)
-        if indices is None:
-            render_pass.draw(vertices, 1, 0, layer)
+        if index_buffer is None:
+            render_pass.draw(vertex_count, 1, 0, instance_index)
         else:
-            render_pass.set_index_buffer(indices, "uint32")
-            render_pass.draw_indexed(vertices, 1, 0, 0, layer)
+            render_pass.set_index_buffer(index_buffer, "uint32")
+            render_pass.draw_indexed(vertex_count, 1, 0, 0, instance_index)
         render_pass.end()
 
     def fill(
@@ -176,11 +176,11 @@ class CommandList(Recorder):
         program: RenderProgram,
         resources: Bindings,
         targets: Sequence[TextureOrView],
-        depth: Mapping[str, object] | None = None,
+        depth_attachment: Mapping[str, object] | None = None,
     ) -> Untyped:
         """Begin a render pass with cleared targets, pipeline and bind group, and return its encoder.
 
-        depth : wgpu's description of the depth attachment; None for a pass without depth
+        depth_attachment : wgpu's description of the depth attachment; None for a pass without depth
         """
         cleared = {"load_op": "clear", "store_op": "store", "clear_value": (0, 0, 0, 0)}
         self._end_pass()
@@ -188,7 +188,7 @@ class CommandList(Recorder):
         render_pass = self._encoder.begin_render_pass(
             label=stage,
             color_attachments=[{"view": target, **cleared} for target in targets],
-            depth_stencil_attachment=depth,
+            depth_stencil_attachment=depth_attachment,
             timestamp_writes=timestamps,
         )
         render_pass.set_pipeline(program.pipeline)
@@ -256,16 +256,27 @@ class Dispatch(NamedTuple):
 
 
 def make_dispatch(
-    stage: str, program: ComputeProgram, group: NativeObject, offsets: Sequence[int], groups: Workgroups
+    stage: str,
+    program: ComputeProgram,
+    bind_group: NativeObject,
+    record_offsets: Sequence[int],
+    workgroups: Workgroups,
 ) -> Dispatch:
     """Return the native arguments for a dispatch of a program.
 
-    group : bind group of the program
-    offsets : offsets of its uniform records in their buffers [byte]
-    groups : workgroups along each axis
+    bind_group : bind group of the program
+    record_offsets : offsets of its uniform records in their buffers [byte]
+    workgroups : workgroups along each axis
     """
-    native_offsets = program.device.ffi.new("uint32_t[]", offsets)
-    return Dispatch(stage, program.pipeline._internal, group._internal, len(offsets), native_offsets, groups)
+    native_offsets = program.device.ffi.new("uint32_t[]", record_offsets)
+    return Dispatch(
+        stage,
+        program.pipeline._internal,
+        bind_group._internal,
+        len(record_offsets),
+        native_offsets,
+        workgroups,
+    )
 
 
 class ComputePass:
@@ -355,9 +366,9 @@ class WallClock:
     def __init__(self) -> None:
         self._times: dict[str, float] = {}
 
-    def add(self, stage: str, started: float) -> None:
-        """Add the time elapsed since `started`, a value of time.perf_counter, to a stage."""
-        self._times[stage] = self._times.get(stage, 0.0) + 1e3 * (time.perf_counter() - started)
+    def add(self, stage: str, start_time: float) -> None:
+        """Add the time elapsed since `start_time`, a value of time.perf_counter, to a stage."""
+        self._times[stage] = self._times.get(stage, 0.0) + 1e3 * (time.perf_counter() - start_time)
 
     def stage_ms(self) -> dict[str, float]:
         """Return the time of each stage and their sum ("total") [ms]."""

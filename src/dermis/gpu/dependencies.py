@@ -18,7 +18,7 @@ R = TypeVar("R", bound=Resource)
 
 _access_ids = count(1)
 
-_CACHED_STATES = 16  # combinations of up-to-date resources for which the stale passes are cached
+_MAX_CACHED_STALE_PASSES = 16  # combinations of up-to-date resources for which the stale passes are cached
 
 
 @dataclass(eq=False, slots=True)
@@ -39,12 +39,12 @@ class ResourceState:
     version: int = 0
     scratch: bool = False
 
-    def overlapping(self, written: Container[ResourceState]) -> list[ResourceState]:
-        """Return the states in `written` with overlapping content: this state, its views, or its texture."""
-        found = [view for view in self.views if view in written]
-        if self in written:
+    def overlapping_states(self, written_states: Container[ResourceState]) -> list[ResourceState]:
+        """Return the written states with overlapping content: this state, its views, or its texture."""
+        found = [view for view in self.views if view in written_states]
+        if self in written_states:
             found.append(self)
-        elif self.parent is not None and self.parent in written:
+        elif self.parent is not None and self.parent in written_states:
             found.append(self.parent)
         return found
 
@@ -73,7 +73,7 @@ class Access:
     dispatches: dict[Hashable, tuple[list[Dispatch], object]] = field(default_factory=dict)
 
 
-def unique_id() -> int:
+def new_access_id() -> int:
     """Return a number for `Access.id` that has not been returned before."""
     return next(_access_ids)
 
@@ -116,29 +116,31 @@ class Dependencies:
         self._reads: list[list[tuple[int | None, ResourceState]]] = []
         # For each resource, the last pass that writes it or a resource that overlaps it.
         self._last_writer: dict[ResourceState, int] = {}
-        self._cached_stale = lru_cache(_CACHED_STATES)(self._find_stale)
+        self._cached_stale = lru_cache(_MAX_CACHED_STALE_PASSES)(self._find_stale)
         writers: dict[ResourceState, int] = {}
         for index, (_, reads, writes) in enumerate(passes):
-            found = [one for state in reads for one in state.overlapping(writers) or [state, *state.views]]
+            found = [
+                one for state in reads for one in state.overlapping_states(writers) or [state, *state.views]
+            ]
             unwritten = set(found).difference(writers, writes)
             sources = [one for one in found if one in writers or one in unwritten]
             self._reads.append([(writers.get(one), one) for one in sources])
             for state in writes:
                 self._add_write(state, index, writers)
 
-    def versions(self, epoch: int, keys: Iterable[Hashable]) -> list[int]:
+    def compute_versions(self, epoch: int, pass_keys: Iterable[Hashable]) -> list[int]:
         """Return the version of the output of each pass.
 
         epoch : number that changes when all content becomes unknown
-        keys : for each pass, everything that its output depends on besides the resources that it reads
+        pass_keys : for each pass, everything that its output depends on besides the resources that it reads
         """
         versions: list[int] = []
-        for key, reads in zip(keys, self._reads, strict=True):
+        for key, reads in zip(pass_keys, self._reads, strict=True):
             inputs = [state.version if index is None else versions[index] for index, state in reads]
             versions.append(hash((epoch, key, *inputs)))
         return versions
 
-    def stale(self, versions: Sequence[int]) -> list[bool]:
+    def find_stale_passes(self, versions: Sequence[int]) -> list[bool]:
         """Return for each pass whether it must run so that all resources get the versions `versions`."""
         current = [state.version == versions[last] for state, last in self._last_writer.items()]
         return self._cached_stale(tuple(current))
@@ -158,8 +160,8 @@ class Dependencies:
                 return stale
             valid -= overwritten
 
-    def _find_stale_unless(self, valid: set[ResourceState]) -> list[bool]:
-        """Return for each pass whether it writes a needed output that is not in `valid`.
+    def _find_stale_unless(self, valid_states: set[ResourceState]) -> list[bool]:
+        """Return for each pass whether it writes a needed output that is not in `valid_states`.
 
         An output is needed if it is the final content of a resource that is not scratch, or the input of a
         stale pass.
@@ -169,7 +171,7 @@ class Dependencies:
             for state in self.passes[index][-1]:
                 is_last = self._last_writer[state] == index
                 is_needed = (is_last and not state.scratch) or (index, state) in needed
-                if is_needed and not (is_last and state in valid):
+                if is_needed and not (is_last and state in valid_states):
                     stale[index] = True
                     needed.update(self._reads[index])
                     break
@@ -182,11 +184,15 @@ class Dependencies:
                 for state in writes:
                     state.set_version(version)
 
-    def _add_write(self, state: ResourceState, index: int, writers: dict[ResourceState, int]) -> None:
+    def _add_write(
+        self, state: ResourceState, pass_index: int, last_writers: dict[ResourceState, int]
+    ) -> None:
         """Register a pass as the last writer of a resource and of overlapping views and textures."""
-        self._last_writer[state] = writers[state] = index
+        self._last_writer[state] = last_writers[state] = pass_index
         for view in state.views:
-            if writers.pop(view, None) is not None:  # from here on, reads of the view come from the texture
-                self._last_writer[view] = index
-        if state.parent is not None and state.parent in writers:
-            self._last_writer[state.parent] = index
+            if (
+                last_writers.pop(view, None) is not None
+            ):  # from here on, reads of the view come from the texture
+                self._last_writer[view] = pass_index
+        if state.parent is not None and state.parent in last_writers:
+            self._last_writer[state.parent] = pass_index

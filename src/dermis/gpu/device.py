@@ -28,8 +28,8 @@ T = TypeVar("T")
 _MAX_TIMED_PASSES = 2048
 _STAGING_STEP_BYTES = 4096
 # Starts of wgpu's log messages that are dropped, as DeviceLostError reports the same.
-_LOSS_NOTES = "DEVICE LOST!", "The WGPU device was lost"
-_RAISED_LIMITS = ("max-texture-dimension-2d", "max-storage-buffer-binding-size", "max-buffer-size")
+_DEVICE_LOSS_LOG_MESSAGES = "DEVICE LOST!", "The WGPU device was lost"
+_LIMITS_RAISED_TO_ADAPTER = ("max-texture-dimension-2d", "max-storage-buffer-binding-size", "max-buffer-size")
 
 
 def open_device(adapter: str = "auto", *, bare: bool = False) -> Device:
@@ -73,12 +73,12 @@ class Device:
         self.ffi, self.lib, self.checked, self._encoder = ffi, lib, libf, GPUCommandEncoder
         self.adapter = adapter
         self.reason = reason
-        logging.getLogger("wgpu").addFilter(_is_no_loss_note)
+        logging.getLogger("wgpu").addFilter(_is_not_loss_message)
         if adapter.kind == "CPU":
             check_software_address_space()
         check_limits(adapter.name, adapter.handle.limits)
         features = [] if bare else list(adapter.features)
-        limits = device_limits(adapter.handle.limits, () if bare else _RAISED_LIMITS)
+        limits = device_limits(adapter.handle.limits, () if bare else _LIMITS_RAISED_TO_ADAPTER)
         try:
             self.handle: Untyped = adapter.handle.request_device_sync(
                 label="dermis", required_features=features, required_limits=limits
@@ -89,7 +89,7 @@ class Device:
                 f"adapter {adapter.name}: expected it to open, but its driver reports: {error}. "
                 "Close other programs that use the GPU or choose --adapter cpu."
             ) from error
-        raised = (int(limits[name]) for name in _RAISED_LIMITS)
+        raised = (int(limits[name]) for name in _LIMITS_RAISED_TO_ADAPTER)
         self.max_texture_size, self.max_storage_bytes, self.max_buffer_bytes = raised
         self.has_timestamps = "timestamp-query" in features
         self.executor = ThreadPoolExecutor(os.cpu_count())
@@ -104,17 +104,17 @@ class Device:
         self.pending_readbacks: set[BufferReadback] = set()
         self._samplers: dict[tuple[tuple[str, str], ...], Sampler] = {}
 
-    def cached(self, name: str, make: Callable[[], T]) -> T:
-        """Return the object with this name, created by `make` on first use and kept with the device."""
-        if name not in self._cached:
-            self._cached[name] = make()
-        found: T = self._cached[name]
+    def cached(self, object_name: str, make_object: Callable[[], T]) -> T:
+        """Return the object with a name, created by `make_object` on first use and kept with the device."""
+        if object_name not in self._cached:
+            self._cached[object_name] = make_object()
+        found: T = self._cached[object_name]
         return found
 
-    def write(self, buffer: Buffer, data: bytearray | bytes, size: int) -> None:
-        """Write the first `size` bytes of data to a buffer before the next submission runs."""
-        start = self.ffi.from_buffer(data)
-        self.checked.wgpuQueueWriteBuffer(self.handle.queue._internal, buffer._internal, 0, start, size)
+    def write(self, buffer: Buffer, content: bytearray | bytes, byte_count: int) -> None:
+        """Write the first `byte_count` bytes of data to a buffer before the next submission runs."""
+        start = self.ffi.from_buffer(content)
+        self.checked.wgpuQueueWriteBuffer(self.handle.queue._internal, buffer._internal, 0, start, byte_count)
 
     def command_encoder(self) -> Untyped:
         """Return a new command encoder without a label, created faster than by wgpu's own method."""
@@ -134,12 +134,12 @@ class Device:
         # wgpu's own submit returns no number, without which one can only wait for all submissions.
         return int(self.checked.wgpuQueueSubmitForIndex(self.handle.queue._internal, 1, command_list))
 
-    def wait(self, submitted: int | None = None) -> None:
+    def wait(self, submission: int | None = None) -> None:
         """Wait until a submission and all earlier submissions have finished.
 
-        submitted : number of the submission, from `submit`; None for the latest submission
+        submission : number of the submission, from `submit`; None for the latest submission
         """
-        number = self.ffi.NULL if submitted is None else self.ffi.new("WGPUSubmissionIndex *", submitted)
+        number = self.ffi.NULL if submission is None else self.ffi.new("WGPUSubmissionIndex *", submission)
         self.checked.wgpuDevicePoll(self.handle._internal, True, number)
 
     @property
@@ -162,27 +162,27 @@ class Device:
         """Return the duration of a timestamp tick [ns]."""
         return float(self.lib.wgpuQueueGetTimestampPeriod(self.handle.queue._internal))
 
-    def uniform_chunk(self, index: int, size: int) -> Buffer:
+    def uniform_chunk(self, chunk_index: int, chunk_bytes: int) -> Buffer:
         """Return a shared uniform buffer by index; all frames use these buffers, created on first use.
 
-        size : size of a new buffer [byte]
+        chunk_bytes : size of a new buffer [byte]
         """
-        while len(self._uniform_chunks) <= index:
-            self._uniform_chunks.append(self.uniform_buffer(size))
-        return self._uniform_chunks[index]
+        while len(self._uniform_chunks) <= chunk_index:
+            self._uniform_chunks.append(self.make_uniform_buffer(chunk_bytes))
+        return self._uniform_chunks[chunk_index]
 
-    def uniform_buffer(self, size: int) -> Buffer:
-        """Create a uniform buffer of `size` bytes."""
-        return self.buffer(np.zeros(size, np.uint8), "UNIFORM")
+    def make_uniform_buffer(self, byte_count: int) -> Buffer:
+        """Create a uniform buffer of `byte_count` bytes."""
+        return self.buffer(np.zeros(byte_count, np.uint8), "UNIFORM")
 
-    def acquire_staging(self, size: int) -> Buffer:
-        """Return a mappable buffer of at least `size` bytes for a readback, if possible a released buffer."""
-        size = -(-size // _STAGING_STEP_BYTES) * _STAGING_STEP_BYTES
-        spare = self._staging.get(size)
+    def acquire_staging(self, min_bytes: int) -> Buffer:
+        """Return a mappable buffer of at least `min_bytes` for a readback, if possible a released buffer."""
+        min_bytes = -(-min_bytes // _STAGING_STEP_BYTES) * _STAGING_STEP_BYTES
+        spare = self._staging.get(min_bytes)
         if spare:
             return spare.pop()
         return self._buffer(
-            "copy for reading", size, "MAP_READ", partial(self.handle.create_buffer, size=size)
+            "copy for reading", min_bytes, "MAP_READ", partial(self.handle.create_buffer, size=min_bytes)
         )
 
     def release_staging(self, buffer: Buffer) -> None:
@@ -191,27 +191,29 @@ class Device:
             self._staging.clear()
         self._staging.setdefault(buffer.size, []).append(buffer)
 
-    def buffer(self, data: NDArray[np.generic], usage: str, name: str = "buffer") -> Buffer:
+    def buffer(self, content: NDArray[np.generic], usage: str, buffer_name: str = "buffer") -> Buffer:
         """Create a buffer from the bytes of an array.
 
         usage : name of the main flag in `wgpu.BufferUsage`, "STORAGE" or "UNIFORM"
-        name : name of the buffer, for the error if it does not fit into memory
+        buffer_name : name of the buffer, for the error if it does not fit into memory
         """
-        data = np.ascontiguousarray(data)
-        create = partial(self.handle.create_buffer_with_data, data=data)
-        return self._buffer(name, data.nbytes, usage, create)
+        content = np.ascontiguousarray(content)
+        create = partial(self.handle.create_buffer_with_data, data=content)
+        return self._buffer(buffer_name, content.nbytes, usage, create)
 
-    def storage_buffer(self, size: int, name: str = "buffer") -> Buffer:
-        """Create a storage buffer of `size` bytes, all zero."""
-        return self._buffer(name, size, "STORAGE", partial(self.handle.create_buffer, size=size))
+    def storage_buffer(self, byte_count: int, buffer_name: str = "buffer") -> Buffer:
+        """Create a storage buffer of `byte_count` bytes, all zero."""
+        return self._buffer(
+            buffer_name, byte_count, "STORAGE", partial(self.handle.create_buffer, size=byte_count)
+        )
 
-    def _buffer(self, name: str, size: int, usage: str, create: Callable[..., Buffer]) -> Buffer:
+    def _buffer(self, buffer_name: str, byte_count: int, usage: str, create: Callable[..., Buffer]) -> Buffer:
         import wgpu
 
         flags = getattr(wgpu.BufferUsage, usage) | wgpu.BufferUsage.COPY_DST
         flags |= 0 if usage == "MAP_READ" else wgpu.BufferUsage.COPY_SRC
         limit = self.max_storage_bytes if usage == "STORAGE" else self.max_buffer_bytes
-        with checked_allocation(self.adapter.name, name, size, limit):
+        with checked_allocation(self.adapter.name, buffer_name, byte_count, limit):
             return create(usage=flags)
 
     def sampler(self, **options: str) -> Sampler:
@@ -236,5 +238,5 @@ class Device:
         return self._timestamps
 
 
-def _is_no_loss_note(record: logging.LogRecord) -> bool:
-    return not record.getMessage().startswith(_LOSS_NOTES)
+def _is_not_loss_message(log_record: logging.LogRecord) -> bool:
+    return not log_record.getMessage().startswith(_DEVICE_LOSS_LOG_MESSAGES)

@@ -27,7 +27,7 @@ class DeviceLostError(DeviceError):
             f"{self.name}: expected the device to last, but its driver lost it. {_LOST_DEVICE_ADVICE}."
         )
 
-    def lost_twice(self) -> DeviceError:
+    def lost_twice_error(self) -> DeviceError:
         """Return the error to raise when the reopened device is lost as well."""
         return DeviceError(
             f"device: expected {self.name} to last for a frame, but it was lost twice. {_LOST_DEVICE_ADVICE}."
@@ -35,7 +35,7 @@ class DeviceLostError(DeviceError):
 
 
 @contextlib.contextmanager
-def gpu_failures(device: Device) -> Iterator[None]:
+def converted_gpu_failures(device: Device) -> Iterator[None]:
     """Convert driver errors (out of memory, invalid call) raised in this context to DeviceError.
 
     Raises DeviceLostError for any error on a device that is lost.
@@ -87,12 +87,12 @@ class ReopeningDevice:
         try:
             return self._run_job(job)
         except DeviceLostError as lost:
-            raise lost.lost_twice() from lost
+            raise lost.lost_twice_error() from lost
 
     def _run_job(self, job: Callable[[], T]) -> T:
         device = self._device or self._open_device()
         try:
-            with gpu_failures(device):
+            with converted_gpu_failures(device):
                 if self._device is None:
                     self._on_open(device)
                     self._device = device

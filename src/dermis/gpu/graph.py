@@ -64,49 +64,51 @@ class FrameListing:
         stage: str,
         program: Program,
         resources: Bindings,
-        groups: Sequence[int],
-        index: int,
+        workgroups: Sequence[int],
+        declared_index: int,
         recorded: bool = False,
     ) -> None:
         """Append a pass to the listing.
 
-        index : index of the declared pass to which the pass belongs, which may be a recording of several
-            passes
+        declared_index : index of the declared pass to which the pass belongs, which may be a recording of
+            several passes
         recorded : whether the pass belongs to a recording
         """
         bindings = {one.name: self._describe_binding(resources[one.name]) for one in program.bindings}
-        listed = ListedPass(stage, program.name, dict(program.constants), bindings, tuple(groups), recorded)
+        listed = ListedPass(
+            stage, program.name, dict(program.constants), bindings, tuple(workgroups), recorded
+        )
         self.passes.append(listed)
-        self._pass_index.append(index)
+        self._pass_index.append(declared_index)
 
-    def add_write(self, stage: str, buffer: Buffer, size: int, index: int) -> None:
-        """Append a write of `size` bytes from the host to a buffer.
+    def add_write(self, stage: str, buffer: Buffer, byte_count: int, declared_index: int) -> None:
+        """Append a write of `byte_count` bytes from the host to a buffer.
 
-        index : index of the declared pass that writes
+        declared_index : index of the declared pass that writes
         """
         self.passes.append(
-            ListedPass(stage, "from the host", {}, {"written": self._describe_binding(buffer)}, (size,))
+            ListedPass(stage, "from the host", {}, {"written": self._describe_binding(buffer)}, (byte_count,))
         )
-        self._pass_index.append(index)
+        self._pass_index.append(declared_index)
 
-    def finish(self, ran: Sequence[bool]) -> None:
-        """Set `ran` of all listed passes after the frame.
+    def finish(self, ran_by_declared_pass: Sequence[bool]) -> None:
+        """Set `ran_by_declared_pass` of all listed passes after the frame.
 
-        ran : for each declared pass whether it ran
+        ran_by_declared_pass : for each declared pass whether it ran
         """
         for one, index in zip(self.passes, self._pass_index, strict=True):
-            one.ran = ran[index]
+            one.ran = ran_by_declared_pass[index]
 
-    def _describe_binding(self, value: Bindable) -> int | str:
-        if isinstance(value, np.ndarray):
-            return f"record {value.nbytes}"
-        description = _describe_resource(value)
+    def _describe_binding(self, bound_object: Bindable) -> int | str:
+        if isinstance(bound_object, np.ndarray):
+            return f"record {bound_object.nbytes}"
+        description = _describe_resource(bound_object)
         if description == "sampler":
             return description
-        if id(value) not in self._resource_index:
-            self._resource_index[id(value)] = len(self.resources)
+        if id(bound_object) not in self._resource_index:
+            self._resource_index[id(bound_object)] = len(self.resources)
             self.resources.append(description)
-        return self._resource_index[id(value)]
+        return self._resource_index[id(bound_object)]
 
 
 class ListingRecorder(Recorder):
@@ -116,23 +118,28 @@ class ListingRecorder(Recorder):
     index : index of the recording among the declared passes
     """
 
-    def __init__(self, device: Device, listing: FrameListing, index: int) -> None:
-        self.device, self._listing, self._index = device, listing, index
+    def __init__(self, device: Device, listing: FrameListing, declared_index: int) -> None:
+        self.device, self._listing, self._index = device, listing, declared_index
 
     def dispatch(
-        self, stage: str, program: ComputeProgram, resources: Bindings, groups: Workgroups, in_place: str = ""
+        self,
+        stage: str,
+        program: ComputeProgram,
+        resources: Bindings,
+        workgroups: Workgroups,
+        in_place_resource: str = "",
     ) -> None:
         """Append a compute pass to the listing instead of running it."""
-        self._listing.add(stage, program, resources, groups, self._index, recorded=True)
+        self._listing.add(stage, program, resources, workgroups, self._index, recorded=True)
 
 
-def _describe_resource(value: Bindable) -> str:
-    if is_view(value):
-        return f"view of {_describe_resource(value.texture)}"
-    if is_texture(value):
-        width, height, layers = value.size
-        return f"{value.format} {width} x {height} x {layers}"
-    return f"buffer {value.size}" if is_buffer(value) else "sampler"
+def _describe_resource(resource: Bindable) -> str:
+    if is_view(resource):
+        return f"view of {_describe_resource(resource.texture)}"
+    if is_texture(resource):
+        width, height, layers = resource.size
+        return f"{resource.format} {width} x {height} x {layers}"
+    return f"buffer {resource.size}" if is_buffer(resource) else "sampler"
 
 
 @dataclass(slots=True)
@@ -186,53 +193,66 @@ class Graph(Recorder):
         self._readbacks.clear()
 
     def dispatch(
-        self, stage: str, program: ComputeProgram, resources: Bindings, groups: Workgroups, in_place: str = ""
+        self,
+        stage: str,
+        program: ComputeProgram,
+        resources: Bindings,
+        workgroups: Workgroups,
+        in_place_resource: str = "",
     ) -> None:
         """Declare a dispatch of a compute program, see `Recorder.dispatch`."""
         access = program.access(resources)
         writes = access.writes
-        if in_place:
-            unchanged = resource_state(self.device, resources[in_place])
+        if in_place_resource:
+            unchanged = resource_state(self.device, resources[in_place_resource])
             writes = tuple(state for state in writes if state is not unchanged)
 
         def run(frame: CommandList) -> None:
-            frame.dispatch(stage, program, resources, groups, access=access)
+            frame.dispatch(stage, program, resources, workgroups, access=access)
 
-        self._declare_pass(stage, program, resources, groups, access, writes, run)
+        self._declare_pass(stage, program, resources, workgroups, access, writes, run)
 
-    def write(self, stage: str, buffer: Buffer, data: bytes) -> None:
+    def write(self, stage: str, buffer: Buffer, content: bytes) -> None:
         """Declare a write of bytes from the host to a buffer, see `Recorder.write`."""
         state = resource_state(self.device, buffer)
 
         def run(frame: CommandList) -> None:
-            frame.write(stage, buffer, data)
+            frame.write(stage, buffer, content)
 
         if self.listing is not None:
-            self.listing.add_write(stage, buffer, len(data), len(self._passes))
-        self._passes.append(DeclaredPass((stage,), run, data, (0, (), (state,))))
+            self.listing.add_write(stage, buffer, len(content), len(self._passes))
+        self._passes.append(DeclaredPass((stage,), run, content, (0, (), (state,))))
 
     def draw(
         self,
         stage: str,
         program: RenderProgram,
         resources: Bindings,
-        vertices: int,
+        vertex_count: int,
         target: DrawTarget,
         *,
-        indices: Buffer | None = None,
-        layer: int = 0,
+        index_buffer: Buffer | None = None,
+        instance_index: int = 0,
     ) -> None:
         """Declare a render pass of triangles, see `Recorder.draw`."""
         attachments = (target.depth, target.colour)
         writes = tuple(resource_state(self.device, one) for one in attachments if one is not None)
 
         def run(frame: CommandList) -> None:
-            frame.draw(stage, program, resources, vertices, target, indices=indices, layer=layer)
+            frame.draw(
+                stage,
+                program,
+                resources,
+                vertex_count,
+                target,
+                index_buffer=index_buffer,
+                instance_index=instance_index,
+            )
 
         access = program.access(resources)
-        index_state = None if indices is None else resource_state(self.device, indices)
-        more_keys = layer, target.clear_depth, index_state
-        self._declare_pass(stage, program, resources, (vertices,), access, writes, run, more_keys)
+        index_state = None if index_buffer is None else resource_state(self.device, index_buffer)
+        more_keys = instance_index, target.clear_depth, index_state
+        self._declare_pass(stage, program, resources, (vertex_count,), access, writes, run, more_keys)
 
     def fill(
         self, stage: str, program: RenderProgram, resources: Bindings, targets: Sequence[TextureOrView]
@@ -245,14 +265,14 @@ class Graph(Recorder):
 
         self._declare_pass(stage, program, resources, (3,), program.access(resources), writes, run)
 
-    def repeat(self, record: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
-        """Declare the compute passes that `record(recorder, *args)` adds, recorded once per set of arguments.
+    def repeat(self, record_passes: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
+        """Declare the passes that `record_passes(recorder, *args)` adds, recorded once per set of arguments.
 
         Either all passes of the recording run, or none. Replaying a recording takes almost no time in Python.
         """
-        recording, result = self.recordings.get(self.device, record, args)
+        recording, result = self.recordings.get(self.device, record_passes, args)
         if self.listing is not None:
-            record(ListingRecorder(self.device, self.listing, len(self._passes)), *args)
+            record_passes(ListingRecorder(self.device, self.listing, len(self._passes)), *args)
         stages, access, dispatches = recording.stages, recording.access, recording.dispatches
         found = access.id, access.reads, access.writes
         self._passes.append(DeclaredPass(stages, lambda frame: frame.run(dispatches), access.id, found))
@@ -269,8 +289,8 @@ class Graph(Recorder):
         frame = CommandList(self.device, timed=timed, uniforms=self._uniforms)
         try:
             dependencies = self._find_dependencies()
-            versions = dependencies.versions(self._epoch, [one.key for one in self._passes])
-            is_stale = dependencies.stale(versions)
+            versions = dependencies.compute_versions(self._epoch, [one.key for one in self._passes])
+            is_stale = dependencies.find_stale_passes(versions)
             stale = [one for one, now in zip(self._passes, is_stale, strict=True) if now]
             if self.listing is not None:
                 self.listing.finish(is_stale)
@@ -303,13 +323,13 @@ class Graph(Recorder):
         stage: str,
         program: Program,
         resources: Bindings,
-        size: tuple[int, ...],
+        workgroups: tuple[int, ...],
         access: Access,
         writes: tuple[ResourceState, ...],
         run: Callable[[CommandList], None],
-        more_keys: tuple[Hashable, ...] = (),
+        further_key_parts: tuple[Hashable, ...] = (),
     ) -> None:
         if self.listing is not None:
-            self.listing.add(stage, program, resources, size, len(self._passes))
-        key = access.id, size, more_keys, program.uniform_values(resources, self._uniforms)
+            self.listing.add(stage, program, resources, workgroups, len(self._passes))
+        key = access.id, workgroups, further_key_parts, program.uniform_values(resources, self._uniforms)
         self._passes.append(DeclaredPass((stage,), run, key, (access.id, access.reads, writes)))

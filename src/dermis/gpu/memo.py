@@ -55,23 +55,27 @@ class Memo:
         self._hits: list[tuple[FunctionKey, CachedResult]] = []
 
     @overload
-    def get(self, function: Callable[[*Ts], T], *args: *Ts, owner: str = "") -> T: ...
+    def get(self, function: Callable[[*Ts], T], *args: *Ts, caller_name: str = "") -> T: ...
 
     @overload
     def get(
-        self, function: Callable[..., T], *args: object, untracked: tuple[object, ...], owner: str = ""
+        self, function: Callable[..., T], *args: object, untracked: tuple[object, ...], caller_name: str = ""
     ) -> T: ...
 
     def get(
-        self, function: Callable[..., T], *args: object, untracked: tuple[object, ...] = (), owner: str = ""
+        self,
+        function: Callable[..., T],
+        *args: object,
+        untracked: tuple[object, ...] = (),
+        caller_name: str = "",
     ) -> T:
         """Return `function(*args, *untracked)`, or the cached result of a call with equal `args`.
 
         untracked : further arguments that do not affect the result and are not compared
-        owner : name of the caller, such as a feature, if several callers use the same function; their results
-            are cached separately
+        caller_name : name of the caller, such as a feature, if several callers use the same function; their
+            results are cached separately
         """
-        key = function, owner
+        key = function, caller_name
         results = self._results.setdefault(key, [])
         for found in results:
             if are_equal(found.args, args):
@@ -93,10 +97,10 @@ class Memo:
         return value
 
     def submit(
-        self, executor: Executor, function: Callable[[*Ts], T], *args: *Ts, owner: str = ""
+        self, executor: Executor, function: Callable[[*Ts], T], *args: *Ts, caller_name: str = ""
     ) -> Future[T]:
         """Return a future of `function(*args)`, run on a thread of `executor`, or the cached future."""
-        return self.get(_submit_to_executor, executor, function, args, owner=owner)
+        return self.get(_submit_to_executor, executor, function, args, caller_name=caller_name)
 
     def result(self, future: Future[T]) -> T:
         """Wait for a future of `submit` and return its result; if it failed, the cache is cleared."""
@@ -133,16 +137,16 @@ class Memo:
             self._pending.pop()
         return result
 
-    def _mark_hits_used(self, key: FunctionKey | None = None) -> None:
-        """Move results used in this frame to the front of the cache: all, or those that depend on `key`."""
+    def _mark_hits_used(self, function_key: FunctionKey | None = None) -> None:
+        """Move results used in this frame to the front of the cache: all, or all that depend on a key."""
         for one, result in self._hits:
-            if key is None or key in result.keys:
+            if function_key is None or function_key in result.keys:
                 self._mark_used(one, result)
 
-    def _mark_used(self, key: FunctionKey, result: CachedResult) -> None:
+    def _mark_used(self, function_key: FunctionKey, result: CachedResult) -> None:
         """Move a result and its parts to the front of the cache, as most recently used."""
-        self._recent_keys[-1].add(key)
-        results = self._results.setdefault(key, [])
+        self._recent_keys[-1].add(function_key)
+        results = self._results.setdefault(function_key, [])
         if not results or results[0] is not result:
             results[:] = [result, *(one for one in results if one is not result)][: self._cache_size]
         for part in result.parts:
@@ -153,38 +157,42 @@ def _submit_to_executor(executor: Executor, function: Callable[[*Ts], T], args: 
     return executor.submit(function, *args)
 
 
-def are_equal(a: Any, b: Any) -> bool:
+def are_equal(first: Any, second: Any) -> bool:
     """Return whether two arguments are equal: arrays and dataclasses by value, other objects by identity."""
-    if a is b:
+    if first is second:
         return True
-    if type(a) is not type(b):
+    if type(first) is not type(second):
         return False
-    if isinstance(a, tuple | list):
-        if len(a) != len(b):
+    if isinstance(first, tuple | list):
+        if len(first) != len(second):
             return False
-        for x, y in zip(a, b, strict=True):  # noqa: SIM110 most items are identical, which needs no call
+        for x, y in zip(first, second, strict=True):  # noqa: SIM110 most items are identical, which needs no call
             if x is not y and not are_equal(x, y):
                 return False
         return True
-    if isinstance(a, np.ndarray):
-        return bool(a.shape == b.shape and a.dtype == b.dtype and a.tobytes() == b.tobytes())
-    if not has_value_equality(a):
+    if isinstance(first, np.ndarray):
+        return bool(
+            first.shape == second.shape
+            and first.dtype == second.dtype
+            and first.tobytes() == second.tobytes()
+        )
+    if not has_value_equality(first):
         return False
-    kind: Any = type(a)  # mypy takes no type of Any for hashable
-    names = field_names(kind)
+    kind: Any = type(first)  # mypy takes no type of Any for hashable
+    names = dataclass_field_names(kind)
     if names is None:
-        return bool(a == b)
+        return bool(first == second)
     for name in names:
-        x, y = getattr(a, name), getattr(b, name)
+        x, y = getattr(first, name), getattr(second, name)
         if x is not y and not are_equal(x, y):
             return False
     return True
 
 
 @cache
-def field_names(kind: type) -> tuple[str, ...] | None:
+def dataclass_field_names(object_type: type) -> tuple[str, ...] | None:
     """Return the field names of a dataclass; None for other types."""
-    return tuple(one.name for one in fields(kind)) if is_dataclass(kind) else None
+    return tuple(one.name for one in fields(object_type)) if is_dataclass(object_type) else None
 
 
 def has_value_equality(value: object) -> bool:

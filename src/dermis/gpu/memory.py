@@ -24,19 +24,19 @@ _SOFTWARE_RENDERING_BYTES = 0.9e9, 0.22e9
 Measured at 512x512 with an atlas of 1024.
 """
 
-_MAX_THREADS = 16  # largest number of threads of Mesa's software adapter
+_MAX_SOFTWARE_THREADS = 16  # largest number of threads of Mesa's software adapter
 
-_CGROUPS = Path("/sys/fs/cgroup")
+_CGROUP_FOLDER = Path("/sys/fs/cgroup")
 
 _MIN_PROBE_BYTES = 1 << 20
 
-_OUT_OF_MEMORY = "out of memory", "not enough memory"  # words in wgpu's errors, whose classes differ
+_OUT_OF_MEMORY_WORDS = "out of memory", "not enough memory"  # words in wgpu's errors, whose classes differ
 
-_RAISE_LIMIT = "Raise it: ulimit -v unlimited"
+_ADDRESS_SPACE_ADVICE = "Raise it: ulimit -v unlimited"
 
-_SMALLER_SIZES = "Choose smaller ones"
+_SMALLER_SIZES_ADVICE = "Choose smaller ones"
 
-_SMALLER_FRAME = (
+_SMALLER_FRAME_ADVICE = (
     "Lower --size, --samples or --atlas, close other programs that use the GPU, or try --adapter cpu"
 )
 
@@ -49,30 +49,34 @@ class OutOfMemoryError(DermisError):
     size : size of the resource [byte]
     """
 
-    def __init__(self, expected: str, actual: str, size: float, advice: str = _SMALLER_FRAME) -> None:
+    def __init__(self, expected: str, actual: str, size: float, advice: str = _SMALLER_FRAME_ADVICE) -> None:
         super().__init__(f"{expected}, but {actual}. {advice}.")
         self.expected, self.actual, self.size = expected, actual, size
 
 
 @contextlib.contextmanager
-def checked_allocation(device: str, name: str, size: float, limit: float) -> Iterator[None]:
+def checked_allocation(
+    adapter_name: str, resource_name: str, resource_bytes: float, max_bytes: float
+) -> Iterator[None]:
     """Raise OutOfMemoryError if the resource that the body of this context creates does not fit.
 
-    device, name : names of the adapter and of the resource, for the message
-    size, limit : size of the resource, and largest size that the device allows [byte]
+    adapter_name, resource_name : names of the adapter and of the resource, for the message
+    resource_bytes, max_bytes : size of the resource, and largest size that the device allows [byte]
     """
     import wgpu
 
-    expected = f"{device}: expected room for the {name}, {format_bytes(size)}"
-    if size > limit:
-        raise OutOfMemoryError(expected, f"it takes at most {format_bytes(limit)} at once", size)
+    expected = f"{adapter_name}: expected room for the {resource_name}, {format_bytes(resource_bytes)}"
+    if resource_bytes > max_bytes:
+        raise OutOfMemoryError(
+            expected, f"it takes at most {format_bytes(max_bytes)} at once", resource_bytes
+        )
     try:
         yield
     except (wgpu.GPUError, MemoryError) as error:
         text = str(error).lower()
-        if isinstance(error, wgpu.GPUError) and not any(words in text for words in _OUT_OF_MEMORY):
+        if isinstance(error, wgpu.GPUError) and not any(words in text for words in _OUT_OF_MEMORY_WORDS):
             raise
-        raise OutOfMemoryError(expected, "it has none left", size) from error
+        raise OutOfMemoryError(expected, "it has none left", resource_bytes) from error
 
 
 def allocated_bytes() -> int:
@@ -85,32 +89,32 @@ def allocated_bytes() -> int:
 
 def check_memory(
     device: Device,
-    needed: float,
-    option: str,
-    sizes: str,
-    advice: Callable[[float], str] = lambda _: _SMALLER_SIZES,
+    needed_bytes: float,
+    option_name: str,
+    sizes_text: str,
+    advice_for_bytes: Callable[[float], str] = lambda _: _SMALLER_SIZES_ADVICE,
 ) -> None:
     """Raise DermisError if textures of a software adapter would not fit into main memory.
 
     The operating system would otherwise kill the process.
 
-    needed : size of the textures and buffers [byte]
-    option, sizes : name of the option and text with the sizes that it sets, for the message
-    advice : function that returns the advice for a number of available bytes
+    needed_bytes : size of the textures and buffers [byte]
+    option_name, sizes_text : name of the option and text with the sizes that it sets, for the message
+    advice_for_bytes : function that returns the advice for a number of available bytes
     """
     if device.adapter.kind != "CPU":
         return
     available = available_memory()
-    if needed > available:
-        actual = f"{sizes} need {needed / 1e9:.0f} GB"
-        refuse(option, f"a frame within {available / 1e9:.0f} GB", actual, advice(available))
+    if needed_bytes > available:
+        actual = f"{sizes_text} need {needed_bytes / 1e9:.0f} GB"
+        refuse(option_name, f"a frame within {available / 1e9:.0f} GB", actual, advice_for_bytes(available))
 
 
-def probe_memory(device: Device, limit: float) -> float:
-    """Return the free memory of a device, at most `limit`, found by trial allocation [byte]."""
+def probe_memory(device: Device, max_bytes: float) -> float:
+    """Return the free memory of a device, at most `max_bytes`, found by trial allocation [byte]."""
     buffers: list[Buffer] = []
-    total, size = 0, min(int(limit), device.max_storage_bytes) // 4 * 4
-    while size >= _MIN_PROBE_BYTES and total < limit:
+    total, size = 0, min(int(max_bytes), device.max_storage_bytes) // 4 * 4
+    while size >= _MIN_PROBE_BYTES and total < max_bytes:
         try:
             buffers.append(device.storage_buffer(size, "probe"))
             total += size
@@ -123,7 +127,7 @@ def probe_memory(device: Device, limit: float) -> float:
 
 def check_driver_address_space() -> None:
     """Raise DermisError if the address space limit (ulimit -v) is too low to load the graphics drivers."""
-    if _address_space_limit() < math.inf and not _has_drivers():
+    if _address_space_limit() < math.inf and not _has_loaded_drivers():
         _check_address_space(
             _bytes_for_threads(_DRIVER_LOADING_BYTES), _bytes_for_threads(_SOFTWARE_RENDERING_BYTES)
         )
@@ -156,35 +160,40 @@ def main_memory() -> float:
     return min(known)
 
 
-def format_bytes(size: float) -> str:
+def format_bytes(byte_count: float) -> str:
     """Return a size in bytes as text in MB or GB."""
-    return f"{size / 1e9:.1f} GB" if size >= 1e8 else f"{size / 1e6:.1f} MB"
+    return f"{byte_count / 1e9:.1f} GB" if byte_count >= 1e8 else f"{byte_count / 1e6:.1f} MB"
 
 
 def _cgroup_limits() -> list[float]:
     """Return the memory limits of the process's Linux control groups, versions 1 and 2 [byte]."""
-    own = [_CGROUPS / name for name in _own_cgroups()]
-    folders = [folder for one in own for folder in (one, *one.parents) if folder.is_relative_to(_CGROUPS)]
-    files = [*(folder / "memory.max" for folder in folders), _CGROUPS / "memory" / "memory.limit_in_bytes"]
+    own = [_CGROUP_FOLDER / name for name in _control_group_paths()]
+    folders = [
+        folder for one in own for folder in (one, *one.parents) if folder.is_relative_to(_CGROUP_FOLDER)
+    ]
+    files = [
+        *(folder / "memory.max" for folder in folders),
+        _CGROUP_FOLDER / "memory" / "memory.limit_in_bytes",
+    ]
     texts = [file.read_text().strip() for file in files if file.is_file()]
     return [float(text) for text in texts if text.isdigit()]
 
 
-def _own_cgroups() -> list[str]:
+def _control_group_paths() -> list[str]:
     lines = Path("/proc/self/cgroup").read_text().splitlines()
     return [line.removeprefix("0::").lstrip("/") for line in lines if line.startswith("0::")]
 
 
-def _check_address_space(needed: float, needed_later: float = 0.0) -> None:
+def _check_address_space(needed_bytes: float, needed_later_bytes: float = 0.0) -> None:
     limit, used = _address_space_limit(), _address_space_used()
-    if used + needed > limit:
-        total = format_bytes(math.ceil((used + needed + needed_later) / 1e8) * 1e8)
+    if used + needed_bytes > limit:
+        total = format_bytes(math.ceil((used + needed_bytes + needed_later_bytes) / 1e8) * 1e8)
         expected = f"at least {total} for graphics drivers and a frame in software"
         actual = f"the limit is {format_bytes(limit)}, of which {format_bytes(used)} are taken"
-        refuse("address space (ulimit -v)", expected, actual, _RAISE_LIMIT)
+        refuse("address space (ulimit -v)", expected, actual, _ADDRESS_SPACE_ADVICE)
 
 
-def _has_drivers() -> bool:
+def _has_loaded_drivers() -> bool:
     """Return whether this process has already loaded the Vulkan loader, and with it the drivers."""
     try:
         return "libvulkan" in Path("/proc/self/maps").read_text()
@@ -216,4 +225,4 @@ def _address_space_used() -> float:
 def _software_threads() -> int:
     """Return the number of threads of Mesa's software adapter."""
     threads = os.environ.get("LP_NUM_THREADS", "")
-    return int(threads) if threads.isdigit() else min(os.cpu_count() or 1, _MAX_THREADS)
+    return int(threads) if threads.isdigit() else min(os.cpu_count() or 1, _MAX_SOFTWARE_THREADS)

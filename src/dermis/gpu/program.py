@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from dermis.base.errors import DermisError
 from dermis.gpu.bind_groups import UNIFORM_BUFFER, BindGroup, ResourceCache, make_bind_group, resource_key
-from dermis.gpu.dependencies import Access, resource_state, unique_id
+from dermis.gpu.dependencies import Access, new_access_id, resource_state
 from dermis.gpu.device import Device
-from dermis.gpu.shader_types import Binding, make_record, shader_bindings, used_members
+from dermis.gpu.shader_types import Binding, make_record, shader_bindings, used_member_selector
 from dermis.gpu.types import Bindable, Bindings, NativeObject, UniformRecord, Untyped
 from dermis.gpu.uniforms import Uniforms
-from dermis.gpu.wgsl_source import Folder, ShaderSource, compose
+from dermis.gpu.wgsl_source import Folder, ShaderSource, compose_shader
 
 UniformRecords = Mapping[str, NDArray[np.generic]]
 """Uniform records by their names in the shader, without other resources."""
@@ -28,9 +28,9 @@ P = TypeVar("P")
 
 _TOOLKIT_SHADERS = Path(__file__).parent / "wgsl"
 
-_LARGE_RECORD_BYTES = 2048  # the record of a skin is smaller, and few shaders read all of it
+_MIN_LARGE_RECORD_BYTES = 2048  # the record of a skin is smaller, and few shaders read all of it
 
-_CACHED_VARIANTS = 12  # for each shader; on a software adapter each variant takes some 7 MB
+_MAX_CACHED_VARIANTS = 12  # for each shader; on a software adapter each variant takes some 7 MB
 
 Constants = tuple[tuple[str, float], ...]
 """Names and values of pipeline constants (`override` in WGSL); others keep their default."""
@@ -62,15 +62,17 @@ class Program:
         self._uniforms = [b for b in self.bindings if _is_uniform(b)]
         self._resource_bindings = [b for b in self.bindings if not _is_uniform(b)]
         self._get_resources = _binding_getter([b.name for b in self._resource_bindings])
-        self._used_members = [(one.name, used_members(self.source.text, one.name)) for one in self._uniforms]
+        self._used_members = [
+            (one.name, used_member_selector(self.source.text, one.name)) for one in self._uniforms
+        ]
         self.bind_groups: ResourceCache[BindGroup] = ResourceCache()
         self._accesses: ResourceCache[Access] = ResourceCache()
         self._group_layout = device.handle.create_bind_group_layout(entries=self._layout_entries())
         self._layout = device.handle.create_pipeline_layout(bind_group_layouts=[self._group_layout])
 
-    def record(self, struct: str, **values: object) -> UniformRecord:
+    def record(self, struct_name: str, **values: object) -> UniformRecord:
         """Return a uniform record for a struct of the shader; members without a value are 0."""
-        return make_record(self.source.text, struct, **values)
+        return make_record(self.source.text, struct_name, **values)
 
     def record_positions(self, resources: Bindings, uniforms: Uniforms) -> tuple[int, ...]:
         """Return the positions in uniform memory of the records that are bound to the shader [byte]."""
@@ -106,7 +108,7 @@ class Program:
                 resource_state(self.device, value) for one, value in named if one.has_content and one.reads
             )
             writes = tuple(resource_state(self.device, value) for one, value in named if one.writes)
-            found = Access(unique_id(), reads, writes)
+            found = Access(new_access_id(), reads, writes)
             self._accesses.add(key, bound, found)
         return found
 
@@ -120,7 +122,7 @@ class Program:
         try:
             for name, select in self._used_members:
                 raw = uniforms.bytes_of(records[name])
-                found.append(raw if len(raw) > _LARGE_RECORD_BYTES else select(raw))
+                found.append(raw if len(raw) > _MIN_LARGE_RECORD_BYTES else select(raw))
         except KeyError as missing:
             raise self._unbound_error(missing) from None
         return tuple(found)
@@ -132,15 +134,19 @@ class Program:
         except KeyError as missing:
             raise self._unbound_error(missing) from None
 
-    def _unbound_error(self, missing: KeyError) -> KeyError:
-        return KeyError(f"{self.name}.wgsl declares {missing.args[0]!r}, and nothing is bound to it")
+    def _unbound_error(self, key_error: KeyError) -> KeyError:
+        return KeyError(f"{self.name}.wgsl declares {key_error.args[0]!r}, and nothing is bound to it")
 
-    def _make_group(self, bound: Sequence[Bindable], resources: Bindings) -> BindGroup:
+    def _make_group(self, bound_resources: Sequence[Bindable], resources: Bindings) -> BindGroup:
         """Create the bind group for bound resources, followed by the buffers of the uniform records."""
         records: UniformRecords = resources  # type: ignore[assignment]  # no cast, which costs time
         sizes = [records[one.name].nbytes for one in self._uniforms]
         return make_bind_group(
-            self.device, self._group_layout, (*self._resource_bindings, *self._uniforms), bound, sizes
+            self.device,
+            self._group_layout,
+            (*self._resource_bindings, *self._uniforms),
+            bound_resources,
+            sizes,
         )
 
     def _compile_shader(self, path: Path) -> Untyped:
@@ -186,12 +192,12 @@ class ComputeProgram(Program):
         pipeline: NativeObject = self._compiled.result()
         return pipeline
 
-    def groups_for(self, size: tuple[int, int], tile: int = 8) -> tuple[int, int]:
+    def workgroups_for(self, image_size: tuple[int, int], tile_side: int = 8) -> tuple[int, int]:
         """Return the workgroups along x and y, each of tile x tile invocations, that cover an image.
 
-        size : width and height of the image [texel]
+        image_size : width and height of the image [texel]
         """
-        return math.ceil(size[0] / tile), math.ceil(size[1] / tile)
+        return math.ceil(image_size[0] / tile_side), math.ceil(image_size[1] / tile_side)
 
 
 class RenderProgram(Program):
@@ -231,18 +237,20 @@ class RenderProgram(Program):
         )
 
 
-def cached_program(device: Device, shader: Hashable, constants: Constants, make: Callable[[], P]) -> P:
+def cached_program(
+    device: Device, shader_key: Hashable, constants: Constants, compile_program: Callable[[], P]
+) -> P:
     """Return the program for a shader and pipeline constants, from the cache if it was used recently.
 
-    shader : key that identifies the shader
-    make : function that compiles the program
+    shader_key : key that identifies the shader
+    compile_program : function that compiles the program
     """
-    variants: dict[Constants, P] = device.programs.setdefault(shader, {})
+    variants: dict[Constants, P] = device.programs.setdefault(shader_key, {})
     found = variants.pop(constants, None)
     if found is None:
-        found = make()
+        found = compile_program()
     variants[constants] = found  # the most recently used one is last
-    if len(variants) > _CACHED_VARIANTS:
+    if len(variants) > _MAX_CACHED_VARIANTS:
         del variants[next(iter(variants))]
     return found
 
@@ -258,15 +266,15 @@ def shader_source(path: Path, folders: Sequence[Folder]) -> ShaderSource:
 
     folders : folders that are searched for included files, before the toolkit's own
     """
-    return compose(path, (*folders, _TOOLKIT_SHADERS))
+    return compose_shader(path, (*folders, _TOOLKIT_SHADERS))
 
 
-def _binding_getter(names: Sequence[str]) -> Callable[[Bindings], Sequence[Bindable]]:
+def _binding_getter(resource_names: Sequence[str]) -> Callable[[Bindings], Sequence[Bindable]]:
     """Return a function that selects resources by name from bindings, as a sequence in this order."""
-    if len(names) > 1:
-        return itemgetter(*names)
+    if len(resource_names) > 1:
+        return itemgetter(*resource_names)
     return lambda resources: [
-        resources[name] for name in names
+        resources[name] for name in resource_names
     ]  # itemgetter returns no sequence for one name
 
 

@@ -27,23 +27,23 @@ class BufferReadback:
         self._handle: object = None  # argument of the driver's callback, which has to stay alive
         self.buffer = device.acquire_staging(size)
 
-    def start(self, submitted: int) -> None:
+    def start(self, submission: int) -> None:
         """Request that the copy is mapped to host memory after a submission.
 
-        submitted : number of the submission that fills the copy, from `Device.submit`
+        submission : number of the submission that fills the copy, from `Device.submit`
         """
         ffi, lib = self.device.ffi, self.device.lib
         info = ffi.new("WGPUBufferMapCallbackInfo *")
         info.mode, info.callback = lib.WGPUCallbackMode_AllowProcessEvents, _map_callback()
-        self._submitted, self._handle = submitted, ffi.new_handle(self)
+        self._submitted, self._handle = submission, ffi.new_handle(self)
         info.userdata1 = self._handle
         self.device.pending_readbacks.add(self)  # has to live until the callback
         arguments = self.buffer._internal, lib.WGPUMapMode_Read, 0, self.buffer.size, info[0]
         self.device.checked.wgpuBufferMapAsync(*arguments)
 
-    def on_mapped(self, status: int) -> None:
+    def on_mapped(self, map_status: int) -> None:
         """Store the status of the mapping; called by the driver."""
-        self._status, self._handle = status, None
+        self._status, self._handle = map_status, None
         self.device.pending_readbacks.discard(self)
 
     def array(self) -> NDArray[np.uint8]:

@@ -39,15 +39,20 @@ class Recorder(ABC):
 
     @abstractmethod
     def dispatch(
-        self, stage: str, program: ComputeProgram, resources: Bindings, groups: Workgroups, in_place: str = ""
+        self,
+        stage: str,
+        program: ComputeProgram,
+        resources: Bindings,
+        workgroups: Workgroups,
+        in_place_resource: str = "",
     ) -> None:
         """Add a dispatch of a compute program.
 
         stage : name of the stage, under which the pass is timed
         resources : resources and uniform records by their names in the shader
-        groups : number of workgroups along each axis
-        in_place : name of a resource that the pass completes from the resource's own content, such as a map
-            whose gutters are filled; the version of this resource does not change
+        workgroups : number of workgroups along each axis
+        in_place_resource : name of a resource that the pass completes from the resource's own content, such
+            as a map whose gutters are filled; the version of this resource does not change
         """
 
     def compute(
@@ -55,17 +60,28 @@ class Recorder(ABC):
         stage: str,
         program: ComputeProgram,
         resources: Bindings,
-        size: tuple[int, int],
-        tile: int = 8,
-        in_place: str = "",
+        invocation_counts: tuple[int, int],
+        tile_side: int = 8,
+        in_place_resource: str = "",
     ) -> None:
-        """Add a dispatch that covers size[0] x size[1] invocations in workgroups of tile x tile."""
-        self.dispatch(stage, program, resources, (*program.groups_for(size, tile), 1), in_place)
+        """Add a dispatch that covers a 2-D grid of invocations by square workgroups.
 
-    def write(self, stage: str, buffer: Buffer, data: bytes) -> None:
+        invocation_counts : number of invocations along x and y
+        tile_side : side of a workgroup [invocations]
+        in_place_resource : see `dispatch`
+        """
+        self.dispatch(
+            stage,
+            program,
+            resources,
+            (*program.workgroups_for(invocation_counts, tile_side), 1),
+            in_place_resource,
+        )
+
+    def write(self, stage: str, buffer: Buffer, content: bytes) -> None:
         """Write bytes from the host to the start of a buffer, before all passes of the frame.
 
-        data : bytes, if possible the same object in each frame, as Python caches the hash of bytes
+        content : bytes, if possible the same object in each frame, as Python caches the hash of bytes
         """
         raise self._unsupported_error(stage)
 
@@ -74,18 +90,18 @@ class Recorder(ABC):
         stage: str,
         program: RenderProgram,
         resources: Bindings,
-        vertices: int,
+        vertex_count: int,
         target: DrawTarget,
         *,
-        indices: Buffer | None = None,
-        layer: int = 0,
+        index_buffer: Buffer | None = None,
+        instance_index: int = 0,
     ) -> None:
         """Add a render pass of triangles.
 
-        vertices : number of vertices, three per triangle
+        vertex_count : number of vertices, three per triangle
         target : depth and colour attachments
-        indices : index buffer; None to number the vertices in order
-        layer : instance index, which shaders use as the layer of a texture array
+        index_buffer : index buffer; None to number the vertices in order
+        instance_index : instance index, which shaders use as the layer of a texture array
         """
         raise self._unsupported_error(stage)
 
@@ -95,9 +111,9 @@ class Recorder(ABC):
         """Add a render pass that runs a program once per texel of its targets."""
         raise self._unsupported_error(stage)
 
-    def repeat(self, record: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
-        """Add the compute passes that `record(recorder, *args)` adds, which must depend only on `args`."""
-        return record(self, *args)
+    def repeat(self, record_passes: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
+        """Add the passes that `record_passes(recorder, *args)` adds; they must depend only on `args`."""
+        return record_passes(self, *args)
 
     def _unsupported_error(self, stage: str) -> NotImplementedError:
         return NotImplementedError(f"{stage}: {type(self).__name__} takes compute passes only")

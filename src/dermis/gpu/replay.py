@@ -12,9 +12,9 @@ import numpy as np
 
 from dermis.gpu.bind_groups import BindGroup
 from dermis.gpu.command_list import Dispatch, make_dispatch
-from dermis.gpu.dependencies import Access, ResourceState, resource_state, unique_id
+from dermis.gpu.dependencies import Access, ResourceState, new_access_id, resource_state
 from dermis.gpu.device import Device
-from dermis.gpu.memo import are_equal, field_names, has_value_equality
+from dermis.gpu.memo import are_equal, dataclass_field_names, has_value_equality
 from dermis.gpu.program import ComputeProgram
 from dermis.gpu.recorder import Recorder, Workgroups
 from dermis.gpu.types import Bindings, Buffer, NativeObject
@@ -22,7 +22,7 @@ from dermis.gpu.uniforms import CHUNK_BYTES, Uniforms
 
 T = TypeVar("T")
 Ts = TypeVarTuple("Ts")
-_CACHED_RECORDINGS = 4  # recordings per function: for two states, each with a moving and a still head
+_MAX_CACHED_RECORDINGS = 4  # recordings per function: for two states, each with a moving and a still head
 
 
 class Recording(Recorder):
@@ -46,7 +46,7 @@ class Recording(Recorder):
     def access(self) -> Access:
         """Return the resources that the recording reads and writes, except scratch that it writes."""
         writes = tuple(state for state in self._writes if not state.scratch)
-        return Access(unique_id(), tuple(self._reads), writes)
+        return Access(new_access_id(), tuple(self._reads), writes)
 
     @cached_property
     def stages(self) -> tuple[str, ...]:
@@ -59,7 +59,12 @@ class Recording(Recorder):
         return len(self.dispatches) == len(self._pipelines)
 
     def dispatch(
-        self, stage: str, program: ComputeProgram, resources: Bindings, groups: Workgroups, in_place: str = ""
+        self,
+        stage: str,
+        program: ComputeProgram,
+        resources: Bindings,
+        workgroups: Workgroups,
+        in_place_resource: str = "",
     ) -> None:
         """Record a dispatch of a compute program, see `Recorder.dispatch`."""
         chunks, dispatches = self._chunks, self.dispatches  # a reference to self would keep it alive
@@ -72,12 +77,12 @@ class Recording(Recorder):
         group, offsets = program.bind_group(resources, self._uniforms)
         self._bind_groups.append(weakref.ref(group, invalidate))
         self._pipelines.append(program.pipeline)
-        dispatches.append(make_dispatch(stage, program, group, offsets, groups))
+        dispatches.append(make_dispatch(stage, program, group, offsets, workgroups))
         access = program.access(resources)
         for state in access.reads:
             if state not in self._writes and state not in access.writes:
                 self._reads[state] = None
-        unchanged = resource_state(self.device, resources[in_place]) if in_place else None
+        unchanged = resource_state(self.device, resources[in_place_resource]) if in_place_resource else None
         self._writes |= dict.fromkeys(state for state in access.writes if state is not unchanged)
 
     def finish(self) -> None:
@@ -88,10 +93,10 @@ class Recording(Recorder):
         self._uniforms = None  # it keeps the buffers alive
 
 
-def _uniform_chunk(device: Device, chunks: list[Buffer], index: int) -> Buffer:
-    if index == len(chunks):
-        chunks.append(device.uniform_buffer(CHUNK_BYTES))
-    return chunks[index]
+def _uniform_chunk(device: Device, chunks: list[Buffer], chunk_index: int) -> Buffer:
+    if chunk_index == len(chunks):
+        chunks.append(device.make_uniform_buffer(CHUNK_BYTES))
+    return chunks[chunk_index]
 
 
 class RecordingCache:
@@ -101,19 +106,19 @@ class RecordingCache:
         self._recordings: dict[Callable[..., object], list[tuple[object, Recording, Any]]] = {}
 
     def get(
-        self, device: Device, record: Callable[[Recorder, *Ts], T], args: tuple[*Ts]
+        self, device: Device, record_passes: Callable[[Recorder, *Ts], T], args: tuple[*Ts]
     ) -> tuple[Recording, T]:
-        """Return the recording of `record(recorder, *args)` and its result, from the cache if possible."""
-        known = self._recordings.setdefault(record, [])
+        """Return the recording of `record_passes(recorder, *args)` and its result, if possible cached."""
+        known = self._recordings.setdefault(record_passes, [])
         found = next((one for one in known if one[1].is_valid and _matches_copy(one[0], args)), None)
         if found is None:
             recording = Recording(device)
-            result = record(recording, *args)
+            result = record_passes(recording, *args)
             recording.finish()
             assert recording.is_valid, "a resource was released right after it was bound"
             found = _weak_copy(args), recording, result
         if not known or known[0] is not found:
-            known[:] = [found, *(one for one in known if one is not found)][:_CACHED_RECORDINGS]
+            known[:] = [found, *(one for one in known if one is not found)][:_MAX_CACHED_RECORDINGS]
         return found[1], found[2]
 
 
@@ -129,40 +134,44 @@ class _WeakFields:
     fields: tuple[object, ...]
 
 
-def _weak_copy(value: object) -> object:
+def _weak_copy(argument: object) -> object:
     """Return a copy of an argument, for later comparison, that keeps no resource alive.
 
     Arrays are copied; objects that compare by identity, such as textures, become weak references.
     """
-    if isinstance(value, tuple):
-        return tuple(map(_weak_copy, value))
-    if isinstance(value, np.ndarray):
-        return value.copy()
-    if not has_value_equality(value):
-        return weakref.ref(value) if value is not None else None
-    if not is_dataclass(value):
-        return value
-    kind: Any = type(value)
-    fields = tuple(_weak_copy(getattr(value, name)) for name in field_names(kind) or ())
-    return _WeakFields(kind, fields) if any(map(_is_weak, fields)) else value
+    if isinstance(argument, tuple):
+        return tuple(map(_weak_copy, argument))
+    if isinstance(argument, np.ndarray):
+        return argument.copy()
+    if not has_value_equality(argument):
+        return weakref.ref(argument) if argument is not None else None
+    if not is_dataclass(argument):
+        return argument
+    kind: Any = type(argument)
+    fields = tuple(_weak_copy(getattr(argument, name)) for name in dataclass_field_names(kind) or ())
+    return _WeakFields(kind, fields) if any(map(_is_weak, fields)) else argument
 
 
-def _is_weak(copy: object) -> bool:
-    return isinstance(copy, weakref.ref | _WeakFields) or (
-        isinstance(copy, tuple) and any(map(_is_weak, copy))
+def _is_weak(weak_copy: object) -> bool:
+    return isinstance(weak_copy, weakref.ref | _WeakFields) or (
+        isinstance(weak_copy, tuple) and any(map(_is_weak, weak_copy))
     )
 
 
-def _matches_copy(copy: object, value: object) -> bool:
+def _matches_copy(weak_copy: object, argument: object) -> bool:
     """Return whether an argument equals the argument from which `_weak_copy` made a copy."""
-    if isinstance(copy, weakref.ref):
-        return copy() is value
-    if isinstance(copy, tuple):
-        return isinstance(value, tuple) and len(copy) == len(value) and all(map(_matches_copy, copy, value))
-    if isinstance(copy, _WeakFields):
-        kind: Any = type(value)
-        if kind is not copy.kind:
+    if isinstance(weak_copy, weakref.ref):
+        return weak_copy() is argument
+    if isinstance(weak_copy, tuple):
+        return (
+            isinstance(argument, tuple)
+            and len(weak_copy) == len(argument)
+            and all(map(_matches_copy, weak_copy, argument))
+        )
+    if isinstance(weak_copy, _WeakFields):
+        kind: Any = type(argument)
+        if kind is not weak_copy.kind:
             return False
-        parts = (getattr(value, name) for name in field_names(kind) or ())
-        return all(map(_matches_copy, copy.fields, parts))
-    return are_equal(copy, value)
+        parts = (getattr(argument, name) for name in dataclass_field_names(kind) or ())
+        return all(map(_matches_copy, weak_copy.fields, parts))
+    return are_equal(weak_copy, argument)

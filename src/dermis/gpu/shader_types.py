@@ -21,10 +21,10 @@ from dermis.gpu.types import UniformRecord
 
 LayoutEntry = dict[str, str]
 """Part of wgpu's bind group layout entry: type, format or dimensions of a resource."""
-_COMMENT = re.compile(r"//[^\n]*")
-_STRUCT = re.compile(r"struct\s+(\w+)\s*\{([^}]*)\}")
-_MEMBER = re.compile(r"(\w+)\s*:\s*(array<\s*\w+\s*,\s*\d+\s*>|\w+(?:<\w+>)?)")
-_BINDING = re.compile(
+_COMMENT_PATTERN = re.compile(r"//[^\n]*")
+_STRUCT_PATTERN = re.compile(r"struct\s+(\w+)\s*\{([^}]*)\}")
+_MEMBER_PATTERN = re.compile(r"(\w+)\s*:\s*(array<\s*\w+\s*,\s*\d+\s*>|\w+(?:<\w+>)?)")
+_BINDING_PATTERN = re.compile(
     r"@group\(0\)\s*@binding\((\d+)\)\s*var(?:<([\w, ]+)>)?\s+(\w+)\s*:\s*([\w<>, ]+?)\s*;([^\n]*)"
 )
 
@@ -72,50 +72,52 @@ class Binding:
 
 
 @cache
-def struct_dtype(text: str, name: str) -> np.dtype[np.void]:
+def struct_dtype(wgsl_text: str, struct_name: str) -> np.dtype[np.void]:
     """Return the NumPy dtype of a WGSL struct, with the member offsets of the shader.
 
     A mat4x4f is stored as its transpose, because WGSL stores columns; a member may be an array of another
     struct.
 
-    text, name : text of the shader, and name of the struct
+    wgsl_text, struct_name : text of the shader, and name of the struct
     """
-    dtype, _ = _parse_struct(dict(_STRUCT.findall(_COMMENT.sub("", text))), name)
+    dtype, _ = _parse_struct(dict(_STRUCT_PATTERN.findall(_COMMENT_PATTERN.sub("", wgsl_text))), struct_name)
     return dtype
 
 
-def make_record(text: str, struct: str, **values: object) -> UniformRecord:
+def make_record(wgsl_text: str, struct_name: str, **values: object) -> UniformRecord:
     """Return a uniform record for a struct in a shader's text; members without a value are 0."""
-    record = np.zeros((), dtype=struct_dtype(text, struct))
+    record = np.zeros((), dtype=struct_dtype(wgsl_text, struct_name))
     for member, value in values.items():
         record[member] = value
     return record
 
 
-def uniform_type(text: str, name: str) -> str:
+def uniform_type(wgsl_text: str, variable_name: str) -> str:
     """Return the name of the struct type of a uniform variable.
 
-    text, name : text of the shader, and name of the variable
+    wgsl_text, variable_name : text of the shader, and name of the variable
     """
-    (struct,) = re.findall(rf"var<uniform>\s*{name}\s*:\s*(\w+)", _COMMENT.sub("", text))
+    (struct,) = re.findall(
+        rf"var<uniform>\s*{variable_name}\s*:\s*(\w+)", _COMMENT_PATTERN.sub("", wgsl_text)
+    )
     return str(struct)
 
 
-def used_members(text: str, name: str) -> Callable[[bytes], Hashable]:
+def used_member_selector(wgsl_text: str, variable_name: str) -> Callable[[bytes], Hashable]:
     """Return a function that selects, from the bytes of a uniform record, the bytes that the shader reads.
 
     The function selects all bytes if the shader passes the record to a function, or if the type of the
     variable is not a struct.
 
-    text, name : text of the shader, and name of the uniform variable
+    wgsl_text, variable_name : text of the shader, and name of the uniform variable
     """
-    code = _COMMENT.sub("", text)
-    declared = re.compile(rf"var<uniform>\s*{name}\s*:\s*(\w+)")
-    used = re.findall(rf"(?<![.\w]){name}\b(?:\.(\w+))?", declared.sub("", code))
+    code = _COMMENT_PATTERN.sub("", wgsl_text)
+    declared = re.compile(rf"var<uniform>\s*{variable_name}\s*:\s*(\w+)")
+    used = re.findall(rf"(?<![.\w]){variable_name}\b(?:\.(\w+))?", declared.sub("", code))
     (struct,) = declared.findall(code)
-    if not used or "" in used or struct not in dict(_STRUCT.findall(code)):
+    if not used or "" in used or struct not in dict(_STRUCT_PATTERN.findall(code)):
         return lambda raw: raw
-    return itemgetter(*_member_slices(struct_dtype(text, struct), set(used)))
+    return itemgetter(*_member_slices(struct_dtype(wgsl_text, struct), set(used)))
 
 
 def _member_slices(dtype: np.dtype[np.void], members: Set[str]) -> Iterator[slice]:
@@ -127,15 +129,15 @@ def _member_slices(dtype: np.dtype[np.void], members: Set[str]) -> Iterator[slic
             yield slice(extents[0][0], sum(extents[-1]))
 
 
-def _parse_struct(bodies: dict[str, str], name: str) -> tuple[np.dtype[np.void], int]:
-    if name not in bodies:
-        raise DermisError(f"struct {name}: expected the shader to declare it, but it does not.")
+def _parse_struct(struct_bodies: dict[str, str], struct_name: str) -> tuple[np.dtype[np.void], int]:
+    if struct_name not in struct_bodies:
+        raise DermisError(f"struct {struct_name}: expected the shader to declare it, but it does not.")
     names: list[str] = []
     formats: list[DTypeLike] = []
     offsets: list[int] = []
     end, align = 0, 4
-    for member, kind in _MEMBER.findall(bodies[name]):
-        base, member_align, size = _parse_member(bodies, kind)
+    for member, kind in _MEMBER_PATTERN.findall(struct_bodies[struct_name]):
+        base, member_align, size = _parse_member(struct_bodies, kind)
         end = _round_up(end, member_align)
         names.append(member)
         formats.append(base)
@@ -146,17 +148,17 @@ def _parse_struct(bodies: dict[str, str], name: str) -> tuple[np.dtype[np.void],
     return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": size}), align
 
 
-def _parse_member(bodies: dict[str, str], kind: str) -> tuple[DTypeLike, int, int]:
-    if array := re.match(r"array<\s*(\w+)\s*,\s*(\d+)\s*>", kind):
-        base, align, size = _parse_member(bodies, array[1])
+def _parse_member(struct_bodies: dict[str, str], wgsl_type: str) -> tuple[DTypeLike, int, int]:
+    if array := re.match(r"array<\s*(\w+)\s*,\s*(\d+)\s*>", wgsl_type):
+        base, align, size = _parse_member(struct_bodies, array[1])
         count = int(array[2])
         if _round_up(size, align) != np.dtype(base).itemsize:
-            raise DermisError(f"{kind}: expected array elements without padding between them.")
+            raise DermisError(f"{wgsl_type}: expected array elements without padding between them.")
         return (base, (count,)), align, count * size
-    if kind in _WGSL_TYPES:
-        scalar, shape, align, size = _WGSL_TYPES[kind]
+    if wgsl_type in _WGSL_TYPES:
+        scalar, shape, align, size = _WGSL_TYPES[wgsl_type]
         return (scalar, shape), align, size
-    dtype, align = _parse_struct(bodies, kind)
+    dtype, align = _parse_struct(struct_bodies, wgsl_type)
     return dtype, align, dtype.itemsize
 
 
@@ -164,41 +166,41 @@ def _round_up(value: int, step: int) -> int:
     return -(-value // step) * step
 
 
-def shader_bindings(text: str) -> tuple[Binding, ...]:
+def shader_bindings(wgsl_text: str) -> tuple[Binding, ...]:
     """Return the resource bindings that a shader declares, ordered by index; all are in group 0.
 
     Float textures are unfilterable unless `// filtered` follows their declaration; samplers filter unless `//
     non-filtering` follows their declaration.
 
-    text : text of the shader
+    wgsl_text : text of the shader
     """
     found = [
         Binding(int(index), name, _layout_entry((space or "").replace(" ", ""), kind.replace(" ", ""), note))
-        for index, space, name, kind, note in _BINDING.findall(text)
+        for index, space, name, kind, note in _BINDING_PATTERN.findall(wgsl_text)
     ]
     return tuple(sorted(found, key=lambda one: one.index))
 
 
-def _layout_entry(space: str, kind: str, note: str) -> dict[str, LayoutEntry]:
-    if space.startswith("uniform"):
+def _layout_entry(address_space: str, wgsl_type: str, comment: str) -> dict[str, LayoutEntry]:
+    if address_space.startswith("uniform"):
         return {"buffer": {"type": "uniform"}}
-    if space.startswith("storage"):
-        return {"buffer": {"type": "storage" if "read_write" in space else "read-only-storage"}}
-    if kind == "sampler_comparison":
+    if address_space.startswith("storage"):
+        return {"buffer": {"type": "storage" if "read_write" in address_space else "read-only-storage"}}
+    if wgsl_type == "sampler_comparison":
         return {"sampler": {"type": "comparison"}}
-    if kind == "sampler":
-        return {"sampler": {"type": "non-filtering" if "non-filtering" in note else "filtering"}}
-    if storage := re.match(r"texture_storage_2d(_array)?<(\w+),(\w+)>", kind):
+    if wgsl_type == "sampler":
+        return {"sampler": {"type": "non-filtering" if "non-filtering" in comment else "filtering"}}
+    if storage := re.match(r"texture_storage_2d(_array)?<(\w+),(\w+)>", wgsl_type):
         dimension = "2d-array" if storage[1] else "2d"
         access = {"write": "write-only", "read": "read-only", "read_write": "read-write"}[storage[3]]
         return {"storage_texture": {"format": storage[2], "access": access, "view_dimension": dimension}}
-    return {"texture": _texture_layout(kind, note)}
+    return {"texture": _texture_layout(wgsl_type, comment)}
 
 
-def _texture_layout(kind: str, note: str) -> LayoutEntry:
-    dimension = "2d-array" if "_array" in kind else "2d"
-    if kind.startswith("texture_depth"):
+def _texture_layout(wgsl_type: str, comment: str) -> LayoutEntry:
+    dimension = "2d-array" if "_array" in wgsl_type else "2d"
+    if wgsl_type.startswith("texture_depth"):
         return {"sample_type": "depth", "view_dimension": dimension}
-    element = kind[kind.index("<") + 1 : -1]
+    element = wgsl_type[wgsl_type.index("<") + 1 : -1]
     loaded = {"f32": "unfilterable-float", "u32": "uint", "i32": "sint"}[element]
-    return {"sample_type": "float" if "// filtered" in note else loaded, "view_dimension": dimension}
+    return {"sample_type": "float" if "// filtered" in comment else loaded, "view_dimension": dimension}

@@ -34,32 +34,34 @@ _TEXEL_FORMATS: dict[str, tuple[type[np.generic], int]] = {
     "depth32float": (np.float32, 1),
 }
 
-FORMAT_BYTES = {name: np.dtype(kind).itemsize * channels for name, (kind, channels) in _TEXEL_FORMATS.items()}
+TEXEL_FORMAT_BYTES = {
+    name: np.dtype(kind).itemsize * channels for name, (kind, channels) in _TEXEL_FORMATS.items()
+}
 """Size of a texel in each format [byte]."""
 
 _LARGE_UPLOAD_BYTES = 1 << 24  # bytes
 
-_PROBE_SIDE = 64
+_ROUNDING_PROBE_SIDE = 64
 
 
 def make_texture(
     device: Device,
     size: tuple[int, int],
-    texel: str,
+    texel_format: str,
     *,
-    layers: int = 1,
-    mips: int = 1,
-    use: str = "compute",
-    name: str = "texture",
+    layer_count: int = 1,
+    mip_count: int = 1,
+    content_source: str = "compute",
+    texture_name: str = "texture",
 ) -> Texture:
-    """Create an empty 2-D texture, or a texture array if `layers` > 1.
+    """Create an empty 2-D texture, or a texture array if `layer_count` > 1.
 
     size : width and height [texel]
-    texel : wgpu's name of the texel format, such as "rgba16float"
-    mips : number of mip levels
-    use : how the texture gets its content: "compute" (storage texture), "raster" (render target) or "map"
-        (upload); shaders can read every texture
-    name : name of the texture, for error messages
+    texel_format : wgpu's name of the texel format, such as "rgba16float"
+    mip_count : number of mip levels
+    content_source : how the texture gets its content: "compute" (storage texture), "raster" (render target)
+        or "map" (upload); shaders can read every texture
+    texture_name : name of the texture, for error messages
 
     Raises DermisError for sizes over the device's limit, and OutOfMemoryError if the device's memory is full.
     """
@@ -67,7 +69,7 @@ def make_texture(
 
     if max(size) > device.max_texture_size or min(size) < 1:
         raise DermisError(
-            f"{name} of {size[0]}x{size[1]}: expected sides from 1 to {device.max_texture_size} "
+            f"{texture_name} of {size[0]}x{size[1]}: expected sides from 1 to {device.max_texture_size} "
             f"(the limit of {device.adapter.name}), but that is outside. Choose a smaller size."
         )
     usage = wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_SRC
@@ -75,12 +77,18 @@ def make_texture(
         "compute": wgpu.TextureUsage.STORAGE_BINDING | wgpu.TextureUsage.COPY_DST,
         "raster": wgpu.TextureUsage.RENDER_ATTACHMENT,
         "map": wgpu.TextureUsage.COPY_DST,
-    }[use]
-    description = f"{name} of {size[0]}x{size[1]}x{layers} {texel}"
-    texels = layers * sum(max(1, size[0] >> mip) * max(1, size[1] >> mip) for mip in range(mips))
-    with checked_allocation(device.adapter.name, description, FORMAT_BYTES[texel] * texels, math.inf):
+    }[content_source]
+    description = f"{texture_name} of {size[0]}x{size[1]}x{layer_count} {texel_format}"
+    texels = layer_count * sum(max(1, size[0] >> mip) * max(1, size[1] >> mip) for mip in range(mip_count))
+    with checked_allocation(
+        device.adapter.name, description, TEXEL_FORMAT_BYTES[texel_format] * texels, math.inf
+    ):
         texture: Texture = device.handle.create_texture(
-            size=(*size, layers), format=texel, usage=usage, mip_level_count=mips, dimension="2d"
+            size=(*size, layer_count),
+            format=texel_format,
+            usage=usage,
+            mip_level_count=mip_count,
+            dimension="2d",
         )
     return texture
 
@@ -95,11 +103,11 @@ def make_view(texture: Texture, *, layer: int = 0, mip: int = 0) -> TextureView:
 
 
 def upload(
-    device: Device, texture: Texture, array: NDArray[np.generic], *, mip: int = 0, layer: int = 0
+    device: Device, texture: Texture, texels: NDArray[np.generic], *, mip: int = 0, layer: int = 0
 ) -> None:
     """Write an array (h, w) or (h, w, c) to one mip level of one layer of a texture."""
     kind, channels = _TEXEL_FORMATS[texture.format]
-    data = np.ascontiguousarray(array, dtype=kind)
+    data = np.ascontiguousarray(texels, dtype=kind)
     height, width = data.shape[:2]
     device.handle.queue.write_texture(
         {"texture": texture, "mip_level": mip, "origin": (0, 0, layer)},
@@ -113,19 +121,25 @@ def upload(
 
 def texel_bytes(texture: Texture) -> int:
     """Return the size of one texel of a texture [byte]."""
-    return FORMAT_BYTES[texture.format]
+    return TEXEL_FORMAT_BYTES[texture.format]
 
 
 def texture_from_array(
-    device: Device, array: NDArray[np.generic], texel_format: str, name: str = "texture"
+    device: Device, texels: NDArray[np.generic], texel_format: str, texture_name: str = "texture"
 ) -> Texture:
     """Create a texture from an array (h, w) or (h, w, c), for reading in shaders.
 
     texel_format : wgpu's name of the texel format, such as "rgba16float"
-    name : name of the texture, for error messages
+    texture_name : name of the texture, for error messages
     """
-    texture = make_texture(device, (array.shape[1], array.shape[0]), texel_format, use="map", name=name)
-    upload(device, texture, array)
+    texture = make_texture(
+        device,
+        (texels.shape[1], texels.shape[0]),
+        texel_format,
+        content_source="map",
+        texture_name=texture_name,
+    )
+    upload(device, texture, texels)
     return texture
 
 
@@ -149,13 +163,15 @@ def download(device: Device, texture: Texture, *, mip: int = 0, layer: int = 0) 
 def half_store_rounding(device: Device) -> str:
     """Return how a device rounds stores to rgba16float textures: "nearest", "toward zero" or "other"."""
     program = ComputeProgram(device, Path(__file__).parent / "wgsl" / "store_probe.wgsl")
-    texture = make_texture(device, (_PROBE_SIDE, _PROBE_SIDE), "rgba16float")
+    texture = make_texture(device, (_ROUNDING_PROBE_SIDE, _ROUNDING_PROBE_SIDE), "rgba16float")
     frame = CommandList(device)
-    size = np.array([_PROBE_SIDE, _PROBE_SIDE, 0, 0], np.uint32)
-    frame.compute("probe", program, {"size": size, "rounded": texture}, (_PROBE_SIDE, _PROBE_SIDE))
+    size = np.array([_ROUNDING_PROBE_SIDE, _ROUNDING_PROBE_SIDE, 0, 0], np.uint32)
+    frame.compute(
+        "probe", program, {"size": size, "rounded": texture}, (_ROUNDING_PROBE_SIDE, _ROUNDING_PROBE_SIDE)
+    )
     frame.submit()
     stored = download(device, texture)[..., 0].astype(np.float64).ravel()
-    exact = 1.0 + np.arange(_PROBE_SIDE * _PROBE_SIDE) / 65536.0
+    exact = 1.0 + np.arange(_ROUNDING_PROBE_SIDE * _ROUNDING_PROBE_SIDE) / 65536.0
     if np.array_equal(stored, exact.astype(np.float16).astype(np.float64)):
         return "nearest"
     down = 1.0 + np.floor((exact - 1.0) * 1024.0) / 1024.0  # halves are 1/1024 apart above 1

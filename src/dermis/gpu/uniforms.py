@@ -12,7 +12,7 @@ from dermis.gpu.device import Device
 from dermis.gpu.types import Buffer
 
 CHUNK_BYTES = 1 << 18
-_ALIGNMENT = 256  # WebGPU's default alignment of uniforms in a buffer
+_RECORD_ALIGNMENT_BYTES = 256  # WebGPU's default alignment of uniforms in a buffer
 
 
 class Uniforms:
@@ -24,9 +24,9 @@ class Uniforms:
         device
     """
 
-    def __init__(self, device: Device, chunk: Callable[[int], Buffer] | None = None) -> None:
+    def __init__(self, device: Device, make_chunk: Callable[[int], Buffer] | None = None) -> None:
         self._device = device
-        self._chunk = chunk or partial(device.uniform_chunk, size=CHUNK_BYTES)
+        self._chunk = make_chunk or partial(device.uniform_chunk, chunk_bytes=CHUNK_BYTES)
         self._staged: list[bytearray] = []
         self._end = CHUNK_BYTES
         # The record itself is kept so that its id stays unique.
@@ -50,9 +50,9 @@ class Uniforms:
             found = self._positions[id(record)] = self._add_record(self.bytes_of(record))
         return found
 
-    def locate(self, position: int) -> tuple[Buffer, int]:
+    def locate(self, uniform_position: int) -> tuple[Buffer, int]:
         """Return the buffer for a position in uniform memory, and the offset in this buffer [byte]."""
-        index, offset = divmod(position, CHUNK_BYTES)
+        index, offset = divmod(uniform_position, CHUNK_BYTES)
         return self._chunk(index), offset
 
     def upload(self) -> None:
@@ -80,5 +80,5 @@ class Uniforms:
             self._end = 0
         start = self._end
         self._staged[-1][start : start + size] = record
-        self._end += -(-size // _ALIGNMENT) * _ALIGNMENT
+        self._end += -(-size // _RECORD_ALIGNMENT_BYTES) * _RECORD_ALIGNMENT_BYTES
         return (len(self._staged) - 1) * CHUNK_BYTES + start

@@ -21,12 +21,12 @@ from typing import NamedTuple
 
 from dermis.base.errors import DermisError
 
-_DIRECTIVE = re.compile(
+_DIRECTIVE_PATTERN = re.compile(
     r'^(?P<indent>\s*)//#(?:include "(?P<file>[\w./]+)"|include <(?P<files>\w+)>'
     r"|each (?P<list>\w+): (?P<text>.*)|fill (?P<filled>.*)|if (?P<option>\w+)|(?P<turn>else|end))\s*$"
 )
 _WORD_PATTERN = re.compile(r"\{(\w+)\}")
-_ERROR_LINE = re.compile(r"(?:wgsl|shader[^:\n]*|source):(\d+):(\d+)")
+_ERROR_LINE_PATTERN = re.compile(r"(?:wgsl|shader[^:\n]*|source):(\d+):(\d+)")
 
 WordReplacements = tuple[tuple[str, str], ...]
 
@@ -75,7 +75,7 @@ class ShaderSource:
     text: str
     origin: tuple[tuple[str, int], ...]
 
-    def locate(self, message: str) -> str:
+    def locate(self, compiler_message: str) -> str:
         """Return a compiler message in which line numbers of the text are replaced by file:line."""
 
         def replacement(match: re.Match[str]) -> str:
@@ -85,10 +85,10 @@ class ShaderSource:
             file, number = self.origin[line - 1]
             return f"{file}:{number}:{match[2]}"
 
-        return _ERROR_LINE.sub(replacement, message)
+        return _ERROR_LINE_PATTERN.sub(replacement, compiler_message)
 
 
-def compose(path: Path, folders: Sequence[Folder]) -> ShaderSource:
+def compose_shader(path: Path, folders: Sequence[Folder]) -> ShaderSource:
     """Return a shader with its directives expanded.
 
     path : file of the shader
@@ -141,7 +141,7 @@ class _Composer:
         self._included.add(path)
         conditions: list[bool] = []  # whether each open `//#if` holds
         for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
-            directive = _DIRECTIVE.match(line)
+            directive = _DIRECTIVE_PATTERN.match(line)
             if directive and (directive["option"] or directive["turn"]):
                 self._update_conditions(conditions, directive, path)
             elif not all(conditions):
@@ -160,37 +160,44 @@ class _Composer:
         if conditions:
             raise DermisError(f"{path.name}: expected //#end after //#if, but the file ends.")
 
-    def _update_conditions(self, conditions: list[bool], directive: re.Match[str], file: Path) -> None:
+    def _update_conditions(self, conditions: list[bool], directive: re.Match[str], shader_file: Path) -> None:
         """Apply a directive `//#if`, `//#else` or `//#end` to the stack of open conditions."""
         if option := directive["option"]:
             conditions.append(option in self._options)
         elif not conditions:
-            raise DermisError(f"{file.name}: expected //#if before //#{directive['turn']}, but got none.")
+            raise DermisError(
+                f"{shader_file.name}: expected //#if before //#{directive['turn']}, but got none."
+            )
         elif directive["turn"] == "else":
             conditions[-1] = not conditions[-1]
         else:
             conditions.pop()
 
-    def _expand_lines(self, directive: re.Match[str], file: Path) -> list[str]:
+    def _expand_lines(self, directive: re.Match[str], shader_file: Path) -> list[str]:
         """Return the lines to which a directive `//#each` or `//#fill` expands."""
         if text := directive["filled"]:
-            return [directive["indent"] + _substitute_words(text, self._numbers, file)]
-        members = enumerate(self._list_members(directive["list"], file))
+            return [directive["indent"] + _substitute_words(text, self._numbers, shader_file)]
+        members = enumerate(self._list_members(directive["list"], shader_file))
         each = [_member_words(member, number) for number, member in members]
-        return [directive["indent"] + _substitute_words(directive["text"], words, file) for words in each]
+        return [
+            directive["indent"] + _substitute_words(directive["text"], words, shader_file) for words in each
+        ]
 
-    def _find_file(self, name: str, file: Path) -> Path:
-        for folder in (file.parent, *self._folders):
-            if (folder / name).is_file():
-                return folder / name
-        raise DermisError(f'{file.name}: expected to find the include "{name}", but no shader folder has it.')
+    def _find_file(self, included_name: str, source_file: Path) -> Path:
+        for folder in (source_file.parent, *self._folders):
+            if (folder / included_name).is_file():
+                return folder / included_name
+        raise DermisError(
+            f'{source_file.name}: expected to find the include "{included_name}", but no shader folder has '
+            "it."
+        )
 
-    def _list_members(self, name: str, file: Path) -> Sequence[ShaderListMember]:
-        if name not in self._lists:
+    def _list_members(self, list_name: str, source_file: Path) -> Sequence[ShaderListMember]:
+        if list_name not in self._lists:
             raise DermisError(
-                f"{file.name}: expected to find the list <{name}>, but no shader folder has it."
+                f"{source_file.name}: expected to find the list <{list_name}>, but no shader folder has it."
             )
-        return self._lists[name]
+        return self._lists[list_name]
 
 
 def _member_words(member: ShaderListMember, member_number: int) -> dict[str, str]:
@@ -198,10 +205,12 @@ def _member_words(member: ShaderListMember, member_number: int) -> dict[str, str
     return {"name": name, "NAME": name.upper(), "number": f"{member_number}u", **dict(member.words)}
 
 
-def _substitute_words(text: str, words: Mapping[str, str], file: Path) -> str:
+def _substitute_words(text: str, words: Mapping[str, str], shader_file: Path) -> str:
     def replacement(match: re.Match[str]) -> str:
         if match[1] not in words:
-            raise DermisError(f"{file.name}: expected a word of {', '.join(words)}, but got {match[0]}.")
+            raise DermisError(
+                f"{shader_file.name}: expected a word of {', '.join(words)}, but got {match[0]}."
+            )
         return words[match[1]]
 
     return _WORD_PATTERN.sub(replacement, text)

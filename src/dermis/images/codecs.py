@@ -23,11 +23,11 @@ if TYPE_CHECKING:
 Pixels = Bytes | NDArray[np.uint16] | Floats
 
 _PNG_COLOUR_TYPES = {1: 0, 3: 2, 4: 6}  # by number of channels
-_UP_FILTER = 2  # PNG's code of the filter that stores differences from the row above
+_PNG_UP_FILTER = 2  # PNG's code of the filter that stores differences from the row above
 
-_STRIP_PIXELS = 1 << 20  # pixels converted at a time
-_CHANNELS_OF_16_BIT = {"gray16": 1, "rgb48": 3, "ya16": 2, "rgba64": 4}  # by FFmpeg's pixel format
-_PIXEL_MODES: dict[str, tuple[str, type[np.generic]]] = {
+_PIXELS_PER_STRIP = 1 << 20  # pixels converted at a time
+_CHANNELS_OF_16_BIT_FORMATS = {"gray16": 1, "rgb48": 3, "ya16": 2, "rgba64": 4}  # by FFmpeg's pixel format
+_PILLOW_PIXEL_MODES: dict[str, tuple[str, type[np.generic]]] = {
     "1": ("L", np.uint8),
     "L": ("L", np.uint8),
     "RGB": ("RGB", np.uint8),
@@ -45,37 +45,37 @@ _PIXEL_MODES: dict[str, tuple[str, type[np.generic]]] = {
     "F": ("F", np.float32),
 }
 """For each Pillow mode of a file, the mode to which it is converted and the NumPy type of the pixels."""
-_PNG_CHANNELS = {0: 1, 2: 3, 6: 4}  # by PNG colour type
+_CHANNELS_OF_PNG_COLOUR_TYPES = {0: 1, 2: 3, 6: 4}  # by PNG colour type
 _TIFF_BITS, _TIFF_PHOTOMETRIC, _TIFF_RGB = 258, 262, 2
 
 
-def decode_with_pillow(data: bytes, convert_tables: bool = False) -> Pixels:
+def decode_with_pillow(file_bytes: bytes, convert_lookup_tables: bool = False) -> Pixels:
     """Decode a picture at full bit depth to an array (H, W, C), in the colour space that its header states.
 
     C is 1, 3 or 4; the type is uint8, uint16, or float32 for a float TIFF. CMYK becomes sRGB.
 
-    convert_tables : whether to convert colours to 8-bit sRGB if the file's ICC profile has lookup tables
+    convert_lookup_tables : whether to convert to 8-bit sRGB if the file's ICC profile has lookup tables
 
     Raises ValueError, OSError and other errors for a file that is damaged, too large or of an unsupported
     type.
     """
-    picture = open_picture(data)
+    picture = open_picture(file_bytes)
     if picture.format == "PNG":
-        open_picture(data).verify()  # the checksums, which Pillow does not check when it decodes
-    to_srgb = table_transform(picture) if convert_tables or picture.mode == "CMYK" else None
-    pixel_format = None if to_srgb else _format_of_16_bit(data, picture)
+        open_picture(file_bytes).verify()  # the checksums, which Pillow does not check when it decodes
+    to_srgb = table_transform(picture) if convert_lookup_tables or picture.mode == "CMYK" else None
+    pixel_format = None if to_srgb else _format_of_16_bit(file_bytes, picture)
     if pixel_format:
-        image = decode_up_filtered_png(data)
-        return _decode_16_bit(data, pixel_format, picture) if image is None else image
-    if picture.mode not in _PIXEL_MODES:
+        image = decode_up_filtered_png(file_bytes)
+        return _decode_16_bit(file_bytes, pixel_format, picture) if image is None else image
+    if picture.mode not in _PILLOW_PIXEL_MODES:
         raise UnsupportedError(f"its pixels are of kind {picture.mode}")
-    mode, dtype = _PIXEL_MODES[picture.mode]
+    mode, dtype = _PILLOW_PIXEL_MODES[picture.mode]
     if picture.mode == "P" and "transparency" in picture.info:
         mode = "RGBA"
     picture.load()
     channels = {"RGB": 3, "RGBA": 4}.get(mode, 1)
     image = np.empty((picture.height, picture.width, channels), dtype)
-    for rows in strips(image):
+    for rows in row_strips(image):
         strip = picture.crop((0, rows.start, picture.width, rows.stop))
         strip = to_srgb.apply(strip) if to_srgb else strip
         strip = strip if strip.mode == mode else strip.convert(mode)
@@ -83,41 +83,41 @@ def decode_with_pillow(data: bytes, convert_tables: bool = False) -> Pixels:
     return image
 
 
-def strips(image: Numbers) -> Iterator[slice]:
+def row_strips(image: Numbers) -> Iterator[slice]:
     """Yield slices that divide the rows of an array into strips of about a million pixels.
 
     Strips of this size are large enough for fast array operations, and need little memory.
     """
-    rows = max(1, _STRIP_PIXELS // max(1, image.shape[1]))
+    rows = max(1, _PIXELS_PER_STRIP // max(1, image.shape[1]))
     for top in range(0, len(image), rows):
         yield slice(top, min(top + rows, len(image)))
 
 
-def _format_of_16_bit(data: bytes, picture: Image) -> str | None:
+def _format_of_16_bit(file_bytes: bytes, picture: Image) -> str | None:
     """Return FFmpeg's name for the pixel format of a 16-bit colour picture; None for other pictures.
 
     Pillow would reduce 16-bit colours to 8 bits, so FFmpeg decodes these pictures.
     """
-    if data.startswith(PNG_SIGNATURE):
-        depth, kind = data[24], data[25]
+    if file_bytes.startswith(PNG_SIGNATURE):
+        depth, kind = file_bytes[24], file_bytes[25]
         return {0: "gray16", 2: "rgb48", 4: "ya16", 6: "rgba64"}[kind] if depth == 16 else None
     tags = getattr(picture, "tag_v2", {})
     bits = tags.get(_TIFF_BITS, ()) if tags.get(_TIFF_PHOTOMETRIC) == _TIFF_RGB else ()
     return {3: "rgb48", 4: "rgba64"}.get(len(bits)) if 16 in bits else None
 
 
-def _decode_16_bit(data: bytes, pixel_format: str, picture: Image) -> NDArray[np.uint16]:
+def _decode_16_bit(file_bytes: bytes, pixel_format: str, picture: Image) -> NDArray[np.uint16]:
     av = import_extra("av", "a picture with 16 bits of colour")
     # FFmpeg gets bytes, because it treats names with percent signs as numbered sequences, and a format,
     # because some of the formats that it guesses open other files
-    with av.open(io.BytesIO(data), format=f"{picture.format}_pipe".lower()) as container:
+    with av.open(io.BytesIO(file_bytes), format=f"{picture.format}_pipe".lower()) as container:
         container.streams.video[0].codec_context.options = {"max_pixels": str(MAX_PIXELS)}
         frame = next(container.decode(video=0))
     if (frame.width, frame.height) != picture.size:
         raise ValueError("its header is damaged")
     if frame.format.name not in (f"{pixel_format}le", f"{pixel_format}be"):
         frame = frame.reformat(format=f"{pixel_format}le")
-    plane, channels = frame.planes[0], _CHANNELS_OF_16_BIT[pixel_format]
+    plane, channels = frame.planes[0], _CHANNELS_OF_16_BIT_FORMATS[pixel_format]
     stored = np.frombuffer(plane, "<u2" if frame.format.name.endswith("le") else ">u2")
     rows = stored.reshape(frame.height, plane.line_size // 2)[:, : frame.width * channels]
     levels = rows.reshape(frame.height, frame.width, channels)
@@ -126,63 +126,68 @@ def _decode_16_bit(data: bytes, pixel_format: str, picture: Image) -> NDArray[np
     return levels.astype(np.uint16)
 
 
-def encode_png(levels: Numbers, effort: int = 6, use_isal: bool = False) -> bytes:
+def encode_png(pixel_levels: Numbers, zlib_level: int = 6, use_isal: bool = False) -> bytes:
     """Encode a picture (H, W, 1, 3 or 4) of uint8 or uint16 as a PNG file.
 
-    effort : compression level of zlib, from 1 (fast) to 9 (small files)
+    zlib_level : compression level of zlib, from 1 (fast) to 9 (small files)
     use_isal : compress with ISA-L of the extra "batch", four times as fast as zlib at level 1 for rendered
         pictures
 
     PNG's "up" filter is used: each row is stored as the difference from the row above. For rendered pictures,
     the files are as small as with the best filter for each row, and encoding takes half of the time.
     """
-    height, width, channels = levels.shape
-    bits = 8 * levels.itemsize
-    rows = levels.astype(levels.dtype.newbyteorder(">")).reshape(height, -1).view(np.uint8)
-    filtered = np.full((height, 1 + rows.shape[1]), _UP_FILTER, np.uint8)
+    height, width, channels = pixel_levels.shape
+    bits = 8 * pixel_levels.itemsize
+    rows = pixel_levels.astype(pixel_levels.dtype.newbyteorder(">")).reshape(height, -1).view(np.uint8)
+    filtered = np.full((height, 1 + rows.shape[1]), _PNG_UP_FILTER, np.uint8)
     filtered[0, 1:] = rows[0]
     np.subtract(rows[1:], rows[:-1], out=filtered[1:, 1:])
     header = struct.pack(">IIBBBBB", width, height, bits, _PNG_COLOUR_TYPES[channels], 0, 0, 0)
-    library, level = (import_extra("isal.isal_zlib", "a data set"), 1) if use_isal else (zlib, effort)
+    library, level = (import_extra("isal.isal_zlib", "a data set"), 1) if use_isal else (zlib, zlib_level)
     pixels = library.compress(filtered.data, level)  # releases the GIL
     return (
         PNG_SIGNATURE + _png_chunk(b"IHDR", header) + _png_chunk(b"IDAT", pixels) + _png_chunk(b"IEND", b"")
     )
 
 
-def _png_chunk(chunk_type: bytes, data: bytes) -> bytes:
-    return struct.pack(">I", len(data)) + chunk_type + data + struct.pack(">I", zlib.crc32(chunk_type + data))
+def _png_chunk(chunk_type: bytes, chunk_data: bytes) -> bytes:
+    return (
+        struct.pack(">I", len(chunk_data))
+        + chunk_type
+        + chunk_data
+        + struct.pack(">I", zlib.crc32(chunk_type + chunk_data))
+    )
 
 
-def png_size(data: bytes) -> tuple[int, int]:
+def png_size(file_bytes: bytes) -> tuple[int, int]:
     """Return width and height of a PNG file after checking its chunks; pixels are not decoded.
 
     Raises ValueError for a file that is not PNG, truncated or damaged.
     """
-    if not data.startswith(PNG_SIGNATURE):
+    if not file_bytes.startswith(PNG_SIGNATURE):
         raise ValueError("its first bytes are not those of PNG")
-    for _ in png_chunks(data):
+    for _ in png_chunks(file_bytes):
         pass
-    width, height = struct.unpack_from(">II", data, 16)
+    width, height = struct.unpack_from(">II", file_bytes, 16)
     return width, height
 
 
-def decode_up_filtered_png(data: bytes) -> Bytes | NDArray[np.uint16] | None:
+def decode_up_filtered_png(file_bytes: bytes) -> Bytes | NDArray[np.uint16] | None:
     """Decode a PNG file in which all rows use the "up" filter, as in files that `encode_png` writes.
 
     The result is an array (H, W, 1, 3 or 4) of uint8 or uint16, or None for a file with other filters.
 
     Raises ValueError when the file is damaged or too large.
     """
-    if not data.startswith(PNG_SIGNATURE) or len(data) < 33:
+    if not file_bytes.startswith(PNG_SIGNATURE) or len(file_bytes) < 33:
         return None
-    width, height, bits, colour, *methods = struct.unpack_from(">IIBBBBB", data, 16)
-    if bits not in (8, 16) or colour not in _PNG_CHANNELS or methods != [0, 0, 0]:
+    width, height, bits, colour, *methods = struct.unpack_from(">IIBBBBB", file_bytes, 16)
+    if bits not in (8, 16) or colour not in _CHANNELS_OF_PNG_COLOUR_TYPES or methods != [0, 0, 0]:
         return None
     check_size(width, height)
-    channels = _PNG_CHANNELS[colour]
+    channels = _CHANNELS_OF_PNG_COLOUR_TYPES[colour]
     step = 1 + width * channels * bits // 8
-    compressed = _compressed_pixels(data)
+    compressed = _compressed_pixels(file_bytes)
     if compressed is None:
         return None
     decompressor = zlib.decompressobj()
@@ -193,17 +198,17 @@ def decode_up_filtered_png(data: bytes) -> Bytes | NDArray[np.uint16] | None:
     if len(stored) != height * step:
         raise ValueError("its pixels are truncated, or there are too many")
     rows = np.frombuffer(stored, np.uint8).reshape(height, step)
-    if (rows[:, 0] != _UP_FILTER).any():
+    if (rows[:, 0] != _PNG_UP_FILTER).any():
         return None
     pixels = np.add.accumulate(rows[:, 1:], axis=0, dtype=np.uint8)
     levels = pixels.view(">u2").astype(np.uint16) if bits == 16 else pixels
     return levels.reshape(height, width, channels)
 
 
-def _compressed_pixels(png: bytes) -> bytes | None:
+def _compressed_pixels(file_bytes: bytes) -> bytes | None:
     """Return the compressed pixels of a PNG file; None for a file in which a tRNS chunk sets transparency."""
     parts = list[memoryview]()
-    for kind, content in png_chunks(png):
+    for kind, content in png_chunks(file_bytes):
         if kind == b"tRNS":
             return None
         if kind == b"IDAT":
@@ -211,18 +216,18 @@ def _compressed_pixels(png: bytes) -> bytes | None:
     return b"".join(parts)
 
 
-def png_chunks(data: bytes) -> Iterator[tuple[bytes, memoryview]]:
+def png_chunks(file_bytes: bytes) -> Iterator[tuple[bytes, memoryview]]:
     """Yield type and data of each chunk of a PNG file after checking its checksum.
 
     Raises ValueError when the file is truncated or damaged.
     """
-    view, offset, kind = memoryview(data), len(PNG_SIGNATURE), b""
+    view, offset, kind = memoryview(file_bytes), len(PNG_SIGNATURE), b""
     while kind != b"IEND":
-        if offset + 12 > len(data):
+        if offset + 12 > len(file_bytes):
             raise ValueError("it is truncated")
-        (length,), kind = struct.unpack_from(">I", data, offset), data[offset + 4 : offset + 8]
+        (length,), kind = struct.unpack_from(">I", file_bytes, offset), file_bytes[offset + 4 : offset + 8]
         end = offset + 8 + length
-        if data[end : end + 4] != struct.pack(">I", zlib.crc32(view[offset + 4 : end])):
+        if file_bytes[end : end + 4] != struct.pack(">I", zlib.crc32(view[offset + 4 : end])):
             raise ValueError(f"its chunk {kind!r} is damaged")
         yield kind, view[offset + 8 : end]
         offset = end + 4

@@ -93,23 +93,23 @@ def linear_of_xyz(xyz_over_white: ArrayLike) -> Doubles:
     return np.asarray(xyz @ np.linalg.inv(_XYZ_OF_REC709).T)
 
 
-def linear_of_lab(colour: ArrayLike) -> Doubles:
+def linear_of_lab(cielab: ArrayLike) -> Doubles:
     """Convert CIE L*a*b* colours (..., 3) with the white point D65 to linear Rec. 709, not clipped."""
-    L, a, b = np.moveaxis(np.asarray(colour, np.float64), -1, 0)
+    L, a, b = np.moveaxis(np.asarray(cielab, np.float64), -1, 0)
     y = (L + 16.0) / 116.0
     f = np.stack([y + a / 500.0, y, y - b / 200.0], axis=-1)
     linear_part = 3.0 * _CIELAB_DELTA**2 * (f - 4.0 / 29.0)
     return linear_of_xyz(np.where(f > _CIELAB_DELTA, f**3, linear_part))
 
 
-def delta_e_2000(first: ArrayLike, second: ArrayLike) -> Doubles:
+def delta_e_2000(first_colours: ArrayLike, second_colours: ArrayLike) -> Doubles:
     """Return the CIEDE2000 colour difference (...) of two arrays of linear Rec. 709 colours (..., 3).
 
     A colour difference of 1 is just noticeable.
 
     Source: [Sharma2005].
     """
-    (L1, a1, b1), (L2, a2, b2) = (np.moveaxis(lab(one), -1, 0) for one in (first, second))
+    (L1, a1, b1), (L2, a2, b2) = (np.moveaxis(lab(one), -1, 0) for one in (first_colours, second_colours))
     mean_chroma = 0.5 * (np.hypot(a1, b1) + np.hypot(a2, b2))
     stretch = 1.5 - 0.5 * _chroma_term(mean_chroma)
     C1, C2 = np.hypot(stretch * a1, b1), np.hypot(stretch * a2, b2)

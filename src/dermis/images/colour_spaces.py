@@ -14,14 +14,14 @@ from dermis.base.arrays import Bytes, Doubles, Floats, Numbers
 from dermis.base.errors import shorten
 from dermis.images.colour import decode_srgb, decode_srgb_levels
 
-_D65 = (0.3127, 0.329)
+_D65_CHROMATICITY = (0.3127, 0.329)
 _PRIMARIES: dict[str, tuple[float, ...]] = {
-    "Rec. 709": (0.64, 0.33, 0.3, 0.6, 0.15, 0.06, *_D65),
-    "Rec. 601": (0.63, 0.34, 0.31, 0.595, 0.155, 0.07, *_D65),
-    "PAL": (0.64, 0.33, 0.29, 0.6, 0.15, 0.06, *_D65),
-    "Rec. 2020": (0.708, 0.292, 0.17, 0.797, 0.131, 0.046, *_D65),
-    "Display P3": (0.68, 0.32, 0.265, 0.69, 0.15, 0.06, *_D65),
-    "Adobe RGB": (0.64, 0.33, 0.21, 0.71, 0.15, 0.06, *_D65),
+    "Rec. 709": (0.64, 0.33, 0.3, 0.6, 0.15, 0.06, *_D65_CHROMATICITY),
+    "Rec. 601": (0.63, 0.34, 0.31, 0.595, 0.155, 0.07, *_D65_CHROMATICITY),
+    "PAL": (0.64, 0.33, 0.29, 0.6, 0.15, 0.06, *_D65_CHROMATICITY),
+    "Rec. 2020": (0.708, 0.292, 0.17, 0.797, 0.131, 0.046, *_D65_CHROMATICITY),
+    "Display P3": (0.68, 0.32, 0.265, 0.69, 0.15, 0.06, *_D65_CHROMATICITY),
+    "Adobe RGB": (0.64, 0.33, 0.21, 0.71, 0.15, 0.06, *_D65_CHROMATICITY),
 }
 """Chromaticities x, y of red, green, blue and white."""
 _ADOBE_GAMMA = 563 / 256
@@ -31,13 +31,13 @@ _CODED_GAMMAS = {1: None, 2: None, 4: 2.2, 5: 2.8, 6: None, 8: 1.0, 13: None, 14
 """Gamma by the number of a transfer function in ITU-T H.273; None for sRGB and for the curves of video, which
 programs display as sRGB."""
 _HDR_CURVES = {16: "PQ", 18: "HLG"}
-_CURVE_LEVELS, _MAX_LEVEL = 65536, 65535
-_CURVE_INPUTS = np.linspace(0.0, 1.0, _CURVE_LEVELS)
-_SRGB_TOLERANCE = 5e-3  # a matrix or curve that differs less from that of sRGB is replaced by it
+_CURVE_LEVEL_COUNT, _MAX_CURVE_LEVEL = 65536, 65535
+_CURVE_SAMPLE_LEVELS = np.linspace(0.0, 1.0, _CURVE_LEVEL_COUNT)
+_SRGB_CURVE_TOLERANCE = 5e-3  # a matrix or curve that differs less from that of sRGB is replaced by it
 _D50_XYZ = np.array([0.9642, 1.0, 0.8249])
-_BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
-_ICC_HEADER, _MAX_ICC_TAGS = 128, 200
-_MAX_NAME_LENGTH = 60  # characters
+_BRADFORD_MATRIX = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
+_ICC_HEADER_BYTES, _MAX_ICC_TAGS = 128, 200
+_MAX_PROFILE_NAME_LENGTH = 60  # characters
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +69,7 @@ class ColourSpace:
         elif self.curves is None:
             linear = decode_srgb_levels(cast(Bytes, rgb))
         else:
-            index = rgb.astype(np.uint16) * np.uint16(_MAX_LEVEL // np.iinfo(rgb.dtype.str).max)
+            index = rgb.astype(np.uint16) * np.uint16(_MAX_CURVE_LEVEL // np.iinfo(rgb.dtype.str).max)
             linear = np.stack([self.curves[c][index[..., c]] for c in range(3)], axis=-1)
         if self.to_rec709 is None:
             return linear
@@ -83,7 +83,7 @@ SRGB = ColourSpace()
 def adobe_rgb() -> ColourSpace:
     """Return Adobe RGB (1998), which cameras may state in EXIF without embedding an ICC profile."""
     return _simplified_space(
-        "Adobe RGB", _matrix_to_rec709(_PRIMARIES["Adobe RGB"]), _CURVE_INPUTS**_ADOBE_GAMMA
+        "Adobe RGB", _matrix_to_rec709(_PRIMARIES["Adobe RGB"]), _CURVE_SAMPLE_LEVELS**_ADOBE_GAMMA
     )
 
 
@@ -102,7 +102,7 @@ def coded_space(primaries: int, transfer: int) -> ColourSpace | None:
     return gamma_space(name, gamma, _PRIMARIES[name])
 
 
-def gamma_space(name: str, gamma: float | None, primaries: Sequence[float] | None) -> ColourSpace:
+def gamma_space(space_name: str, gamma: float | None, primaries: Sequence[float] | None) -> ColourSpace:
     """Return the colour space with the given gamma and primaries.
 
     gamma : exponent from levels to linear values; None for the curve of sRGB
@@ -111,21 +111,21 @@ def gamma_space(name: str, gamma: float | None, primaries: Sequence[float] | Non
     Raises ValueError for primaries that are invalid or lie on one line.
     """
     matrix = np.eye(3) if primaries is None else _matrix_to_rec709(primaries)
-    return _simplified_space(name, matrix, None if gamma is None else _CURVE_INPUTS**gamma)
+    return _simplified_space(space_name, matrix, None if gamma is None else _CURVE_SAMPLE_LEVELS**gamma)
 
 
-def profile_name(icc: bytes) -> str:
+def profile_name(icc_profile: bytes) -> str:
     """Return the printable name of an ICC profile; empty if the name cannot be read."""
     from PIL import ImageCms
 
     try:
-        name = ImageCms.getProfileDescription(ImageCms.ImageCmsProfile(io.BytesIO(icc)))
+        name = ImageCms.getProfileDescription(ImageCms.ImageCmsProfile(io.BytesIO(icc_profile)))
     except (OSError, ImageCms.PyCMSError):
         return ""
-    return shorten("".join(one for one in name.strip() if one.isprintable()), _MAX_NAME_LENGTH)
+    return shorten("".join(one for one in name.strip() if one.isprintable()), _MAX_PROFILE_NAME_LENGTH)
 
 
-def profile_space(icc: bytes) -> ColourSpace | None:
+def profile_space(icc_profile: bytes) -> ColourSpace | None:
     """Return the colour space of an ICC profile with primaries and curves; None for lookup tables.
 
     `ColourSpace.linear` applies primaries and curves at the full bit depth of a picture; LittleCMS in Pillow
@@ -133,31 +133,31 @@ def profile_space(icc: bytes) -> ColourSpace | None:
 
     Raises ValueError, ArithmeticError and struct.error for a damaged profile.
     """
-    (count,) = struct.unpack_from(">I", icc, _ICC_HEADER)
-    rows = struct.iter_unpack(">4sII", icc[_ICC_HEADER + 4 :][: 12 * min(count, _MAX_ICC_TAGS)])
-    tags = {name: icc[offset : offset + size] for name, offset, size in rows}
-    kind, channels = icc[16:20], b"rgb"
+    (count,) = struct.unpack_from(">I", icc_profile, _ICC_HEADER_BYTES)
+    rows = struct.iter_unpack(">4sII", icc_profile[_ICC_HEADER_BYTES + 4 :][: 12 * min(count, _MAX_ICC_TAGS)])
+    tags = {name: icc_profile[offset : offset + size] for name, offset, size in rows}
+    kind, channels = icc_profile[16:20], b"rgb"
     if b"A2B0" in tags or {b"RGB ": b"rTRC", b"GRAY": b"kTRC"}.get(kind, b"") not in tags:
         return None
     if kind == b"GRAY":
-        return _simplified_space(profile_name(icc), np.eye(3), _profile_curve(tags[b"kTRC"]))
+        return _simplified_space(profile_name(icc_profile), np.eye(3), _profile_curve(tags[b"kTRC"]))
     columns = [_fixed_point_numbers(tags[b"%cXYZ" % one], 3) for one in channels]
     curves = [_profile_curve(tags[b"%cTRC" % one]) for one in channels]
     to_rec709 = np.linalg.inv(_matrix_to_xyz(_PRIMARIES["Rec. 709"])) @ np.array(columns).T
-    return _simplified_space(profile_name(icc), to_rec709, np.array(curves))
+    return _simplified_space(profile_name(icc_profile), to_rec709, np.array(curves))
 
 
-def _simplified_space(name: str, to_rec709: Doubles, curves: Doubles | None) -> ColourSpace:
+def _simplified_space(space_name: str, to_rec709: Doubles, curves: Doubles | None) -> ColourSpace:
     """Return a colour space; a matrix or curves equal to those of sRGB become None.
 
     to_rec709, curves : see `ColourSpace`; one curve (65536,) is used for all channels
     """
     if curves is not None:
-        same = np.allclose(curves, decode_srgb(_CURVE_INPUTS), rtol=0.0, atol=_SRGB_TOLERANCE)
-        curves = None if same else np.broadcast_to(curves, (3, _CURVE_LEVELS))
-    same = np.allclose(to_rec709, np.eye(3), rtol=0.0, atol=_SRGB_TOLERANCE)
+        same = np.allclose(curves, decode_srgb(_CURVE_SAMPLE_LEVELS), rtol=0.0, atol=_SRGB_CURVE_TOLERANCE)
+        curves = None if same else np.broadcast_to(curves, (3, _CURVE_LEVEL_COUNT))
+    same = np.allclose(to_rec709, np.eye(3), rtol=0.0, atol=_SRGB_CURVE_TOLERANCE)
     return ColourSpace(
-        name, None if same else to_rec709, None if curves is None else np.asarray(curves, np.float32)
+        space_name, None if same else to_rec709, None if curves is None else np.asarray(curves, np.float32)
     )
 
 
@@ -179,35 +179,35 @@ def _matrix_to_xyz(primaries: Sequence[float]) -> Doubles:
     if not (np.isfinite(xyz).all() and y[3] > 0.0 and abs(np.linalg.det(xyz[:, :3])) > 1e-6):
         raise ValueError("its primaries span no colours")
     white = xyz[:, 3] / y[3]
-    adapted = _BRADFORD @ _D50_XYZ / (_BRADFORD @ white)
-    adaptation = np.linalg.inv(_BRADFORD) @ (adapted[:, None] * _BRADFORD)
+    adapted = _BRADFORD_MATRIX @ _D50_XYZ / (_BRADFORD_MATRIX @ white)
+    adaptation = np.linalg.inv(_BRADFORD_MATRIX) @ (adapted[:, None] * _BRADFORD_MATRIX)
     return np.asarray(adaptation @ (xyz[:, :3] * np.linalg.solve(xyz[:, :3], white)))
 
 
-def _profile_curve(tag: bytes) -> Doubles:
+def _profile_curve(curve_tag: bytes) -> Doubles:
     """Return the linear values (65536,) of evenly spaced levels, from a curve tag of an ICC profile."""
-    kind, (count,) = tag[:4], struct.unpack_from(">I", tag, 8)
+    kind, (count,) = curve_tag[:4], struct.unpack_from(">I", curve_tag, 8)
     if kind == b"curv" and count < 2:
-        gamma = struct.unpack_from(">H", tag, 12)[0] / 256.0 if count else 1.0
-        return np.asarray(_CURVE_INPUTS**gamma)
+        gamma = struct.unpack_from(">H", curve_tag, 12)[0] / 256.0 if count else 1.0
+        return np.asarray(_CURVE_SAMPLE_LEVELS**gamma)
     if kind == b"curv":
-        values = np.frombuffer(tag, ">u2", count, 12) / _MAX_LEVEL
-        return np.asarray(np.interp(_CURVE_INPUTS, np.linspace(0.0, 1.0, count), values))
+        values = np.frombuffer(curve_tag, ">u2", count, 12) / _MAX_CURVE_LEVEL
+        return np.asarray(np.interp(_CURVE_SAMPLE_LEVELS, np.linspace(0.0, 1.0, count), values))
     if kind != b"para" or count >> 16 > 4:
         raise ValueError("a curve is of an unknown kind")
     function = count >> 16
-    numbers = _fixed_point_numbers(tag, (1, 3, 4, 5, 7)[function], 12) + [1.0, 0.0] * (function == 0)
+    numbers = _fixed_point_numbers(curve_tag, (1, 3, 4, 5, 7)[function], 12) + [1.0, 0.0] * (function == 0)
     if function <= 2:  # constant up to -b / a
         (g, a, b), offset = numbers[:3], sum(numbers[3:])
         c, d, e, f = 0.0, -b / a, offset, offset
     else:
         g, a, b, c, d, e, f = (*numbers, 0.0, 0.0)[:7]
     with np.errstate(all="ignore"):
-        power = np.maximum(a * _CURVE_INPUTS + b, 0.0) ** g + e
-    curve = np.where(d <= _CURVE_INPUTS, power, c * _CURVE_INPUTS + f)
+        power = np.maximum(a * _CURVE_SAMPLE_LEVELS + b, 0.0) ** g + e
+    curve = np.where(d <= _CURVE_SAMPLE_LEVELS, power, c * _CURVE_SAMPLE_LEVELS + f)
     return np.asarray(np.clip(np.nan_to_num(curve), 0.0, 1.0))
 
 
-def _fixed_point_numbers(tag: bytes, count: int, offset: int = 8) -> list[float]:
-    """Read `count` numbers of an ICC profile's tag, stored as signed fixed point with 16 fractional bits."""
-    return [value / 65536.0 for value in struct.unpack_from(f">{count}i", tag, offset)]
+def _fixed_point_numbers(tag_bytes: bytes, number_count: int, byte_offset: int = 8) -> list[float]:
+    """Read numbers of an ICC profile's tag, stored as signed fixed point with 16 fractional bits."""
+    return [value / 65536.0 for value in struct.unpack_from(f">{number_count}i", tag_bytes, byte_offset)]

@@ -9,9 +9,20 @@ from dermis.base.errors import shorten
 from dermis.images.header import UnsupportedError
 
 _CHANNEL_LETTERS = {"red": "R", "green": "G", "blue": "B", "alpha": "A"}
-_READABLE_CHANNELS = ("RGBA", "RGB", "Y")
-_MAIN_LAYERS = ("beauty", "combined", "composite", "image", "rgba", "rgb", "color", "colour", "c", "main")
-_MAX_NAME_LENGTH = 60  # characters
+_READABLE_CHANNEL_SETS = ("RGBA", "RGB", "Y")
+_MAIN_LAYER_NAMES = (
+    "beauty",
+    "combined",
+    "composite",
+    "image",
+    "rgba",
+    "rgb",
+    "color",
+    "colour",
+    "c",
+    "main",
+)
+_MAX_LAYER_NAME_LENGTH = 60  # characters
 _MAX_LISTED_LAYERS = 6
 
 
@@ -44,7 +55,7 @@ def choose_layer(parts: Sequence[tuple[str, Sequence[str]]]) -> tuple[ExrLayer, 
         layer for index, part in enumerate(parts) for layer in _picture_layers(index, *part, len(parts) > 1)
     ]
     if found:
-        chosen = min(found, key=_sort_key)
+        chosen = min(found, key=_layer_preference)
         colours = [_display_name(layer.name) for layer in found if len(layer.channels) > 1]
         if len(colours) < 2:
             return chosen, None
@@ -71,7 +82,7 @@ def _picture_layers(
         layer, _, last = channel.rpartition(".")
         groups.setdefault(layer, {}).setdefault(_CHANNEL_LETTERS.get(last.lower(), last.upper()), channel)
     for layer, letters in groups.items():
-        names = next((names for names in _READABLE_CHANNELS if set(names) <= letters.keys()), None)
+        names = next((names for names in _READABLE_CHANNEL_SETS if set(names) <= letters.keys()), None)
         is_vector = names == "Y" and "X" in letters
         if names == "Y" and {"RY", "BY"} & letters.keys():
             raise UnsupportedError("its colours are stored as luminance and chroma (Y, RY, BY)")
@@ -80,15 +91,15 @@ def _picture_layers(
             yield ExrLayer(part_index, title, tuple(letters[name] for name in names))
 
 
-def _sort_key(layer: ExrLayer) -> tuple[bool, int]:
+def _layer_preference(layer: ExrLayer) -> tuple[bool, int]:
     """Return a sort key: layers with colours before grey layers, then whole pictures before components."""
     last = layer.name.rpartition(".")[2].lower()
-    by_name = 0 if not layer.name else 1 if last in _MAIN_LAYERS else 2
+    by_name = 0 if not layer.name else 1 if last in _MAIN_LAYER_NAMES else 2
     return len(layer.channels) == 1, by_name
 
 
 def _display_name(layer_name: str) -> str:
     return (
-        shorten("".join(one for one in layer_name if one.isprintable()), _MAX_NAME_LENGTH)
+        shorten("".join(one for one in layer_name if one.isprintable()), _MAX_LAYER_NAME_LENGTH)
         or "the one without a name"
     )

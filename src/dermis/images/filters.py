@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from dermis.base.arrays import Floats
 
-_STRIP_ROWS = 16  # rows filtered at a time, which fit into the processor cache
+_ROWS_PER_STRIP = 16  # rows filtered at a time, which fit into the processor cache
 
 
 def mip_chain(image: NDArray[np.floating]) -> list[Floats]:
@@ -48,11 +48,11 @@ def smooth_quantisation(height: NDArray[np.floating]) -> Floats:
     """
     plain = np.asarray(height, np.float32)
     padded, smooth = np.pad(plain, 3, "edge"), np.empty_like(plain)
-    for top in range(0, len(plain), _STRIP_ROWS):
-        rows = padded[top : top + _STRIP_ROWS + 6]
+    for top in range(0, len(plain), _ROWS_PER_STRIP):
+        rows = padded[top : top + _ROWS_PER_STRIP + 6]
         for _ in range(6):
             rows = rows[1:] + rows[:-1]
         for _ in range(6):
             rows = rows[:, 1:] + rows[:, :-1]
-        np.multiply(rows, np.float32(1 / 4096), out=smooth[top : top + _STRIP_ROWS])
+        np.multiply(rows, np.float32(1 / 4096), out=smooth[top : top + _ROWS_PER_STRIP])
     return smooth

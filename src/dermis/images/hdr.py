@@ -20,17 +20,17 @@ from dermis.images.header import PictureHeader, UnsupportedError
 from dermis.images.sizes import MAX_PIXELS, TooLargeError, check_size
 
 EXR_SIGNATURE = b"\x76\x2f\x31\x01"
-_CHANNELS_BY_COUNT = {1: "Y", 3: "RGB"}  # names of the channels by their number
-_MAX_SAMPLES = 3 * MAX_PIXELS  # total of all channels and parts, because the library decodes all of them
-_MAX_CHANNELS = 1024
-_ASPECT_TOLERANCE = 1e-3
-_MAX_NAME_LENGTH = 60  # characters
+_CHANNEL_NAMES_BY_COUNT = {1: "Y", 3: "RGB"}  # names of the channels by their number
+_MAX_EXR_SAMPLES = 3 * MAX_PIXELS  # total of all channels and parts, because the library decodes all of them
+_MAX_EXR_CHANNELS = 1024
+_PIXEL_ASPECT_TOLERANCE = 1e-3
+_MAX_CHANNEL_NAME_LENGTH = 60  # characters
 Slices = tuple[slice, ...]
 RADIANCE_SIGNATURE = b"#?"
 _XYZ_FORMAT = b"FORMAT=32-bit_rle_xyze"
 _RADIANCE_FORMATS = {b"FORMAT=32-bit_rle_rgbe", _XYZ_FORMAT}
 _XYZ_PRIMARIES = np.array([1, 0, 0, 1, 0, 0, 1 / 3, 1 / 3])
-_RADIANCE_VALUES = {
+_RADIANCE_HEADER_DEFAULTS = {
     "EXPOSURE": [1.0],
     "COLORCORR": [1.0] * 3,
     "PRIMARIES": [0.0] * 8,
@@ -38,7 +38,7 @@ _RADIANCE_VALUES = {
     "PIXASPECT": [1.0],
 }
 """Names of numbers in a header, with their defaults; primaries of 0 are unknown."""
-_UNUSED_VALUE_NAMES = ("GAMMA", "PIXASPECT")  # named in a note if they are not 1
+_UNUSED_RADIANCE_HEADER_NAMES = ("GAMMA", "PIXASPECT")  # named in a note if they are not 1
 EXR_PROPERTIES = (
     drawn("half, float, 32-bit integers; all kinds of compression; scan lines, tiles"),
     refused("deep pixels"),
@@ -65,29 +65,29 @@ RADIANCE_PROPERTIES = (
     drawn("size: `-Y`, `+Y`, `-X`, `+X`, rows or columns first", "upright"),
     drawn("`EXPOSURE`, `COLORCORR`, also several", "pixels are divided by them"),
     drawn_with_note("`PRIMARIES`", "converted to Rec. 709; zeros, as Photoshop writes them, are not used"),
-    noted(in_code(_UNUSED_VALUE_NAMES), "no note if they are 1"),
+    noted(in_code(_UNUSED_RADIANCE_HEADER_NAMES), "no note if they are 1"),
     refused("run-length coding of before 1991"),
     no_effect("`VIEW`, `SOFTWARE`, comments"),
 )
 """Properties of Radiance files (.hdr)."""
-_MAX_HEADER_BYTES = 1 << 16
-_STRIP_PIXELS = 1 << 18  # pixels decoded at a time
-_MAX_LITERAL = 128  # codes up to this count literal bytes, larger codes are runs
-_DECODED_BYTES = [k if k <= _MAX_LITERAL else k - _MAX_LITERAL for k in range(256)]
+_MAX_RADIANCE_HEADER_BYTES = 1 << 16
+_PIXELS_PER_STRIP = 1 << 18  # pixels decoded at a time
+_MAX_LITERAL_RUN = 128  # codes up to this count literal bytes, larger codes are runs
+_DECODED_BYTES_BY_RUN_CODE = [k if k <= _MAX_LITERAL_RUN else k - _MAX_LITERAL_RUN for k in range(256)]
 """Number of decoded bytes by code."""
-_CODE_BYTES = [k + 1 if k <= _MAX_LITERAL else 2 for k in range(256)]
+_ENCODED_BYTES_BY_RUN_CODE = [k + 1 if k <= _MAX_LITERAL_RUN else 2 for k in range(256)]
 """Number of stored bytes by code: the code itself and its data."""
 
 
-def decode_exr(data: bytes) -> Floats:
+def decode_exr(file_bytes: bytes) -> Floats:
     """Decode the picture in an OpenEXR file to an array (H, W, 1, 3 or 4), 0 outside its data window.
 
     Raises ValueError for a file without a layer of R, G, B or Y, and for a file that is too large or damaged.
     """
     import OpenEXR
 
-    layer, _ = _checked_layer(_open_exr_header(data))
-    parts = OpenEXR.File(io.BytesIO(data), separate_channels=True).parts
+    layer, _ = _checked_layer(_open_exr_header(file_bytes))
+    parts = OpenEXR.File(io.BytesIO(file_bytes), separate_channels=True).parts
     if len(parts) <= layer.part:
         raise ValueError("its pixels are truncated or damaged")
     part = parts[layer.part]
@@ -98,9 +98,9 @@ def decode_exr(data: bytes) -> Floats:
     return image
 
 
-def exr_header(data: bytes) -> PictureHeader:
+def exr_header(file_bytes: bytes) -> PictureHeader:
     """Return the header of an OpenEXR file; pixels are not decoded."""
-    file = _open_exr_header(data)
+    file = _open_exr_header(file_bytes)
     layer, layer_note = _checked_layer(file)
     header = file.parts[layer.part].header
     size, stored, placed = _overlap_windows(header)
@@ -110,7 +110,7 @@ def exr_header(data: bytes) -> PictureHeader:
         notes.append("its data window is a part of its display window, and the rest is black")
     if not _covers_window(stored, _window_size(header["dataWindow"])):
         notes.append("its pixels outside its display window are left out")
-    if abs((aspect := header.get("pixelAspectRatio", 1.0)) - 1.0) > _ASPECT_TOLERANCE:
+    if abs((aspect := header.get("pixelAspectRatio", 1.0)) - 1.0) > _PIXEL_ASPECT_TOLERANCE:
         notes.append(f"its pixel aspect of {aspect:g} is not used")
     is_grey = len(layer.channels) == 1
     return PictureHeader(size, space, notes=tuple(notes), colour_note=colour_note, is_grey=is_grey)
@@ -124,7 +124,7 @@ def _exr_colour_space(header: Any) -> tuple[ColourSpace, str | None]:
     if primaries is None and name not in ("", "data", "unknown"):
         primaries = OpenEXR.colorInteropIDToChromaticities(name)
         if primaries is None:
-            shown = shorten("".join(one for one in name if one.isprintable()), _MAX_NAME_LENGTH)
+            shown = shorten("".join(one for one in name if one.isprintable()), _MAX_CHANNEL_NAME_LENGTH)
             return (
                 SRGB,
                 f"its colour space, {shown}, is unknown, and its colours are taken as linear Rec. 709",
@@ -133,10 +133,10 @@ def _exr_colour_space(header: Any) -> tuple[ColourSpace, str | None]:
     return space, None if space.is_default else "its colours are converted from its primaries to Rec. 709"
 
 
-def _open_exr_header(data: bytes) -> Any:
+def _open_exr_header(file_bytes: bytes) -> Any:
     import OpenEXR
 
-    return OpenEXR.File(io.BytesIO(data), separate_channels=True, header_only=True)
+    return OpenEXR.File(io.BytesIO(file_bytes), separate_channels=True, header_only=True)
 
 
 def _checked_layer(exr_file: Any) -> tuple[ExrLayer, str | None]:
@@ -159,9 +159,9 @@ def _checked_layer(exr_file: Any) -> tuple[ExrLayer, str | None]:
         channel_count += len(part.header["channels"])
     if not exr_file.parts:
         raise ValueError("its header is truncated or damaged")
-    if samples > _MAX_SAMPLES:
+    if samples > _MAX_EXR_SAMPLES:
         raise TooLargeError(f"all its channels have {samples / 1e6:.0f} million numbers")
-    if channel_count > _MAX_CHANNELS:
+    if channel_count > _MAX_EXR_CHANNELS:
         raise UnsupportedError(f"it has {channel_count} channels")
     channels = [{one.name: one for one in part.header["channels"]} for part in exr_file.parts]
     layer, note = choose_layer(
@@ -187,12 +187,12 @@ def _overlap_windows(header: Any) -> tuple[tuple[int, int], Slices, Slices]:
     return _window_size(header["displayWindow"]), stored, placed
 
 
-def _covers_window(slices: Slices, window_size: tuple[int, int]) -> bool:
-    return tuple((one.start, one.stop) for one in slices) == ((0, window_size[1]), (0, window_size[0]))
+def _covers_window(window_slices: Slices, window_size: tuple[int, int]) -> bool:
+    return tuple((one.start, one.stop) for one in window_slices) == ((0, window_size[1]), (0, window_size[0]))
 
 
-def _window_size(window: Any) -> tuple[int, int]:
-    low, high = ([int(value) for value in corner] for corner in window)
+def _window_size(exr_window: Any) -> tuple[int, int]:
+    low, high = ([int(value) for value in corner] for corner in exr_window)
     return high[0] - low[0] + 1, high[1] - low[1] + 1
 
 
@@ -204,7 +204,7 @@ def encode_exr(picture: NDArray[np.floating]) -> bytes:
     """
     import OpenEXR
 
-    names = _CHANNELS_BY_COUNT[picture.shape[2]]
+    names = _CHANNEL_NAMES_BY_COUNT[picture.shape[2]]
     channels = {name: np.ascontiguousarray(picture[..., k]) for k, name in enumerate(names)}
     header = {"compression": OpenEXR.RLE_COMPRESSION, "type": OpenEXR.scanlineimage}
     file = io.BytesIO()
@@ -231,25 +231,25 @@ class _RadianceHeader:
     offset: int
 
 
-def decode_radiance(data: bytes) -> Floats:
+def decode_radiance(file_bytes: bytes) -> Floats:
     """Decode a Radiance .hdr file to linear radiance (H, W, 3), divided by the exposures in the header.
 
     FFmpeg is not used, because FFmpeg accepts truncated files.
 
     Raises ValueError for a file that is truncated or damaged.
     """
-    header = _radiance_header(data)
+    header = _radiance_header(file_bytes)
     (height, width), offset = header.lengths, header.offset
     exposure, correction = header.values["EXPOSURE"], header.values["COLORCORR"]
-    compressed = data[offset : offset + 4] == _scanline_marker(width) and 8 <= width < 32768
-    if len(data) - offset < height * (4 if compressed else 4 * width):
+    compressed = file_bytes[offset : offset + 4] == _scanline_marker(width) and 8 <= width < 32768
+    if len(file_bytes) - offset < height * (4 if compressed else 4 * width):
         raise ValueError("it is truncated")
     radiance = np.empty((height, width, 3), np.float32)
-    rows = max(1, _STRIP_PIXELS // width)
+    rows = max(1, _PIXELS_PER_STRIP // width)
     for top in range(0, height, rows):
         strip = radiance[top : top + rows]
         decode = _decode_runs if compressed else _decode_uncompressed
-        rgbe, offset = decode(data, offset, len(strip), width)
+        rgbe, offset = decode(file_bytes, offset, len(strip), width)
         # A mantissa byte is in units of 1/256 of 2^(E - 128); E = 0 means black, and 2^-136 is black as well.
         scale = np.ldexp(np.float32(1 / exposure[0]), rgbe[..., 3].astype(np.int32) - 136)
         np.multiply(rgbe[..., :3], scale[..., None], out=strip)
@@ -259,32 +259,34 @@ def decode_radiance(data: bytes) -> Floats:
     return rows_first[:: -1 if "+Y" in header.axes else 1, :: -1 if "-X" in header.axes else 1]
 
 
-def radiance_header(data: bytes) -> PictureHeader:
+def radiance_header(file_bytes: bytes) -> PictureHeader:
     """Return the header of a Radiance .hdr file."""
-    header = _radiance_header(data)
+    header = _radiance_header(file_bytes)
     rows_first = "Y" in header.axes[0]
     size = header.lengths[::-1] if rows_first else header.lengths
     primaries = _XYZ_PRIMARIES if header.is_xyz else header.values["PRIMARIES"]
     space = gamma_space("", None, [float(one) for one in primaries]) if np.any(primaries) else SRGB
     notes = [
         f"its {name} of {float(header.values[name][0]):g} is not used"
-        for name in _UNUSED_VALUE_NAMES
+        for name in _UNUSED_RADIANCE_HEADER_NAMES
         if header.values[name][0] != 1.0
     ]
     colour_note = None if space.is_default else "its colours are converted from its primaries to Rec. 709"
     return PictureHeader(size, space, notes=tuple(notes), colour_note=colour_note)
 
 
-def _radiance_header(data: bytes) -> _RadianceHeader:
-    found = re.search(rb"\n\n([-+][XY]) (\d{1,9}) ([-+][XY]) (\d{1,9})\n", data[:_MAX_HEADER_BYTES])
+def _radiance_header(file_bytes: bytes) -> _RadianceHeader:
+    found = re.search(
+        rb"\n\n([-+][XY]) (\d{1,9}) ([-+][XY]) (\d{1,9})\n", file_bytes[:_MAX_RADIANCE_HEADER_BYTES]
+    )
     if not found or found[1][1:] == found[3][1:]:
         raise ValueError("its header has no size of the form -Y height +X width")
-    lines = data[: found.start()].splitlines()
+    lines = file_bytes[: found.start()].splitlines()
     formats = {line for line in lines if line.startswith(b"FORMAT=")}
     if len(formats) != 1 or not formats <= _RADIANCE_FORMATS:
         raise ValueError("its header does not say FORMAT=32-bit_rle_rgbe or 32-bit_rle_xyze")
     values = {}
-    for name, default in _RADIANCE_VALUES.items():
+    for name, default in _RADIANCE_HEADER_DEFAULTS.items():
         start = f"{name}=".encode()
         rows = [
             [float(one) for one in line[len(start) :].split()] for line in lines if line.startswith(start)
@@ -303,54 +305,54 @@ def _scanline_marker(width: int) -> bytes:
     return bytes((2, 2, width >> 8 & 255, width & 255))
 
 
-def _decode_runs(data: bytes, offset: int, height: int, width: int) -> tuple[Bytes, int]:
+def _decode_runs(file_bytes: bytes, byte_offset: int, height: int, width: int) -> tuple[Bytes, int]:
     """Decode run-length encoded scanlines to RGBE pixels (H, W, 4); also return the end of the scanlines.
 
-    offset : byte at which the first scanline starts; the end is also in bytes
+    byte_offset : byte at which the first scanline starts; the end is also in bytes
     height : number of scanlines
     """
     starts: list[int] = []
     marker, append = _scanline_marker(width), starts.append
     for _ in range(height):
-        if data[offset : offset + 4] != marker:
+        if file_bytes[byte_offset : byte_offset + 4] != marker:
             raise ValueError("a scanline has an invalid start")
-        offset += 4
+        byte_offset += 4
         for _ in range(4):
             x = 0
             try:
                 while x < width:
-                    code = data[offset]
-                    append(offset)
-                    x += _DECODED_BYTES[code]
-                    offset += _CODE_BYTES[code]
+                    code = file_bytes[byte_offset]
+                    append(byte_offset)
+                    x += _DECODED_BYTES_BY_RUN_CODE[code]
+                    byte_offset += _ENCODED_BYTES_BY_RUN_CODE[code]
             except IndexError:
                 raise ValueError("it is truncated") from None
             if x != width:
                 raise ValueError("a run is longer than its scanline")
-    if offset > len(data):
+    if byte_offset > len(file_bytes):
         raise ValueError("it is truncated")
-    planes = _expand_runs(np.frombuffer(data, np.uint8), np.array(starts)).reshape(height, 4, width)
-    return planes.transpose(0, 2, 1), offset
+    planes = _expand_runs(np.frombuffer(file_bytes, np.uint8), np.array(starts)).reshape(height, 4, width)
+    return planes.transpose(0, 2, 1), byte_offset
 
 
-def _expand_runs(data: Bytes, starts: Index) -> Bytes:
+def _expand_runs(file_bytes: Bytes, code_offsets: Index) -> Bytes:
     """Return the bytes to which run-length codes expand.
 
-    data : bytes of the file
-    starts : (n,) offset of each code in `data`
+    file_bytes : bytes of the file
+    code_offsets : (n,) offset of each code in `file_bytes`
     """
-    code = data[starts]
-    count = np.array(_DECODED_BYTES)[code]
+    code = file_bytes[code_offsets]
+    count = np.array(_DECODED_BYTES_BY_RUN_CODE)[code]
     if not count.all():
         raise ValueError("a run is empty")
-    first = np.repeat(starts + 1, count)
+    first = np.repeat(code_offsets + 1, count)
     within = np.arange(len(first)) - np.repeat(np.cumsum(count) - count, count)
-    return np.asarray(data[first + within * np.repeat(code <= _MAX_LITERAL, count)])
+    return np.asarray(file_bytes[first + within * np.repeat(code <= _MAX_LITERAL_RUN, count)])
 
 
-def _decode_uncompressed(data: bytes, offset: int, height: int, width: int) -> tuple[Bytes, int]:
-    pixels = np.frombuffer(data, np.uint8, height * width * 4, offset).reshape(height, width, 4)
+def _decode_uncompressed(file_bytes: bytes, byte_offset: int, height: int, width: int) -> tuple[Bytes, int]:
+    pixels = np.frombuffer(file_bytes, np.uint8, height * width * 4, byte_offset).reshape(height, width, 4)
     # (1, 1, 1, n) repeats a pixel in the format of before 1991, which current programs do not write.
     if np.any(np.all(pixels[..., :3] == 1, axis=-1)):
         raise ValueError("its pixels use the old run-length encoding")
-    return pixels, offset + pixels.size
+    return pixels, byte_offset + pixels.size

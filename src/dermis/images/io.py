@@ -38,7 +38,7 @@ T = TypeVar("T")
 _EXPECTED_PICTURE = "a picture (PNG, JPEG, TIFF, WebP, AVIF, HEIC, EXR or HDR)"
 
 
-_OTHER_FORMATS = {
+_UNSUPPORTED_FORMATS_BY_SIGNATURE = {
     EXR_SIGNATURE: "OpenEXR inside another file",
     b"GIF8": "GIF",
     b"BM": "BMP",
@@ -50,9 +50,11 @@ _OTHER_FORMATS = {
     b"\0\0\0\x0cjP  ": "JPEG 2000",
 }
 """Formats that are not read, by their first bytes."""
-OTHER_PICTURES = (refused(", ".join(dict.fromkeys(_OTHER_FORMATS.values())), "by name"),)
+UNSUPPORTED_PICTURE_PROPERTIES = (
+    refused(", ".join(dict.fromkeys(_UNSUPPORTED_FORMATS_BY_SIGNATURE.values())), "by name"),
+)
 """Picture formats that are not read."""
-ODD_PIXELS = (
+ODD_PIXEL_PROPERTIES = (
     drawn_with_note("infinite", "the largest finite value"),
     drawn_with_note("NaN, negative", "0"),
     refused("more than half of the pixels not finite, or none above 0"),
@@ -90,8 +92,8 @@ def read_image(path: str | Path | EmbeddedPicture) -> Pixels:
     Raises DermisError when the file is missing, not a picture, truncated, or has unsupported pixels.
     """
     data = read_bytes(path)
-    _issue_note(path, _read_header(path, data), colours=False, upright=False)
-    return _decode_pixels(path, data, convert_tables=False)
+    _issue_note(path, _read_header(path, data), read_as_colours=False, upright=False)
+    return _decode_pixels(path, data, convert_lookup_tables=False)
 
 
 def read_colours(path: str | Path | EmbeddedPicture, upright: bool = False) -> tuple[Pixels, ColourSpace]:
@@ -106,26 +108,26 @@ def read_colours(path: str | Path | EmbeddedPicture, upright: bool = False) -> t
     """
     data, embedded = read_bytes(path), isinstance(path, EmbeddedPicture)
     header = _read_header(path, data)
-    _issue_note(path, header, colours=True, upright=upright)
-    image = _decode_pixels(path, data, convert_tables=not embedded)
+    _issue_note(path, header, read_as_colours=True, upright=upright)
+    image = _decode_pixels(path, data, convert_lookup_tables=not embedded)
     return _apply_orientation(
         image, header.orientation if upright else 1
     ), SRGB if embedded else header.colour_space
 
 
-def note_properties(path: str | Path | EmbeddedPicture, colours: bool) -> None:
+def note_properties(path: str | Path | EmbeddedPicture, read_as_colours: bool) -> None:
     """Issue the note that reading a picture would issue, for a picture that is taken from a cache.
 
-    colours : whether the picture is read as colours by `read_colours`, not as numbers by `read_image`
+    read_as_colours : whether the picture is read as colours by `read_colours`, not as numbers by `read_image`
     """
-    _issue_note(path, _read_header(path, read_bytes(path)), colours, upright=False)
+    _issue_note(path, _read_header(path, read_bytes(path)), read_as_colours, upright=False)
 
 
 def _issue_note(
-    path: str | Path | EmbeddedPicture, header: PictureHeader, colours: bool, upright: bool
+    path: str | Path | EmbeddedPicture, header: PictureHeader, read_as_colours: bool, upright: bool
 ) -> None:
-    notes = [*header.notes, *["it is grey, without colours"] * (colours and header.is_grey)]
-    if colours and header.colour_note:
+    notes = [*header.notes, *["it is grey, without colours"] * (read_as_colours and header.is_grey)]
+    if read_as_colours and header.colour_note:
         embedded = isinstance(path, EmbeddedPicture)
         notes.append("its colour profile is not used, as glTF demands" if embedded else header.colour_note)
     if header.orientation != 1:
@@ -135,12 +137,12 @@ def _issue_note(
         notify(f"{path}: {'; '.join(notes)}")
 
 
-def repaired_radiance(name: object, radiance: Floats) -> Floats:
+def repair_radiance(file_name: object, radiance: Floats) -> Floats:
     """Replace infinite, NaN and negative radiance (H, W, C); a note states how many pixels were changed.
 
     Infinite values become the largest finite value; NaN and negative values become 0.
 
-    name : name of the file, for messages
+    file_name : name of the file, for messages
 
     Raises DermisError if most pixels are not finite, or no value is above 0.
     """
@@ -152,12 +154,12 @@ def repaired_radiance(name: object, radiance: Floats) -> Floats:
     highest = float(radiance.max(where=finite, initial=0.0))
     if 2 * odd > texels or highest <= 0.0:
         actual = f"{odd:,} of its {texels:,} pixels are not finite, and the largest value is {highest:g}"
-        refuse(name, "a picture of radiance above 0", actual, "Export it again")
+        refuse(file_name, "a picture of radiance above 0", actual, "Export it again")
     negative = int(((radiance < 0.0) & finite).any(axis=-1).sum())
     faults = {"infinite or NaN": odd, "negative": negative}
     counts = " and ".join(f"{count:,} {kind}" for kind, count in faults.items() if count)
     result = f"infinite values become {highest:g}, the largest finite one, others 0"
-    notify(f"{name}: {counts} pixels of {texels:,}; {result if odd else 'they become 0'}")
+    notify(f"{file_name}: {counts} pixels of {texels:,}; {result if odd else 'they become 0'}")
     return np.maximum(np.nan_to_num(radiance, nan=0.0, posinf=highest, neginf=0.0), np.float32(0.0))
 
 
@@ -169,14 +171,18 @@ def read_size(path: str | Path | EmbeddedPicture) -> tuple[int, int]:
     return _read_header(path, read_bytes(path)).size
 
 
-def _read_header(path: str | Path | EmbeddedPicture, data: bytes) -> PictureHeader:
-    header: PictureHeader = _apply_format_function(path, data, exr_header, radiance_header, pillow_header)
+def _read_header(path: str | Path | EmbeddedPicture, file_bytes: bytes) -> PictureHeader:
+    header: PictureHeader = _apply_format_function(
+        path, file_bytes, exr_header, radiance_header, pillow_header
+    )
     return header
 
 
-def _decode_pixels(path: str | Path | EmbeddedPicture, data: bytes, convert_tables: bool) -> Pixels:
-    pillow = partial(decode_with_pillow, convert_tables=convert_tables)
-    image: Pixels = _apply_format_function(path, data, decode_exr, decode_radiance, pillow)
+def _decode_pixels(
+    path: str | Path | EmbeddedPicture, file_bytes: bytes, convert_lookup_tables: bool
+) -> Pixels:
+    pillow = partial(decode_with_pillow, convert_lookup_tables=convert_lookup_tables)
+    image: Pixels = _apply_format_function(path, file_bytes, decode_exr, decode_radiance, pillow)
     return image
 
 
@@ -191,29 +197,36 @@ def _apply_orientation(image: Pixels, orientation: int) -> Pixels:
 
 def _apply_format_function(
     path: str | Path | EmbeddedPicture,
-    data: bytes,
+    file_bytes: bytes,
     exr_function: Callable[[bytes], T],
     radiance_function: Callable[[bytes], T],
     other_function: Callable[[bytes], T],
 ) -> T:
     """Return the result of the function for a picture's format; the first bytes determine the format.
 
-    data : bytes of the file
+    file_bytes : bytes of the file
     exr_function, radiance_function, other_function : functions of these bytes, for OpenEXR, for .hdr, and for
         other formats
 
     Raises DermisError if the format is unknown, or if the function fails.
     """
-    codec = other_function if picture_format(data) else None
+    codec = other_function if picture_format(file_bytes) else None
     for start, other in ((EXR_SIGNATURE, exr_function), (RADIANCE_SIGNATURE, radiance_function)):
-        codec = other if data.startswith(start) else codec
+        codec = other if file_bytes.startswith(start) else codec
     is_inside = isinstance(path, EmbeddedPicture) and isinstance(path.data, bytes)
     if codec is None or (codec is exr_function and is_inside):
-        known = next((name for start, name in _OTHER_FORMATS.items() if data.startswith(start)), None)
+        known = next(
+            (
+                name
+                for start, name in _UNSUPPORTED_FORMATS_BY_SIGNATURE.items()
+                if file_bytes.startswith(start)
+            ),
+            None,
+        )
         actual = f"it is {known}" if known else "its first bytes match none of these formats"
         refuse(path, _EXPECTED_PICTURE, actual, "Convert it to PNG")
     try:
-        return codec(data)
+        return codec(file_bytes)
     except TooLargeError as fault:
         refuse(path, "a picture of at most 8192 x 8192 pixels", str(fault), "Resize it")
     except UnsupportedError as fault:
@@ -283,26 +296,27 @@ def write_image(path: str | Path, linear: NDArray[np.floating]) -> None:
     write_png(path, levels)
 
 
-def write_png(path: str | Path, levels: Numbers, effort: int = 6) -> None:
+def write_png(path: str | Path, pixel_levels: Numbers, zlib_level: int = 6) -> None:
     """Write integer levels unchanged to a PNG file of 8 bits (uint8) or 16 bits (uint16).
 
-    levels : (H, W), or (H, W, C) with C of 1, 3 or 4; uint8 or uint16
-    effort : compression level of zlib, from 1 (fast) to 9 (small files)
+    pixel_levels : (H, W), or (H, W, C) with C of 1, 3 or 4; uint8 or uint16
+    zlib_level : compression level of zlib, from 1 (fast) to 9 (small files)
     """
-    image = levels[..., None] if levels.ndim == 2 else levels
+    image = pixel_levels[..., None] if pixel_levels.ndim == 2 else pixel_levels
     if image.ndim != 3 or image.shape[2] not in (1, 3, 4) or image.dtype not in (np.uint8, np.uint16):
-        actual = f"they have shape {levels.shape} and type {levels.dtype}"
+        actual = f"they have shape {pixel_levels.shape} and type {pixel_levels.dtype}"
         refuse(path, "pixels (H, W, 1, 3 or 4) of uint8 or uint16", actual, "Convert them first")
-    data = encode_png(image, effort)
+    data = encode_png(image, zlib_level)
     with atomic_write.atomic_file(path) as temporary:
         temporary.write_bytes(data)
 
 
-def write_exr(path: str | Path, linear: NDArray[np.floating], fast: bool = False) -> None:
+def write_exr(path: str | Path, linear: NDArray[np.floating], run_length: bool = False) -> None:
     """Write a float32 OpenEXR file with lossless compression.
 
     linear : (H, W, 3) or (H, W, 4), linear Rec. 709, stored as channels R, G, B (and A)
-    fast : use run-length encoding instead of ZIP: twice as fast, and files of a rendered head are 4 % larger
+    run_length : use run-length encoding instead of ZIP: twice as fast, but files of a rendered head are 4 %
+        larger
     """
     import OpenEXR
 
@@ -310,31 +324,33 @@ def write_exr(path: str | Path, linear: NDArray[np.floating], fast: bool = False
         refuse(path, "pixels (H, W, 3 or 4)", f"they have shape {linear.shape}", "Stack them first")
     channels = {"RGB" if linear.shape[2] == 3 else "RGBA": np.ascontiguousarray(linear, np.float32)}
     with atomic_write.atomic_file(path) as temporary:
-        OpenEXR.File(_exr_header(fast), channels).write(str(temporary))
+        OpenEXR.File(_exr_header(run_length), channels).write(str(temporary))
 
 
-def encode_exr_parts(parts: Mapping[str, Mapping[str, Numbers]], fast: bool = False) -> bytes:
+def encode_exr_parts(
+    channels_of_parts: Mapping[str, Mapping[str, Numbers]], run_length: bool = False
+) -> bytes:
     """Encode several pictures as the parts of one float32 OpenEXR file with lossless compression.
 
-    parts : nested dictionaries of the channels (H, W): part name, then channel name; most programs show only
-        the first part
-    fast : use run-length encoding instead of ZIP, see `write_exr`
+    channels_of_parts : nested dictionaries of the channels (H, W): part name, then channel name; most
+        programs show only the first part
+    run_length : use run-length encoding instead of ZIP, see `write_exr`
     """
     import OpenEXR
 
     exr_parts = []
-    for name, channels in parts.items():
+    for name, channels in channels_of_parts.items():
         floats = {key: np.ascontiguousarray(values, np.float32) for key, values in channels.items()}
-        exr_parts.append(OpenEXR.Part(_exr_header(fast), floats, name))
+        exr_parts.append(OpenEXR.Part(_exr_header(run_length), floats, name))
     file = io.BytesIO()
     OpenEXR.File(exr_parts).write(file)
     return file.getvalue()
 
 
-def _exr_header(fast: bool) -> dict[str, Any]:
+def _exr_header(run_length: bool) -> dict[str, Any]:
     import OpenEXR
 
-    compression = OpenEXR.RLE_COMPRESSION if fast else OpenEXR.ZIP_COMPRESSION
+    compression = OpenEXR.RLE_COMPRESSION if run_length else OpenEXR.ZIP_COMPRESSION
     return {"compression": compression, "type": OpenEXR.scanlineimage}
 
 

@@ -22,54 +22,62 @@ from dermis.base.quantities import checked_array, checked_integer
 MOVIE_SUFFIX = ".mp4"
 DEFAULT_CRF = 18
 """Constant rate factor at which rendered skin shows no compression artefacts."""
-_MAX_CRF, _ENCODER, _PRESET = 51, "libx264", "medium"
-_BT709, _LIMITED_RANGE = 1, 1  # H.264's codes of the colour space, and of levels from 16 to 235
-_QUEUE_LENGTH = 8
-_MAX_SIDE = 1 << 14  # largest side of a frame in H.264
+_MAX_CRF, _VIDEO_ENCODER, _ENCODER_PRESET = 51, "libx264", "medium"
+_FFMPEG_BT709, _FFMPEG_LIMITED_RANGE = 1, 1  # H.264's codes of the colour space, and of levels from 16 to 235
+_MAX_QUEUED_FRAMES = 8
+_MAX_FRAME_SIDE_PIXELS = 1 << 14  # largest side of a frame in H.264
 _NTSC_RATES = tuple(Fraction(1000 * rate, 1001) for rate in (24, 30, 48, 60, 120))
 _NTSC_TOLERANCE = Fraction(5, 1000)
-_RATE_PATTERN = re.compile(
+_FRAME_RATE_PATTERN = re.compile(
     r"\d{1,9}(\.\d{1,20})?(/\d{1,9}|e[-+]?\d{1,2})?"
 )  # limits the digits, because exponents of fractions are expensive
-_MAX_RATE, _MAX_DENOMINATOR = 1000, 1001
+_MAX_FRAME_RATE, _MAX_FRAME_RATE_DENOMINATOR = 1000, 1001
 
 
-def parse_frame_rate(value: str | float | Fraction, culprit: object = "rate") -> Fraction:
+def parse_frame_rate(frame_rate: str | float | Fraction, culprit: object = "rate") -> Fraction:
     """Return a frame rate as an exact fraction, because rounded frame times would drift.
 
-    value : frame rate such as 30, 12.5 or "24000/1001" [1/s]; 23.976 means 24000/1001, and likewise 29.97 and
-        59.94 mean the exact NTSC rates
+    frame_rate : frame rate such as 30, 12.5 or "24000/1001" [1/s]; 23.976 means 24000/1001, and likewise
+        29.97 and 59.94 mean the exact NTSC rates
     culprit : name of the option or argument, for errors
 
     Raises DermisError for values that are not a frame rate above 0 and up to 1000.
     """
-    text = str(value).strip() if isinstance(value, str | float | Fraction) else format_value(value)
+    text = (
+        str(frame_rate).strip()
+        if isinstance(frame_rate, str | float | Fraction)
+        else format_value(frame_rate)
+    )
     try:
-        rate = Fraction(text if _RATE_PATTERN.fullmatch(text) else 0)
+        rate = Fraction(text if _FRAME_RATE_PATTERN.fullmatch(text) else 0)
     except (ValueError, ZeroDivisionError):
         rate = Fraction(0)
-    if not 0 < rate <= _MAX_RATE:
-        expected = f"frames a second up to {_MAX_RATE}, such as 30, 23.976 or 24000/1001"
+    if not 0 < rate <= _MAX_FRAME_RATE:
+        expected = f"frames a second up to {_MAX_FRAME_RATE}, such as 30, 23.976 or 24000/1001"
         refuse(culprit, expected, f"got {format_value(text)}", "Correct it")
     nearest = min(_NTSC_RATES, key=lambda ntsc: abs(ntsc - rate))
-    rate = nearest if abs(nearest - rate) < _NTSC_TOLERANCE else rate.limit_denominator(_MAX_DENOMINATOR)
-    return max(rate, Fraction(1, _MAX_DENOMINATOR))
+    rate = (
+        nearest
+        if abs(nearest - rate) < _NTSC_TOLERANCE
+        else rate.limit_denominator(_MAX_FRAME_RATE_DENOMINATOR)
+    )
+    return max(rate, Fraction(1, _MAX_FRAME_RATE_DENOMINATOR))
 
 
-def check_movie(path: str | Path, size: tuple[int, int], crf: int = DEFAULT_CRF) -> Path:
+def check_movie(path: str | Path, frame_size: tuple[int, int], crf: int = DEFAULT_CRF) -> Path:
     """Check before a long computation that a movie can be written to a path, and return the path.
 
-    size : width and height of the frames [pixel]
+    frame_size : width and height of the frames [pixel]
     crf : constant rate factor, from 0 (lossless) to 51
 
     Raises DermisError when the path is not writable, a side is odd, the rate factor is invalid, or there is
     no encoder.
     """
     target = check_output(path, (MOVIE_SUFFIX,), f"Give it the suffix {MOVIE_SUFFIX}")
-    checked_array("--size", size, (2,), 1, _MAX_SIDE, "pixels")
-    if size[0] % 2 or size[1] % 2:
-        even = f"{size[0] + size[0] % 2}x{size[1] + size[1] % 2}"
-        actual = f"got {size[0]}x{size[1]}"
+    checked_array("--size", frame_size, (2,), 1, _MAX_FRAME_SIDE_PIXELS, "pixels")
+    if frame_size[0] % 2 or frame_size[1] % 2:
+        even = f"{frame_size[0] + frame_size[0] % 2}x{frame_size[1] + frame_size[1] % 2}"
+        actual = f"got {frame_size[0]}x{frame_size[1]}"
         refuse(
             "--size",
             f"even width and height, which {MOVIE_SUFFIX} requires",
@@ -84,10 +92,10 @@ def check_movie(path: str | Path, size: tuple[int, int], crf: int = DEFAULT_CRF)
 def _check_encoder(path: str | Path) -> None:
     av = import_extra("av", "movies")
     try:
-        av.codec.Codec(_ENCODER, "w")
+        av.codec.Codec(_VIDEO_ENCODER, "w")
     except ValueError:
         advice = "Install av from PyPI (pip install av), or write frames/%05d.png"
-        refuse(path, f"FFmpeg with the encoder {_ENCODER}", "the installed PyAV lacks it", advice)
+        refuse(path, f"FFmpeg with the encoder {_VIDEO_ENCODER}", "the installed PyAV lacks it", advice)
 
 
 class MovieWriter:
@@ -156,13 +164,13 @@ class MovieWriter:
         from av.video.reformatter import VideoReformatter
 
         self._container = av.open(str(path), "w", format="mp4", options={"movflags": "faststart"})
-        options = {"crf": str(self._crf), "preset": _PRESET}
-        self._stream = self._container.add_stream(_ENCODER, rate=self.rate, options=options)
+        options = {"crf": str(self._crf), "preset": _ENCODER_PRESET}
+        self._stream = self._container.add_stream(_VIDEO_ENCODER, rate=self.rate, options=options)
         self._stream.width, self._stream.height = self.size
         self._stream.pix_fmt = "yuv420p"
         codec = self._stream.codec_context
-        codec.time_base, codec.color_range = 1 / self.rate, _LIMITED_RANGE
-        codec.colorspace = codec.color_primaries = codec.color_trc = _BT709
+        codec.time_base, codec.color_range = 1 / self.rate, _FFMPEG_LIMITED_RANGE
+        codec.colorspace = codec.color_primaries = codec.color_trc = _FFMPEG_BT709
         self._reformatter = VideoReformatter()
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="dermis-movie")
 
@@ -186,7 +194,7 @@ class MovieWriter:
             refuse(self.path, expected, actual, "Use the renderer's sRGB picture")
         self._queue.append(self._pool.submit(self._encode, self._count, picture))
         self._count += 1
-        while len(self._queue) > _QUEUE_LENGTH or (self._queue and self._queue[0].done()):
+        while len(self._queue) > _MAX_QUEUED_FRAMES or (self._queue and self._queue[0].done()):
             self._queue.popleft().result()
 
     def _encode(self, frame_index: int, picture: NDArray[np.generic]) -> None:

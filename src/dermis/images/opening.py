@@ -34,16 +34,16 @@ if TYPE_CHECKING:
     from PIL.ImageCms import ImageCmsTransform
 
 PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
-_FORMATS = {PNG_SIGNATURE: "PNG", b"\xff\xd8\xff": "JPEG"} | dict.fromkeys(
+_FORMATS_BY_SIGNATURE = {PNG_SIGNATURE: "PNG", b"\xff\xd8\xff": "JPEG"} | dict.fromkeys(
     (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"), "TIFF"
 )
-_BRANDS = {b"avif": "AVIF", b"avis": "AVIF"} | dict.fromkeys(
+_FORMATS_BY_BRAND = {b"avif": "AVIF", b"avis": "AVIF"} | dict.fromkeys(
     (b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"hevm", b"hevs"), "HEIC"
 )
 """Formats by brand of the container that AVIF and HEIC share."""
 PICTURE_PROPERTIES = (
     drawn(
-        ", ".join(dict.fromkeys((*_FORMATS.values(), "WebP", *_BRANDS.values()))),
+        ", ".join(dict.fromkeys((*_FORMATS_BY_SIGNATURE.values(), "WebP", *_FORMATS_BY_BRAND.values()))),
         "AVIF and WebP need a Pillow that has them, as its wheels do; HEIC needs "
         '`pip install "dermis[formats]"`, 16-bit colour `"dermis[video]"`',
     ),
@@ -78,29 +78,29 @@ PICTURE_PROPERTIES = (
 )
 """Properties of picture files that Pillow opens."""
 _MAX_BRAND_BYTES = 64
-_HEIC, _HEIC_DECODER = "HEIC", "dermis.images.heic_decoder"
+_HEIC_FORMAT, _HEIC_DECODER_MODULE = "HEIC", "dermis.images.heic_decoder"
 _PILLOW_LOCK = threading.Lock()
-_JPEG_SCAN = b"\xff\xda"
+_JPEG_SCAN_MARKER = b"\xff\xda"
 _MAX_SCANNED_PIXELS = 1 << 30  # total of all scans of a JPEG: sixteen scans of the largest picture
-_GREY_MODES = ("1", "L", "LA", "La", "I;16", "I;16B")
-_EXIF_ORIENTATION, _EXIF_IFD, _EXIF_COLOURS, _INTEROPERABILITY_IFD = 0x112, 0x8769, 0xA001, 0xA005
-_ADOBE_RGB_COLOURS, _ADOBE_RGB_FILE = 2, "R03"
-_TIFF_SUBFILE, _TIFF_DNG_VERSION, _CANON_RAW = 254, 50706, b"CR"
+_PILLOW_GREY_MODES = ("1", "L", "LA", "La", "I;16", "I;16B")
+_EXIF_ORIENTATION, _EXIF_IFD, _EXIF_COLOUR_SPACE, _INTEROPERABILITY_IFD = 0x112, 0x8769, 0xA001, 0xA005
+_EXIF_ADOBE_RGB_COLOUR_SPACE, _EXIF_ADOBE_RGB_INTEROPERABILITY = 2, "R03"
+_TIFF_SUBFILE_TYPE, _TIFF_DNG_VERSION, _CANON_RAW_SIGNATURE = 254, 50706, b"CR"
 _SRGB_GAMMA, _GAMMA_TOLERANCE = 1 / 2.2, 0.01  # gamma by which PNG files state sRGB
 
 
-def picture_format(data: bytes) -> str | None:
+def picture_format(file_bytes: bytes) -> str | None:
     """Return the name of a picture's format, recognised by the first bytes; None for other formats."""
-    if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
+    if file_bytes[:4] == b"RIFF" and file_bytes[8:12] == b"WEBP":
         return "WEBP"
-    if data[4:8] == b"ftyp":
-        end = min(int.from_bytes(data[:4]), _MAX_BRAND_BYTES)
-        brands = (data[start : start + 4] for start in range(8, end, 4))
-        return next((_BRANDS[brand] for brand in brands if brand in _BRANDS), None)
-    return next((name for start, name in _FORMATS.items() if data.startswith(start)), None)
+    if file_bytes[4:8] == b"ftyp":
+        end = min(int.from_bytes(file_bytes[:4]), _MAX_BRAND_BYTES)
+        brands = (file_bytes[start : start + 4] for start in range(8, end, 4))
+        return next((_FORMATS_BY_BRAND[brand] for brand in brands if brand in _FORMATS_BY_BRAND), None)
+    return next((name for start, name in _FORMATS_BY_SIGNATURE.items() if file_bytes.startswith(start)), None)
 
 
-def open_picture(data: bytes) -> Image:
+def open_picture(file_bytes: bytes) -> Image:
     """Open a picture with Pillow after checking header and size; only pixels of HEIC are decoded at once.
 
     Raises ValueError, OSError and other errors for a file that is damaged, too large or not supported, and
@@ -109,9 +109,9 @@ def open_picture(data: bytes) -> Image:
     import PIL.Image
     from PIL import features
 
-    name = picture_format(data) or "PNG"
-    if name == _HEIC:
-        return _open_heic(data)
+    name = picture_format(file_bytes) or "PNG"
+    if name == _HEIC_FORMAT:
+        return _open_heic(file_bytes)
     with _PILLOW_LOCK:  # Pillow's own limit is a global variable and differs
         limit, PIL.Image.MAX_IMAGE_PIXELS = PIL.Image.MAX_IMAGE_PIXELS, None
         try:
@@ -123,53 +123,57 @@ def open_picture(data: bytes) -> Image:
                     "Update it: pip install --upgrade pillow",
                 )
             else:
-                picture = PIL.Image.open(io.BytesIO(data), formats=(name,))
+                picture = PIL.Image.open(io.BytesIO(file_bytes), formats=(name,))
         except (PIL.UnidentifiedImageError, SyntaxError) as fault:
             raise ValueError("its header cannot be read, or its kind of pixels is not supported") from fault
         finally:
             PIL.Image.MAX_IMAGE_PIXELS = limit
     check_size(picture.width, picture.height)
     tags = getattr(picture, "tag_v2", {})
-    if _TIFF_DNG_VERSION in tags or tags.get(_TIFF_SUBFILE, 0) & 1 or data[8:10] == _CANON_RAW:
+    if (
+        _TIFF_DNG_VERSION in tags
+        or tags.get(_TIFF_SUBFILE_TYPE, 0) & 1
+        or file_bytes[8:10] == _CANON_RAW_SIGNATURE
+    ):
         raise UnsupportedError("it is a camera's raw file, of which only a preview can be read")
-    scanned = data.count(_JPEG_SCAN) * picture.width * picture.height
+    scanned = file_bytes.count(_JPEG_SCAN_MARKER) * picture.width * picture.height
     if name == "JPEG" and scanned > _MAX_SCANNED_PIXELS:
         raise ValueError("it was stored in too many scans")
     return picture
 
 
-def _open_heic(data: bytes) -> Image:
+def _open_heic(file_bytes: bytes) -> Image:
     """Return a HEIC picture, which is decoded in a separate process."""
     import PIL.Image
 
     import_extra("pi_heif", "a HEIC picture")
-    answer = _decode_heic(data)
+    answer = _decode_heic(file_bytes)
     check_size(*answer["size"].tolist())
     bits, turned, several = answer["facts"].tolist()
     picture = PIL.Image.fromarray(answer["pixels"])
     picture.info = {"icc_profile": answer["profile"].tobytes(), "bit_depth": bits, "turned": turned}
-    picture.format, picture.is_animated = _HEIC, several  # type: ignore[attr-defined]
+    picture.format, picture.is_animated = _HEIC_FORMAT, several  # type: ignore[attr-defined]
     return picture
 
 
 @lru_cache(maxsize=1)  # cached, as header and pixels of a picture are read one after the other
-def _decode_heic(data: bytes) -> Arrays:
-    request = Arrays(data=np.frombuffer(data, np.uint8))
-    return run_decoder(_HEIC_DECODER, request, len(data), "a HEIC picture", "pixels")
+def _decode_heic(file_bytes: bytes) -> Arrays:
+    request = Arrays(data=np.frombuffer(file_bytes, np.uint8))
+    return run_decoder(_HEIC_DECODER_MODULE, request, len(file_bytes), "a HEIC picture", "pixels")
 
 
-def pillow_header(data: bytes) -> PictureHeader:
+def pillow_header(file_bytes: bytes) -> PictureHeader:
     """Return the header of a picture file.
 
     Raises the errors of `open_picture`.
     """
-    picture = open_picture(data)
+    picture = open_picture(file_bytes)
     exif = _read_exif(picture)
     orientation = exif.get(_EXIF_ORIENTATION, 1)
-    space, colour_note = _colour_space(data, picture, exif)
+    space, colour_note = _colour_space(file_bytes, picture, exif)
     orientation = orientation if orientation in range(1, 9) else 1
-    notes = tuple(_header_notes(data, picture))
-    is_grey = picture.mode in (*_GREY_MODES, "F")
+    notes = tuple(_header_notes(file_bytes, picture))
+    is_grey = picture.mode in (*_PILLOW_GREY_MODES, "F")
     return PictureHeader((picture.width, picture.height), space, orientation, notes, colour_note, is_grey)
 
 
@@ -197,9 +201,9 @@ def table_transform(picture: Image) -> ImageCmsTransform | None:
         return None
 
 
-def _has_curves(icc: bytes) -> bool:
+def _has_curves(icc_profile: bytes) -> bool:
     try:
-        return profile_space(icc) is not None
+        return profile_space(icc_profile) is not None
     except (ValueError, *MALFORMED_DATA_ERRORS):
         return False
 
@@ -215,10 +219,10 @@ def _read_exif(picture: Image) -> Exif:
         return PIL.Image.Exif()
 
 
-def _colour_space(data: bytes, picture: Image, exif: Exif) -> tuple[ColourSpace, str | None]:
+def _colour_space(file_bytes: bytes, picture: Image, exif: Exif) -> tuple[ColourSpace, str | None]:
     """Return the colour space of the decoded pixels, and a note if this space is not sRGB or is unknown."""
     icc = picture.info.get("icc_profile")
-    coded = _code_points(data, picture)
+    coded = _code_points(file_bytes, picture)
     if icc and not (coded and picture.format == "PNG"):
         return _profiled_space(picture, icc)
     if coded:
@@ -236,28 +240,28 @@ def _conversion_note(space_name: str) -> str:
     return f"its colours are converted from {space_name} to sRGB"
 
 
-def _profiled_space(picture: Image, icc: bytes) -> tuple[ColourSpace, str | None]:
+def _profiled_space(picture: Image, icc_profile: bytes) -> tuple[ColourSpace, str | None]:
     """Return the colour space of the decoded pixels of a picture with an ICC profile, and a note."""
-    name = profile_name(icc) or "a profile without a name"
-    is_grey = picture.mode in _GREY_MODES
+    name = profile_name(icc_profile) or "a profile without a name"
+    is_grey = picture.mode in _PILLOW_GREY_MODES
     try:
-        space = profile_space(icc)
+        space = profile_space(icc_profile)
     except (ValueError, *MALFORMED_DATA_ERRORS):
         return SRGB, "its colour profile is damaged, and its colours are taken as sRGB"
     if space is None and table_transform(picture):
         is_cmyk = picture.mode == "CMYK"  # noted at the conversion
         return SRGB, None if is_cmyk else f"{_conversion_note(name)}, at 8 bits a channel"
-    if space is None or picture.mode in ("CMYK", "F") or (icc[16:20] == b"GRAY" and not is_grey):
+    if space is None or picture.mode in ("CMYK", "F") or (icc_profile[16:20] == b"GRAY" and not is_grey):
         return SRGB, f"its colour profile, {name}, does not fit its pixels, and is not used"
     return space, None if space.is_default else _conversion_note(name)
 
 
-def _code_points(data: bytes, picture: Image) -> tuple[int, int] | None:
+def _code_points(file_bytes: bytes, picture: Image) -> tuple[int, int] | None:
     """Return the code points of primaries and transfer function in a PNG, AVIF or HEIC file, or None."""
-    if picture.format == "PNG" and (start := data.find(b"cICP", 0, data.find(b"IDAT"))) > 0:
-        return data[start + 4], data[start + 5]
-    if picture.format in ("AVIF", _HEIC) and (start := data.find(b"colrnclx")) > 0:
-        primaries, transfer = struct.unpack_from(">HH", data, start + 8)
+    if picture.format == "PNG" and (start := file_bytes.find(b"cICP", 0, file_bytes.find(b"IDAT"))) > 0:
+        return file_bytes[start + 4], file_bytes[start + 5]
+    if picture.format in ("AVIF", _HEIC_FORMAT) and (start := file_bytes.find(b"colrnclx")) > 0:
+        primaries, transfer = struct.unpack_from(">HH", file_bytes, start + 8)
         return primaries, transfer
     return None
 
@@ -267,7 +271,8 @@ def _is_adobe_rgb(exif: Exif) -> bool:
     try:
         file_kind = str(exif.get_ifd(_INTEROPERABILITY_IFD).get(1, "")).strip("\0 ")
         return (
-            file_kind == _ADOBE_RGB_FILE or exif.get_ifd(_EXIF_IFD).get(_EXIF_COLOURS) == _ADOBE_RGB_COLOURS
+            file_kind == _EXIF_ADOBE_RGB_INTEROPERABILITY
+            or exif.get_ifd(_EXIF_IFD).get(_EXIF_COLOUR_SPACE) == _EXIF_ADOBE_RGB_COLOUR_SPACE
         )
     except Exception:  # Pillow raises anything for damaged data
         return False
@@ -283,13 +288,13 @@ def _png_space(picture: Image) -> ColourSpace:
     return gamma_space(f"gamma {gamma:.3g}", None if is_srgb else 1.0 / gamma, primaries)
 
 
-def _header_notes(data: bytes, picture: Image) -> Iterator[str]:
+def _header_notes(file_bytes: bytes, picture: Image) -> Iterator[str]:
     """Yield sentences about properties that are converted or not used."""
     if picture.mode == "CMYK":
         profile = profile_name(picture.info.get("icc_profile", b"")) if table_transform(picture) else ""
         how = f"by its profile, {profile}" if profile else "without a profile, so that its colours are rough"
         yield f"its CMYK is converted to sRGB {how}"
-    if (bits := _stored_bits(data, picture)) > 8:
+    if (bits := _stored_bits(file_bytes, picture)) > 8:
         yield f"its {bits} bits a channel are reduced to 8"
     if picture.info.get("turned"):
         yield "it is turned upright as its EXIF says"
@@ -297,10 +302,10 @@ def _header_notes(data: bytes, picture: Image) -> Iterator[str]:
         yield "it has several pictures, and only the first is read"
 
 
-def _stored_bits(data: bytes, picture: Image) -> int:
+def _stored_bits(file_bytes: bytes, picture: Image) -> int:
     """Return the stored bits per channel of AVIF and HEIC, and of TIFF in CMYK; 8 for other files."""
-    if picture.format == "AVIF" and (start := data.find(b"av1C")) > 0 and data[start + 6] & 0x40:
-        return 12 if data[start + 6] & 0x20 else 10
+    if picture.format == "AVIF" and (start := file_bytes.find(b"av1C")) > 0 and file_bytes[start + 6] & 0x40:
+        return 12 if file_bytes[start + 6] & 0x20 else 10
     if picture.mode == "CMYK":
         return int(max(getattr(picture, "tag_v2", {}).get(258, (8,))))
     return int(picture.info.get("bit_depth", 8))

@@ -11,15 +11,15 @@ from numpy.typing import ArrayLike
 from dermis.base.arrays import Doubles
 from dermis.images.colour import decode_srgb, delta_e_2000, lab
 
-CLASS_STATEMENT = (
+SKIN_CLASS_DISCLAIMER = (
     "ITA and the nearest classes describe this colour, not a person, ancestry or risk of sunburn"
 )
 """Statement for users, beside the numbers."""
-_ITA_LIGHTNESS = 50.0  # L* of the pivot of the angle
+_ITA_CENTRE_LIGHTNESS = 50.0  # L* of the pivot of the angle
 _MONK_SRGB = (
     "f6ede4", "f3e7db", "f7ead0", "eadaba", "d7bd96", "a07e56", "825c43", "604134", "3a312a", "292420",
 )  # fmt: skip
-_FITZPATRICK_ITA = (("I", 55.0), ("II", 41.0), ("III", 28.0), ("IV", 10.0), ("V", -30.0))
+_MIN_ITA_OF_FITZPATRICK_TYPES = (("I", 55.0), ("II", 41.0), ("III", 28.0), ("IV", 10.0), ("V", -30.0))
 """Type and the ITA above which a colour is assigned to it; VI is below all [degrees]."""
 
 
@@ -47,9 +47,14 @@ class SkinTone(NamedTuple):
     def as_json(self) -> dict[str, float | int | str]:
         """Return rounded numbers, classes, and a note that the classes describe colours, not people."""
         values = {name: round(one, 2) for name, one in zip(self._fields[:5], self[:5], strict=True)}
-        return {**values, "monk": self.monk, "fitzpatrick": self.fitzpatrick, "statement": CLASS_STATEMENT}
+        return {
+            **values,
+            "monk": self.monk,
+            "fitzpatrick": self.fitzpatrick,
+            "statement": SKIN_CLASS_DISCLAIMER,
+        }
 
-    def line(self) -> str:
+    def as_text(self) -> str:
         """Return the description as a line of text."""
         numbers = f"L* {self.L:.1f}, a* {self.a:.1f}, b* {self.b:.1f}, hue {self.hue_degrees:.0f}°"
         nearest = f"nearest Monk {self.monk}, Fitzpatrick {self.fitzpatrick}"
@@ -65,7 +70,7 @@ def ita_degrees(cielab: ArrayLike) -> Doubles:
     Source: [Chardon1991].
     """
     L, _, b = np.moveaxis(np.asarray(cielab, np.float64), -1, 0)
-    return np.asarray(np.degrees(np.arctan2(L - _ITA_LIGHTNESS, np.maximum(b, 1e-6))))
+    return np.asarray(np.degrees(np.arctan2(L - _ITA_CENTRE_LIGHTNESS, np.maximum(b, 1e-6))))
 
 
 def hue_degrees(cielab: ArrayLike) -> Doubles:
@@ -83,7 +88,7 @@ def skin_tone(linear: ArrayLike) -> SkinTone:
     L, a, b = (float(one) for one in lab(colour))
     ita = float(ita_degrees((L, a, b)))
     monk = 1 + int(np.argmin(delta_e_2000(_monk_colours(), colour)))
-    fitzpatrick = next((name for name, lowest in _FITZPATRICK_ITA if ita > lowest), "VI")
+    fitzpatrick = next((name for name, lowest in _MIN_ITA_OF_FITZPATRICK_TYPES if ita > lowest), "VI")
     return SkinTone(L, a, b, float(hue_degrees((L, a, b))), ita, monk, fitzpatrick)
 
 

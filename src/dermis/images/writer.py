@@ -23,8 +23,8 @@ from dermis.images.codecs import png_size
 from dermis.images.hdr import decode_exr
 from dermis.images.io import OUTPUT_SUFFIXES, check_output, read_bytes, write_exr, write_png
 
-_FAST_COMPRESSION = 1  # zlib level
-_QUEUE_PER_THREAD = 4
+_FAST_ZLIB_LEVEL = 1  # zlib level
+_QUEUED_PICTURES_PER_THREAD = 4
 _NUMBER_PLACEHOLDER = re.compile(r"%(?:0(\d+))?d")
 
 
@@ -38,10 +38,10 @@ class ImageWriter:
             writer.write(f"{number:04}.png", image)
     """
 
-    def __init__(self, threads: int | None = None) -> None:
-        count = threads or os.cpu_count() or 1
+    def __init__(self, thread_count: int | None = None) -> None:
+        count = thread_count or os.cpu_count() or 1
         self._pool = ThreadPoolExecutor(count, thread_name_prefix="dermis-images")
-        self._max_queued = _QUEUE_PER_THREAD * count
+        self._max_queued = _QUEUED_PICTURES_PER_THREAD * count
         self._queue: deque[Future[None]] = deque()
         self._checked_folders: set[tuple[Path, str]] = set()
 
@@ -61,7 +61,9 @@ class ImageWriter:
         if not is_exr and (picture.dtype != np.uint8 or picture.ndim != 3 or picture.shape[2] not in (3, 4)):
             advice = "Use the renderer's sRGB picture, or write .exr"
             refuse(path, "pixels (H, W, 3 or 4) of uint8", actual, advice)
-        write = partial(write_exr, fast=True) if is_exr else partial(write_png, effort=_FAST_COMPRESSION)
+        write = (
+            partial(write_exr, run_length=True) if is_exr else partial(write_png, zlib_level=_FAST_ZLIB_LEVEL)
+        )
         self._queue.append(self._pool.submit(write, path, picture))
         while len(self._queue) > self._max_queued or (self._queue and self._queue[0].done()):
             self._queue.popleft().result()
@@ -105,12 +107,12 @@ class FrameFiles:
 
     pattern: Path
 
-    def path(self, number: int) -> Path:
+    def path(self, frame_number: int) -> Path:
         """Return the path of the picture of a frame.
 
-        number : number of the frame
+        frame_number : number of the frame
         """
-        name = _NUMBER_PLACEHOLDER.sub(lambda found: f"{number:0{found[1] or 1}d}", self.pattern.name)
+        name = _NUMBER_PLACEHOLDER.sub(lambda found: f"{frame_number:0{found[1] or 1}d}", self.pattern.name)
         return self.pattern.with_name(name)
 
     def prepare(self) -> None:
@@ -141,14 +143,16 @@ class FrameFiles:
             with atomic_file(self._record_path) as temporary:
                 temporary.write_text(content_key, encoding="utf-8")
 
-    def missing(self, numbers: Iterable[int], size: tuple[int, int]) -> list[int]:
+    def missing_frames(self, frame_numbers: Iterable[int], picture_size: tuple[int, int]) -> list[int]:
         """Return the frame numbers whose pictures are missing, incomplete, or of another sequence.
 
-        numbers : frame numbers to check
-        size : width and height of the pictures [pixel]
+        frame_numbers : frame numbers to check
+        picture_size : width and height of the pictures [pixel]
         """
         start_ns = self._record_path.stat().st_mtime_ns
-        return [number for number in numbers if not _is_complete(self.path(number), size, start_ns)]
+        return [
+            number for number in frame_numbers if not _is_complete(self.path(number), picture_size, start_ns)
+        ]
 
     def _record_matches(self, content_key: str) -> bool:
         """Return whether the record file contains a content key."""
@@ -163,17 +167,17 @@ class FrameFiles:
         return self.pattern.with_name(f".{self.pattern.name}.made-of")
 
 
-def _is_complete(path: Path, size: tuple[int, int], start_ns: int) -> bool:
+def _is_complete(picture_path: Path, picture_size: tuple[int, int], start_ns: int) -> bool:
     """Return whether a file is a complete picture of a given size, written after the sequence was started.
 
     start_ns : modification time of the record file [ns]
     """
     try:
-        if not path.is_file() or path.stat().st_mtime_ns < start_ns:
+        if not picture_path.is_file() or picture_path.stat().st_mtime_ns < start_ns:
             return False
-        if path.suffix.lower() == ".png":
-            return png_size(read_bytes(path)) == size
-        height, width = decode_exr(read_bytes(path)).shape[:2]
+        if picture_path.suffix.lower() == ".png":
+            return png_size(read_bytes(picture_path)) == picture_size
+        height, width = decode_exr(read_bytes(picture_path)).shape[:2]
     except (OSError, ValueError, RuntimeError, DermisError):
         return False
-    return (width, height) == size
+    return (width, height) == picture_size

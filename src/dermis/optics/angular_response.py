@@ -10,36 +10,40 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
-TABLE_STEPS = 64
+INTERPOLATION_STEPS = 64
 """Number of intervals into which tables over [0, 1] divide their argument."""
 DIRECTION_ROWS = 32
 """Number of incident directions in tables; the square roots of their cosines are evenly spaced."""
 _QUADRATURE_NODES = 32
-_MAX_ALBEDO = 1.0 - 1e-8
-CACHE_SIZE = 256
+_MAX_SINGLE_SCATTERING_ALBEDO = 1.0 - 1e-8
+CACHED_COLUMN_COUNT = 256
 """Number of table columns that each function caches."""
 
 
-def interpolate_table(column: Callable[[float], Floats], position: float) -> Floats:
+def interpolate_table(column_at: Callable[[float], Floats], table_position: float) -> Floats:
     """Interpolate a table over [0, 1] linearly at one position, between the two nearest columns.
 
-    column : function that returns the column, an array, at a multiple of 1 / TABLE_STEPS; the function should
-        cache its results
-    position : position in the table; values outside [0, 1] are clamped
+    column_at : function that returns the column, an array, at a multiple of 1 / INTERPOLATION_STEPS; the
+        function should cache its results
+    table_position : position in the table; values outside [0, 1] are clamped
     """
-    scaled = min(max(position, 0.0), 1.0) * TABLE_STEPS
-    low = min(int(scaled), TABLE_STEPS - 1)
+    scaled = min(max(table_position, 0.0), 1.0) * INTERPOLATION_STEPS
+    low = min(int(scaled), INTERPOLATION_STEPS - 1)
     weight = scaled - low
-    return np.asarray((1.0 - weight) * column(low / TABLE_STEPS) + weight * column((low + 1) / TABLE_STEPS))
+    return np.asarray(
+        (1.0 - weight) * column_at(low / INTERPOLATION_STEPS)
+        + weight * column_at((low + 1) / INTERPOLATION_STEPS)
+    )
 
 
-def interpolate_columns(column: Callable[[float], Floats], positions: ArrayLike) -> Floats:
+def interpolate_columns(column_at: Callable[[float], Floats], table_positions: ArrayLike) -> Floats:
     """Interpolate a table over [0, 1] at c positions; the last axis of the result has one entry per position.
 
-    column : function that returns the column at a multiple of 1 / TABLE_STEPS, see `interpolate_table`
+    column_at : function that returns the column at a multiple of 1 / INTERPOLATION_STEPS, see
+        `interpolate_table`
     """
-    values = np.atleast_1d(np.asarray(positions, np.float64)).tolist()
-    return np.stack([interpolate_table(column, value) for value in values], axis=-1)
+    values = np.atleast_1d(np.asarray(table_positions, np.float64)).tolist()
+    return np.stack([interpolate_table(column_at, value) for value in values], axis=-1)
 
 
 @dataclass(frozen=True)
@@ -67,15 +71,15 @@ class AngularResponse:
     mean_kernel: float
 
 
-def angular_response(total: ArrayLike, eta: float) -> AngularResponse:
+def angular_response(total_reflectance: ArrayLike, eta: float) -> AngularResponse:
     """Return the angular response of isotropically scattering half-spaces with given reflectances.
 
-    total : (c,) reflectance of the half-space in each channel for light at normal incidence [-]
+    total_reflectance : (c,) reflectance of the half-space in each channel for light at normal incidence [-]
     eta : index of refraction relative to air, at least 1 [-]
 
     Sources: [Chandrasekhar1960] for the half-space; [Jensen2001] for the separation of single scattering.
     """
-    columns = interpolate_columns(partial(_response_column, eta), total)
+    columns = interpolate_columns(partial(_response_column, eta), total_reflectance)
     table, (diffuse, single_scattering) = columns[:DIRECTION_ROWS], columns[DIRECTION_ROWS:]
     return AngularResponse(eta, table, diffuse, single_scattering, _mean_kernel(eta))
 
@@ -159,14 +163,14 @@ class _HalfSpace:
         return float((self.leaving * self.reflectance(self._mu)).sum() / self.leaving.sum())
 
 
-@lru_cache(maxsize=CACHE_SIZE)
-def _response_column(eta: float, total: float) -> Floats:
+@lru_cache(maxsize=CACHED_COLUMN_COUNT)
+def _response_column(eta: float, total_reflectance: float) -> Floats:
     """Return the fields of `AngularResponse` for one channel as a column of a table, (DIRECTION_ROWS + 2,).
 
     The first DIRECTION_ROWS elements are `relative_reflectance`, the last two are
     `relative_diffuse_reflectance` and `single_scattering`.
     """
-    albedo = albedo_for_reflectance(total, eta)
+    albedo = albedo_for_reflectance(total_reflectance, eta)
     space = _HalfSpace(albedo, eta)
     normal = float(space.reflectance(1.0))
     if normal <= 0.0:
@@ -176,30 +180,34 @@ def _response_column(eta: float, total: float) -> Floats:
     return np.concatenate([table, [space.diffuse_reflectance(), single_scattering]]) / normal
 
 
-@lru_cache(maxsize=CACHE_SIZE)
+@lru_cache(maxsize=CACHED_COLUMN_COUNT)
 def _mean_kernel(eta: float) -> float:
     """Return the mean of 1/(a + b) over the cosines a and b of incident and exit directions [-]."""
     mu, weight = gauss_legendre(0.0, 1.0)
     return float((2.0 * weight * mu * mean_single_scattering_kernel(mu, eta)).sum())
 
 
-def albedo_for_reflectance(total: float, eta: float) -> float:
+def albedo_for_reflectance(total_reflectance: float, eta: float) -> float:
     """Return the single-scattering albedo of the half-space with a given reflectance at normal incidence [-].
 
     The reflectance of an isotropically scattering half-space is inverted numerically.
 
-    total : reflectance for light at normal incidence [-]
+    total_reflectance : reflectance for light at normal incidence [-]
     eta : index of refraction relative to air [-]
     """
     from scipy.optimize import brentq
 
     def excess(albedo: float) -> float:
-        return float(_HalfSpace(albedo, eta).reflectance(1.0)) - total
+        return float(_HalfSpace(albedo, eta).reflectance(1.0)) - total_reflectance
 
     min_albedo = 1e-6
-    if total <= 0.0 or excess(min_albedo) >= 0.0:
+    if total_reflectance <= 0.0 or excess(min_albedo) >= 0.0:
         return min_albedo
-    return float(brentq(excess, min_albedo, _MAX_ALBEDO)) if excess(_MAX_ALBEDO) > 0.0 else _MAX_ALBEDO
+    return (
+        float(brentq(excess, min_albedo, _MAX_SINGLE_SCATTERING_ALBEDO))
+        if excess(_MAX_SINGLE_SCATTERING_ALBEDO) > 0.0
+        else _MAX_SINGLE_SCATTERING_ALBEDO
+    )
 
 
 def internal_reflectance(cosine: Floats, eta: float) -> Floats:
@@ -215,12 +223,16 @@ def critical_cosine(eta: float) -> float:
     return float(np.sqrt(1.0 - 1.0 / eta**2))
 
 
-def gauss_legendre(low: float, high: float, count: int = _QUADRATURE_NODES) -> tuple[Floats, Floats]:
-    """Return nodes and weights of Gauss-Legendre quadrature from `low` to `high`, (count,) each."""
-    nodes, weights = _unit_gauss_legendre(count)
-    return low + 0.5 * (high - low) * (nodes + 1.0), 0.5 * (high - low) * weights
+def gauss_legendre(
+    lower_limit: float, upper_limit: float, node_count: int = _QUADRATURE_NODES
+) -> tuple[Floats, Floats]:
+    """Return nodes and weights of Gauss-Legendre quadrature between two limits, (node_count,) each."""
+    nodes, weights = _unit_gauss_legendre(node_count)
+    return lower_limit + 0.5 * (upper_limit - lower_limit) * (nodes + 1.0), 0.5 * (
+        upper_limit - lower_limit
+    ) * weights
 
 
 @lru_cache(maxsize=4)
-def _unit_gauss_legendre(count: int) -> tuple[Floats, Floats]:
-    return np.polynomial.legendre.leggauss(count)
+def _unit_gauss_legendre(node_count: int) -> tuple[Floats, Floats]:
+    return np.polynomial.legendre.leggauss(node_count)

@@ -12,10 +12,10 @@ from dermis.optics.media import Floats
 from dermis.optics.radial import SMALLEST_FLOAT, RadialProfile
 
 _MIN_RADIUS_MM, _MAX_RADIUS_MM, _RADIUS_COUNT = 1e-4, 1000.0, 800
-_EDGE_RESPONSE_ANGLES = 256  # samples of the integral in `edge_response`
+_EDGE_RESPONSE_ANGLE_COUNT = 256  # samples of the integral in `edge_response`
 
 
-def radii() -> Floats:
+def cumulative_radii() -> Floats:
     """Return the radii at which every cumulative profile is sampled, (n,) [mm]: 0, then log-spaced."""
     return np.concatenate([[0.0], np.geomspace(_MIN_RADIUS_MM, _MAX_RADIUS_MM, _RADIUS_COUNT)])
 
@@ -43,7 +43,7 @@ class CumulativeProfile:
             (n, 3) [-]
         energy : (3,) all emerging light, divided by the light that enters [-]
         """
-        grid = radii()
+        grid = cumulative_radii()
         return cls(grid, np.asarray(fraction_within(grid), np.float64), np.asarray(energy, np.float64))
 
     @classmethod
@@ -74,13 +74,13 @@ class CumulativeProfile:
         t) dt at x > 0, and 1 minus the response at -x elsewhere.
         """
         x = np.asarray(distance_mm, np.float64)
-        t = (np.arange(_EDGE_RESPONSE_ANGLES) + 0.5) * (0.5 * np.pi / _EDGE_RESPONSE_ANGLES)
+        t = (np.arange(_EDGE_RESPONSE_ANGLE_COUNT) + 0.5) * (0.5 * np.pi / _EDGE_RESPONSE_ANGLE_COUNT)
         mean = self.fraction_within(np.abs(x)[..., None] / np.sin(t)).mean(axis=-2)
         return np.asarray(0.5 + 0.5 * np.sign(x)[..., None] * mean)
 
-    def radius_at_fraction(self, fraction: float) -> Floats:
+    def radius_at_fraction(self, light_fraction: float) -> Floats:
         """Return the radius within which a given fraction of the emerging light leaves, (3,) [mm]."""
-        return np.array([np.interp(fraction, self.fraction[:, i], self.radii_mm) for i in range(3)])
+        return np.array([np.interp(light_fraction, self.fraction[:, i], self.radii_mm) for i in range(3)])
 
     def with_energy(self, energy: ArrayLike) -> CumulativeProfile:
         """Return a profile with the same fractions of light within radii and another total reflectance.
@@ -90,16 +90,16 @@ class CumulativeProfile:
         return CumulativeProfile(self.radii_mm, self.fraction, np.asarray(energy, np.float64))
 
 
-def interpolate_cumulative(radius_mm: Floats, edges_mm: Floats, fraction: Floats) -> Floats:
+def interpolate_cumulative(radius_mm: Floats, edges_mm: Floats, fraction_within_edges: Floats) -> Floats:
     """Interpolate tabulated fractions of light within radii by a monotonic spline, (n, c) [-].
 
     radius_mm : (n,) radii of the result [mm]
     edges_mm : (k,) tabulated radii, the first 0 [mm]
-    fraction : (k, c) tabulated fractions [-]
+    fraction_within_edges : (k, c) tabulated fractions [-]
     """
     from scipy.interpolate import PchipInterpolator
 
-    interpolate = PchipInterpolator(np.log(edges_mm[1:]), fraction[1:], axis=0)
+    interpolate = PchipInterpolator(np.log(edges_mm[1:]), fraction_within_edges[1:], axis=0)
     clamped = np.clip(radius_mm, edges_mm[1], edges_mm[-1])
     linear = np.minimum(radius_mm / edges_mm[1], 1.0)  # within the first ring R(r) is proportional to 1/r
     return np.asarray(interpolate(np.log(clamped)) * linear[:, None])

@@ -9,32 +9,32 @@ from functools import lru_cache, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.optics.angular_response import CACHE_SIZE, interpolate_table
+from dermis.optics.angular_response import CACHED_COLUMN_COUNT, interpolate_table
 from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.diffusion import hankel, layered_diffusion
 from dermis.optics.diffusion.boundary import boundary_mismatch
 from dermis.optics.gaussians import GaussianSum
-from dermis.optics.half_space import half_space, kind_for_index, tabulated_albedo
+from dermis.optics.half_space import half_space, tabulated_albedo, tabulated_kind_for_index
 from dermis.optics.media import Layer, Medium
 
 Floats = NDArray[np.float64]
-MAX_ALBEDO, MIN_ALBEDO = 1.0 - 1e-6, 1e-3
+MAX_EQUIVALENT_ALBEDO, MIN_EQUIVALENT_ALBEDO = 1.0 - 1e-6, 1e-3
 _LOG_FREQUENCY_RANGE = (-14.0, 14.0)  # natural logarithms of frequencies [1/mm]
-_ABSORPTION_WEIGHT = 0.35  # of absorption in the published formula of the offset
+_OFFSET_ABSORPTION_WEIGHT = 0.35  # of absorption in the published formula of the offset
 
 
-def equivalent_medium(profile: GaussianSum, total: Floats, eta: float) -> Medium:
-    """Return the half-space whose reflectance is `total` and which spreads light as widely as a profile.
+def equivalent_medium(profile: GaussianSum, total_reflectance: Floats, eta: float) -> Medium:
+    """Return the half-space with a given reflectance that spreads light as widely as a profile.
 
     The width is the inverse of the frequency at which the Hankel transform of R(r) has fallen to half of its
     value at 0.
 
     profile : diffusion profile
-    total : (c,) reflectance of the half-space for light at normal incidence [-]
+    total_reflectance : (c,) reflectance of the half-space for light at normal incidence [-]
     eta : index of refraction relative to air [-]
     """
-    albedo, extinction = np.empty(len(total)), np.empty(len(total))
-    for c, reflectance in enumerate(total):
+    albedo, extinction = np.empty(len(total_reflectance)), np.empty(len(total_reflectance))
+    for c, reflectance in enumerate(total_reflectance):
         column = partial(_half_space_column, eta, profile.from_photons)
         root, half = interpolate_table(column, float(reflectance))
         gaussians = tuple(zip(profile.variance_mm2.tolist(), profile.weight[:, c].tolist(), strict=True))
@@ -44,17 +44,17 @@ def equivalent_medium(profile: GaussianSum, total: Floats, eta: float) -> Medium
     return Medium("half-space", (layer,), eta)
 
 
-@lru_cache(maxsize=CACHE_SIZE)
-def _half_space_column(eta: float, from_photons: bool, total: float) -> Floats:
-    """Return albedo and inverse width of the half-space with the reflectance `total`, as a table column (2,).
+@lru_cache(maxsize=CACHED_COLUMN_COUNT)
+def _half_space_column(eta: float, from_photons: bool, total_reflectance: float) -> Floats:
+    """Return albedo and inverse width of the half-space with a given reflectance, as a table column (2,).
 
     The first element is the square root of 1 minus the single-scattering albedo [-], the second the frequency
     at which the Hankel transform of R(r) has fallen to half of its value at 0 [1/mean free path]. If
     `from_photons` is true and a table of photon counts exists, R(r) is from this table, otherwise from
     layered diffusion.
     """
-    albedo = albedo_for_total(total, eta, from_photons)
-    kind = kind_for_index(eta) if from_photons else None
+    albedo = albedo_for_total(total_reflectance, eta, from_photons)
+    kind = tabulated_kind_for_index(eta) if from_photons else None
     if kind is None:
         half = _half_frequency(partial(_reflectance_transform, _unit_medium(albedo, eta)))
     else:
@@ -63,25 +63,32 @@ def _half_space_column(eta: float, from_photons: bool, total: float) -> Floats:
     return np.array([np.sqrt(1.0 - albedo), half])
 
 
-def albedo_for_total(total: float, eta: float, from_photons: bool = False) -> float:
+def albedo_for_total(total_reflectance: float, eta: float, from_photons: bool = False) -> float:
     """Return the single-scattering albedo of the half-space with a given total reflectance [-].
 
-    total : reflectance for light at normal incidence [-]
+    total_reflectance : reflectance for light at normal incidence [-]
     eta : index of refraction relative to air [-]
     from_photons : whether to invert tables of photon counts where they exist, instead of layered diffusion
     """
     from scipy.optimize import brentq
 
-    kind = kind_for_index(eta) if from_photons else None
+    kind = tabulated_kind_for_index(eta) if from_photons else None
     if kind is not None:
-        return float(tabulated_albedo(kind, total))
+        return float(tabulated_albedo(kind, total_reflectance))
 
     def excess(albedo: float) -> float:
-        return _reflectance_transform(_unit_medium(albedo, eta), float(hankel.ZERO_FREQUENCY[0])) - total
+        return (
+            _reflectance_transform(_unit_medium(albedo, eta), float(hankel.NEAR_ZERO_FREQUENCY[0]))
+            - total_reflectance
+        )
 
-    if excess(MIN_ALBEDO) >= 0.0:
-        return MIN_ALBEDO
-    return float(brentq(excess, MIN_ALBEDO, MAX_ALBEDO)) if excess(MAX_ALBEDO) > 0.0 else MAX_ALBEDO
+    if excess(MIN_EQUIVALENT_ALBEDO) >= 0.0:
+        return MIN_EQUIVALENT_ALBEDO
+    return (
+        float(brentq(excess, MIN_EQUIVALENT_ALBEDO, MAX_EQUIVALENT_ALBEDO))
+        if excess(MAX_EQUIVALENT_ALBEDO) > 0.0
+        else MAX_EQUIVALENT_ALBEDO
+    )
 
 
 def _unit_medium(albedo: float, eta: float) -> Medium:
@@ -120,7 +127,7 @@ def _half_frequency(transform: Callable[[float], float]) -> float:
     """Return the frequency at which a Hankel transform has fallen to half of its value at 0 [1/mm]."""
     from scipy.optimize import brentq
 
-    total = transform(float(hankel.ZERO_FREQUENCY[0]))
+    total = transform(float(hankel.NEAR_ZERO_FREQUENCY[0]))
     excess = lambda log: transform(float(np.exp(log))) - 0.5 * total  # noqa: E731
     return float(np.exp(brentq(excess, *_LOG_FREQUENCY_RANGE)))
 
@@ -136,4 +143,6 @@ def oblique_offset_mm(medium: Medium) -> float:
     Source: [WangJacques1995].
     """
     layer = medium.layers[0]
-    return float(np.mean(1.0 / (layer.sigma_s_prime + _ABSORPTION_WEIGHT * layer.sigma_a)) / medium.eta)
+    return float(
+        np.mean(1.0 / (layer.sigma_s_prime + _OFFSET_ABSORPTION_WEIGHT * layer.sigma_a)) / medium.eta
+    )

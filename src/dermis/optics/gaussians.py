@@ -17,7 +17,7 @@ MAX_VARIANCE_MM2 = 1e4
 MAX_WEIGHT = 100.0
 _MIN_VARIANCE_MM2 = 1e-12  # a nanometre squared, far below the wavelengths of light
 _MIN_ALBEDO = 1e-12  # smallest albedo of a channel by which single precision can divide
-_TABLE_ADVICE = "Correct the profile's table"
+_PROFILE_TABLE_ADVICE = "Correct the profile's table"
 
 
 @dataclass(frozen=True)
@@ -50,22 +50,27 @@ class GaussianSum:
         variance, weight = self.variance_mm2, self.weight
         if variance.ndim != 1 or weight.ndim != 2 or len(variance) != len(weight) or weight.size == 0:
             actual = f"got shapes {variance.shape} and {weight.shape}"
-            refuse(self.name, "k variances and k x c weights", actual, _TABLE_ADVICE)
+            refuse(self.name, "k variances and k x c weights", actual, _PROFILE_TABLE_ADVICE)
         if not (np.isfinite(variance).all() and np.isfinite(weight).all()):
-            refuse(self.name, "finite numbers", "got NaN or infinity", _TABLE_ADVICE)
+            refuse(self.name, "finite numbers", "got NaN or infinity", _PROFILE_TABLE_ADVICE)
         if len(variance) > MAX_GAUSSIANS or variance.max() > MAX_VARIANCE_MM2:
             limit = f"at most {MAX_GAUSSIANS} Gaussians of up to {MAX_VARIANCE_MM2:g} mm2"
-            refuse(self.name, limit, f"got {len(variance)} up to {variance.max():g}", _TABLE_ADVICE)
+            refuse(self.name, limit, f"got {len(variance)} up to {variance.max():g}", _PROFILE_TABLE_ADVICE)
         if (variance < _MIN_VARIANCE_MM2).any() or (np.diff(variance) <= 0).any():
             expected = f"variances from {_MIN_VARIANCE_MM2:g} mm2 that increase"
-            refuse(self.name, expected, f"they are {variance.tolist()}", _TABLE_ADVICE)
+            refuse(self.name, expected, f"they are {variance.tolist()}", _PROFILE_TABLE_ADVICE)
         if (weight < 0).any() or (weight.sum(axis=0) < _MIN_ALBEDO).any():
             refuse(
-                self.name, "weights of 0 or more, some above 0 in each channel", "they are not", _TABLE_ADVICE
+                self.name,
+                "weights of 0 or more, some above 0 in each channel",
+                "they are not",
+                _PROFILE_TABLE_ADVICE,
             )
         if weight.max() > MAX_WEIGHT:
             actual = f"got {weight.max():g}"
-            refuse(self.name, f"weights up to {MAX_WEIGHT:g}, fractions of light", actual, _TABLE_ADVICE)
+            refuse(
+                self.name, f"weights up to {MAX_WEIGHT:g}, fractions of light", actual, _PROFILE_TABLE_ADVICE
+            )
 
     @property
     def albedo(self) -> Floats:
@@ -91,10 +96,10 @@ class GaussianSum:
         s = np.asarray(frequency, dtype=np.float64)[..., None]
         return np.asarray(np.exp(-self.variance_mm2 * s**2 / 2) @ self.weight)
 
-    def inner_product(self, other: GaussianSum) -> Floats:
+    def inner_product(self, other_profile: GaussianSum) -> Floats:
         """Return the integral of r R(r) S(r) over r, where S is another sum of Gaussians, (c,) [1/mm2].
 
         Such products give the least-squares error between two profiles.
         """
-        gram = 1 / (4 * np.pi**2 * np.add.outer(self.variance_mm2, other.variance_mm2))
-        return np.asarray(np.einsum("ic,ij,jc->c", self.weight, gram, other.weight))
+        gram = 1 / (4 * np.pi**2 * np.add.outer(self.variance_mm2, other_profile.variance_mm2))
+        return np.asarray(np.einsum("ic,ij,jc->c", self.weight, gram, other_profile.weight))

@@ -24,12 +24,15 @@ has an index-matched surface that is lit uniformly from all directions.
 PHOTON_TABLE_SOURCES = ("Wang1995",)
 TABULATED_ALBEDO_RANGE = 0.02, 0.99999
 """Smallest and largest single-scattering albedo of the tables [-]."""
-_SCALAR_COLUMNS = ("kind", "albedo", "total")
+_HALF_SPACE_COLUMNS = ("kind", "albedo", "total")
 CountedModel = Literal["counted"]
 COUNTED_MODEL: CountedModel = "counted"
 """Name of the profile model that uses tabulated photon counts."""
-_MIN_LOG_STEP, _MAX_LOG_STEP = 0.05, 0.4  # step of log r for derivatives: larger where few photons leave
-_RELATIVE_LOG_STEP = 0.02  # step of log r, divided by the square root of mean free path / r
+_MIN_LOG_RADIUS_STEP, _MAX_LOG_RADIUS_STEP = (
+    0.05,
+    0.4,
+)  # step of log r for derivatives: larger where few photons leave
+_RELATIVE_LOG_RADIUS_STEP = 0.02  # step of log r, divided by the square root of mean free path / r
 
 
 class _PhotonTable(NamedTuple):
@@ -47,7 +50,7 @@ class _PhotonTable(NamedTuple):
     totals: Callable[[Floats], Floats]
 
 
-def kind_for_index(eta: float) -> HalfSpaceKind | None:
+def tabulated_kind_for_index(eta: float) -> HalfSpaceKind | None:
     """Return the kind of perpendicularly lit half-space that is tabulated for an index of refraction.
 
     The result is None if no table exists for the index.
@@ -55,7 +58,9 @@ def kind_for_index(eta: float) -> HalfSpaceKind | None:
     return "skin" if eta == SKIN_ETA else "matched" if eta == 1.0 else None
 
 
-def half_space(kind: HalfSpaceKind, albedo: ArrayLike, mean_free_path_mm: ArrayLike) -> CumulativeProfile:
+def half_space(
+    half_space_kind: HalfSpaceKind, albedo: ArrayLike, mean_free_path_mm: ArrayLike
+) -> CumulativeProfile:
     """Return the cumulative profile of a half-space in three channels from a photon-count table.
 
     albedo : (3,) single-scattering albedo, clamped to the range of the table [-]
@@ -63,22 +68,23 @@ def half_space(kind: HalfSpaceKind, albedo: ArrayLike, mean_free_path_mm: ArrayL
 
     Source: [Wang1995].
     """
-    table = _photon_table(kind)
+    table = _photon_table(half_space_kind)
     return CumulativeProfile.from_function(
-        fractions_within(kind, albedo, mean_free_path_mm), table.totals(_table_position(table, albedo))
+        fractions_within(half_space_kind, albedo, mean_free_path_mm),
+        table.totals(_table_position(table, albedo)),
     )
 
 
 def fractions_within(
-    kind: HalfSpaceKind, albedo: ArrayLike, mean_free_path_mm: ArrayLike
+    half_space_kind: HalfSpaceKind, albedo: ArrayLike, mean_free_path_mm: ArrayLike
 ) -> Callable[[Floats], Floats]:
     """Return a function from radii (n,) [mm] to the fraction of the emerging light within each, (n, 3) [-].
 
-    kind : surface and illumination of the half-space
+    half_space_kind : surface and illumination of the half-space
     albedo : (3,) single-scattering albedo, clamped to the range of the table [-]
     mean_free_path_mm : (3,) mean free path [mm]
     """
-    table = _photon_table(kind)
+    table = _photon_table(half_space_kind)
     fraction = table.fraction(_table_position(table, albedo))
     mean_free_path = np.asarray(mean_free_path_mm, np.float64)
 
@@ -92,14 +98,14 @@ def fractions_within(
     return within
 
 
-def tabulated_albedo(kind: HalfSpaceKind, total: ArrayLike) -> Floats:
+def tabulated_albedo(half_space_kind: HalfSpaceKind, total_reflectance: ArrayLike) -> Floats:
     """Return the single-scattering albedos of half-spaces with given total reflectances, from a table [-].
 
-    kind : surface and illumination of the half-spaces
+    half_space_kind : surface and illumination of the half-spaces
     """
-    table = _photon_table(kind)
+    table = _photon_table(half_space_kind)
     fine = np.linspace(table.root_absorption[0], table.root_absorption[-1], 2000)
-    root = np.interp(np.asarray(total, np.float64), table.totals(fine)[::-1], fine[::-1])
+    root = np.interp(np.asarray(total_reflectance, np.float64), table.totals(fine)[::-1], fine[::-1])
     return np.asarray(1.0 - root**2)
 
 
@@ -113,11 +119,11 @@ def _root_absorption(albedo: ArrayLike) -> Floats:
 
 
 @cache
-def _photon_table(kind: HalfSpaceKind) -> _PhotonTable:
+def _photon_table(half_space_kind: HalfSpaceKind) -> _PhotonTable:
     from scipy.interpolate import PchipInterpolator
 
-    rows = [row for row in read_rows("dermis.optics", "data/half_space") if row["kind"] == kind]
-    columns = [name for name in rows[0] if name not in _SCALAR_COLUMNS]
+    rows = [row for row in read_rows("dermis.optics", "data/half_space") if row["kind"] == half_space_kind]
+    columns = [name for name in rows[0] if name not in _HALF_SPACE_COLUMNS]
     scale = _root_absorption([float(row["albedo"]) for row in rows])
     total = np.array([float(row["total"]) for row in rows])
     fraction = np.array([[float(row[name]) for name in columns] for row in rows])
@@ -137,7 +143,7 @@ def has_photon_table(medium: Medium) -> bool:
     single = len(medium.layers) == 1 and medium.semi_infinite and medium.channels == 3
     low, high = TABULATED_ALBEDO_RANGE
     inside = (layer.alpha_prime >= low) & (layer.alpha_prime <= high)
-    return single and kind_for_index(medium.eta) is not None and bool(inside.all())
+    return single and tabulated_kind_for_index(medium.eta) is not None and bool(inside.all())
 
 
 def tabulated_cumulative(medium: Medium) -> CumulativeProfile | None:
@@ -145,7 +151,7 @@ def tabulated_cumulative(medium: Medium) -> CumulativeProfile | None:
 
     Scattering is replaced by isotropic scattering with the same reduced coefficients.
     """
-    kind, layer = kind_for_index(medium.eta), medium.layers[0]
+    kind, layer = tabulated_kind_for_index(medium.eta), medium.layers[0]
     if kind is None or not has_photon_table(medium):
         return None
     return half_space(kind, layer.alpha_prime, layer.mean_free_path_mm)
@@ -156,13 +162,21 @@ def tabulated_profile(medium: Medium) -> RadialProfile | None:
 
     Scattering is replaced by isotropic scattering with the same reduced coefficients.
     """
-    cumulative, kind, layer = tabulated_cumulative(medium), kind_for_index(medium.eta), medium.layers[0]
+    cumulative, kind, layer = (
+        tabulated_cumulative(medium),
+        tabulated_kind_for_index(medium.eta),
+        medium.layers[0],
+    )
     if cumulative is None or kind is None:
         return None
     mean_free_path, edges, radius = layer.mean_free_path_mm, ring_edges(), radius_grid()
     within = fractions_within(kind, layer.alpha_prime, mean_free_path)
     rings = np.diff(within(edges), axis=0) * cumulative.energy
-    step = np.clip(_RELATIVE_LOG_STEP * np.sqrt(mean_free_path.min() / radius), _MIN_LOG_STEP, _MAX_LOG_STEP)
+    step = np.clip(
+        _RELATIVE_LOG_RADIUS_STEP * np.sqrt(mean_free_path.min() / radius),
+        _MIN_LOG_RADIUS_STEP,
+        _MAX_LOG_RADIUS_STEP,
+    )
     rate = (within(radius * np.exp(step)) - within(radius * np.exp(-step))) / (2.0 * step)[:, None]
     return RadialProfile(
         name=medium.name,

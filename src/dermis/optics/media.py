@@ -27,8 +27,8 @@ _DJ3_NOTE = (
     "published sum of six Gaussians follows from neither reading: it is the preset gpu-gems-3"
 )
 _ETA_RANGE = 1.0, 2.5  # from an index-matched surface to more than diamond
-_MIN_SCATTERING = 1e-6  # that of clear water [1/mm]
-_MAX_COEFFICIENT = 1e6  # ten times the absorption of a metal [1/mm]
+_MIN_SCATTERING_PER_MM = 1e-6  # that of clear water [1/mm]
+_MAX_COEFFICIENT_PER_MM = 1e6  # ten times the absorption of a metal [1/mm]
 _MIN_THICKNESS_MM, _MAX_THICKNESS_MM = 1e-9, 1e4  # from less than an atom to more than a human body
 _COEFFICIENT_KEYS = ("absorption_per_mm", "scattering_per_mm")
 
@@ -117,9 +117,9 @@ class Medium:
         """Return the medium with another index of refraction."""
         return replace(self, eta=eta)
 
-    def channel(self, index: int) -> Medium:
+    def channel(self, channel_index: int) -> Medium:
         """Return the medium with only one of its channels or wavelengths."""
-        channel = slice(index, index + 1)
+        channel = slice(channel_index, channel_index + 1)
         layers = tuple(
             replace(layer, sigma_a=layer.sigma_a[channel], sigma_s_prime=layer.sigma_s_prime[channel])
             for layer in self.layers
@@ -132,9 +132,15 @@ def _check_layer(culprit: str, layer: Layer, is_last: bool) -> None:
     if a.ndim != 1 or a.shape != s.shape or len(a) == 0:
         actual = f"got shapes {a.shape} and {s.shape}"
         refuse(culprit, "one absorption and scattering coefficient per channel", actual, "Correct the lists")
-    if not ((a >= 0) & (a <= _MAX_COEFFICIENT) & (s >= _MIN_SCATTERING) & (s <= _MAX_COEFFICIENT)).all():
+    if not (
+        (a >= 0)
+        & (a <= _MAX_COEFFICIENT_PER_MM)
+        & (s >= _MIN_SCATTERING_PER_MM)
+        & (s <= _MAX_COEFFICIENT_PER_MM)
+    ).all():
         actual = f"got absorption {a.tolist()} and scattering {s.tolist()}"
-        expected = f"absorption from 0 and scattering from {_MIN_SCATTERING:g} to {_MAX_COEFFICIENT:g} /mm"
+        scattering_range = f"{_MIN_SCATTERING_PER_MM:g} to {_MAX_COEFFICIENT_PER_MM:g} /mm"
+        expected = f"absorption from 0 and scattering from {scattering_range}"
         refuse(culprit, expected, actual, "Correct them")
     semi_infinite = np.isinf(layer.thickness_mm) and layer.thickness_mm > 0 and is_last
     if not semi_infinite and not _MIN_THICKNESS_MM <= layer.thickness_mm <= _MAX_THICKNESS_MM:
@@ -144,7 +150,7 @@ def _check_layer(culprit: str, layer: Layer, is_last: bool) -> None:
 
 
 @cache
-def media() -> Mapping[str, Medium]:
+def published_media() -> Mapping[str, Medium]:
     """Return the published media by name, such as "skin1" or "dj3", with the index of refraction of skin."""
     named: dict[str, Medium] = {}
     for table, sources in _TABLE_SOURCES.items():
@@ -174,44 +180,51 @@ def medium_from_toml(path: Path, document: Mapping[str, Any]) -> Medium:
     return Medium(str(document.get("name", path.stem)), layers, eta)
 
 
-def _layer_from_table(culprit: str, table: Mapping[str, Any]) -> Layer:
-    check_reduced(culprit, table)
-    unknown = sorted(set(table) - {"name", "thickness_mm", *_COEFFICIENT_KEYS})
+def _layer_from_table(culprit: str, layer_entries: Mapping[str, Any]) -> Layer:
+    check_reduced(culprit, layer_entries)
+    unknown = sorted(set(layer_entries) - {"name", "thickness_mm", *_COEFFICIENT_KEYS})
     if unknown:
         known = ", ".join(("name", "thickness_mm", *_COEFFICIENT_KEYS))
         refuse(culprit, known, f"got {', '.join(unknown)}", "Take it out or correct its name")
-    absorption, scattering = (_rgb_coefficients(culprit, table, key) for key in _COEFFICIENT_KEYS)
-    thickness = table.get("thickness_mm", np.inf)
+    absorption, scattering = (_rgb_coefficients(culprit, layer_entries, key) for key in _COEFFICIENT_KEYS)
+    thickness = layer_entries.get("thickness_mm", np.inf)
     if thickness != np.inf:
         thickness = checked_number(
             f"{culprit}: thickness_mm", thickness, _MIN_THICKNESS_MM, _MAX_THICKNESS_MM
         )
-    return Layer(absorption, scattering, thickness, str(table.get("name", "layer")))
+    return Layer(absorption, scattering, thickness, str(layer_entries.get("name", "layer")))
 
 
-def _rgb_coefficients(culprit: str, table: Mapping[str, Any], key: str) -> Floats:
+def _rgb_coefficients(culprit: str, layer_entries: Mapping[str, Any], coefficient_key: str) -> Floats:
     unit = "1/mm in red, green and blue"
-    return checked_array(f"{culprit}: {key}", table.get(key), (3,), 0.0, _MAX_COEFFICIENT, unit)
+    return checked_array(
+        f"{culprit}: {coefficient_key}",
+        layer_entries.get(coefficient_key),
+        (3,),
+        0.0,
+        _MAX_COEFFICIENT_PER_MM,
+        unit,
+    )
 
 
-def _read_media(table: str) -> dict[str, list[Layer]]:
+def _read_media(table_name: str) -> dict[str, list[Layer]]:
     found: dict[str, list[Layer]] = {}
-    for row in read_rows("dermis.optics", f"data/media/{table}"):
+    for row in read_rows("dermis.optics", f"data/media/{table_name}"):
         medium, layer, thickness, *coefficients = row.values()
         sigma = np.array(coefficients, dtype=np.float64)
         found.setdefault(medium, []).append(Layer(sigma[:3], sigma[3:], float(thickness), layer))
     return found
 
 
-def albedo_from_colour(colour: ArrayLike, g: float = 0.0) -> Floats:
+def albedo_from_colour(diffuse_reflectance: ArrayLike, g: float = 0.0) -> Floats:
     """Return the single-scattering albedo of the half-space with a given diffuse reflectance [-].
 
-    colour : diffuse reflectance of any shape, 0 to 1 [-]
+    diffuse_reflectance : diffuse reflectance of any shape, 0 to 1 [-]
     g : mean cosine of the scattering angle [-]
 
     Source: van de Hulst's formula inverted, [dEon2016] eq. 53.7.
     """
-    C = np.clip(np.asarray(colour, np.float64), 0.0, 1.0)
+    C = np.clip(np.asarray(diffuse_reflectance, np.float64), 0.0, 1.0)
     s = 4.09712 + 4.20863 * C - np.sqrt(9.59217 + 41.6808 * C + 17.7126 * C**2)
     s = np.clip(s, 0.0, 1.0)
     return np.asarray((1.0 - s**2) / (1.0 - g * s**2))

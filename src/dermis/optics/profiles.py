@@ -29,9 +29,9 @@ PUBLISHED_PRESET = "gpu-gems-3"
 GAUSSIAN_TERMS = 6
 PHOTON_MODELS = "counted", "montecarlo"
 """Models whose profiles come from photon counts."""
-_CSV_HEADER = ["variance_mm2", "red", "green", "blue"]
-_CSV_FORMAT = "a CSV file with the columns " + ",".join(_CSV_HEADER)
-_CACHED_FILES = 16
+_PROFILE_CSV_HEADER = ["variance_mm2", "red", "green", "blue"]
+_PROFILE_CSV_FORMAT = "a CSV file with the columns " + ",".join(_PROFILE_CSV_HEADER)
+_MAX_CACHED_FILES = 16
 _PROFILE_ADVICE = "Correct the profile's table"
 
 
@@ -106,21 +106,23 @@ def find_gaussians(name: str | Path) -> GaussianSum | None:
         refuse_mcml(path)
     state = _file_state(path)
     if not state and path.suffix.lower() != ".toml":
-        expected = f"a preset ({', '.join(preset_names())}), a .toml file of a tissue, or {_CSV_FORMAT}"
+        expected = (
+            f"a preset ({', '.join(preset_names())}), a .toml file of a tissue, or {_PROFILE_CSV_FORMAT}"
+        )
         refuse(f"profile {name}", expected, "there is no such file", "Check the name")
     return _read_gaussians(path, state)
 
 
-@lru_cache(_CACHED_FILES)
-def _read_gaussians(path: Path, state: tuple[int, ...]) -> GaussianSum | None:
-    """Return the Gaussians of a file, or None for tissue; results are cached, as each frame requests them.
+@lru_cache(_MAX_CACHED_FILES)
+def _read_gaussians(path: Path, file_state: tuple[int, ...]) -> GaussianSum | None:
+    """Return the Gaussians of a file, or None for tissue; the result is cached for later frames.
 
-    state : state of the file as returned by `_file_state`, so that a changed file is read again
+    file_state : state of the file as returned by `_file_state`, so that a changed file is read again
     """
     if path.suffix.lower() == ".toml":
         document = read_toml(path)
         return _from_toml(path, document) if "variances_mm2" in document else None
-    return _parse_csv(str(path), read_text(path, _CSV_FORMAT))
+    return _parse_csv(str(path), read_text(path, _PROFILE_CSV_FORMAT))
 
 
 def _file_state(path: Path) -> tuple[int, ...]:
@@ -164,31 +166,39 @@ def _fit_preset(name: str) -> GaussianSum:
     return fit_profile(load_tissue(name), name)
 
 
-def fit_profile(tissue: Tissue, name: str | Path, initial: GaussianSum | None = None) -> GaussianSum:
+def fit_profile(
+    tissue: Tissue, profile_name: str | Path, similar_fit: GaussianSum | None = None
+) -> GaussianSum:
     """Fit six Gaussians to the diffusion profile of a tissue, computed by the tissue's default model.
 
     Fits to photon counts keep the total reflectance: counted profiles are steeper than profiles of diffusion
     models, and an unconstrained fit would lose up to 2 % of the light.
 
-    initial : fit of a similar tissue, from which the new fit starts; this is several times faster
+    similar_fit : fit of a similar tissue, from which the new fit starts; this is several times faster
 
     Raises DermisError when the fit is not a valid profile.
     """
-    return _fit_rings(tissue.rings(), tissue.default_model, f"profile {name}", initial)
+    return _fit_rings(tissue.rings(), tissue.default_model, f"profile {profile_name}", similar_fit)
 
 
-def fit_radial(radial: RadialProfile, name: str, initial: GaussianSum | None = None) -> GaussianSum:
+def fit_radial(
+    radial: RadialProfile, profile_name: str, similar_fit: GaussianSum | None = None
+) -> GaussianSum:
     """Fit six Gaussians to a radial profile; fits to photon counts keep the total reflectance.
 
-    name : name of the fitted profile
-    initial : fit of a similar profile, from which the new fit starts; this is several times faster
+    profile_name : name of the fitted profile
+    similar_fit : fit of a similar profile, from which the new fit starts; this is several times faster
     """
-    return _fit_rings(radial.rings(), radial.model, name, initial)
+    return _fit_rings(radial.rings(), radial.model, profile_name, similar_fit)
 
 
-def _fit_rings(rings: RingTarget, model: str, name: str, initial: GaussianSum | None) -> GaussianSum:
+def _fit_rings(
+    rings: RingTarget, model: str, profile_name: str, similar_fit: GaussianSum | None
+) -> GaussianSum:
     from_photons = model in PHOTON_MODELS
-    fit = fit_gaussians(rings, GAUSSIAN_TERMS, keep_energy=from_photons, initial=initial, name=name)
+    fit = fit_gaussians(
+        rings, GAUSSIAN_TERMS, keep_energy=from_photons, similar_fit=similar_fit, profile_name=profile_name
+    )
     return replace(fit.profile, from_photons=from_photons)
 
 
@@ -206,23 +216,26 @@ def _from_toml(path: Path, document: Mapping[str, Any]) -> GaussianSum:
     return replace(_rgb_sum(path, variances, weights), from_photons=document.get("model") in PHOTON_MODELS)
 
 
-def _parse_csv(name: str, text: str) -> GaussianSum:
-    lines = [line.strip() for line in text.splitlines() if line.strip() and not line.startswith("#")]
-    if not lines or [cell.strip() for cell in lines[0].split(",")] != _CSV_HEADER:
+def _parse_csv(profile_name: str, csv_text: str) -> GaussianSum:
+    lines = [line.strip() for line in csv_text.splitlines() if line.strip() and not line.startswith("#")]
+    if not lines or [cell.strip() for cell in lines[0].split(",")] != _PROFILE_CSV_HEADER:
         actual = f"its first line is {lines[0] if lines else 'missing'!r}"
-        refuse(f"profile {name}", _CSV_FORMAT, actual, _PROFILE_ADVICE)
+        refuse(f"profile {profile_name}", _PROFILE_CSV_FORMAT, actual, _PROFILE_ADVICE)
     try:
         table = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]], dtype=np.float64)
     except ValueError:
         table = np.empty((0, 4))
     if table.ndim != 2 or table.shape[1:] != (4,) or len(table) == 0:
-        refuse(f"profile {name}", "rows of four numbers", "it has other rows", _PROFILE_ADVICE)
-    return _rgb_sum(name, table[:, 0], table[:, 1:])
+        refuse(f"profile {profile_name}", "rows of four numbers", "it has other rows", _PROFILE_ADVICE)
+    return _rgb_sum(profile_name, table[:, 0], table[:, 1:])
 
 
-def _rgb_sum(name: object, variance_mm2: Floats, weight: Floats) -> GaussianSum:
+def _rgb_sum(profile_name: object, variance_mm2: Floats, weight: Floats) -> GaussianSum:
     if weight.ndim != 2 or weight.shape[1:] != (3,):
         refuse(
-            f"profile {name}", "weights in red, green and blue", f"got shape {weight.shape}", _PROFILE_ADVICE
+            f"profile {profile_name}",
+            "weights in red, green and blue",
+            f"got shape {weight.shape}",
+            _PROFILE_ADVICE,
         )
-    return GaussianSum(f"profile {name}", variance_mm2, weight)
+    return GaussianSum(f"profile {profile_name}", variance_mm2, weight)

@@ -61,17 +61,17 @@ class RadialProfile:
         return RingTarget(self.edges_mm, self.ring_energy, self.total)
 
 
-def ring_edges(rings: int = 120) -> Floats:
-    """Return the radii that bound a disc and the log-spaced rings around it, (rings + 1,) [mm]."""
-    return np.concatenate([[0.0], np.geomspace(1e-3, MAX_RADIUS_MM, rings)])
+def ring_edges(ring_count: int = 120) -> Floats:
+    """Return the radii that bound a disc and the log-spaced rings around it, (ring_count + 1,) [mm]."""
+    return np.concatenate([[0.0], np.geomspace(1e-3, MAX_RADIUS_MM, ring_count)])
 
 
-def radius_grid(count: int = 600) -> Floats:
-    """Return the log-spaced radii at which profiles are sampled, (count,) [mm]."""
-    return np.geomspace(MIN_RADIUS_MM, MAX_RADIUS_MM, count)
+def radius_grid(radius_count: int = 600) -> Floats:
+    """Return the log-spaced radii at which profiles are sampled, (radius_count,) [mm]."""
+    return np.geomspace(MIN_RADIUS_MM, MAX_RADIUS_MM, radius_count)
 
 
-def resample(radius_mm: Floats, grid_mm: Floats, values: Floats) -> Floats:
+def resample_profile(radius_mm: Floats, grid_mm: Floats, values: Floats) -> Floats:
     """Resample values (m, c) from a log-spaced grid to n radii by a cubic spline in log r, (n, c)."""
     from scipy.interpolate import CubicSpline
 
@@ -90,17 +90,22 @@ def enclosed_energy(radius_mm: Floats, grid_mm: Floats, reflectance: Floats) -> 
     rate = 2.0 * np.pi * grid_mm[:, None] ** 2 * reflectance  # per unit of log r
     inner = 0.5 * rate[:1]  # R is nearly constant within the first radius of the grid
     within = inner + cumulative_simpson(rate, x=np.log(grid_mm), axis=0, initial=0.0)
-    energy = resample(np.maximum(radius_mm, grid_mm[0]), grid_mm, within)
+    energy = resample_profile(np.maximum(radius_mm, grid_mm[0]), grid_mm, within)
     return np.where(radius_mm[:, None] > 0.0, energy, 0.0)
 
 
-def missing_light_warnings(total: Floats, ring_energy: Floats) -> list[str]:
+def missing_light_warnings(total_reflectance: Floats, ring_energy: Floats) -> list[str]:
     """Return a warning if at least 1 % of the total reflectance emerges outside the rings.
 
-    total : (c,) total reflectance [-]
+    total_reflectance : (c,) total reflectance [-]
     ring_energy : (k, c) light through each ring [-]
     """
-    missing = float(((total - ring_energy.sum(axis=0)) / np.maximum(np.abs(total), SMALLEST_FLOAT)).max())
+    missing = float(
+        (
+            (total_reflectance - ring_energy.sum(axis=0))
+            / np.maximum(np.abs(total_reflectance), SMALLEST_FLOAT)
+        ).max()
+    )
     if missing < NOTABLE_MISSING_FRACTION:
         return []
     return [f"{missing:.0%} of the light leaves beyond the widest radius and is in the total only"]

@@ -12,21 +12,21 @@ from dermis.base.reading import open_regular_file
 
 MCML_SUFFIXES = (".mci", ".mco")
 _ANISOTROPY_KEYS = ("g", "anisotropy")
-_HEAD_BYTES = 1 << 16  # size of the beginning of an MCML file, which contains its layers
+_MCML_HEADER_BYTES = 1 << 16  # size of the beginning of an MCML file, which contains its layers
 _MAX_LISTED_LAYERS = 6  # in a message
-_MAX_THICKNESS_MM = 1e4  # thicker layers of MCML files stand for semi-infinite ones
+_MAX_LISTED_THICKNESS_MM = 1e4  # thicker layers of MCML files stand for semi-infinite ones
 
 
-def check_reduced(culprit: str, table: Mapping[str, object]) -> None:
+def check_reduced(culprit: str, layer_entries: Mapping[str, object]) -> None:
     """Raise an error for a layer that states an anisotropy: its scattering is probably not reduced.
 
     culprit : file or layer, for the message
-    table : entries of the layer, with "scattering_per_mm"
+    layer_entries : entries of the layer, with "scattering_per_mm"
     """
-    key = next((key for key in _ANISOTROPY_KEYS if key in table), None)
+    key = next((key for key in _ANISOTROPY_KEYS if key in layer_entries), None)
     if key is None:
         return
-    scattering, g = table.get("scattering_per_mm"), table[key]
+    scattering, g = layer_entries.get("scattering_per_mm"), layer_entries[key]
     reduced = "mu_s (1 - g)"
     if isinstance(scattering, list | tuple):
         anisotropies = g if isinstance(g, list | tuple) else [g] * len(scattering)
@@ -45,7 +45,7 @@ def refuse_mcml(path: Path) -> NoReturn:
     """
     expected = "a .toml file with [[layers]] in 1/mm for red, green and blue"
     with open_regular_file(path, expected) as file:
-        lines = file.read(_HEAD_BYTES).decode("latin-1").splitlines()
+        lines = file.read(_MCML_HEADER_BYTES).decode("latin-1").splitlines()
     rows = [_parse_numbers(line.partition("#")[0].split()) for line in lines]
     layers = list(takewhile(lambda row: len(row) == 5, dropwhile(lambda row: len(row) != 5, rows)))
     values = [
@@ -60,7 +60,7 @@ def _layer_entries(eta: float, mu_a: float, mu_s: float, g: float, thickness_cm:
     """Convert a layer of MCML to the keys and values of the TOML files of this package."""
     thickness = (
         f"thickness_mm {10 * thickness_cm:.4g}"
-        if 10 * thickness_cm <= _MAX_THICKNESS_MM
+        if 10 * thickness_cm <= _MAX_LISTED_THICKNESS_MM
         else "no thickness_mm"
     )
     coefficients = (

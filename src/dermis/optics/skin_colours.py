@@ -8,15 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.optics.diffusion.boundary import normal_reflectance
-from dermis.optics.diffusion.hankel import ZERO_FREQUENCY
+from dermis.optics.diffusion.hankel import NEAR_ZERO_FREQUENCY
 from dermis.optics.diffusion.models import hankel_transform
 from dermis.optics.media import SKIN_ETA, Floats, Layer, Medium
 from dermis.optics.pigments.parameters import SkinParameters
 from dermis.optics.pigments.skin import dj2006_layers
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 
-_TABLE_NODES = 65
-_ROWS_PER_BATCH = 5  # rows of the table that are computed together and fit into the processor's cache
+_COLOUR_TABLE_NODES = 65
+_TABLE_ROWS_PER_BATCH = 5  # rows of the table that are computed together and fit into the processor's cache
 _COEFFICIENT_FIELDS = ("sigma_a", "sigma_s_prime")
 
 
@@ -47,44 +47,44 @@ class ColourTable:
         return np.asarray(low + u * (high - low))
 
 
-def _cell_and_offset(fraction: Floats, nodes: int) -> tuple[NDArray[np.int64], Floats]:
+def _cell_and_offset(pigment_fraction: Floats, node_count: int) -> tuple[NDArray[np.int64], Floats]:
     """Return the table cell of each fraction (k,), and the position within the cell from 0 to 1, (k, 1)."""
-    position = np.sqrt(np.clip(fraction, 0.0, 1.0)) * (nodes - 1)
-    cell = np.minimum(position.astype(np.int64), nodes - 2)
+    position = np.sqrt(np.clip(pigment_fraction, 0.0, 1.0)) * (node_count - 1)
+    cell = np.minimum(position.astype(np.int64), node_count - 2)
     return cell, (position - cell)[:, None]
 
 
-def colour_table(parameters: SkinParameters, nodes: int = _TABLE_NODES) -> ColourTable:
+def colour_table(parameters: SkinParameters, node_count: int = _COLOUR_TABLE_NODES) -> ColourTable:
     """Compute the diffuse reflectance of skins over melanin and blood by layered diffusion.
 
     parameters : parameters of the skins; melanin and blood are ignored
-    nodes : number of fractions along each axis of the table
+    node_count : number of fractions along each axis of the table
     """
-    colours = spectral_table(parameters, nodes) @ rgb_weights(WAVELENGTHS_NM).T
+    colours = spectral_table(parameters, node_count) @ rgb_weights(WAVELENGTHS_NM).T
     return ColourTable(np.maximum(colours, 0.0))
 
 
-def spectral_table(parameters: SkinParameters, nodes: int = _TABLE_NODES) -> Floats:
+def spectral_table(parameters: SkinParameters, node_count: int = _COLOUR_TABLE_NODES) -> Floats:
     """Return the diffuse reflectance of skins over melanin and blood at `WAVELENGTHS_NM`, (n, n, 31) [-].
 
-    parameters, nodes : as in `colour_table`; the fractions along the axes are the same
+    parameters, node_count : as in `colour_table`; the fractions along the axes are the same
     """
-    epidermis, dermis = dj2006_layers(parameters, np.linspace(0.0, 1.0, nodes) ** 2)
-    blood = np.arange(nodes)
+    epidermis, dermis = dj2006_layers(parameters, np.linspace(0.0, 1.0, node_count) ** 2)
+    blood = np.arange(node_count)
     spectra = []
-    for melanin in np.array_split(np.arange(nodes), -(-nodes // _ROWS_PER_BATCH)):
-        rows, columns = np.repeat(melanin, nodes), np.tile(blood, len(melanin))
+    for melanin in np.array_split(np.arange(node_count), -(-node_count // _TABLE_ROWS_PER_BATCH)):
+        rows, columns = np.repeat(melanin, node_count), np.tile(blood, len(melanin))
         medium = Medium("skins", (_select_rows(epidermis, rows), _select_rows(dermis, columns)), SKIN_ETA)
-        total = hankel_transform(medium, "layered", "layer", ZERO_FREQUENCY)[0]
+        total = hankel_transform(medium, "layered", "layer", NEAR_ZERO_FREQUENCY)[0]
         spectra.append(total.reshape(-1, len(WAVELENGTHS_NM)))
     entering = 1.0 - normal_reflectance(SKIN_ETA)
-    return np.asarray(entering * np.concatenate(spectra)).reshape(nodes, nodes, len(WAVELENGTHS_NM))
+    return np.asarray(entering * np.concatenate(spectra)).reshape(node_count, node_count, len(WAVELENGTHS_NM))
 
 
-def _select_rows(layer: Layer, rows: NDArray[np.int64]) -> Layer:
+def _select_rows(layer: Layer, row_indices: NDArray[np.int64]) -> Layer:
     """Return one layer whose channels are the concatenated coefficients of selected rows of stacked layers.
 
     layer : stacked layers, with coefficients (n, c)
-    rows : indices of the rows, which may repeat
+    row_indices : indices of the rows, which may repeat
     """
-    return replace(layer, **{name: getattr(layer, name)[rows].ravel() for name in _COEFFICIENT_FIELDS})
+    return replace(layer, **{name: getattr(layer, name)[row_indices].ravel() for name in _COEFFICIENT_FIELDS})

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dermis.optics.angular_response import (
-    CACHE_SIZE,
+    CACHED_COLUMN_COUNT,
     DIRECTION_ROWS,
     AngularResponse,
     albedo_for_reflectance,
@@ -29,7 +29,7 @@ DIRECTION_NODES = 16
 DEEP_OPTICAL_DEPTH = 1e4
 """Thickness from which a slab is treated as a half-space [mean free paths]."""
 _MIN_OPTICAL_DEPTH = 1e-6  # optical depth of a slab in which light scatters at most once
-_EXTRAPOLATION_POINTS = 3  # number of cosines from which values beyond the last cosine are extrapolated
+_EXTRAPOLATION_POINT_COUNT = 3  # number of cosines from which values beyond the last cosine are extrapolated
 _MIN_REFLECTANCE = 1e-12
 
 
@@ -56,21 +56,21 @@ class PhaseMatrices:
     forward: Floats
 
 
-def phase_matrices(albedo: float, g: float, cosine: Floats, terms: int) -> PhaseMatrices:
+def phase_matrices(albedo: float, g: float, cosine: Floats, polynomial_count: int) -> PhaseMatrices:
     """Return the Henyey-Greenstein phase function between discrete directions, from Legendre polynomials.
 
     albedo : reduced albedo [-]
     g : mean cosine of the scattering angle, at least 0 and less than 1 [-]
     cosine : (m,) cosines of the directions from the normal
-    terms : number of polynomials; the rest of the series is treated as unscattered light
+    polynomial_count : number of polynomials; the rest of the series is treated as unscattered light
 
     Sources: [HenyeyGreenstein1941]; [Wiscombe1977] for the truncated forward peak.
     """
     unscaled = 1.0 + albedo * g / (1.0 - g)
-    single, peak = albedo / ((1.0 - g) * unscaled), g**terms
-    order = np.arange(terms)
+    single, peak = albedo / ((1.0 - g) * unscaled), g**polynomial_count
+    order = np.arange(polynomial_count)
     moment = (2.0 * order + 1.0) * (g**order - peak) / (1.0 - peak)
-    P = np.polynomial.legendre.legvander(cosine, terms - 1)
+    P = np.polynomial.legendre.legvander(cosine, polynomial_count - 1)
     remaining = 1.0 - peak * single
     return PhaseMatrices(
         albedo=(1.0 - peak) * single / remaining,
@@ -98,7 +98,11 @@ class Slabs:
 
 
 def solve_slabs(
-    albedo: float, optical_depth: ArrayLike, eta: float, nodes: int = DIRECTION_NODES, g: float = 0.0
+    albedo: float,
+    optical_depth: ArrayLike,
+    eta: float,
+    direction_nodes: int = DIRECTION_NODES,
+    g: float = 0.0,
 ) -> Slabs:
     """Compute reflection and transmission of slabs by adding and doubling.
 
@@ -107,14 +111,14 @@ def solve_slabs(
     albedo : single-scattering albedo; the reduced albedo if scattering is anisotropic [-]
     optical_depth : (n,) thickness in (reduced) mean free paths, above 0 [-]
     eta : index of refraction relative to the air on both sides, at least 1 [-]
-    nodes : number of directions that leave the slab, and of directions that are totally reflected
+    direction_nodes : number of directions that leave the slab, and of directions that are totally reflected
     g : mean cosine of the scattering angle, at least 0 [-]
 
     Source: [Chandrasekhar1960] section 50 for the addition of layers.
     """
     tau = np.atleast_1d(np.asarray(optical_depth, np.float64))
-    transport = _Transport.create(albedo, eta, nodes, g)
-    doublings = transport.doublings(float(tau.max()))
+    transport = _Transport.create(albedo, eta, direction_nodes, g)
+    doublings = transport.doubling_count(float(tau.max()))
     *_, (R, T, unscattered) = _doubling_steps(transport, tau / 2.0**doublings, doublings)
     return _slabs_in_air(transport, R, T, unscattered)
 
@@ -122,27 +126,29 @@ def solve_slabs(
 def solve_doubled_slabs(
     albedo: float,
     smallest_depth: ArrayLike,
-    doublings: int,
+    doubling_count: int,
     eta: float,
-    nodes: int = DIRECTION_NODES,
+    direction_nodes: int = DIRECTION_NODES,
     g: float = 0.0,
 ) -> Slabs:
     """Solve slabs and all their successive doublings, in the time that the thickest slabs alone would take.
 
-    albedo, eta, nodes, g : arguments of `solve_slabs`
+    albedo, eta, direction_nodes, g : arguments of `solve_slabs`
     smallest_depth : (n,) optical depths of similar size [-]
-    doublings : number d of doublings; the result has n (d + 1) slabs, ordered by the number of doublings,
-        then by `smallest_depth`
+    doubling_count : number d of doublings; the result has n (d + 1) slabs, ordered by the number of
+        doublings, then by `smallest_depth`
     """
-    transport = _Transport.create(albedo, eta, nodes, g)
-    initial_doublings = transport.doublings(float(np.max(smallest_depth)))
+    transport = _Transport.create(albedo, eta, direction_nodes, g)
+    initial_doublings = transport.doubling_count(float(np.max(smallest_depth)))
     tau = np.asarray(smallest_depth, np.float64) / 2.0**initial_doublings
-    steps = list(_doubling_steps(transport, tau, initial_doublings + doublings))[initial_doublings:]
+    steps = list(_doubling_steps(transport, tau, initial_doublings + doubling_count))[initial_doublings:]
     R, T, unscattered = (np.concatenate(part) for part in zip(*steps, strict=True))
     return _slabs_in_air(transport, R, T, unscattered)
 
 
-def half_space_radiance(albedo: float, eta: float, nodes: int, g: float) -> tuple[Floats, Floats, Floats]:
+def half_space_radiance(
+    albedo: float, eta: float, direction_nodes: int, g: float
+) -> tuple[Floats, Floats, Floats]:
     """Return discrete directions in a half-space, their shares of uniform light, and the emerging radiance.
 
     Returns cosines (m,) of the directions below the surface; the fraction (m,) of the light entering from a
@@ -150,8 +156,8 @@ def half_space_radiance(albedo: float, eta: float, nodes: int, g: float) -> tupl
     The radiance is scaled so that the mean over exit directions, weighted by the fractions, is the
     reflectance.
     """
-    transport = _Transport.create(albedo, eta, nodes, g)
-    doublings = transport.doublings(DEEP_OPTICAL_DEPTH)
+    transport = _Transport.create(albedo, eta, direction_nodes, g)
+    doublings = transport.doubling_count(DEEP_OPTICAL_DEPTH)
     tau = np.array([DEEP_OPTICAL_DEPTH / 2.0**doublings])
     *_, (R, T, unscattered) = _doubling_steps(transport, tau, doublings)
     reflected, _ = _add_faces(R * transport.flux, T * transport.flux, unscattered, transport.internal, R, T)
@@ -183,7 +189,7 @@ class _Transport:
         internal, escapes = internal_reflectance(mu, eta), mu > critical_cosine(eta)
         return cls(mu, 2.0 * weight * mu, internal, escapes, phase_matrices(albedo, g, mu, nodes))
 
-    def doublings(self, depth: float) -> int:
+    def doubling_count(self, depth: float) -> int:
         """Return how often a slab thin enough for single scattering must be doubled to reach a given depth.
 
         depth : thickness in reduced mean free paths [-]
@@ -221,20 +227,20 @@ def _unscattered_exit(unscattered: Floats, internal: Floats) -> tuple[Floats, Fl
     return down * unscattered * internal, down
 
 
-def _direction_quadrature(eta: float, nodes: int) -> tuple[Floats, Floats]:
+def _direction_quadrature(eta: float, direction_nodes: int) -> tuple[Floats, Floats]:
     """Return nodes and weights over cosines in a medium: directions that escape, then all other directions.
 
     A direction escapes if it is not totally reflected at the face.
     """
     critical = critical_cosine(eta)
     spans = [(critical, 1.0), (0.0, critical)] if critical > 0.0 else [(0.0, 1.0)]
-    parts = [gauss_legendre(low, high, nodes) for low, high in spans]
+    parts = [gauss_legendre(low, high, direction_nodes) for low, high in spans]
     mu, weight = (np.concatenate(both) for both in zip(*parts, strict=True))
     return mu, weight
 
 
 def _doubling_steps(
-    transport: _Transport, tau: Floats, doublings: int
+    transport: _Transport, tau: Floats, doubling_count: int
 ) -> Iterator[tuple[Floats, Floats, Floats]]:
     """Yield reflection, transmission and unscattered light of thin slabs, and again after each doubling.
 
@@ -250,7 +256,7 @@ def _doubling_steps(
     T = 0.25 * albedo * t / (a * b) * np.exp(-0.5 * t * (1.0 / a + 1.0 / b)) * transport.phase.forward
     unscattered = np.exp(-t[..., 0] / mu)
     yield R, T, unscattered
-    for _ in range(doublings):
+    for _ in range(doubling_count):
         up, down = R * flux, T * flux + unscattered[:, :, None] * np.eye(len(mu))
         entering = R * unscattered[:, None, :]
         between = np.linalg.solve(np.eye(len(mu)) - up @ up, T + up @ entering)
@@ -286,13 +292,13 @@ def _add_faces(
     return solved[:, :count], solved[:, count:]
 
 
-def anisotropic_response(total: ArrayLike, eta: float, g: float) -> AngularResponse:
+def anisotropic_response(total_reflectance: ArrayLike, eta: float, g: float) -> AngularResponse:
     """Return the angular response of half-spaces with anisotropic scattering.
 
     The reduced absorption and scattering coefficients equal those of isotropically scattering half-spaces
-    with the reflectances `total`.
+    with the reflectances `total_reflectance`.
 
-    total : (c,) reflectance of the isotropic half-spaces for light at normal incidence [-]
+    total_reflectance : (c,) reflectance of the isotropic half-spaces for light at normal incidence [-]
     eta : index of refraction relative to air, at least 1 [-]
     g : mean cosine of the scattering angle, at least 0 [-]
 
@@ -301,27 +307,30 @@ def anisotropic_response(total: ArrayLike, eta: float, g: float) -> AngularRespo
     two coefficients is added to the single-scattering factor of `angular_response`, which is for isotropic
     scattering.
     """
-    isotropic = angular_response(total, eta)
+    isotropic = angular_response(total_reflectance, eta)
     if g == 0.0:
         return isotropic
     columns, isotropic_columns = (
-        interpolate_columns(partial(_response_column, eta, mean_cosine), total) for mean_cosine in (g, 0.0)
+        interpolate_columns(partial(_response_column, eta, mean_cosine), total_reflectance)
+        for mean_cosine in (g, 0.0)
     )
     table, (diffuse, single_scattering) = columns[:DIRECTION_ROWS], columns[DIRECTION_ROWS:]
     single_scattering = isotropic.single_scattering + single_scattering - isotropic_columns[-1]
     return AngularResponse(eta, table, diffuse, single_scattering, isotropic.mean_kernel)
 
 
-@lru_cache(maxsize=CACHE_SIZE)
-def _response_column(eta: float, g: float, total: float) -> Floats:
+@lru_cache(maxsize=CACHED_COLUMN_COUNT)
+def _response_column(eta: float, g: float, total_reflectance: float) -> Floats:
     """Return the fields of `AngularResponse` for one channel as a column of a table, (DIRECTION_ROWS + 2,).
 
     The first DIRECTION_ROWS elements are `relative_reflectance`, the last two are
     `relative_diffuse_reflectance` and `single_scattering`.
 
-    total : total diffuse reflectance of the half-space [-]
+    total_reflectance : total diffuse reflectance of the half-space [-]
     """
-    a, fraction, radiance = half_space_radiance(albedo_for_reflectance(total, eta), eta, DIRECTION_NODES, g)
+    a, fraction, radiance = half_space_radiance(
+        albedo_for_reflectance(total_reflectance, eta), eta, DIRECTION_NODES, g
+    )
     reflectance = fraction @ radiance
     normal = float(_interpolate_over_cosines(a, reflectance, np.ones(1))[0])
     if normal <= _MIN_REFLECTANCE:
@@ -337,18 +346,18 @@ def _response_column(eta: float, g: float, total: float) -> Floats:
     return np.concatenate([table, [fraction @ reflectance, single_scattering]]) / normal
 
 
-def _interpolate_over_cosines(sample_cosine: Floats, values: Floats, cosine: Floats) -> Floats:
+def _interpolate_over_cosines(sample_cosine: Floats, sample_values: Floats, cosine: Floats) -> Floats:
     """Interpolate samples over cosines linearly, and extrapolate beyond them by a polynomial.
 
     sample_cosine : (m,) cosines of the samples
-    values : (m,) samples
+    sample_values : (m,) samples
     cosine : cosines of the result
     """
     order = np.argsort(sample_cosine)
-    x, y = sample_cosine[order], values[order]
+    x, y = sample_cosine[order], sample_values[order]
     interpolated = np.interp(cosine, x, y)
-    first, last = slice(_EXTRAPOLATION_POINTS), slice(-_EXTRAPOLATION_POINTS, None)
+    first, last = slice(_EXTRAPOLATION_POINT_COUNT), slice(-_EXTRAPOLATION_POINT_COUNT, None)
     for end, outside in ((first, cosine < x[0]), (last, cosine > x[-1])):
-        polynomial = np.polyfit(x[end], y[end], _EXTRAPOLATION_POINTS - 1)
+        polynomial = np.polyfit(x[end], y[end], _EXTRAPOLATION_POINT_COUNT - 1)
         interpolated = np.where(outside, np.polyval(polynomial, cosine), interpolated)
     return np.asarray(interpolated)

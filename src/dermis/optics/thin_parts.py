@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.optics.angular_response import (
-    CACHE_SIZE,
+    CACHED_COLUMN_COUNT,
     DIRECTION_ROWS,
     interpolate_columns,
     interpolate_table,
@@ -20,7 +20,7 @@ from dermis.optics.angular_response import (
 from dermis.optics.diffusion import hankel
 from dermis.optics.diffusion.boundary import boundary_mismatch
 from dermis.optics.diffusion.layered_diffusion import solve_thicknesses
-from dermis.optics.equivalent_medium import MAX_ALBEDO, MIN_ALBEDO, albedo_for_total
+from dermis.optics.equivalent_medium import MAX_EQUIVALENT_ALBEDO, MIN_EQUIVALENT_ALBEDO, albedo_for_total
 from dermis.optics.media import Layer, Medium
 from dermis.optics.slabs import DEEP_OPTICAL_DEPTH, DIRECTION_NODES, Slabs, solve_doubled_slabs, solve_slabs
 
@@ -30,7 +30,7 @@ THICKNESS_ROWS = 32
 _DEEP_SLAB_DEPTH = (
     10.0  # thickness beyond which relative transmittance by direction is constant [mean free paths]
 )
-_UNIFORM_NODES = 8  # number of discrete directions for uniform light
+_DIRECTION_NODES = 8  # number of discrete directions for uniform light
 # Thickness of the thinnest slabs that are solved [mean free paths], and how often they are doubled.
 _MIN_OPTICAL_DEPTHS, _DOUBLING_COUNT = 1e-4 * np.array([1.0, 2.0**0.5]), 25
 _OPTICAL_DEPTHS = (_MIN_OPTICAL_DEPTHS * 2.0 ** np.arange(_DOUBLING_COUNT + 1)[:, None]).ravel()
@@ -89,34 +89,36 @@ def solve_thin_parts(
     return ThinParts(max_thickness_mm, transmitted, lost, np.clip(mean, -1.0, 1.0))
 
 
-def oblique_transmittance(total: Floats, eta: float, from_photons: bool = False, g: float = 0.0) -> Floats:
+def oblique_transmittance(
+    total_reflectance: Floats, eta: float, from_photons: bool = False, g: float = 0.0
+) -> Floats:
     """Return the relative transmittance of deep slabs by incident direction, (DIRECTION_ROWS, c) [-].
 
     The relative transmittance for a direction is t / r: t is the slab's transmittance for the direction
     divided by its transmittance for uniform light, and r is the same quotient for the reflectance of a
     half-space. The square roots of the incident cosines in air are evenly spaced from 0 to 1.
 
-    total : (c,) reflectance of the half-space for light at normal incidence [-]
+    total_reflectance : (c,) reflectance of the half-space for light at normal incidence [-]
     eta : index of refraction relative to air [-]
     from_photons : whether the diffusion profile comes from photon counts, not from a diffusion model
     g : mean cosine of the scattering angle [-]
     """
-    return interpolate_columns(partial(_oblique_column, eta, from_photons, g), total)
+    return interpolate_columns(partial(_oblique_column, eta, from_photons, g), total_reflectance)
 
 
-@lru_cache(maxsize=CACHE_SIZE)
-def _oblique_column(eta: float, from_photons: bool, g: float, total: float) -> Floats:
+@lru_cache(maxsize=CACHED_COLUMN_COUNT)
+def _oblique_column(eta: float, from_photons: bool, g: float, total_reflectance: float) -> Floats:
     cosine = refracted_cosine(np.linspace(0.0, 1.0, DIRECTION_ROWS) ** 2, eta)
     half_space, relative = _deep_transmittance(
-        albedo_for_total(total, eta, from_photons), eta, DIRECTION_NODES, g
+        albedo_for_total(total_reflectance, eta, from_photons), eta, DIRECTION_NODES, g
     )
     return np.interp(cosine, half_space.cosine, relative)
 
 
-def _deep_transmittance(albedo: float, eta: float, nodes: int, g: float) -> tuple[Slabs, Floats]:
+def _deep_transmittance(albedo: float, eta: float, direction_nodes: int, g: float) -> tuple[Slabs, Floats]:
     """Return a half-space as `Slabs`, and `oblique_transmittance` of deep slabs at its incident cosines."""
-    half_space = solve_slabs(albedo, DEEP_OPTICAL_DEPTH, eta, nodes, g)
-    deep = solve_slabs(albedo, _DEEP_SLAB_DEPTH, eta, nodes, g)
+    half_space = solve_slabs(albedo, DEEP_OPTICAL_DEPTH, eta, direction_nodes, g)
+    deep = solve_slabs(albedo, _DEEP_SLAB_DEPTH, eta, direction_nodes, g)
     return half_space, _relative_transmittance(deep, half_space)[0]
 
 
@@ -158,15 +160,15 @@ def _slab_totals(layer: Layer, thickness_mm: Floats, eta: float, g: float) -> It
         yield _SlabTotals(*spline(np.log(depth))[:, c].T)
 
 
-@lru_cache(maxsize=CACHE_SIZE)
+@lru_cache(maxsize=CACHED_COLUMN_COUNT)
 def _totals_column(eta: float, g: float, root_absorption: float) -> Floats:
     """Return the four fields of `_SlabTotals` at `_OPTICAL_DEPTHS`, (n, 4), for one albedo.
 
     root_absorption : square root of 1 minus the reduced albedo, in which the totals are tabulated [-]
     """
-    albedo = min(max(1.0 - root_absorption**2, MIN_ALBEDO), MAX_ALBEDO)
-    slabs = solve_doubled_slabs(albedo, _MIN_OPTICAL_DEPTHS, _DOUBLING_COUNT, eta, _UNIFORM_NODES, g)
-    half_space, deep = _deep_transmittance(albedo, eta, _UNIFORM_NODES, g)
+    albedo = min(max(1.0 - root_absorption**2, MIN_EQUIVALENT_ALBEDO), MAX_EQUIVALENT_ALBEDO)
+    slabs = solve_doubled_slabs(albedo, _MIN_OPTICAL_DEPTHS, _DOUBLING_COUNT, eta, _DIRECTION_NODES, g)
+    half_space, deep = _deep_transmittance(albedo, eta, _DIRECTION_NODES, g)
     reflectance, deep_change = half_space.reflected @ half_space.flux, deep - 1.0
     weight = half_space.flux * half_space.reflected[0]
     slab_change = _relative_transmittance(slabs, half_space) - 1.0
@@ -185,7 +187,7 @@ def _spread_weights(medium: Medium, thickness_mm: Floats, variance_mm2: Floats) 
 
     layer, A, stiffness = medium.layers[0], boundary_mismatch(medium.eta, "exact"), 100.0
     s = _FIT_FREQUENCIES * float(layer.sigma_t_prime[0])
-    frequency = np.concatenate([hankel.ZERO_FREQUENCY, s])
+    frequency = np.concatenate([hankel.NEAR_ZERO_FREQUENCY, s])
     transform = solve_thicknesses(frequency, layer, thickness_mm, A)[1][..., 0]
     # the last row makes the weights sum to 1
     ones = np.full((1, len(variance_mm2)), stiffness)

@@ -27,7 +27,7 @@ from dermis.optics.half_space import (
     has_photon_table,
     tabulated_profile,
 )
-from dermis.optics.media import SKIN_ETA, Floats, Layer, Medium, media, medium_from_toml
+from dermis.optics.media import SKIN_ETA, Floats, Layer, Medium, medium_from_toml, published_media
 from dermis.optics.pigments.parameters import DEFAULT_STRUCTURE, SKINS, SkinParameters, Structure
 from dermis.optics.pigments.skin import spectral_medium
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
@@ -130,7 +130,7 @@ class Tissue:
         model = self.default_model
         if model == COUNTED_MODEL:
             return self.profile().rings()
-        return diffusion_rings(self.medium, model, rgb=self.rgb)
+        return diffusion_rings(self.medium, model, rgb_weights=self.rgb)
 
     def transmittance(self, thickness_mm: ArrayLike) -> Floats:
         """Return the transmittance of slabs of the tissue, (n, 3) [-].
@@ -147,7 +147,7 @@ class Tissue:
 
 def tissue_names() -> tuple[str, ...]:
     """Return the names of the presets that `load_tissue` accepts."""
-    return (*media(), *SKINS)
+    return (*published_media(), *SKINS)
 
 
 def load_tissue(
@@ -190,17 +190,21 @@ def load_tissue(
     overrides = _checked_pigments(pigments or {})
     if str(name) in SKINS:
         return _spectral_tissue(str(name), structure or DEFAULT_STRUCTURE, SKINS[str(name)], overrides)
-    if str(name) not in media() and Path(name).suffix.lower() != ".toml":
+    if str(name) not in published_media() and Path(name).suffix.lower() != ".toml":
         known = ", ".join(tissue_names())
         refuse(f"tissue {name}", f"one of {known}, or a .toml file", "it is none of these", "Check the name")
-    document = {} if str(name) in media() else read_toml(Path(name))
+    document = {} if str(name) in published_media() else read_toml(Path(name))
     if "skin" in document:
         return _from_skin_table(Path(name), document, structure, overrides)
     if overrides:
         option = "--" + next(iter(overrides)).replace("_", "-")
         skins = ", ".join(SKINS)
         refuse(option, f"a skin made of pigments ({skins})", f"got {name}", "Leave it out, or use a skin")
-    medium = media()[str(name)] if str(name) in media() else medium_from_toml(Path(name), document)
+    medium = (
+        published_media()[str(name)]
+        if str(name) in published_media()
+        else medium_from_toml(Path(name), document)
+    )
     return Tissue(medium)
 
 

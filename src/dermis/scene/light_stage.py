@@ -35,14 +35,14 @@ def light_stage_weights(lights: Sequence[DirectionalLight], environment: Environ
 
     Raises DermisError when the panorama cannot be read.
     """
-    from dermis.environment.panorama import directions, load_panorama, solid_angles
+    from dermis.environment.panorama import load_panorama, texel_directions, texel_solid_angles
 
     radiance = load_panorama(environment.name)
     size = radiance.shape[0], radiance.shape[1]
-    texel_irradiance = environment.exposure * radiance * solid_angles(*size)[..., None]
+    texel_irradiance = environment.exposure * radiance * texel_solid_angles(*size)[..., None]
     angle = np.radians(environment.rotation_degrees)
     cosine, sine = np.cos(angle), np.sin(angle)
-    x, y, z = np.moveaxis(directions(*size).reshape(-1, 3), -1, 0)
+    x, y, z = np.moveaxis(texel_directions(*size).reshape(-1, 3), -1, 0)
     rotated = np.stack([cosine * x + sine * z, y, cosine * z - sine * x], axis=-1)
     towards = -np.array([light.direction for light in lights], dtype=np.float64)
     towards /= np.linalg.norm(towards, axis=1, keepdims=True)

@@ -18,7 +18,7 @@ TABLE_COSINES: Floats = np.linspace(0.0, 1.0, 64) ** 2
 TABLE_ROUGHNESSES: Floats = np.linspace(MIN_ROUGHNESS_ROOT, 1.0, 32) ** 2
 """Cosines and roughnesses of `albedo_table`, uniform in the square root to resolve grazing angles."""
 
-_TABLE_NODES = (24, 12)
+_TABLE_QUADRATURE_NODES = (24, 12)
 _MIN_COSINE = 1e-3
 
 
@@ -60,13 +60,15 @@ def directional_albedo(
     return albedo
 
 
-def _slope_quadrature(low: Floats, high: Floats, m: Floats, nodes: int) -> tuple[Floats, Floats]:
-    """Return quadrature nodes and weights for slopes from `low` to `high`, on the last axis.
+def _slope_quadrature(
+    low_slope: Floats, high_slope: Floats, m: Floats, node_count: int
+) -> tuple[Floats, Floats]:
+    """Return quadrature nodes and weights for slopes from `low_slope` to `high_slope`, on the last axis.
 
     The nodes are dense within m of slope 0, where lobes of roughness m have their peak.
     """
-    nodes_unit, weight = np.polynomial.legendre.leggauss(nodes)
-    first, last = np.arctan(low / m), np.arctan(high / m)
+    nodes_unit, weight = np.polynomial.legendre.leggauss(node_count)
+    first, last = np.arctan(low_slope / m), np.arctan(high_slope / m)
     t = np.tan(0.5 * (first + last) + 0.5 * (last - first) * nodes_unit)
     return m * t, m * (1.0 + t**2) * 0.5 * (last - first) * weight
 
@@ -81,7 +83,10 @@ def albedo_table(model: str = "kelemen", fresnel: str = "schlick") -> NDArray[np
     """
     lobe, reflectance = MODELS[model].lobe, FRESNEL[fresnel]
     # row by row, so that the nodes fit into the CPU's cache
-    rows = [directional_albedo(TABLE_COSINES, m, lobe, reflectance, _TABLE_NODES) for m in TABLE_ROUGHNESSES]
+    rows = [
+        directional_albedo(TABLE_COSINES, m, lobe, reflectance, _TABLE_QUADRATURE_NODES)
+        for m in TABLE_ROUGHNESSES
+    ]
     rho = np.stack(rows)
     mean = np.asarray(2.0 * np.trapezoid(rho * TABLE_COSINES, TABLE_COSINES, axis=1))[:, None]
     return np.stack([rho, np.broadcast_to(mean, rho.shape)], axis=-1).astype(np.float32)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 BECKMANN_TABLE_SIZE = 512
-_TABLE_EXPONENT = 0.1
+_BECKMANN_TABLE_EXPONENT = 0.1
 
 
 def beckmann(cos_h: ArrayLike, m: ArrayLike) -> NDArray[np.float64]:
@@ -27,8 +27,8 @@ def beckmann(cos_h: ArrayLike, m: ArrayLike) -> NDArray[np.float64]:
 
 
 @cache
-def beckmann_table(size: int = BECKMANN_TABLE_SIZE) -> NDArray[np.float32]:
-    """Return beckmann(cos_h, m)^0.1 / 2 as a table (size, size) for the shader.
+def beckmann_table(table_side: int = BECKMANN_TABLE_SIZE) -> NDArray[np.float32]:
+    """Return beckmann(cos_h, m)^0.1 / 2 as a table (table_side, table_side) for the shader.
 
     Columns are cos_h from 0 to 1 inclusive, so that the peak of the highlight is in the table; rows are m at
     texel centres. The power flattens the peak for accurate interpolation; the shader decodes a value t as (2
@@ -36,8 +36,8 @@ def beckmann_table(size: int = BECKMANN_TABLE_SIZE) -> NDArray[np.float32]:
 
     Source: [dEonLuebke2007] section 14.3.
     """
-    cos_h = np.arange(size) / (size - 1)
-    m = (np.arange(size) + 0.5) / size
+    cos_h = np.arange(table_side) / (table_side - 1)
+    m = (np.arange(table_side) + 0.5) / table_side
     with np.errstate(under="ignore"):
-        table = 0.5 * beckmann(cos_h[None, :], m[:, None]) ** _TABLE_EXPONENT
+        table = 0.5 * beckmann(cos_h[None, :], m[:, None]) ** _BECKMANN_TABLE_EXPONENT
     return table.astype(np.float32)

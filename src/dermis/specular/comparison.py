@@ -14,7 +14,7 @@ from dermis.specular.models import MODELS
 Floats = NDArray[np.float64]
 COMPARED_ROUGHNESSES = np.round(np.arange(1, 6) / 10, 1)
 COMPARED_COSINES = np.round(np.arange(1, 21) / 20, 2)
-_DIRECTION_PAIRS = 4000
+_DIRECTION_PAIR_COUNT = 4000
 _NORMAL = np.array([0.0, 0.0, 1.0])
 
 
@@ -53,8 +53,8 @@ def albedo_rows(model: str) -> list[dict[str, float]]:
 
 def _random_directions(rng: Any) -> Floats:
     cosine, phi = (
-        rng.uniform(np.cos(np.radians(85)), 1.0, _DIRECTION_PAIRS),
-        rng.uniform(0, 2 * np.pi, _DIRECTION_PAIRS),
+        rng.uniform(np.cos(np.radians(85)), 1.0, _DIRECTION_PAIR_COUNT),
+        rng.uniform(0, 2 * np.pi, _DIRECTION_PAIR_COUNT),
     )
     sine = np.sqrt(1.0 - cosine**2)
     return np.stack([sine * np.cos(phi), sine * np.sin(phi), cosine], axis=-1)

@@ -51,13 +51,13 @@ FRESNEL: dict[str, Fresnel] = {"schlick": schlick, "exact": dielectric}
 """Fresnel functions by their names in scene files."""
 
 
-def hemispherical_reflectance(fresnel: Fresnel = dielectric, nodes: int = 64) -> float:
+def hemispherical_reflectance(fresnel: Fresnel = dielectric, node_count: int = 64) -> float:
     """Return the reflectance 2 int F(mu) mu dmu of a smooth surface under a uniform sky [-].
 
     fresnel : function that returns F from the cosine mu of incidence
-    nodes : number of quadrature nodes
+    node_count : number of quadrature nodes
     """
-    x, w = np.polynomial.legendre.leggauss(nodes)
+    x, w = np.polynomial.legendre.leggauss(node_count)
     mu = 0.5 * (x + 1.0)
     return float(w @ (fresnel(mu) * mu))
 

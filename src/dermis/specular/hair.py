@@ -19,7 +19,7 @@ FIBRE_SAMPLES = 16
 """Number of rays across the width of the fibre over which scattering is averaged."""
 _MIN_COS_SQUARED = 1e-5
 _EUMELANIN_ABSORPTION, _PHEOMELANIN_ABSORPTION = np.array([0.419, 0.697, 1.37]), np.array([0.187, 0.4, 1.05])
-_ABSORPTION_RADIUS_MM = 0.04  # radius of a hair; the absorptions above are per radius
+_REFERENCE_FIBRE_RADIUS_MM = 0.04  # radius of a hair; the absorptions above are per radius
 
 
 class FibreParameters(NamedTuple):
@@ -34,16 +34,20 @@ class FibreParameters(NamedTuple):
 
 
 def fibre_parameters(
-    along: float = LONGITUDINAL_ROUGHNESS, around: float = AZIMUTHAL_ROUGHNESS
+    longitudinal_roughness: float = LONGITUDINAL_ROUGHNESS, azimuthal_roughness: float = AZIMUTHAL_ROUGHNESS
 ) -> FibreParameters:
     """Return the lobe widths of a fibre from the perceptual roughness along and around the fibre's axis.
 
-    along, around : longitudinal and azimuthal roughness, 0 to 1 [-]
+    longitudinal_roughness, azimuthal_roughness : longitudinal and azimuthal roughness, 0 to 1 [-]
 
     Source: [Chiang2016] equations 7 and 8.
     """
-    v = (0.726 * along + 0.812 * along**2 + 3.7 * along**20) ** 2
-    width = np.sqrt(np.pi / 8) * (0.265 * around + 1.194 * around**2 + 5.372 * around**22)
+    v = (
+        0.726 * longitudinal_roughness + 0.812 * longitudinal_roughness**2 + 3.7 * longitudinal_roughness**20
+    ) ** 2
+    width = np.sqrt(np.pi / 8) * (
+        0.265 * azimuthal_roughness + 1.194 * azimuthal_roughness**2 + 5.372 * azimuthal_roughness**22
+    )
     return FibreParameters((v, 0.25 * v, 4.0 * v, 4.0 * v), float(width))
 
 
@@ -69,21 +73,28 @@ def absorption_per_mm(eumelanin: ArrayLike, pheomelanin: ArrayLike) -> Floats:
     Source: [dEon2011] section 6.1.
     """
     brown, red = (np.asarray(c, float)[..., None] for c in (eumelanin, pheomelanin))
-    return np.asarray((brown * _EUMELANIN_ABSORPTION + red * _PHEOMELANIN_ABSORPTION) / _ABSORPTION_RADIUS_MM)
+    return np.asarray(
+        (brown * _EUMELANIN_ABSORPTION + red * _PHEOMELANIN_ABSORPTION) / _REFERENCE_FIBRE_RADIUS_MM
+    )
 
 
-def longitudinal_scattering(sin_i: ArrayLike, sin_o: ArrayLike, v: float) -> Floats:
+def longitudinal_scattering(sin_i: ArrayLike, sin_o: ArrayLike, variance: float) -> Floats:
     """Return the longitudinal scattering function, whose integral over the light's sine sin_i is 1 [-].
 
     sin_i, sin_o : sines of the inclinations of light and view, towards the tip of the fibre
-    v : variance of the lobe
+    variance : variance of the lobe
 
     Source: [dEon2011] equation 7.
     """
     i, o = np.asarray(sin_i, float), np.asarray(sin_o, float)
-    a = np.sqrt(np.maximum(1 - i * i, 0.0) * np.maximum(1 - o * o, 0.0)) / v
+    a = np.sqrt(np.maximum(1 - i * i, 0.0) * np.maximum(1 - o * o, 0.0)) / variance
     # exp(-i o / v) I0(a) / (2 v sinh(1 / v)), without overflow
-    return np.asarray(np.i0(a) * np.exp(-a) * np.exp(a - i * o / v - 1 / v) / (v * -np.expm1(-2 / v)))
+    return np.asarray(
+        np.i0(a)
+        * np.exp(-a)
+        * np.exp(a - i * o / variance - 1 / variance)
+        / (variance * -np.expm1(-2 / variance))
+    )
 
 
 def azimuthal_logistic(x: ArrayLike, width: float) -> Floats:
@@ -109,14 +120,14 @@ def fresnel(cosine: ArrayLike) -> Floats:
     return np.asarray(0.5 * (parallel**2 + across**2))
 
 
-def lobe_fractions(sin_o: ArrayLike, depth: ArrayLike, h: ArrayLike) -> list[Floats]:
+def lobe_fractions(sin_o: ArrayLike, absorption_depth: ArrayLike, h: ArrayLike) -> list[Floats]:
     """Return the fractions (..., 3) of light in the lobes R, TT and TRT, and in all further lobes together.
 
     R is reflected light, TT transmitted light, and TRT light that is reflected once inside the fibre. Without
     absorption, the fractions sum to 1.
 
     sin_o : sine of the inclination of the view
-    depth : (..., 3) absorption coefficient times the radius of the fibre [-]
+    absorption_depth : (..., 3) absorption coefficient times the radius of the fibre [-]
     h : offset of the incident ray from the fibre's axis, in units of the fibre's radius, -1 to 1 [-]
 
     Source: [Chiang2016] section 4.
@@ -125,7 +136,7 @@ def lobe_fractions(sin_o: ArrayLike, depth: ArrayLike, h: ArrayLike) -> list[Flo
     cos_o = np.sqrt(np.maximum(1 - o * o, _MIN_COS_SQUARED))
     sin_inner = h * cos_o / np.sqrt(KERATIN_ETA**2 - o * o)
     path_length = 2 * np.sqrt(1 - sin_inner**2) / np.sqrt(1 - (o / KERATIN_ETA) ** 2)
-    attenuation = np.exp(-np.asarray(depth, float) * path_length[..., None])
+    attenuation = np.exp(-np.asarray(absorption_depth, float) * path_length[..., None])
     f = fresnel(cos_o * np.sqrt(1 - h * h))[..., None]
     transmitted = (1 - f) ** 2 * attenuation
     internal = transmitted * attenuation * f
@@ -134,13 +145,17 @@ def lobe_fractions(sin_o: ArrayLike, depth: ArrayLike, h: ArrayLike) -> list[Flo
 
 
 def fibre_scattering(
-    sin_i: ArrayLike, sin_o: ArrayLike, phi: ArrayLike, depth: ArrayLike, parameters: FibreParameters
+    sin_i: ArrayLike,
+    sin_o: ArrayLike,
+    phi: ArrayLike,
+    absorption_depth: ArrayLike,
+    parameters: FibreParameters,
 ) -> Floats:
     """Return the radiance (..., 3) of a fibre per unit of irradiance, averaged over the fibre's width [1/sr].
 
     sin_i, sin_o : sines of the inclinations of light and view, towards the tip of the fibre
     phi : azimuth from light to view around the fibre [rad]
-    depth : (3,) absorption coefficient times the radius of the fibre [-]
+    absorption_depth : (3,) absorption coefficient times the radius of the fibre [-]
     parameters : widths of the lobes
 
     Irradiance refers to a plane that faces the light. The cosine of incidence on the fibre is included:
@@ -153,7 +168,7 @@ def fibre_scattering(
     total = np.zeros((*o.shape, 3))
     for h in (np.arange(FIBRE_SAMPLES) + 0.5) * 2 / FIBRE_SAMPLES - 1:
         entry, inner = np.arcsin(h), np.arcsin(h * cos_o / np.sqrt(KERATIN_ETA**2 - o * o))
-        for p, term in enumerate(lobe_fractions(o, depth, np.full(o.shape, h))):
+        for p, term in enumerate(lobe_fractions(o, absorption_depth, np.full(o.shape, h))):
             exit_azimuth = 2 * p * inner - 2 * entry + p * np.pi
             around = np.full(o.shape, 0.5 / np.pi)
             if p < 3:

@@ -48,17 +48,17 @@ def two_lobe_masking(cos_theta: ArrayLike, m: ArrayLike) -> Floats:
     return np.asarray(1.0 / _mix_lobes(lambda rough: 1.0 / smith_masking(cos_theta, rough), m))
 
 
-def _mix_lobes(quantity: Callable[[Floats], Floats], roughness: ArrayLike) -> Floats:
+def _mix_lobes(lobe_quantity: Callable[[Floats], Floats], roughness: ArrayLike) -> Floats:
     """Return the mean of a quantity over the narrow and the wide lobe, with the weights of the lobes.
 
-    quantity : function of the roughness of a lobe
+    lobe_quantity : function of the roughness of a lobe
     roughness : roughness of the model [-]
     """
     factors = NARROW_FACTOR, WIDE_FACTOR
     narrow, wide = (
         np.clip(factor * np.asarray(roughness), MIN_ROUGHNESS, MAX_ROUGHNESS) for factor in factors
     )
-    return np.asarray(NARROW_WEIGHT * quantity(narrow) + (1.0 - NARROW_WEIGHT) * quantity(wide))
+    return np.asarray(NARROW_WEIGHT * lobe_quantity(narrow) + (1.0 - NARROW_WEIGHT) * lobe_quantity(wide))
 
 
 TWO_LOBE = Model(

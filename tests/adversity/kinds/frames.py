@@ -38,7 +38,7 @@ def _take(plan: Plan) -> None:
     files = FrameFiles(Path(plan["file"]))
     files.prepare()
     files.start(_MADE_OF)
-    missing = files.missing(range(_COUNT), _SIZE)
+    missing = files.missing_frames(range(_COUNT), _SIZE)
     for number in set(range(_COUNT)) - set(missing):
         try:
             shape = read_image(files.path(number)).shape

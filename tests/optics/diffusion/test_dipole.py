@@ -13,10 +13,10 @@ from dermis.base.errors import DermisError
 from dermis.optics.diffusion import dipole
 from dermis.optics.diffusion.boundary import boundary_mismatch
 from dermis.optics.diffusion.models import diffusion_profile
-from dermis.optics.media import media
+from dermis.optics.media import published_media
 from dermis.optics.radial import enclosed_energy
 
-MARBLE_GREEN = media()["marble"].channel(1).with_eta(1.5)
+MARBLE_GREEN = published_media()["marble"].channel(1).with_eta(1.5)
 
 
 def test_marble_of_the_notebook() -> None:
@@ -67,7 +67,9 @@ def test_total_is_the_integral() -> None:
 
 def test_white_medium_gives_all_back() -> None:
     assert dipole.total_reflectance(slab(1.0).layers[0], boundary_mismatch(1.4))[0] == pytest.approx(1.0)
-    assert diffusion_profile(media()["spectralon"], "dipole").total == pytest.approx([1.0, 1.0, 1.0])
+    assert diffusion_profile(published_media()["spectralon"], "dipole").total == pytest.approx(
+        [1.0, 1.0, 1.0]
+    )
 
 
 @pytest.mark.parametrize(
@@ -93,13 +95,13 @@ def _leaves_after_one_event(eta: float) -> float:
 def test_better_dipole_converges_in_its_sources() -> None:
     layer = slab(0.95).layers[0]
     r = np.geomspace(0.05, 20.0, 40)
-    few, many = (dipole.better_dipole_reflectance(r, layer, 1.4, sources=n) for n in (100, 1600))
+    few, many = (dipole.better_dipole_reflectance(r, layer, 1.4, source_count=n) for n in (100, 1600))
     assert np.allclose(few, many, rtol=0.02)
 
 
 @pytest.mark.parametrize("model", ["dipole", "better-dipole"])
 def test_stacks_are_refused(model: str) -> None:
     with pytest.raises(DermisError, match=r"one semi-infinite layer.*3 layers.*multipole or layered"):
-        diffusion_profile(media()["dj3"], model)  # type: ignore[arg-type]
+        diffusion_profile(published_media()["dj3"], model)  # type: ignore[arg-type]
     with pytest.raises(DermisError, match="one semi-infinite layer"):
         diffusion_profile(slab(0.9, 2.0), model)  # type: ignore[arg-type]

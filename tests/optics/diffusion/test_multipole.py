@@ -13,7 +13,7 @@ from dermis.optics.diffusion import dipole, hankel, multipole
 from dermis.optics.diffusion.boundary import boundary_mismatch
 from dermis.optics.diffusion.multipole import Slab
 from dermis.optics.media import Layer, Medium
-from dermis.optics.radial import enclosed_energy, resample
+from dermis.optics.radial import enclosed_energy, resample_profile
 
 A = boundary_mismatch(1.4, "exact")
 
@@ -24,7 +24,8 @@ def of(medium: Medium, clamp: multipole.Clamp = "layer") -> Slab:
 
 def totals(one: Slab) -> tuple[float, float]:
     R, T = (
-        f(hankel.ZERO_FREQUENCY, one) for f in (multipole.reflectance_hankel, multipole.transmittance_hankel)
+        f(hankel.NEAR_ZERO_FREQUENCY, one)
+        for f in (multipole.reflectance_hankel, multipole.transmittance_hankel)
     )
     return float(R[0, 0]), float(T[0, 0])
 
@@ -58,7 +59,9 @@ def test_series_is_the_inverse_of_the_closed_sum(thickness: float, clamp: multip
         (multipole.transmittance, multipole.transmittance_hankel),
     ):
         exact = series(r, one)
-        inverse = resample(r, hankel.radii(), hankel.inverse_transform(closed(hankel.frequencies(), one)))
+        inverse = resample_profile(
+            r, hankel.transform_radii(), hankel.inverse_transform(closed(hankel.transform_frequencies(), one))
+        )
         assert np.allclose(inverse, exact, rtol=1e-5, atol=1e-7 * np.abs(exact).max())
 
 
@@ -68,14 +71,14 @@ def test_images_left_out_are_under_the_bound() -> None:
     for tolerance in (1e-2, 1e-4):
         kept = enclosed_energy(grid[-1:], grid, multipole.reflectance(grid, one, tolerance))[0]
         assert kept == pytest.approx(
-            multipole.reflectance_hankel(hankel.ZERO_FREQUENCY, one)[0], abs=2 * tolerance
+            multipole.reflectance_hankel(hankel.NEAR_ZERO_FREQUENCY, one)[0], abs=2 * tolerance
         )
 
 
 def test_without_absorption_all_light_leaves_one_face_or_the_other() -> None:
     one = of(slab(1.0, 3.0))
     R, T = (
-        f(hankel.ZERO_FREQUENCY, one)[0, 0]
+        f(hankel.NEAR_ZERO_FREQUENCY, one)[0, 0]
         for f in (multipole.reflectance_hankel, multipole.transmittance_hankel)
     )
     assert abs(1.0 - R - T) < 1e-7
@@ -95,8 +98,8 @@ def test_thick_slab_is_the_dipole() -> None:
 def test_printed_source_leaves_a_thin_slab_and_the_clamped_one_does_not() -> None:
     """A source below the slab makes its transmittance negative."""
     thin = slab(0.98, 0.5)
-    lost = multipole.transmittance_hankel(hankel.ZERO_FREQUENCY, of(thin, "none"))[0, 0]
-    kept = multipole.transmittance_hankel(hankel.ZERO_FREQUENCY, of(thin, "layer"))[0, 0]
+    lost = multipole.transmittance_hankel(hankel.NEAR_ZERO_FREQUENCY, of(thin, "none"))[0, 0]
+    kept = multipole.transmittance_hankel(hankel.NEAR_ZERO_FREQUENCY, of(thin, "layer"))[0, 0]
     assert lost < 0.0 < kept < 1.0
 
 
@@ -108,7 +111,7 @@ def test_slabs_of_monte_carlo(sample_folder: Path, thickness: float) -> None:
     one = of(slab(0.98, thickness))
     entering = 1.0 - run["Rsp"]
     R, T = (
-        f(hankel.ZERO_FREQUENCY, one)[0, 0]
+        f(hankel.NEAR_ZERO_FREQUENCY, one)[0, 0]
         for f in (multipole.reflectance_hankel, multipole.transmittance_hankel)
     )
     assert entering * R == pytest.approx(run["Rd_per_incident"], rel=0.10)
@@ -119,5 +122,7 @@ def test_slabs_of_monte_carlo(sample_folder: Path, thickness: float) -> None:
 def test_asymmetric_faces_turn_with_the_slab() -> None:
     one = Slab(Layer(np.array([0.1]), np.array([0.9]), 2.0), A, 1.0)
     assert one.flipped().flipped() == one
-    up, down = (multipole.transmittance_hankel(hankel.ZERO_FREQUENCY, s)[0, 0] for s in (one, one.flipped()))
+    up, down = (
+        multipole.transmittance_hankel(hankel.NEAR_ZERO_FREQUENCY, s)[0, 0] for s in (one, one.flipped())
+    )
     assert up != pytest.approx(down, rel=1e-3)

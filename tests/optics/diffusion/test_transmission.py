@@ -11,7 +11,7 @@ from slabs import slab, table
 from dermis.base.errors import DermisError
 from dermis.optics.diffusion.models import gaussian_transmittance, slab_transmittance, truncated_medium
 from dermis.optics.gaussians import GaussianSum
-from dermis.optics.media import media
+from dermis.optics.media import published_media
 from dermis.optics.profiles import load_profile
 
 THICK_MM = np.array([0.25, 0.5, 1.0, 2.0, 4.0, 8.0])
@@ -34,14 +34,14 @@ def test_variance_is_not_halved_nor_doubled() -> None:
 
 @pytest.mark.parametrize("name", ["dj3", "skin1", "marble"])
 def test_thicker_is_darker_and_redder(name: str) -> None:
-    through = slab_transmittance(media()[name], THICK_MM)
+    through = slab_transmittance(published_media()[name], THICK_MM)
     assert (np.diff(through, axis=0) < 0.0).all()
     assert (through[2:, 0] > through[2:, 1]).all() and (through[2:, 1] > through[2:, 2]).all()
     assert ((through > 0.0) & (through < 1.0)).all()
 
 
 def test_all_light_comes_through_next_to_nothing() -> None:
-    thin = slab_transmittance(media()["marble"], [1e-4])[0]
+    thin = slab_transmittance(published_media()["marble"], [1e-4])[0]
     assert thin == pytest.approx(np.full(3, 1.0 - (0.4 / 2.4) ** 2), rel=2e-3)
 
 
@@ -59,7 +59,7 @@ def test_slabs_of_monte_carlo(sample_folder: Path, alpha_prime: float) -> None:
 
 
 def test_cut_keeps_what_is_above() -> None:
-    skin = media()["dj3"]
+    skin = published_media()["dj3"]
     assert [layer.thickness_mm for layer in truncated_medium(skin, 0.3).layers] == pytest.approx([0.25, 0.05])
     assert [layer.name for layer in truncated_medium(skin, 5.0).layers] == [
         layer.name for layer in skin.layers

@@ -201,8 +201,8 @@ def test_a_near_fit_leads_to_the_cold_optimum(
     target = stored_rgb(sample_folder, "dj3")
     wider = PointTarget(1.1 * target.radius_mm, target.reflectance * [1.0, 0.8, 0.6], target.total)
     before, cold = (fit_gaussians(t, 6, shared=shared) for t in (wider, target))
-    monkeypatch.setattr(fit_module, "_START_FRACTIONS", ())  # no other start is needed
-    warm = fit_gaussians(target, 6, shared=shared, initial=before.profile)
+    monkeypatch.setattr(fit_module, "_START_LIGHT_FRACTIONS", ())  # no other start is needed
+    warm = fit_gaussians(target, 6, shared=shared, similar_fit=before.profile)
     assert mean_error(warm) <= 1.001 * mean_error(cold)
 
 
@@ -210,7 +210,7 @@ def test_a_slider_over_all_melanin_stays_near_the_cold_optima() -> None:
     initial = None
     for melanin in np.linspace(0.0, 0.5, 21):
         target = load_tissue("spectral", pigments={"melanin": float(melanin)}).profile().rings()
-        warm, cold = fit_gaussians(target, 6, initial=initial), fit_gaussians(target, 6)
+        warm, cold = fit_gaussians(target, 6, similar_fit=initial), fit_gaussians(target, 6)
         assert mean_error(warm) < 1.2 * mean_error(cold)
         initial = warm.profile
 
@@ -218,7 +218,9 @@ def test_a_slider_over_all_melanin_stays_near_the_cold_optima() -> None:
 def test_a_near_fit_of_another_size_is_left_aside(sample_folder: Path) -> None:
     target = stored_rgb(sample_folder, "dj3")
     four = fit_gaussians(target, 4)
-    assert np.allclose(fit_gaussians(target, 5, initial=four.profile).error, fit_gaussians(target, 5).error)
+    assert np.allclose(
+        fit_gaussians(target, 5, similar_fit=four.profile).error, fit_gaussians(target, 5).error
+    )
 
 
 def test_fits_take_few_steps(sample_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -233,7 +235,7 @@ def test_fits_take_few_steps(sample_folder: Path, monkeypatch: pytest.MonkeyPatc
     profile = fit_gaussians(target, 6).profile
     assert 0 < steps[0] < 200
     steps[0] = 0
-    fit_gaussians(target, 6, initial=profile)
+    fit_gaussians(target, 6, similar_fit=profile)
     assert 0 < steps[0] < 10
 
 

@@ -12,7 +12,7 @@ from scipy.special import ndtr
 from dermis.optics.fits.burley import fit_burley
 from dermis.optics.fits.gaussian import fit_gaussians
 from dermis.optics.fits.separable import (
-    SECTOR_COUNT,
+    SECTORS_PER_QUADRANT,
     SeparableKernel,
     evaluate_kernel,
     fit_separable,
@@ -41,7 +41,7 @@ def one(variance: float) -> GaussianSum:
 
 def test_all_light_goes_somewhere_alike_in_x_and_y() -> None:
     cells = CROSS.sector_energy(EDGES)
-    assert cells.shape == (120, SECTOR_COUNT, 1)
+    assert cells.shape == (120, SECTORS_PER_QUADRANT, 1)
     assert cells.sum() == pytest.approx(0.8, rel=1e-9)
     assert np.allclose(cells, cells[:, ::-1], atol=1e-15)
 
@@ -63,10 +63,10 @@ def test_sectors_near_the_axes_get_the_light_of_the_cross() -> None:
     """A thin ring at 2.8 degrees from an axis is compared with 42 degrees."""
     ring = np.array([1.99, 2.01])
     cells = CROSS.sector_energy(ring)[0, :, 0]
-    theta = (np.arange(SECTOR_COUNT) + 0.5) * np.pi / 2 / SECTOR_COUNT
+    theta = (np.arange(SECTORS_PER_QUADRANT) + 0.5) * np.pi / 2 / SECTORS_PER_QUADRANT
     along_x, along_y = (line_profile(CROSS, 2 * f(theta))[:, 0] for f in (np.cos, np.sin))
     density = 0.8 * along_x * along_y
-    area = np.pi * (ring[1] ** 2 - ring[0] ** 2) / SECTOR_COUNT
+    area = np.pi * (ring[1] ** 2 - ring[0] ** 2) / SECTORS_PER_QUADRANT
     assert cells[0] > 3 * cells[7]
     assert np.allclose(cells[3:-3], (area * density)[3:-3], rtol=0.02)  # the middle stands for the sector
 

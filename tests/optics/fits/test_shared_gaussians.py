@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dermis.optics.fits.gaussian import SHARED_TERMS, _combined_ring_target, shared_gaussians
+from dermis.optics.fits.gaussian import SHARED_GAUSSIAN_COUNT, _combined_ring_target, shared_gaussians
 from dermis.optics.profiles import load_profile
 
 
@@ -18,7 +18,7 @@ def test_each_keeps_its_total_and_its_shape(names: tuple[str, ...], most: float)
     profiles = [load_profile(name) for name in names]
     shared = shared_gaussians(profiles)
     for before, after in zip(profiles, shared, strict=True):
-        assert len(after.variance_mm2) <= SHARED_TERMS
+        assert len(after.variance_mm2) <= SHARED_GAUSSIAN_COUNT
         np.testing.assert_array_equal(after.variance_mm2, shared[0].variance_mm2)
         np.testing.assert_allclose(after.albedo, before.albedo, rtol=1e-9)
         assert _combined_ring_target([before]).error(after.variance_mm2, after.weight).max() < most

@@ -72,7 +72,7 @@ def test_whole_chain_from_pigments_to_the_colours_of_another_program(sample_fold
         skin = SkinParameters(row["f_mel"], 1.0, row["f_blood"], oxygen=0.75, epidermis_mm=0.06, baseline=1.0)
         epidermis, dermis = spectral_medium("dj2006", skin, scattering=jacques_1998).layers
         medium = Medium("skin", (epidermis, replace(dermis, sigma_s_prime=sigma_s_prime)))
-        total = diffusion_profile(medium, rgb=rgb_weights()).total
+        total = diffusion_profile(medium, rgb_weights=rgb_weights()).total
         assert total == pytest.approx([row["lin_R"], row["lin_G"], row["lin_B"]], abs=6e-4)
 
 

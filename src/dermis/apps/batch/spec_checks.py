@@ -10,7 +10,7 @@ from dermis.apps.batch.distributions import Distribution
 from dermis.apps.batch.spec_tables import NO_ENVIRONMENT, RANDOM_EXPRESSION, CorrelationGroup, table_values
 from dermis.base.errors import DermisError, refuse, shorten
 from dermis.base.reading import is_file
-from dermis.environment.panorama import UNIFORM
+from dermis.environment.panorama import UNIFORM_PANORAMA
 from dermis.formats.samples import SAMPLES
 from dermis.human.expressions import Weights
 from dermis.human.hair.look import HairLook
@@ -129,7 +129,7 @@ def _check_heads_and_environments(distributions: Mapping[str, Distribution], fol
     heads = [HUMAN, *(name for name, sample in SAMPLES.items() if sample.kind == "head")]
     maps = [
         NO_ENVIRONMENT,
-        UNIFORM,
+        UNIFORM_PANORAMA,
         *(name for name, sample in SAMPLES.items() if sample.kind == "environment"),
     ]
     for parameter, known in ((_HEAD_PARAMETER, heads), ("environment.name", maps)):

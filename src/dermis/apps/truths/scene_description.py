@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import refuse
-from dermis.environment.panorama import UNIFORM, load_panorama
+from dermis.environment.panorama import UNIFORM_PANORAMA, load_panorama
 from dermis.scene.camera import Camera
 from dermis.scene.environment import Environment
 
@@ -135,7 +135,7 @@ def cycles_light(
 
 def mitsuba_environment(mi: Mitsuba, environment: Environment) -> SceneDict:
     """Return Mitsuba's description of an environment light."""
-    if environment.name == UNIFORM:
+    if environment.name == UNIFORM_PANORAMA:
         return {"type": "constant", "radiance": mitsuba_rgb(np.full(3, environment.exposure))}
     panorama = environment.exposure * load_panorama(environment.name)
     # Mitsuba's panoramas begin at the middle column of ours.
@@ -153,7 +153,7 @@ def cycles_world(environment: Environment | None) -> tuple[SceneDict, dict[str, 
     if environment is None:
         return {"strength": 0.0}, {}
     world: SceneDict = {"strength": environment.exposure}
-    if environment.name == UNIFORM:
+    if environment.name == UNIFORM_PANORAMA:
         return world, {}
     # Cycles' panoramas have their middle at +X and their top at +Z, ours at -Z and +Y.
     world["turn"] = (_CYCLES_FROM_DERMIS_AXES @ _environment_rotation(environment)).tolist()

@@ -16,7 +16,7 @@ from dermis.apps.viewer.state import ViewerState
 from dermis.apps.viewer.view_renderer import HeadPreparation, Images, ViewRenderer
 from dermis.base.errors import DermisError
 from dermis.gpu import Device, Texture, TextureView
-from dermis.gpu.failures import DeviceLostError, gpu_failures
+from dermis.gpu.failures import DeviceLostError, converted_gpu_failures
 from dermis.gpu.program import Program
 from dermis.scene.camera import Camera
 
@@ -139,7 +139,7 @@ class Viewer:
     def draw(self) -> None:
         """Draw a frame into the canvas; reopen a device that was lost."""
         try:
-            with gpu_failures(self.session.view_renderer.renderer.device):
+            with converted_gpu_failures(self.session.view_renderer.renderer.device):
                 self._draw(self._clock())
             self._failures = 0
         except DermisError as error:
@@ -312,7 +312,7 @@ class Viewer:
             self._context.unconfigure()
         try:
             if self._failures > _MAX_DEVICE_FAILURES:
-                raise error.lost_twice() if isinstance(error, DeviceLostError) else error
+                raise error.lost_twice_error() if isinstance(error, DeviceLostError) else error
             self.session.view_renderer = ViewRenderer(self._adapter)
             self._preparation.reset()
             self._configure_canvas()

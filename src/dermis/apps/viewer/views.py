@@ -25,7 +25,7 @@ from dermis.gpu import (
     make_texture,
     upload,
 )
-from dermis.gpu.failures import gpu_failures
+from dermis.gpu.failures import converted_gpu_failures
 from dermis.gpu.textures import texture_from_array
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
@@ -105,7 +105,7 @@ class IntermediateViews:
         device = self._renderer.device
         if self._image is None or self._image.size[:2] != image_size:
             self._image = make_texture(device, image_size, "rgba8uint")
-        with gpu_failures(device):
+        with converted_gpu_failures(device):
             frame = CommandList(device)
             frame.compute("view", shader, {**bindings, "bytes": self._image}, image_size)
             frame.submit()

@@ -18,18 +18,23 @@ from dermis.atlas.stitched.coverage import (
 )
 from dermis.atlas.stitched.gutter import GutterWidth, Packing, find_border
 from dermis.atlas.stitched.overlap_cuts import cut_overlaps
-from dermis.atlas.stitched.pack import MAX_CELLS, PieceLayout, find_layout, pack_pieces
+from dermis.atlas.stitched.pack import MAX_CELLS_PER_SIDE, PieceLayout, find_layout, pack_pieces
 from dermis.atlas.stitched.surface import FlatSurface, flat_surface
 from dermis.atlas.unwrap.charts import connected_pieces
 from dermis.base.arrays import Doubles, Index, Mask
 from dermis.mesh.mesh import Mesh
 
-_MIN_DENSITY = 0.05  # lowest ratio of a piece's uv density to the mean at which light is blurred in it
-_SPECK_MM2 = 1.0  # parts of a chart with less area are merged into its largest part
-_DENSITY_RANGE = (0.5, 1.4)  # ratio of uv density to the mean; pieces outside are scaled towards this range
-_MAX_GUTTER = 1 / 8  # largest width of gutters as a fraction of the map's side
+_MIN_RELATIVE_UV_DENSITY = (
+    0.05  # lowest ratio of a piece's uv density to the mean at which light is blurred in it
+)
+_MAX_SPECK_MM2 = 1.0  # parts of a chart with less area are merged into its largest part
+_RELATIVE_UV_DENSITY_RANGE = (
+    0.5,
+    1.4,
+)  # ratio of uv density to the mean; pieces outside are scaled towards this range
+_MAX_GUTTER_FRACTION = 1 / 8  # largest width of gutters as a fraction of the map's side
 _LAYOUT_VERSION = 1  # increment when `find_stitched_layout` gives other results, and write the tables again
-LAYOUT_NAMES = "piece", "scale", "origins"
+LAYOUT_ARRAY_NAMES = "piece", "scale", "origins"
 """Names of the arrays of `find_stitched_layout`."""
 
 
@@ -45,9 +50,9 @@ def find_pieces(surface: FlatSurface) -> tuple[Index, Doubles]:
     piece = _merge_specks(surface, chart, piece)
     piece = np.where(surface.valid, piece, -1)
     density, mean = _uv_density(surface, piece)
-    piece[density < _MIN_DENSITY * mean] = -1
+    piece[density < _MIN_RELATIVE_UV_DENSITY * mean] = -1
     density, mean = _uv_density(surface, piece)
-    low, high = (limit * mean for limit in _DENSITY_RANGE)
+    low, high = (limit * mean for limit in _RELATIVE_UV_DENSITY_RANGE)
     target = np.where(density < low, np.sqrt(low * density), density)
     target = np.where(density > high, np.sqrt(high * density), target)
     return renumber_pieces(piece), np.where(piece >= 0, target / np.maximum(density, 1e-12), 1.0)
@@ -65,7 +70,7 @@ def _merge_specks(surface: FlatSurface, chart: Index, piece: Index) -> Index:
     order = np.argsort(area[piece], kind="stable")
     largest = np.zeros(int(chart.max()) + 1, np.int64)
     largest[chart[order]] = piece[order]
-    return np.where(area[piece] < _SPECK_MM2, largest[chart], piece)
+    return np.where(area[piece] < _MAX_SPECK_MM2, largest[chart], piece)
 
 
 def _uv_density(surface: FlatSurface, piece: Index) -> tuple[Doubles, float]:
@@ -81,32 +86,36 @@ def _uv_density(surface: FlatSurface, piece: Index) -> tuple[Doubles, float]:
     return np.where(inside, np.sqrt(uv / np.maximum(mm2, 1e-12))[index], mean), mean
 
 
-def build_stitched(mesh: Mesh, size: int, gutter_mm: float) -> Atlas | None:
+def build_stitched(mesh: Mesh, atlas_side: int, gutter_mm: float) -> Atlas | None:
     """Build the atlas of a stitched layout, in which gutters show the surface across the seams of each chart.
 
     Charts are moved apart to make space for the gutters. The result is None if the charts do not fit into the
     texels.
 
-    size : texels along each side of the map
+    atlas_side : texels along each side of the map
     gutter_mm : width of the gutters [mm]
     """
     surface = flat_surface(mesh)
     piece, scale = find_pieces(surface)
-    width = GutterWidth(gutter_mm, _MAX_GUTTER * size)
-    shipped = shipped_arrays(mesh, layout_table(gutter_mm), LAYOUT_NAMES) if size >= MAX_CELLS else None
+    width = GutterWidth(gutter_mm, _MAX_GUTTER_FRACTION * atlas_side)
+    shipped = (
+        shipped_arrays(mesh, layout_table(gutter_mm), LAYOUT_ARRAY_NAMES)
+        if atlas_side >= MAX_CELLS_PER_SIDE
+        else None
+    )
     if shipped is None:
         piece, layout = cut_overlaps(surface, piece, gutter_mm), None
     else:
         piece = shipped["piece"].astype(np.int64)
         layout = PieceLayout(float(shipped["scale"]), shipped["origins"])
-    packing = pack_pieces(surface, piece, scale, size, width, layout)
+    packing = pack_pieces(surface, piece, scale, atlas_side, width, layout)
     if packing is None:
         return None
     # where a piece overlaps itself, only one layer owns texels, and gutters must not read the hidden one
-    piece = np.where(hidden_triangles(surface, piece, packing, size), -1, piece)
+    piece = np.where(hidden_triangles(surface, piece, packing, atlas_side), -1, piece)
     members = np.flatnonzero(piece >= 0)
     border = find_border(surface, piece, members)
-    coverage = compute_coverage(surface, piece, members, border, packing, width, (size, size))
+    coverage = compute_coverage(surface, piece, members, border, packing, width, (atlas_side, atlas_side))
     return _assemble_atlas(surface, packing, coverage, piece >= 0)
 
 
@@ -123,12 +132,12 @@ def find_stitched_layout(mesh: Mesh, gutter_mm: float) -> dict[str, NDArray[Any]
     surface = flat_surface(mesh)
     piece, scale = find_pieces(surface)
     piece = cut_overlaps(surface, piece, gutter_mm)
-    width = GutterWidth(gutter_mm, _MAX_GUTTER * MAX_CELLS)
-    layout = find_layout(surface, piece, scale, MAX_CELLS, width)
+    width = GutterWidth(gutter_mm, _MAX_GUTTER_FRACTION * MAX_CELLS_PER_SIDE)
+    layout = find_layout(surface, piece, scale, MAX_CELLS_PER_SIDE, width)
     if layout is None:
         raise ValueError("the charts do not fit")
     values = piece.astype(np.int16), np.float64(layout.scale), layout.origins
-    return {name: np.asarray(value) for name, value in zip(LAYOUT_NAMES, values, strict=True)}
+    return {name: np.asarray(value) for name, value in zip(LAYOUT_ARRAY_NAMES, values, strict=True)}
 
 
 def _assemble_atlas(surface: FlatSurface, packing: Packing, coverage: Coverage, mapped: Mask) -> Atlas:

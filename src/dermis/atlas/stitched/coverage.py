@@ -15,8 +15,8 @@ from dermis.atlas.stitched.texels import (
     anchors_diverge,
     centre_weights,
     gap_limit_mm,
-    mostly_hidden,
-    rasterise_owners,
+    mostly_hidden_triangles,
+    rasterise_texel_triangles,
     unconnected_pairs,
 )
 from dermis.base.arrays import Floats, Index, Ints, Mask
@@ -50,29 +50,31 @@ class Coverage:
 def compute_coverage(
     surface: FlatSurface,
     piece: Index,
-    members: Index,
+    member_triangles: Index,
     border: Border,
     packing: Packing,
     width: GutterWidth,
-    shape: tuple[int, int],
+    grid_shape: tuple[int, int],
 ) -> Coverage:
     """Compute the surface points that the texels of packed pieces and their gutters show.
 
     piece : (f,) piece of each triangle, -1 if there is none
-    members : (t,) indices of the triangles to rasterise
+    member_triangles : (t,) indices of the triangles to rasterise
     border : border of the pieces, see `find_border`
-    shape : height and width of the grid of texels
+    grid_shape : height and width of the grid of texels
     """
-    owner = rasterise_owners(packing.corners, _drawing_order(surface, piece, members), shape)
+    owner = rasterise_texel_triangles(
+        packing.corners, _drawing_order(surface, piece, member_triangles), grid_shape
+    )
     weights = centre_weights(packing.corners, owner)
     coverage = Coverage(
         owner,
         weights,
         anchor_triangle=owner.copy(),
         anchor_weights=weights.copy(),
-        piece=np.empty(shape, np.int32),
-        gutter=np.zeros(shape, np.bool_),
-        distance_mm=np.zeros(shape, np.float32),
+        piece=np.empty(grid_shape, np.int32),
+        gutter=np.zeros(grid_shape, np.bool_),
+        distance_mm=np.zeros(grid_shape, np.float32),
     )
     _add_gutters(coverage, piece, trace_gutter(surface, border, packing, width, owner))
     coverage.piece[:] = np.where(coverage.anchor_triangle >= 0, piece[coverage.anchor_triangle], -1)
@@ -99,30 +101,34 @@ def _add_gutters(coverage: Coverage, piece: Index, texels: GutterTexels) -> None
     coverage.gutter[unlit] = False
 
 
-def hidden_triangles(surface: FlatSurface, piece: Index, packing: Packing, size: int) -> Mask:
+def hidden_triangles(surface: FlatSurface, piece: Index, packing: Packing, atlas_side: int) -> Mask:
     """Return the mask (f,) of triangles most of whose texels are owned by other triangles of their piece."""
     members = np.flatnonzero(piece >= 0)
-    owner = rasterise_owners(packing.corners, _drawing_order(surface, piece, members), (size, size))
-    return mostly_hidden(packing.corners, members, owner)
+    owner = rasterise_texel_triangles(
+        packing.corners, _drawing_order(surface, piece, members), (atlas_side, atlas_side)
+    )
+    return mostly_hidden_triangles(packing.corners, members, owner)
 
 
-def _drawing_order(surface: FlatSurface, piece: Index, members: Index) -> Index:
+def _drawing_order(surface: FlatSurface, piece: Index, member_triangles: Index) -> Index:
     """Return triangle indices sorted so that triangles mirrored within their piece come first.
 
     Texels that mirrored triangles share with other triangles are thus owned by the other triangles.
 
-    members : (t,) indices of the triangles
+    member_triangles : (t,) indices of the triangles
     """
-    return members[np.argsort(~_mirrored_triangles(surface, piece[members], members), kind="stable")]
+    return member_triangles[
+        np.argsort(~_mirrored_triangles(surface, piece[member_triangles], member_triangles), kind="stable")
+    ]
 
 
-def _mirrored_triangles(surface: FlatSurface, piece: Index, members: Index) -> Mask:
+def _mirrored_triangles(surface: FlatSurface, piece: Index, member_triangles: Index) -> Mask:
     """Return the mask (t,) of triangles that are mirrored in uv, compared with most of their piece.
 
-    piece, members : (t,) piece and index of each triangle
+    piece, member_triangles : (t,) piece and index of each triangle
     """
-    total = np.bincount(piece, surface.area_uv[members])
-    return np.asarray(np.sign(total)[piece] != np.sign(surface.area_uv[members]))
+    total = np.bincount(piece, surface.area_uv[member_triangles])
+    return np.asarray(np.sign(total)[piece] != np.sign(surface.area_uv[member_triangles]))
 
 
 def _repeat_edge(coverage: Coverage, piece: Index, beyond_end: Mask, y: Index, x: Index) -> None:
@@ -182,16 +188,23 @@ def edge_distances(surface: FlatSurface, packing: Packing, coverage: Coverage) -
 
 
 def _has_gap(
-    surface: FlatSurface, packing: Packing, coverage: Coverage, first: Index, second: Index, axis: int
+    surface: FlatSurface,
+    packing: Packing,
+    coverage: Coverage,
+    first_texels: Index,
+    second_texels: Index,
+    axis: int,
 ) -> Mask:
     """Return the mask of pairs of adjacent texels whose surface points are not adjacent on the surface.
 
-    first, second : (n,) flat indices of the texels
+    first_texels, second_texels : (n,) flat indices of the texels
     axis : 0 for pairs along x, 1 along y
     """
-    one, other = (_anchored_texels(surface, packing, coverage, texel) for texel in (first, second))
+    one, other = (
+        _anchored_texels(surface, packing, coverage, texel) for texel in (first_texels, second_texels)
+    )
     triangle, weights = coverage.triangle.ravel(), coverage.weights.reshape(-1, 2)
-    points = [surface.points(triangle[texel], weights[texel]) for texel in (first, second)]
+    points = [surface.points(triangle[texel], weights[texel]) for texel in (first_texels, second_texels)]
     distance_mm = np.linalg.norm(points[0] - points[1], axis=1)
     return np.asarray(anchors_diverge(one, other) & (distance_mm > gap_limit_mm(one, other, axis)))
 

@@ -21,7 +21,7 @@ INNER_POINT_WEIGHTS = 0.3547, 0.3141, 0.3312
 The centroid would let more geodesics hit corners.
 """
 
-_MAX_STEPS = 4096
+_MAX_CROSSED_EDGES = 4096
 
 
 class Geodesics(NamedTuple):
@@ -31,17 +31,17 @@ class Geodesics(NamedTuple):
 
     ray : index of each geodesic in the arrays of `trace_geodesics`
     triangle : index of the current triangle
-    side : side (0, 1, 2) through which the geodesic leaves this triangle
-    a, b : end points of that side
+    exit_side : side (0, 1, 2) through which the geodesic leaves this triangle
+    side_start, side_end : end points of that side
     direction : vector from the start to the target
     orientation : 1, or -1 in triangles that face opposite to the first triangle
     """
 
     ray: Index
     triangle: Index
-    side: Index
-    a: Complex
-    b: Complex
+    exit_side: Index
+    side_start: Complex
+    side_end: Complex
     direction: Complex
     orientation: Doubles
 
@@ -62,19 +62,26 @@ class GeodesicEnds(NamedTuple):
     weights: Doubles
     complete: Mask
 
-    def set_ends(self, rays: Geodesics, first: Index, b: Doubles, c: Doubles, complete: bool) -> None:
+    def set_ends(
+        self,
+        rays: Geodesics,
+        first_corner: Index,
+        second_weight: Doubles,
+        third_weight: Doubles,
+        reached_target: bool,
+    ) -> None:
         """Store the ends of the selected geodesics.
 
         rays : geodesics that end in their current triangle
-        first : corner (0, 1, 2) of the triangle with the weight 1 - b - c
-        b, c : weights of the two corners that follow corner `first`
-        complete : whether the geodesics reached their target
+        first_corner : corner (0, 1, 2) of the triangle with the weight 1 - second_weight - third_weight
+        second_weight, third_weight : weights of the two corners that follow corner `first_corner`
+        reached_target : whether the geodesics reached their target
         """
-        weights = np.column_stack((1.0 - b - c, b, c))
-        order = (np.arange(3) - first[:, None]) % 3
+        weights = np.column_stack((1.0 - second_weight - third_weight, second_weight, third_weight))
+        order = (np.arange(3) - first_corner[:, None]) % 3
         self.triangle[rays.ray] = rays.triangle
         self.weights[rays.ray] = np.take_along_axis(weights, order, axis=1)[:, 1:]
-        self.complete[rays.ray] = complete
+        self.complete[rays.ray] = reached_target
 
 
 def trace_geodesics(
@@ -92,7 +99,7 @@ def trace_geodesics(
     rays = _leave_first_triangle(
         adjacency, np.asarray(triangle, np.int64), _as_complex(start), _as_complex(target), ends
     )
-    for _ in range(_MAX_STEPS):
+    for _ in range(_MAX_CROSSED_EDGES):
         if not len(rays.ray):
             break
         rays = _cross_edge(adjacency, rays, ends)
@@ -121,17 +128,20 @@ def _leave_first_triangle(
 
 def _cross_edge(adjacency: Adjacency, rays: Geodesics, ends: GeodesicEnds) -> Geodesics:
     """Continue geodesics into the next triangle, and store the ends of the geodesics that end there."""
-    neighbour = adjacency.neighbour[rays.triangle, rays.side]
+    neighbour = adjacency.neighbour[rays.triangle, rays.exit_side]
     ended = (neighbour < 0) | ~adjacency.passable[neighbour]
     if ended.any():
         stopped = rays.select(ended)
-        ends.set_ends(stopped, stopped.side, _exit_fraction(stopped), np.zeros(len(stopped.ray)), False)
+        ends.set_ends(stopped, stopped.exit_side, _exit_fraction(stopped), np.zeros(len(stopped.ray)), False)
         rays, neighbour = rays.select(~ended), neighbour[~ended]
-    neighbour_side = adjacency.neighbour_side[rays.triangle, rays.side].astype(np.int64)
-    flipped = adjacency.flipped[rays.triangle, rays.side]
+    neighbour_side = adjacency.neighbour_side[rays.triangle, rays.exit_side].astype(np.int64)
+    flipped = adjacency.flipped[rays.triangle, rays.exit_side]
     orientation = np.where(flipped, -rays.orientation, rays.orientation)
     # positions of the corners at both ends of the shared edge, and of the apex, after unfolding
-    a, b = np.where(flipped, rays.a, rays.b), np.where(flipped, rays.b, rays.a)
+    a, b = (
+        np.where(flipped, rays.side_start, rays.side_end),
+        np.where(flipped, rays.side_end, rays.side_start),
+    )
     along, up = adjacency.apex[neighbour, neighbour_side].T
     apex = a + (along + 1j * orientation * up) * (b - a)
     # the geodesic leaves through one of the two edges at the apex
@@ -153,22 +163,22 @@ def _as_complex(points: Doubles) -> Complex:
     return np.ascontiguousarray(points, np.float64).view(np.complex128)[..., 0]
 
 
-def _cross(a: Complex, b: Complex) -> Doubles:
-    return np.asarray(a.real * b.imag - a.imag * b.real)
+def _cross(first_vector: Complex, second_vector: Complex) -> Doubles:
+    return np.asarray(first_vector.real * second_vector.imag - first_vector.imag * second_vector.real)
 
 
 def _exit_fraction(rays: Geodesics) -> Doubles:
-    """Return the fraction of the way from a to b at which each geodesic crosses the side, 0 to 1 [-]."""
-    here, there = _cross(rays.direction, rays.a), _cross(rays.direction, rays.b)
+    """Return the position at which each geodesic crosses its exit side, from 0 (start) to 1 (end) [-]."""
+    here, there = _cross(rays.direction, rays.side_start), _cross(rays.direction, rays.side_end)
     return np.clip(here / np.where(here == there, np.inf, here - there), 0.0, 1.0)
 
 
 def _clipped_weights(
-    first: Complex, second: Complex, third: Complex, point: Complex
+    first_corner: Complex, second_corner: Complex, third_corner: Complex, point: Complex
 ) -> tuple[Doubles, Doubles]:
     """Return the barycentric weights of the second and third corner at a point, clipped to the triangle."""
-    area = _cross(second - first, third - first)
-    second_weight = np.clip(_cross(point - first, third - first) / area, 0.0, 1.0)
-    third_weight = np.clip(_cross(second - first, point - first) / area, 0.0, 1.0)
+    area = _cross(second_corner - first_corner, third_corner - first_corner)
+    second_weight = np.clip(_cross(point - first_corner, third_corner - first_corner) / area, 0.0, 1.0)
+    third_weight = np.clip(_cross(second_corner - first_corner, point - first_corner) / area, 0.0, 1.0)
     total = np.maximum(second_weight + third_weight, 1.0)
     return second_weight / total, third_weight / total

@@ -17,7 +17,9 @@ from dermis.atlas.stitched.nearest import BorderSides, NearestPoints, nearest_bo
 from dermis.atlas.stitched.surface import FlatSurface
 from dermis.base.arrays import Doubles, Index, Ints, Mask
 
-_MAX_STRETCH = 2.0  # largest width of a gutter on the grid, relative to the width at its piece's mean density
+_MAX_GUTTER_STRETCH = (
+    2.0  # largest width of a gutter on the grid, relative to the width at its piece's mean density
+)
 
 
 class Border(NamedTuple):
@@ -53,15 +55,17 @@ class GutterWidth(NamedTuple):
     max_texels: float
 
 
-def find_border(surface: FlatSurface, piece: Index, members: Index) -> Border:
+def find_border(surface: FlatSurface, piece: Index, member_triangles: Index) -> Border:
     """Return the triangle sides at which pieces of charts end.
 
     piece : (f,) piece of each triangle, -1 if there is none
-    members : (t,) indices of the triangles whose sides are examined, each in a piece
+    member_triangles : (t,) indices of the triangles whose sides are examined, each in a piece
     """
-    neighbour = surface.uv_neighbour[members]
-    row, index = np.nonzero((neighbour == members[:, None]) | (piece[members, None] != piece[neighbour]))
-    triangle = members[row]
+    neighbour = surface.uv_neighbour[member_triangles]
+    row, index = np.nonzero(
+        (neighbour == member_triangles[:, None]) | (piece[member_triangles, None] != piece[neighbour])
+    )
+    triangle = member_triangles[row]
     across = surface.adjacency.neighbour[triangle, index]
     return Border(triangle, index, (across >= 0) & surface.adjacency.passable[across])
 
@@ -74,26 +78,26 @@ def border_sides(surface: FlatSurface, border: Border, packing: Packing, width: 
     steps = steps / packing.texels_per_uv[triangle][:, None, None, None]
     # slivers may be stretched a hundredfold, where gutters in proportion would waste space
     max_texels = np.minimum(
-        width.max_texels, _MAX_STRETCH * width.gutter_mm * packing.texels_per_mm[triangle]
+        width.max_texels, _MAX_GUTTER_STRETCH * width.gutter_mm * packing.texels_per_mm[triangle]
     )
     return BorderSides(ends, steps, np.where(border.seam, width.gutter_mm, 0.0), max_texels)
 
 
 def needed_texels(
     surface: FlatSurface,
-    members: Index,
+    member_triangles: Index,
     border: Border,
     packing: Packing,
     width: GutterWidth,
-    shape: tuple[int, int],
+    grid_shape: tuple[int, int],
 ) -> Mask:
     """Return the mask (h, w) of texels that pieces, their rims and their gutters may need.
 
-    members : (t,) indices of the triangles of the pieces
-    shape : height and width of the grid of texels
+    member_triangles : (t,) indices of the triangles of the pieces
+    grid_shape : height and width of the grid of texels
     """
-    found = np.zeros(shape, np.bool_)
-    found.ravel()[covered_texels(packing.corners[members], shape)[0]] = True
+    found = np.zeros(grid_shape, np.bool_)
+    found.ravel()[covered_texels(packing.corners[member_triangles], grid_shape)[0]] = True
     found.ravel()[nearest_border_points(border_sides(surface, border, packing, width), found).texel] = True
     return found
 
@@ -154,7 +158,7 @@ def trace_from_border(
     first, rows = border.side[nearest.side], np.arange(len(anchor_triangle))
     second = (first + 1) % 3
     corners = surface.adjacency.planar_corners
-    start = _lerp(corners[anchor_triangle, first], corners[anchor_triangle, second], t)
+    start = _interpolate_linearly(corners[anchor_triangle, first], corners[anchor_triangle, second], t)
     offset = texels - border_points(sides, nearest)
     step = np.einsum("ns,nsa->na", offset, border_steps(sides, nearest))
     corner = np.zeros((len(anchor_triangle), 3))
@@ -165,14 +169,14 @@ def trace_from_border(
 def border_points(sides: BorderSides, nearest: NearestPoints) -> Doubles:
     """Return the positions (n, 2) of nearest border points on the texel grid [texel]."""
     first, second = np.moveaxis(sides.ends[nearest.side], 1, 0)
-    return _lerp(first, second, nearest.fraction[:, None])
+    return _interpolate_linearly(first, second, nearest.fraction[:, None])
 
 
 def border_steps(sides: BorderSides, nearest: NearestPoints) -> Doubles:
     """Return the surface vectors (n, 2, 2) of one-texel steps to the right and down at border points [mm]."""
     first, second = np.moveaxis(sides.steps[nearest.side], 1, 0)
-    return _lerp(first, second, nearest.fraction[:, None, None])
+    return _interpolate_linearly(first, second, nearest.fraction[:, None, None])
 
 
-def _lerp(a: Doubles, b: Doubles, t: Doubles) -> Doubles:
-    return np.asarray(a + (b - a) * t)
+def _interpolate_linearly(start_values: Doubles, end_values: Doubles, fraction: Doubles) -> Doubles:
+    return np.asarray(start_values + (end_values - start_values) * fraction)

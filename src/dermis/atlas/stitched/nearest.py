@@ -105,10 +105,10 @@ def _side_metric(sides: BorderSides) -> _SideMetric:
 
 
 def _candidate_texels(
-    sides: BorderSides, metric: _SideMetric, shape: tuple[int, ...]
+    sides: BorderSides, metric: _SideMetric, grid_shape: tuple[int, ...]
 ) -> tuple[Index, Index, Index]:
     """Return all pairs of a border side and a texel that may be in its gutter: side, x and y, (n,) each."""
-    height, width = shape
+    height, width = grid_shape
     low = np.ceil(sides.ends.min(axis=1) - metric.half_extent)
     high = np.floor(sides.ends.max(axis=1) + metric.half_extent)
     left, top = np.maximum(low, 0).astype(np.int64).T

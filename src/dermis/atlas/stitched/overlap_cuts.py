@@ -23,7 +23,7 @@ from dermis.atlas.stitched.texels import (
     AnchoredTexels,
     anchors_diverge,
     gap_limit_mm,
-    rasterise_owners,
+    rasterise_texel_triangles,
     unconnected_pairs,
 )
 from dermis.atlas.unwrap.charts import connected_pieces
@@ -31,20 +31,22 @@ from dermis.base.arrays import Doubles, Index, Ints, Mask
 from dermis.mesh.geometry import label_components
 
 _MIN_TEXEL_MM = 0.9  # smallest texel of the grids on which overlaps are searched
-_MAX_TEXELS = 100_000  # largest number of texels of a piece on such a grid
-_MAX_GRID_CELLS = 600_000  # largest number of texels of the whole grid
-_CONFLICT_RANGE = 0.6  # fraction of the gutter width within which conflicts are counted
-_CLUSTER_CELL = 0.7  # size of cells for clusters, in gutter widths; adjacent cells form one cluster
+_MAX_PIECE_TEXELS = 100_000  # largest number of texels of a piece on such a grid
+_MAX_GRID_TEXELS = 600_000  # largest number of texels of the whole grid
+_CONFLICT_RANGE_FRACTION = 0.6  # fraction of the gutter width within which conflicts are counted
+_CLUSTER_CELL_GUTTER_WIDTHS = (
+    0.7  # size of cells for clusters, in gutter widths; adjacent cells form one cluster
+)
 _CELLS_PER_GUTTER = 8  # cells of the grid for distances, per gutter width
-_MIN_CONFLICT_LENGTH = 1.0  # shortest length of conflicts that is worth a cut, in gutter widths
-_MIN_BENEFIT = 0.2  # fewest separated conflicts per texel of a cut
-_LINE_DIRECTIONS, _LINE_OFFSETS = 8, 16  # number of directions and offsets of lines that are tried
-_LENGTH_BIAS = (
+_MIN_CONFLICT_GUTTER_WIDTHS = 1.0  # shortest length of conflicts that is worth a cut, in gutter widths
+_MIN_CONFLICTS_PER_CUT_TEXEL = 0.2  # fewest separated conflicts per texel of a cut
+_LINE_DIRECTION_COUNT, _LINE_OFFSET_COUNT = 8, 16  # number of directions and offsets of lines that are tried
+_CUT_LENGTH_BIAS_TEXELS = (
     1.0  # texels per conflict that are added to a cut's length, so that very short cuts are not preferred
 )
-_MIN_PART_AREA = 0.1  # area of the smallest part that stays separate, in squared gutter widths
-_MAX_DEPTH = 4  # largest number of successive cuts
-_MAX_GROWTH = 0.25  # largest growth of the area of all pieces by gutters along cuts
+_MIN_PART_AREA_GUTTER_WIDTHS2 = 0.1  # area of the smallest part that stays separate, in squared gutter widths
+_MAX_SUCCESSIVE_CUTS = 4  # largest number of successive cuts
+_MAX_RELATIVE_AREA_GROWTH = 0.25  # largest growth of the area of all pieces by gutters along cuts
 
 
 class Conflicts(NamedTuple):
@@ -87,31 +89,35 @@ class _PieceGrid(NamedTuple):
     nearest: NearestPoints
 
 
-def find_conflicts(surface: FlatSurface, mapped: Mask, members: Index, gutter_mm: float) -> Conflicts:
+def find_conflicts(
+    surface: FlatSurface, mapped: Mask, member_triangles: Index, gutter_mm: float
+) -> Conflicts:
     """Find where gutters of one chart piece meet, by drawing the piece on a separate texel grid.
 
     mapped : (f,) mask of triangles that belong to any piece
-    members : (t,) indices of the triangles of this piece
+    member_triangles : (t,) indices of the triangles of this piece
     """
-    mm2, area_uv = surface.area_mm2[members].sum(), np.abs(surface.area_uv[members]).sum()
-    low, high = surface.uv[members].min(axis=(0, 1)), surface.uv[members].max(axis=(0, 1))
+    mm2, area_uv = surface.area_mm2[member_triangles].sum(), np.abs(surface.area_uv[member_triangles]).sum()
+    low, high = surface.uv[member_triangles].min(axis=(0, 1)), surface.uv[member_triangles].max(axis=(0, 1))
     box_mm2 = float((high - low).prod()) * mm2 / area_uv
-    texel_mm = float(max(_MIN_TEXEL_MM, np.sqrt(mm2 / _MAX_TEXELS), np.sqrt(box_mm2 / _MAX_GRID_CELLS)))
+    texel_mm = float(
+        max(_MIN_TEXEL_MM, np.sqrt(mm2 / _MAX_PIECE_TEXELS), np.sqrt(box_mm2 / _MAX_GRID_TEXELS))
+    )
     texels_per_uv = float(np.sqrt(mm2 / area_uv) / texel_mm)
     width = GutterWidth(gutter_mm, np.ceil(2 * gutter_mm / texel_mm))
     margin, ones = width.max_texels + 2, np.ones(len(mapped))
     corners = np.zeros(surface.uv.shape)
-    corners[members] = (surface.uv[members] - low) * texels_per_uv + margin
+    corners[member_triangles] = (surface.uv[member_triangles] - low) * texels_per_uv + margin
     columns, rows = np.ceil((high - low) * texels_per_uv + 2 * margin + 1).astype(int)
     piece = np.where(mapped, 1, -1)
-    piece[members] = 0
+    piece[member_triangles] = 0
     packing, shape = Packing(corners, texels_per_uv * ones, ones / texel_mm), (int(rows), int(columns))
     grid = _draw_grid(
         surface,
-        find_border(surface, piece, members),
+        find_border(surface, piece, member_triangles),
         packing,
         width,
-        rasterise_owners(corners, members, shape),
+        rasterise_texel_triangles(corners, member_triangles, shape),
     )
     first, second = (grid.anchored.select(texels) for texels in _gap_pairs(surface, mapped, grid))
     origin = low * texels_per_uv - margin
@@ -120,16 +126,16 @@ def find_conflicts(surface: FlatSurface, mapped: Mask, members: Index, gutter_mm
 
 
 def _draw_grid(
-    surface: FlatSurface, border: Border, packing: Packing, width: GutterWidth, owner: Ints
+    surface: FlatSurface, border: Border, packing: Packing, width: GutterWidth, texel_triangle: Ints
 ) -> _PieceGrid:
     sides = border_sides(surface, border, packing, width)
-    sides = sides._replace(gutter_mm=_CONFLICT_RANGE * sides.gutter_mm)
-    nearest, covered = nearest_border_points(sides, owner >= 0), np.flatnonzero(owner >= 0)
-    f, texel = owner.ravel()[covered], np.concatenate((covered, nearest.texel))
-    row, labels = np.full(owner.shape, -1), np.where(owner >= 0, owner, -2)
+    sides = sides._replace(gutter_mm=_CONFLICT_RANGE_FRACTION * sides.gutter_mm)
+    nearest, covered = nearest_border_points(sides, texel_triangle >= 0), np.flatnonzero(texel_triangle >= 0)
+    f, texel = texel_triangle.ravel()[covered], np.concatenate((covered, nearest.texel))
+    row, labels = np.full(texel_triangle.shape, -1), np.where(texel_triangle >= 0, texel_triangle, -2)
     row.ravel()[texel] = np.arange(len(texel))
     labels.ravel()[nearest.texel] = -1
-    texels = np.column_stack(np.divmod(texel, owner.shape[1])[::-1]).astype(np.float64)
+    texels = np.column_stack(np.divmod(texel, texel_triangle.shape[1])[::-1]).astype(np.float64)
     anchors = np.concatenate((texels[: len(covered)], border_points(sides, nearest)))
     steps = surface.uv_metric[f, 0, :2] / packing.texels_per_uv[f, None]
     step_mm = np.concatenate((steps, np.linalg.norm(border_steps(sides, nearest), axis=2)))
@@ -179,10 +185,10 @@ def cut_overlaps(surface: FlatSurface, piece: Index, gutter_mm: float) -> Index:
     order = np.argsort(piece, kind="stable")[np.count_nonzero(piece < 0) :]
     starts = np.flatnonzero(np.diff(piece[order])) + 1
     queue = [(members, 0) for members in np.split(order, starts) if len(members)]
-    budget_mm2 = _MAX_GROWTH * surface.area_mm2[order].sum()
+    budget_mm2 = _MAX_RELATIVE_AREA_GROWTH * surface.area_mm2[order].sum()
     while queue:
         members, depth = queue.pop()
-        parts = _cut_piece(surface, piece >= 0, members, gutter_mm) if depth < _MAX_DEPTH else None
+        parts = _cut_piece(surface, piece >= 0, members, gutter_mm) if depth < _MAX_SUCCESSIVE_CUTS else None
         cost_mm2 = 0.0 if parts is None else 2 * gutter_mm * _cut_length_mm(surface, members, parts)
         if parts is None or cost_mm2 > budget_mm2:
             done[members] = count
@@ -193,48 +199,52 @@ def cut_overlaps(surface: FlatSurface, piece: Index, gutter_mm: float) -> Index:
     return done
 
 
-def _cut_length_mm(surface: FlatSurface, members: Index, part: Index) -> float:
+def _cut_length_mm(surface: FlatSurface, member_triangles: Index, part_of_triangle: Index) -> float:
     """Return the length of all triangle sides along which a chart piece is cut into parts [mm].
 
-    members, part : (t,) indices of the piece's triangles, and the part of each
+    member_triangles, part_of_triangle : (t,) indices of the piece's triangles, and the part of each
     """
     part_of = np.full(len(surface.uv), -1, np.int64)
-    part_of[members] = part
-    other = part_of[surface.uv_neighbour[members]]
-    length = np.linalg.norm(np.roll(surface.corners[members], -1, axis=1) - surface.corners[members], axis=2)
-    return float(length[(other >= 0) & (other != part[:, None])].sum()) / 2
+    part_of[member_triangles] = part_of_triangle
+    other = part_of[surface.uv_neighbour[member_triangles]]
+    length = np.linalg.norm(
+        np.roll(surface.corners[member_triangles], -1, axis=1) - surface.corners[member_triangles], axis=2
+    )
+    return float(length[(other >= 0) & (other != part_of_triangle[:, None])].sum()) / 2
 
 
-def _cut_piece(surface: FlatSurface, mapped: Mask, members: Index, gutter_mm: float) -> Index | None:
+def _cut_piece(surface: FlatSurface, mapped: Mask, member_triangles: Index, gutter_mm: float) -> Index | None:
     """Cut a chart piece where its gutters meet; return the part of each triangle (t,), or None if uncut.
 
-    members : (t,) indices of the piece's triangles
+    member_triangles : (t,) indices of the piece's triangles
     """
-    conflicts = find_conflicts(surface, mapped, members, gutter_mm)
+    conflicts = find_conflicts(surface, mapped, member_triangles, gutter_mm)
     reach = gutter_mm / conflicts.texel_mm
-    part = np.zeros(len(members), np.int64)
+    part = np.zeros(len(member_triangles), np.int64)
     for row, cluster in enumerate(_conflict_clusters(conflicts, reach), start=1):
-        if len(cluster) * conflicts.texel_mm < _MIN_CONFLICT_LENGTH * gutter_mm:
+        if len(cluster) * conflicts.texel_mm < _MIN_CONFLICT_GUTTER_WIDTHS * gutter_mm:
             continue
         overlap = conflicts._replace(first=conflicts.first[cluster], second=conflicts.second[cluster])
         normal, offset, separated = _best_line(overlap, reach)
-        half = surface.uv[members].mean(axis=1) * conflicts.texels_per_uv @ normal > offset
+        half = surface.uv[member_triangles].mean(axis=1) * conflicts.texels_per_uv @ normal > offset
         across = float(np.count_nonzero(np.abs(conflicts.inside @ normal - offset) < 0.5))
         around = float(separated + 2 * reach)
-        if separated < _MIN_BENEFIT * min(across, around):
+        if separated < _MIN_CONFLICTS_PER_CUT_TEXEL * min(across, around):
             continue
         if across <= around:
-            return _connected_parts(surface, members, half.astype(np.int64), gutter_mm)
-        part[_conflict_strip(surface, members, overlap, half, reach) & (part == 0)] = row
-    return _connected_parts(surface, members, part, gutter_mm)
+            return _connected_parts(surface, member_triangles, half.astype(np.int64), gutter_mm)
+        part[_conflict_strip(surface, member_triangles, overlap, half, reach) & (part == 0)] = row
+    return _connected_parts(surface, member_triangles, part, gutter_mm)
 
 
-def _conflict_clusters(conflicts: Conflicts, reach: float) -> list[Index]:
+def _conflict_clusters(conflicts: Conflicts, gutter_texels: float) -> list[Index]:
     """Group neighbouring conflicts between gutters; return the indices of the conflicts in each group.
 
-    reach : gutter width [texel]
+    gutter_texels : gutter width [texel]
     """
-    cells = np.floor((conflicts.first + conflicts.second) / 2 / (_CLUSTER_CELL * reach)).astype(np.int64)
+    cells = np.floor(
+        (conflicts.first + conflicts.second) / 2 / (_CLUSTER_CELL_GUTTER_WIDTHS * gutter_texels)
+    ).astype(np.int64)
     cells, cell_of = np.unique(cells, axis=0, return_inverse=True)
     adjacent = np.abs(cells[:, None] - cells).max(axis=2) <= 1
     label = label_components(len(cells), *np.nonzero(adjacent))[cell_of.reshape(-1)]
@@ -257,62 +267,64 @@ def _within_reach(points: Doubles, others: Doubles, reach: float) -> Mask:
 
 
 def _conflict_strip(
-    surface: FlatSurface, members: Index, overlap: Conflicts, half: Mask, reach: float
+    surface: FlatSurface, member_triangles: Index, overlap: Conflicts, half_mask: Mask, gutter_texels: float
 ) -> Mask:
     """Return the mask (t,) of triangles near meeting gutters, on one side of a line through the piece.
 
     The chosen side is where the triangles near meeting gutters have the smaller area.
 
-    half : (t,) mask of triangles on one side of the line
-    reach : gutter width [texel]
+    half_mask : (t,) mask of triangles on one side of the line
+    gutter_texels : gutter width [texel]
     """
-    corners = surface.uv[members] * overlap.texels_per_uv
+    corners = surface.uv[member_triangles] * overlap.texels_per_uv
     points = np.concatenate((corners, corners.mean(axis=1, keepdims=True)), axis=1)
     near = np.asarray(
-        _within_reach(points, np.concatenate((overlap.first, overlap.second)), reach).any(axis=1)
+        _within_reach(points, np.concatenate((overlap.first, overlap.second)), gutter_texels).any(axis=1)
     )
-    area = surface.area_mm2[members]
-    return near & (half if area[near & half].sum() < area[near & ~half].sum() else ~half)
+    area = surface.area_mm2[member_triangles]
+    return near & (half_mask if area[near & half_mask].sum() < area[near & ~half_mask].sum() else ~half_mask)
 
 
-def _best_line(overlap: Conflicts, reach: float) -> tuple[Doubles, float, int]:
+def _best_line(overlap: Conflicts, gutter_texels: float) -> tuple[Doubles, float, int]:
     """Return the line that separates the most conflicts per length of the cut along it.
 
     Returns normal and offset of the line, and the number of conflicts that the line separates.
     """
     close = overlap.inside[
-        _within_reach(overlap.inside, np.concatenate((overlap.first, overlap.second)), reach)
+        _within_reach(overlap.inside, np.concatenate((overlap.first, overlap.second)), gutter_texels)
     ]
     best, line = -1.0, (np.array([1.0, 0.0]), 0.0, 0)
-    for angle in np.arange(_LINE_DIRECTIONS) * np.pi / _LINE_DIRECTIONS:
+    for angle in np.arange(_LINE_DIRECTION_COUNT) * np.pi / _LINE_DIRECTION_COUNT:
         normal = np.array([np.cos(angle), np.sin(angle)])
         one, other, inside = (points @ normal for points in (overlap.first, overlap.second, close))
         low, high = np.minimum(one, other), np.maximum(one, other)
         first, last = low.min(), high.max()
-        offsets = first + (last - first) * (np.arange(_LINE_OFFSETS)[:, None] + 0.5) / _LINE_OFFSETS
+        offsets = first + (last - first) * (np.arange(_LINE_OFFSET_COUNT)[:, None] + 0.5) / _LINE_OFFSET_COUNT
         separated = np.count_nonzero((low < offsets) & (offsets < high), axis=1)
         length = np.count_nonzero(np.abs(inside - offsets) < 0.5, axis=1)
-        score = separated / (length + _LENGTH_BIAS * len(one))
+        score = separated / (length + _CUT_LENGTH_BIAS_TEXELS * len(one))
         found = int(score.argmax())
         if score[found] > best:
             best, line = score[found], (normal, float(offsets[found, 0]), int(separated[found]))
     return line
 
 
-def _connected_parts(surface: FlatSurface, members: Index, part: Index, gutter_mm: float) -> Index | None:
+def _connected_parts(
+    surface: FlatSurface, member_triangles: Index, part_of_triangle: Index, gutter_mm: float
+) -> Index | None:
     """Divide the parts of a cut chart into connected parts; merge small parts into their largest neighbour.
 
     Returns the part of each triangle (t,), or None if only one part remains.
     """
     index = np.full(len(surface.uv), -1, np.int64)
-    index[members] = np.arange(len(members))
-    there = index[surface.uv_neighbour[members]]
-    neighbour = np.where(there >= 0, there, np.arange(len(members))[:, None])
-    part = connected_pieces(part, neighbour)
-    area = np.bincount(part, surface.area_mm2[members])
-    is_small = area[part] < _MIN_PART_AREA * gutter_mm**2
+    index[member_triangles] = np.arange(len(member_triangles))
+    there = index[surface.uv_neighbour[member_triangles]]
+    neighbour = np.where(there >= 0, there, np.arange(len(member_triangles))[:, None])
+    part_of_triangle = connected_pieces(part_of_triangle, neighbour)
+    area = np.bincount(part_of_triangle, surface.area_mm2[member_triangles])
+    is_small = area[part_of_triangle] < _MIN_PART_AREA_GUTTER_WIDTHS2 * gutter_mm**2
     largest_neighbour = np.take_along_axis(
-        part[neighbour], area[part[neighbour]].argmax(axis=1)[:, None], axis=1
+        part_of_triangle[neighbour], area[part_of_triangle[neighbour]].argmax(axis=1)[:, None], axis=1
     )[:, 0]
-    part = connected_pieces(np.where(is_small, largest_neighbour, part), neighbour)
-    return part if part.max() > 0 else None
+    part_of_triangle = connected_pieces(np.where(is_small, largest_neighbour, part_of_triangle), neighbour)
+    return part_of_triangle if part_of_triangle.max() > 0 else None

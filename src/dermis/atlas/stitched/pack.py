@@ -12,21 +12,26 @@ from dermis.atlas.stitched.gutter import Border, GutterWidth, Packing, find_bord
 from dermis.atlas.stitched.surface import FlatSurface
 from dermis.base.arrays import Doubles, Index, Mask
 
-Span = tuple[int, int, int]
+CellRun = tuple[int, int, int]
 """Run of cells in a row: row, first and last column."""
-MAX_CELLS = 512
+MAX_CELLS_PER_SIDE = 512
 """Largest number of cells along each side of the square; layouts of larger maps are the same."""
 _COARSE_CELL_SIDE = 4  # side of a coarse cell, with which the best order is searched [cell]
 _BISECTION_COUNT = 8  # number of trials in the search for the scale
-_FINE_BISECTIONS, _FINE_GAIN = 4, 1.12  # trials with fine cells, and the largest factor of scale to gain
+_FINE_BISECTION_COUNT, _MAX_FINE_SCALE_GAIN = (
+    4,
+    1.12,
+)  # trials with fine cells, and the largest factor of scale to gain
 _ORDER_COUNT = 6  # number of packing orders: by area, height and width, each by rows and by columns
 _MIN_SCALE_GAIN = 1.003  # gain of scale for which the search is repeated with another order
 _MAX_MASK_ATTEMPTS = 4  # number of attempts with masks of different scales
-_MASK_RATIO = 0.65  # masks are computed again if the ratio of the found scale to their scale is smaller
-_MASK_EXCESS = 1.15  # ratio of the scale of the next masks to the found scale
+_MIN_MASK_SCALE_RATIO = (
+    0.65  # masks are computed again if the ratio of the found scale to their scale is smaller
+)
+_NEXT_MASK_SCALE_RATIO = 1.15  # ratio of the scale of the next masks to the found scale
 
 
-def place_shapes(shapes: Sequence[Sequence[Span]], cells_per_side: int) -> list[tuple[int, int]] | None:
+def place_shapes(shapes: Sequence[Sequence[CellRun]], cells_per_side: int) -> list[tuple[int, int]] | None:
     """Return the column and row at which each shape is placed on n x n cells, or None if not all shapes fit.
 
     Each shape is placed at the first free position, searched row by row.
@@ -47,16 +52,19 @@ def place_shapes(shapes: Sequence[Sequence[Span]], cells_per_side: int) -> list[
     return corners
 
 
-def _free_positions(occupied: int, spans: Sequence[Span], cells_per_side: int) -> int:
+def _free_positions(occupied_cells: int, spans: Sequence[CellRun], cells_per_side: int) -> int:
     """Return the free positions for the upper left cell of a shape, as a bit mask of n x n cells.
 
-    occupied : bit mask of the occupied cells
+    occupied_cells : bit mask of the occupied cells
     """
     height = 1 + max(row for row, _, _ in spans)
     width = 1 + max(last for _, _, last in spans)
     if max(height, width) > cells_per_side:
         return 0
-    blocked, ahead = 0, [occupied]  # ahead: cells from which one of the next 1, 2, 4, ... cells is occupied
+    blocked, ahead = (
+        0,
+        [occupied_cells],
+    )  # ahead: cells from which one of the next 1, 2, 4, ... cells is occupied
     for row, first, last in spans:
         length = last - first + 1
         step = length.bit_length() - 1
@@ -118,27 +126,27 @@ class PieceLayout(NamedTuple):
 
 def pack_pieces(
     surface: FlatSurface,
-    piece: Index,
-    scale: Doubles,
-    size: int,
+    triangle_piece: Index,
+    uv_scale: Doubles,
+    map_side: int,
     width: GutterWidth,
     layout: PieceLayout | None = None,
 ) -> Packing | None:
     """Pack chart pieces with their gutters at the largest common scale; return None if they do not fit.
 
-    piece : (f,) index of each triangle's piece from 0, -1 for triangles in no piece
-    scale : (f,) factor of each triangle's uv that evens out texel density
-    size : texels along each side of the map
+    triangle_piece : (f,) index of each triangle's piece from 0, -1 for triangles in no piece
+    uv_scale : (f,) factor of each triangle's uv that evens out texel density
+    map_side : texels along each side of the map
     layout : known result of `find_layout`, which is slow; None to compute it
     """
-    groups, pieces = _prepare_pieces(surface, piece, scale)
-    packing = Packing(np.zeros(surface.uv.shape), *np.zeros((2, len(piece))))
+    groups, pieces = _prepare_pieces(surface, triangle_piece, uv_scale)
+    packing = Packing(np.zeros(surface.uv.shape), *np.zeros((2, len(triangle_piece))))
     if not pieces:
         return packing
-    found = layout or _find_layout(pieces, size, width)
+    found = layout or _find_layout(pieces, map_side, width)
     if found is None:
         return None
-    per_cell = size / min(size, MAX_CELLS)
+    per_cell = map_side / min(map_side, MAX_CELLS_PER_SIDE)
     for members, one, low in zip(groups, pieces, found.origins, strict=True):
         packing.corners[members] = (one.uv * found.scale + low) * per_cell - 0.5
         packing.texels_per_uv[members] = one.scale * found.scale * per_cell
@@ -147,48 +155,56 @@ def pack_pieces(
 
 
 def find_layout(
-    surface: FlatSurface, piece: Index, scale: Doubles, size: int, width: GutterWidth
+    surface: FlatSurface, triangle_piece: Index, uv_scale: Doubles, map_side: int, width: GutterWidth
 ) -> PieceLayout | None:
     """Return the layout with which `pack_pieces` packs the same pieces; None if they do not fit."""
-    return _find_layout(_prepare_pieces(surface, piece, scale)[1], size, width)
+    return _find_layout(_prepare_pieces(surface, triangle_piece, uv_scale)[1], map_side, width)
 
 
-def _prepare_pieces(surface: FlatSurface, piece: Index, scale: Doubles) -> tuple[list[Index], list[_Piece]]:
+def _prepare_pieces(
+    surface: FlatSurface, triangle_piece: Index, uv_scale: Doubles
+) -> tuple[list[Index], list[_Piece]]:
     """Return the triangles of each piece, and the pieces prepared for packing."""
-    order = np.argsort(piece, kind="stable")[np.count_nonzero(piece < 0) :]
+    order = np.argsort(triangle_piece, kind="stable")[np.count_nonzero(triangle_piece < 0) :]
     groups = [
-        members for members in np.split(order, np.flatnonzero(np.diff(piece[order])) + 1) if len(members)
+        members
+        for members in np.split(order, np.flatnonzero(np.diff(triangle_piece[order])) + 1)
+        if len(members)
     ]
-    return groups, [_single_piece(surface, piece, members, float(scale[members[0]])) for members in groups]
+    return groups, [
+        _single_piece(surface, triangle_piece, members, float(uv_scale[members[0]])) for members in groups
+    ]
 
 
-def _single_piece(surface: FlatSurface, piece: Index, members: Index, scale: float) -> _Piece:
-    border = find_border(surface, piece, members)
-    index_in_piece = np.empty(len(piece), np.int64)
-    index_in_piece[members] = np.arange(len(members))
+def _single_piece(
+    surface: FlatSurface, triangle_piece: Index, member_triangles: Index, uv_scale: float
+) -> _Piece:
+    border = find_border(surface, triangle_piece, member_triangles)
+    index_in_piece = np.empty(len(triangle_piece), np.int64)
+    index_in_piece[member_triangles] = np.arange(len(member_triangles))
     border = border._replace(triangle=index_in_piece[border.triangle])
-    uv, subset = surface.uv[members] * scale, surface.subset(members)
+    uv, subset = surface.uv[member_triangles] * uv_scale, surface.subset(member_triangles)
     uv -= uv.min(axis=(0, 1))
-    uv_per_mm = scale * float(np.sqrt(np.abs(subset.area_uv).sum() / subset.area_mm2.sum()))
-    return _Piece(subset, uv, uv.max(axis=(0, 1)), scale, uv_per_mm, border)
+    uv_per_mm = uv_scale * float(np.sqrt(np.abs(subset.area_uv).sum() / subset.area_mm2.sum()))
+    return _Piece(subset, uv, uv.max(axis=(0, 1)), uv_scale, uv_per_mm, border)
 
 
-def _find_layout(pieces: list[_Piece], size: int, width: GutterWidth) -> PieceLayout | None:
+def _find_layout(pieces: list[_Piece], map_side: int, width: GutterWidth) -> PieceLayout | None:
     """Return the layout with the largest scale that the search finds, or None if the pieces never fit."""
-    cells = min(size, MAX_CELLS)
-    width = width._replace(max_texels=width.max_texels * cells / size)
+    cells = min(map_side, MAX_CELLS_PER_SIDE)
+    width = width._replace(max_texels=width.max_texels * cells / map_side)
     area = sum(float(np.abs(one.surface.area_uv).sum()) * one.scale**2 for one in pieces)
     top = cells / float(np.sqrt(area))
     for _ in range(_MAX_MASK_ATTEMPTS):
         found = _find_largest_scale([_piece_mask(one, top, width) for one in pieces], cells, top)
-        if found is None or found.scale > _MASK_RATIO * top:
+        if found is None or found.scale > _MIN_MASK_SCALE_RATIO * top:
             return found
-        top = _MASK_EXCESS * found.scale
+        top = _NEXT_MASK_SCALE_RATIO * found.scale
     return None
 
 
-def _find_largest_scale(masks: list[_PieceMask], cells: int, top: float) -> PieceLayout | None:
-    """Return the layout with the largest scale below `top`, for the best of several orders of the pieces.
+def _find_largest_scale(masks: list[_PieceMask], cells_per_side: int, max_scale: float) -> PieceLayout | None:
+    """Return the layout with the largest scale below a maximum, for the best of several orders of pieces.
 
     The best order is searched with coarse cells.
     """
@@ -196,26 +212,43 @@ def _find_largest_scale(masks: list[_PieceMask], cells: int, top: float) -> Piec
     for order in range(_ORDER_COUNT):
         lower = coarse.scale if coarse else 0.0
         if order == 0 or (
-            coarse and _try_scale(masks, lower * _MIN_SCALE_GAIN, cells // _COARSE_CELL_SIDE, order)
+            coarse and _try_scale(masks, lower * _MIN_SCALE_GAIN, cells_per_side // _COARSE_CELL_SIDE, order)
         ):
             found = _bisect_scale(
-                masks, (lower, top / _COARSE_CELL_SIDE), cells // _COARSE_CELL_SIDE, order, _BISECTION_COUNT
+                masks,
+                (lower, max_scale / _COARSE_CELL_SIDE),
+                cells_per_side // _COARSE_CELL_SIDE,
+                order,
+                _BISECTION_COUNT,
             )
             coarse, best = (found, order) if found else (coarse, best)
     if coarse is None:
-        return _bisect_scale(masks, (0.0, top), cells, 0, _BISECTION_COUNT)
+        return _bisect_scale(masks, (0.0, max_scale), cells_per_side, 0, _BISECTION_COUNT)
     same = PieceLayout(_COARSE_CELL_SIDE * coarse.scale, _COARSE_CELL_SIDE * coarse.origins)
-    return _bisect_scale(masks, (same.scale, same.scale * _FINE_GAIN), cells, best, _FINE_BISECTIONS) or same
+    return (
+        _bisect_scale(
+            masks,
+            (same.scale, same.scale * _MAX_FINE_SCALE_GAIN),
+            cells_per_side,
+            best,
+            _FINE_BISECTION_COUNT,
+        )
+        or same
+    )
 
 
 def _bisect_scale(
-    masks: list[_PieceMask], bounds: tuple[float, float], cells: int, order: int, bisections: int
+    masks: list[_PieceMask],
+    scale_bounds: tuple[float, float],
+    cells_per_side: int,
+    order_index: int,
+    bisection_count: int,
 ) -> PieceLayout | None:
     """Return the layout with the largest scale between two bounds, or None if no trial fits."""
-    (low, high), best = bounds, None
-    for _ in range(bisections):
+    (low, high), best = scale_bounds, None
+    for _ in range(bisection_count):
         middle = (low + high) / 2
-        found = _try_scale(masks, middle, cells, order)
+        found = _try_scale(masks, middle, cells_per_side, order_index)
         if found is None:
             high = middle
         else:
@@ -223,25 +256,27 @@ def _bisect_scale(
     return best
 
 
-def _try_scale(masks: list[_PieceMask], scale: float, cells: int, order: int) -> PieceLayout | None:
+def _try_scale(
+    masks: list[_PieceMask], scale: float, cells_per_side: int, order_index: int
+) -> PieceLayout | None:
     """Return the layout of the pieces at one scale, or None if they do not fit.
 
     scale : cells per unit of the pieces' scaled uv
-    order : index of the packing order: order // 2 selects the sort key (area, height, width), odd orders
-        place by columns
+    order_index : index of the packing order: order // 2 selects the sort key (area, height, width), odd
+        orders place by columns
     """
     shapes, low = zip(*(_scaled_mask(one, scale / one.scale) for one in masks), strict=True)
-    if order % 2 == 1:
+    if order_index % 2 == 1:
         shapes = tuple(shape.T for shape in shapes)
     size = [(np.count_nonzero(shape), *shape.shape) for shape in shapes]
-    if sum(area for area, _, _ in size) > cells**2:
+    if sum(area for area, _, _ in size) > cells_per_side**2:
         return None
-    first = np.argsort([-one[order // 2] for one in size], kind="stable")
-    found = place_shapes([_row_spans(shapes[k]).tolist() for k in first], cells)
+    first = np.argsort([-one[order_index // 2] for one in size], kind="stable")
+    found = place_shapes([_cell_runs(shapes[k]).tolist() for k in first], cells_per_side)
     if found is None:
         return None
     corners = np.empty((len(masks), 2))
-    corners[first] = np.array(found)[:, ::-1] if order % 2 == 1 else found
+    corners[first] = np.array(found)[:, ::-1] if order_index % 2 == 1 else found
     return PieceLayout(scale, corners + low)
 
 
@@ -274,12 +309,12 @@ def _piece_mask(piece: _Piece, scale: float, width: GutterWidth) -> _PieceMask:
     mask[:-1] |= mask[1:].copy()
     mask[:, 1:] |= mask[:, :-1].copy()
     mask[:, :-1] |= mask[:, 1:].copy()
-    return _PieceMask(_row_spans(mask), margin, scale)
+    return _PieceMask(_cell_runs(mask), margin, scale)
 
 
-def _row_spans(mask: Mask) -> Index:
+def _cell_runs(cell_mask: Mask) -> Index:
     """Return the runs of true cells of a mask, (m, 3): row, first and last column."""
-    step = np.diff(np.pad(mask, ((0, 0), (1, 1))).astype(np.int8), axis=1)
+    step = np.diff(np.pad(cell_mask, ((0, 0), (1, 1))).astype(np.int8), axis=1)
     row, begin = np.nonzero(step > 0)
     return np.column_stack((row, begin, np.nonzero(step < 0)[1] - 1))
 

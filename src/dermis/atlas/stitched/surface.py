@@ -13,7 +13,7 @@ from dermis.base.arrays import Doubles, Index, Ints, Mask
 from dermis.mesh.geometry import MIN_UV_CROSS, cross_2d, tangents, triangle_areas, uv_cross, weld
 from dermis.mesh.mesh import Mesh
 
-_MIN_LENGTH_MM = 1e-9
+_MIN_SIDE_LENGTH_MM = 1e-9
 
 
 class Adjacency(NamedTuple):
@@ -73,14 +73,14 @@ class FlatSurface:
         """
         return interpolate_corners(self.corners, triangle, weights.astype(np.float64))
 
-    def subset(self, members: Index) -> FlatSurface:
+    def subset(self, member_triangles: Index) -> FlatSurface:
         """Return the surface with only some of its triangles; its adjacency is not valid for geodesics."""
         names = [field.name for field in fields(self) if field.name != "adjacency"]
-        return replace(self, **{name: getattr(self, name)[members] for name in names})
+        return replace(self, **{name: getattr(self, name)[member_triangles] for name in names})
 
 
 def interpolate_corners(
-    corners: NDArray[np.floating], triangle: NDArray[np.integer], weights: NDArray[np.floating]
+    corner_values: NDArray[np.floating], triangle: NDArray[np.integer], weights: NDArray[np.floating]
 ) -> NDArray[Any]:
     """Interpolate data (f, 3, c) at triangle corners to points on the triangles, (n, c).
 
@@ -88,9 +88,9 @@ def interpolate_corners(
     weights : (n, 2) barycentric weights of the second and third corner
     """
     second, third = weights[:, :1], weights[:, 1:]
-    found = (1.0 - second - third) * corners[:, 0][triangle]
-    found += second * corners[:, 1][triangle]
-    found += third * corners[:, 2][triangle]
+    found = (1.0 - second - third) * corner_values[:, 0][triangle]
+    found += second * corner_values[:, 1][triangle]
+    found += third * corner_values[:, 2][triangle]
     return np.asarray(found)
 
 
@@ -127,9 +127,9 @@ def _planar_corners(corners: Doubles) -> tuple[Doubles, Doubles]:
     The first corner is at 0 and the second to its right.
     """
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    x = first / np.maximum(np.linalg.norm(first, axis=1, keepdims=True), _MIN_LENGTH_MM)
+    x = first / np.maximum(np.linalg.norm(first, axis=1, keepdims=True), _MIN_SIDE_LENGTH_MM)
     up = second - (second * x).sum(axis=1, keepdims=True) * x
-    y = up / np.maximum(np.linalg.norm(up, axis=1, keepdims=True), _MIN_LENGTH_MM)
+    y = up / np.maximum(np.linalg.norm(up, axis=1, keepdims=True), _MIN_SIDE_LENGTH_MM)
     axes = np.stack((x, y), axis=1)
     return np.einsum("fki,fai->fka", corners - corners[:, :1], axes), axes
 
@@ -153,27 +153,27 @@ def side_neighbours(mesh: Mesh) -> tuple[Ints, NDArray[np.int8], Mask]:
     )
 
 
-def _apexes(flat: Doubles) -> Doubles:
+def _apexes(planar_corners: Doubles) -> Doubles:
     """Return the third corner relative to each side (f, 3, 2), along and to the left of the side.
 
     The coordinates are fractions of the side's length.
     """
-    side = np.roll(flat, -1, axis=1) - flat
-    third = np.roll(flat, -2, axis=1) - flat
-    square = np.maximum((side**2).sum(axis=2), _MIN_LENGTH_MM**2)
+    side = np.roll(planar_corners, -1, axis=1) - planar_corners
+    third = np.roll(planar_corners, -2, axis=1) - planar_corners
+    square = np.maximum((side**2).sum(axis=2), _MIN_SIDE_LENGTH_MM**2)
     along = (side * third).sum(axis=2) / square
     left = cross_2d(side, third) / square
     return np.stack((along, left), axis=-1)
 
 
 def _uv_steps(
-    mesh: Mesh, flat: Doubles, axes: Doubles, uv: Doubles, area_uv: Doubles
+    mesh: Mesh, planar_corners: Doubles, plane_axes: Doubles, uv: Doubles, area_uv: Doubles
 ) -> tuple[Doubles, Doubles]:
     """Return the fields `uv_steps` and `uv_metric` of `FlatSurface`.
 
     Both are averages over the triangles around a vertex that have the same orientation in uv.
 
-    flat, axes : planar corners and axes from `_planar_corners`
+    planar_corners, plane_axes : planar corners and axes from `_planar_corners`
     """
     count = len(mesh.positions)
     corner = mesh.triangles + count * (area_uv < 0)[:, None].astype(np.int32)
@@ -183,9 +183,9 @@ def _uv_steps(
     product = length.prod(axis=-1)
     cosine = (steps[:, :, 0] * steps[:, :, 1]).sum(axis=-1) / np.maximum(product, 1e-12)
     # projected to the triangle's plane, with the length preserved
-    uv_steps = np.einsum("fksi,fai->fksa", steps, axes)
+    uv_steps = np.einsum("fksi,fai->fksa", steps, plane_axes)
     uv_steps *= (length / np.maximum(np.linalg.norm(uv_steps, axis=-1), 1e-12))[..., None]
-    triangle_steps = _triangle_steps(flat, uv)[:, None]
+    triangle_steps = _triangle_steps(planar_corners, uv)[:, None]
     # the mean over triangles of very different normals may be meaningless: use the triangle's own steps there
     area = cross_2d(uv_steps[..., 0, :], uv_steps[..., 1, :])
     is_meaningless = area * np.sign(area_uv)[:, None] >= -0.05 * product
@@ -193,9 +193,9 @@ def _uv_steps(
     return uv_steps, np.concatenate((length, cosine[..., None]), axis=-1)
 
 
-def _triangle_steps(flat: Doubles, uv: Doubles) -> Doubles:
+def _triangle_steps(planar_corners: Doubles, uv: Doubles) -> Doubles:
     """Return the surface vectors (f, 2, 2) per unit of u and of v, constant over each triangle [mm]."""
-    e, d = flat[:, 1:] - flat[:, :1], uv[:, 1:] - uv[:, :1]
+    e, d = planar_corners[:, 1:] - planar_corners[:, :1], uv[:, 1:] - uv[:, :1]
     cross = cross_2d(d[:, 0], d[:, 1])
     cross = np.where(np.abs(cross) > MIN_UV_CROSS, cross, np.inf)[:, None]
     u = (e[:, 0] * d[:, 1, 1:] - e[:, 1] * d[:, 0, 1:]) / cross

@@ -11,44 +11,44 @@ from dermis.atlas.stitched.surface import FlatSurface
 from dermis.base.arrays import Doubles, Floats, Index, Ints, Mask
 
 # There is a gap between texels whose surface points are farther apart than this many steps plus the slack.
-_GAP_STEPS, _GAP_SLACK_MM = 2.0, 0.5
-_INNER_MARGIN = 1e-3  # texel centres this far inside an edge are not in the triangle across it [texel]
+_MAX_CONNECTED_STEPS, _GAP_SLACK_MM = 2.0, 0.5
+_INNER_MARGIN_TEXELS = 1e-3  # texel centres this far inside an edge are not in the triangle across it [texel]
 
 
-def rasterise_owners(corners: Doubles, triangles: Index, shape: tuple[int, int]) -> Ints:
+def rasterise_texel_triangles(corners: Doubles, drawn_triangles: Index, grid_shape: tuple[int, int]) -> Ints:
     """Draw triangles; return for each texel centre (h, w) the last triangle that covers it, -1 without any.
 
     corners : (f, 3, 2) corners of all triangles [texel]
-    triangles : (t,) indices in drawing order
+    drawn_triangles : (t,) indices in drawing order
     """
-    owner = np.full(shape, -1, np.int32)
-    texel, which = covered_texels(corners[triangles], shape)
-    owner.ravel()[texel] = triangles[which]
+    owner = np.full(grid_shape, -1, np.int32)
+    texel, which = covered_texels(corners[drawn_triangles], grid_shape)
+    owner.ravel()[texel] = drawn_triangles[which]
     return owner
 
 
-def mostly_hidden(corners: Doubles, triangles: Index, owner: Ints) -> Mask:
+def mostly_hidden_triangles(corners: Doubles, drawn_triangles: Index, texel_triangle: Ints) -> Mask:
     """Return the mask (f,) of triangles most of whose texels are owned by other triangles.
 
     corners : (f, 3, 2) corners of all triangles [texel]
-    triangles : (t,) indices of the drawn triangles
-    owner : (h, w) triangle that owns each texel, from `rasterise_owners`
+    drawn_triangles : (t,) indices of the drawn triangles
+    texel_triangle : (h, w) triangle that owns each texel, from `rasterise_texel_triangles`
     """
-    texel, which = covered_texels(corners[triangles], owner.shape, _INNER_MARGIN)
-    drawn, count = triangles[which], len(corners)
-    owned = np.bincount(drawn[owner.ravel()[texel] == drawn], minlength=count)
+    texel, which = covered_texels(corners[drawn_triangles], texel_triangle.shape, _INNER_MARGIN_TEXELS)
+    drawn, count = drawn_triangles[which], len(corners)
+    owned = np.bincount(drawn[texel_triangle.ravel()[texel] == drawn], minlength=count)
     return np.asarray(owned < 0.5 * np.bincount(drawn, minlength=count))
 
 
-def centre_weights(corners: Doubles, owner: Ints) -> Floats:
+def centre_weights(corners: Doubles, texel_triangle: Ints) -> Floats:
     """Return the barycentric weights (h, w, 2) of the second and third corner at each texel centre.
 
     corners : (f, 3, 2) corners of all triangles [texel]
-    owner : (h, w) triangle that owns each texel, -1 if there is none
+    texel_triangle : (h, w) triangle that owns each texel, -1 if there is none
     """
-    y, x = np.nonzero(owner >= 0)
-    weights = np.zeros((*owner.shape, 2), np.float32)
-    weights[y, x] = barycentric_weights(corners[owner[y, x]], np.column_stack((x, y)))
+    y, x = np.nonzero(texel_triangle >= 0)
+    weights = np.zeros((*texel_triangle.shape, 2), np.float32)
+    weights[y, x] = barycentric_weights(corners[texel_triangle[y, x]], np.column_stack((x, y)))
     return weights
 
 
@@ -69,17 +69,21 @@ class AnchoredTexels(NamedTuple):
         return AnchoredTexels._make(part[indices] for part in self)
 
 
-def unconnected_pairs(surface: FlatSurface, owner: Ints, axis: int) -> tuple[Index, Index]:
+def unconnected_pairs(surface: FlatSurface, texel_triangle: Ints, axis: int) -> tuple[Index, Index]:
     """Return the flat indices (n,) of both texels of each adjacent pair whose triangles share no side in uv.
 
-    owner : (h, w) triangle that owns the texel, -1 in gutters, -2 elsewhere
+    texel_triangle : (h, w) triangle that owns the texel, -1 in gutters, -2 elsewhere
     axis : 0 for texels adjacent along x, 1 along y
     """
-    step = 1 if axis == 0 else owner.shape[1]
-    pair = (owner[:, :-1], owner[:, 1:]) if axis == 0 else (owner[:-1], owner[1:])
+    step = 1 if axis == 0 else texel_triangle.shape[1]
+    pair = (
+        (texel_triangle[:, :-1], texel_triangle[:, 1:])
+        if axis == 0
+        else (texel_triangle[:-1], texel_triangle[1:])
+    )
     y, x = np.nonzero((np.minimum(*pair) >= -1) & ((pair[0] != pair[1]) | (pair[0] < 0)))
-    first = y * owner.shape[1] + x
-    f, g = (owner.ravel()[texel] for texel in (first, first + step))
+    first = y * texel_triangle.shape[1] + x
+    f, g = (texel_triangle.ravel()[texel] for texel in (first, first + step))
     apart = (f < 0) | (g < 0)
     owned = ~apart
     neighbour, g = surface.uv_neighbour[f[owned]].T, g[owned]
@@ -87,25 +91,29 @@ def unconnected_pairs(surface: FlatSurface, owner: Ints, axis: int) -> tuple[Ind
     return first[apart], first[apart] + step
 
 
-def anchors_diverge(first: AnchoredTexels, second: AnchoredTexels) -> Mask:
+def anchors_diverge(first_texels: AnchoredTexels, second_texels: AnchoredTexels) -> Mask:
     """Return the mask of texel pairs whose anchors are farther apart than either texel is from its anchor.
 
     The anchor of a texel is the nearest point of its chart.
     """
     distance2 = np.maximum(
-        _squared_length(first.texels - first.anchors), _squared_length(second.texels - second.anchors)
+        _squared_length(first_texels.texels - first_texels.anchors),
+        _squared_length(second_texels.texels - second_texels.anchors),
     )
-    return np.asarray(_squared_length(first.anchors - second.anchors) > distance2)
+    return np.asarray(_squared_length(first_texels.anchors - second_texels.anchors) > distance2)
 
 
-def gap_limit_mm(first: AnchoredTexels, second: AnchoredTexels, axis: int) -> Doubles:
+def gap_limit_mm(first_texels: AnchoredTexels, second_texels: AnchoredTexels, axis: int) -> Doubles:
     """Return the largest distance (n,) between the surface points of adjacent texels without a gap [mm].
 
     axis : 0 for texels adjacent along x, 1 along y
     """
-    return _GAP_STEPS * np.maximum(first.step_mm[:, axis], second.step_mm[:, axis]) + _GAP_SLACK_MM
+    return (
+        _MAX_CONNECTED_STEPS * np.maximum(first_texels.step_mm[:, axis], second_texels.step_mm[:, axis])
+        + _GAP_SLACK_MM
+    )
 
 
-def _squared_length(offset: Doubles) -> Doubles:
+def _squared_length(vectors: Doubles) -> Doubles:
     """Return the squared length of (n, 2) vectors."""
-    return np.asarray(offset[:, 0] ** 2 + offset[:, 1] ** 2)
+    return np.asarray(vectors[:, 0] ** 2 + vectors[:, 1] ** 2)

@@ -12,7 +12,7 @@ from dermis.base.arrays import Floats, Index, Ints, Mask
 from dermis.mesh.geometry import expand_runs
 
 Words = NDArray[np.uint32]
-TILE_CELLS = 4
+CELLS_PER_TILE_SIDE = 4
 """Number of cells along each side of a tile."""
 
 TILE_MARGIN_TEXELS = 0.7
@@ -20,9 +20,11 @@ TILE_MARGIN_TEXELS = 0.7
 
 # In standard deviations of the widest Gaussian: largest distance between an entry and an exit cell; and side
 # of a cell, so small that light interpolated between cells is smooth.
-_PAIR_RADIUS_SIGMAS, _CELL_SIGMAS = 3.2, 0.36
+_PAIR_RADIUS_SIGMAS, _CELL_SIDE_SIGMAS = 3.2, 0.36
 _MAX_SIGMA_MM = 10.0  # limit for materials such as wax, in which there would be too many pairs of cells
-_MAX_TEXELS = 1024  # texels per side whose light is averaged into cells; more if there are more cells
+_MAX_AVERAGED_TEXELS_PER_SIDE = (
+    1024  # texels per side whose light is averaged into cells; more if there are more cells
+)
 _SAME_POINT_TEXELS = 0.1  # largest distance in the atlas at which a texel and a surface point count as equal
 
 
@@ -74,7 +76,7 @@ class Cells:
     @property
     def tiles_per_side(self) -> int:
         """Return the number of tiles along each side of the atlas."""
-        return -(-self.side // TILE_CELLS)
+        return -(-self.side // CELLS_PER_TILE_SIDE)
 
 
 def divide_into_cells(atlas: Atlas, max_sigma_mm: float, relative_cell_size: float = 1.0) -> Cells:
@@ -85,10 +87,10 @@ def divide_into_cells(atlas: Atlas, max_sigma_mm: float, relative_cell_size: flo
     relative_cell_size : cell size relative to the default [-]
     """
     sigma_mm, texel_mm = min(max_sigma_mm, _MAX_SIGMA_MM), _texel_mm(atlas)
-    side = int(np.ceil(atlas.size * texel_mm / (_CELL_SIGMAS * sigma_mm * relative_cell_size)))
+    side = int(np.ceil(atlas.size * texel_mm / (_CELL_SIDE_SIGMAS * sigma_mm * relative_cell_size)))
     side = min(max(side, 1), atlas.size)
-    stride = max(1, atlas.size // max(_MAX_TEXELS, side))
-    tiles = -(-side // TILE_CELLS)
+    stride = max(1, atlas.size // max(_MAX_AVERAGED_TEXELS_PER_SIDE, side))
+    tiles = -(-side // CELLS_PER_TILE_SIDE)
     centre = _centre_texels(atlas.size, side)
     lit = _cells_with_texels(atlas.lit[::stride, ::stride], atlas.size, side, stride)
     triangle = atlas.triangle[np.ix_(centre, centre)]
@@ -114,52 +116,53 @@ def divide_into_cells(atlas: Atlas, max_sigma_mm: float, relative_cell_size: flo
 
 def _texel_mm(atlas: Atlas) -> float:
     """Return the median side of a lit texel on the surface [mm]."""
-    step = max(1, atlas.size // _MAX_TEXELS)
+    step = max(1, atlas.size // _MAX_AVERAGED_TEXELS_PER_SIDE)
     lit, stretch = atlas.lit[::step, ::step], atlas.stretch[::step, ::step].astype(np.float32)
     density = stretch[..., 0][lit] * stretch[..., 1][lit]
     return float(1.0 / np.sqrt(np.median(density))) if len(density) else 1.0
 
 
-def _centre_texels(size: int, side: int) -> Index:
-    """Return the index of the texel at the centre of each cell along one axis (side,)."""
-    return np.asarray(((np.arange(side) + 0.5) * size / side).astype(np.int64))
+def _centre_texels(atlas_side: int, cells_per_side: int) -> Index:
+    """Return the index of the texel at the centre of each cell along one axis (cells_per_side,)."""
+    return np.asarray(((np.arange(cells_per_side) + 0.5) * atlas_side / cells_per_side).astype(np.int64))
 
 
-def _cells_with_texels(texels: Mask, size: int, side: int, stride: int) -> Mask:
-    """Return the (side, side) mask of cells that contain a marked texel.
+def _cells_with_texels(texel_mask: Mask, atlas_side: int, cells_per_side: int, stride: int) -> Mask:
+    """Return the mask (cells_per_side, cells_per_side) of cells that contain a marked texel.
 
-    texels : mask of every `stride`-th texel of the map along each axis
+    texel_mask : mask of every `stride`-th texel of the map along each axis
     """
-    first = -(-np.arange(side) * size // (side * stride))
-    rows = np.logical_or.reduceat(texels, first, axis=0)
+    first = -(-np.arange(cells_per_side) * atlas_side // (cells_per_side * stride))
+    rows = np.logical_or.reduceat(texel_mask, first, axis=0)
     return np.asarray(np.logical_or.reduceat(rows, first, axis=1))
 
 
-def _dilate_cells(cells: Mask) -> Mask:
+def _dilate_cells(cell_mask: Mask) -> Mask:
     """Return a mask of cells dilated by one cell in all eight directions."""
-    padded = np.pad(cells, 1)
+    padded = np.pad(cell_mask, 1)
     rows = padded[:-2] | padded[1:-1] | padded[2:]
     return np.asarray(rows[:, :-2] | rows[:, 1:-1] | rows[:, 2:])
 
 
-def _sort_by_tile(tile: NDArray[np.integer], tiles_per_side: int) -> tuple[Index, Index]:
+def _sort_by_tile(tile_of_entry: NDArray[np.integer], tiles_per_side: int) -> tuple[Index, Index]:
     """Return the order that sorts array entries by tile, and the start of each tile's entries (t + 1,)."""
-    order = np.argsort(tile, kind="stable")
+    order = np.argsort(tile_of_entry, kind="stable")
     return order, np.concatenate(
-        [[0], np.cumsum(np.bincount(tile, minlength=tiles_per_side * tiles_per_side))]
+        [[0], np.cumsum(np.bincount(tile_of_entry, minlength=tiles_per_side * tiles_per_side))]
     )
 
 
-def _source_cells(lit: Mask, tiles_per_side: int) -> tuple[Index, Index]:
+def _source_cells(lit_mask: Mask, tiles_per_side: int) -> tuple[Index, Index]:
     """Return the indices of the lit cells sorted by tile, and the start of each tile's entries."""
-    y, x = np.nonzero(lit)
+    y, x = np.nonzero(lit_mask)
     order, first = _sort_by_tile(
-        (y // TILE_CELLS * tiles_per_side + x // TILE_CELLS).astype(np.int32), tiles_per_side
+        (y // CELLS_PER_TILE_SIDE * tiles_per_side + x // CELLS_PER_TILE_SIDE).astype(np.int32),
+        tiles_per_side,
     )
-    return (y * len(lit) + x)[order], first
+    return (y * len(lit_mask) + x)[order], first
 
 
-def _tile_of(atlas: Atlas, points: Words, side: int, tiles_per_side: int) -> Ints:
+def _tile_of(atlas: Atlas, points: Words, cells_per_side: int, tiles_per_side: int) -> Ints:
     """Return the index (m,) of the tile in which each surface point lies in the atlas.
 
     A point that a gutter texel shows is in the tile of the texel whose light the gutter texel copies.
@@ -167,22 +170,26 @@ def _tile_of(atlas: Atlas, points: Words, side: int, tiles_per_side: int) -> Int
     points : (m, 2) triangle index, and packed barycentric weights
     """
     uv = np.stack(_atlas_uv(atlas, points[:, 0], points[:, 1]))
-    column, row = np.clip(uv * np.float32(side), 0, side - 1).astype(np.int32) // TILE_CELLS
+    column, row = (
+        np.clip(uv * np.float32(cells_per_side), 0, cells_per_side - 1).astype(np.int32)
+        // CELLS_PER_TILE_SIDE
+    )
     return np.asarray(row * tiles_per_side + column, np.int32)
 
 
-def _pack_words(low: NDArray[np.integer], high: NDArray[np.integer]) -> Words:
+def _pack_words(low_halves: NDArray[np.integer], high_halves: NDArray[np.integer]) -> Words:
     """Pack pairs of 16-bit integers into 32-bit words."""
-    return np.asarray(low.astype(np.uint32) | (high.astype(np.uint32) << 16), np.uint32)
+    return np.asarray(low_halves.astype(np.uint32) | (high_halves.astype(np.uint32) << 16), np.uint32)
 
 
-def _tile_triangles(atlas: Atlas, side: int, tiles_per_side: int) -> tuple[Words, Words]:
+def _tile_triangles(atlas: Atlas, cells_per_side: int, tiles_per_side: int) -> tuple[Words, Words]:
     """Return the start of each tile's entries, and the triangles whose uv bounding boxes overlap the tile."""
     index = np.flatnonzero(atlas.mapped)
     uv, margin = atlas.corner_uv[index].astype(np.float64), TILE_MARGIN_TEXELS / atlas.size
     low, high = uv.min(axis=1) - margin, uv.max(axis=1) + margin
     first, last = (
-        np.clip((uv * side).astype(np.int64) // TILE_CELLS, 0, tiles_per_side - 1) for uv in (low, high)
+        np.clip((uv * cells_per_side).astype(np.int64) // CELLS_PER_TILE_SIDE, 0, tiles_per_side - 1)
+        for uv in (low, high)
     )
     width, height = (last - first + 1).T
     which, tile_in_box = expand_runs(np.zeros_like(width), width * height)
@@ -191,14 +198,14 @@ def _tile_triangles(atlas: Atlas, side: int, tiles_per_side: int) -> tuple[Words
     return begin.astype(np.uint32), index[which[order]].astype(np.uint32)
 
 
-def _gutter_copies(atlas: Atlas, side: int) -> tuple[Index, Words]:
+def _gutter_copies(atlas: Atlas, cells_per_side: int) -> tuple[Index, Words]:
     """Return the start of each cell's entries, and the gutter texels with the texels that they copy."""
     rim, uv = _rim_texels(atlas)
     texel = np.concatenate([atlas.gutter, rim])
     x, y = np.clip(np.rint(np.concatenate([atlas.source, uv])), 0, atlas.size - 1).astype(np.int64).T
-    cell = y * side // atlas.size * side + x * side // atlas.size
+    cell = y * cells_per_side // atlas.size * cells_per_side + x * cells_per_side // atlas.size
     order = np.argsort(cell, kind="stable")
-    first = np.concatenate([[0], np.cumsum(np.bincount(cell, minlength=side * side))])
+    first = np.concatenate([[0], np.cumsum(np.bincount(cell, minlength=cells_per_side * cells_per_side))])
     return first, np.column_stack([_pack_words(*texel[order].T), _pack_words(x[order], y[order])])
 
 

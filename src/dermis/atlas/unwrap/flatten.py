@@ -11,8 +11,11 @@ from dermis.base.arrays import Doubles, Index, Mask
 from dermis.mesh.geometry import edges, label_components, uv_cross
 
 Complexes = NDArray[np.complex128]
-_MAX_RINGS = 5  # number of rings of triangles around mirrored ones whose points may move
-_REWEIGHTINGS, _ITERATIONS = 6, 8  # number of updates of the weights, and of iterations after each
+_MAX_UNTANGLED_RINGS = 5  # number of rings of triangles around mirrored ones whose points may move
+_REWEIGHTING_COUNT, _RIGID_ITERATION_COUNT = (
+    6,
+    8,
+)  # number of updates of the weights, and of iterations after each
 
 
 def planar_triangles(corners: NDArray[np.floating]) -> Complexes:
@@ -69,7 +72,7 @@ def untangle(positions: Doubles, triangles: Index) -> Doubles:
     ends, _, counts = edges(triangles)
     inner = np.ones(len(positions), dtype=bool)
     inner[ends[counts != 2]] = False
-    for rings in range(_MAX_RINGS):
+    for rings in range(_MAX_UNTANGLED_RINGS):
         free = np.zeros(len(positions), dtype=bool)
         free[triangles[uv_cross(positions[triangles]) <= 0]] = True
         for _ in range(rings):
@@ -81,27 +84,29 @@ def untangle(positions: Doubles, triangles: Index) -> Doubles:
     return positions
 
 
-def _average_neighbours(positions: Doubles, ends: Index, free: Mask) -> Doubles:
+def _average_neighbours(positions: Doubles, edge_points: Index, free_points: Mask) -> Doubles:
     """Place all free points at the mean of their neighbours; return positions (n, 2).
 
-    ends : (e, 2) point indices of the edges
-    free : (n,) mask of the points that may move
+    edge_points : (e, 2) point indices of the edges
+    free_points : (n,) mask of the points that may move
     """
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import laplacian
     from scipy.sparse.linalg import spsolve
 
     n = len(positions)
-    both = np.vstack((ends, ends[:, ::-1]))
+    both = np.vstack((edge_points, edge_points[:, ::-1]))
     links = csr_array((np.ones(len(both)), (both[:, 0], both[:, 1])), shape=(n, n))
     matrix: Any = laplacian(links)
-    rows: Any = csr_array(matrix)[free]  # the format of `laplacian` is slow to index
+    rows: Any = csr_array(matrix)[free_points]  # the format of `laplacian` is slow to index
     result = positions.copy()
-    result[free] = spsolve(rows[:, free].tocsc(), -(rows[:, ~free] @ positions[~free])).reshape(-1, 2)
+    result[free_points] = spsolve(
+        rows[:, free_points].tocsc(), -(rows[:, ~free_points] @ positions[~free_points])
+    ).reshape(-1, 2)
     return result
 
 
-def flatten(points: Doubles, triangles: Index, density: Doubles, weight: Doubles) -> Doubles:
+def flatten(points: Doubles, triangles: Index, length_ratio: Doubles, stretch_weight: Doubles) -> Doubles:
     """Flatten a surface into the plane with little stretch; return positions (n, 2) [mm times density].
 
     The plane is seen from outside, x to the right and y up. Connected components are flattened together, each
@@ -109,8 +114,8 @@ def flatten(points: Doubles, triangles: Index, density: Doubles, weight: Doubles
 
     points : (n, 3) vertices [mm]
     triangles : (f, 3) vertex indices
-    density : (f,) desired ratio of length in the plane to length on the surface [-]
-    weight : (f,) importance of each triangle's stretch [-]
+    length_ratio : (f,) desired ratio of length in the plane to length on the surface [-]
+    stretch_weight : (f,) importance of each triangle's stretch [-]
 
     The initial map is a least squares conformal map [Levy2002] in the Hermitian form of [Mullen2008]. The map
     is then made as rigid as possible [Liu2008], with higher weights for strongly compressed triangles as in
@@ -119,10 +124,12 @@ def flatten(points: Doubles, triangles: Index, density: Doubles, weight: Doubles
     shapes = planar_triangles(points[triangles])
     component = vertex_components(triangles, len(points))
     z = _conformal_map(points, triangles, component, shapes)
-    scaled = shapes * density[:, None]
-    for _ in range(_REWEIGHTINGS):
+    scaled = shapes * length_ratio[:, None]
+    for _ in range(_REWEIGHTING_COUNT):
         a, b = affine_coefficients(scaled, z[triangles])
-        z = _rigid_step(z, triangles, component, scaled, weight / density**2 * _stiffness_weights(a, b))
+        z = _rigid_step(
+            z, triangles, component, scaled, stretch_weight / length_ratio**2 * _stiffness_weights(a, b)
+        )
     return untangle(np.column_stack((z.real, z.imag)), triangles)
 
 
@@ -203,25 +210,25 @@ def _stiffness_weights(a: Complexes, b: Complexes) -> Doubles:
 
 
 def _rigid_step(
-    z: Complexes, triangles: Index, component: Index, shapes: Complexes, weight: Doubles
+    positions: Complexes, triangles: Index, component: Index, shapes: Complexes, stretch_weight: Doubles
 ) -> Complexes:
     """Return complex positions after some as-rigid-as-possible iterations with fixed weights.
 
     shapes : (f, 3) desired shape and size of the triangles
-    weight : (f,) importance of each triangle's stretch [-]
+    stretch_weight : (f,) importance of each triangle's stretch [-]
     """
-    n, cot = len(z), _cotangents(shapes) * weight[:, None]
+    n, cot = len(positions), _cotangents(shapes) * stretch_weight[:, None]
     free = np.ones(n, dtype=bool)
     free[np.unique(component, return_index=True)[1]] = False
     solve = _factorise(_laplacian(triangles, cot, n)[free][:, free])
     weighted_edges = cot * (np.roll(shapes, -1, axis=1) - shapes)
     start, end = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
-    for _ in range(_ITERATIONS):
-        a, _ = affine_coefficients(shapes, z[triangles])
+    for _ in range(_RIGID_ITERATION_COUNT):
+        a, _ = affine_coefficients(shapes, positions[triangles])
         rotated = (weighted_edges * (a / np.maximum(np.abs(a), 1e-12))[:, None]).ravel()
         axes = rotated.real, rotated.imag
         right = [np.bincount(end, axis, n) - np.bincount(start, axis, n) for axis in axes]
         x, y = solve(np.column_stack(right)[free]).T
-        z = np.zeros(n, dtype=np.complex128)
-        z[free] = x + 1j * y
-    return z
+        positions = np.zeros(n, dtype=np.complex128)
+        positions[free] = x + 1j * y
+    return positions

@@ -14,7 +14,7 @@ from dermis.base.progress import logged_step
 from dermis.mesh.geometry import compact_vertices
 from dermis.mesh.mesh import Mesh
 
-_CACHE_VERSION = 1  # increment when `unwrap_mesh` returns other layouts
+_LAYOUT_CACHE_VERSION = 1  # increment when `unwrap_mesh` returns other layouts
 
 
 def with_layout(mesh: Mesh, unwrapped: Mask) -> tuple[Mesh, Index]:
@@ -58,15 +58,15 @@ def with_layout(mesh: Mesh, unwrapped: Mask) -> tuple[Mesh, Index]:
     return laid_out, vertex
 
 
-def _cached_layout(part: Mesh) -> Arrays:
+def _cached_layout(unwrapped_mesh: Mesh) -> Arrays:
     """Unwrap a mesh; return uv (v, 2) and triangles (f, 3), from the cache on disk if possible."""
-    digest = hashlib.sha256(f"{_CACHE_VERSION}".encode())
-    for array in (part.positions, part.point, part.triangles):
+    digest = hashlib.sha256(f"{_LAYOUT_CACHE_VERSION}".encode())
+    for array in (unwrapped_mesh.positions, unwrapped_mesh.point, unwrapped_mesh.triangles):
         digest.update(np.ascontiguousarray(array).tobytes())
 
     @logged_step("unwrapping the mesh")
     def make() -> Arrays:
-        laid_out = unwrap_mesh(part)
+        laid_out = unwrap_mesh(unwrapped_mesh)
         used_vertices, triangles = compact_vertices(laid_out.triangles)
         return {"uv": laid_out.uv[used_vertices], "triangles": triangles.astype(np.int32)}
 

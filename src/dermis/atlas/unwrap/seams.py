@@ -1,4 +1,4 @@
-"""Seams of charts: border edges, split vertices, and changes of charts that do not flatten well."""
+"""Seams of charts: border edges, split vertices, and repair of charts that overlap when flattened."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dermis.atlas.unwrap.charts import grow_charts, merge_strays, neighbours, opposite_sides
+from dermis.atlas.unwrap.charts import grow_charts, merge_strays, neighbour_triangles, opposite_sides
 from dermis.atlas.unwrap.flatten import flatten, vertex_components
 from dermis.base.arrays import Doubles, Index, Mask
 from dermis.mesh.geometry import cross_2d, label_components, uv_cross
@@ -15,26 +15,26 @@ _EDGES_PER_BLOCK = 256  # number of edges that are compared with all other edges
 _MAX_REASSIGNMENTS = 6  # number of moves of faulty triangles to adjacent charts before charts are split
 
 
-def border_edges(corners: Index) -> tuple[Index, Index]:
+def border_edges(triangles: Index) -> tuple[Index, Index]:
     """Return border edges (k, 2), counter-clockwise around their only triangle, and this triangle (k,)."""
-    start, end = corners.T.ravel(), np.roll(corners, -1, axis=1).T.ravel()
-    alone = np.flatnonzero(opposite_sides(corners) == np.arange(len(start)))
-    return np.column_stack((start, end))[alone], alone % len(corners)
+    start, end = triangles.T.ravel(), np.roll(triangles, -1, axis=1).T.ravel()
+    alone = np.flatnonzero(opposite_sides(triangles) == np.arange(len(start)))
+    return np.column_stack((start, end))[alone], alone % len(triangles)
 
 
-def split_at_seams(triangles: Index, chart: Index) -> tuple[Index, Index]:
+def split_at_seams(triangles: Index, triangle_chart: Index) -> tuple[Index, Index]:
     """Split vertices at seams; return triangles of new vertices (f, 3), and the old vertex of each (v,).
 
     Two triangles share the vertices of their common edge only if they belong to one chart.
 
     triangles : (f, 3) old vertex indices
-    chart : (f,) chart of each triangle
+    triangle_chart : (f,) chart of each triangle
     """
     f, other = len(triangles), opposite_sides(triangles)
     start, end = triangles.T.ravel(), np.roll(triangles, -1, axis=1).T.ravel()
     # sides in the same direction belong to triangles of opposite orientation
     side = np.arange(3 * f)
-    joined = (start == end[other]) & (chart[side % f] == chart[other % f]) & (other != side)
+    joined = (start == end[other]) & (triangle_chart[side % f] == triangle_chart[other % f]) & (other != side)
     here, there = np.flatnonzero(joined), other[joined]
     after = (side + f) % (3 * f)  # index of the corner at the end of a side
     one, two = np.concatenate((here, after[here])), np.concatenate((after[there], there))
@@ -44,19 +44,19 @@ def split_at_seams(triangles: Index, chart: Index) -> tuple[Index, Index]:
     return vertex.reshape(3, f).T, point
 
 
-def faulty_triangles(positions: Doubles, corners: Index, chart: Index) -> Mask:
+def faulty_triangles(positions: Doubles, triangles: Index, triangle_chart: Index) -> Mask:
     """Return the mask (f,) of triangles that are mirrored, collapsed, or at a self-crossing of the border.
 
     A chart without such triangles does not overlap itself.
 
     positions : (v, 2) vertices, x to the right, y up
-    corners : (f, 3) vertex indices
-    chart : (f,) chart of each triangle, numbered from 0
+    triangles : (f, 3) vertex indices
+    triangle_chart : (f,) chart of each triangle, numbered from 0
     """
-    faulty: Mask = uv_cross(positions[corners]) <= 0
-    sides, owner = border_edges(corners)
-    for k in range(int(chart.max()) + 1):
-        own = np.flatnonzero(chart[owner] == k)
+    faulty: Mask = uv_cross(positions[triangles]) <= 0
+    sides, owner = border_edges(triangles)
+    for k in range(int(triangle_chart.max()) + 1):
+        own = np.flatnonzero(triangle_chart[owner] == k)
         faulty[owner[own[crossing_edges(positions[sides[own]])]]] = True
     return faulty
 
@@ -72,8 +72,8 @@ def crossing_edges(edges: Doubles) -> Mask:
     return found
 
 
-def _pairs_cross(block: Doubles, edges: Doubles) -> Mask:
-    a, b = block[:, None, 0], block[:, None, 1]
+def _pairs_cross(edge_block: Doubles, edges: Doubles) -> Mask:
+    a, b = edge_block[:, None, 0], edge_block[:, None, 1]
     c, d = edges[None, :, 0], edges[None, :, 1]
     straddle = cross_2d(b - a, c - a) * cross_2d(b - a, d - a) < 0
     return np.asarray(straddle & (cross_2d(d - c, a - c) * cross_2d(d - c, b - c) < 0))
@@ -102,59 +102,64 @@ class ChartMesh(NamedTuple):
     positions: Doubles
     triangles: Index
 
-    def flatten(self, chart: Index) -> FlatCharts:
+    def flatten(self, triangle_chart: Index) -> FlatCharts:
         """Flatten charts, given as the chart of each triangle (f,), and mark faulty triangles.
 
         Closed pieces are opened: their first triangle becomes a chart.
         """
-        corners, point = split_at_seams(self.triangles, chart)
+        corners, point = split_at_seams(self.triangles, triangle_chart)
         piece = vertex_components(corners, len(point))[corners[:, 0]]
         closed = np.setdiff1d(piece, piece[border_edges(corners)[1]])
         if len(closed):
-            opened, first = chart.copy(), np.unique(piece, return_index=True)[1]
-            opened[first[closed]] = chart.max() + 1 + np.arange(len(closed))
+            opened, first = triangle_chart.copy(), np.unique(piece, return_index=True)[1]
+            opened[first[closed]] = triangle_chart.max() + 1 + np.arange(len(closed))
             return self.flatten(opened)
         ones = np.ones(len(corners))
         uv_mm = flatten(self.positions[point], corners, ones, ones)
         return FlatCharts(corners, point, uv_mm, piece, faulty_triangles(uv_mm, corners, piece))
 
-    def subset(self, mask: Mask) -> ChartMesh:
+    def subset(self, triangle_mask: Mask) -> ChartMesh:
         """Return the mesh of the triangles that a mask selects."""
-        return ChartMesh(self.positions, self.triangles[mask])
+        return ChartMesh(self.positions, self.triangles[triangle_mask])
 
 
-def flatten_charts(mesh: ChartMesh, chart: Index) -> FlatCharts:
-    """Flatten charts (f,) so that no triangle is faulty; charts are changed where necessary."""
-    flat = mesh.flatten(chart)
+def flatten_charts(mesh: ChartMesh, triangle_chart: Index) -> FlatCharts:
+    """Flatten charts so that no triangle is faulty; charts are divided differently where necessary.
+
+    triangle_chart : (f,) chart of each triangle
+    """
+    flat = mesh.flatten(triangle_chart)
     while flat.faulty.any():
         flat = mesh.flatten(_repair_charts(mesh, flat, 0))
     return flat
 
 
-def _repair_charts(mesh: ChartMesh, flat: FlatCharts, depth: int) -> Index:
-    """Return changed charts (f,) that flatten without faulty triangles.
+def _repair_charts(mesh: ChartMesh, flat: FlatCharts, change_count: int) -> Index:
+    """Return the chart of each triangle (f,) after charts were repaired, so that no triangle is faulty.
 
     Faulty triangles are first moved to adjacent charts; if that does not suffice, charts are split.
 
-    depth : number of changes made so far
+    change_count : number of repairs made so far
     """
     if not flat.faulty.any():
         return flat.chart
     chart = (
         _reassign_faulty_triangles(mesh, flat)
-        if depth < _MAX_REASSIGNMENTS
+        if change_count < _MAX_REASSIGNMENTS
         else _split_faulty_charts(mesh, flat)
     )
     changed = flat.faulty | (chart != flat.chart)
     affected = np.isin(flat.chart, flat.chart[changed]) | np.isin(chart, chart[changed])
     subset = mesh.subset(affected)
-    chart[affected] = chart.max() + 1 + _repair_charts(subset, subset.flatten(chart[affected]), depth + 1)
+    chart[affected] = (
+        chart.max() + 1 + _repair_charts(subset, subset.flatten(chart[affected]), change_count + 1)
+    )
     return chart
 
 
 def _reassign_faulty_triangles(mesh: ChartMesh, flat: FlatCharts) -> Index:
     """Return charts (f,) in which faulty triangles belong to an adjacent chart, if there is one."""
-    adjacent = flat.chart[neighbours(mesh.triangles)]
+    adjacent = flat.chart[neighbour_triangles(mesh.triangles)]
     other = np.where(adjacent == flat.chart[:, None], -1, adjacent).max(axis=1)
     return merge_strays(np.where(flat.faulty & (other >= 0), other, flat.chart), mesh.triangles)
 

@@ -16,16 +16,16 @@ from dermis.base.errors import refuse
 from dermis.mesh.geometry import cross_2d, expand_runs, triangle_areas
 from dermis.mesh.mesh import Mesh, build_mesh
 
-_GRID_CELLS = 512  # number of cells along each side of the map
-_MAX_PLACEMENTS = 1000  # largest number of charts that are placed, in all orders together
+_GRID_CELLS_PER_SIDE = 512  # number of cells along each side of the map
+_MAX_CHART_PLACEMENTS = 1000  # largest number of charts that are placed, in all orders together
 _BISECTION_COUNT = 9  # number of trials in the search for the scale
 _MIN_SCALE_GAIN = 1.004  # gain of scale for which the search is repeated with another order
 CHART_PADDING = 1 / 128
 """Empty space between charts as a fraction of the map's side: 8 texels at 1024."""
 DEFAULT_UP_DIRECTION = (0.0, 1.0, -0.1)
 """Direction in space that points up on the map: upwards and, for horizontal surfaces, backwards."""
-_MIN_AREA_MM2 = 1e-10
-_CHART_COUNT = 16
+_MIN_TRIANGLE_AREA_MM2 = 1e-10
+_DEFAULT_CHART_COUNT = 16
 _MIN_CHART_AREA_MM2 = 1e-6
 
 
@@ -45,7 +45,7 @@ def pack_charts(outlines: list[Doubles], padding: float) -> tuple[float, Doubles
     shifted = [edges - low for edges, low in zip(outlines, corner, strict=True)]
     size = np.array([edges.max(axis=(0, 1)) for edges in shifted])
     area = sum(float(cross_2d(edges[:, 0], edges[:, 1]).sum() / 2) for edges in shifted)
-    bound = _GRID_CELLS / np.sqrt(max(area, (size**2).max()))
+    bound = _GRID_CELLS_PER_SIDE / np.sqrt(max(area, (size**2).max()))
     best, cells = 0.0, None
     for order in _packing_orders(size):
         low, high = best, bound
@@ -60,44 +60,46 @@ def pack_charts(outlines: list[Doubles], padding: float) -> tuple[float, Doubles
                 best, cells, low = scale, found, scale
     if cells is None:
         refuse("charts", "fewer charts", f"got {len(outlines)}", "Cut the mesh into larger charts")
-    return best / _GRID_CELLS, (cells - best * corner) / _GRID_CELLS
+    return best / _GRID_CELLS_PER_SIDE, (cells - best * corner) / _GRID_CELLS_PER_SIDE
 
 
-def _packing_orders(size: Doubles) -> Iterator[Index]:
+def _packing_orders(chart_sizes: Doubles) -> Iterator[Index]:
     """Yield orders in which charts are dropped: by height, by width, and random orders.
 
-    size : (c, 2) width and height of each chart
+    chart_sizes : (c, 2) width and height of each chart
     """
-    yield np.argsort(-size[:, 1], kind="stable")
-    yield np.argsort(-size[:, 0], kind="stable")
+    yield np.argsort(-chart_sizes[:, 1], kind="stable")
+    yield np.argsort(-chart_sizes[:, 0], kind="stable")
     random = np.random.default_rng(0)
-    for _ in range(min(_MAX_PLACEMENTS // len(size), factorial(len(size)) - 2)):
-        yield random.permutation(len(size))
+    for _ in range(min(_MAX_CHART_PLACEMENTS // len(chart_sizes), factorial(len(chart_sizes)) - 2)):
+        yield random.permutation(len(chart_sizes))
 
 
-def _drop_charts(shifted: list[Doubles], order: Index, scale: float, padding: float) -> Doubles | None:
+def _drop_charts(
+    chart_edges: list[Doubles], chart_order: Index, scale: float, padding: float
+) -> Doubles | None:
     """Drop charts in an order; return their lower left corners (c, 2) [cell], or None if they do not fit.
 
-    shifted : border edges of each chart, with the lower left corner of the chart at 0
+    chart_edges : border edges of each chart, with the lower left corner of the chart at 0
     scale : cells per unit of the border edges
     """
-    margin = int(np.ceil(padding * _GRID_CELLS / 2))
-    horizon, cells = np.zeros(_GRID_CELLS, dtype=np.int64), np.zeros((len(shifted), 2))
-    for k in order:
-        low, high = _height_profile(shifted[k] * scale, margin)
-        if len(low) > _GRID_CELLS:
+    margin = int(np.ceil(padding * _GRID_CELLS_PER_SIDE / 2))
+    horizon, cells = np.zeros(_GRID_CELLS_PER_SIDE, dtype=np.int64), np.zeros((len(chart_edges), 2))
+    for k in chart_order:
+        low, high = _height_profile(chart_edges[k] * scale, margin)
+        if len(low) > _GRID_CELLS_PER_SIDE:
             return None
         heights = (np.lib.stride_tricks.sliding_window_view(horizon, len(low)) - low).max(axis=1)
         x = int(heights.argmin())
         y = int(heights[x])
-        if y + high.max() >= _GRID_CELLS:
+        if y + high.max() >= _GRID_CELLS_PER_SIDE:
             return None
         horizon[x : x + len(low)] = np.maximum(horizon[x : x + len(low)], y + high + 1)
         cells[k] = x + margin, y + margin
     return cells
 
 
-def _height_profile(edges: Doubles, margin: int) -> tuple[Index, Index]:
+def _height_profile(edges: Doubles, margin_cells: int) -> tuple[Index, Index]:
     """Return the lowest and highest cell of a chart in each column (w,), with a margin of empty cells.
 
     edges : (k, 2, 2) edges of the chart's border [cell]
@@ -108,12 +110,12 @@ def _height_profile(edges: Doubles, margin: int) -> tuple[Index, Index]:
     which, step = expand_runs(np.zeros_like(steps), steps)
     t = step / steps[which]
     x, y = (edges[which, 0] * (1 - t)[:, None] + edges[which, 1] * t[:, None]).astype(np.int64).T
-    width = int(x.max()) + 1 + 2 * margin
-    low, high = np.full(width, _GRID_CELLS), np.full(width, -_GRID_CELLS)
-    np.minimum.at(low, x + margin, y)
-    np.maximum.at(high, x + margin, y)
-    window = 2 * margin + 1
-    return minimum_filter1d(low, window), maximum_filter1d(high, window) + 2 * margin
+    width = int(x.max()) + 1 + 2 * margin_cells
+    low, high = np.full(width, _GRID_CELLS_PER_SIDE), np.full(width, -_GRID_CELLS_PER_SIDE)
+    np.minimum.at(low, x + margin_cells, y)
+    np.maximum.at(high, x + margin_cells, y)
+    window = 2 * margin_cells + 1
+    return minimum_filter1d(low, window), maximum_filter1d(high, window) + 2 * margin_cells
 
 
 @dataclass(frozen=True)
@@ -135,8 +137,8 @@ class UvLayout:
 def unwrap(
     positions: Doubles,
     triangles: Index,
-    chart: Index,
-    upright: ArrayLike = DEFAULT_UP_DIRECTION,
+    triangle_chart: Index,
+    up_direction: ArrayLike = DEFAULT_UP_DIRECTION,
     padding: float = CHART_PADDING,
 ) -> UvLayout:
     """Unwrap a mesh into a uv layout in which no triangle is mirrored and no two triangles overlap.
@@ -146,15 +148,15 @@ def unwrap(
 
     positions : (n, 3) points of the mesh [mm]
     triangles : (f, 3) point indices; each triangle must have an area
-    chart : (f,) desired chart of each triangle; a chart in several pieces becomes several charts
-    upright : (3,), or (f, 3) per triangle, direction in space that points up on the map
+    triangle_chart : (f,) desired chart of each triangle; a chart in several pieces becomes several charts
+    up_direction : (3,), or (f, 3) per triangle, direction in space that points up on the map
     padding : empty space between charts as a fraction of the map's side
 
     Raises DermisError if a triangle has no area or if there are too many charts for one map.
     """
     _check_areas(positions, triangles)
-    flat = flatten_charts(ChartMesh(positions, triangles), chart)
-    up = np.broadcast_to(np.asarray(upright, dtype=np.float64), (len(triangles), 3))
+    flat = flatten_charts(ChartMesh(positions, triangles), triangle_chart)
+    up = np.broadcast_to(np.asarray(up_direction, dtype=np.float64), (len(triangles), 3))
     first = np.unique(flat.chart, return_index=True)[1]
     height = np.einsum("fki,fi->fk", positions[triangles], up[first][flat.chart])
     uv = _packed_uv(_orient_charts(flat, height), flat, padding)
@@ -162,20 +164,20 @@ def unwrap(
 
 
 def _check_areas(positions: Doubles, triangles: Index) -> None:
-    degenerate = int((triangle_areas(positions[triangles]) < _MIN_AREA_MM2).sum())
+    degenerate = int((triangle_areas(positions[triangles]) < _MIN_TRIANGLE_AREA_MM2).sum())
     if degenerate:
         refuse("mesh", "triangles with an area", f"{degenerate} have none", "Remove them first")
 
 
-def _orient_charts(flat: FlatCharts, height: Doubles) -> Doubles:
-    """Rotate each chart so that `height` increases upwards; return positions (v, 2).
+def _orient_charts(flat: FlatCharts, upright_coordinate: Doubles) -> Doubles:
+    """Rotate each chart so that `upright_coordinate` increases upwards; return positions (v, 2).
 
-    height : (f, 3) coordinate in space along the upright direction, at the corners [mm]
+    upright_coordinate : (f, 3) coordinate in space along the upright direction, at the corners [mm]
     """
     z = flat.uv_mm[:, 0] + 1j * flat.uv_mm[:, 1]
     z3 = z[flat.corners]
     # i times the edge opposite a corner is the direction of the gradient of its hat function
-    slope = 1j * (height * (np.roll(z3, -2, axis=1) - np.roll(z3, -1, axis=1))).sum(axis=1)
+    slope = 1j * (upright_coordinate * (np.roll(z3, -2, axis=1) - np.roll(z3, -1, axis=1))).sum(axis=1)
     up = np.bincount(flat.chart, slope.real) + 1j * np.bincount(flat.chart, slope.imag)
     rotation = np.where(np.abs(up) > 0, 1j * np.conj(up) / np.maximum(np.abs(up), 1e-300), 1)
     z *= rotation[_vertex_charts(flat)]
@@ -211,7 +213,9 @@ def unwrap_mesh(mesh: Mesh) -> Mesh:
     valid = np.flatnonzero(triangle_areas(positions[points]) > _MIN_CHART_AREA_MM2)
     triangles = points[valid]
     layout = unwrap(
-        positions, triangles, smooth_charts(grow_charts(positions, triangles, _CHART_COUNT), triangles)
+        positions,
+        triangles,
+        smooth_charts(grow_charts(positions, triangles, _DEFAULT_CHART_COUNT), triangles),
     )
     corner = np.full((len(points), 3), len(layout.uv), dtype=np.int64)
     corner[valid] = layout.triangles

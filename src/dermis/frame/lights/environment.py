@@ -17,8 +17,8 @@ from dermis.scene.environment import Environment
 from dermis.scene.model import Scene
 from dermis.scene.skin import Skin, lobe_name
 
-_MAX_HALF = 65504.0  # largest 16-bit float
-_BACKGROUND_ROWS = 2048  # limit of a panorama in the background
+_MAX_HALF_FLOAT = 65504.0  # largest 16-bit float
+_MAX_BACKGROUND_ROWS = 2048  # limit of a panorama in the background
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,42 +36,46 @@ class EnvironmentMap:
     peak_irradiance: float = 0.0
 
 
-def load_environment_map(device: Device, name: str | None) -> EnvironmentMap:
+def load_environment_map(device: Device, environment_name: str | None) -> EnvironmentMap:
     """Return the prefiltered panorama of an environment, or a black panorama for the name None.
 
     Raises DermisError when there is no such environment.
     """
-    if name is None:
-        return EnvironmentMap(make_texture(device, (1, 1), "rgba16float", layers=2, use="map"), ())
-    prefiltered = prefilter(name)
+    if environment_name is None:
+        return EnvironmentMap(
+            make_texture(device, (1, 1), "rgba16float", layer_count=2, content_source="map"), ()
+        )
+    prefiltered = prefilter(environment_name)
     return EnvironmentMap(
         _upload_layers(device, prefiltered.layers), prefiltered.suns, float(prefiltered.layers[0].max())
     )
 
 
-def unfiltered_panorama(device: Device, name: str) -> Texture:
+def unfiltered_panorama(device: Device, environment_name: str) -> Texture:
     """Upload an unfiltered panorama, suns included, for sharp backgrounds; a second layer is black."""
-    radiance = load_panorama(name, max_rows=_BACKGROUND_ROWS).astype(np.float32)
+    radiance = load_panorama(environment_name, max_rows=_MAX_BACKGROUND_ROWS).astype(np.float32)
     return _upload_layers(device, [radiance, np.zeros_like(radiance)])
 
 
 def _upload_layers(device: Device, layers: Sequence[NDArray[np.float32]] | NDArray[np.float32]) -> Texture:
     height, width = layers[0].shape[:2]
     size = width + 2, height + 2
-    texture = make_texture(device, size, "rgba16float", layers=len(layers), use="map")
+    texture = make_texture(device, size, "rgba16float", layer_count=len(layers), content_source="map")
     for index, layer in enumerate(layers):
         texels = np.dstack([_with_border(layer), np.ones(size[::-1])])
-        upload(device, texture, np.minimum(texels, _MAX_HALF), layer=index)
+        upload(device, texture, np.minimum(texels, _MAX_HALF_FLOAT), layer=index)
     return texture
 
 
-def _with_border(layer: NDArray[np.float32]) -> NDArray[np.float32]:
+def _with_border(panorama: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return a panorama with a border of one texel for filters.
 
     Columns wrap around. Beyond a pole, the border continues on the opposite side of the sphere.
     """
-    half = layer.shape[1] // 2
-    rows = np.concatenate([np.roll(layer[:1], half, axis=1), layer, np.roll(layer[-1:], half, axis=1)])
+    half = panorama.shape[1] // 2
+    rows = np.concatenate(
+        [np.roll(panorama[:1], half, axis=1), panorama, np.roll(panorama[-1:], half, axis=1)]
+    )
     return np.concatenate([rows[:, -1:], rows, rows[:, :1]], axis=1)
 
 

@@ -144,12 +144,12 @@ def area_light_members(light: PointLight, radiance: float, half_width: float, ha
     }
 
 
-def override_name(name: str) -> str:
+def override_name(kind_name: str) -> str:
     """Return the name of the pipeline constant that enables a kind of light in shaders.
 
-    name : name of the kind in scene files
+    kind_name : name of the kind in scene files
     """
-    return f"{name.replace('-', '_').upper()}_LIGHT"
+    return f"{kind_name.replace('-', '_').upper()}_LIGHT"
 
 
 def light_shaders() -> list[ShaderListMember]:

@@ -30,17 +30,17 @@ from dermis.scene.model import Scene
 
 Floats = NDArray[np.float64]
 _MAX_LIGHTS = 64
-_MAX_SHADOW_FILTER = 6  # largest half width of a shadow filter [shadow texels]
-_SAMPLES_PER_SIDE = 4  # an area light is sampled by 4 x 4 points
+_MAX_SHADOW_FILTER_TEXELS = 6  # largest half width of a shadow filter [shadow texels]
+_LIGHT_SAMPLES_PER_SIDE = 4  # an area light is sampled by 4 x 4 points
 _PART_SAMPLES_PER_SIDE = 2  # each of several parts of a light is sampled by 2 x 2 points
-_SHADOW_RAYS = 64  # shadow rays to an area light that is not divided
-_MIN_SHADOW_RAYS = 12  # least number of shadow rays to a part of a light
-_SUN_SHADOW_RAYS = 32  # shadow rays to a sun
+_SHADOW_RAY_COUNT = 64  # shadow rays to an area light that is not divided
+_MIN_SHADOW_RAY_COUNT = 12  # least number of shadow rays to a part of a light
+_SUN_SHADOW_RAY_COUNT = 32  # shadow rays to a sun
 
 
 def light_shader_constants() -> dict[str, float]:
     """Return the values that `//#fill` lines insert in lights.wgsl and soft_shadows.wgsl, by name."""
-    return {"max_lights": _MAX_LIGHTS, "max_rays": _SHADOW_RAYS, "min_rays": _MIN_SHADOW_RAYS}
+    return {"max_lights": _MAX_LIGHTS, "max_rays": _SHADOW_RAY_COUNT, "min_rays": _MIN_SHADOW_RAY_COUNT}
 
 
 def sun_lights(suns: tuple[Sun, ...], environment: Environment) -> tuple[DirectionalLight, ...]:
@@ -87,11 +87,11 @@ def light_part_counts(scene: Scene) -> tuple[int, ...]:
     return tuple(len(KINDS[light.kind].parts(light)) for light in scene.lights)
 
 
-def light_shadow_views(scene: Scene, outline: Outline, size: int) -> list[ShadowView | None]:
+def light_shadow_views(scene: Scene, outline: Outline, map_side: int) -> list[ShadowView | None]:
     """Return the view of the shadow map of each part of each light, None for lights without shadows.
 
     outline : outline of the head's shape
-    size : side of the shadow maps [texels]
+    map_side : side of the shadow maps [texels]
 
     Raises DermisError for more lights than the shader supports, and for a light inside the bounds of the
     head.
@@ -109,20 +109,22 @@ def light_shadow_views(scene: Scene, outline: Outline, size: int) -> list[Shadow
         KINDS[light.kind].check(light, head, culprit)
     shadowed = [(culprit, light) for culprit, light in numbered if light.shadows]
     points = [(culprit, light) for culprit, light in shadowed if not isinstance(light, DirectionalLight)]
-    point_views = iter(point_shadow_views(points, head.centre_mm, outline, size))
+    point_views = iter(point_shadow_views(points, head.centre_mm, outline, map_side))
 
     def view(light: Light) -> ShadowView:
         if isinstance(light, DirectionalLight):
-            return parallel_shadow_view(np.array(light.direction), outline, size)
+            return parallel_shadow_view(np.array(light.direction), outline, map_side)
         return next(point_views)
 
     return [view(light) if light.shadows else None for _, light in numbered]
 
 
-def light_records(program: ComputeProgram, scene: Scene, views: list[ShadowView | None]) -> UniformRecord:
+def light_records(
+    program: ComputeProgram, scene: Scene, shadow_views: list[ShadowView | None]
+) -> UniformRecord:
     """Return the uniform record `Lights` of all lights of the scene.
 
-    views : view of the shadow map of each part of each light, from `light_shadow_views`
+    shadow_views : view of the shadow map of each part of each light, from `light_shadow_views`
     """
     record = program.record("Lights", sample_points=light_sample_points())
     lights = record["light"]
@@ -130,7 +132,7 @@ def light_records(program: ComputeProgram, scene: Scene, views: list[ShadowView 
     divided = [(part, len(parts)) for parts in each for part in parts]
     none, layers = dict.fromkeys(lights.dtype.names or (), 0), count()
     rows = []
-    for (light, siblings), view in zip(divided, views, strict=True):
+    for (light, siblings), view in zip(divided, shadow_views, strict=True):
         members = _light_members(light, scene.head.centre_mm, view, siblings)
         one = {**none, **members, "layer": next(layers) if view else -1}
         rows.append(tuple(one.values()))
@@ -144,16 +146,16 @@ def light_sample_points() -> Floats:
 
     Columns are x and y on the unit disc, then x and y on the square.
     """
-    even = (0.5 + np.arange(_SHADOW_RAYS)[:, None] * [0.7548776662, 0.5698402910]) % 1.0
+    even = (0.5 + np.arange(_SHADOW_RAY_COUNT)[:, None] * [0.7548776662, 0.5698402910]) % 1.0
     phi = 2.0 * np.pi * even[:, 1]
     disc = np.sqrt(even[:, :1]) * np.stack([np.cos(phi), np.sin(phi)], axis=-1)
     return np.hstack([disc, 2.0 * even - 1.0])
 
 
-def _light_members(light: Light, centre: Triple, view: ShadowView | None, siblings: int) -> Members:
+def _light_members(light: Light, centre: Triple, view: ShadowView | None, part_count: int) -> Members:
     """Return the members of the shader struct `Light`; members that are left out are 0.
 
-    siblings : number of parts into which the light is divided, this part included
+    part_count : number of parts into which the light is divided, this part included
     """
     kind, parallel = KINDS[light.kind], isinstance(light, DirectionalLight)
     distance, texel, position = 1.0, 1.0, (0.0, 0.0, 0.0)
@@ -180,9 +182,11 @@ def _light_members(light: Light, centre: Triple, view: ShadowView | None, siblin
         "texel": texel if view else 0.0,
         # a tent of half width h fades over 2 h texels
         "softness": 0.5 * light.softness_mm,
-        "half_width": min(max(half_width, 1), _MAX_SHADOW_FILTER),
-        "rays": _SUN_SHADOW_RAYS if parallel else max(_MIN_SHADOW_RAYS, _SHADOW_RAYS // siblings),
-        "side": 1 if kind.punctual else _PART_SAMPLES_PER_SIDE if siblings > 1 else _SAMPLES_PER_SIDE,
+        "half_width": min(max(half_width, 1), _MAX_SHADOW_FILTER_TEXELS),
+        "rays": _SUN_SHADOW_RAY_COUNT
+        if parallel
+        else max(_MIN_SHADOW_RAY_COUNT, _SHADOW_RAY_COUNT // part_count),
+        "side": 1 if kind.punctual else _PART_SAMPLES_PER_SIDE if part_count > 1 else _LIGHT_SAMPLES_PER_SIDE,
         **shadow,
         **kind.members(light, centre, distance),
     }

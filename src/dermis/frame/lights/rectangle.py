@@ -10,8 +10,8 @@ from dermis.frame.lights.kind import Kind, Members, area_light_members
 from dermis.frame.projection import Triple, vector_between, view_axes
 from dermis.scene.lights import Light, RectangleLight
 
-_MAX_PART_RATIO = 0.35  # largest ratio of a part's side to the light's distance from its target
-_MAX_PARTS = 3  # largest number of parts along each side
+_MAX_PART_SIDE_PER_DISTANCE = 0.35  # largest ratio of a part's side to the light's distance from its target
+_MAX_PARTS_PER_SIDE = 3  # largest number of parts along each side
 
 
 class _Rectangle(Kind[RectangleLight]):
@@ -58,17 +58,17 @@ KIND = _Rectangle()
 
 def _part_count(side_mm: float, distance_mm: float) -> int:
     """Return the number of parts along one side of a rectangle, seen from a distance."""
-    return min(max(math.ceil(side_mm / (_MAX_PART_RATIO * distance_mm)), 1), _MAX_PARTS)
+    return min(max(math.ceil(side_mm / (_MAX_PART_SIDE_PER_DISTANCE * distance_mm)), 1), _MAX_PARTS_PER_SIDE)
 
 
-def facing_irradiance(width: float, height: float, distance: float) -> float:
+def facing_irradiance(width_mm: float, height_mm: float, distance_mm: float) -> float:
     """Return the irradiance at a point opposite the centre of a rectangle of radiance 1 [-].
 
-    width, height : sides of the rectangle [mm]
-    distance : distance of the point from the centre [mm]
+    width_mm, height_mm : sides of the rectangle [mm]
+    distance_mm : distance of the point from the centre [mm]
 
     Source: the view factor of a corner, [Baum1989].
     """
-    a, b = 0.5 * width / distance, 0.5 * height / distance
+    a, b = 0.5 * width_mm / distance_mm, 0.5 * height_mm / distance_mm
     across, along = math.hypot(1.0, a), math.hypot(1.0, b)
     return 2.0 * (a / across * math.atan(b / across) + b / along * math.atan(a / along))

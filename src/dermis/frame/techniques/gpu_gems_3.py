@@ -12,7 +12,7 @@ import numpy as np
 
 from dermis.frame.features.atlas.textures import AtlasTextures
 from dermis.frame.features.diffusion.pyramid import Blur, Halvings, PyramidLevels, make_levels
-from dermis.frame.programs import HALF_FORMAT, program
+from dermis.frame.programs import HALF_TEXEL_FORMAT, program
 from dermis.frame.technique import ProfileSplit
 from dermis.frame.techniques.technique import AtlasTechnique
 from dermis.gpu import (
@@ -25,7 +25,7 @@ from dermis.gpu import (
     TextureOrView,
     make_texture,
 )
-from dermis.gpu.textures import FORMAT_BYTES
+from dermis.gpu.textures import TEXEL_FORMAT_BYTES
 
 TexturePair = tuple[TextureOrView, TextureOrView]
 
@@ -49,15 +49,15 @@ class GpuGems3(AtlasTechnique):
 
     def make_levels(self, device: Device, side: int, halvings: Halvings) -> PyramidLevels:
         """Create textures for light, its blurred levels and a blurred stretch map."""
-        pyramid = make_levels(device, side, halvings, HALF_FORMAT)
-        first, second = (make_texture(device, (side, side), HALF_FORMAT) for _ in range(2))
+        pyramid = make_levels(device, side, halvings, HALF_TEXEL_FORMAT)
+        first, second = (make_texture(device, (side, side), HALF_TEXEL_FORMAT) for _ in range(2))
         return StretchedLevels(
-            pyramid.stacks, pyramid.first, pyramid.scratch, side, HALF_FORMAT, stretch=(first, second)
+            pyramid.stacks, pyramid.first, pyramid.scratch, side, HALF_TEXEL_FORMAT, stretch=(first, second)
         )
 
     def texel_bytes(self, levels: int) -> float:
         """Return the memory per atlas texel of the pyramid levels and the blurred stretch map [bytes]."""
-        return float(FORMAT_BYTES[HALF_FORMAT] * (levels + 4))
+        return float(TEXEL_FORMAT_BYTES[HALF_TEXEL_FORMAT] * (levels + 4))
 
     def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
         """Return how often the resolution of each level is halved: never, all levels have full resolution."""

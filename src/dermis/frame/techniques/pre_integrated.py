@@ -17,14 +17,16 @@ from dermis.optics.fits.separable import preintegrated_kernel
 from dermis.optics.gaussians import Floats, GaussianSum
 from dermis.scene.settings import Settings
 
-MAX_CURVATURE = 0.5
+MAX_CURVATURE_PER_MM = 0.5
 """Curvature of the last row of the sphere table [1/mm], a radius of 2 mm."""
 
 _COSINE_COUNT = 257  # odd, so that one column is N.L = 0, where incident light begins
-_CURVATURE_ROWS, _EDGE_ROWS = 33, 9  # as in pre_integrated.wgsl
+_CURVATURE_ROWS, _SHADOW_EDGE_ROWS = 33, 9  # as in pre_integrated.wgsl
 _QUADRATURE_NODES = 48
-_EXTENT_SIGMAS = 7.0  # standard deviations over which a Gaussian is integrated
-_SHADOW_TAIL = 0.01  # fraction of the light that scatters farther across a shadow edge than the table covers
+_INTEGRATION_SIGMAS = 7.0  # standard deviations over which a Gaussian is integrated
+_SHADOW_TAIL_FRACTION = (
+    0.01  # fraction of the light that scatters farther across a shadow edge than the table covers
+)
 _MAX_PENUMBRA_MM = 8.0
 
 
@@ -62,7 +64,7 @@ class PreIntegratedSkin(Technique):
         """Write the largest curvature, the penumbra width and the relief smoothing to the shading record."""
         assert isinstance(resources, PreIntegratedTables)
         scales = {
-            "max_curvature": MAX_CURVATURE,
+            "max_curvature": MAX_CURVATURE_PER_MM,
             "penumbra": resources.penumbra_width_mm,
             "relief": resources.relief_mm,
         }
@@ -82,7 +84,9 @@ TECHNIQUE = PreIntegratedSkin()
 def pre_integrate(device: Device, profile: GaussianSum) -> PreIntegratedTables:
     """Compute the tables of scattered light for a profile, and upload them."""
     penumbra = penumbra_width_mm(profile)
-    edges = [shadow_edge_row(profile, penumbra, width) for width in np.linspace(0.0, penumbra, _EDGE_ROWS)]
+    edges = [
+        shadow_edge_row(profile, penumbra, width) for width in np.linspace(0.0, penumbra, _SHADOW_EDGE_ROWS)
+    ]
     rows = np.concatenate([sphere_table(profile), np.stack(edges)])
     table = np.concatenate([rows, np.zeros((*rows.shape[:2], 1))], axis=-1)
     return PreIntegratedTables(
@@ -94,14 +98,14 @@ def sphere_table(profile: GaussianSum) -> Floats:
     """Return max(N.L, 0) after scattering on spheres, (n, m, c): rows by curvature, columns by N.L [-].
 
     N is the normal and L the direction to the light; N.L is from -1 to 1, curvature from 0 to
-    `MAX_CURVATURE`. Light spreads by straight distance: on a sphere of radius r, a Gaussian of variance v is
-    exp(r^2/v (cos a - 1)) at the central angle a, normalised over the sphere. [Penner2011] integrates around
-    a ring instead, which does not conserve energy.
+    `MAX_CURVATURE_PER_MM`. Light spreads by straight distance: on a sphere of radius r, a Gaussian of
+    variance v is exp(r^2/v (cos a - 1)) at the central angle a, normalised over the sphere. [Penner2011]
+    integrates around a ring instead, which does not conserve energy.
     """
     cosines = np.linspace(-1.0, 1.0, _COSINE_COUNT)
     rows = [np.repeat(np.maximum(cosines, 0.0)[:, None], len(profile.albedo), axis=1)]
     fractions = profile.weight / profile.albedo
-    for curvature_per_mm in np.linspace(0.0, MAX_CURVATURE, _CURVATURE_ROWS)[1:]:
+    for curvature_per_mm in np.linspace(0.0, MAX_CURVATURE_PER_MM, _CURVATURE_ROWS)[1:]:
         concentration = 1.0 / (curvature_per_mm**2 * profile.variance_mm2)
         rows.append(np.stack([scattered_cosine(cosines, k) for k in concentration], axis=1) @ fractions)
     return np.stack(rows)
@@ -116,7 +120,7 @@ def scattered_cosine(cosines: ArrayLike, concentration: float) -> Floats:
     from scipy.special import i0e
 
     theta = np.arccos(np.asarray(cosines, dtype=np.float64))
-    extent = _EXTENT_SIGMAS / np.sqrt(concentration)
+    extent = _INTEGRATION_SIGMAS / np.sqrt(concentration)
     low, high = np.clip(theta - extent, 0.0, 0.5 * np.pi), np.clip(theta + extent, 0.0, 0.5 * np.pi)
     x, w = np.polynomial.legendre.leggauss(_QUADRATURE_NODES)
     half = 0.5 * (high - low)[..., None]
@@ -145,7 +149,9 @@ def shadow_edge_row(profile: GaussianSum, radius_mm: float, half_width_mm: float
 def penumbra_width_mm(profile: GaussianSum) -> float:
     """Return the distance from a shadow edge beyond which scattering changes light by at most 1 % [mm]."""
     distance = np.geomspace(0.05, _MAX_PENUMBRA_MM, 512)
-    beyond = (0.5 - preintegrated_kernel(profile).half_line_integral(distance)).max(axis=1) > _SHADOW_TAIL
+    beyond = (0.5 - preintegrated_kernel(profile).half_line_integral(distance)).max(
+        axis=1
+    ) > _SHADOW_TAIL_FRACTION
     return float(distance[min(int(beyond.sum()), len(distance) - 1)])
 
 

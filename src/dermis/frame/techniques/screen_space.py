@@ -31,9 +31,9 @@ from dermis.scene.settings import Settings
 
 TECHNIQUES_FOLDER = Path(__file__).parent
 # Largest fraction of the light of a channel that may lie beyond the kernel's reach on one side.
-_MAX_TAIL = 5e-4
-_MIN_REACH_MM, _MAX_REACH_MM = 0.01, 400.0
-_ENTRY_COUNT = 256
+_MAX_TAIL_FRACTION = 5e-4
+_MIN_KERNEL_REACH_MM, _MAX_KERNEL_REACH_MM = 0.01, 400.0
+_KERNEL_ENTRY_COUNT = 256
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +82,7 @@ class ScreenSpace(Technique):
 
     def make_subsurface_layers(self, memo: Memo, device: Device, settings: Settings) -> SubsurfaceLayers:
         """Return the textures in which the light of outputs is diffused, without a finished picture."""
-        return memo.get(make_subsurface_layers, device, settings.size, False, owner="outputs")
+        return memo.get(make_subsurface_layers, device, settings.size, False, caller_name="outputs")
 
     def subsurface_layers(self, resources: TechniqueResources | None) -> Texture | None:
         """Return texture layers: light below the skin, and its fraction that leaves towards the camera."""
@@ -113,16 +113,16 @@ TECHNIQUE = ScreenSpace()
 
 
 def make_subsurface_layers(
-    device: Device, size: tuple[int, int], with_result: bool = True
+    device: Device, picture_size: tuple[int, int], with_result: bool = True
 ) -> SubsurfaceLayers:
     """Create the textures for a picture of size (width, height), without a kernel.
 
     with_result : whether a texture for the finished picture is needed
     """
-    layers = make_texture(device, size, "rgba32float", layers=2)
+    layers = make_texture(device, picture_size, "rgba32float", layer_count=2)
     subsurface, transmittance = (make_view(layers, layer=k) for k in range(2))
-    scratch = make_texture(device, size, "rgba32float")
-    result = make_texture(device, size, "rgba32float") if with_result else None
+    scratch = make_texture(device, picture_size, "rgba32float")
+    result = make_texture(device, picture_size, "rgba32float") if with_result else None
     return SubsurfaceLayers(layers, subsurface, transmittance, scratch, result, None)
 
 
@@ -133,23 +133,23 @@ def make_kernel(device: Device, profile: GaussianSum) -> Kernel:
 
 
 def draw(
-    graph: Recorder, layers: SubsurfaceLayers, kernel: Kernel, window: Window, surface: Texture
+    graph: Recorder, layers: SubsurfaceLayers, kernel: Kernel, window: Window, surface_light: Texture
 ) -> Texture:
     """Declare the passes that diffuse the light of `layers`, and return the finished picture.
 
     window : rectangle of the image plane that the picture shows
-    surface : shaded picture without the light below the skin
+    surface_light : shaded picture without the light below the skin
     """
     assert layers.result is not None
     draw_blur(graph, layers, kernel, window)
     bound: MutableBindings = {
-        "surface": surface,
+        "surface": surface_light,
         "subsurface": layers.subsurface,
         "transmittance": layers.transmittance,
         "picture": layers.result,
     }
     shader = program(graph.device, TECHNIQUES_FOLDER / "resurface.wgsl")
-    graph.compute("screen space", shader, bound, surface.size[:2])
+    graph.compute("screen space", shader, bound, surface_light.size[:2])
     return layers.result
 
 
@@ -183,13 +183,13 @@ def kernel_table(kernel: SeparableKernel) -> tuple[NDArray[np.float64], float]:
     Distances are evenly spaced in their square root.
     """
     reach = _kernel_reach_mm(kernel)
-    fractions = kernel.half_line_integral(reach * np.linspace(0.0, 1.0, _ENTRY_COUNT) ** 2)
+    fractions = kernel.half_line_integral(reach * np.linspace(0.0, 1.0, _KERNEL_ENTRY_COUNT) ** 2)
     fractions *= 0.5 / fractions[-1]  # the light beyond the reach is added to the light within it
-    return np.concatenate([fractions, np.zeros((_ENTRY_COUNT, 1))], axis=1)[None], reach
+    return np.concatenate([fractions, np.zeros((_KERNEL_ENTRY_COUNT, 1))], axis=1)[None], reach
 
 
 def _kernel_reach_mm(kernel: SeparableKernel) -> float:
-    """Return the distance beyond which each channel has at most `_MAX_TAIL` of its light per side [mm]."""
-    distance = np.geomspace(_MIN_REACH_MM, _MAX_REACH_MM, 4096)
-    beyond = (0.5 - kernel.half_line_integral(distance)).max(axis=1) > _MAX_TAIL
+    """Return the distance beyond which each channel has at most 0.05 % of its light per side [mm]."""
+    distance = np.geomspace(_MIN_KERNEL_REACH_MM, _MAX_KERNEL_REACH_MM, 4096)
+    beyond = (0.5 - kernel.half_line_integral(distance)).max(axis=1) > _MAX_TAIL_FRACTION
     return float(distance[min(int(beyond.sum()), len(distance) - 1)])

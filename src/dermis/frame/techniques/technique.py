@@ -8,7 +8,7 @@ import numpy as np
 
 from dermis.frame.features.atlas import gutters
 from dermis.frame.features.atlas.passes import draw_blend, draw_stretch
-from dermis.frame.features.atlas.textures import MAX_HALVINGS, AtlasTextures
+from dermis.frame.features.atlas.textures import MAX_ATLAS_HALVINGS, AtlasTextures
 from dermis.frame.features.diffusion import combine
 from dermis.frame.features.diffusion import mixture as mix
 from dermis.frame.features.diffusion.mixture import Mixture
@@ -20,20 +20,20 @@ from dermis.frame.features.diffusion.pyramid import (
     make_levels,
 )
 from dermis.frame.features.irradiance import irradiance
-from dermis.frame.features.irradiance.irradiance import TEXEL_FILTER_SIGMA
+from dermis.frame.features.irradiance.irradiance import LIGHT_FILTER_SIGMA_TEXELS
 from dermis.frame.features.surface import texels
 from dermis.frame.features.translucency import passes as translucency
 from dermis.frame.features.translucency.resources import Translucency
 from dermis.frame.inputs import FrameInputs
-from dermis.frame.programs import FLOAT_FORMAT, level_format
+from dermis.frame.programs import FLOAT_TEXEL_FORMAT, level_format
 from dermis.frame.technique import ProfileSplit, TechniqueResources, TechniqueTraits, channel_weights
 from dermis.gpu import ComputeProgram, Device, Graph, Memo, Recorder, Texture, TextureOrView, UniformRecord
-from dermis.gpu.textures import FORMAT_BYTES
+from dermis.gpu.textures import TEXEL_FORMAT_BYTES
 from dermis.optics.gaussians import GaussianSum
 from dermis.scene.settings import Settings
 
 # Narrower Gaussians are finer than texels and pores: they are relit in the picture, not blurred.
-_RELIT_MM2 = 0.1**2
+_RELIT_VARIANCE_MM2 = 0.1**2
 
 
 class Technique(TechniqueTraits):
@@ -54,11 +54,11 @@ class Technique(TechniqueTraits):
         side : side of the atlas [texels]
         halvings : how often the resolution of each level is halved, for each layout
         """
-        return make_levels(device, side, halvings, FLOAT_FORMAT)
+        return make_levels(device, side, halvings, FLOAT_TEXEL_FORMAT)
 
     def make_sum(self, device: Device, side: int) -> Texture:
         """Create the texture for the exitance of scattered light, side x side texels."""
-        return combine.make_sum(device, side)
+        return combine.make_blur_sum(device, side)
 
     def add_intermediate_levels(
         self, split: ProfileSplit, atlas: AtlasTextures, edge: str
@@ -143,7 +143,7 @@ class AtlasTechnique(Technique):
 
     def relights_narrowest(self, profile: GaussianSum) -> bool:
         """Return whether unblurred light, evaluated per pixel, replaces the narrowest Gaussian."""
-        return bool(profile.variance_mm2[0] <= _RELIT_MM2)
+        return bool(profile.variance_mm2[0] <= _RELIT_VARIANCE_MM2)
 
     def split(self, profile: GaussianSum, normalise: bool) -> ProfileSplit:
         """Split a profile into the narrow Gaussian that is relit, if any, and the Gaussians that blur.
@@ -163,8 +163,10 @@ class AtlasTechnique(Technique):
 
     def texel_bytes(self, levels: int) -> float:
         """Return the peak memory per atlas texel on a software adapter, with temporary textures [bytes]."""
-        mips = sum(0.25**halving for halving in range(MAX_HALVINGS + 1))
-        return FORMAT_BYTES[FLOAT_FORMAT] * (levels + 2 * mips)  # upper bound, as if no level were halved
+        mips = sum(0.25**halving for halving in range(MAX_ATLAS_HALVINGS + 1))
+        return TEXEL_FORMAT_BYTES[FLOAT_TEXEL_FORMAT] * (
+            levels + 2 * mips
+        )  # upper bound, as if no level were halved
 
     def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
         """Return how often the resolution of each level is halved, starting with the unblurred level.
@@ -181,7 +183,7 @@ class AtlasTechnique(Technique):
         if not inputs.blurs:
             return resources.scattered
         for index, (layout, blur) in enumerate(zip(layouts, inputs.blurs, strict=True)):
-            into = levels.layer(0), levels.size, levels.texel, blur.scale, TEXEL_FILTER_SIGMA
+            into = levels.layer(0), levels.size, levels.texel, blur.scale, LIGHT_FILTER_SIGMA_TEXELS
             graph.repeat(draw_stretch, layout.head, layout.atlas)
             if layout.gutter_update:
                 graph.repeat(
@@ -249,7 +251,7 @@ class AtlasTechnique(Technique):
         for other, (entering, weight) in enumerate(zip(mixture.entering, blur.weight_changes, strict=True)):
             change = replace(blur, weight=weight)
             combine.draw(graph, levels, change, mixture.sum_layer(1 + 2 * other))
-            mix.draw_entering(graph, levels, mixture, layout, other)
+            mix.draw_entering_light(graph, levels, mixture, layout, other)
             self.blur_levels(graph, entering, atlas, blur)
             combine.draw(graph, entering, change, mixture.sum_layer(2 + 2 * other))
         mix.draw(graph, mixture, layout, into)

@@ -35,49 +35,50 @@ def fresnel(cosine: ArrayLike, eta: float) -> Floats:
 
 
 @cache
-def internal_moment(order: int, eta: float, nodes: int = 64) -> float:
+def internal_moment(cosine_power: int, eta: float, node_count: int = 64) -> float:
     """Return the moment int F(mu) mu^order dmu of the internal Fresnel reflectance F [-].
 
-    order : power of the cosine mu, which is integrated from 0 to 1
+    cosine_power : power of the cosine mu, which is integrated from 0 to 1
     eta : index of refraction relative to air [-]
-    nodes : number of quadrature nodes
+    node_count : number of quadrature nodes
 
     Source: [dEonIrving2011] section 3.
     """
     if eta == 1.0:
         return 0.0
     critical = np.sqrt(1.0 - 1.0 / eta**2)
-    x, w = np.polynomial.legendre.leggauss(nodes)
+    x, w = np.polynomial.legendre.leggauss(node_count)
     # F has a square-root singularity at the critical angle; substituting the transmitted cosine removes it.
     t = 0.5 * (x + 1.0)
     mu = np.sqrt(critical**2 + (t / eta) ** 2)
-    inside = fresnel(np.minimum(mu, 1.0), 1.0 / eta) * mu**order * t / (eta**2 * mu)
-    return float(critical ** (order + 1) / (order + 1) + 0.5 * w @ inside)
+    inside = fresnel(np.minimum(mu, 1.0), 1.0 / eta) * mu**cosine_power * t / (eta**2 * mu)
+    return float(critical ** (cosine_power + 1) / (cosine_power + 1) + 0.5 * w @ inside)
 
 
-def diffuse_reflectance(eta: float, kind: DiffuseIntegral = "polynomial") -> float:
+def diffuse_reflectance(eta: float, integral_method: DiffuseIntegral = "polynomial") -> float:
     """Return the reflectance F_dr of the surface for diffuse light from inside the medium [-].
 
-    kind : "polynomial", the fit used by the published dipole and multipole, or "exact", the integral
+    integral_method : "polynomial", the fit used by the published dipole and multipole, or "exact", the
+        integral
 
     Source: [Egan1973]; as printed in [Jensen2001].
     """
     if eta == 1.0:
         return 0.0
-    if kind == "exact":
+    if integral_method == "exact":
         return 2.0 * internal_moment(1, eta)
     return -1.4399 / eta**2 + 0.7099 / eta + 0.6681 + 0.0636 * eta
 
 
-def boundary_mismatch(eta: float, kind: DiffuseIntegral = "polynomial") -> float:
+def boundary_mismatch(eta: float, integral_method: DiffuseIntegral = "polynomial") -> float:
     """Return the boundary mismatch A = (1 + F_dr) / (1 - F_dr); 1 at an index-matched surface [-].
 
     Diffusion extrapolates the fluence to zero at the distance 2 A D above the surface. F_dr is the
     `diffuse_reflectance` from inside.
 
-    kind : "polynomial" or "exact" computation of F_dr
+    integral_method : "polynomial" or "exact" computation of F_dr
 
     Source: [Jensen2001] section 2.3.
     """
-    F_dr = diffuse_reflectance(eta, kind)
+    F_dr = diffuse_reflectance(eta, integral_method)
     return (1.0 + F_dr) / (1.0 - F_dr)

@@ -20,7 +20,7 @@ def source_depths(layer: Layer, A: float) -> tuple[Floats, Floats]:
     return z_r, z_r + 4.0 * A * layer.D
 
 
-def flux(radius_mm: ArrayLike, depth_mm: Floats, sigma_tr: Floats) -> Floats:
+def point_source_flux(radius_mm: ArrayLike, depth_mm: Floats, sigma_tr: Floats) -> Floats:
     """Return the flux through the surface from a unit point source in an infinite medium, (n, c) [1/mm2].
 
     radius_mm : (n,) distances along the surface [mm]
@@ -43,7 +43,9 @@ def reflectance(radius_mm: ArrayLike, layer: Layer, A: float) -> Floats:
     Source: [JensenBuhler2002] eq. 5.
     """
     z_r, z_v = source_depths(layer, A)
-    fluxes = flux(radius_mm, z_r, layer.sigma_tr) + flux(radius_mm, z_v, layer.sigma_tr)
+    fluxes = point_source_flux(radius_mm, z_r, layer.sigma_tr) + point_source_flux(
+        radius_mm, z_v, layer.sigma_tr
+    )
     return np.asarray(layer.alpha_prime * fluxes)
 
 
@@ -62,14 +64,16 @@ def total_reflectance(layer: Layer, A: float) -> Floats:
     return np.asarray(reflectance_hankel(0.0, layer, A))
 
 
-def better_dipole_reflectance(radius_mm: ArrayLike, layer: Layer, eta: float, sources: int = 100) -> Floats:
+def better_dipole_reflectance(
+    radius_mm: ArrayLike, layer: Layer, eta: float, source_count: int = 100
+) -> Floats:
     """Return R(r) of the better dipole, for light that scattered at least twice, (n, c) [1/mm2].
 
     R(r) is per power that enters.
 
     radius_mm : (n,) distances r from the beam [mm]
     eta : index of refraction relative to air [-]
-    sources : number of point sources along the beam
+    source_count : number of point sources along the beam
 
     Source: [dEonIrving2011] with the corrections of [Habel2013], as the dipole term of [Pharr2023].
     """
@@ -79,13 +83,13 @@ def better_dipole_reflectance(radius_mm: ArrayLike, layer: Layer, eta: float, so
     sigma_tr = np.sqrt(layer.sigma_a / D_g)
     z_e = 2.0 * D_g * (1.0 + 3.0 * F2) / (1.0 - 2.0 * F1)
     result = np.zeros((*r.shape, len(layer.sigma_a)))
-    for u in (np.arange(sources) + 0.5) / sources:  # equal fractions of the first scattering events
+    for u in (np.arange(source_count) + 0.5) / source_count:  # equal fractions of the first scattering events
         z_r = -np.log1p(-u) / layer.sigma_t_prime
         z_v = z_r + 2.0 * z_e
         d_r, d_v = (np.sqrt(r[..., None] ** 2 + z**2) for z in (z_r, z_v))
         fluence = (np.exp(-sigma_tr * d_r) / d_r - np.exp(-sigma_tr * d_v) / d_v) / (4.0 * np.pi * D_g)
-        outward = flux(r, z_r, sigma_tr) + flux(r, z_v, sigma_tr)
+        outward = point_source_flux(r, z_r, sigma_tr) + point_source_flux(r, z_v, sigma_tr)
         # Empirical correction: diffusion overestimates light that scattered once close to the beam.
         kappa = -np.expm1(-2.0 * layer.sigma_t_prime * (d_r + z_r))
         result += kappa * (fluence * (1.0 - 2.0 * F1) / 4.0 + outward * (1.0 - 3.0 * F2) / 2.0)
-    return np.asarray(layer.alpha_prime**2 * result / sources)
+    return np.asarray(layer.alpha_prime**2 * result / source_count)

@@ -8,33 +8,42 @@ import numpy as np
 
 from dermis.optics.media import Floats
 
-SAMPLE_COUNT = 2048
+TRANSFORM_SAMPLE_COUNT = 2048
 _FREQUENCY_DECADES = 16.0
 _CENTRE_FREQUENCY_PER_MM = 10.0  # skin scatters over tenths of a millimetre
-_LOG_STEP = _FREQUENCY_DECADES * np.log(10.0) / SAMPLE_COUNT
+_LOG_FREQUENCY_STEP = _FREQUENCY_DECADES * np.log(10.0) / TRANSFORM_SAMPLE_COUNT
 
-ZERO_FREQUENCY = np.array([1e-8])
+NEAR_ZERO_FREQUENCY = np.array([1e-8])
 """Frequency so low that a Hankel transform equals the total reflectance there, (1,) [1/mm]."""
 
 
 @cache
-def frequencies() -> Floats:
-    """Return the log-spaced frequencies s of the input of `inverse_transform`, (SAMPLE_COUNT,) [1/mm]."""
+def transform_frequencies() -> Floats:
+    """Return the log-spaced frequencies s of the input of `inverse_transform` [1/mm].
+
+    The shape is (TRANSFORM_SAMPLE_COUNT,).
+    """
     return np.asarray(
-        _CENTRE_FREQUENCY_PER_MM * np.exp(_LOG_STEP * (np.arange(SAMPLE_COUNT) - (SAMPLE_COUNT - 1) / 2.0))
+        _CENTRE_FREQUENCY_PER_MM
+        * np.exp(
+            _LOG_FREQUENCY_STEP * (np.arange(TRANSFORM_SAMPLE_COUNT) - (TRANSFORM_SAMPLE_COUNT - 1) / 2.0)
+        )
     )
 
 
 @cache
-def radii() -> Floats:
-    """Return the radii r at which `inverse_transform` returns R(r), (SAMPLE_COUNT,) log-spaced [mm]."""
-    return np.asarray(np.exp(_log_radius_offset()) / frequencies()[::-1])
+def transform_radii() -> Floats:
+    """Return the log-spaced radii r at which `inverse_transform` returns R(r) [mm].
+
+    The shape is (TRANSFORM_SAMPLE_COUNT,).
+    """
+    return np.asarray(np.exp(_log_radius_offset()) / transform_frequencies()[::-1])
 
 
 def inverse_transform(transform: Floats) -> Floats:
-    """Return R(r) at `radii` from its Hankel transform, (SAMPLE_COUNT, c) [1/mm2].
+    """Return R(r) at `transform_radii` from its Hankel transform, (TRANSFORM_SAMPLE_COUNT, c) [1/mm2].
 
-    transform : (SAMPLE_COUNT, c) Hankel transform at `frequencies` [-]
+    transform : (TRANSFORM_SAMPLE_COUNT, c) Hankel transform at `transform_frequencies` [-]
 
     The relative error is 1e-8 where R(r) is within six decades of its maximum; elsewhere the error is 1e-9 of
     the maximum.
@@ -43,13 +52,13 @@ def inverse_transform(transform: Floats) -> Floats:
     """
     from scipy.fft import fht
 
-    weighted = transform * frequencies()[:, None] / (2.0 * np.pi)
-    scaled = fht(np.ascontiguousarray(weighted.T), _LOG_STEP, mu=0.0, offset=_log_radius_offset())
-    return np.asarray(scaled.T / radii()[:, None])
+    weighted = transform * transform_frequencies()[:, None] / (2.0 * np.pi)
+    scaled = fht(np.ascontiguousarray(weighted.T), _LOG_FREQUENCY_STEP, mu=0.0, offset=_log_radius_offset())
+    return np.asarray(scaled.T / transform_radii()[:, None])
 
 
 @cache
 def _log_radius_offset() -> float:
     from scipy.fft import fhtoffset
 
-    return float(fhtoffset(_LOG_STEP, mu=0.0))
+    return float(fhtoffset(_LOG_FREQUENCY_STEP, mu=0.0))

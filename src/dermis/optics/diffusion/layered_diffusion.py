@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from dermis.optics.media import Floats, Layer, Medium
 
 Source = Literal["beam", "point"]
-_TOTAL_FREQUENCY = np.array([1e-8])  # so low that a Hankel transform equals the total reflectance [1/mm]
+_NEAR_ZERO_FREQUENCY = np.array([1e-8])  # so low that a Hankel transform equals the total reflectance [1/mm]
 
 
 class _Sublayer(NamedTuple):
@@ -39,6 +39,12 @@ class _Face(NamedTuple):
 class _DownwardTransfer(NamedTuple):
     """Coefficients that yield the fluence at the lower face of a sublayer from the fluence at its upper face.
 
+    E : attenuation exp(-q d) across the thickness d of the sublayer [-]
+    rho : reflection coefficient of the lower face for the solution that decays downwards [-]
+    common : 1 / (1 + E^2 rho), the sum of the reflections between both faces [-]
+    beta : part of the fluence at the lower face that grows towards this face, caused by sources
+    lower : particular solution at the lower face, which is 0 at the upper face
+
     All coefficients are 0 for a semi-infinite sublayer. Only the last sublayer of a medium can be
     semi-infinite.
     """
@@ -54,45 +60,50 @@ class _DownwardTransfer(NamedTuple):
         return np.asarray(fluence * across + (self.beta * (1.0 - self.E * across) + self.lower))
 
 
-def solve(frequency: ArrayLike, medium: Medium, A: float, source: Source = "beam") -> tuple[Floats, Floats]:
+def solve_layers(
+    frequency: ArrayLike, medium: Medium, A: float, source_kind: Source = "beam"
+) -> tuple[Floats, Floats]:
     """Return the Hankel transforms of R(r) and T(r) of a layered medium, (n, c) each [-].
 
     R(r) and T(r) are the profiles at the upper and the lower face per power that enters.
 
     frequency : (n,) frequencies s > 0 [1/mm]
     A : boundary mismatch with air; internal interfaces are index-matched [-]
-    source : "beam" distributes first scattering along the beam, so that R(r) diverges logarithmically at r =
-        0; "point" places first scattering one mean free path deep, so that R(r) is finite
+    source_kind : "beam" distributes first scattering along the beam, so that R(r) diverges logarithmically at
+        r = 0; "point" places first scattering one mean free path deep, so that R(r) is finite
 
     Source: [Haskell1994] for the boundary, [Kienle1998] for layers, [Farrell1992] for the beam.
     """
-    return _solve_sublayers(frequency, _sublayers(medium, source), medium.channels, A)
+    return _solve_sublayers(frequency, _sublayers(medium, source_kind), medium.channels, A)
 
 
-def solve_reflectance(frequency: ArrayLike, medium: Medium, A: float, source: Source = "beam") -> Floats:
+def solve_reflectance(frequency: ArrayLike, medium: Medium, A: float, source_kind: Source = "beam") -> Floats:
     """Return the Hankel transform of R(r) of a layered medium, (n, c) [-].
 
-    R(r) is per power that enters. This is faster than `solve`, which also computes T(r).
+    R(r) is per power that enters. This is faster than `solve_layers`, which also computes T(r).
 
     frequency : (n,) frequencies s > 0 [1/mm]
     A : boundary mismatch with air [-]
-    source : "beam" or "point", the distribution of first scattering, see `solve`
+    source_kind : "beam" or "point", the distribution of first scattering, see `solve_layers`
     """
-    return _solve_upwards(frequency, _sublayers(medium, source), medium.channels, A)[0] / (2.0 * A)
+    return _solve_upwards(frequency, _sublayers(medium, source_kind), medium.channels, A)[0] / (2.0 * A)
 
 
-def solve_two_layers(upper: Layer, thickness_mm: ArrayLike, lower: Layer, A: float) -> Floats:
+def solve_two_layers(upper_layer: Layer, thickness_mm: ArrayLike, lower_layer: Layer, A: float) -> Floats:
     """Return the total reflectance of n upper layers on half-spaces, per power that enters, (n, c) [-].
 
-    upper, lower : layers with coefficients (n, c), or (c,) if these are the same for all n skins
+    upper_layer, lower_layer : layers with coefficients (n, c), or (c,) if these are the same for all n skins
     thickness_mm : (n, 1) thicknesses of the upper layers, or one number [mm]
     A : boundary mismatch with air [-]
     """
     d = np.asarray(thickness_mm, dtype=np.float64)
-    ones = np.ones(np.shape(upper.sigma_a)[-1])
-    beam = np.exp(-upper.sigma_t_prime * d)
-    sublayers = [_Sublayer(upper, d, ones, 0.0 * ones), _Sublayer(lower, np.inf, beam, 0.0 * ones)]
-    return _solve_upwards(_TOTAL_FREQUENCY, sublayers, len(ones), A)[0] / (2.0 * A)
+    ones = np.ones(np.shape(upper_layer.sigma_a)[-1])
+    beam = np.exp(-upper_layer.sigma_t_prime * d)
+    sublayers = [
+        _Sublayer(upper_layer, d, ones, 0.0 * ones),
+        _Sublayer(lower_layer, np.inf, beam, 0.0 * ones),
+    ]
+    return _solve_upwards(_NEAR_ZERO_FREQUENCY, sublayers, len(ones), A)[0] / (2.0 * A)
 
 
 def solve_thicknesses(
@@ -111,10 +122,10 @@ def solve_thicknesses(
 
 
 def _solve_sublayers(
-    frequency: ArrayLike, sublayers: list[_Sublayer], channels: int, A: float
+    frequency: ArrayLike, sublayers: list[_Sublayer], channel_count: int, A: float
 ) -> tuple[Floats, Floats]:
     """Return the Hankel transforms of R(r) and T(r) of a stack of sublayers, topmost first [-]."""
-    fluence, transfers = _solve_upwards(frequency, sublayers, channels, A)
+    fluence, transfers = _solve_upwards(frequency, sublayers, channel_count, A)
     R = fluence / (2.0 * A)
     for transfer in transfers:
         fluence = transfer.lower_fluence(fluence)
@@ -122,11 +133,11 @@ def _solve_sublayers(
 
 
 def _solve_upwards(
-    frequency: ArrayLike, sublayers: list[_Sublayer], channels: int, A: float
+    frequency: ArrayLike, sublayers: list[_Sublayer], channel_count: int, A: float
 ) -> tuple[Floats, list[_DownwardTransfer]]:
     """Return the fluence at the surface, and the downward transfer through each sublayer, topmost first."""
     s = np.asarray(frequency, dtype=np.float64)[..., None]
-    zero = np.zeros((*s.shape[:-1], channels))
+    zero = np.zeros((*s.shape[:-1], channel_count))
     face, transfers = _Face(zero + 1.0 / (2.0 * A), zero), list[_DownwardTransfer]()
     for sublayer in reversed(sublayers):
         face, transfer = _propagate_up(s, sublayer, face)
@@ -134,11 +145,11 @@ def _solve_upwards(
     return np.asarray(2.0 * A * face.W / (1.0 + 2.0 * A * face.Z)), transfers
 
 
-def _propagate_up(s: Floats, sublayer: _Sublayer, below: _Face) -> tuple[_Face, _DownwardTransfer]:
+def _propagate_up(s: Floats, sublayer: _Sublayer, lower_face: _Face) -> tuple[_Face, _DownwardTransfer]:
     """Propagate the boundary condition from a sublayer's lower to its upper face.
 
     s : frequencies [1/mm]
-    below : boundary condition at the lower face
+    lower_face : boundary condition at the lower face
 
     Returns the boundary condition at the upper face, and the transfer of the fluence from the upper to the
     lower face.
@@ -155,17 +166,17 @@ def _propagate_up(s: Floats, sublayer: _Sublayer, below: _Face) -> tuple[_Face, 
     near = np.where(gap * d < 1e-8, d, -np.expm1(-gap * d) / np.where(gap > 0.0, gap, 1.0))
     lower = source * np.exp(-np.minimum(q, sigma_t) * d) * near / (sigma_t + q)
     lower_slope = slope * E - sigma_t * lower
-    rho = (D * q - below.Z) / (D * q + below.Z)
-    W = below.W + sublayer.point  # the flux jumps at a source on the face
-    beta = (W - below.Z * lower - D * lower_slope) / (D * q + below.Z)
+    rho = (D * q - lower_face.Z) / (D * q + lower_face.Z)
+    W = lower_face.W + sublayer.point  # the flux jumps at a source on the face
+    beta = (W - lower_face.Z * lower - D * lower_slope) / (D * q + lower_face.Z)
     common = 1.0 / (1.0 + E**2 * rho)
     face = _Face(D * q * (1.0 - E**2 * rho) * common, 2.0 * D * q * beta * E * common + D * slope)
     # phi at the lower face is a E + b + P, with a = (phi0 - beta E) common and b = a E rho + beta.
     return face, _DownwardTransfer(E, rho, common, beta, lower)
 
 
-def _sublayers(medium: Medium, source: Source) -> list[_Sublayer]:
-    return list(_beam_sublayers(medium) if source == "beam" else _point_sublayers(medium))
+def _sublayers(medium: Medium, source_kind: Source) -> list[_Sublayer]:
+    return list(_beam_sublayers(medium) if source_kind == "beam" else _point_sublayers(medium))
 
 
 def _beam_sublayers(medium: Medium) -> Iterator[_Sublayer]:

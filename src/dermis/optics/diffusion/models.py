@@ -25,7 +25,7 @@ from dermis.optics.radial import (
     enclosed_energy,
     missing_light_warnings,
     radius_grid,
-    resample,
+    resample_profile,
     ring_edges,
 )
 
@@ -38,73 +38,81 @@ MODEL_SOURCES: dict[DiffusionModel, tuple[str, ...]] = {
     "layered": ("Kienle1998", "Farrell1992", "Haskell1994"),
     "layered-point": ("Kienle1998", "Haskell1994"),
 }
-_MIN_ACCURATE_ALBEDO = 0.9  # reduced albedo below which the error of the dipole exceeds 10 %
-_NOTABLE_NEGATIVE = 0.005  # ratio of negative light to total reflectance above which a warning is given
+_MIN_ACCURATE_DIPOLE_ALBEDO = 0.9  # reduced albedo below which the error of the dipole exceeds 10 %
+_NOTABLE_NEGATIVE_FRACTION = (
+    0.005  # ratio of negative light to total reflectance above which a warning is given
+)
 
 
 def diffusion_profile(
-    medium: Medium, model: DiffusionModel = "layered", clamp: Clamp = "layer", rgb: Floats | None = None
+    medium: Medium,
+    model: DiffusionModel = "layered",
+    clamp: Clamp = "layer",
+    rgb_weights: Floats | None = None,
 ) -> RadialProfile:
     """Return the diffusion profile R(r) of a medium, computed by a diffusion model.
 
     medium : stack of layers
     model : "dipole" and "better-dipole" require one half-space; the other models accept any stack
     clamp : position of the multipole's source in layers thinner than a mean free path, see `Slab`
-    rgb : (3, c) weights from wavelengths to linear Rec. 709; the result then has three channels and is per
-        incident power
+    rgb_weights : (3, c) weights from wavelengths to linear Rec. 709; the result then has three channels and
+        is per incident power
 
     Raises DermisError when the model is not valid for the medium.
 
     Source: the works listed in `MODEL_SOURCES`.
     """
-    grid, values, total = _sampled_profile(medium, model, clamp, rgb)
+    grid, values, total = _sampled_profile(medium, model, clamp, rgb_weights)
     edges, radius = ring_edges(), radius_grid()
     ring_energy = np.diff(enclosed_energy(edges, grid, values), axis=0)
     return RadialProfile(
         name=medium.name,
         model=model,
         radius_mm=radius,
-        reflectance=resample(radius, grid, values),
+        reflectance=resample_profile(radius, grid, values),
         total=total,
         edges_mm=edges,
         ring_energy=ring_energy,
-        incident=rgb is not None,
+        incident=rgb_weights is not None,
         warnings=(*_medium_warnings(medium, model, clamp), *_result_warnings(total, ring_energy)),
         sources=(*medium.sources, *MODEL_SOURCES[model]),
     )
 
 
 def diffusion_rings(
-    medium: Medium, model: DiffusionModel = "layered", clamp: Clamp = "layer", rgb: Floats | None = None
+    medium: Medium,
+    model: DiffusionModel = "layered",
+    clamp: Clamp = "layer",
+    rgb_weights: Floats | None = None,
 ) -> RingTarget:
     """Return only the ring energies that `diffusion_profile` computes, to fit many media faster."""
-    grid, values, total = _sampled_profile(medium, model, clamp, rgb)
+    grid, values, total = _sampled_profile(medium, model, clamp, rgb_weights)
     edges = ring_edges()
     return RingTarget(edges, np.diff(enclosed_energy(edges, grid, values), axis=0), total)
 
 
 def _sampled_profile(
-    medium: Medium, model: DiffusionModel, clamp: Clamp, rgb: Floats | None
+    medium: Medium, model: DiffusionModel, clamp: Clamp, rgb_weights: Floats | None
 ) -> tuple[Floats, Floats, Floats]:
     """Return radii r (n,) [mm], R(r) at these radii (n, c) [1/mm2], and the total reflectance (c,) [-]."""
     if model in ("dipole", "better-dipole"):
         _check_half_space(medium, model)
-    closed_form = rgb is None and len(medium.layers) == 1 and model in ("dipole", "multipole")
+    closed_form = rgb_weights is None and len(medium.layers) == 1 and model in ("dipole", "multipole")
     if closed_form or model == "better-dipole":
         grid = np.geomspace(1e-6, 1e3, 1500)
         values = _closed_form_profile(medium, model, clamp, grid)
-        values = values if rgb is None else values @ rgb.T
+        values = values if rgb_weights is None else values @ rgb_weights.T
     else:
-        grid = hankel.radii()
-        transform = hankel_transform(medium, model, clamp, hankel.frequencies())
-        values = hankel.inverse_transform(transform if rgb is None else transform @ rgb.T)
+        grid = hankel.transform_radii()
+        transform = hankel_transform(medium, model, clamp, hankel.transform_frequencies())
+        values = hankel.inverse_transform(transform if rgb_weights is None else transform @ rgb_weights.T)
     if model == "better-dipole":
         total = enclosed_energy(grid[-1:], grid, values)[0]
     else:
-        total = hankel_transform(medium, model, clamp, hankel.ZERO_FREQUENCY)[0]
-    if rgb is not None:
+        total = hankel_transform(medium, model, clamp, hankel.NEAR_ZERO_FREQUENCY)[0]
+    if rgb_weights is not None:
         entering = 1.0 - normal_reflectance(medium.eta)
-        values, total = entering * values, entering * total @ rgb.T
+        values, total = entering * values, entering * total @ rgb_weights.T
     inside = (grid > 1e-7) & (grid < 1e3)  # the rest is numerical noise
     return grid[inside], values[inside], total
 
@@ -145,7 +153,7 @@ def _medium_warnings(medium: Medium, model: DiffusionModel, clamp: Clamp) -> lis
             effect = lost if clamp == "none" else "its source is moved into it"
             warnings.append(f"layer {number} ({layer.name}) is thinner than a mean free path: {effect}")
     worst = float(_first_event_albedo(medium).min())
-    if worst < _MIN_ACCURATE_ALBEDO:
+    if worst < _MIN_ACCURATE_DIPOLE_ALBEDO:
         warnings.append(
             f"the first mean free path absorbs (reduced albedo down to {worst:.2f}): at 0.5 the total of "
             "layered diffusion has an error of 14 %, that of the dipole 37 %"
@@ -165,19 +173,19 @@ def _first_event_albedo(medium: Medium) -> Floats:
     return scattered / depth
 
 
-def _result_warnings(total: Floats, ring_energy: Floats) -> Sequence[str]:
+def _result_warnings(total_reflectance: Floats, ring_energy: Floats) -> Sequence[str]:
     """Return warnings about negative reflectances, and about totals that differ from the sum of the rings."""
-    warnings = missing_light_warnings(total, ring_energy)
-    if (total < 0.0).any():
-        warnings.append(f"a total reflectance is negative: {np.round(total, 4).tolist()}")
-    size = np.maximum(np.abs(total), SMALLEST_FLOAT)
+    warnings = missing_light_warnings(total_reflectance, ring_energy)
+    if (total_reflectance < 0.0).any():
+        warnings.append(f"a total reflectance is negative: {np.round(total_reflectance, 4).tolist()}")
+    size = np.maximum(np.abs(total_reflectance), SMALLEST_FLOAT)
     negative = float((-np.minimum(ring_energy, 0.0).sum(axis=0) / size).max())
-    if negative > _NOTABLE_NEGATIVE:
+    if negative > _NOTABLE_NEGATIVE_FRACTION:
         warnings.append(
             f"R(r) is negative at some radii, {negative:.1%} of a channel's total: layers too thin for the "
             "model, or colours outside Rec. 709. No sum of Gaussians fits it there"
         )
-    surplus = float(((ring_energy.sum(axis=0) - total) / size).max())
+    surplus = float(((ring_energy.sum(axis=0) - total_reflectance) / size).max())
     if surplus > NOTABLE_MISSING_FRACTION:
         warnings.append(f"R(r) has {surplus:.0%} more light than the total: its radii are too coarse")
     return warnings
@@ -215,11 +223,11 @@ def slab_transmittance(
             depth = sum(layer.sigma_t_prime * layer.thickness_mm for layer in slab.layers)
             unscattered = (1.0 - normal_reflectance(medium.eta)) * np.exp(-depth)
             A = boundary_mismatch(medium.eta, "exact")
-            diffuse = layered_diffusion.solve(hankel.ZERO_FREQUENCY, slab, A)[1][0]
+            diffuse = layered_diffusion.solve_layers(hankel.NEAR_ZERO_FREQUENCY, slab, A)[1][0]
             transmittances.append(diffuse + unscattered)
         else:
             A = boundary_mismatch(medium.eta)
-            transmittances.append(multipole.stack_response(hankel.ZERO_FREQUENCY, slab, A).T_down[0])
+            transmittances.append(multipole.stack_response(hankel.NEAR_ZERO_FREQUENCY, slab, A).T_down[0])
     return np.stack(transmittances)
 
 
@@ -249,25 +257,26 @@ class ModelError:
     tissues: tuple[str, ...]
 
 
-def known_error(model: str, tissue: str = "") -> ModelError | None:
+def measured_model_error(model_name: str, tissue_name: str = "") -> ModelError | None:
     """Return the measured error of a diffusion model, or None if the model was never measured.
 
-    tissue : name of a tissue; if it is empty or was not measured, the error ranges over all measured tissues
+    tissue_name : name of a tissue; if it is empty or was not measured, the error ranges over all measured
+        tissues
     """
-    by_tissue = {name: error for (name, key), error in _measured_errors().items() if key == model}
-    if tissue in by_tissue:
-        by_tissue = {tissue: by_tissue[tissue]}
+    by_tissue = {name: error for (name, key), error in _measured_errors().items() if key == model_name}
+    if tissue_name in by_tissue:
+        by_tissue = {tissue_name: by_tissue[tissue_name]}
     if not by_tissue:
         return None
     errors = np.array(list(by_tissue.values()))
     return ModelError(errors.min(axis=0), errors.max(axis=0), tuple(by_tissue))
 
 
-def error_against_photons(radial: RadialProfile, photons: RadialProfile) -> ModelError:
+def error_against_photons(model_profile: RadialProfile, photon_profile: RadialProfile) -> ModelError:
     """Return the error of a profile's ring energies relative to photon counts of the same tissue."""
-    squares = ((radial.ring_energy - photons.ring_energy) ** 2).sum(axis=0)
-    error = np.sqrt(squares / (photons.ring_energy**2).sum(axis=0))
-    return ModelError(error, error, (radial.name,))
+    squares = ((model_profile.ring_energy - photon_profile.ring_energy) ** 2).sum(axis=0)
+    error = np.sqrt(squares / (photon_profile.ring_energy**2).sum(axis=0))
+    return ModelError(error, error, (model_profile.name,))
 
 
 @cache

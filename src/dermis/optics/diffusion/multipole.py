@@ -100,14 +100,14 @@ def transmittance(radius_mm: ArrayLike, slab: Slab, tolerance: float = 1e-8) -> 
     return _image_series(radius_mm, slab, lambda shift: (d - l - shift, d + l + 2.0 * top - shift), tolerance)
 
 
-def _image_sum(frequency: ArrayLike, slab: Slab, real: Floats, image: Floats) -> Floats:
+def _image_sum(frequency: ArrayLike, slab: Slab, real_source: Floats, image_source: Floats) -> Floats:
     """Return the Hankel transform of R(r) or T(r) of two periodic series of point sources.
 
     With the depth z of a source, the period P and q^2 = sigma_tr^2 + s^2, each series is half the albedo
     times the sum over i of sign(z + i P) exp(-|z + i P| q). The result is the series of real sources minus
     the series of their images.
 
-    real, image : (c,) signed distances from the face to one real source and to one image [mm]
+    real_source, image_source : (c,) signed distances from the face to one real source and to one image [mm]
     """
     q = np.sqrt(slab.layer.sigma_tr**2 + np.asarray(frequency, dtype=np.float64)[..., None] ** 2)
     P = slab.period_mm
@@ -116,17 +116,19 @@ def _image_sum(frequency: ArrayLike, slab: Slab, real: Floats, image: Floats) ->
         z0 = np.mod(z, P)  # the series is odd and periodic: the sum of two geometric series
         return np.asarray((np.exp(-z0 * q) - np.exp(-(P - z0) * q)) / -np.expm1(-P * q))
 
-    return np.asarray(0.5 * slab.layer.alpha_prime * (image_sources(real) - image_sources(image)))
+    return np.asarray(
+        0.5 * slab.layer.alpha_prime * (image_sources(real_source) - image_sources(image_source))
+    )
 
 
 def _image_series(
-    radius_mm: ArrayLike, slab: Slab, pair: Callable[[Floats], tuple[Floats, Floats]], tolerance: float
+    radius_mm: ArrayLike, slab: Slab, source_pair: Callable[[Floats], tuple[Floats, Floats]], tolerance: float
 ) -> Floats:
     result = np.zeros((*np.shape(radius_mm), len(slab.source_mm)))
     for i in range(-(n := image_pairs_needed(slab, tolerance)), n + 1):
-        real, image = pair(i * slab.period_mm)
-        result += dipole.flux(radius_mm, real, slab.layer.sigma_tr)
-        result -= dipole.flux(radius_mm, image, slab.layer.sigma_tr)
+        real, image = source_pair(i * slab.period_mm)
+        result += dipole.point_source_flux(radius_mm, real, slab.layer.sigma_tr)
+        result -= dipole.point_source_flux(radius_mm, image, slab.layer.sigma_tr)
     return np.asarray(slab.layer.alpha_prime * result)
 
 

@@ -13,7 +13,7 @@ from dermis.optics.media import Floats
 
 _MEDIAN_RADIUS_FACTOR = 1.58  # s times the radius within which half of the light leaves
 _UNITY_ENGINE_CUTOFF = 0.997  # fraction of the light within the radius at which Unity cuts profiles off
-UNREAL_FACTOR = 0.6
+UNREAL_SHAPE_RATIO = 0.6
 _UNREAL_MIN_DISTANCE_CM = 0.1
 
 
@@ -179,7 +179,7 @@ def unreal_parameters(profile: BurleyProfile) -> UnrealParameters:
     units, so scale 1 is life-size for centimetres.
     """
     _check_rgb(profile)
-    mean_free_path = 0.1 * UNREAL_FACTOR * shape_factor(profile.albedo) / profile.shape
+    mean_free_path = 0.1 * UNREAL_SHAPE_RATIO * shape_factor(profile.albedo) / profile.shape
     distance = max(float(mean_free_path.max()), _UNREAL_MIN_DISTANCE_CM)
     return UnrealParameters(
         surface_albedo=tuple(profile.albedo.tolist()),

@@ -12,23 +12,23 @@ import numpy as np
 from dermis.base.errors import refuse
 from dermis.base.renamed import renamed_keywords
 from dermis.optics.fits.targets import PointTarget, RingTarget
-from dermis.optics.fits.variable_projection import TOLERANCE, DesignFunction, WeightedFit, minimise
+from dermis.optics.fits.variable_projection import COST_TOLERANCE, DesignFunction, WeightedFit, minimise
 from dermis.optics.gaussians import MAX_VARIANCE_MM2, GaussianSum
 from dermis.optics.media import Floats
 
 FitTarget = PointTarget | RingTarget
-MAX_TERMS = 8
+MAX_FITTED_GAUSSIANS = 8
 # Fractions of the light within the standard deviations of the narrowest and the widest Gaussian of a start.
 # For all tested profiles, one of these starts leads to the smallest error found from any start.
-_START_FRACTIONS = ((0.02, 0.99), (0.1, 0.999), (0.02, 0.9), (0.1, 0.6), (0.001, 0.99))
+_START_LIGHT_FRACTIONS = ((0.02, 0.99), (0.1, 0.999), (0.02, 0.9), (0.1, 0.6), (0.001, 0.99))
 # Tolerance of fits that start from a similar fit: their ring energies differ from those of the converged fit
 # by at most 0.06 % of the brightest ring, and their errors by at most 0.0001.
-_INITIAL_FIT_TOLERANCE = 3e-6
+_COST_TOLERANCE_FROM_SIMILAR_FIT = 3e-6
 _ENERGY_EQUATION_WEIGHT = 1e4  # weight of the energy equation; its square bounds the error of the energy
-SHARED_TERMS = 6
+SHARED_GAUSSIAN_COUNT = 6
 """Number of Gaussians in a fit of several profiles with shared variances."""
 _RING_EDGES_MM = np.concatenate([[0.0], np.geomspace(1e-3, 60.0, 93)])
-_CACHED_FITS = 8
+_MAX_CACHED_FITS = 8
 _HashableSum = tuple[str, bytes, bytes, int]
 
 
@@ -57,8 +57,8 @@ def fit_gaussians(
     *,
     shared: bool = True,
     keep_energy: bool = False,
-    initial: GaussianSum | None = None,
-    name: str = "fit",
+    similar_fit: GaussianSum | None = None,
+    profile_name: str = "fit",
 ) -> GaussianFit:
     """Fit a sum of Gaussians with the smallest error to a diffusion profile.
 
@@ -68,22 +68,27 @@ def fit_gaussians(
         errors; otherwise each channel has its own variances and the weight 0 at the variances of the other
         channels
     keep_energy : whether the weights must sum to the target's total reflectance
-    initial : fit of a similar profile, from whose variances the search starts; this is several times faster,
-        but the best fit may be missed
-    name : name of the fitted profile
+    similar_fit : fit of a similar profile, from whose variances the search starts; this is several times
+        faster, but the best fit may be missed
+    profile_name : name of the fitted profile
 
     Raises DermisError for an invalid number of terms, and for profiles that Gaussians cannot fit.
 
     Source: [dEonLuebke2007] section 14.4 for the error that is minimised.
     """
-    if not 1 <= terms <= MAX_TERMS:
-        refuse("terms of a fit", f"1 to {MAX_TERMS} Gaussians", f"got {terms}", "Choose another number")
+    if not 1 <= terms <= MAX_FITTED_GAUSSIANS:
+        refuse(
+            "terms of a fit",
+            f"1 to {MAX_FITTED_GAUSSIANS} Gaussians",
+            f"got {terms}",
+            "Choose another number",
+        )
     groups = [target] if shared else [target.channel(i) for i in range(len(target.total))]
     fits = [
-        _fit_group(group, terms, keep_energy, _variances_of_fit(initial, None if shared else i, terms))
+        _fit_group(group, terms, keep_energy, _variances_of_fit(similar_fit, None if shared else i, terms))
         for i, group in enumerate(groups)
     ]
-    profile = _combine_fits(fits, name)
+    profile = _combine_fits(fits, profile_name)
     return GaussianFit(
         profile=profile,
         error=target.error(profile.variance_mm2, profile.weight),
@@ -94,22 +99,28 @@ def fit_gaussians(
 
 
 def _fit_group(
-    target: FitTarget, terms: int, keep_energy: bool, initial: Floats | None
+    target: FitTarget, gaussian_count: int, keep_energy: bool, start_variances_mm2: Floats | None
 ) -> tuple[Floats, Floats]:
     """Fit k Gaussians to the channels of a target; return variances (k,) and weights (k, c).
 
-    initial : (k,) variances to start from [mm2], or None
+    start_variances_mm2 : (k,) variances to start from [mm2], or None
     """
     norm = np.linalg.norm(target.samples, axis=0)
     design, samples = _with_energy_equation(target) if keep_energy else (target.design, target.samples)
     bounds = _log_variance_bounds(target)
 
-    def run(start: Floats, tolerance: float = TOLERANCE) -> WeightedFit:
+    def run(start: Floats, tolerance: float = COST_TOLERANCE) -> WeightedFit:
         return minimise(design, samples / norm, np.clip(start, *bounds), bounds, tolerance)
 
-    best = None if initial is None else run(np.log(initial), _INITIAL_FIT_TOLERANCE)
+    best = (
+        None
+        if start_variances_mm2 is None
+        else run(np.log(start_variances_mm2), _COST_TOLERANCE_FROM_SIMILAR_FIT)
+    )
     if best is None or not best.weight.any(axis=1).all():  # another start may use all Gaussians
-        best = min((run(start) for start in _initial_variances(target, terms)), key=lambda fit: fit.cost)
+        best = min(
+            (run(start) for start in _initial_variances(target, gaussian_count)), key=lambda fit: fit.cost
+        )
     weight = best.weight * norm
     if not weight.any(axis=0).all():
         actual = "no weights of 0 or more fit it"
@@ -120,9 +131,9 @@ def _fit_group(
     return np.exp(best.log_variance[used]), weight[used]
 
 
-def _initial_variances(target: FitTarget, terms: int) -> list[Floats]:
-    ends = [np.log(target.mean_radius_at(fractions) ** 2 / 2.0) for fractions in _START_FRACTIONS]
-    return [np.linspace(low, high, terms) for low, high in ends]
+def _initial_variances(target: FitTarget, gaussian_count: int) -> list[Floats]:
+    ends = [np.log(target.mean_radius_at(fractions) ** 2 / 2.0) for fractions in _START_LIGHT_FRACTIONS]
+    return [np.linspace(low, high, gaussian_count) for low, high in ends]
 
 
 def _log_variance_bounds(target: FitTarget) -> tuple[float, float]:
@@ -150,22 +161,24 @@ def _with_energy_equation(target: FitTarget) -> tuple[DesignFunction, Floats]:
     return design, np.vstack([stiffness * target.total, target.samples])
 
 
-def _variances_of_fit(initial: GaussianSum | None, channel: int | None, terms: int) -> Floats | None:
+def _variances_of_fit(
+    similar_fit: GaussianSum | None, channel: int | None, gaussian_count: int
+) -> Floats | None:
     """Return the variances of a similar fit, from which a new fit starts.
 
-    The result is None without a similar fit, or if its number of Gaussians is not `terms`.
+    The result is None without a similar fit, or if its number of Gaussians is not `gaussian_count`.
 
-    initial : similar fit, or None
+    similar_fit : similar fit, or None
     channel : index of the channel whose Gaussians are used; None to use the Gaussians of all channels
-    terms : number of Gaussians of the new fit
+    gaussian_count : number of Gaussians of the new fit
     """
-    if initial is None:
+    if similar_fit is None:
         return None
-    used = initial.weight.any(axis=1) if channel is None else initial.weight[:, channel] > 0.0
-    return initial.variance_mm2[used] if used.sum() == terms else None
+    used = similar_fit.weight.any(axis=1) if channel is None else similar_fit.weight[:, channel] > 0.0
+    return similar_fit.variance_mm2[used] if used.sum() == gaussian_count else None
 
 
-def _combine_fits(fits: list[tuple[Floats, Floats]], name: str) -> GaussianSum:
+def _combine_fits(fits: list[tuple[Floats, Floats]], profile_name: str) -> GaussianSum:
     """Combine fits of separate channels into one sum of Gaussians, in which channels share equal variances.
 
     fits : variances (k,) and weights (k, c) of each fit
@@ -178,7 +191,7 @@ def _combine_fits(fits: list[tuple[Floats, Floats]], name: str) -> GaussianSum:
         rows = index[row : row + len(v)]
         np.add.at(weight[:, channel : channel + w.shape[1]], rows, w)
         row, channel = row + len(v), channel + w.shape[1]
-    return GaussianSum(name, variance, weight)
+    return GaussianSum(profile_name, variance, weight)
 
 
 def single_gaussian(profile: GaussianSum) -> GaussianSum:
@@ -201,7 +214,9 @@ def single_gaussian(profile: GaussianSum) -> GaussianSum:
     return candidate(minimize_scalar(misfit, bounds=(ends[0] - 1e-6, ends[1] + 1e-6), method="bounded").x)
 
 
-def shared_gaussians(profiles: Sequence[GaussianSum], terms: int = SHARED_TERMS) -> tuple[GaussianSum, ...]:
+def shared_gaussians(
+    profiles: Sequence[GaussianSum], gaussian_count: int = SHARED_GAUSSIAN_COUNT
+) -> tuple[GaussianSum, ...]:
     """Fit several profiles with one set of variances, so that one series of blurs serves all profiles.
 
     The total reflectances are preserved. Profiles that already share their variances are returned unchanged.
@@ -209,19 +224,19 @@ def shared_gaussians(profiles: Sequence[GaussianSum], terms: int = SHARED_TERMS)
     first = profiles[0].variance_mm2
     if all(np.array_equal(first, one.variance_mm2) for one in profiles):
         return tuple(profiles)
-    fitted = _fit_shared(tuple(map(_hashable_sum, profiles)), terms)
+    fitted = _fit_shared(tuple(map(_hashable_sum, profiles)), gaussian_count)
     pairs = zip(fitted, profiles, strict=True)
     return tuple(replace(fit, from_photons=profile.from_photons) for fit, profile in pairs)
 
 
-@lru_cache(_CACHED_FITS)
-def _fit_shared(tables: tuple[_HashableSum, ...], terms: int) -> tuple[GaussianSum, ...]:
+@lru_cache(_MAX_CACHED_FITS)
+def _fit_shared(hashable_sums: tuple[_HashableSum, ...], gaussian_count: int) -> tuple[GaussianSum, ...]:
     profiles = [
         GaussianSum(name, np.frombuffer(variance), np.frombuffer(weight).reshape(-1, channels))
-        for name, variance, weight, channels in tables
+        for name, variance, weight, channels in hashable_sums
     ]
     fit = fit_gaussians(
-        _combined_ring_target(profiles), terms, keep_energy=True, name="shared profiles"
+        _combined_ring_target(profiles), gaussian_count, keep_energy=True, profile_name="shared profiles"
     ).profile
     ends = np.cumsum([one.weight.shape[1] for one in profiles])[:-1]
     parts = np.split(fit.weight, ends, axis=1)

@@ -11,11 +11,14 @@ from dermis.optics.fits.targets import RingTarget, ring_error
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Floats
 
-SECTOR_COUNT = 16
+SECTORS_PER_QUADRANT = 16
 """Number of equal sectors of a quarter circle into which each ring is divided."""
 
 _QUADRATURE_NODES = 8
-_START_FRACTIONS = ((0.3, 0.9), (0.1, 0.6))  # light within the radii that set the two variances of a start
+_START_LIGHT_FRACTIONS = (
+    (0.3, 0.9),
+    (0.1, 0.6),
+)  # light within the radii that set the two variances of a start
 
 
 @dataclass(frozen=True)
@@ -41,10 +44,10 @@ class SeparableKernel:
         return np.asarray(0.5 * (self.weight * erf(x / np.sqrt(2.0 * self.variance_mm2))).sum(axis=-2))
 
     def sector_energy(self, edges_mm: Floats) -> Floats:
-        """Return the light through equal sectors of each ring, (n, SECTOR_COUNT, c) [-].
+        """Return the light through equal sectors of each ring, (n, SECTORS_PER_QUADRANT, c) [-].
 
-        A ring is divided into SECTOR_COUNT sectors in each quadrant; the light of the four quadrants is
-        added.
+        Each quadrant of a ring is divided into SECTORS_PER_QUADRANT sectors; the light of the four quadrants
+        is added.
 
         edges_mm : (n + 1,) radii of the ring edges [mm]
         """
@@ -101,15 +104,15 @@ def _fit_channel(target: RingTarget) -> Floats:
     """Fit one channel; return the weight of the first Gaussian and both log variances, (3,)."""
     from scipy.optimize import least_squares
 
-    scale = np.sqrt(SECTOR_COUNT) / np.linalg.norm(target.energy)
+    scale = np.sqrt(SECTORS_PER_QUADRANT) / np.linalg.norm(target.energy)
 
     def residual(x: Floats) -> Floats:
         cells = _sector_fractions(target.edges_mm, np.exp(x[1:]), np.array([x[0], 1.0 - x[0]]))
-        return np.asarray(scale * (target.total * cells - target.energy / SECTOR_COUNT).ravel())
+        return np.asarray(scale * (target.total * cells - target.energy / SECTORS_PER_QUADRANT).ravel())
 
     edges = target.edges_mm
     low, high = 2.0 * np.log(edges[1] / 4.0), 2.0 * np.log(edges[-1])
-    starts = [np.log(target.mean_radius_at(fractions) ** 2 / 2.0) for fractions in _START_FRACTIONS]
+    starts = [np.log(target.mean_radius_at(fractions) ** 2 / 2.0) for fractions in _START_LIGHT_FRACTIONS]
     bounds = ([0.0, low, low], [1.0, high, high])
     fits = [
         least_squares(residual, np.append(0.5, np.clip(start, low, high)), bounds=bounds, xtol=1e-10)
@@ -119,11 +122,11 @@ def _fit_channel(target: RingTarget) -> Floats:
 
 
 def _sector_fractions(edges_mm: Floats, variance: Floats, weight: Floats) -> Floats:
-    """Return the fraction of a kernel's light in each ring and sector, for one channel, (n, SECTOR_COUNT).
+    """Return the fraction of one channel's light in each ring and sector, (n, SECTORS_PER_QUADRANT) [-].
 
     variance, weight : (k,) Gaussians of a(x)
     """
-    cells = np.zeros((len(edges_mm) - 1, SECTOR_COUNT))
+    cells = np.zeros((len(edges_mm) - 1, SECTORS_PER_QUADRANT))
     for i in range(len(variance)):
         cells += weight[i] ** 2 * _elliptic_sectors(edges_mm, variance[i], variance[i])
         for j in range(i):
@@ -132,17 +135,17 @@ def _sector_fractions(edges_mm: Floats, variance: Floats, weight: Floats) -> Flo
     return cells
 
 
-def _elliptic_sectors(edges_mm: Floats, along: float, across: float) -> Floats:
-    """Return the fraction of an elliptic Gaussian's light in each ring and sector, (n, SECTOR_COUNT).
+def _elliptic_sectors(edges_mm: Floats, variance_x_mm2: float, variance_y_mm2: float) -> Floats:
+    """Return the fraction of an elliptic Gaussian's light in each ring and sector, (n, SECTORS_PER_QUADRANT).
 
-    along, across : variances along x and y [mm2]
+    variance_x_mm2, variance_y_mm2 : variances along x and y [mm2]
     """
     x, w = np.polynomial.legendre.leggauss(_QUADRATURE_NODES)
-    theta = np.linspace(0.0, 0.5 * np.pi, SECTOR_COUNT + 1)
+    theta = np.linspace(0.0, 0.5 * np.pi, SECTORS_PER_QUADRANT + 1)
     # Angle on the circle before it is stretched to the ellipse: equal angles contain equal light.
-    phi = np.arctan2(np.sqrt(along) * np.sin(theta), np.sqrt(across) * np.cos(theta))
+    phi = np.arctan2(np.sqrt(variance_x_mm2) * np.sin(theta), np.sqrt(variance_y_mm2) * np.cos(theta))
     half = 0.5 * np.diff(phi)[:, None]
     node = phi[:-1, None] + half * (1.0 + x)
-    variance = along * np.cos(node) ** 2 + across * np.sin(node) ** 2
+    variance = variance_x_mm2 * np.cos(node) ** 2 + variance_y_mm2 * np.sin(node) ** 2
     within = -np.expm1(-(edges_mm[:, None, None] ** 2) / (2.0 * variance))
     return np.asarray(np.diff((within * half * w).sum(axis=2), axis=0) * 2.0 / np.pi)

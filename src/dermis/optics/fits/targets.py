@@ -71,9 +71,9 @@ class PointTarget:
         rate = self._sqrt_quadrature_weights[:, None] ** 2 * np.abs(self.reflectance)
         return _radii_at_fractions(fractions, self.radius_mm, rate)
 
-    def channel(self, index: int) -> PointTarget:
+    def channel(self, channel_index: int) -> PointTarget:
         """Return the part of the target with only one channel, to fit this channel separately."""
-        channel = slice(index, index + 1)
+        channel = slice(channel_index, channel_index + 1)
         return PointTarget(self.radius_mm, self.reflectance[:, channel], self.total[channel])
 
 
@@ -125,41 +125,55 @@ class RingTarget:
         """
         return _radii_at_fractions(fractions, self.edges_mm[1:], np.abs(self.energy))
 
-    def channel(self, index: int) -> RingTarget:
+    def channel(self, channel_index: int) -> RingTarget:
         """Return the part of the target with only one channel, to fit this channel separately."""
-        channel = slice(index, index + 1)
+        channel = slice(channel_index, channel_index + 1)
         return RingTarget(self.edges_mm, self.energy[:, channel], self.total[channel])
 
 
-def ring_error(target: RingTarget, energy: Floats) -> Floats:
+def ring_error(target: RingTarget, fitted_energy: Floats) -> Floats:
     """Return the relative error E_b = sqrt(sum of (fit - target)^2 / sum of target^2) over rings, (c,) [-].
 
-    energy : (n, c) light of the fit through each ring; or (n, m, c) light through m equal sectors of each
-        ring, for kernels that are not radially symmetric
+    fitted_energy : (n, c) light of the fit through each ring; or (n, m, c) light through m equal sectors of
+        each ring, for kernels that are not radially symmetric
     """
-    cells = energy if energy.ndim == 3 else energy[:, None]
+    cells = fitted_energy if fitted_energy.ndim == 3 else fitted_energy[:, None]
     m = cells.shape[1]
     residual = cells - target.energy[:, None] / m
     return np.asarray(np.sqrt(m * (residual**2).sum(axis=(0, 1)) / (target.energy**2).sum(axis=0)))
 
 
-def _radii_at_fractions(fractions: Sequence[float], radius_mm: Floats, rate: Floats) -> Floats:
+def _radii_at_fractions(light_fractions: Sequence[float], radius_mm: Floats, rate: Floats) -> Floats:
     cumulative = np.cumsum(rate / rate.sum(axis=0), axis=0).mean(axis=1)
-    return np.asarray(np.interp(fractions, cumulative, radius_mm))
+    return np.asarray(np.interp(light_fractions, cumulative, radius_mm))
 
 
-def _check_target(kind: str, radius_mm: Floats, values: Floats, total: Floats) -> None:
-    culprit = f"{kind} target"
-    if values.ndim != 2 or radius_mm.shape != values.shape[:1] or total.shape != values.shape[1:]:
-        actual = f"got {radius_mm.shape}, {values.shape} and {total.shape}"
+def _check_target(
+    target_kind: str, radius_mm: Floats, profile_values: Floats, total_reflectance: Floats
+) -> None:
+    culprit = f"{target_kind} target"
+    if (
+        profile_values.ndim != 2
+        or radius_mm.shape != profile_values.shape[:1]
+        or total_reflectance.shape != profile_values.shape[1:]
+    ):
+        actual = f"got {radius_mm.shape}, {profile_values.shape} and {total_reflectance.shape}"
         refuse(culprit, "arrays of n, n x c and c numbers", actual, "Correct the arrays")
-    if not (np.isfinite(radius_mm).all() and np.isfinite(values).all() and np.isfinite(total).all()):
+    if not (
+        np.isfinite(radius_mm).all()
+        and np.isfinite(profile_values).all()
+        and np.isfinite(total_reflectance).all()
+    ):
         refuse(culprit, "finite numbers", "got NaN or infinity", "Correct the arrays")
     if len(radius_mm) < 2 or not (np.diff(radius_mm) > 0.0).all():
         refuse(culprit, "two or more increasing radii", "they do not increase", "Sort them")
-    dark = [i for i in range(values.shape[1]) if not (values[:, i].any() and total[i] > 0.0)]
+    dark = [
+        i
+        for i in range(profile_values.shape[1])
+        if not (profile_values[:, i].any() and total_reflectance[i] > 0.0)
+    ]
     if dark:
-        peak, sum_ = values[:, dark[0]].max(), total[dark[0]]
+        peak, sum_ = profile_values[:, dark[0]].max(), total_reflectance[dark[0]]
         actual = f"channel {dark[0]} has a maximum of {peak:.3g} and a sum of {sum_:.3g}"
         advice = "Leave it out, or use another model, another skin or more photons"
         refuse(culprit, "light in every channel", actual, advice)

@@ -14,12 +14,12 @@ import numpy as np
 from dermis.optics.media import Floats
 
 DesignFunction = Callable[[Floats], tuple[Floats, Floats]]
-_MAX_STEPS = 100
-_MAX_STEP = 1.0
-TOLERANCE = 1e-7
+_MAX_STEP_COUNT = 100
+_MAX_LOG_VARIANCE_STEP = 1.0
+COST_TOLERANCE = 1e-7
 """Relative decrease of the cost below which the descent stops."""
-_MAX_DAMPING = 1e8
-_ROWS_PER_BLOCK = 512
+_MAX_MARQUARDT_DAMPING = 1e8
+_QR_ROWS_PER_BLOCK = 512
 
 
 class WeightedFit(NamedTuple):
@@ -42,8 +42,8 @@ def minimise(
     design: DesignFunction,
     samples: Floats,
     log_variance: Floats,
-    bounds: tuple[float, float],
-    tolerance: float = TOLERANCE,
+    log_variance_bounds: tuple[float, float],
+    cost_tolerance: float = COST_TOLERANCE,
 ) -> WeightedFit:
     """Return the fit at a local minimum of the squared residuals, reached by descent from start variances.
 
@@ -51,17 +51,17 @@ def minimise(
         variance
     samples : (n, c) data to fit
     log_variance : (k,) logarithms of the start variances
-    bounds : smallest and largest log variance
-    tolerance : relative decrease of the cost below which the descent stops
+    log_variance_bounds : smallest and largest log variance
+    cost_tolerance : relative decrease of the cost below which the descent stops
     """
     fit = _optimal_weights(design, samples, log_variance)
     damping, previous = 1e-2, None
-    for _ in range(_MAX_STEPS):
+    for _ in range(_MAX_STEP_COUNT):
         step = _marquardt_step(fit, damping)
         update = step if previous is None else _anderson_step(fit.log_variance, step, *previous)
-        trial = _optimal_weights(design, samples, np.clip(fit.log_variance + update, *bounds))
+        trial = _optimal_weights(design, samples, np.clip(fit.log_variance + update, *log_variance_bounds))
         if trial.cost < fit.cost:
-            converged = fit.cost - trial.cost < tolerance * fit.cost
+            converged = fit.cost - trial.cost < cost_tolerance * fit.cost
             previous = fit.log_variance, step
             fit, damping = trial, max(damping / 5.0, 1e-12)
             if converged:
@@ -70,7 +70,7 @@ def minimise(
             previous = None
         else:
             damping = max(4.0 * damping, 1e-6)
-            if damping > _MAX_DAMPING:
+            if damping > _MAX_MARQUARDT_DAMPING:
                 break
     return fit
 
@@ -79,10 +79,12 @@ def _marquardt_step(fit: WeightedFit, damping: float) -> Floats:
     scale = fit.curvature.diagonal()
     damped = fit.curvature + np.diag(damping * (scale + 1e-12 * scale.max()))
     step = -np.linalg.lstsq(damped, fit.gradient, rcond=None)[0]
-    return np.asarray(np.clip(step, -_MAX_STEP, _MAX_STEP))
+    return np.asarray(np.clip(step, -_MAX_LOG_VARIANCE_STEP, _MAX_LOG_VARIANCE_STEP))
 
 
-def _anderson_step(position: Floats, step: Floats, last_position: Floats, last_step: Floats) -> Floats:
+def _anderson_step(
+    log_variance: Floats, step: Floats, last_log_variance: Floats, last_step: Floats
+) -> Floats:
     """Return the step of Anderson acceleration, extrapolated from the last two steps [Anderson1965].
 
     Plain steps neglect the curvature of the residuals and converge linearly; one extrapolated step replaces a
@@ -91,8 +93,8 @@ def _anderson_step(position: Floats, step: Floats, last_position: Floats, last_s
     change = step - last_step
     size = float(change @ change)
     factor = float(step @ change) / size if size > 0.0 else 0.0
-    extrapolated = step - factor * (position - last_position + change)
-    return np.asarray(np.clip(extrapolated, -_MAX_STEP, _MAX_STEP))
+    extrapolated = step - factor * (log_variance - last_log_variance + change)
+    return np.asarray(np.clip(extrapolated, -_MAX_LOG_VARIANCE_STEP, _MAX_LOG_VARIANCE_STEP))
 
 
 def _optimal_weights(design: DesignFunction, samples: Floats, log_variance: Floats) -> WeightedFit:
@@ -118,7 +120,7 @@ def qr_factor(matrix: Floats) -> Floats:
     Blocks of rows are factorised separately, because BLAS would start threads for the whole matrix that cost
     more than they save.
     """
-    blocks = np.array_split(matrix, -(-len(matrix) // _ROWS_PER_BLOCK))
+    blocks = np.array_split(matrix, -(-len(matrix) // _QR_ROWS_PER_BLOCK))
     factors = [np.asarray(np.linalg.qr(block, mode="r")) for block in blocks]
     return factors[0] if len(factors) == 1 else np.asarray(np.linalg.qr(np.vstack(factors), mode="r"))
 

@@ -13,7 +13,7 @@ from dermis.optics.media import Floats
 PRIOR_NAMES = ("melanin", "blood", "oxygen", "epidermis_mm")
 """Parameters of the prior; all but oxygen are distributed by their logarithms."""
 _OXYGEN_INDEX = PRIOR_NAMES.index("oxygen")
-_SMALLEST_FRACTION = 1e-4
+_MIN_PIGMENT_FRACTION = 1e-4
 _COVARIANCE_COLUMNS = [f"{a}_{b}" for i, a in enumerate(PRIOR_NAMES) for b in PRIOR_NAMES[: i + 1]]
 PRIOR_COLUMNS = ("weight", *PRIOR_NAMES, *_COVARIANCE_COLUMNS)
 """Columns of the table: weight, mean and lower triangle of the covariance of each component."""
@@ -43,7 +43,7 @@ class SkinPrior:
 
     def conditioned_on(self, melanin: float, blood: float) -> SkinPrior:
         """Return the distribution of skins whose melanin and blood fractions are known [-]."""
-        log_fractions = np.log(np.maximum([melanin, blood], _SMALLEST_FRACTION))
+        log_fractions = np.log(np.maximum([melanin, blood], _MIN_PIGMENT_FRACTION))
         weight, mean, covariance = [], [], []
         for w, m, C in zip(self.weight, self.mean, self.covariance, strict=True):
             gain = C[:, :2] @ np.linalg.inv(C[:2, :2])
@@ -55,14 +55,14 @@ class SkinPrior:
         weights = np.array(weight) + 1e-300
         return SkinPrior(weights / weights.sum(), np.array(mean), np.array(covariance))
 
-    def sample(self, count: int, seed: int = 0) -> dict[str, Floats]:
-        """Draw `count` random skins: (count,) values of each of `PRIOR_NAMES`, oxygen clipped to 0 to 1."""
+    def sample(self, skin_count: int, seed: int = 0) -> dict[str, Floats]:
+        """Draw random skins: (skin_count,) values of each of `PRIOR_NAMES`, oxygen clipped to 0 to 1."""
         rng = np.random.default_rng(seed)
-        component = rng.choice(len(self.weight), size=count, p=self.weight)
+        component = rng.choice(len(self.weight), size=skin_count, p=self.weight)
         values, vectors = np.linalg.eigh(self.covariance)
         roots = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
         points = self.mean[component] + np.einsum(
-            "nij,nj->ni", roots[component], rng.standard_normal((count, len(PRIOR_NAMES)))
+            "nij,nj->ni", roots[component], rng.standard_normal((skin_count, len(PRIOR_NAMES)))
         )
         columns = {name: np.exp(points[:, i]) for i, name in enumerate(PRIOR_NAMES) if i != _OXYGEN_INDEX}
         return columns | {"oxygen": np.clip(points[:, _OXYGEN_INDEX], 0.0, 1.0)}
@@ -84,12 +84,12 @@ def skin_prior() -> SkinPrior:
     return SkinPrior(float_columns(rows, "weight")[:, 0], mean, covariance)
 
 
-def prior_points(values: dict[str, Floats]) -> Floats:
+def prior_points(parameter_values: dict[str, Floats]) -> Floats:
     """Convert the parameters of n skins to points (n, 4) in the coordinates of `SkinPrior`.
 
-    values : (n,) values of each of `PRIOR_NAMES`; points contain the logarithms of these values, but oxygen
-        itself
+    parameter_values : (n,) values of each of `PRIOR_NAMES`; points contain the logarithms of these values,
+        but oxygen itself
     """
-    columns = [np.log(np.maximum(values[name], _SMALLEST_FRACTION)) for name in PRIOR_NAMES]
-    columns[_OXYGEN_INDEX] = values["oxygen"]
+    columns = [np.log(np.maximum(parameter_values[name], _MIN_PIGMENT_FRACTION)) for name in PRIOR_NAMES]
+    columns[_OXYGEN_INDEX] = parameter_values["oxygen"]
     return np.stack(columns, axis=-1)

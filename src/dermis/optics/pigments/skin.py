@@ -30,7 +30,7 @@ _STRATUM_CORNEUM_MM, _PAPILLARY_DERMIS_MM = 0.01, 0.2
 _RETICULAR_BLOOD_RATIO = 0.0091 / 0.012
 _UNIFORM_INDEX_NOTE = f"all layers have the index {SKIN_ETA:g}, without reflection between them"
 _BASELINE_NOTE = "what was measured on rats; 0.5 fits the spectra of measured people"
-_THIN_NOTE = "the multipole is inaccurate for so thin a layer: use layered diffusion"
+_THIN_LAYER_NOTE = "the multipole is inaccurate for so thin a layer: use layered diffusion"
 _LayerBuilder = Callable[[SkinParameters, Floats, Floats], tuple[Layer, ...]]
 
 
@@ -149,13 +149,14 @@ def _bloodless_absorption(parameters: SkinParameters, wavelength_nm: Floats) -> 
     return parameters.baseline * baseline_absorption(wavelength_nm)
 
 
-def dj2006_layers(parameters: SkinParameters, fractions: Floats) -> tuple[Layer, Layer]:
+def dj2006_layers(parameters: SkinParameters, pigment_fractions: Floats) -> tuple[Layer, Layer]:
     """Return epidermis and dermis of "dj2006" for n pigment fractions, with coefficients (n, 31).
 
     parameters : the other parameters of the skins; its fields `melanin` and `blood` are ignored
-    fractions : (n,) melanin fractions of the epidermis, which are also the blood fractions of the dermis [-]
+    pigment_fractions : (n,) melanin fractions of the epidermis, which are also the blood fractions of the
+        dermis [-]
     """
-    column, scattering = fractions[:, None], donner_jensen_2006(WAVELENGTHS_NM)
+    column, scattering = pigment_fractions[:, None], donner_jensen_2006(WAVELENGTHS_NM)
     epidermal = _epidermal_absorption(parameters, column, WAVELENGTHS_NM)
     dermal = _dermal_absorption(parameters, column, WAVELENGTHS_NM)
     ratios = 1.0, DERMIS_SCATTERING_RATIO
@@ -173,14 +174,14 @@ _STRUCTURES: dict[str, tuple[_LayerBuilder, str, tuple[str, ...]]] = {
     "donner2008": (
         _build_donner2008,
         f"the sheet adds {LEAKED_MELANIN:.1%} of what the melanin above it absorbs, as public code reads the "
-        f"paper; carotene is left out; {_THIN_NOTE}",
+        f"paper; carotene is left out; {_THIN_LAYER_NOTE}",
         ("Donner2008", "DonnerJensen2006", "Jacques1998", "Prahl1999"),
     ),
     "biospec": (
         _build_biospec,
         "BioSpec traces rays and has no reduced scattering: the law of dj2006 is used instead; its epidermis "
         "is 0.1 mm thick, its reticular dermis 1.8 mm on a mirror, but semi-infinite here; carotene and "
-        f"bilirubin are left out; {_THIN_NOTE}",
+        f"bilirubin are left out; {_THIN_LAYER_NOTE}",
         ("KrishnaswamyBaranoski2004", "DonnerJensen2006", "Jacques1998", "Prahl1999"),
     ),
 }

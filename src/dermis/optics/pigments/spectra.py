@@ -42,16 +42,16 @@ def visible_wavelengths(wavelength_nm: ArrayLike) -> Floats:
     return wavelength
 
 
-def interpolate_spectrum(table: str, column: str, wavelength_nm: ArrayLike) -> Floats:
-    """Interpolate a spectrum from the file data/spectra/`table`.csv linearly, in the unit of the file.
+def interpolate_spectrum(table_name: str, column_name: str, wavelength_nm: ArrayLike) -> Floats:
+    """Interpolate a spectrum from the file data/spectra/`table_name`.csv linearly, in the unit of the file.
 
-    table : name of the file, without folder and suffix
-    column : heading of the column with the spectrum
+    table_name : name of the file, without folder and suffix
+    column_name : heading of the column with the spectrum
     wavelength_nm : wavelengths of any shape, from 380 to 780 [nm]
     """
-    columns = _spectrum_columns(table)
+    columns = _spectrum_columns(table_name)
     wavelength = visible_wavelengths(wavelength_nm)
-    return np.asarray(np.interp(wavelength, columns["wavelength_nm"], columns[column]))
+    return np.asarray(np.interp(wavelength, columns["wavelength_nm"], columns[column_name]))
 
 
 def rgb_weights(wavelength_nm: Floats = WAVELENGTHS_NM) -> Floats:
@@ -86,8 +86,8 @@ def _primaries_xyz() -> Floats:
 
 
 @cache
-def _spectrum_columns(table: str) -> dict[str, Floats]:
-    rows = read_rows("dermis.optics", f"data/spectra/{table}")
+def _spectrum_columns(table_name: str) -> dict[str, Floats]:
+    rows = read_rows("dermis.optics", f"data/spectra/{table_name}")
     return {name: float_columns(rows, name)[:, 0] for name in rows[0]}
 
 

@@ -14,7 +14,7 @@ from dermis.base.errors import format_value, notify, refuse
 from dermis.human.person import Human
 from dermis.human.skin.painted import PaintedMaps
 from dermis.images.colour_spaces import SRGB
-from dermis.images.io import EmbeddedPicture, read_colours, repaired_radiance
+from dermis.images.io import EmbeddedPicture, read_colours, repair_radiance
 from dermis.mesh.head import Head
 from dermis.optics.media import Floats
 from dermis.optics.pigments.parameters import DEFAULT_SKIN, SPECTRAL_PRESET
@@ -84,7 +84,7 @@ def read_photograph(source: str | Path | EmbeddedPicture | ArrayLike) -> Photogr
         usable = opaque
     colours = image[..., :3]
     if is_linear:
-        colours = repaired_radiance(name, np.asarray(colours, np.float32))
+        colours = repair_radiance(name, np.asarray(colours, np.float32))
     else:
         usable &= colours.max(axis=2) < _CLIPPED_LEVEL_FRACTION * full
     return Photograph(space.linear(colours).astype(np.float64), usable.astype(np.float64))

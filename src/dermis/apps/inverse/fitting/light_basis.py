@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 
-from dermis.environment.panorama import directions
+from dermis.environment.panorama import texel_directions
 from dermis.mesh.geometry import fibonacci_sphere
 from dermis.optics.media import Floats
 
@@ -61,7 +61,7 @@ def panorama(lobe_strengths: Floats) -> Floats:
 
     lobe_strengths : (9,) weights of the lobes with the axes `lobe_directions`
     """
-    texels = directions(PANORAMA_ROWS, 2 * PANORAMA_ROWS)
+    texels = texel_directions(PANORAMA_ROWS, 2 * PANORAMA_ROWS)
     return np.maximum(lobe_radiance(lobe_directions(), texels) @ lobe_strengths, 0.0)
 
 

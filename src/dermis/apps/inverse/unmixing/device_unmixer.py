@@ -147,7 +147,9 @@ def _with_alpha_channel(pixels: Pixels) -> Pixels:
 
 def _table_texture(device: Device, model: SkinModel) -> Texture:
     layers = [_with_alpha_channel(layer.astype(np.float32)) for layer in model.log_colours]
-    texture = make_texture(device, layers[0].shape[1::-1], _TEXTURE_FORMAT, layers=len(layers), use="map")
+    texture = make_texture(
+        device, layers[0].shape[1::-1], _TEXTURE_FORMAT, layer_count=len(layers), content_source="map"
+    )
     for index, layer in enumerate(layers):
         upload(device, texture, layer, layer=index)
     return texture

@@ -21,7 +21,7 @@ from dermis.optics.angular_response import (
     mean_single_scattering_kernel,
     refracted_cosine,
 )
-from dermis.optics.media import media
+from dermis.optics.media import published_media
 from dermis.scene import Scene, Settings, Skin
 from dermis.scene.heads import load_head
 
@@ -40,7 +40,7 @@ def half_space(adapter: str = "auto") -> None:
 
 def direction_table(head: Head, adapter: str) -> str:
     """Return a Markdown table of how reflection depends on direction, by channel, for two skins."""
-    layer = media()["skin1"].layers[0]
+    layer = published_media()["skin1"].layers[0]
     albedo = layer.sigma_s_prime / (layer.sigma_a + layer.sigma_s_prime)
     forward = layer.sigma_s_prime / (layer.sigma_a * (1.0 - FORWARD_G) + layer.sigma_s_prime)
     median, high = _studio_ratios(head, adapter)

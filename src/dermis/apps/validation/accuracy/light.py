@@ -13,9 +13,15 @@ from dermis.apps.validation.pages import print_tables
 from dermis.atlas.build import cached_atlas
 from dermis.environment.isotropic_fits import LOBE_TABLE_ROUGHNESSES, ROUGHNESS_COUNT, VIEW_COUNT
 from dermis.environment.isotropic_lobes import isotropic_lobe_table
-from dermis.environment.panorama import directions, load_panorama, resample, solid_angles, split_suns
-from dermis.environment.prefilter import ROUGHEST, ROUGHNESSES, SMOOTHEST, Prefiltered, prefilter
-from dermis.frame.features.occlusion.baked import DIRECTION_COUNT, bake_occlusion
+from dermis.environment.panorama import (
+    load_panorama,
+    resample_panorama,
+    split_suns,
+    texel_directions,
+    texel_solid_angles,
+)
+from dermis.environment.prefilter import LAYER_ROUGHNESSES, ROUGHEST, SMOOTHEST, Prefiltered, prefilter
+from dermis.frame.features.occlusion.baked import SKY_DIRECTION_COUNT, bake_occlusion
 from dermis.frame.lights.rectangle import facing_irradiance
 from dermis.frame.projection import view_axes_array
 from dermis.mesh.head import Head
@@ -67,9 +73,13 @@ def panorama(panorama_name: str, row_count: int = 256) -> tuple[Array, Array, Pr
 
     Light is radiance times solid angle, without suns.
     """
-    radiance = resample(split_suns(load_panorama(panorama_name))[0], row_count)
-    light = radiance * solid_angles(*radiance.shape[:2])[..., None]
-    return directions(*radiance.shape[:2]).reshape(-1, 3), light.reshape(-1, 3), prefilter(panorama_name)
+    radiance = resample_panorama(split_suns(load_panorama(panorama_name))[0], row_count)
+    light = radiance * texel_solid_angles(*radiance.shape[:2])[..., None]
+    return (
+        texel_directions(*radiance.shape[:2]).reshape(-1, 3),
+        light.reshape(-1, 3),
+        prefilter(panorama_name),
+    )
 
 
 def irradiance_error(panorama_name: str, normal_count: int = 200) -> float:
@@ -149,8 +159,8 @@ def lobe_radiance(layers: Array, directions: Array, roughness_m: float) -> Array
     directions : (k, 3) directions of the lobes
     roughness_m : roughness of the lobes
     """
-    level = (len(ROUGHNESSES) - 1) * np.log(roughness_m / SMOOTHEST) / np.log(ROUGHEST / SMOOTHEST)
-    low = int(np.clip(level, 0, len(ROUGHNESSES) - 2))
+    level = (len(LAYER_ROUGHNESSES) - 1) * np.log(roughness_m / SMOOTHEST) / np.log(ROUGHEST / SMOOTHEST)
+    low = int(np.clip(level, 0, len(LAYER_ROUGHNESSES) - 2))
     f = float(np.clip(level - low, 0, 1))
     below, above = (sample_panorama(layers[1 + k], directions) for k in (low, low + 1))
     return np.asarray((1 - f) * below + f * above)
@@ -243,7 +253,7 @@ def occlusion_error(renderer: dermis.Renderer) -> float:
     texels, atlas = inputs.layouts[0].atlas.resources["atlas"], cached_atlas(head.mesh, 512, "stitched")
     ours, reference = (
         bake_occlusion(renderer.device, head, atlas, inputs.bindings, texels, 512, count)[:512]
-        for count in (DIRECTION_COUNT, 1024)
+        for count in (SKY_DIRECTION_COUNT, 1024)
     )
     return float(np.sqrt(np.nanmean((ours - reference) ** 2)))
 
@@ -264,5 +274,5 @@ def tables(adapter: str = "auto") -> dict[str, str]:
         "furnaces": furnace_rows(renderer),
         "soft_shadows": "\n".join(f"| {rig} | {bias:+.1%} | {rms:.1%} |" for rig, bias, rms in shadows),
         "occlusion": f"{occlusion_error(renderer):.3f}",
-        "directions": str(DIRECTION_COUNT),
+        "directions": str(SKY_DIRECTION_COUNT),
     }

@@ -20,7 +20,7 @@ from dermis.optics.fits.burley import fit_burley
 from dermis.optics.fits.gaussian import fit_gaussians
 from dermis.optics.fits.separable import fit_separable
 from dermis.optics.fits.targets import ring_error
-from dermis.optics.media import SKIN_ETA, media
+from dermis.optics.media import SKIN_ETA, published_media
 from dermis.optics.profiles import load_profile
 from dermis.optics.radial import RadialProfile
 from dermis.optics.tissue import Tissue, load_tissue
@@ -47,7 +47,7 @@ def optics() -> None:
 def tissue_by_name(tissue_name: str) -> Tissue:
     """Return a tissue by name; homogeneous skin has the index of refraction assumed by [Jensen2001]."""
     tissue = load_tissue(tissue_name)
-    return Tissue(media()[tissue_name].with_eta(1.3)) if tissue_name.startswith("skin") else tissue
+    return Tissue(published_media()[tissue_name].with_eta(1.3)) if tissue_name.startswith("skin") else tissue
 
 
 def models_table() -> str:
@@ -83,7 +83,7 @@ def counted_table() -> str:
     rows = []
     for name in ("skin1", "skin2"):
         for eta in (1.0, SKIN_ETA):
-            tissue = Tissue(media()[name].with_eta(eta))
+            tissue = Tissue(published_media()[name].with_eta(eta))
             reference = monte_carlo_profile(tissue.medium, photons=PHOTON_COUNT, seed=1)
             for model in ("counted", "layered"):
                 profile = tissue.profile(model)

@@ -48,7 +48,7 @@ from dermis.base.disk import load_arrays, try_save_arrays
 from dermis.frame.renderer import Renderer
 from dermis.human.person import Human
 from dermis.mesh.head import Head
-from dermis.optics.media import Medium, media
+from dermis.optics.media import Medium, published_media
 from dermis.scene.heads import load_head
 from dermis.scene.settings import Settings
 
@@ -333,7 +333,7 @@ def _measurement_jobs(measuring: Measuring) -> list[_Job]:
         (
             "heads",
             f"{name} / {light} / {medium}",
-            partial(measuring.measure_head, name, light, media()[medium].with_eta(1.0)),
+            partial(measuring.measure_head, name, light, published_media()[medium].with_eta(1.0)),
         )
         for medium in _HEAD_MEDIA
         for name in _HEAD_FILES

@@ -25,7 +25,7 @@ from dermis.optics.angular_response import (
 )
 from dermis.optics.diffusion.models import diffusion_profile
 from dermis.optics.fits.gaussian import fit_gaussians
-from dermis.optics.media import Medium, media
+from dermis.optics.media import Medium, published_media
 from dermis.optics.profiles import GAUSSIAN_TERMS, write_profile
 from dermis.optics.slabs import anisotropic_response
 from dermis.scene import Skin
@@ -81,7 +81,7 @@ def skins_by_direction(medium: Medium, folder: str) -> dict[str, Skin]:
     folder : folder for the file of the profile
     """
     file = Path(folder) / f"{medium.name}_{medium.eta:g}.toml"
-    fit = fit_gaussians(diffusion_profile(medium).rings(), GAUSSIAN_TERMS, name=medium.name)
+    fit = fit_gaussians(diffusion_profile(medium).rings(), GAUSSIAN_TERMS, profile_name=medium.name)
     write_profile(file, fit.profile, {})
     values = {"profile": str(file), "albedo": "profile", "energy": "none", "rho_s": 0.0}
     values |= {"specular": "none"} if medium.eta == 1.0 else {}
@@ -93,7 +93,7 @@ def error_rows(renderer: dermis.Renderer) -> str:
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         for name, eta in SLAB_MEDIA:
-            medium = media()[name].with_eta(eta)
+            medium = published_media()[name].with_eta(eta)
             for direction, skin in skins_by_direction(medium, folder).items():
                 for thickness in THICKNESSES_MM:
                     rendered = rendered_response(renderer, skin, thickness)
@@ -110,7 +110,7 @@ def forward_error_rows(renderer: dermis.Renderer) -> str:
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         for name, eta in SLAB_MEDIA:
-            medium = media()[name].with_eta(eta)
+            medium = published_media()[name].with_eta(eta)
             half_space = skins_by_direction(medium, folder)["half-space"]
             for g in (0.0, FORWARD_G):
                 skin = half_space.model_copy(update={"anisotropy": g})
@@ -130,7 +130,7 @@ def forward_direction_rows() -> str:
     for g in (0.0, FORWARD_G):
         cells = []
         for eta in (1.0, 1.4):
-            albedos = media()["skin1"].layers[0].alpha_prime
+            albedos = published_media()["skin1"].layers[0].alpha_prime
             cells.append(" ".join(f"{_direction_pairs_error(float(one), eta, g):.3f}" for one in albedos))
         rows.append(f"| anisotropy {g:g} | {' | '.join(cells)} |")
     return "\n".join(rows)
@@ -165,7 +165,7 @@ def forward_rows() -> str:
     """Return Markdown rows on red light through forward-scattering and isotropic slabs, by Monte Carlo."""
     rows = []
     for eta in (1.0, 1.4):
-        layer = media()["skin1"].layers[0]
+        layer = published_media()["skin1"].layers[0]
         absorbed, scattered = float(layer.sigma_a[0]), float(layer.sigma_s_prime[0])
         for thickness in THICKNESSES_MM:
             cells = []

@@ -21,7 +21,7 @@ from dermis.frame.surface_points import irradiance_at, surface_points
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere
-from dermis.optics.media import media
+from dermis.optics.media import published_media
 from dermis.scene import Settings
 from dermis.scene.lights import DirectionalLight
 from dermis.scene.techniques import TECHNIQUES
@@ -160,7 +160,7 @@ def lambertian_limit(head: Head, medium: str, path_traced: Comparison, adapter: 
     assert not isinstance(light, DirectionalLight)
     to_light = np.array(light.position) - position
     cosine = np.clip((normal * to_light).sum(axis=1) / np.linalg.norm(to_light, axis=1), 0.0, 1.0)
-    layer = media()[medium].layers[0]
+    layer = published_media()[medium].layers[0]
     single_albedo = layer.sigma_s_prime / (layer.sigma_a + layer.sigma_s_prime)
     albedo = np.stack([directional_albedo(cosine, one) for one in single_albedo], axis=-1)
     irradiance = irradiance_at(renderer, scene, SETTINGS, visible.triangle, visible.barycentric)

@@ -14,8 +14,8 @@ from dermis.frame.features.surface import texels as surface_texels
 from dermis.frame.features.translucency import passes as translucency
 from dermis.frame.inputs import FrameInputs
 from dermis.frame.programs import (
-    FLOAT_FORMAT,
-    HALF_FORMAT,
+    FLOAT_TEXEL_FORMAT,
+    HALF_TEXEL_FORMAT,
     program_constants,
     registry_version,
     shader_folders,
@@ -48,14 +48,18 @@ class FragmentPasses(GpuGems3):
     def make_levels(self, device: Device, side: int, halvings: Halvings) -> PyramidLevels:
         """Return textures for the irradiance and the pyramid levels, all in half precision."""
         count = max(map(len, halvings))
-        stack = make_texture(device, (side, side), HALF_FORMAT, layers=count, use="raster")
-        scratch, *stretch = (make_texture(device, (side, side), HALF_FORMAT, use="raster") for _ in range(3))
+        stack = make_texture(
+            device, (side, side), HALF_TEXEL_FORMAT, layer_count=count, content_source="raster"
+        )
+        scratch, *stretch = (
+            make_texture(device, (side, side), HALF_TEXEL_FORMAT, content_source="raster") for _ in range(3)
+        )
         first, second = (texture.create_view() for texture in stretch)
-        return StretchedLevels((stack,), (0,), scratch, side, HALF_FORMAT, stretch=(first, second))
+        return StretchedLevels((stack,), (0,), scratch, side, HALF_TEXEL_FORMAT, stretch=(first, second))
 
     def make_sum(self, device: Device, side: int) -> Texture:
         """Return the texture for the weighted sum of the pyramid levels."""
-        return make_texture(device, (side, side), FLOAT_FORMAT, use="raster")
+        return make_texture(device, (side, side), FLOAT_TEXEL_FORMAT, content_source="raster")
 
     def scatter(self, graph: Graph, inputs: FrameInputs) -> Texture:
         """Record the passes that light the atlas, blur the light and sum the levels; return the sum."""
@@ -81,7 +85,9 @@ class FragmentPasses(GpuGems3):
 
         constants : pipeline constants of the shader
         """
-        return _fragment_program(device, "gpu_gems_3_fragment.wgsl", constants, [HALF_FORMAT, HALF_FORMAT])
+        return _fragment_program(
+            device, "gpu_gems_3_fragment.wgsl", constants, [HALF_TEXEL_FORMAT, HALF_TEXEL_FORMAT]
+        )
 
     def draw_blur(
         self,
@@ -103,7 +109,7 @@ class FragmentPasses(GpuGems3):
         target: TextureOrView,
         radiance_scale: float,
     ) -> None:
-        shader = _fragment_program(graph.device, "gpu_gems_3_irradiance.wgsl", constants, [HALF_FORMAT])
+        shader = _fragment_program(graph.device, "gpu_gems_3_irradiance.wgsl", constants, [HALF_TEXEL_FORMAT])
         entering = shader.record("Entering", scale=radiance_scale)
         bound = {**layout.bindings, "surfaces": layout.surfaces, "entering": entering}
         graph.fill("irradiance", shader, bound, [target])
@@ -117,7 +123,7 @@ class FragmentPasses(GpuGems3):
         transmitted_light: Texture | None,
         lost_light: Texture | None,
     ) -> None:
-        shader = _fragment_program(graph.device, "gpu_gems_3_sum.wgsl", (), [FLOAT_FORMAT])
+        shader = _fragment_program(graph.device, "gpu_gems_3_sum.wgsl", (), [FLOAT_TEXEL_FORMAT])
         padded = np.zeros((MAX_GAUSSIANS, 4), np.float32)
         padded[: len(blur.weight), :3] = blur.weight / blur.scale
         padded[0, 3] = 1.0

@@ -19,7 +19,7 @@ from dermis.apps.validation.benchmarks.floor import frame_traffic, stage_bytes
 from dermis.apps.validation.benchmarks.gpu_gems_3_fragments import FRAGMENT_PASSES
 from dermis.frame.renderer import Renderer
 from dermis.gpu.command_list import Timing
-from dermis.gpu.failures import gpu_failures
+from dermis.gpu.failures import converted_gpu_failures
 from dermis.gpu.memory import allocated_bytes
 from dermis.mesh.head import Head
 from dermis.scene.model import Scene
@@ -97,7 +97,7 @@ def measure_case(
 
     Raises DermisError for frames that the device cannot hold.
     """
-    with gpu_failures(renderer.device), TECHNIQUES.including(FRAGMENT_TECHNIQUE, FRAGMENT_PASSES):
+    with converted_gpu_failures(renderer.device), TECHNIQUES.including(FRAGMENT_TECHNIQUE, FRAGMENT_PASSES):
         return _measure_case(renderer, case, head, folder, bytes_per_s, counts)
 
 

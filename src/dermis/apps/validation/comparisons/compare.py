@@ -22,7 +22,7 @@ from dermis.frame.renderer import Renderer
 from dermis.frame.surface_points import surface_points
 from dermis.images.colour import encode_srgb
 from dermis.mesh.head import Head
-from dermis.optics.media import media
+from dermis.optics.media import published_media
 from dermis.scene.settings import Settings
 from dermis.scene.skin import DirectionName, Skin
 from dermis.scene.sources import scattering_sources
@@ -136,7 +136,7 @@ def comparison_subject(
 
     The parameters are those of `compare`.
     """
-    index_matched = media()[medium].with_eta(1.0)
+    index_matched = published_media()[medium].with_eta(1.0)
     with medium_scene(head, light, region, index_matched, model) as (scene, profile):
         yield ComparisonSubject(Renderer(adapter), scene, profile, index_matched, settings)
 
@@ -147,7 +147,7 @@ def check_names(reference_name: str, light_name: str, region_name: str, medium_n
         "against": (reference_name, REFERENCES),
         "light": (light_name, LIGHTS),
         "region": (region_name, REGIONS),
-        "medium": (medium_name, media()),
+        "medium": (medium_name, published_media()),
     }
     for option, (name, known) in choices.items():
         if name not in known:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dermis.environment.panorama import UNIFORM
+from dermis.environment.panorama import UNIFORM_PANORAMA
 from dermis.human.expressions import expression
 from dermis.mesh.head import Head
 from dermis.mesh.pose import Pose
@@ -94,7 +94,7 @@ VIEWS: dict[str, View] = {
     "portrait, esplanade": View(portrait, "royal_esplanade"),
     "three-quarter, lebombo": View(three_quarter, "lebombo"),
 }
-PANORAMAS = ("royal_esplanade", "lebombo", UNIFORM)
+PANORAMAS = ("royal_esplanade", "lebombo", UNIFORM_PANORAMA)
 
 
 def view_scene(head: Head, view: View) -> Scene:

@@ -17,7 +17,7 @@ from dermis.apps.validation.comparisons.scenes import default_region, medium_sce
 from dermis.base.errors import DermisError
 from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head
-from dermis.optics.media import Medium, media
+from dermis.optics.media import Medium, published_media
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
@@ -128,7 +128,7 @@ def render_peers(
 
     on_progress : function called with the number of steps since its last call
     """
-    medium = media()["skin1"].with_eta(1.0)
+    medium = published_media()["skin1"].with_eta(1.0)
     settings = Settings(size=(plan.side, plan.side))
     cycles: dict[str, list[list[CyclesPass]]] = {method: [] for method in CYCLES_METHODS}
     ours: dict[str, FrameTimes] = {}

@@ -327,7 +327,9 @@ def cells_text(archive: Archive, variables: Doubles, measured_table: MeasuredTab
                     writer.writerow(_cell_row(archive, variables, own, (GROUP_OF_CODE[code], name, sex, "")))
             for number, middle in AGE_MIDDLES.items():
                 if (own := here & (archive.age == middle)).sum() >= _MIN_CELL_PEOPLE:
-                    writer.writerow(_cell_row(archive, variables, own, (GROUP_OF_CODE[code], name, "", number)))
+                    writer.writerow(
+                        _cell_row(archive, variables, own, (GROUP_OF_CODE[code], name, "", number))
+                    )
     return out.getvalue()
 
 

@@ -25,7 +25,7 @@ from dermis.apps.viewer.session import Session, apply_regions
 from dermis.apps.viewer.state import ViewerState, validated_copy
 from dermis.base.errors import DermisError
 from dermis.human.regions.region_table import DEFAULT_TABLE_NAME
-from dermis.images.skin_tone import CLASS_STATEMENT, skin_tone
+from dermis.images.skin_tone import SKIN_CLASS_DISCLAIMER, skin_tone
 from dermis.optics.pigments.parameters import DEFAULT_SKIN, DEFAULT_STRUCTURE, SKINS
 from dermis.optics.profiles import PUBLISHED_PRESET, preset_names
 from dermis.scene.frozen_model import fields_under
@@ -98,8 +98,8 @@ def _draw_tone(session: Session) -> None:
     """Draw the description of the mean colour of the head's skin."""
     colour = session.state.scene.head.maps.mean_colour
     if colour is not None:
-        imgui.text_disabled(skin_tone(colour).line())
-        draw_tooltip(CLASS_STATEMENT)
+        imgui.text_disabled(skin_tone(colour).as_text())
+        draw_tooltip(SKIN_CLASS_DISCLAIMER)
 
 
 def _draw_pigments(session: Session, skin: Skin) -> None:

@@ -21,7 +21,7 @@ from dermis.gpu import Bindings, Buffer, Device, Recorder
 from dermis.mesh.mesh import Mesh
 
 Words = NDArray[np.uint32]
-_NO_NEIGHBOUR = 0xFFFFFFFF  # word of a triangle edge without skin across it
+_NO_NEIGHBOUR_WORD = 0xFFFFFFFF  # word of a triangle edge without skin across it
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +82,7 @@ def _side_words(mesh: Mesh) -> Words:
     neighbour, neighbour_side, flipped = side_neighbours(mesh)
     skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
     word = (neighbour.astype(np.uint32) << 3) | (neighbour_side.astype(np.uint32) << 1) | flipped
-    return np.where((neighbour >= 0) & skin[neighbour], word, _NO_NEIGHBOUR).astype(np.uint32)
+    return np.where((neighbour >= 0) & skin[neighbour], word, _NO_NEIGHBOUR_WORD).astype(np.uint32)
 
 
 def _halving_buffers(device: Device, finer: AtlasTextures, coarser: AtlasTextures) -> Bindings:
@@ -102,18 +102,20 @@ def _halving_buffers(device: Device, finer: AtlasTextures, coarser: AtlasTexture
     }
 
 
-def draw(graph: Recorder, atlas: AtlasTextures, tracing: GutterTracing, head: HeadGeometry) -> None:
+def draw(graph: Recorder, atlas: AtlasTextures, tracing: GutterTracing, rest_head: HeadGeometry) -> None:
     """Declare the passes that trace the source of each gutter texel, at all resolutions of the atlas.
 
     atlas : result of `with_separate_gutters`, whose gutter buffers are filled
-    head : surface of the person at rest
+    rest_head : surface of the person at rest
     """
     device, size = graph.device, (("SIZE", atlas.resources["atlas"].size[0]),)
     assert atlas.gutter is not None
     paths = {"starts": tracing.starts, "sides": tracing.sides, "gutter": atlas.gutter}
     trace = program(device, "atlas/gutter_trace.wgsl", size)
     halve = program(device, "atlas/gutter_halve.wgsl")
-    graph.dispatch("gutters", trace, {**head.resources, **paths}, workgroup_grid(len(atlas.gutter_texels)))
+    graph.dispatch(
+        "gutters", trace, {**rest_head.resources, **paths}, workgroup_grid(len(atlas.gutter_texels))
+    )
     levels = [level for level in (atlas, *atlas.coarser) if level.gutter]
     for (finer, coarser), halving in zip(pairwise(levels), tracing.halvings, strict=True):
         assert finer.gutter is not None and coarser.gutter is not None

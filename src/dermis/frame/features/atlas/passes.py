@@ -10,7 +10,7 @@ from dermis.frame.seams import FEATHER_MM
 from dermis.gpu import Device, Recorder, Texture, TextureOrView, make_texture
 
 _STRETCH_SOURCE_BYTES = 12  # size of an entry of stretch_sources in stretch_beyond.wgsl
-_ENTRIES_PER_ROW = 1024  # ROW of gutter.wgsl
+_GUTTER_ENTRIES_PER_ROW = 1024  # ROW of gutter.wgsl
 
 
 def draw_stretch(graph: Recorder, head: HeadGeometry, atlas: AtlasTextures) -> None:
@@ -23,7 +23,7 @@ def draw_stretch(graph: Recorder, head: HeadGeometry, atlas: AtlasTextures) -> N
         beyond = program(device, "atlas/stretch_beyond.wgsl", constants)
         listed = bound | {"stretch_sources": atlas.stretch_sources}
         groups = workgroup_grid(atlas.stretch_sources.size // _STRETCH_SOURCE_BYTES)
-        graph.dispatch("stretch", beyond, listed, groups, in_place="stretch_map")
+        graph.dispatch("stretch", beyond, listed, groups, in_place_resource="stretch_map")
     draw_coarser_stretch_maps(graph, atlas)
 
 
@@ -39,42 +39,49 @@ def draw_coarser_stretch_maps(graph: Recorder, atlas: AtlasTextures) -> None:
 
 def _placeholder_edge_map(device: Device) -> Texture:
     """Return a 1 x 1 texture to bind as `edge_map` for shaders that do not read the distances to edges."""
-    return device.cached("no edges", lambda: make_texture(device, (1, 1), "r32float", use="map"))
+    return device.cached("no edges", lambda: make_texture(device, (1, 1), "r32float", content_source="map"))
 
 
-def draw_gutters(graph: Recorder, stage: str, atlas: AtlasTextures, light: TextureOrView, texel: str) -> None:
+def draw_gutters(
+    graph: Recorder, stage_name: str, atlas: AtlasTextures, light_texture: TextureOrView, texel_format: str
+) -> None:
     """Declare the passes that copy light of a texture from across the seams to its gutters.
 
     The light is first copied to a buffer, because a pass cannot read and write the same texture.
 
-    stage : name of the stage in timings
-    light : texture of light over the atlas
-    texel : texture format of `light`
+    stage_name : name of the stage in timings
+    light_texture : texture of light over the atlas
+    texel_format : texture format of `light_texture`
     """
     if atlas.gutter is None or atlas.gutter_light is None:
         return
     device = graph.device
-    gather = program(device, "atlas/stitch_gather.wgsl", source=texel)
-    place = program(device, "atlas/stitch_place.wgsl", store=texel)
+    gather = program(device, "atlas/stitch_gather.wgsl", source=texel_format)
+    place = program(device, "atlas/stitch_place.wgsl", store=texel_format)
     linear = device.sampler(mag_filter="linear", min_filter="linear")
-    size = (_ENTRIES_PER_ROW, -(-atlas.gutter.size // (GUTTER_ENTRY_BYTES * _ENTRIES_PER_ROW)))
+    size = (_GUTTER_ENTRIES_PER_ROW, -(-atlas.gutter.size // (GUTTER_ENTRY_BYTES * _GUTTER_ENTRIES_PER_ROW)))
     lists = {"gutter": atlas.gutter, "gathered": atlas.gutter_light}
-    graph.compute(stage, gather, {**lists, "source": light, "linear": linear}, size, TILE_SIDE)
-    graph.compute(stage, place, {**lists, "stored": light}, size, TILE_SIDE, in_place="stored")
+    graph.compute(stage_name, gather, {**lists, "source": light_texture, "linear": linear}, size, TILE_SIDE)
+    graph.compute(
+        stage_name, place, {**lists, "stored": light_texture}, size, TILE_SIDE, in_place_resource="stored"
+    )
 
 
-def draw_blend(graph: Recorder, first: LitAtlas, second: LitAtlas, target: Texture) -> None:
+def draw_blend(
+    graph: Recorder, first_layout: LitAtlas, second_layout: LitAtlas, blended_light: Texture
+) -> None:
     """Declare the pass that fades from the light of the first layout to the light of the second near seams.
 
-    first, second : layouts with different seams; the second is shown only near the seams of the first
-    target : texture for the result, as large as the atlas of the first layout
+    first_layout, second_layout : layouts with different seams; the second is shown only near the seams of the
+        first
+    blended_light : texture for the result, as large as the atlas of the first layout
     """
     bound = {
-        **second.bindings,  # with the atlas coordinates of the second layout
-        **first.atlas.resources,
-        "first": first.scattered,
-        "second": second.scattered,
-        "blended": target,
+        **second_layout.bindings,  # with the atlas coordinates of the second layout
+        **first_layout.atlas.resources,
+        "first": first_layout.scattered,
+        "second": second_layout.scattered,
+        "blended": blended_light,
     }
     shader = program(graph.device, "atlas/blend.wgsl", (("FADE_MM", FEATHER_MM),))
-    graph.compute("blend", shader, bound, target.size[:2])
+    graph.compute("blend", shader, bound, blended_light.size[:2])

@@ -15,13 +15,15 @@ from dermis.frame.seams import FEATHER_MM, SEAM_METHODS, SeamMethod
 from dermis.gpu import Buffer, Constants, Device, Texture, make_texture, mark_scratch
 from dermis.gpu.textures import texture_from_array
 
-_HALVING_KEY = "halved 2"  # key of the disk cache: increase the number when `halve_mip` changes its results
-MAX_HALVINGS = 3
+_HALVING_CACHE_KEY = (
+    "halved 2"  # key of the disk cache: increase the number when `halve_mip` changes its results
+)
+MAX_ATLAS_HALVINGS = 3
 """Number of coarser resolutions of an atlas that blurs may use."""
 GUTTER_ENTRY_BYTES = 16
 """Size of an entry in the buffer of gutter texels, see gutter.wgsl [bytes]."""
-_TEXTURE_NAME = "map of the atlas"
-_LIGHT_BYTES = 16  # size of the light of a gutter texel
+_ATLAS_TEXTURE_NAME = "map of the atlas"
+_GUTTER_LIGHT_BYTES = 16  # size of the light of a gutter texel
 _GUTTER_BIT = 1 << 15  # bit of the first component of reach_map that marks gutter texels, see reach.wgsl
 SAME_SOURCE_TEXELS = 4.0
 """Largest distance between sources of gutter texels that are averaged at half the resolution [texels]."""
@@ -66,38 +68,44 @@ class AtlasTextures:
     coarser: tuple[AtlasTextures, ...] = ()
     median_texels_per_mm: float = 0.0
 
-    def mips_for(self, edge: str) -> tuple[AtlasTextures, ...]:
+    def mips_for(self, edge_mode: str) -> tuple[AtlasTextures, ...]:
         """Return the atlas at all resolutions that blurs may use, the finest first.
 
-        edge : filter mode at the edges of charts; only "repeated" permits coarser resolutions
+        edge_mode : filter mode at the edges of charts; only "repeated" permits coarser resolutions
         """
-        return (self, *(self.coarser if edge == "repeated" else ()))
+        return (self, *(self.coarser if edge_mode == "repeated" else ()))
 
 
 def upload_atlas(
-    device: Device, atlas: Atlas, stretch: str = "full", seams: SeamMethod = SEAM_METHODS["stitch"]
+    device: Device,
+    atlas: Atlas,
+    stretch_correction: str = "full",
+    seam_method: SeamMethod = SEAM_METHODS["stitch"],
 ) -> AtlasTextures:
     """Upload an atlas, with an empty stretch map that `draw_stretch` fills.
 
-    stretch : "full" includes the angle between u and v, "axes" assumes right angles, "none" assumes the same
-        texel density everywhere
-    seams : how seams are treated; determines whether an edge map is uploaded, and whether seams are feathered
+    stretch_correction : "full" includes the angle between u and v, "axes" assumes right angles, "none"
+        assumes the same texel density everywhere
+    seam_method : how seams are treated; determines whether an edge map is uploaded, and whether seams are
+        feathered
     """
     texels = pack_surface_points(atlas.triangle, atlas.barycentric)
     own = atlas.lit
     texels[~own] = 0
-    resources = {"atlas": texture_from_array(device, texels, "rg32uint", _TEXTURE_NAME)}
-    if seams.feathered or len(seams.layouts) > 1:
-        resources["edge_map"] = texture_from_array(device, edge_distances(atlas), "r32float", _TEXTURE_NAME)
-    even = _rms_density(atlas.stretch[own]) if stretch == "none" else 0.0
-    feather = FEATHER_MM if seams.feathered else 0.0
+    resources = {"atlas": texture_from_array(device, texels, "rg32uint", _ATLAS_TEXTURE_NAME)}
+    if seam_method.feathered or len(seam_method.layouts) > 1:
+        resources["edge_map"] = texture_from_array(
+            device, edge_distances(atlas), "r32float", _ATLAS_TEXTURE_NAME
+        )
+    even = _rms_density(atlas.stretch[own]) if stretch_correction == "none" else 0.0
+    feather = FEATHER_MM if seam_method.feathered else 0.0
     mip = AtlasMip(atlas.coverage, own, atlas.edge_distance, atlas.gutter, atlas.source)
     return _upload_mip(
         device,
         mip,
         resources,
-        sheared=stretch == "full",
-        stretch_constants=(("SHEAR", stretch == "full"), ("EVEN", even), ("FEATHER_MM", feather)),
+        sheared=stretch_correction == "full",
+        stretch_constants=(("SHEAR", stretch_correction == "full"), ("EVEN", even), ("FEATHER_MM", feather)),
         stretch_sources=device.buffer(_stretch_sources(atlas), "STORAGE") if len(atlas.outside) else None,
         coarser=_upload_coarser(device, mip) if len(atlas.gutter) else (),
         median_texels_per_mm=_median_density(atlas.stretch, own),
@@ -109,16 +117,16 @@ def _rms_density(stretch: NDArray[np.float16]) -> float:
     return float(np.sqrt((stretch.astype(np.float64) ** 2).mean())) if len(stretch) else 0.0
 
 
-def _median_density(stretch: NDArray[np.float16], inside: NDArray[np.bool_]) -> float:
+def _median_density(stretch: NDArray[np.float16], inside_mask: NDArray[np.bool_]) -> float:
     """Return the median over texels of the smaller of the densities along u and v [texels/mm].
 
-    inside : mask of the texels to count: texels inside charts, gutters excluded
+    inside_mask : mask of the texels to count: texels inside charts, gutters excluded
 
     Non-negative half floats are ordered like their 16-bit patterns, and a histogram of the patterns is faster
     than sorting.
     """
     words = stretch.view(np.uint16)
-    counts = np.bincount(np.minimum(words[..., 0], words[..., 1])[inside], minlength=1 << 16)
+    counts = np.bincount(np.minimum(words[..., 0], words[..., 1])[inside_mask], minlength=1 << 16)
     total = int(counts.sum())
     if total == 0:
         return 0.0
@@ -127,23 +135,23 @@ def _median_density(stretch: NDArray[np.float16], inside: NDArray[np.bool_]) -> 
 
 
 def _upload_mip(
-    device: Device, mip: AtlasMip, resources: dict[str, Texture], **members: Any
+    device: Device, mip: AtlasMip, resources: dict[str, Texture], **further_fields: Any
 ) -> AtlasTextures:
     reach = mip.reach.copy()
     reach[..., 0] |= np.where(mip.covered & ~mip.lit, _GUTTER_BIT, 0).astype(np.uint16)
     resources = resources | {
-        "reach_map": texture_from_array(device, reach, "rgba16uint", _TEXTURE_NAME),
+        "reach_map": texture_from_array(device, reach, "rgba16uint", _ATLAS_TEXTURE_NAME),
         "stretch_map": make_texture(
-            device, (reach.shape[1], reach.shape[0]), "rgba16float", name=_TEXTURE_NAME
+            device, (reach.shape[1], reach.shape[0]), "rgba16float", texture_name=_ATLAS_TEXTURE_NAME
         ),
     }
     if not len(mip.gutter):
-        return AtlasTextures(resources, **members)
+        return AtlasTextures(resources, **further_fields)
     entries = np.concatenate([mip.source.view(np.uint32), mip.gutter.astype(np.uint32)], axis=1)
-    gutter_light = mark_scratch(device, device.storage_buffer(_LIGHT_BYTES * len(entries)))
+    gutter_light = mark_scratch(device, device.storage_buffer(_GUTTER_LIGHT_BYTES * len(entries)))
     gutter = device.buffer(entries, "STORAGE")
     return AtlasTextures(
-        resources, gutter_texels=mip.gutter, gutter=gutter, gutter_light=gutter_light, **members
+        resources, gutter_texels=mip.gutter, gutter=gutter, gutter_light=gutter_light, **further_fields
     )
 
 
@@ -160,7 +168,7 @@ def _upload_coarser(device: Device, mip: AtlasMip) -> tuple[AtlasTextures, ...]:
     """Upload the atlas at half, a quarter, ... of its resolution, computed or read from the disk cache."""
     parts = [field.name for field in fields(AtlasMip)]
     count = 0
-    while count < MAX_HALVINGS and len(mip.reach) % (2 << count) == 0:
+    while count < MAX_ATLAS_HALVINGS and len(mip.reach) % (2 << count) == 0:
         count += 1
 
     def compute() -> dict[str, NDArray[np.generic]]:
@@ -170,19 +178,21 @@ def _upload_coarser(device: Device, mip: AtlasMip) -> tuple[AtlasTextures, ...]:
         return {f"{k} {part}": getattr(coarser, part) for k, coarser in enumerate(mips[1:]) for part in parts}
 
     names = [f"{k} {part}" for k in range(count) for part in parts]
-    arrays = cached_arrays([getattr(mip, part) for part in parts], _HALVING_KEY, names, compute)
+    arrays = cached_arrays([getattr(mip, part) for part in parts], _HALVING_CACHE_KEY, names, compute)
     mips = (AtlasMip(**{part: arrays[f"{k} {part}"] for part in parts}) for k in range(count))
     return tuple(_upload_mip(device, coarser, {}) for coarser in mips)
 
 
-def pack_surface_points(triangle: NDArray[np.integer], barycentric: NDArray[np.number]) -> NDArray[np.uint32]:
+def pack_surface_points(
+    triangle_index: NDArray[np.integer], barycentric: NDArray[np.number]
+) -> NDArray[np.uint32]:
     """Pack surface points into (n, n, 2) words: the triangle index plus 1, and two barycentric weights.
 
-    triangle : (n, n) triangle indices, -1 for texels without a surface
+    triangle_index : (n, n) triangle indices, -1 for texels without a surface
     barycentric : (n, n, 2) weights of the second and third corner [1/65535]
     """
     packed = barycentric[..., 0].astype(np.uint32) | (barycentric[..., 1].astype(np.uint32) << 16)
-    return np.stack([(triangle + 1).astype(np.uint32), packed], axis=-1)
+    return np.stack([(triangle_index + 1).astype(np.uint32), packed], axis=-1)
 
 
 def edge_distances(atlas: Atlas) -> NDArray[np.float32]:
@@ -212,62 +222,65 @@ class AtlasMip:
     source: NDArray[np.float32]
 
 
-def halve_mip(mip: AtlasMip) -> AtlasMip:
+def halve_mip(atlas_mip: AtlasMip) -> AtlasMip:
     """Return the masks and gutters of an atlas at half its resolution.
 
     Gutter texels next to a chart become averages of finer texels; gutter texels farther away stay stitched.
     """
     from scipy.ndimage import binary_dilation
 
-    own = _square_texels(mip.lit)
+    own = _square_texels(atlas_mip.lit)
     any_own = own[0] | own[1] | own[2] | own[3]
-    measured = np.where(any_own, own, _square_texels(mip.covered))
+    measured = np.where(any_own, own, _square_texels(atlas_mip.covered))
     covered = measured[0] | measured[1] | measured[2] | measured[3]
     stitched = covered & ~binary_dilation(any_own, np.ones((3, 3), bool))
     return AtlasMip(
-        covered, covered & ~stitched, _halved_reach(mip.reach, measured), *_halved_gutter(mip, stitched)
+        covered,
+        covered & ~stitched,
+        _halved_reach(atlas_mip.reach, measured),
+        *_halved_gutter(atlas_mip, stitched),
     )
 
 
-def _square_texels(image: NDArray[np.generic]) -> NDArray[np.generic]:
+def _square_texels(texel_values: NDArray[np.generic]) -> NDArray[np.generic]:
     """Split an (n, n) image into 2 x 2 squares: (4, n/2, n/2), the first axis over the texels of a square."""
-    return np.stack([image[y::2, x::2] for y in (0, 1) for x in (0, 1)])
+    return np.stack([texel_values[y::2, x::2] for y in (0, 1) for x in (0, 1)])
 
 
-def _halved_reach(reach: NDArray[np.uint16], measured: NDArray[np.bool_]) -> NDArray[np.uint16]:
+def _halved_reach(reach: NDArray[np.uint16], measured_texels: NDArray[np.bool_]) -> NDArray[np.uint16]:
     """Return the reach of each 2 x 2 square of texels, (n/2, n/2, 4) [squares].
 
-    The reach of a square is the smallest reach of those of its texels that are in `measured`.
+    The reach of a square is the smallest reach of those of its texels that are in `measured_texels`.
 
     reach : (n, n, 4) reach of each texel, see `AtlasMip` [texels]
-    measured : (4, n/2, n/2) mask of texels, as split by `_square_texels`
+    measured_texels : (4, n/2, n/2) mask of texels, as split by `_square_texels`
     """
-    squares = np.zeros((*measured.shape[1:], 4), np.uint16)
+    squares = np.zeros((*measured_texels.shape[1:], 4), np.uint16)
     within = np.array([[0, 1, 0, 1], [1, 0, 1, 0], [0, 0, 1, 1], [1, 1, 0, 0]])  # steps inside the square
     for side in range(4):
         steps = (
             _square_texels(reach[..., side]).astype(np.int16) - within[side].astype(np.int16)[:, None, None]
         )
-        steps[~measured] = np.iinfo(np.int16).max
+        steps[~measured_texels] = np.iinfo(np.int16).max
         squares[..., side] = np.maximum(steps.min(axis=0), 0) // 2
-    squares[~measured.any(axis=0)] = 0
+    squares[~measured_texels.any(axis=0)] = 0
     return squares
 
 
 def _halved_gutter(
-    mip: AtlasMip, stitched: NDArray[np.bool_]
+    mip: AtlasMip, stitched_squares: NDArray[np.bool_]
 ) -> tuple[NDArray[np.uint16], NDArray[np.float32]]:
     """Return the (x, y) of stitched squares, and the mean position of the sources of their texels."""
     x, y = (mip.gutter.astype(np.int64) // 2).T
-    used = stitched[y, x]
+    used = stitched_squares[y, x]
     source = mip.source[used].astype(np.float64)
     squares, first, index = np.unique(
-        y[used] * stitched.shape[1] + x[used], return_index=True, return_inverse=True
+        y[used] * stitched_squares.shape[1] + x[used], return_index=True, return_inverse=True
     )
     near = np.abs(source - source[first][index]).max(axis=1) < SAME_SOURCE_TEXELS
     count = np.bincount(index[near], minlength=len(squares))
     mean = np.stack(
         [np.bincount(index[near], source[near, k], minlength=len(squares)) / count for k in (0, 1)], axis=-1
     )
-    gutter = np.stack([squares % stitched.shape[1], squares // stitched.shape[1]], axis=-1)
+    gutter = np.stack([squares % stitched_squares.shape[1], squares // stitched_squares.shape[1]], axis=-1)
     return gutter.astype(np.uint16), (0.5 * mean - 0.25).astype(np.float32)

@@ -12,10 +12,10 @@ from dermis.frame.features.atlas.passes import draw_gutters
 from dermis.frame.features.atlas.textures import AtlasTextures
 from dermis.frame.features.diffusion.kernels import (
     CHAINED_TRUNCATION_SIGMAS,
-    MAX_CHAINED_DEVIATION,
+    KERNEL_TRUNCATION_SIGMAS,
+    MAX_CHAINED_SIGMA_TEXELS,
     MAX_TABLE_VARIANCE,
     ROWS_PER_UNIT,
-    TRUNCATION_SIGMAS,
     kernel_table,
 )
 from dermis.frame.features.diffusion.pyramid import Blur, PyramidLevels
@@ -23,7 +23,7 @@ from dermis.frame.programs import TILE_SIDE, program
 from dermis.gpu import ComputeProgram, Device, MutableBindings, Recorder, Texture, TextureOrView
 from dermis.gpu.textures import texture_from_array
 
-EDGE_MODES = ("repeated", "cleared", "skipped")
+CHART_EDGE_MODES = ("repeated", "cleared", "skipped")
 # Variance that halving the resolution adds: averaging four texels, and interpolating the means [texel^2].
 _AVERAGING_VARIANCE, _INTERPOLATION_VARIANCE = 1 / 16, 3 / 16
 
@@ -33,7 +33,7 @@ def draw(graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blu
     variance_mm2, sheets = blur.variance_mm2, atlas.mips_for(blur.edge)
     source: TextureOrView = levels.layer(0)
     first_deviation = np.sqrt(variance_mm2[0]) * atlas.median_texels_per_mm  # [texel]
-    full_first = len(variance_mm2) == 1 or first_deviation > MAX_CHAINED_DEVIATION
+    full_first = len(variance_mm2) == 1 or first_deviation > MAX_CHAINED_SIGMA_TEXELS
     for k, members in enumerate(_spread_members(variance_mm2, blur.halvings), start=1):
         source_halvings, halvings = blur.halvings[k - 1 : k + 1]
         draw_gutters(graph, "diffuse", sheets[source_halvings], source, levels.texel)
@@ -41,7 +41,9 @@ def draw(graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blu
             source = _halve(graph, levels, source, k - 1, halvings)
         # The level after an intermediate one gains most of its width in one blur.
         wide = k > 1 and k - 1 in blur.intermediate_levels and k not in blur.intermediate_levels
-        truncation = TRUNCATION_SIGMAS if wide or (full_first and k == 1) else CHAINED_TRUNCATION_SIGMAS
+        truncation = (
+            KERNEL_TRUNCATION_SIGMAS if wide or (full_first and k == 1) else CHAINED_TRUNCATION_SIGMAS
+        )
         clear = blur.scale * np.asarray(blur.clear)
         for axis, blurred in enumerate((levels.scratch_view(halvings), levels.layer(k, halvings))):
             shader = _axis_program(graph.device, levels.texel, axis, atlas.sheared, blur.edge)
@@ -53,35 +55,39 @@ def draw(graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blu
 
 
 def _halve(
-    graph: Recorder, levels: PyramidLevels, source: TextureOrView, k: int, halvings: int
+    graph: Recorder, levels: PyramidLevels, finer_level: TextureOrView, level_index: int, halvings: int
 ) -> TextureOrView:
     """Average texels of a level to fill level k at half its resolution; return the view of level k.
 
-    source : view of the level at the finer resolution
+    finer_level : view of the level at the finer resolution
     halvings : how often the resolution of the result is halved
     """
-    halved = levels.layer(k, halvings)
+    halved = levels.layer(level_index, halvings)
     shader = program(graph.device, "diffusion/diffuse_halve.wgsl", (), levels.texel, levels.texel)
-    _dispatch(graph, shader, {"source": source, "stored": halved}, levels.size >> halvings)
+    _dispatch(graph, shader, {"source": finer_level, "stored": halved}, levels.size >> halvings)
     return halved
 
 
-def _dispatch(graph: Recorder, shader: ComputeProgram, bindings: MutableBindings, side: int) -> None:
+def _dispatch(
+    graph: Recorder, blur_program: ComputeProgram, bindings: MutableBindings, atlas_side: int
+) -> None:
     linear = graph.device.sampler(mag_filter="linear", min_filter="linear")
-    graph.compute("diffuse", shader, bindings | {"linear": linear}, (side, side), TILE_SIDE)
+    graph.compute("diffuse", blur_program, bindings | {"linear": linear}, (atlas_side, atlas_side), TILE_SIDE)
 
 
-def _axis_program(device: Device, texel: str, axis: int, sheared: bool, edge: str) -> ComputeProgram:
+def _axis_program(
+    device: Device, texel_format: str, axis: int, sheared: bool, edge_mode: str
+) -> ComputeProgram:
     """Return the program that blurs along one axis of the atlas.
 
-    texel : texture format of the levels
+    texel_format : texture format of the levels
     axis : 0 for u, 1 for v
     sheared : whether to account for an angle between u and v that is not a right angle
-    edge : filter mode at the edges of charts
+    edge_mode : filter mode at the edges of charts
     """
     table = (("ROWS_PER_UNIT", ROWS_PER_UNIT), ("MAX_TABLE_VARIANCE", MAX_TABLE_VARIANCE))
-    constants = (("AXIS", axis), *table, ("SHEARED", sheared), ("EDGE", EDGE_MODES.index(edge)))
-    return program(device, "diffusion/diffuse.wgsl", constants, texel, texel)
+    constants = (("AXIS", axis), *table, ("SHEARED", sheared), ("EDGE", CHART_EDGE_MODES.index(edge_mode)))
+    return program(device, "diffusion/diffuse.wgsl", constants, texel_format, texel_format)
 
 
 def _kernel_texture(device: Device) -> Texture:

@@ -16,7 +16,7 @@ ROWS_PER_UNIT = 64
 """Number of rows of the kernel table per unit of variance."""
 MAX_TABLE_VARIANCE = 9
 """Variance of the last row of the kernel table [step^2]."""
-TRUNCATION_SIGMAS = 3.3
+KERNEL_TRUNCATION_SIGMAS = 3.3
 """Half-width of a kernel in standard deviations."""
 CHAINED_TRUNCATION_SIGMAS = 2.4
 """Half-width of a kernel whose source is already blurred, in standard deviations.
@@ -24,26 +24,26 @@ CHAINED_TRUNCATION_SIGMAS = 2.4
 The kernel still has the exact variance, and the next blur smooths its truncated shape: the error is at
 most 0.014 % of an image.
 """
-MAX_CHAINED_DEVIATION = 1.5
+MAX_CHAINED_SIGMA_TEXELS = 1.5
 """Largest standard deviation at which `CHAINED_TRUNCATION_SIGMAS` suits unblurred light too [texel]."""
-_MAX_TAPS = math.ceil(TRUNCATION_SIGMAS * math.sqrt(MAX_TABLE_VARIANCE))
-_BISECTIONS = 60
-_WIDE_TRUNCATION, _MAX_STEP = 4.0, 1.6  # as in diffuse.wgsl
-_READS_PER_PASS = 5.0  # texel reads of a pass besides its taps: stretch map, gutters, the result
-_READS_PER_LEVEL = 2.0  # fixed cost of a level, in reads per texel of the full resolution
-_MIN_SAVING = 0.25  # fraction of the cost that an intermediate level has to save
-_HALVING_MARGIN = 1.001  # factor of the variance that permits a halving, against rounding
-_MIN_DEVIATION = 1.0  # least standard deviation of an intermediate level, in its own texels
+_MAX_TAP_COUNT = math.ceil(KERNEL_TRUNCATION_SIGMAS * math.sqrt(MAX_TABLE_VARIANCE))
+_KERNEL_BISECTION_COUNT = 60
+_WIDE_TRUNCATION_SIGMAS, _MAX_TAP_STEP_TEXELS = 4.0, 1.6  # as in diffuse.wgsl
+_FIXED_READS_PER_PASS = 5.0  # texel reads of a pass besides its taps: stretch map, gutters, the result
+_FIXED_READS_PER_LEVEL = 2.0  # fixed cost of a level, in reads per texel of the full resolution
+_MIN_SAVED_COST_FRACTION = 0.25  # fraction of the cost that an intermediate level has to save
+_HALVING_VARIANCE_MARGIN = 1.001  # factor of the variance that permits a halving, against rounding
+_MIN_LEVEL_SIGMA_TEXELS = 1.0  # least standard deviation of an intermediate level, in its own texels
 _MIN_VARIANCE_RATIO = 1.5  # least ratio of the variances of an intermediate level and any other
 
 
-def tap_count(variance: float, truncation: float = TRUNCATION_SIGMAS) -> int:
+def tap_count(variance: float, truncation_sigmas: float = KERNEL_TRUNCATION_SIGMAS) -> int:
     """Return the number of taps of a Gaussian kernel on each side of its centre.
 
     variance : variance of the kernel [step^2], where a step is the distance between taps
-    truncation : half-width of the kernel in standard deviations
+    truncation_sigmas : half-width of the kernel in standard deviations
     """
-    return math.ceil(truncation * math.sqrt(variance))
+    return math.ceil(truncation_sigmas * math.sqrt(variance))
 
 
 @cache
@@ -57,20 +57,20 @@ def kernel_table() -> NDArray[np.float32]:
     solved, for each number of taps, such that the kernel has the desired variance.
     """
     variance = np.arange(MAX_TABLE_VARIANCE * ROWS_PER_UNIT + 2)[:, None] / ROWS_PER_UNIT
-    n = np.arange(_MAX_TAPS + 1)
+    n = np.arange(_MAX_TAP_COUNT + 1)
     tap_mask = n[None, :] <= n[:, None]  # (column of the table, tap)
     low, high = np.zeros((len(variance), len(n))), np.ones((len(variance), len(n)))
-    for _ in range(_BISECTIONS):
+    for _ in range(_KERNEL_BISECTION_COUNT):
         middle = 0.5 * (low + high)
         too_narrow = _kernel_variance(middle, tap_mask) < variance
         low, high = np.where(too_narrow, middle, low), np.where(too_narrow, high, middle)
     return (0.5 * (low + high)).astype(np.float32)
 
 
-def _kernel_variance(q: Floats, tap_mask: NDArray[np.bool_]) -> Floats:
+def _kernel_variance(weight_ratio: Floats, tap_mask: NDArray[np.bool_]) -> Floats:
     n2 = np.arange(tap_mask.shape[1], dtype=np.float64) ** 2
     with np.errstate(under="ignore"):
-        weights = np.where(tap_mask, q[..., None] ** n2, 0.0)
+        weights = np.where(tap_mask, weight_ratio[..., None] ** n2, 0.0)
     variance: Floats = 2.0 * (weights @ n2) / (2.0 * weights.sum(axis=-1) - 1.0)
     return variance
 
@@ -101,14 +101,17 @@ def _add_intermediate_levels(
     chain = list(profile_mm2)
     min_cost = chain_cost(chain, texels_per_mm, max_halvings)
     for side in (2.0**times / texels_per_mm for times in range(max_halvings)):  # side of a texel
-        level_mm2 = _HALVING_MARGIN * max(MIN_SMOOTHNESS * (2.0 * side) ** 2, _MIN_DEVIATION * side) ** 2
+        level_mm2 = (
+            _HALVING_VARIANCE_MARGIN
+            * max(MIN_SMOOTHNESS * (2.0 * side) ** 2, _MIN_LEVEL_SIGMA_TEXELS * side) ** 2
+        )
         if level_mm2 >= profile_mm2[-1]:
             continue
         if any(level_mm2 < _MIN_VARIANCE_RATIO * v and v < _MIN_VARIANCE_RATIO * level_mm2 for v in chain):
             continue
         candidate = sorted({*chain, level_mm2})
         cost = chain_cost(candidate, texels_per_mm, max_halvings)
-        if cost < (1.0 - _MIN_SAVING) * min_cost:
+        if cost < (1.0 - _MIN_SAVED_COST_FRACTION) * min_cost:
             chain, min_cost = candidate, cost
     intermediate_levels = tuple(k for k, v in enumerate(chain, start=1) if v not in profile_mm2)
     return np.array(chain), intermediate_levels
@@ -125,10 +128,12 @@ def chain_cost(variance_mm2: list[float], texels_per_mm: float, max_halvings: in
     cost = 0.0
     for (before, after), halved in zip(pairwise([0.0, *variance_mm2]), halvings[1:], strict=True):
         per_mm2 = (texels_per_mm / 2.0**halved) ** 2
-        step = max(1.0, math.floor(math.sqrt(min(_MAX_STEP**2 * before, after - before) * per_mm2)))
+        step = max(
+            1.0, math.floor(math.sqrt(min(_MAX_TAP_STEP_TEXELS**2 * before, after - before) * per_mm2))
+        )
         scaled = (after - before) * per_mm2 / step**2
         reach = tap_count(
-            scaled, _WIDE_TRUNCATION if scaled > MAX_TABLE_VARIANCE else CHAINED_TRUNCATION_SIGMAS
+            scaled, _WIDE_TRUNCATION_SIGMAS if scaled > MAX_TABLE_VARIANCE else CHAINED_TRUNCATION_SIGMAS
         )
-        cost += 2.0 * (2.0 * reach + 1.0 + _READS_PER_PASS) / 4.0**halved + _READS_PER_LEVEL
+        cost += 2.0 * (2.0 * reach + 1.0 + _FIXED_READS_PER_PASS) / 4.0**halved + _FIXED_READS_PER_LEVEL
     return cost

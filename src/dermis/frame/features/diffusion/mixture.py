@@ -15,12 +15,12 @@ from dermis.formats.maps import mixture_map
 from dermis.frame.features.atlas.lit_atlas import LitAtlas
 from dermis.frame.features.atlas.passes import draw_gutters
 from dermis.frame.features.diffusion.pyramid import PyramidLevels
-from dermis.frame.programs import FLOAT_FORMAT, HALF_FORMAT, TILE_SIDE, program
+from dermis.frame.programs import FLOAT_TEXEL_FORMAT, HALF_TEXEL_FORMAT, TILE_SIDE, program
 from dermis.gpu import Bindings, Device, Recorder, Texture, TextureView, make_texture, upload
 from dermis.gpu.textures import make_view
 from dermis.images.filters import mip_chain
 
-_CACHE_SIZE = 4
+_CACHED_BLEND_MAPS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,29 +41,32 @@ class Mixture:
     sums: Texture
     _views: dict[int, TextureView] = field(default_factory=dict)
 
-    def sum_layer(self, layer: int) -> TextureView:
+    def sum_layer(self, layer_index: int) -> TextureView:
         """Return a view of one layer of `sums`."""
-        if layer not in self._views:
-            self._views[layer] = make_view(self.sums, layer=layer)
-        return self._views[layer]
+        if layer_index not in self._views:
+            self._views[layer_index] = make_view(self.sums, layer=layer_index)
+        return self._views[layer_index]
 
 
 def make_mixture(
-    device: Device, uv_weights: Texture, entering: tuple[PyramidLevels, ...], layouts: int
+    device: Device, uv_weights: Texture, entering_light: tuple[PyramidLevels, ...], layout_count: int
 ) -> Mixture:
     """Allocate the textures of a mixture of profiles.
 
     uv_weights : texture of the blend weights over uv
-    entering : pyramids for the light that enters, one for each profile but the first
-    layouts : number of atlas layouts
+    entering_light : pyramids for the light that enters, one for each profile but the first
+    layout_count : number of atlas layouts
     """
-    side, texel = entering[0].size, entering[0].texel
+    side, texel = entering_light[0].size, entering_light[0].texel
     atlas_weights = tuple(
-        make_texture(device, (side, side), texel, name="shares of profiles") for _ in range(layouts)
+        make_texture(device, (side, side), texel, texture_name="shares of profiles")
+        for _ in range(layout_count)
     )
-    layers = sum_layer_count(len(entering))
-    sums = make_texture(device, (side, side), FLOAT_FORMAT, layers=layers, name="light of mixed profiles")
-    return Mixture(uv_weights, entering, atlas_weights, sums)
+    layers = sum_layer_count(len(entering_light))
+    sums = make_texture(
+        device, (side, side), FLOAT_TEXEL_FORMAT, layer_count=layers, texture_name="light of mixed profiles"
+    )
+    return Mixture(uv_weights, entering_light, atlas_weights, sums)
 
 
 def sum_layer_count(other_count: int) -> int:
@@ -74,43 +77,45 @@ def sum_layer_count(other_count: int) -> int:
     return 1 + 2 * other_count
 
 
-def upload_blend_weights(device: Device, weights: NDArray[np.float32]) -> Texture:
+def upload_blend_weights(device: Device, blend_weights: NDArray[np.float32]) -> Texture:
     """Upload the (h, w, 2) blend weights of two profiles as a texture with all its mip levels."""
-    height, width = weights.shape[:2]
-    mips = mip_chain(np.pad(weights, ((0, 0), (0, 0), (0, 2))))
-    texture = make_texture(device, (width, height), HALF_FORMAT, mips=len(mips), use="map")
+    height, width = blend_weights.shape[:2]
+    mips = mip_chain(np.pad(blend_weights, ((0, 0), (0, 0), (0, 2))))
+    texture = make_texture(
+        device, (width, height), HALF_TEXEL_FORMAT, mip_count=len(mips), content_source="map"
+    )
     for mip, pixels in enumerate(mips):
         upload(device, texture, pixels, mip=mip)
     return texture
 
 
-def load_blend_weights(name: str) -> NDArray[np.float32]:
+def load_blend_weights(image_path: str) -> NDArray[np.float32]:
     """Return the (h, w, 2) blend weights in an image file, cached until the file changes.
 
-    name : path of the image
+    image_path : path of the image
 
     Raises DermisError for a file that is missing or is not an image of blend weights.
     """
-    path = checked_path(name, "a map of profiles")
+    path = checked_path(image_path, "a map of profiles")
     try:
         status = path.stat()
     except (OSError, ValueError):
         expected = "a picture: grey, or red and green"
-        refuse(f"profile map {name}", expected, "there is no such file", "Check the name")
+        refuse(f"profile map {image_path}", expected, "there is no such file", "Check the name")
     return _load_image(path, (status.st_mtime_ns, status.st_size, status.st_ino))
 
 
-@lru_cache(_CACHE_SIZE)
+@lru_cache(_CACHED_BLEND_MAPS)
 def _load_image(path: Path, _: tuple[int, ...]) -> NDArray[np.float32]:
     return mixture_map(path)
 
 
-def draw_blend_weights(graph: Recorder, layout: LitAtlas, mixture: Mixture, index: int) -> None:
+def draw_blend_weights(graph: Recorder, layout: LitAtlas, mixture: Mixture, layout_index: int) -> None:
     """Declare the pass that resamples the blend weights from uv to the atlas, gutters included.
 
-    index : index of the atlas layout
+    layout_index : index of the atlas layout
     """
-    into, texel = mixture.atlas_weights[index], mixture.entering[0].texel
+    into, texel = mixture.atlas_weights[layout_index], mixture.entering[0].texel
     bindings: Bindings = {
         **layout.bindings,
         **layout.atlas.resources,
@@ -122,30 +127,30 @@ def draw_blend_weights(graph: Recorder, layout: LitAtlas, mixture: Mixture, inde
     draw_gutters(graph, "profiles", layout.atlas, into, texel)
 
 
-def draw_entering(
-    graph: Recorder, levels: PyramidLevels, mixture: Mixture, index: int, profile_index: int
+def draw_entering_light(
+    graph: Recorder, levels: PyramidLevels, mixture: Mixture, layout_index: int, profile_index: int
 ) -> None:
     """Declare the pass that fills level 0 of another profile with the entering light times its blend weight.
 
     levels : pyramid whose level 0 holds all light that enters
-    index : index of the atlas layout
+    layout_index : index of the atlas layout
     profile_index : index of the profile among all profiles but the first
     """
     entering, device, texel = mixture.entering[profile_index], graph.device, levels.texel
     shader = program(device, "diffusion/profile_entering.wgsl", (("OTHER", profile_index),), texel, texel)
     linear = device.sampler(mag_filter="linear", min_filter="linear")
     light = {"source": levels.layer(0), "stored": entering.layer(0)}
-    bindings: Bindings = {**light, "linear": linear, "blend_weights": mixture.atlas_weights[index]}
+    bindings: Bindings = {**light, "linear": linear, "blend_weights": mixture.atlas_weights[layout_index]}
     graph.compute("profiles", shader, bindings, (levels.size,) * 2, TILE_SIDE)
 
 
-def draw(graph: Recorder, mixture: Mixture, index: int, target: Texture) -> None:
+def draw(graph: Recorder, mixture: Mixture, layout_index: int, blended_exitance: Texture) -> None:
     """Declare the pass that blends the sums of all profiles; the alpha channel packs the blend weights.
 
-    index : index of the atlas layout
-    target : texture for the blended exitance
+    layout_index : index of the atlas layout
+    blended_exitance : texture for the blended exitance
     """
     shader = program(graph.device, "diffusion/profile_mixture.wgsl", (("OTHERS", len(mixture.entering)),))
-    weights = mixture.atlas_weights[index]
-    bindings: Bindings = {"sums": mixture.sums, "blend_weights": weights, "mixed": target}
-    graph.compute("profiles", shader, bindings, target.size[:2], TILE_SIDE)
+    weights = mixture.atlas_weights[layout_index]
+    bindings: Bindings = {"sums": mixture.sums, "blend_weights": weights, "mixed": blended_exitance}
+    graph.compute("profiles", shader, bindings, blended_exitance.size[:2], TILE_SIDE)

@@ -17,7 +17,7 @@ from dermis.scene.tissue import skin_tissue
 
 ProfileMix = tuple[tuple[GaussianSum, ...], NDArray[np.float32] | None]
 """Profiles as sums of the same Gaussians, and (h, w, 2) blend weights of all but the first."""
-_CACHE_SIZE = 4  # the current skin, one to compare with, and two previous ones
+_CACHED_FIT_COUNT = 4  # the current skin, one to compare with, and two previous ones
 
 
 class SkinProfiles:
@@ -69,7 +69,7 @@ class SkinProfiles:
             profile = cached[1]
         else:
             profile = fit_profile(skin_tissue(skin), skin.profile, self._initial_guess(skin))
-        self._fits = [*(fit for fit in self._fits if fit is not cached), (skin, profile)][-_CACHE_SIZE:]
+        self._fits = [*(fit for fit in self._fits if fit is not cached), (skin, profile)][-_CACHED_FIT_COUNT:]
         return profile
 
     def _initial_guess(self, skin: Skin) -> GaussianSum | None:
@@ -79,8 +79,12 @@ class SkinProfiles:
         fit = self._latest_fit(_similarity_key, skin)
         return fit and fit[1]
 
-    def _latest_fit(self, key: Callable[[Skin], object], skin: Skin) -> tuple[Skin, GaussianSum] | None:
-        return next((fit for fit in reversed(self._fits) if key(fit[0]) == key(skin)), None)
+    def _latest_fit(
+        self, similarity_key: Callable[[Skin], object], skin: Skin
+    ) -> tuple[Skin, GaussianSum] | None:
+        return next(
+            (fit for fit in reversed(self._fits) if similarity_key(fit[0]) == similarity_key(skin)), None
+        )
 
 
 def _tissue_key(skin: Skin) -> tuple[object, ...]:

@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.frame.programs import FLOAT_FORMAT
+from dermis.frame.programs import FLOAT_TEXEL_FORMAT
 from dermis.gpu import Device, Texture, TextureView, make_texture, mark_scratch
 from dermis.gpu.textures import make_view
 
-_TARGET_IRRADIANCE = 16.0  # sum of all lights after scaling, 1/4000 of the largest half float
-_MAX_SCALE = 2.0**100  # its inverse is a float too; for dimmer light the scale is limited
+_SCALED_LIGHT_SUM = 16.0  # sum of all lights after scaling, 1/4000 of the largest half float
+_MAX_IRRADIANCE_SCALE = 2.0**100  # its inverse is a float too; for dimmer light the scale is limited
 Floats = NDArray[np.float64]
 Halvings = tuple[tuple[int, ...], ...]
 """For each layout, how often the resolution of each level is halved."""
@@ -43,12 +43,12 @@ class PyramidLevels:
     texel: str
     _views: dict[tuple[int, int], TextureView] = field(default_factory=dict)
 
-    def layer(self, k: int, halvings: int = 0) -> TextureView:
+    def layer(self, level_index: int, halvings: int = 0) -> TextureView:
         """Return a view of level k in the stack whose resolution is halved `halvings` times."""
-        if (k, halvings) not in self._views:
-            layer = k - self.first[halvings]
-            self._views[k, halvings] = make_view(self.stacks[halvings], layer=layer)
-        return self._views[k, halvings]
+        if (level_index, halvings) not in self._views:
+            layer = level_index - self.first[halvings]
+            self._views[level_index, halvings] = make_view(self.stacks[halvings], layer=layer)
+        return self._views[level_index, halvings]
 
     def scratch_view(self, halvings: int = 0) -> TextureView:
         """Return a view of the scratch texture at the resolution that is halved `halvings` times."""
@@ -85,22 +85,35 @@ class Blur:
         return tuple(k for k in range(len(self.halvings)) if k not in self.intermediate_levels)
 
 
-def make_levels(device: Device, size: int, halvings: Halvings, texel: str) -> PyramidLevels:
+def make_levels(device: Device, atlas_side: int, halvings: Halvings, texel_format: str) -> PyramidLevels:
     """Allocate the textures of a blur pyramid.
 
-    size : side of the atlas at full resolution [texels]
+    atlas_side : side of the atlas at full resolution [texels]
     halvings : how often the resolution of each level is halved, for each layout
-    texel : texture format
+    texel_format : texture format
     """
     ranges = levels_by_resolution(halvings)
     stacks = tuple(
-        make_texture(device, (size >> times,) * 2, texel, layers=len(levels), name="blurred light")
+        make_texture(
+            device,
+            (atlas_side >> times,) * 2,
+            texel_format,
+            layer_count=len(levels),
+            texture_name="blurred light",
+        )
         for times, levels in enumerate(ranges)
     )
     between = mark_scratch(
-        device, make_texture(device, (size, size), texel, mips=len(ranges), name="light between two blurs")
+        device,
+        make_texture(
+            device,
+            (atlas_side, atlas_side),
+            texel_format,
+            mip_count=len(ranges),
+            texture_name="light between two blurs",
+        ),
     )
-    return PyramidLevels(stacks, tuple(levels.start for levels in ranges), between, size, texel)
+    return PyramidLevels(stacks, tuple(levels.start for levels in ranges), between, atlas_side, texel_format)
 
 
 def levels_by_resolution(halvings: Halvings) -> tuple[range, ...]:
@@ -119,17 +132,17 @@ def levels_by_resolution(halvings: Halvings) -> tuple[range, ...]:
     )
 
 
-def half_precision_scale(texel: str, brightest: float) -> float:
+def half_precision_scale(texel_format: str, irradiance_sum: float) -> float:
     """Return the factor that brings irradiance into the range of half floats; 1 for 32-bit floats.
 
-    texel : texture format of the levels
-    brightest : sum of the irradiances of all lights; skin close to a light receives more
+    texel_format : texture format of the levels
+    irradiance_sum : sum of the irradiances of all lights; skin close to a light receives more
 
     The factor is a power of two, so that scaling is exact.
     """
-    if texel == FLOAT_FORMAT or brightest == 0.0:
+    if texel_format == FLOAT_TEXEL_FORMAT or irradiance_sum == 0.0:
         return 1.0
-    return math.ldexp(0.5, math.frexp(min(_TARGET_IRRADIANCE / brightest, _MAX_SCALE))[1])
+    return math.ldexp(0.5, math.frexp(min(_SCALED_LIGHT_SUM / irradiance_sum, _MAX_IRRADIANCE_SCALE))[1])
 
 
 def choose_halvings(

@@ -56,33 +56,38 @@ def make(
     memo: Memo,
     device: Device,
     request: FrameRequest,
-    scheme: BlurScheme,
+    blur_scheme: BlurScheme,
     atlases: Sequence[AtlasTextures],
 ) -> Resources:
     """Return the pyramid, the blurs and the mixture of profiles for all atlas layouts.
 
-    scheme : technique that chooses the formats and resolutions of the blurs
+    blur_scheme : technique that chooses the formats and resolutions of the blurs
     atlases : textures of the atlas in each layout
     """
-    blurs = tuple(_make_blur(request, scheme, one) for one in atlases) if request.blur_count else ()
+    blurs = tuple(_make_blur(request, blur_scheme, one) for one in atlases) if request.blur_count else ()
     side, halvings = request.settings.atlas if blurs else 1, tuple(blur.halvings for blur in blurs) or ((0,),)
-    args = device, scheme, side, halvings, request.light_key
-    levels = memo.get(_make_levels, *args, owner=request.view_name)
+    args = device, blur_scheme, side, halvings, request.light_key
+    levels = memo.get(_make_levels, *args, caller_name=request.view_name)
     mixture = None
     if request.blend_weights is not None and blurs:
         names = (f"{request.view_name} other {k}" for k in range(len(request.other_profiles)))
-        entering = tuple(memo.get(_make_levels, *args, owner=name) for name in names)
+        entering = tuple(memo.get(_make_levels, *args, caller_name=name) for name in names)
         mixture = memo.get(
-            _cached_mixture, device, request.blend_weights, entering, len(atlases), owner=request.view_name
+            _cached_mixture,
+            device,
+            request.blend_weights,
+            entering,
+            len(atlases),
+            caller_name=request.view_name,
         )
     return Resources(levels, blurs, mixture)
 
 
-def _make_blur(request: FrameRequest, scheme: BlurScheme, atlas: AtlasTextures) -> Blur:
+def _make_blur(request: FrameRequest, blur_scheme: BlurScheme, atlas: AtlasTextures) -> Blur:
     red, green, blue = (np.pi * c * request.seam_method.coloured for c in request.settings.seam_colour)
     edge, clear = request.seam_method.edge, (red, green, blue)
-    split, intermediate = scheme.add_intermediate_levels(request.split, atlas, edge)
-    halvings = scheme.halvings(split, atlas, edge)
+    split, intermediate = blur_scheme.add_intermediate_levels(request.split, atlas, edge)
+    halvings = blur_scheme.halvings(split, atlas, edge)
     return Blur(
         split.blurred_mm2,
         split.weight,
@@ -94,11 +99,13 @@ def _make_blur(request: FrameRequest, scheme: BlurScheme, atlas: AtlasTextures) 
     )
 
 
-def _make_levels(device: Device, scheme: BlurScheme, side: int, halvings: Halvings, _: str) -> PyramidLevels:
-    return scheme.make_levels(device, side, halvings)
+def _make_levels(
+    device: Device, blur_scheme: BlurScheme, atlas_side: int, halvings: Halvings, _: str
+) -> PyramidLevels:
+    return blur_scheme.make_levels(device, atlas_side, halvings)
 
 
 def _cached_mixture(
-    device: Device, weights: NDArray[np.float32], entering: tuple[PyramidLevels, ...], layouts: int
+    device: Device, blend_weights: NDArray[np.float32], entering: tuple[PyramidLevels, ...], layout_count: int
 ) -> Mixture:
-    return make_mixture(device, upload_blend_weights(device, weights), entering, layouts)
+    return make_mixture(device, upload_blend_weights(device, blend_weights), entering, layout_count)

@@ -419,5 +419,5 @@ def make(memo: Memo, device: Device, request: FrameRequest) -> Resources | None:
     buffers = cached(make_strand_buffers, device, capacity, casters)
     tables = cached(make_strand_tables, device, head.bare, coarse, buffers, groom)
     picture = cached(make_strand_picture, device, capacity, request.settings.size)
-    shadows = cached(make_deep_opacity, device, layers, owner=f"{layers} {request.view_name}")
+    shadows = cached(make_deep_opacity, device, layers, caller_name=f"{layers} {request.view_name}")
     return Resources(tables, picture, shadows, cached(mean_skin_albedo, head))

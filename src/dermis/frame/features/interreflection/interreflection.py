@@ -18,8 +18,8 @@ from dermis.mesh.head import Head
 LinkBuffers = tuple[tuple[Buffer, int], dict[str, Buffer], dict[str, Buffer]]
 """Buffer and number of sample points, form factors of patches, and form factors of cells."""
 _FLOAT4_BYTES = 16  # bytes of four floats
-_BOUNCES = 4  # number of bounces between patches; the gathering by cells is one more
-_TEAM_SIZE = 16  # shader invocations per patch or cell
+_BOUNCE_COUNT = 4  # number of bounces between patches; the gathering by cells is one more
+_INVOCATIONS_PER_PATCH = 16  # shader invocations per patch or cell
 
 
 def shader_constants() -> dict[str, int]:
@@ -74,25 +74,25 @@ def make_interreflection(
     device: Device,
     head: Head,
     atlas: Atlas,
-    albedo: NDArray[np.float64],
+    profile_albedo: NDArray[np.float64],
     has_occlusion: bool,
     light_key: str,
-    owner: str,
+    layout_key: str,
 ) -> Interreflection | None:
     """Return the interreflection of a head, None for a head where no skin sees other skin.
 
-    albedo : (3,) albedo of the profile
+    profile_albedo : (3,) albedo of the profile
     has_occlusion : whether there is a map of the visible fraction of the sky
     light_key : cache key of the light, for callers that draw several scenes in turn
-    owner : name of the atlas layout in the cache
+    layout_key : name of the atlas layout in the cache
     """
-    form_factors = memo.get(_form_factors, head, atlas, owner=owner)
+    form_factors = memo.get(_form_factors, head, atlas, caller_name=layout_key)
     if not len(form_factors.cell_factor):
         return None
-    uploaded = memo.get(_upload_links, device, form_factors, owner=owner)
-    key = f"{owner} {light_key}"
-    buffers = memo.get(_make_buffers, device, uploaded, has_occlusion, light_key, owner=key)
-    return Interreflection(buffers, albedo)
+    uploaded = memo.get(_upload_links, device, form_factors, caller_name=layout_key)
+    key = f"{layout_key} {light_key}"
+    buffers = memo.get(_make_buffers, device, uploaded, has_occlusion, light_key, caller_name=key)
+    return Interreflection(buffers, profile_albedo)
 
 
 def placeholder_interreflection(device: Device) -> Buffer:
@@ -120,17 +120,20 @@ def _upload_links(device: Device, form_factors: FormFactors) -> LinkBuffers:
 
 
 def _upload_rows(
-    device: Device, first: NDArray[np.uint32], patch: NDArray[np.uint32], form_factor: NDArray[np.float32]
+    device: Device,
+    row_start: NDArray[np.uint32],
+    patch_index: NDArray[np.uint32],
+    form_factor: NDArray[np.float32],
 ) -> dict[str, Buffer]:
-    links = np.stack([patch, form_factor.view(np.uint32)], axis=1)
+    links = np.stack([patch_index, form_factor.view(np.uint32)], axis=1)
     links = links if len(links) else np.zeros((1, 2), np.uint32)
-    return {"first": device.buffer(first, "STORAGE"), "links": device.buffer(links, "STORAGE")}
+    return {"first": device.buffer(row_start, "STORAGE"), "links": device.buffer(links, "STORAGE")}
 
 
 def _make_buffers(
-    device: Device, uploaded: LinkBuffers, stores_means: bool, _: str
+    device: Device, link_buffers: LinkBuffers, stores_means: bool, _: str
 ) -> InterreflectionBuffers:
-    sample_points, patch_links, cell_links = uploaded
+    sample_points, patch_links, cell_links = link_buffers
     count = sample_points[1]
     direct, uniform, *bounced = (
         mark_scratch(device, device.storage_buffer(_FLOAT4_BYTES * (count // SAMPLES_PER_PATCH)))
@@ -174,7 +177,9 @@ def draw(graph: Recorder, bindings: Bindings, interreflection: Interreflection, 
 def _draw_bounces(graph: Recorder, buffers: InterreflectionBuffers) -> None:
     """Declare the passes that let light bounce between the patches, and gather it in the atlas cells."""
     device = graph.device
-    team = 1 if device.adapter.kind == "CPU" else _TEAM_SIZE  # barriers are slow on software adapters
+    team = (
+        1 if device.adapter.kind == "CPU" else _INVOCATIONS_PER_PATCH
+    )  # barriers are slow on software adapters
     constants: Constants = (("TEAM", team), ("MEAN", int(buffers.stores_means)))
     patches, cells = (
         workgroup_grid(count, WORKGROUP_SIZE // team)
@@ -185,7 +190,7 @@ def _draw_bounces(graph: Recorder, buffers: InterreflectionBuffers) -> None:
     graph.dispatch("interreflection", means, {"sample_exitance": buffers.sample_exitance, **shared}, patches)
     bounce = program(device, "interreflection/interreflection_bounce.wgsl", constants)
     exitance = buffers.direct_exitance
-    for bounced in islice(cycle(buffers.bounced_exitance), _BOUNCES):
+    for bounced in islice(cycle(buffers.bounced_exitance), _BOUNCE_COUNT):
         bindings: Bindings = {**buffers.patch_links, **shared, "exitance": exitance, "bounced": bounced}
         graph.dispatch("interreflection", bounce, bindings, patches)
         exitance = bounced

@@ -30,17 +30,19 @@ from dermis.mesh.grown_strands import absorbed_by_hair, hair_cover
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
 
-DIRECTION_COUNT = 128
+SKY_DIRECTION_COUNT = 128
 """Number of directions from which a depth map of the head is drawn."""
 DEPTH_MAP_SIDE = 512
 """Side of a depth map [texels]."""
 DIFFUSIVITY = 1.66
 """Path of diffuse light through a plane layer relative to its thickness, on average; also in
 strands_light.wgsl."""
-CACHE_VERSION = f"1 {DIRECTION_COUNT} {DEPTH_MAP_SIDE}"
+OCCLUSION_CACHE_VERSION = f"1 {SKY_DIRECTION_COUNT} {DEPTH_MAP_SIDE}"
 """Version of baked maps on disk; change it when baking gives other results."""
-_MAPS_PER_BATCH = 32  # number of depth maps that are drawn at a time
-_MAX_SIDE = 1024  # largest side of an occlusion map [texels]; its texels are smaller than a millimetre
+_DEPTH_MAPS_PER_BATCH = 32  # number of depth maps that are drawn at a time
+_MAX_OCCLUSION_MAP_SIDE = (
+    1024  # largest side of an occlusion map [texels]; its texels are smaller than a millimetre
+)
 
 
 def bake_occlusion(
@@ -48,47 +50,56 @@ def bake_occlusion(
     head: Head,
     atlas: Atlas,
     bindings: Bindings,
-    texels: Texture,
-    side: int,
-    directions: int = DIRECTION_COUNT,
-    map_size: int = DEPTH_MAP_SIDE,
+    surface_texels: Texture,
+    result_side: int,
+    direction_count: int = SKY_DIRECTION_COUNT,
+    depth_map_side: int = DEPTH_MAP_SIDE,
 ) -> NDArray[np.float32]:
-    """Return the cosine-weighted visible fraction of the sky (rows, side), NaN where there is no surface [-].
+    """Return the cosine-weighted visible fraction of the sky (rows, result_side), NaN without a surface [-].
 
     Depth maps are drawn from directions all around. A point sums the directions in which it is visible. The
-    first `side` rows are texels of the atlas, the other rows hold the vertices of the mesh.
+    first `result_side` rows are texels of the atlas, the other rows hold the vertices of the mesh.
 
     bindings : resources of the lighting; the resources of geometry and lights are replaced
-    texels : texture of the surface point of each atlas texel
-    side : side of the atlas in the result [texels]
-    directions : number of depth maps
-    map_size : side of a depth map [texels]
+    surface_texels : texture of the surface point of each atlas texel
+    result_side : side of the atlas in the result [texels]
+    direction_count : number of depth maps
+    depth_map_side : side of a depth map [texels]
     """
     mesh, commands = head.mesh, CommandList(device)
     shape = evaluate_rest_shape(device, shape_tables(device, head), head.control.positions_mm)
     geometry = upload_geometry(device, mesh, atlas, shape)
-    shader, to_sky = program(device, "occlusion/occlusion.wgsl"), fibonacci_sphere(directions)
-    rows = side - (-len(mesh.positions) // side)
-    sums = device.buffer(np.zeros((rows, side, 2), np.float32), "STORAGE")
-    layers = make_layers(device, (map_size, map_size), _MAPS_PER_BATCH, triangles=False)
-    for first in range(0, len(to_sky), _MAPS_PER_BATCH):
+    shader, to_sky = program(device, "occlusion/occlusion.wgsl"), fibonacci_sphere(direction_count)
+    rows = result_side - (-len(mesh.positions) // result_side)
+    sums = device.buffer(np.zeros((rows, result_side, 2), np.float32), "STORAGE")
+    layers = make_layers(
+        device, (depth_map_side, depth_map_side), _DEPTH_MAPS_PER_BATCH, store_triangles=False
+    )
+    for first in range(0, len(to_sky), _DEPTH_MAPS_PER_BATCH):
         views = [
-            parallel_shadow_view(-d, mesh.outline, map_size) for d in to_sky[first : first + _MAPS_PER_BATCH]
+            parallel_shadow_view(-d, mesh.outline, depth_map_side)
+            for d in to_sky[first : first + _DEPTH_MAPS_PER_BATCH]
         ]
         draw_layers(commands, "occlusion", layers, shadow_map_views(views), geometry)
-        sky = shader.record("Sky", directions=len(views), side=side, vertices=len(mesh.positions))
+        sky = shader.record("Sky", directions=len(views), side=result_side, vertices=len(mesh.positions))
         lights: Bindings = {"lights": _light_record(shader, views), "shadow_maps": layers.texture, "sky": sky}
-        resources: Bindings = {**bindings, **geometry.resources, **lights, "atlas": texels, "sums": sums}
-        commands.compute("occlusion", shader, resources, (side, rows))
+        resources: Bindings = {
+            **bindings,
+            **geometry.resources,
+            **lights,
+            "atlas": surface_texels,
+            "sums": sums,
+        }
+        commands.compute("occlusion", shader, resources, (result_side, rows))
     commands.submit()
-    raw = np.frombuffer(device.handle.queue.read_buffer(sums), np.float32).reshape(rows, side, 2)
+    raw = np.frombuffer(device.handle.queue.read_buffer(sums), np.float32).reshape(rows, result_side, 2)
     with np.errstate(invalid="ignore"):
         return np.asarray(raw[..., 0] / raw[..., 1])
 
 
-def _light_record(shader: ComputeProgram, views: list[ShadowView]) -> UniformRecord:
+def _light_record(shader: ComputeProgram, shadow_views: list[ShadowView]) -> UniformRecord:
     record = shader.record("Lights")
-    for layer, view in enumerate(views):
+    for layer, view in enumerate(shadow_views):
         light = record["light"][layer]
         light["parallel"], light["layer"], light["half_width"] = 1, layer, 1
         light["direction"] = np.cross(view.up, view.right)
@@ -96,63 +107,69 @@ def _light_record(shader: ComputeProgram, views: list[ShadowView]) -> UniformRec
     return record
 
 
-def fill_gaps(baked: NDArray[np.float32], side: int) -> NDArray[np.float32]:
+def fill_gaps(baked_occlusion: NDArray[np.float32], result_side: int) -> NDArray[np.float32]:
     """Return a baked occlusion map whose empty texels are filled from the nearest texel with a value.
 
     The last row of the atlas is repeated, as a border for filters between texels and vertices.
 
-    baked : (rows, side) result of `bake_occlusion`, NaN where there is no surface
-    side : side of the atlas in the result [texels]
+    baked_occlusion : (rows, result_side) result of `bake_occlusion`, NaN where there is no surface
+    result_side : side of the atlas in the result [texels]
     """
     from scipy.ndimage import distance_transform_edt
 
-    texels = baked[:side]
+    texels = baked_occlusion[:result_side]
     empty = np.isnan(texels)
     if not empty.all():
         nearest = distance_transform_edt(empty, return_distances=False, return_indices=True)
         texels = texels[tuple(nearest)]
-    return np.nan_to_num(np.vstack([texels, texels[-1:], baked[side:]]), nan=1.0)
+    return np.nan_to_num(np.vstack([texels, texels[-1:], baked_occlusion[result_side:]]), nan=1.0)
 
 
 def cached_occlusion_map(
-    device: Device, head: Head, atlas: Atlas, hair: Groom | None, bindings: Bindings, texels: Texture
+    device: Device,
+    head: Head,
+    atlas: Atlas,
+    hair: Groom | None,
+    bindings: Bindings,
+    surface_texels: Texture,
 ) -> Texture:
     """Return a texture of the visible fraction of the sky at texels and vertices, baked or read from disk.
 
     hair : hair of the head, which dims the sky on the skin below it
     bindings : resources of the lighting; the resources of geometry and lights are replaced
-    texels : texture of the surface point of each atlas texel
+    surface_texels : texture of the surface point of each atlas texel
     """
-    side = min(atlas.size, _MAX_SIDE)
+    side = min(atlas.size, _MAX_OCCLUSION_MAP_SIDE)
 
     @logged_step("computing the ambient occlusion")
     def bake() -> NDArray[np.uint16]:
-        baked = bake_occlusion(device, head, atlas, bindings, texels, side)
+        baked = bake_occlusion(device, head, atlas, bindings, surface_texels, side)
         integers: NDArray[np.uint16] = np.rint(65535.0 * fill_gaps(baked, side)).astype(np.uint16)
         return integers
 
-    integers = cached_occlusion(head.mesh, atlas, f"{CACHE_VERSION} {side}", bake)
+    integers = cached_occlusion(head.mesh, atlas, f"{OCCLUSION_CACHE_VERSION} {side}", bake)
     visible = integers / np.float32(65535.0)
     if hair is not None and len(hair):
-        visible = visible * _hair_transmittance(head.mesh, hair, download(device, texels), side)
+        visible = visible * _hair_transmittance(head.mesh, hair, download(device, surface_texels), side)
     return texture_from_array(device, visible, "r32float")
 
 
 def _hair_transmittance(
-    mesh: Mesh, hair: Groom, texels: NDArray[np.uint32], side: int
+    mesh: Mesh, hair: Groom, packed_texels: NDArray[np.uint32], result_side: int
 ) -> NDArray[np.float32]:
     """Return the fraction of the light of the sky that passes the hair, in the layout of `fill_gaps` [-].
 
     The hair of the scalp and the beard absorbs diffuse light as a plane layer over its roots; strands scatter
     what they do not absorb.
 
-    texels : (s, s, 2) triangle + 1 and packed barycentric weights of each atlas texel, as on the device
-    side : side of the atlas in the result [texels]
+    packed_texels : (s, s, 2) triangle + 1 and packed barycentric weights of each atlas texel, as on the
+        device
+    result_side : side of the atlas in the result [texels]
     """
     absorbed = absorbed_by_hair(hair)
     passing = np.exp(-DIFFUSIVITY * absorbed * hair_cover(hair, mesh))[mesh.point].astype(np.float32)
-    rows = ((np.arange(side) + 0.5) * len(texels) / side).astype(int)
-    chosen = texels[np.ix_(rows, rows)]
+    rows = ((np.arange(result_side) + 0.5) * len(packed_texels) / result_side).astype(int)
+    chosen = packed_texels[np.ix_(rows, rows)]
     corners, triangle = passing[mesh.triangles], chosen[..., 0].astype(np.int64) - 1
     is_hairy = np.asarray((corners < 1.0).any(axis=1))
     covered = (triangle >= 0) & is_hairy[triangle]
@@ -160,11 +177,13 @@ def _hair_transmittance(
     first, second, third = corners[triangle[covered]].T
     atlas = np.ones(chosen.shape[:2], np.float32)
     atlas[covered] = first * (1.0 - b - c) + second * b + third * c
-    rest = np.ones(-(-len(passing) // side) * side, np.float32)
+    rest = np.ones(-(-len(passing) // result_side) * result_side, np.float32)
     rest[: len(passing)] = passing
-    return np.vstack([atlas, atlas[-1:], rest.reshape(-1, side)]).astype(np.float32)
+    return np.vstack([atlas, atlas[-1:], rest.reshape(-1, result_side)]).astype(np.float32)
 
 
 def placeholder_occlusion(device: Device) -> Texture:
     """Return a 1 x 1 placeholder for the occlusion map of scenes without occlusion."""
-    return device.cached("no occlusion", lambda: make_texture(device, (1, 1), "r32float", use="map"))
+    return device.cached(
+        "no occlusion", lambda: make_texture(device, (1, 1), "r32float", content_source="map")
+    )

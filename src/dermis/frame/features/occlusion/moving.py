@@ -29,13 +29,13 @@ SKY_VIEW_COUNT = 64
 DEPTH_MAP_SIDE = 256
 """Side of a depth map [texels]."""
 _VIEW_MARGIN_MM = 1.0  # free space around the head in a view
-_BORDER_TEXELS = 2.0  # empty texels around the head, so that points lifted off its surface stay inside
+_VIEW_BORDER_TEXELS = 2.0  # empty texels around the head, so that points lifted off its surface stay inside
 _ANCHOR_RADIUS_MM = 100.0  # distance from the middle of the head at which the weight of anchors falls to 1/e
-_MAX_ANCHORS = 512
-_VERTEX_SHADER = "occlusion/moving_occlusion_vertices.wgsl"
+_MAX_ANCHOR_COUNT = 512
+_VERTEX_VISIBILITY_SHADER = "occlusion/moving_occlusion_vertices.wgsl"
 # Arguments of `coarse_triangles`: least number of faces, and largest distance of omitted vertices from the
 # simplified surface [mm], a quarter of a texel.
-_OCCLUDER_LIMITS = (5_000, 0.4)
+_OCCLUDER_MIN_FACES_AND_MAX_ERROR = (5_000, 0.4)
 
 
 class SkyViews(NamedTuple):
@@ -77,7 +77,7 @@ def sky_views(outline: Outline, rotation: Floats) -> SkyViews:
     low, high = local.min(axis=2).astype(np.float64), local.max(axis=2).astype(np.float64)
     half, middle = 0.5 * (high - low) + _VIEW_MARGIN_MM, 0.5 * (high + low)
     half[:, 2] += outline.margin_mm
-    half[:, :2] *= DEPTH_MAP_SIDE / (DEPTH_MAP_SIDE - 2.0 * _BORDER_TEXELS)
+    half[:, :2] *= DEPTH_MAP_SIDE / (DEPTH_MAP_SIDE - 2.0 * _VIEW_BORDER_TEXELS)
     clips = np.zeros((SKY_VIEW_COUNT, 4, 4))
     clips[:, :3, :3], clips[:, :3, 3] = axes / half[..., None], -middle / half
     clips[:, 2] *= -0.5  # from 1 near to 0 far
@@ -100,7 +100,7 @@ def _view_axes() -> Floats:
 def make_anchors(head: Head) -> RotationAnchors:
     """Return the anchors of a head, with Gaussian weights about its centre: shoulders count little."""
     rig = head.control
-    points = np.unique(np.linspace(0, len(rig.positions_mm) - 1, _MAX_ANCHORS).astype(np.intp))
+    points = np.unique(np.linspace(0, len(rig.positions_mm) - 1, _MAX_ANCHOR_COUNT).astype(np.intp))
     positions = rig.positions_mm[points].astype(np.float64)
     distance2 = ((positions - head.centre_mm) ** 2).sum(axis=1)
     weight = np.exp(-distance2 / _ANCHOR_RADIUS_MM**2)[:, None]
@@ -157,13 +157,13 @@ def make_vertex_sky_visibility(
     rest_geometry : the triangles of the head at rest
     """
     count, rig, commands = len(head.mesh.positions), head.control, CommandList(device, timed=False)
-    layers = make_layers(device, (DEPTH_MAP_SIDE, DEPTH_MAP_SIDE), SKY_VIEW_COUNT, triangles=False)
-    occluders = upload_triangles(device, coarse_triangles(head, *_OCCLUDER_LIMITS))
+    layers = make_layers(device, (DEPTH_MAP_SIDE, DEPTH_MAP_SIDE), SKY_VIEW_COUNT, store_triangles=False)
+    occluders = upload_triangles(device, coarse_triangles(head, *_OCCLUDER_MIN_FACES_AND_MAX_ERROR))
     sky = VertexSkyVisibility(
         layers, occluders, device.buffer(np.zeros((count, 2), np.float32), "STORAGE"), count
     )
     views = sky_views(Outline(rig.outline_mm(rig.rest)), np.eye(3))
-    _draw_vertices(commands, sky, views, sky_record(device, views, count), rest_geometry, resting=True)
+    _draw_vertices(commands, sky, views, sky_record(device, views, count), rest_geometry, is_at_rest=True)
     commands.submit()
     return sky
 
@@ -180,24 +180,24 @@ def make_moving_map(device: Device, rest_map: Texture) -> tuple[Texture, MovingO
 
 def draw(
     graph: Recorder,
-    sky: VertexSkyVisibility,
+    vertex_visibility: VertexSkyVisibility,
     views: SkyViews,
-    record: UniformRecord,
-    maps: Sequence[tuple[LitAtlas, MovingOcclusion | None]],
+    views_record: UniformRecord,
+    occlusion_maps: Sequence[tuple[LitAtlas, MovingOcclusion | None]],
 ) -> None:
     """Declare the passes that update the occlusion maps of all atlas layouts for the current shape.
 
-    record : uniform record of the views, from `sky_record`
-    maps : atlas layouts, each with the resources that update its map, or None
+    views_record : uniform record of the views, from `sky_record`
+    occlusion_maps : atlas layouts, each with the resources that update its map, or None
     """
-    _draw_vertices(graph, sky, views, record, maps[0][0].head)
-    for layout, occlusion in maps:
+    _draw_vertices(graph, vertex_visibility, views, views_record, occlusion_maps[0][0].head)
+    for layout, occlusion in occlusion_maps:
         if occlusion:
-            _draw_map(graph, sky, layout, occlusion)
+            _draw_map(graph, vertex_visibility, layout, occlusion)
 
 
 def _draw_map(
-    graph: Recorder, sky: VertexSkyVisibility, layout: LitAtlas, occlusion: MovingOcclusion
+    graph: Recorder, vertex_visibility: VertexSkyVisibility, layout: LitAtlas, occlusion: MovingOcclusion
 ) -> None:
     """Declare the passes that update the occlusion map of a layout from its vertices.
 
@@ -211,17 +211,21 @@ def _draw_map(
     }
     find_corners = program(graph.device, "occlusion/moving_occlusion_corners.wgsl")
     graph.compute("occlusion", find_corners, bindings, occlusion.corners.size[:2])
-    maps: Bindings = {"rest_map": occlusion.rest_map, "visibility": sky.visibility, "moving_map": moving_map}
+    maps: Bindings = {
+        "rest_map": occlusion.rest_map,
+        "visibility": vertex_visibility.visibility,
+        "moving_map": moving_map,
+    }
     fill = program(graph.device, "occlusion/moving_occlusion.wgsl")
     graph.compute("occlusion", fill, {**bindings, **maps}, moving_map.size[:2], TILE_SIDE)
 
 
-def sky_record(device: Device, views: SkyViews, vertices: int) -> UniformRecord:
+def sky_record(device: Device, views: SkyViews, vertex_count: int) -> UniformRecord:
     """Return the uniform record of the sky views for moving_occlusion_vertices.wgsl.
 
-    vertices : number of vertices of the mesh
+    vertex_count : number of vertices of the mesh
     """
-    record = program(device, _VERTEX_SHADER).record("Sky", vertices=vertices)
+    record = program(device, _VERTEX_VISIBILITY_SHADER).record("Sky", vertices=vertex_count)
     members = record["views"]
     members["column"], members["row"], members["depth"] = views.to_map.swapaxes(0, 1)
     members["to_sky"] = views.to_sky
@@ -231,23 +235,31 @@ def sky_record(device: Device, views: SkyViews, vertices: int) -> UniformRecord:
 
 def _draw_vertices(
     graph: Recorder,
-    sky: VertexSkyVisibility,
+    vertex_visibility: VertexSkyVisibility,
     views: SkyViews,
-    record: UniformRecord,
+    views_record: UniformRecord,
     head: HeadGeometry,
-    resting: bool = False,
+    is_at_rest: bool = False,
 ) -> None:
     """Declare the passes that compute the visible fraction of the sky at the vertices of a shape.
 
-    record : uniform record of the views, from `sky_record`
-    resting : whether the shape is at rest, so that the fractions are stored as the fractions at rest
+    views_record : uniform record of the views, from `sky_record`
+    is_at_rest : whether the shape is at rest, so that the fractions are stored as the fractions at rest
     """
-    draw_layers(graph, "occlusion", sky.layers, views.views, sky.occluders.with_vertices_of(head))
+    draw_layers(
+        graph,
+        "occlusion",
+        vertex_visibility.layers,
+        views.views,
+        vertex_visibility.occluders.with_vertices_of(head),
+    )
     bindings: Bindings = {
         **head.resources,
-        "sky": record,
-        "maps": sky.layers.texture,
-        "visibility": sky.visibility,
+        "sky": views_record,
+        "maps": vertex_visibility.layers.texture,
+        "visibility": vertex_visibility.visibility,
     }
-    shader = program(graph.device, _VERTEX_SHADER, (("RESTING", resting),) if resting else ())
-    graph.dispatch("occlusion", shader, bindings, workgroup_grid(sky.vertices))
+    shader = program(
+        graph.device, _VERTEX_VISIBILITY_SHADER, (("RESTING", is_at_rest),) if is_at_rest else ()
+    )
+    graph.dispatch("occlusion", shader, bindings, workgroup_grid(vertex_visibility.vertices))

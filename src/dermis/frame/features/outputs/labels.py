@@ -34,14 +34,18 @@ class LabelBuffers:
     hair_classes: Buffer | None
     hair_labels: Buffer
 
-    def hair_bindings(self, centres: Texture) -> Bindings | None:
+    def hair_bindings(self, centre_triangles: Texture) -> Bindings | None:
         """Return the resources with which the hair pass labels pixels, None without hair.
 
-        centres : texture of the triangle at the centre of each pixel
+        centre_triangles : texture of the triangle at the centre of each pixel
         """
         if self.hair_classes is None:
             return None
-        return {"hair_classes": self.hair_classes, "hair_labels": self.hair_labels, "centres": centres}
+        return {
+            "hair_classes": self.hair_classes,
+            "hair_labels": self.hair_labels,
+            "centres": centre_triangles,
+        }
 
 
 def make_label_buffers(memo: Memo, device: Device, request: FrameRequest) -> LabelBuffers | None:
@@ -53,10 +57,10 @@ def make_label_buffers(memo: Memo, device: Device, request: FrameRequest) -> Lab
     labels = cached(mesh_labels, head)
     tables = cached(_upload_tables, device, labels)
     if not has_strands(request.head, settings):
-        unused = cached(_word_buffer, device, 1, owner="no hair labels")
+        unused = cached(_word_buffer, device, 1, caller_name="no hair labels")
         return LabelBuffers(tables, len(labels.classes), None, unused)
     pixels = settings.size[0] * settings.size[1]
-    hair_labels = cached(_word_buffer, device, pixels, owner="hair labels")
+    hair_labels = cached(_word_buffer, device, pixels, caller_name="hair labels")
     return LabelBuffers(tables, len(labels.classes), cached(_upload_hair_classes, device, head), hair_labels)
 
 
@@ -89,5 +93,5 @@ def _upload_hair_classes(device: Device, head: Head) -> Buffer:
     return device.buffer(hair_classes(head).astype(np.uint32), "STORAGE")
 
 
-def _word_buffer(device: Device, count: int) -> Buffer:
-    return device.storage_buffer(4 * count, "hair labels")
+def _word_buffer(device: Device, word_count: int) -> Buffer:
+    return device.storage_buffer(4 * word_count, "hair labels")

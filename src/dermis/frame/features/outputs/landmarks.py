@@ -21,7 +21,7 @@ LANDMARK_TOLERANCE_MM = 2.0
 """Largest depth by which the mesh may be in front of a landmark that counts as visible."""
 # Struct Landmark of landmarks.wgsl.
 _LANDMARK_DTYPE = np.dtype([("corner", "u4", 4), ("weight", "f4", 4), ("material", "u4", 4)])
-_RESULT_FLOATS = 4  # x, y, z and visibility
+_FLOATS_PER_LANDMARK = 4  # x, y, z and visibility
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,40 +39,40 @@ class LandmarkBuffers:
     results: Buffer
     count: int
 
-    def positions(self, raw: NDArray[np.uint8]) -> LandmarkPositions:
+    def positions(self, result_bytes: NDArray[np.uint8]) -> LandmarkPositions:
         """Return the positions and visibility of the landmarks of each set, from the bytes of `results`."""
-        rows, first, positions = raw.view(np.float32).reshape(-1, _RESULT_FLOATS), 0, {}
+        rows, first, positions = result_bytes.view(np.float32).reshape(-1, _FLOATS_PER_LANDMARK), 0, {}
         for name, points in self.sets.items():
             positions[name] = points.names, rows[first : first + len(points.names)]
             first += len(points.names)
         return positions
 
 
-def checked_landmarks(names: Iterable[str]) -> tuple[str, ...]:
+def checked_landmarks(set_names: Iterable[str]) -> tuple[str, ...]:
     """Check names of landmark sets and paths of landmark files, and return them without duplicates.
 
     Raises DermisError for a name that is neither a set nor a file.
     """
-    if isinstance(names, str) or not isinstance(names, Iterable):
-        actual = f"got {format_value(names)}"
+    if isinstance(set_names, str) or not isinstance(set_names, Iterable):
+        actual = f"got {format_value(set_names)}"
         refuse("landmarks", "several names", actual, 'Write landmarks=("ibug-68",)')
-    return tuple(dict.fromkeys(check_landmarks(name) for name in names))
+    return tuple(dict.fromkeys(check_landmarks(name) for name in set_names))
 
 
-def make_landmark_buffers(device: Device, head: Head, names: tuple[str, ...]) -> LandmarkBuffers:
+def make_landmark_buffers(device: Device, head: Head, set_names: tuple[str, ...]) -> LandmarkBuffers:
     """Upload the surface points of the landmarks of a head.
 
-    names : names of landmark sets, or paths of landmark files
+    set_names : names of landmark sets, or paths of landmark files
 
     Raises DermisError for landmarks that the head does not have.
     """
-    sets = {name: landmark_points(head, name) for name in names}
+    sets = {name: landmark_points(head, name) for name in set_names}
     rows = np.zeros(sum(len(points.names) for points in sets.values()), _LANDMARK_DTYPE)
     rows["corner"] = np.concatenate([points.point for points in sets.values()])
     rows["weight"] = np.concatenate([points.weight for points in sets.values()])
     rows["material"][:, 0] = np.concatenate([points.material for points in sets.values()]) + 1
     table = device.buffer(rows.view(np.uint32), "STORAGE")
-    results = device.storage_buffer(4 * _RESULT_FLOATS * len(rows), "landmarks")
+    results = device.storage_buffer(4 * _FLOATS_PER_LANDMARK * len(rows), "landmarks")
     return LandmarkBuffers(sets, table, results, len(rows))
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dermis.base.errors import DermisError, refuse
-from dermis.frame.features.diffusion.combine import make_sum
+from dermis.frame.features.diffusion.combine import make_blur_sum
 from dermis.frame.features.outputs.planes import Planes, draw_planes, stage_program
 from dermis.frame.features.outputs.stage_inputs import StageInputs
 from dermis.frame.features.shading.shade import placeholder_subsurface_layers
@@ -34,7 +34,7 @@ from dermis.scene.tissue import skin_tissue
 
 _TRANSLUCENCY_OUTPUTS = ("translucent", "thickness")
 _PIGMENT_OUTPUTS = ("melanin", "blood")
-_MAX_LIGHTS = 64  # as in visibility.wgsl
+_MAX_VISIBILITY_LIGHTS = 64  # as in visibility.wgsl
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +70,9 @@ def make_light_outputs(
     if "translucent" in requested:
         roles = [*map(str, range(len(translucency))), *(["both"] if translucency[1:] else [])]
         side = request.settings.atlas
-        transmitted = tuple(cached(make_sum, device, side, owner=f"through {role}") for role in roles)
+        transmitted = tuple(
+            cached(make_blur_sum, device, side, caller_name=f"through {role}") for role in roles
+        )
     return LightOutputs(
         light_part_counts=request.light_part_counts,
         transmitted=transmitted,
@@ -102,7 +104,7 @@ def draw_light(graph: Recorder, planes: Planes, resources: LightOutputs, inputs:
 def draw_visibility(graph: Recorder, planes: Planes, resources: LightOutputs, inputs: StageInputs) -> None:
     """Declare the pass that computes how much of each light a pixel sees, as a fraction."""
     shader, counts = stage_program(graph.device, planes, inputs.constants), resources.light_part_counts
-    ends = np.zeros(_MAX_LIGHTS, np.uint32)
+    ends = np.zeros(_MAX_VISIBILITY_LIGHTS, np.uint32)
     ends[: len(counts)] = np.cumsum(counts)
     parts = shader.record("LightParts", count=len(counts), end=ends.reshape(-1, 4))
     draw_planes(graph, planes, shader, _shading_bindings(shader, inputs) | {"light_parts": parts})
@@ -129,12 +131,12 @@ def make_thickness_map(device: Device, pairs: PairBuffers) -> Texture:
     surface = pairs.cells.receiver_mask
     texels = np.zeros((*surface.shape, 4), np.float32)
     texels[..., 0], texels[..., 3] = pairs.cells.radius_mm * surface, surface
-    texture = make_texture(device, surface.shape, "rgba32float", name="thickness")
+    texture = make_texture(device, surface.shape, "rgba32float", texture_name="thickness")
     upload(device, texture, texels)
     return texture
 
 
-def measure_thickness(graph: Recorder, translucency: Translucency, target: Texture) -> None:
+def measure_thickness(graph: Recorder, translucency: Translucency, thickness_map: Texture) -> None:
     """Declare the pass that writes the thickness of the posed head to the texture of `make_thickness_map`."""
     pairs, shader = translucency.pairs, program(graph.device, "outputs/thickness_map.wgsl")
     count, cells = pairs.receivers[1], pairs.cells
@@ -145,7 +147,7 @@ def measure_thickness(graph: Recorder, translucency: Translucency, target: Textu
         "pairs": pairs.pairs,
         "receiver_points": translucency.receiver_points,
         "source_points": translucency.source_points,
-        "thickness_map": target,
+        "thickness_map": thickness_map,
     }
     graph.dispatch("outputs", shader, bindings, workgroup_grid(count))
 

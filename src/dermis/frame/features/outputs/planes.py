@@ -39,32 +39,35 @@ class Planes:
         """Return the pipeline constants that tell the shader the index of the first plane of each output."""
         return tuple((f"{name.upper()}_FIRST", first) for name, first in self._first_channels().items())
 
-    def first_channel_constant(self, name: str) -> Constants:
+    def first_channel_constant(self, output_name: str) -> Constants:
         """Return the pipeline constant that tells the shader the index of the first plane of an output."""
-        return ((f"{name.upper()}_FIRST", self._first_channels()[name]),)
+        return ((f"{output_name.upper()}_FIRST", self._first_channels()[output_name]),)
 
-    def byte_range(self, name: str) -> tuple[int, int]:
+    def byte_range(self, output_name: str) -> tuple[int, int]:
         """Return the offset of an output in the buffer, and its length [byte]."""
         plane = _WORD_BYTES * self.size[0] * self.size[1]
-        return plane * self._first_channels()[name], plane * self.channels[name]
+        return plane * self._first_channels()[output_name], plane * self.channels[output_name]
 
-    def arrays(self, raw: NDArray[np.uint8]) -> dict[str, PlaneArray]:
+    def arrays(self, buffer_bytes: NDArray[np.uint8]) -> dict[str, PlaneArray]:
         """Return each output as an (h, w) or (h, w, channels) array.
 
-        raw : bytes of the whole buffer
+        buffer_bytes : bytes of the whole buffer
         """
         ranges = {name: self.byte_range(name) for name in self.channels}
-        return {name: self.array(name, raw[start : start + size]) for name, (start, size) in ranges.items()}
+        return {
+            name: self.array(name, buffer_bytes[start : start + size])
+            for name, (start, size) in ranges.items()
+        }
 
-    def array(self, name: str, raw: NDArray[np.uint8]) -> PlaneArray:
+    def array(self, output_name: str, output_bytes: NDArray[np.uint8]) -> PlaneArray:
         """Return one output as an (h, w) or (h, w, channels) array.
 
-        raw : bytes of this output, in the range `byte_range`
+        output_bytes : bytes of this output, in the range `byte_range`
         """
-        output, (width, height) = OUTPUTS[name], self.size
+        output, (width, height) = OUTPUTS[output_name], self.size
         kind = np.dtype(output.kind).kind
-        words: PlaneArray = raw.view({"f": np.float32, "i": np.int32, "u": np.uint32}[kind])
-        shape = (height, width) if output.channels == 1 else (height, width, self.channels[name])
+        words: PlaneArray = output_bytes.view({"f": np.float32, "i": np.int32, "u": np.uint32}[kind])
+        shape = (height, width) if output.channels == 1 else (height, width, self.channels[output_name])
         return words.reshape(shape).astype(output.kind, copy=False)
 
     def _first_channels(self) -> dict[str, int]:
@@ -76,24 +79,32 @@ class Planes:
 
 
 def make_planes(
-    device: Device, stage: str, channels: tuple[tuple[str, int], ...], size: tuple[int, int]
+    device: Device,
+    stage_name: str,
+    channel_counts: tuple[tuple[str, int], ...],
+    picture_size: tuple[int, int],
 ) -> Planes:
     """Allocate the planes of a stage for a picture of size (width, height).
 
-    stage : name of the shader that fills the planes
-    channels : (name, number of channels) of each output
+    stage_name : name of the shader that fills the planes
+    channel_counts : (name, number of channels) of each output
 
     Raises DermisError if the planes do not fit in one buffer of the device.
     """
-    pixels, count = size[0] * size[1], max(1, sum(number for _, number in channels))
+    pixels, count = picture_size[0] * picture_size[1], max(1, sum(number for _, number in channel_counts))
     if _WORD_BYTES * count * pixels > device.max_storage_bytes:
         most = device.max_storage_bytes // (_WORD_BYTES * count)
-        limit = f"at most {most} pixels with {', '.join(name for name, _ in channels)}"
+        limit = f"at most {most} pixels with {', '.join(name for name, _ in channel_counts)}"
         actual = f"there are {pixels}"
         refuse(
             "size", f"{limit} at once from {device.adapter.name}", actual, "Ask for fewer, or a smaller one"
         )
-    return Planes(stage, dict(channels), size, device.storage_buffer(_WORD_BYTES * count * pixels, "outputs"))
+    return Planes(
+        stage_name,
+        dict(channel_counts),
+        picture_size,
+        device.storage_buffer(_WORD_BYTES * count * pixels, "outputs"),
+    )
 
 
 def stage_program(device: Device, planes: Planes, constants: Constants = ()) -> ComputeProgram:

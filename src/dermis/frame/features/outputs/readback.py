@@ -20,7 +20,7 @@ from dermis.scene.settings import Settings
 
 PictureArray = NDArray[Any]  # callers choose the dtype
 """(h, w, 3) or (h, w, 4) array of sRGB bytes or linear floats."""
-_INVOCATIONS_PER_ROW = 1024  # as in the shaders
+_PACKING_INVOCATIONS_PER_ROW = 1024  # as in the shaders
 _WORD_BYTES = 4  # size of a word [bytes]
 _PIXELS_PER_INVOCATION, _WORDS_PER_INVOCATION = 4, 3  # read and written by pack.wgsl
 
@@ -75,28 +75,28 @@ def start_readback(
     graph: Graph,
     picture: Picture,
     *,
-    linear: bool = False,
-    alpha: Settings | None = None,
+    as_linear: bool = False,
+    alpha_settings: Settings | None = None,
     outputs: Resources | None = None,
 ) -> Readback:
     """Pack the picture and its outputs, and start their readback.
 
-    linear : whether to read linear floats instead of sRGB bytes
-    alpha : settings of the picture, to read its coverage as alpha: floats are premultiplied, bytes are not;
-        None for three channels
+    as_linear : whether to read linear floats instead of sRGB bytes
+    alpha_settings : settings of the picture, to read its coverage as alpha: floats are premultiplied, bytes
+        are not; None for three channels
     outputs : resources of the outputs to read back too, None for the picture alone
 
     Raises DermisError if the data do not fit in one buffer of the device.
     """
     device, pixels, bindings = graph.device, picture.size[0] * picture.size[1], MutableBindings()
-    channels = 4 if alpha else 3
-    if linear:
+    channels = 4 if alpha_settings else 3
+    if as_linear:
         shader = program(device, "outputs/pack_linear.wgsl", (("CHANNELS", channels),))
         count, words, bindings["exposed"] = pixels, channels * pixels, picture.exposed
-    elif alpha:
+    elif alpha_settings:
         shader, count, words = program(device, "outputs/pack_straight.wgsl"), pixels, pixels
         bindings["exposed"] = picture.exposed
-        bindings["settings"] = shader.record("Straight", **encoding_members(alpha))
+        bindings["settings"] = shader.record("Straight", **encoding_members(alpha_settings))
     else:
         count = -(-pixels // _PIXELS_PER_INVOCATION)
         shader, words = program(device, "outputs/pack.wgsl"), _WORDS_PER_INVOCATION * count
@@ -107,24 +107,27 @@ def start_readback(
     _check_size(
         device, sum(buffer.size for buffer in buffers), device.max_buffer_bytes, pixels, "outputs of "
     )
-    grid = _INVOCATIONS_PER_ROW, -(-count // _INVOCATIONS_PER_ROW)
+    grid = _PACKING_INVOCATIONS_PER_ROW, -(-count // _PACKING_INVOCATIONS_PER_ROW)
     graph.compute("pack", shader, bindings | {"packed": packed}, grid)
-    kind = np.float32 if linear else np.uint8
+    kind = np.float32 if as_linear else np.uint8
     return Readback(graph.read_back(*buffers), picture.size, kind, channels, words, outputs)
 
 
-def _check_size(device: Device, size: int, limit: int, pixels: int, contents: str = "") -> None:
-    if size > limit:
-        expected = f"{contents}at most {limit * pixels // size} pixels at once from {device.adapter.name}"
-        advice = "Ask for fewer outputs, or a smaller size" if contents else "Choose a smaller one"
-        refuse("size", expected, f"there are {pixels}", advice)
+def _check_size(
+    device: Device, needed_bytes: int, max_bytes: int, pixel_count: int, contents_name: str = ""
+) -> None:
+    if needed_bytes > max_bytes:
+        max_pixels = max_bytes * pixel_count // needed_bytes
+        expected = f"{contents_name}at most {max_pixels} pixels at once from {device.adapter.name}"
+        advice = "Ask for fewer outputs, or a smaller size" if contents_name else "Choose a smaller one"
+        refuse("size", expected, f"there are {pixel_count}", advice)
 
 
-def _packed_buffer(device: Device, picture: Picture, words: int) -> Buffer:
+def _packed_buffer(device: Device, picture: Picture, word_count: int) -> Buffer:
     """Return the buffer for the packed picture; it is kept with the picture for later readbacks.
 
-    words : size of the packed picture [4 bytes]
+    word_count : size of the packed picture [4 bytes]
     """
-    if words not in picture.packed:
-        picture.packed[words] = device.buffer(np.zeros(words, np.uint32), "STORAGE")
-    return picture.packed[words]
+    if word_count not in picture.packed:
+        picture.packed[word_count] = device.buffer(np.zeros(word_count, np.uint32), "STORAGE")
+    return picture.packed[word_count]

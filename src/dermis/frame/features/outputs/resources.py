@@ -43,9 +43,9 @@ class Resources:
         landmarks = [self.landmarks.results] if self.landmarks else []
         return [*(planes.buffer for planes in self.planes), *landmarks]
 
-    def planes_of_output(self, name: str) -> Planes:
+    def planes_of_output(self, output_name: str) -> Planes:
         """Return the planes of the stage that computes an output."""
-        return next(planes for planes in self.planes if name in planes.channels)
+        return next(planes for planes in self.planes if output_name in planes.channels)
 
 
 def make(
@@ -71,16 +71,16 @@ def make(
     return Resources(
         names=request.outputs,
         planes=tuple(
-            cached(make_planes, device, stage, tuple(outputs), settings.size, owner=stage)
+            cached(make_planes, device, stage, tuple(outputs), settings.size, caller_name=stage)
             for stage, outputs in stages.items()
         ),
         centres=None if settings.samples == 1 else cached(_make_centres, device, settings.size),
-        previous=cached(make_shape, device, tables, owner="before") if "motion" in stages else None,
+        previous=cached(make_shape, device, tables, caller_name="before") if "motion" in stages else None,
         light=make_light_outputs(memo, device, request, translucency),
         labels=make_label_buffers(memo, device, request),
         landmarks=cached(make_landmark_buffers, device, bare, sets) if sets else None,
     )
 
 
-def _make_centres(device: Device, size: tuple[int, int]) -> ViewLayers:
-    return make_layers(device, size, 1, triangles=True)
+def _make_centres(device: Device, picture_size: tuple[int, int]) -> ViewLayers:
+    return make_layers(device, picture_size, 1, store_triangles=True)

@@ -92,8 +92,10 @@ def _draw_label(graph: Graph, planes: Planes, resources: Resources, inputs: Stag
     draw_labels(graph, planes, resources.labels, inputs)
 
 
-def _light_stage(draw: Callable[[Graph, Planes, light.LightOutputs, StageInputs], None]) -> DrawStage:
-    return lambda graph, planes, resources, inputs: draw(graph, planes, resources.light, inputs)
+def _light_stage(
+    draw_light_outputs: Callable[[Graph, Planes, light.LightOutputs, StageInputs], None],
+) -> DrawStage:
+    return lambda graph, planes, resources, inputs: draw_light_outputs(graph, planes, resources.light, inputs)
 
 
 DRAW_STAGES: Registry[DrawStage] = Registry(
@@ -119,11 +121,11 @@ def shader_lists() -> Mapping[str, Callable[[], Sequence[ShaderListMember]]]:
     return {f"{stage}_outputs": partial(_stage_members, stage) for stage in sorted(stages)}
 
 
-def _stage_members(stage: str) -> list[ShaderListMember]:
+def _stage_members(stage_name: str) -> list[ShaderListMember]:
     return [
         ShaderListMember(one.name, one.shader, _wgsl_type(one))
         for one in OUTPUTS.values()
-        if one.stage == stage
+        if one.stage == stage_name
     ]
 
 

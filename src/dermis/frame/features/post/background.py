@@ -10,7 +10,7 @@ from dermis.frame.programs import program
 from dermis.gpu import Bindings, Recorder, Texture, UniformRecord
 from dermis.scene.settings import Settings
 
-_BACKGROUNDS = ("gradient", "environment")  # numbered from 1 as in background.wgsl; 0 is a colour
+_DRAWN_BACKGROUNDS = ("gradient", "environment")  # numbered from 1 as in background.wgsl; 0 is a colour
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,14 +30,14 @@ def draw(
     graph: Recorder,
     backdrop: Backdrop,
     shading: tuple[Bindings, UniformRecord],
-    image: Texture,
+    foreground: Texture,
     meter: Meter | None,
     settings: Settings,
 ) -> Texture:
     """Declare the pass that adds the background to a picture; return `backdrop.result`.
 
     shading : resources of the lighting, and the uniform record of the shading pass
-    image : texture of the picture without background
+    foreground : texture of the picture without background
     meter : exposure meter, None for a fixed exposure
     """
     (lighting, view), background = shading, settings.background
@@ -46,12 +46,12 @@ def draw(
     record = shader.record(
         "Background",
         rays=ray_record(shader, view),
-        kind=1 + _BACKGROUNDS.index(background) if isinstance(background, str) else 0,
+        kind=1 + _DRAWN_BACKGROUNDS.index(background) if isinstance(background, str) else 0,
         colour=(0.0, 0.0, 0.0) if isinstance(background, str) else background,
         exposure=exposure,
         blur=settings.background_blur,
     )
-    images = {"image": image, "result": backdrop.result}
+    images = {"image": foreground, "result": backdrop.result}
     bindings = {**lighting, "background": record, "metered": metered, **images}
     if backdrop.panorama is not None:
         bindings["panorama"] = backdrop.panorama

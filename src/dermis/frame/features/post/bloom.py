@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from dermis.frame.programs import program
 from dermis.gpu import Bindings, Device, Recorder, Texture, make_texture
 
-_OMITTED_HALVINGS = 4  # omitted halvings: the widest Gaussian spans a sixteenth of the picture
+_OMITTED_HALVING_COUNT = 4  # omitted halvings: the widest Gaussian spans a sixteenth of the picture
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,20 +20,20 @@ class BloomTextures:
     result: Texture
 
 
-def make_bloom(device: Device, size: tuple[int, int]) -> BloomTextures:
+def make_bloom(device: Device, picture_size: tuple[int, int]) -> BloomTextures:
     """Allocate the textures of the bloom for a picture of size (width, height)."""
-    count = max(1, int(math.log2(min(size))) - _OMITTED_HALVINGS) if min(size) > 1 else 1
-    sides = [(max(1, size[0] >> k), max(1, size[1] >> k)) for k in range(1, count + 1)]
+    count = max(1, int(math.log2(min(picture_size))) - _OMITTED_HALVING_COUNT) if min(picture_size) > 1 else 1
+    sides = [(max(1, picture_size[0] >> k), max(1, picture_size[1] >> k)) for k in range(1, count + 1)]
     halved, sums = ([make_texture(device, side, "rgba32float") for side in sides] for _ in range(2))
-    return BloomTextures(halved, sums[:-1], make_texture(device, size, "rgba32float"))
+    return BloomTextures(halved, sums[:-1], make_texture(device, picture_size, "rgba32float"))
 
 
-def draw(graph: Recorder, textures: BloomTextures, picture: Texture, scattered: float) -> Texture:
+def draw(graph: Recorder, textures: BloomTextures, picture: Texture, scattered_fraction: float) -> Texture:
     """Declare the passes that scatter a fraction of the picture's light; return `textures.result`.
 
     The total light is unchanged.
 
-    scattered : fraction of the light that the lens scatters [-]
+    scattered_fraction : fraction of the light that the lens scatters [-]
     """
     source = picture
     for halved in textures.halved:
@@ -42,15 +42,25 @@ def draw(graph: Recorder, textures: BloomTextures, picture: Texture, scattered: 
     for halved, total in zip(reversed(textures.halved[:-1]), reversed(textures.sums), strict=True):
         _draw_step(graph, 1, halved, source, total, 1.0, 1.0)
         source = total
-    weight = scattered / len(textures.halved)
-    _draw_step(graph, 1, picture, source, textures.result, 1.0 - scattered, weight)
+    weight = scattered_fraction / len(textures.halved)
+    _draw_step(graph, 1, picture, source, textures.result, 1.0 - scattered_fraction, weight)
     return textures.result
 
 
 def _draw_step(
-    graph: Recorder, widen: int, picture: Texture, smaller: Texture, target: Texture, *factors: float
+    graph: Recorder,
+    widening_factor: int,
+    picture: Texture,
+    coarser_sum: Texture,
+    result_texture: Texture,
+    *factors: float,
 ) -> None:
-    shader = program(graph.device, "post/bloom.wgsl", (("WIDEN", widen),))
+    shader = program(graph.device, "post/bloom.wgsl", (("WIDEN", widening_factor),))
     record = shader.record("Bloom", own=factors[0], wider=factors[1])
-    bindings: Bindings = {"bloom": record, "picture": picture, "smaller": smaller, "result": target}
-    graph.compute("bloom", shader, bindings, target.size[:2])
+    bindings: Bindings = {
+        "bloom": record,
+        "picture": picture,
+        "smaller": coarser_sum,
+        "result": result_texture,
+    }
+    graph.compute("bloom", shader, bindings, result_texture.size[:2])

@@ -13,7 +13,7 @@ from dermis.scene.settings import Settings
 
 METER_SIDE = 64
 """Number of metered points along each side of a grid over the picture."""
-METER_KEY = 0.85
+METERED_IRRADIANCE = 0.85
 """Linear value to which white skin is exposed, such that the exposure of studio light is about 1."""
 MAX_CLIPPED_FRACTION = 0.01
 """Largest fraction of the visible skin that may be overexposed."""
@@ -24,7 +24,7 @@ MIN_HIGHLIGHT_FACTOR = 0.5
 def shader_constants() -> dict[str, float]:
     """Return the values that `//#fill` lines insert in the shaders of the exposure meter, by name."""
     highlights = {"meter_clipping": MAX_CLIPPED_FRACTION, "meter_stopped_down": MIN_HIGHLIGHT_FACTOR}
-    return {"meter_side": METER_SIDE, "meter_key": METER_KEY, **highlights}
+    return {"meter_side": METER_SIDE, "meter_key": METERED_IRRADIANCE, **highlights}
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,19 +47,19 @@ def draw(
     meter: Meter,
     shading: tuple[Bindings, UniformRecord, Constants],
     visibility: Texture,
-    image: Texture,
+    radiance_image: Texture,
 ) -> None:
     """Declare the passes that measure the irradiance of the visible skin, and derive the exposure from it.
 
     shading : resources of the lighting, uniform record of the shading pass, and pipeline constants of the
         lights
     visibility : texture of the triangle at each sample
-    image : texture of the radiance of the picture
+    radiance_image : texture of the radiance of the picture
     """
     lighting, view, constants = shading
     shader = program(graph.device, "post/meter.wgsl", constants)
     camera = shader.record("MeterCamera", rays=ray_record(shader, view), sample=view["jitter"][0, :2])
-    images = {"visibility_buffer": visibility, "image": image}
+    images = {"visibility_buffer": visibility, "image": radiance_image}
     bindings = {**lighting, **images, "camera": camera, "points": meter.points}
     graph.compute("meter", shader, bindings, (METER_SIDE, METER_SIDE))
     key = program(graph.device, "post/meter_key.wgsl")

@@ -30,10 +30,17 @@ class Picture:
     packed: dict[int, Buffer] = field(default_factory=dict)
 
 
-def make_picture(device: Device, size: tuple[int, int]) -> Picture:
+def make_picture(device: Device, picture_size: tuple[int, int]) -> Picture:
     """Allocate the textures of a picture of size (width, height)."""
-    radiance, exposed = (make_texture(device, size, "rgba32float", name="picture") for _ in range(2))
-    return Picture(radiance, exposed, make_texture(device, size, "rgba8uint", name="picture"), size)
+    radiance, exposed = (
+        make_texture(device, picture_size, "rgba32float", texture_name="picture") for _ in range(2)
+    )
+    return Picture(
+        radiance,
+        exposed,
+        make_texture(device, picture_size, "rgba8uint", texture_name="picture"),
+        picture_size,
+    )
 
 
 def draw(

@@ -81,7 +81,7 @@ def _backdrop(memo: Memo, device: Device, request: FrameRequest) -> Backdrop | N
     settings, environment = request.settings, request.environment
     if settings.background == "none":
         return None
-    result = memo.get(make_texture, device, settings.size, "rgba32float", owner="background")
+    result = memo.get(make_texture, device, settings.size, "rgba32float", caller_name="background")
     if settings.background != "environment":
         return Backdrop(result)
     if environment is None:

@@ -36,14 +36,14 @@ def shader_constants() -> dict[str, int]:
     return {"baked_numbers": BAKED_CHANNEL_COUNT}
 
 
-def point_words(triangle: NDArray[np.integer], weights: NDArray[np.floating]) -> NDArray[np.uint32]:
+def point_words(triangle_index: NDArray[np.integer], weights: NDArray[np.floating]) -> NDArray[np.uint32]:
     """Pack surface points into (n, 4) words for bake.wgsl.
 
-    triangle : (n,) indices of the triangles on which the points lie
+    triangle_index : (n,) indices of the triangles on which the points lie
     weights : (n, 2) barycentric weights of the second and third corner
     """
-    words = np.zeros((len(triangle), 4), np.uint32)
-    words[:, 0] = triangle
+    words = np.zeros((len(triangle_index), 4), np.uint32)
+    words[:, 0] = triangle_index
     words[:, 1:3] = weights.astype(np.float32).view(np.uint32)
     return words
 
@@ -52,26 +52,26 @@ def bake(
     device: Device,
     constants: Constants,
     bindings: Bindings,
-    points: NDArray[np.uint32],
-    footprint: float,
+    packed_points: NDArray[np.uint32],
+    texel_side_uv: float,
     pigments: tuple[float, float] | None,
 ) -> NDArray[np.float32]:
     """Return (n, BAKED_CHANNEL_COUNT) values at surface points, in the channels of `BAKED_CHANNELS`.
 
     constants : pipeline constants of the shading
     bindings : resources of the frame that shading.wgsl and bake.wgsl read
-    points : (n, 4) packed surface points, from `point_words`
-    footprint : side of a texel in uv, the inverse of the number of texels along the map [-]
+    packed_points : (n, 4) packed surface points, from `point_words`
+    texel_side_uv : side of a texel in uv, the inverse of the number of texels along the map [-]
     pigments : melanin and blood fractions of uniform skin [-]; None to read them from painted maps
     """
     shader = program(device, "shading/bake.wgsl", constants)
-    count, size = len(points), 4 * BAKED_CHANNEL_COUNT * len(points)
+    count, size = len(packed_points), 4 * BAKED_CHANNEL_COUNT * len(packed_points)
     baked = device.storage_buffer(size, "baked")
     uniform = pigments or (0.0, 0.0)
     record = shader.record(
-        "Baking", count=count, footprint=footprint, painted=pigments is None, uniform_pigments=uniform
+        "Baking", count=count, footprint=texel_side_uv, painted=pigments is None, uniform_pigments=uniform
     )
-    own: Bindings = {"baking": record, "points": device.buffer(points, "STORAGE"), "baked": baked}
+    own: Bindings = {"baking": record, "points": device.buffer(packed_points, "STORAGE"), "baked": baked}
     commands = CommandList(device, timed=False)
     commands.dispatch("bake", shader, {**bindings, **own}, workgroup_grid(count))
     commands.submit()

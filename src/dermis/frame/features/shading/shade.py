@@ -32,7 +32,7 @@ def draw(
     visibility: ViewLayers,
     scattered: Texture,
     image: Texture,
-    size: tuple[int, int],
+    picture_size: tuple[int, int],
     subsurface: Texture | None = None,
 ) -> Texture:
     """Declare the pass that shades all samples of all pixels; return the image of radiance and coverage.
@@ -44,7 +44,7 @@ def draw(
     subsurface : texture layers that receive the subsurface light and the fraction of that light that leaves
         towards the camera; the image is then without this light. None to add the light to the image
     """
-    device, (width, height) = graph.device, size
+    device, (width, height) = graph.device, picture_size
     bindings = {**lighting, "shade": view, "visibility_buffer": visibility.texture, "scattered": scattered}
     bindings |= {"image": image, "subsurface": subsurface or placeholder_subsurface_layers(device)}
     shader = shade_program(device, (*constants, *strip_constants(device, visibility.count)))
@@ -54,4 +54,4 @@ def draw(
 
 def placeholder_subsurface_layers(device: Device) -> Texture:
     """Return a placeholder for the layers of light below the skin, for techniques outside screen space."""
-    return device.cached("nothing apart", lambda: make_texture(device, (1, 1), "rgba32float", layers=2))
+    return device.cached("nothing apart", lambda: make_texture(device, (1, 1), "rgba32float", layer_count=2))

@@ -31,10 +31,10 @@ from dermis.scene.settings import Settings
 from dermis.scene.skin import MAX_OTHER_PROFILES
 
 _MAX_MATERIALS = 64
-_WET = -1.0  # roughness of plain materials, see parts.wgsl
+_WET_MATERIAL_ROUGHNESS = -1.0  # roughness of plain materials, see parts.wgsl
 # Factors of light from below the surface and of reflected light, by `Settings.parts`.
 _LIGHT_FACTORS = {"all": (1.0, 1.0), "diffuse": (1.0, 0.0), "specular": (0.0, 1.0)}
-_RAY_MEMBERS = ("eye", "forward", "right", "up", "shift")
+_CAMERA_RAY_MEMBERS = ("eye", "forward", "right", "up", "shift")
 
 
 class Pinhole(NamedTuple):
@@ -70,14 +70,14 @@ def pinhole(camera: Camera, head: Head, settings: Settings) -> Pinhole:
     return Pinhole(eye, view_axes(forward, camera.up), camera.window(width / height))
 
 
-def camera_views(pinhole: Pinhole, outline: Outline, samples: int) -> Views:
+def camera_views(pinhole: Pinhole, outline: Outline, sample_count: int) -> Views:
     """Return the projection of a camera, with the positions of all samples in a pixel.
 
-    samples : number of samples per pixel
+    sample_count : number of samples per pixel
     """
     rows = view_rows(pinhole.eye, pinhole.axes)
     clip = perspective(rows, pinhole.window, *depth_range(outline, rows))
-    return Views(np.array([clip]), pixel_samples(samples))
+    return Views(np.array([clip]), pixel_samples(sample_count))
 
 
 def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: ProfileSplit) -> UniformRecord:
@@ -108,7 +108,7 @@ def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: Pr
     for index, material in enumerate(materials):
         part = record["part_materials"][index]
         part["emission"], part["metalness"] = material.emission, material.metalness
-        part["roughness"] = _WET if material.roughness is None else material.roughness
+        part["roughness"] = _WET_MATERIAL_ROUGHNESS if material.roughness is None else material.roughness
         part["has_maps"] = material.has_maps
     for name, value in split.fine.items():
         record["fine"][name] = value
@@ -144,4 +144,4 @@ def with_camera(view: UniformRecord, pinhole: Pinhole, eyes: EyePoses | None) ->
 
 def ray_record(shader: ComputeProgram, view: UniformRecord) -> UniformRecord:
     """Copy the camera rays of a Shade record to a record of the struct Rays, for other shaders."""
-    return shader.record("Rays", **{name: view[name] for name in _RAY_MEMBERS})
+    return shader.record("Rays", **{name: view[name] for name in _CAMERA_RAY_MEMBERS})

@@ -33,20 +33,20 @@ class ShadowMaps:
         return self.layers.texture
 
 
-def make_shadow_maps(device: Device, layers: int, size: int) -> ShadowMaps:
-    """Allocate `layers` empty shadow maps of size x size texels.
+def make_shadow_maps(device: Device, layer_count: int, map_side: int) -> ShadowMaps:
+    """Allocate `layer_count` empty square shadow maps of `map_side` texels per side.
 
     Raises DermisError when the maps do not fit into memory.
     """
-    needed = SHADOW_TEXEL_BYTES * layers * size**2
-    check_memory(device, needed, "shadow_size", f"{layers} maps of {size} texels")
-    side = _square_count(size)
-    bounds = make_texture(device, (side + side // 2, side), "r32float", layers=max(2, layers))
-    return ShadowMaps(make_layers(device, (size, size), layers, triangles=False), bounds)
+    needed = SHADOW_TEXEL_BYTES * layer_count * map_side**2
+    check_memory(device, needed, "shadow_size", f"{layer_count} maps of {map_side} texels")
+    side = _square_count(map_side)
+    bounds = make_texture(device, (side + side // 2, side), "r32float", layer_count=max(2, layer_count))
+    return ShadowMaps(make_layers(device, (map_side, map_side), layer_count, store_triangles=False), bounds)
 
 
 def draw(
-    graph: Recorder, maps: ShadowMaps, views: Views, head: HeadGeometry, with_bounds: bool = True
+    graph: Recorder, shadow_maps: ShadowMaps, views: Views, head: HeadGeometry, with_bounds: bool = True
 ) -> None:
     """Declare the passes that draw the depths seen from each light.
 
@@ -54,18 +54,18 @@ def draw(
     """
     if not len(views.clips):
         return
-    draw_layers(graph, "shadows", maps.layers, views, head)
+    draw_layers(graph, "shadows", shadow_maps.layers, views, head)
     if with_bounds:
         bound: Bindings = {
-            "maps": maps.texture,
+            "maps": shadow_maps.texture,
             "maps_sampler": graph.device.sampler(),
-            "bounds": maps.bounds,
+            "bounds": shadow_maps.bounds,
         }
-        groups = _square_count(maps.layers.size[0]) // 16
+        groups = _square_count(shadow_maps.layers.size[0]) // 16
         shader = program(graph.device, "shadows/shadow_bounds.wgsl")
         graph.dispatch("shadows", shader, bound, (groups, groups, len(views.clips)))
 
 
-def _square_count(size: int) -> int:
+def _square_count(map_side: int) -> int:
     """Return the number of squares of 4 x 4 texels along a shadow map, rounded up to a multiple of 16."""
-    return 16 * -(-size // 64)
+    return 16 * -(-map_side // 64)

@@ -17,9 +17,9 @@ from dermis.mesh.mesh import Mesh
 SMOOTHING_SIGMA_MM = 3.0
 """Standard deviation of the smoothing [mm], about the distance that light travels in skin."""
 
-_MAX_STEPS = 256
+_MAX_SMOOTHING_STEPS = 256
 Index = NDArray[np.int64]
-_STAGE = "curvature"
+_CURVATURE_STAGE = "curvature"
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,18 +66,18 @@ def placeholder_curvature(device: Device) -> Buffer:
     return device.cached("no curvature", lambda: device.buffer(np.zeros(1, np.float32), "STORAGE"))
 
 
-def _smoothing_steps(mesh: Mesh, pairs: Index, directed: Index) -> int:
+def _smoothing_steps(mesh: Mesh, edge_points: Index, directed_edges: Index) -> int:
     """Return the number of smoothing steps whose combined standard deviation is `SMOOTHING_SIGMA_MM`.
 
-    pairs : (e, 2) points of the edges of the mesh
-    directed : (2 e, 2) the edges in both directions, sorted by their first point
+    edge_points : (e, 2) points of the edges of the mesh
+    directed_edges : (2 e, 2) the edges in both directions, sorted by their first point
     """
     points = mesh.points_mm
-    square = ((points[pairs[:, 0]] - points[pairs[:, 1]]) ** 2).sum(axis=1)
-    degree = 1.0 + np.bincount(directed[:, 0], minlength=len(points))
+    square = ((points[edge_points[:, 0]] - points[edge_points[:, 1]]) ** 2).sum(axis=1)
+    degree = 1.0 + np.bincount(directed_edges[:, 0], minlength=len(points))
     # One step moves a value along an edge, or not at all. Its variance along each of the surface's two axes:
     step = 0.5 * float(np.median(square)) * (1.0 - 1.0 / float(np.median(degree)))
-    return int(np.clip(np.ceil(SMOOTHING_SIGMA_MM**2 / max(step, 1e-12)), 1, _MAX_STEPS))
+    return int(np.clip(np.ceil(SMOOTHING_SIGMA_MM**2 / max(step, 1e-12)), 1, _MAX_SMOOTHING_STEPS))
 
 
 def draw(graph: Recorder, head: HeadGeometry, curvature: Curvature) -> None:
@@ -88,9 +88,9 @@ def draw(graph: Recorder, head: HeadGeometry, curvature: Curvature) -> None:
     if curvature.steps % 2:
         buffers.reverse()
     bound = head.resources | curvature.tables | {"curvatures": buffers[0]}
-    graph.dispatch(_STAGE, program(device, "shape/curvature.wgsl"), bound, groups)
+    graph.dispatch(_CURVATURE_STAGE, program(device, "shape/curvature.wgsl"), bound, groups)
     smooth = program(device, "shape/curvature_smooth.wgsl")
     for step in range(curvature.steps):
         before, after = buffers[step % 2], buffers[1 - step % 2]
         smoothing = curvature.tables | {"before": before, "curvatures": after}
-        graph.dispatch(_STAGE, smooth, smoothing, groups)
+        graph.dispatch(_CURVATURE_STAGE, smooth, smoothing, groups)

@@ -15,7 +15,7 @@ from dermis.mesh.head import Head
 from dermis.mesh.maps import PartMaps
 from dermis.mesh.mesh import Mesh
 
-_CUT_OUT = 4  # flag of triangles that are cut out, see cutouts.wgsl
+_CUT_OUT_FLAG = 4  # flag of triangles that are cut out, see cutouts.wgsl
 _TRIANGLES_PER_ROW = 2048  # width of the texture; shaders query it
 
 
@@ -43,47 +43,53 @@ class HeadGeometry:
         """Return these triangles with the posed vertices of a shape."""
         return replace(self, resources=self.resources | shape.vertices)
 
-    def with_vertices_of(self, other: HeadGeometry) -> HeadGeometry:
+    def with_vertices_of(self, other_geometry: HeadGeometry) -> HeadGeometry:
         """Return these triangles with the vertex buffers of another geometry of the same head."""
         return replace(
-            self, resources={**self.resources, **{name: other.resources[name] for name in VERTEX_RESOURCES}}
+            self,
+            resources={
+                **self.resources,
+                **{name: other_geometry.resources[name] for name in VERTEX_RESOURCES},
+            },
         )
 
 
 def upload_geometry(
-    device: Device, mesh: Mesh, atlas: Atlas, shape: Shape, parts: PartMaps | None = None
+    device: Device, mesh: Mesh, atlas: Atlas, shape: Shape, part_maps: PartMaps | None = None
 ) -> HeadGeometry:
     """Upload the triangles of a head with their atlas coordinates, and add the vertices of its shape.
 
-    parts : maps of the parts that are not skin, whose opacity cuts holes into some of them; without maps,
+    part_maps : maps of the parts that are not skin, whose opacity cuts holes into some of them; without maps,
         parts with holes are left out
     """
     table, cut_out = _triangle_table(mesh, atlas), mesh.cut_out
-    if parts is None or not cut_out.any():
+    if part_maps is None or not cut_out.any():
         table[0, cut_out, :3] = 0
         return _upload_table(device, table, shape.vertices)
-    table[0, cut_out, 3] |= _CUT_OUT
-    opacity = texture_from_array(device, parts.colour[..., 3:].astype(np.float16), "r16float")
+    table[0, cut_out, 3] |= _CUT_OUT_FLAG
+    opacity = texture_from_array(device, part_maps.colour[..., 3:].astype(np.float16), "r16float")
     return replace(_upload_table(device, table, shape.vertices | {"opacity_map": opacity}), has_cutouts=True)
 
 
-def upload_triangles(device: Device, triangles: NDArray[np.integer]) -> HeadGeometry:
+def upload_triangles(device: Device, triangle_vertices: NDArray[np.integer]) -> HeadGeometry:
     """Upload only the (t, 3) vertex indices of triangles, for depth passes of a simplified mesh."""
-    table = np.zeros((3, len(triangles), 4), dtype=np.uint32)
-    table[0, :, :3] = triangles
+    table = np.zeros((3, len(triangle_vertices), 4), dtype=np.uint32)
+    table[0, :, :3] = triangle_vertices
     return _upload_table(device, table, {})
 
 
 def _upload_table(
-    device: Device, table: NDArray[np.uint32], vertices: dict[str, Texture | Buffer]
+    device: Device, triangle_table: NDArray[np.uint32], vertices: dict[str, Texture | Buffer]
 ) -> HeadGeometry:
-    rows = np.concatenate([_arrange_in_rows(part, _TRIANGLES_PER_ROW) for part in table])
+    rows = np.concatenate([_arrange_in_rows(part, _TRIANGLES_PER_ROW) for part in triangle_table])
     read = device.adapter.kind != "CPU"  # see geometry.wgsl; an unread buffer must still be bound
     resources: dict[str, Texture | Buffer] = {
         "triangle_table": texture_from_array(device, rows, "rgba32uint"),
         "triangle_buffer": device.buffer(rows if read else rows[:1, :3], "STORAGE"),
     }
-    return HeadGeometry(resources | vertices, device.buffer(table[0, :, :3], "INDEX"), table.shape[1])
+    return HeadGeometry(
+        resources | vertices, device.buffer(triangle_table[0, :, :3], "INDEX"), triangle_table.shape[1]
+    )
 
 
 def _triangle_table(mesh: Mesh, atlas: Atlas) -> NDArray[np.uint32]:
@@ -97,11 +103,11 @@ def _triangle_table(mesh: Mesh, atlas: Atlas) -> NDArray[np.uint32]:
     return table
 
 
-def _arrange_in_rows(table: NDArray[np.uint32], per_row: int) -> NDArray[np.uint32]:
-    rows = -(-len(table) // per_row)
-    padded = np.zeros((rows * per_row, table.shape[1]), dtype=table.dtype)
-    padded[: len(table)] = table
-    return padded.reshape(rows, per_row, -1)
+def _arrange_in_rows(triangle_table: NDArray[np.uint32], triangles_per_row: int) -> NDArray[np.uint32]:
+    rows = -(-len(triangle_table) // triangles_per_row)
+    padded = np.zeros((rows * triangles_per_row, triangle_table.shape[1]), dtype=triangle_table.dtype)
+    padded[: len(triangle_table)] = triangle_table
+    return padded.reshape(rows, triangles_per_row, -1)
 
 
 def rest_geometry(
@@ -111,16 +117,16 @@ def rest_geometry(
     tables: ShapeTables,
     head: Head,
     rest_positions_mm: NDArray[np.float32] | None,
-    index: int,
+    layout_index: int,
 ) -> HeadGeometry:
     """Return the triangles of an atlas layout with the vertices of the head at rest.
 
     geometry : triangles of the layout, with the vertices of the posed head
     rest_positions_mm : (p, 3) control points of another person at rest [mm], None for the head itself
-    index : index of the atlas layout
+    layout_index : index of the atlas layout
     """
     positions, owner = rest_positions_mm, "person"
     if positions is None:
         positions, owner = head.control.positions_mm, "head"
-    shape = memo.get(evaluate_rest_shape, device, tables, positions, owner=owner)
-    return memo.get(HeadGeometry.with_shape, geometry, shape, owner=f"{owner} {index}")
+    shape = memo.get(evaluate_rest_shape, device, tables, positions, caller_name=owner)
+    return memo.get(HeadGeometry.with_shape, geometry, shape, caller_name=f"{owner} {layout_index}")

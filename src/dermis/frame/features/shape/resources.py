@@ -30,7 +30,7 @@ class Resources:
 def make(memo: Memo, device: Device, request: FrameRequest) -> Resources:
     """Return the buffers from which the shape of the requested head is computed."""
     cached, mesh = memo.get, request.topology.mesh
-    tables = cached(shape_tables, device, request.topology, owner="shared" if request.is_shared else "")
+    tables = cached(shape_tables, device, request.topology, caller_name="shared" if request.is_shared else "")
     return Resources(
         shape=cached(make_shape, device, tables),
         tables=tables,

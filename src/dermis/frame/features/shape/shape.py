@@ -22,8 +22,8 @@ VERTICES_PER_ROW = 512
 """Vertices per row of the vertex texture; each has four texels."""
 VERTEX_RESOURCES = ("vertex_table", "vertex_buffer", "vertex_lengths")
 """Names of the vertex textures and buffers in geometry.wgsl and texel_stretch.wgsl."""
-_VERTEX_MEMBERS = ("uv", "f4", 2), ("point", "u4"), ("pad", "u4"), ("normal", "f4", 3), ("last", "u4")
-_VERTEX_DTYPE = np.dtype(list(_VERTEX_MEMBERS))  # struct of a vertex in shape_vertices.wgsl
+_VERTEX_STRUCT_MEMBERS = ("uv", "f4", 2), ("point", "u4"), ("pad", "u4"), ("normal", "f4", 3), ("last", "u4")
+_VERTEX_DTYPE = np.dtype(list(_VERTEX_STRUCT_MEMBERS))  # struct of a vertex in shape_vertices.wgsl
 MIN_TANGENT = 1e-3
 """Least length of the part of dpdu orthogonal to the normal, relative to dpdu; shorter ones are replaced."""
 
@@ -95,11 +95,11 @@ def shape_tables(device: Device, head: Head) -> ShapeTables:
     )
 
 
-def make_shape(device: Device, tables: ShapeTables, *, moves: bool = True) -> Shape:
+def make_shape(device: Device, tables: ShapeTables, *, is_animated: bool = True) -> Shape:
     """Create the buffers of a shape.
 
     tables : constant buffers of the head, from `shape_tables`
-    moves : whether morph targets and bones move the shape; False for a shape at rest
+    is_animated : whether morph targets and bones move the shape; False for a shape at rest
     """
     rest, morphs, stencils = _point_buffer(device, tables.control), dict[str, Buffer](), dict[str, Buffer]()
     weights, matrices = (
@@ -107,7 +107,7 @@ def make_shape(device: Device, tables: ShapeTables, *, moves: bool = True) -> Sh
         _float_buffer(device, 12 * max(1, tables.bones)),
     )
     points = rest
-    if moves and tables.morphs:
+    if is_animated and tables.morphs:
         points = _point_buffer(device, tables.control)
         moving = {"rest": rest, "weights": weights, "matrices": matrices, "posed": points}
         morphs = tables.morphs | moving
@@ -118,27 +118,27 @@ def make_shape(device: Device, tables: ShapeTables, *, moves: bool = True) -> Sh
     return Shape(rest, weights, matrices, morphs, stencils, surface, tables)
 
 
-def _point_buffer(device: Device, count: int) -> Buffer:
-    return _float_buffer(device, 3 * count)
+def _point_buffer(device: Device, point_count: int) -> Buffer:
+    return _float_buffer(device, 3 * point_count)
 
 
-def _float_buffer(device: Device, count: int) -> Buffer:
-    return device.buffer(np.zeros(count, np.float32), "STORAGE")
+def _float_buffer(device: Device, float_count: int) -> Buffer:
+    return device.buffer(np.zeros(float_count, np.float32), "STORAGE")
 
 
 def _upload_tables(device: Device, tables: dict[str, NDArray[np.generic]]) -> dict[str, Buffer]:
     return {name: device.buffer(table, "STORAGE") for name, table in tables.items()}
 
 
-def _vertex_resources(device: Device, count: int) -> dict[str, Texture | Buffer]:
+def _vertex_resources(device: Device, vertex_count: int) -> dict[str, Texture | Buffer]:
     """Create the vertex texture (for software), the vertex buffer (for GPUs) and the tangent lengths."""
-    rows, software = -(-count // VERTICES_PER_ROW), device.adapter.kind == "CPU"
+    rows, software = -(-vertex_count // VERTICES_PER_ROW), device.adapter.kind == "CPU"
     table = make_texture(device, (4 * VERTICES_PER_ROW, rows if software else 1), "rgba32float")
     words = np.zeros((1 if software else rows * VERTICES_PER_ROW, 4, 4), np.float32)
     return dict(
         zip(
             VERTEX_RESOURCES,
-            (table, device.buffer(words, "STORAGE"), _float_buffer(device, 4 * count)),
+            (table, device.buffer(words, "STORAGE"), _float_buffer(device, 4 * vertex_count)),
             strict=True,
         )
     )
@@ -155,23 +155,23 @@ def _morph_tables(rig: Rig) -> dict[str, NDArray[np.generic]]:
     }
 
 
-def displacements(targets: MorphTargets, template: MorphTargets) -> NDArray[np.float32]:
+def displacements(targets: MorphTargets, template_targets: MorphTargets) -> NDArray[np.float32]:
     """Return the (n, 4) displacements [mm] and target indices, ordered by point, for shape_pose.wgsl.
 
-    template : targets that displace the same points; their order is used for all people of a template
+    template_targets : targets that displace the same points; their order is used for all people of a template
     """
     target_index = np.repeat(np.arange(len(targets.names), dtype=np.uint32), np.diff(targets.first))
-    order = template.point_order
+    order = template_targets.point_order
     table = np.zeros((max(1, len(order)), 4), np.float32)
     table[: len(order), :3] = targets.delta_mm.take(order, axis=0)
     table[: len(order), 3] = target_index.take(order).view(np.float32)
     return table
 
 
-def _bone_influences(skeleton: Skeleton | None, count: int) -> Words:
+def _bone_influences(skeleton: Skeleton | None, point_count: int) -> Words:
     """Return (p, 8) words: the indices of four bones per point, and their weights as float bits.
 
-    count : number of points
+    point_count : number of points
     """
     if skeleton is None:
         return np.zeros((1, 8), np.uint32)
@@ -179,7 +179,7 @@ def _bone_influences(skeleton: Skeleton | None, count: int) -> Words:
     return np.ascontiguousarray(np.concatenate([skeleton.bone.astype(np.uint32), weight], axis=1))
 
 
-def _contact_words(contact: LidContact | None, count: int) -> Words:
+def _contact_words(contact: LidContact | None, point_count: int) -> Words:
     """Return (p, 3) words that keep points outside the eyeballs, zeros for points without contact.
 
     The words are the indices of the front and back point of the eyeball, and the least distance from the
@@ -187,7 +187,7 @@ def _contact_words(contact: LidContact | None, count: int) -> Words:
     """
     if contact is None:
         return np.zeros((1, 3), np.uint32)
-    words = np.zeros((count, 3), np.uint32)
+    words = np.zeros((point_count, 3), np.uint32)
     clearance = np.ascontiguousarray(contact.min_clearance_mm, np.float32).view(np.uint32)
     ends = contact.apex[contact.ball], contact.back[contact.ball]
     words[contact.point] = np.stack([*ends, clearance], axis=1)
@@ -222,9 +222,9 @@ def _surface_tables(mesh: Mesh) -> dict[str, NDArray[np.generic]]:
     }
 
 
-def run_bounds(ordered: NDArray[np.integer], values: NDArray[np.integer]) -> Words:
+def run_bounds(sorted_values: NDArray[np.integer], run_values: NDArray[np.integer]) -> Words:
     """Return the (n, 2) start and end of the run of each of n values in a sorted array."""
-    ends = [np.searchsorted(ordered, values, side) for side in ("left", "right")]
+    ends = [np.searchsorted(sorted_values, run_values, side) for side in ("left", "right")]
     return np.stack(ends, axis=1).astype(np.uint32)
 
 
@@ -244,9 +244,9 @@ def normals_in_vertex_frames(mesh: Mesh) -> Doubles:
     return np.asarray(np.einsum("vkc,vc->vk", frame, mesh.normals.astype(np.float64)))
 
 
-def _run_offsets(index: NDArray[np.integer], count: int) -> Words:
-    """Return (count + 1,) offsets: where the runs of 0, 1, 2, ... start in a sorted array, and its length."""
-    return np.concatenate([[0], np.cumsum(np.bincount(index, minlength=count))]).astype(np.uint32)
+def _run_offsets(sorted_index: NDArray[np.integer], run_count: int) -> Words:
+    """Return (run_count + 1,) offsets: starts of the runs of 0, 1, ... in a sorted array, and its length."""
+    return np.concatenate([[0], np.cumsum(np.bincount(sorted_index, minlength=run_count))]).astype(np.uint32)
 
 
 class MotionBytes(NamedTuple):
@@ -283,7 +283,7 @@ def draw(graph: Recorder, shape: Shape, motion: MotionBytes) -> None:
 
 def make_rest_shape(device: Device, tables: ShapeTables) -> Shape:
     """Create the buffers of a person's shape at rest, without morph targets and bones."""
-    return make_shape(device, tables, moves=False)
+    return make_shape(device, tables, is_animated=False)
 
 
 def evaluate_rest_shape(device: Device, tables: ShapeTables, positions_mm: NDArray[np.float32]) -> Shape:
@@ -317,9 +317,20 @@ def _evaluate_surface(graph: Recorder, shape: Shape) -> None:
     _dispatch(graph, "shape/shape_vertices.wgsl", shape.surface, tables.vertices, limits)
 
 
-def _dispatch(graph: Recorder, name: str, bound: Bindings, count: int, constants: Constants = ()) -> None:
-    """Declare a pass of the shape with one shader invocation for each of `count` elements.
+def _dispatch(
+    graph: Recorder,
+    shader_name: str,
+    bound_resources: Bindings,
+    invocation_count: int,
+    constants: Constants = (),
+) -> None:
+    """Declare a pass of the shape with one shader invocation for each of `invocation_count` elements.
 
-    bound : resources of the shader
+    bound_resources : resources of the shader
     """
-    graph.dispatch("shape", program(graph.device, name, constants), bound, workgroup_grid(count))
+    graph.dispatch(
+        "shape",
+        program(graph.device, shader_name, constants),
+        bound_resources,
+        workgroup_grid(invocation_count),
+    )

@@ -25,8 +25,8 @@ from dermis.mesh.maps import PartMaps
 from dermis.mesh.mesh import Mesh
 from dermis.specular.beckmann import beckmann_table
 
-_SOFTWARE_SIDE = 1024  # limit of painted maps on software adapters, which are slow [texels]
-_MEAN_SIDE = 512  # side of the grid over which the mean of a map is computed [texels]
+_MAX_SOFTWARE_MAP_SIDE = 1024  # limit of painted maps on software adapters, which are slow [texels]
+_MEAN_GRID_SIDE = 512  # side of the grid over which the mean of a map is computed [texels]
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,25 +42,30 @@ class UploadedMaps:
 
 
 def upload_maps(
-    device: Device, head: Head, use_colour: bool, decoded: bool = True, side: int = 0, animated: bool = False
+    device: Device,
+    head: Head,
+    use_colour: bool,
+    decode_srgb: bool = True,
+    painted_side: int = 0,
+    animated: bool = False,
 ) -> UploadedMaps:
     """Upload or paint the maps of a head, with their sampler and the table of Beckmann's distribution.
 
     use_colour : False replaces the colour map by white, for profiles that contain the colour
-    decoded : False treats the sRGB values of the colour map as linear, a mistake shown in the talk
+    decode_srgb : False treats the sRGB values of the colour map as linear, a mistake shown in the talk
         [dEonLuebke2007]
-    side : side of painted maps [texels]
+    painted_side : side of painted maps [texels]
     animated : whether expressions change painted maps
     """
     maps = head.maps
     if not isinstance(maps, PaintedMaps):
-        return UploadedMaps(_upload_file_maps(device, head, use_colour, decoded), None)
-    if not decoded and use_colour and maps.colour is None:  # a painted map has no sRGB encoding
-        found = paint.paint_arrays(device, _painted_surface(head), maps.look, side)
+        return UploadedMaps(_upload_file_maps(device, head, use_colour, decode_srgb), None)
+    if not decode_srgb and use_colour and maps.colour is None:  # a painted map has no sRGB encoding
+        found = paint.paint_arrays(device, _painted_surface(head), maps.look, painted_side)
         maps = replace(maps, colour=found.colour)
         head = replace(head, maps=maps)
-    painted, expression_maps = _paint_maps(device, head, maps, use_colour, (side, animated))
-    return UploadedMaps(_upload_file_maps(device, head, use_colour, decoded) | painted, expression_maps)
+    painted, expression_maps = _paint_maps(device, head, maps, use_colour, (painted_side, animated))
+    return UploadedMaps(_upload_file_maps(device, head, use_colour, decode_srgb) | painted, expression_maps)
 
 
 def detail_bindings(device: Device, has_fine_relief: bool) -> MutableBindings:
@@ -83,7 +88,7 @@ def _paint_maps(
     """
     surface, (side, animated) = _painted_surface(head), paint_options
     if device.adapter.kind == "CPU":
-        side = min(side, _SOFTWARE_SIDE)
+        side = min(side, _MAX_SOFTWARE_MAP_SIDE)
     from_file = {"relief": maps.height if maps.normal is None else maps.normal, "colour": maps.colour}
     animated = animated and (from_file["relief"] is None or (use_colour and maps.colour is None))
     painted = paint.paint_textures(device, surface, maps.look, side, animated)
@@ -98,7 +103,7 @@ def _painted_surface(head: Head) -> PaintedSurface:
     return painted_surface(head.topology.mesh, head.topology.control.stencils)
 
 
-def _upload_file_maps(device: Device, head: Head, use_colour: bool, decoded: bool) -> MutableBindings:
+def _upload_file_maps(device: Device, head: Head, use_colour: bool, decode_srgb: bool) -> MutableBindings:
     maps = head.maps
     white = np.ones((1, 1, 3), np.float32)
     colour = (
@@ -106,7 +111,7 @@ def _upload_file_maps(device: Device, head: Head, use_colour: bool, decoded: boo
         if use_colour and maps.colour is not None
         else white * (DEFAULT_COLOUR if use_colour else 1.0)
     )
-    colour = colour if decoded else encode_srgb(colour)
+    colour = colour if decode_srgb else encode_srgb(colour)
     return {
         "map_sampler": device.sampler(mag_filter="linear", min_filter="linear", mipmap_filter="linear"),
         "relief_map": map_mips.make_relief(device, maps.height),
@@ -137,32 +142,32 @@ def _part_bindings(device: Device, maps: PartMaps | None) -> MutableBindings:
     return {"part_maps": map_mips.upload_layers(device, layers, "part maps")}
 
 
-def _factor_channel(values: NDArray[np.float32] | None) -> NDArray[np.float32]:
-    return np.ones((1, 1, 1), np.float32) if values is None else values[..., None]
+def _factor_channel(factor_map: NDArray[np.float32] | None) -> NDArray[np.float32]:
+    return np.ones((1, 1, 1), np.float32) if factor_map is None else factor_map[..., None]
 
 
-def _relative_to_mean(values: NDArray[np.float32] | None, mesh: Mesh) -> NDArray[np.float32]:
+def _relative_to_mean(factor_map: NDArray[np.float32] | None, mesh: Mesh) -> NDArray[np.float32]:
     """Return a map divided by its mean over the surface, a factor for uniform specular strength [-]."""
-    if values is None:
+    if factor_map is None:
         return _factor_channel(None)
-    texel, triangle = rasterise(mesh, _MEAN_SIDE, np.arange(len(mesh.triangles)))
+    texel, triangle = rasterise(mesh, _MEAN_GRID_SIDE, np.arange(len(mesh.triangles)))
     corners = mesh.positions[mesh.triangles].astype(np.float64)
     weight = (triangle_areas(corners) / np.maximum(triangle_uv_area(mesh), 1e-12))[triangle]
-    height, width = values.shape
-    row, column = texel // _MEAN_SIDE, texel % _MEAN_SIDE
-    found = values[row * height // _MEAN_SIDE, column * width // _MEAN_SIDE]
+    height, width = factor_map.shape
+    row, column = texel // _MEAN_GRID_SIDE, texel % _MEAN_GRID_SIDE
+    found = factor_map[row * height // _MEAN_GRID_SIDE, column * width // _MEAN_GRID_SIDE]
     mean = float((weight * found).sum() / weight.sum()) if len(texel) else 0.0
-    return _factor_channel(values / mean if mean > 0 else np.ones_like(values))
+    return _factor_channel(factor_map / mean if mean > 0 else np.ones_like(factor_map))
 
 
-def _upload_grey(device: Device, values: NDArray[np.float32]) -> Texture:
+def _upload_grey(device: Device, grey_map: NDArray[np.float32]) -> Texture:
     """Upload a one-channel map as half floats with all mip levels.
 
     The CPU computes the levels, because devices need not support writing to r16float textures.
     """
-    levels = mip_chain(values)
-    height, width = values.shape[:2]
-    texture = make_texture(device, (width, height), "r16float", mips=len(levels), use="map")
+    levels = mip_chain(grey_map)
+    height, width = grey_map.shape[:2]
+    texture = make_texture(device, (width, height), "r16float", mip_count=len(levels), content_source="map")
     for index, level in enumerate(levels):
         upload(device, texture, level, mip=index)
     return texture

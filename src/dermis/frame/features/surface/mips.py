@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.frame.programs import HALF_FORMAT, program
+from dermis.frame.programs import HALF_TEXEL_FORMAT, program
 from dermis.gpu import (
     Bindings,
     Buffer,
@@ -24,8 +24,8 @@ from dermis.gpu.textures import make_view, texture_from_array
 from dermis.images.filters import mip_chain
 
 Floats = NDArray[np.float32]
-_ROWS_PER_INVOCATION = 32  # rows per invocation of relief.wgsl
-_BAND_BYTES = 96 << 20  # largest size of the heights of a pass; every device can bind such a buffer
+_RELIEF_ROWS_PER_INVOCATION = 32  # rows per invocation of relief.wgsl
+_MAX_BAND_BYTES = 96 << 20  # largest size of the heights of a pass; every device can bind such a buffer
 
 
 class MippedTexture(NamedTuple):
@@ -41,28 +41,28 @@ class MippedTexture(NamedTuple):
         return width, height
 
 
-def upload_colours(device: Device, image: Floats) -> Texture:
+def upload_colours(device: Device, colour_map: Floats) -> Texture:
     """Upload an (h, w, 3) colour map as half floats with all mip levels."""
-    mipped = empty_map(device, image.shape)
-    alpha = np.ones(image.shape[:2], np.float16)
-    upload(device, mipped.texture, np.dstack([image.astype(np.float16), alpha]))
+    mipped = empty_map(device, colour_map.shape)
+    alpha = np.ones(colour_map.shape[:2], np.float16)
+    upload(device, mipped.texture, np.dstack([colour_map.astype(np.float16), alpha]))
     frame = CommandList(device, timed=False)
     fill_mips(frame, mipped)
     frame.submit()
     return mipped.texture
 
 
-def upload_slopes(device: Device, image: Floats | None) -> Texture:
+def upload_slopes(device: Device, slopes: Floats | None) -> Texture:
     """Upload (h, w, 2) slopes and their squares with mip levels; shaders derive the slope variance.
 
-    image : slopes along u and v, None for a flat texture
+    slopes : slopes along u and v, None for a flat texture
     """
-    if image is None:
+    if slopes is None:
         return _flat_relief(device)
-    mipped, frame = empty_map(device, image.shape), CommandList(device, timed=False)
-    bound: Bindings = {"slopes": texture_from_array(device, image, "rg32float"), "stored": mipped.levels[0]}
-    shader = program(device, "surface/map_moments.wgsl", store=HALF_FORMAT)
-    frame.compute("maps", shader, bound, image.shape[1::-1])
+    mipped, frame = empty_map(device, slopes.shape), CommandList(device, timed=False)
+    bound: Bindings = {"slopes": texture_from_array(device, slopes, "rg32float"), "stored": mipped.levels[0]}
+    shader = program(device, "surface/map_moments.wgsl", store=HALF_TEXEL_FORMAT)
+    frame.compute("maps", shader, bound, slopes.shape[1::-1])
     fill_mips(frame, mipped)
     frame.submit()
     return mipped.texture
@@ -78,49 +78,62 @@ def upload_detail(device: Device, slopes: Floats) -> Texture:
     return upload_layers(device, [slopes, np.pad(sums, ((0, 0), (0, 0), (0, 2)))], "texture")
 
 
-def upload_layers(device: Device, layers: Sequence[Floats], name: str) -> Texture:
+def upload_layers(device: Device, layer_maps: Sequence[Floats], texture_name: str) -> Texture:
     """Upload maps (h, w, 4) of one size as layers of a texture of half floats, with all mip levels.
 
-    name : name of the texture, for error messages
+    texture_name : name of the texture, for error messages
     """
-    height, width = layers[0].shape[:2]
+    height, width = layer_maps[0].shape[:2]
     mips = max(height, width).bit_length()
     texture = make_texture(
-        device, (width, height), HALF_FORMAT, layers=len(layers), mips=mips, use="map", name=name
+        device,
+        (width, height),
+        HALF_TEXEL_FORMAT,
+        layer_count=len(layer_maps),
+        mip_count=mips,
+        content_source="map",
+        texture_name=texture_name,
     )
-    for layer, texels in enumerate(layers):
+    for layer, texels in enumerate(layer_maps):
         for mip, level in enumerate(mip_chain(texels)):
             upload(device, texture, level, mip=mip, layer=layer)
     return texture
 
 
-def make_relief(device: Device, height: Floats | None) -> Texture:
+def make_relief(device: Device, height_map: Floats | None) -> Texture:
     """Compute a texture of the slopes of a height map and their squares, with all mip levels.
 
-    height : (h, w) heights whose differences are slopes [mm/texel], None for a flat texture
+    height_map : (h, w) heights whose differences are slopes [mm/texel], None for a flat texture
 
     Heights are extrapolated linearly beyond the edges.
     """
-    if height is None or height.size == 1:
+    if height_map is None or height_map.size == 1:
         return _flat_relief(device)
-    padded = np.pad(height, 1, "reflect", reflect_type="odd")
-    band = max(_BAND_BYTES // padded[:1].nbytes // _ROWS_PER_INVOCATION, 1) * _ROWS_PER_INVOCATION
-    bands = (device.buffer(padded[top : top + band + 2], "STORAGE") for top in range(0, len(height), band))
-    return relief_from_buffers(device, bands, height.shape, band)
+    padded = np.pad(height_map, 1, "reflect", reflect_type="odd")
+    band = (
+        max(_MAX_BAND_BYTES // padded[:1].nbytes // _RELIEF_ROWS_PER_INVOCATION, 1)
+        * _RELIEF_ROWS_PER_INVOCATION
+    )
+    bands = (
+        device.buffer(padded[top : top + band + 2], "STORAGE") for top in range(0, len(height_map), band)
+    )
+    return relief_from_buffers(device, bands, height_map.shape, band)
 
 
 def relief_from_buffers(
-    device: Device, bands: Iterable[Buffer], shape: tuple[int, ...], band: int
+    device: Device, height_bands: Iterable[Buffer], map_shape: tuple[int, ...], rows_per_band: int
 ) -> Texture:
     """Compute a texture of the slopes of a height map and their squares, from heights in buffers.
 
-    bands : buffers of consecutive rows, with a border of one texel on all sides
-    shape : (h, w) of the height map
-    band : number of rows per buffer
+    height_bands : buffers of consecutive rows, with a border of one texel on all sides
+    map_shape : (h, w) of the height map
+    rows_per_band : number of rows per buffer
     """
-    mipped, frame, (rows, columns) = empty_map(device, shape), CommandList(device, timed=False), shape
-    for index, heights in enumerate(bands):
-        _draw_slopes(frame, mipped, heights, index * band, min(band, rows - index * band))
+    mipped, frame, (rows, columns) = empty_map(device, map_shape), CommandList(device, timed=False), map_shape
+    for index, heights in enumerate(height_bands):
+        _draw_slopes(
+            frame, mipped, heights, index * rows_per_band, min(rows_per_band, rows - index * rows_per_band)
+        )
     fill_mips(frame, mipped, 1 if rows % 2 or columns % 2 else 2)
     frame.submit()
     return mipped.texture
@@ -136,10 +149,12 @@ def fill_relief(recorder: Recorder, relief: MippedTexture, heights: Buffer) -> N
     fill_mips(recorder, relief, 2)
 
 
-def _draw_slopes(recorder: Recorder, relief: MippedTexture, heights: Buffer, top: int, rows: int) -> None:
+def _draw_slopes(
+    recorder: Recorder, relief: MippedTexture, heights: Buffer, first_row: int, row_count: int
+) -> None:
     device = recorder.device
     first = device.cached(
-        f"relief from row {top}", lambda: device.buffer(np.array([top], np.uint32), "STORAGE")
+        f"relief from row {first_row}", lambda: device.buffer(np.array([first_row], np.uint32), "STORAGE")
     )
     bound: Bindings = {
         "top": first,
@@ -147,18 +162,22 @@ def _draw_slopes(recorder: Recorder, relief: MippedTexture, heights: Buffer, top
         "stored": relief.levels[0],
         "halved": relief.levels[1],
     }
-    size = -(-relief.size[0] // 2), -(-rows // _ROWS_PER_INVOCATION)
-    recorder.compute("maps", program(device, "surface/relief.wgsl", store=HALF_FORMAT), bound, size)
+    size = -(-relief.size[0] // 2), -(-row_count // _RELIEF_ROWS_PER_INVOCATION)
+    recorder.compute("maps", program(device, "surface/relief.wgsl", store=HALF_TEXEL_FORMAT), bound, size)
 
 
 def _flat_relief(device: Device) -> Texture:
-    return device.cached("no relief", lambda: make_texture(device, (1, 1), HALF_FORMAT, use="map"))
+    return device.cached(
+        "no relief", lambda: make_texture(device, (1, 1), HALF_TEXEL_FORMAT, content_source="map")
+    )
 
 
-def empty_map(device: Device, shape: tuple[int, ...]) -> MippedTexture:
+def empty_map(device: Device, map_shape: tuple[int, ...]) -> MippedTexture:
     """Allocate an (h, w) map of half floats with all mip levels."""
-    mips = max(shape[:2]).bit_length()
-    texture = make_texture(device, (shape[1], shape[0]), HALF_FORMAT, mips=mips, name="painted map")
+    mips = max(map_shape[:2]).bit_length()
+    texture = make_texture(
+        device, (map_shape[1], map_shape[0]), HALF_TEXEL_FORMAT, mip_count=mips, texture_name="painted map"
+    )
     return with_mip_views(texture)
 
 
@@ -169,13 +188,16 @@ def with_mip_views(texture: Texture) -> MippedTexture:
     )
 
 
-def fill_mips(recorder: Recorder, mipped: MippedTexture, first: int = 1) -> None:
+def fill_mips(recorder: Recorder, mipped: MippedTexture, first_level: int = 1) -> None:
     """Declare the passes that compute each mip level from the next finer mip level.
 
-    first : index of the first level to compute
+    first_level : index of the first level to compute
     """
-    shader, levels = program(recorder.device, "surface/map_halve.wgsl", store=HALF_FORMAT), mipped.levels
+    shader, levels = (
+        program(recorder.device, "surface/map_halve.wgsl", store=HALF_TEXEL_FORMAT),
+        mipped.levels,
+    )
     width, height = mipped.size
-    for mip in range(first, len(levels)):
+    for mip in range(first_level, len(levels)):
         bound: Bindings = {"finer": levels[mip - 1], "stored": levels[mip]}
         recorder.compute("maps", shader, bound, (max(width >> mip, 1), max(height >> mip, 1)))

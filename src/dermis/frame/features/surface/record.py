@@ -24,9 +24,9 @@ from dermis.specular.models import MODELS
 Floats = NDArray[np.float64]
 DEFAULT_COLOUR = 0.8
 """Albedo of heads without a colour map [-]."""
-_EYE_SEEDS = 1000  # number of different eyes
-_NO_BAND = -1.0
-_MAX_OFFSET_MM = 3.0  # limit of the offset of oblique light, as the surface is flat only near a texel
+_EYE_SEED_COUNT = 1000  # number of different eyes
+_NO_RELIEF_LEVEL = -1.0
+_MAX_OBLIQUE_OFFSET_MM = 3.0  # limit of the offset of oblique light, as the surface is flat only near a texel
 
 
 def lobe_shaders() -> list[ShaderListMember]:
@@ -60,7 +60,7 @@ def fill_eye(record: UniformRecord, look: EyeLook) -> None:
     """Write the appearance of eyes to the members of one or more records of the shader struct `Eye`."""
     for name in ("eumelanin", "pupil_mm", "redness"):
         record[name] = getattr(look, name)
-    record["seed"] = look.seed % _EYE_SEEDS
+    record["seed"] = look.seed % _EYE_SEED_COUNT
 
 
 def surface_constants(skin: Skin) -> tuple[tuple[str, int], ...]:
@@ -118,7 +118,9 @@ def _direction_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str
     response = anisotropic_response(*half_space, skin.anisotropy)
     return {
         "eta_below": response.eta,
-        "oblique_offset_mm": min(oblique_offset_mm(equivalent_medium(profile, *half_space)), _MAX_OFFSET_MM),
+        "oblique_offset_mm": min(
+            oblique_offset_mm(equivalent_medium(profile, *half_space)), _MAX_OBLIQUE_OFFSET_MM
+        ),
         "mean_single_scattering": response.mean_kernel,
         "single_scattering": response.single_scattering,
         "uniform_reflectance": response.relative_diffuse_reflectance,
@@ -136,6 +138,6 @@ def _relief_band(maps: Maps) -> float:
     relief of the height map is added.
     """
     if maps.normal is None or maps.height is None:
-        return _NO_BAND
+        return _NO_RELIEF_LEVEL
     finer = max(maps.height.shape[:2]) / max(maps.normal.shape[:2])
-    return float(np.log2(finer)) if finer > 1 else _NO_BAND
+    return float(np.log2(finer)) if finer > 1 else _NO_RELIEF_LEVEL

@@ -10,10 +10,13 @@ SURFACE_TEXEL_BYTES = 32
 """Size of a texel of the surface texture [bytes]."""
 
 
-def make_surface_texture(device: Device, side: int) -> Texture:
+def make_surface_texture(device: Device, atlas_side: int) -> Texture:
     """Allocate the texture of positions, normals, colours and gloss of texels, see packed_surface.wgsl."""
     return mark_scratch(
-        device, make_texture(device, (side, side), "rgba32uint", layers=2, name="atlas's surface")
+        device,
+        make_texture(
+            device, (atlas_side, atlas_side), "rgba32uint", layer_count=2, texture_name="atlas's surface"
+        ),
     )
 
 

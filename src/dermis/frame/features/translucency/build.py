@@ -25,7 +25,7 @@ from dermis.frame.features.translucency.passes import (
     RECEIVER_BYTES,
     SOURCE_BYTES,
     choose_source_level,
-    make_buffer,
+    make_element_buffer,
     weight_bindings,
 )
 from dermis.frame.features.translucency.resources import PairBuffers, Translucency
@@ -36,11 +36,14 @@ from dermis.optics.gaussians import GaussianSum
 from dermis.optics.thin_parts import ThinParts, solve_thin_parts
 
 Floats = NDArray[np.float64]
-_REACH_DEVIATIONS, _MAX_REACH_MM = 4.0, 40.0  # thickest part in the tables: in standard deviations, and in mm
-_STEPS_PER_DOUBLING, _MIN_WIDTH_MM = 2, 0.5  # spacing and minimum of rounded widths
-_CACHE_SIZE = 4
+_MAX_THICKNESS_SIGMAS, _MAX_THICKNESS_MM = (
+    4.0,
+    40.0,
+)  # thickest part in the tables: in standard deviations, and in mm
+_WIDTH_STEPS_PER_DOUBLING, _MIN_WIDTH_MM = 2, 0.5  # spacing and minimum of rounded widths
+_CACHED_PAIR_SEARCHES = 4
 _UNIT_LIGHT = np.array([0xFE000, 0x3F8FE000], np.uint32)  # white light of 1, encoded as in packed_light.wgsl
-_COARSENING = 1.5  # factor of the cell side when memory does not hold the pairs
+_CELL_COARSENING_FACTOR = 1.5  # factor of the cell side when memory does not hold the pairs
 
 
 def thin_part_tables(memo: Memo, request: FrameRequest) -> ThinParts | None:
@@ -59,7 +62,7 @@ def _level_tables(
     colour: Floats,
     eta: float,
     g: float,
-    total: Floats,
+    total_weight: Floats,
     variance_mm2: Floats,
     weight: Floats,
 ) -> ThinParts:
@@ -69,15 +72,15 @@ def _level_tables(
 
     colour, eta : (3,) diffuse reflectance [-] and index of refraction of the half-space
     g : anisotropy [-]
-    total : (3,) sums of the weights of all Gaussians of the profile [-]
+    total_weight : (3,) sums of the weights of all Gaussians of the profile [-]
     variance_mm2, weight : (k,) variances [mm^2] and (k, 3) weights of the blurred levels
     """
-    reach = min(_REACH_DEVIATIONS * float(np.sqrt(variance_mm2[-1])), _MAX_REACH_MM)
+    reach = min(_MAX_THICKNESS_SIGMAS * float(np.sqrt(variance_mm2[-1])), _MAX_THICKNESS_MM)
     tables = solve_thin_parts(equivalent_medium(profile, colour, eta), variance_mm2, reach, g)
-    blurred = weight.sum(axis=0) / np.maximum(total, MIN_WEIGHT_SUM)
+    blurred = weight.sum(axis=0) / np.maximum(total_weight, MIN_WEIGHT_SUM)
     scale = np.minimum(1.0, blurred / np.maximum(tables.lost.sum(axis=1), MIN_WEIGHT_SUM))[:, None]
     lost = tables.lost * scale / np.maximum(blurred, MIN_WEIGHT_SUM)
-    return replace(tables, transmitted=tables.transmitted * scale * total, lost=lost)
+    return replace(tables, transmitted=tables.transmitted * scale * total_weight, lost=lost)
 
 
 def make_translucency(
@@ -88,31 +91,34 @@ def make_translucency(
     atlas: Atlas,
     variance_mm2: Floats,
     weight: Floats,
-    tables: ThinParts | None,
+    thickness_tables: ThinParts | None,
     shares_pairs: bool,
-    owner: str,
+    layout_key: str,
 ) -> Translucency:
     """Return the resources for light that is transmitted through thin parts of a head.
 
     surface : resources of geometry.wgsl and of the atlas, for the current shape
     rest_surface : the same resources for the shape in which pairs are searched
     variance_mm2, weight : (k,) variances [mm^2] and (k, 3) weights of the blurred levels
-    tables : transmittance by thickness; None to weight pairs by the Gaussians of their straight distance
+    thickness_tables : transmittance by thickness; None to weight pairs by the Gaussians of their straight
+        distance
     shares_pairs : whether skins with similar profiles use the same pairs; true for skins that may change
         between frames
-    owner : name of the atlas layout in the cache
+    layout_key : name of the atlas layout in the cache
     """
     widest_mm = float(np.sqrt(variance_mm2[-1]))
     widest_mm = rounded_width(widest_mm) if shares_pairs else widest_mm
-    cells = memo.get(_cell_divisions, atlas, owner=owner)(widest_mm)
-    pairs = memo.get(PairCache, device, rest_surface, atlas, owner=owner).find(cells)
-    buffers = memo.get(make_buffers, device, surface, pairs, owner=owner)
-    return memo.get(with_profile, device, buffers, variance_mm2, weight, tables, owner=owner)
+    cells = memo.get(_cell_divisions, atlas, caller_name=layout_key)(widest_mm)
+    pairs = memo.get(PairCache, device, rest_surface, atlas, caller_name=layout_key).find(cells)
+    buffers = memo.get(make_buffers, device, surface, pairs, caller_name=layout_key)
+    return memo.get(
+        with_profile, device, buffers, variance_mm2, weight, thickness_tables, caller_name=layout_key
+    )
 
 
 def _cell_divisions(atlas: Atlas) -> Callable[[float], Cells]:
     """Return a function that divides an atlas into cells for a width, and caches the last few divisions."""
-    return lru_cache(_CACHE_SIZE)(partial(divide_into_cells, atlas))
+    return lru_cache(_CACHED_PAIR_SEARCHES)(partial(divide_into_cells, atlas))
 
 
 class PairCache:
@@ -129,20 +135,20 @@ class PairCache:
         """Return the pairs for a division into cells, from the cache or by a new search."""
         pairs = self._cache.pop(cells, None)
         if pairs is None:
-            while len(self._cache) >= _CACHE_SIZE:
+            while len(self._cache) >= _CACHED_PAIR_SEARCHES:
                 self._cache.pop(next(iter(self._cache)))
             pairs = find_pairs(self._device, self._surface, self._atlas, cells)
         self._cache[cells] = pairs
         return pairs
 
 
-def rounded_width(widest_mm: float) -> float:
+def rounded_width(widest_sigma_mm: float) -> float:
     """Round a width to the nearest power of sqrt(2) [mm], so that skins with similar profiles share pairs.
 
-    widest_mm : standard deviation of the widest Gaussian [mm]
+    widest_sigma_mm : standard deviation of the widest Gaussian [mm]
     """
-    step = round(_STEPS_PER_DOUBLING * float(np.log2(max(widest_mm, _MIN_WIDTH_MM))))
-    return float(2.0 ** (step / _STEPS_PER_DOUBLING))
+    step = round(_WIDTH_STEPS_PER_DOUBLING * float(np.log2(max(widest_sigma_mm, _MIN_WIDTH_MM))))
+    return float(2.0 ** (step / _WIDTH_STEPS_PER_DOUBLING))
 
 
 @logged_step("finding the thin parts")
@@ -150,42 +156,42 @@ def find_pairs(device: Device, surface: Bindings, atlas: Atlas, cells: Cells) ->
     """Find the translucent pairs of a surface, with coarser cells if a buffer cannot hold all pairs."""
     table, times = search_pairs(device, surface, cells), count(1)
     while table is None:
-        cells = divide_into_cells(atlas, cells.max_sigma_mm, _COARSENING ** next(times))
+        cells = divide_into_cells(atlas, cells.max_sigma_mm, _CELL_COARSENING_FACTOR ** next(times))
         table = search_pairs(device, surface, cells)
     return make_pair_buffers(device, cells, table)
 
 
-def make_pair_buffers(device: Device, cells: Cells, table: PairTable) -> PairBuffers:
+def make_pair_buffers(device: Device, cells: Cells, pair_table: PairTable) -> PairBuffers:
     """Return the pairs of a search as the buffers that the passes of a frame read."""
     return PairBuffers(
         cells=cells,
-        receivers=upload_receivers(device, cells, table.receiver),
-        sources=upload_sources(device, cells, table.source),
-        pairs=table.pairs,
-        count=int(table.first[-1]),
-        receiver_ranges=device.buffer(_receiver_ranges(cells, table), "STORAGE"),
+        receivers=upload_receivers(device, cells, pair_table.receiver),
+        sources=upload_sources(device, cells, pair_table.source),
+        pairs=pair_table.pairs,
+        count=int(pair_table.first[-1]),
+        receiver_ranges=device.buffer(_receiver_ranges(cells, pair_table), "STORAGE"),
         transmitted=mark_scratch(device, _zero_light(device, cells.receiver_mask)),
         lost=_zero_light(device, cells.receiver_mask),
     )
 
 
-def _receiver_ranges(cells: Cells, table: PairTable) -> NDArray[np.uint32]:
+def _receiver_ranges(cells: Cells, pair_table: PairTable) -> NDArray[np.uint32]:
     """Return (m, 3) words: the packed cell of each receiver, and the first and end index of its pairs.
 
     Without receivers, the table is one row of zeros. Receivers with many pairs come first: invocations that
     run side by side then take about equally long, and the last workgroups are short.
     """
-    first, end = table.first[:-1], table.first[1:]
+    first, end = pair_table.first[:-1], pair_table.first[1:]
     order = np.argsort(first - end, kind="stable")
-    rows = np.stack([cells.receivers[table.receiver], first, end], axis=-1)[order].astype(np.uint32)
+    rows = np.stack([cells.receivers[pair_table.receiver], first, end], axis=-1)[order].astype(np.uint32)
     return rows if len(rows) else np.zeros((1, 3), np.uint32)
 
 
-def _zero_light(device: Device, surface: NDArray[np.bool_]) -> Texture:
+def _zero_light(device: Device, surface_mask: NDArray[np.bool_]) -> Texture:
     """Return a black texture with alpha 1 where the mask shows surface, over the coarse atlas."""
-    light = np.zeros((*surface.shape, 4), np.float32)
-    light[..., 3] = surface
-    texture = make_texture(device, surface.shape, "rgba32float")
+    light = np.zeros((*surface_mask.shape, 4), np.float32)
+    light[..., 3] = surface_mask
+    texture = make_texture(device, surface_mask.shape, "rgba32float")
     upload(device, texture, light)
     return texture
 
@@ -195,22 +201,25 @@ def with_profile(
     buffers: Translucency,
     variance_mm2: Floats,
     weight: Floats,
-    tables: ThinParts | None = None,
+    thickness_tables: ThinParts | None = None,
 ) -> Translucency:
     """Return a copy of the translucency resources with the weights of a profile.
 
     variance_mm2, weight : (k,) variances [mm^2] and (k, 3) weights of the blurred levels
-    tables : transmittance by thickness; None to weight pairs by the Gaussians of their straight distance
+    thickness_tables : transmittance by thickness; None to weight pairs by the Gaussians of their straight
+        distance
     """
     fraction = weight / np.maximum(weight.sum(axis=0), MIN_WEIGHT_SUM)
-    transmitted = weight if tables is None else tables.transmitted
-    lost = fraction if tables is None else tables.lost
+    transmitted = weight if thickness_tables is None else thickness_tables.transmitted
+    lost = fraction if thickness_tables is None else thickness_tables.lost
     return replace(
         buffers,
-        weight_bindings=weight_bindings(device, buffers.pairs, variance_mm2, weight, tables, transmitted),
-        loss_bindings=weight_bindings(device, buffers.pairs, variance_mm2, fraction, tables, lost),
+        weight_bindings=weight_bindings(
+            device, buffers.pairs, variance_mm2, weight, thickness_tables, transmitted
+        ),
+        loss_bindings=weight_bindings(device, buffers.pairs, variance_mm2, fraction, thickness_tables, lost),
         gaussian_count=len(weight),
-        uses_tables=tables is not None,
+        uses_tables=thickness_tables is not None,
         source_level=choose_source_level(buffers.pairs.cells.cell_mm, variance_mm2),
     )
 
@@ -224,10 +233,10 @@ def make_buffers(device: Device, surface: Bindings, pairs: PairBuffers) -> Trans
     return Translucency(
         pairs=pairs,
         surface=surface,
-        receiver_points=mark_scratch(device, make_buffer(device, receivers, RECEIVER_BYTES)),
-        source_points=make_buffer(device, sources, SOURCE_BYTES),
-        weights=make_buffer(device, pairs.count, 8),
-        source_light=mark_scratch(device, make_buffer(device, sources, 16)),
-        direction_factors=mark_scratch(device, make_buffer(device, sources, 8)),
+        receiver_points=mark_scratch(device, make_element_buffer(device, receivers, RECEIVER_BYTES)),
+        source_points=make_element_buffer(device, sources, SOURCE_BYTES),
+        weights=make_element_buffer(device, pairs.count, 8),
+        source_light=mark_scratch(device, make_element_buffer(device, sources, 16)),
+        direction_factors=mark_scratch(device, make_element_buffer(device, sources, 8)),
         unit_light=device.buffer(np.tile(_UNIT_LIGHT, (max(sources, 1), 2)), "STORAGE"),
     )

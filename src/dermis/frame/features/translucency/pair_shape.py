@@ -9,10 +9,10 @@ from dermis.frame.request import FrameRequest
 from dermis.gpu import Memo
 from dermis.mesh.head import Head
 
-MAX_STRAIN = 0.2
+MAX_SHARED_PAIR_STRAIN = 0.2
 """Relative change of lengths on the surface up to which the pairs of the head at rest are used."""
-_SAMPLES, _SEED = 2000, 0
-_QUANTILE = 0.9  # quantile of the changes of length; it ignores the few lengths from lip to lip
+_SAMPLED_LENGTH_COUNT, _SAMPLING_SEED = 2000, 0
+_STRAIN_QUANTILE = 0.9  # quantile of the changes of length; it ignores the few lengths from lip to lip
 
 
 class StrainGauge:
@@ -23,7 +23,7 @@ class StrainGauge:
 
         self._rest_mm = head.control.positions_mm
         count = len(self._rest_mm)
-        sample = np.random.default_rng(_SEED).permutation(count)[:_SAMPLES]
+        sample = np.random.default_rng(_SAMPLING_SEED).permutation(count)[:_SAMPLED_LENGTH_COUNT]
         nearest = np.asarray(cKDTree(self._rest_mm[sample]).query(self._rest_mm[sample], 2)[1])
         pairs: Intp = np.column_stack([sample, sample[nearest[:, 1]]])
         self._pairs = pairs[self._lengths(self._rest_mm, pairs) > 0.0]
@@ -35,7 +35,7 @@ class StrainGauge:
         positions_mm : (p, 3) control points of another shape [mm]
         """
         lengths = self._lengths(positions_mm, self._pairs)
-        return float(np.quantile(np.abs(lengths / self._rest_lengths - 1.0), _QUANTILE))
+        return float(np.quantile(np.abs(lengths / self._rest_lengths - 1.0), _STRAIN_QUANTILE))
 
     @staticmethod
     def _lengths(positions_mm: Floats, pairs: Intp) -> Floats:
@@ -47,11 +47,12 @@ def pair_positions_mm(memo: Memo, request: FrameRequest) -> Floats | None:
     """Return the control points of the shape in which pairs are searched [mm], None for the head at rest.
 
     Pairs of the topology follow other shapes, such as the frames of a mesh sequence: only their weights
-    change. Pairs are searched separately for a shape that strains the surface by more than `MAX_STRAIN`.
+    change. Pairs are searched separately for a shape that strains the surface by more than
+    `MAX_SHARED_PAIR_STRAIN`.
     People of one template always share the pairs of the template.
     """
     positions = request.rest_positions_mm
     if positions is None or request.is_shared:
         return None
     gauge = memo.get(StrainGauge, request.topology)
-    return positions if gauge.strain(positions) > MAX_STRAIN else None
+    return positions if gauge.strain(positions) > MAX_SHARED_PAIR_STRAIN else None

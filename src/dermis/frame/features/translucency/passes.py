@@ -18,47 +18,50 @@ from dermis.optics.thin_parts import THICKNESS_ROWS, ThinParts
 RECEIVER_BYTES, SOURCE_BYTES = 48, 32
 """Sizes of the structs Receiver and Source of translucent_pair.wgsl."""
 
-_GPU_CONSTANTS: Constants = (("SIZE", 128), ("TEAM", 16), ("ROUND", 4))
+_GPU_WORKGROUP_CONSTANTS: Constants = (("SIZE", 128), ("TEAM", 16), ("ROUND", 4))
 # On software adapters barriers are slow, so that each invocation works alone.
-_SOFTWARE_CONSTANTS: Constants = (("SIZE", 128), ("TEAM", 1), ("ROUND", 1))
-_SOURCE_GROUP = 64  # invocations of a workgroup, as in translucency_gather.wgsl
+_SOFTWARE_WORKGROUP_CONSTANTS: Constants = (("SIZE", 128), ("TEAM", 1), ("ROUND", 1))
+_SOURCES_PER_WORKGROUP = 64  # invocations of a workgroup, as in translucency_gather.wgsl
 Floats = NDArray[np.float64]
 # Least ratio of a Gaussian's variance to the squared sample spacing, for a sum that is constant to 1e-6.
 _MIN_VARIANCE_RATIO = 0.72
 # Pairs per row of workgroups, and per workgroup, in translucency_weights.wgsl.
 _PAIRS_PER_ROW, _PAIRS_PER_GROUP = 1024, 64
-_MIN_SMOOTHNESS = 0.45  # least ratio of the deviation of the light that sources sample to their spacing
+_MIN_SOURCE_SMOOTHNESS = (
+    0.45  # least ratio of the deviation of the light that sources sample to their spacing
+)
 
 
-def make_buffer(device: Device, count: int, size: int = 4) -> Buffer:
-    """Allocate a buffer for `count` elements of `size` bytes, but for at least one element."""
-    return device.storage_buffer(size * max(1, count))
+def make_element_buffer(device: Device, element_count: int, element_bytes: int = 4) -> Buffer:
+    """Allocate a buffer for elements of `element_bytes` each, but for at least one element."""
+    return device.storage_buffer(element_bytes * max(1, element_count))
 
 
 def draw_points(
     graph: Recorder,
-    role: str,
+    cell_role: str,
     surface: Bindings,
     cells: Cells,
-    table: tuple[Buffer, int],
+    cell_table: tuple[Buffer, int],
     points: Buffer,
-    facets: bool = False,
+    metric_from_triangles: bool = False,
 ) -> None:
     """Declare the pass that writes the current positions and normals of receivers or sources.
 
     The pass also writes the area of sources, or the metric of receivers, which maps offsets in the atlas to
     lengths.
 
-    role : "receiver" or "source"
+    cell_role : "receiver" or "source"
     surface : resources of geometry.wgsl and of the atlas
-    table : buffer of cells, and its number of rows
+    cell_table : buffer of cells, and its number of rows
     points : buffer to write to
-    facets : whether to take the metric of receivers from the triangles instead of the stretch map
+    metric_from_triangles : whether to take the metric of receivers from the triangles instead of the stretch
+        map
     """
-    name, (buffer, count) = f"translucency/translucency_{role}s.wgsl", table
-    shader = program(graph.device, name, (("FACETS", 1),) if facets else ())
+    name, (buffer, count) = f"translucency/translucency_{cell_role}s.wgsl", cell_table
+    shader = program(graph.device, name, (("FACETS", 1),) if metric_from_triangles else ())
     record = shader.record("Cells", size=cells.size, side=cells.side, stride=cells.stride, count=count)
-    own: Bindings = {"cells": record, f"{role}s": buffer, f"{role}_points": points}
+    own: Bindings = {"cells": record, f"{cell_role}s": buffer, f"{cell_role}_points": points}
     graph.dispatch("pairs", shader, {**surface, **own}, workgroup_grid(count))
 
 
@@ -91,7 +94,7 @@ def draw(
         else thin_parts.unit_light,
         "source_light": thin_parts.source_light,
     }
-    graph.dispatch("translucency", gather, bindings, workgroup_grid(pairs.sources[1], _SOURCE_GROUP))
+    graph.dispatch("translucency", gather, bindings, workgroup_grid(pairs.sources[1], _SOURCES_PER_WORKGROUP))
     sum_pairs(graph, thin_parts, thin_parts.source_light, pairs.transmitted, constants)
     return pairs.transmitted
 
@@ -114,35 +117,38 @@ def draw_direction_factors(
         "source_points": thin_parts.source_points,
         "direction_factors": thin_parts.direction_factors,
     }
-    graph.dispatch("translucency", shader, bindings, workgroup_grid(count, _SOURCE_GROUP))
+    graph.dispatch("translucency", shader, bindings, workgroup_grid(count, _SOURCES_PER_WORKGROUP))
 
 
 def sum_pairs(
     graph: Recorder,
     thin_parts: Translucency,
     source_light: Buffer,
-    target: Texture,
+    light_sums: Texture,
     constants: Constants = (),
-    stage: str = "translucency",
+    stage_name: str = "translucency",
 ) -> None:
     """Declare the pass that sums the light of the sources at each receiver, weighted by pair.
 
     source_light : buffer of the light of each source
-    target : texture of the coarse atlas
+    light_sums : texture of the coarse atlas
     constants : pipeline constants that replace the defaults of translucency.wgsl
-    stage : name of the stage in timings
+    stage_name : name of the stage in timings
     """
     device, pairs = graph.device, thin_parts.pairs
     bindings: Bindings = {
         "receivers": pairs.receiver_ranges,
         "weights": thin_parts.weights,
         "source_light": source_light,
-        "transmitted": target,
+        "transmitted": light_sums,
     }
-    team = dict((_SOFTWARE_CONSTANTS if device.adapter.kind == "CPU" else _GPU_CONSTANTS) + constants)
+    team = dict(
+        (_SOFTWARE_WORKGROUP_CONSTANTS if device.adapter.kind == "CPU" else _GPU_WORKGROUP_CONSTANTS)
+        + constants
+    )
     shader = program(device, "translucency/translucency.wgsl", tuple(team.items()))
     receivers_per_group = int(team["SIZE"]) // int(team["TEAM"])
-    graph.dispatch(stage, shader, bindings, workgroup_grid(pairs.receivers[1], receivers_per_group))
+    graph.dispatch(stage_name, shader, bindings, workgroup_grid(pairs.receivers[1], receivers_per_group))
 
 
 def draw_weights(graph: Recorder, thin_parts: Translucency) -> None:
@@ -162,17 +168,17 @@ def draw_weights(graph: Recorder, thin_parts: Translucency) -> None:
     shader = _weights_program(graph.device, thin_parts.gaussian_count, thin_parts.uses_tables)
     groups = _PAIRS_PER_ROW // _PAIRS_PER_GROUP, max(1, -(-pairs.count // _PAIRS_PER_ROW)), 1
     graph.dispatch("pairs", shader, {**bindings, **thin_parts.loss_bindings}, groups)
-    sum_pairs(graph, thin_parts, thin_parts.unit_light, pairs.lost, stage="pairs")
+    sum_pairs(graph, thin_parts, thin_parts.unit_light, pairs.lost, stage_name="pairs")
     graph.dispatch("pairs", shader, {**bindings, **thin_parts.weight_bindings}, groups)
 
 
-def choose_source_level(spacing_mm: float, variance_mm2: Floats) -> int:
+def choose_source_level(source_spacing_mm: float, variance_mm2: Floats) -> int:
     """Return the index of the narrowest blurred level that is smooth enough to sample at the sources.
 
-    spacing_mm : distance between sources [mm]
+    source_spacing_mm : distance between sources [mm]
     variance_mm2 : (k,) variances of the blurred levels [mm^2]
     """
-    smooth = np.flatnonzero(variance_mm2 >= (_MIN_SMOOTHNESS * spacing_mm) ** 2)
+    smooth = np.flatnonzero(variance_mm2 >= (_MIN_SOURCE_SMOOTHNESS * source_spacing_mm) ** 2)
     return int(smooth[0]) if len(smooth) else len(variance_mm2) - 1
 
 
@@ -181,45 +187,45 @@ def weight_bindings(
     pairs: PairBuffers,
     variance_mm2: Floats,
     weight: Floats,
-    tables: ThinParts | None = None,
+    thickness_tables: ThinParts | None = None,
     transmittance: Floats | None = None,
 ) -> Bindings:
     """Return the uniform record and the transmittance table of a profile for translucency_weights.wgsl.
 
     variance_mm2, weight : (k,) variances [mm^2] and (k, 3) weights of the blurred levels
-    tables : tables by thickness, None to weight pairs by Gaussians
-    transmittance : (THICKNESS_ROWS, k, 3) table to use, `transmitted` or `lost` of `tables`
+    thickness_tables : tables by thickness, None to weight pairs by Gaussians
+    transmittance : (THICKNESS_ROWS, k, 3) table to use, `transmitted` or `lost` of `thickness_tables`
     """
     gaussian = np.zeros((MAX_GAUSSIANS, 4), np.float32)
     gaussian[: len(weight), :3], gaussian[: len(weight), 3] = weight, variance_mm2
-    record = _weights_program(device, len(weight), tables is not None).record(
+    record = _weights_program(device, len(weight), thickness_tables is not None).record(
         "PairProfile",
-        reach_mm=1.0 if tables is None else tables.max_thickness_mm,
+        reach_mm=1.0 if thickness_tables is None else thickness_tables.max_thickness_mm,
         radius_mm=pairs.cells.radius_mm,
         source_mm2=variance_mm2[choose_source_level(pairs.cells.cell_mm, variance_mm2)],
         cell_mm2=pairs.cells.cell_mm**2,
         min_variance_ratio=_MIN_VARIANCE_RATIO,
         gaussian=gaussian,
     )
-    table = _transmittance_table(len(weight), tables, transmittance)
+    table = _transmittance_table(len(weight), thickness_tables, transmittance)
     return {"pair_profile": record, "transmittance": device.buffer(table, "STORAGE")}
 
 
 def _transmittance_table(
-    gaussians: int, tables: ThinParts | None, transmittance: Floats | None
+    gaussian_count: int, thickness_tables: ThinParts | None, transmittance: Floats | None
 ) -> NDArray[np.float32]:
     """Return the (rows k, 4) transmittance by thickness and Gaussian, with the directionality as alpha.
 
-    Only the first Gaussian of each thickness holds the directionality. Without `tables`, the result is one
-    row of zeros.
+    Only the first Gaussian of each thickness holds the directionality. Without `thickness_tables`, the result
+    is one row of zeros.
     """
-    if tables is None or transmittance is None:
+    if thickness_tables is None or transmittance is None:
         return np.zeros((1, 4), np.float32)
-    table = np.zeros((THICKNESS_ROWS, gaussians, 4), np.float32)
-    table[..., :3], table[:, 0, 3] = transmittance, tables.directionality
+    table = np.zeros((THICKNESS_ROWS, gaussian_count, 4), np.float32)
+    table[..., :3], table[:, 0, 3] = transmittance, thickness_tables.directionality
     return table.reshape(-1, 4)
 
 
-def _weights_program(device: Device, gaussians: int, uses_tables: bool) -> ComputeProgram:
-    constants = ("COUNT", gaussians), ("TABLES", uses_tables)
+def _weights_program(device: Device, gaussian_count: int, uses_tables: bool) -> ComputeProgram:
+    constants = ("COUNT", gaussian_count), ("TABLES", uses_tables)
     return program(device, "translucency/translucency_weights.wgsl", constants)

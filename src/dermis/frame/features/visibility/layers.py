@@ -32,10 +32,12 @@ from dermis.gpu import (
 from dermis.gpu.program import Program
 from dermis.gpu.textures import make_view
 
-_TARGET_GROUPS = 2048  # number of workgroups that occupy a GPU; for large meshes each takes more triangles
-_GROUP_TRIANGLES = (8, 128)  # least and most triangles of a workgroup of visibility_buffer.wgsl
-_RUN_TRIANGLES = 16  # consecutive triangles per workgroup of a mesh with many small triangles
-_GROUPS_PER_ROW = 32768
+_TARGET_WORKGROUP_COUNT = (
+    2048  # number of workgroups that occupy a GPU; for large meshes each takes more triangles
+)
+_TRIANGLES_PER_WORKGROUP_RANGE = (8, 128)  # least and most triangles of a workgroup of visibility_buffer.wgsl
+_CONSECUTIVE_TRIANGLES = 16  # consecutive triangles per workgroup of a mesh with many small triangles
+_WORKGROUPS_PER_ROW = 32768
 _TILE_PIXELS = (64, 32)  # width and height of a tile, as in tiles.wgsl
 _RECORD_DEPTH, _RECORD_TRIANGLE, _RECORD_BOTH = 0, 1, 2  # modes of visibility_buffer.wgsl: what it records
 _MAX_DEPTH_STEP_MM = 0.1  # largest step of depth for which depth and triangle of a sample share one word
@@ -68,17 +70,23 @@ class ViewLayers:
 
 
 def make_layers(
-    device: Device, size: tuple[int, int], count: int, *, triangles: bool, compute: bool | None = None
+    device: Device,
+    layer_size: tuple[int, int],
+    layer_count: int,
+    *,
+    store_triangles: bool,
+    use_compute_pass: bool | None = None,
 ) -> ViewLayers:
-    """Allocate `count` layers of size (width, height); layers too large for a buffer are rasterised.
+    """Allocate `layer_count` layers of size (width, height); layers too large for a buffer are rasterised.
 
-    triangles : whether the layers store triangle indices instead of depth
-    compute : whether to use the compute pass instead of the rasteriser; None to choose by the adapter
+    store_triangles : whether the layers store triangle indices instead of depth
+    use_compute_pass : whether to use the compute pass instead of the rasteriser; None to choose by the
+        adapter
     """
-    compute = device.adapter.kind != "CPU" if compute is None else compute
-    fits = 4 * size[0] * size[1] * count <= device.max_storage_bytes
-    make = _compute_layers if compute and fits else _raster_layers
-    return make(device, size, max(1, count), triangles)
+    use_compute_pass = device.adapter.kind != "CPU" if use_compute_pass is None else use_compute_pass
+    fits = 4 * layer_size[0] * layer_size[1] * layer_count <= device.max_storage_bytes
+    make = _compute_layers if use_compute_pass and fits else _raster_layers
+    return make(device, layer_size, max(1, layer_count), store_triangles)
 
 
 def draw_layers(graph: Recorder, stage: str, layers: ViewLayers, views: Views, head: HeadGeometry) -> None:
@@ -97,31 +105,50 @@ def draw(graph: Recorder, visibility: ViewLayers, views: Views, head: HeadGeomet
     draw_layers(graph, "visibility", visibility, views, head)
 
 
-def _compute_layers(device: Device, size: tuple[int, int], count: int, triangles: bool) -> ViewLayers:
-    texel, name = ("r32uint", "visibility buffer") if triangles else ("r32float", "shadow maps")
-    texture = make_texture(device, size, texel, layers=max(2, count), name=name)
-    across, down = _tile_counts(size)
-    counts = size[0] * size[1] * count, 1, across * down * count
-    return ViewLayers(texture, size, count, triangles, [], [], *(_word_buffer(device, one) for one in counts))
+def _compute_layers(
+    device: Device, layer_size: tuple[int, int], layer_count: int, store_triangles: bool
+) -> ViewLayers:
+    texel, name = ("r32uint", "visibility buffer") if store_triangles else ("r32float", "shadow maps")
+    texture = make_texture(device, layer_size, texel, layer_count=max(2, layer_count), texture_name=name)
+    across, down = _tile_counts(layer_size)
+    counts = layer_size[0] * layer_size[1] * layer_count, 1, across * down * layer_count
+    return ViewLayers(
+        texture,
+        layer_size,
+        layer_count,
+        store_triangles,
+        [],
+        [],
+        *(_word_buffer(device, one) for one in counts),
+    )
 
 
-def _word_buffer(device: Device, count: int) -> Buffer:
-    return device.buffer(np.zeros(count, np.uint32), "STORAGE")
+def _word_buffer(device: Device, word_count: int) -> Buffer:
+    return device.buffer(np.zeros(word_count, np.uint32), "STORAGE")
 
 
-def _raster_layers(device: Device, size: tuple[int, int], count: int, triangles: bool) -> ViewLayers:
-    name = "visibility buffer" if triangles else "shadow maps"
+def _raster_layers(
+    device: Device, layer_size: tuple[int, int], count: int, store_triangles: bool
+) -> ViewLayers:
+    name = "visibility buffer" if store_triangles else "shadow maps"
 
     def layered(texel: str, layer_count: int) -> tuple[Texture, list[TextureView]]:
-        texture = make_texture(device, size, texel, layers=max(2, layer_count), use="raster", name=name)
+        texture = make_texture(
+            device,
+            layer_size,
+            texel,
+            layer_count=max(2, layer_count),
+            content_source="raster",
+            texture_name=name,
+        )
         return texture, [make_view(texture, layer=k) for k in range(layer_count)]
 
-    if not triangles:
+    if not store_triangles:
         texture, depth = layered("depth32float", count)
-        return ViewLayers(texture, size, count, triangles, depth, [None] * count)
+        return ViewLayers(texture, layer_size, count, store_triangles, depth, [None] * count)
     _, depth = layered("depth32float", 1)
     texture, targets = layered("r32uint", count)
-    return ViewLayers(texture, size, count, triangles, depth * count, targets)
+    return ViewLayers(texture, layer_size, count, store_triangles, depth * count, targets)
 
 
 def _draw_compute(graph: Recorder, stage: str, layers: ViewLayers, views: Views, head: HeadGeometry) -> None:
@@ -144,8 +171,8 @@ def _draw_compute(graph: Recorder, stage: str, layers: ViewLayers, views: Views,
         "tiles": layers.tiles,
         "layers": layers.texture,
     }
-    work, count = _work_split(triangles, len(clips), len(positions))
-    groups = (min(count, _GROUPS_PER_ROW), -(-count // _GROUPS_PER_ROW), len(clips))
+    work, count = _split_work(triangles, len(clips), len(positions))
+    groups = (min(count, _WORKGROUPS_PER_ROW), -(-count // _WORKGROUPS_PER_ROW), len(clips))
     for recorded in passes:
         constants = (("RECORDED", recorded), ("SAMPLES", len(positions)), *work, *head.constants)
         shader = program(device, "visibility/visibility_buffer.wgsl", constants)
@@ -153,39 +180,43 @@ def _draw_compute(graph: Recorder, stage: str, layers: ViewLayers, views: Views,
     graph.dispatch(stage, resolve, resources, (*_tile_counts(layers.size), layers.count))
 
 
-def _pass_modes(layers: ViewLayers, triangles: int, clips: Matrix) -> tuple[int, ...]:
+def _pass_modes(layers: ViewLayers, triangle_count: int, clip_matrices: Matrix) -> tuple[int, ...]:
     """Return the modes of visibility_buffer.wgsl: one pass if depth and triangle fit in a word, else two.
 
-    triangles : number of triangles
-    clips : (k, 4, 4) matrices from world to clip space
+    triangle_count : number of triangles
+    clip_matrices : (k, 4, 4) matrices from world to clip space
     """
     if not layers.triangles:
         return (_RECORD_DEPTH,)
-    steps = 2.0 ** (32 - triangles.bit_length())
-    precise = max(map(_depth_range_mm, clips)) <= _MAX_DEPTH_STEP_MM * steps
+    steps = 2.0 ** (32 - triangle_count.bit_length())
+    precise = max(map(_depth_range_mm, clip_matrices)) <= _MAX_DEPTH_STEP_MM * steps
     return (_RECORD_BOTH,) if precise else (_RECORD_DEPTH, _RECORD_TRIANGLE)
 
 
-def _draw_raster(graph: Recorder, stage: str, layers: ViewLayers, clips: Matrix, head: HeadGeometry) -> None:
+def _draw_raster(
+    graph: Recorder, stage: str, layers: ViewLayers, clip_matrices: Matrix, head: HeadGeometry
+) -> None:
     shader = _raster_program(graph.device, layers.triangles, head.has_cutouts)
-    resources = {**head.resources, "views": _views_record(shader, layers, clips, head)}
+    resources = {**head.resources, "views": _views_record(shader, layers, clip_matrices, head)}
     for layer, (depth, target) in enumerate(zip(layers.depth, layers.targets, strict=True)):
         indexed = not (layers.triangles or head.has_cutouts)  # else the shader finds the corners itself
         indices, into = head.indices if indexed else None, DrawTarget(depth, 0.0, target)
-        graph.draw(stage, shader, resources, 3 * head.triangles, into, indices=indices, layer=layer)
+        graph.draw(
+            stage, shader, resources, 3 * head.triangles, into, index_buffer=indices, instance_index=layer
+        )
 
 
-def _raster_program(device: Device, triangles: bool, has_cutouts: bool) -> RenderProgram:
+def _raster_program(device: Device, store_triangles: bool, has_cutouts: bool) -> RenderProgram:
     """Return the program that rasterises triangles or depth.
 
     has_cutouts : whether a fragment shader leaves holes, also where only depth is drawn
     """
 
     def make() -> RenderProgram:
-        by_triangle = triangles or has_cutouts
+        by_triangle = store_triangles or has_cutouts
         name = "visibility/visibility_buffer_raster.wgsl" if by_triangle else "visibility/depth_raster.wgsl"
         path, folders = FEATURES_FOLDER / name, shader_folders(*(("CUTOUTS",) if has_cutouts else ()))
-        constants, targets = program_constants(device, path, folders), ["r32uint"] if triangles else []
+        constants, targets = program_constants(device, path, folders), ["r32uint"] if store_triangles else []
         return RenderProgram(
             device,
             path,
@@ -196,24 +227,26 @@ def _raster_program(device: Device, triangles: bool, has_cutouts: bool) -> Rende
             has_fragment=by_triangle,
         )
 
-    return cached_program(device, ("visibility buffer", triangles, has_cutouts), (), make)
+    return cached_program(device, ("visibility buffer", store_triangles, has_cutouts), (), make)
 
 
-def _views_record(shader: Program, layers: ViewLayers, clips: Matrix, head: HeadGeometry) -> UniformRecord:
+def _views_record(
+    shader: Program, layers: ViewLayers, clip_matrices: Matrix, head: HeadGeometry
+) -> UniformRecord:
     record = shader.record("Views", triangles=head.triangles)
     record["width"], record["height"] = layers.size
-    record["clip"][: len(clips)] = clips.swapaxes(1, 2)
+    record["clip"][: len(clip_matrices)] = clip_matrices.swapaxes(1, 2)
     return record
 
 
-def _depth_range_mm(clip: Matrix) -> float:
+def _depth_range_mm(clip_matrix: Matrix) -> float:
     """Return the length of the longest depth step, extrapolated to the range of depths from 0 to 1 [mm].
 
     Divided by the number of steps, it bounds the error of an integer depth.
 
-    clip : (4, 4) matrix from world to clip space
+    clip_matrix : (4, 4) matrix from world to clip space
     """
-    rows: list[list[float]] = clip.tolist()
+    rows: list[list[float]] = clip_matrix.tolist()
     _, _, (*depth, depth_offset), (*distance, distance_offset) = rows
     scale = sum(d * d for d in distance)
     if scale == 0.0:  # parallel rays
@@ -226,20 +259,22 @@ def _depth_range_mm(clip: Matrix) -> float:
 
 
 @cache
-def _work_split(triangles: int, views: int, samples: int) -> tuple[Constants, int]:
+def _split_work(triangle_count: int, view_count: int, sample_count: int) -> tuple[Constants, int]:
     """Return the pipeline constants and the number of workgroups of the compute pass, tuned on an H200.
 
-    triangles, views, samples : number of triangles, of views, and of samples per pixel
+    triangle_count, view_count, sample_count : number of triangles, of views, and of samples per pixel
     """
-    fewest, most = _GROUP_TRIANGLES
-    per_group = min(most, max(fewest, 1 << (triangles * views // _TARGET_GROUPS).bit_length() >> 1))
+    fewest, most = _TRIANGLES_PER_WORKGROUP_RANGE
+    per_group = min(
+        most, max(fewest, 1 << (triangle_count * view_count // _TARGET_WORKGROUP_COUNT).bit_length() >> 1)
+    )
     many = per_group == most  # meshes of many triangles have small ones
-    threads = 256 if many or samples > 1 else 128
-    run, small = (_RUN_TRIANGLES, 32) if many else (1, 16)
+    threads = 256 if many or sample_count > 1 else 128
+    run, small = (_CONSECUTIVE_TRIANGLES, 32) if many else (1, 16)
     constants = ("TRIANGLES", per_group), ("RUN", run), ("SMALL", small), ("THREADS", threads)
-    return constants, -(-triangles // per_group)
+    return constants, -(-triangle_count // per_group)
 
 
-def _tile_counts(size: tuple[int, int]) -> tuple[int, int]:
+def _tile_counts(picture_size: tuple[int, int]) -> tuple[int, int]:
     """Return the number of tiles of the compute pass across and down a picture of size (width, height)."""
-    return -(-size[0] // _TILE_PIXELS[0]), -(-size[1] // _TILE_PIXELS[1])
+    return -(-picture_size[0] // _TILE_PIXELS[0]), -(-picture_size[1] // _TILE_PIXELS[1])

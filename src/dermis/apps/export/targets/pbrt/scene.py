@@ -12,7 +12,7 @@ from dermis.apps.export.scene_parts import supported_lights
 from dermis.apps.truths.lights import facing_irradiance
 from dermis.base.errors import notify
 from dermis.base.registry import Registry
-from dermis.environment.panorama import UNIFORM
+from dermis.environment.panorama import UNIFORM_PANORAMA
 from dermis.scene.camera import Camera
 from dermis.scene.environment import Environment
 from dermis.scene.lights import (
@@ -83,7 +83,7 @@ def light_lines(lights: Iterable[Light], environment: Environment | None) -> Lin
             notify(f"pbrt has no {light.kind} light, so light {number} is omitted")
             continue
         lines += ["AttributeBegin", *PBRT_LIGHTS[light.kind](light), "AttributeEnd"]
-    if environment is not None and environment.name != UNIFORM:
+    if environment is not None and environment.name != UNIFORM_PANORAMA:
         notify(f"the panorama {environment.name} is omitted, as pbrt uses another projection")
     elif environment is not None:
         lines.append(directive("LightSource", "infinite", {"rgb L": [environment.exposure] * 3}))

@@ -25,7 +25,7 @@ from dermis.apps.export.target import (
     write_files,
 )
 from dermis.optics.cumulative_profile import CumulativeProfile
-from dermis.optics.fits.burley import UNREAL_FACTOR, BurleyProfile, shape_factor, unreal_parameters
+from dermis.optics.fits.burley import UNREAL_SHAPE_RATIO, BurleyProfile, shape_factor, unreal_parameters
 from dermis.optics.media import Floats
 
 ALBEDO_NAME, COLOUR_NAME, DISTANCE_NAME = "surface_albedo", "mean_free_path_color", "mean_free_path_distance"
@@ -76,7 +76,7 @@ class Unreal(Target):
             * get_numbers(parameters, SCALE_NAME)[0]
         )
         albedo = np.array(get_numbers(parameters, ALBEDO_NAME))
-        return burley_curve(path / (UNREAL_FACTOR * shape_factor(albedo)), subject.curve.energy)
+        return burley_curve(path / (UNREAL_SHAPE_RATIO * shape_factor(albedo)), subject.curve.energy)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
         """Write the editor script, and the maps of a head beside it."""

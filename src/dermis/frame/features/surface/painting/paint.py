@@ -16,7 +16,7 @@ from dermis.base.disk import Arrays, array_key, load_arrays, load_or_make
 from dermis.base.errors import refuse
 from dermis.base.progress import logged_step
 from dermis.frame.features.surface import mips as map_mips
-from dermis.frame.programs import FEATURES_FOLDER, HALF_FORMAT, program, shader_folders, workgroup_grid
+from dermis.frame.programs import FEATURES_FOLDER, HALF_TEXEL_FORMAT, program, shader_folders, workgroup_grid
 from dermis.gpu import (
     Bindings,
     Buffer,
@@ -57,12 +57,12 @@ _PAINTING_LISTS: dict[str, Sequence[str]] = {
     "amounts": list(ZONE_AMOUNTS),
     "grounds": list(NOISE_REGIONS),
 }
-_SKIN_SHADER, _OWNER_SHADER = "surface/painting/skin.wgsl", "surface/painting/owner.wgsl"
-_MAX_TRIANGLES = 1 << 20  # limit by the bits of a triangle index in painted_surface.wgsl
-_PADDING = (0, 0), (0, 2)  # padding from two to four columns
-_CACHE_FOLDER = "painted"
+_SKIN_SHADER, _TEXEL_TRIANGLE_SHADER = "surface/painting/skin.wgsl", "surface/painting/owner.wgsl"
+_MAX_PAINTED_TRIANGLES = 1 << 20  # limit by the bits of a triangle index in painted_surface.wgsl
+_TRIANGLE_ROW_PADDING = (0, 0), (0, 2)  # padding from two to four columns
+_PAINTED_CACHE_FOLDER = "painted"
 _WORD_BYTES = 4
-_MAP_NAMES = ("colour", "specular", "roughness")
+_PAINTED_MAP_NAMES = ("colour", "specular", "roughness")
 _FOLDING_VALUE_COUNT = FOLD_MOVEMENT_COUNT + 1  # numbers in `folding` of the shader: fold movements and flush
 
 
@@ -79,8 +79,8 @@ def painting_constants() -> dict[str, float]:
     return sizes | counts | rows | {"folding": FOLD_MOVEMENT_COUNT, "wander_rows": ZONE_BORDER_NOISES}
 
 
-def _as_members(names: Sequence[str]) -> Callable[[], Sequence[ShaderListMember]]:
-    return lambda: [ShaderListMember(name, Path()) for name in names]
+def _as_members(member_names: Sequence[str]) -> Callable[[], Sequence[ShaderListMember]]:
+    return lambda: [ShaderListMember(name, Path()) for name in member_names]
 
 
 class PaintInputs(NamedTuple):
@@ -99,28 +99,28 @@ class PaintInputs(NamedTuple):
     surface: PaintedSurface
 
 
-def paint_inputs(surface: PaintedSurface, look: SkinLook, side: int) -> PaintInputs:
+def paint_inputs(surface: PaintedSurface, look: SkinLook, map_side: int) -> PaintInputs:
     """Return the shader inputs with which the maps of a look are painted.
 
-    side : side of the maps [texels]
+    map_side : side of the maps [texels]
 
     Raises DermisError for too many triangles.
     """
-    if surface.count >= _MAX_TRIANGLES:
+    if surface.count >= _MAX_PAINTED_TRIANGLES:
         actual = f"got {surface.count:,}"
-        refuse("painted skin", f"fewer than {_MAX_TRIANGLES:,} triangles", actual, "Subdivide less")
+        refuse("painted skin", f"fewer than {_MAX_PAINTED_TRIANGLES:,} triangles", actual, "Subdivide less")
     text = _shader_text(_SKIN_SHADER)
     names = set(struct_dtype(text, "Paint").names or ()) & set(vars(look))
     values = {name: getattr(look, name) for name in names}
     low, high = oxygen_range(look)
-    paint = make_record(text, "Paint", side=side, low_oxygen=low, high_oxygen=high, **values)
+    paint = make_record(text, "Paint", side=map_side, low_oxygen=low, high_oxygen=high, **values)
     tables = np.ndarray((), struct_dtype(text, "Tables"), _face_tables(look.recession, look.sites))
     return PaintInputs(paint, tables, painted_colour_tables(look), surface)
 
 
-def cache_key(inputs: PaintInputs, driver: str) -> str:
+def cache_key(inputs: PaintInputs, driver_name: str) -> str:
     """Return the disk cache key of painted maps, a hash of inputs, shaders and driver."""
-    source = "\n".join((driver, _shader_text(_SKIN_SHADER), _shader_text(_OWNER_SHADER)))
+    source = "\n".join((driver_name, _shader_text(_SKIN_SHADER), _shader_text(_TEXEL_TRIANGLE_SHADER)))
     records = (np.frombuffer(record.tobytes(), np.uint8) for record in (inputs.paint, inputs.tables))
     return array_key([*records, inputs.colours, inputs.surface.vertices, inputs.surface.triangles], source)
 
@@ -138,8 +138,8 @@ def _face_tables(recession: float, sites: SiteDifferences) -> bytes:
     """
     folds, edge = face.fold_curves(), face.hairline_heights(recession)
     ends = np.column_stack([folds.first[:-1], folds.first[1:] - 1]).astype(np.float32)
-    curves = np.pad(np.hstack([folds.curves, ends]), _PADDING)
-    hairline = np.pad(np.column_stack([edge, np.append(edge[1:], edge[-1])]), _PADDING)
+    curves = np.pad(np.hstack([folds.curves, ends]), _TRIANGLE_ROW_PADDING)
+    hairline = np.pad(np.column_stack([edge, np.append(edge[1:], edge[-1])]), _TRIANGLE_ROW_PADDING)
     tables = (
         textures.noise_table(),
         textures.dot_table(),
@@ -165,37 +165,44 @@ class RestMaps(NamedTuple):
     deltas: Texture | None
 
 
-def cached_rest_maps(device: Device, inputs: PaintInputs, side: int, animated: bool = False) -> RestMaps:
+def cached_rest_maps(
+    device: Device, inputs: PaintInputs, map_side: int, with_expressions: bool = False
+) -> RestMaps:
     """Return the painted maps at rest, cached on disk for software adapters, which paint slowly.
 
     Only the first maps that a device paints are stored, because programs that render many people rarely need
     the same person again.
 
-    animated : whether to include the changes by expressions
+    with_expressions : whether to include the changes by expressions
     """
     if device.adapter.kind != "CPU":
-        return paint_rest_maps(device, inputs, side)
-    key, names = cache_key(inputs, f"{device.adapter.name} {device.adapter.driver}"), [*_MAP_NAMES, "heights"]
-    names += ["deltas"] if animated else []
-    arrays = load_arrays(_CACHE_FOLDER, key, names)
+        return paint_rest_maps(device, inputs, map_side)
+    key, names = (
+        cache_key(inputs, f"{device.adapter.name} {device.adapter.driver}"),
+        [*_PAINTED_MAP_NAMES, "heights"],
+    )
+    names += ["deltas"] if with_expressions else []
+    arrays = load_arrays(_PAINTED_CACHE_FOLDER, key, names)
     if arrays is not None:
-        return _upload_arrays(device, arrays, side)
-    maps = paint_rest_maps(device, inputs, side)
+        return _upload_arrays(device, arrays, map_side)
+    maps = paint_rest_maps(device, inputs, map_side)
     if device.cached("first painted", lambda: key) == key:
-        load_or_make(_CACHE_FOLDER, key, names, lambda: _download_maps(device, maps, animated))
+        load_or_make(
+            _PAINTED_CACHE_FOLDER, key, names, lambda: _download_maps(device, maps, with_expressions)
+        )
     return maps
 
 
 @logged_step("painting the skin")
-def paint_rest_maps(device: Device, inputs: PaintInputs, side: int) -> RestMaps:
+def paint_rest_maps(device: Device, inputs: PaintInputs, map_side: int) -> RestMaps:
     """Paint the maps of a face without expression.
 
-    side : side of the maps [texels]
+    map_side : side of the maps [texels]
     """
-    surface: Bindings = {"paint": inputs.paint, **_surface_buffers(device, inputs, side)}
-    maps = {name: map_mips.empty_map(device, (side, side)) for name in _MAP_NAMES}
-    heights = device.storage_buffer(_WORD_BYTES * (side + 2) ** 2)
-    deltas = make_texture(device, (side, side), HALF_FORMAT, layers=2)
+    surface: Bindings = {"paint": inputs.paint, **_surface_buffers(device, inputs, map_side)}
+    maps = {name: map_mips.empty_map(device, (map_side, map_side)) for name in _PAINTED_MAP_NAMES}
+    heights = device.storage_buffer(_WORD_BYTES * (map_side + 2) ** 2)
+    deltas = make_texture(device, (map_side, map_side), HALF_TEXEL_FORMAT, layer_count=2)
     outputs = {name: one.levels[0] for name, one in maps.items()}
     tables: Bindings = {
         "tables": inputs.tables,
@@ -204,54 +211,58 @@ def paint_rest_maps(device: Device, inputs: PaintInputs, side: int) -> RestMaps:
         "expression_deltas": deltas,
     }
     frame = CommandList(device, timed=False)
-    frame.compute("maps", program(device, _SKIN_SHADER), {**surface, **tables, **outputs}, (side, side))
+    frame.compute(
+        "maps", program(device, _SKIN_SHADER), {**surface, **tables, **outputs}, (map_side, map_side)
+    )
     frame.submit()
     return RestMaps(**maps, heights=heights, deltas=deltas)
 
 
-def _surface_buffers(device: Device, inputs: PaintInputs, side: int) -> dict[str, Buffer]:
+def _surface_buffers(device: Device, inputs: PaintInputs, map_side: int) -> dict[str, Buffer]:
     """Return buffers of the painted mesh and of the triangle that owns each texel, cached for all people."""
     surface = inputs.surface
     cache = device.cached("painted surfaces", WeakKeyDictionary[PaintedSurface, dict[int, dict[str, Buffer]]])
     sides: dict[int, dict[str, Buffer]] = cache.setdefault(surface, {})
-    if side not in sides:
+    if map_side not in sides:
         sides.clear()
         buffers = {
             "vertices": device.buffer(surface.vertices, "STORAGE"),
             "triangles": device.buffer(surface.triangles, "STORAGE"),
-            "owners": device.storage_buffer(_WORD_BYTES * side * side),
+            "owners": device.storage_buffer(_WORD_BYTES * map_side * map_side),
         }
         frame = CommandList(device, timed=False)
         bound: Bindings = {"paint": inputs.paint, **buffers}
-        frame.dispatch("maps", program(device, _OWNER_SHADER), bound, workgroup_grid(surface.count))
+        frame.dispatch("maps", program(device, _TEXEL_TRIANGLE_SHADER), bound, workgroup_grid(surface.count))
         frame.submit()
-        sides[side] = buffers
-    return sides[side]
+        sides[map_side] = buffers
+    return sides[map_side]
 
 
 def _upload_colour_tables(device: Device, inputs: PaintInputs) -> Texture:
     nodes = inputs.colours.shape[1]
-    texture = make_texture(device, (nodes, nodes), "rgba32float", layers=len(inputs.colours), use="map")
+    texture = make_texture(
+        device, (nodes, nodes), "rgba32float", layer_count=len(inputs.colours), content_source="map"
+    )
     for layer, table in enumerate(inputs.colours):
         upload(device, texture, np.dstack([table, np.ones((nodes, nodes, 1), np.float32)]), layer=layer)
     return texture
 
 
-def _download_maps(device: Device, maps: RestMaps, animated: bool) -> Arrays:
-    arrays = {name: download(device, getattr(maps, name).texture) for name in _MAP_NAMES}
+def _download_maps(device: Device, maps: RestMaps, with_expressions: bool) -> Arrays:
+    arrays = {name: download(device, getattr(maps, name).texture) for name in _PAINTED_MAP_NAMES}
     arrays["heights"] = np.frombuffer(device.handle.queue.read_buffer(maps.heights), np.float32)
-    if animated and maps.deltas is not None:
+    if with_expressions and maps.deltas is not None:
         arrays["deltas"] = np.stack([download(device, maps.deltas, layer=layer) for layer in range(2)])
     return arrays
 
 
-def _upload_arrays(device: Device, arrays: Arrays, side: int) -> RestMaps:
-    maps = {name: map_mips.empty_map(device, (side, side)) for name in _MAP_NAMES}
+def _upload_arrays(device: Device, arrays: Arrays, map_side: int) -> RestMaps:
+    maps = {name: map_mips.empty_map(device, (map_side, map_side)) for name in _PAINTED_MAP_NAMES}
     for name, one in maps.items():
         upload(device, one.texture, arrays[name])
     deltas = None
     if "deltas" in arrays:
-        deltas = make_texture(device, (side, side), HALF_FORMAT, layers=2)
+        deltas = make_texture(device, (map_side, map_side), HALF_TEXEL_FORMAT, layer_count=2)
         for layer, texels in enumerate(arrays["deltas"]):
             upload(device, deltas, texels, layer=layer)
     return RestMaps(**maps, heights=device.buffer(arrays["heights"], "STORAGE"), deltas=deltas)
@@ -272,14 +283,16 @@ class ExpressionMaps:
     relief: map_mips.MippedTexture
 
 
-def draw_expression(graph: Graph, maps: ExpressionMaps, amounts: NDArray[np.float32]) -> None:
+def draw_expression(graph: Graph, maps: ExpressionMaps, movement_strengths: NDArray[np.float32]) -> None:
     """Declare the passes that compute the colour and relief of an expression.
 
-    amounts : (9,) strength of each facial movement, from `human.skin.face.movement_weights` [-]
+    movement_strengths : (9,) strength of each facial movement, from `human.skin.face.movement_weights` [-]
     """
     shader, side = program(graph.device, "surface/painting/expression.wgsl"), maps.colour.size[0]
-    folding = amounts[:_FOLDING_VALUE_COUNT].reshape(2, 4)
-    record = shader.record("Expression", folding=folding, pressed=amounts[_FOLDING_VALUE_COUNT], side=side)
+    folding = movement_strengths[:_FOLDING_VALUE_COUNT].reshape(2, 4)
+    record = shader.record(
+        "Expression", folding=folding, pressed=movement_strengths[_FOLDING_VALUE_COUNT], side=side
+    )
     graph.compute("maps", shader, maps.bindings | {"expression": record}, (side, side))
     graph.repeat(_fill_maps, maps)
 
@@ -316,36 +329,41 @@ class RawPaintedArrays(NamedTuple):
 
 
 def paint_textures(
-    device: Device, surface: PaintedSurface, look: SkinLook, side: int, animated: bool = False
+    device: Device, surface: PaintedSurface, look: SkinLook, map_side: int, with_expressions: bool = False
 ) -> PaintedTextures:
     """Paint the maps of a look as textures.
 
-    side : side of the maps [texels]
-    animated : whether expressions change colour and relief, which `draw_expression` then fills
+    map_side : side of the maps [texels]
+    with_expressions : whether expressions change colour and relief, which `draw_expression` then fills
     """
-    maps = cached_rest_maps(device, paint_inputs(surface, look, side), side, animated)
-    colour = map_mips.empty_map(device, (side, side)) if animated else maps.colour
+    maps = cached_rest_maps(device, paint_inputs(surface, look, map_side), map_side, with_expressions)
+    colour = map_mips.empty_map(device, (map_side, map_side)) if with_expressions else maps.colour
     frame = CommandList(device, timed=False)
-    for one in (maps.specular, maps.roughness) if animated else (colour, maps.specular, maps.roughness):
+    for one in (
+        (maps.specular, maps.roughness) if with_expressions else (colour, maps.specular, maps.roughness)
+    ):
         map_mips.fill_mips(frame, one)
     frame.submit()
     gloss = maps.specular.texture, maps.roughness.texture
-    if not animated or maps.deltas is None:
-        texture = map_mips.relief_from_buffers(device, [maps.heights], (side, side), side)
+    if not with_expressions or maps.deltas is None:
+        texture = map_mips.relief_from_buffers(device, [maps.heights], (map_side, map_side), map_side)
         return PaintedTextures(colour.texture, *gloss, texture, None)
-    relief, heights = map_mips.empty_map(device, (side, side)), device.storage_buffer(maps.heights.size)
+    relief, heights = (
+        map_mips.empty_map(device, (map_side, map_side)),
+        device.storage_buffer(maps.heights.size),
+    )
     bindings: MutableBindings = {"colour_at_rest": maps.colour.texture, "heights_at_rest": maps.heights}
     bindings |= {"expression_deltas": maps.deltas, "heights": heights, "colour": colour.levels[0]}
     expression_maps = ExpressionMaps(bindings, heights, colour, relief)
     return PaintedTextures(colour.texture, *gloss, relief.texture, expression_maps)
 
 
-def paint_arrays(device: Device, surface: PaintedSurface, look: SkinLook, side: int) -> Maps:
+def paint_arrays(device: Device, surface: PaintedSurface, look: SkinLook, map_side: int) -> Maps:
     """Paint the maps of a look as arrays, without pores and furrows, which are too fine for maps.
 
     Heights fade to 0 outside the charts.
     """
-    arrays = paint_raw_arrays(device, surface, look, side)
+    arrays = paint_raw_arrays(device, surface, look, map_side)
     rho_s = DEFAULT_RHO_S * arrays.specular[..., 0]
     return Maps(
         colour=np.ascontiguousarray(arrays.colour[..., :3]),
@@ -355,11 +373,13 @@ def paint_arrays(device: Device, surface: PaintedSurface, look: SkinLook, side: 
     )
 
 
-def paint_raw_arrays(device: Device, surface: PaintedSurface, look: SkinLook, side: int) -> RawPaintedArrays:
+def paint_raw_arrays(
+    device: Device, surface: PaintedSurface, look: SkinLook, map_side: int
+) -> RawPaintedArrays:
     """Paint the maps of a look as arrays, with all channels that the shader writes."""
-    maps = paint_rest_maps(device, paint_inputs(surface, look, side), side)
+    maps = paint_rest_maps(device, paint_inputs(surface, look, map_side), map_side)
     textures = maps.colour, maps.specular, maps.roughness
     colour, specular, roughness = (download(device, one.texture).astype(np.float32) for one in textures)
     raw = np.frombuffer(device.handle.queue.read_buffer(maps.heights), np.float32)
-    height = np.ascontiguousarray(raw.reshape(side + 2, side + 2)[1:-1, 1:-1])
+    height = np.ascontiguousarray(raw.reshape(map_side + 2, map_side + 2)[1:-1, 1:-1])
     return RawPaintedArrays(colour, specular, roughness, height)

@@ -21,47 +21,52 @@ EYE_PICTURE_SIDE = 1024
 """Side of the pictures [texels]; a texel of the iris is 0.025 mm wide."""
 
 
-def paint_eye(device: Device, look: EyeLook, side: int = EYE_PICTURE_SIDE) -> EyeTextures:
+def paint_eye(device: Device, look: EyeLook, picture_side: int = EYE_PICTURE_SIDE) -> EyeTextures:
     """Paint pictures of an eye along its axis through the cornea, for programs without the eye shader.
 
-    side : side of the pictures [pixels]
+    picture_side : side of the pictures [pixels]
     """
     shader = program(device, "surface/painting/eye_pictures.wgsl")
     picture = shader.record("EyePicture", rim=UV_RADIUS_OF_BACK, falling=UV_DECAY_ANGLE_RADIANS)
     fill_eye(picture["eye"], look)
-    textures = {name: make_texture(device, (side, side), "rgba32float") for name in ("colours", "normals")}
+    textures = {
+        name: make_texture(device, (picture_side, picture_side), "rgba32float")
+        for name in ("colours", "normals")
+    }
     frame = CommandList(device, timed=False)
-    frame.compute("paint", shader, {"picture": picture, **textures}, (side, side))
+    frame.compute("paint", shader, {"picture": picture, **textures}, (picture_side, picture_side))
     frame.submit()
     colours, normals = (download(device, texture)[..., :3] for texture in textures.values())
     return EyeTextures(np.ascontiguousarray(colours, np.float32), np.ascontiguousarray(normals, np.float32))
 
 
-def paint_head(device: Device, head: Head, side: int) -> tuple[Head, EyeTextures | None]:
+def paint_head(device: Device, head: Head, map_side: int) -> tuple[Head, EyeTextures | None]:
     """Return a head with its painted maps as arrays, and pictures of the eyes if they are modelled.
 
-    side : side of the painted maps, a power of two from 256 to 4096 [texels]
+    map_side : side of the painted maps, a power of two from 256 to 4096 [texels]
     """
     eyes = None if head.eyes is None else paint_eye(device, head.eyes.look)
-    return with_painted_maps(device, head, side), eyes
+    return with_painted_maps(device, head, map_side), eyes
 
 
-def with_painted_maps(device: Device, head: Head, side: int) -> Head:
+def with_painted_maps(device: Device, head: Head, map_side: int) -> Head:
     """Return a head whose painted maps are arrays.
 
     Maps from files are kept, and heads without painted maps are returned unchanged.
 
-    side : side of the painted maps, a power of two from 256 to 4096 [texels]
+    map_side : side of the painted maps, a power of two from 256 to 4096 [texels]
 
     Raises DermisError for an invalid side.
     """
-    if not MIN_SIDE <= side <= MAX_SIDE or side & (side - 1):
+    if not MIN_SIDE <= map_side <= MAX_SIDE or map_side & (map_side - 1):
         expected = f"a power of two from {MIN_SIDE} to {MAX_SIDE}"
-        refuse("size of the maps", expected, f"got {side}", "Take 1024, 2048 or 4096")
+        refuse("size of the maps", expected, f"got {map_side}", "Take 1024, 2048 or 4096")
     maps = head.maps
     if not isinstance(maps, PaintedMaps):
         return head
-    painted = paint.paint_arrays(device, painted_surface(head.mesh, head.control.stencils), maps.look, side)
+    painted = paint.paint_arrays(
+        device, painted_surface(head.mesh, head.control.stencils), maps.look, map_side
+    )
     given_maps = {field.name: getattr(maps, field.name) for field in fields(painted)}
     if given_maps["normal"] is not None:
         painted = replace(painted, height=None)

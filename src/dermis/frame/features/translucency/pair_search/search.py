@@ -7,20 +7,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.atlas.translucency.cells import TILE_CELLS, TILE_MARGIN_TEXELS, Cells
+from dermis.atlas.translucency.cells import CELLS_PER_TILE_SIDE, TILE_MARGIN_TEXELS, Cells
 from dermis.frame.features.translucency.passes import (
     RECEIVER_BYTES,
     SOURCE_BYTES,
     draw_points,
-    make_buffer,
+    make_element_buffer,
 )
 from dermis.frame.programs import program, workgroup_grid
 from dermis.gpu import Bindings, Buffer, CommandList, Constants, Device
 
 Words = NDArray[np.uint32]
 Index = NDArray[np.int64]
-_MAX_BLOCKS = 40  # limit of blocks along a side of the atlas
-_BOUNDS_BYTES = 48  # size of the struct Bounds of bounds.wgsl
+_MAX_BLOCKS_PER_SIDE = 40  # limit of blocks along a side of the atlas
+_TILE_BOUNDS_BYTES = 48  # size of the struct Bounds of bounds.wgsl
 _MAX_GUTTER_COPIES = 8  # COPIES of map_positions.wgsl
 _PAIR_BYTES = 12
 
@@ -33,34 +33,36 @@ class SearchPasses:
     """
 
     def __init__(self, device: Device, cells: Cells) -> None:
-        block = -(-cells.tiles_per_side // _MAX_BLOCKS)
+        block = -(-cells.tiles_per_side // _MAX_BLOCKS_PER_SIDE)
         self.device, self.commands = device, CommandList(device, timed=False)
         self.blocks = -(-cells.tiles_per_side // block)
         self._parameters = {
             "radius_mm": cells.radius_mm,
             "variance_mm2": cells.max_sigma_mm**2,
-            "tile": TILE_CELLS / cells.side,
+            "tile": CELLS_PER_TILE_SIDE / cells.side,
             "margin": TILE_MARGIN_TEXELS / cells.size,
             "tiles": cells.tiles_per_side,
             "blocks": self.blocks,
             "block": block,
         }
 
-    def add(self, name: str, count: int, bindings: Bindings, constants: Constants = ()) -> None:
-        """Add a pass with one shader invocation for each of `count` elements.
+    def add(self, name: str, invocation_count: int, bindings: Bindings, constants: Constants = ()) -> None:
+        """Add a pass with one shader invocation for each of `invocation_count` elements.
 
         name : name of the shader in this folder, without its suffix
         """
         shader = program(self.device, f"translucency/pair_search/{name}.wgsl", constants)
-        record = shader.record("Search", **self._parameters, count=count)
-        self.commands.dispatch("pair search", shader, {**bindings, "search": record}, workgroup_grid(count))
+        record = shader.record("Search", **self._parameters, count=invocation_count)
+        self.commands.dispatch(
+            "pair search", shader, {**bindings, "search": record}, workgroup_grid(invocation_count)
+        )
 
-    def read(self, buffer: Buffer, count: int) -> Index:
-        """Submit all passes so far, and return the first `count` words of a buffer."""
+    def read(self, buffer: Buffer, word_count: int) -> Index:
+        """Submit all passes so far, and return the first `word_count` words of a buffer."""
         self.commands.submit()
         self.commands = CommandList(self.device, timed=False)
         words = np.frombuffer(self.device.handle.queue.read_buffer(buffer), np.uint32)
-        return words[:count].astype(np.int64)
+        return words[:word_count].astype(np.int64)
 
     def upload(self, *columns: NDArray[np.integer]) -> Buffer:
         """Upload integer columns as a table of 32-bit words; an empty table becomes one row of zeros."""
@@ -75,12 +77,12 @@ def upload_words(device: Device, *columns: NDArray[np.integer]) -> Buffer:
     return device.buffer(table, "STORAGE")
 
 
-def list_offsets(counts: Index) -> Index:
+def list_offsets(list_lengths: Index) -> Index:
     """Return (n + 1,) offsets of n lists that are stored one after the other, and their total length.
 
-    counts : (n,) lengths of the lists
+    list_lengths : (n,) lengths of the lists
     """
-    return np.concatenate([[0], np.cumsum(counts)])
+    return np.concatenate([[0], np.cumsum(list_lengths)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,34 +107,34 @@ def find_tile_pairs(passes: SearchPasses, surface: Bindings, cells: Cells) -> Ti
     surface : resources of geometry.wgsl
     """
     device, count = passes.device, cells.tiles_per_side**2
-    tiles, counts = make_buffer(device, count, _BOUNDS_BYTES), make_buffer(device, count)
+    tiles, counts = make_element_buffer(device, count, _TILE_BOUNDS_BYTES), make_element_buffer(device, count)
     bindings = {"tiles": tiles, "block_pairs": _find_block_pairs(passes, surface, cells, tiles)}
     every_tile = passes.upload(np.arange(count), np.zeros(count, np.int64))
     passes.add("tile_pairs", count, {**bindings, "queries": every_tile, "partners": counts})
     partner_count = passes.read(counts, count)
     tile = np.flatnonzero(partner_count)
     first = list_offsets(partner_count[tile])
-    partners = make_buffer(device, int(first[-1]))
+    partners = make_element_buffer(device, int(first[-1]))
     bindings |= {"queries": passes.upload(tile, first[:-1]), "partners": partners}
     passes.add("tile_pairs", len(tile), bindings, (("LISTED", 1),))
     return TilePairs(tiles, tile, first, partners)
 
 
-def _find_block_pairs(passes: SearchPasses, surface: Bindings, cells: Cells, tiles: Buffer) -> Buffer:
+def _find_block_pairs(passes: SearchPasses, surface: Bindings, cells: Cells, tile_bounds: Buffer) -> Buffer:
     """Return a buffer with a bit for each pair of blocks of tiles: whether translucent pairs are possible.
 
-    tiles : buffer to fill with the bounding box and normal cone of each tile
+    tile_bounds : buffer to fill with the bounding box and normal cone of each tile
     """
     blocks = passes.blocks**2
     words = blocks * -(-blocks // 32)
-    bounds = make_buffer(passes.device, blocks, _BOUNDS_BYTES)
-    block_pairs = make_buffer(passes.device, words)
+    bounds = make_element_buffer(passes.device, blocks, _TILE_BOUNDS_BYTES)
+    block_pairs = make_element_buffer(passes.device, words)
     triangles = {
         "triangle_first": passes.upload(cells.triangle_first),
         "triangles": passes.upload(cells.triangles),
     }
-    passes.add("tiles", cells.tiles_per_side**2, {**surface, **triangles, "tiles": tiles})
-    passes.add("blocks", blocks, {"tiles": tiles, "blocks": bounds})
+    passes.add("tiles", cells.tiles_per_side**2, {**surface, **triangles, "tiles": tile_bounds})
+    passes.add("blocks", blocks, {"tiles": tile_bounds, "blocks": bounds})
     passes.add("block_pairs", words, {"blocks": bounds, "block_pairs": block_pairs})
     return block_pairs
 
@@ -168,14 +170,16 @@ def candidate_cells(cells: Cells, tile_pairs: TilePairs) -> CandidateCells:
     return CandidateCells(receiver, cells.sources[source], *ranges, end - count, end)
 
 
-def _expand_ranges(first: Index, chosen: Index) -> tuple[Index, Index]:
-    """Return all integers of the ranges first[i] to first[i + 1], for i in `chosen`, one range after another.
+def _expand_ranges(range_starts: Index, chosen_ranges: Index) -> tuple[Index, Index]:
+    """Return all integers of chosen ranges, one range after another; range i ends where range i + 1 starts.
 
-    The second result holds, for each integer, the index in `chosen` of its range.
+    The second result holds, for each integer, the index in `chosen_ranges` of its range.
     """
-    count = first[chosen + 1] - first[chosen]
-    position = np.repeat(np.arange(len(chosen)), count)
-    integers = np.arange(len(position)) + np.repeat(first[chosen] - list_offsets(count)[:-1], count)
+    count = range_starts[chosen_ranges + 1] - range_starts[chosen_ranges]
+    position = np.repeat(np.arange(len(chosen_ranges)), count)
+    integers = np.arange(len(position)) + np.repeat(
+        range_starts[chosen_ranges] - list_offsets(count)[:-1], count
+    )
     return integers, position
 
 
@@ -187,10 +191,10 @@ def compute_positions(
     surface : resources of geometry.wgsl and of the atlas
     """
     device, commands = passes.device, passes.commands
-    receiver_points = make_buffer(device, len(candidates.receiver), RECEIVER_BYTES)
-    source_points = make_buffer(device, len(candidates.source), SOURCE_BYTES)
+    receiver_points = make_element_buffer(device, len(candidates.receiver), RECEIVER_BYTES)
+    source_points = make_element_buffer(device, len(candidates.source), SOURCE_BYTES)
     receivers = upload_receivers(device, cells, candidates.receiver)
-    draw_points(commands, "receiver", surface, cells, receivers, receiver_points, facets=True)
+    draw_points(commands, "receiver", surface, cells, receivers, receiver_points, metric_from_triangles=True)
     draw_points(
         commands, "source", surface, cells, upload_sources(device, cells, candidates.source), source_points
     )
@@ -213,41 +217,47 @@ def upload_hit_ranges(passes: SearchPasses, candidates: CandidateCells) -> tuple
     return bindings, int(word[-1])
 
 
-def draw_gutter_copies(passes: SearchPasses, cells: Cells, source: Index, bindings: Bindings) -> Buffer:
+def draw_gutter_copies(passes: SearchPasses, cells: Cells, source_cells: Index, bindings: Bindings) -> Buffer:
     """Return a buffer of the gutter positions at which sources appear again, see gutter_copies.wgsl.
 
-    source : (n,) indices of cells that emit light
+    source_cells : (n,) indices of cells that emit light
     bindings : further resources of gutter_copies.wgsl
     """
     side, ranges = cells.side, list[Index]()
-    y, x = np.divmod(source, side)
+    y, x = np.divmod(source_cells, side)
     for row in (y - 1, y, y + 1):
         within = (row >= 0) & (row < side)
         begin = np.clip(row, 0, side - 1) * side
         first = cells.gutter_copy_first[begin + np.maximum(x - 1, 0)]
         end = cells.gutter_copy_first[begin + np.minimum(x + 1, side - 1) + 1]
         ranges += [first, np.where(within, end, first)]
-    copies = make_buffer(passes.device, _MAX_GUTTER_COPIES * len(source))
+    copies = make_element_buffer(passes.device, _MAX_GUTTER_COPIES * len(source_cells))
     resources = {**bindings, "rows": passes.upload(*ranges), "copies": copies}
-    passes.add("gutter_copies", len(source), resources)
+    passes.add("gutter_copies", len(source_cells), resources)
     return copies
 
 
-def upload_receivers(device: Device, cells: Cells, receiver: Index) -> tuple[Buffer, int]:
+def upload_receivers(device: Device, cells: Cells, receiver_index: Index) -> tuple[Buffer, int]:
     """Upload the surface point and the cell of each receiver; return the buffer and its number of rows.
 
-    receiver : (n,) indices among the cells that receive light
+    receiver_index : (n,) indices among the cells that receive light
     """
-    columns = *cells.receiver_points[receiver].T, cells.receivers[receiver], np.zeros(len(receiver), np.int64)
-    return upload_words(device, *columns), len(receiver)
+    columns = (
+        *cells.receiver_points[receiver_index].T,
+        cells.receivers[receiver_index],
+        np.zeros(len(receiver_index), np.int64),
+    )
+    return upload_words(device, *columns), len(receiver_index)
 
 
-def upload_sources(device: Device, cells: Cells, cell: Index) -> tuple[Buffer, int]:
+def upload_sources(device: Device, cells: Cells, source_cells: Index) -> tuple[Buffer, int]:
     """Upload the packed (x, y) of cells that emit light; return the buffer and its number of rows.
 
-    cell : (n,) indices of cells in the coarse atlas
+    source_cells : (n,) indices of cells in the coarse atlas
     """
-    return upload_words(device, cell % cells.side | (cell // cells.side << 16)), len(cell)
+    return upload_words(device, source_cells % cells.side | (source_cells // cells.side << 16)), len(
+        source_cells
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -279,7 +289,7 @@ def search_pairs(device: Device, surface: Bindings, cells: Cells) -> PairTable |
     if max(4 * words, RECEIVER_BYTES * count) > device.max_storage_bytes:
         return None
     points = compute_positions(passes, surface, cells, candidates)
-    hits, counts = make_buffer(device, words), make_buffer(device, count)
+    hits, counts = make_element_buffer(device, words), make_element_buffer(device, count)
     hit_bindings = {**ranges, "partners": tile_pairs.partners, "hits": hits}
     passes.add("hits", count, {**hit_bindings, **points, "tiles": tile_pairs.bounds, "counts": counts})
     pair_count = passes.read(counts, count)
@@ -306,7 +316,7 @@ def _list_pairs(
     """
     device, sources, first = passes.device, len(candidates.source), list_offsets(pair_count)
     count, first_pair = int(first[-1]), passes.upload(first)
-    pairs, used = make_buffer(device, count, _PAIR_BYTES), make_buffer(device, sources)
+    pairs, used = make_element_buffer(device, count, _PAIR_BYTES), make_element_buffer(device, sources)
     passes.add("pairs", len(pair_count), {**hit_bindings, "first": first_pair, "pairs": pairs, "used": used})
     is_receiver, is_source = pair_count > 0, passes.read(used, sources) > 0
     chosen = np.flatnonzero(is_source)
