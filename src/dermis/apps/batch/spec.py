@@ -29,7 +29,7 @@ from dermis.scene.settings import Settings
 from dermis.scene.toml_text import key_text, table_text
 
 MAX_IMAGES = 10**9
-GENERATOR = 2
+GENERATOR = 3
 """Number of the rules by which seeds become people and pictures: other rules make other people of a seed.
 
 Number 1 stands for the people of version 0.1, number 2 for people with the skin of measured people.
