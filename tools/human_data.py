@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from human_layout import human_layout
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, diags_array, eye_array, vstack
+from scipy.sparse import coo_array, csr_array, vstack
 
 from dermis.base.command_line import run_script
 from dermis.human.makehuman import DELTA_UNIT_MM
@@ -42,9 +42,10 @@ BONES = {  # by bone of the bust: beginnings of the names of the published bones
     "eye.L": ("eye.L",),
     "eye.R": ("eye.R",),
 }
-CORNER_MM = 25.0  # approximate radius of the cut's corners
-SMOOTHING_STEPS = 40  # smoothing steps along the edge of the cut, which crosses the folds of the armpits
-CAP_QUADS = 4  # number of quads of the cap from front to back
+CHEST_CUT_MM, CORNER_MM = 385.0, 25.0  # height of the first bust's cut, approximate radius of its corners
+ARM_CUT_MM, ARM_CUT_RISE, CHEST_HALF_WIDTH_MM = 445.0, 0.35, 138.0
+"""Height of the cut above the armpits, and by how much it rises outwards through the upper arms."""
+CAP_RINGS = 4  # number of rings of quads from the edge of the cap to its centre
 
 
 def main(folder: Path) -> None:
@@ -54,7 +55,7 @@ def main(folder: Path) -> None:
     mean = MM * data["positions_dm"].astype(np.float64) + displaced_by(data, MEAN_PERSON)
     data = without_groups(data, "eyelashes")
     quads, kept, mix = clip_to_bust(data, mean)
-    shape = capped(quads, data["quad_group"][kept].astype(np.int64), mix, mean)
+    shape = capped(quads, data["quad_group"][kept].astype(np.int64), mix)
     published, uv = data["quads_uv"][kept].astype(np.int64), data["uv"].astype(np.float64)
     own, corner = human_layout(shape.points_mm(mean), shape.quads, published, uv, shape.group)
     made = bust(data, shape) | {"uv": own.astype(np.float32), "quads_uv": corner.astype(np.uint16)}
@@ -96,12 +97,22 @@ def displaced_by(data: Arrays, weights: dict[str, float]) -> Doubles:
 
 
 def edge_distance_mm(points_mm: Doubles) -> Doubles:
-    """Return the (n,) signed distances of positions (n, 3) from the edge of the bust, negative inside [mm].
+    """Return the (n,) approximate distances of positions (n, 3) from the edge, negative in the bust [mm].
 
-    The cut is level above the breasts and rises outwards through the shoulders.
+    The bust is the first bust with shoulders and the upper arms down to a cut above the armpits.
+    """
+    outside_chest = np.maximum(np.abs(points_mm[:, 0]) - CHEST_HALF_WIDTH_MM, 0.0)
+    arm_cut = ARM_CUT_MM + ARM_CUT_RISE * outside_chest
+    return np.minimum(first_edge_distance_mm(points_mm), arm_cut - points_mm[:, 1])
+
+
+def first_edge_distance_mm(points_mm: Doubles) -> Doubles:
+    """Return the distances (n,) from the edge of the first bust, negative inside [mm].
+
+    The first bust has a level cut above the breasts, which rises outwards through the shoulders.
     """
     x, y = np.abs(points_mm[:, 0]), points_mm[:, 1]
-    below, beside = 385.0 - y, 0.93 * (x - 118.0) - 0.37 * (y - 385.0)
+    below, beside = CHEST_CUT_MM - y, 0.93 * (x - 118.0) - 0.37 * (y - CHEST_CUT_MM)
     return np.asarray(CORNER_MM * np.logaddexp(below / CORNER_MM, beside / CORNER_MM))
 
 
@@ -115,15 +126,16 @@ def without_groups(data: Arrays, kind: str) -> Arrays:
     return data | named | {name: data[name][kept] for name in ("quads", "quads_uv")}
 
 
-def clip_to_bust(data: Arrays, points_mm: Doubles) -> tuple[Index, NDArray[np.bool_], Any]:
-    """Return the quads of the bust, the mask of the kept quads, and the mixing weights of the points.
+def clip_to_bust(data: Arrays, points_mm: Doubles) -> tuple[Index, Index, Any]:
+    """Return the quads of the bust, their indices in the data, and the mixing weights of the points.
 
-    Points outside the edge are moved to it along the shortest path into the bust.
+    Points outside the edge are moved to it along the shortest path into the bust. Quads and points of the
+    first bust come first, so that indices in tables and files of earlier versions stay valid.
     """
     quads, group = data["quads"].astype(np.int64), data["quad_group"].astype(np.int64)
-    away = edge_distance_mm(points_mm)
-    inside = away <= 0
-    kept = inside[quads].any(axis=1) | (group > 0)
+    inside = edge_distance_mm(points_mm) <= 0
+    first = (first_edge_distance_mm(points_mm) <= 0)[quads].any(axis=1) | (group > 0)
+    kept = np.concatenate([np.flatnonzero(first), np.flatnonzero(~first & inside[quads].any(axis=1))])
     quads = quads[kept]
     into, share, least = np.arange(len(points_mm)), np.zeros(len(points_mm)), np.full(len(points_mm), np.inf)
     for steps in (1, 2, 3):  # along sides, or across quads for corners without a side into the bust
@@ -133,7 +145,8 @@ def clip_to_bust(data: Arrays, points_mm: Doubles) -> tuple[Index, NDArray[np.bo
             way = part * np.linalg.norm(points_mm[outer] - points_mm[inner]) + (1e6 if steps == 2 else 0.0)
             if way < least[outer]:
                 into[outer], share[outer], least[outer] = inner, part, way
-    used = np.unique(quads)
+    used = np.unique(quads[: first.sum()])
+    used = np.concatenate([used, np.setdiff1d(quads, used)])
     rows = np.arange(len(used))
     values = np.concatenate([1 - share[used], share[used]])
     columns = np.concatenate([used, into[used]])
@@ -153,44 +166,23 @@ def crossing(outer: Doubles, inner: Doubles) -> float:
     return high
 
 
-def capped(quads: Index, group: Index, mix: Any, points_mm: Doubles) -> Shape:
-    """Return the bust with its opening closed by caps: rows of quads from front to back."""
-    loop = border(quads[group == 0])
-    where = mix[loop] @ points_mm
-    top = int(np.argmax(np.where(where[:, 0] > 0, where[:, 1], -np.inf)))  # where front and back separate
-    loop = np.roll(loop, -top)
-    mix, half = relaxed(mix, loop), len(loop) // 2
-    # separate points, as normals are not smooth around the edge
-    copies = np.arange(mix.shape[0], mix.shape[0] + len(loop))
-    mix, loop = vstack([mix, mix[loop]]).tocsr(), copies
-    front, back = loop[: half + 1], np.r_[loop[0], loop[: half - 1 : -1]]
-    columns, mixes, count = [front[1:-1]], [mix], mix.shape[0]
-    for k in range(1, CAP_QUADS):
-        mixes.append((1 - k / CAP_QUADS) * mix[front[1:-1]] + (k / CAP_QUADS) * mix[back[1:-1]])
-        columns.append(count + np.arange(half - 1))
-        count += half - 1
-    columns.append(back[1:-1])
-    rows = np.stack(columns, axis=1)
-    tips = [[loop[0], *rows[0, k : k + 3][::-1]] for k in range(0, CAP_QUADS, 2)]
-    tips += [[loop[half], *rows[-1, k : k + 3]] for k in range(0, CAP_QUADS, 2)]
-    between = np.stack([rows[:-1, :-1], rows[1:, :-1], rows[1:, 1:], rows[:-1, 1:]], axis=-1).reshape(-1, 4)
-    caps = np.concatenate([np.array(tips), between[:, ::-1]])
-    group = np.concatenate([group, np.full(len(caps), group.max() + 1)])
-    return Shape(np.concatenate([quads, caps]), group, vstack(mixes).tocsr())
-
-
-def relaxed(mix: Any, loop: Index) -> Any:
-    """Return the mixing weights after the points of a loop are moved towards their neighbours."""
-    n = len(loop)
-    around: Any = (0.5 * eye_array(n) + 0.25 * (eye_array(n, k=1) + eye_array(n, k=-1))).tolil()
-    around[0, n - 1] = around[n - 1, 0] = 0.25
-    rows = mix[loop]
-    for _ in range(SMOOTHING_STEPS):
-        rows = around.tocsr() @ rows
-    held = np.ones(mix.shape[0])
-    held[loop] = 0.0
-    put = coo_array((np.ones(n), (loop, np.arange(n))), (mix.shape[0], n)).tocsr()
-    return (diags_array(held) @ mix + put @ rows).tocsr()
+def capped(quads: Index, group: Index, mix: Any) -> Shape:
+    """Return the bust with its opening closed by a cap: rings of quads around a centre."""
+    loop, count = border(quads[group == 0]), mix.shape[0]
+    n, centre = len(loop), mix[loop].mean(axis=0)
+    # the edge has points of its own in the cap, as normals are not smooth around the edge
+    fractions = np.arange(CAP_RINGS) / CAP_RINGS
+    rings = [csr_array((1 - k) * mix[loop] + k * np.tile(centre, (n, 1))) for k in fractions]
+    ring = count + np.arange(CAP_RINGS * n).reshape(CAP_RINGS, n)
+    after = np.roll(ring, -1, axis=1)
+    between = np.stack([ring[:-1], ring[1:], after[1:], after[:-1]], axis=-1).reshape(-1, 4)
+    last, middle = ring[-1], np.full(n // 2, count + CAP_RINGS * n)
+    inner = np.stack([last[0::2], middle, np.roll(last, -2)[0::2], last[1::2]], axis=-1)
+    caps = np.concatenate([between, inner])
+    mix = vstack([mix, *rings, csr_array(centre[None])]).tocsr()
+    return Shape(
+        np.concatenate([quads, caps]), np.concatenate([group, np.full(len(caps), group.max() + 1)]), mix
+    )
 
 
 def border(quads: Index) -> Index:
@@ -198,12 +190,12 @@ def border(quads: Index) -> Index:
     sides = np.stack([quads, np.roll(quads, -1, axis=1)], axis=-1).reshape(-1, 2)
     there = set(map(tuple, sides.tolist()))
     after = {a: b for a, b in there if (b, a) not in there}
-    start, point = after.popitem()
-    loop = [start]
+    start = min(after)
+    loop, point = [start], after.pop(start)
     while point != start:
         loop.append(point)
         point = after.pop(point)
-    assert not after and len(loop) % 2 == 0, "one border, with a point opposite to each"
+    assert not after and len(loop) % 2 == 0, "one border of pairs of sides"
     return np.array(loop)
 
 

@@ -36,7 +36,7 @@ def human_layout(
     group : (q,) group of each quad, 0 for skin
     """
     published, uv = _with_seams(points_mm, quads[: len(published)], published, uv)
-    corner = np.concatenate([published, len(uv) + _strip(quads[len(published) :])])
+    corner = np.concatenate([published, len(uv) + _cap_corners(quads[len(published) :])])
     flat = np.zeros((int(corner.max()) + 1, 2))
     island = _islands(corner)
     pieces = list[Index]()
@@ -64,7 +64,7 @@ def _flattened(points_mm: Doubles, quads: Index, corner: Index, uv: Doubles, gro
     middle = points[triangles].mean(axis=1)
     if group or middle[:, 2].min() > 40.0:  # parts that are not skin; mouth and sockets
         is_cap = used.max() >= len(uv)
-        flat = _unrolled(points) if is_cap else uv[used]
+        flat = points[:, [0, 2]] if is_cap else uv[used]  # the cap is seen from below
         stretch = np.median(singular_values(points[triangles], flat[triangles] * [1, -1]).prod(axis=1))
         made[used] = flat * (PLAIN if group else HIDDEN) / np.sqrt(abs(stretch))
         return made
@@ -130,15 +130,7 @@ def _upright(flat: Doubles, points: Doubles) -> Doubles:
     return np.column_stack([z.real, z.imag])
 
 
-def _unrolled(points: Doubles) -> Doubles:
-    """Return flat coordinates of the points of a strip: distance along the strip, and depth."""
-    order = np.argsort(np.arctan2(points[:, 0], points[:, 1].max() + 1 - points[:, 1]), kind="stable")
-    along = np.zeros(len(points))
-    along[order] = np.r_[0, np.cumsum(np.linalg.norm(np.diff(points[order][:, :2], axis=0), axis=1))]
-    return np.column_stack([along, points[:, 2]])
-
-
-def _strip(caps: Index) -> Index:
+def _cap_corners(caps: Index) -> Index:
     """Return the uv corners of the caps: one corner for each of their points."""
     return np.unique(caps, return_inverse=True)[1].reshape(-1, 4) if len(caps) else caps
 

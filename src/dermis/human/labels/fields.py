@@ -17,7 +17,7 @@ from dermis.human.hair.density import height_above_hairline
 from dermis.human.labels.classes import class_number
 from dermis.human.regions.average import AVERAGE_HUMAN, average_head, is_human, part_quads
 from dermis.human.regions.labels import known_landmarks, warp_to_average
-from dermis.human.regions.region_table import neck_distance_mm, nose_distance_mm
+from dermis.human.regions.region_table import neck_distance_mm, nose_distance_mm, torso_distance_mm
 from dermis.human.skin.surface import BORDER_FIELDS, average_surface, lid_rings
 from dermis.mesh.eyeball import LIMBUS_MM
 from dermis.mesh.head import Head
@@ -37,6 +37,7 @@ HUMAN_FIELDS = (
     "nose",
     "right_brow",
     "left_brow",
+    "torso",
     "neck",
 )
 """Label classes of the skin, in order of precedence."""
@@ -47,7 +48,7 @@ _MIN_BROW_Z_MM = -30.0  # minimum z of brows
 _HAIRLINE_MARGIN_MM = -8.0  # height relative to the hairline below which hair belongs to the beard
 _DENSE_SUBDIVISION_LEVELS = 2
 SIDE_NAMES = "right", "left"
-_PART_CLASSES = {"upper teeth": "teeth", "lower teeth": "teeth", "tongue": "tongue", "cut": "neck"}
+_PART_CLASSES = {"upper teeth": "teeth", "lower teeth": "teeth", "tongue": "tongue", "cut": "torso"}
 _MAX_CACHED_TOPOLOGIES = 3
 _LABEL_CACHE_LOCK = Lock()
 
@@ -70,6 +71,7 @@ def label_fields() -> Doubles:
         "lower_lip": np.minimum(lips, -above),
         "nose": nose_distance_mm(points),
         "neck": neck_distance_mm(points),
+        "torso": torso_distance_mm(points),
     }
     for name, values in (("ear", _ear_field()), ("eye", -lids), ("brow", _brow_field(points))):
         fields[f"left_{name}"] = np.where(left, values, _FIELD_OUTSIDE_CLASS_MM)

@@ -46,6 +46,7 @@ _CHIN_OUTLINE = np.array([[-110.0, 26.0], [-68, 22.0]])
 
 
 _MIN_NOSE_Z_MM, _JAW_Y_MM = -20.0, -108.0
+_NECK_NOTCH_YZ_MM = -195.0, -42.0  # notch between the collar bones, at the base of the neck
 DEFAULT_TABLE_NAME = "default"
 """Name of the package's table, which has artist's values."""
 REGION_VALUE_LIMITS = {"m": (0.05, 1.0), "rho_s": (0.0, 1.0)}
@@ -71,6 +72,19 @@ def neck_distance_mm(points: Doubles) -> Doubles:
     points : (n, 3) positions on the average human [mm]
     """
     return np.asarray(_JAW_Y_MM + 0.42 * np.maximum(6 - points[:, 2], 0) - points[:, 1])
+
+
+def torso_distance_mm(points: Doubles) -> Doubles:
+    """Return the vertical distance (n,) of each point below the base of the neck [mm].
+
+    The base of the neck runs from the notch between the collar bones over the shoulders to the lowest vertebra
+    of the neck. The distance is positive on the torso and negative on neck and head.
+
+    points : (n, 3) positions on the average human [mm]
+    """
+    x, y, z = np.abs(points[:, 0]), points[:, 1], points[:, 2]
+    base_y = _NECK_NOTCH_YZ_MM[0] - 0.417 * (z - _NECK_NOTCH_YZ_MM[1]) + 0.35 * x
+    return np.asarray(base_y - y)
 
 
 def classify_regions(points: Doubles, on_lips: Mask, on_ears: Mask) -> NDArray[np.int64]:
