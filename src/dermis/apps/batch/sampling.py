@@ -1,4 +1,4 @@
-"""Sampling of each image's parameters by hashing, so that they do not depend on machine and order."""
+"""Sampling of the parameters of images by hashing, independently of the machine and of the images' order."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def table_numbers(parameters: Mapping[str, float | int | str], table_name: str) 
 
 
 def hashed_uniform(seed: int, image_or_person: int, parameter: str) -> float:
-    """Return a uniform random number in (0, 1) that depends on a seed, an image and a parameter only.
+    """Return a uniform random number in (0, 1) that depends only on a seed, an image and a parameter.
 
     The random number is a BLAKE2b hash of the three arguments as text. Random numbers for different arguments
     are therefore independent.
@@ -73,7 +73,7 @@ def hashed_uniform(seed: int, image_or_person: int, parameter: str) -> float:
 def round_significant(number: float) -> float:
     """Return a number with six significant digits.
 
-    Later digits of logarithms and roots differ between machines.
+    In the results of logarithms and roots, the digits after these can differ between machines.
     """
     return float(f"{number:.6g}") + 0.0  # no -0.0
 
@@ -141,7 +141,7 @@ def expression_weights(
     target_weights : weights of the expression by name of the morph target; a name without Left or Right
         moves both sides
     intensity : factor of all weights [-]
-    asymmetry : relative increase of weights on the left and decrease on the right [-]
+    asymmetry : relative increase of the weights on the left side, and decrease of those on the right [-]
     variation : standard deviation of the logarithm of each weight [-]
     sample_normal : function that returns a standard normal random number for a target name
     """
@@ -229,7 +229,7 @@ class Sampler:
         return float(ndtri(self._uniform(image_number, parameter)))
 
     def _target_weights(self, image_number: int, sampled_parameters: Parameters) -> dict[str, float]:
-        """Return the weights, in an image, of all morph targets that the spec can move.
+        """Return the weights that all morph targets used by the spec have in one image.
 
         image_number : number of the image
         sampled_parameters : parameters of the image that have been sampled so far
@@ -259,7 +259,7 @@ class Sampler:
 
     @cached_property
     def targets(self) -> tuple[str, ...]:
-        """Return the sorted names of all morph targets that the spec can move."""
+        """Return the sorted names of all morph targets that the spec can use."""
         names = set(table_values(self.distributions, "pose"))
         for name in map(str, self.distributions["expression.name"].support):
             if name == RANDOM_EXPRESSION:
