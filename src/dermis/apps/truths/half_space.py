@@ -13,12 +13,13 @@ _H_FUNCTION_ITERATIONS = 500
 
 
 def h_function(cosine: ArrayLike, albedo: float) -> Floats:
-    """Return Chandrasekhar's H function, by which a half-space's reflection is given in closed form [-].
+    """Return Chandrasekhar's H function, from which the reflection of a half-space is computed [-].
 
-    cosine : cosines of angles to the normal, of any shape
+    cosine : cosines of angles to the normal, an array of any shape
     albedo : single-scattering albedo, below 1 [-]
 
-    Source: [Chandrasekhar1960] section 38, in its form without cancellation, iterated on Gaussian nodes.
+    Source: [Chandrasekhar1960] section 38: the form of the integral equation in which no digits cancel,
+    solved by iteration at Gaussian nodes.
     """
     if not 0.0 <= albedo < 1.0:
         refuse("half-space", "an albedo from 0 to below 1", f"got {albedo:g}", "Correct it")
