@@ -76,7 +76,10 @@ def rendered_response(renderer: dermis.Renderer, skin: Skin, thickness_mm: float
 
 
 def skins_by_direction(medium: Medium, folder: str) -> dict[str, Skin]:
-    """Return skins with a medium's profile whose light leaves as Lambertian or as from a half-space, by name.
+    """Return two skins that have the diffusion profile of a medium, keyed by their setting `direction`.
+
+    Light leaves the skin "lambertian" with equal radiance in all directions. Light leaves the skin
+    "half-space" with the angular distribution of a half-space.
 
     folder : folder for the file of the profile
     """
@@ -105,7 +108,7 @@ def error_rows(renderer: dermis.Renderer) -> str:
 def forward_error_rows(renderer: dermis.Renderer) -> str:
     """Return Markdown rows with the errors of half-space skin against forward-scattering slabs.
 
-    The skin ignores forward scattering, or takes it into account by the setting `anisotropy`.
+    Half of the rows ignore forward scattering; the others account for it by the skin's `anisotropy`.
     """
     rows = []
     with tempfile.TemporaryDirectory() as folder:
@@ -124,7 +127,7 @@ def forward_error_rows(renderer: dermis.Renderer) -> str:
 def forward_direction_rows() -> str:
     """Return Markdown rows with errors of radiance below the surface of forward-scattering skin1.
 
-    Errors are over all directions of light and view.
+    Each error is taken over all directions of light and view.
     """
     rows = []
     for g in (0.0, FORWARD_G):
@@ -151,7 +154,10 @@ def _direction_pairs_error(albedo: float, eta: float, g: float) -> float:
 
 
 def _error_cells(response: Array, reference: Array) -> str:
-    """Return table cells for transmittance, then reflectance: RMS error, and ratio of red light by angle."""
+    """Return table cells with the RMS error and, for each angle, the ratio of red light to the reference.
+
+    Cells of transmittance come first, then cells of reflectance.
+    """
     flux, cells = np.sqrt(np.cos(np.radians(INCIDENT_DEGREES)))[:, None], []
     for side in (1, 0):
         ours, exact = response[side], reference[side]
