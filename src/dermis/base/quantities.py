@@ -72,9 +72,9 @@ def check_fields(
 ) -> None:
     """Check that the values of an object's attributes lie in given ranges.
 
-    range_of_field : lowest and highest value by name of the attribute; if both are ints, the value must be a
-        whole number
-    prefix : text before the name of the attribute in errors
+    range_of_field : dictionary from the name of an attribute to its lowest and highest value; if both are
+        ints, the attribute must be a whole number
+    prefix : text that is put before the names of attributes in errors
 
     Raises DermisError as `checked_number` does.
     """
@@ -97,7 +97,7 @@ def _number_in_range(value: object, low: float, high: float) -> int | float | No
 def _has_text(values: Any, dimension_count: int) -> bool:
     """Return whether nested lists or arrays contain text or booleans, which NumPy would convert to numbers.
 
-    dimension_count : number of dimensions of the expected array; lists nested more deeply count as text
+    dimension_count : number of dimensions of the expected array; more deeply nested lists are treated as text
     """
     import numpy as np
 

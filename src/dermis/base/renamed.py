@@ -63,7 +63,7 @@ def successor(module_name: str, old_name: str) -> str | None:
 def renamed_keywords(**new_names: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """Return a decorator that lets a function accept the old names of keyword arguments, with a warning.
 
-    new_names : new names by old names
+    new_names : new name of each argument, passed as old_name="new_name"
     """
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
@@ -98,7 +98,7 @@ def find_renamed_modules() -> None:
 
 
 class _RenamedModuleFinder:
-    """Import hook for the old path of a renamed module; it imports the module from the new path."""
+    """Import hook that finds a renamed module by its old path and imports the module from the new path."""
 
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
@@ -119,7 +119,7 @@ class _RenamedModuleFinder:
 def _new_module_path(fullname: str) -> str | None:
     """Return the new path of a renamed module, without the package's name; None for other modules.
 
-    fullname : old path with the package's name
+    fullname : old path of the module, with the package's name
     """
     package, _, path = fullname.partition(".")
     if package != _PACKAGE_NAME:

@@ -61,7 +61,7 @@ class SkinAppearance(NamedTuple):
         skin
     opaque : PLY file of each material except skin, by material index
     pictured : roles of a material's pictures, by material index; materials without pictures are absent
-    pictures : PNG files of the pictures that all materials share, by role
+    pictures : PNG files of pictures by role; all materials share these pictures
     """
 
     media: Mapping[Boundary, IsotropicMedium]
@@ -86,8 +86,8 @@ def scene_files(
     picture_size : width and height of the picture [pixel]
     samples_per_pixel : number of paths that Mitsuba traces for each pixel
 
-    Raises DermisError if the scene has lights without shadows, a camera with a shifted lens, or skin that
-    does not enclose a volume, which Mitsuba does not support.
+    Raises DermisError for what Mitsuba does not support: lights without shadows, a camera with a shifted
+    lens, and skin that does not enclose a volume.
     """
     backend = XmlBackend()
     meshes = skin_meshes(backend, scene.head)
@@ -113,7 +113,10 @@ def scene_files(
 
 
 def medium_description(medium: IsotropicMedium) -> SceneDict:
-    """Return Mitsuba's description of a homogeneous medium [mm]; the scale is the largest extinction."""
+    """Return Mitsuba's description of a homogeneous medium, in mm.
+
+    The largest extinction coefficient is the medium's scale, by which Mitsuba multiplies the coefficients.
+    """
     extinction = np.asarray(medium.sigma_t)
     return {
         "type": "homogeneous",
@@ -131,7 +134,7 @@ def surface_bsdf(
     """Return Mitsuba's description of the skin's surface, or of the outer layer of an index-matched surface.
 
     boundary : surface model of the skin
-    transmittance : texture that scales light on entry and again on exit; None for 1
+    transmittance : texture that scales light on entry and again on exit; None for a factor of 1
     roughness : Beckmann m, a number or a texture
     """
     facets = {"distribution": "beckmann", "alpha": roughness}
@@ -149,7 +152,7 @@ def surface_bsdf(
 def _lower_surface_bsdf(has_dimming: bool) -> SceneDict:
     """Return Mitsuba's description of the inner layer of an index-matched surface.
 
-    This layer absorbs part of the light that leaves the skin, where the skin is darker than its medium.
+    Where the skin is darker than its medium, this layer absorbs part of the light that leaves the skin.
 
     has_dimming : whether the skin has a texture of the absorbed fraction
     """

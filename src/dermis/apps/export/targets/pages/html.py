@@ -1,4 +1,4 @@
-"""HTML files with embedded scripts and styles, and a Content-Security-Policy that forbids further ones."""
+"""HTML files with embedded scripts and styles, and a Content-Security-Policy that forbids all others."""
 
 from __future__ import annotations
 
@@ -45,10 +45,10 @@ def render_page(
 
 
 def escape_script(script: str) -> str:
-    """Return a script that can be placed in a <script> element without changing its strings."""
+    """Return a script escaped for a <script> element; the values of its string literals do not change."""
     return _SCRIPT_END.sub(r"<\\/", script).replace("<!--", r"<\!--")
 
 
 def csp_hash(inline_text: str) -> str:
-    """Return the hash by which a Content-Security-Policy allows an inline script or style."""
+    """Return the hash with which a Content-Security-Policy allows an inline script or style."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(inline_text.encode()).digest()).decode()}'"

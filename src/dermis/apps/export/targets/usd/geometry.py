@@ -129,10 +129,10 @@ def to_metres(positions_mm: NDArray[np.floating]) -> Floats:
 
 
 def add_motion(stage: Usd.Stage, root: Sdf.Path, mesh: Usd.Prim, deformable: DeformableMesh) -> None:
-    """Add blend shapes, a skeleton and a rest animation, with which programs can pose the head.
+    """Add blend shapes, a skeleton and a rest animation, so that programs can pose the head.
 
     root : path of the UsdSkelRoot
-    mesh : mesh that blend shapes and skeleton deform
+    mesh : mesh that the blend shapes and the skeleton deform
     deformable : the head's mesh with morph targets and bone weights, all morph targets at weight 0
     """
     path = root.AppendChild("skeleton")

@@ -1,6 +1,6 @@
 """USD stage of a head in metres, Y up.
 
-Materials are OpenPBR as MaterialX nodes, with UsdPreviewSurface for programs that do not support OpenPBR.
+Each material has MaterialX nodes for OpenPBR, and a UsdPreviewSurface for programs without OpenPBR.
 """
 
 from __future__ import annotations
