@@ -17,7 +17,7 @@ _UNFINISHED_NAME_PATTERN = re.compile(r"\.(.+)-[0-9a-f]{12}\.unfinished")
 
 
 def temporary_path(final_path: Path) -> Path:
-    """Return an unused hidden path in the folder of `final_path`, for content to be renamed when complete."""
+    """Return an unused hidden path beside `final_path`, at which to write content before renaming it."""
     return final_path.with_name(f".{final_path.name}-{secrets.token_hex(6)}.unfinished")
 
 
@@ -26,7 +26,7 @@ def atomic_write(final_path: Path, write_content: Callable[[Path], object]) -> N
 
     If another process removes the temporary file during a cleanup, the file is written again.
 
-    write_content : function that writes the content to a path, its argument
+    write_content : function that writes the content to the path passed to it
 
     Raises DermisError if the file cannot be written.
     """

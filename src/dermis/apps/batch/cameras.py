@@ -65,7 +65,7 @@ def sampled_camera(
     )
 
     def aim(offset_fraction: float) -> AimOffset:
-        """Return the aim offset of the camera that applies a fraction of the sampled offset of the face."""
+        """Return the aim offset of the camera at which the face has a fraction of its sampled offset."""
         return -0.5 * frame * offset_fraction * offset[0], -0.5 * frame * offset_fraction * offset[1]
 
     fraction, low, high = 1.0, 0.0, 1.0
@@ -86,7 +86,7 @@ def _aim_camera(
     centre : (3,) centre of the face [mm]
     axes : (3, 3) axes of the camera as rows, from `_camera_axes`
     distance_mm : distance of the camera from the centre of the face [mm]
-    frame_mm : height visible at the centre of the face if the camera looked at this centre [mm]
+    frame_mm : visible height at the centre of the face, for a camera aimed at this centre [mm]
     aim_offset : offset of the camera's target from the centre of the face, to the right and upwards [mm]
     """
     scale = math.hypot(distance_mm, *aim_offset) / distance_mm  # keeps the angle of view

@@ -141,8 +141,8 @@ def _markdown_table(column_names: Sequence[str], table_rows: TableRows) -> str:
 class OutputFormat(TypedDict):
     """File format of an output array, for programs that read the data set.
 
-    A stored level encodes the value (level - zero) * step; a step of 1 and a zero of 0 mean that values are
-    stored unscaled.
+    A stored number `level` stands for the value (level - zero) * step. A step of 1 and a zero of 0 mean that
+    values are stored unscaled.
     """
 
     file: str
@@ -173,7 +173,7 @@ def output_formats(spec: Spec) -> dict[str, OutputFormat]:
 
 
 def label_names(spec: Spec) -> dict[str, dict[int, str]]:
-    """Return a dictionary from pixel value to class name for each label output of the spec."""
+    """Return, for each label output of the spec, a dictionary from pixel value to class name."""
     by_output: dict[str, dict[int, str]] = {}
     for one in label_classes():
         for output, level in zip(_LABEL_OUTPUTS, (one.number, one.face_synthetics), strict=True):

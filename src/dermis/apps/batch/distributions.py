@@ -1,4 +1,4 @@
-"""Probability distributions in a spec, written as a constant or as a TOML table: {uniform = [0, 1]}."""
+"""Probability distributions in a spec, written as a constant or a TOML table such as {uniform = [0, 1]}."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ class Uniform(Distribution):
     logarithmic: bool = False
 
     def __post_init__(self) -> None:
-        """Check that the limits are ordered, and that limits of logarithms are positive."""
+        """Check that the limits are ordered and, if the distribution is logarithmic, positive."""
         require(self.low < self.high, "a lower limit that is less than the upper limit")
         require(self.low > 0 or not self.logarithmic, "limits above 0 for log_uniform")
 

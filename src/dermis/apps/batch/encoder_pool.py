@@ -22,8 +22,8 @@ class EncoderPool:
     """Pool of processes that encode images as files; the images are assigned to the processes in turn.
 
     process_count : number of processes; if 0, the calling process encodes the images
-    encode : picklable function whose arguments are those in a job, and which returns the number and the files
-        of an image
+    encode : picklable function, called with the arguments in a job, that returns the number and the files of
+        an image
     """
 
     def __init__(self, process_count: int, encode: Callable[..., EncodedImage]) -> None:

@@ -148,7 +148,7 @@ def _parameter_test(parameter: str, distribution: Distribution, samples: Samples
 
 
 def _number_test(parameter: str, distribution: Distribution, sorted_samples: Array) -> FitTest:
-    """Return the Kolmogorov-Smirnov test of sorted samples that were rounded to six digits."""
+    """Return the Kolmogorov-Smirnov test of sorted samples, rounded to six significant digits."""
     count, error = len(sorted_samples), _RELATIVE_ROUNDING_ERROR * np.abs(sorted_samples)
     up_to = np.searchsorted(sorted_samples, sorted_samples, "right") / count
     below = np.searchsorted(sorted_samples, sorted_samples, "left") / count

@@ -1,4 +1,4 @@
-"""Index of a data set: a Parquet table with the sampled parameters of each image, and its statistics."""
+"""Index of a data set: a Parquet table with the parameters of each image; summaries of its columns."""
 
 from __future__ import annotations
 

@@ -158,7 +158,7 @@ def read_record(json_bytes: bytes, culprit: object) -> Record:
 
 @contextmanager
 def shard_files(path: Path) -> Iterator[dict[str, FileReaders]]:
-    """Yield a dictionary from each image key of a shard to functions that read the image's files, by suffix.
+    """Open a shard, and yield functions that read its files, indexed by image key and file suffix.
 
     The functions can be called inside the with block.
 

@@ -172,7 +172,7 @@ def _must_grow(existing_toml: str, spec: Spec, out: Path) -> bool:
 
 
 def _remove_joined_parts(out: Path, spec: Spec, complete_shards: Iterable[Shard]) -> None:
-    """Remove parts whose shard exists: a run was interrupted between joining and removing these parts."""
+    """Remove the parts of complete shards, left over by a run that was interrupted after joining them."""
     if files := part_files(out):
         complete_shards = set(complete_shards)
         for number, path in files.items():

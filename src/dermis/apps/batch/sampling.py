@@ -47,7 +47,7 @@ _CONDITIONAL_PARAMETERS: tuple[tuple[str | tuple[str, ...], Callable[[Parameters
 
 
 def table_numbers(parameters: Mapping[str, float | int | str], table_name: str) -> dict[str, float]:
-    """Return the numeric parameters of a spec table by key, without the table's name.
+    """Return the numeric parameters of a spec table, with the name of the table removed from their names.
 
     table_name : dotted name of the table, such as "light.key"
     """
@@ -73,7 +73,7 @@ def hashed_uniform(seed: int, image_or_person: int, parameter: str) -> float:
 def round_significant(number: float) -> float:
     """Return a number with six significant digits.
 
-    In the results of logarithms and roots, the digits after these can differ between machines.
+    After the sixth digit, computed logarithms and roots can differ between machines.
     """
     return float(f"{number:.6g}") + 0.0  # no -0.0
 
@@ -96,7 +96,7 @@ class Movement:
 
 @cache
 def load_movements() -> Mapping[str, tuple[Movement, ...]]:
-    """Return the facial movements of mixture.csv by part of the face."""
+    """Return the facial movements in mixture.csv, grouped by part of the face."""
     by_part: dict[str, tuple[Movement, ...]] = {}
     for row in read_rows(str(__package__), "mixture"):
         words = row["moves"].split()

@@ -116,7 +116,7 @@ class SceneBuilder:
         return _Person(head, face_points(head), find_rotation_bones(head.control.skeleton).head, skin)
 
     def _resolve_file(self, head_or_panorama: float | str) -> str:
-        """Return the path of a head or panorama file in the spec's folder; for other names, the name."""
+        """Return the path of a file in the spec's folder, or the name itself if there is no such file."""
         file = self.spec.folder / str(head_or_panorama)
         return str(file) if is_file(file) else str(head_or_panorama)
 
@@ -154,7 +154,7 @@ def sampled_person(parameters: Parameters) -> Human:
 def _subdivision_levels(picture_size: tuple[int, int]) -> int:
     """Return the number of times that heads are subdivided for a picture size [pixel].
 
-    The number is equal for all sampled people, so that all their heads have the same topology.
+    The number is the same for all sampled people, so that all their heads have the same topology.
     """
     return max(MIN_HUMAN_LEVELS, SmoothIn(size=picture_size)(Human().head(subdivide=0)))
 

@@ -34,7 +34,7 @@ class ShardManifest:
     first, stop : first image number, and the number after the last image
     left_out : numbers of the images that could not be rendered, with the reasons
     sha256 : SHA-256 of all bytes before the manifest
-    made_with : adapter, and versions of the software, with which the images were rendered
+    made_with : adapter and software versions with which the images were rendered
     """
 
     spec: str
@@ -231,5 +231,5 @@ def folder_sha256(folder: Path, file_names: Iterable[str]) -> str:
 
 
 def _file_hash_input(file_name: str, content: bytes) -> bytes:
-    """Return what is hashed of a file for the SHA-256 of its folder: its name, size and content."""
+    """Return the bytes by which a file enters the SHA-256 of its folder: name, size and content."""
     return f"{file_name} {len(content)}\n".encode() + content

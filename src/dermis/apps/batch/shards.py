@@ -66,9 +66,9 @@ def shard_at(shard_number: int, spec: Spec) -> Shard:
 def list_parts(shard: Shard, spec: Spec) -> list[Part]:
     """Return the parts of a shard in order.
 
-    The part size is the smallest multiple of the number of images per person that is between 16 and 32; if
-    there is none, it is 16. Except for the first part of a shard, the number of a part's first image is a
-    multiple of the part size. The first and the last part may therefore be smaller.
+    The part size is the smallest multiple of the number of images per person that is between 16 and 32, or 16
+    if there is none. Except for the first part of a shard, the number of a part's first image is a multiple of
+    the part size. The first and the last part may therefore be smaller.
     """
     group = spec.images_per_person
     size = -(-_MIN_PART_IMAGES // group) * group if group <= _MAX_PART_IMAGES else _MIN_PART_IMAGES

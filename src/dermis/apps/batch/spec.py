@@ -137,7 +137,7 @@ class Spec(FrozenModel):
 
     @property
     def landmark_tables(self) -> Mapping[str, str]:
-        """Return the name of each preset landmark set, or the path of its table, by the set's name."""
+        """Return a dictionary from landmark set name to source: a preset name, or the path of a table."""
         return {name: name if name in LANDMARK_SETS else str(self.folder / name) for name in self.landmarks}
 
     @property
@@ -192,9 +192,9 @@ def _table_distributions(table_name: str, table_value: object) -> dict[str, Dist
 def load_spec(path: str | Path, **values: object) -> Spec:
     """Return the spec in a TOML file; paths in the file are relative to the folder of the file.
 
-    values : `count`, `seed`, `size` or `format`, in place of the values in the file
+    values : `count`, `seed`, `size` or `format`, replacing the values in the file
 
-    Raises DermisError for values that cannot be rendered, with their table and key, and for missing files.
+    Raises DermisError, naming table and key, for values that cannot be rendered; also for missing files.
     """
     path = checked_path(path, "a spec of a data set in TOML")
     data = read_toml(path, "a spec of a data set in TOML")

@@ -148,7 +148,7 @@ T = TypeVar("T")
 
 
 def table_values(values_by_dotted_name: Mapping[str, T], table_name: str) -> dict[str, T]:
-    """Return the entries of one spec table, by key without the name of the table.
+    """Return the entries of one spec table, with the name of the table removed from their names.
 
     values_by_dotted_name : entries of all tables by dotted name, such as "light.key.size_mm"
     table_name : dotted name of the table, such as "light.key"

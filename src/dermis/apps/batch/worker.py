@@ -58,7 +58,7 @@ class RunOptions:
 
     spec : spec of the data set
     out : folder of the data set
-    encoders : number of encoder processes per worker; with 0, the worker encodes itself
+    encoders : number of encoder processes per worker; if 0, the worker encodes the images
     keep_going : whether images that cannot be rendered are omitted and recorded, instead of ending the run
     """
 
