@@ -63,7 +63,7 @@ def atomic_file(path: str | Path) -> Iterator[Path]:
 
 @contextmanager
 def atomic_folder(path: str | Path, marker: str) -> Iterator[Path]:
-    """Yield a new empty folder that replaces `path` on success and is deleted after an error.
+    """Yield a new empty folder, which replaces `path` on success and is deleted after an error.
 
     marker : name of a file by which an existing folder is recognised as output of this package; only a folder
         with this file, or an empty folder, is replaced

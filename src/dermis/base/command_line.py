@@ -1,4 +1,4 @@
-"""Framework of command-line programs: commands are functions; errors are one line, with exit status 2."""
+"""Framework of command-line programs: commands are functions; errors are one line and exit status 2."""
 
 from __future__ import annotations
 

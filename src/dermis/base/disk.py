@@ -41,7 +41,7 @@ _MAX_THREADS = 4
 
 
 def cached_array(sources: Array | Sequence[Array], parameters: str, compute: Callable[[], Array]) -> Array:
-    """Return the array that `compute` computes from `sources`, from the disk cache if it is cached.
+    """Return the array that `compute` computes from `sources`; use the disk cache if it has the array.
 
     parameters : text with everything besides `sources` on which the result depends; part of the cache key
     """
@@ -51,7 +51,7 @@ def cached_array(sources: Array | Sequence[Array], parameters: str, compute: Cal
 def cached_arrays(
     sources: Array | Sequence[Array], parameters: str, names: list[str], compute: Callable[[], Arrays]
 ) -> Arrays:
-    """Return the arrays that `compute` computes from `sources`, from the disk cache if they are cached.
+    """Return the arrays that `compute` computes from `sources`; use the disk cache if it has the arrays.
 
     parameters : text with everything besides `sources` on which the result depends; part of the cache key
     names : names of the arrays in the result
@@ -76,7 +76,7 @@ def array_key(sources: Sequence[Array], parameters: str) -> str:
 def load_or_make(folder: str, cache_key: str, names: list[str], compute: Callable[[], Arrays]) -> Arrays:
     """Return arrays from the disk cache; if there is no valid entry, compute the arrays and cache them.
 
-    folder : name of a folder of the cache
+    folder : name of a folder inside the cache folder
     names : names of the arrays in the result
     """
     arrays = load_arrays(folder, cache_key, names)

@@ -41,7 +41,7 @@ def run_decoder(
     """Run a decoder in a separate process and return its answer.
 
     decoder_module : module of the decoder, which runs in an empty temporary folder
-    request_arrays : numeric arrays by name
+    request_arrays : dictionary from name to numeric array
     data_bytes : size of the data to decode [bytes]; determines the time limit
     culprit : name of the file, for errors
     expected : what the file should be, for errors

@@ -17,7 +17,7 @@ def checked_number(culprit: object, value: object, low: float, high: float, reas
 
     culprit : option or field with the value, for errors
     low, high : limits of the range, both included
-    reason : reason for the limits, or the unit, for errors
+    reason : reason for the limits, or unit of the value, to be added to errors
 
     Raises DermisError for text, booleans, arrays, NaN, infinity and numbers outside the range.
     """
@@ -46,7 +46,7 @@ def checked_array(
     culprit : option or field with the values, for errors
     shape : expected shape, with 0 for an axis of any length
     low, high : limits of the range, both included
-    reason : reason for the limits, or the unit, for errors
+    reason : reason for the limits, or unit of the value, to be added to errors
 
     Raises DermisError for another shape, and when an element is not a number in the range.
     """

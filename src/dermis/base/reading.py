@@ -1,6 +1,7 @@
 """Safe reading of files that users name, and of further files to which these files refer.
 
-Only regular files of limited size are read, and errors of parsers become messages that name the file.
+Only regular files are read, with a limit on their size, and errors of parsers become messages that name the
+file.
 """
 
 from __future__ import annotations

@@ -106,7 +106,7 @@ class _RenamedModuleFinder:
         return ModuleSpec(fullname, cast(Any, self)) if _new_module_path(fullname) else None
 
     def create_module(self, spec: ModuleSpec) -> None:
-        """Let the import system create the module; `exec_module` then replaces it by the renamed module."""
+        """Let the import system create a module, which `exec_module` then replaces by the renamed module."""
 
     def exec_module(self, module: ModuleType) -> None:
         old = module.__name__

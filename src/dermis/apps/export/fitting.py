@@ -184,7 +184,8 @@ def fit_length_scale(
 ) -> float:
     """Return the length by which a profile's radii are multiplied to match one channel of `curve` [mm].
 
-    The sum of squared differences is minimised, at radii spaced evenly in log r.
+    The sum of squared differences between the cumulative profiles is minimised, at radii spaced evenly in log
+    r.
 
     colour_channel : index of the channel of `curve`, 0 for red
     unit_cdf : cumulative profile for a length of 1: a function that takes radii (n,) and returns the fraction

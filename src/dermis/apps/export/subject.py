@@ -135,7 +135,7 @@ class Subject:
         return replace(self, scene=replace(self.scene, head=painted))
 
     def encode_maps(self) -> dict[str, bytes]:
-        """Return the PNG file of each map of the head, by role.
+        """Return a dictionary from role to PNG file for the maps of the head.
 
         The roles are colour, normal, roughness, specular and height.
 
@@ -152,7 +152,7 @@ class Subject:
 def load_subject(
     source: str | Path, *, profile: str | Path | None = None, model: ModelName | None = None, **head: Any
 ) -> Subject:
-    """Load a skin or a head by name or from a file, and return it with its reference profile.
+    """Load a skin or a head, given by name or file, and return it with the reference profile of its skin.
 
     source : name ("skin1", "dj3", "light", "gpu-gems-3") or file (.toml, .csv) of a profile, or a head:
         "human", "human:7", a person's .json file, the name of a sample, or a mesh file (.glb, .obj, .usdz,

@@ -236,7 +236,7 @@ def _maps_description(
 ) -> dict[str, object]:
     """Return the description of all maps for maps.json: layout, lights, units and ranges.
 
-    map_entries : unit, meaning, range and PNG encoding of each map, by name of the map
+    map_entries : dictionary from the name of each map to its unit, meaning, range and PNG encoding
     """
     return {
         "format": "dermis maps 1",

@@ -93,7 +93,7 @@ def subdivide_triangles(
 
 
 def coloured_meshes(renderer: Renderer, scene: Scene, materials: Iterable[int]) -> dict[int, bytes]:
-    """Return a PLY file of the triangles of each material, by material index.
+    """Return a dictionary from material index to a PLY file of the triangles with this material.
 
     The triangles are subdivided, with a colour at each vertex instead of maps. Positions are in mm, relative
     to the head's centre.

@@ -53,15 +53,16 @@ class IsotropicMedium(NamedTuple):
 class SkinAppearance(NamedTuple):
     """Media and textures of the skin, and the meshes of the head's other materials.
 
-    media : medium of the skin for each surface model in `BOUNDARIES`
+    media : dictionary from each surface model in `BOUNDARIES` to the medium of the skin
     roughness : Beckmann m, a number or a map (n, n)
     transmittance : (n, n, 3) map by which a refracting surface scales light on entry and again on exit; None
         for uniform skin
     dimming : (n, n) fraction of the emerging light that an index-matched surface absorbs; None for uniform
         skin
-    opaque : PLY file of each material except skin, by material index
-    pictured : roles of a material's pictures, by material index; materials without pictures are absent
-    pictures : PNG files of pictures by role; all materials share these pictures
+    opaque : dictionary from material index to PLY file, for all materials except skin
+    pictured : dictionary from material index to the roles of the material's pictures; materials without
+        pictures are absent
+    pictures : dictionary from role to PNG file of the pictures, which all materials share
     """
 
     media: Mapping[Boundary, IsotropicMedium]
@@ -209,7 +210,7 @@ def _skin_elements(
 ) -> list[ET.Element]:
     """Return the XML elements of the skin with one surface model: medium, surface and shapes.
 
-    meshes : PLY files of the skin's surfaces by shape name
+    meshes : dictionary from shape name to the PLY file of a surface of the skin
     """
     roughness = appearance.roughness if isinstance(appearance.roughness, float) else _exr_texture("roughness")
     transmittance = None if appearance.transmittance is None else _exr_texture("passing")

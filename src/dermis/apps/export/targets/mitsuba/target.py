@@ -157,7 +157,7 @@ def _boundary_transmittance(boundary: Boundary) -> float:
 
 
 def _pictured_parts(subject: Subject) -> dict[int, set[PartRole]]:
-    """Return the roles of pictures by material index; eyeballs and parts without pictures are omitted."""
+    """Return a dictionary from material index to picture roles, for parts with pictures except eyeballs."""
     head, pictures = subject.head_or_ball, subject.part_pictures
     if pictures is None:
         return {}
@@ -167,7 +167,7 @@ def _pictured_parts(subject: Subject) -> dict[int, set[PartRole]]:
 
 
 def _opaque_meshes(scene: Scene, adapter: str, picture_materials: Container[int]) -> dict[int, bytes]:
-    """Return a PLY file for each of the head's materials except skin, by material index.
+    """Return a dictionary from material index to PLY file, for the head's materials except skin.
 
     picture_materials : indices of the materials with pictures; files of other materials have vertex colours
     """

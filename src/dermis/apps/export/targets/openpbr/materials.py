@@ -236,7 +236,7 @@ def file_prefix(file: Path, subject: Subject) -> str:
 
 
 def write_maps(subject: Subject, folder: Path, prefix: str) -> dict[str, Path]:
-    """Write the maps of the head's skin as PNG files, and return their paths by role.
+    """Write the maps of the head's skin as PNG files, and return a dictionary from role to path.
 
     prefix : prefix of the file names
     """

@@ -168,7 +168,7 @@ def material_parameters(subject: Subject) -> Parameters:
 
 
 def page_camera(scene: Scene, centre_mm: Sequence[float]) -> Json:
-    """Return the scene's camera as JSON: positions in the page's scene [m], vertical angle of view [rad].
+    """Return the scene's camera as JSON, with positions in the page's scene [m] and angle of view [rad].
 
     centre_mm : (3,) point of the scene that is the origin of the page's scene [mm]
     """

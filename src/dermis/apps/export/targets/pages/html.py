@@ -30,7 +30,7 @@ def render_page(
     script : script from `escape_script`
     policy : directives of the Content-Security-Policy except script-src and style-src
     script_sources : sources that script-src allows in addition to the embedded script
-    placeholder_texts : HTML or data of the template's other placeholders, by name
+    placeholder_texts : HTML or data for each of the template's other placeholders
     """
     style = (folder / "page.css").read_text("utf-8")
     allowed = " ".join([csp_hash(script), *script_sources])

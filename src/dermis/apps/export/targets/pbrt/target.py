@@ -247,7 +247,7 @@ def _ball_scene(ball: Head) -> Scene:
 def _scene_lines(
     subject: Subject, parameters: Parameters, scene: Scene, file_prefix: str
 ) -> tuple[Lines, dict[str, bytes]]:
-    """Return the directives of the scene, and the contents of the mesh and image files by file name.
+    """Return the directives of the scene, and a dictionary from name to content of mesh and image files.
 
     file_prefix : prefix of the names of mesh and image files
     """
@@ -316,7 +316,7 @@ def _opaque_materials(
 
 
 def _part_textures(subject: Subject, file_prefix: str) -> tuple[Lines, dict[str, bytes]]:
-    """Return the texture directives for parts that are not skin, and the image files by name.
+    """Return the texture directives for parts that are not skin, and a dictionary of image files by name.
 
     file_prefix : prefix of the names of the image files
     """
@@ -339,7 +339,7 @@ class SkinTextures(NamedTuple):
     """Textures of the skin in a pbrt scene.
 
     lines : directives that define the textures
-    files : contents of the image files by file name
+    files : dictionary from the name of each image file to its content
     material_textures : pbrt type, and name of the texture or image file, of each parameter of the skin's
         material with a map
     """

@@ -111,7 +111,7 @@ def _editor_script(
 ) -> str:
     """Return a Python script for the editor that creates the profile and imports the maps beside the script.
 
-    map_files : file names of the maps by role
+    map_files : dictionary from the role of each map to its file name
     """
     settings = [
         f"    {json.dumps(one.name)}: {_python_literal(one.value)},  # {one.unit}\n" for one in parameters

@@ -48,7 +48,7 @@ def mesh_polygons(mesh: Mesh) -> Polygons:
 
 
 def point_vertices(mesh: Mesh) -> NDArray[np.intp]:
-    """Return the index of the first vertex at each point (p,); vertices on a uv seam share points."""
+    """Return the index of the first vertex at each point (p,); at uv seams, vertices share a point."""
     return np.unique(mesh.point, return_index=True)[1]
 
 

@@ -35,7 +35,7 @@ def build_stage(
     """Return the stage with a head's mesh, hairs, rig and materials.
 
     head_name : display name of the head
-    materials : OpenPBR materials by material index in the mesh
+    materials : dictionary from material index in the mesh to OpenPBR material
     file_prefix : prefix of the file names of the maps, which are beside the stage
     """
     stage = Usd.Stage.CreateInMemory()

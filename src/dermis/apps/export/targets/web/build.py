@@ -40,7 +40,7 @@ INTERACTIVE_QUALITY = {"software": (256, 1, 2)}
 class PageContent:
     """Data that the web page embeds: frames, buffers, maps and the poster.
 
-    frames_by_kind : JSON description of the captured frames by kind of adapter, "gpu" or "software"
+    frames_by_kind : dictionary from kind of adapter, "gpu" or "software", to the JSON of its captured frames
     byte_runs : collector that stores and compresses the data of buffers and textures
     maps : maps encoded as pictures
     pictures : WebP files of the maps, to which `picture_entries` refers by index
@@ -78,11 +78,11 @@ class PageRequest:
     """Scene, sliders and settings for which the frames of the page are captured.
 
     settings : settings of all frames, except the size and the technique, which differ between frames
-    sizes : sides of the square pictures by kind of adapter [pixel], see `PICTURE_SIDES`; the page does not
-        run on a kind of adapter that has no sizes
+    sizes : dictionary from kind of adapter to the sides of the square pictures [pixel], see `PICTURE_SIDES`;
+        the page does not run on a kind of adapter that is absent
     adapter : adapter on which the frames are captured
-    interactive : quality while the user drags a control, by kind of adapter, see `INTERACTIVE_QUALITY`; a
-        kind that is absent keeps full quality
+    interactive : dictionary from kind of adapter to the quality while the user drags a control, see
+        `INTERACTIVE_QUALITY`; a kind that is absent keeps full quality
     """
 
     scene: Scene
@@ -171,7 +171,7 @@ def _frame_changes(
     default_inputs: FrameInputs,
     named_frame: NamedFrame,
 ) -> Json:
-    """Return the JSON of the changes of a frame's records and buffers at each node, by slider name.
+    """Return the JSON of the changes of a frame's records and buffers at each node of each slider.
 
     default_inputs : inputs of the frame with all sliders at their default values
     """
@@ -203,8 +203,8 @@ def _mip_entries(content: PageContent, picture_map: PictureMap) -> list[list[tup
 def _colour_maps(content: PageContent, renderer: Renderer, request: PageRequest, maps: PictureMaps) -> Json:
     """Return the JSON of the colour maps that replace the head's colour map at nodes of sliders.
 
-    The JSON contains the resource index of the head's colour map and, by slider name, the picture entry of
-    the colour map at each node.
+    The JSON contains the resource index of the head's colour map and, for each slider, the picture entries of
+    the colour maps at its nodes.
     """
     map_index = next((k for k, one in maps.items() if one.role == "colour_map"), None)
     if map_index is None:

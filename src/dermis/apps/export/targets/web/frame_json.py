@@ -63,9 +63,9 @@ def frames_json(
 
     Data that is all zero is not stored, as the page creates resources filled with zeros.
 
-    picture_maps : maps that are stored as pictures, by resource index
-    quantisation_steps : steps to which a buffer of float vectors is rounded, one for each component of a
-        vector; by resource index of the buffer
+    picture_maps : dictionary from resource index to map, for the maps that are stored as pictures
+    quantisation_steps : dictionary from the resource index of a buffer of float vectors to the rounding steps
+        of the components of a vector
     byte_runs : collector of the data; the JSON refers to the data by index of the byte run
     """
     pictures = [[capture.resource(f.picture.bytes), capture.resource(f.picture.exposed)] for f in frames]

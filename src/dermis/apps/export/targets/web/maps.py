@@ -110,7 +110,7 @@ _MAP_ROLES = (_COLOUR_ROLE, "relief_map", "slope_map", "specular_map", "roughnes
 
 @dataclass
 class MapPictures:
-    """WebP pictures of all maps that the page stores, by role, mip level and layer.
+    """WebP pictures of all maps that the page stores; the keys are role, mip level and layer.
 
     If the device can compute the further mip levels of a map, only the first level is stored.
     """
@@ -119,14 +119,14 @@ class MapPictures:
     _encoded_texels: dict[str, NDArray[np.float16]] = field(default_factory=dict)
 
     def matches_picture(self, role: str, texels: NDArray[np.float16]) -> bool:
-        """Return whether texels equal those from which the first picture with a given role was encoded."""
+        """Return whether texels equal the texels of the first picture with a given role before encoding."""
         return bool(np.array_equal(self._encoded_texels[role], texels))
 
     def replace_textures(self, renderer: Renderer, capture: FrameCapture, frames: Frames) -> PictureMaps:
         """Encode the frames' maps as pictures, and upload the decoded texels to the renderer's textures.
 
-        The renderer then draws with the maps that the page decodes. Returns the replaced maps by resource
-        index.
+        The renderer then draws with the same maps as the page. Returns a dictionary from resource index to
+        replaced map.
         """
         maps = {}
         for index, role in _picture_textures(capture, frames).items():
@@ -199,10 +199,10 @@ def read_texels(capture: FrameCapture, resource_index: int, mip_level: int) -> N
 
 
 def _picture_textures(capture: FrameCapture, frames: Frames) -> dict[int, str]:
-    """Return the roles of the half-float map textures that are stored as pictures, by resource index.
+    """Return a dictionary from resource index to role, for the map textures that are stored as pictures.
 
-    Textures smaller than MIN_PICTURE_SIDE are stored as texels instead. The role of a texture is its name in
-    the shaders.
+    These are half-float textures; sides shorter than MIN_PICTURE_SIDE exclude a texture. The role of a
+    texture is its name in the shaders.
     """
     return {
         index: role

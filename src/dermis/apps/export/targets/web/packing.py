@@ -89,7 +89,7 @@ def quantise(floats: NDArray[np.float32], column_steps: tuple[float, ...]) -> ND
 
 
 def encode_seven_bits(raw_bytes: bytes) -> str:
-    """Return bytes as text with 7 bits per character, so that HTML can contain them.
+    """Return bytes as text with 7 bits per character, which HTML can contain.
 
     Code points that HTML would change are increased by 256.
     """
