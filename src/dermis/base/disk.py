@@ -263,7 +263,7 @@ def _temporary_file(path: Path) -> Iterator[BinaryIO]:
 
 
 def _prune_folder(cache_path: Path) -> None:
-    """Delete the least recently used files beyond the size limit of the folder, and old unfinished files."""
+    """Delete the least recently used files until the size limit is met, and delete old unfinished files."""
     newest_first = sorted(
         _folder_files(cache_path, _CACHE_FILE_SUFFIX), key=lambda entry: entry[1].st_mtime, reverse=True
     )

@@ -44,7 +44,7 @@ def _file_property(
     *keys: str,
     other_parts: Treatment | None = None,
 ) -> FileProperty:
-    """Return a file property; `drawn`, `noted` and so on are partial calls with a fixed treatment."""
+    """Return a file property; the functions `drawn`, `noted` and so on fix the treatment."""
     return FileProperty(treatment, property_name, detail_text, keys, other_parts)
 
 

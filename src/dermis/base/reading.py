@@ -147,7 +147,7 @@ def checked_path(file_name: object, expected: str) -> Path:
 
 @contextmanager
 def parsing(culprit: object, expected: str, *errors: type[Exception]) -> Iterator[None]:
-    """Convert the exceptions of a parser in the block into a DermisError that names the file.
+    """Convert exceptions that a parser raises in a with block into a DermisError that names the file.
 
     culprit : name of the file
     expected : what the file should be

@@ -55,7 +55,7 @@ def point_vertices(mesh: Mesh) -> NDArray[np.intp]:
 def add_mesh(
     stage: Usd.Stage, path: Sdf.Path, head: Head, deformable: DeformableMesh
 ) -> dict[int, UsdGeom.Subset]:
-    """Add the mesh in its rest pose to the stage; return the geometry subset of each material index.
+    """Add the head's mesh in its rest pose to the stage; return the geometry subsets by material index.
 
     deformable : the head's mesh with morph targets and bone weights, all morph targets at weight 0
     """

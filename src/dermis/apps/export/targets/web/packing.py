@@ -53,7 +53,7 @@ class ByteRunCollector:
         return len(self.runs) - 1
 
     def add_floats(self, floats: NDArray[np.float32], column_steps: tuple[float, ...]) -> int:
-        """Add a run of floats, stored as integer multiples of a step per column; return its index in `runs`.
+        """Add floats as a run of integer multiples of one step per column; return the run's index in `runs`.
 
         floats : (n, c) floats that are multiples of the steps
         column_steps : (c,) steps, powers of two
