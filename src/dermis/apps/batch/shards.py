@@ -67,8 +67,8 @@ def list_parts(shard: Shard, spec: Spec) -> list[Part]:
     """Return the parts of a shard in order.
 
     The part size is the smallest multiple of the number of images per person that is between 16 and 32, or 16
-    if there is none. Except for the first part of a shard, the number of a part's first image is a multiple of
-    the part size. The first and the last part may therefore be smaller.
+    if there is none. Except for the first part of a shard, every part starts at an image number that is a
+    multiple of the part size. The first and the last part may therefore be smaller.
     """
     group = spec.images_per_person
     size = -(-_MIN_PART_IMAGES // group) * group if group <= _MAX_PART_IMAGES else _MIN_PART_IMAGES

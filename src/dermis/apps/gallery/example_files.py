@@ -182,7 +182,7 @@ def _colour_map_srgb(head: Head) -> Bytes:
 
 
 def _hair_cards(paths: Doubles, outward: Doubles, width_mm: float) -> _Surface:
-    """Return hair cards: ribbons along paths, each showing a random one of those in `_hair_card_picture`.
+    """Return hair cards: ribbons along paths, each textured with a random card of `_hair_card_picture`.
 
     paths : (n, k, 3) points of each path from root to tip [mm]
     outward : (n, k, 3) outward directions at these points

@@ -37,7 +37,7 @@ def first_frame(panel: Panel) -> Image:
 def panel_sheet(panels: Panels, columns: int = 0) -> SrgbImage:
     """Arrange panels with captions in rows and return an sRGB image (h, w, 3).
 
-    The first frame stands for a panel that is an animation.
+    An animation is represented by its first frame.
 
     columns : number of panels in a row; 0 for a single row
     """

@@ -155,7 +155,7 @@ class GalleryPicture:
 
 
 def draw_pictures(scripts: Sequence[Script], studio: Studio) -> Iterator[GalleryPicture]:
-    """Run the scripts and yield the picture of each; for a script that fails, it only holds the reason."""
+    """Run the scripts and yield their pictures; the picture of a script that fails only holds the reason."""
     for script in scripts:
         started, studio.frames_ms = time.perf_counter(), []
         try:

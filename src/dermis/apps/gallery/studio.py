@@ -51,7 +51,7 @@ class Studio:
         return self._load(head_name or self.name, subdivide=1, **options)
 
     def coloured_head(self) -> Head:
-        """Return the gallery's head with a colour map; if its maps are procedural, paint the map first."""
+        """Return the gallery's head with a colour map, which is painted first if the maps are procedural."""
         head = self.head()
         return with_painted_maps(self.renderer.device, head, 1024) if head.maps.is_painted else head
 
@@ -95,7 +95,7 @@ class Studio:
     def light_map(self, scene: Scene, pyramid_level: int, **settings: Any) -> NDArray[np.float32]:
         """Return the blurred irradiance in the atlas, divided by pi, (n, n, 3).
 
-        pyramid_level : number of Gaussian blurs applied so far; 0 for the light as it enters the skin
+        pyramid_level : 0 for the light as it enters the skin, higher for light blurred more strongly
         settings : fields of `Settings`
         """
         from dermis.gpu import download

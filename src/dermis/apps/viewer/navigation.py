@@ -130,7 +130,7 @@ def interpolate_cameras(start_camera: Camera, end_camera: Camera, fraction: floa
 
 
 def pick(scene: Scene, camera: Camera, x: float, y: float, aspect: float) -> Floats | None:
-    """Return the surface point at a position in the image [mm]; None if no surface is visible there.
+    """Return the surface point [mm] at a position in the image; None if no surface is visible there.
 
     The point is relative to the centre of the head.
 
@@ -164,7 +164,7 @@ def drag_light(state: ViewerState, light_index: int, right: float, up: float) ->
     """Orbit a light around its target in the direction of a drag, or rotate the environment.
 
     light_index : index of the light; an index after the last light selects the environment
-    right : angle by which the light moves to the right on screen [rad]
+    right : angle by which the light moves to the right on screen, or by which the environment turns [rad]
     up : angle by which the light moves up on screen; ignored for the environment [rad]
     """
     if light_index < len(state.scene.lights):

@@ -122,7 +122,7 @@ class MotionPlayer:
         self.play(0.0)
 
     def play(self, start_s: float | None = None) -> None:
-        """Play the motion from a given time, or from its beginning if that time is its end.
+        """Play the motion from a given time; if that time is the end of the motion, play from the beginning.
 
         start_s : time in the motion to start from; None for the current time [s]
         """
@@ -154,7 +154,7 @@ class MotionPlayer:
     def advance(self) -> None:
         """Advance the motion to the current time of the clock.
 
-        The time starts to run after the first frame, because drawing that frame may take long.
+        The time of the motion starts to run after the first frame, because drawing that frame may take long.
         """
         now, clip = self._clock(), self.clip if self.is_playing else None
         if clip is None or self._starting:

@@ -82,7 +82,7 @@ class HeadLoader:
     def take_loaded(self, state: ViewerState) -> ViewerState | None:
         """Return the state with a newly loaded head or scene; None if none was loaded since the last call.
 
-        state : current state, whose head is replaced by a loaded head; a loaded scene replaces it completely
+        state : current state; a loaded head replaces the head of this state, a loaded scene the whole state
 
         Raises DermisError if the head cannot be loaded.
         """
@@ -134,7 +134,7 @@ _log = logging.getLogger(__name__)
 
 
 class Session:
-    """Viewing session: the undo history, the controls and the player of a motion, and the renderer.
+    """Viewing session: undo history, controls, motion player and renderer.
 
     motion : motion to play; None if there is no motion
     clock : function that returns the time [s]

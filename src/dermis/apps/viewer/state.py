@@ -82,11 +82,12 @@ class ViewerState:
     """State of the viewer: the scene, the render settings, and the view that is displayed.
 
     settings : render settings; their `size` is ignored, because the window determines the size
-    head : table from which the head was loaded, as in [head] of a scene file; empty if created in memory
+    head : table from which the head was loaded, with the keys of the [head] table of a scene file; empty for
+        a head created in memory
     view : picture or intermediate result to display, one of `views.VIEW_NAMES`
     rig : name of the light preset; empty for custom lights
     atlas_view : part of the atlas that the view "atlas" shows
-    seconds : time in the motion at which the pose was taken [s]
+    seconds : time in the motion from which the pose was taken [s]
     """
 
     scene: Scene
@@ -99,7 +100,7 @@ class ViewerState:
 
     @property
     def head_table(self) -> Table:
-        """Return the table `head` with the head's subdivision level; empty for a head created in memory."""
+        """Return the table `head` plus the head's subdivision level; empty for a head created in memory."""
         return self.head and {"subdivide": self.scene.head.levels, **self.head}
 
     def with_skin(self, **fields: object) -> ViewerState:
@@ -168,7 +169,7 @@ class ViewerState:
     def with_head(self, head: Head, head_table: Table, rho_s: float) -> ViewerState:
         """Return a copy with another head, or with other maps for the same head.
 
-        head_table : table from which the head was loaded, as in [head] of a scene file
+        head_table : table from which the head was loaded, with the keys of the [head] table of a scene file
         rho_s : mean specular strength [-]
         """
         skin = validated_copy(self.scene.skin, rho_s=rho_s)
@@ -259,9 +260,9 @@ def load_state(path: Path, current: ViewerState | None = None) -> ViewerState:
 def initial_state(scene: Scene, settings: Settings, head_table: Table, rig_name: str) -> ViewerState:
     """Return the initial state of a scene.
 
-    If `settings.parts` selects only the diffuse or only the specular light, the state shows this view.
+    If `settings.parts` selects only the diffuse or only the specular light, that becomes the displayed view.
 
-    head_table : table from which the head was loaded, as in [head] of a scene file
+    head_table : table from which the head was loaded, with the keys of the [head] table of a scene file
     rig_name : name of the light preset; empty for custom lights
     """
     view = settings.parts if settings.parts in PART_VIEWS else PICTURE_VIEW_NAME

@@ -160,7 +160,7 @@ class ViewRenderer:
         self._atlas_state: tuple[ViewerState, str] | None = None
 
     def prepare(self, state: ViewerState, on_resources_ready: Callable[[], None] = lambda: None) -> None:
-        """Render small images of a state, with motion and still quality, to create all resources and shaders.
+        """Create all resources and shaders for a state by rendering small images at motion and full quality.
 
         on_resources_ready : function called when the resources of the head have been created
 
@@ -225,7 +225,7 @@ class ViewRenderer:
     def _frozen_image(
         self, frozen_state: ViewerState, camera: Camera, view_size: tuple[int, int], is_moving: bool
     ) -> Texture:
-        """Return a copy of the image of the frozen state; it is only rendered again if the camera moved."""
+        """Return a copy of the image of the frozen state, reused until the camera or the settings change."""
         settings, frozen = self._settings(frozen_state, view_size, is_moving), self._frozen
         still_settings = self._settings(frozen_state, view_size, is_moving=False)
         is_cached = frozen and frozen.state is frozen_state and frozen.camera == camera
@@ -346,13 +346,13 @@ class HeadPreparation:
         return self._future is not None
 
     def reset(self) -> None:
-        """Discard the prepared meshes and the image shown meanwhile, after the renderer was replaced."""
+        """Discard the prepared meshes and the image shown during preparation; the renderer was replaced."""
         self._ready_mesh = self._future = self._next_mesh = self._held_image = None
 
     def prepare_head(self, view_renderer: ViewRenderer, state: ViewerState) -> Texture | None:
         """Start to prepare the head of a state if it is new; return None once the state can be drawn.
 
-        Until then, return the image to show in the meantime: the last image drawn.
+        Until then, return the last image, to be shown in the meantime.
 
         Raises the exception that stopped a preparation, once.
         """

@@ -166,10 +166,10 @@ class Address(NamedTuple):
 
 
 def bind(host: str, port: int, *, require_token: bool = False) -> tuple[socket.socket, Address]:
-    """Return a listening socket and its address; a host that is not local always gets a token.
+    """Return a listening socket and its address, which includes a token if the host is not local.
 
     port : port number; 0 for any free port
-    require_token : whether a local host gets a token too
+    require_token : whether the address includes a token even if the host is local
 
     Raises DermisError if the address cannot be used.
     """

@@ -49,7 +49,7 @@ class FieldStyle:
     options : integers to choose from in a drop-down list
     names : text to show for each keyword that the field accepts
     custom_value : for a field that accepts keywords: function that returns the initial value when the user
-        replaces the keyword by a custom value; None if the user cannot
+        replaces the keyword by a custom value; None if custom values are not offered
     """
 
     label: str = ""
@@ -221,7 +221,7 @@ def clamp(value: float, value_range: SliderRange) -> float:
 
 
 def edit_value(session: Session, label: str, change_and_value: tuple[bool, Any], with_value: ToState) -> None:
-    """Change the state to the new value of a control; all changes of one drag are undone together.
+    """Apply the new value of a control to the state; all changes of one drag are undone together.
 
     change_and_value : whether the control has changed, and its value
     with_value : function that returns a state, given the new value

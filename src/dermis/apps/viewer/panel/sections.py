@@ -179,7 +179,7 @@ def can_move(session: Session) -> bool:
 
 
 def draw_expressions(session: Session) -> None:
-    """Draw sliders of the morph targets and bones whose names match the search."""
+    """Draw sliders for the morph targets and bones whose names match the search."""
     head = session.state.scene.head
     flags = int(imgui.InputTextFlags_.escape_clears_all)
     _, session.search = imgui.input_text_with_hint("##search", "search", session.search, flags)
