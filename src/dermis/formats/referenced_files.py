@@ -30,7 +30,8 @@ def find_referenced_file(path: Path, file_name: str) -> Path | None:
 def resolve_uri(path: Path, uri: str) -> Path:
     """Return the path of a file that a glTF file references by a relative URI; the file need not exist.
 
-    Raises DermisError for a file outside the folder of the glTF file, even if a link in it leads there.
+    Raises DermisError for a file outside the folder of the glTF file, even if a link inside the folder leads
+    to it.
     """
     file = _resolve_below(path.parent, PureWindowsPath(unquote(uri)))
     if file is None or ":" in uri.partition("/")[0]:

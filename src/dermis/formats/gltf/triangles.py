@@ -144,7 +144,7 @@ class _SceneReader:
         """Refuse a scene with more than the allowed number of parts, triangles, vertices or displacements.
 
         item_noun : what is counted, a key of `_MAX_SCENE_COUNTS`
-        count : number found so far
+        count : number of these
         """
         advice = "Export the head alone, or decimated"
         limits.check_limit(self.document.path, count, _MAX_SCENE_COUNTS[item_noun], item_noun, advice)
