@@ -160,15 +160,15 @@ def _sample_ancestry(
     sampled_fractions: NDArray[np.float64],
     fixed_fields: Mapping[str, Any],
 ) -> tuple[NDArray[np.float64], dict[str, float]]:
-    """Return the ancestry fractions (3,) of a person's shape, and the weights of the skin's measured groups.
+    """Return the ancestry fractions (3,) of the shape, and the weights of the measured groups for the skin.
 
     If the ancestry of the shape is fixed, the skin follows the shape. If only a skin ancestry or an ITA is
     fixed, the shape follows the skin. Otherwise some people of Caucasian shape have South Asian or Middle
     Eastern skin.
 
     fixed_numbers : values of numeric fields that are not sampled
-    fixed_fields : values of all fields that are not sampled
     sampled_fractions : (3,) sampled ancestry fractions of the shape
+    fixed_fields : values of all fields that are not sampled
     """
     picks, chance = rng.random(3), rng.random()
     ancestry, shape_given = (

@@ -290,7 +290,7 @@ def _steer(state: Growth, style: Style) -> Doubles:
 
 
 def _tie_offsets(state: Growth, style: Style) -> Doubles:
-    """Return where guides pass through the tie of a ponytail or bun (g, 3), relative to its middle [mm].
+    """Return the points (g, 3) where guides pass through the tie of a ponytail, relative to its middle [mm].
 
     Each guide passes the middle of the tie on the side where its root is.
     """

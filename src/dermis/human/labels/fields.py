@@ -250,7 +250,7 @@ def _skin_fields(head: Head) -> dict[str, Doubles]:
 
 
 def _warped_fields(head: Head, landmarks: Mapping[str, tuple[float, float, float]]) -> dict[str, Doubles]:
-    """Return the label fields of a head of another topology, by class name, as in `_skin_fields`.
+    """Return a dictionary from class name to the label field (p,) of a head of another topology [mm].
 
     Each point is warped onto the average human by the landmarks, and gets the fields of the nearest point
     there.

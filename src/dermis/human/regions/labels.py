@@ -60,7 +60,7 @@ def known_landmarks(head: Head) -> Landmarks | None:
 
 @cache
 def average_landmarks() -> Landmarks:
-    """Return a dictionary from landmark name to position on the average human, for all landmarks [mm]."""
+    """Return a dictionary from landmark name to position on the average human [mm]."""
     return _landmark_tuples(human_landmarks(average_head()))
 
 

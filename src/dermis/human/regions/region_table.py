@@ -64,9 +64,9 @@ def nose_distance_mm(points: Doubles) -> Doubles:
 
 
 def neck_distance_mm(points: Doubles) -> Doubles:
-    """Return how far (n,) points are vertically below the line from jaw to skull, negative above it [mm].
+    """Return the vertical distances (n,) of points from the line between jaw and skull [mm].
 
-    The distance is therefore positive on the neck and negative on the head.
+    The distance is positive below the line, on the neck, and negative above the line, on the head.
 
     points : (n, 3) positions on the average human [mm]
     """
