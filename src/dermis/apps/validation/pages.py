@@ -36,7 +36,9 @@ def in_checkout(path: Path) -> Path:
 
 
 def add_tests_to_path() -> None:
-    """Make the modules in the folder tests importable, because some measurements use meshes that they build.
+    """Make the modules in the folder `tests` importable.
+
+    Some measurements use meshes that these modules build.
 
     Raises DermisError where the tests are missing.
     """

@@ -1,1 +1,1 @@
-"""Errors of exported skins and heads, measured in other programs."""
+"""Comparison of exported skins and heads, as other programs render them, with dermis."""

@@ -49,7 +49,7 @@ def peers(
     lights:
         Names of lights, separated by commas: front, back or laser.
     quick:
-        A small image with few paths, to check that everything works. Writes only the file of -o.
+        Render a small image with few paths, to check that everything works. Writes only the file of -o.
     side:
         Side of the images [pixel; 512, or 160 with --quick].
     output:
