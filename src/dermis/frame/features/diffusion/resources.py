@@ -32,7 +32,7 @@ class BlurScheme(Protocol):
         """
 
     def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
-        """Return how often the resolution of each level is halved, starting with the unblurred level.
+        """Return how many times the resolution of each level is halved; level 0 is the unblurred light.
 
         edge : filter mode at the edges of charts
         """

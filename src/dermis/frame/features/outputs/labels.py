@@ -23,8 +23,8 @@ LABEL_STAGE = "label"
 class LabelBuffers:
     """Buffers that label.wgsl and strand_labels.wgsl read and write.
 
-    tables : label tables of the mesh by their names in label.wgsl
-    field_count : number of distance fields, whose zeros bound classes within triangles
+    tables : dictionary from names in label.wgsl to label tables of the mesh
+    field_count : number of distance fields; their zero lines are borders of classes within triangles
     hair_classes : class of each strand, None without hair
     hair_labels : class of the hair in each pixel, written by the hair pass
     """
@@ -65,7 +65,7 @@ def make_label_buffers(memo: Memo, device: Device, request: FrameRequest) -> Lab
 
 
 def shader_constants() -> dict[str, int]:
-    """Return the values that `//#fill` lines insert in the label shaders, by name."""
+    """Return the named values that `//#fill` lines insert into the label shaders."""
     names = "right_brow", "left_brow", "hair", "beard", "lashes"
     return {f"class_{name}": class_number(name) for name in names} | {"class_count": len(label_classes())}
 
@@ -79,7 +79,7 @@ def draw_labels(graph: Recorder, planes: Planes, buffers: LabelBuffers, inputs: 
 
 
 def _upload_tables(device: Device, labels: MeshLabels) -> MutableBindings:
-    """Upload the label tables of a mesh, and the FaceSynthetics number of each class of dermis."""
+    """Upload the label tables of a mesh, and the number in FaceSynthetics of each class in dermis."""
     face_synthetics = [one.face_synthetics for one in label_classes()]
     arrays = {
         "label_base": labels.base.astype(np.uint32),

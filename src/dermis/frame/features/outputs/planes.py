@@ -62,7 +62,7 @@ class Planes:
     def array(self, output_name: str, output_bytes: NDArray[np.uint8]) -> PlaneArray:
         """Return one output as an (h, w) or (h, w, channels) array.
 
-        output_bytes : bytes of this output, in the range `byte_range`
+        output_bytes : bytes of the buffer in the range that `byte_range` returns
         """
         output, (width, height) = OUTPUTS[output_name], self.size
         kind = np.dtype(output.kind).kind

@@ -23,7 +23,8 @@ class Resources:
 
     names : names of the outputs in the order of the request
     planes : buffers of the outputs, one for each stage
-    centres : triangle at the centre of each pixel; None if the only sample of a pixel is at its centre
+    centres : texture of the triangle at each pixel centre, None if the only sample of a pixel is at its
+        centre
     previous : shape of the head in the previous scene, None without motion vectors
     light : resources for outputs of light and skin
     labels, landmarks : buffers of labels and landmarks, None if they are not requested
@@ -57,9 +58,10 @@ def make(
 ) -> Resources | None:
     """Return the resources of the requested outputs, None if none are requested.
 
-    translucency : translucency of each layout
+    translucency : for each layout, the resources of light through thin parts, None if no light crosses them
 
-    Raises DermisError if outputs do not fit in one buffer of the device, or the scene does not have them.
+    Raises DermisError if the outputs do not fit in one buffer of the device, or if the scene cannot provide
+    them.
     """
     if not request.outputs and not request.landmarks:
         return None
