@@ -189,7 +189,7 @@ def _close_upper_lid(rings: Points) -> None:
 
 
 def _compress_radius(axis_distance: Points) -> Points:
-    """Compress distances from the viewing axis near the outline of the eyeball, to keep lid points on it.
+    """Compress distances from the viewing axis near the outline of the eyeball, so lid points stay on it.
 
     axis_distance : distances from the axis divided by the radius of the eyeball [-]
     """

@@ -40,7 +40,7 @@ class TargetDeltas(NamedTuple):
 
 
 def morphed_points_mm(weights: Mapping[str, float]) -> Points:
-    """Return the mesh points of a person, followed by the joints of the skeleton (n, 3) [mm].
+    """Return the points (n, 3) of a person's mesh, followed by the joints of the skeleton [mm].
 
     The origin is the midpoint between the eyes.
 

@@ -51,7 +51,7 @@ MEAN_WEIGHTS = {
 
 
 class _LayoutFaces(NamedTuple):
-    """Vertices and quads of the human mesh in one uv layout, which are the same for all people.
+    """Vertices and quads of the human mesh in one uv layout; they are the same for all people.
 
     point : (v,) index of the control point of each vertex
     uv : (v, 2) texture coordinates

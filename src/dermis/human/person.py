@@ -141,7 +141,7 @@ def sample_fields(seed: int, fixed_fields: Mapping[str, Any]) -> dict[str, Any]:
 def _ancestry_fractions(
     fixed_fields: Mapping[str, float], sampled_fractions: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return ancestry fractions (3,): fixed weights divided by their sum, or else the sampled fractions.
+    """Return ancestry fractions (3,) from fixed weights, or the sampled fractions if no weights are fixed.
 
     fixed_fields : values of fields that are not sampled; may contain weights of ancestries
     sampled_fractions : (3,) sampled ancestry fractions

@@ -113,7 +113,7 @@ class Clip(ShortRepr):
 
     @property
     def note(self) -> str:
-        """Return a sentence about names of the file that the head lacks; empty if the head lacks none."""
+        """Return a sentence about targets and bones of the file that the head lacks; empty if none."""
         if not self.left_out:
             return ""
         names = ", ".join(self.left_out[:_MAX_LISTED_NAMES])

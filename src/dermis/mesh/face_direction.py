@@ -168,7 +168,7 @@ def _normal_variation(points: Doubles, normals: Doubles) -> float:
 
 
 def _ridge_height(points: Doubles, front_axis: int) -> float:
-    """Return the distance by which the middle of a face protrudes beyond its sides, largest over all heights.
+    """Return the largest distance by which the middle of a face protrudes beyond its sides at any height.
 
     points : (n, 3) points of the front or back of a head
     front_axis : index of the coordinate along which the face may look

@@ -132,7 +132,7 @@ def vertex_normals(positions: Floats, point: Ints, triangles: Ints) -> Floats:
 def sum_by_index(row_index: NDArray[np.integer], row_values: Doubles, sum_count: int) -> Doubles:
     """Return the sums (sum_count, k) of rows that have the same index.
 
-    row_index : (n,) index of each row, which is the index of the sum to which the row is added
+    row_index : (n,) index of the sum to which each row is added
     row_values : (n, k) rows
     sum_count : number of sums
     """

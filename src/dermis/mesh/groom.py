@@ -28,7 +28,7 @@ class Guides:
         and along its normal, from the mean of the corners [mm]
     weight : (g, k, a) weights of the quads, which add up to 1 for each knot [-]
     rest_mm : (g, k, 4) position of each knot on the mean person at rest, and its height above the skin [mm]
-    cut : (g,) fraction of its length at which the style cuts each guide [-]
+    cut : (g,) fraction of the length of each guide at which the style cuts it [-]
     """
 
     corner: Ints
@@ -45,9 +45,9 @@ class StrandRoots:
     roots : n roots on quads of the control mesh
     guide, guide_weight : (n, 4) guides between which each strand is interpolated, and their weights
     clump : (n,) index of the strand in the middle of the clump to which each strand belongs
-    place : (n, 4) place of each root on the head: angle from the front [degrees], height above the midpoint
-        of the eyes, which is compared with the hairline [mm], thinning of the hair there on a receding crown,
-        0 to 1, and position from the nape (0) to the top of the head (1)
+    place : (n, 4) place of each root on the head: angle from the front [degrees]; height above the midpoint
+        of the eyes [mm], to be compared with the height of the hairline; thinning of the hair if the crown
+        recedes, 0 to 1; and position from the nape (0) to the top of the head (1)
     along_mm : (n,) position of each clump along its cornrow, so that the braids of consecutive clumps join
         [mm]
     part : (n,) index of the part of the groom, such as scalp or beard

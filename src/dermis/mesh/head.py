@@ -103,7 +103,10 @@ class Head:
 
     @property
     def topology(self) -> Head:
-        """Return the head that provides atlas and tables: the template of the rig, or else `bare`."""
+        """Return the head whose atlas and tables this head uses.
+
+        This is the template if the rig has the same template, and `bare` otherwise.
+        """
         template = self.template
         if template is None or self.rig is None or self.rig.template is not template.rig:
             return self.bare

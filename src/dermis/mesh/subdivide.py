@@ -109,7 +109,7 @@ def subdivide(mesh: Mesh, levels: int) -> SubdividedMesh:
 
 
 def refinement(mesh: Mesh, levels: int) -> Refinement:
-    """Return the subdivision of all meshes with this mesh's topology; `subdivide` states its rules.
+    """Return the subdivision of all meshes with this mesh's topology; see `subdivide` for its rules.
 
     levels : 1 to 3
     """
@@ -210,7 +210,7 @@ def coarse_triangles(head: Head, min_faces: int, tolerance_mm: float) -> Ints:
 
 
 def _coarsen_triangles(triangles: Ints, positions_mm: Floats, levels: int, tolerance_mm: float) -> Ints:
-    """Leave out levels of Loop subdivision in flat regions.
+    """Return triangles with fewer levels of Loop subdivision in flat regions.
 
     Loop's rules divide a triangle into four, the first three of which are at its corners.
 
@@ -226,7 +226,7 @@ def _coarsen_triangles(triangles: Ints, positions_mm: Floats, levels: int, toler
 
 
 def _coarsen_quads(quads: Corners, positions_mm: Floats, levels: int, tolerance_mm: float) -> Ints:
-    """Leave out levels of Catmull-Clark subdivision in flat regions; the result is triangles.
+    """Return triangles with fewer levels of Catmull-Clark subdivision in flat regions.
 
     The rules divide a polygon into quads, one from each corner to its centre.
 

@@ -355,7 +355,7 @@ def _clear_face(points: Doubles) -> Doubles:
 
 
 def cut_fractions(knots: Doubles, style: Style) -> Doubles:
-    """Return the fraction (g,) of its length at which the style cuts each guide; 1 for uncut guides.
+    """Return the fraction (g,) of the length of each guide at which the style cuts it; 1 for uncut guides.
 
     knots : (g, k, 3) knots of the guides on the mean person [mm]
     """
@@ -376,7 +376,7 @@ def cut_fractions(knots: Doubles, style: Style) -> Doubles:
 
 
 def _first_below(knots: Doubles, level: Doubles) -> Doubles:
-    """Return the fraction (g,) of its length at which each curve first falls below a height.
+    """Return the fraction (g,) of the length of each curve at which it first falls below a height.
 
     The fraction is 1 for curves that do not fall below the height.
 

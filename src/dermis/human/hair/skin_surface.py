@@ -87,7 +87,7 @@ class GrowthSurface:
         return self._columns.T
 
     def root_frames(self, roots: Roots) -> RootFrames:
-        """Return positions and frames, on the subdivided mesh, of roots on the quads of the control mesh."""
+        """Convert roots on control quads to roots on the subdivided mesh, with positions and frames."""
         finer = refine_roots(self.control_mesh, roots, self._levels)
         return RootFrames(finer, *root_frames(self._mesh, finer, self.points_mm))
 

@@ -23,8 +23,7 @@ class Style:
     lift : tangent of the angle between combed hair and the skin at the root
     parting_mm : x coordinate of the parting
     volume_mm : height of the outermost hair above the skin
-    stiffness : tendency of a guide to continue straight: weight of its direction, against gravity, in each
-        step
+    stiffness : weight of the previous direction of a guide, against gravity, in each step of growth
     gravity : strength of gravity
     cut_y_mm : height at which hair is cut level; None for hair that is not cut level
     fringe_y_mm : height at which hair over the forehead is cut; None for a style without a fringe
@@ -39,7 +38,8 @@ class Style:
     coil_mm : radius of a bun around the tie; 0 for a tail
     crown : minimum recession of the hair at crown and temples, which the recession of `SkinLook` may exceed
     women, men : relative probabilities of the style among women and among men
-    tight, loose : whether tightly coiled hair is worn in this style, and whether other hair is
+    tight : whether tightly coiled hair is worn in this style
+    loose : whether hair that is not tightly coiled is worn in this style
     """
 
     comb: Comb

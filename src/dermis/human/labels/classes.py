@@ -34,5 +34,5 @@ def label_classes() -> tuple[LabelClass, ...]:
 
 @cache
 def class_number(class_name: str) -> int:
-    """Return the number of the label class that has a name."""
+    """Return the number of the label class with the name `class_name`."""
     return next(one.number for one in label_classes() if one.name == class_name)

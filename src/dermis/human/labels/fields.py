@@ -54,7 +54,7 @@ _LABEL_CACHE_LOCK = Lock()
 
 @cache
 def label_fields() -> Doubles:
-    """Return signed distances (k, p) of control points to the borders of the classes `HUMAN_FIELDS` [mm].
+    """Return signed distances (k, p) of control points to the borders of the classes in `HUMAN_FIELDS` [mm].
 
     Distances are positive inside a class.
     """
@@ -157,7 +157,7 @@ _LABEL_CACHE: dict[bytes, MeshLabels] = {}
 
 
 class MeshLabels(NamedTuple):
-    """Label classes of a mesh, whose borders may cross triangles.
+    """Label classes of a mesh; borders between classes may cross triangles.
 
     base : (t,) class of each triangle where no field is positive
     classes : (k,) class of each field; a surface point has the class of its first positive field

@@ -44,8 +44,8 @@ def with_regions(head: Head, table: RegionTable | str | Path = DEFAULT_TABLE_NAM
     """Return a head with roughness and specular maps by region of the face.
 
     The specular map contains rho_s itself. The renderer scales specular maps to a mean of `Skin.rho_s`, so
-    set `Skin.rho_s` to the returned mean. If the head already has a roughness or specular map, that map is
-    divided by its local mean, and the new map is multiplied by the result, which is the fine detail.
+    set `Skin.rho_s` to the returned mean. Fine detail of existing roughness and specular maps is kept:
+    the new map is multiplied by the ratio of the existing map to its local mean.
 
     Parameters
     ----------

@@ -93,8 +93,9 @@ def zone_table(recession: float = 0.0, sites: SiteDifferences | None = None) -> 
 def _site_amounts() -> NDArray[np.float64]:
     """Return the amounts (k, 7) of the k zones that produce a pigment difference of 1 at each of seven sites.
 
-    Column j is for site j of the cheek and `FACE_SITES`. The zones with these amounts add up to exactly 1 at
-    the position of site j and to 0 at the positions of the other sites, although the zones overlap.
+    Column 0 is for the cheek, the other columns are for `FACE_SITES`. Zones with the amounts of one column
+    add up to exactly 1 at the position of its site and to 0 at the positions of the other sites, although the
+    zones overlap.
     """
     zones, names = read_rows(__package__, "zones"), (_REFERENCE_SITE, *FACE_SITES)
     places = {row["site"]: row for row in read_rows(__package__, "sites")}
@@ -171,7 +172,7 @@ def table_sizes() -> dict[str, int]:
 
 
 def _sample_count(knot_count: int) -> int:
-    """Return the number of samples that represent a spline with a number of knots."""
+    """Return the number of samples that represent a spline with `knot_count` knots."""
     return _FOLD_SAMPLES_PER_SEGMENT * (knot_count - 1) + 1
 
 

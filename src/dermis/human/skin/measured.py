@@ -157,8 +157,8 @@ class MeasuredTable(NamedTuple):
     groups : mapping from group name to distribution
     sex, age : (4,) changes of the variables from female to male, and from young to old
     mean_age_term : mean of `age_term` over the ages that `Human.drawn` samples
-    site_slope : (12, 2) change of a site's differences in melanin and in blood per doubling of melanin and
-        blood of the cheek [-]
+    site_slope : (12, 2) change of each site's difference in melanin per doubling of the cheek's melanin, and
+        the same for blood [-]
     site_spread : (12, 2) standard deviations of the differences in melanin and in blood between people
         [doublings]
     """
@@ -218,7 +218,7 @@ class MeasuredTable(NamedTuple):
 
 @cache
 def measured_table() -> MeasuredTable:
-    """Return the table of measured people in the package."""
+    """Return the package's table of measured people."""
     text = resources.files("dermis.human").joinpath("data", "measured.json").read_text("utf-8")
     return parse_table(json.loads(text))
 
@@ -369,7 +369,7 @@ def _clipped_pigments(pigment_values: Doubles) -> MeasuredPigments:
 def with_ita(
     pigments: MeasuredPigments, ita: float, eumelanin: float = DEFAULT_SKIN.eumelanin
 ) -> MeasuredPigments:
-    """Return pigments with the melanin fraction that results in an ITA.
+    """Return pigments whose melanin fraction is changed so that the skin has the ITA `ita`.
 
     If no melanin fraction gives this ITA, other parameters change too: very light skin gets less blood with
     more oxygen, and very dark skin gets a thicker epidermis.
