@@ -135,7 +135,7 @@ class Mesh(ShortRepr):
 
 
 def _valid_normals(file_normals: Floats, computed_normals: Floats) -> Floats:
-    """Return the file's normals (v, 3), replaced by computed normals where not finite or not of unit length.
+    """Return the file's normals (v, 3), with computed normals in place of those that are not unit vectors.
 
     file_normals, computed_normals : (v, 3) normals of the file, and normals computed from the triangles
     """
@@ -163,7 +163,7 @@ def build_mesh(
     uv : (v, 2) v down
     triangles : (f, 3) vertex indices, at least one triangle
     material : (f,) index into `materials`
-    normals : (v, 3) normals, used where they are finite and of unit length; if None, all are computed
+    normals : (v, 3) unit normals; computed instead where they are invalid, or everywhere if None
     point : (v,) index of the unique position; if None, equal positions are welded
     quads : (q, 2) pairs of triangles that are a quad, see `Mesh`
     """
