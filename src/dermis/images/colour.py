@@ -82,9 +82,9 @@ def lab(linear: ArrayLike) -> Doubles:
 
 
 def linear_of_xyz(xyz_over_white: ArrayLike) -> Doubles:
-    """Return linear Rec. 709 colours (..., 3) that look under D65 as other colours look in another light.
+    """Return linear Rec. 709 colours (..., 3) that look under D65 like other colours in another light.
 
-    The L*a*b* of both are equal, each relative to the white of its light.
+    The L*a*b* of the returned colours under D65 equals that of the other colours in the other light.
 
     xyz_over_white : (..., 3) X, Y and Z of the colours in the other light, divided by X, Y and Z of white in
         that light

@@ -61,8 +61,8 @@ class ColourSpace:
     def linear(self, pixels: Numbers) -> Floats:
         """Convert pixels (..., 1, 3 or 4) to linear Rec. 709 (..., 3); grey is repeated, alpha is dropped.
 
-        If the primaries are converted, results are clipped: to at least 0, and, for integer pixels, to at
-        most 1.
+        If the primaries are converted, results below 0 are clipped; for integer pixels, results above 1 are
+        clipped too.
         """
         rgb = pixels[..., :3] if pixels.shape[-1] >= 3 else np.repeat(pixels, 3, axis=-1)
         if rgb.dtype.kind == "f":
@@ -129,7 +129,7 @@ def profile_name(icc_profile: bytes) -> str:
 def profile_space(icc_profile: bytes) -> ColourSpace | None:
     """Return the colour space of an ICC profile; None if the profile has lookup tables or no curves.
 
-    `ColourSpace.linear` then converts colours at the full bit depth of a picture; LittleCMS in Pillow
+    `ColourSpace.linear` converts colours at the full bit depth of a picture, whereas LittleCMS in Pillow
     supports only 8 bits.
 
     Raises ValueError, ArithmeticError and struct.error for a damaged profile.
@@ -149,7 +149,7 @@ def profile_space(icc_profile: bytes) -> ColourSpace | None:
 
 
 def _simplified_space(space_name: str, to_rec709: Doubles, curves: Doubles | None) -> ColourSpace:
-    """Return a colour space, with None in place of a matrix or curves that are those of sRGB.
+    """Return a colour space, with None in place of a matrix or curves that are equal to those of sRGB.
 
     to_rec709 : see `ColourSpace`
     curves : see `ColourSpace`; a single curve (65536,) is used for all channels

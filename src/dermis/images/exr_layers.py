@@ -1,4 +1,4 @@
-"""Choice of the layer, a set of channels, that is read as the picture of an OpenEXR file."""
+"""Choice of the layer (set of channels) of an OpenEXR file that is read as the picture."""
 
 from __future__ import annotations
 
@@ -75,8 +75,8 @@ def _picture_layers(
 ) -> Iterator[ExrLayer]:
     """Yield the layers of a part that can be read as a picture.
 
-    The channels of such a layer are R, G, B and optionally A, or Y alone. Their names may be in lower case
-    or spelled out.
+    The channels of such a layer are R, G, B and optionally A, or Y alone. The names of the channels may be in
+    lower case or spelled out.
 
     part_index, part_name : index and name of the part
     channels : names of the channels of the part

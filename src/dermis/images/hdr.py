@@ -221,8 +221,8 @@ class _RadianceHeader:
     axes : direction in which scanlines follow each other, and direction of the pixels of a scanline, such as
         "-Y" and "+X"
     lengths : number of scanlines, and number of pixels per scanline
-    values : dictionary from a variable, such as EXPOSURE, to its number, or to the product of its numbers if
-        the header has several lines for it
+    values : dictionary from the name of a variable, such as EXPOSURE, to its number; the numbers of a
+        variable on several lines are multiplied
     is_xyz : whether the colours are CIE XYZ
     offset : byte at which the pixels start
     """

@@ -15,7 +15,7 @@ def decode(request: Arrays) -> Arrays:
     """Return the size, ICC profile, properties and pixels of a HEIC picture; called by `answer_request`.
 
     The properties are the bits per channel in the file, whether the picture was turned upright, and whether
-    the file has more pictures. Pictures that are too large are answered without pixels.
+    the file has more pictures. The pixels of a picture that is too large are left out.
 
     request : arrays with the bytes of the file as "data"
     """

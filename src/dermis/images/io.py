@@ -68,7 +68,7 @@ ODD_PIXEL_PROPERTIES = (
 class EmbeddedPicture:
     """Picture file that belongs to a glTF file or USD package.
 
-    Its colours are read as sRGB, even if the picture has another colour profile.
+    The colours are read as sRGB, even if the picture has another colour profile.
 
     name : name of the picture in error messages
     data : bytes of the picture file, in any format but OpenEXR, or path of a file beside the glTF file
@@ -337,8 +337,8 @@ def encode_exr_parts(
 ) -> bytes:
     """Encode several pictures as the parts of one float32 OpenEXR file with lossless compression.
 
-    channels_of_parts : dictionary from the name of a part to its channels, which are a dictionary from the
-        name of a channel to its array (H, W); most programs show only the first part
+    channels_of_parts : dictionary from the name of a part to a dictionary from the name of a channel to an
+        array (H, W); most programs show only the first part
     run_length : use run-length encoding instead of ZIP, see `write_exr`
     """
     import OpenEXR

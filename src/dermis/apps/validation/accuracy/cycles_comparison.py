@@ -56,7 +56,8 @@ class HighlightRow(TypedDict):
     view : camera preset
     model : model of surface reflection
     energy : ratio of the reflected light to that of Cycles [-]
-    grain, grain_of_cycles : contrast of fine detail in the two pictures [-]
+    grain : contrast of fine detail in the picture by dermis [-]
+    grain_of_cycles : contrast of fine detail in the picture by Cycles [-]
     correlation : correlation of the two pictures in bright pixels [-]
     """
 
@@ -69,7 +70,7 @@ class HighlightRow(TypedDict):
 
 
 class SkinRender(NamedTuple):
-    """Picture (h, w, 3) in linear light, and the fraction of its light that the surface reflects [-]."""
+    """Picture (h, w, 3) in linear light, and the fraction of its light that is surface reflection [-]."""
 
     picture: Picture
     reflected: float
@@ -219,9 +220,9 @@ def with_normal_map(head: Head) -> Head:
 
 
 def principled_skin(head: Head) -> PrincipledSkin:
-    """Return a Cycles material with a head's colours and the default skin's mean scattering distance.
+    """Return a Cycles material that has a head's colours and scatters light as far as the default skin.
 
-    The mean scattering distance, from entry to exit, is 2.5 d for Burley's profile, where d is the mean free
+    For Burley's profile, the mean distance between entry and exit of light is 2.5 d, where d is the mean free
     path divided by a factor that depends on the colour.
     """
     assert head.maps.colour is not None and head.maps.mean_colour is not None

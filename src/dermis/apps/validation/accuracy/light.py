@@ -45,7 +45,7 @@ def light(adapter: str = "auto") -> None:
 
 
 def sample_panorama(layer: Array, directions: Array) -> Array:
-    """Return the radiance (n, 3) of a panorama in given directions, interpolated as by the shader.
+    """Return the radiance (n, 3) of a panorama in given directions, interpolated as in the shader.
 
     layer : (h, w, 3) panorama
     directions : (n, 3) directions
@@ -129,7 +129,8 @@ def reflected_radiance(
 
     Texels where the lobe is below 1e-10 of its peak are skipped.
 
-    directions, light : (n, 3) directions of the texels, and their radiance times solid angle
+    directions : (n, 3) directions of the texels
+    light : (n, 3) radiance of the texels, multiplied by their solid angles
     normal, view : (3,) unit vectors
     roughness_m : roughness of the lobe
     """
@@ -253,7 +254,7 @@ def soft_shadow_error(renderer: dermis.Renderer, light_preset: str) -> tuple[flo
 def occlusion_error(renderer: dermis.Renderer) -> float:
     """Return the RMS error of the visible sky fraction on the scanned head [-].
 
-    The reference has 1024 directions.
+    The reference is computed with 1024 directions.
     """
     head = dermis.load_head("lee_perry_smith", subdivide=0)
     inputs = renderer.prepare(Scene(head), Settings(size=(64, 64), atlas=512, samples=1))

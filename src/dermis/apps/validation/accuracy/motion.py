@@ -108,7 +108,7 @@ def posed_points(head: Head, person_points: Points, target_weights: Mapping[str,
 def picture_error(
     renderer: Renderer, head: Head, person_points: Points, target_weights: Mapping[str, float], view_name: str
 ) -> float:
-    """Return the relative RMSE between pictures of a posed head and of a head loaded in that shape.
+    """Return the relative RMSE between pictures of a posed head and of a head loaded in the posed shape.
 
     person_points : (p, 3) positions in the rest pose [mm]
     target_weights : morph target weights of the expression
@@ -125,7 +125,7 @@ def picture_error(
 
 
 def _with_centre(head: Head, shaped_head: Head) -> Head:
-    """Return a head after setting its centre to that of another head.
+    """Set the centre of a head to the centre of `shaped_head`, and return the head.
 
     Lights and cameras are relative to the centre.
     """

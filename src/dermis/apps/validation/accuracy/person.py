@@ -288,9 +288,9 @@ def person(
     variant: str = "auto",
     seconds: float = 0.0,
 ) -> None:
-    """Compare people with path tracing, keep the figures, and write docs/path_traced.md.
+    """Compare people rendered by dermis with path tracing, and write docs/path_traced.md.
 
-    Comparisons that the file of results already has at the same size and with as many paths are skipped.
+    A comparison is skipped if the file of results already has it at the same size and with as many paths.
     Needs Mitsuba, and DERMIS_DATA or a network for the panoramas and the heads.
 
     Parameters

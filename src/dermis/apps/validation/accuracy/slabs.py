@@ -44,7 +44,7 @@ def slabs(adapter: str = "auto") -> None:
 
 
 def exact_response(medium: Medium, thickness_mm: float, g: float = 0.0) -> Array:
-    """Return reflectance and transmittance of a slab by adding and doubling, (2, angles, 3).
+    """Return reflectance and transmittance (2, angles, 3) of a slab by adding and doubling.
 
     thickness_mm : thickness of the slab [mm]
     g : mean cosine of the scattering angle; the medium's scattering coefficient already has the factor 1 - g
@@ -81,7 +81,7 @@ def skins_by_direction(medium: Medium, folder: str) -> dict[str, Skin]:
     Light leaves the skin "lambertian" with equal radiance in all directions. Light leaves the skin
     "half-space" with the angular distribution of a half-space.
 
-    folder : folder for the file of the profile
+    folder : folder in which the file of the profile is written
     """
     file = Path(folder) / f"{medium.name}_{medium.eta:g}.toml"
     fit = fit_gaussians(diffusion_profile(medium).rings(), GAUSSIAN_TERMS, profile_name=medium.name)
@@ -125,9 +125,9 @@ def forward_error_rows(renderer: dermis.Renderer) -> str:
 
 
 def forward_direction_rows() -> str:
-    """Return Markdown rows with errors of radiance below the surface of forward-scattering skin1.
+    """Return Markdown rows with errors of radiance below the surface of the medium "skin1".
 
-    Each error is taken over all directions of light and view.
+    The medium is taken as forward-scattering. Each error is over all directions of light and view.
     """
     rows = []
     for g in (0.0, FORWARD_G):

@@ -33,7 +33,7 @@ def specular() -> None:
 
 
 def read_albedo(lobe_model: str, cosine: Floats, roughness_m: Floats) -> Floats:
-    """Return directional and mean albedo (..., 2) of a lobe, interpolated in its table as by the shader."""
+    """Return directional and mean albedo (..., 2) of a lobe, interpolated in its table as in the shader."""
     axes = np.sqrt(TABLE_ROUGHNESSES), np.sqrt(TABLE_COSINES)
     coordinates = np.stack(np.broadcast_arrays(np.sqrt(roughness_m), np.sqrt(cosine)), axis=-1)
     return np.asarray(RegularGridInterpolator(axes, albedo_table(lobe_model).astype(float))(coordinates))

@@ -119,7 +119,7 @@ def fine_atlas_row(head: Head, adapter: str) -> str:
 def profile_model_rows(head: Head, path_traced: dict[str, dict[str, Comparison]], adapter: str) -> str:
     """Return Markdown rows of errors against path tracing, by scattering model of the profile.
 
-    path_traced : comparisons with Monte Carlo profiles: a dictionary from medium to a dictionary from light
+    path_traced : comparisons with Monte Carlo profiles, keyed by medium, then by light
     """
     rows, techniques = [], ("texture-space", "screen-space")
     for light in SAMPLES_BY_LIGHT:
@@ -147,7 +147,7 @@ def lambertian_limit(head: Head, medium: str, path_traced: Comparison, adapter: 
     This error is reached by skin whose albedo is the directional albedo of a half-space; the text also has
     the energy of this skin.
 
-    path_traced : comparison with path tracing in this light
+    path_traced : comparison with path tracing under this light
     """
     renderer = dermis.Renderer(adapter)
     scene = comparison_scene(head, "front", default_region("front"), "gpu-gems-3")

@@ -64,7 +64,7 @@ def tables(head: Head, settings: Settings, adapter: str) -> dict[str, str]:
 def render(subject: ComparisonSubject, technique: str, **changed_settings: object) -> Floats:
     """Return the linear radiance (h, w, 3) of a technique.
 
-    Like the references, it has one sample per pixel and no interreflection.
+    Like the references, the image has one sample per pixel and no interreflection.
 
     changed_settings : further settings
     """
@@ -80,7 +80,7 @@ def atlas_rows(
     normalised_image: ReferenceImage,
     light_name: str,
 ) -> list[str]:
-    """Return Markdown rows with errors of texture space by atlas size, against two references.
+    """Return Markdown rows with errors of texture-space diffusion by atlas size, against two references.
 
     Each error is also given as a ratio to the error of an image without scattering.
 
@@ -131,9 +131,10 @@ def mean_and_percentile(uniform_light: Floats) -> str:
 
 
 def region_rows(subject: ComparisonSubject, integral_image: ReferenceImage, light_name: str) -> list[str]:
-    """Return Markdown rows, one per region of the face: errors of texture space, and of a perfect uv map.
+    """Return Markdown rows with errors of texture-space diffusion, one row per region of the face.
 
-    The errors of a perfect map are those of diffusion on the surface itself, by the heat equation.
+    The rows also have the errors that diffusion would have in a perfect uv map, that is, on the surface
+    itself, by the heat equation.
     """
     landmarks = known_landmarks(subject.scene.head)
     assert landmarks is not None

@@ -114,7 +114,8 @@ def light_across_air(mesh: Mesh, light_direction: Array, points: Array, normals:
     Light crosses air if the straight path between source and point leaves the body.
 
     light_direction : (3,) direction of the light
-    points, normals : (n, 3) positions and surface normals
+    points : (n, 3) positions
+    normals : (n, 3) surface normals
     """
 
     def light(points: MeshPoints) -> Array:

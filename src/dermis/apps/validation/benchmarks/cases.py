@@ -59,7 +59,7 @@ class BenchmarkCase:
 
 @dataclass(frozen=True)
 class BenchmarkPreset:
-    """Set of benchmark cases: a base frame, and for each of its parameters the alternatives to measure."""
+    """Set of benchmark cases: a base frame, and other values to measure for each of its parameters."""
 
     base_case: BenchmarkCase
     image: tuple[tuple[int, int], ...]

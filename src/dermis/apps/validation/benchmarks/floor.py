@@ -61,8 +61,8 @@ def stage_bytes(traffic: FrameTraffic) -> dict[str, float]:
     """Return the least memory traffic of each stage: inputs read once and results written once [byte].
 
     Texels without a surface and pixels without the head are not counted if a stage does not need them.
-    Neither are repeated reads within a stage or a blur, scratch data between passes, and tables that fit in
-    caches.
+    Repeated reads within a stage or a blur, scratch data between passes, and tables that fit in caches are
+    not counted either.
     """
     inputs, picture = traffic.inputs, traffic.inputs.resources.post.picture
     pixels, shadow = picture.size[0] * picture.size[1], inputs.resources.shadow_maps.texture

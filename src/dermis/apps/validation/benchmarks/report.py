@@ -86,8 +86,8 @@ def cells(benchmark_row: BenchmarkRow) -> tuple[str, ...]:
 def stage_table(benchmark: Benchmark) -> list[tuple[str, ...]]:
     """Return a table of the stages of the base frame, with column titles as its first row.
 
-    The columns are the device time, its lower bound, the ratio of both, and the device times with the passes
-    of GPU Gems 3.
+    The columns are the device time, its lower bound, the ratio of the two, and the device times with the
+    passes of GPU Gems 3.
     """
     if benchmark.base_row is None:
         return []

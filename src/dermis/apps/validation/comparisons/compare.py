@@ -141,7 +141,7 @@ def comparison_subject(
     """Yield the subject of a comparison.
 
     The diffusion profile is in a temporary file, which is deleted when the context ends. The parameters are
-    described at `compare`.
+    described in `compare`.
     """
     index_matched = published_media()[medium].with_eta(1.0)
     with medium_scene(head, light, region, index_matched, model) as (scene, profile):

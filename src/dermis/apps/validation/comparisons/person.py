@@ -166,8 +166,8 @@ def render_subject_frame(
 ) -> Floats:
     """Return the linear radiance (h, w, 3) of a subject's frame.
 
-    If the skin does not refract, two frames are added: scattered light of skin without surface reflection,
-    and surface reflection alone.
+    If the skin does not refract, the radiance is the sum of two frames: light scattered by skin without
+    surface reflection, and surface reflection alone.
 
     skin : skin of the path-traced reference; None for the default skin
     """
@@ -350,8 +350,8 @@ _MIN_RELATIVE_HIGHLIGHT = 1.6  # least brightness of highlights, relative to the
 class IrisErrors(NamedTuple):
     """Errors of an iris as rendered by dermis against the path-traced reference.
 
-    right : shift to the right of the reference's pupil, relative to the pupil by dermis [pixel]
-    down : downward shift of the reference's pupil, relative to the pupil by dermis [pixel]
+    right : shift of the reference's pupil relative to the pupil by dermis, positive to the right [pixel]
+    down : shift of the reference's pupil relative to the pupil by dermis, positive downwards [pixel]
     brightness : ratio of the iris's mean brightness by dermis to its mean brightness in the reference;
         highlights are left out [-]
     left_half : `brightness` of the left half of the iris [-]

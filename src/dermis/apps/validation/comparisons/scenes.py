@@ -54,7 +54,7 @@ LIGHTS: dict[str, Callable[[Head], tuple[Light, ...]]] = {
 
 
 def _ear_position(head: Head) -> tuple[float, float, float]:
-    """Return the leftmost point of the head at the height of its ears, relative to its centre [mm]."""
+    """Return the leftmost point of a head at the height of the ears, relative to the head's centre [mm]."""
     points = head.mesh.positions - head.centre_mm
     height_offset = np.abs(points[:, 1])
     at_ear_height = points[height_offset <= max(_MAX_EAR_HEIGHT_MM, float(height_offset.min()))]

@@ -1,1 +1,1 @@
-"""Comparison of exported skins and heads, as other programs render them, with dermis."""
+"""Skins and heads exported to other programs, rendered there, and compared with dermis."""

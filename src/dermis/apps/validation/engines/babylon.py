@@ -66,7 +66,7 @@ def babylon_page(library: Path) -> Iterator[Page]:
 def measured_radiance(
     page: Page, profile_colour: Floats, meters_per_unit: float, pixel_mm: float, azimuth: float
 ) -> Floats:
-    """Return the radiance (side, side, 3) that Babylon.js draws, relative to the radiance far from the edge.
+    """Return the radiance (side, side, 3) that Babylon.js draws, relative to that of a fully lit plane.
 
     Row 0 is at the bottom.
 

@@ -141,7 +141,7 @@ def binned_response(curve: CumulativeProfile, d_mm: Floats) -> Floats:
 
 
 def measure_heads(pythons: dict[str, Path]) -> Iterator[JsonObject]:
-    """Yield differences in outline and colour between a head by Cycles and by dermis, without hair."""
+    """Yield differences in outline and colour between pictures of a bald head by Cycles and by dermis."""
     subject = load_subject("human").with_painted_maps(EXPORTED_MAP_SIDE, "auto")
     assert subject.scene is not None
     head = replace(subject.scene.head, hair=None, strands=None)

@@ -208,7 +208,7 @@ def _equal_error_costs(
 ) -> JsonObject:
     """Return the cost of Cycles' random walk at the error of dermis, and the cost at low noise.
 
-    dermis_row : row of dermis, whose error against the reference Cycles is to reach
+    dermis_row : row of dermis; its error against the reference is the target for Cycles
     """
     reference, levels = renders.reference, list(zip(*renders.cycles["random-walk"], strict=True))
     bias = relative_rmse(mean.image, reference.image, mask, reference.variance, mean.variance).value

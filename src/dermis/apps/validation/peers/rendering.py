@@ -1,4 +1,4 @@
-"""Renderings of a scene by dermis, Cycles and Mitsuba in turns, which spreads slow phases of the machine."""
+"""Interleaved renderings of a scene by dermis, Cycles and Mitsuba, so that all are slowed down alike."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ CYCLES_METHODS: tuple[SubsurfaceMethod, ...] = ("random-walk", "burley")
 
 @dataclass(frozen=True)
 class RenderVariant:
-    """One of the variants of dermis that are compared with other renderers.
+    """Variant of dermis that is compared with other renderers.
 
     technique : scattering technique
     atlas : side of the atlas [texel]

@@ -53,7 +53,8 @@ def peers(
     side:
         Side of the images [pixel; 512, or 160 with --quick].
     output:
-        JSON file of the results [benchmarks/results/peers.json, and docs/peers.md beside it].
+        JSON file of the results [benchmarks/results/peers.json]. With another file, docs/peers.md is not
+        written.
     adapter:
         Adapter of dermis: cpu, so that all renderers use the same processor.
     """

@@ -35,7 +35,8 @@ class DrawnPeople(NamedTuple):
     """Colours of n people of one group at the sites of `HEAD_SITES`.
 
     cielab : (n, 7, 3) colours under D65
-    age, sex : (n,) age [years] and sex
+    age : (n,) ages [years]
+    sex : (n,) sexes, 0 for female and 1 for male
     """
 
     cielab: Doubles
@@ -78,7 +79,7 @@ def people(seeds: int = _SEED_COUNT) -> None:
 
 
 def page(seeds: int = _SEED_COUNT) -> None:
-    """Measure the variation of people and write docs/measured.md.
+    """Compare drawn people with the archive, and write docs/measured.md.
 
     Parameters
     ----------
@@ -174,7 +175,10 @@ def sites_table(archive: Archive, drawn: Mapping[str, DrawnPeople]) -> str:
 
 
 def sex_age_table(archive: Archive, drawn: Mapping[str, DrawnPeople]) -> str:
-    """Return a Markdown table of colour differences of the cheek by sex and age, averaged over the groups."""
+    """Return a Markdown table of the cheek's colour differences between sexes and between ages.
+
+    The differences are averaged over the groups.
+    """
     lines = ["| difference | archive: L*, a*, b* | drawn |", "|---|---|---|"]
     for name in ("men minus women", "from 55 years minus below 45"):
         both = []

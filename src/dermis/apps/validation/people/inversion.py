@@ -37,7 +37,7 @@ def model_spectra(variables: Doubles) -> Doubles:
 
 
 def model_lab(variables: Doubles) -> Doubles:
-    """Return the CIELAB colours (n, 3) of skins, whose variables are described at `model_spectra`."""
+    """Return the CIELAB colours (n, 3) of skins, whose variables are described in `model_spectra`."""
     return lab(model_spectra(variables) @ rgb_weights(WAVELENGTHS_NM).T)
 
 

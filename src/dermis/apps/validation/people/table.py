@@ -209,8 +209,8 @@ def _population() -> tuple[Doubles, Doubles]:
 def _calibrate(document: dict[str, Any], archive: Archive, ages: Doubles, sexes: Doubles) -> None:
     """Adjust quantiles and site differences so that median colours of drawn people equal the archive's.
 
-    The table `document` is changed in place. Spectra do not determine the thickness of the epidermis; of
-    several values, the one is kept with which colours of sites of the head agree best.
+    The table `document` is changed in place. Spectra do not determine the thickness of the epidermis, so
+    several values are tried, and the value that best reproduces the colours of the head is kept.
     """
     rng = np.random.default_rng(1)
     population = _Population(
@@ -275,7 +275,7 @@ def _drawn_cheeks(document: dict[str, Any], group: str, people: _Population) -> 
 
 
 def _matching_shift(variables: Doubles, target_colour: Doubles, people_count: int) -> tuple[Doubles, Doubles]:
-    """Return the shift (4,) of variables that moves a median colour to a target, and its remaining error.
+    """Return the shift (4,) of variables that brings their median colour to a target, and the error left.
 
     variables : (n, 4) variables of people
     target_colour : (3,) median colour to reach [CIELAB]

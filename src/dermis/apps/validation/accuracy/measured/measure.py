@@ -341,7 +341,7 @@ def _addition_errors(sample: Archive) -> list[JsonObject]:
 def _site_fits(archive: Archive) -> list[JsonObject]:
     """Return the thickness of the epidermis and the oxygenation that fit each site best.
 
-    Results of fits to colours, with two further unknowns, and of fits to spectra are both returned.
+    Fits to colours, with two unknowns per spectrum, and fits to spectra have separate results.
     """
     rows = []
     for site in range(len(SITES)):
@@ -388,9 +388,9 @@ def _site_fold_errors(archive: Archive) -> JsonObject:
 
 
 def _edge_loss_errors(sample: Archive) -> JsonObject:
-    """Return the fractions of light that apertures miss, and constants fitted to spectra without this loss.
+    """Return the fractions of light that apertures miss, and constants fitted to corrected spectra.
 
-    The spectra are corrected for the light that was missed.
+    The spectra are corrected for the light that each aperture misses.
     """
     skins = [replace(DEFAULT_SKIN, melanin=m, blood=0.008) for m in _EDGE_LOSS_MELANIN]
     losses = [edge_loss(one, _EDGE_LOSS_WAVELENGTHS_NM) for one in skins]

@@ -142,8 +142,8 @@ def _folds_table(folds: Sequence[JsonObject]) -> str:
 def _confounded_texts(results: JsonObject) -> dict[str, str]:
     """Return texts on the constants of the model, keyed by placeholder.
 
-    They name pairs of constants that the spectra hardly distinguish, and baselines that are fitted to spectra
-    corrected for the light that apertures miss.
+    The texts list pairs of constants that the spectra hardly distinguish, and baselines fitted to spectra
+    that are corrected for the light that apertures miss.
     """
     pairs = {}
     for row in results["additions"]:

@@ -47,7 +47,8 @@ def lit_fraction(distance_mm: Floats, measured_mm: float, lit_mm: float) -> Floa
     The fraction is averaged over circles around all points of the measured disc.
 
     distance_mm : (n,) radii of the circles
-    measured_mm, lit_mm : radii of the two concentric discs
+    measured_mm : radius of the measured disc
+    lit_mm : radius of the lit disc, which has the same centre
     """
     r = np.maximum(distance_mm, 1e-12)
     point = np.sqrt((np.arange(_RADIUS_COUNT) + 0.5) / _RADIUS_COUNT)[:, None] * measured_mm
