@@ -304,7 +304,7 @@ def _continue_sheets(mesh: RawMesh, max_pairs_per_edge: int = _MAX_TRIANGLES_PER
 
 
 def _directions_from_sides(mesh: RawMesh, sides: Index) -> Floats:
-    """Return the unit vectors (..., 3) in triangles that are perpendicular to sides and point inwards.
+    """Return unit vectors (..., 3) from sides into their triangles, perpendicular to the sides.
 
     sides : (...) sides of triangles, see `_Sides`
     """

@@ -257,7 +257,7 @@ def _parse_polypaint(hex_digits: str, vertex_count: int) -> tuple[Doubles | None
 def _parse_number_table(
     path: Path, statement_rows: _StatementRows, statement_key: str
 ) -> tuple[Doubles, Index]:
-    """Return the first six numbers (n, 6) of each statement, padded with NaN, and the count (n,) of all."""
+    """Return the first six numbers (n, 6) of each statement, padded with NaN, and its count of numbers (n,)."""
     words = run_starts(statement_rows.text > _SPACE)
     first = np.searchsorted(words, statement_rows.start)
     counts = np.diff(first, append=len(words))

@@ -252,8 +252,8 @@ def with_materials(
     Parts whose pictures are a sequence of UDIM tiles are divided into one part for each tile.
 
     path : path of the OBJ file
-    mesh_parts : mesh parts; the first name of a part's group is the name of its material, if it has a
-        material
+    mesh_parts : mesh parts; if a part has a material, the name of the material is the first name of the
+        part's group
     """
     materials: list[FileMaterial] = []
     notes = [f"mtllib: {name} is not in its folder. {_MISSING_ADVICE}" for name in library.missing]

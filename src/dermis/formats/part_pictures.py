@@ -1,4 +1,4 @@
-"""Pictures of the parts of a head that are not skin, encoded as other programs read them."""
+"""Pictures of the parts of a head that are not skin, encoded in the forms that other programs read."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class PartPictures:
             return dict(zip(levels, pool.map(encode_png, levels.values()), strict=True))
 
     def emission(self, material: Material) -> tuple[float, tuple[float, ...]]:
-        """Return the strength of a part's emission, a radiance, and a colour to multiply it by.
+        """Return the strength of a part's emission (a radiance), and the colour that multiplies it.
 
         With an emission map, the strength is the largest radiance in the map and the colour is white. Without
         a map, strength times colour is the emission of the material.

@@ -226,7 +226,7 @@ def _read_header(path: Path, ply_bytes: bytes) -> _Header:
 
 
 def _declared_element(path: Path, header_words: Sequence[str], remaining_bytes: int) -> _Element:
-    """Return an element, yet without properties; refuse a count that is too large for a mesh or the file.
+    """Return an element that has no properties yet; refuse a count too large for a mesh or for the file.
 
     header_words : words after "element"
     """

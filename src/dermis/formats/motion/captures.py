@@ -289,8 +289,8 @@ def find_rotation_bones(skeleton: Skeleton | None) -> RotationBones:
 def head_bone_angles(bones: RotationBones, rotations: Doubles) -> dict[str, Doubles]:
     """Return the Euler angles (k, 3) [degrees] of the head and neck bones, by bone name.
 
-    rotations : (k, 4) quaternions of the head's rotation in a capture, which head and neck bones perform
-        together
+    rotations : (k, 4) quaternions of the head's rotation in a capture, which the head and neck bones
+        perform together
     """
     parts = bones.head.items()
     return {name: _euler_angles(_partial_rotation(rotations, fraction)) for name, fraction in parts}

@@ -202,7 +202,7 @@ def _complete_table(
 
 
 def _rows_without_face(cell_values: Doubles, is_angle: Mask, has_shape_count: Mask) -> Mask:
-    """Return the mask (k,) of rows without a face: empty rows, and rows of zeros under some conditions.
+    """Return the mask (k,) of rows without a face: rows of empty cells, and certain rows of zeros.
 
     Rows of zeros show no face if most other rows contain rotations. They also show no face if they state no
     number of blend shapes although other rows do.

@@ -97,7 +97,7 @@ def load_sequence(
 
     The first, the middle and the last file are read immediately, all other files on demand.
 
-    Raises DermisError for files that do not contain the topology of the head.
+    Raises DermisError for files that do not have the topology of the head.
     """
     files, rate = frame_files(path), DEFAULT_FRAME_RATE if fps is None else fps
     axes, source = Axes(up, front), head.file_vertices
@@ -229,7 +229,7 @@ class FrameVertices(NamedTuple):
 
 
 class _ObjPattern(NamedTuple):
-    """Hash of an OBJ file without positions and normals, to recognise files that differ only in these.
+    """Fingerprint of an OBJ file that does not depend on its positions and normals.
 
     digest : hash of all lines except `v` and `vn`
     line_count : number of `v` lines
@@ -324,7 +324,7 @@ def _find_pattern(path: Path, obj_bytes: bytes) -> _ObjPattern:
 
 
 def _parse_positions(obj_bytes: bytes, pattern: _ObjPattern) -> Doubles | None:
-    """Return the vertex positions (v, 3) of an OBJ file in file units; None for another pattern.
+    """Return the vertex positions (v, 3) of an OBJ file in file units; None if its pattern differs.
 
     obj_bytes : bytes of the file
     pattern : pattern of the first file of the sequence

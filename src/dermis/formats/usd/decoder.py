@@ -50,7 +50,7 @@ class _Faces(NamedTuple):
     vertex: Index
 
     def corner_elements(self, interpolation: str) -> Index | None:
-        """Return the primvar element index of each corner (c,); None for an unknown interpolation."""
+        """Return the index (c,) of the primvar element at each corner; None for an unknown interpolation."""
         corners = len(self.vertex)
         return {
             "constant": np.zeros(corners, np.int64),
