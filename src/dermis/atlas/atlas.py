@@ -75,7 +75,7 @@ class Atlas:
         return lit
 
     def unscattered_fraction(self, mesh: Mesh) -> float:
-        """Return the fraction of skin triangles without texels, whose light is not diffused [-]."""
+        """Return the fraction of skin triangles without texels; light on these is not diffused [-]."""
         skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
         return float(1.0 - self.mapped[skin].mean()) if skin.any() else 0.0
 

@@ -277,7 +277,7 @@ def _form_factors(
 
 
 def _nearest_patch(patch_of_cell: Index) -> Words:
-    """Return for each cell (CELLS_PER_SIDE^2,) the patch that contains it, or else the nearest in uv."""
+    """Return for each cell (CELLS_PER_SIDE^2,) the patch that contains it, or the nearest patch in uv."""
     from scipy.ndimage import distance_transform_edt
 
     known = patch_of_cell.reshape(CELLS_PER_SIDE, CELLS_PER_SIDE)
@@ -292,7 +292,7 @@ def _sparse_rows(
 ) -> tuple[Words, Words, Floats]:
     """Return form factors as rows of a sparse matrix: start of each row, patch indices, and factors.
 
-    row_index : (m,) row of each line: index of the cell or patch that it left
+    row_index : (m,) index of the cell or patch that each line left
     target_patch : (m,) index of the patch that the line met next
     line_counts : (r,) number of lines that left each cell or patch
     patch_count : number of patches

@@ -99,7 +99,7 @@ def covered_texels(
 
 
 def _integers_between(low: Doubles, high: Doubles, grid_side: int, margin: float) -> tuple[Index, Index]:
-    """Return the first and last integer from low + margin to high - margin, limited to the grid."""
+    """Return the first and last integer between low + margin and high - margin, limited to the grid."""
     first = np.clip(np.ceil(low + margin), 0, grid_side).astype(np.int64)
     return first, np.clip(np.floor(high - margin), -1, grid_side - 1).astype(np.int64)
 

@@ -18,7 +18,7 @@ _POSITION_TOLERANCE_MM = 1e-4  # processors differ in the last bits of a positio
 
 
 def shipped_arrays(mesh: Mesh, table_name: str, array_names: Sequence[str]) -> dict[str, NDArray[Any]] | None:
-    """Return the arrays of a table that the package contains for a mesh; None if it contains none.
+    """Return the arrays of a table that the package contains for a mesh; None if there is no such table.
 
     table_name : name of the table, which contains all parameters that affect the arrays, except the mesh
     array_names : names of the arrays

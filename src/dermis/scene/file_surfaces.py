@@ -128,7 +128,7 @@ def with_file_textures(
 
 
 def _with_mean_colours(mesh: Mesh, materials: list[Material], maps: PartMaps) -> list[Material]:
-    """Set the colour of each material to the mean colour of its maps, for programs that ignore the maps."""
+    """Return materials in the mean colour of their maps, for programs that do not read the maps."""
     size = np.array(maps.colour.shape[1::-1])
     coloured = []
     for index, material in enumerate(materials):

@@ -68,8 +68,8 @@ def looking_at(head: Head, target_mm: ArrayLike, pose: Pose | Mapping[str, float
 def _eyelid_rotations(rig: Rig, side_name: str) -> list[BoneRotation]:
     """Return the morph targets that move the lids of an eye when a bone turns the eye.
 
-    Each result contains a morph target, and the rotation of the parametric human's eye to which the target's
-    full weight corresponds.
+    Each result contains a morph target, and the rotation of the parametric human's eye at which this target
+    has full weight.
 
     side_name : "Left" or "Right"
     """

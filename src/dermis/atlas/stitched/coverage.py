@@ -123,9 +123,10 @@ def _drawing_order(surface: FlatSurface, piece: Index, member_triangles: Index) 
 
 
 def _mirrored_triangles(surface: FlatSurface, piece: Index, member_triangles: Index) -> Mask:
-    """Return the mask (t,) of triangles that are mirrored in uv, compared with most of their piece.
+    """Return the mask (t,) of triangles that are mirrored in uv relative to most triangles of their piece.
 
-    piece, member_triangles : (t,) piece and index of each triangle
+    piece : (t,) piece of each triangle to examine
+    member_triangles : (t,) indices of these triangles
     """
     total = np.bincount(piece, surface.area_uv[member_triangles])
     return np.asarray(np.sign(total)[piece] != np.sign(surface.area_uv[member_triangles]))

@@ -70,7 +70,7 @@ class GeodesicEnds(NamedTuple):
         third_weight: Doubles,
         reached_target: bool,
     ) -> None:
-        """Store the ends of the selected geodesics.
+        """Store where some geodesics end.
 
         rays : geodesics that end in their current triangle
         first_corner : corner (0, 1, 2) of the triangle with the weight 1 - second_weight - third_weight

@@ -109,7 +109,7 @@ def _side_metric(sides: BorderSides) -> _SideMetric:
 def _candidate_texels(
     sides: BorderSides, metric: _SideMetric, grid_shape: tuple[int, ...]
 ) -> tuple[Index, Index, Index]:
-    """Return the border side, x and y (n,) of each texel that may be in the gutter of this side."""
+    """Return candidates for gutter texels, as three arrays (n,): border side, x and y."""
     height, width = grid_shape
     low = np.ceil(sides.ends.min(axis=1) - metric.half_extent)
     high = np.floor(sides.ends.max(axis=1) + metric.half_extent)

@@ -205,7 +205,8 @@ def cut_overlaps(surface: FlatSurface, piece: Index, gutter_mm: float) -> Index:
 def _cut_length_mm(surface: FlatSurface, member_triangles: Index, part_of_triangle: Index) -> float:
     """Return the length of all triangle sides along which a chart piece is cut into parts [mm].
 
-    member_triangles, part_of_triangle : (t,) indices of the piece's triangles, and the part of each
+    member_triangles : (t,) indices of the piece's triangles
+    part_of_triangle : (t,) index of the part to which each of these triangles belongs
     """
     part_of = np.full(len(surface.uv), -1, np.int64)
     part_of[member_triangles] = part_of_triangle
@@ -217,7 +218,7 @@ def _cut_length_mm(surface: FlatSurface, member_triangles: Index, part_of_triang
 
 
 def _cut_piece(surface: FlatSurface, mapped: Mask, member_triangles: Index, gutter_mm: float) -> Index | None:
-    """Cut a chart piece where its gutters meet; return the part of each triangle (t,), None without a cut.
+    """Cut a chart piece where its gutters meet; return the part of each triangle (t,), or None if uncut.
 
     member_triangles : (t,) indices of the piece's triangles
     """
