@@ -27,7 +27,7 @@ def cite(
     skin: SkinOptions = NO_OPTIONS,
     against: Literal["surface-integral", "heat", "path-traced", "cycles"] | None = None,
 ) -> int:
-    """Print BibTeX entries: of the works behind a picture or a comparison, or of the given keys.
+    """Print the BibTeX entries of given keys, or of the works behind a picture or a comparison.
 
     Examples:
 
