@@ -192,7 +192,7 @@ def _build_person(seed: int | None, numbers: Options, tone: Options, targets: di
     """Return the average person, or the random person of a seed, with some parameters and targets replaced.
 
     numbers : dictionary from fields of `Human` to their new values
-    tone : skin ancestry and ITA (individual typology angle) for which the skin of a random person is sampled
+    tone : skin ancestry and ITA (individual typology angle), which determine the person's skin
     targets : dictionary from MakeHuman shape targets to weights
     """
     from dermis.human.person import Human
