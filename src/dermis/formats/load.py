@@ -197,7 +197,7 @@ def _find_front(
 
 
 def _weld_groups(mesh_parts: list[MeshPart]) -> Floats:
-    """Return a weld group for each vertex, (v,): coincident vertices of different groups are not welded."""
+    """Return the weld group (v,) of each vertex; coincident vertices of different groups are not welded."""
     numbers = [number if part.separate else 0 for number, part in enumerate(mesh_parts, start=1)]
     return np.repeat(np.array(numbers, np.float32), [len(part.positions) for part in mesh_parts])
 

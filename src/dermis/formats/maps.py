@@ -228,7 +228,8 @@ def load_maps(
         is ignored
     normal : tangent-space normals, red towards +u, green as given by `normal_y`
     height : grey, white outwards; requires `height_mm`
-    height_mm : height difference of 1/255 of the full scale, one grey level of an 8-bit map [mm]
+    height_mm : height difference of one grey level of an 8-bit map, or of 1/255 of the full scale of any map
+        [mm]
     specular, roughness : grey, linear values without sRGB conversion
     region : 8-bit grey labels
     normal_y : "up" if green points towards row 0 (OpenGL, Blender), "down" if away from row 0 (DirectX)

@@ -89,7 +89,7 @@ class FileMaterial:
 
     @property
     def metalness(self) -> float:
-        """Return the factor of the metalness [-]."""
+        """Return the metalness factor, which is 1 if the file states none [-]."""
         return 1.0 if self.stated_metalness is None else self.stated_metalness
 
     @property

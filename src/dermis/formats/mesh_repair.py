@@ -100,7 +100,10 @@ class RawMesh:
         )
 
     def with_corners(self, corner_points: Index) -> RawMesh:
-        """Return the mesh with new points at corners (f, 3); vertices at several points are duplicated."""
+        """Return the mesh with new point indices at corners; vertices with several points are duplicated.
+
+        corner_points : (f, 3) new point index at each corner
+        """
         triangles, stride = self.triangles.copy(), int(corner_points.max()) + 1
         moved = corner_points != self.point[triangles]
         copies, number = np.unique(triangles[moved] * stride + corner_points[moved], return_inverse=True)
@@ -447,8 +450,8 @@ class _PieceSurface:
         """Return the visible balance of each component, and whether backs prevail in the mesh.
 
         The visible balance of a component is 1 if only its front is visible from outside, -1 if only its back
-        is visible, and 0 if hardly any part of it is visible. Backs prevail if they are two thirds of all
-        visible samples.
+        is visible, and 0 if hardly any part of it is visible. Backs prevail if they are more than two
+        thirds of all visible samples.
 
         doubtful_pieces : mask of components that get additional samples, so that small components have enough
         """

@@ -143,9 +143,9 @@ def parse_geometry(path: Path, obj_text: str) -> ObjGeometry:
 
 
 def _plain_text(obj_text: str) -> str:
-    """Join continued lines; remove blanks at the start of lines and comments at their end.
+    """Join continued lines; remove leading blanks, and comments at the ends of lines.
 
-    The number of lines is unchanged.
+    The number of lines is unchanged, as empty lines take the place of joined lines.
     """
     if "\\\n" in obj_text:
         obj_text = _CONTINUED_LINE.sub(
@@ -203,7 +203,7 @@ def _check_lines(path: Path, text_length: Index, is_vertex: Mask) -> None:
 def _refuse_line(
     path: Path, statement_rows: _StatementRows, row_index: int, expected: str, actual: str = ""
 ) -> NoReturn:
-    """Raise the error for one of the statements in `statement_rows`; the message names its line.
+    """Raise an error for one of the statements in `statement_rows`; the message names the line.
 
     row_index : index of the statement in `statement_rows`
     expected : what the statement should contain
@@ -257,7 +257,7 @@ def _parse_polypaint(hex_digits: str, vertex_count: int) -> tuple[Doubles | None
 def _parse_number_table(
     path: Path, statement_rows: _StatementRows, statement_key: str
 ) -> tuple[Doubles, Index]:
-    """Return the first six numbers (n, 6) of each statement, padded with NaN, and its count of numbers (n,)."""
+    """Return the first six numbers of each statement, padded with NaN (n, 6), and its number count (n,)."""
     words = run_starts(statement_rows.text > _SPACE)
     first = np.searchsorted(words, statement_rows.start)
     counts = np.diff(first, append=len(words))
@@ -333,7 +333,7 @@ def _face_groups(
 
     face_line : (n,) line number of each face
 
-    If no group and no material has a name, the names of objects (`o`) replace those of groups.
+    If no group and no material has a name, the names of objects (`o`) replace group names.
     """
     named = any(key in ("usemtl", "g") and value for _, key, value in statements)
     material_key, group_key = "usemtl", "g" if named else "o"

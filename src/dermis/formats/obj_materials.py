@@ -118,7 +118,7 @@ class MtlTexture:
 
     @property
     def transform(self) -> UvTransform:
-        """Return the transform of uv with v down."""
+        """Return the transform for uv coordinates with v down."""
         (scale_u, scale_v), (u, v) = self.scale, self.offset
         if (self.scale, self.offset) == ((1.0, 1.0), (0.0, 0.0)):
             return IDENTITY_UV_TRANSFORM

@@ -17,7 +17,8 @@ def find_referenced_file(path: Path, file_name: str) -> Path | None:
     path : path of the mesh file
     file_name : name relative to the folder of the mesh file; Windows separators are accepted
 
-    If the name leads outside the folder, its last component is looked up in the folder.
+    If there is no such file in the folder or below, the last component of the name is looked up in the
+    folder.
     """
     named = PureWindowsPath(file_name.strip().strip('"'))
     for candidate in (named, PureWindowsPath(named.name)):

@@ -75,7 +75,7 @@ def register_wgpu_types() -> None:
 def register_types(ffi: Any) -> int:
     """Register the C types of pointers, arrays and callbacks with cffi, and return their number.
 
-    This uses cffi's internals. If they differ, nothing is registered and the first frame takes longer.
+    This uses cffi's internals. If these have changed, nothing is registered and the first frame takes longer.
     """
     try:
         with ffi._lock:  # cffi's own callers take it too

@@ -93,7 +93,7 @@ class ResourceCache(Generic[T]):
         return len(self._keys)
 
     def find(self, cache_key: ResourceKey) -> T | None:
-        """Return the cached entry for a key of `resource_key`, or None without an entry."""
+        """Return the cached entry for a key from `resource_key`; None without an entry."""
         return self._entries.get(cache_key)
 
     def add(self, cache_key: ResourceKey, resources: Sequence[object], cached_object: T) -> None:

@@ -196,13 +196,13 @@ class CommandList(Recorder):
 
     @property
     def _encoder(self) -> Untyped:
-        """Return the current command encoder; each submission starts a new one."""
+        """Return the current command encoder, a new encoder after each submission."""
         if self._open_encoder is None:
             self._open_encoder = self.device.command_encoder()
         return self._open_encoder
 
     def _compute_pass(self, stage: str) -> ComputePass:
-        """Return the open compute pass, or begin one; a stage that is timed gets a separate pass."""
+        """Return the open compute pass, or begin a pass; each timed stage gets a separate pass."""
         if self._splits_stages and self._pass and stage != self._stage:
             self._end_pass()
         if not self._pass:

@@ -74,7 +74,7 @@ class ReopeningDevice:
         self.run(lambda: None)
 
     def run(self, job: Callable[[], T]) -> T:
-        """Return the result of `job()`, which is repeated on a reopened device if the current one is lost.
+        """Return the result of `job()`; if the device is lost, repeat the job on the reopened device.
 
         Raises DermisError if the reopened device is lost as well, and DeviceError for other driver errors.
         """

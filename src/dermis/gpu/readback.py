@@ -28,7 +28,7 @@ class BufferReadback:
         self.buffer = device.acquire_staging(size)
 
     def start(self, submission: int) -> None:
-        """Request that the copy is mapped to host memory after a submission.
+        """Request that the copy be mapped to host memory after a submission.
 
         submission : number of the submission that fills the copy, from `Device.submit`
         """

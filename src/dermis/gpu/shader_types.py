@@ -70,7 +70,7 @@ class Binding:
 
     @property
     def reads(self) -> bool:
-        """Return whether the shader may read the resource, which is false for write-only textures."""
+        """Return whether the shader may read the resource; write-only textures cannot be read."""
         return bool(self.entry.get("storage_texture", {}).get("access") != "write-only")
 
 

@@ -191,8 +191,8 @@ class VertexDisplacements(NamedTuple):
 def target_names(mesh: Tree) -> tuple[str, ...]:
     """Return the names of a mesh's morph targets.
 
-    Most programs write the names as "targetNames" in the mesh's extras; a target without a name is called
-    "target 0", by its index.
+    Most programs write the names as "targetNames" in the mesh's extras; targets without names are called
+    "target 0", "target 1" and so on.
     """
     counts = [len(primitive.get("targets", [])) for primitive in mesh["primitives"]]
     extras = mesh.get("extras")
@@ -212,7 +212,7 @@ def read_targets(
     all_target_names : names of the morph targets of the mesh
     vertex_count : number of vertices of the primitive
 
-    Raises DermisError if the number of displacements is not `vertex_count` or values are not finite.
+    Raises DermisError if the number of displacements is not `vertex_count`, or if values are not finite.
     """
     displacements: dict[str, VertexDisplacements] = {}
     for name, target in zip(all_target_names, primitive.get("targets", []), strict=False):

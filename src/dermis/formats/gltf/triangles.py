@@ -192,7 +192,7 @@ class _SceneReader:
     def _read_primitive(
         self, mesh: Tree, target_names: tuple[str, ...], primitive: Tree
     ) -> tuple[MeshPart, dict[str, VertexDisplacements]]:
-        """Return a primitive in mesh space, deformed by the default weights, and all morph targets of it."""
+        """Return a primitive in mesh space, with the default weights applied, and its morph targets."""
         attributes = primitive["attributes"]
         self._check_count("vertices", self.document.item("accessors", attributes["POSITION"])["count"])
         positions = self.document.read_floats(attributes["POSITION"]).reshape(-1, 3)

@@ -105,7 +105,9 @@ class _TargetBind(NamedTuple):
     """Morph target that an expression moves.
 
     name : name of the expression
-    target : index of the target in the mesh
+    mesh : JSON tree of the mesh with the morph target
+    target : index of the morph target in the mesh
+    weight : weight that the expression gives the morph target
     """
 
     name: str

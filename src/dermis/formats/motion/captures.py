@@ -161,7 +161,7 @@ def note_lost_frames(culprit: object, lost_frame_count: int, frame_count: int) -
 
 
 def fill_gaps(times_s: Doubles, channels: Doubles) -> Doubles:
-    """Return values (k, n) in which linear interpolation over time replaces NaN.
+    """Return values (k, n) in which NaN is replaced by linear interpolation over time.
 
     Before the first and after the last known value, values are constant.
 

@@ -94,7 +94,7 @@ def _material_groups(mesh: Tree, materials: Sequence[FileMaterial]) -> list[Mate
 def _mesh_parts(
     path: Path, decoded_arrays: Arrays, array_prefix: str, groups: list[MaterialGroup]
 ) -> tuple[list[MeshPart], list[str]]:
-    """Return the parts of a mesh, one for each group, and notes for the user on left-out polygons and uv.
+    """Return the parts of a mesh, one for each group, and notes on polygons without three corners or uv.
 
     decoded_arrays : arrays of all meshes, see `_SceneReader.read`
     array_prefix : prefix of the names of this mesh's arrays

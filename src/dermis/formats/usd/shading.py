@@ -60,7 +60,7 @@ _BLACK = (0.0, 0.0, 0.0)
 
 
 class _InputSource(NamedTuple):
-    """Output of a shader to which an input is connected."""
+    """Shader output to which an input of another shader is connected."""
 
     shader: UsdShade.Shader
     output: str
@@ -100,7 +100,7 @@ class MaterialReader:
         return _emission_to_colour(tree)
 
     def _add_source(self, tree: Tree, input_name: str, role: str, input_source: _InputSource) -> None:
-        """Add the texture or the vertex colours to which an input is connected to a material tree."""
+        """Add to a material tree the texture or vertex colours to which an input is connected."""
         kind = str(input_source.shader.GetIdAttr().Get())
         if kind.startswith("UsdPrimvarReader_float") and role == "colour":
             tree |= {
