@@ -61,7 +61,7 @@ def draw_frame(graph: Graph, inputs: FrameInputs, technique: Technique) -> None:
 
 
 def _stage_inputs(graph: Graph, inputs: FrameInputs, technique: Technique, scattered: Texture) -> StageInputs:
-    """Return the inputs of the passes that compute outputs: of shading, geometry, picture and technique."""
+    """Collect the inputs of the passes that compute outputs: shading, geometry, picture and technique."""
     resources, diffused = inputs.resources, None
     layers = technique.subsurface_layers(resources.output_layers)
     if layers is not None:

@@ -26,7 +26,7 @@ _MAX_BYTE_LEVEL = 255  # largest byte of a picture
 
 @dataclass(eq=False)
 class FrameTextures:
-    """Device, textures and buffers of a frame; all are replaced if it is drawn again on a new device.
+    """Device, textures and buffers of a frame; all are replaced if a lost device is opened again.
 
     meter : exposure meter, None for a fixed exposure
     outputs : resources of the outputs besides the picture, None if none are requested

@@ -77,7 +77,7 @@ class FrameRequest:
 
     @cached_property
     def split(self) -> ProfileSplit:
-        """Return the split into relit and blurred Gaussians, of the profile and of any other profiles."""
+        """Return the profile and any other profiles, each split into relit and blurred Gaussians."""
         profiles = self.profile, *self.other_profiles
         first, *others = (self.technique.split(profile, self.albedo_from_map) for profile in profiles)
         fine = {} if others else first.fine  # with blends, stripes are as fine as texels

@@ -39,7 +39,7 @@ SEAM_METHODS = {
 
 
 def seam_method(method_name: str, can_stitch: bool) -> SeamMethod:
-    """Return the seam method `method_name`, or "clear-colour" in place of an impossible "stitch".
+    """Return the seam method `method_name`; if it is "stitch" and cannot be used, return "clear-colour".
 
     can_stitch : whether the technique can carry light across seams
     """

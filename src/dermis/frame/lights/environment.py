@@ -70,8 +70,8 @@ def _upload_layers(device: Device, layers: Sequence[NDArray[np.float32]] | NDArr
 def _with_border(panorama: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return a panorama with a border of one texel for filters.
 
-    On the left and right, the border wraps around. Beyond a pole, it continues on the opposite side of the
-    sphere.
+    On the left and right, the border wraps around. Beyond a pole, the border continues on the opposite side
+    of the sphere.
     """
     half = panorama.shape[1] // 2
     rows = np.concatenate(

@@ -113,7 +113,9 @@ def sphere_table(profile: GaussianSum) -> Floats:
 
 
 def scattered_cosine(cosines: ArrayLike, concentration: float) -> Floats:
-    """Return max(N.L, 0) convolved on the sphere with the normalised exp(k cos a), a the central angle [-].
+    """Return max(N.L, 0) convolved on the sphere with the normalised kernel exp(k cos a) [-].
+
+    The angle a is the angle at the centre of the sphere.
 
     cosines : values of N.L at which the result is evaluated [-]
     concentration : k, the squared radius of the sphere divided by the variance of the Gaussian [-]

@@ -86,7 +86,7 @@ class ScreenSpace(Technique):
         return memo.get(make_subsurface_layers, device, settings.size, False, caller_name="outputs")
 
     def subsurface_layers(self, resources: TechniqueResources | None) -> Texture | None:
-        """Return the texture whose layers hold the subsurface light and the fraction towards the camera."""
+        """Return the texture of subsurface light, which is `SubsurfaceLayers.layers`."""
         return resources.layers if isinstance(resources, SubsurfaceLayers) else None
 
     def finish(self, graph: Graph, inputs: FrameInputs, radiance: Texture) -> Texture:

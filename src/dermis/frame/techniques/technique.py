@@ -63,7 +63,9 @@ class Technique(TechniqueTraits):
     def add_intermediate_levels(
         self, split: ProfileSplit, atlas: AtlasTextures, edge: str
     ) -> tuple[ProfileSplit, tuple[int, ...]]:
-        """Insert Gaussians of weight 0 that make blurs cheaper, here none; return the split and levels.
+        """Insert Gaussians of weight 0 that make blurs cheaper; return the new split and the inserted levels.
+
+        In this base class, no Gaussians are inserted.
 
         edge : filter mode at the edges of charts
         """

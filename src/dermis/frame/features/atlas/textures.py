@@ -56,8 +56,8 @@ class AtlasTextures:
     gutter_light : buffer of the light of the gutter texels, None if there are no gutters
     gutter_texels : (a, 2) coordinates x and y of the gutter texels
     coarser : the atlas at half, a quarter, ... of the resolution; only for stitched layouts
-    median_texels_per_mm : median texel density of the head at rest; in each texel, the smaller of the
-        densities along u and v counts [texels/mm]
+    median_texels_per_mm : median over texels of min(density along u, density along v), for the head at rest
+        [texels/mm]
     """
 
     resources: dict[str, Texture]
@@ -120,7 +120,7 @@ def _rms_density(stretch: NDArray[np.float16]) -> float:
 
 
 def _median_density(stretch: NDArray[np.float16], inside_mask: NDArray[np.bool_]) -> float:
-    """Return the median texel density, where the smaller density along u or v counts [texels/mm].
+    """Return the median over texels of min(density along u, density along v) [texels/mm].
 
     inside_mask : mask of the texels inside charts, which excludes gutters
 
@@ -158,9 +158,10 @@ def _upload_mip(
 
 
 def _stretch_sources(atlas: Atlas) -> NDArray[np.uint32]:
-    """Return (r, 3) words for stretch_beyond.wgsl: gutter texels, and surface points with their stretch.
+    """Return (r, 3) words for stretch_beyond.wgsl, one row for each gutter texel.
 
-    The words are the packed texel, the triangle, and two packed barycentric weights.
+    The words are the packed texel, and the surface point whose stretch it copies: the triangle, and two
+    packed barycentric weights.
     """
     (x, y), (second, third) = (pair.T.astype(np.uint32) for pair in (atlas.outside, atlas.border_weights))
     return np.stack([x | (y << 16), atlas.border_triangle.astype(np.uint32), second | (third << 16)], axis=1)

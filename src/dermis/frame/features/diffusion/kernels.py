@@ -87,7 +87,7 @@ def add_intermediate_levels(
     texels_per_mm : texel density of the atlas at full resolution
     max_halvings : largest number of times that the resolution may be halved
 
-    An intermediate level is just blurred enough for `choose_halvings` to halve the resolution of the next
+    An intermediate level is blurred just enough for `choose_halvings` to halve the resolution of the next
     level, and its standard deviation is at least one texel of its resolution. Level 0 is the unblurred light.
     """
     profile_mm2 = tuple(float(v) for v in variance_mm2)

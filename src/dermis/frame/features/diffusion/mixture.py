@@ -32,8 +32,8 @@ class Mixture:
         weight
     atlas_weights : for each layout, a texture over the atlas of the same blend weights
     sums : texture array of exitance. Layer 0 holds the exitance if all light scatters by the first profile.
-        Each other profile has two layers with the difference that its scattering makes: the first for all
-        light, the second for the light in its pyramid in `entering`
+        For each other profile, two layers hold the exitance by that profile minus the exitance by the first:
+            one layer for all light, one layer for the light in the profile's pyramid in `entering`
     """
 
     uv_weights: Texture
@@ -131,7 +131,7 @@ def draw_blend_weights(graph: Recorder, layout: LitAtlas, mixture: Mixture, layo
 def draw_entering_light(
     graph: Recorder, levels: PyramidLevels, mixture: Mixture, layout_index: int, profile_index: int
 ) -> None:
-    """Declare the pass that fills level 0 of a profile's pyramid with entering light times its blend weight.
+    """Declare the pass that fills level 0 of a profile's pyramid with entering light times blend weight.
 
     levels : pyramid whose level 0 holds all light that enters
     layout_index : index of the atlas layout

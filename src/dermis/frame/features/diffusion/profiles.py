@@ -25,8 +25,8 @@ class SkinProfiles:
 
     A fit with a similar profile as initial guess is several times faster. For skin described by pigments
     alone, the guess is the published profile, so that results do not depend on the people rendered before.
-    For skin that defines its layers or its structure, it is the last fit of a skin with the same number of
-    layers.
+    For skin that defines its layers or its structure, the guess is the last fit of a skin with the same
+    number of layers.
     """
 
     def __init__(self) -> None:

@@ -139,7 +139,7 @@ def coarse_counts(device: Device, head: Head) -> StrandCounts:
 
 
 def caster_counts(device: Device, coarse: StrandCounts) -> StrandCounts:
-    """Return the number of coarse strands that cast shadows in place of all, and the knots of each."""
+    """Return the number of coarse strands that cast shadows in place of all, and of the knots of each."""
     detail = adapter_detail(device)
     return StrandCounts(min(coarse.hairs, detail.casters), min(coarse.knots, detail.caster_knots))
 
@@ -380,7 +380,7 @@ def make_groom_tables(device: Device, groom: Groom, style: GuideTables, roots: B
     """Upload the parameters of a person's groom, such as colour and length.
 
     style : guides of the hair style, shared by all people with that style
-    roots : buffer of the strand roots of the style, shared in the same way
+    roots : buffer of the strand roots of the hair style, shared by the same people
     """
     parts = device.buffer(groom.parameters.view(np.float32), "STORAGE")
     return GroomTables(style, roots, parts, device.buffer(groom.hairline_mm, "STORAGE"))

@@ -58,8 +58,9 @@ def bake_occlusion(
     """Return the cosine-weighted visible fraction of the sky at texels and vertices, (rows, result_side) [-].
 
     Depth maps of the head are drawn from directions all around it. For each point, the cosines of the
-    directions from which it is visible are summed. The first `result_side` rows of the result are the texels
-    of the atlas, NaN where there is no surface; the other rows hold the vertices of the mesh.
+    directions from which the point is visible are summed, and divided by the sum of all cosines. The first
+    `result_side` rows of the result are the texels of the atlas, NaN where there is no surface; the other
+    rows hold the vertices of the mesh.
 
     bindings : resources of the lighting, in which geometry and lights are replaced
     surface_texels : texture of the surface point of each atlas texel

@@ -137,7 +137,7 @@ class MovingOcclusion:
 
 @dataclass(frozen=True, eq=False)
 class VertexSkyVisibility:
-    """Visible fraction of the sky at the vertices of a head, and depth maps to compute it.
+    """Visible fraction of the sky at the vertices of a head, and depth maps from which it is computed.
 
     layers : depth maps from directions all around the head
     occluders : triangles of the simplified head, which are drawn into the depth maps

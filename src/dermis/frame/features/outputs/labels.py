@@ -79,7 +79,7 @@ def draw_labels(graph: Recorder, planes: Planes, buffers: LabelBuffers, inputs: 
 
 
 def _upload_tables(device: Device, labels: MeshLabels) -> MutableBindings:
-    """Upload the label tables of a mesh, and the number in FaceSynthetics of each class in dermis."""
+    """Upload the label tables of a mesh, and for each class of dermis its number in FaceSynthetics."""
     face_synthetics = [one.face_synthetics for one in label_classes()]
     arrays = {
         "label_base": labels.base.astype(np.uint32),

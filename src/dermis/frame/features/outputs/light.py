@@ -39,7 +39,7 @@ _MAX_VISIBILITY_LIGHTS = 64  # as in visibility.wgsl
 
 @dataclass(frozen=True, eq=False)
 class LightOutputs:
-    """Resources for outputs of light and skin, apart from the planes into which they are written.
+    """Resources for outputs of light and skin, apart from the buffers into which the outputs are written.
 
     light_part_counts : number of parts into which the shader divides each light
     transmitted : textures of the light through thin parts: one for each layout and, if there are several

@@ -45,7 +45,7 @@ class Resources:
         return [*(planes.buffer for planes in self.planes), *landmarks]
 
     def planes_of_output(self, output_name: str) -> Planes:
-        """Return the planes of the stage that computes an output."""
+        """Return the buffer of the stage that computes an output."""
         return next(planes for planes in self.planes if output_name in planes.channels)
 
 

@@ -26,7 +26,7 @@ class HeadGeometry:
     resources : dictionary from names in geometry.wgsl to textures and buffers
     indices : index buffer for the rasteriser
     triangles : number of triangles
-    has_cutouts : whether the opacity maps of some parts cut holes into them, see cutouts.wgsl
+    has_cutouts : whether the opacity maps of some parts cut holes into these parts, see cutouts.wgsl
     """
 
     resources: dict[str, Texture | Buffer]

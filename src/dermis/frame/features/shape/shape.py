@@ -136,7 +136,9 @@ def _upload_tables(device: Device, tables: dict[str, NDArray[np.generic]]) -> di
 
 
 def _vertex_resources(device: Device, vertex_count: int) -> dict[str, Texture | Buffer]:
-    """Create the texture (for software adapters) or buffer (for GPUs) of vertices, and tangent lengths."""
+    """Create the texture and the buffer of vertices, and the buffer of tangent lengths.
+
+    Software adapters store vertices in the texture, GPUs in the buffer; the unused one is minimal."""
     rows, software = -(-vertex_count // VERTICES_PER_ROW), device.adapter.kind == "CPU"
     table = make_texture(device, (4 * VERTICES_PER_ROW, rows if software else 1), "rgba32float")
     words = np.zeros((1 if software else rows * VERTICES_PER_ROW, 4, 4), np.float32)
@@ -251,7 +253,9 @@ def normals_in_vertex_frames(mesh: Mesh) -> Doubles:
 
 
 def _run_offsets(sorted_index: NDArray[np.integer], run_count: int) -> Words:
-    """Return the start of the run of 0, 1, ... in a sorted array, then its length, (run_count + 1,)."""
+    """Return the start of each run of 0, 1, ... in a sorted array, then the length of the array.
+
+    The shape of the result is (run_count + 1,)."""
     return np.concatenate([[0], np.cumsum(np.bincount(sorted_index, minlength=run_count))]).astype(np.uint32)
 
 

@@ -69,7 +69,7 @@ def upload_slopes(device: Device, slopes: Floats | None) -> Texture:
 
 
 def upload_detail(device: Device, slopes: Floats) -> Texture:
-    """Upload the slopes of two tiling reliefs as one layer, and squared lengths of slopes as a second.
+    """Upload the slopes of two tiling reliefs as one layer, and their squared lengths as a second layer.
 
     slopes : (h, w, 4) slopes along u and v of the first relief, then of the second relief
     """

@@ -35,7 +35,7 @@ def lobe_shaders() -> list[ShaderListMember]:
 
 
 def lobe_constants() -> dict[str, float]:
-    """Return the named values that `//#fill` lines insert into lobe.wgsl and in the shaders of the lobes."""
+    """Return the named values that `//#fill` lines insert into lobe.wgsl and the shaders of the lobes."""
     model_numbers = {name: number for model in MODELS.values() for name, number in model.numbers.items()}
     return {"root_of_first_row": MIN_ROUGHNESS_ROOT, **model_numbers}
 
@@ -132,9 +132,9 @@ def _direction_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str
 
 
 def _relief_band(maps: Maps) -> float:
-    """Return the mip level at which the height map is as large as the normal map; -1 if none.
+    """Return the mip level at which the height map is as large as the normal map, -1 if there is none.
 
-    Only relief finer than that level is taken from the height map and added to the normal map; for -1, all
+    Only relief finer than that level is taken from the height map and added to the normal map; otherwise all
     relief of the height map is added.
     """
     if maps.normal is None or maps.height is None:

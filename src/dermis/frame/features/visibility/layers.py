@@ -54,8 +54,10 @@ class ViewLayers:
     count : number of layers in use
     triangles : whether layers store triangle indices instead of depth
     depth : depth attachments of the rasteriser: one for each layer, or a single one if `triangles`
-    targets : colour targets of the rasteriser, one for each layer
-    nearness, triangle_ids, tiles : buffers of the compute pass; `triangle_ids` is allocated on first use
+    targets : colour targets of the rasteriser, one for each layer; None for layers of depth
+    nearness : buffer of the compute pass: depth of each sample, in some modes packed with the triangle
+    triangle_ids : buffer of the compute pass with the triangle of each sample, allocated on first use
+    tiles : buffer of the compute pass with the state of each tile
     """
 
     texture: Texture

@@ -91,7 +91,7 @@ class TilePairs:
 
     bounds : buffer of the bounding box and normal cone of each tile
     tile : (t,) indices of the tiles that are in at least one pair
-    first : (t + 1,) offsets into `partners`; the partners of tile i are from first[i] up to first[i + 1]
+    first : (t + 1,) offsets into `partners`; the partners of tile[i] are from first[i] up to first[i + 1]
     partners : buffer of the tiles with which each tile is paired
     """
 
@@ -145,10 +145,10 @@ class CandidateCells:
 
     receiver : (r,) cells that receive light, as indices into the list of such cells
     source : (s,) cells that emit light, as indices into the coarse atlas
-    first : (r,) start of the partners in `TilePairs.partners` of each receiver's tile
-    end : (r,) end of the same range
-    sources_first : (t,) start of the sources in `source` of each of the t tiles of the atlas
-    sources_end : (t,) end of the same range
+    first : (r,) index in `TilePairs.partners` where the partners of each receiver's tile start
+    end : (r,) index where these partners end
+    sources_first : (t,) index in `source` where the sources of each of the t tiles of the atlas start
+    sources_end : (t,) index where these sources end
     """
 
     receiver: Index
@@ -174,7 +174,7 @@ def candidate_cells(cells: Cells, tile_pairs: TilePairs) -> CandidateCells:
 def _expand_ranges(range_starts: Index, chosen_ranges: Index) -> tuple[Index, Index]:
     """Return the integers in chosen ranges, and for each integer the position of its range.
 
-    The integers of the first chosen range come first; positions count in `chosen_ranges`.
+    The ranges keep their order. A position is an index into `chosen_ranges`.
 
     range_starts : start of each range; a range ends where the next range starts
     chosen_ranges : indices of the chosen ranges
@@ -190,7 +190,7 @@ def _expand_ranges(range_starts: Index, chosen_ranges: Index) -> tuple[Index, In
 def compute_positions(
     passes: SearchPasses, surface: Bindings, cells: Cells, candidates: CandidateCells
 ) -> Bindings:
-    """Return a dictionary from shader names to buffers of the positions and normals of all candidates.
+    """Return a dictionary from names in shaders to buffers of the candidates' positions and normals.
 
     surface : resources of geometry.wgsl and of the atlas
     """
@@ -222,7 +222,7 @@ def upload_hit_ranges(passes: SearchPasses, candidates: CandidateCells) -> tuple
 
 
 def draw_gutter_copies(passes: SearchPasses, cells: Cells, source_cells: Index, bindings: Bindings) -> Buffer:
-    """Return a buffer of the positions in gutters where sources are copied to, see gutter_copies.wgsl.
+    """Return a buffer of the positions in gutters that show copies of sources, see gutter_copies.wgsl.
 
     source_cells : (n,) indices of cells that emit light
     bindings : further resources of gutter_copies.wgsl
@@ -269,7 +269,8 @@ class PairTable:
     """Translucent pairs as the search returns them, ordered by receiver.
 
     receiver : (m,) receivers that are in a pair, as indices into the list of cells that receive light
-    first : (m + 1,) offsets into `pairs`; the pairs of receiver i are from first[i] up to first[i + 1]
+    first : (m + 1,) offsets into the list of pairs; receiver[i] has the pairs from first[i] up to first[i +
+        1]
     source : (n,) cells that emit light in at least one pair
     pairs : buffer of three words for each pair: source, receiver, and the offset in the atlas between the two
     """
