@@ -123,7 +123,7 @@ def shader_options(source: str, store: str, labels: bool, constants: Constants =
 def program_constants(
     device: Device, path: Path, folders: Sequence[Folder], constants: Constants = ()
 ) -> dict[str, float]:
-    """Return a dictionary of `constants`, plus those of `device_constants` that the shader declares."""
+    """Return a dictionary of `constants` and of the `device_constants` that the shader declares."""
     return used_constants(path, folders, device_constants(device)) | dict(constants)
 
 

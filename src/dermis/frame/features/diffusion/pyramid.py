@@ -26,7 +26,7 @@ MIN_WEIGHT_SUM = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class PyramidLevels:
-    """Textures of the blur pyramid: unblurred light as level 0, its blurred levels, and scratch space.
+    """Textures of the blur pyramid: unblurred light as level 0, the blurred levels, and scratch space.
 
     stacks : one texture array for each resolution, finest first, with a layer for each level of that
         resolution; at coarser resolutions, layer 0 is a reduced copy of the last level of the next finer

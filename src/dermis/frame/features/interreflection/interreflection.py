@@ -39,7 +39,8 @@ class InterreflectionBuffers:
     sample_exitance : buffer of the exitance of the sample points
     direct_exitance : buffer of the exitance of the patches by direct light
     uniform_exitance : buffer of the exitance of the patches under a uniform irradiance of 1
-    bounced_exitance : two buffers of the exitance of the patches after a bounce, used in turn
+    bounced_exitance : two buffers of the exitance of the patches after a bounce; bounces alternate between
+        them
     from_skin : buffer of the light that reaches each cell from other skin
     no_light : buffer of zeros that takes the place of `from_skin` while the sample points are lit
     """

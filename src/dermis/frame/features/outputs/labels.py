@@ -25,8 +25,8 @@ class LabelBuffers:
 
     tables : dictionary from names in label.wgsl to label tables of the mesh
     field_count : number of distance fields; their zero lines are borders of classes within triangles
-    hair_classes : class of each strand, None without hair
-    hair_labels : class of the hair in each pixel, written by the hair pass
+    hair_classes : buffer of the class of each strand, None if the head has no hair
+    hair_labels : buffer of the class of the hair in each pixel, written by the hair pass
     """
 
     tables: MutableBindings
@@ -35,7 +35,7 @@ class LabelBuffers:
     hair_labels: Buffer
 
     def hair_bindings(self, centre_triangles: Texture) -> Bindings | None:
-        """Return the resources with which the hair pass labels pixels, None without hair.
+        """Return the resources with which the hair pass labels pixels, None if there is no hair.
 
         centre_triangles : texture of the triangle at the centre of each pixel
         """

@@ -25,9 +25,10 @@ class Resources:
     planes : buffers of the outputs, one for each stage
     centres : texture of the triangle at each pixel centre, None if the only sample of a pixel is at its
         centre
-    previous : shape of the head in the previous scene, None without motion vectors
+    previous : shape of the head in the previous scene, None if no motion vectors are requested
     light : resources for outputs of light and skin
-    labels, landmarks : buffers of labels and landmarks, None if they are not requested
+    labels : buffers of the labels, None if no labels are requested
+    landmarks : buffers of the landmarks, None if no landmarks are requested
     """
 
     names: tuple[str, ...]

@@ -264,7 +264,7 @@ class MotionBytes(NamedTuple):
 
     positions : position of each control point at rest, three floats [mm]
     weights : weight of each morph target, one float
-    matrices : matrix of each bone from rest to pose, twelve floats row by row [mm]
+    matrices : matrix of each bone, from rest to pose, twelve floats row by row [mm]
     displacements : result of the function `displacements` for a person who uses the buffers of a template,
         else empty
     """
