@@ -43,7 +43,7 @@ class RenderedFrame(ShortRepr):
     """Picture on the device, valid until its renderer draws the next frame.
 
     textures : device, picture and outputs
-    gpu_ms : device time of each timed stage, and "total" [ms]; None if the frame is not timed
+    gpu_ms : device time of each timed stage, and "total" [ms]; None if stages were not timed
     frame_ms : time from recording the frame to its completion [ms]
     setup_ms : time before the frame for uploads, the atlas and shaders [ms]
     gaussians : number of Gaussians of the profile
