@@ -36,7 +36,7 @@ class SkinPrior:
     covariance: Floats
 
     def moments(self, parameter_name: str) -> tuple[float, float]:
-        """Return mean and standard deviation of a parameter's logarithm, or for oxygen of the value itself."""
+        """Return mean and standard deviation of a parameter's logarithm; for oxygen, of the value itself."""
         i = PRIOR_NAMES.index(parameter_name)
         mean = float(self.weight @ self.mean[:, i])
         second = float(self.weight @ (self.covariance[:, i, i] + self.mean[:, i] ** 2))
