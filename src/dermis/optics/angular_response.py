@@ -150,7 +150,9 @@ class _HalfSpace:
         )
 
     def _reflected_radiance(self, mu: Floats, H: Floats) -> Floats:
-        """Return pi times the radiance that the medium reflects, (d, n) for d exit directions [-].
+        """Return pi times the radiance that the medium reflects into each of the discrete directions [-].
+
+        The result (d, n) has a row for each discrete direction and a column for each incident direction.
 
         mu : (n,) cosines of the directions of incident light below the surface
         H : (n,) H function at these cosines
@@ -168,7 +170,7 @@ class _HalfSpace:
         return np.asarray(leaving.reshape(np.shape(cosine)))
 
     def diffuse_reflectance(self) -> float:
-        """Return the fraction that leaves again of the light that enters from a uniform sky [-]."""
+        """Return the fraction of the light entering from a uniform sky that leaves again [-]."""
         return float((self.leaving * self.reflectance(self._mu)).sum() / self.leaving.sum())
 
 

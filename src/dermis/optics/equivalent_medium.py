@@ -49,8 +49,8 @@ def _half_space_column(eta: float, from_photons: bool, total_reflectance: float)
     """Return two numbers (2,), as a table column, for the half-space with a given reflectance.
 
     The first number is the square root of 1 minus the single-scattering albedo [-]. The second number is the
-    frequency at which the Hankel transform of R(r) has fallen to half of its value at frequency 0 [1/mean
-    free path]. R(r) comes from a table of photon counts if `from_photons` is true and the table exists, and
+    frequency, per mean free path, at which the Hankel transform of R(r) has fallen to half of its value at
+    frequency 0. R(r) comes from a table of photon counts if `from_photons` is true and the table exists, and
     else from layered diffusion.
     """
     albedo = albedo_for_total(total_reflectance, eta, from_photons)

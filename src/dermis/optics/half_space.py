@@ -51,7 +51,7 @@ class _PhotonTable(NamedTuple):
 
 
 def tabulated_kind_for_index(eta: float) -> HalfSpaceKind | None:
-    """Return the name of the photon-count table, for perpendicular light, of an index of refraction.
+    """Return the tabulated kind of half-space, lit perpendicularly, for an index of refraction.
 
     The result is None if no table exists for this index.
     """

@@ -221,7 +221,7 @@ def _slabs_in_air(transport: _Transport, R: Floats, T: Floats, unscattered: Floa
 
 
 def _unscattered_exit(unscattered: Floats, internal: Floats) -> tuple[Floats, Floats]:
-    """Return the unscattered light that leaves on the side of entry and on the far side, (n, m) each [-].
+    """Return the fractions (n, m) of light that leave unscattered on the side of entry and the far side [-].
 
     unscattered : (n, m) fraction of light that crosses the slab without scattering [-]
     internal : (m,) reflectance of a face from inside [-]

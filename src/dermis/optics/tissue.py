@@ -160,8 +160,9 @@ def load_tissue(
     ----------
     name : str or Path
         Preset ("skin1", "dj3", "spectral" ...), or a .toml file.
-    structure : {"dj2006", "donner2008", "biospec"}, optional Layer structure of a skin made of pigments; by
-        default the structure that the file states, or "dj2006".
+    structure : {"dj2006", "donner2008", "biospec"}, optional
+        Layer structure of a skin made of pigments; by default the structure that the file states, or else
+        "dj2006".
     pigments : Mapping of str to float, optional
         For a skin made of pigments, values that replace fields of its `SkinParameters`.
 

@@ -31,7 +31,7 @@ class BlenderTask(NamedTuple):
 
 
 def blender_python(python: str | Path | None = None) -> Path:
-    """Return the path of a Python with bpy: the argument, or by default the variable DERMIS_BLENDER_PYTHON.
+    """Return the path of a Python with bpy, by default from the environment variable DERMIS_BLENDER_PYTHON.
 
     Raises DermisError when there is no such file.
     """

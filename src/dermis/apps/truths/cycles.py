@@ -121,7 +121,7 @@ def cycles_passes(
     settings : settings of the frame, of which only the size is used
     method : subsurface method of Cycles
     seed : random seed of the first pass; each further pass uses the next number
-    python : path of a Python with `bpy`; by default the variable DERMIS_BLENDER_PYTHON
+    python : path of a Python with `bpy`; by default from the environment variable DERMIS_BLENDER_PYTHON
 
     Raises DermisError when there is no such Python, when Cycles fails, and when the medium has several
     layers.

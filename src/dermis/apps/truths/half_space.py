@@ -53,7 +53,8 @@ def diffuse_albedo(albedo: float) -> float:
 def reflected_radiance(cosine_in: ArrayLike, cosine_out: ArrayLike, albedo: float) -> Floats:
     """Return the ratio of the radiance that a half-space reflects to the irradiance of parallel light [1/sr].
 
-    cosine_in, cosine_out : cosines between light and normal, and between view and normal
+    cosine_in : cosine of the angle between light and normal
+    cosine_out : cosine of the angle between view and normal
     albedo : single-scattering albedo [-]
 
     Source: [Chandrasekhar1960] section 33: S / (4 pi cosine_in cosine_out), with his scattering function S.

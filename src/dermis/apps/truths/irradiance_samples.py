@@ -27,7 +27,7 @@ class MeshPoints:
     barycentric: Floats
 
     def interpolate(self, mesh: Mesh, vertex_values: NDArray[np.floating]) -> Floats:
-        """Return vertex values interpolated at the points, (n, k).
+        """Return the values (n, k) at the points, interpolated from vertex values.
 
         vertex_values : (v, k) values at the vertices of the mesh
         """
@@ -39,7 +39,7 @@ IrradianceFunction = Callable[[MeshPoints], Floats]
 
 @dataclass(frozen=True)
 class IrradianceSamples:
-    """Irradiance on a surface of small triangles, linear within each.
+    """Irradiance on a surface of small triangles, interpolated linearly on each triangle.
 
     positions : (n, 3) sample positions [mm]
     triangles : (m, 3) sample indices of the corners; the triangles cover the surface without overlaps

@@ -204,9 +204,10 @@ def _cycles_point_light(
 
 
 def facing_irradiance(width: float, height: float, distance: float) -> float:
-    """Return the irradiance that a rectangle of radiance 1 causes on a parallel surface before its centre.
+    """Return the irradiance that a rectangle of radiance 1 causes on a parallel surface facing its centre.
 
-    width, height, distance : size of the rectangle, and its distance from the surface, all in the same unit
+    width, height : size of the rectangle
+    distance : distance between rectangle and surface, in the same unit as the size
 
     Source: view factor from a corner, [Baum1989].
     """

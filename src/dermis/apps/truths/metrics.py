@@ -1,4 +1,4 @@
-"""Differences between an image and a reference: relative error without noise, energy ratio, FLIP."""
+"""Differences between an image and a reference: relative error corrected for noise, energy ratio, FLIP."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ZERO_DIFFERENCE_GREY = 0.5
 
 
 class Estimate(NamedTuple):
-    """Estimated value with its standard error, which is 0 where the reference has no noise."""
+    """Estimated value with its standard error, which is 0 if the reference has no noise."""
 
     value: float
     standard_error: float
@@ -30,9 +30,9 @@ class Estimate(NamedTuple):
 
 @dataclass(frozen=True)
 class FlipDifference:
-    """Perceived difference of two pictures by FLIP, from 0 to 1.
+    """Perceived difference between two pictures by FLIP, from 0 to 1.
 
-    mean : mean of the pixels in the mask
+    mean : mean difference of the pixels in the mask
     error : (h, w) difference of each pixel; 0 outside the mask
     pixels_per_degree : assumed resolution at the viewer's eye
     """
@@ -62,10 +62,13 @@ def relative_rmse(
     Let the reference be T = t + n with noise n of mean 0 and variance s², and let D = I - T. On average, D²
     is (I - t)² + s² and T² is t² + s², so noise does not bias the estimate E = sum(D² - s²) / sum(T² - s²).
 
-    Each pixel contributes U = D² - s² - E (T² - s²) to the error e of E. The random part of U is -2 n (I - t
-    + E t) + (1 - E)(n² - s²). For normally distributed n, the variance of U is 4 s² (I - t + E t)² + 2 (1 -
-    E)² s⁴, with the unbiased estimate 4 s² (D + E T)² - 2 (1 - E)² s⁴. For skewed noise, E is still unbiased
-    but e is too small, by 7 to 16 % if the reference is the mean of 64 exponentially distributed samples.
+    Each pixel contributes U = D² - s² - E (T² - s²) to the error e of E.
+    The random part of U is -2 n (I - t + E t) + (1 - E)(n² - s²).
+    For normally distributed n, the variance of U is 4 s² (I - t + E t)² + 2 (1 - E)² s⁴.
+    Its unbiased estimate is 4 s² (D + E T)² - 2 (1 - E)² s⁴.
+    For skewed noise, E is still unbiased but e is too small, by 7 to 16 % if the reference is the mean of 64
+    exponentially distributed samples.
+
     Pixels are independent of one another. Channels may share paths, so the standard deviations of the
     channels are added, which overestimates e by at most sqrt(c). The standard error of sqrt(E) is the larger
     of its distances to sqrt(E + e) and to sqrt(max(E - e, 0)).

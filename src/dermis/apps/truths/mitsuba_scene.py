@@ -281,9 +281,10 @@ def mesh_shape(
 ) -> MitsubaObject:
     """Return triangles as a Mitsuba mesh.
 
-    vertices, normals, uv : positions (v, 3), normals (v, 3) and uv (v, 2) of the vertices; normals are None
-        for flat shading, uv are None without textures
+    vertices : (v, 3) positions of the vertices
     triangles : (f, 3) vertex indices
+    normals : (v, 3) normals of the vertices; None for flat shading
+    uv : (v, 2) texture coordinates of the vertices; None if there are no textures
     attributes : BSDF, emitter and media
     """
     properties = mi.Properties()

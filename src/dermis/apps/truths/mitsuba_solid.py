@@ -25,7 +25,7 @@ class ClosedSurface:
     positions : (p, 3) vertex positions [mm]
     triangles : (f, 3) vertex indices
     caps : number of openings that were closed
-    cap_area : total area of the triangles that close them [mm2]
+    cap_area : total area of the triangles that close these openings [mm2]
     """
 
     positions: Floats
@@ -39,7 +39,7 @@ def closed_skin(mesh: Mesh, head_name: str) -> ClosedSurface:
 
     head_name : name of the head, for messages
 
-    Raises DermisError when the skin encloses no volume: an open surface, or one with inward normals.
+    Raises DermisError when the skin encloses no volume, because it is open or its normals point inwards.
     """
     skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
     if not skin.any():

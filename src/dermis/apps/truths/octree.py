@@ -25,7 +25,7 @@ class Octree(NamedTuple):
 
     first : (n,) index of the node's first triangle
     end : (n,) index after the node's last triangle
-    next_node : (n,) next node outside this node
+    next_node : (n,) index of the next node that is not inside this node
     centre : (n, 3) mean position on the node's triangles, weighted by irradiance [mm]
     radius : (n,) radius of a ball around the centre that contains the node's triangles and points [mm]
     points : (n, 3, 3) positions of the three points [mm]
@@ -203,7 +203,7 @@ def _central_moments(
 
 
 def _triangle_moments(corners: Floats, irradiance: Floats, area: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return three integrals over each triangle: of irradiance E, of E x with position x, and of E x xᵀ.
+    """Return three integrals over each triangle: of irradiance E, of E times position x, of E times x xᵀ.
 
     corners : (m, 3, 3) corner positions
     irradiance : (m, 3) irradiance of one channel at the corners
@@ -244,7 +244,7 @@ def _point_flux(
 def _reduce_nodes(
     operation: np.ufunc, triangle_values: Floats, first_triangle: Index, end_triangle: Index
 ) -> Floats:
-    """Return the values of each node's triangles reduced by a NumPy ufunc, such as np.add.
+    """Return for each node the values of its triangles, reduced by a NumPy ufunc such as np.add.
 
     triangle_values : (m, ...) values of the triangles
     first_triangle, end_triangle : (n,) range of each node's triangles

@@ -86,8 +86,8 @@ def path_trace(
     settings : settings of the frame, of which only the size is used
     variant : variant of Mitsuba; "llvm_ad_rgb" takes half the time for many samples but needs a recent LLVM
         (14 and 15 end the process), and "cuda_ad_rgb" needs an NVIDIA GPU
-    use_cache : whether to read and write passes on disk; without the cache, `seconds` is the time of this
-        call
+    use_cache : whether to read and write passes on disk; without the cache, `PathTraced.seconds` is the
+        duration of this call
     progress : function called with the number of finished passes and the number of all passes
 
     Raises DermisError when Mitsuba is missing, or when it cannot trace the scene: for a skin surface that
@@ -277,7 +277,7 @@ def scene_key(
 
 
 def load_passes(cache_key: str, picture_size: tuple[int, int]) -> PassStatistics | None:
-    """Return the cached passes with a key and picture size; None if the cache has no such passes."""
+    """Return the cached passes for a key and a picture size, or None if the cache has no such passes."""
     found = load_arrays(_CACHE_FOLDER, cache_key, ("mean", "spread", "mask", "notes", "count", "seconds"))
     if found is None or found["mean"].shape != (picture_size[1], picture_size[0], 3):
         return None

@@ -25,8 +25,7 @@ MAX_PHOTON_EVENTS = 100_000
 class LayerStack(NamedTuple):
     """Optical properties of each layer and of the air on both sides, and the depths of the faces.
 
-    The arrays of properties have the shape (layers + 2,), and the array of depths has the shape (layers +
-    1,).
+    The properties are arrays of the shape (layers + 2,), and the depths have the shape (layers + 1,).
     """
 
     eta: Floats

@@ -23,9 +23,9 @@ need not be opened."""
 
 @dataclass(frozen=True)
 class GaussianSum:
-    """Diffusion profile R(r), a sum of weight exp(-r² / 2v) / (2 pi v).
+    """Diffusion profile R(r), the sum of weight exp(-r² / 2v) / (2 pi v) over Gaussians.
 
-    The renderer has another class for such sums, so that the reference shares no code with it.
+    The renderer uses another class, so that the reference shares no code with the renderer.
 
     weight : (k, 3) energy of each Gaussian, by channel [-]
     variance_mm2 : (k,) variance v of each Gaussian [mm²]
@@ -40,7 +40,7 @@ class GaussianSum:
         return float(np.sqrt(-2 * np.log(_RELATIVE_GAUSSIAN_CUTOFF) * np.max(self.variance_mm2)))
 
     def derivatives(self, radius_mm: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return R(r), dR/dr and d²R/dr² at radii (n,), each (n, 3) [mm^-2, mm^-3, mm^-4]."""
+        """Return R(r), dR/dr and d²R/dr², each (n, 3), at n radii [mm^-2, mm^-3, mm^-4]."""
         r, v = radius_mm[:, None], np.asarray(self.variance_mm2)
         gaussian = np.exp(-(r**2) / (2 * v)) / (2 * np.pi * v)
         weight = np.asarray(self.weight)
@@ -66,7 +66,7 @@ class RadialTable:
         return float(self.radius_mm[-1])
 
     def derivatives(self, radius_mm: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return R(r), dR/dr and d²R/dr² at radii (n,), each (n, 3) [mm^-2, mm^-3, mm^-4]."""
+        """Return R(r), dR/dr and d²R/dr², each (n, 3), at n radii [mm^-2, mm^-3, mm^-4]."""
         from scipy.interpolate import PchipInterpolator
 
         r, R = np.asarray(self.radius_mm, np.float64), np.asarray(self.reflectance, np.float64)
@@ -89,8 +89,8 @@ class ProfileTable(NamedTuple):
     R : (rows, 3) profile, 0 in the last row [mm^-2]
     slope : (rows,) upper bound of |dR/dr| [mm^-3]
     curvature : (rows,) upper bound of half the second derivative in any direction [mm^-4]
-    error_density : (rows,) permitted error of light from this radius per area of source; it decreases with
-        the radius, and its integral over the plane is 1 [mm^-2]
+    error_density : (rows,) share of the permitted error per area at this radius; it decreases with the
+        radius, and its integral over the plane is 1 [mm^-2]
     """
 
     rows_per_root: float

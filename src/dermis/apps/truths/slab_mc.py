@@ -34,7 +34,7 @@ _REPORTED_PHOTON_LOSS = 1e-3  # fraction of dropped photons from which on a warn
 
 
 def default_ring_edges() -> Floats:
-    """Return the default radii of ring edges: a disc of 0.001 mm and 92 rings, each 12 % wider [mm]."""
+    """Return the default radii of ring edges: 0, then 0.001 mm, then each 12 % larger, up to 40 mm [mm]."""
     return np.concatenate([[0.0], np.geomspace(1e-3, 40.0, 93)])
 
 
@@ -49,7 +49,7 @@ def trace_slab(
 
     layers : layers, topmost first; interfaces between unequal indices of refraction reflect and refract
     photons : number of photons; standard errors are proportional to 1 / sqrt(photons)
-    seed : random seed, which gives equal results on any number of processors
+    seed : random seed; the results do not depend on the number of processors
     edges_mm : (n + 1,) radii of the ring edges, from 0; None for `default_ring_edges` [mm]
     progress : function called with the number of finished batches and the number of all batches
 

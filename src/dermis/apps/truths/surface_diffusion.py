@@ -40,7 +40,7 @@ def diffuse_on_surface(
     variances_mm2: ArrayLike,
     steps: int = TIME_STEPS_PER_LEVEL,
 ) -> Floats:
-    """Return vertex values blurred along the surface by a Gaussian of each variance, (k, n, c).
+    """Return vertex values (k, n, c), blurred along the surface by a Gaussian of each of k variances.
 
     The blur by each variance, called a level, starts from the result of the next smaller variance. Each time
     step uses TR-BDF2, a scheme of second order that, unlike the Crank-Nicolson scheme, does not oscillate
@@ -118,7 +118,7 @@ def patch_margin_mm(variances_mm2: ArrayLike) -> float:
 def _diffuse(
     mass: csc_array, stiffness: csc_array, values: Floats, variance: float, step_count: int
 ) -> Floats:
-    """Return vertex values after diffusion by the heat equation for half the variance as time.
+    """Return vertex values after diffusion by the heat equation for the time variance / 2.
 
     mass, stiffness : matrices from `mass_and_stiffness`
     step_count : number of time steps
@@ -135,7 +135,7 @@ def _diffuse(
 
 
 def _lu_solver(matrix: csc_array) -> Callable[[Floats], Floats]:
-    """Return a function that solves a linear system, by sparse LU factorisation without pivoting.
+    """Return a function that solves the linear system of a matrix, by sparse LU without pivoting.
 
     matrix : symmetric, positive definite matrix
     """

@@ -1,6 +1,6 @@
 """Diffusion in layered media, with continuous fluence and flux at each interface.
 
-In the Hankel domain, the fluence phi(z) in each layer satisfies D phi'' - D q^2 phi = -S(z). Here, q^2 =
+In the Hankel domain, the fluence phi(z) in each layer satisfies D phi'' - D q^2 phi = -S(z). Here, q^2 is
 sigma_tr^2 + s^2 at the frequency s, and S is the source of light that has just scattered for the first time.
 At each face, the layers below impose the boundary condition D phi' = W - Z phi. A recursion computes Z and W
 of the faces from bottom to top.
@@ -42,7 +42,7 @@ class _DownwardTransfer(NamedTuple):
     E : attenuation exp(-q d) across the thickness d of the sublayer [-]
     rho : reflection coefficient of the lower face for the solution that decays downwards [-]
     common : 1 / (1 + E^2 rho), the sum of the reflections between both faces [-]
-    beta : part of the solution that grows towards the lower face, at this face, as far as sources cause it
+    beta : amplitude, at the lower face, of the solution that grows downwards; only the part due to sources
     lower : value at the lower face of the particular solution that is 0 at the upper face
 
     All coefficients are 0 for a semi-infinite sublayer. Only the last sublayer of a medium can be
@@ -84,7 +84,7 @@ def solve_reflectance(frequency: ArrayLike, medium: Medium, A: float, source_kin
 
     frequency : (n,) frequencies s > 0 [1/mm]
     A : boundary mismatch with air [-]
-    source_kind : "beam" or "point", where light first scatters, see `solve_layers`
+    source_kind : "beam" or "point", the place where light first scatters, see `solve_layers`
     """
     return _solve_upwards(frequency, _sublayers(medium, source_kind), medium.channels, A)[0] / (2.0 * A)
 

@@ -1,4 +1,4 @@
-"""Diffusion profiles of media by a named diffusion model, and the measured errors of these models."""
+"""Diffusion profiles of media by one of several diffusion models, and the measured errors of these models."""
 
 from __future__ import annotations
 
@@ -175,7 +175,7 @@ def _first_event_albedo(medium: Medium) -> Floats:
 
 
 def _result_warnings(total_reflectance: Floats, ring_energy: Floats) -> Sequence[str]:
-    """Return warnings about negative reflectances, and about totals that the rings do not sum to."""
+    """Return warnings about negative reflectances, and about rings that do not sum to the total."""
     warnings = missing_light_warnings(total_reflectance, ring_energy)
     if (total_reflectance < 0.0).any():
         warnings.append(f"a total reflectance is negative: {np.round(total_reflectance, 4).tolist()}")

@@ -95,7 +95,7 @@ class BurleyFit:
 
 
 def fit_burley(target: RingTarget) -> BurleyFit:
-    """Return the Burley profile with the smallest error of the ring energies and the target's totals."""
+    """Fit Burley's profile to ring energies with the smallest error, without changing any channel's total."""
     shape = np.array([_fit_shape(target.channel(i)) for i in range(len(target.total))])
     profile = BurleyProfile(target.total, shape)
     return BurleyFit(
@@ -173,8 +173,8 @@ def unreal_parameters(profile: BurleyProfile) -> UnrealParameters:
     """Return the subsurface profile settings of Unreal Engine that reproduce a fitted Burley profile.
 
     According to public copies of the engine's source code (SubsurfaceProfile.cpp, BurleyNormalizedSSS.cpp),
-    the engine multiplies the mean free path l (colour times distance) by `shape_factor_diffuse` / (0.6
-    `shape_factor`) to get the diffuse mean free path. The shape s is `shape_factor_diffuse` divided by the
+    the engine gets the diffuse mean free path from the mean free path l (colour times distance), multiplied
+    by `shape_factor_diffuse` / (0.6 `shape_factor`). The shape s is `shape_factor_diffuse` divided by the
     diffuse mean free path, so s = 0.6 `shape_factor` / l. The engine's kernel divides millimetres by ten to
     get scene units, so a scene in centimetres is life-size at scale 1.
     """

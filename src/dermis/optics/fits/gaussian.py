@@ -148,7 +148,7 @@ def _log_variance_bounds(target: FitTarget) -> tuple[float, float]:
 def _with_energy_equation(target: FitTarget) -> tuple[DesignFunction, Floats]:
     """Return a target's design and samples with one more equation: the weights must sum to the total.
 
-    The equation counts so much in the least squares that it is fulfilled almost exactly.
+    The equation has so large a weight that it is fulfilled almost exactly.
     """
     width = target.mean_radius_at([0.5]) ** 2 / 2.0
     stiffness = _ENERGY_EQUATION_WEIGHT * float(np.linalg.norm(target.design(width)[0]))

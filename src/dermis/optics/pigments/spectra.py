@@ -108,9 +108,9 @@ def pheomelanin(wavelength_nm: ArrayLike) -> Floats:
 
 
 def melanosome(wavelength_nm: ArrayLike, eumelanin_fraction: float) -> Floats:
-    """Return the absorption coefficient of a mixture of eumelanin and pheomelanin melanosomes [1/mm].
+    """Return the absorption coefficient of melanosomes with a mixture of eumelanin and pheomelanin [1/mm].
 
-    eumelanin_fraction : fraction of melanosomes with eumelanin, 0 to 1 [-]
+    eumelanin_fraction : fraction of the melanosomes that contain eumelanin, 0 to 1 [-]
 
     Source: [DonnerJensen2006].
     """
@@ -174,8 +174,8 @@ def donner_jensen_2006(wavelength_nm: ArrayLike) -> Floats:
 
     The unit could not be checked against the paper, and is taken to be 1/mm. Some implementations take it to
     be 1/cm. They then use another law, because the scattering would be a tenth of that of skin. In 1/mm, half
-    of this law, which applies to the dermis, equals the law of [Bashkatov2005] for skin, 73.7 lambda^-0.22 +
-    1.1e12 lambda^-4 [1/cm], which is 3 per mm at 550 nm.
+    of this law, which applies to the dermis, equals the law of [Bashkatov2005] for skin. This is
+    73.7 lambda^-0.22 + 1.1e12 lambda^-4 [1/cm], or 3 per mm at 550 nm.
 
     Source: [DonnerJensen2006], as quoted by public code.
     """

@@ -112,7 +112,7 @@ class InitialGuess:
         self._table = skin_colour_table(fixed["eumelanin"], fixed["oxygen"], fixed["epidermis_mm"])
 
     def best(self, sun_count: int, melanin_grid: Floats = _MELANIN_GRID) -> FitPoint:
-        """Return the pigments, specular strength and `sun_count` suns with the smallest residual.
+        """Return the point whose pigments, specular strength and `sun_count` suns have the smallest residual.
 
         melanin_grid : melanin fractions to try
         """
@@ -373,7 +373,7 @@ def _initial_points(problem: FitProblem, candidate: FitPoint, sun_count: int) ->
 def _checked_white(white_point: WhitePoint) -> Floats:
     """Return the light's colour (3,) as the user gives it, scaled to green 1; (1, 1, 1) for "specular".
 
-    Raises DermisError when it is neither "specular" nor a colour.
+    Raises DermisError for any other value.
     """
     if isinstance(white_point, str):
         if white_point != "specular":

@@ -1,4 +1,4 @@
-"""Frames of a face under each light alone, whose linear combination approximates a photograph."""
+"""Frames of a face under each light alone; linear combinations of these frames approximate a photograph."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class FaceRenderer:
         )
 
     def diffuse_and_specular(self, point: FitPoint) -> tuple[Floats, Floats]:
-        """Return the diffuse and the specular radiance under each light alone, (9 + k, p, 3) each."""
+        """Return the diffuse radiance (9 + k, p, 3) and the specular radiance under each light alone."""
         scenes = []
         for scene, view in self._single_light_scenes(point):
             rendered = self._draw(scene, view, ("diffuse", "specular"))

@@ -160,7 +160,7 @@ def _as_camera(camera_source: object, head: Head) -> Camera | Callable[[Head], C
 
 
 def _painted_person(head: Head) -> Human | None:
-    """Return the person that a head shows unchanged, in shape and in painted skin, or else None."""
+    """Return the person whose shape and painted skin a head has, or None if there is no such person."""
     maps = head.maps
     if not isinstance(maps, PaintedMaps) or maps.colour is not None or not is_person_name(head.name):
         return None
@@ -173,8 +173,8 @@ def _painted_person(head: Head) -> Human | None:
 def _without_light(scene: Scene) -> Scene:
     """Return the scene without light, with the pigments that a fit keeps fixed.
 
-    Each of these pigments has the value that the scene states, else that of the painted person, else a
-    default.
+    Each of these pigments has the value that the scene states. If the scene states none, it has the value of
+    the painted person, or else a default.
     """
     fixed_pigments = {name: getattr(DEFAULT_SKIN, name) for name in ("epidermis_mm", "eumelanin", "oxygen")}
     if isinstance(scene.head.maps, PaintedMaps):

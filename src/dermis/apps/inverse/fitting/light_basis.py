@@ -33,7 +33,7 @@ def lobe_radiance(lobe_axes: Floats, directions: Floats) -> Floats:
 
 @cache
 def lobe_directions() -> Floats:
-    """Return the axes (9, 3) of the nine ambient lobes, selected greedily to be linearly independent."""
+    """Return the axes (9, 3) of nine ambient lobes, selected one by one to be linearly independent."""
     candidates = fibonacci_sphere(_CANDIDATE_LOBE_COUNT)
     selected = [int(np.argmax(candidates[:, 2]))]
     for _ in range(AMBIENT_LOBE_COUNT - 1):  # add the candidate that the selected lobes approximate worst

@@ -87,7 +87,7 @@ class SkinModel:
 
 
 def _node_below(axis_fraction: Floats, node_count: int) -> tuple[NDArray[np.int64], Floats]:
-    """Return the table node below each position in [0, 1], and how far it is to the next node, in [0, 1]."""
+    """Return the node below each position in [0, 1], and the fraction of the way from it to the next node."""
     position = np.clip(axis_fraction, 0.0, 1.0) * (node_count - 1)
     node = np.clip(position.astype(np.int64), 0, max(node_count - 2, 0))
     return node, position - node

@@ -260,9 +260,10 @@ def _derivatives(
 
 
 def colour_metric(lab_colours: Floats) -> Floats:
-    """Return matrices (n, 3, 3) that map a small L*a*b* difference to a vector of length CIEDE2000.
+    """Return matrices (n, 3, 3) that convert small L*a*b* differences to a space with CIEDE2000 distances.
 
-    The rotation term of CIEDE2000, which only matters for blue colours, is left out.
+    The length of a converted difference is the CIEDE2000 difference, without the rotation term, which only
+    matters for blue colours.
 
     lab_colours : (n, 3) L*a*b* of the colours
 

@@ -235,9 +235,10 @@ def unmix(
         File (PNG, JPEG, HEIC, EXR and others), or (h, w, 3) diffuse reflectance in linear Rec. 709 [-].
     skin : SkinParameters
         Epidermal thickness, eumelanin and oxygen of the model's skins; melanin and blood are ignored.
-    third : {"none", "oxygen"} "oxygen" also estimates the oxygenated fraction of haemoglobin; the mean of its
-        prior is the fraction in `skin`, and its standard deviation is that among measured people. "none"
-        keeps the fraction in `skin`.
+    third : {"none", "oxygen"}
+        "oxygen" also estimates the oxygenated fraction of haemoglobin; the mean of its prior is the fraction
+        in `skin`, and the standard deviation is that among measured people. "none" keeps the fraction in
+        `skin`.
     noise : float
         Relative standard deviation of a channel [-].
     shading : bool

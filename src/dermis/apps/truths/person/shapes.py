@@ -327,8 +327,8 @@ def hair_shapes(mi: Mitsuba, hairs: HairFibres, shape_name: str = "hairs") -> Sc
 def absorption_groups(optical_depth: NDArray[np.floating]) -> list[NDArray[np.int64]]:
     """Return at most `MAX_HAIR_GROUPS` groups of fibres with similar absorption, each as fibre indices.
 
-    optical_depth : (n, 3) absorption coefficient of each fibre times its radius; fibres are sorted by its sum
-        over the channels [-]
+    optical_depth : (n, 3) absorption coefficient of each fibre times its radius; fibres are grouped by the
+        sum of the channels [-]
     """
     order = np.argsort(optical_depth.sum(axis=1), kind="stable")
     return [group for group in np.array_split(order, min(MAX_HAIR_GROUPS, len(order))) if len(group)]
@@ -350,7 +350,7 @@ def write_curves(path: Path, knots_mm: Doubles, radius_mm: NDArray[np.floating])
 
 
 def bspline_control_points(knots: Doubles) -> Doubles:
-    """Return the control points (n, k + 2, c) of uniform cubic B-splines through knots, straight at the ends.
+    """Return the control points (n, k + 2, c) of uniform cubic B-splines through knots, uncurved at the ends.
 
     knots : (n, k, c) points through which the curves pass
     """
