@@ -1,1 +1,1 @@
-"""Applications built on the renderer: data sets, exports, validation, galleries and viewers."""
+"""Applications built on the renderer: data sets, exports, validation, the gallery and viewers."""

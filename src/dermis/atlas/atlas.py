@@ -21,23 +21,23 @@ MAX_SHEAR = 0.9  # largest shear that the blur takes into account; larger values
 class Atlas:
     """Map from the texels of a uv layout to the surface; row 0 is the top of the map (v = 0).
 
-    triangle : (n, n) int32 index of the triangle at the texel's centre, -1 if there is none; in a gutter the
-        nearest triangle of the chart or, in a stitched layout, the triangle across the seam
+    triangle : (n, n) int32 index of the triangle at the texel's centre, -1 if there is none; a gutter texel
+        has the nearest triangle of its chart or, in a stitched layout, the triangle across the seam
     barycentric : (n, n, 2) uint16 weights of the triangle's second and third corner [1/65535]
-    stretch : (n, n, 2) float16 texels per mm along u and v; outside a chart, the stretch at the chart's
-        nearest edge [1/mm]
+    stretch : (n, n, 2) float16 texels per mm along u and v; a texel outside its chart has the stretch of the
+        chart's nearest edge [1/mm]
     shear : (n, n) float16 cosine of the angle between the directions of u and v on the surface
-    edge_distance : (n, n, 4) uint16 distance to the edge of the chart, or to the end of its gutter, to the
-        left, right, up and down [texel]
+    edge_distance : (n, n, 4) uint16 distances in the directions left, right, up and down at which the chart
+        or, if it has a gutter, its gutter ends [texel]
     corner_uv : (f, 3, 2) float32 uv of each triangle's corners in the atlas, v down
     gutter : (a, 2) uint16 gutter texels (x, y), into which the light of other texels is copied
     source : (a, 2) float32 position from which the light of each gutter texel is copied, integer at texel
         centres [texel]
-    outside : (r, 2) uint16 texels (x, y) outside their chart, whose stretch is that of the chart's nearest
+    outside : (r, 2) uint16 texels (x, y) outside their chart, which have the stretch of the chart's nearest
         edge
     border_triangle : (r,) int32 index of the triangle at the nearest edge of each texel in `outside`
-    border_weights : (r, 2) uint16 weights of that triangle's second and third corner at the nearest point
-        [1/65535]
+    border_weights : (r, 2) uint16 weights of that triangle's second and third corner at the point of the edge
+        nearest to the texel [1/65535]
     texels_per_uv : (f,) float32 texels per unit of the mesh's own uv in each triangle
     mapped : (f,) mask of triangles that own texels; light on the remaining triangles (opaque, collapsed,
         overlapped in uv) is not diffused
@@ -69,13 +69,13 @@ class Atlas:
 
     @property
     def lit(self) -> Mask:
-        """Return the (n, n) mask of texels whose light is computed instead of copied from other texels."""
+        """Return the (n, n) mask of texels whose light is computed, not copied from other texels."""
         lit = self.coverage
         lit[self.gutter[:, 1], self.gutter[:, 0]] = False
         return lit
 
     def unscattered_fraction(self, mesh: Mesh) -> float:
-        """Return the fraction of skin triangles without texels, whose light is not diffused [-]."""
+        """Return the fraction of skin triangles without texels; light on these is not diffused [-]."""
         skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
         return float(1.0 - self.mapped[skin].mean()) if skin.any() else 0.0
 

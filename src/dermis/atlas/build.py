@@ -24,12 +24,12 @@ def build_atlas(mesh: Mesh, atlas_side: int, layout: str = "mesh", gutter_mm: fl
     """Build the atlas of a mesh in one of three uv layouts.
 
     atlas_side : texels along each side of the map
-    layout : "mesh" is the mesh's own uv; "stitched" moves the mesh's charts apart and adds gutters that
-        continue the surface across the seams, unless there are too many charts for that; "unwrapped" replaces
-        the mesh's uv by new charts
+    layout : "mesh" keeps the mesh's own uv; "stitched" moves the mesh's charts apart and adds gutters that
+        continue the surface across the seams, unless the mesh has too many charts; "unwrapped" replaces the
+        mesh's uv by new charts
     gutter_mm : width of the gutters of a stitched layout [mm]
 
-    Raises DermisError for a size under 64 and for an unknown layout.
+    Raises DermisError if `atlas_side` is less than 64 or the layout is unknown.
     """
     if atlas_side < MIN_ATLAS_SIZE:
         expected = f"a size of {MIN_ATLAS_SIZE} texels or more"
@@ -48,7 +48,7 @@ def build_atlas(mesh: Mesh, atlas_side: int, layout: str = "mesh", gutter_mm: fl
 
 
 def cached_atlas(mesh: Mesh, atlas_side: int, layout: str = "mesh", gutter_mm: float = GUTTER_MM) -> Atlas:
-    """Return the atlas that `build_atlas` builds, cached on disk if a cache folder is writable."""
+    """Return the result of `build_atlas`, which is cached on disk if a cache folder is writable."""
     names = [field.name for field in fields(Atlas)]
 
     @logged_step("mapping the skin to the atlas")
@@ -60,7 +60,7 @@ def cached_atlas(mesh: Mesh, atlas_side: int, layout: str = "mesh", gutter_mm: f
 
 
 def cached_occlusion(mesh: Mesh, atlas: Atlas, inputs_key: str, bake_occlusion: Callable[[], Array]) -> Array:
-    """Return the occlusion that `bake_occlusion` computes for the texels of an atlas, cached on disk.
+    """Return the occlusion that `bake_occlusion` computes for the texels of an atlas, with a cache on disk.
 
     inputs_key : text that identifies all inputs of `bake_occlusion` except the mesh and the atlas
     """

@@ -40,17 +40,19 @@ _LINE_INDEX_STRIDE = 4096  # stride of line indices: more than the lines along a
 class FormFactors:
     """Form factors from the cells and patches of the uv square to the patches that they face.
 
-    A cell receives light; a patch of 2 x 2 cells emits it. The form factors of cells and of patches are two
-    sparse matrices by rows: the entries of row k start at `first[k]` and end at `first[k + 1]`.
+    A cell receives light; a patch of 2 x 2 cells emits it. The form factors of cells and those of patches are
+    two sparse matrices, stored row by row: the entries of row k start at index `..._first[k]` and end before
+    index `..._first[k + 1]`.
 
-    cell_first : (CELLS_PER_SIDE^2 + 1,) start of each cell's entries
-    cell_target, cell_factor : (k,) index of the patch that the cell faces, and (k,) float32 form factor, 0 to
-        1 [-]
+    cell_first : (CELLS_PER_SIDE^2 + 1,) index of the first entry of each cell
+    cell_target : (k,) index of the patch that the cell faces
+    cell_factor : (k,) float32 form factor from the cell to this patch, 0 to 1 [-]
     nearest_patch : (CELLS_PER_SIDE^2,) index of the patch that contains each cell, or of the nearest patch
-    confidence : (CELLS_PER_SIDE^2,) float32 ratio of the number of lines that leave each cell to the median
-        number, at most 1 [-]
-    patch_first, patch_target, patch_factor : sparse matrix of the form factors from patches to patches
-    sample_triangle : (p * SAMPLES_PER_PATCH,) uint32 triangle index of the sample points
+    confidence : (CELLS_PER_SIDE^2,) float32 number of traced lines that leave each cell, divided by the
+        median number, at most 1 [-]
+    patch_first, patch_target, patch_factor : the same three arrays for form factors from patches to patches
+    sample_triangle : (p * SAMPLES_PER_PATCH,) uint32 triangle that contains each sample point of the p
+        patches
     sample_weights : (p * SAMPLES_PER_PATCH,) uint32 packed weights of that triangle's second and third corner
     """
 
@@ -72,7 +74,7 @@ class FormFactors:
 
 
 def cached_form_factors(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> FormFactors:
-    """Return the form factors that `compute_form_factors` computes, cached on disk or from the package."""
+    """Return the result of `compute_form_factors`, from the package or the cache on disk if possible."""
     names = [field.name for field in fields(FormFactors)]
     if shipped := shipped_arrays(mesh, form_factor_table(mapped), names):
         return FormFactors(**shipped)
@@ -109,8 +111,8 @@ def compute_form_factors(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> FormFac
     surface.
 
     corner_uv : (f, 3, 2) uv of the triangles' corners in the atlas
-    mapped : (f,) mask of triangles that have texels; other triangles block light and emit none, but triangles
-        with an opacity map, such as hair cards, are ignored
+    mapped : (f,) mask of triangles that have texels; all other triangles only block light, except that
+        triangles with an opacity map, such as hair cards, are ignored
     """
     facing, line_counts = _trace_lines(mesh, corner_uv, mapped, _TRIAL_BUNDLE_COUNT, _TRIAL_LINES_PER_SIDE)
     if len(facing):
@@ -122,7 +124,9 @@ def compute_form_factors(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> FormFac
 def _trace_lines(
     mesh: Mesh, corner_uv: Floats, mapped: Mask, bundle_count: int, lines_per_side: int
 ) -> tuple[Index, Doubles]:
-    """Return pairs of cells (m, 2) that lines connect through the air, and how many lines left each cell.
+    """Return pairs of cells (m, 2) that lines connect through the air, and line counts for all cells.
+
+    The count of a cell is the number of lines that left it.
 
     bundle_count : number of bundles of parallel lines, one per direction
     lines_per_side : number of lines along each side of a bundle
@@ -171,8 +175,8 @@ def _trace_lines(
 def intersect_lines(points: Doubles) -> tuple[Index, Doubles, Mask, Index, Doubles]:
     """Intersect triangles with all lines parallel to z whose x and y are integers.
 
-    Returns, for each of n intersections, the line index, z, whether the surface faces +z, the triangle index,
-    and the barycentric weights (n, 3) of the triangle's corners.
+    Returns five arrays with one entry for each of n intersections: the line index, z, whether the surface
+    faces +z, the triangle index, and the barycentric weights (n, 3) of the triangle's corners.
 
     points : (f, 3, 3) corners of the triangles
     """
@@ -209,8 +213,8 @@ def _integer_range(corner_coordinates: Doubles) -> tuple[Doubles, Index]:
 def _facing_cells(line_index: Index, depth: Doubles, outward: Mask, cell_index: Index) -> Index:
     """Return pairs of cells (m, 2): the cell that a line leaves, and the cell that it meets next.
 
-    Each line is followed in both directions; a segment that leads to no other surface is omitted. The second
-    cell is -1 where the surface has no texels.
+    Each line is followed in both directions; if it meets no other surface, there is no pair. The second cell
+    is -1 where the surface that the line meets has no texels.
     """
     order = np.lexsort((depth, line_index))
     line_index, outward, cell_index = line_index[order], outward[order], cell_index[order]
@@ -249,9 +253,9 @@ def _line_axes(direction: Doubles, roll_angle: float) -> Doubles:
 def _form_factors(
     facing_cells: Index, line_counts: Doubles, mesh: Mesh, corner_uv: Floats, mapped: Mask
 ) -> FormFactors:
-    """Return the form factors that result from counts of lines between cells.
+    """Return the form factors that follow from the number of lines between cells.
 
-    facing_cells : (m, 2) pairs of cells that lines connect
+    facing_cells : (m, 2) pairs of cells that lines connect, from `_trace_lines`
     line_counts : (CELLS_PER_SIDE^2,) number of lines that left each cell
     """
     patch_of, triangle, weights = _divide_into_patches(mesh, corner_uv, mapped)
@@ -273,7 +277,7 @@ def _form_factors(
 
 
 def _nearest_patch(patch_of_cell: Index) -> Words:
-    """Return the patch that contains each cell (CELLS_PER_SIDE^2,), or the patch nearest to it in uv."""
+    """Return for each cell (CELLS_PER_SIDE^2,) the patch that contains it, or the nearest patch in uv."""
     from scipy.ndimage import distance_transform_edt
 
     known = patch_of_cell.reshape(CELLS_PER_SIDE, CELLS_PER_SIDE)
@@ -326,10 +330,10 @@ def _divide_into_patches(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> tuple[I
 
 
 def _sample_points(mesh: Mesh, mapped: Mask) -> tuple[Index, Doubles, Doubles]:
-    """Return random points on the triangles that have texels: triangle index, weights and rank.
+    """Return random points on the triangles that have texels: triangle indices, weights and random ranks.
 
-    Each triangle has at least one point. The points with the lowest ranks are uniformly distributed over the
-    surface.
+    Each triangle has at least one point. The points with the lowest ranks, whatever their number, are
+    uniformly distributed over the surface.
     """
     a, b, c = (mesh.positions[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
     area = np.where(mapped, 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1), 0.0)

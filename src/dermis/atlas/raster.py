@@ -45,9 +45,9 @@ def chart_uv_area(mesh: Mesh, chart: Ints) -> Doubles:
 
 
 def usable_triangles(mesh: Mesh, map_side: int, min_texels: float = _MIN_BLURRED_CHART_TEXELS) -> Mask:
-    """Return the mask (f,) of triangles in whose texels light can be diffused.
+    """Return the mask (f,) of triangles that have enough texels for light to be diffused in them.
 
-    The mask excludes triangles without uv area and all triangles of charts with less than `min_texels`
+    The mask excludes triangles without uv area, and all triangles of charts with fewer than `min_texels`
     texels.
 
     map_side : texels along each side of the map
@@ -59,7 +59,7 @@ def usable_triangles(mesh: Mesh, map_side: int, min_texels: float = _MIN_BLURRED
 
 
 def texel_corners(mesh: Mesh, map_side: int, triangle_index: NDArray[np.integer]) -> Doubles:
-    """Return the uv of the selected triangles' corners in texels (t, 3, 2), integers at texel centres.
+    """Return the uv of triangle corners in units of texels (t, 3, 2); texel centres are at integers.
 
     triangle_index : (t,) indices of the triangles
     """
@@ -79,12 +79,15 @@ def rasterise(mesh: Mesh, map_side: int, triangle_index: NDArray[np.integer]) ->
 def covered_texels(
     corners: Doubles, grid_shape: tuple[int, int], margin: float = -_EDGE_TOLERANCE_TEXELS
 ) -> tuple[Index, Index]:
-    """Return the flat index of each texel centre in a triangle, and the row of that triangle in `corners`.
+    """Find the texels whose centre is in a triangle; return their flat indices, and triangle indices.
 
-    corners : (t, 3, 2) corners of the triangles [texel], integers at texel centres
+    The result has one entry for each pair of a texel and a triangle that covers its centre. Triangle indices
+    refer to `corners`.
+
+    corners : (t, 3, 2) corners of the triangles [texel]; texel centres are at integers
     grid_shape : height and width of the grid of texels
-    margin : smallest distance of a covered centre from the edges, along rows and columns; if negative,
-        centres just outside count as covered [texel]
+    margin : smallest distance of a covered centre from the edges, measured along rows and columns; if
+        negative, centres just outside a triangle count as covered [texel]
     """
     height, width = grid_shape
     low, high = corners[..., 1].min(axis=1), corners[..., 1].max(axis=1)
@@ -96,7 +99,7 @@ def covered_texels(
 
 
 def _integers_between(low: Doubles, high: Doubles, grid_side: int, margin: float) -> tuple[Index, Index]:
-    """Return the first and last integer from low + margin to high - margin, limited to the grid."""
+    """Return the first and last integer between low + margin and high - margin, limited to the grid."""
     first = np.clip(np.ceil(low + margin), 0, grid_side).astype(np.int64)
     return first, np.clip(np.floor(high - margin), -1, grid_side - 1).astype(np.int64)
 
@@ -105,8 +108,8 @@ def _row_interval(corners: Doubles, triangle: Index, y: Index) -> tuple[Doubles,
     """Return the lowest and highest x at which each row y of texels intersects its triangle.
 
     corners : (t, 3, 2) corners of the triangles [texel]
-    triangle : (n,) triangle index of each row
-    y : (n,) row index
+    triangle : (n,) index of the triangle that each row intersects
+    y : (n,) index of the row of texels
     """
     lowest = np.full(len(y), -np.inf)
     highest = np.full(len(y), np.inf)
@@ -163,7 +166,7 @@ def build_mesh_layout(mesh: Mesh, atlas_side: int) -> Atlas:
 def _overlapped_charts(
     triangle_chart: NDArray[np.integer], texel: Index, triangle: Index, atlas_side: int
 ) -> Mask:
-    """Return the mask (f,) of triangles in charts whose texels are mostly covered by a larger chart.
+    """Return the mask (f,) of triangles in charts that a larger chart mostly covers in uv.
 
     texel, triangle : (k,) flat texel index and triangle index of each covered texel centre
     """
@@ -182,9 +185,9 @@ def _overlapped_charts(
 def _assign_texels(
     mesh: Mesh, mapped: Mask, texel: Index, triangle: Index, atlas_side: int
 ) -> tuple[Ints, Mask]:
-    """Return the triangle that owns each texel, and the mask (f,) of triangles that own few of their texels.
+    """Return the triangle that owns each texel, and the mask (f,) of triangles that own too few texels.
 
-    Where a chart is folded onto itself, the triangles that are not mirrored in uv own the texels.
+    Where a chart is folded onto itself in uv, its unmirrored triangles own the texels.
 
     texel, triangle : (k,) flat texel index and triangle index of each covered texel centre
     """
@@ -200,7 +203,7 @@ def _assign_texels(
 
 
 def _dilate_texel_triangles(texel_triangle: Ints) -> Ints:
-    """Assign to each empty texel the triangle of one of its eight neighbours, direct neighbours first."""
+    """Assign to each empty texel the triangle of one of its eight neighbours, diagonal neighbours last."""
     dilated = texel_triangle.copy()
     padded = np.pad(texel_triangle, 1, constant_values=-1)
     n = len(texel_triangle)
@@ -211,9 +214,10 @@ def _dilate_texel_triangles(texel_triangle: Ints) -> Ints:
 
 
 def _interpolable_triangles(mesh: Mesh, atlas_side: int, texel_triangle: Ints) -> Mask:
-    """Return the mask (f,) of triangles around whose corners all texels have an owner.
+    """Return the mask (f,) of triangles for which bilinear interpolation finds only texels with an owner.
 
-    Bilinear interpolation at a corner reads the four texels around it, some of which may be empty at slivers.
+    Bilinear interpolation at a corner reads the four texels around the corner. At thin triangles, some of
+    these texels may be empty.
     """
     low = np.floor(texel_corners(mesh, atlas_side, np.arange(len(mesh.triangles)))).astype(np.int64)
     found = np.ones(len(low), dtype=bool)
@@ -224,7 +228,7 @@ def _interpolable_triangles(mesh: Mesh, atlas_side: int, texel_triangle: Ints) -
 
 
 def _texel_weights(mesh: Mesh, atlas_side: int, texel_triangle: Ints) -> NDArray[np.uint16]:
-    """Return the barycentric weights at each texel centre, (n, n, 2) [1/65535].
+    """Return the barycentric weights of the second and third corner at each texel centre (n, n, 2) [1/65535].
 
     A gutter texel has the weights of the nearest point of its triangle.
     """
@@ -242,7 +246,7 @@ def barycentric_weights(corners: Doubles, points: NDArray[Any]) -> Doubles:
 
     Points outside their triangle are moved to its border.
 
-    corners : (n, 3, 2) corners of one triangle per point
+    corners : (n, 3, 2) corners of each point's triangle
     points : (n, 2) points
     """
     e1, e2, offset = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], points - corners[:, 0]

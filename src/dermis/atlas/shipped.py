@@ -1,4 +1,4 @@
-"""Tables of the package's own head that take seconds to compute; `tools/human_tables.py` writes them."""
+"""Precomputed tables for the package's own head, written by `tools/human_tables.py`."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ _POSITION_TOLERANCE_MM = 1e-4  # processors differ in the last bits of a positio
 
 
 def shipped_arrays(mesh: Mesh, table_name: str, array_names: Sequence[str]) -> dict[str, NDArray[Any]] | None:
-    """Return the arrays of a table that the package contains for a mesh; None if it contains none.
+    """Return the arrays of a table that the package contains for a mesh; None if there is no such table.
 
-    table_name : text with everything besides the mesh that the arrays depend on
+    table_name : name of the table, which contains all parameters that affect the arrays, except the mesh
     array_names : names of the arrays
     """
     file = resources.files(__package__).joinpath("data", table_file(mesh))
@@ -42,9 +42,9 @@ def table_file(mesh: Mesh) -> str:
 
 
 def file_arrays(mesh: Mesh, tables: dict[str, dict[str, NDArray[Any]]]) -> dict[str, NDArray[Any]]:
-    """Return the arrays of a file of tables, by their names in the file.
+    """Return the contents of a table file: a dictionary from the names of arrays in the file to the arrays.
 
-    tables : arrays of each table, as `shipped_arrays` returns them
+    tables : dictionary from table names to the arrays of each table, as `shipped_arrays` returns them
     """
     members = {f"{table} {name}": array for table, one in tables.items() for name, array in one.items()}
     return {_FINGERPRINT_ARRAY_NAME: position_fingerprint(mesh), **members}
@@ -53,7 +53,7 @@ def file_arrays(mesh: Mesh, tables: dict[str, dict[str, NDArray[Any]]]) -> dict[
 def position_fingerprint(mesh: Mesh) -> Doubles:
     """Return mean and root mean square of the vertices, followed by some vertices, as one array [mm].
 
-    Heads of one topology have different fingerprints as soon as a few vertices differ by a millimetre.
+    If some vertices of two heads with the same topology differ by a millimetre, their fingerprints differ.
     """
     positions = mesh.positions.astype(np.float64)
     sample = positions[:: max(len(positions) // _COMPARED_VERTEX_COUNT, 1)]

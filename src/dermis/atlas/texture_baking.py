@@ -33,10 +33,11 @@ _ROLE_DEFAULTS: Mapping[Role, tuple[float, ...]] = {
 class PackedTextures:
     """Uv layout and texture maps that several materials share.
 
-    vertices, uv : (n,) vertex indices in the mesh, and (n, 2) uv of these vertices in the shared maps
-    maps : shared map (side, side, k) of each role, such as colour or roughness, multiplied by the materials'
-        factors
-    notes : sentences for users about lost detail
+    vertices : (n,) vertex indices in the mesh
+    uv : (n, 2) uv of these vertices in the shared maps
+    maps : dictionary from each role, such as "colour", to the shared map (side, side, k), in which pictures
+        are multiplied by the factors of their materials
+    notes : sentences that tell users which detail was lost
     """
 
     vertices: Numbers
@@ -54,7 +55,8 @@ def pack_textures(
 ) -> PackedTextures:
     """Bake one uv layout and one set of texture maps for selected materials of a mesh.
 
-    surface, materials : surface data and materials of the mesh's file
+    surface : surface data of the mesh's file
+    materials : materials of the mesh's file
     material_mask : (m,) mask of the mesh's materials that share the maps
     required : roles for which a map is baked even if no material has a picture for the role
     """
@@ -71,7 +73,7 @@ def pack_textures(
 
 @dataclass(frozen=True, eq=False)
 class _Baker:
-    """Baker of texture maps for a layout of tiles."""
+    """Baker of the shared texture maps of several materials, with one tile of the maps per material."""
 
     mesh: Mesh
     surface: FileSurface
@@ -108,7 +110,7 @@ class _Baker:
         return self.materials[tile.material] if tile.material >= 0 else FileMaterial()
 
     def _tile_values(self, tile: Tile, role: Role) -> Floats:
-        """Return the values (h, w, k) of a role on a tile's texels, multiplied by the material's factors."""
+        """Return a tile's map (h, w, k) of a role: the picture multiplied by the material's factors."""
         material, (width, height) = self._tile_material(tile), tile.size
         texture = material.textures.get(role)
         factor = _material_factor(material, role, self.surface.colours is not None)
@@ -123,7 +125,7 @@ class _Baker:
         return values
 
     def _finish_colours(self, tile: Tile, values: Floats) -> None:
-        """Multiply colours and opacity (h, w, 4) by vertex colours and the opacity picture, in place."""
+        """Multiply a tile's colours and opacity (h, w, 4) in place by vertex colours and opacity picture."""
         material = self._tile_material(tile)
         if "opacity" in material.textures:
             values[..., 3:] *= self._sample_picture(tile, material.textures["opacity"], "opacity")
@@ -146,9 +148,9 @@ class _Baker:
         return sample_points(picture, position, texture.wrap)
 
     def _interpolate_to_texels(self, tile: Tile, values: Numbers) -> Floats:
-        """Interpolate values (n, k) of a tile's vertices to its texels (h, w, k).
+        """Interpolate values (n, k) at a tile's vertices to its texels (h, w, k).
 
-        Texels outside all triangles have the value of the nearest texel inside one.
+        Texels outside all triangles get the value of the nearest texel inside a triangle.
         """
         from scipy.ndimage import distance_transform_edt
 
@@ -181,7 +183,7 @@ def _barycentric_coordinates(corners: Doubles, points: Doubles) -> Doubles:
 
 
 def _material_factor(material: FileMaterial, role: Role, has_vertex_colours: bool) -> Floats:
-    """Return the factor (k,) by which a material multiplies its values of a role."""
+    """Return the factor (k,) by which a material multiplies its picture of a role, such as its colour."""
     has_colour = has_vertex_colours or "colour" in material.textures
     colour = material.colour or ((1.0, 1.0, 1.0) if has_colour else DEFAULT_COLOUR)
     factors: dict[Role, Sequence[float]] = {
@@ -262,7 +264,7 @@ def _matching_mip(picture: Floats, texels_per_sample: float) -> Floats:
 
 
 def _neighbour_texels(position: Doubles, texel_count: int, wrap: Wrap) -> tuple[Numbers, Numbers, Doubles]:
-    """Return the two texels around each position in [0, 1] along one axis, and the weight of the second."""
+    """Return the two texels around each position in [0, 1] on an axis, and the second texel's weight."""
     texel = position * texel_count - 0.5
     texel = np.where(np.abs(texel - np.rint(texel)) < 1e-6 * texel_count, np.rint(texel), texel)
     first = np.floor(texel)

@@ -30,11 +30,12 @@ class Tile:
     """Rectangle of the shared map that shows one material of the mesh.
 
     material : index of the file's material, -1 if there is none
-    vertices, triangles : indices of vertices and triangles in the mesh
+    vertices : (n,) indices of the tile's vertices in the mesh
+    triangles : indices of the tile's triangles in the mesh
     uv : (n, 2) positions of the vertices in the material's pictures, v down
-    low, high : (2,) lowest and highest position in the pictures that the tile shows
+    low, high : (2,) upper left and lower right corner of the part of the pictures that the tile shows
     size : width and height [texel]
-    corner : left and top texel in the map, without the padding
+    corner : column and row of the tile's upper left texel in the map, excluding the padding around the tile
     """
 
     material: int
@@ -56,7 +57,7 @@ class Tile:
 
 
 def base_texture(material: FileMaterial) -> Texture | None:
-    """Return the texture whose mapping determines a material's layout: colour, or else the first texture."""
+    """Return the texture whose mapping determines a material's uv layout: colour, or else the first one."""
     return material.textures.get("colour") or next(iter(material.textures.values()), None)
 
 
@@ -69,10 +70,9 @@ def file_uv(mesh: Mesh, surface: FileSurface, uv_set: int, vertices: NDArray[np.
 def lay_out_tiles(
     mesh: Mesh, surface: FileSurface, materials: Sequence[FileMaterial], material_mask: Mask
 ) -> tuple[list[Tile], int, float]:
-    """Return the tiles of selected materials, and the side of the map that they share [texel].
+    """Return tiles for selected materials, the side of the shared map [texel], and a scale factor.
 
-    The third result is the factor, at most 1, by which the materials' pictures are reduced to fit into the
-    map.
+    The factor is at most 1; all pictures are scaled by it to fit into the map.
 
     surface : surface data of the file that the mesh comes from
     material_mask : (m,) mask of the mesh's materials that share the map
@@ -135,7 +135,7 @@ def _move_charts(
 
 
 def _set_plain_sizes(mesh: Mesh, tiles: list[Tile], materials: Sequence[FileMaterial]) -> list[Tile]:
-    """Set the sizes of tiles without pictures; skin gets the median texel density of the other tiles."""
+    """Set the sizes of tiles without pictures; skin gets the median texel density of tiles with pictures."""
     areas = [float(triangle_areas(mesh.positions[mesh.triangles[tile.triangles]]).sum()) for tile in tiles]
     density = [tile.size[0] * tile.size[1] / max(mm2, 1e-9) for tile, mm2 in zip(tiles, areas, strict=True)]
     median_density = float(np.median([value for value in density if value > 0] or [0.0]))
@@ -156,7 +156,7 @@ def _set_plain_sizes(mesh: Mesh, tiles: list[Tile], materials: Sequence[FileMate
 
 
 def _pack_tiles(tiles: list[Tile]) -> tuple[list[Tile], int, float]:
-    """Pack tiles; return the tiles with positions, the side of the map, and the scale at which they fit."""
+    """Pack tiles; return the tiles with positions, the side of the map, and the scale at which tiles fit."""
     scale = 1.0
     while True:
         sizes = [tuple(max(1, round(scale * length)) for length in tile.size) for tile in tiles]
@@ -172,7 +172,7 @@ def _pack_tiles(tiles: list[Tile]) -> tuple[list[Tile], int, float]:
 
 
 def _pack_in_rows(tile_sizes: Sequence[tuple[int, ...]]) -> tuple[int, list[tuple[int, int]]]:
-    """Pack rectangles in rows; return the side of the smallest square that holds them, and their corners."""
+    """Pack rectangles in rows; return the side of a square that holds them, and their upper left corners."""
     padded = np.array(tile_sizes) + 2 * TILE_PADDING_TEXELS
     order = np.argsort(-padded[:, 1], kind="stable")
     side = float(max(padded.max(), np.sqrt(padded.prod(axis=1).sum())))

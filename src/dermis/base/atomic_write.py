@@ -17,7 +17,7 @@ def check_output(path: str | Path, suffixes: Sequence[str], advice: str = "Choos
     """Check before a long computation that a file can be written to a path, and return the path.
 
     suffixes : allowed suffixes of the name, such as ".png"
-    advice : what to do about a suffix that is not allowed; last sentence of the error
+    advice : what to do about a suffix that is not allowed; the last sentence of the error
 
     Raises DermisError for a suffix that is not allowed, and when the folder is missing or not writable.
     """
@@ -44,7 +44,7 @@ def check_output(path: str | Path, suffixes: Sequence[str], advice: str = "Choos
 
 @contextmanager
 def atomic_file(path: str | Path) -> Iterator[Path]:
-    """Yield a temporary path; the file written there replaces `path` on success, or is deleted on error."""
+    """Yield a temporary path; a file written there replaces `path` on success and is deleted after errors."""
     try:
         target = Path(os.path.realpath(path))
     except ValueError as fault:  # a NUL in the name
@@ -63,7 +63,7 @@ def atomic_file(path: str | Path) -> Iterator[Path]:
 
 @contextmanager
 def atomic_folder(path: str | Path, marker: str) -> Iterator[Path]:
-    """Yield a new empty folder that replaces `path` on success and is deleted after an error.
+    """Yield a new empty folder, which replaces `path` on success and is deleted after an error.
 
     marker : name of a file by which an existing folder is recognised as output of this package; only a folder
         with this file, or an empty folder, is replaced

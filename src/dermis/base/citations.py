@@ -1,6 +1,6 @@
-"""Bibliography of the package: BibTeX entries by author-year key.
+"""Bibliography of the package: BibTeX entries with keys of author and year.
 
-Entries keep their original text; libraries that parse BibTeX would reformat it.
+The original text of entries is kept; libraries that parse BibTeX would reformat the text.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def bibtex(keys: Iterable[str]) -> str:
 
 
 def parse_bibtex(bibtex_text: str, source_name: str = "base/references.bib") -> dict[str, str]:
-    """Return the unchanged text of each entry of a BibTeX file, by the key of the entry.
+    """Return a dictionary from the key of each entry in a BibTeX file to the unchanged text of the entry.
 
     source_name : name of the file, for error messages
 

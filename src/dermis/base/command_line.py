@@ -1,4 +1,4 @@
-"""Framework of command-line programs: commands are functions; errors are one line, with exit status 2."""
+"""Framework of command-line programs: commands are functions; errors are one line and exit status 2."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _OUT_OF_MEMORY_TEXTS = (
 
 
 def make_app(program_name: str, help_text: str | None) -> App:
-    """Return a cyclopts app without commands, with plain text help and exit statuses as return values."""
+    """Return a cyclopts app without commands; its help is plain text, and calls return commands' results."""
     return App(
         name=program_name,
         help=help_text,
@@ -69,8 +69,8 @@ def run_script(
 ) -> NoReturn:
     """Run a script as a command-line program, with its docstring as help, and exit.
 
-    function_or_commands : function of the program; or, for a program with several commands, the summary
-        of each command by "module:function"
+    function_or_commands : function of the program; for a program with several commands, a mapping from the
+        function of each command, as "module:function", to the summary of the command
     program_name : name of the program; by default the name of the script's file
     """
     program_name, help_text = program_name or Path(sys.argv[0]).name, reflow(sys.modules["__main__"].__doc__)
@@ -111,7 +111,7 @@ def print_failure(program_name: str, message: str) -> int:
 
 
 def _show_warnings_as_notes() -> None:
-    """Show each `DermisWarning` once, as a note on stderr, in a with block; show other warnings as usual."""
+    """In a with block, show each `DermisWarning` once, as a note on stderr, and other warnings as usual."""
     default, shown = warnings.showwarning, set[str]()
 
     def show_once(message: Warning | str, category: type[Warning], *args: Any, **kwargs: Any) -> None:
@@ -126,7 +126,7 @@ def _show_warnings_as_notes() -> None:
 
 
 def usage_message(error: CycloptsError, program_name: str) -> str:
-    """Return the error message for an invalid command line: what was expected and given, and where help is.
+    """Return the error message for an invalid command line: what was expected and given, and how to get help.
 
     program_name : name of the program
     """
@@ -163,7 +163,7 @@ def _describe_error(error: CycloptsError, command: str) -> tuple[str, str, str]:
 
 
 def _option_name(error: Any) -> str:
-    """Return the option at fault as the user wrote it, or the name of the positional argument at fault."""
+    """Return the invalid option as the user wrote it, or the name of the invalid positional argument."""
     token = getattr(error, "token", None)
     return str((token and token.keyword) or (error.argument and error.argument.name) or "an option")
 

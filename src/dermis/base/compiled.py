@@ -40,7 +40,7 @@ _embeds_addresses = attrgetter("library.has_dynamic_globals")  # memory addresse
 
 
 class _CodeCache(caching.NullCache):  # type: ignore[misc, name-defined]
-    """Disk cache of compiled functions, in place of numba's cache, which unpickles any file in its folder.
+    """Disk cache of compiled functions; replaces numba's cache, which unpickles any file in its folder.
 
     Cached files are read only from private folders, and the hash of a file is checked before unpickling.
     """
@@ -75,7 +75,7 @@ class _CodeCache(caching.NullCache):  # type: ignore[misc, name-defined]
 
 @cache
 def _source_hash(source_folder: Path) -> str:
-    """Return a hash of all Python files in a folder, as part of the cache key.
+    """Return a hash of all Python files in a folder; the hash is part of the cache key.
 
     Compiled loops contain the constants and functions that they import from these files.
     """

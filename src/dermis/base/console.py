@@ -39,7 +39,7 @@ def print_report(as_json: bool, report: object, lines: Callable[[], Iterable[str
     """Print the result of a command as JSON or as text.
 
     as_json : whether to print `report` as JSON
-    lines : function that returns the lines of the text
+    lines : function that returns the lines of the text; called only if the text is printed
     """
     if as_json:
         print_json(report)
@@ -56,7 +56,7 @@ def note(note_text: str) -> None:
 def progress_bar(task: str) -> Iterator[Callable[[int, int], None]]:
     """Show a progress bar on stderr if stderr is a terminal, and yield a function that updates the bar.
 
-    The function takes the number of finished steps and the number of all steps.
+    The function takes the number of finished steps and the total number of steps.
     """
     if not sys.stderr.isatty():
         yield lambda done, total: None
@@ -89,9 +89,9 @@ def spinner(task: str) -> Iterator[None]:
 
 
 class _SpinnerText(logging.Handler):
-    """Log handler that provides the text of a spinner: the task, and its current step.
+    """Log handler that provides the text of a spinner: the task, and the current step of the task.
 
-    A step is shown once the step has taken two seconds.
+    A step is shown after it has been running for two seconds.
     """
 
     def __init__(self, task: str) -> None:

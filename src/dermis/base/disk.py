@@ -1,4 +1,4 @@
-"""Disk cache of arrays; the key of an entry is a hash of the inputs from which the arrays are computed.
+"""Disk cache of computed arrays; the key of an entry is a hash of the inputs of the computation.
 
 The first line of a file is the SHA-256 of the second line. The second line is JSON with the key of the entry,
 the types and shapes of the arrays, and the SHA-256 of each block of the bytes that follow. Files that do not
@@ -41,7 +41,7 @@ _MAX_THREADS = 4
 
 
 def cached_array(sources: Array | Sequence[Array], parameters: str, compute: Callable[[], Array]) -> Array:
-    """Return the array that `compute` computes from `sources`, from the disk cache if it is cached.
+    """Return the array that `compute` computes from `sources`; use the disk cache if it has the array.
 
     parameters : text with everything besides `sources` on which the result depends; part of the cache key
     """
@@ -51,7 +51,7 @@ def cached_array(sources: Array | Sequence[Array], parameters: str, compute: Cal
 def cached_arrays(
     sources: Array | Sequence[Array], parameters: str, names: list[str], compute: Callable[[], Arrays]
 ) -> Arrays:
-    """Return the arrays that `compute` computes from `sources`, from the disk cache if they are cached.
+    """Return the arrays that `compute` computes from `sources`; use the disk cache if it has the arrays.
 
     parameters : text with everything besides `sources` on which the result depends; part of the cache key
     names : names of the arrays in the result
@@ -64,7 +64,7 @@ def array_key(sources: Sequence[Array], parameters: str) -> str:
     """Return the cache key of a result that is computed from arrays.
 
     sources : arrays from which the result is computed
-    parameters : text with all parameters, besides the arrays, on which the result depends
+    parameters : text with all other inputs on which the result depends
     """
     digest = hashlib.sha256(parameters.encode())
     for source in sources:
@@ -76,7 +76,7 @@ def array_key(sources: Sequence[Array], parameters: str) -> str:
 def load_or_make(folder: str, cache_key: str, names: list[str], compute: Callable[[], Arrays]) -> Arrays:
     """Return arrays from the disk cache; if there is no valid entry, compute the arrays and cache them.
 
-    folder : name of a folder of the cache
+    folder : name of a folder inside the cache folder
     names : names of the arrays in the result
     """
     arrays = load_arrays(folder, cache_key, names)
@@ -134,7 +134,7 @@ def save_arrays(folder: str, cache_key: str, arrays: Arrays) -> None:
 
 
 def _is_trusted(folder: Path) -> bool:
-    """Return whether no other user can write to a folder; if another user can, print a note once."""
+    """Return whether no other user can write to a folder; if others can, warn once."""
     if reason := other_writers(folder):
         advice = "make it private, or name another in DERMIS_CACHE"
         _notify_once(f"{cache_folder()} is not used, because {reason}: {advice}")
@@ -202,7 +202,7 @@ def _digest_line(header_line: bytes) -> bytes:
 
 
 def _byte_count(dtype: np.dtype[Any], array_shape: Sequence[int]) -> int:
-    """Return the size of an array in bytes, after a check of type and shape, before memory is allocated."""
+    """Return the size of an array in bytes; raise ValueError if the type or the shape is invalid."""
     if (
         dtype.kind not in _PLAIN_DTYPE_KINDS
         or not dtype.itemsize
@@ -226,7 +226,7 @@ def _read_block(path: Path, block: memoryview, offset: int) -> str:
 
 
 def _byte_blocks(arrays: Iterable[Array]) -> list[memoryview]:
-    """Return views of at most 2 MiB that together cover the bytes of all arrays, in the same order."""
+    """Return views of at most 2 MiB each, which together cover the bytes of all arrays in order."""
     buffers = [array.reshape(-1, order="A").view(np.uint8).data for array in arrays]
     return [
         data[start : start + _BYTES_PER_BLOCK]
@@ -238,7 +238,7 @@ def _byte_blocks(arrays: Iterable[Array]) -> list[memoryview]:
 def _map_threaded(
     function: Callable[..., str], blocks: list[memoryview], *further_arguments: Sequence[int]
 ) -> list[str]:
-    """Apply a function to each block, and return the results; large data are divided among threads.
+    """Apply a function to each block, and return the results; several threads are used for large data.
 
     further_arguments : sequences of further arguments, one value for each block
     """
@@ -263,7 +263,7 @@ def _temporary_file(path: Path) -> Iterator[BinaryIO]:
 
 
 def _prune_folder(cache_path: Path) -> None:
-    """Delete the least recently used files beyond the size limit of the folder, and old unfinished files."""
+    """Delete the least recently used files until the size limit is met, and delete old unfinished files."""
     newest_first = sorted(
         _folder_files(cache_path, _CACHE_FILE_SUFFIX), key=lambda entry: entry[1].st_mtime, reverse=True
     )

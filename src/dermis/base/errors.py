@@ -65,7 +65,7 @@ def refuse(culprit: object, expected: str, actual: str, advice: str) -> NoReturn
 
 
 def format_value(value: object, max_length: int = 60) -> str:
-    """Return the repr of a value for an error message, shortened or replaced by the type if it is too long.
+    """Return the repr of a value for an error message; a long repr is shortened, or replaced by the type.
 
     max_length : longest repr [characters]
     """
@@ -82,12 +82,12 @@ def format_value(value: object, max_length: int = 60) -> str:
 
 
 def error_text(error: Exception) -> str:
-    """Return the first line of an error's message; for an OSError, without the path, which callers add."""
+    """Return the first line of an error's message; the path in an OSError is left out, as callers add it."""
     text = getattr(error, "strerror", None) or str(error) or type(error).__name__
     return text.splitlines()[0].rstrip(".")
 
 
 def shorten(text: str, max_length: int) -> str:
-    """Return a text for a message; the middle of a text longer than `max_length` is left out."""
+    """Return a text for a message; if the text is longer than `max_length`, its middle is left out."""
     half = (max_length - 5) // 2
     return text if len(text) <= max_length else f"{text[:half]} ... {text[-half:]}"

@@ -27,9 +27,9 @@ _DISTRIBUTION_OF_MODULE = {"pxr": "usd-core"}  # distributions with other names 
 
 
 def import_extra(module_name: str, task_noun: str) -> Any:
-    """Import a module of an optional dependency listed in `EXTRAS` and return it.
+    """Import and return a module of an optional dependency that is listed in `EXTRAS`.
 
-    task_noun : noun phrase for the purpose that needs the module, for the error
+    task_noun : task that needs the module, as a noun phrase for the error, such as "writing MaterialX"
 
     Raises DermisError when the dependency is not installed.
     """

@@ -1,4 +1,4 @@
-"""Declarations of how readers treat the properties of files; docs/formats.md is built from them."""
+"""Declarations of how readers treat the properties of files, from which docs/formats.md is built."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class FileProperty:
     name : property as the documentation shows it, in Markdown
     detail : how the property is drawn, or why it is not drawn, in Markdown
     keys : words by which the reader recognises the property, such as statements or extensions
-    other_parts : treatment in materials of parts that are not skin; None for the treatment in skin
+    other_parts : treatment in materials of parts that are not skin; None if it is the same as in skin
     """
 
     treatment: Treatment
@@ -44,7 +44,7 @@ def _file_property(
     *keys: str,
     other_parts: Treatment | None = None,
 ) -> FileProperty:
-    """Return a file property; `drawn`, `noted` and so on are this function with a fixed treatment."""
+    """Return a file property; the functions `drawn`, `noted` and so on fix the treatment."""
     return FileProperty(treatment, property_name, detail_text, keys, other_parts)
 
 
@@ -62,5 +62,5 @@ def keys_of(properties: Iterable[FileProperty], *treatments: Treatment) -> tuple
 
 
 def in_code(keys: Iterable[str]) -> str:
-    """Return words as code in Markdown, separated by commas."""
+    """Return words formatted as code in Markdown, separated by commas."""
     return ", ".join(f"`{key}`" for key in keys)

@@ -1,8 +1,9 @@
 """Decoding of untrusted data by native libraries, in a separate process with limits.
 
 A decoder is a module of this package that calls `answer_request` when it is run as a program. Request and
-answer are arrays by name: a line of JSON with the types and shapes of the arrays, followed by the bytes of
-the arrays. A crash, a hang, or the use of too much memory ends the process and becomes a `DermisError`.
+answer consist of named arrays: a line of JSON with the names, types and shapes of the arrays, followed by the
+bytes of the arrays. A crash, a hang, or the use of too much memory ends the process and becomes a
+`DermisError`.
 """
 
 from __future__ import annotations
@@ -40,8 +41,8 @@ def run_decoder(
     """Run a decoder in a separate process and return its answer.
 
     decoder_module : module of the decoder, which runs in an empty temporary folder
-    request_arrays : numeric arrays by name
-    data_bytes : size of the data to decode, which determines the time limit [bytes]
+    request_arrays : dictionary from name to numeric array
+    data_bytes : size of the data to decode [bytes]; determines the time limit
     culprit : name of the file, for errors
     expected : what the file should be, for errors
 
@@ -79,8 +80,8 @@ def run_decoder(
 def answer_request(decode: Callable[[Arrays], Arrays]) -> None:
     """Read a request from stdin, and write the answer to stdout; called by decoders run as programs.
 
-    decode : function that returns the answer; it raises DermisError to refuse the data, and any other
-        exception if the data are damaged
+    decode : function that takes the request and returns the answer; raises DermisError to refuse the data,
+        and any other exception if the data are damaged
     """
     output = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # libraries print messages
@@ -121,7 +122,7 @@ def _unpack_arrays(packed_arrays: bytes) -> Arrays:
 
 
 def _limit_process(cpu_s: int) -> None:
-    """Limit memory, CPU time and files of this process, where the operating system supports it.
+    """Limit memory, CPU time and files of this process, where the operating system supports such limits.
 
     cpu_s : largest CPU time [s]
     """

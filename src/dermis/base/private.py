@@ -1,4 +1,4 @@
-"""Private folders and files: only this user and root can have written to them."""
+"""Private folders and files, to which only this user and root can have written."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _WRITABLE_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 def cache_folder() -> Path:
     """Return the folder of the disk cache: DERMIS_CACHE, or the user's cache folder.
 
-    For a user without a home folder, this is a path at which nothing can be stored.
+    For a user without a home folder, a path is returned at which nothing can be stored.
     """
     import platformdirs
 
@@ -69,9 +69,10 @@ def other_writers(folder: Path) -> str:
 
 
 def open_private_file(path: Path) -> io.FileIO:
-    """Open a regular file, and no link, pipe or device, for unbuffered reading.
+    """Open a regular file for unbuffered reading; links, pipes and devices are refused.
 
-    Raises OSError when the file cannot be read, and ValueError when other users may have written the file.
+    Raises OSError when the file cannot be opened, and ValueError when the file is not regular or other users
+    may have written to it.
     """
     descriptor = os.open(path, _OPEN_FOR_READING_FLAGS)
     status = os.fstat(descriptor)
@@ -106,7 +107,7 @@ def _path_components(path: Path) -> Iterator[Path]:
 def _is_shared(file_status: os.stat_result) -> bool:
     """Return whether users other than this one have write access to a file or folder.
 
-    Access of a group whose only member is this user does not count.
+    Access for a group does not count if this user is the only member of the group.
     """
     import grp
     import pwd

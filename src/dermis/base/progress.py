@@ -14,7 +14,7 @@ LOGGER = logging.getLogger("dermis")
 def logged_step(step_text: str) -> Iterator[None]:
     """Log the start of a slow preparation step with level INFO, and its duration with level DEBUG.
 
-    step_text : description, such as "fitting the eyes"
+    step_text : description of the step, such as "fitting the eyes"
     """
     start = time.perf_counter()
     LOGGER.info(step_text)

@@ -17,7 +17,7 @@ def checked_number(culprit: object, value: object, low: float, high: float, reas
 
     culprit : option or field with the value, for errors
     low, high : limits of the range, both included
-    reason : reason for the limits, or the unit, for errors
+    reason : reason for the limits, or unit of the value, to be added to errors
 
     Raises DermisError for text, booleans, arrays, NaN, infinity and numbers outside the range.
     """
@@ -46,7 +46,7 @@ def checked_array(
     culprit : option or field with the values, for errors
     shape : expected shape, with 0 for an axis of any length
     low, high : limits of the range, both included
-    reason : reason for the limits, or the unit, for errors
+    reason : reason for the limits, or unit of the value, to be added to errors
 
     Raises DermisError for another shape, and when an element is not a number in the range.
     """
@@ -72,9 +72,9 @@ def check_fields(
 ) -> None:
     """Check that the values of an object's attributes lie in given ranges.
 
-    range_of_field : lowest and highest value by name of the attribute; if both are ints, the value must be a
-        whole number
-    prefix : text before the name of the attribute in errors
+    range_of_field : dictionary from the name of an attribute to its lowest and highest value; if both are
+        ints, the attribute must be a whole number
+    prefix : text that is put before the names of attributes in errors
 
     Raises DermisError as `checked_number` does.
     """
@@ -97,7 +97,7 @@ def _number_in_range(value: object, low: float, high: float) -> int | float | No
 def _has_text(values: Any, dimension_count: int) -> bool:
     """Return whether nested lists or arrays contain text or booleans, which NumPy would convert to numbers.
 
-    dimension_count : number of dimensions of the expected array; lists nested more deeply count as text
+    dimension_count : number of dimensions of the expected array; more deeply nested lists are treated as text
     """
     import numpy as np
 

@@ -1,7 +1,7 @@
 """Safe reading of files that users name, and of further files to which these files refer.
 
-Only regular files are opened, their size is limited, and errors of parsers become messages with the name of
-the file.
+Only regular files are read, with a limit on their size, and errors of parsers become messages that name the
+file.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ def is_file(path: str | Path) -> bool:
 
 
 def read_text(path: str | Path, expected: str, max_bytes: int = MAX_TEXT_BYTES) -> str:
-    """Return the text of a file in UTF-8, or in UTF-16 with a byte order mark; UTF-8 may also have the mark.
+    """Return the text of a file in UTF-8, with or without a byte order mark, or in UTF-16 with the mark.
 
     expected : what the file should be, for error messages
 
@@ -120,7 +120,7 @@ def read_toml(path: str | Path, expected: str = "a TOML file") -> dict[str, Any]
 
 
 def parse_json(json_text: str | bytes, culprit: object, expected: str) -> Any:
-    """Return the value of a JSON text in which all numbers are finite.
+    """Return the value of a JSON text; all numbers in the text must be finite.
 
     Raises DermisError for invalid JSON, deep nesting, and numbers that are too large.
     """
@@ -147,7 +147,7 @@ def checked_path(file_name: object, expected: str) -> Path:
 
 @contextmanager
 def parsing(culprit: object, expected: str, *errors: type[Exception]) -> Iterator[None]:
-    """Convert the exceptions of a parser in the block into a DermisError that names the file.
+    """Convert exceptions that a parser raises in a with block into a DermisError that names the file.
 
     culprit : name of the file
     expected : what the file should be

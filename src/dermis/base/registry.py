@@ -22,7 +22,7 @@ class Registry(Mapping[str, T], Generic[T]):
     kind : str
         What an entry is, for error messages, such as "technique".
     entries : Mapping of str to object or str, optional
-        Initial entries by name.
+        Initial entries: a mapping from name to entry.
     advice : str, optional
         What to do about a name that is not registered, for error messages.
 
@@ -96,7 +96,7 @@ class Registry(Mapping[str, T], Generic[T]):
         return [f"{name}: {summary}" for name, summary in self._summaries.items()]
 
     def __getitem__(self, name: str) -> T:
-        """Return the object of an entry; an object named by text is imported on first use.
+        """Return the object of an entry, importing the object on first use if the entry is text.
 
         Raises DermisError for a name that is not registered.
         """
@@ -147,7 +147,7 @@ class RegisteredName:
         return name
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
-        """Return the schema of the annotated type, followed by `check`."""
+        """Return the schema of the annotated type, extended by a call of `check`."""
         from pydantic_core.core_schema import no_info_after_validator_function
 
         return no_info_after_validator_function(self.check, handler(source))

@@ -63,7 +63,7 @@ def successor(module_name: str, old_name: str) -> str | None:
 def renamed_keywords(**new_names: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """Return a decorator that lets a function accept the old names of keyword arguments, with a warning.
 
-    new_names : new names by old names
+    new_names : new name of each argument, passed as old_name="new_name"
     """
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
@@ -98,7 +98,7 @@ def find_renamed_modules() -> None:
 
 
 class _RenamedModuleFinder:
-    """Import hook for the old path of a renamed module; it imports the module from the new path."""
+    """Import hook that finds a renamed module by its old path and imports the module from the new path."""
 
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
@@ -106,7 +106,7 @@ class _RenamedModuleFinder:
         return ModuleSpec(fullname, cast(Any, self)) if _new_module_path(fullname) else None
 
     def create_module(self, spec: ModuleSpec) -> None:
-        """Let the import system create the module; `exec_module` then replaces it by the renamed module."""
+        """Let the import system create a module, which `exec_module` then replaces by the renamed module."""
 
     def exec_module(self, module: ModuleType) -> None:
         old = module.__name__
@@ -119,7 +119,7 @@ class _RenamedModuleFinder:
 def _new_module_path(fullname: str) -> str | None:
     """Return the new path of a renamed module, without the package's name; None for other modules.
 
-    fullname : old path with the package's name
+    fullname : old path of the module, with the package's name
     """
     package, _, path = fullname.partition(".")
     if package != _PACKAGE_NAME:

@@ -23,7 +23,7 @@ class ShortRepr:
 
 
 def short_repr(value: object) -> str:
-    """Return the repr of a value, or for arrays and long collections the type with the shape or length."""
+    """Return the repr of a value; for arrays and long collections, the type with the shape or length."""
     if isinstance(value, np.ndarray):
         return f"{value.dtype}{list(value.shape)}"
     if isinstance(value, Collection) and (len(value) > _MAX_SHOWN_ITEMS or not _is_short(value)):

@@ -18,7 +18,7 @@ Rows = list[dict[str, str]]
 
 
 def read_rows(package: str, table_name: str) -> Rows:
-    """Return the rows of a CSV table in a package, as dictionaries by column name.
+    """Return the rows of a CSV table in a package, each as a dictionary from column name to text.
 
     package : name of the package, such as "dermis.environment"
     table_name : path of the table in the package, without .csv
@@ -27,7 +27,10 @@ def read_rows(package: str, table_name: str) -> Rows:
 
 
 def parse_rows(csv_text: str) -> Rows:
-    """Parse the rows of a CSV text as dictionaries by column name; lines that start with # are comments."""
+    """Parse each row of a CSV text as a dictionary from column name to text.
+
+    Lines that start with # are comments.
+    """
     return list(csv.DictReader(line for line in csv_text.splitlines() if not line.startswith("#")))
 
 
@@ -41,14 +44,14 @@ def column_separator(table_line: str) -> str:
 
 @lru_cache(4096)
 def plain_key(key_or_column: str) -> str:
-    """Return a key or column name in lower case without punctuation: timestampms for timestamp_ms."""
+    """Return a key or column name in lower case without punctuation, such as timestampms for timestamp_ms."""
     return re.sub(r"[\W_]", "", key_or_column).casefold()
 
 
 def float_columns(table_rows: Sequence[Mapping[str, str]], column_names: str) -> NDArray[np.float64]:
-    """Return selected columns of a table as floats, (table_rows, columns).
+    """Return selected columns of a table as an array of floats (rows, columns).
 
-    table_rows : rows of the table, by column name
+    table_rows : rows of the table, each a mapping from column name to text
     column_names : names of the columns, separated by spaces
     """
     return np.array([[float(row[name]) for name in column_names.split()] for row in table_rows])

@@ -36,12 +36,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class _AnimatedScene:
-    """Scene whose head is moved by a clip; frame k shows the time k / rate.
+    """Scene whose head is moved by a clip; frame k shows the clip at time k / rate.
 
-    scene, settings : scene without the motion, and settings of all frames
+    scene : scene without the motion
+    settings : settings of all frames
     clip : motion of the head
     rate : frame rate of the animation [1/s]
-    first : number of the first frame; automatic exposure is metered at this frame
+    first : number of the first frame, at which automatic exposure is metered
     """
 
     scene: Scene
@@ -51,9 +52,9 @@ class _AnimatedScene:
     first: int
 
     def scenes(self, frame_numbers: Iterable[int]) -> Iterator[Scene]:
-        """Yield the scene at each frame; morph targets and bones that the clip does not move keep their pose.
+        """Yield the scene at each frame; morph targets and bones that the clip lacks stay as in the scene.
 
-        frame_numbers : numbers of the frames
+        frame_numbers : numbers of the frames to yield
         """
         from dermis.mesh.pose import merge_poses
 
@@ -82,8 +83,8 @@ def animate(
 ) -> int:
     """Render a moving head as a movie (H.264 in MP4) or as numbered images.
 
-    Numbered images that already exist are reused if they are complete and belong to the same scene, so an
-    interrupted command can be repeated to continue it. All other options are those of `dermis render`.
+    An interrupted command can be continued by repeating it: existing numbered images are kept if they are
+    complete and show the same scene. All other options are those of `dermis render`.
 
     Examples:
 
@@ -103,21 +104,23 @@ def animate(
         File with the motion: .glb or .gltf with clips, .csv of Live Link Face, .json of MediaPipe, or a
         sequence of meshes such as face_%05d.obj. [default: the file of the head]
     output:
-        Movie (.mp4) or numbered images such as frames/%05d.png or .exr; their folder is created if necessary.
+        Movie (.mp4), or numbered images (.png or .exr), such as frames/%05d.png; the folder of images is
+        created if necessary.
     clip:
         Name of the clip, for glTF files with several clips.
     fps:
-        Frame rate, such as 30, 23.976 or 24000/1001 [1/s]. [default: rate of the motion, or 30]
+        Frame rate of the output, such as 30, 23.976 or 24000/1001 [1/s]. [default: rate of the motion, or 30]
     motion_fps:
-        Frame rate of a motion file without times: a mesh sequence [default: --fps, or 30] or timecodes [1/s].
+        Frame rate of a mesh sequence [default: --fps, or 30], or of a motion file with timecodes or without
+        times [1/s].
     begin:
         Start time within the motion [s]. [default: 0]
     end:
-        End time within the motion, exclusive [s]. [default: end of the motion]
+        End time within the motion; a frame at this time is not rendered [s]. [default: end of the motion]
     crf:
-        Quality of the movie as constant rate factor, 0 (lossless) to 51. [default: 18]
+        Constant rate factor of the movie, 0 (lossless) to 51 (lowest quality). [default: 18]
     overwrite:
-        Render existing numbered images again.
+        Render all numbered images again, including those that exist.
     names:
         List the morph targets, bones and clips of the head without rendering.
     as_json:
@@ -197,8 +200,8 @@ def _common_exposure(animated_scene: _AnimatedScene, renderer: Renderer) -> floa
 def _frame_digest(animation: _AnimatedScene, options: SceneOptions, *files: str) -> str:
     """Return a hash of everything that determines the frames; images from runs with an equal hash are reused.
 
-    files : head and motion as named on the command line; the size and modification time of files are part of
-        the hash
+    files : head and motion as named on the command line; the hash includes the size and modification time of
+        each file
     """
     scene = animation.scene
     names = [*files, scene.head.name, *map(str, options.head.values()), animation.clip.name]
@@ -243,7 +246,7 @@ class TimeSpan:
     """Time span and frame rate from the options of `dermis animate`; fields of omitted options are None.
 
     begin, end : first and last time within the motion [s]
-    rate : frame rate of the animation, from --fps [1/s]
+    rate : frame rate of the rendered animation, from --fps [1/s]
     motion_rate : frame rate of motion files that have no time stamps, from --motion-fps [1/s]
     """
 
@@ -295,9 +298,11 @@ def parse_time_span(
 
 
 def motion_file(head_or_scene: str, motion: str | None) -> str:
-    """Return the name of the motion file: the value of --motion, or the head's file if that file is glTF.
+    """Return the name of the motion file: the value of --motion, or else the head's file, which must be glTF.
 
     head_or_scene : head or scene file as named on the command line
+
+    Raises DermisError if --motion is missing and the head's file is not glTF.
     """
     from dermis.formats.parts import is_gltf
 
@@ -333,7 +338,7 @@ def load_clip(
 
 
 def animatable_names(head_or_scene: str, head: Head) -> dict[str, tuple[str, ...]]:
-    """Return the names of morph targets, bones and clips, by kind; the clips are those in the head's file."""
+    """Return a dictionary from kinds (morph targets, bones, and clips in the head's file) to names."""
     from dermis.formats.gltf.animations import clip_names
     from dermis.formats.parts import is_gltf
 

@@ -57,9 +57,9 @@ def batch(
 ) -> int:
     """Render a data set with ground truth: people, expressions, lights and cameras drawn from distributions.
 
-    An interrupted command can be repeated to continue it: complete parts of 16 to 32 images are kept. With a
-    larger --count, the command adds images to the data set. The same spec gives the same bytes on the same
-    kind of adapter, independent of the number and location of the workers.
+    An interrupted command can be continued by repeating it: complete parts of 16 to 32 images are kept. With
+    a larger --count, the command adds images to the data set. On the same kind of adapter, a spec always
+    gives the same bytes, whatever the number and location of the workers.
 
     Examples:
 
@@ -78,40 +78,40 @@ def batch(
     spec:
         File with the distributions of the data set (.toml); see --example.
     output:
-        Folder of the data set, created if necessary; with --dry-run the contact sheet (.png).
+        Folder of the data set, created if necessary; with --dry-run, the file for the contact sheet (.png).
     count:
-        Number of images; a larger number than that of an existing data set adds images. [default: from the
-        spec]
+        Number of images; if an existing data set has fewer, images are added. [default: from the spec]
     size:
-        Width and height of the images, WIDTHxHEIGHT [pixel]. [default: from the spec]
+        Width and height of the images, such as 512x512 [pixel]. [default: from the spec]
     seed:
         Seed of the random numbers. [default: from the spec]
     format:
         Format of the shards: WebDataset tar files, or folders. [default: from the spec]
     shard:
-        I/N: render every N-th shard, beginning with shard I (from 0), for job arrays with a shared disk.
+        I/N: render every N-th shard, beginning with shard I (counted from 0); for job arrays with a shared
+        disk.
     part:
-        I/N: render every N-th part, beginning with part I (from 0), of the shards that --shard selects; for
-        job arrays with more jobs than shards.
+        I/N: within the shards that --shard selects, render every N-th part, beginning with part I (counted
+        from 0); for job arrays with more jobs than shards.
     adapters:
         Numbers of several adapters, such as 0,1; see `dermis doctor`. [default: all GPUs of the best kind]
     workers:
-        Number of worker processes. [default: one per GPU; on a software adapter one per two cores]
+        Number of worker processes. [default: one per GPU, or one per two cores on a software adapter]
     workers_per_gpu:
         Number of worker processes that share each GPU; more than one can increase its utilisation. [default:
         1]
     encoders:
-        Number of processes per worker that encode images; 0 encodes in the worker itself. [default: by the
-        number of cores]
+        Number of processes per worker that encode images; with 0, the worker itself encodes them. [default:
+        depends on the number of cores]
     scheduler:
-        Address of a dask scheduler, such as tcp://head:8786; each dask worker renders on its own GPU.
+        Address of a dask scheduler, such as tcp://head:8786, whose workers render, each on its own GPU.
     cluster:
-        Scheduler file with the address, as written by `dask scheduler --scheduler-file FILE`.
+        File with the address of a dask scheduler, as written by `dask scheduler --scheduler-file FILE`.
     keep_going:
-        Skip images that cannot be rendered, and list them.
+        Skip images that cannot be rendered, and list these images.
     dry_run:
-        Print the parameters of the data set and an estimate of its size and duration, and render its first 16
-        images as a contact sheet, without writing it.
+        Do not write the data set: print its parameters, estimate its size and the rendering time, and render
+        its first 16 images as a contact sheet.
     example:
         Print a complete example spec with comments.
     as_json:
@@ -241,7 +241,7 @@ _RATE_AVERAGING_S = 60.0  # over which the rate is averaged
 
 @contextmanager
 def image_progress() -> Iterator[Callable[[Progress], None]]:
-    """Yield a function that shows the progress of a run: first rendered images, then verified shards.
+    """Yield a function that shows the progress of a run: images rendered, then shards verified.
 
     The function updates a progress bar in a terminal, and logs lines if stderr is not a terminal.
     """
@@ -277,7 +277,7 @@ def image_progress() -> Iterator[Callable[[Progress], None]]:
 
 
 class ImageRate:
-    """Number of images per second, averaged over the last minute, for progress messages.
+    """Meter of the number of images per second, averaged over the last minute, for progress messages.
 
     clock : function that returns the current time [s]
     """
@@ -297,7 +297,7 @@ class ImageRate:
 
 
 class ProgressLog:
-    """Progress messages for log files, at most one every 30 seconds.
+    """Writer of progress messages to log files, at most one message every 30 seconds.
 
     write : function that writes one line to the log
     clock : function that returns the current time [s]

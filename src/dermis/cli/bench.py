@@ -22,14 +22,14 @@ def bench(
     adapter: AdapterOption = "auto",
     as_json: JsonOption = False,
 ) -> int:
-    """Measure the time of each stage of a frame, and compare it with the memory bandwidth limit.
+    """Measure the time of each stage of a frame, and compare it with the limit set by memory bandwidth.
 
-    Camera and lights move between the frames, and every frame is computed from scratch. The passes of 2007
-    are measured in the same run, as compute and as fragment shaders. Frames that do not fit on the adapter
-    are skipped and listed with the reason.
+    Camera and lights move between frames, and every frame is computed from scratch. The passes of GPU Gems 3
+    (2007) are measured in the same run, both as compute shaders and as fragment shaders. Frames that exceed
+    the limits of the adapter are skipped and listed with the reason.
 
-    The GPU time of a stage is measured with each stage in its own pass. The time of a whole frame is measured
-    with the stages sharing one pass, as in normal use, and is therefore less than the sum of its stages.
+    To measure the GPU time of each stage, every stage runs in a separate pass. To measure a whole frame, all
+    stages share one pass, as in normal use; the time of a frame is therefore less than the sum of its stages.
 
     Examples:
 
@@ -45,11 +45,12 @@ def bench(
     ----------
     preset:
         interactive (around 1920x1080, atlas 2048), film (around 3840x2160, atlas 4096), or cpu (around
-        1024x1024; takes minutes on two cores). [default: by the adapter]
+        1024x1024; takes minutes on two cores). [default: depends on the adapter]
     head:
-        auto (the scan lee_perry_smith if it has been downloaded, else human), or any HEAD of `dermis render`.
+        auto (the scan lee_perry_smith if it has been downloaded, else human), or any head that `dermis
+        render` accepts.
     output:
-        HTML report with plots to write.
+        HTML file to write: a report with plots.
     as_json:
         Print one JSON object with all timings.
     """

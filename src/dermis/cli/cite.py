@@ -27,7 +27,7 @@ def cite(
     skin: SkinOptions = NO_OPTIONS,
     against: Literal["surface-integral", "heat", "path-traced", "cycles"] | None = None,
 ) -> int:
-    """Print the BibTeX entries of the works behind a picture or comparison, or of the given keys.
+    """Print the BibTeX entries of given keys, or of the works behind a picture or a comparison.
 
     Examples:
 
@@ -44,11 +44,11 @@ def cite(
     Parameters
     ----------
     keys:
-        Author-year keys as used in the documentation.
+        Keys of works, such as Kelemen2001, as used in the documentation.
     scene:
         Scene file whose skin, lights and settings are cited. [default: the default picture]
     against:
-        Reference solution of `dermis compare`; cite this solution, the error measures and the techniques.
+        Reference solution of `dermis compare`: cite the works behind a comparison with this solution.
     """
     from dermis.base.citations import bibtex
 

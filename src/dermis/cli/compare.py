@@ -75,8 +75,8 @@ def compare(
 ) -> int:
     """Compare scattering techniques with a reference solution, or the specular models with each other.
 
-    Techniques are compared on skin in the colour of the diffusion profile, without maps, surface reflection
-    or energy conservation.
+    For the comparison of techniques, the skin has the colour of the diffusion profile, and no maps, surface
+    reflection or energy conservation.
 
     Examples:
 
@@ -95,27 +95,28 @@ def compare(
     Parameters
     ----------
     subject:
-        A head (sample name or file), or the word specular for the models of surface reflection.
+        A head (sample name or file), or the word specular to compare models of surface reflection.
     against:
-        Reference solution: surface-integral (profile integrated over the surface; shows the error of the
+        Reference solution: surface-integral (profile integrated over the surface; shows the error due to the
         atlas), heat (diffusion along the surface around the centre of the picture), path-traced (light
-        transport in the medium; needs Mitsuba) or cycles (random walk of Blender; DERMIS_BLENDER_PYTHON names
-        a Python interpreter with bpy). [default: surface-integral]
+        transport in the medium; needs Mitsuba) or cycles (Blender's random walk; the variable
+        DERMIS_BLENDER_PYTHON names a Python interpreter with bpy). [default: surface-integral]
     techniques:
         Names of techniques, separated by commas; see `dermis render --technique`. [default: all]
     light:
-        front, back (through the ear) or laser (a stripe across cheek and ear). [default: front]
+        Light: front, back (through the ear) or laser (a stripe across cheek and ear). [default: front]
     region:
-        portrait, three-quarter, ear, cheek or nose. [default: where the light has the largest effect]
+        Part of the head in the picture: portrait, three-quarter, ear, cheek or nose. [default: where the
+        light has the largest effect]
     medium:
-        skin1, skin2 or another named medium, index-matched. [default: skin1]
+        skin1, skin2 or another named medium, with an index-matched surface. [default: skin1]
     model:
         Model of the diffusion profile: counted (tabulated photons), layered (layered diffusion) or montecarlo
         (photons traced now). [default: counted for one semi-infinite layer, else layered]
     samples:
         Paths per pixel, for path-traced and cycles. [default: 64]
     output:
-        HTML report to write; for specular the folder of the plots.
+        HTML report to write; for specular, the folder of the plots.
     as_json:
         Print one JSON object with the measured values.
     """
@@ -131,7 +132,7 @@ def compare(
 
 
 def _refuse_unused_options(compared_subject: str, options: Options) -> None:
-    """Raise DermisError for options that have no effect on a comparison of this subject.
+    """Raise DermisError for options that do not affect the comparison of a subject.
 
     compared_subject : name of a head, or "specular"
     """
@@ -346,7 +347,7 @@ def _lobe_figure(roughness: float) -> Figure:
 def _lobe_intensity(model_name: str, roughness: float) -> Doubles:
     """Return the reflected intensity f cos(theta_i) cos(theta_o), (3, n), for the BRDF f of a model [1/sr].
 
-    The rows are for the angles of incidence in `_COLOUR_OF_INCIDENCE_DEGREES`, the columns for the angles of
+    Each row belongs to an angle of incidence in `_COLOUR_OF_INCIDENCE_DEGREES`, each column to an angle in
     `_view_angles`.
 
     model_name : name of the specular model
@@ -371,7 +372,7 @@ def _view_angles() -> Doubles:
 
 
 def _albedo_figure(roughness: float) -> Figure:
-    """Return a plot of the directional albedo of each specular model by angle of incidence.
+    """Return a plot of each specular model's directional albedo against the angle of incidence.
 
     roughness : Beckmann roughness [-]
     """

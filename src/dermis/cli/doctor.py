@@ -19,7 +19,7 @@ _REPORTED_PACKAGES = ("dermis", "wgpu", "numpy", "scipy", "pydantic", "OpenEXR",
 def doctor(*, adapter: AdapterOption = "auto", as_json: JsonOption = False) -> int:
     """List adapters, versions and sample data, report which adapter is used and why, and render a test frame.
 
-    Exits with 0 if everything works and with 2 if not.
+    The exit status is 0 if everything works, otherwise 2.
 
     For example:
 

@@ -39,10 +39,10 @@ def export(
     naive: FlagOption = False,
     as_json: JsonOption = False,
 ) -> int:
-    """Export a skin or a head to another program, and report the remaining error.
+    """Export a skin or a head to another program, and report how well that program can reproduce it.
 
-    The diffusion profile is fitted with the profile model of the program, and the errors are reported for the
-    light within a radius, for the light beside a shadow edge, and for the total.
+    The profile model of the program is fitted to the diffusion profile of the skin. The errors of the fit are
+    reported for the light within a radius, for the light beside a shadow edge, and for the total light.
 
     Examples:
 
@@ -66,26 +66,26 @@ def export(
         A skin (skin1, dj3, medium, gpu-gems-3 ..., a .toml or .csv file) or a head (human, human:SEED, a
         person (.json), a sample or a mesh file).
     output:
-        File to write, or a folder, created if necessary, if the name has no suffix. A table of the
-        parameters, their meaning and the errors is written beside the file or into the folder, as Markdown
-        and JSON.
+        File to write; a name without suffix is a folder, created if necessary. A table of the parameters,
+        their meaning and the errors is written beside the file or into the folder, as Markdown and JSON.
     version:
         Version of the program. [default: newest supported]
     variant:
-        Variant of the export, such as a scattering method of the program. [default: the first]
+        Variant of the export, such as a scattering method of the program. [default: the first variant]
     diffuse_transmission:
         Short for --variant diffuse-transmission of the target gltf.
     model:
-        Model of the true diffusion profile. [default: montecarlo for one semi-infinite layer, else layered]
+        Model that computes the diffusion profile of the skin. [default: montecarlo for one semi-infinite
+        layer, else layered]
     profile:
-        Skin of a head. [default: the pigments of a person, else gpu-gems-3]
+        Skin to use for a head. [default: the pigments of a person, else gpu-gems-3]
     library:
-        For web pages: npm's node_modules folder with the library to embed. [default: load it from a public
-        server]
+        For web pages: npm's node_modules folder with the library to embed. [default: the page loads the
+        library from a public server]
     map_side:
         Side of the painted maps, a power of two from 256 to 4096 [texel].
     naive:
-        Also print the values that result from copying the numbers without conversion.
+        Also print the parameters that a user would get by copying the numbers without conversion.
     as_json:
         Print one JSON object with the parameters and errors.
     """

@@ -32,9 +32,9 @@ def fit(
     """Estimate the light and the skin in a photograph: melanin, blood, roughness, gloss, sky and suns.
 
     The head must have the shape of the person, and the camera must match the photograph. The command writes
-    scene.toml (for `dermis render`) with its light and person, the table fit.json, and the photograph, the
-    fit and their difference as PNG. Eumelanin, oxygenation and epidermis thickness stay at the values of the
-    scene, or else at the defaults that `dermis profile --help` prints.
+    the estimated light and skin to scene.toml (for `dermis render`) and fit.json, and the photograph, the
+    fitted picture and their difference as PNG. Eumelanin, oxygenation and epidermis thickness are not
+    estimated: they have the values of the scene, or else the defaults that `dermis profile --help` prints.
 
     Examples:
 
@@ -47,31 +47,32 @@ def fit(
     Parameters
     ----------
     photo:
-        Photograph: JPEG, HEIC, PNG, TIFF, WebP or AVIF, rotated by its EXIF orientation and converted by its
-        colour profile; or EXR or HDR (linear).
+        Photograph: JPEG, HEIC, PNG, TIFF, WebP or AVIF, whose EXIF orientation and colour profile are
+        applied; or EXR or HDR (linear).
     head:
-        human, human:SEED, a person (.json), a sample or a mesh file; or a scene (.toml) with head, camera and
-        pose.
+        Head of the person: human, human:SEED, a person (.json), a sample or a mesh file; or a scene (.toml)
+        with head, camera and pose.
     camera:
-        portrait, three-quarter, profile or a TOML file with [camera]. [default: camera of the scene]
+        Camera of the photograph: portrait, three-quarter, profile or a TOML file with [camera]. [default:
+        camera of the scene]
     landmarks:
-        Landmarks in the photograph, from which the camera and the shape of the human are estimated: a table
-        of name,x,y or x,y [pixel], iBUG's .pts, the output of `dermis render --landmarks`, or JSON of
-        MediaPipe.
+        File with landmarks in the photograph, from which the camera and the shape of the human are estimated:
+        a table of name,x,y or x,y [pixel], a .pts file of iBUG, the output of `dermis render --landmarks`, or
+        JSON of MediaPipe.
     output:
         Folder of the results, created if necessary.
     suns:
         Number of directional lights in addition to the environment: 0, 1 or 2.
     exposure:
-        Factor from radiance to pixel value; only its product with the intensity of the light can be
-        estimated.
+        Factor from radiance to pixel value. A photograph only determines the product of this factor and the
+        intensity of the light.
     white:
         Colour of the light as linear red,green,blue; or the word specular to estimate it from specular
         highlights.
     noise:
         Relative standard deviation of the pixel values [-].
     side:
-        Length of the longer side of the photograph during the fit [pixel].
+        Length to which the longer side of the photograph is reduced for the fit [pixel].
     atlas:
         Side of the atlas of the rendered frames [texel].
     as_json:

@@ -27,7 +27,7 @@ def gallery(
 ) -> int:
     """Render the comparisons of the 2007 talk and a page that explains them.
 
-    Writes the pictures and index.html, which contains all of them and works offline.
+    Writes the pictures, and index.html, a page that contains all pictures and works offline.
 
     Examples:
 

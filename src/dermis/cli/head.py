@@ -90,13 +90,11 @@ def head(
     Parameters
     ----------
     output:
-        File to write: .glb, or .json with only the parameters of the person, for `dermis render`.
+        File to write: .glb, or .json with only the parameters of the person, which `dermis render` reads.
     seed:
-        Seed of a random person; the options below override values of this person. [default: the average
-        person]
+        Seed of a random person; other options override values of this person. [default: the average person]
     african:
-        Proportion of this ancestry, 0 to 1; the three proportions are normalised to a sum of 1. [default:
-        1/3]
+        Proportion of this ancestry, 0 to 1; the three proportions are scaled to a sum of 1. [default: 1/3]
     asian:
         Proportion of this ancestry, 0 to 1. [default: 1/3]
     caucasian:
@@ -110,16 +108,16 @@ def head(
     muscle:
         Muscle mass, -1 (lowest) to 1 (highest). [default: 0]
     skin_ancestry:
-        Measured group that determines the colours of skin, eyes and hair, independently of the shape:
-        african, arabian, asian, caucasian, chinese, iraqi, japanese, middle eastern, south asian or
-        southeast asian. [default: that of the shape]
+        Group of measured people that determines the colours of skin, eyes and hair, independently of the
+        shape: african, arabian, asian, caucasian, chinese, iraqi, japanese, middle eastern, south asian or
+        southeast asian. [default: the ancestry of the shape]
     ita:
-        Individual typology angle of the cheek, -65 (darkest) to 70 (lightest); the other pigments are typical
-        of measured people with this angle [degrees]. [default: from the person]
+        Individual typology angle of the cheek, -65 (darkest) to 70 (lightest) [degrees]; all pigments are
+        typical of measured people with this angle. [default: from the person]
     target:
         Weights of MakeHuman shape targets, such as nose/nose-hump-incr=0.5; repeatable.
     expression:
-        Weights of morph targets in the rest pose of the file, such as jawOpen=0.2; repeatable.
+        Weights of morph targets in the rest pose of the written file, such as jawOpen=0.2; repeatable.
     skin:
         Pigments and texture, such as melanin=0.1,freckles=0.4: melanin, eumelanin, blood, oxygen, redness,
         freckles, moles, spots, tan, veins, stubble, recession, beard, oil and age from 0 to 1, epidermis_mm,
@@ -130,7 +128,8 @@ def head(
     hair:
         Hair, such as style=bob,curl=0.3: style (none, short, long, afro, ponytail and others, see the guide),
         length_mm, density, curl, fade, beard_mm, bushy, grey, eumelanin, pheomelanin and seed [default: from
-        the person]. In .glb files hairs are thin tubes, which dermis ignores when it reads the file.
+        the person]. In .glb files, hairs are thin tubes; dermis ignores these tubes when it reads such a
+        file.
     colour:
         Colour map of the skin, sRGB. [default: painted]
     normal:
@@ -140,7 +139,8 @@ def head(
     size:
         Side of the painted maps, a power of two from 256 to 4096 [texel].
     layout:
-        uv layout: own (most texels for the face) or hm08 (of MakeHuman, for its skin textures).
+        uv layout: own (most texels for the face), or hm08 (MakeHuman's layout, for MakeHuman's skin
+        textures).
     subdivide:
         Levels of subdivision, 0 to 3; each level makes the file four times larger. [default: 1]
     list_targets:
@@ -189,10 +189,11 @@ def head(
 
 
 def _build_person(seed: int | None, numbers: Options, tone: Options, targets: dict[str, float]) -> Human:
-    """Return the average person, or a random person for a seed, with given parameters and shape targets.
+    """Return the average person, or the random person of a seed, with some parameters and targets replaced.
 
-    numbers : fields of `Human` by name
-    tone : skin ancestry and ITA, for which the skin of a random person is sampled
+    numbers : dictionary from fields of `Human` to their new values
+    tone : skin ancestry and ITA (individual typology angle), which determine the person's skin
+    targets : dictionary from MakeHuman shape targets to weights
     """
     from dermis.human.person import Human
 

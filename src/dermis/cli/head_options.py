@@ -60,7 +60,7 @@ EyeOptions = Annotated[
 
 
 def note_eyes(head: Head, eyes_option: str | None) -> None:
-    """Print a note on stderr if the eyeballs of a mesh file were not replaced by the package's eyes.
+    """Print a note on stderr if a mesh file kept its eyeballs instead of getting the package's eyes.
 
     eyes_option : value of the option --eyes
     """
@@ -103,14 +103,17 @@ BoneAngleOptions = Annotated[
 
 
 def parse_weights(option_values: Sequence[str], option_name: str = POSE_OPTION) -> dict[str, float]:
-    """Return weights by name from option values such as "jawOpen=0.6,mouthSmileLeft=1"."""
+    """Return a dictionary from names to weights for option values such as "jawOpen=0.6,mouthSmileLeft=1"."""
     expected = "NAME=WEIGHT,..., such as jawOpen=0.6,mouthSmileLeft=1"
     parts = (part for text in option_values for part in text.split(","))
     return {name: weight for name, (weight,) in _parse_pairs(parts, 1, option_name, expected)}
 
 
 def parse_bone_angles(option_values: Sequence[str]) -> dict[str, list[float]]:
-    """Return the angles about x, y and z [degrees] by bone from option values such as "head=0,25,0"."""
+    """Return a dictionary from bones to angles about x, y and z [degrees].
+
+    option_values : texts such as "head=0,25,0"
+    """
     return dict(
         _parse_pairs(
             option_values, 3, BONE_OPTION, "NAME=X,Y,Z with three angles in degrees, such as head=0,25,0"
@@ -123,7 +126,7 @@ def _parse_pairs(
 ) -> Iterator[tuple[str, list[float]]]:
     """Yield the name and the numbers of each option value "NAME=NUMBER,...".
 
-    number_count : how many numbers each value must have
+    number_count : number of numbers after the sign = in each value
     option_name : name of the option, for error messages
     expected : expected format of the values, for error messages
     """
@@ -138,10 +141,10 @@ def _parse_pairs(
 def pose_from_options(
     weights: Mapping[str, float], bone_angles: Mapping[str, Sequence[float]], head: Head, head_name: str
 ) -> Pose:
-    """Return the pose of the options --pose and --bone.
+    """Return the pose that the options --pose and --bone describe.
 
-    weights : morph target weights by name of the target [-]
-    bone_angles : rotation about x, y and z by name of the bone [degrees]
+    weights : dictionary from morph targets to weights [-]
+    bone_angles : dictionary from bones to rotation angles about x, y and z [degrees]
     head_name : head as named on the command line, for error messages
 
     Raises DermisError for targets and bones that the head does not have.
@@ -174,7 +177,7 @@ def pose_with_gaze(option_value: str, scene: Scene) -> Pose:
 
 
 def _parse_numbers(option_value: str) -> list[float] | None:
-    """Return the numbers of a comma-separated text; None if a part is not a number or exceeds 1e10."""
+    """Return the numbers of a comma-separated text; None if a part is not a number or is beyond 1e10."""
     try:
         numbers = [float(part) for part in option_value.split(",")]
     except ValueError:

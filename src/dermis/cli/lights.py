@@ -20,7 +20,7 @@ def lights(name: str = "", /, *, as_json: JsonOption = False) -> int:
     Parameters
     ----------
     name:
-        studio, window, top, rim, rembrandt, laser or another rig of the list.
+        Name of a rig: studio, window, top, rim, rembrandt, laser or another rig of the list.
     as_json:
         Print one JSON object: the lights of the rig under "lights", or the summaries of all rigs under
         "rigs".

@@ -1,4 +1,4 @@
-"""Options generated from pydantic models, option types that commands share, and parsers of values."""
+"""Options generated from pydantic models, option types that commands share, and parsers of option values."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def _to_int(_: type, tokens: Sequence[Token]) -> int:
 def _to_choice(
     model: type[FrozenModel], field_name: str, choice_type: object, tokens: Sequence[Token]
 ) -> str:
-    """Return the choice that was typed, after a check against all choices, including those of plug-ins."""
+    """Return the word that was typed, after a check against all choices, including choices from plug-ins."""
     from dermis.scene.frozen_model import field_choices
 
     if (word := tokens[0].value) in (choices := field_choices(model, field_name)):
@@ -85,8 +85,8 @@ def model_options(
 
     only_fields : names of the fields to include; all fields by default
     excluded_fields : names of the fields to exclude
-    option_names : option names that differ from the field name, by field name
-    shown_defaults : defaults that the help shows in place of the model's defaults, by field name
+    option_names : dictionary from fields to option names, for fields whose option has a different name
+    shown_defaults : dictionary from fields to defaults that the help shows instead of the model's defaults
     """
     from dermis.scene.frozen_model import field_heading
 
@@ -113,13 +113,13 @@ def drop_none(**options: object) -> Options:
 def option_name(field: str, option_names: Mapping[str, str] | None = None) -> str:
     """Return the command line option for a field, such as --rho-s for rho_s.
 
-    option_names : option names that differ from the field name, by field name
+    option_names : dictionary from fields to option names, for fields whose option has a different name
     """
     return "--" + (option_names or {}).get(field, field).replace("_", "-")
 
 
 def is_option(model: type[FrozenModel], field: str) -> bool:
-    """Return whether a field gets an option: a field of words, numbers or tuples, but not of models."""
+    """Return whether a field gets an option: true for words, numbers and tuples, false for nested models."""
     return _option_type(model, field)[0] is not None
 
 
@@ -173,9 +173,9 @@ def _option_help(model: type[FrozenModel], field: str, shown_defaults: Mapping[s
 def check_fields(
     model: type[M], field_values: Mapping[str, object], option_names: Mapping[str, str] | None = None
 ) -> M:
-    """Return a model with given field values; error messages name the option instead of the field.
+    """Return a model instance with given field values; error messages name options instead of fields.
 
-    option_names : option names that differ from the field name, by field name
+    option_names : dictionary from fields to option names, for fields whose option has a different name
 
     Raises DermisError for invalid values.
     """
@@ -194,10 +194,10 @@ def refuse_options(
 ) -> None:
     """Raise DermisError if any option is given in a context in which it would have no effect.
 
-    fields : field names of the given options
-    option_names : option names that differ from the field name, by field name
+    fields : names of the fields that the given options set
+    option_names : dictionary from fields to option names, for fields whose option has a different name
     context : description of the context for the message, such as "with a dask cluster"
-    advice : advice to the user
+    advice : advice to the user, for the message
     """
     for field in fields:
         refuse(option_name(field, option_names), f"no such option {context}", "it is given", advice)

@@ -41,7 +41,7 @@ OutputsFormatOption = Annotated[
 
 
 class FrameOutputs:
-    """Outputs of a frame requested with --outputs, such as depth, and the files to which they are written.
+    """Outputs of a frame, such as depth, that --outputs requests, and the files to which they are written.
 
     Raises DermisError for unknown outputs and for files that cannot be written.
     """
@@ -72,9 +72,9 @@ class FrameOutputs:
     def write(self, picture: Floats | None, output_values: Mapping[str, PlaneArray]) -> None:
         """Write the outputs to their files.
 
-        picture : linear image that shares one EXR file with the outputs; None if the outputs have separate
+        picture : linear image to write into the same EXR file as the outputs; None if outputs have separate
             files
-        output_values : pixel arrays by output name
+        output_values : dictionary from output names to pixel arrays
         """
         from dermis.frame.output_files import write_multipart, write_output
 
@@ -87,7 +87,7 @@ class FrameOutputs:
 
     @property
     def report(self) -> dict[str, str]:
-        """Return the path of each output's file, by output name, for JSON reports."""
+        """Return a dictionary from output names to paths of the written files, for JSON reports."""
         return {name: str(path) for name, path in self.paths.items()}
 
 
@@ -201,7 +201,7 @@ class AnimationOutput:
     def frames_to_render(
         self, frame_numbers: range, frame_size: tuple[int, int], frame_digest: str
     ) -> Sequence[int]:
-        """Return the numbers of the frames to render: frames without a complete image of an earlier run.
+        """Return the numbers of frames to render: frames for which no earlier run left a complete image.
 
         frame_digest : hash of everything that determines the frames; images with another hash are rendered
             again
@@ -216,7 +216,7 @@ class AnimationOutput:
 
     @contextmanager
     def open_writer(self, frame_size: tuple[int, int], rate: Fraction) -> Iterator[WriteFrame]:
-        """Yield a function that queues a frame for writing; the with block ends when all frames are written.
+        """Yield a function that queues a frame for writing; the with block ends after all frames are written.
 
         rate : frame rate of a movie [1/s]
         """

@@ -1,7 +1,8 @@
 """Standard streams and signal handling of the process that runs a command.
 
-A failed write to stdout or stderr does not raise an exception; it is reported once when the command ends.
-Ctrl-C and signals that ask the process to end raise KeyboardInterrupt, so that no file is left half-written.
+A failed write to stdout or stderr does not raise an exception; the failure is reported once, when the command
+ends. Ctrl-C and signals that ask the process to end raise KeyboardInterrupt, so that no file is left
+half-written.
 """
 
 from __future__ import annotations
@@ -32,9 +33,9 @@ _STREAM_OPEN_MODES = os.O_RDONLY, os.O_RDONLY, os.O_WRONLY
 class StandardStreams:
     """Context manager that replaces stdout and stderr by streams whose write methods never raise.
 
-    A stream that is closed at the start is treated as a stream to which all writes fail. The file descriptor
-    of such a stream is reserved; otherwise the next opened file would get it, and libraries would print into
-    that file.
+    If a stream is already closed at the start, all writes to it fail. The file descriptor of such a stream is
+    reserved; otherwise the next opened file would get this descriptor, and libraries would print into that
+    file.
     """
 
     def __enter__(self) -> Self:
@@ -147,7 +148,8 @@ class Interruption:
     """Context manager that raises KeyboardInterrupt once, after Ctrl-C, SIGTERM or SIGHUP.
 
     A second signal ends the process immediately, even while the main thread is inside a driver or another
-    library. Signals for which the parent process or a library has set a handler are left alone.
+    library. The handling of a signal is not changed if the parent process or a library has already changed
+    it.
 
     code : exit status for the received signal; 0 without a signal
     """
@@ -207,7 +209,7 @@ class Interruption:
         self._writing.send(_RETRY_BYTE)
 
     def _on_unraisable(self, error: sys.UnraisableHookArgs) -> None:
-        """Repeat a KeyboardInterrupt that was raised where Python ignores exceptions, as in a destructor."""
+        """Repeat a KeyboardInterrupt that Python ignored, such as one raised in a destructor."""
         if self.code and issubclass(error.exc_type, KeyboardInterrupt):
             self._raise_later()
         else:
@@ -216,7 +218,8 @@ class Interruption:
     def _watch(self) -> None:
         """Wait for signals in a thread: end the process after a second signal, and repeat a postponed signal.
 
-        The main thread handles signals only between Python instructions, not inside a library.
+        A separate thread is needed because the main thread handles signals only between Python instructions,
+        not inside a library.
         """
         first_signal_s = 0.0
         with self._reading:
@@ -264,7 +267,7 @@ def _running_loop() -> AbstractEventLoop | None:
 
 
 def _caller_swallows_exceptions(stack_frame: FrameType | None) -> bool:
-    """Return whether a library that called the code in a stack frame would swallow an exception.
+    """Return whether the library that called the code in a stack frame would swallow an exception.
 
     Examples of such code are callbacks of a graphics driver, and modules during an import.
     """

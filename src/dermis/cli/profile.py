@@ -28,7 +28,7 @@ _OPTION_NAMES = {"structure": "skin"}
 
 
 def _default_pigments() -> dict[str, str]:
-    """Return the default of each pigment option for the help, with the different values of named skins."""
+    """Return the default of each pigment option as help text, with the values of named skins that differ."""
     defaults: dict[str, str] = {"structure": DEFAULT_STRUCTURE}
     for field in Pigments.model_fields.keys() - defaults.keys():
         default = getattr(DEFAULT_SKIN, field)
@@ -91,39 +91,41 @@ def profile(
     ----------
     name:
         Medium (dj3, skin1, skin2, marble ...), pigmented skin (spectral, light, medium, dark), the published
-        table gpu-gems-3, or a .toml file with [[layers]], with a table [skin], or written by -o.
+        table gpu-gems-3, or a .toml file that has [[layers]] or a table [skin], or that -o has written.
     model:
-        Model of the profile. counted: tabulated photon counts, for one semi-infinite layer of index 1 or 1.4,
-        where it is the default; layered: layered diffusion, the default for all other media; layered-point:
-        the same with a finite value at r = 0; dipole, better-dipole: one semi-infinite layer; multipole: the
-        model of the 2007 talk; montecarlo: photons traced now, the reference.
+        Model of the profile. counted: tabulated photon counts, the default for one semi-infinite layer of
+        index 1 or 1.4; layered: layered diffusion, the default for all other media; layered-point: layered
+        with a finite value at r = 0; dipole, better-dipole: for one semi-infinite layer; multipole: the model
+        of the 2007 talk; montecarlo: the reference, for which photons are traced now.
     clamp:
-        Source depth of the multipole in layers thinner than one mean free path: inside the layer (layer), or
-        below it, as published (none).
+        Source depth of the multipole in layers thinner than one mean free path: layer (moved inside the
+        layer), or none (below the layer, as published).
     eta:
         Index of refraction of the layers; 1 for an index-matched surface. [default: 1.4]
     photons:
-        Number of Monte Carlo photons per channel or wavelength. [default: 1000000]
+        Number of Monte Carlo photons per colour channel or wavelength. [default: 1000000]
     seed:
         Seed of the Monte Carlo random numbers. [default: 0]
     anisotropy:
-        Mean scattering cosine g of Monte Carlo photons, at constant reduced scattering.
+        Mean cosine g of the scattering angle of Monte Carlo photons; reduced scattering does not change.
     oiliness:
-        Oiliness of the surface; it has no effect on the profile.
+        Oiliness of the surface, 0 to 1; only recorded in the file that -o writes, without effect on the
+        profile.
     fit:
         Number of Gaussians to fit, 1 to 8. [default: 6]
     fit_kind:
-        Additional fit to report: Burley's normalised diffusion, or a separable kernel.
+        Additional fit to report: burley (normalised diffusion) or separable (separable kernel); gaussian adds
+        none.
     variances:
-        Variances of the Gaussians: the same for all channels, as the renderer needs them, or per channel.
+        Variances of the Gaussians: shared by all colour channels, as the renderer requires, or per-channel.
     keep_energy:
-        Constrain the weights to sum to the total reflectance; always on for the model counted.
+        Make the weights of the Gaussians sum to the total reflectance; always on for the model counted.
     through:
         Thicknesses at which to report the transmitted colour, such as 0.5,1,2 [mm].
     output:
         Profile to write (.toml), for `dermis render --profile`.
     plot:
-        Plot to write (.png, .svg or .pdf): r R(r) of each channel and its fit.
+        Plot to write (.png, .svg or .pdf): r R(r) of each colour channel, and its fit.
     check:
         Add Monte Carlo results with error bars to the plot.
     as_json:
@@ -186,11 +188,11 @@ def _check_outputs(output: Path | None, plot: Path | None, check: bool) -> None:
 
 
 def _tracing_options(photons: int | None, seed: int | None, anisotropy: float, is_traced: bool) -> Options:
-    """Return the keyword arguments of the Monte Carlo simulation.
+    """Return the keyword arguments for the Monte Carlo simulation.
 
-    Prints a note if an option of the simulation is given although no simulation will run.
+    A note is printed if an option of the simulation is given although the simulation will not run.
 
-    is_traced : whether a simulation will run
+    is_traced : whether the simulation will run
     """
     if not is_traced and (photons, seed, anisotropy) != (None, None, 0.0):
         note("note: --photons, --seed and --anisotropy have no effect without --model montecarlo or --check")

@@ -1,4 +1,4 @@
-"""Report of `dermis profile` as text, JSON, profile file and plot."""
+"""Report of `dermis profile`, as text, JSON, a profile file and a plot."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 def _format_row(channel_values: Floats) -> str:
-    """Return a number for each of red, green and blue as aligned text."""
+    """Return three numbers, for red, green and blue, as aligned text."""
     return " ".join(f"{value:7.4f}" for value in channel_values)
 
 
@@ -53,9 +53,9 @@ def gaussian_fit(
     shared_variances: bool,
     keep_energy: bool,
 ) -> GaussianFit:
-    """Return the Gaussians fitted to a diffusion profile, or a published table of Gaussians unchanged.
+    """Return the Gaussians fitted to a diffusion profile; if there are published Gaussians, return these.
 
-    published_gaussians : published Gaussians; None to fit the profile
+    published_gaussians : Gaussians to return unchanged; None to fit the profile
     term_count : number of Gaussians to fit
     shared_variances : whether all colour channels have the same variances
     keep_energy : whether the weights must sum to the total reflectance
@@ -80,7 +80,7 @@ def additional_fit(radial_profile: RadialProfile, fit_kind: str) -> BurleyFit | 
 
 @dataclass(frozen=True)
 class ProfileReport:
-    """Diffusion profile with fits and the errors of the fits, as `dermis profile` prints them.
+    """Diffusion profile with its fits and their errors, as `dermis profile` prints them.
 
     radial : diffusion profile
     tissue : tissue that the profile describes; None for a table of Gaussians
@@ -88,7 +88,7 @@ class ProfileReport:
     other_fit : Burley or separable fit; None if not requested
     through_mm : thicknesses at which the transmitted colour is reported [mm]
     model_error : error of the diffusion model relative to Monte Carlo; None if this error is unknown
-    spectrum : (31,) total reflectance by wavelength; None for tissue given by RGB coefficients [-]
+    spectrum : (31,) total reflectance at each wavelength; None for tissue given by RGB coefficients [-]
     """
 
     radial: RadialProfile
@@ -240,7 +240,7 @@ class ProfileReport:
         return {"burley": values | engines}
 
     def _transmitted_colours(self) -> dict[str, Floats]:
-        """Return the transmittance (n, 3) of slabs with the thicknesses `through_mm`, by method [-]."""
+        """Return a dictionary from methods to transmittances (n, 3) of slabs as thick as `through_mm` [-]."""
         if not self.through_mm:
             return {}
         gaussians = {"gaussians": gaussian_transmittance(self.fit.profile, self.through_mm)}
@@ -260,7 +260,7 @@ _MAX_PLOTTED_RELATIVE_ERROR = 0.3  # relative standard error above which a point
 
 
 def draw_plot(path: Path, report: ProfileReport, monte_carlo: RadialProfile | None) -> None:
-    """Plot r R(r) per colour channel: the model, its Gaussian fit, and Monte Carlo with error bars.
+    """Plot r R(r) of each colour channel: the model, its fits, and Monte Carlo results with error bars.
 
     path : file to write, .png, .svg or .pdf
     monte_carlo : profile traced for comparison; None for no comparison
@@ -288,7 +288,7 @@ def draw_plot(path: Path, report: ProfileReport, monte_carlo: RadialProfile | No
 
 
 def _plot_spectra(axes: Axes, report: ProfileReport) -> None:
-    """Plot total reflectance by wavelength, and the coefficients of the layers on a second axis."""
+    """Plot total reflectance against wavelength, and the coefficients of the layers on a second axis."""
     assert report.tissue is not None and report.spectrum is not None
     axes.plot(WAVELENGTHS_NM, report.spectrum, color="black", linewidth=1.6, label="R")
     axes.set(xlim=(400, 700), ylim=(0, 1), xlabel="wavelength [nm]", ylabel="R, of incident light")
@@ -311,7 +311,7 @@ def _add_legend(figure: Figure, axes: Axes) -> None:
 
 
 def _plot_curves(axes: Axes, report: ProfileReport) -> float:
-    """Plot r R(r) of a diffusion profile and of its fits per colour channel; return the maximum [1/mm]."""
+    """Plot r R(r) of a diffusion profile and its fits for each colour channel; return the maximum [1/mm]."""
     radial, fit = report.radial, report.fit.profile
     r = radial.radius_mm
     fitted = fit.radiant_exitance(r)

@@ -79,7 +79,7 @@ def render(
         human (the head of the package), human:SEED (a random person), a person (.json), a sample
         (lee_perry_smith), a mesh (.glb .gltf .vrm .usdz .obj .ply .stl) or a scene (.toml).
     output:
-        Image to write: .png (sRGB, 8 bit) or .exr (linear Rec. 709, float); with alpha if --background is
+        Image to write: .png (sRGB, 8 bit) or .exr (linear Rec. 709, float); it has alpha if --background is
         none.
     as_json:
         Print one JSON object with the timings of a frame whose caches are filled.
@@ -134,7 +134,7 @@ def render(
 
 @contextlib.contextmanager
 def _gc_disabled() -> Iterator[None]:
-    """Disable garbage collection in a with block; for one picture, collection frees little memory."""
+    """Disable garbage collection in a with block, as it frees little memory while one picture is rendered."""
     was_enabled = gc.isenabled()
     gc.disable()
     try:
@@ -149,7 +149,7 @@ def _write_images(
 ) -> None:
     """Write the image file and the requested outputs, which may share the image's EXR file.
 
-    output_values : pixel arrays of the outputs by name
+    output_values : dictionary from output names to pixel arrays
     """
     from dermis.images.io import write_image, write_png
 
@@ -167,8 +167,8 @@ def _write_images(
 def _note_light(scene: Scene, settings: Settings, rendered: RenderedFrame) -> None:
     """Print notes on stderr about lighting that may surprise users.
 
-    There is one note for skin triangles that are lit without scattering, one for sun-like peaks of the
-    environment, and one for the setting gamma "wrong".
+    The notes concern skin triangles that are lit without scattering, sun-like peaks of the environment, and
+    the setting gamma "wrong".
     """
     technique, suns = TECHNIQUES[settings.technique], rendered.suns
     if (

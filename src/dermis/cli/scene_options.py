@@ -59,7 +59,10 @@ if not TYPE_CHECKING:
 @Parameter(name="*")
 @dataclass(frozen=True)
 class SceneOptions:
-    """Options of a scene on the command line; the options of a model are a dictionary by field name."""
+    """Options of a scene on the command line.
+
+    The options generated from a model are one dictionary from field names to values.
+    """
 
     settings: SettingsOptions = field(default_factory=dict)
     skin: SkinOptions = field(default_factory=dict)
@@ -99,7 +102,7 @@ DEFAULT_SCENE_OPTIONS = SceneOptions()
 def assemble_scene(head_or_scene: str, options: SceneOptions) -> tuple[Scene, Settings]:
     """Return the scene and settings that a head or scene file and the command line options describe.
 
-    Settings that neither the file nor an option gives have the values of `PHOTOGRAPHIC_SETTINGS`.
+    Settings that neither the scene file nor an option specifies are taken from `PHOTOGRAPHIC_SETTINGS`.
 
     head_or_scene : head or scene file as named on the command line
     """
@@ -138,9 +141,9 @@ def assemble_scene(head_or_scene: str, options: SceneOptions) -> tuple[Scene, Se
 
 
 def fit_atlas(scene: Scene, settings: Settings, adapter_kind: str) -> Settings:
-    """Return settings for an adapter: software adapters get the atlas that the picture resolves, with a note.
+    """Return settings that suit an adapter: software adapters get an atlas no larger than the picture needs.
 
-    An atlas that the user or the scene file gives is kept.
+    A note tells the user. An atlas size that the user or the scene file specifies is kept.
 
     adapter_kind : kind of the graphics adapter, "CPU" for software
     """
@@ -228,10 +231,12 @@ def _merge_environment(scene_environment: Environment | None, options: Options) 
 def _select_lights(
     scene: Scene, rig_or_file: str | None, environment: Environment | None, *, replaces_environment: bool
 ) -> tuple[Light, ...]:
-    """Return the lights of --lights; without --lights, no lights if --env is given, else the scene's lights.
+    """Return the lights that the command line options select.
 
-    rig_or_file : value of --lights: name of a lighting rig, or path of a file; None if the option is not
-        given
+    These are the lights of --lights; without --lights, no lights if --env is given, else the lights of the
+    scene.
+
+    rig_or_file : value of --lights (name of a lighting rig, or path of a file); None without this option
     replaces_environment : whether --env replaces the environment
     """
     from dermis.scene import load_lights

@@ -1,4 +1,4 @@
-"""The command `dermis unmix`: melanin and blood from skin colour, and recolouring."""
+"""The command `dermis unmix`: melanin and blood estimated from skin colour, and recolouring."""
 
 from __future__ import annotations
 
@@ -40,10 +40,10 @@ def unmix(
     """Estimate melanin and blood of each texel of a skin colour map, and recolour it.
 
     The command writes melanin.exr and blood.exr (volume fractions, as in `dermis profile`), their standard
-    deviations melanin_sd.exr and blood_sd.exr, and residual.exr, the ratio of the colour map to the model
-    colour, which contains paint, hair and everything else that is not such skin.
+    deviations melanin_sd.exr and blood_sd.exr, and residual.exr, the colour map divided by the model's
+    colour. The residual contains what the model cannot explain, such as paint and hair.
 
-    With --spectra it prints the pigments of each measured reflectance spectrum of a table instead.
+    With --spectra, the command instead prints the pigments for each measured reflectance spectrum in a table.
 
     Examples:
 
@@ -62,25 +62,26 @@ def unmix(
     Parameters
     ----------
     colour_map:
-        Albedo of the skin: PNG, JPEG, HEIC, TIFF, WebP or AVIF, turned by its EXIF and converted by its
-        colour profile; or EXR (linear, 0 to 1).
+        Albedo of the skin: PNG, JPEG, HEIC, TIFF, WebP or AVIF, whose EXIF orientation and colour profile are
+        applied; or EXR (linear, 0 to 1).
     spectra:
-        Table of measured reflectance spectra (CSV, also .gz), instead of a colour map: wavelengths from 400
-        to 700 nm as headings (400, r400, 400 nm) or in the first column, values from 0 to 1 or in percent.
+        Table of measured reflectance spectra to use instead of a colour map (.csv or .csv.gz). Wavelengths
+        from 400 to 700 nm are headings (400, r400, 400 nm) or the first column; values are from 0 to 1 or in
+        percent.
     output:
         Folder of the maps, created if necessary.
     melanin:
-        Recolour: a factor such as x2, or the new median volume fraction such as 0.1.
+        Recolour: factor on melanin, such as x2, or its new median volume fraction, such as 0.1.
     blood:
-        Recolour: a factor such as x2, or the new median volume fraction such as 0.02.
+        Recolour: factor on blood, such as x2, or its new median volume fraction, such as 0.02.
     oxygen:
         Recolour: new oxygen saturation of the blood, 0 to 1.
     eumelanin:
         Recolour: new fraction of the melanin that is eumelanin, 0 to 1.
     find:
-        oxygen: estimate the oxygen saturation too, with a prior around --model-oxygen as wide as the
-        distribution of measured people; all: also the level of scattering and the thickness of the epidermis,
-        of spectra only.
+        What to estimate besides melanin and blood. oxygen: oxygen saturation, with a prior that is centred at
+        --model-oxygen and has the spread of measured people; all (only with --spectra): also the level of
+        scattering and the thickness of the epidermis.
     model_oxygen:
         Oxygen saturation of the skin in the colour map, 0 to 1.
     model_eumelanin:
@@ -88,13 +89,12 @@ def unmix(
     epidermis_mm:
         Thickness of the epidermis [mm].
     surface:
-        Reflection of the surface that the spectra contain and that is subtracted; 0 for spectra without
-        specular reflection [-].
+        Surface reflectance to subtract from the spectra; 0 for spectra without specular reflection [-].
     noise:
-        Relative standard deviation of the colour channels, which determines the uncertainty of the result
+        Relative standard deviation of the colour channels, from which the uncertainty of the result follows
         [-].
     shading:
-        Treat slow changes of brightness as shading and divide by them; written as shading.exr.
+        Treat slow changes of brightness as shading: divide the colours by it, and write it to shading.exr.
     widths:
         Also write three diffusion profiles and their mixing map, for `dermis render --profile-map`.
     as_json:
@@ -160,7 +160,7 @@ def _unmix_spectra(
 def _parse_change(
     melanin: str | None, blood: str | None, oxygen: float | None, eumelanin: float | None
 ) -> PigmentChange | None:
-    """Return the change of pigments that the recolouring options request; None if no option is given."""
+    """Return the change of pigments that the recolouring options request; None without such options."""
     from dermis.apps.inverse.unmixing.unmix import PigmentChange, parse_fraction_change
     from dermis.base.quantities import checked_number
 

@@ -35,9 +35,9 @@ def view(
 
     Drag to rotate, right-drag to pan, scroll to zoom, double-click to set the centre of rotation, and
     Shift-drag to move the light. Keys 1 to 5 select camera presets, Space plays and pauses a motion, Tab
-    hides the panel, ? shows all keys, and Ctrl+Z and Ctrl+Y undo and redo. The panel saves the scene as a
-    TOML file for `dermis render`. All other options are those of `dermis render`; --size is the size of the
-    window [default: 1280x800].
+    hides the panel, Ctrl+Z and Ctrl+Y undo and redo, and ? shows all keys. The panel can save the scene as a
+    TOML file for `dermis render`. All other options are those of `dermis render`, but --size is the size of
+    the window [default: 1280x800].
 
     Examples:
 
@@ -52,20 +52,21 @@ def view(
     head:
         human (the head of the package), a sample, a mesh file or a scene (.toml).
     browser:
-        Serve a web page instead of opening a window, for machines without a screen. The page shows the
-        progress until the first picture is ready.
+        Serve a web page instead of opening a window, for machines without a screen. Until the first picture
+        is ready, the page shows the progress.
     port:
         Port of the web page; 0 for any free port. [default: 8765]
     host:
-        Address to listen on; addresses other than this machine require the token in the printed URL.
+        Address to listen on; if other machines can reach it, visitors need the token in the printed URL.
         [default: 127.0.0.1]
     token:
-        Require a token on this machine too, for machines with several users and behind a proxy.
+        Require the token on this machine too, for machines that several users share or that are behind a
+        proxy.
     motion:
         Motion to play: a clip of a glTF file (file.glb or file.glb#clip), a .csv of Live Link Face, a .json
         of MediaPipe, or a sequence of meshes (a folder, or face_%05d.obj).
     motion_fps:
-        Frame rate of a motion file without times [1/s].
+        Frame rate of a mesh sequence, or of a motion file with timecodes or without times [1/s].
     """
     if not browser:
         for option, value in {"port": port, "host": host, "token": token or None}.items():

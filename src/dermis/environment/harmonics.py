@@ -16,9 +16,9 @@ _KERNEL_QUADRATURE_NODES = 4096
 def legendre_functions(cosine: Floats, degree: int, order_count: int) -> list[Floats]:
     """Return the associated Legendre functions up to `degree`, as one array for each order m.
 
-    The array of order m has the shape (degree + 1 - m, n). The functions are fully normalised: a function
-    times exp(i m phi) has a squared modulus with integral 1 over the sphere. The functions are computed by
-    recurrence in the degree [HolmesFeatherstone2002].
+    The array of order m has the shape (degree + 1 - m, n). The functions are fully normalised: if a function
+    is multiplied by exp(i m phi), the squared modulus of the product has integral 1 over the sphere. The
+    functions are computed by recurrence in the degree [HolmesFeatherstone2002].
 
     cosine : (n,) cosines of the polar angle
     order_count : number of orders m, from 0
@@ -41,8 +41,8 @@ def legendre_functions(cosine: Floats, degree: int, order_count: int) -> list[Fl
 def analyse_panorama(radiance: Floats, degree: int) -> list[Complex]:
     """Return the spherical harmonic coefficients of a panorama, an array for each order m from 0 to `degree`.
 
-    The array of order m has the shape (degree + 1 - m, c). As radiance is real, negative orders are
-    redundant.
+    The array of order m has the shape (degree + 1 - m, c). Negative orders are omitted; they follow from the
+    others, as radiance is real.
 
     radiance : (h, w, c) radiance of the panorama
     """
@@ -61,8 +61,9 @@ def analyse_panorama(radiance: Floats, degree: int) -> list[Complex]:
 def zonal_factors(kernel: Callable[[Floats], Floats], degree: int) -> Floats:
     """Return the factors (degree + 1,) by which convolution with a kernel multiplies harmonic coefficients.
 
-    kernel : isotropic kernel as a function of the angle theta in 0..pi/2, taken as 0 beyond; the factor of
-        degree 0 is the kernel's integral over the sphere
+    kernel : isotropic kernel as a function of the angle theta in 0..pi/2, taken as 0 beyond pi/2
+
+    The factor of degree 0 is the integral of the kernel over the sphere.
 
     Source: the Funk-Hecke theorem, as in [RamamoorthiHanrahan2001].
     """
@@ -72,10 +73,10 @@ def zonal_factors(kernel: Callable[[Floats], Floats], degree: int) -> Floats:
 
 
 def synthesise_panoramas(coefficients: list[Complex], factors: Floats, height: int) -> Floats:
-    """Return k panoramas (k, height, 2 height, c) from one set of coefficients, scaled by k sets of factors.
+    """Return k panoramas (k, height, 2 height, c), each from the coefficients times a set of factors.
 
     coefficients : coefficients of the spherical harmonics, see `analyse_panorama`
-    factors : (k, degree + 1) factor of each panorama for each degree, such as k results of `zonal_factors`
+    factors : (k, degree + 1) factor for each panorama and degree, such as k results of `zonal_factors`
     """
     width, channels = 2 * height, coefficients[0].shape[1]
     count, degree = factors.shape[0], factors.shape[1] - 1

@@ -1,8 +1,8 @@
 """Least-squares fits of sums of isotropic lobes to specular lobes.
 
 At each node of a table over roughness and view angle, five isotropic lobes approximate the specular lobe.
-Each isotropic lobe has four parameters, relative to the mean direction and standard deviations of the
-specular lobe.
+Each isotropic lobe has four parameters, which are fitted relative to the mean direction and the standard
+deviations of the specular lobe.
 """
 
 from __future__ import annotations
@@ -58,14 +58,14 @@ def fit_isotropic_lobes(lobe: Lobe) -> Floats:
     roughness, weight.
 
     Three lobes are in the plane of incidence; for views near the normal, only one or two of these lobes have
-    weight. The other two lobes are a pair: on both sides of the plane of incidence or, where the specular
-    lobe is elongated, in the plane.
+    weight. The other two lobes form a pair. Where the specular lobe is elongated, both lobes of the pair are
+    in the plane of incidence; elsewhere, they are mirror images on opposite sides of this plane.
 
-    The fit minimises the expected difference between the reflections of a random environment by the specular
-    lobe and by the sum of the isotropic lobes. The power of the environment falls with the harmonic degree,
-    and light also comes from below the horizon. Fits proceed from rough surfaces and grazing views to smooth
-    surfaces and views along the normal. A fit starts at the mean of adjacent table nodes that are already
-    fitted, so that lobes vary smoothly over the table.
+    The fit minimises the expected difference between two reflections of a random environment: by the specular
+    lobe, and by the sum of the isotropic lobes. The environment surrounds the surface on all sides, also
+    below the horizon, and its power falls with the harmonic degree. Fits proceed from rough surfaces and
+    grazing views to smooth surfaces and views along the normal. Each fit starts at the mean parameters of the
+    adjacent table nodes that are already fitted, so that lobes vary smoothly over the table.
     """
     found: dict[TableNode, Floats] = {}
     cosines, roughnesses = LOBE_TABLE_COSINES.tolist(), LOBE_TABLE_ROUGHNESSES.tolist()
@@ -97,10 +97,10 @@ def _active_lobes(view_index: int) -> NDArray[np.bool_]:
 
 
 def _parameter_direction(parameter_kind: int, *lobe_amounts: tuple[int, float]) -> Floats:
-    """Return a direction (20,) in the space of the lobe parameters: a change of one parameter in some lobes.
+    """Return a direction (20,) in the space of lobe parameters that changes one parameter of some lobes.
 
     parameter_kind : parameter that changes, such as `_POSITION`
-    lobe_amounts : pairs of the index of a lobe, and the change of the parameter of this lobe
+    lobe_amounts : pairs of a lobe index and the amount by which the parameter of this lobe changes
     """
     change = np.zeros((4, LOBE_COUNT))
     for lobe, amount in lobe_amounts:
@@ -111,8 +111,9 @@ def _parameter_direction(parameter_kind: int, *lobe_amounts: tuple[int, float]) 
 def _free_directions(target: LobeTarget, view_index: int) -> Floats:
     """Return the directions (20, k) in parameter space along which a fit moves the lobes.
 
-    Directions of the lobes in the plane of incidence come first, then directions of the pair. The pair stays
-    symmetric about the plane unless both lobes of the pair are in the plane.
+    Directions that move the lobes in the plane of incidence come first, then directions that move the pair of
+    lobes (see `fit_isotropic_lobes`). The two lobes of the pair either both stay in the plane, or remain
+    mirror images of each other.
 
     view_index : index of the view in LOBE_TABLE_COSINES
     """
@@ -137,9 +138,10 @@ def _is_elongated(target: LobeTarget) -> bool:
 
 
 def _arrange_pair(initial: Floats, target: LobeTarget, view_index: int) -> Floats:
-    """Return initial parameters (4, 5) with the pair placed as the specular lobe requires.
+    """Return initial parameters (4, 5) in which the pair of lobes is placed as the specular lobe requires.
 
-    For an elongated specular lobe, the pair is in the plane of incidence, else on both sides of this plane.
+    If the specular lobe is elongated, both lobes of the pair are placed in the plane of incidence. Otherwise
+    they are placed on opposite sides of this plane.
 
     initial : (4, 5) initial parameters; axes: kind of parameter, lobe
     view_index : index of the view in LOBE_TABLE_COSINES
@@ -163,12 +165,14 @@ def _arrange_pair(initial: Floats, target: LobeTarget, view_index: int) -> Float
 def _fit_parameters(target: LobeTarget, view_index: int, initial: Floats, neighbour_mean: Floats) -> Floats:
     """Fit five isotropic lobes to a specular lobe and return their parameters (4, 5).
 
-    The four parameters are position in the plane of incidence, distance from this plane, logarithm of the
-    width, and logarithm of the weight. Lengths are in standard deviations of the specular lobe.
+    The four parameters of a lobe are its position along the plane of incidence, its distance from this plane,
+    the logarithm of its width, and the logarithm of its weight. The unit of lengths is the standard deviation
+    of the specular lobe.
 
     view_index : index of the view in LOBE_TABLE_COSINES
     initial : initial parameters (4, 5)
-    neighbour_mean : mean parameters (4, 5) of adjacent table nodes, towards which the fit is regularised
+    neighbour_mean : mean parameters (4, 5) of adjacent table nodes; regularisation pulls the fit towards
+        these
     """
     from scipy.optimize import least_squares
 
@@ -186,7 +190,7 @@ def _fit_parameters(target: LobeTarget, view_index: int, initial: Floats, neighb
 
     @lru_cache(maxsize=2)
     def reduced_system(vector: bytes) -> Floats:
-        """Return Jacobian and residual, reduced by QR from about 8,000 to 16 rows.
+        """Return the Jacobian and the residuals, reduced by QR from about 8,000 rows to 16.
 
         vector : parameters along the free directions, as bytes of float64
         """

@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 
 
 def isotropic_lobe_constants() -> dict[str, float]:
-    """Return the values of environment.wgsl's `#fill` constants for the table: sizes and roughness range."""
+    """Return the sizes and roughness range of the table, as `#fill` constants for environment.wgsl."""
     return {
         "mirror_rough": ROUGHNESS_COUNT,
         "mirror_views": VIEW_COUNT,
@@ -35,20 +35,23 @@ def isotropic_lobe_constants() -> dict[str, float]:
 
 @cache
 def isotropic_lobe_table(model: str = "kelemen") -> Floats:
-    """Return the isotropic lobes that approximate a specular lobe, by roughness and view, (12, 16, 5, 4).
+    """Return a table (12, 16, 5, 4) of the five isotropic lobes that approximate a specular lobe.
 
-    The last axis is the direction (x, y), the roughness and the weight of each of five lobes.
+    The axes of the table are roughness, view, lobe, and parameter. The roughness axis is uniform in the
+    logarithm of the roughness, from 0.05 to 1. The view axis is uniform in the square root of the cosine of
+    the view angle. The parameters are the direction (x, y), the roughness and the weight of a lobe.
 
     model : name in MODELS
 
-    The first axis is uniform in the logarithm of the roughness from 0.05 to 1, the second in the square root
-    of the view's cosine. Directions are stereographic coordinates (x, y) about the mirror direction: the
-    direction is 2 x away from the viewer, 2 y across the plane of incidence and 1 - x^2 - y^2 along the
-    mirror direction, all divided by 1 + x^2 + y^2. Lobes that are interpolated between columns thus follow
-    the mirror direction; the views of the last two columns are 29 degrees apart. The weighted sum of five
-    lobes approximates the specular lobe, which at grazing views is elongated, off the mirror direction, and
-    ends at the horizon. Lobes of weight 0 need no lookup. Models without a shipped table are fitted on first
-    use, which takes half a minute.
+    The direction (x, y) is in stereographic coordinates about the mirror direction. Its unit vector has three
+    components: 2x away from the viewer (in the plane of incidence), 2y perpendicular to the plane of
+    incidence, and 1 - x^2 - y^2 along the mirror direction, each divided by 1 + x^2 + y^2. When the table is
+    interpolated between views, the lobes thus follow the mirror direction; the last two views are 29 degrees
+    apart.
+
+    The weighted sum of the five lobes approximates the specular lobe. At grazing views, the specular lobe is
+    elongated, deviates from the mirror direction, and ends at the horizon. Lobes of weight 0 need no lookup.
+    Models without a shipped table are fitted on first use, which takes half a minute.
     """
     rows = [row for row in read_rows("dermis.environment", "data/mirrors") if row["model"] == model]
     columns = [

@@ -1,6 +1,7 @@
 """Spherical harmonics of specular and isotropic lobes, with the normal of the plane of incidence as pole.
 
-Lobes are symmetric about this plane, so half of the harmonics vanish; n is the number of the other harmonics.
+Lobes are symmetric about this plane, so half of the harmonics vanish; n is the number of harmonics that
+remain.
 """
 
 from __future__ import annotations
@@ -50,8 +51,8 @@ class LobeTarget(NamedTuple):
 class IsotropicLobes(NamedTuple):
     """Parameters of five isotropic lobes, (5,) each.
 
-    angle : angle of the direction from the normal, in the plane of incidence [rad]
-    out_of_plane : angle of the direction from the plane of incidence [rad]
+    angle : angle from the normal to the direction after its projection onto the plane of incidence [rad]
+    out_of_plane : angle between the direction and the plane of incidence [rad]
     log_roughness : logarithm of the roughness
     weight : weights, which sum to 1
     """
@@ -63,9 +64,9 @@ class IsotropicLobes(NamedTuple):
 
 
 def lobe_target(lobe: Lobe, view_cosine: float, m: float) -> LobeTarget:
-    """Expand a specular lobe in spherical harmonics, as a fitting target.
+    """Expand a specular lobe in spherical harmonics, to which isotropic lobes are then fitted.
 
-    view_cosine : cosine of the angle between view and surface normal
+    view_cosine : cosine of the angle between view direction and surface normal
     m : roughness [-]
 
     The quadrature covers one side of the plane of incidence, as the lobe is symmetric about this plane.
@@ -95,10 +96,11 @@ def lobe_target(lobe: Lobe, view_cosine: float, m: float) -> LobeTarget:
 
 @cache
 def harmonic_terms(degree: int) -> tuple[NDArray[np.intp], NDArray[np.intp], Floats]:
-    """Return degree, order and weight (n,) of the harmonics that are symmetric about the plane of incidence.
+    """Return degree, order and weight of the n harmonics that are symmetric about the plane of incidence.
 
-    The sum of the squared, weighted differences of two lobes' coefficients is the expected squared difference
-    of the two lobes' reflections of a randomly rotated environment.
+    The weights are chosen for comparisons of two lobes that reflect the same, randomly rotated environment.
+    The expected squared difference of the two reflections is a sum over the harmonics: the difference of the
+    two coefficients is multiplied by the weight and squared.
     """
     pairs = [(l, m) for m in range(degree + 1) for l in range(m, degree + 1, 2)]
     degrees, orders = np.array(pairs, np.intp).T
@@ -110,9 +112,9 @@ def harmonic_terms(degree: int) -> tuple[NDArray[np.intp], NDArray[np.intp], Flo
 def isotropic_sum(lobes: IsotropicLobes, degree: int) -> tuple[Complex, Complex]:
     """Return the harmonic coefficients (n,) of a sum of isotropic lobes, and their derivatives (n, 4, 5).
 
-    Each lobe is averaged with the mirror image of the lobe in the plane of incidence. The four derivatives
-    for each lobe are with respect to the lobe's angle, out-of-plane angle, log roughness, and log weight
-    (while the sum of all weights is constant).
+    Each lobe is averaged with its mirror image in the plane of incidence. The four derivatives for each lobe
+    are with respect to the angle, the out-of-plane angle, the log roughness, and the log weight of the lobe.
+    For the log weight, the sum of all weights is kept constant.
     """
     order = harmonic_terms(degree)[1]
     azimuthal = np.exp(-1j * np.outer(np.arange(degree + 1), lobes.angle))[order]
@@ -143,9 +145,9 @@ def _legendre_from_plane(sine: Floats, degree: int) -> Floats:
 
 @cache
 def _legendre_at_nodes(roughness: float, degree: int) -> Floats:
-    """Return the associated Legendre functions (n, k) at the quadrature nodes across the plane of incidence.
+    """Return the associated Legendre functions (n, k) at k quadrature angles from the plane of incidence.
 
-    roughness : roughness of the lobe, which determines how far the nodes extend
+    roughness : roughness of the lobe, which determines the largest angle
     """
     t = (np.arange(_NODES_ACROSS_INCIDENCE) + 0.5) / _NODES_ACROSS_INCIDENCE
     return _legendre_from_plane(np.sin(min(10.0 * roughness + 0.05, 0.5 * np.pi) * t**2), degree)
@@ -172,9 +174,9 @@ def _interpolate_legendre(degree: int, out_of_plane: Floats) -> tuple[Floats, Fl
 
 
 def _layer_convolution_factors(log_roughness: float, degree: int) -> Floats:
-    """Return the convolution factors of a prefiltered lobe for each harmonic, and their derivatives, (2, n).
+    """Return the convolution factors of a prefiltered lobe, and their derivatives, for each harmonic, (2, n).
 
-    The factors are interpolated between two prefiltered layers, as in the shader. Derivatives are with
+    The factors are interpolated between two prefiltered layers, as in the shader. The derivatives are with
     respect to the logarithm of the roughness.
 
     log_roughness : logarithm of the roughness
@@ -189,7 +191,7 @@ def _layer_convolution_factors(log_roughness: float, degree: int) -> Floats:
 
 @cache
 def _layer_factor_table() -> Floats:
-    """Return the convolution factors (layers, degrees) of each prefiltered layer for each degree.
+    """Return the convolution factor of each prefiltered layer for each degree, (layers, degrees).
 
     Factors for degrees above the highest degree of the layers are 0.
     """

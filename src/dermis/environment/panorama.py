@@ -32,9 +32,9 @@ def load_panorama(panorama_name: str, max_rows: int = _MAX_PANORAMA_ROWS) -> Flo
     """Load a panorama of radiance (h, 2 h, 3), linear Rec. 709, with -Z at the centre, +X right and +Y up.
 
     panorama_name : a sample, a file (.hdr, .exr), or "uniform"
-    max_rows : largest h; larger pictures are reduced by averaging
+    max_rows : largest number of rows h; larger pictures are reduced by averaging
 
-    A few infinite, NaN or negative pixels are repaired, with a note.
+    A few infinite, NaN or negative pixels are repaired, with a note to the user.
 
     Raises DermisError for any other name, and for a picture without radiance.
     """
@@ -92,11 +92,11 @@ def resample_panorama(radiance: NDArray[np.floating], height: int) -> Floats:
 
 
 def _interval_means(interval_values: NDArray[np.floating], edges: Floats, target_edges: Floats) -> Floats:
-    """Return means of a piecewise constant function over other intervals, along the first axis.
+    """Return the means of a piecewise constant function over target intervals, along the first axis.
 
-    interval_values : (n, ...) values of the function between consecutive edges
-    edges : (n + 1,) increasing edges of these intervals
-    target_edges : (k + 1,) edges of the intervals over which the k means are taken
+    interval_values : (n, ...) values of the function between consecutive `edges`
+    edges : (n + 1,) increasing positions at which the function changes, with both ends
+    target_edges : (k + 1,) edges of the target intervals, over which the k means are taken
     """
     first = np.clip(np.searchsorted(edges, target_edges[:-1], "right") - 1, 0, len(interval_values) - 1)
     after = np.clip(np.searchsorted(edges, target_edges[1:], "left"), 1, len(interval_values))
@@ -148,15 +148,15 @@ class Sun:
 
 
 def split_suns(radiance: Floats) -> tuple[Floats, list[Sun]]:
-    """Split a panorama into suns and the remaining panorama, which together have the original light.
+    """Split a panorama into a remaining panorama and suns, which together have the light of the original.
 
     Suns are sorted by irradiance, the strongest first.
 
-    radiance : (h, w, 3)
+    radiance : (h, w, 3) radiance of the panorama
 
-    A sun is the radiance above 32 times the mean, within 8 degrees of the centre of a bright cluster. At most
-    four suns are extracted. Each sun causes at least 5 % of the irradiance that a uniform sky with the
-    panorama's mean radiance would cause. This is a simplified median cut of light probes [Debevec2005].
+    A sun is the radiance in excess of 32 times the mean, within 8 degrees of the centre of a bright cluster.
+    At most four suns are extracted. Each sun causes at least 5 % of the irradiance that a uniform sky with
+    the panorama's mean radiance would cause. This is a simplified median cut of light probes [Debevec2005].
     """
     mean = float(luminance(mean_radiance(radiance)))
     brightness = np.asarray(luminance(radiance), np.float64)
@@ -185,11 +185,13 @@ def _luminance_sum(colours: Floats) -> float:
 
 
 def _fit_sun(irradiances: Floats, unit_vectors: Floats, solid_angles: Floats) -> Sun:
-    """Return the sun for a cluster of n texels: a uniform disc with the same light and mean square radiance.
+    """Return the sun that replaces a cluster of n texels.
+
+    The sun is a uniform disc with the irradiance of the cluster and the same integral of squared radiance.
 
     irradiances : (n, 3) radiance of each texel times the solid angle of the texel
     unit_vectors : (n, 3) unit vectors to the texels
-    solid_angles : (n,) solid angles [sr]
+    solid_angles : (n,) solid angles of the texels [sr]
     """
     grey = np.asarray(luminance(irradiances), np.float64)
     centre = grey @ unit_vectors
@@ -200,11 +202,11 @@ def _fit_sun(irradiances: Floats, unit_vectors: Floats, solid_angles: Floats) ->
 def _bright_clusters(
     brightness: Floats, unit_vectors: Floats, solid_angles: Floats
 ) -> list[NDArray[np.bool_]]:
-    """Group n bright texels into clusters; return a mask (n,) of each cluster, brightest peak first.
+    """Group n bright texels into clusters; return the mask (n,) of each cluster, brightest peak first.
 
-    brightness : (n,) luminance
+    brightness : (n,) luminance of the texels
     unit_vectors : (n, 3) unit vectors to the texels
-    solid_angles : (n,) solid angles [sr]
+    solid_angles : (n,) solid angles of the texels [sr]
     """
     near = np.cos(np.radians(_SUN_CLUSTER_DEGREES))
     remaining = np.ones(len(brightness), bool)

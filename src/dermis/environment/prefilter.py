@@ -21,13 +21,14 @@ _MAX_HARMONIC_DEGREE = 160  # the factor of the smoothest lobe is 2e-4 here, so 
 
 
 def isotropic_lobe(theta: Floats, m: float) -> Floats:
-    """Return the weight of radiance at an angle from the mirror direction, for a view along the normal.
+    """Return the weight of light at an angle to the mirror direction, for a view along the normal.
 
     theta : angle from the mirror direction [rad], 0 to pi / 2
     m : roughness [-]
 
-    The weight is the Kelemen lobe for equal normal, view and mirror direction [Karis2013], up to a constant
-    factor: the angle of the half vector h is theta / 2, and h.h is 4 cos^2(theta / 2) before normalisation.
+    The weight is the Kelemen lobe times cos(theta), up to a constant factor. Normal, view and mirror
+    direction are assumed to be equal [Karis2013]. The half vector h is then at the angle theta / 2 from the
+    normal, and h.h is 4 cos^2(theta / 2) before normalisation.
     """
     half = np.cos(0.5 * theta)
     with np.errstate(under="ignore"):
@@ -35,7 +36,7 @@ def isotropic_lobe(theta: Floats, m: float) -> Floats:
 
 
 def reflection_constants() -> dict[str, float]:
-    """Return the values of environment.wgsl's `#fill` constants for the layers: count and roughness range."""
+    """Return the number and roughness range of the layers, as `#fill` constants for environment.wgsl."""
     return {
         "reflections": len(LAYER_ROUGHNESSES),
         "smoothest_reflection": SMOOTHEST,
@@ -47,9 +48,9 @@ def reflection_constants() -> dict[str, float]:
 class Prefiltered:
     """Panorama convolved with a cosine and with lobes of several roughnesses, for lookups by the shader.
 
-    layers : (14, h, 2 h, 3) float32: irradiance by normal, then mean radiance by mirror direction for each
-        roughness
-    suns : peaks of the panorama, which are not part of the layers
+    layers : (14, h, 2 h, 3) a layer of irradiance by normal direction, then for each roughness a layer of
+        weighted mean radiance by mirror direction
+    suns : suns that were removed from the panorama before the convolution
     """
 
     layers: NDArray[np.float32]
@@ -58,12 +59,12 @@ class Prefiltered:
 
 @logged_step("filtering the environment")
 def prefilter(panorama_name: str) -> Prefiltered:
-    """Load a panorama, split off its suns, and convolve the remainder with isotropic kernels.
+    """Load a panorama, separate its suns, and convolve the remainder with isotropic kernels.
 
     panorama_name : see `load_panorama`
 
-    Convolution is exact multiplication of spherical harmonics up to degree 160, so there is no noise from
-    sampling.
+    The convolution multiplies the coefficients of spherical harmonics up to degree 160, so there is no noise
+    from sampling.
 
     Sources: [KautzMcCool2000] for reflections by roughness, [RamamoorthiHanrahan2001] for irradiance.
     """
@@ -78,7 +79,7 @@ def prefilter(panorama_name: str) -> Prefiltered:
 
 
 def isotropic_kernel(m: float) -> Floats:
-    """Return the factors (161,), one per degree, of the convolution with an isotropic lobe of roughness m.
+    """Return the factor for each degree (161,) of the convolution with an isotropic lobe of roughness m.
 
     The lobe is normalised to unit integral.
     """

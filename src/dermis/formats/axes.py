@@ -1,6 +1,6 @@
 """Coordinate axes of files: the axis that points up, and the axis along which the face looks.
 
-NumPy is imported on first use, so that help texts appear quickly.
+NumPy is imported on first use, so that command-line help appears quickly.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ Front = Literal["auto", "x", "y", "z", "-x", "-y", "-z"]
 
 
 class Axes(NamedTuple):
-    """Axes of a file that point upwards and to the front.
+    """Up axis and front axis of a file.
 
     up : axis that points upwards; None if the axis is unknown, in which case Y is assumed
-    front : axis along which the face looks, perpendicular to `up`; "auto" if it is not known, and -Y is
-        assumed if Z is up, as in Blender, else Z
+    front : axis along which the face looks, perpendicular to `up`; "auto" if the axis is unknown, in which
+        case -Y is assumed if Z is up (as in Blender), and Z otherwise
     """
 
     up: Axis | None = None
@@ -32,17 +32,17 @@ class Axes(NamedTuple):
 
     @property
     def face(self) -> Axis:
-        """Return the axis along which the face looks, or the assumed axis if it is not known."""
+        """Return the axis along which the face looks, or the assumed axis if `front` is "auto"."""
         if self.front != "auto":
             return self.front
         return "-y" if self.up in ("z", "-z") else "z"
 
     def or_stated(self, stated_axes: Axes) -> Axes:
-        """Return the axes that the user chose (these axes), completed by the axes that the file states.
+        """Return these axes, which the user chose; axes that the user left open are taken from the file.
 
         stated_axes : axes that the file states
 
-        The front that the file states is used only if the file also has the resulting up axis.
+        The stated front is used only if the resulting up axis is also the stated one.
         """
         chosen = self._replace(up=self.up or stated_axes.up)
         same = chosen.front == "auto" and chosen.top == stated_axes.top
@@ -69,7 +69,7 @@ def to_y_up(vectors: Doubles, file_axes: Axes) -> Doubles:
 
 
 def file_axis(direction: Axis, axes: Axes) -> Axis:
-    """Return the axis of a file that `to_y_up` rotates to an axis of the head.
+    """Return the axis of a file that `to_y_up` turns into the axis `direction` of the head.
 
     direction : axis of the head
     axes : axes of the file

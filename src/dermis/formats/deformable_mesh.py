@@ -35,7 +35,8 @@ class VertexTarget(NamedTuple):
     """Morph target of a mesh: the vertices that it changes, and their changes at weight 1.
 
     vertex : (n,) indices of the changed vertices
-    delta_mm, normal : (n, 3) changes of position [mm] and of the unit normal
+    delta_mm : (n, 3) changes of position [mm]
+    normal : (n, 3) changes of the unit normal
     """
 
     vertex: Index
@@ -45,7 +46,7 @@ class VertexTarget(NamedTuple):
 
 @dataclass(frozen=True)
 class DeformableMesh:
-    """Mesh of a head with the morph targets and bone weights that its rig gives each vertex, for export."""
+    """Mesh of a head for export, with morph targets and bone weights for each vertex."""
 
     head: Head
 
@@ -56,7 +57,7 @@ class DeformableMesh:
 
     @cached_property
     def refinement(self) -> csr_array | None:
-        """Return the subdivision matrix (q, p), control points to mesh points; None without subdivision."""
+        """Return the (q, p) subdivision matrix, control points to mesh points; None without subdivision."""
         from scipy.sparse import csr_array
 
         stencils = self.rig.stencils
@@ -127,7 +128,7 @@ class DeformableMesh:
         return bone[point].astype(dtype), weight[point].astype(np.float32)
 
     def _control_displacements(self, target_index: int) -> Doubles:
-        """Return the displacements of the control points by a morph target at weight 1, (p, 3) [mm]."""
+        """Return the displacements (p, 3) of the control points by a morph target at weight 1 [mm]."""
         targets, displacement = self.rig.targets, np.zeros((len(self.rig.positions_mm), 3))
         part = targets.rows(target_index)
         displacement[targets.point[part]] = targets.delta_mm[part]
@@ -143,9 +144,10 @@ def point_bone_influences(rig: Rig, refinement: csr_array | None) -> tuple[Index
 
     refinement : (q, p) subdivision matrix from control points to mesh points; None without subdivision
 
-    Without subdivision, the weights of the rig are kept. A subdivided point may depend on more than four
-    bones, and linear blend skinning does not commute with subdivision: the four bones and weights minimise
-    the squared distance to the subdivided point, averaged over rotations of each bone about any axis.
+    Without subdivision, the weights of the rig are kept. With subdivision, a point may depend on more than
+    four bones, and linear blend skinning does not commute with subdivision. Four bones and their weights are
+    therefore fitted: they minimise the squared distance between the skinned point and the point that results
+    from subdivision of the skinned control mesh, averaged over rotations of each bone about all axes.
     """
     skeleton = rig.skeleton
     assert skeleton is not None
@@ -218,12 +220,13 @@ def _quadratic_error(
     refinement: csr_array,
     descendant_matrix: Doubles,
 ) -> tuple[Doubles, Doubles]:
-    """Return H (n, u, u) and g (n, u) of the squared error w H w - 2 g w [mm²] of skinned points.
+    """Return the matrices H (n, u, u) and vectors g (n, u) of a quadratic error of n skinned points.
 
-    w are the weights of u candidate bones for each of n points.
+    For each point, the squared error is w H w - 2 g w [mm²], up to a constant. The vector w (u,) contains the
+    weights of u candidate bones.
 
-    followed_fractions : (p, b) fraction of each bone's rotation that each control point follows, as the sum
-        of the weights of the bone and of its descendants
+    followed_fractions : (p, b) fraction of each bone's rotation that each control point follows: the summed
+        weights of the bone and its descendants
     refinement : (n, p) subdivision matrix from control points to the n points
     descendant_matrix : (b, u) 1 where candidate bone u is bone b or one of its descendants, else 0
     """
@@ -242,7 +245,8 @@ def _quadratic_error(
 def _best_bone_weights(hessian: Doubles, gradient: Doubles) -> Doubles:
     """Return the weights w (n, u) that minimise w H w - 2 g w: non-negative, sum 1, at most four above 0.
 
-    hessian, gradient : H (n, u, u) and g (n, u), see `_quadratic_error`
+    hessian : matrices H (n, u, u), see `_quadratic_error`
+    gradient : vectors g (n, u), see `_quadratic_error`
     """
     count, bones = gradient.shape
     smallest, best = np.full(count, np.inf), np.zeros(gradient.shape)

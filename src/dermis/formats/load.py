@@ -83,8 +83,8 @@ def load_rigged(
         (`default_unit_mm`)
     v_origin : edge of the map at v = 0, "top" as in glTF, "bottom" as in OBJ and PLY; "auto" selects by
         format
-    up, front : axes of the file that point upwards and along which the face looks, see `to_y_up`; by default
-        the up axis that the file states, and the front that `face_direction` finds
+    up : axis of the file that points upwards, see `to_y_up`; by default the axis that the file states
+    front : axis of the file along which the face looks; by default the axis that `face_direction` finds
     skin_groups : names of the groups that are skin; empty to detect them
     opaque : names of groups that are not skin
     eye_groups : names of groups that contain eyeballs, besides the groups found by `is_eye_name`
@@ -157,7 +157,7 @@ def _load_uncached(
 
 
 def _resolve_axes(user_axes: Axes, file_axes: Axes, mesh_path: Path) -> Axes:
-    """Return the axes that the user chose, completed by the axes that the file states.
+    """Return the axes that the user chose; axes that the user left open are taken from the file.
 
     Raises DermisError if the front is parallel to the up axis.
     """
@@ -171,9 +171,10 @@ def _resolve_axes(user_axes: Axes, file_axes: Axes, mesh_path: Path) -> Axes:
 def _find_front(
     axes: Axes, mesh_file: MeshFile, joined_part: MeshPart, skin_triangles: Mask
 ) -> tuple[Axes, str]:
-    """Detect the front from the shape; return axes with this front, and a note if it is not the default.
+    """Detect the front axis from the shape of the mesh; return the axes with this front, and a note.
 
-    A front that is already set is kept, and so is the default front of files that this package wrote.
+    The note is empty if the front is the default. A front that is already set is kept, and so is the default
+    front of files that this package wrote.
 
     joined_part : mesh part with all vertices of the file
     skin_triangles : (f,) mask of triangles that are skin
@@ -196,13 +197,13 @@ def _find_front(
 
 
 def _weld_groups(mesh_parts: list[MeshPart]) -> Floats:
-    """Return a weld group for each vertex, (v,): coincident vertices of different groups are not welded."""
+    """Return the weld group (v,) of each vertex; coincident vertices of different groups are not welded."""
     numbers = [number if part.separate else 0 for number, part in enumerate(mesh_parts, start=1)]
     return np.repeat(np.array(numbers, np.float32), [len(part.positions) for part in mesh_parts])
 
 
 def _uv_from_top(uv: Doubles, mesh_path: Path, v_origin: Origin) -> Doubles:
-    """Return uv (v, 2) with v = 0 in the top row, clamped to [0, 1] where rounding exceeds it."""
+    """Return uv (v, 2) with v = 0 at the top edge; rounding errors beyond [0, 1] are clamped."""
     from_top = v_origin == "top" or (v_origin == "auto" and is_gltf(mesh_path))
     flipped = uv if from_top else np.column_stack((uv[:, 0], 1 - uv[:, 1]))
     clamped = np.clip(flipped, 0, 1)
@@ -230,7 +231,7 @@ class _AssignedMaterials(NamedTuple):
 def _assign_materials(
     mesh_file: MeshFile, declared_names: GroupNames, mesh_path: Path
 ) -> tuple[_AssignedMaterials, str]:
-    """Return the materials of the mesh, in the order of the file, and a note on which of them are skin."""
+    """Return the materials of the mesh, in the order of the file, and a note on which materials are skin."""
     parts, unnamed = mesh_file.parts, (mesh_path.stem,)
     groups = [replace(part.group, names=part.group.names or unnamed) for part in parts]
     is_opaque = _match_groups(groups, declared_names.opaque, "opaque", mesh_path)
@@ -290,7 +291,7 @@ def _match_groups(
 ) -> list[bool]:
     """Return for each group whether one of its names is in `declared_names`; refuse names that no group has.
 
-    option_name : argument of `load_rigged` with these names, for the error
+    option_name : argument of `load_rigged` that contains `declared_names`, for the error
     """
     folded = {name.casefold() for name in declared_names}
     unknown = folded - {name.casefold() for group in groups for name in group.names}
@@ -310,12 +311,12 @@ class GroupNames(NamedTuple):
 
 
 class FileSurface(NamedTuple):
-    """Data of a mesh file with which the file's materials and pictures are applied to the mesh.
+    """Data of a mesh file for applying the materials and pictures of the file to the mesh.
 
-    in_file : (m,) for each material of the mesh, the index of its material in the file, -1 if there is none
+    in_file : (m,) index in the file of each material of the mesh, -1 for a material that is not in the file
     has_uv : (m,) mask of materials whose triangles have uv in the file
     colours : (v, 3) linear colours of vertices, or None
-    other_uv : additional uv sets (v, 2), by their index in the file
+    other_uv : dictionary from the index of an additional uv set in the file to its coordinates (v, 2)
     """
 
     in_file: tuple[int, ...] = ()
@@ -328,7 +329,8 @@ class RiggedMesh(NamedTuple):
     """Mesh with the rig that deforms it; the rig is None for a mesh that cannot be deformed.
 
     notes : sentences for users on content that was repaired, replaced or left out
-    materials : materials of the file, which `surface` indexes; empty if the mesh is from the disk cache
+    materials : materials of the file, to which indices in `surface` refer; empty if the mesh is from the disk
+        cache
     unit_mm : length unit of the file or of its format [mm]; None if the mesh is from the disk cache
     file_vertices : relation between the points of the mesh and the vertices of the file
     """
@@ -415,7 +417,7 @@ def _from_arrays(arrays: Arrays) -> RiggedMesh:
 def is_eye_name(group_names: Sequence[str]) -> bool:
     """Return whether a group's names denote an eyeball or its parts, such as Eye_L, sclera, Std_Cornea_R.
 
-    group_names : names of the group, with its material first; the first name with a known word decides
+    group_names : names of the group, the name of its material first; the first name with a known word decides
 
     Lashes, brows, lids and transparent layers on the eye, such as tear films, are not eyes.
     """

@@ -53,7 +53,7 @@ def check_finite(path: PathLike, texels: A) -> A:
 def _convert_in_strips(
     image: Pixels, texel_shape: tuple[int, ...], convert_strip: Callable[[Any], Floats]
 ) -> Floats:
-    """Convert a picture (H, W, ...) to an array (H, W, *shape) in strips of rows, to limit memory."""
+    """Convert a picture (H, W, ...) to an array (H, W, *texel_shape) in strips of rows, to save memory."""
     converted = np.empty((*image.shape[:2], *texel_shape), np.float32)
     for rows in row_strips(image):
         converted[rows] = convert_strip(image[rows])
@@ -143,7 +143,11 @@ def slope_map(path: PathLike, normal_y: str) -> Floats:
 
 
 def _normal_statistics(normals: Floats) -> Doubles:
-    """Return (4,): numbers of all texels and of outward unit normals, then the sum of z over either set."""
+    """Return four statistics of normals, (4,).
+
+    These are the number of texels, the number of texels with outward unit normals, the sum of the z
+    components over all texels, and the sum of the z components over texels with outward unit normals.
+    """
     length = np.sqrt(np.einsum("hwc,hwc->hw", normals, normals))
     z = normals[..., 2]
     outward = (np.abs(length - 1) < 0.15) & (z > 0)
@@ -155,8 +159,10 @@ def _check_normals(
 ) -> None:
     """Refuse a picture with too few outward unit normals to be a tangent-space normal map.
 
-    texel_count, outward_count : numbers of all texels and of outward unit normals
-    z_sum, outward_z_sum : sums of the z components over all texels and over outward unit normals
+    texel_count : number of texels
+    outward_count : number of texels with outward unit normals
+    z_sum : sum of the z components of the normals over all texels
+    outward_z_sum : sum of the z components over texels with outward unit normals
     """
     # A quarter suffices, as the rest may be empty space between uv islands.
     if outward_count < 0.25 * texel_count or outward_z_sum < 0.7 * outward_count:
@@ -222,7 +228,8 @@ def load_maps(
         is ignored
     normal : tangent-space normals, red towards +u, green as given by `normal_y`
     height : grey, white outwards; requires `height_mm`
-    height_mm : height difference of 1/255 of the full scale, one grey level of an 8-bit map [mm]
+    height_mm : height difference of one grey level of an 8-bit map, or of 1/255 of the full scale of any map
+        [mm]
     specular, roughness : grey, linear values without sRGB conversion
     region : 8-bit grey labels
     normal_y : "up" if green points towards row 0 (OpenGL, Blender), "down" if away from row 0 (DirectX)

@@ -47,7 +47,7 @@ class Texture:
         return self.uv_set, self.transform
 
     def map_uv(self, uv: Doubles) -> Doubles:
-        """Return the positions (n, 2) in the picture, 0 to 1, of uv coordinates (n, 2) with v down."""
+        """Convert uv coordinates (n, 2), with v down, to positions (n, 2) in the picture, from 0 to 1."""
         a, b, c, d, e, f = self.transform
         return np.asarray(uv @ np.array([[a, d], [b, e]]) + [c, f])
 
@@ -57,16 +57,18 @@ class FileMaterial:
     """Material of a mesh file, described by the parameters of glTF's metallic-roughness model.
 
     name : name of the material, empty if there is none
-    textures : pictures by role; the factors below multiply the values of the pictures
-    colour, alpha : linear base colour and opacity [-]
+    textures : pictures by role; the factors among the other fields multiply the values of the pictures
+    colour : linear base colour [-]; None if not stated
+    alpha : opacity [-]
     roughness : perceptual roughness, the square root of the width alpha of GGX [-]; None if not stated
-    stated_metalness : factor of the metalness [-]; None where the file leaves it to the default of glTF, 1
-    emission, normal_scale : emissiveFactor and normalTexture.scale of glTF
+    stated_metalness : factor of the metalness [-]; None if not stated, so that glTF's default of 1 applies
+    emission : glTF's emissiveFactor
+    normal_scale : glTF's normalTexture.scale
     scatters : whether the file states that light scatters below the surface
     maps : keyword arguments of `load_maps` that files of this package store; they replace `textures`
-    skin_only : properties that are drawn on skin only; for other parts, a note lists them
-    missing : sentences on missing pictures, by role
-    unused : properties that have no effect here, for the note
+    skin_only : properties that are drawn on skin only; for parts that are not skin, a note lists them
+    missing : dictionary from role to a sentence on the missing picture
+    unused : properties that have no effect in this package, for a note to the user
     """
 
     name: str = ""
@@ -87,16 +89,16 @@ class FileMaterial:
 
     @property
     def metalness(self) -> float:
-        """Return the factor of the metalness [-]."""
+        """Return the metalness factor, which is 1 if the file states none [-]."""
         return 1.0 if self.stated_metalness is None else self.stated_metalness
 
     @property
     def cutoff(self) -> float:
-        """Return the opacity at which the surface ends; blended materials end where they are half opaque."""
+        """Return the opacity below which the surface is cut away, also for materials with blending."""
         return self.alpha_cutoff if self.alpha_mode == "mask" else _BLENDED_OPACITY_CUTOFF
 
     def skin_pictures(self) -> dict[str, object]:
-        """Return keyword arguments of `load_maps` for skin that shows the pictures in its own uv."""
+        """Return keyword arguments of `load_maps` for skin whose uv layout is also that of the pictures."""
         if self.maps is not None:
             return dict(self.maps)
         return {role: self.textures[role].picture for role in ("colour", "normal") if role in self.textures}

@@ -27,7 +27,8 @@ def check_mesh(mesh: Mesh, culprit: object, *, has_pictures: bool = False) -> No
     """Refuse a mesh that cannot be rendered as skin.
 
     culprit : source of the mesh for errors, usually its file
-    has_pictures : whether the file has pictures; uv outside [0, 1] are then valid, as pictures are packed
+    has_pictures : whether the file has pictures; uv outside [0, 1] are then valid, because pictures are
+        packed into a new uv layout later
 
     Raises `DermisError` for numbers that are not finite, indices out of range, uv outside [0, 1], degenerate
     triangles, edges of more than two triangles, and a mesh without skin.

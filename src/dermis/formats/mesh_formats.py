@@ -27,8 +27,8 @@ class MeshFormat:
 
     suffixes : file name suffixes in lower case, with the dot
     read : function that reads a file; may raise any exception for a damaged file
-    properties : properties of the files, except properties of materials, and what the reader does with each
-    materials : properties of materials, and what the reader does with each
+    properties : what the reader does with each property of a file, except properties of materials
+    materials : what the reader does with each property of a material
     """
 
     suffixes: tuple[str, ...]

@@ -59,11 +59,11 @@ class RawMesh:
     positions : (v, 3) vertex positions [mm]
     normals : (v, 3) normals of the file, NaN where the file has none
     uv : (v, 2) uv with v down
-    point : (v,) index of the point at which each vertex is
+    point : (v,) index of the point at which each vertex lies
     triangles : (f, 3) vertex indices
     material : (f,) material index of each triangle
     quads : (q, 2) pairs of triangles that are the halves of a quad
-    vertices : the same vertices in the file's space, with morph targets and bones
+    vertices : the same vertices in the file's space, with their morph targets and bones
     file_vertex : (v,) index of each vertex among the vertices that the file's triangles use
     """
 
@@ -100,7 +100,10 @@ class RawMesh:
         )
 
     def with_corners(self, corner_points: Index) -> RawMesh:
-        """Return the mesh with new points at corners (f, 3); vertices at several points are duplicated."""
+        """Return the mesh with new point indices at corners; vertices with several points are duplicated.
+
+        corner_points : (f, 3) new point index at each corner
+        """
         triangles, stride = self.triangles.copy(), int(corner_points.max()) + 1
         moved = corner_points != self.point[triangles]
         copies, number = np.unique(triangles[moved] * stride + corner_points[moved], return_inverse=True)
@@ -110,7 +113,7 @@ class RawMesh:
         return replace(self._select_vertices(source), point=point, triangles=triangles)
 
     def compact(self) -> RawMesh:
-        """Return the mesh without unused vertices and points, and without quads whose halves were parted."""
+        """Return the mesh without unused vertices and points, and without quads that were split apart."""
         used, triangles = compact_vertices(self.triangles)
         point = np.unique(self.point[used], return_inverse=True)[1].reshape(-1).astype(np.int32)
         first, second = triangles[self.quads[:, 0]], triangles[self.quads[:, 1]]
@@ -156,10 +159,12 @@ def _count_with_noun(item_count: int, noun: str) -> str:
 
 
 def _drop_triangles(mesh: RawMesh, flat_mask: Mask, is_skin: Mask, notes: list[str]) -> RawMesh:
-    """Return the mesh without the flat triangles of a mask (f,) and without duplicates.
+    """Return the mesh without duplicate triangles and without flat triangles.
 
     Among triangles of one material with the same three points, the first is kept. Among materials with
     exactly the same triangles, skin is kept, or else the first material.
+
+    flat_mask : (f,) mask of flat triangles
     """
     if flat_mask.any():
         notes.append(f"left out {_count_with_noun(int(flat_mask.sum()), 'triangle')} without area")
@@ -179,9 +184,10 @@ def _drop_triangles(mesh: RawMesh, flat_mask: Mask, is_skin: Mask, notes: list[s
 
 
 def _duplicate_materials(triangle_key: Index, material: Ints, is_skin: Mask) -> Mask:
-    """Return the mask (m,) of materials that have exactly the triangles of another material, which is kept.
+    """Return the mask (m,) of materials to drop, because a kept material has exactly the same triangles.
 
-    triangle_key, material : (f,) key of each triangle, see `triangle_keys`, and its material index
+    triangle_key : (f,) key of each triangle, see `triangle_keys`
+    material : (f,) material index of each triangle
     """
     ends = np.cumsum(np.bincount(material, minlength=len(is_skin)))
     triangles = np.split(triangle_key[np.lexsort((triangle_key, material))], ends[:-1])
@@ -196,11 +202,13 @@ def _duplicate_materials(triangle_key: Index, material: Ints, is_skin: Mask) -> 
 class _Sides(NamedTuple):
     """Sides of triangles, grouped by the edge that they share.
 
-    Side 3 t + k runs from corner k of triangle t to its next corner.
+    Side 3 t + k runs from corner k of triangle t to the next corner.
 
     side : (3f,) sides, ordered by edge
-    first, counts : (e,) for each of e edges, the index in `side` of its first side, and its number of sides
-    start, end : (3f,) points at the ends of each side
+    first : (e,) index in `side` of the first side of each edge
+    counts : (e,) number of sides of each edge
+    start : (3f,) index of the point at which each side starts
+    end : (3f,) index of the point at which each side ends
     """
 
     side: Index
@@ -226,7 +234,7 @@ def _group_sides(corner_points: Index) -> _Sides:
 
 
 def _label_components(node_count: int, node_pairs: NDArray[np.integer]) -> Index:
-    """Return the connected component of each node of a graph, (count,).
+    """Return the index (node_count,) of the connected component of each node of a graph.
 
     node_pairs : (n, 2) nodes at the ends of each link
     """
@@ -263,8 +271,9 @@ def _separate_sheets(mesh: RawMesh, notes: list[str]) -> RawMesh:
 def _continue_sheets(mesh: RawMesh, max_pairs_per_edge: int = _MAX_TRIANGLES_PER_EDGE // 2) -> Index:
     """Return pairs of triangle sides (n, 2) across which sheets continue at non-manifold edges.
 
-    At each edge, the first pair preferably has the same material, opposite directions and the flattest
-    continuation; further pairs must have opposite directions.
+    The pairs of an edge are chosen one after another. Two sides of the same material are preferred, then
+    sides that run in opposite directions, then sides whose triangles continue each other with the least bend.
+    All pairs of an edge except the first must have opposite directions.
 
     max_pairs_per_edge : largest number of pairs at an edge
     """
@@ -298,7 +307,10 @@ def _continue_sheets(mesh: RawMesh, max_pairs_per_edge: int = _MAX_TRIANGLES_PER
 
 
 def _directions_from_sides(mesh: RawMesh, sides: Index) -> Floats:
-    """Return the unit vectors (..., 3) perpendicular to triangle sides (...), into the triangles."""
+    """Return unit vectors (..., 3) from sides into their triangles, perpendicular to the sides.
+
+    sides : (...) sides of triangles, see `_Sides`
+    """
     p, q, r = (mesh.positions[np.roll(mesh.triangles, -k, axis=1).ravel()[sides]] for k in range(3))
     along, inwards = q - p, r - p
     scale = (inwards * along).sum(axis=-1) / (along * along).sum(axis=-1)
@@ -307,11 +319,10 @@ def _directions_from_sides(mesh: RawMesh, sides: Index) -> Floats:
 
 
 def _split_points(mesh: RawMesh, side_pairs: Index) -> Index:
-    """Return the point index at each corner (f, 3) after points at non-manifold edges were split.
+    """Split points at non-manifold edges; return the new point index at each corner, (f, 3).
 
-    Corners at a point still share the point if `side_pairs` connect their triangles around it. The largest
-    group
-    of such corners keeps the point, other groups get new points.
+    Corners at a point form groups whose triangles are connected around the point by `side_pairs`. The largest
+    group keeps the point, and each other group gets a new point.
 
     side_pairs : (n, 2) pairs of sides across which sheets continue
     """
@@ -394,7 +405,7 @@ def _find_pieces(mesh: RawMesh) -> tuple[Index, Mask]:
 
 
 def _corner_normals(mesh: RawMesh) -> Doubles:
-    """Return the sum of the file's normals at the three corners of each triangle, as columns (3, f)."""
+    """Return the sum (3, f) of the file's normals at the three corners of each triangle."""
     normals = np.where(np.isfinite(mesh.normals), mesh.normals, 0).T
     return np.asarray(sum(normals.take(one, axis=1) for one in np.ascontiguousarray(mesh.triangles.T)))
 
@@ -405,7 +416,7 @@ class _PieceSurface:
 
     piece : (f,) index of each triangle's component
     area_normals : (3, f) normals with twice the triangle's area as their length [mm²]
-    corners : (3, 3, f) positions of the three corners, as columns [mm]
+    corners : (3, 3, f) positions of the corners; axes: corner, coordinate, triangle [mm]
     """
 
     piece: Index
@@ -418,7 +429,7 @@ class _PieceSurface:
         return np.sqrt(dot_columns(self.area_normals, self.area_normals))
 
     def outward_directions(self) -> Doubles:
-        """Return the vector from the component's centroid to each triangle, as columns (3, f)."""
+        """Return the vector (3, f) to each triangle from the centroid of its component."""
         centre = self.corners.mean(axis=0)
         total = np.maximum(np.bincount(self.piece, self.double_area), np.finfo(np.float64).tiny)
         for axis in centre:
@@ -427,17 +438,20 @@ class _PieceSurface:
         return np.asarray(centre)
 
     def mean_cosine(self, direction: Doubles) -> Doubles:
-        """Return the mean cosine of normals and directions (3, f) for each component; 0 for null vectors."""
+        """Return the mean cosine between normals and directions for each component.
+
+        direction : (3, f) direction for each triangle; a component whose directions are all zero gets 0
+        """
         length = np.bincount(self.piece, self.double_area * np.sqrt(dot_columns(direction, direction)))
         total = np.bincount(self.piece, dot_columns(self.area_normals, direction))
         return total / np.where(length > 0, length, 1)
 
     def visible_balance(self, doubtful_pieces: Mask) -> tuple[Doubles, bool]:
-        """Return how much of each component's front and back is visible, and whether backs prevail.
+        """Return the visible balance of each component, and whether backs prevail in the mesh.
 
         The visible balance of a component is 1 if only its front is visible from outside, -1 if only its back
-        is visible, and 0 if hardly any part of it is visible. Backs prevail if they are two thirds of all
-        visible samples.
+        is visible, and 0 if hardly any part of it is visible. Backs prevail if they are more than two
+        thirds of all visible samples.
 
         doubtful_pieces : mask of components that get additional samples, so that small components have enough
         """
@@ -476,8 +490,9 @@ class _PieceSurface:
     def _draw_samples(self, triangle_weight: Doubles) -> tuple[Index, Doubles]:
         """Return random points on the triangles: index of the triangle (n,), and position (3, n) [mm].
 
-        triangle_weight : (f,) relative probability of each triangle
         Positions are relative to the centre of the mesh.
+
+        triangle_weight : (f,) relative probability of each triangle
         """
         total = np.cumsum(triangle_weight)
         triangle = np.searchsorted(
@@ -493,10 +508,11 @@ def _inside_out_pieces(surface: _PieceSurface, doubtful_pieces: Mask, normals_co
     """Return the mask of connected components that are wound inside out.
 
     A component is judged by the side that is visible from outside. If both sides are equally visible, the
-    normals of the file decide. A hidden component is inside out if the backs of the whole mesh prevail.
+    normals of the file decide. A component of which neither side is visible is inside out if backs prevail in
+    the whole mesh.
 
     doubtful_pieces : mask of components that may be inside out
-    normals_cosine : mean cosine between the file's normals and the triangles' normals, for each component
+    normals_cosine : for each component, the mean cosine between the file's normals and the triangles' normals
     """
     balance, backs_prevail = surface.visible_balance(doubtful_pieces)
     opposed = (normals_cosine < _MAX_COSINE_OF_OPPOSITE_NORMALS) & (balance <= _MIN_VISIBILITY_BALANCE)
@@ -504,7 +520,7 @@ def _inside_out_pieces(surface: _PieceSurface, doubtful_pieces: Mask, normals_co
 
 
 def _move_uv(mesh: RawMesh, materials: Sequence[FileMaterial | None], notes: list[str]) -> RawMesh:
-    """Return the mesh with uv charts moved by whole tiles and clamped, where this puts them into [0, 1]."""
+    """Return the mesh with uv charts moved by whole tiles and clamped, if they then fit into [0, 1]."""
     if mesh.uv.min() >= -UV_TOLERANCE and mesh.uv.max() <= 1 + UV_TOLERANCE:
         return mesh
     place = weld(np.column_stack((mesh.point, mesh.uv)))

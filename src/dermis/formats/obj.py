@@ -39,7 +39,7 @@ def read_obj_text(path: Path) -> str:
 def read_obj(path: Path) -> MeshFile:
     """Read a .obj file, one mesh part per pair of `usemtl` and `g`.
 
-    The colour of a part is Kd of its material in the .mtl file, taken as linear.
+    The colour of a part is the value Kd of its material in the .mtl file, taken as linear.
     """
     return parse_obj(path, read_obj_text(path))
 
@@ -47,7 +47,7 @@ def read_obj(path: Path) -> MeshFile:
 def parse_obj(path: Path, obj_text: str) -> MeshFile:
     """Parse the text of a .obj file, one mesh part per pair of `usemtl` and `g`.
 
-    path : path of the file, for errors and to find its .mtl
+    path : path of the file, for errors and to find the .mtl file
     """
     geometry = parse_geometry(path, obj_text)
     library = read_library(path, geometry.statements)
@@ -70,14 +70,16 @@ def obj_maps(
     height_mm: float | None = None,
     normal_y: Literal["up", "down"] = "up",
 ) -> tuple[Maps, list[str]]:
-    """Return the maps of a skin with one material and untransformed pictures, and notes on omitted maps.
+    """Return the maps of the material of a skin, and notes for the user about maps that cannot be used.
 
-    The statements map_Kd, norm, map_Bump or bump, map_Ks and map_Pr are read. A bump map may contain normals,
-    as many programs write them, or heights, which require `height_mm`; -bm scales both. map_Pr is the square
-    root of the roughness m.
+    The skin must have a single material, and its pictures must have no uv transforms. The statements map_Kd,
+    norm, map_Bump or bump, map_Ks and map_Pr are read. A bump map may contain normals, as many programs write
+    them, or heights, which require `height_mm`. Normals and heights are scaled by the option -bm. map_Pr
+    contains the square root of the roughness m.
 
     material : name of the material in the .mtl files
-    overridden_roles : roles of the maps that the caller sets by other means; the file's maps are not read
+    overridden_roles : roles of the maps that the caller sets by other means, and that are not read from the
+        file
     height_mm, normal_y : see `load_maps`
     """
     textures = read_library(path, read_obj_text(path)).materials[material].textures
@@ -115,7 +117,7 @@ def _load_map(
     height_mm: float | None,
     normal_y: Literal["up", "down"],
 ) -> dict[str, Any]:
-    """Load the map in a picture file by its role; heights and slopes are multiplied by -bm.
+    """Load the map of a role from a picture file; heights and slopes are multiplied by the option -bm.
 
     The result is {role: map}; the role "bump" becomes "height" for a grey picture, else "normal".
     """

@@ -79,7 +79,8 @@ _KIND_OF_LEFT_OUT_STATEMENT = {key: kind for kind, keys in _LEFT_OUT_STATEMENTS.
 class ObjGeometry:
     """Geometry of an OBJ file.
 
-    pairs, pair : combinations of `usemtl` and `g` names, and the index of each polygon's combination
+    pairs : combinations of a `usemtl` name and a `g` name
+    pair : (n,) index in `pairs` for each polygon
     statements : non-numeric statements, as text
     notes : sentences on content that was repaired or left out
     """
@@ -97,11 +98,11 @@ _Statement = tuple[int, str, str]
 
 @dataclass(frozen=True)
 class _StatementRows:
-    """Statements of one kind without their first word.
+    """Statements of one kind, without the first word of each.
 
-    line : (n,) line of each statement, counted from 0
-    text : ASCII codes, with a line feed at the end of each statement
-    start : (n,) position of each statement in the text
+    line : (n,) line number of each statement, counted from 0
+    text : ASCII codes of the statements, each of which ends with a line feed
+    start : (n,) position of each statement in `text`
     """
 
     line: Index
@@ -112,7 +113,7 @@ class _StatementRows:
 def parse_geometry(path: Path, obj_text: str) -> ObjGeometry:
     """Return the geometry in the text of an OBJ file.
 
-    Raises DermisError with the number of the line for numbers and indices that are invalid.
+    Raises DermisError for invalid numbers and indices; the message names the line.
     """
     limits.check_limit(path, obj_text.count("\n"), _MAX_LINES, "lines", limits.DECIMATE_ADVICE)
     rows, others, unread = _split_statements(path, _plain_text(obj_text))
@@ -142,9 +143,9 @@ def parse_geometry(path: Path, obj_text: str) -> ObjGeometry:
 
 
 def _plain_text(obj_text: str) -> str:
-    """Join continued lines; remove blanks at the start of lines and comments at their end.
+    """Join continued lines; remove leading blanks, and comments at the ends of lines.
 
-    The number of lines is unchanged.
+    The number of lines is unchanged, as empty lines take the place of joined lines.
     """
     if "\\\n" in obj_text:
         obj_text = _CONTINUED_LINE.sub(
@@ -159,7 +160,7 @@ def _plain_text(obj_text: str) -> str:
 def _split_statements(
     path: Path, plain_text: str
 ) -> tuple[dict[str, _StatementRows], list[_Statement], dict[str, None]]:
-    """Return numeric statements by kind, other used statements, and the first words of unused statements."""
+    """Return numeric statements by kind, other statements that are used, and first words of the rest."""
     data = np.frombuffer(f"{plain_text}\n".encode("utf-8", "replace"), np.uint8)
     end = np.flatnonzero(data == _LINE_FEED)
     start = np.concatenate([[0], end[:-1] + 1])
@@ -202,9 +203,10 @@ def _check_lines(path: Path, text_length: Index, is_vertex: Mask) -> None:
 def _refuse_line(
     path: Path, statement_rows: _StatementRows, row_index: int, expected: str, actual: str = ""
 ) -> NoReturn:
-    """Raise the error for one of the statements in `statement_rows`; the message names its line.
+    """Raise an error for one of the statements in `statement_rows`; the message names the line.
 
     row_index : index of the statement in `statement_rows`
+    expected : what the statement should contain
     actual : clause that says what is wrong; by default a quotation of the statement
     """
     ends = np.append(statement_rows.start[1:], len(statement_rows.text))
@@ -221,7 +223,8 @@ def _refuse_line(
 def _parse_vertices(path: Path, statement_rows: _StatementRows) -> tuple[Doubles, Doubles | None, list[str]]:
     """Return positions (n, 3), linear colours (n, 3) or None, and notes.
 
-    One number after the position is a weight, by which the position is divided; three numbers are a colour.
+    A single number after the position is a weight, by which the position is divided; three numbers after it
+    are a colour.
     """
     table, counts = _parse_number_table(path, statement_rows, "v")
     positions, notes = table[:, :3], list[str]()
@@ -241,7 +244,7 @@ def _parse_vertices(path: Path, statement_rows: _StatementRows) -> tuple[Doubles
 def _parse_polypaint(hex_digits: str, vertex_count: int) -> tuple[Doubles | None, list[str]]:
     """Return the linear colours (n, 3) of the polypaint of ZBrush, or None and a note.
 
-    hex_digits : hexadecimal mask, red, green and blue of each vertex
+    hex_digits : two hexadecimal digits each for mask, red, green and blue of each vertex
     vertex_count : number of vertices
     """
     try:
@@ -254,7 +257,7 @@ def _parse_polypaint(hex_digits: str, vertex_count: int) -> tuple[Doubles | None
 def _parse_number_table(
     path: Path, statement_rows: _StatementRows, statement_key: str
 ) -> tuple[Doubles, Index]:
-    """Return the first six numbers (n, 6) of each statement, padded with NaN, and their true count (n,)."""
+    """Return the first six numbers of each statement, padded with NaN (n, 6), and its number count (n,)."""
     words = run_starts(statement_rows.text > _SPACE)
     first = np.searchsorted(words, statement_rows.start)
     counts = np.diff(first, append=len(words))
@@ -284,9 +287,9 @@ def _first_non_numeric(statement_rows: _StatementRows, dtype: type[np.float64] |
 
 
 def _parse_faces(path: Path, rows_of_statement: Mapping[str, _StatementRows]) -> tuple[Index, Index]:
-    """Return the number of corners of each face, and position, uv and normal index of each corner (c, 3).
+    """Return the number of corners of each face, and the indices (c, 3) of each corner.
 
-    The index is -1 for a corner without uv or normal.
+    The indices are those of position, uv and normal; a missing uv or normal has the index -1.
     """
     faces = rows_of_statement["f"]
     slash = faces.text == _SLASH
@@ -326,11 +329,11 @@ def _parse_faces(path: Path, rows_of_statement: Mapping[str, _StatementRows]) ->
 def _face_groups(
     path: Path, statements: Sequence[_Statement], face_line: Index
 ) -> tuple[list[tuple[str, str]], Index]:
-    """Return the combinations of `usemtl` and `g` names, and the index of each face's combination.
+    """Return the combinations of `usemtl` and `g` names, and the index of the combination of each face.
 
-    face_line : (n,) lines of the faces
+    face_line : (n,) line number of each face
 
-    Where no group and no material has a name, the objects (`o`) are the groups.
+    If no group and no material has a name, the names of objects (`o`) replace group names.
     """
     named = any(key in ("usemtl", "g") and value for _, key, value in statements)
     material_key, group_key = "usemtl", "g" if named else "o"

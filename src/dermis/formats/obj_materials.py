@@ -102,8 +102,9 @@ class MtlTexture:
     key : statement that references the picture, such as map_Kd
     name : file name as written
     factor : option -bm, by which the map is multiplied [-]
-    scale, offset : options -s and -o along u and v, where v points up
-    wrap : continuation beyond the picture, by option -clamp
+    scale : option -s along u and v, where v points up
+    offset : option -o along u and v
+    wrap : continuation beyond the picture, as the option -clamp states
     unused : options without effect, such as the turbulence -t
     """
 
@@ -117,7 +118,7 @@ class MtlTexture:
 
     @property
     def transform(self) -> UvTransform:
-        """Return the transform of uv with v down."""
+        """Return the transform for uv coordinates with v down."""
         (scale_u, scale_v), (u, v) = self.scale, self.offset
         if (self.scale, self.offset) == ((1.0, 1.0), (0.0, 0.0)):
             return IDENTITY_UV_TRANSFORM
@@ -128,8 +129,8 @@ class MtlTexture:
 class MtlMaterial:
     """Material of an .mtl file.
 
-    numbers : values by statement, see `NUMERIC_STATEMENTS`
-    textures : pictures by role, see `TEXTURE_ROLES`
+    numbers : dictionary from statement to its numbers, see `NUMERIC_STATEMENTS`
+    textures : dictionary from role to picture, see `TEXTURE_ROLES`
     unread : first words of all other statements
     """
 
@@ -209,7 +210,7 @@ def _parse_numbers(statement: str) -> list[float]:
 
 
 def _parse_texture(statement_key: str, statement: str) -> MtlTexture:
-    """Parse a texture statement of an .mtl file; its file name extends to the end of the line.
+    """Parse a texture statement of an .mtl file; the file name extends to the end of the line.
 
     statement_key : statement, such as map_Kd
     statement : text after the key, options first
@@ -251,8 +252,8 @@ def with_materials(
     Parts whose pictures are a sequence of UDIM tiles are divided into one part for each tile.
 
     path : path of the OBJ file
-    mesh_parts : mesh parts; if a part has a material, the first name of the part's group is the name of the
-        material
+    mesh_parts : mesh parts; if a part has a material, the name of the material is the first name of the
+        part's group
     """
     materials: list[FileMaterial] = []
     notes = [f"mtllib: {name} is not in its folder. {_MISSING_ADVICE}" for name in library.missing]
@@ -275,7 +276,7 @@ def with_materials(
 
 
 def _udim_tiles(mesh_part: MeshPart) -> list[tuple[int, MeshPart]]:
-    """Divide a part into the UDIM tiles of its triangles; return the number and the part of each tile."""
+    """Divide a part by the UDIM tile of each triangle; return the number and the part of each tile."""
     if mesh_part.uv is None or not len(mesh_part.triangles):
         return [(_FIRST_UDIM, mesh_part)]
     column, row = np.floor(mesh_part.uv[mesh_part.triangles].mean(axis=1)).astype(int).T

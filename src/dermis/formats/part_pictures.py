@@ -1,4 +1,4 @@
-"""Pictures of the parts of a head that are not skin, in the forms that other programs read."""
+"""Pictures of the parts of a head that are not skin, encoded in the forms that other programs read."""
 
 from __future__ import annotations
 
@@ -64,9 +64,10 @@ class PartPictures:
             return dict(zip(levels, pool.map(encode_png, levels.values()), strict=True))
 
     def emission(self, material: Material) -> tuple[float, tuple[float, ...]]:
-        """Return the largest radiance that a part emits, and the colour that multiplies its emission picture.
+        """Return the strength of a part's emission (a radiance), and the colour that multiplies it.
 
-        A part without a picture of its emission emits this colour.
+        With an emission map, the strength is the largest radiance in the map and the colour is white. Without
+        a map, strength times colour is the emission of the material.
         """
         if self.maps.emission is not None:
             return float(self.maps.emission.max()), (1.0, 1.0, 1.0)

@@ -1,4 +1,4 @@
-"""Parts of mesh files: one group of triangles each, with the units and the uv of the file."""
+"""Parts of mesh files: groups of triangles, with the length unit and the uv of the file."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def default_unit_mm(path: str | Path) -> float:
 class MaterialGroup:
     """Names and colour of a group of triangles.
 
-    names : name of the group's material if it has a name, then name of the mesh or OBJ group
+    names : name of the group's material, if the material has a name, then name of the mesh or OBJ group
     colour : diffuse reflectance, linear [-]
     material : index of the file's material, -1 if there is none
     """
@@ -59,18 +59,21 @@ class MaterialGroup:
 
 @dataclass(frozen=True)
 class MeshPart:
-    """Triangles of one group in the rest pose, with the units and the v direction of the file.
+    """Triangles of one group in the rest pose, with the length unit and the v direction of the file.
 
     positions : (v, 3) vertex positions
     uv : (v, 2) uv of the vertices, or None
     normals : (v, 3) normals of the vertices, or None
     triangles : (f, 3) vertex indices
-    targets : morph targets by name: displaced vertices (n,), and their displacements (n, 3) at weight 1
-    bone, weight : (v, k) bones of each vertex, and weights that sum to 1; None without bones
+    targets : dictionary from morph target name to the indices (n,) of the displaced vertices and their
+        displacements (n, 3) at weight 1
+    bone : (v, k) bone indices of each vertex; None without bones
+    weight : (v, k) weights of these bones, which sum to 1; None without bones
     quads : (q, 2) pairs of triangles that are the halves of a quad
     separate : whether the vertices must not be welded to coincident vertices of other parts
     colours : (v, 3) linear colours of vertices, or None
-    other_uv : additional uv sets (v, 2) that textures use, by their index in the file
+    other_uv : dictionary from the index of an additional uv set in the file to its coordinates (v, 2);
+        contains only sets that textures use
     """
 
     group: MaterialGroup
@@ -92,7 +95,8 @@ class Bones:
     """Bone hierarchy of a file, parents before children.
 
     parent : (b,) index of each bone's parent, -1 for a root
-    local, world : (b, 4, 4) rest transforms from a bone's space to its parent's space, and to file space
+    local : (b, 4, 4) rest transforms from each bone's space to the space of its parent
+    world : (b, 4, 4) rest transforms from each bone's space to file space
     """
 
     names: tuple[str, ...]
@@ -108,7 +112,7 @@ class MeshFile:
     weights : default weights of morph targets by name; weights of 0 are omitted
     materials : materials of the file, to which the groups refer
     notes : sentences for users on content that was repaired, replaced or left out
-    unit_mm : length unit that the file states [mm], or None
+    unit_mm : length unit that the file states [mm]; None if it states none
     axes : axes that the file states
     """
 
@@ -139,11 +143,11 @@ def parse_colour(numbers: Sequence[float | str]) -> Colour:
 
 
 def find_quads(corner_counts: NDArray[np.integer], triangles: Index) -> Index:
-    """Return the pairs of triangles that are halves of quads, (q, 2); empty if quads cannot be identified.
+    """Return the pairs (q, 2) of triangles that are halves of quads; empty if quads cannot be identified.
 
     corner_counts : (n,) number of corners of each polygon of the file
-    triangles : (f, 3) triangulated polygons, either in the order of the file, or all triangles first, then
-        the first halves of all quads, their second halves, and all other polygons
+    triangles : (f, 3) triangulated polygons, either in the order of the file, or ordered by kind: all
+        triangles first, then the first halves of all quads, then the second halves, then all other polygons
     """
     none, count = np.empty((0, 2), dtype=np.int64), int((corner_counts == 4).sum())
     if count == 0 or int((corner_counts - 2).sum()) != len(triangles):

@@ -92,7 +92,10 @@ _STRUCT_CODES = dict(zip(dict.fromkeys(_NUMPY_TYPES.values()), "bBhHiIfdqQe", st
 
 
 class _Property(NamedTuple):
-    """Property of an element: a list if `length_dtype`, the type of the list's length, is not ""."""
+    """Property of an element, which is a number or a list of numbers.
+
+    length_dtype : type of the length of the list; "" for a number
+    """
 
     name: str
     dtype: str
@@ -117,8 +120,8 @@ class _Header(NamedTuple):
     """Header of a PLY file.
 
     order : byte order as in NumPy types, "=" for text
-    size : size of the header in bytes
-    pictures : file names of pictures, in comments
+    size : size of the header [bytes]
+    pictures : file names of pictures, which the comments of the header state
     """
 
     order: str
@@ -128,14 +131,14 @@ class _Header(NamedTuple):
 
 
 class _Columns(dict[str, "Numbers | _ListColumn"]):
-    """Columns of an element by name; also records which columns were used."""
+    """Dictionary from property name to column of an element, which records the columns that were used."""
 
     def __init__(self) -> None:
         super().__init__()
         self.used: set[str] = set()
 
     def take(self, property_names: Sequence[str]) -> Numbers | None:
-        """Return scalar properties as columns of an array (n, k); None unless all of them exist."""
+        """Return k scalar properties as columns of an array (n, k); None unless all of them exist."""
         columns = [column for name in property_names if isinstance(column := self.get(name), np.ndarray)]
         if not columns or len(columns) < len(property_names):
             return None
@@ -143,11 +146,11 @@ class _Columns(dict[str, "Numbers | _ListColumn"]):
         return np.column_stack(columns)
 
     def take_first(self, property_choices: Sequence[Sequence[str]]) -> Numbers | None:
-        """Return the first set of properties that exists as an array (n, k); None if there is none."""
+        """Return the first set of properties that exists, as an array (n, k); None if no set exists."""
         return next((one for names in property_choices if (one := self.take(names)) is not None), None)
 
     def take_list(self, list_names: Sequence[str]) -> _ListColumn | None:
-        """Return the first existing list property among some names; None if none exists."""
+        """Return the first list property in `list_names` that exists; None if no such property exists."""
         for name in list_names:
             if isinstance(column := self.get(name), _ListColumn):
                 self.used.add(name)
@@ -158,7 +161,7 @@ class _Columns(dict[str, "Numbers | _ListColumn"]):
 def read_ply(path: Path) -> MeshFile:
     """Read a .ply file.
 
-    Uv are properties of vertices (`UV_NAMES`) or the list `texcoord` of faces; colours of vertices are sRGB.
+    The uv are properties of vertices (`UV_NAMES`) or the list `texcoord` of faces. Vertex colours are sRGB.
     """
     data = read_file(path, "a PLY file", limits.MAX_FILE_BYTES)
     header = _read_header(path, data)
@@ -223,7 +226,7 @@ def _read_header(path: Path, ply_bytes: bytes) -> _Header:
 
 
 def _declared_element(path: Path, header_words: Sequence[str], remaining_bytes: int) -> _Element:
-    """Return an element without its properties; refuse a count too large for a mesh or for the file's size.
+    """Return an element that has no properties yet; refuse a count too large for a mesh or for the file.
 
     header_words : words after "element"
     """
@@ -237,7 +240,7 @@ def _declared_element(path: Path, header_words: Sequence[str], remaining_bytes: 
 
 
 def _declared_property(path: Path, header_words: Sequence[str]) -> _Property:
-    """Return a property.
+    """Return the property that a line of the header declares.
 
     header_words : words after "property"
     """
@@ -277,8 +280,8 @@ def _read_elements(path: Path, header: _Header, ply_data: Bytes) -> dict[str, _C
 class _ElementReader:
     """Reader of the rows of an element.
 
-    order : byte order
-    is_text : whether the data are the numbers of a text file, as float64
+    order : byte order as in NumPy types
+    is_text : whether `data` holds the numbers of a text file, converted to float64
     """
 
     path: Path
@@ -316,7 +319,7 @@ class _ElementReader:
         return np.dtype(np.float64 if self.is_text else self.order + type_name)
 
     def _fixed_size(self, properties: Sequence[_Property]) -> int:
-        """Return the size of a row's properties without the items of lists [bytes]."""
+        """Return the size of a row without the items of its lists [bytes]."""
         return sum(self._dtype(one.length_dtype or one.dtype).itemsize for one in properties)
 
     def _check_end(self, end_byte: int) -> None:
@@ -329,7 +332,8 @@ class _ElementReader:
     ) -> Numbers:
         """Return the values of a property in all rows, concatenated.
 
-        first_byte, value_count : (n,) position of each row's first value [bytes], and number of its values
+        first_byte : (n,) position of the first value in each row [bytes]
+        value_count : (n,) number of values in each row
         row_bytes : (n,) size of each row [bytes]
         """
         stored = self._dtype(type_name)
@@ -343,7 +347,7 @@ class _ElementReader:
         return np.asarray(values.astype(type_name))
 
     def _list_lengths(self, byte_position: int) -> list[Index]:
-        """Return the lengths of each list property, (n,) each."""
+        """Return the lengths (n,) of each list property in the n rows."""
         steps, skipped = list[_ListStep](), list[_Property]()
         for one in self.element.properties:
             skipped.append(one)
@@ -362,9 +366,10 @@ class _ElementReader:
     def _is_uniform(
         self, byte_position: int, row_bytes: int, list_steps: Sequence[_ListStep], list_lengths: Index
     ) -> bool:
-        """Return whether the lists of all rows have the lengths of the first row.
+        """Return whether the lists of all rows are as long as in the first row.
 
         row_bytes : size of the first row [bytes]
+        list_lengths : lengths of the lists in the first row
         """
         start = byte_position + row_bytes * np.arange(self.element.count)
         if start[-1] + row_bytes > len(self.data):
@@ -380,7 +385,7 @@ class _ElementReader:
     def _read_rows(
         self, byte_position: int, list_steps: Sequence[_ListStep], trailing_bytes: int, row_count: int
     ) -> tuple[Index, int]:
-        """Read rows in sequence; return the lengths of their lists (row_count, lists), and the next position.
+        """Read rows in sequence; return the lengths (row_count, lists) of lists, and the position of the end.
 
         trailing_bytes : size of the properties after the last list [bytes]
         """
@@ -405,7 +410,12 @@ class _ElementReader:
 
 
 class _ListStep(NamedTuple):
-    """List in a row: bytes after the previous list, type of the list's length, and size of an item [byte]."""
+    """Position of a list property in a row, relative to the previous list.
+
+    skip : number of bytes between the previous list and this list
+    length : type of the length of the list
+    item_size : size of an item [byte]
+    """
 
     skip: int
     length: np.dtype[Any]
@@ -413,7 +423,7 @@ class _ListStep(NamedTuple):
 
 
 def _polygon_corners(path: Path, faces: _Columns, strips: _Columns, vertex_count: int) -> tuple[Index, Index]:
-    """Return the number of corners of each face and strip triangle, and the vertex of each corner.
+    """Return the number of corners of each face and strip triangle, and the vertex index of each corner.
 
     vertex_count : number of vertices in the file
     """
@@ -450,9 +460,10 @@ def _strip_triangles(strip_lists: _ListColumn) -> Index:
 def _corner_uv(
     path: Path, vertex_columns: _Columns, face_columns: _Columns, corner_counts: Index, corner_vertex: Index
 ) -> tuple[Doubles, Index]:
-    """Return uv coordinates (t, 2), and the index of each corner's uv, -1 if there is none.
+    """Return uv coordinates (t, 2), and the index of the uv of each corner, -1 for a corner without uv.
 
-    corner_counts, corner_vertex : number of corners of each polygon, and the vertex of each corner
+    corner_counts : number of corners of each polygon
+    corner_vertex : index of the vertex at each corner
     """
     wedges = face_columns.take_list(("texcoord",))
     if wedges is None:
@@ -472,7 +483,7 @@ def _corner_uv(
 
 
 def _vertex_colours(vertex_columns: _Columns) -> tuple[Doubles | None, list[str]]:
-    """Return the linear colours (n, 3) of vertices or None, and notes."""
+    """Return the linear colours (n, 3) of vertices, or None, and notes for the user on them."""
     values, alpha = vertex_columns.take_first(COLOUR_NAMES), vertex_columns.take_first(_ALPHA_NAMES)
     notes = []
     if alpha is not None and len(np.unique(alpha)) > 1:
@@ -486,7 +497,7 @@ def _vertex_colours(vertex_columns: _Columns) -> tuple[Doubles | None, list[str]
 def _main_picture(
     picture_names: Sequence[str], picture_index: Numbers | None
 ) -> tuple[str | None, list[str]]:
-    """Return the picture that most faces use, and a note on the other pictures.
+    """Return the name of the picture that most faces use, and notes on the other pictures.
 
     picture_names : names of the pictures
     picture_index : (n, 1) index of each face's picture in `picture_names`; None if the file states none

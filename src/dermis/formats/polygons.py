@@ -23,10 +23,11 @@ class Polygons:
     """Polygons of a file.
 
     counts : (n,) number of corners of each polygon, at least 3
-    corners : (c, 3) indices of position, uv and normal of each corner, -1 if there is none
-    positions : (p, 3)
-    uv : (t, 2)
-    normals : (m, 3)
+    corners : (c, 3) indices of position, uv and normal of each corner; a missing uv or normal has the index
+        -1
+    positions : (p, 3) positions to which the corners refer
+    uv : (t, 2) uv coordinates to which the corners refer
+    normals : (m, 3) normals to which the corners refer
     colours : (p, 3) linear colours of the positions, or None
     """
 
@@ -46,7 +47,8 @@ class Polygons:
     ) -> list[MeshPart]:
         """Return a mesh part for each group that has polygons, in the order of the groups' first polygons.
 
-        groups, group_index : all groups, and (n,) index in `groups` for each polygon
+        groups : all groups
+        group_index : (n,) index in `groups` for each polygon
         triangle_order : order of the triangles, see `triangulate`
 
         Polygons without uv become separate parts, whose uv is None.
@@ -69,7 +71,7 @@ class Polygons:
         corners: Index,
         triangle_order: TriangleOrder,
     ) -> MeshPart:
-        """Return selected polygons as a part with one vertex per combination of position, normal and uv."""
+        """Return polygons as a part with one vertex for each combination of position, normal and uv."""
         vertex, uv, normal = corners.T + np.array([[0], [1], [1]])
         if not uv.all():
             uv = np.zeros_like(uv)
@@ -102,7 +104,10 @@ def missing_uv(polygons: Polygons) -> list[str]:
 
 
 def check_polygon_sizes(path: Path, corner_counts: Index) -> None:
-    """Refuse polygons with too many corners (n,), or with too many triangles in total."""
+    """Refuse n polygons if one has too many corners, or if they have too many triangles in total.
+
+    corner_counts : (n,) number of corners of each polygon
+    """
     corners, triangles = int(corner_counts.max(initial=0)), int(np.maximum(corner_counts - 2, 0).sum())
     advice = "Divide it into smaller ones"
     limits.check_limit(path, corners, limits.MAX_POLYGON_CORNERS, "corners of a face", advice)
@@ -138,8 +143,8 @@ def triangulate(corner_counts: Index, triangle_order: TriangleOrder) -> tuple[In
     """Triangulate polygons as fans; return the corners of triangles (f, 3), and the halves of quads (q, 2).
 
     corner_counts : (n,) number of corners of each polygon; corners are numbered consecutively
-    triangle_order : "by polygon", or "by kind": all triangles first, then the first halves of all quads,
-        their second halves, and all other polygons; files of quads alone are always ordered by kind
+    triangle_order : "by polygon", or "by kind": all triangles first, then the first halves of all quads, then
+        the second halves, then all other polygons; polygons that are all quads are always ordered by kind
     """
     sizes = corner_counts - 2
     polygon, step = expand_runs(np.zeros_like(sizes), sizes)

@@ -66,23 +66,23 @@ def join_parts(mesh_parts: list[MeshPart], mesh_path: Path) -> MeshPart:
 
 
 def _joined_colours(mesh_parts: list[MeshPart]) -> Doubles | None:
-    """Join the vertex colours of all parts; parts without colours become white. None if no part has any."""
+    """Join the vertex colours of all parts; colourless parts become white. None if no part has colours."""
     if all(part.colours is None for part in mesh_parts):
         return None
     return np.vstack([np.ones_like(p.positions) if p.colours is None else p.colours for p in mesh_parts])
 
 
 def _joined_uv(mesh_parts: list[MeshPart], uv_set: int) -> Doubles:
-    """Join an additional uv set of all parts, with zeros for parts that lack it."""
+    """Join an additional uv set of all parts, with zeros for parts that lack this uv set."""
     return np.vstack([p.other_uv.get(uv_set, np.zeros((len(p.positions), 2))) for p in mesh_parts])
 
 
 def select_vertices(mesh_part: MeshPart, vertices: Index) -> MeshPart:
-    """Return a mesh part with the selected vertices, their morph targets and bones.
+    """Return a mesh part with selected vertices, including their morph targets, bones and colours.
 
     vertices : (n,) indices of the vertices, possibly repeated
 
-    Triangles, uv and normals still refer to the vertices of `mesh_part`.
+    Triangles, uv and normals are unchanged, and so still refer to the vertices of `mesh_part`.
     """
     order, count = (
         np.argsort(vertices, kind="stable"),
@@ -141,7 +141,7 @@ def _part_uv(mesh_part: MeshPart, mesh_path: Path) -> Doubles:
 
 
 def read_mesh_file(mesh_path: Path) -> MeshFile:
-    """Read a mesh file of any supported format, without parts that have no triangles.
+    """Read a mesh file of any supported format; parts without triangles are left out.
 
     Raises DermisError for every fault of the file.
     """
@@ -170,7 +170,7 @@ def read_mesh_file(mesh_path: Path) -> MeshFile:
 
 
 def _without_unused_vertices(mesh_part: MeshPart) -> MeshPart:
-    """Return a mesh part without unused vertices, whose coordinates may be invalid."""
+    """Remove unused vertices from a mesh part, as their coordinates may be invalid."""
     count, uv, normals = len(mesh_part.positions), mesh_part.uv, mesh_part.normals
     damaged = any(array is not None and len(array) != count for array in (uv, normals))
     if damaged or mesh_part.triangles.min() < 0 or mesh_part.triangles.max() >= count:

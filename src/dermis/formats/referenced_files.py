@@ -17,7 +17,8 @@ def find_referenced_file(path: Path, file_name: str) -> Path | None:
     path : path of the mesh file
     file_name : name relative to the folder of the mesh file; Windows separators are accepted
 
-    If the name leads outside the folder, its last component is looked up in the folder.
+    If there is no such file in the folder or below, the last component of the name is looked up in the
+    folder.
     """
     named = PureWindowsPath(file_name.strip().strip('"'))
     for candidate in (named, PureWindowsPath(named.name)):
@@ -30,7 +31,8 @@ def find_referenced_file(path: Path, file_name: str) -> Path | None:
 def resolve_uri(path: Path, uri: str) -> Path:
     """Return the path of a file that a glTF file references by a relative URI; the file need not exist.
 
-    Raises DermisError for a file outside the folder of the glTF file, even if a link in it leads there.
+    Raises DermisError for a file outside the folder of the glTF file, even if a link inside the folder leads
+    to it.
     """
     file = _resolve_below(path.parent, PureWindowsPath(unquote(uri)))
     if file is None or ":" in uri.partition("/")[0]:

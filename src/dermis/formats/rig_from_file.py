@@ -1,4 +1,4 @@
-"""Construction of rigs for the welded points of a mesh from morph targets and bones of a file's vertices."""
+"""Construction of rigs for the welded points of a mesh from the morph targets and bones of a file."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ _MIN_DISPLACEMENT_MM = 1e-4  # smaller displacements are rounding errors and cou
 
 
 def split_points(point: Ints, mesh_part: MeshPart, linear_to_head: Doubles, culprit: object) -> Ints:
-    """Return point indices (v,) in which coincident vertices that move differently are separate points.
+    """Return point indices (v,) such that coincident vertices that move differently are separate points.
 
     point : (v,) index of the point of each vertex, welded by position
     mesh_part : vertices with their morph targets and bone weights
-    linear_to_head : (3, 3) matrix from the file's space to the head's [mm]
+    linear_to_head : (3, 3) matrix from the space of the file to that of the head [mm]
 
     Raises DermisError if too many vertices at one position move differently.
     """
@@ -52,7 +52,7 @@ def _targets_differ(
     """Return the mask (n,) of vertex pairs that some morph target moves apart.
 
     first_vertex, second_vertex : (n,) vertex indices of the pairs
-    linear_to_head : (3, 3) matrix from the file's space to the head's [mm]
+    linear_to_head : (3, 3) matrix from the space of the file to that of the head [mm]
     """
     apart, delta = np.zeros(len(first_vertex), bool), np.zeros((len(mesh_part.positions), 3))
     for vertex, delta_of_vertex in mesh_part.targets.values():
@@ -90,7 +90,7 @@ def build_rig(
     point : (v,) index of the point of each vertex
     mesh_part : the same vertices with their morph targets and bone weights, in the file's space
     weights : default weights of morph targets by name
-    to_head : (4, 4) matrix from the file's space to the head's [mm]
+    to_head : (4, 4) matrix from the space of the file to that of the head [mm]
 
     Raises DermisError for bones with a scale of 0.
     """

@@ -34,9 +34,10 @@ class Sample:
     """Files, licence and units of a sample.
 
     kind : "head" for a mesh with maps, "environment" for a latitude-longitude picture
-    folder : name of its folder below DERMIS_DATA, or below the cache
-    files : files by role: mesh, colour, specular, normal, height, licence, or environment
-    licence, attribution : terms of use, and the authors to credit
+    folder : name of the folder of the sample below DERMIS_DATA, or below the cache
+    files : dictionary from role (mesh, colour, specular, normal, height, licence or environment) to file
+    licence : terms of use
+    attribution : authors to credit
     unit_mm : length of one unit of the mesh [mm]
     v_origin : edge of the maps where v = 0, "top" or "bottom"
     height_mm : relief of one grey level of the 8-bit height map [mm]
@@ -74,7 +75,7 @@ def fetch_sample(name: str) -> dict[str, Path]:
 
     If DERMIS_DATA is set, the folder that it names must contain the files, and nothing is downloaded.
 
-    Raises DermisError for an unknown sample, without a network, and for files with unexpected hashes.
+    Raises DermisError for an unknown sample, for a failed download, and for a file with an unexpected hash.
     """
     sample = _find_sample(name)
     paths = {role: _sample_folder(sample) / file.name for role, file in sample.files.items()}
@@ -126,7 +127,7 @@ def _has_expected_hash(path: Path, sample_file: SampleFile) -> bool:
 
 @lru_cache(maxsize=256)
 def _file_sha256(path: Path, byte_count: int, mtime_ns: int) -> str:
-    """Return the SHA-256 of a file; the result is cached for its size and modification time."""
+    """Return the SHA-256 of a file, cached while the size and modification time are unchanged."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 

@@ -1,4 +1,4 @@
-"""Size limits of mesh files: larger than any head, yet files load in seconds and within two gigabytes."""
+"""Size limits of mesh files: high enough for any head, low enough to load in seconds and two gigabytes."""
 
 from __future__ import annotations
 
@@ -40,8 +40,9 @@ MAX_MTL_FILES = 64
 def check_limit(culprit: object, actual_count: int, max_count: int, items_noun: str, advice: str) -> None:
     """Raise an error for a file with more than `max_count` objects of one kind.
 
-    culprit : the file, for the error
-    actual_count, items_noun : number of the objects, and a plural noun for them
+    culprit : file, for the error
+    actual_count : number of the objects
+    items_noun : plural noun for the objects
     """
     if actual_count > max_count:
         refuse(culprit, f"at most {max_count:,} {items_noun}", f"it has {actual_count:,}", advice)

@@ -64,11 +64,15 @@ def choose_skin(
 ) -> list[bool]:
     """Return whether each mesh part is skin.
 
-    The first of these rules that applies to any part decides: parts whose materials scatter light; names with
-    words of `SKIN_WORDS`; names with words of `BODY_WORDS` and none of `NON_SKIN_WORDS`; parts that cover at
-    least a tenth of the head and have no word of `NON_SKIN_WORDS`. If no rule applies, all parts are skin.
+    The following rules are tried in this order, and the first that selects any part decides. If no rule
+    selects a part, all parts are skin.
 
-    groups : names of the parts
+    1. The material of the part scatters light.
+    2. A name of the part contains a word of `SKIN_WORDS`.
+    3. A name contains a word of `BODY_WORDS`, and no name contains a word of `NON_SKIN_WORDS`.
+    4. The part covers at least a tenth of the head, and no name contains a word of `NON_SKIN_WORDS`.
+
+    groups : groups with the names of the parts
     scatters : for each part, whether the file states that light scatters below the surface
     """
     words = [_group_words(group) for group in groups]
@@ -87,13 +91,13 @@ def _group_words(material_group: MaterialGroup) -> set[str]:
 
 
 def _has_skin_word(name_words: set[str]) -> bool:
-    """Return whether any word means skin, alone or in a compound such as faceskin."""
+    """Return whether any word means skin, either alone or in a compound such as faceskin."""
     own = {word for word in name_words if word.endswith(("skin", "skins")) and word not in NON_SKIN_WORDS}
     return bool(own | (name_words & set(SKIN_WORDS)))
 
 
 def _covers_head(mesh_parts: Sequence[MeshPart], is_not_skin: Sequence[bool]) -> list[bool]:
-    """Return whether each mesh part covers a notable fraction of the head's area."""
+    """Return whether each mesh part covers at least a minimum fraction of the head's area."""
     heights = np.concatenate([part.positions[:, 1] for part in mesh_parts])
     lowest = heights.max() - HEAD_HEIGHT_FRACTION * np.ptp(heights)
     area = np.zeros(len(mesh_parts))
@@ -105,7 +109,7 @@ def _covers_head(mesh_parts: Sequence[MeshPart], is_not_skin: Sequence[bool]) ->
 
 
 def describe_choice(groups: Sequence[MaterialGroup], is_skin: Sequence[bool]) -> str:
-    """Return a note on which groups are skin, and on the option to change this; empty for a single group."""
+    """Return a note on the groups that are skin and the option to change them; "" if all groups are skin."""
     names = [group.names[0] for group in groups]
     skin = list(dict.fromkeys(name for name, own in zip(names, is_skin, strict=True) if own))
     other = [name for name in dict.fromkeys(names) if name not in skin]

@@ -1,4 +1,4 @@
-"""STL files, binary or text: triangles without uv, names and colours."""
+"""STL files, binary or text: triangles without uv, names or colours."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def read_stl(path: Path) -> MeshFile:
 
 
 def _binary_corners(path: Path, stl_bytes: bytes, triangle_count: int) -> tuple[Doubles, tuple[str, ...]]:
-    """Return the corners (3f, 3) of a binary file, and notes.
+    """Return the corners (3f, 3) of a binary file, and notes for the user.
 
     triangle_count : number of triangles that the header states
     """

@@ -65,11 +65,11 @@ def with_settled_unit(rigged: RiggedMesh, path: Path, unit_mm: float | None, cul
 
 
 def guess_unit_mm(positions: Floats, triangles: Ints) -> float:
-    """Return the likely unit of a mesh whose file states none [mm].
+    """Return the likely length unit of a mesh whose file states no unit [mm].
 
-    The guess is the millimetre if the mesh is then 100 to 1000 mm large and not a standing figure. Otherwise
-    the guess is the unit of `COMMON_UNITS_MM` with which the mesh is closest in size to an adult or a head,
-    or to a hand if the mesh is flat or slender.
+    The guess is the millimetre if this makes the mesh 100 to 1000 mm large and the mesh is not a standing
+    figure. Otherwise the guess is a unit of `COMMON_UNITS_MM`: with this unit, a standing figure is closest
+    in size to an adult, a flat or slender mesh to a hand, and any other mesh to a head.
 
     positions : (v, 3) vertices in the unit of the file, Y up
     triangles : (f, 3) vertex indices
@@ -88,7 +88,10 @@ def guess_unit_mm(positions: Floats, triangles: Ints) -> float:
 
 
 def _is_in_mm(positions: Floats) -> bool:
-    """Return whether height or longest side of vertices (v, 3) suggest that their unit is the millimetre."""
+    """Return whether the height or longest side of a mesh suggests that its unit is the millimetre.
+
+    positions : (v, 3) vertices in the unit of the file
+    """
     sizes, (low, high) = np.ptp(positions, axis=0), _SIZE_RANGE_OF_MM_FILES
     return any(low <= size <= high for size in (sizes[1], sizes.max()))
 
@@ -104,9 +107,9 @@ def _size_text(sizes_mm: Floats) -> str:
 
 
 def _refuse_size(mesh: Mesh, unit_mm: float, culprit: object) -> None:
-    """Refuse a mesh of impossible size; the advice names units with which the size would be usual.
+    """Refuse a mesh of impossible size; the error advises units with which the size would be usual.
 
-    unit_mm : unit of the file with which the mesh was read [mm]
+    unit_mm : unit with which the file was read [mm]
     """
     low, high = _USUAL_SIZE_RANGE_MM[is_standing_figure(mesh.positions, mesh.triangles)]
     advice = "Set the millimetres per unit of the file with --unit-mm"

@@ -11,8 +11,8 @@ from dermis.images.colour import decode_srgb
 def linear_colours(stored_colours: Numbers) -> tuple[Doubles, list[str]]:
     """Convert vertex colours of a file to linear colours (n, 3) from 0 to 1; also return notes for users.
 
-    stored_colours : (n, 3) sRGB; integers are divided by the largest value of their type, floats by 255 if
-        one is larger than 1; vertices whose values are NaN are white
+    stored_colours : (n, 3) sRGB; integers are divided by the largest value of their type; floats are divided
+        by 255 if any float is larger than 1; NaN becomes 1
     """
     notes = []
     if stored_colours.dtype.kind in "iu":

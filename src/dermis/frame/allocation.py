@@ -1,4 +1,4 @@
-"""Allocation of the resources of a frame that depend neither on the camera nor on positions of lights."""
+"""Allocation of the resources of a frame that depend neither on the camera nor on the positions of lights."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ LayoutAtlas = tuple[Atlas, AtlasTextures]
 def make_resources(memo: Memo, device: Device, request: FrameRequest, technique: Technique) -> Resources:
     """Return the textures, buffers and records that a request needs, from the cache if nothing has changed.
 
-    Raises DermisError for sizes over the device's limits.
+    Raises DermisError for sizes that exceed the limits of the device.
     """
     settings, cached = request.settings, memo.get
     check_limits(device, request)
@@ -162,7 +162,7 @@ def _shared_bindings(
 def _cached_sky_visibility(
     memo: Memo, device: Device, request: FrameRequest, layout: AtlasLayout, shapes: shape.Resources
 ) -> VertexSkyVisibility:
-    """Return the sky visibility at the vertices, from the cache or newly computed for the head at rest."""
+    """Return the sky visibility at the vertices of the head at rest, from the cache or newly computed."""
     at_rest = rest_geometry(memo, device, layout.head, shapes.tables, request.topology, None, 0)
     return memo.get(make_vertex_sky_visibility, device, request.topology, untracked=(at_rest,))
 
@@ -193,7 +193,7 @@ def _make_layout(
     shared: Bindings,
     layout_index: int,
 ) -> AtlasLayout:
-    """Return the resources of one atlas layout, without the record of the lights, which each frame adds.
+    """Return the resources of one atlas layout; each frame adds the uniform record of its lights.
 
     layout_atlas : the atlas, and its textures on the device
     shared : result of `_shared_bindings`, with the maps of the head

@@ -1,4 +1,4 @@
-"""Maps of the skin, computed by the frame at the texels of the uv layout."""
+"""Baking of maps of the skin: its properties and its light, at the texels of the uv layout."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ class BakedMaps:
 
     covered : (n, n) mask of texels whose centre is on skin; all other texels copy the nearest texel in the
         mask
-    maps : (n, n) or (n, n, c) maps by the names of `features.shading.bake.BAKED_CHANNELS`
-    absent : reason why a map is missing, by the name of the map
+    maps : dictionary from a name in `features.shading.bake.BAKED_CHANNELS` to an (n, n) or (n, n, c) map
+    absent : dictionary from the name of each missing map to the reason why it is missing
     """
 
     covered: NDArray[np.bool_]
@@ -55,14 +55,14 @@ class BakedMaps:
 
 
 def bake(renderer: Renderer, scene: Scene, settings: Settings, map_side: int) -> BakedMaps:
-    """Compute maps of the skin in its uv layout: its properties, and light before and after scattering.
+    """Compute maps of a head's skin: properties of the surface, and light before and after scattering.
 
     settings : settings of the lighting; size, samples, technique and `strands` are ignored
     map_side : side of the maps, a power of two [texels]
 
-    Maps are evaluated at the centres of texels, with a filter as wide as a texel.
+    The maps are evaluated at the centres of texels, with a filter as wide as a texel.
 
-    Raises DermisError for sizes over the limits of the device, and when the device fails.
+    Raises DermisError for sizes that exceed the limits of the device, and if the device fails.
     """
     changes = {"size": _DISCARDED_PICTURE_SIZE, "samples": 1, "technique": "texture-space", "parts": "all"}
     settings = settings.model_copy(update=changes)
@@ -112,9 +112,10 @@ def layout_points(mesh: Mesh, map_side: int) -> tuple[NDArray[np.int64], NDArray
 def _texel_weights(
     mesh: Mesh, map_side: int, texel_index: NDArray[np.int64], triangle_index: NDArray[np.int64]
 ) -> NDArray[np.float64]:
-    """Return (n, 2) barycentric weights of texel centres for the second and third corner of a triangle.
+    """Return (n, 2) barycentric weights of texel centres for the second and third corner of their triangles.
 
-    texel_index, triangle_index : (n,) indices of the texels, row by row, and of the triangles that cover them
+    texel_index : (n,) indices of the texels, counted row by row
+    triangle_index : (n,) indices of the triangles that cover these texels
     """
     corners = texel_corners(mesh, map_side, triangle_index)
     offset = np.stack([texel_index % map_side, texel_index // map_side], axis=1) - corners[:, 0]
@@ -133,7 +134,9 @@ def _available_outputs(
     output_names: tuple[str, ...],
     absence_reasons: dict[str, str],
 ) -> tuple[str, ...]:
-    """Return `output_names` if the scene has these outputs; else return () and add to `absence_reasons`."""
+    """Return `output_names` if the scene has these outputs, else ().
+
+    absence_reasons : dictionary to which the reason is added if the result is ()"""
     try:
         renderer.draw(scene, settings, timed=False, outputs=output_names)
     except DermisError:
@@ -150,7 +153,7 @@ def _bake_points(
     packed_points: NDArray[np.uint32],
     map_side: int,
 ) -> Floats:
-    """Render a frame to light the atlas, and return (n, BAKED_CHANNEL_COUNT) values at surface points.
+    """Render a frame, which lights the atlas; return (n, BAKED_CHANNEL_COUNT) values at surface points.
 
     output_names : names of outputs whose resources bake.wgsl needs
     packed_points : (n, 4) surface points, packed by `features.shading.bake.point_words`
@@ -189,7 +192,7 @@ def _to_maps(
 ) -> BakedMaps:
     """Arrange the channels of skin texels as maps, and fill all other texels from the nearest skin texel.
 
-    texel_index : (n,) indices of the skin texels, row by row
+    texel_index : (n,) indices of the skin texels, counted row by row
     texel_values : (n, BAKED_CHANNEL_COUNT) values at these texels, in the channels of `BAKED_CHANNELS`
     """
     covered = np.zeros(map_side * map_side, np.bool_)
@@ -212,7 +215,7 @@ def _to_maps(
 
 
 def _nearest_covered_texels(covered_mask: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return, for each texel outside the mask in row order, the flat index of the nearest texel inside."""
+    """Return, for each texel outside the mask, row by row, the flat index of the nearest texel inside it."""
     from scipy.ndimage import distance_transform_edt
 
     y, x = distance_transform_edt(~covered_mask, return_distances=False, return_indices=True)

@@ -23,8 +23,8 @@ ADAPTER_KINDS = {"gpu": "DiscreteGPU", "software": "CPU"}
 def capture_renderer(device_kind: str, adapter: str) -> Renderer:
     """Return a renderer that records passes for GPUs or for software adapters.
 
-    device_kind : adapter on which the passes will be replayed, "gpu" or "software"
-    adapter : selector of the adapter on which the renderer itself runs; it may be of another kind
+    device_kind : kind of adapter on which the passes will be replayed, "gpu" or "software"
+    adapter : selector of the adapter on which the renderer runs, which may be of the other kind
     """
     renderer = Renderer(adapter, cache_size=_RENDERER_CACHE_SIZE, cache_ttl=1000)
     if renderer.device.adapter.kind != ADAPTER_KINDS[device_kind]:
@@ -41,9 +41,9 @@ def capture_frame(capture: FrameCapture, inputs: FrameInputs) -> CapturedFrame:
 
 
 def reduce_hair(captured_frame: CapturedFrame, hair_divisor: int) -> CapturedFrame:
-    """Return a captured frame that draws one in `hair_divisor` coarse hairs, widened to cover the same area.
+    """Return a captured frame with fewer coarse hairs, which are widened to cover the same area.
 
-    hair_divisor : divisor of the number of hairs; 0 keeps all hairs
+    hair_divisor : number by which the number of coarse hairs is divided; 0 keeps all hairs
     """
     for _, record in (one for one in captured_frame.records if one[0] == "StrandView" and hair_divisor > 1):
         count = int(record["coarse"]) // hair_divisor
@@ -53,7 +53,7 @@ def reduce_hair(captured_frame: CapturedFrame, hair_divisor: int) -> CapturedFra
 
 
 def capture_mips(capture: FrameCapture, texture: Texture) -> CapturedFrame:
-    """Record the passes that compute the mip levels of a map from its finest level."""
+    """Record the passes that compute the coarser mip levels of a map from its finest level."""
     return capture.capture(lambda graph: map_mips.fill_mips(graph, map_mips.with_mip_views(texture)))
 
 

@@ -1,4 +1,4 @@
-"""Passes of one frame in their order, from the posed shape to the picture and its outputs."""
+"""Passes of one frame in order, from the posed shape to the picture and its outputs."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def draw_frame(graph: Graph, inputs: FrameInputs, technique: Technique) -> None:
 
 
 def _stage_inputs(graph: Graph, inputs: FrameInputs, technique: Technique, scattered: Texture) -> StageInputs:
-    """Collect what the passes of outputs need: shading inputs, geometry, picture and technique."""
+    """Collect the inputs of the passes that compute outputs: shading, geometry, picture and technique."""
     resources, diffused = inputs.resources, None
     layers = technique.subsurface_layers(resources.output_layers)
     if layers is not None:

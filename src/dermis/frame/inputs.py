@@ -1,4 +1,4 @@
-"""Inputs of a frame: cached resources, and records of the camera, the lights and the pose."""
+"""Inputs of a frame: cached resources, and values for the camera, the lights and the pose."""
 
 from __future__ import annotations
 
@@ -25,17 +25,19 @@ class FrameInputs:
     motion : pose of the head, as bytes for the shaders
     face_movements : (9,) strength of the facial movements that change the painted maps, None if no map
         changes
-    layouts : atlas layouts of `resources`, each with the record of this frame's lights
-    blurs : Gaussian blurs of each layout, with the factor that brings this frame's light into their range
+    layouts : atlas layouts of `resources`, each with the uniform record of this frame's lights
+    blurs : Gaussian blurs of each layout, with a factor that brings this frame's light into the range of the
+        texture format
     shadow_views : projections of all shadow maps
     light_constants : pipeline constants of the lights in use
     camera_views : projection of the camera, with the positions of samples in a pixel
     window : rectangle of the image plane that the picture shows
-    sky_view : views of the head from all directions of the sky, and their uniform record; None unless
-        occlusion follows the shape
-    view, constants : uniform record of the shading pass, and its pipeline constants
+    sky_view : views of the head from all directions of the sky, and the uniform record of the views; None
+        unless occlusion follows the shape
+    view : uniform record of the shading pass
+    constants : pipeline constants of the shading pass
     centre_mm : centre of the head, the origin of positions in the scene [mm]
-    previous : pose and camera of the previous scene for motion vectors, None unless requested
+    previous : pose and camera of the previous scene for motion vectors, None if these are not requested
     """
 
     resources: Resources

@@ -74,7 +74,7 @@ def out_of_memory_error(
 def suggest_settings(request: FrameRequest, budget_bytes: float) -> str:
     """Return advice on settings whose frame fits into `budget_bytes` bytes.
 
-    The setting that needs most memory is halved until the frame fits.
+    The setting that needs the most memory is halved until the frame fits.
     """
     smaller, changed = request, dict[str, str]()
     needed = frame_bytes(request)
@@ -91,7 +91,7 @@ def suggest_settings(request: FrameRequest, budget_bytes: float) -> str:
 
 
 def frame_bytes(request: FrameRequest) -> dict[str, float]:
-    """Return the memory that each size setting of a frame requires [bytes], without the head and its maps."""
+    """Return the memory that each size setting requires [bytes], without the head and its maps."""
     technique, settings, atlases = request.technique, request.settings, request.atlas_plan
     width, height = settings.size
     pixel = _PICTURE_PIXEL_BYTES + _BYTES_PER_SAMPLE * settings.samples + technique.pixel_bytes
@@ -109,7 +109,7 @@ def frame_bytes(request: FrameRequest) -> dict[str, float]:
 
 
 def _mixing_bytes(request: FrameRequest) -> float:
-    """Return the memory per atlas texel that a blend of several profiles adds [bytes]."""
+    """Return the additional memory per atlas texel for blending several profiles [bytes]."""
     others = len(request.other_profiles)
     maps = len(request.atlas_plan.layouts) + sum_layer_count(others)
     return (
@@ -120,7 +120,7 @@ def _mixing_bytes(request: FrameRequest) -> float:
 
 
 def _halved_settings(settings: Settings, option_name: str) -> Settings | None:
-    """Return settings with half the value of a size option, None if half the value is too small.
+    """Return settings with half the value of a size option, None if this value would be too small.
 
     For "size", the samples per pixel are halved first.
     """
@@ -132,7 +132,7 @@ def _halved_settings(settings: Settings, option_name: str) -> Settings | None:
 
 
 def _command_line_options(settings: Settings, option_name: str) -> dict[str, str]:
-    """Return the command line options for a size setting, by the name of the setting."""
+    """Return a dictionary from the name of a size setting to the command line options that set its value."""
     if option_name != "size":
         return {option_name: f"--{option_name.replace('_', '-')} {getattr(settings, option_name)}"}
     width, height = settings.size

@@ -30,7 +30,7 @@ class Landmarks(NamedTuple):
     names : names of the landmarks, in the order of the set
     positions_mm : (n, 3) world positions relative to the centre of the head [mm]
     pixels : (n, 2) image coordinates, x to the right and y down, (0, 0) at the centre of the upper left pixel
-    visible : (n,) whether the mesh does not occlude the landmark; hair is ignored
+    visible : (n,) whether the landmark is visible: not hidden by the mesh; hair is ignored
     """
 
     names: tuple[str, ...]
@@ -48,11 +48,12 @@ class Observation(ShortRepr):
     picture : ndarray
         (h, w, 3), or with alpha (h, w, 4), sRGB bytes or linear floats.
     outputs : mapping
-        Outputs by name, (h, w) or (h, w, c) with row 0 at the top, see `dermis.scene.outputs`.
+        Dictionary from the name of an output to an array (h, w) or (h, w, c) with row 0 at the top, see
+        `dermis.scene.outputs`.
     camera : OpenCvCamera
         Intrinsic matrix K and pose R, t as in OpenCV; positions are relative to the head's centre [mm].
     landmarks : mapping
-        Landmarks by the name of their set.
+        Dictionary from the name of a set to its landmarks.
     head_pose : ndarray
         (3, 4) rotation and translation [mm] from the head at rest to the camera.
     gaze : ndarray or None
@@ -83,9 +84,9 @@ def observation_jobs(
     previous: Scene | Iterable[Scene | None] | None,
     settings: Iterable[Settings],
 ) -> Iterator[tuple[Callable[[], Readback], Callable[[Readback], Observation]]]:
-    """Yield two functions for each scene: the first submits a frame, the second reads back the observation.
+    """Yield two functions for each scene: the first submits a frame, the second returns the observation.
 
-    submit_frame : function that submits a frame, given a scene, the previous scene and `settings`
+    submit_frame : function of a scene, the previous scene and `settings`, which submits a frame
     previous : previous scenes for motion vectors, see `pair_with_previous`
     settings : settings of each scene
     """
@@ -112,10 +113,11 @@ def _landmarks(
 def pair_with_previous(
     scenes: Iterable[Scene], previous: Scene | Iterable[Scene | None] | None
 ) -> Iterator[tuple[Scene, Scene | None]]:
-    """Yield each scene together with the previous scene, from which its motion is measured, or with None.
+    """Yield each scene with its previous scene, from which motion is measured, or with None.
 
-    previous : the scene before the first one, or None; each later scene is then paired with the scene before
-        it, or with None if the head changes. Alternatively an iterable with the previous scene of each scene
+    previous : either an iterable with one previous scene or None for each scene, or only the previous scene
+        of the first scene, or None. In the latter cases, each later scene is paired with the scene before it,
+        or with None if the head changes
     """
     if isinstance(previous, Iterable):
         for one, before in zip_longest(scenes, previous, fillvalue=_NO_PREVIOUS_SCENE):

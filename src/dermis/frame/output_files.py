@@ -39,7 +39,7 @@ def output_path(picture_path: Path, output_name: str, file_format: Format) -> Pa
 
 
 def encode_output(output_name: str, output_array: PlaneArray, file_format: Format) -> bytes:
-    """Return the bytes of a file with one output; equal arrays give equal bytes.
+    """Return the bytes of a file that stores one output; equal arrays give equal bytes.
 
     output_name : name of the output
     output_array : (h, w) or (h, w, c) array of the output
@@ -62,7 +62,7 @@ def write_multipart(path: Path, picture: PlaneArray, output_arrays: Mapping[str,
     """Write a linear picture and outputs as the parts of one OpenEXR file.
 
     picture : (h, w, 3 or 4) linear floats
-    output_arrays : arrays of the outputs by name
+    output_arrays : dictionary from the name of an output to its array
     """
     parts = {_PICTURE_PART_NAME: dict(zip("RGBA", np.moveaxis(picture, -1, 0), strict=False))}
     parts |= {name: _channels(OUTPUTS[name], one) for name, one in output_arrays.items()}
@@ -86,7 +86,7 @@ def quantise(output_name: str, output_array: PlaneArray) -> NDArray[np.uint8 | n
 
 
 def _channels(output: Output, output_array: PlaneArray) -> dict[str, PlaneArray]:
-    """Return the channels of an output by their names in an OpenEXR file: depth.Z, normal.X, ..."""
+    """Return a dictionary from channel names in OpenEXR, such as normal.X, to channels of an output."""
     channels = np.atleast_3d(output_array)
     names = output.channel_names or [str(k) for k in range(channels.shape[2])]
     return {f"{output.name}.{name}": channels[..., k] for k, name in enumerate(names)}

@@ -1,4 +1,4 @@
-"""Preparation of the inputs of a frame from a scene, with a cache of the resources that did not change."""
+"""Preparation of the inputs of a frame from a scene; resources that have not changed come from a cache."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class HeadState(NamedTuple):
 
 
 class Preparation:
-    """Preparation of the inputs of frames on a device, with the cache of its resources.
+    """Preparation of the inputs of frames on a device, with a cache of resources.
 
     cache_size : number of variants of each resource that are cached
     cache_ttl : number of frames after which unused resources are released
@@ -79,16 +79,17 @@ class Preparation:
         previous: Scene | None = None,
         landmarks: tuple[str, ...] = (),
     ) -> FrameInputs:
-        """Return the inputs of a frame, from cached resources where nothing has changed.
+        """Return the inputs of a frame.
 
-        Cached resources that are no longer used are released.
+        Resources are taken from the cache where nothing has changed; cached resources that are no longer used
+        are released.
 
         view : name of the scene, for callers that draw several scenes in turn
         outputs : names of outputs besides the picture
         previous : scene of the same head for motion vectors; without it, motion is 0
         landmarks : names of landmark sets
 
-        Raises DermisError for sizes over the limits of the device.
+        Raises DermisError for sizes that exceed the limits of the device.
         """
         inputs = self._inputs(scene, settings, TECHNIQUES[settings.technique], view, (outputs, landmarks))
         if "motion" in outputs:
@@ -161,7 +162,8 @@ class Preparation:
     def _profiles(self, skin: Skin, technique: Technique) -> ProfileMix:
         """Return the profiles of the skin and their blend weights.
 
-        Techniques that cannot blend profiles get the first profile alone, and None in place of weights.
+        For techniques that cannot blend profiles, the result is the first profile alone, with None as
+        weights.
         """
         if technique.mixes_profiles:
             return self.profiles.mixture(skin)
@@ -170,7 +172,7 @@ class Preparation:
     def _sky_view(
         self, head: Head, motion: Motion | None, outline: Outline
     ) -> tuple[SkyViews, UniformRecord]:
-        """Return the views of the posed head from all directions of the sky, and their uniform record."""
+        """Return views of the posed head from all directions of the sky, and their uniform record."""
         anchors, motion = self.memo.get(make_anchors, head.topology), motion or head.control.rest
         return self.memo.get(_sky_view, outline, untracked=(motion, self.device, head, anchors))
 
@@ -191,7 +193,7 @@ class Preparation:
         return PreviousScene(None if motion == inputs.motion else motion, view)
 
     def _head_state(self, head: Head, motion: Motion | None) -> HeadState:
-        """Return the pose, outline and eyes of a head, in its rest pose if `motion` is None."""
+        """Return the pose, outline and eyes of a head; if `motion` is None, the head is at rest."""
         at_rest = self.memo.get(_rest_motion, head)
         return self.memo.get(_posed_state, head, motion or head.control.rest, at_rest)
 
@@ -202,7 +204,9 @@ def interreflection_constants(resources: Resources) -> Constants:
 
 
 def _motion_bytes(head: Head, motion: Motion, at_rest: MotionBytes) -> MotionBytes:
-    """Return a pose as bytes for the shaders; unchanged rest positions reuse the bytes of `at_rest`."""
+    """Return a pose as bytes for the shaders.
+
+    at_rest : rest pose, whose positions are reused if the control points are the same"""
     weights, matrices = motion.weights.tobytes(), motion.matrices.tobytes()
     is_rest = motion.positions_mm is head.control.positions_mm
     positions = at_rest.positions if is_rest else motion.positions_mm.tobytes()
@@ -210,7 +214,7 @@ def _motion_bytes(head: Head, motion: Motion, at_rest: MotionBytes) -> MotionByt
 
 
 def _rest_positions_mm(scene: Scene) -> NDArray[np.float32] | None:
-    """Return the (p, 3) control points of the person at rest [mm], None if the topology has the same."""
+    """Return the person's (p, 3) control points at rest [mm], None if the topology has the same points."""
     motion = scene.motion or scene.head.control.rest
     positions_mm = motion.positions_mm
     return None if positions_mm is scene.head.topology.control.positions_mm else positions_mm
@@ -248,7 +252,7 @@ def _sky_view(
 
 
 def with_lights(layout: AtlasLayout, lights_record: UniformRecord) -> AtlasLayout:
-    """Return a copy of the layout with the uniform record of these lights in its shader bindings."""
+    """Return a copy of a layout whose shader bindings include the uniform record of the lights."""
     return replace(layout, bindings=layout.bindings | {"lights": lights_record})
 
 
@@ -259,7 +263,7 @@ def _scaled_blurs(blurs: tuple[Blur, ...], irradiance_scale: float) -> tuple[Blu
 def _light_resources(
     _: Head, __: Lights, outline: Outline, map_side: int, device: Device, scene: Scene
 ) -> tuple[UniformRecord, Views, tuple[int, ...]]:
-    """Return the uniform record of the lights, the views of shadow maps, and the part count of each light.
+    """Return the record of the lights, the views of shadow maps, and the number of parts of each light.
 
     The first two parameters only serve as cache keys.
     """

@@ -53,8 +53,8 @@ _COMMON_SHADERS = (  # shaders of most frames
 def shader_folders(*option_names: str) -> tuple[Folder, ...]:
     """Return the folders from which shaders include files, with the lists and constants of all features.
 
-    A feature is a package in `features`. Its functions `shader_constants` and `shader_lists` are discovered
-    here, so that features need no registration.
+    A feature is a package in `features`. The functions `shader_constants` and `shader_lists` of each package
+    are found automatically, so that features need not be registered.
 
     option_names : names of the `//#if` conditions that hold
     """
@@ -65,7 +65,9 @@ def shader_folders(*option_names: str) -> tuple[Folder, ...]:
 
 @lru_cache(maxsize=1)
 def _feature_definitions(_: int) -> tuple[dict[str, ListMembers], dict[str, float]]:
-    """Return the lists and constants of all features, for one `registry_version`."""
+    """Return the lists and constants of all features.
+
+    The parameter, from `registry_version`, only serves as a cache key."""
     constants = light_shader_constants() | isotropic_lobe_constants() | reflection_constants()
     lists: dict[str, ListMembers] = {"lights": light_shaders}
     for feature in _features():
@@ -121,7 +123,7 @@ def shader_options(source: str, store: str, labels: bool, constants: Constants =
 def program_constants(
     device: Device, path: Path, folders: Sequence[Folder], constants: Constants = ()
 ) -> dict[str, float]:
-    """Return the values of `constants`, and of the `device_constants` that the shader declares, by name."""
+    """Return a dictionary of `constants` and of the `device_constants` that the shader declares."""
     return used_constants(path, folders, device_constants(device)) | dict(constants)
 
 
@@ -144,7 +146,7 @@ def registry_version() -> int:
 
 
 def device_constants(device: Device) -> Constants:
-    """Return the pipeline constants that are fastest on the device, for shaders that declare them.
+    """Return the values of pipeline constants with which shaders run fastest on the device.
 
     GPUs read buffers faster. Software adapters read textures faster, skip lights behind each point's surface,
     shade columns of pixels and take longer steps along hairs that cast shadows; see geometry.wgsl,
@@ -156,17 +158,17 @@ def device_constants(device: Device) -> Constants:
 
 
 def strip_constants(device: Device, sample_count: int) -> Constants:
-    """Return the pipeline constant that shortens the column of pixels per invocation, for many samples.
+    """Return the pipeline constant that lets an invocation shade fewer pixels, if a pixel has many samples.
 
-    On software adapters an invocation shades a column of pixels, and a driver limits its loop iterations. The
-    result is empty where no limit is reached.
+    On software adapters, an invocation shades a column of pixels, and the driver limits the number of loop
+    iterations per invocation. The result is empty if this limit is not reached.
     """
     strip = max(1, _MAX_SAMPLES // sample_count)
     return (("STRIP", strip),) if device.adapter.kind == "CPU" and strip < _PIXELS_PER_COLUMN else ()
 
 
 def level_format(device: Device) -> str:
-    """Return the faster texture format of pyramid levels: half floats on GPUs, floats in software."""
+    """Return the fastest format of pyramid levels: half floats on GPUs, floats on software adapters."""
     return FLOAT_TEXEL_FORMAT if device.adapter.kind == "CPU" else HALF_TEXEL_FORMAT
 
 

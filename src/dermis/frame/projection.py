@@ -30,7 +30,7 @@ PIXEL_CENTRE = np.full((1, 2), 0.5)
 
 
 class Views(NamedTuple):
-    """Projections for the layers of a texture array, one layer for each sample position of each view.
+    """Projections for the layers of a texture array; each sample position of each view has one layer.
 
     clips : (k, 4, 4) matrices from world to clip space
     sample_positions : (n, 2) positions of the samples in a pixel, from 0 to 1 to the right and down [pixels]
@@ -54,7 +54,7 @@ class ShadowView(NamedTuple):
     """View of the head from a light, for its shadow map.
 
     clip : (4, 4) matrix from world to clip space
-    texel : side of a texel; for parallel light in mm, for other lights relative to the distance [-]
+    texel : side of a texel: in mm for parallel light, else relative to the distance from the light [-]
     origin : position of the light; for parallel light the centre of the map [mm]
     right, up : unit vectors along the rows and columns of the map
     near, far : depths at which the map stores 1 and 0 [mm]
@@ -83,8 +83,8 @@ def view_axes_array(forward: Vectors, up: Vectors) -> tuple[Vectors, Vectors, Ve
 def view_axes(forward: Sequence[float], up: Sequence[float] = _UP_DIRECTION) -> Axes:
     """Return the unit vectors right, up and forward of a view direction, as tuples.
 
-    For single vectors this is faster than NumPy. Where `up` is parallel to `forward`, a horizontal axis takes
-    its place.
+    For single vectors, this function is faster than NumPy. If `up` is parallel to `forward`, it is replaced
+    by a horizontal axis.
     """
     f = unit_vector(forward)
     r = _cross(f, up)
@@ -140,7 +140,7 @@ def perspective(rows: Rows, window: Window, near: float, far: float) -> list[Seq
     rows : upper three rows of the view matrix
     near, far : distances at which depth is 1 and 0 [mm]
 
-    Reversed depth has an even precision over the whole range, because floats are densest near 0.
+    Reversed depth has a similar precision at all distances, because floats are densest near 0.
     """
     scale = -near / (far - near)
     depth = [scale * c for c in rows[2]]
@@ -165,9 +165,9 @@ def depth_range(outline: Outline, rows: Rows) -> tuple[float, float]:
 def point_shadow_views(
     lights: Sequence[tuple[str, PointLight]], centre: Triple, outline: Outline, map_side: int
 ) -> list[ShadowView]:
-    """Return for each point light the narrowest view from its position that contains the whole mesh.
+    """Return, for each point light, the narrowest view from the light that contains the whole mesh.
 
-    lights : each light with its name for error messages
+    lights : lights, each preceded by its name in error messages
     centre : centre of the head, the origin of light positions [mm]
     outline : outline of the head's shape
     map_side : side of the shadow maps [texels]
@@ -212,7 +212,7 @@ def _check_outside(lights: Sequence[tuple[str, PointLight]], outside_flags: Sequ
 
 
 def _largest_tangents(side_coordinates: NDArray[np.floating], depth: NDArray[np.floating]) -> list[float]:
-    """Return, for each view, the tangent of half the square field of view that contains all points [-].
+    """Return, for each view, the tangent of half the field of view that contains all points [-].
 
     side_coordinates : (2, k, n) x and y of points in k views; the array is overwritten to avoid allocations
     depth : (k, n) depths of the points
@@ -246,7 +246,7 @@ def parallel_shadow_view(direction: Vectors, outline: Outline, map_side: int) ->
 
 @cache
 def pixel_samples(sample_count: int) -> NDArray[np.float64]:
-    """Return sample positions in a pixel, a (sample_count, 2) Hammersley set in the unit square."""
+    """Return the sample positions within a pixel: a (sample_count, 2) Hammersley set in the unit square."""
     index = np.arange(sample_count)
     y, digit, remaining = np.zeros(sample_count), 0.5, index.copy()
     while remaining.any():

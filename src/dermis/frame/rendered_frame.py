@@ -26,7 +26,7 @@ _MAX_BYTE_LEVEL = 255  # largest byte of a picture
 
 @dataclass(eq=False)
 class FrameTextures:
-    """Device, textures and buffers of a frame; all are replaced if the frame is drawn again on a new device.
+    """Device, textures and buffers of a frame; all are replaced if a lost device is opened again.
 
     meter : exposure meter, None for a fixed exposure
     outputs : resources of the outputs besides the picture, None if none are requested
@@ -43,7 +43,7 @@ class RenderedFrame(ShortRepr):
     """Picture on the device, valid until its renderer draws the next frame.
 
     textures : device, picture and outputs
-    gpu_ms : device time of each timed stage, and "total" [ms]; None without timestamps
+    gpu_ms : device time of each timed stage, and "total" [ms]; None if stages were not timed
     frame_ms : time from recording the frame to its completion [ms]
     setup_ms : time before the frame for uploads, the atlas and shaders [ms]
     gaussians : number of Gaussians of the profile
@@ -51,8 +51,8 @@ class RenderedFrame(ShortRepr):
     suns : number of lights that the environment adds
     settings : settings of the frame
     start_readback : function that starts the readback of a picture, see `features.outputs.readback`
-    run_on_device : function that runs a job and returns its result, after drawing the frame again if its
-        device was lost
+    run_on_device : function that runs a job and returns the job's result; if the device of the frame was
+        lost, it first draws the frame again
     is_current : function that tells whether the picture is still valid
     """
 
@@ -89,14 +89,14 @@ class RenderedFrame(ShortRepr):
         return self._read_back()
 
     def rgba8(self) -> NDArray[np.uint8]:
-        """Return (h, w, 4) sRGB bytes over the background "none", where alpha is the coverage by the head.
+        """Return (h, w, 4) sRGB bytes of a frame with background "none"; alpha is the coverage by the head.
 
-        Colours are not multiplied by alpha, as in PNG files.
+        As in PNG files, colours are not multiplied by alpha.
         """
         return self._read_back(alpha=self.settings)
 
     def linear_rgba(self) -> NDArray[np.float32]:
-        """Return (h, w, 4) linear floats over the background "none", multiplied by alpha as in OpenEXR."""
+        """Return (h, w, 4) linear floats of a frame with background "none", premultiplied by alpha."""
         return self._download_exposed()
 
     def output(self, name: str) -> PlaneArray:

@@ -53,9 +53,10 @@ def pipeline_frames(
 
     A frame whose device is lost is submitted again.
 
-    reopening_device : runs functions, and opens the device again when it is lost
+    reopening_device : object that runs functions, and opens the device again when it is lost
     device : function that returns the current device
-    frames : for each frame, a function that submits it, and one that returns the result of its readback
+    frames : for each frame, a function that submits the frame, and a function that returns the result of its
+        readback
     """
     pending: deque[tuple[Readback, Submit, Receive[T]]] = deque()
 
@@ -74,7 +75,7 @@ def pipeline_frames(
 
 
 class Renderer:
-    """Renderer of scenes on one device; it computes again only what changed since the previous frame.
+    """Renderer of scenes on one device, which recomputes only what has changed since the previous frame.
 
     When the driver loses the device, it is opened again and the frame is rendered again.
 
@@ -87,7 +88,8 @@ class Renderer:
     cache_ttl : int
         Number of frames after which unused resources are released.
     reopens : bool
-        False raises DeviceLostError when the device is lost, for callers with resources of their own on it.
+        Whether a lost device is opened again. If False, DeviceLostError is raised, for callers that keep
+        other resources on the device.
 
     Raises
     ------
@@ -212,10 +214,10 @@ class Renderer:
         settings : Settings, optional
             Size, technique and other settings.
         force : bool
-            True runs all passes, instead of only those whose inputs have changed.
+            Whether to run all passes, instead of only the passes whose inputs have changed.
         timed : bool or "whole"
-            True times each stage in a pass of its own, which makes the frame slower. "whole" times the frame
-            as one pass. False returns when the frame is submitted, and waits only if three frames are in
+            True times each stage in a separate pass, which makes the frame slower. "whole" times the frame as
+            one pass. False returns as soon as the frame is submitted, and waits only if three frames are in
             flight.
         view : str
             Name of the scene, for callers that draw several scenes in turn: each name caches its own light
@@ -233,7 +235,7 @@ class Renderer:
         Raises
         ------
         DermisError
-            For sizes over the limits of the device, and when the device fails.
+            For sizes that exceed the limits of the device, and if the device fails.
 
         Examples
         --------
@@ -288,7 +290,7 @@ class Renderer:
         )
 
     def _run_on_device(self, textures: FrameTextures, redraw: Callable[[], None], job: Callable[[], T]) -> T:
-        """Return the result of a job that reads a frame; draw the frame again if its device was lost.
+        """Return the result of a job that reads a frame; if the device was lost, draw the frame again first.
 
         textures : textures of the frame, which `redraw` replaces
         redraw : function that draws the frame again
@@ -373,7 +375,7 @@ class Renderer:
         Raises
         ------
         DermisError
-            For sizes over the limits of the device, and when the device fails.
+            For sizes that exceed the limits of the device, and if the device fails.
         """
         submit = partial(self._submit_readback, settings=Settings(**settings), linear=linear, alpha=alpha)
         frames = ((partial(submit, Scene.coerce(scene)), Readback.image) for scene in scenes)
@@ -405,8 +407,8 @@ class Renderer:
         linear : bool
             True returns float32 linear Rec. 709 instead of sRGB bytes.
         previous : Scene or iterable of Scene, optional
-            Scene before the first scene, for motion vectors between consecutive scenes of the same head; or
-            the previous scene of each scene.
+            Scenes for motion vectors: either an iterable with the previous scene of each scene, or the scene
+            before the first one; each later scene then uses the scene before it, if the head is the same.
         landmarks : iterable of str
             Landmark sets (keys of `dermis.human.landmarks.sets.LANDMARK_SETS`), or files of rows name,vertex.
 
@@ -418,7 +420,7 @@ class Renderer:
         Raises
         ------
         DermisError
-            For sizes over the limits of the device, and when the device fails.
+            For sizes that exceed the limits of the device, and if the device fails.
         """
         if settings is None or isinstance(settings, Settings | Mapping):
             settings = repeat(as_model(Settings, settings or {}, "settings", "size=(512, 512)"))
@@ -429,7 +431,7 @@ class Renderer:
 
 
 def render(scene: Scene | Head, adapter: str = "auto", **settings: Any) -> NDArray[np.float32]:
-    """Return the picture of a scene; for many pictures, keep a `Renderer`.
+    """Return the picture of a scene; for many pictures, use one `Renderer`.
 
     Parameters
     ----------
@@ -448,7 +450,8 @@ def render(scene: Scene | Head, adapter: str = "auto", **settings: Any) -> NDArr
     Raises
     ------
     DermisError
-        For invalid settings, an unknown adapter, sizes over the limits of the device, or a failing device.
+        For invalid settings, an unknown adapter, sizes that exceed the limits of the device, or a device
+        failure.
 
     References
     ----------

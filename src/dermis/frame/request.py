@@ -25,8 +25,8 @@ class FrameRequest:
     """Everything on which the cached resources of a frame depend.
 
     profile : diffusion profile of the skin, the first profile if a map blends several profiles
-    rest_positions_mm : (p, 3) control points of the person at rest [mm], None if they equal those of the
-        topology
+    rest_positions_mm : (p, 3) control points of the person at rest [mm], None if they equal the control
+        points of the topology
     environment_map : prefiltered map of `environment`
     light_part_counts : number of parts into which each light is divided, suns of the environment last
     shadow_layers : number of shadow maps
@@ -34,7 +34,8 @@ class FrameRequest:
     view_name : cache key of the scene, for callers that draw several scenes in turn
     other_profiles : profiles that a map blends with `profile`; all have the same Gaussians
     blend_weights : (h, w, 2) map of the weights of the other profiles [-], None for a single profile
-    outputs, landmarks : names of the outputs and landmark sets that are requested besides the picture
+    outputs : names of the requested outputs besides the picture
+    landmarks : names of the requested landmark sets
     """
 
     head: Head
@@ -61,7 +62,7 @@ class FrameRequest:
 
     @property
     def is_shared(self) -> bool:
-        """Return whether several people share the topology, and with it the atlas and other resources."""
+        """Return whether several people share the topology, and thus also the atlas and other resources."""
         return self.topology is not self.head.bare
 
     @property
@@ -71,12 +72,12 @@ class FrameRequest:
 
     @property
     def light_key(self) -> str:
-        """Return the cache key of resources that hold light, one for each view name and shadow map size."""
+        """Return the cache key of resources that hold light, from view name and shadow map size."""
         return f"{self.view_name} {self.settings.shadow_size}"
 
     @cached_property
     def split(self) -> ProfileSplit:
-        """Return the profile, and any other profiles, split into relit and blurred Gaussians."""
+        """Return the profile and any other profiles, each split into relit and blurred Gaussians."""
         profiles = self.profile, *self.other_profiles
         first, *others = (self.technique.split(profile, self.albedo_from_map) for profile in profiles)
         fine = {} if others else first.fine  # with blends, stripes are as fine as texels
@@ -110,7 +111,7 @@ class FrameRequest:
 
     @property
     def painted_side(self) -> int:
-        """Return the side of the maps that the device paints [texels], 0 for heads with maps from files."""
+        """Return the side of the maps that the device paints [texels], 0 if the maps come from files."""
         if not isinstance(self.head.maps, PaintedMaps):
             return 0
         side = 1 << (self.settings.atlas - 1).bit_length()
@@ -118,7 +119,9 @@ class FrameRequest:
 
     @property
     def has_fine_relief(self) -> bool:
-        """Return whether the skin has relief finer than its maps, whose strength painted gloss maps store."""
+        """Return whether the skin has relief finer than its maps.
+
+        The painted gloss maps store the strength of this relief."""
         maps = self.head.maps
         return self.painted_side > 0 and maps.specular is None and maps.roughness is None
 
@@ -134,10 +137,10 @@ class FrameRequest:
 
     @property
     def output_channels(self) -> dict[str, int]:
-        """Return the number of channels of each requested output."""
+        """Return a dictionary from the name of each requested output to its number of channels."""
         return {name: OUTPUTS[name].channels or len(self.light_part_counts) for name in self.outputs}
 
     @cached_property
     def atlas_plan(self) -> AtlasPlan:
-        """Return the names of the atlas layouts, and the side of the atlases."""
+        """Return the names of the atlas layouts, and the side that all atlases have."""
         return plan_atlases(self.seam_method, self.settings, self.blur_count, self.has_occlusion)

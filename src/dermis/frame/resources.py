@@ -22,7 +22,7 @@ class AtlasLayout(LitAtlas):
     """Layout of the atlas in which light is diffused, with its resources.
 
     translucency : resources of the light through thin parts, None if no light crosses thin parts
-    occlusion : resources that update the occlusion map, None where occlusion does not follow the shape
+    occlusion : resources that update the occlusion map, None if occlusion does not follow the shape
     interreflection : resources of interreflection, None if there is no interreflection
     """
 
@@ -36,15 +36,16 @@ class Resources:
     """Cached resources of a frame, for all features.
 
     expression_maps : painted maps that expressions change, None if no map changes
-    layouts : atlas layouts in which light is diffused; the picture is shaded from the first
+    layouts : atlas layouts in which light is diffused; the picture is shaded from the first layout
     scattered : texture of the exitance of light that scattered below the surface
     technique : tables and textures of the technique; None if the technique needs none
     output_layers : textures in which the technique diffuses the light of outputs; None if the technique needs
         none
-    sky : visible fraction of the sky at the vertices, None where occlusion does not follow the shape
+    sky : visible fraction of the sky at the vertices, None if occlusion does not follow the shape
     hair : resources of the hair, None if no hair is drawn
-    visibility : triangle at each sample of the picture
-    view, constants : uniform record of the shading pass without the camera, and its pipeline constants
+    visibility : texture of the triangle at each sample of the picture
+    view : uniform record of the shading pass, without the camera
+    constants : pipeline constants of the shading pass
     outputs : resources of the outputs besides the picture, None if none are requested
     suns : number of lights that the environment adds
     gaussians : number of Gaussians of the profile

@@ -15,8 +15,8 @@ FEATHER_MM = 3.0  # width over which an edited stretch map narrows the blur towa
 class SeamMethod:
     """How seams are treated: the layouts of the atlases, and the texels that blurs read beyond a chart.
 
-    layouts : names of layouts: "stitched", "mesh" for the uv layout of the mesh, or "unwrapped" for a layout
-        with other seams
+    layouts : names of the layouts: "stitched", "mesh" (the uv layout of the mesh) or "unwrapped" (a layout
+        with other seams)
     edge : filter mode at the edges of charts, one of `features.diffusion.blur.CHART_EDGE_MODES`
     feathered : whether the stretch map is changed near edges so that blurs become narrower there
     coloured : whether empty texels have the colour `Settings.seam_colour`; otherwise they are black
@@ -39,7 +39,7 @@ SEAM_METHODS = {
 
 
 def seam_method(method_name: str, can_stitch: bool) -> SeamMethod:
-    """Return the seam method with a name; "clear-colour" replaces "stitch" for techniques that cannot stitch.
+    """Return the seam method `method_name`; if it is "stitch" and cannot be used, return "clear-colour".
 
     can_stitch : whether the technique can carry light across seams
     """
@@ -54,7 +54,7 @@ class AtlasPlan(NamedTuple):
 
 
 def plan_atlases(method: SeamMethod, settings: Settings, blur_count: int, has_occlusion: bool) -> AtlasPlan:
-    """Return the layouts and the size of the atlases; an atlas that stores nothing has the smallest size.
+    """Return the layouts and the side of the atlases; an atlas that stores nothing has the smallest side.
 
     blur_count : number of Gaussians that blur light over the atlas
     has_occlusion : whether the atlas stores occlusion of the environment

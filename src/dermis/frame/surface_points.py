@@ -1,4 +1,4 @@
-"""Surface points under pixel centres, and the irradiance that enters the skin at given points."""
+"""Surface points at pixel centres, and the irradiance at points of the surface."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Index = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class SurfacePoints:
-    """Surface points of the head under the centres of pixels.
+    """Surface points of the head that are visible at the centres of pixels.
 
     mask : (h, w) mask of the pixels that show the head
     triangle : (n,) indices of the triangles in these pixels, row by row
@@ -66,7 +66,7 @@ def _surface_points(renderer: Renderer, scene: Scene, settings: Settings) -> Sur
 def _barycentric(
     scene: Scene, view: NDArray[np.void], triangle_index: Index, head_mask: NDArray[np.bool_]
 ) -> Floats:
-    """Return (n, 3) barycentric weights where the camera rays of pixels meet their triangles, see shade.wgsl.
+    """Return (n, 3) barycentric weights of the points where camera rays meet the triangles, see shade.wgsl.
 
     view : uniform record of the shading pass
     triangle_index : (n,) indices of the triangles in the pixels of the mask
@@ -94,8 +94,10 @@ def irradiance_at(
 ) -> Floats:
     """Return (n, 3) irradiance at points of the surface, times the skin colour applied before scattering [-].
 
-    scene : scene without maps and environment, because these need atlas positions; interreflection is ignored
-    triangle, barycentric : (n,) triangle indices and (n, 3) barycentric weights of the points
+    scene : scene without maps and environment, which would need the positions of the points in the atlas;
+        interreflection is ignored
+    triangle : (n,) indices of the triangles on which the points lie
+    barycentric : (n, 3) barycentric weights of the points
     """
     side = max(1, int(np.ceil(np.sqrt(len(triangle)))))
     triangles = np.full(side * side, -1, np.int64)

@@ -19,13 +19,15 @@ Floats = NDArray[np.float64]
 class ProfileSplit:
     """Profile split into a narrow Gaussian that is relit per pixel, and Gaussians that blur the atlas.
 
-    To relight means to use unblurred light, evaluated per pixel, in place of light blurred by the Gaussian.
+    Relit means that light at each pixel is evaluated directly, instead of being blurred by the Gaussian.
 
     relit : (3,) weights of the relit Gaussian [-]
     total : (3,) sums of the weights of all Gaussians [-]
-    blurred_mm2, weight : (k,) variances [mm2] and (k, 3) weights [-] of the Gaussians that blur
+    blurred_mm2 : (k,) variances of the Gaussians that blur [mm2]
+    weight : (k, 3) weights of the Gaussians that blur [-]
     others : splits of the other profiles that a map blends with this profile; all have the same Gaussians
-    fine : members of the shader's struct Fine, for light that varies within a texel; empty if it is ignored
+    fine : members of the shader struct Fine, which corrects light that varies within a texel; empty for no
+        correction
     """
 
     relit: Floats
@@ -37,12 +39,12 @@ class ProfileSplit:
 
     @property
     def relit_changes(self) -> Floats:
-        """Return the relit Gaussian's weights in the o other profiles minus its weights here, (o, 3) [-]."""
+        """Return the relit weights of the o other profiles minus those of this profile, (o, 3) [-]."""
         return np.array([one.relit - self.relit for one in self.others]).reshape(-1, 3)
 
     @property
     def weight_changes(self) -> tuple[Floats, ...]:
-        """Return, for each other profile, the (k, 3) weights of its blurs minus the weights here [-]."""
+        """Return, for each other profile, its (k, 3) blur weights minus those of this profile [-]."""
         return tuple(one.weight - self.weight for one in self.others)
 
 
@@ -51,7 +53,7 @@ class TechniqueResources:
 
 
 class TechniqueTraits:
-    """Properties of a technique; `techniques.technique.Technique` adds its resources and passes.
+    """Properties of a technique; its subclass `techniques.technique.Technique` adds resources and passes.
 
     sources : keys of the bibliography
     uses_atlas : whether light is diffused over the atlas
@@ -75,9 +77,10 @@ class TechniqueTraits:
     subsurface_layer_bytes: ClassVar[int] = 0
 
     def split(self, profile: GaussianSum, normalise: bool) -> ProfileSplit:
-        """Split a profile into a relit Gaussian and Gaussians that blur; this base class blurs none.
+        """Split a profile into a relit Gaussian and Gaussians that blur; in this class, none blurs.
 
-        normalise : whether the weights of each channel sum to 1, so that only the colour map sets the albedo
+        normalise : whether to scale the weights of each channel to a sum of 1, so that only the colour map
+            sets the albedo
         """
         total = channel_weights(profile, normalise).sum(axis=0)
         return ProfileSplit(total, total, np.empty(0), np.empty((0, 3)))
@@ -87,7 +90,7 @@ class TechniqueTraits:
         return settings.stretch
 
     def texel_bytes(self, levels: int) -> float:
-        """Return the memory per atlas texel on a software adapter, temporary textures included [bytes].
+        """Return the memory per atlas texel on a software adapter, including temporary textures [bytes].
 
         levels : number of Gaussians that blur light
         """
@@ -95,5 +98,7 @@ class TechniqueTraits:
 
 
 def channel_weights(profile: GaussianSum, normalise_weights: bool) -> Floats:
-    """Return the (k, 3) weights of the Gaussians, on request scaled to a sum of 1 per channel [-]."""
+    """Return the (k, 3) weights of the Gaussians [-].
+
+    normalise_weights : whether to scale the weights of each channel to a sum of 1"""
     return profile.weight / profile.albedo if normalise_weights else profile.weight

@@ -1,7 +1,8 @@
 """Graphics adapters of this machine, their limits, and a faster start of wgpu.
 
-C types that wgpu looks up by name are registered in advance: cffi parses each new name together with all
-typedefs of the header, which takes some ten milliseconds, and a first frame looks up seventy-five.
+C types that wgpu looks up by name are registered in advance. Otherwise, cffi would parse each new name
+together with all typedefs of the header, which takes about ten milliseconds per name, and a first frame looks
+up 75.
 """
 
 from __future__ import annotations
@@ -74,7 +75,7 @@ def register_wgpu_types() -> None:
 def register_types(ffi: Any) -> int:
     """Register the C types of pointers, arrays and callbacks with cffi, and return their number.
 
-    This uses cffi's internals. If they differ, nothing is registered and the first frame takes longer.
+    This uses cffi's internals. If these have changed, nothing is registered and the first frame takes longer.
     """
     try:
         with ffi._lock:  # cffi's own callers take it too
@@ -144,7 +145,7 @@ class Adapter:
     backend : graphics interface: "Vulkan", "Metal", "D3D12" or "OpenGL"
     features : names in `OPTIONAL_FEATURES` that the adapter supports
     handle : adapter object of wgpu
-    number : index in `list_adapters`, by which "#1" selects one of several GPUs with the same name
+    number : index in the result of `list_adapters`; the selector "#1" selects the adapter with the number 1
     """
 
     name: str
@@ -157,7 +158,7 @@ class Adapter:
 
 
 def list_adapters() -> list[Adapter]:
-    """Return all adapters, best first: GPUs before software, then by the number of supported features.
+    """Return all adapters, best first: GPUs before software adapters, then by number of features.
 
     Raises DermisError if drivers fail, or if the address space is too small for them.
     """
@@ -177,7 +178,7 @@ def list_adapters() -> list[Adapter]:
 
 
 def select_adapters(selector: str) -> tuple[list[Adapter], str]:
-    """Return the adapters that match a selector, best first, and the reason for the choice, for users.
+    """Return the adapters that match a selector, best first, and the reason for the choice as text.
 
     selector : "auto", "cpu", part of a name, or "#1" for the adapter with the number 1, counted from 0
 
@@ -227,7 +228,8 @@ def similar_adapters(selector: str) -> list[Adapter]:
 def check_limits(adapter_name: str, adapter_limits: Mapping[str, int]) -> None:
     """Raise DermisError for an adapter whose limits are too low for the shaders of a frame.
 
-    adapter_name, adapter_limits : name of the adapter, and its limits by name
+    adapter_name : name of the adapter
+    adapter_limits : dictionary from the name of a limit to its value on the adapter
     """
     for name in _REQUIRED_LIMITS:
         minimum = DEFAULT_LIMITS[name]
@@ -240,7 +242,7 @@ def check_limits(adapter_name: str, adapter_limits: Mapping[str, int]) -> None:
 def device_limits(adapter_limits: Mapping[str, int], full_limits: Sequence[str]) -> dict[str, int]:
     """Return the limits to request for a device: WebGPU's defaults, or less where the adapter offers less.
 
-    adapter_limits : limits of the adapter by name
+    adapter_limits : dictionary from the name of a limit to its value on the adapter
     full_limits : names of the limits that are requested at the full value that the adapter offers
     """
     limits = {

@@ -1,4 +1,4 @@
-"""Bind groups, created by direct calls of the native library for speed: a new head needs dozens."""
+"""Bind groups, created by direct calls of the native library for speed, as a new head needs dozens."""
 
 from __future__ import annotations
 
@@ -27,7 +27,8 @@ T = TypeVar("T")
 class BindGroup:
     """Bind group, which keeps the bound resources alive.
 
-    _internal : handle in the native library, released with this object; wgpu's own objects use the same name
+    _internal : handle in the native library, released with this object; wgpu's own objects have the
+        same attribute
     """
 
     __slots__ = ("__weakref__", "_internal")
@@ -53,7 +54,7 @@ def make_bind_group(
     """Create the bind group of a program.
 
     bound_objects : buffer, texture, texture view or sampler for each binding, the uniform buffers last
-    record_sizes : size of the record in each of these uniform buffers [byte]
+    record_sizes : size of the record in each uniform buffer [byte]
     """
     entries = device.ffi.new("WGPUBindGroupEntry[]", len(bound_objects))
     first_uniform = len(bound_objects) - len(record_sizes)
@@ -73,8 +74,8 @@ def make_bind_group(
 class ResourceCache(Generic[T]):
     """Cache keyed by the identity of resources; an entry is dropped when one of its resources is released.
 
-    A bind group keeps the memory of its resources allocated. It must therefore be dropped as soon as nothing
-    else uses one of its resources.
+    A cached bind group keeps the memory of its resources allocated. The cache therefore drops a bind group as
+    soon as one of its resources is no longer used elsewhere.
     """
 
     def __init__(self) -> None:
@@ -92,7 +93,7 @@ class ResourceCache(Generic[T]):
         return len(self._keys)
 
     def find(self, cache_key: ResourceKey) -> T | None:
-        """Return the cached entry for a key of `resource_key`, or None without an entry."""
+        """Return the cached entry for a key from `resource_key`; None without an entry."""
         return self._entries.get(cache_key)
 
     def add(self, cache_key: ResourceKey, resources: Sequence[object], cached_object: T) -> None:
@@ -102,7 +103,7 @@ class ResourceCache(Generic[T]):
             self._keys_of(resource).add(cache_key)
 
     def _keys_of(self, resource: object) -> set[ResourceKey]:
-        """Return the cache keys that contain a resource, and start to watch its release if it is new."""
+        """Return the cache keys that contain a resource; the release of a new resource is then watched."""
         identity = id(resource)
         if identity not in self._keys:
             this = weakref.ref(self)

@@ -1,4 +1,4 @@
-"""Capture of frames as data: shaders, programs, resources and passes, for playback by web pages."""
+"""Capture of frames as data (shaders, programs, resources and passes), which web pages play back."""
 
 from __future__ import annotations
 
@@ -44,15 +44,17 @@ class CapturedPass:
     """Pass of a captured frame.
 
     stage : name of the stage
-    program, bound : index of the program, and for each of its bindings the index of the resource or uniform
-        record; None and empty for a write from the host
-    groups : workgroups along each axis, number of vertices of a render pass, or number of bytes written by
-        the host
+    program : index of the program; None for a write from the host
+    bound : for each binding of the program, the index of the resource or uniform record; empty for a write
+        from the host
+    groups : for a compute pass, the workgroups along each axis; for a render pass, the number of vertices;
+        for a write from the host, the number of bytes
     completes : index of the resource that the pass extends in place (see `Recorder.dispatch`); -1 if none
-    raster : for a render pass its layer and clear depth, and the resource indices of index buffer, depth view
-        and colour target, each -1 if none
-    written : index of the buffer and the bytes that the host writes to it
-    unit : index of the group of passes that run or are skipped together: a recording, or a single pass
+    raster : for a render pass, the layer, the depth to which it clears, and the resource indices of index
+        buffer, depth view and colour target, each -1 if there is none; None for other passes
+    written : for a write from the host, the index of the buffer and the bytes; None for other passes
+    unit : index of the unit to which the pass belongs, a recording or a single pass; passes of a unit run or
+        are skipped together
     """
 
     stage: str
@@ -69,7 +71,7 @@ class CapturedPass:
 class CapturedFrame:
     """Passes of a captured frame, and the uniform records that they read.
 
-    records : name of the WGSL struct and content of each record
+    records : for each record, the name of the WGSL struct and the content
     """
 
     passes: list[CapturedPass] = field(default_factory=list)
@@ -98,8 +100,8 @@ class FrameCapture(Graph):
     """Recorder that captures the passes of a declared frame as data instead of running the passes.
 
     shaders : WGSL texts of the shaders
-    programs : for each program its shader, constants, bindings and, for render programs, depth test and
-        target
+    programs : for each program, its shader, constants and bindings, and for render programs also depth test
+        and target format
     resources : description of each resource, from `describe_resource`
     structs : dtypes of the uniform records by the name of their WGSL struct
     """
@@ -138,7 +140,7 @@ class FrameCapture(Graph):
         return [np.ascontiguousarray(one).view(np.uint8).reshape(-1) for one in texels]
 
     def resource_at(self, resource_index: int) -> Untyped:
-        """Return the texture, view, buffer or sampler with an index in `resources`."""
+        """Return the texture, view, buffer or sampler that `resources` describes at an index."""
         return self._objects[resource_index]
 
     def resource(self, bound_object: Bindable) -> int:
@@ -194,11 +196,11 @@ class FrameCapture(Graph):
     def fill(
         self, stage: str, program: RenderProgram, resources: Bindings, targets: Sequence[TextureOrView]
     ) -> None:
-        """Raise NotImplementedError, as players of captured frames have no passes that fill targets."""
+        """Raise NotImplementedError, as players of captured frames have no support for such passes."""
         raise NotImplementedError(f"{stage}: passes that fill targets cannot be captured")
 
     def repeat(self, record_passes: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
-        """Capture the passes that `record_passes` adds as one unit, which players run or skip as a whole."""
+        """Capture the passes that `record_passes` adds, as one unit that players run or skip as a whole."""
         if self._unit is not None:
             return record_passes(self, *args)
         passes = self._frame.passes
@@ -247,8 +249,7 @@ class FrameCapture(Graph):
 def describe_resource(device: Device, resource: Bindable) -> PlainData:
     """Return the parameters with which a resource can be created again, as plain data for JSON.
 
-    The parameters of a texture or buffer are sizes, format and usage flags; the parameters of a sampler are
-    its options.
+    These are sizes, format and usage flags of a texture or buffer, or the options of a sampler.
     """
     if is_texture(resource):
         size, mips = list(resource.size), resource.mip_level_count

@@ -27,11 +27,11 @@ _MAX_CACHED_DISPATCHES = 16  # for each pass: its record positions depend on whi
 class CommandList(Recorder):
     """Recorder that encodes passes, submits them together and measures the time of each stage.
 
-    On software adapters each timed stage is submitted separately and waited for.
+    Stages that are not timed individually share compute passes. On software adapters, each timed stage is
+    submitted separately, and the host waits until it has finished.
 
-    timed : see `Timing`; on software adapters, "whole" times each stage too. Stages that are not timed
-        individually share compute passes
-    uniforms : uniform memory for the records of the passes; new if None
+    timed : see `Timing`; on software adapters, "whole" also times each stage
+    uniforms : uniform memory for the records of the passes; None to allocate new memory
     submitted : number of the last submission, for `Device.wait`
     """
 
@@ -61,8 +61,7 @@ class CommandList(Recorder):
         """Add a dispatch of a compute program, see `Recorder.dispatch`.
 
         in_place_resource : ignored, as only the search for stale passes needs it
-        access : `Access` of the program to these resources, in which the native dispatch is cached for later
-            frames
+        access : `Access` of the program to these resources, which caches the native dispatch for later frames
         """
         key = stage, workgroups, program.record_positions(resources, self._uniforms)
         known = access.dispatches if access else {}
@@ -106,7 +105,7 @@ class CommandList(Recorder):
         )
 
     def read_back(self, buffers: Sequence[Buffer], readback: BufferReadback) -> None:
-        """Add copies of buffers into a readback, one after another; mapping starts after submission."""
+        """Add copies of buffers, one after another, to a readback, which is mapped after submission."""
         self._end_pass()
         start = 0
         for buffer in buffers:
@@ -197,13 +196,13 @@ class CommandList(Recorder):
 
     @property
     def _encoder(self) -> Untyped:
-        """Return the current command encoder; each submission starts a new one."""
+        """Return the current command encoder, a new encoder after each submission."""
         if self._open_encoder is None:
             self._open_encoder = self.device.command_encoder()
         return self._open_encoder
 
     def _compute_pass(self, stage: str) -> ComputePass:
-        """Return the open compute pass, or begin one; a stage that is timed gets a separate pass."""
+        """Return the open compute pass, or begin a pass; each timed stage gets a separate pass."""
         if self._splits_stages and self._pass and stage != self._stage:
             self._end_pass()
         if not self._pass:
@@ -217,7 +216,7 @@ class CommandList(Recorder):
         self._pass = None
 
     def _begin_stage(self, stage: str) -> TimestampWrites | None:
-        """Begin a stage and return the `timestamp_writes` of its pass, or None."""
+        """Begin a stage and return the `timestamp_writes` of its pass; None without timestamps."""
         if self._wall_clock and self._stage not in ("", stage):
             self._end_stage(self._wall_clock)
         self._stage = stage
@@ -242,8 +241,10 @@ class Dispatch(NamedTuple):
     """Arguments of a compute dispatch, as native handles.
 
     stage : name of the stage
-    pipeline, bind_group : native handles of the pipeline and of the bind group
-    uniforms, offsets : number of dynamic uniform offsets, and C array of these offsets [byte]
+    pipeline : native handle of the pipeline
+    bind_group : native handle of the bind group
+    uniforms : number of dynamic uniform offsets
+    offsets : C array of these offsets [byte]
     groups : workgroups along each axis
     """
 
@@ -265,7 +266,7 @@ def make_dispatch(
     """Return the native arguments for a dispatch of a program.
 
     bind_group : bind group of the program
-    record_offsets : offsets of its uniform records in their buffers [byte]
+    record_offsets : offsets of the uniform records in their buffers [byte]
     workgroups : workgroups along each axis
     """
     native_offsets = program.device.ffi.new("uint32_t[]", record_offsets)
@@ -314,7 +315,10 @@ class ComputePass:
 
 
 class Timestamps:
-    """GPU timestamps at the start of each pass; a pass lasts until the next pass, so that stages add up.
+    """GPU timestamps at the start of each pass, from which the times of stages are computed.
+
+    The time of a pass extends to the start of the next pass, so that the times of the stages sum to the
+    total.
 
     frame_only : whether to take only the first and the last timestamp, because each timestamp costs time
     """
@@ -325,7 +329,7 @@ class Timestamps:
         self._stages: list[str] = []
 
     def begin(self, stage: str) -> TimestampWrites | None:
-        """Reserve a timestamp for a pass; return the pass's `timestamp_writes`, None without a timestamp."""
+        """Reserve a timestamp for a pass and return the `timestamp_writes`; None if no timestamp is taken."""
         is_full = len(self._stages) >= self._queries.count - 1  # the last one is for the end
         if is_full or (self._frame_only and self._stages):
             return None
@@ -359,15 +363,15 @@ class Timestamps:
 class WallClock:
     """Host time from the submission of each stage to its end, for software adapters.
 
-    Mesa writes the timestamps of compute passes before their work is done, and waiting costs nothing in
-    software.
+    Timestamps are unsuitable, because Mesa writes the timestamps of compute passes before their work is done.
+    Waiting for each stage does not slow down rendering in software.
     """
 
     def __init__(self) -> None:
         self._times: dict[str, float] = {}
 
     def add(self, stage: str, start_time: float) -> None:
-        """Add the time elapsed since `start_time`, a value of time.perf_counter, to a stage."""
+        """Add the time since `start_time`, a result of time.perf_counter, to the time of a stage."""
         self._times[stage] = self._times.get(stage, 0.0) + 1e3 * (time.perf_counter() - start_time)
 
     def stage_ms(self) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""Dependencies between the passes of a frame, by which stale passes are found."""
+"""Dependencies between the passes of a frame, used to find stale passes."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ _MAX_CACHED_STALE_PASSES = 16  # combinations of up-to-date resources for which 
 class ResourceState:
     """Version of the content of a texture, buffer or texture view.
 
-    Content with equal versions was written by the same pass from equal inputs; version 0 means unknown
-    content.
+    Equal versions mean that the same pass wrote the content from equal inputs. Version 0 means that the
+    content is unknown.
 
-    parent : state of the viewed texture, for a view; None for other resources
-    views : states of the views of a texture
+    parent : for a view, the state of the viewed texture; None for other resources
+    views : for a texture, the states of its views
     version : version of the current content
     scratch : whether the resource only carries data between passes, so that nothing reads it after a frame
     """
@@ -40,7 +40,10 @@ class ResourceState:
     scratch: bool = False
 
     def overlapping_states(self, written_states: Container[ResourceState]) -> list[ResourceState]:
-        """Return the written states with overlapping content: this state, its views, or its texture."""
+        """Return the states in `written_states` whose content overlaps with that of this state.
+
+        These may be the state itself, the states of its views, or the state of the texture that it views.
+        """
         found = [view for view in self.views if view in written_states]
         if self in written_states:
             found.append(self)
@@ -62,9 +65,10 @@ class Access:
     """Resources that a program reads and writes with one set of bindings.
 
     id : unique number of the combination of program and resources
-    reads, writes : states of the resources; a resource that is read and written is in both
-    dispatches : native dispatches of earlier frames with their bind groups, by stage, workgroups and
-        positions of the uniform records
+    reads : states of the resources that the program reads
+    writes : states of the resources that the program writes, some of which it may also read
+    dispatches : cache of the native dispatches of earlier frames and their bind groups; the keys are stage,
+        workgroups and positions of the uniform records
     """
 
     id: int
@@ -102,12 +106,12 @@ PassAccess = tuple[int, tuple[ResourceState, ...], tuple[ResourceState, ...]]
 
 
 class Dependencies:
-    """Dependencies between the passes of a frame, from which stale passes are found.
+    """Dependencies between the passes of a frame, used to find stale passes.
 
     The version that a pass writes is a hash of its key and of the versions that it reads. A pass is skipped
     if its outputs already have that version, or if no pass that runs reads these outputs.
 
-    passes : for each pass, in order, its access id and the resources that it reads and writes
+    passes : for each pass, in order, its access id and the states of the resources that it reads and writes
     """
 
     def __init__(self, passes: list[PassAccess]) -> None:
@@ -141,7 +145,10 @@ class Dependencies:
         return versions
 
     def find_stale_passes(self, versions: Sequence[int]) -> list[bool]:
-        """Return for each pass whether it must run so that all resources get the versions `versions`."""
+        """Return for each pass whether it must run to bring all resources up to date.
+
+        versions : version that the output of each pass should have
+        """
         current = [state.version == versions[last] for state, last in self._last_writer.items()]
         return self._cached_stale(tuple(current))
 

@@ -33,9 +33,9 @@ _LIMITS_RAISED_TO_ADAPTER = ("max-texture-dimension-2d", "max-storage-buffer-bin
 
 
 def open_device(adapter: str = "auto", *, bare: bool = False) -> Device:
-    """Open an adapter as a device; if the best matching adapter does not open, try the next adapter.
+    """Open an adapter as a device; if the best matching adapter does not open, try the next match.
 
-    adapter : "auto" (the best), "cpu" (software), part of an adapter's name, or "#1" for its number
+    adapter : "auto" (the best), "cpu" (software), part of an adapter's name, or "#" and the adapter's number
     bare : whether to request only the limits that WebGPU guarantees everywhere, and no optional feature
 
     Raises DermisError if no adapter matches or none opens.
@@ -50,17 +50,19 @@ def open_device(adapter: str = "auto", *, bare: bool = False) -> Device:
 class Device:
     """Logical device with its queue, on which all resources and programs of a renderer live.
 
-    The device has WebGPU's default limits, so that a program that needs more fails on every machine alike;
-    only the largest sizes of textures and buffers are those of the adapter. The device has the features in
-    `OPTIONAL_FEATURES` that the adapter supports.
+    The device has WebGPU's default limits, even if the adapter offers more, so that a program that exceeds
+    them fails on every machine. Only the maximum sizes of textures and buffers are those of the adapter. The
+    device has the features in `OPTIONAL_FEATURES` that the adapter supports.
 
-    adapter, reason : adapter, and why it was chosen, for users
-    bare : whether the largest sizes are also WebGPU's defaults, and no optional feature is requested
+    adapter : opened adapter
+    reason : reason for the choice of the adapter, for users
+    bare : whether the maximum sizes are also WebGPU's defaults, and no optional feature is requested
     executor : threads for work outside Python (compiling, reading, copying); jobs that have not started are
         cancelled when the device is dropped
-    ffi, lib, checked : native library of wgpu, called directly in each frame to save the overhead of wgpu's
-        Python code; functions of `checked` raise the library's errors; errors in a pass are raised when its
-        encoder is submitted
+    ffi : cffi interface of wgpu's native library
+    lib : functions of the native library, which frames call directly to save the overhead of wgpu's Python
+        code; errors in a pass are raised when its encoder is submitted
+    checked : the same functions with checks: they raise the errors that the library reports
     resource_states : versions of the content of textures, buffers and views, see dependencies.py
     programs : compiled shaders, see program.py
     spare_chunks : unused host memory for uniforms, kept because allocation takes longer
@@ -105,14 +107,14 @@ class Device:
         self._samplers: dict[tuple[tuple[str, str], ...], Sampler] = {}
 
     def cached(self, object_name: str, make_object: Callable[[], T]) -> T:
-        """Return the object with a name, created by `make_object` on first use and kept with the device."""
+        """Return the object of this device called `object_name`; `make_object` creates it on first use."""
         if object_name not in self._cached:
             self._cached[object_name] = make_object()
         found: T = self._cached[object_name]
         return found
 
     def write(self, buffer: Buffer, content: bytearray | bytes, byte_count: int) -> None:
-        """Write the first `byte_count` bytes of data to a buffer before the next submission runs."""
+        """Write the first `byte_count` bytes of `content` to a buffer, before the next submission runs."""
         start = self.ffi.from_buffer(content)
         self.checked.wgpuQueueWriteBuffer(self.handle.queue._internal, buffer._internal, 0, start, byte_count)
 
@@ -163,7 +165,7 @@ class Device:
         return float(self.lib.wgpuQueueGetTimestampPeriod(self.handle.queue._internal))
 
     def uniform_chunk(self, chunk_index: int, chunk_bytes: int) -> Buffer:
-        """Return a shared uniform buffer by index; all frames use these buffers, created on first use.
+        """Return the uniform buffer at an index, created on first use; all frames share these buffers.
 
         chunk_bytes : size of a new buffer [byte]
         """
@@ -176,7 +178,7 @@ class Device:
         return self.buffer(np.zeros(byte_count, np.uint8), "UNIFORM")
 
     def acquire_staging(self, min_bytes: int) -> Buffer:
-        """Return a mappable buffer of at least `min_bytes` for a readback, if possible a released buffer."""
+        """Return a mappable buffer of at least `min_bytes` for a readback; released buffers are reused."""
         min_bytes = -(-min_bytes // _STAGING_STEP_BYTES) * _STAGING_STEP_BYTES
         spare = self._staging.get(min_bytes)
         if spare:
@@ -186,7 +188,7 @@ class Device:
         )
 
     def release_staging(self, buffer: Buffer) -> None:
-        """Keep a staging buffer for later readbacks; if its size is new, drop the buffers of other sizes."""
+        """Keep a staging buffer for later readbacks; if its size is new, drop kept buffers of other sizes."""
         if buffer.size not in self._staging:
             self._staging.clear()
         self._staging.setdefault(buffer.size, []).append(buffer)

@@ -1,4 +1,4 @@
-"""Errors of devices as package errors, and devices that are reopened when lost."""
+"""Conversion of device errors to errors of this package, and devices that are reopened when lost."""
 
 from __future__ import annotations
 
@@ -58,12 +58,12 @@ def converted_gpu_failures(device: Device) -> Iterator[None]:
 
 
 class ReopeningDevice:
-    """Device that is opened again when it is lost; the interrupted work is then repeated.
+    """Device that is opened again when it is lost, after which the interrupted work is repeated.
 
     open_device : function that opens a device
-    on_open : function that creates the resources of the caller on each opened device
-    reopens : whether a lost device is opened again; if False, DeviceLostError is raised, for callers that
-        keep other resources on the device too
+    on_open : function that is called with each opened device and creates the resources of the caller on it
+    reopens : whether a lost device is opened again; if False, DeviceLostError is raised, for callers whose
+        device also holds resources that `on_open` does not create
     """
 
     def __init__(
@@ -74,9 +74,9 @@ class ReopeningDevice:
         self.run(lambda: None)
 
     def run(self, job: Callable[[], T]) -> T:
-        """Return the result of `job()`, which is repeated on a reopened device if the current one is lost.
+        """Return the result of `job()`; if the device is lost, repeat the job on the reopened device.
 
-        Raises DermisError if both devices are lost, and DeviceError for other errors of the driver.
+        Raises DermisError if the reopened device is lost as well, and DeviceError for other driver errors.
         """
         try:
             return self._run_job(job)

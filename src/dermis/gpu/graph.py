@@ -30,11 +30,11 @@ class ListedPass:
     stage : name of the stage
     shader : name of the shader file
     constants : pipeline constants by name
-    bindings : for each name in the shader, the index of a resource in the listing, "sampler", or "record 128"
-        for a record of 128 bytes
-    groups : workgroups along each axis, number of vertices of a render pass, or number of bytes written by
-        the host
-    recorded : whether the pass belongs to a recording and its uniform records never change
+    bindings : dictionary from a name in the shader to what is bound: the index of a resource in the listing,
+        "sampler", or for example "record 128" for a uniform record of 128 bytes
+    groups : for a compute pass, the workgroups along each axis; for a render pass, the number of vertices;
+        for a write from the host, the number of bytes
+    recorded : whether the pass belongs to a recording, so that its uniform records never change
     ran : whether the pass ran in that frame
     """
 
@@ -70,8 +70,8 @@ class FrameListing:
     ) -> None:
         """Append a pass to the listing.
 
-        declared_index : index of the declared pass to which the pass belongs, which may be a recording of
-            several passes
+        declared_index : index of the declared pass, which may be a recording that contains several listed
+            passes
         recorded : whether the pass belongs to a recording
         """
         bindings = {one.name: self._describe_binding(resources[one.name]) for one in program.bindings}
@@ -92,9 +92,9 @@ class FrameListing:
         self._pass_index.append(declared_index)
 
     def finish(self, ran_by_declared_pass: Sequence[bool]) -> None:
-        """Set `ran_by_declared_pass` of all listed passes after the frame.
+        """Set `ran` of all listed passes after the frame.
 
-        ran_by_declared_pass : for each declared pass whether it ran
+        ran_by_declared_pass : for each declared pass, whether it ran
         """
         for one, index in zip(self.passes, self._pass_index, strict=True):
             one.ran = ran_by_declared_pass[index]
@@ -147,7 +147,7 @@ class DeclaredPass:
     """Pass declared on a graph, or all passes of a recording, which run as a whole.
 
     stages : names of the stages of the pass or passes
-    run : function that adds the pass to a command list
+    run : function that adds the pass, or the passes, to a command list
     key : everything that the output depends on besides the resources that are read
     access : access id, and states of the resources that are read and written
     """
@@ -166,9 +166,9 @@ class Graph(Recorder):
     the shader reads. A pass is skipped if its outputs already have that version, or if no pass that runs
     reads these outputs.
 
-    recordings : cache of the recordings of `repeat`
+    recordings : cache of the recordings that `repeat` makes
     executed_stages : stages of the passes that ran in the last frame, in order
-    listing : listing that records the passes of the next frame; None to record nothing
+    listing : listing to which the passes of the next frame are added; None for no listing
     """
 
     def __init__(self, device: Device) -> None:
@@ -266,9 +266,10 @@ class Graph(Recorder):
         self._declare_pass(stage, program, resources, (3,), program.access(resources), writes, run)
 
     def repeat(self, record_passes: Callable[[Recorder, *Ts], T], *args: *Ts) -> T:
-        """Declare the passes that `record_passes(recorder, *args)` adds, recorded once per set of arguments.
+        """Declare the passes that `record_passes(recorder, *args)` adds.
 
-        Either all passes of the recording run, or none. Replaying a recording takes almost no time in Python.
+        The passes are recorded once per set of arguments. Either all passes of a recording run, or none.
+        Replaying a recording takes almost no time in Python.
         """
         recording, result = self.recordings.get(self.device, record_passes, args)
         if self.listing is not None:

@@ -1,4 +1,4 @@
-"""Cache of results that the CPU prepares for frames: uploaded maps, fitted tables, empty textures."""
+"""Cache of what the CPU prepares for frames, such as uploaded maps, fitted tables and empty textures."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ class CachedResult:
 class Memo:
     """Cache of function results: a function is called again only when an argument has changed.
 
-    cache_size : number of results kept per function, for callers that alternate between a few sets of
+    cache_size : number of results to keep for each function, for callers that alternate between a few sets of
         arguments
-    cache_ttl : number of frames after which results of unused functions are dropped, at least `cache_size`
-        squared
+    cache_ttl : number of frames for which the results of an unused function are kept, raised to at least
+        `cache_size` squared
     """
 
     def __init__(self, cache_size: int = 1, cache_ttl: int = 1) -> None:
@@ -99,11 +99,11 @@ class Memo:
     def submit(
         self, executor: Executor, function: Callable[[*Ts], T], *args: *Ts, caller_name: str = ""
     ) -> Future[T]:
-        """Return a future of `function(*args)`, run on a thread of `executor`, or the cached future."""
+        """Return a future of `function(*args)`, which runs on a thread of `executor`; futures are cached."""
         return self.get(_submit_to_executor, executor, function, args, caller_name=caller_name)
 
     def result(self, future: Future[T]) -> T:
-        """Wait for a future of `submit` and return its result; if it failed, the cache is cleared."""
+        """Wait for a future from `submit` and return its result; clear the cache if the function failed."""
         try:
             return future.result()
         except Exception:
@@ -138,7 +138,10 @@ class Memo:
         return result
 
     def _mark_hits_used(self, function_key: FunctionKey | None = None) -> None:
-        """Move results used in this frame to the front of the cache: all, or all that depend on a key."""
+        """Move the results that this frame used to the front of the cache.
+
+        function_key : key on which the moved results depend; None to move all used results
+        """
         for one, result in self._hits:
             if function_key is None or function_key in result.keys:
                 self._mark_used(one, result)
@@ -196,5 +199,5 @@ def dataclass_field_names(object_type: type) -> tuple[str, ...] | None:
 
 
 def has_value_equality(value: object) -> bool:
-    """Return whether the type of an object defines `__eq__` by value; resources on the device do not."""
+    """Return whether an object is compared by value; resources on the device are compared by identity."""
     return type(value).__eq__ is not object.__eq__

@@ -44,9 +44,11 @@ _SMALLER_FRAME_ADVICE = (
 class OutOfMemoryError(DermisError):
     """Error for a resource that does not fit into the memory of a device.
 
-    expected, actual : the two parts of the message, without advice and full stop, for callers that add other
-        advice
+    expected : first part of the message, which says what needs memory
+    actual : second part of the message, which says why it does not fit
     size : size of the resource [byte]
+
+    Callers can combine both parts with other advice.
     """
 
     def __init__(self, expected: str, actual: str, size: float, advice: str = _SMALLER_FRAME_ADVICE) -> None:
@@ -60,8 +62,10 @@ def checked_allocation(
 ) -> Iterator[None]:
     """Raise OutOfMemoryError if the resource that the body of this context creates does not fit.
 
-    adapter_name, resource_name : names of the adapter and of the resource, for the message
-    resource_bytes, max_bytes : size of the resource, and largest size that the device allows [byte]
+    adapter_name : name of the adapter, for the message
+    resource_name : name of the resource, for the message
+    resource_bytes : size of the resource [byte]
+    max_bytes : largest size that the device allows [byte]
     """
     import wgpu
 
@@ -94,13 +98,14 @@ def check_memory(
     sizes_text: str,
     advice_for_bytes: Callable[[float], str] = lambda _: _SMALLER_SIZES_ADVICE,
 ) -> None:
-    """Raise DermisError if textures of a software adapter would not fit into main memory.
+    """Raise DermisError if textures and buffers on a software adapter would not fit into main memory.
 
     The operating system would otherwise kill the process.
 
     needed_bytes : size of the textures and buffers [byte]
-    option_name, sizes_text : name of the option and text with the sizes that it sets, for the message
-    advice_for_bytes : function that returns the advice for a number of available bytes
+    option_name : name of the option that sets the sizes, for the message
+    sizes_text : description of these sizes, for the message
+    advice_for_bytes : function that returns advice, given the number of available bytes
     """
     if device.adapter.kind != "CPU":
         return
@@ -111,7 +116,7 @@ def check_memory(
 
 
 def probe_memory(device: Device, max_bytes: float) -> float:
-    """Return the free memory of a device, at most `max_bytes`, found by trial allocation [byte]."""
+    """Return the free memory of a device, at most `max_bytes`, which is found by trial allocation [byte]."""
     buffers: list[Buffer] = []
     total, size = 0, min(int(max_bytes), device.max_storage_bytes) // 4 * 4
     while size >= _MIN_PROBE_BYTES and total < max_bytes:
@@ -142,7 +147,7 @@ def check_software_address_space() -> None:
 def available_memory() -> float:
     """Return the memory that this process can still allocate [byte].
 
-    The memory is limited by the address space, by the memory of the machine and by the control group.
+    The memory is limited by the address space, the memory of the machine, and the control group.
     """
     return min(_address_space_limit() - _address_space_used(), main_memory())
 

@@ -75,7 +75,7 @@ class Program:
         return make_record(self.source.text, struct_name, **values)
 
     def record_positions(self, resources: Bindings, uniforms: Uniforms) -> tuple[int, ...]:
-        """Return the positions in uniform memory of the records that are bound to the shader [byte]."""
+        """Return the positions of the bound uniform records in uniform memory [byte]."""
         records: UniformRecords = resources  # type: ignore[assignment]  # no cast, which costs time
         try:
             return tuple([uniforms.position(records[name]) for name, _ in self._used_members])
@@ -115,7 +115,7 @@ class Program:
     def uniform_values(self, resources: Bindings, uniforms: Uniforms) -> tuple[Hashable, ...]:
         """Return the bytes of the uniform records that the shader reads, as part of a pass's key.
 
-        Large records are returned as a whole, because several passes share the hash of a record.
+        Large records are returned as a whole, because several passes can then share the hash of a record.
         """
         found: list[Hashable] = []
         records: UniformRecords = resources  # type: ignore[assignment]  # no cast, which costs time
@@ -193,9 +193,10 @@ class ComputeProgram(Program):
         return pipeline
 
     def workgroups_for(self, image_size: tuple[int, int], tile_side: int = 8) -> tuple[int, int]:
-        """Return the workgroups along x and y, each of tile x tile invocations, that cover an image.
+        """Return the numbers of workgroups along x and y that cover an image.
 
         image_size : width and height of the image [texel]
+        tile_side : side of a workgroup [invocations]
         """
         return math.ceil(image_size[0] / tile_side), math.ceil(image_size[1] / tile_side)
 
@@ -205,9 +206,9 @@ class RenderProgram(Program):
 
     targets : texture formats of the colour targets; empty to draw only depth
     depth_compare : wgpu's name of the depth test, such as "less"; None for no depth attachment
-    has_fragment : whether `fragment` runs, which may discard pixels of a depth pass; by default only if there
-        are targets
-    raster : depth test and format of the first target, for players of captured frames
+    has_fragment : whether `fragment` runs; None to run it if there are targets. Without targets, `fragment`
+        may discard pixels of the depth pass
+    raster : depth test and format of the first target, for players of captured frames (see capture.py)
     """
 
     stages = "VERTEX", "FRAGMENT"
@@ -270,7 +271,7 @@ def shader_source(path: Path, folders: Sequence[Folder]) -> ShaderSource:
 
 
 def _binding_getter(resource_names: Sequence[str]) -> Callable[[Bindings], Sequence[Bindable]]:
-    """Return a function that selects resources by name from bindings, as a sequence in this order."""
+    """Return a function that selects the resources called `resource_names`, in this order, from bindings."""
     if len(resource_names) > 1:
         return itemgetter(*resource_names)
     return lambda resources: [

@@ -15,8 +15,8 @@ from dermis.gpu.failures import DeviceLostError
 class BufferReadback:
     """Copy of a buffer in staging memory, which becomes readable when a submission has finished.
 
-    wgpu's own mapping waits on another thread for the newest submission; here only the reader waits, and only
-    for the submission that fills the copy.
+    In wgpu's own mapping, another thread waits for the newest submission. Here, only the reader waits, and
+    only for the submission that fills the copy.
 
     size : size of the copy [byte]
     """
@@ -28,7 +28,7 @@ class BufferReadback:
         self.buffer = device.acquire_staging(size)
 
     def start(self, submission: int) -> None:
-        """Request that the copy is mapped to host memory after a submission.
+        """Request that the copy be mapped to host memory after a submission.
 
         submission : number of the submission that fills the copy, from `Device.submit`
         """
@@ -72,7 +72,7 @@ class BufferReadback:
 
 @cache
 def _map_callback() -> object:
-    """Return the C callback for finished mappings, which all readbacks share as its creation is slow."""
+    """Return the C callback for finished mappings; all readbacks share it, because creating it is slow."""
     from wgpu.backends.wgpu_native import ffi
 
     @ffi.callback("void(WGPUMapAsyncStatus, WGPUStringView, void *, void *)")  # type: ignore[untyped-decorator]

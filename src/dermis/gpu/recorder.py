@@ -17,7 +17,7 @@ Workgroups = tuple[int, int, int]
 
 
 class DrawTarget(NamedTuple):
-    """Attachments of a render pass, which the pass clears first.
+    """Attachments of a render pass, which are cleared when the pass begins.
 
     depth : view of the depth attachment
     clear_depth : depth to which the depth attachment is cleared
@@ -32,7 +32,7 @@ class DrawTarget(NamedTuple):
 class Recorder(ABC):
     """Interface for adding passes: to a command list, a graph, a recording, a capture or a listing.
 
-    All implementations accept compute passes; recordings and listings of recordings refuse all others.
+    All implementations accept compute passes; recordings and listings of recordings refuse other passes.
     """
 
     device: Device
@@ -51,8 +51,8 @@ class Recorder(ABC):
         stage : name of the stage, under which the pass is timed
         resources : resources and uniform records by their names in the shader
         workgroups : number of workgroups along each axis
-        in_place_resource : name of a resource that the pass completes from the resource's own content, such
-            as a map whose gutters are filled; the version of this resource does not change
+        in_place_resource : name of a resource that the pass completes from its present content, such as a map
+            whose gutters are filled; the version of this resource does not change
         """
 
     def compute(
@@ -64,7 +64,7 @@ class Recorder(ABC):
         tile_side: int = 8,
         in_place_resource: str = "",
     ) -> None:
-        """Add a dispatch that covers a 2-D grid of invocations by square workgroups.
+        """Add a dispatch in which square workgroups cover a 2-D grid of invocations.
 
         invocation_counts : number of invocations along x and y
         tile_side : side of a workgroup [invocations]
@@ -81,7 +81,7 @@ class Recorder(ABC):
     def write(self, stage: str, buffer: Buffer, content: bytes) -> None:
         """Write bytes from the host to the start of a buffer, before all passes of the frame.
 
-        content : bytes, if possible the same object in each frame, as Python caches the hash of bytes
+        content : bytes; the same object should be passed in each frame, as Python caches the hash of bytes
         """
         raise self._unsupported_error(stage)
 
@@ -101,7 +101,7 @@ class Recorder(ABC):
         vertex_count : number of vertices, three per triangle
         target : depth and colour attachments
         index_buffer : index buffer; None to number the vertices in order
-        instance_index : instance index, which shaders use as the layer of a texture array
+        instance_index : instance index, which shaders use as an index into the layers of a texture array
         """
         raise self._unsupported_error(stage)
 

@@ -44,7 +44,7 @@ class Recording(Recorder):
 
     @cached_property
     def access(self) -> Access:
-        """Return the resources that the recording reads and writes, except scratch that it writes."""
+        """Return the resources that the recording reads and writes, except written scratch resources."""
         writes = tuple(state for state in self._writes if not state.scratch)
         return Access(new_access_id(), tuple(self._reads), writes)
 
@@ -100,7 +100,7 @@ def _uniform_chunk(device: Device, chunks: list[Buffer], chunk_index: int) -> Bu
 
 
 class RecordingCache:
-    """Cache of the most recent recordings of each function, for callers that alternate between arguments."""
+    """Cache of the latest recordings of each function, for callers that alternate between arguments."""
 
     def __init__(self) -> None:
         self._recordings: dict[Callable[..., object], list[tuple[object, Recording, Any]]] = {}
@@ -108,7 +108,7 @@ class RecordingCache:
     def get(
         self, device: Device, record_passes: Callable[[Recorder, *Ts], T], args: tuple[*Ts]
     ) -> tuple[Recording, T]:
-        """Return the recording of `record_passes(recorder, *args)` and its result, if possible cached."""
+        """Return the recording and the result of `record_passes(recorder, *args)`, cached if possible."""
         known = self._recordings.setdefault(record_passes, [])
         found = next((one for one in known if one[1].is_valid and _matches_copy(one[0], args)), None)
         if found is None:
@@ -124,7 +124,7 @@ class RecordingCache:
 
 @dataclass(frozen=True)
 class _WeakFields:
-    """Copy of a dataclass instance that keeps resources among its fields only by weak references.
+    """Copy of a dataclass instance whose fields refer to resources only by weak references.
 
     kind : type of the dataclass
     fields : weak copies of the field values

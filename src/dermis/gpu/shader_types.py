@@ -1,7 +1,8 @@
 """Parser of WGSL declarations: structs as NumPy dtypes, and resource bindings by name.
 
 Structs and bindings are declared only in shaders. Python reads the declarations from the shaders, so that the
-data of both sides cannot differ. Alignment rules: WGSL specification, section "Memory Layout".
+data layouts of Python and the shaders cannot differ. Alignment rules: WGSL specification, section "Memory
+Layout".
 """
 
 from __future__ import annotations
@@ -47,8 +48,10 @@ _WGSL_TYPES: dict[str, tuple[str, tuple[int, ...], int, int]] = {
 class Binding:
     """Resource binding that a shader declares.
 
-    index, name : binding index in group 0, and name of the variable in the shader
-    entry : resource part of wgpu's bind group layout entry, such as {"buffer": {"type": "uniform"}}
+    index : binding index in group 0
+    name : name of the variable in the shader
+    entry : part of wgpu's bind group layout entry that describes the resource, such as
+        {"buffer": {"type": "uniform"}}
     """
 
     index: int
@@ -67,7 +70,7 @@ class Binding:
 
     @property
     def reads(self) -> bool:
-        """Return whether the shader may read the resource, which is false for write-only textures."""
+        """Return whether the shader may read the resource; write-only textures cannot be read."""
         return bool(self.entry.get("storage_texture", {}).get("access") != "write-only")
 
 
@@ -75,10 +78,11 @@ class Binding:
 def struct_dtype(wgsl_text: str, struct_name: str) -> np.dtype[np.void]:
     """Return the NumPy dtype of a WGSL struct, with the member offsets of the shader.
 
-    A mat4x4f is stored as its transpose, because WGSL stores columns; a member may be an array of another
+    A mat4x4f is stored as its transpose, because WGSL stores columns. A member may be an array of another
     struct.
 
-    wgsl_text, struct_name : text of the shader, and name of the struct
+    wgsl_text : text of the shader
+    struct_name : name of the struct
     """
     dtype, _ = _parse_struct(dict(_STRUCT_PATTERN.findall(_COMMENT_PATTERN.sub("", wgsl_text))), struct_name)
     return dtype
@@ -95,7 +99,8 @@ def make_record(wgsl_text: str, struct_name: str, **values: object) -> UniformRe
 def uniform_type(wgsl_text: str, variable_name: str) -> str:
     """Return the name of the struct type of a uniform variable.
 
-    wgsl_text, variable_name : text of the shader, and name of the variable
+    wgsl_text : text of the shader
+    variable_name : name of the variable
     """
     (struct,) = re.findall(
         rf"var<uniform>\s*{variable_name}\s*:\s*(\w+)", _COMMENT_PATTERN.sub("", wgsl_text)
@@ -109,7 +114,8 @@ def used_member_selector(wgsl_text: str, variable_name: str) -> Callable[[bytes]
     The function selects all bytes if the shader passes the record to a function, or if the type of the
     variable is not a struct.
 
-    wgsl_text, variable_name : text of the shader, and name of the uniform variable
+    wgsl_text : text of the shader
+    variable_name : name of the uniform variable
     """
     code = _COMMENT_PATTERN.sub("", wgsl_text)
     declared = re.compile(rf"var<uniform>\s*{variable_name}\s*:\s*(\w+)")

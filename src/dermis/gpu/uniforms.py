@@ -20,8 +20,7 @@ class Uniforms:
 
     Sharing is safe because the queue orders the writes of a frame after the submissions of earlier frames.
 
-    chunk : function that returns a buffer of CHUNK_BYTES by its index; None for the shared buffers of the
-        device
+    chunk : function from index to a buffer of CHUNK_BYTES; None for the shared buffers of the device
     """
 
     def __init__(self, device: Device, make_chunk: Callable[[int], Buffer] | None = None) -> None:
@@ -41,9 +40,9 @@ class Uniforms:
         return found[0]
 
     def position(self, record: NDArray[np.generic]) -> int:
-        """Return the position of a record in uniform memory, placing it on first use [byte].
+        """Return the position of a record in uniform memory, placing the record on first use [byte].
 
-        Positions are counted through all buffers; `locate` converts them.
+        Positions are counted across all buffers; `locate` converts a position to a buffer and an offset.
         """
         found = self._positions.get(id(record))
         if found is None:
@@ -62,7 +61,7 @@ class Uniforms:
             self._device.write(self._chunk(index), staged, self._end if last else CHUNK_BYTES)
 
     def finish(self) -> None:
-        """Forget all records, after the last submission; their host memory is kept for later frames."""
+        """Forget all records after the last submission; keep their host memory for later frames."""
         self._device.spare_chunks.extend(self._staged)
         self.clear()
 

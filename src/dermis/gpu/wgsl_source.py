@@ -36,7 +36,7 @@ class ShaderListMember(NamedTuple):
 
     name : name in scene files; in shaders, {name} has underscores for hyphens and {NAME} is in capitals
     file : shader file to include; None for a member without a file
-    words : replacements for further {words} in `//#each` lines
+    words : pairs of a further {word} in `//#each` lines and its replacement
     """
 
     name: str
@@ -49,9 +49,10 @@ class ShaderFolder(os.PathLike[str]):
     """Folder of shaders, with the definitions that their directives refer to.
 
     path : path of the folder
-    lists : functions that return the members of each list, by list name; called whenever a shader is composed
-    numbers : function that returns constants shared by shaders and Python, by name; called whenever a shader
-        is composed
+    lists : dictionary from list name to a function that returns the members of the list; called whenever a
+        shader is composed
+    numbers : function that returns a dictionary of constants that shaders and Python share; called whenever a
+        shader is composed
     options : names for which `//#if` is true in the shaders of all folders
     """
 
@@ -76,7 +77,7 @@ class ShaderSource:
     origin: tuple[tuple[str, int], ...]
 
     def locate(self, compiler_message: str) -> str:
-        """Return a compiler message in which line numbers of the text are replaced by file:line."""
+        """Return a compiler message in which line numbers of the composed text are replaced by file:line."""
 
         def replacement(match: re.Match[str]) -> str:
             line = int(match[1])
@@ -92,7 +93,7 @@ def compose_shader(path: Path, folders: Sequence[Folder]) -> ShaderSource:
     """Return a shader with its directives expanded.
 
     path : file of the shader
-    folders : folders that are searched for included files which are not beside the including file
+    folders : folders that are searched for included files that are not next to the including file
 
     Raises DermisError for a missing file, list, {word} or `//#end`.
     """
@@ -107,7 +108,7 @@ def compose_shader(path: Path, folders: Sequence[Folder]) -> ShaderSource:
 
 
 class _Definitions(NamedTuple):
-    """Folders, lists, numbers and options to which directives refer, hashable as a cache key."""
+    """Folders, lists, numbers and options to which directives refer, in hashable form as a cache key."""
 
     folders: tuple[Path, ...]
     lists: tuple[tuple[str, tuple[ShaderListMember, ...]], ...]

@@ -27,15 +27,15 @@ def expression(name: str) -> dict[str, float]:
 
 
 def expand_targets(names: Iterable[str]) -> tuple[str, ...]:
-    """Return names of morph targets without duplicates; names without a side become left and right targets.
+    """Return unique names of morph targets; a name without a side is replaced by its left and right targets.
 
-    "mouthSmile" becomes "mouthSmileLeft" and "mouthSmileRight".
+    For example, "mouthSmile" is replaced by "mouthSmileLeft" and "mouthSmileRight".
     """
     return tuple(dict.fromkeys(target for name in names for target in expand_sides(name)))
 
 
 def expand_sides(target_name: str) -> tuple[str, ...]:
-    """Return the left and the right target for a name without side; only the name if none exist."""
+    """Return the left and the right target of a name without a side, or the name itself if there are none."""
     return (
         tuple(f"{target_name}{side}" for side in TARGET_SIDES)
         if f"{target_name}Left" in _arkit_names()

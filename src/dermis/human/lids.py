@@ -56,8 +56,8 @@ Doubles = NDArray[np.float64]
 class EyeSocket(NamedTuple):
     """Position and size of an eyeball of a person in MakeHuman's data.
 
-    centre : (3,) centre of the published eyeball [mm]
-    size : radius relative to the published average eyeball [-]
+    centre : (3,) centre of MakeHuman's eyeball [mm]
+    size : radius relative to MakeHuman's eyeball of the average person [-]
     """
 
     centre: Points
@@ -68,11 +68,11 @@ class LidSide(NamedTuple):
     """Indices and weights of the control points that move with the eyelids of one eye.
 
     rings : (r,) indices of the lid points, row by row of lid_rings.csv
-    point : (n,) indices of the lid points and of the surrounding skin
+    point : (n,) indices of the lid points and of the points of the surrounding skin
     weights : (n, r) weights with which the points in `point` follow the displacements of the points in
         `rings`
-    contact, clearances_mm : (c,) indices of the points that slide over the eye, and their minimum distances
-        from the eye [mm]
+    contact : (c,) indices of the points that slide over the eye
+    clearances_mm : (c,) minimum distances of these points from the eye [mm]
     """
 
     rings: Index
@@ -82,13 +82,16 @@ class LidSide(NamedTuple):
     clearances_mm: Points
 
     def reindexed(self, point: Index) -> LidSide:
-        """Return a copy whose indices are positions in `point`, a sorted array with all points of lids."""
+        """Return a copy in which each point index is replaced by its position in an array of indices.
+
+        point : sorted array of indices that contains all indices of the lids
+        """
         names = "rings", "point", "contact"
         return self._replace(**{name: np.searchsorted(point, getattr(self, name)) for name in names})
 
 
 def fit_socket(eyeball_points: Points) -> EyeSocket:
-    """Return the centre and relative size of a published eyeball, from its points (b, 3) [mm]."""
+    """Return the centre and relative size of MakeHuman's eyeball, computed from its points (b, 3) [mm]."""
     centre = (eyeball_points.min(axis=0) + eyeball_points.max(axis=0)) / 2
     return EyeSocket(
         centre, float(np.linalg.norm(eyeball_points - centre, axis=1).mean()) / PUBLISHED_EYE_RADIUS_MM
@@ -101,7 +104,7 @@ def fit_lids(
     is_closed: bool = False,
     gaze_axis: Points = REST_GAZE,
 ) -> Points:
-    """Return a person's published points (n, 3) with the lids fitted to eyeballs of anatomical size [mm].
+    """Return MakeHuman's points (n, 3) of a person with lids fitted to eyeballs of anatomical size [mm].
 
     sockets : sockets of the left and the right eye
     is_closed : whether the upper lids are lowered onto the lower lids
@@ -152,9 +155,9 @@ def lid_contact(first_eye_point: int, eyeball_point_count: int, apex: int, back:
 
 
 def _lid_displacements(rings: Points, socket: EyeSocket, lid_is_closed: bool | Flags) -> Points:
-    """Return the displacements (..., r, 3) of lid points from the published to the anatomical eyeball [mm].
+    """Return the displacements (..., r, 3) of lid points from MakeHuman's to the anatomical eyeball [mm].
 
-    Seen from the front the points stay in place, except near the outline of the eyeball. The edges of the
+    Seen from the front, the points stay in place except near the outline of the eyeball. The edges of the
     lids touch the eyeball, and the thickness of the lids is kept.
     """
     published = (rings - socket.centre) / socket.size
@@ -186,7 +189,7 @@ def _close_upper_lid(rings: Points) -> None:
 
 
 def _compress_radius(axis_distance: Points) -> Points:
-    """Compress distances from the viewing axis near the outline of the eyeball, to keep lid points on it.
+    """Compress distances from the viewing axis near the outline of the eyeball, so lid points stay on it.
 
     axis_distance : distances from the axis divided by the radius of the eyeball [-]
     """
@@ -197,7 +200,7 @@ def _compress_radius(axis_distance: Points) -> Points:
 
 @cache
 def lid_sides() -> tuple[LidSide, LidSide]:
-    """Return the lid points of the left and the right eye, computed on the average person for all people."""
+    """Return the lid points of the left and the right eye, which are the same for all people."""
     points_mm, (left, right) = average_surface()[0].astype(np.float64), lid_rings()
     body = np.unique(model_data()["quads"][model_data()["group"] == 0]).astype(np.int64)
     return _lid_side(left, points_mm, body, "Left"), _lid_side(right, points_mm, body, "Right")
@@ -224,10 +227,10 @@ def _lid_side(rings: Index, points_mm: Points, body_points: Index, side_name: st
 
 
 def _sliding_points(rings: Index, candidate_points: Index, side_name: str) -> Index:
-    """Return the skin points (c,) beyond the lid rings that slide over the eye because a blink moves them.
+    """Return the skin points (c,) outside the lid rings that a blink slides over the eye.
 
     rings : (rows, 4) lid points from lid_rings.csv
-    candidate_points : (n,) candidates
+    candidate_points : (n,) points from which the result is selected
     side_name : "Left" or "Right"
     """
     index = target_deltas().names.index(f"{EXPRESSION_PREFIX}eyeBlink{side_name}")
@@ -244,7 +247,7 @@ def _sliding_points(rings: Index, candidate_points: Index, side_name: str) -> In
 def fit_lid_targets(points_mm: Points, sockets: tuple[EyeSocket, EyeSocket]) -> NDArray[np.float32]:
     """Return the displacements (m, 3) of `expression_targets`, adjusted to a person's fitted lids [mm].
 
-    points_mm : (n, 3) published points of the person [mm]
+    points_mm : (n, 3) MakeHuman's points of the person [mm]
     sockets : sockets of the left and the right eye
     """
     lids, delta_mm = _lid_targets(), expression_targets().delta_mm.copy()
@@ -261,15 +264,15 @@ def fit_lid_targets(points_mm: Points, sockets: tuple[EyeSocket, EyeSocket]) -> 
 
 
 class _LidTargets(NamedTuple):
-    """Index tables of the morph targets that move the lids, equal for all people.
+    """Index tables of the t morph targets that move the lids; the tables are the same for all people.
 
-    closed, axis : (t,) whether a target closes the lids, and (t, 1, 3) viewing direction of the eyes when the
-        target is active
+    closed : (t,) whether each target closes the lids
+    axis : (t, 1, 3) viewing direction of the eyes when each target is active
     point : (n,) indices of the points around both eyes
-    lid_sides, target_index : for the left and the right eye, the lid points as indices into `point`, and the
-        indices of the targets that move these points
-    row, target, point_index : (m,) rows of `MorphTargets.delta_mm` that displace points around the eyes, the
-        index of the target of each row, and the index of its point in `point`
+    lid_sides : lid points of the left and of the right eye, as indices into `point`
+    target_index : indices of the targets that move the lid points of the left and of the right eye
+    row : (m,) rows of `MorphTargets.delta_mm` that displace points around the eyes
+    target, point_index : (m,) index of the target of each row, and position of the displaced point in `point`
     """
 
     closed: Flags
@@ -306,7 +309,7 @@ def _lid_targets() -> _LidTargets:
 
 @cache
 def gaze_axes() -> dict[str, Points]:
-    """Return the viewing direction (3,) that each gaze target at full weight gives an eye, by target name."""
+    """Return a dictionary from gaze target to the viewing direction (3,) of the eye at full target weight."""
     angles = {rotation.target: np.radians(rotation.degrees) for rotation in gaze_rotations()}
     axes = {}
     for name, (x, y, _) in angles.items():

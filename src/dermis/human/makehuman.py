@@ -25,10 +25,11 @@ EXPRESSION_PREFIX = "faceunits/"
 
 
 class TargetDeltas(NamedTuple):
-    """Displacements of all published morph targets, concatenated.
+    """Displacements of all t morph targets of MakeHuman, concatenated.
 
-    names : names of the t targets, with their folders
-    first : (t + 1,) index in `point` and `delta_mm` at which each target starts, followed by m
+    names : names of the targets, with their folders
+    first : (t + 1,) index in `point` and `delta_mm` at which each target starts, and m, the number of
+        displacements, at the end
     point, delta_mm : (m,) indices of the displaced points, and (m, 3) displacements at a weight of 1 [mm]
     """
 
@@ -39,11 +40,11 @@ class TargetDeltas(NamedTuple):
 
 
 def morphed_points_mm(weights: Mapping[str, float]) -> Points:
-    """Return the mesh points of a person, followed by the joints of the skeleton (n, 3) [mm].
+    """Return the points (n, 3) of a person's mesh, followed by the joints of the skeleton [mm].
 
     The origin is the midpoint between the eyes.
 
-    weights : weights of published morph targets by name
+    weights : mapping from names of MakeHuman's morph targets to weights
 
     Raises DermisError for unknown targets.
     """
@@ -64,12 +65,12 @@ def morphed_points_mm(weights: Mapping[str, float]) -> Points:
 
 @cache
 def _target_indices() -> Mapping[str, int]:
-    """Return the index of each published morph target by name."""
+    """Return a dictionary from the name of each of MakeHuman's morph targets to its index."""
     return {name: index for index, name in enumerate(target_deltas().names)}
 
 
 def check_targets(names: Iterable[str]) -> None:
-    """Raise an error if there is no published morph target of a name; the message suggests similar names."""
+    """Raise DermisError for names that are not morph targets of MakeHuman; suggest similar names."""
     for name in names:
         if name not in _target_indices():
             known = target_deltas().names
@@ -100,7 +101,7 @@ def human_targets() -> tuple[str, ...]:
 
 @cache
 def model_data() -> Mapping[str, NDArray[Any]]:
-    """Return the arrays of MakeHuman's mesh, morph targets and bones by name, from data/human.npz."""
+    """Return the arrays of data/human.npz by name: MakeHuman's mesh, morph targets and bones."""
     file = resources.files(__package__).joinpath("data", "human.npz")
     with resources.as_file(file) as path, np.load(path) as stored:
         return {name: stored[name] for name in stored}
@@ -122,7 +123,7 @@ def mesh_point_count() -> int:
 
 @cache
 def target_deltas() -> TargetDeltas:
-    """Return the displacements of all published morph targets."""
+    """Return the displacements of all morph targets of MakeHuman."""
     arrays = model_data()
     delta = DELTA_UNIT_MM * arrays["target_delta"].astype(np.float32)
     first, point = (arrays[name].astype(np.int64) for name in ("target_first", "target_point"))

@@ -1,4 +1,4 @@
-"""Head of the parametric human: mesh, eyes, expressions and bones, and the template that people share."""
+"""Head of the parametric human with eyes, expressions and bones, and the template shared by all people."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ MEAN_WEIGHTS = {
 
 
 class _LayoutFaces(NamedTuple):
-    """Vertices and quads of the human mesh in one uv layout, equal for all people.
+    """Vertices and quads of the human mesh in one uv layout; they are the same for all people.
 
     point : (v,) index of the control point of each vertex
     uv : (v, 2) texture coordinates
@@ -68,7 +68,7 @@ class _LayoutFaces(NamedTuple):
 def build_head(weights: Mapping[str, float], maps: Maps, layout: Layout, eyes: EyeLook) -> Head:
     """Return the bare head of a person before subdivision, without hair.
 
-    weights : weights of published morph targets by name
+    weights : mapping from names of MakeHuman's morph targets to weights
     maps : maps of the skin
     layout : uv layout
     eyes : look of the eyes
@@ -97,7 +97,7 @@ def build_head(weights: Mapping[str, float], maps: Maps, layout: Layout, eyes: E
 def control_points_mm(weights: Mapping[str, float]) -> NDArray[np.float32]:
     """Return the control points (p, 3) of a person in rest pose, relative to the midpoint of the eyes [mm].
 
-    weights : weights of published morph targets by name
+    weights : mapping from names of MakeHuman's morph targets to weights
     """
     points_mm = morphed_points_mm(weights)
     sockets = _eye_sockets(points_mm)
@@ -107,7 +107,7 @@ def control_points_mm(weights: Mapping[str, float]) -> NDArray[np.float32]:
 
 
 def _eye_sockets(points_mm: Points) -> tuple[lids.EyeSocket, lids.EyeSocket]:
-    """Return the sockets of the left and the right eye, from the published points of a person."""
+    """Return the sockets of the left and the right eye, from MakeHuman's points of a person."""
     left, right = (lids.fit_socket(points_mm[group_points(name)]) for name in (LEFT_EYE, RIGHT_EYE))
     return left, right
 
@@ -129,7 +129,7 @@ def _layout_faces(layout: Layout) -> _LayoutFaces:
 
 
 def _combined_quads(layout: Layout) -> tuple[Points, Index, Index, Index]:
-    """Return the quads of a uv layout, with anatomical eyeballs in place of the published eyeballs.
+    """Return the quads of a uv layout, with anatomical eyeballs in place of MakeHuman's.
 
     The arrays are uv (u, 2), control point indices (q, 4), uv indices (q, 4) and material indices (q,).
     """

@@ -61,7 +61,7 @@ def expression_targets() -> MorphTargets:
 
 @cache
 def _moved_points() -> NDArray[np.bool_]:
-    """Return a mask (n,) of the published points that blend shapes may move: all but joints and eyeballs."""
+    """Return a mask (n,) of MakeHuman's points that blend shapes may move: all but joints and eyeballs."""
     arrays = model_data()
     balls = [index for index, name in enumerate(arrays["group_names"]) if str(name).endswith("-eye")]
     moved = np.ones(len(arrays["positions_mm"]), bool)
@@ -76,8 +76,9 @@ def build_skeleton(
     """Return the skeleton of a person: spine, clavicles, three neck bones, head, jaw and eyes.
 
     joint_mm : (j, 3) positions of the person's joints [mm]
-    eye_centres_mm : centres (3,) of the left and the right eyeball, about which they rotate [mm]
-    eyeball_point_count : number of points of an eyeball; both eyeballs follow the mesh points, left first
+    eye_centres_mm : centres (3,) of rotation of the left and the right eyeball [mm]
+    eyeball_point_count : number of points of an eyeball; the points of the left and then of the right eyeball
+        come after all other points
     """
     arrays = model_data()
     names = tuple(map(str, arrays["bone_names"]))
@@ -100,7 +101,7 @@ def _skin_weights(
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
     """Return the bone indices (p, 4) of all points, and the skinning weights (p, 4) of these bones.
 
-    An eyeball follows only its own bone.
+    The points of an eyeball follow only the bone of that eye.
 
     eye_bones : indices of the bones of the left and the right eye
     """

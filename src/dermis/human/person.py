@@ -97,7 +97,7 @@ _NO_TARGETS: Mapping[str, float] = MappingProxyType({})
 
 
 def sample_fields(seed: int, fixed_fields: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields of a random `Human` by name, for `Human.drawn`.
+    """Return the fields of a random `Human` as a dictionary from field name to value.
 
     fixed_fields : values of fields that are not sampled
     """
@@ -141,7 +141,7 @@ def sample_fields(seed: int, fixed_fields: Mapping[str, Any]) -> dict[str, Any]:
 def _ancestry_fractions(
     fixed_fields: Mapping[str, float], sampled_fractions: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return ancestry fractions (3,): fixed weights divided by their sum, or else the sampled fractions.
+    """Return ancestry fractions (3,) from fixed weights, or the sampled fractions if no weights are fixed.
 
     fixed_fields : values of fields that are not sampled; may contain weights of ancestries
     sampled_fractions : (3,) sampled ancestry fractions
@@ -160,15 +160,15 @@ def _sample_ancestry(
     sampled_fractions: NDArray[np.float64],
     fixed_fields: Mapping[str, Any],
 ) -> tuple[NDArray[np.float64], dict[str, float]]:
-    """Return ancestry fractions of the shape (3,), and the weights of the measured groups of the skin.
+    """Return the ancestry fractions (3,) of the shape, and the weights of the measured groups for the skin.
 
     If the ancestry of the shape is fixed, the skin follows the shape. If only a skin ancestry or an ITA is
     fixed, the shape follows the skin. Otherwise some people of Caucasian shape have South Asian or Middle
     Eastern skin.
 
     fixed_numbers : values of numeric fields that are not sampled
-    fixed_fields : values of all fields that are not sampled
     sampled_fractions : (3,) sampled ancestry fractions of the shape
+    fixed_fields : values of all fields that are not sampled
     """
     picks, chance = rng.random(3), rng.random()
     ancestry, shape_given = (
@@ -191,7 +191,11 @@ def _sample_ancestry(
 
 
 def _pick_name(weight_of_name: Mapping[str, float], cumulative_chance: float) -> str:
-    """Return the name at which the cumulative weight exceeds `cumulative_chance`, a number from 0 to 1."""
+    """Return the name whose share of the cumulative weights contains a number from 0 to 1.
+
+    weight_of_name : weight of each name
+    cumulative_chance : uniformly distributed number, 0 to 1
+    """
     ends = np.cumsum(list(weight_of_name.values()))
     return list(weight_of_name)[
         min(int(np.searchsorted(ends, cumulative_chance, "right")), len(weight_of_name) - 1)
@@ -205,10 +209,11 @@ def _sample_hair_and_skin(
     skin: SkinLook,
     fixed_fields: Mapping[str, Any],
 ) -> dict[str, Any]:
-    """Return the fields "hair" and "skin": a random hair look, and the skin with its stubble and recession.
+    """Return a random hair look and a skin look with matching stubble and recession, as fields of `Human`.
 
-    demographics, typical_look : demographics and typical hair look of the person
-    skin : sampled skin look, whose shadow of shaved hair is adjusted to the hair
+    demographics : ancestry, sex and age of the person
+    typical_look : typical hair look of the person
+    skin : sampled skin look, whose stubble, beard shadow and recession are replaced
     fixed_fields : values of fields that are not sampled
     """
     hair, recession = sample_hair(rng, demographics, typical_look), sample_recession(rng, demographics)
@@ -287,23 +292,23 @@ def _opposite_targets() -> tuple[_OppositeTargets, ...]:
 
 @dataclass(frozen=True)
 class Human:
-    """Person of the parametric human: ancestry, sex, age, weight, muscle, and any published morph target.
+    """Person of the parametric human: ancestry, sex, age, weight, muscle, and MakeHuman's morph targets.
 
     Parameters
     ----------
     african, asian, caucasian : float
         Weights of the ancestries, 0 to 1; only their ratios count.
     sex : float
-        From 0, female, to 1, male [-].
+        Sex, from 0 (female) to 1 (male) [-].
     age : float
         Age, 25 to 90 [years].
     weight, muscle : float
-        From -1, least, to 1, most; 0 is average [-].
+        Body weight and muscle, from -1 (least) to 1 (most); 0 is average [-].
     hair_eumelanin, hair_pheomelanin : float
-        Pigments of the hair if `hair` is not given, 0 to 10 [-]: eumelanin of 0.3 is blond, 1.3 brown,
-        4 dark, 8 black; red hair has 0.3 and a pheomelanin of 2.
+        Pigments of the hair if `hair` is not given, 0 to 10 [-]. A eumelanin of 0.3 gives blond hair, 1.3
+        brown, 4 dark and 8 black hair; a eumelanin of 0.3 with a pheomelanin of 2 gives red hair.
     targets : mapping
-        Weights of published morph targets, such as {"nose/nose-hump-incr": 0.5}, normally 0 to 1.
+        Weights of MakeHuman's morph targets, such as {"nose/nose-hump-incr": 0.5}, normally 0 to 1.
     skin : SkinLook, optional
         Look of the skin; by default typical for the person.
     eyes : EyeLook, optional
@@ -414,7 +419,7 @@ class Human:
         maps : Maps, optional
             Maps of the skin; by default painted according to the look of the skin.
         layout : {"own", "hm08"}
-            Uv layout: "own" gives the face most space; "hm08" is the layout of MakeHuman, for its skins.
+            Uv layout: "own" gives the face most space; "hm08" is MakeHuman's layout, for MakeHuman's skins.
         subdivide : int or callable
             Levels of Catmull-Clark subdivision, 0 to 3, or a function that returns the levels for a head.
         hairs : float
@@ -443,8 +448,9 @@ class Human:
     def on(self, head: Head) -> Head:
         """Return the head of another person with the skin and eyes of this person.
 
-        With `Pose(positions_mm=person.positions_mm)` the head also gets the shape of this person; only its
-        skin is painted again, which is faster than a new head. Hair and joint positions remain unchanged.
+        A pose `Pose(positions_mm=person.positions_mm)` gives the head the shape of this person too. This is
+        faster than building a new head, because only the skin is painted again. Hair and joints remain
+        unchanged.
 
         Parameters
         ----------
@@ -473,7 +479,7 @@ class Human:
 
     @property
     def look(self) -> SkinLook:
-        """Return the skin look `skin`, or the typical skin look for the person's ancestry, sex and age."""
+        """Return the field `skin`, or the typical skin look for the person's ancestry, sex and age."""
         if self.skin is not None:
             return self.skin
         typical, visibility = typical_skin(self._demographics), stubble_visibility(self.hairdo)
@@ -481,12 +487,12 @@ class Human:
 
     @property
     def iris(self) -> EyeLook:
-        """Return the eye look `eyes`, or the typical eye look for the person's ancestry."""
+        """Return the field `eyes`, or the typical eye look for the person's ancestry."""
         return typical_eyes(self._demographics) if self.eyes is None else self.eyes
 
     @property
     def hairdo(self) -> HairLook:
-        """Return the hair look `hair`, or the typical hair look for the person's ancestry, sex and age."""
+        """Return the field `hair`, or the typical hair look for the person's ancestry, sex and age."""
         if self.hair is not None:
             return self.hair
         return typical_hair(self._demographics, self.hair_eumelanin, self.hair_pheomelanin)
@@ -504,15 +510,15 @@ class Human:
     def positions_mm(self) -> NDArray[np.float32]:
         """Return the control points (p, 3) in rest pose, relative to the midpoint between the eyes [mm].
 
-        `Pose(positions_mm=...)` gives any head of the parametric human this shape, as the points of all
-        people correspond.
+        `Pose(positions_mm=...)` gives the head of any other person this shape, because all people have
+        corresponding points.
 
         Raises DermisError for unknown targets.
         """
         return control_points_mm(self.weights())
 
     def weights(self) -> dict[str, float]:
-        """Return the non-zero weights of all published morph targets that shape this person, by name."""
+        """Return a dictionary from MakeHuman's morph targets that shape this person to their weights."""
         weights = {**self._ancestry_weights(), **self._build_weights()}
         for name, weight in self.targets.items():
             weights[name] = weights.get(name, 0.0) + weight
@@ -527,7 +533,7 @@ class Human:
         }
 
     def _build_weights(self) -> dict[str, float]:
-        """Return the morph target weights for body weight and muscle; average build needs no target."""
+        """Return the weights of morph targets for body weight and muscle; average build needs no targets."""
         weights = {}
         for kind, fraction in self._adult_fractions().items():
             for muscle, muscle_fraction in _blend_fractions(self.muscle).items():

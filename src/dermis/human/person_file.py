@@ -30,14 +30,14 @@ _STRETCH_ATLAS_SIDE = 1024
 
 
 def person_numbers(person: Human) -> dict[str, Any]:
-    """Return all parameters of a person by name, including the typical looks of skin, eyes and hair."""
+    """Return all parameters of a person as a dictionary, with the typical looks of skin, eyes and hair."""
     numbers = {one.name: getattr(person, one.name) for one in fields(person)}
     numbers |= {"targets": dict(person.targets), "skin": asdict(person.look)}
     return numbers | {"eyes": asdict(person.iris), "hair": asdict(person.hairdo)}
 
 
 def write_person_json(path: Path, person: Human) -> int:
-    """Write the parameters of a person as JSON in an atomic write, and return the file size [byte]."""
+    """Write the parameters of a person as JSON, atomically, and return the file size [byte]."""
     data = (json.dumps({"person": person_numbers(person)}, indent=2, default=float) + "\n").encode()
     with atomic_file(path) as temporary:
         temporary.write_bytes(data)
@@ -67,7 +67,7 @@ def read_person(path: Path) -> Human:
 
 
 def _build_dataclass(path: Path, dataclass_type: type[T], field_values: Any) -> T:
-    """Return an instance of a dataclass, such as `Human` or `SkinLook`, from its fields in a file."""
+    """Return an instance of a dataclass, such as `Human` or `SkinLook`, built from field values in a file."""
     known = [one.name for one in fields(dataclass_type)]
     if not isinstance(field_values, Mapping):
         actual = f"got {format_value(field_values)}"
@@ -90,10 +90,10 @@ def write_person_glb(
     weights: Mapping[str, float] | None = None,
     eyes: EyeTextures | None = None,
 ) -> int:
-    """Write a person's head as a .glb file in an atomic write, and return the file size [byte].
+    """Write a person's head as a .glb file, atomically, and return the file size [byte].
 
     roughness : Beckmann roughness m of skin without a roughness map [-]
-    weights : weights of the morph targets of expressions that are active in the file
+    weights : weights of the expression morph targets, stored as default weights in the file
     eyes : colour and normal textures of the eyes; if None, the eyes are exported with one colour
     """
     notes = {"person": person_numbers(person)}

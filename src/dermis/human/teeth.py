@@ -23,7 +23,7 @@ _ARCH_SAMPLE_COUNT = 2000
 def teeth_layout(upper: bool) -> tuple[NDArray[np.int64], Doubles]:
     """Return the point indices (n,) of the upper or lower teeth, and their uv (n, 2).
 
-    The uv are computed on the average person and are equal for all people.
+    The uv coordinates are computed on the average person and are the same for all people.
     """
     points = group_points("helper-upper-teeth" if upper else "helper-lower-teeth")
     x, y, z = average_surface()[0][points].astype(np.float64).T

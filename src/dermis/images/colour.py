@@ -82,12 +82,12 @@ def lab(linear: ArrayLike) -> Doubles:
 
 
 def linear_of_xyz(xyz_over_white: ArrayLike) -> Doubles:
-    """Return the linear Rec. 709 colours (..., 3) that look under D65 like given colours under another light.
+    """Return linear Rec. 709 colours (..., 3) that look under D65 like other colours in another light.
 
-    The returned colours under D65 and the given colours under the other light have equal L*a*b*.
+    The L*a*b* of the returned colours under D65 equals that of the other colours in the other light.
 
-    xyz_over_white : (..., 3) X, Y and Z of the given colours, divided by X, Y and Z of white, under the other
-        light
+    xyz_over_white : (..., 3) X, Y and Z of the colours in the other light, divided by X, Y and Z of white in
+        that light
     """
     xyz = np.asarray(xyz_over_white, np.float64) * _WHITE_XYZ
     return np.asarray(xyz @ np.linalg.inv(_XYZ_OF_REC709).T)

@@ -1,4 +1,4 @@
-"""Colour spaces that picture files state, and conversion of pixels from these to linear Rec. 709."""
+"""Colour spaces declared in picture files, and conversion of their pixels to linear Rec. 709."""
 
 from __future__ import annotations
 
@@ -44,9 +44,9 @@ _MAX_PROFILE_NAME_LENGTH = 60  # characters
 class ColourSpace:
     """Colour space of a picture's pixels; by default, integers are sRGB and floats are linear Rec. 709.
 
-    name : name of the colour space, for notes
+    name : name of the colour space, for notes to the user
     to_rec709 : (3, 3) matrix from linear colours to linear Rec. 709; None for the primaries of Rec. 709
-    curves : (3, 65536) for each channel, the linear values of evenly spaced levels; None for sRGB's curve
+    curves : (3, 65536) linear values of each channel at evenly spaced levels; None for sRGB's curve
     """
 
     name: str = "sRGB"
@@ -61,7 +61,8 @@ class ColourSpace:
     def linear(self, pixels: Numbers) -> Floats:
         """Convert pixels (..., 1, 3 or 4) to linear Rec. 709 (..., 3); grey is repeated, alpha is dropped.
 
-        Colours outside Rec. 709 are clipped: colours from integer levels to 0 to 1, floats to 0 and above.
+        If the primaries are converted, results below 0 are clipped; for integer pixels, results above 1 are
+        clipped too.
         """
         rgb = pixels[..., :3] if pixels.shape[-1] >= 3 else np.repeat(pixels, 3, axis=-1)
         if rgb.dtype.kind == "f":
@@ -81,7 +82,7 @@ SRGB = ColourSpace()
 
 
 def adobe_rgb() -> ColourSpace:
-    """Return Adobe RGB (1998), which cameras may state in EXIF without embedding an ICC profile."""
+    """Return Adobe RGB (1998), which cameras may declare in EXIF without embedding an ICC profile."""
     return _simplified_space(
         "Adobe RGB", _matrix_to_rec709(_PRIMARIES["Adobe RGB"]), _CURVE_SAMPLE_LEVELS**_ADOBE_GAMMA
     )
@@ -105,7 +106,7 @@ def coded_space(primaries: int, transfer: int) -> ColourSpace | None:
 def gamma_space(space_name: str, gamma: float | None, primaries: Sequence[float] | None) -> ColourSpace:
     """Return the colour space with the given gamma and primaries.
 
-    gamma : exponent from levels to linear values; None for the curve of sRGB
+    gamma : exponent that converts levels to linear values; None for the curve of sRGB
     primaries : chromaticities x, y of red, green, blue and white; None for Rec. 709
 
     Raises ValueError for primaries that are invalid or lie on one line.
@@ -126,9 +127,9 @@ def profile_name(icc_profile: bytes) -> str:
 
 
 def profile_space(icc_profile: bytes) -> ColourSpace | None:
-    """Return the colour space of an ICC profile with primaries and curves; None for lookup tables.
+    """Return the colour space of an ICC profile; None if the profile has lookup tables or no curves.
 
-    `ColourSpace.linear` applies primaries and curves at the full bit depth of a picture; LittleCMS in Pillow
+    `ColourSpace.linear` converts colours at the full bit depth of a picture, whereas LittleCMS in Pillow
     supports only 8 bits.
 
     Raises ValueError, ArithmeticError and struct.error for a damaged profile.
@@ -148,9 +149,10 @@ def profile_space(icc_profile: bytes) -> ColourSpace | None:
 
 
 def _simplified_space(space_name: str, to_rec709: Doubles, curves: Doubles | None) -> ColourSpace:
-    """Return a colour space; a matrix or curves equal to those of sRGB become None.
+    """Return a colour space, with None in place of a matrix or curves that are equal to those of sRGB.
 
-    to_rec709, curves : see `ColourSpace`; one curve (65536,) is used for all channels
+    to_rec709 : see `ColourSpace`
+    curves : see `ColourSpace`; a single curve (65536,) is used for all channels
     """
     if curves is not None:
         same = np.allclose(curves, decode_srgb(_CURVE_SAMPLE_LEVELS), rtol=0.0, atol=_SRGB_CURVE_TOLERANCE)
@@ -162,7 +164,9 @@ def _simplified_space(space_name: str, to_rec709: Doubles, curves: Doubles | Non
 
 
 def _matrix_to_rec709(primaries: Sequence[float]) -> Doubles:
-    """Return the matrix (3, 3) from linear RGB of given primaries to linear Rec. 709; white stays white.
+    """Return the matrix (3, 3) from linear RGB with the given primaries to linear Rec. 709.
+
+    The white of the primaries becomes the white of Rec. 709.
 
     primaries : chromaticities x, y of red, green, blue and white
     """
@@ -209,5 +213,5 @@ def _profile_curve(curve_tag: bytes) -> Doubles:
 
 
 def _fixed_point_numbers(tag_bytes: bytes, number_count: int, byte_offset: int = 8) -> list[float]:
-    """Read numbers of an ICC profile's tag, stored as signed fixed point with 16 fractional bits."""
+    """Read numbers in signed fixed point with 16 fractional bits from a tag of an ICC profile."""
     return [value / 65536.0 for value in struct.unpack_from(f">{number_count}i", tag_bytes, byte_offset)]

@@ -1,4 +1,4 @@
-"""Choice of the layer of an OpenEXR file: of the channels that are read as the picture."""
+"""Choice of the layer (set of channels) of an OpenEXR file that is read as the picture."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ class ExrLayer:
 
     part : index of the part that contains the layer
     name : name of the layer, preceded by the name of the part in files of several parts; empty if the
-        channels are just named R, G, B
-    channels : names of the channels for red, green, blue and, if the layer has it, alpha; or for grey
+        channels are named only R, G, B
+    channels : names of the red, green, blue and, if present, alpha channels; or the name of the grey channel
     """
 
     part: int
@@ -49,7 +49,9 @@ def choose_layer(parts: Sequence[tuple[str, Sequence[str]]]) -> tuple[ExrLayer, 
 
     parts : name and channels of each part
 
-    Raises UnsupportedError if no layer has R, G and B or Y, unless the file has a single channel.
+    A file with a single channel of any name is read as grey.
+
+    Raises UnsupportedError if the file has several channels and no layer of colours or grey.
     """
     found = [
         layer for index, part in enumerate(parts) for layer in _picture_layers(index, *part, len(parts) > 1)
@@ -71,7 +73,10 @@ def choose_layer(parts: Sequence[tuple[str, Sequence[str]]]) -> tuple[ExrLayer, 
 def _picture_layers(
     part_index: int, part_name: str, channels: Sequence[str], several_parts: bool
 ) -> Iterator[ExrLayer]:
-    """Yield the picture layers of a part: channels R, G, B (any case, or words) with or without A, or Y.
+    """Yield the layers of a part that can be read as a picture.
+
+    The channels of such a layer are R, G, B and optionally A, or Y alone. The names of the channels may be in
+    lower case or spelled out.
 
     part_index, part_name : index and name of the part
     channels : names of the channels of the part
@@ -92,7 +97,7 @@ def _picture_layers(
 
 
 def _layer_preference(layer: ExrLayer) -> tuple[bool, int]:
-    """Return a sort key: layers with colours before grey layers, then whole pictures before components."""
+    """Return a sort key that puts preferred layers first, see `choose_layer`."""
     last = layer.name.rpartition(".")[2].lower()
     by_name = 0 if not layer.name else 1 if last in _MAIN_LAYER_NAMES else 2
     return len(layer.channels) == 1, by_name

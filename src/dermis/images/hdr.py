@@ -80,9 +80,11 @@ _ENCODED_BYTES_BY_RUN_CODE = [k + 1 if k <= _MAX_LITERAL_RUN else 2 for k in ran
 
 
 def decode_exr(file_bytes: bytes) -> Floats:
-    """Decode the picture in an OpenEXR file to an array (H, W, 1, 3 or 4), 0 outside its data window.
+    """Decode the picture in an OpenEXR file to an array (H, W, 1, 3 or 4).
 
-    Raises ValueError for a file without a layer of R, G, B or Y, and for a file that is too large or damaged.
+    Pixels outside the data window are 0.
+
+    Raises ValueError for a file without channels R, G, B or Y, and for a file that is too large or damaged.
     """
     import OpenEXR
 
@@ -117,7 +119,7 @@ def exr_header(file_bytes: bytes) -> PictureHeader:
 
 
 def _exr_colour_space(header: Any) -> tuple[ColourSpace, str | None]:
-    """Return the colour space of a part of an OpenEXR file, and a note if it is not linear Rec. 709."""
+    """Return the colour space of a part of an OpenEXR file, and a note unless it is linear Rec. 709."""
     import OpenEXR
 
     primaries, name = header.get("chromaticities"), header.get("colorInteropID", "")
@@ -140,9 +142,9 @@ def _open_exr_header(file_bytes: bytes) -> Any:
 
 
 def _checked_layer(exr_file: Any) -> tuple[ExrLayer, str | None]:
-    """Check the header of an OpenEXR file; return the layer to decode, and a note if others are not read.
+    """Check the header of an OpenEXR file; return the layer to decode, and a note on layers that are ignored.
 
-    The total size of the channels of all parts is limited, because the library decodes all channels.
+    The total size of all channels of the file is limited, because the library decodes all of them.
 
     exr_file : OpenEXR.File that was opened with header_only
     """
@@ -199,8 +201,8 @@ def _window_size(exr_window: Any) -> tuple[int, int]:
 def encode_exr(picture: NDArray[np.floating]) -> bytes:
     """Encode a picture (H, W, 1 or 3) of float16 or float32 as an OpenEXR file with channels Y or R, G, B.
 
-    The compression is run-length encoding. For noisy pictures, other methods are slower without smaller
-    files.
+    The compression is run-length encoding. For noisy pictures, other methods are slower, and the files are
+    no smaller.
     """
     import OpenEXR
 
@@ -219,7 +221,8 @@ class _RadianceHeader:
     axes : direction in which scanlines follow each other, and direction of the pixels of a scanline, such as
         "-Y" and "+X"
     lengths : number of scanlines, and number of pixels per scanline
-    values : numbers by name, such as EXPOSURE; for a name on several lines, the product of the lines' numbers
+    values : dictionary from the name of a variable, such as EXPOSURE, to its number; the numbers of a
+        variable on several lines are multiplied
     is_xyz : whether the colours are CIE XYZ
     offset : byte at which the pixels start
     """
@@ -306,9 +309,9 @@ def _scanline_marker(width: int) -> bytes:
 
 
 def _decode_runs(file_bytes: bytes, byte_offset: int, height: int, width: int) -> tuple[Bytes, int]:
-    """Decode run-length encoded scanlines to RGBE pixels (H, W, 4); also return the end of the scanlines.
+    """Decode run-length encoded scanlines to RGBE pixels (H, W, 4); also return the offset of their end.
 
-    byte_offset : byte at which the first scanline starts; the end is also in bytes
+    byte_offset : offset of the first scanline in the file [byte]
     height : number of scanlines
     """
     starts: list[int] = []

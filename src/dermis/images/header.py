@@ -19,8 +19,8 @@ class PictureHeader:
     colour_space : colour space of the decoded pixels
     orientation : EXIF orientation from 1 (upright) to 8: the rotation or reflection that makes the picture
         upright
-    notes : sentences about properties that are converted or not used
-    colour_note : sentence about the conversion of colours, for pictures that are read as colours
+    notes : sentences for the user about properties that are converted or not used
+    colour_note : sentence for the user about the conversion of colours, for a picture that is read as colours
     is_grey : whether the pixels have one colour channel
     """
 

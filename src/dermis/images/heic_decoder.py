@@ -12,13 +12,12 @@ from dermis.images.sizes import MAX_PIXELS
 
 
 def decode(request: Arrays) -> Arrays:
-    """Decode a HEIC picture, as the function of a decoder, see `answer_request`.
+    """Return the size, ICC profile, properties and pixels of a HEIC picture; called by `answer_request`.
 
-    The answer has the size, the ICC profile, three properties, and, unless there are too many, the pixels.
     The properties are the bits per channel in the file, whether the picture was turned upright, and whether
-    the file has more pictures.
+    the file has more pictures. The pixels of a picture that is too large are left out.
 
-    request : arrays with the bytes of the file
+    request : arrays with the bytes of the file as "data"
     """
     import pi_heif
 

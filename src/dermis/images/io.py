@@ -66,7 +66,9 @@ ODD_PIXEL_PROPERTIES = (
 
 @dataclass(frozen=True)
 class EmbeddedPicture:
-    """Picture file of a glTF file or USD package; its colours are sRGB, even if it has another profile.
+    """Picture file that belongs to a glTF file or USD package.
+
+    The colours are read as sRGB, even if the picture has another colour profile.
 
     name : name of the picture in error messages
     data : bytes of the picture file, in any format but OpenEXR, or path of a file beside the glTF file
@@ -81,10 +83,10 @@ class EmbeddedPicture:
 
 
 def read_image(path: str | Path | EmbeddedPicture) -> Pixels:
-    """Return the stored pixels (H, W, C) of a picture file with numeric data, with row 0 at the top.
+    """Return the stored pixels (H, W, C) of a picture of numbers, such as a height map; row 0 is at the top.
 
     C is 1 (grey), 3 (RGB) or 4 (RGBA); grey with alpha becomes RGBA, CMYK becomes RGB. Colour profiles and
-    camera orientation are not used. Notes name other properties that are not used.
+    camera orientation are ignored. Notes tell the user which other properties of the file are ignored.
 
     path : PNG, JPEG, TIFF, WebP, AVIF or HEIC, returned as uint8 or uint16 (a float TIFF as float32), or EXR
         or HDR, returned as linear float32; the format is recognised by content, not by suffix
@@ -116,7 +118,7 @@ def read_colours(path: str | Path | EmbeddedPicture, upright: bool = False) -> t
 
 
 def note_properties(path: str | Path | EmbeddedPicture, read_as_colours: bool) -> None:
-    """Issue the note that reading a picture would issue, for a picture that is taken from a cache.
+    """Issue the note that reading a picture would issue; used if the picture is taken from a cache instead.
 
     read_as_colours : whether the picture is read as colours by `read_colours`, not as numbers by `read_image`
     """
@@ -202,11 +204,14 @@ def _apply_format_function(
     radiance_function: Callable[[bytes], T],
     other_function: Callable[[bytes], T],
 ) -> T:
-    """Return the result of the function for a picture's format; the first bytes determine the format.
+    """Call one of three functions with the bytes of a picture file, and return its result.
+
+    The format of the file, recognised by the first bytes, determines which function is called.
 
     file_bytes : bytes of the file
-    exr_function, radiance_function, other_function : functions of these bytes, for OpenEXR, for .hdr, and for
-        other formats
+    exr_function : function for OpenEXR files
+    radiance_function : function for Radiance .hdr files
+    other_function : function for all other formats
 
     Raises DermisError if the format is unknown, or if the function fails.
     """
@@ -332,8 +337,8 @@ def encode_exr_parts(
 ) -> bytes:
     """Encode several pictures as the parts of one float32 OpenEXR file with lossless compression.
 
-    channels_of_parts : nested dictionaries of the channels (H, W): part name, then channel name; most
-        programs show only the first part
+    channels_of_parts : dictionary from the name of a part to a dictionary from the name of a channel to an
+        array (H, W); most programs show only the first part
     run_length : use run-length encoding instead of ZIP, see `write_exr`
     """
     import OpenEXR

@@ -39,7 +39,7 @@ def parse_frame_rate(frame_rate: str | float | Fraction, culprit: object = "rate
 
     frame_rate : frame rate such as 30, 12.5 or "24000/1001" [1/s]; 23.976 means 24000/1001, and likewise
         29.97 and 59.94 mean the exact NTSC rates
-    culprit : name of the option or argument, for errors
+    culprit : name of the option or argument, for error messages
 
     Raises DermisError for values that are not a frame rate above 0 and up to 1000.
     """

@@ -90,7 +90,7 @@ _SRGB_GAMMA, _GAMMA_TOLERANCE = 1 / 2.2, 0.01  # gamma by which PNG files state 
 
 
 def picture_format(file_bytes: bytes) -> str | None:
-    """Return the name of a picture's format, recognised by the first bytes; None for other formats."""
+    """Return the name of a picture's format, recognised by the first bytes; None if it is not recognised."""
     if file_bytes[:4] == b"RIFF" and file_bytes[8:12] == b"WEBP":
         return "WEBP"
     if file_bytes[4:8] == b"ftyp":
@@ -101,7 +101,9 @@ def picture_format(file_bytes: bytes) -> str | None:
 
 
 def open_picture(file_bytes: bytes) -> Image:
-    """Open a picture with Pillow after checking header and size; only pixels of HEIC are decoded at once.
+    """Open a picture with Pillow, and check its header and size.
+
+    Pixels are decoded on first use, except those of HEIC, which are decoded at once.
 
     Raises ValueError, OSError and other errors for a file that is damaged, too large or not supported, and
     DermisError if a package is missing.
@@ -165,7 +167,7 @@ def _decode_heic(file_bytes: bytes) -> Arrays:
 def pillow_header(file_bytes: bytes) -> PictureHeader:
     """Return the header of a picture file.
 
-    Raises the errors of `open_picture`.
+    Raises the same errors as `open_picture`.
     """
     picture = open_picture(file_bytes)
     exif = _read_exif(picture)
@@ -241,7 +243,10 @@ def _conversion_note(space_name: str) -> str:
 
 
 def _profiled_space(picture: Image, icc_profile: bytes) -> tuple[ColourSpace, str | None]:
-    """Return the colour space of the decoded pixels of a picture with an ICC profile, and a note."""
+    """Return the colour space of the decoded pixels of a picture with an ICC profile.
+
+    The second result is a note for the user if colours are converted or the profile is not used, else None.
+    """
     name = profile_name(icc_profile) or "a profile without a name"
     is_grey = picture.mode in _PILLOW_GREY_MODES
     try:
@@ -257,7 +262,10 @@ def _profiled_space(picture: Image, icc_profile: bytes) -> tuple[ColourSpace, st
 
 
 def _code_points(file_bytes: bytes, picture: Image) -> tuple[int, int] | None:
-    """Return the code points of primaries and transfer function in a PNG, AVIF or HEIC file, or None."""
+    """Return the code points of primaries and transfer function in a PNG, AVIF or HEIC file.
+
+    Returns None for a file without code points.
+    """
     if picture.format == "PNG" and (start := file_bytes.find(b"cICP", 0, file_bytes.find(b"IDAT"))) > 0:
         return file_bytes[start + 4], file_bytes[start + 5]
     if picture.format in ("AVIF", _HEIC_FORMAT) and (start := file_bytes.find(b"colrnclx")) > 0:
@@ -267,7 +275,7 @@ def _code_points(file_bytes: bytes, picture: Image) -> tuple[int, int] | None:
 
 
 def _is_adobe_rgb(exif: Exif) -> bool:
-    """Return whether EXIF states Adobe RGB; most cameras state Adobe RGB only in EXIF, without a profile."""
+    """Return whether EXIF declares Adobe RGB; most cameras declare it only there, without an ICC profile."""
     try:
         file_kind = str(exif.get_ifd(_INTEROPERABILITY_IFD).get(1, "")).strip("\0 ")
         return (
@@ -279,7 +287,10 @@ def _is_adobe_rgb(exif: Exif) -> bool:
 
 
 def _png_space(picture: Image) -> ColourSpace:
-    """Return the colour space that a PNG file states by gamma and chromaticities; sRGB for other files."""
+    """Return the colour space that a PNG file declares by its gamma and chromaticities.
+
+    Returns sRGB for PNG files without gamma, and for other formats.
+    """
     gamma, corners = picture.info.get("gamma"), picture.info.get("chromaticity")
     if picture.format != "PNG" or "srgb" in picture.info or not gamma:
         return SRGB
@@ -289,7 +300,7 @@ def _png_space(picture: Image) -> ColourSpace:
 
 
 def _header_notes(file_bytes: bytes, picture: Image) -> Iterator[str]:
-    """Yield sentences about properties that are converted or not used."""
+    """Yield notes for the user about properties of a picture that are converted or not used."""
     if picture.mode == "CMYK":
         profile = profile_name(picture.info.get("icc_profile", b"")) if table_transform(picture) else ""
         how = f"by its profile, {profile}" if profile else "without a profile, so that its colours are rough"

@@ -26,7 +26,7 @@ _MIN_ITA_OF_FITZPATRICK_TYPES = (("I", 55.0), ("II", 41.0), ("III", 28.0), ("IV"
 class SkinTone(NamedTuple):
     """Description of a skin colour under D65, without surface reflection.
 
-    L, a, b : CIELAB
+    L, a, b : CIELAB coordinates
     hue_degrees : hue angle, arctan(b / a) [degrees]
     ita_degrees : individual typology angle, arctan((L - 50) / b) [degrees]
     monk : nearest class of the Monk Skin Tone Scale by CIEDE2000, 1 (lightest) to 10
@@ -45,7 +45,7 @@ class SkinTone(NamedTuple):
     fitzpatrick: str
 
     def as_json(self) -> dict[str, float | int | str]:
-        """Return rounded numbers, classes, and a note that the classes describe colours, not people."""
+        """Return the description with rounded numbers and a note that it describes a colour, not a person."""
         values = {name: round(one, 2) for name, one in zip(self._fields[:5], self[:5], strict=True)}
         return {
             **values,
@@ -64,8 +64,8 @@ class SkinTone(NamedTuple):
 def ita_degrees(cielab: ArrayLike) -> Doubles:
     """Return the individual typology angle (...) of CIELAB colours (..., 3) [degrees].
 
-    The individual typology angle is the angle of the colour around L* = 50, b* = 0, from 90 (light) to -90
-    (dark). Colours with negative b*, which skin does not have, get 90 or -90.
+    The individual typology angle is the angle of a colour about the point L* = 50, b* = 0 in the plane of b*
+    and L*, from 90 (light) to -90 (dark). Colours with negative b*, which skin does not have, get 90 or -90.
 
     Source: [Chardon1991].
     """

@@ -69,7 +69,7 @@ class ImageWriter:
             self._queue.popleft().result()
 
     def _check_folder(self, path: Path) -> None:
-        """Check that a path is writable, once per folder and suffix, as a check takes longer than a frame."""
+        """Check that a path is writable, but only once per folder and suffix, because checks are slow."""
         key = path.parent, path.suffix
         if key not in self._checked_folders:
             check_output(path)
@@ -144,7 +144,7 @@ class FrameFiles:
                 temporary.write_text(content_key, encoding="utf-8")
 
     def missing_frames(self, frame_numbers: Iterable[int], picture_size: tuple[int, int]) -> list[int]:
-        """Return the frame numbers whose pictures are missing, incomplete, or of another sequence.
+        """Return the frame numbers whose pictures are missing, incomplete, or belong to another sequence.
 
         frame_numbers : frame numbers to check
         picture_size : width and height of the pictures [pixel]

@@ -68,7 +68,7 @@ class Clip(ShortRepr):
         Parameters
         ----------
         seconds : float
-            Time [s]; before the start and after the end the first and the last pose are returned.
+            Time [s]. A time before the start gives the first pose, a time after the end gives the last pose.
 
         Returns
         -------
@@ -89,7 +89,7 @@ class Clip(ShortRepr):
         Parameters
         ----------
         rate : float
-            Frame rate [1/s]; frame k is at the time k / rate, and no frame is after the end of the clip.
+            Frame rate [1/s]. Frame k shows the time k / rate; frames after the end of the clip do not count.
 
         Returns
         -------
@@ -113,7 +113,7 @@ class Clip(ShortRepr):
 
     @property
     def note(self) -> str:
-        """Return a sentence about names of the file that the head lacks; empty if the head lacks none."""
+        """Return a sentence about targets and bones of the file that the head lacks; empty if none."""
         if not self.left_out:
             return ""
         names = ", ".join(self.left_out[:_MAX_LISTED_NAMES])

@@ -22,7 +22,7 @@ class EyeLook:
     Parameters
     ----------
     eumelanin : float, optional
-        Eumelanin of the iris, from 0 for blue to 1 for the darkest brown [-].
+        Eumelanin of the iris, from 0 (blue) to 1 (darkest brown) [-].
     pupil_mm : float, optional
         Radius of the pupil, 1 to 4 [mm].
     redness : float, optional

@@ -51,9 +51,9 @@ def iris_mm() -> float:
 
 
 def profile_mm(angle_from_axis: Doubles) -> Doubles:
-    """Return the distance from the ball's centre to the surface of ball and cornea [mm].
+    """Return the distance from the ball's centre to the outer surface of ball and cornea [mm].
 
-    angle_from_axis : angle between the direction and the eye's axis [rad]
+    angle_from_axis : angle between the eye's axis and the direction in which the distance is measured [rad]
     """
     centre = cornea_centre_mm()
     within = np.maximum(CORNEA_MM**2 - (centre * np.sin(angle_from_axis)) ** 2, 0.0)
@@ -62,12 +62,12 @@ def profile_mm(angle_from_axis: Doubles) -> Doubles:
 
 
 def radial_distances_mm(points: Doubles, eye_axis: Doubles) -> tuple[Doubles, Doubles]:
-    """Return the distances (...) of points and of the eyeball's surface from the ball's centre [mm].
+    """Return distances (...) from the ball's centre, first to points, then to the eyeball's surface [mm].
+
+    The distance to the surface is measured along the ray from the centre through each point.
 
     points : (..., 3) positions relative to the ball's centre [mm]
     eye_axis : (..., 3) unit vectors of the eyes' axes
-
-    The distance of the surface is measured along the ray from the centre through the point.
     """
     distance = np.linalg.norm(points, axis=-1)
     cosine = (points * eye_axis).sum(axis=-1) / np.maximum(distance, 1e-9)
@@ -80,8 +80,10 @@ class LidContact(ShortRepr):
 
     point : (n,) control points of the lids
     ball : (n,) index of the eyeball over which each lid point slides
-    min_clearance_mm : (n,) smallest distance from the eyeball's surface, for an eye of adult size [mm]
-    apex, back : (k,) control points of each eyeball: apex of the cornea, and the opposite point of the ball
+    min_clearance_mm : (n,) smallest distance of each lid point from the eyeball's surface, for an eye of
+        adult size [mm]
+    apex, back : (k,) control points of each eyeball: the apex of the cornea, and the opposite point of the
+        ball
     edge : (k, r) control points along the lid edges, once around each opening
     """
 
@@ -111,11 +113,11 @@ class LidContact(ShortRepr):
 
 @cache
 def build_eyeball(quads_per_edge: int = QUADS_PER_EDGE, position_scale: float = 1.0) -> tuple[Doubles, Index]:
-    """Return the points (n, 3) of an eyeball that looks along +Z [mm], and its quads (q, 4).
+    """Return the points (n, 3) [mm] and the quads (q, 4) of an eyeball that looks along +Z.
 
     quads_per_edge : number of quads along each edge of the cube that is projected to the ball
-    position_scale : factor of the positions; control points need a factor above 1, as their subdivision
-        surface is smaller
+    position_scale : factor of the positions; above 1 for control points, because a subdivision surface is
+        smaller than its control mesh
     """
     points, quads = list[Doubles](), list[Index]()
     grid = np.tan(np.linspace(-np.pi / 4, np.pi / 4, quads_per_edge + 1))  # evenly spaced in angle

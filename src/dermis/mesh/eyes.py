@@ -17,9 +17,9 @@ from dermis.mesh.rig import Motion, Rig
 class Eyes(ShortRepr):
     """The k eyeballs of a head: spheres with a cornea, see mesh/eyeball.py.
 
-    apex, back, side : (k,) control points of each eyeball: apex of the cornea, the point opposite to it, and
-        the point of the equator towards +X when the head looks along +Z
-    material : (k,) index of the material
+    apex, back : (k,) control points of each eyeball: the apex of the cornea, and the point opposite to it
+    side : (k,) control point of each eyeball on its equator, on the side of +X when the head looks along +Z
+    material : (k,) index of the material of each eyeball
     look : appearance of both eyes
     radius_mm : (k,) radius of the ball when the eye is scaled to a cornea of adult size [mm]
     centre_offset_mm : (k,) shift of the ball's centre along the axis, relative to an adult eye [mm]

@@ -112,7 +112,7 @@ def _axis_name(axis: int, sign: float) -> Direction:
 def _head_height(points: Doubles) -> float:
     """Return the height of the head of a figure.
 
-    It extends from the top down to where the figure becomes wider than a head, at the shoulders.
+    The head extends from the top of the figure down to the shoulders, where the figure becomes wider.
 
     points : (n, 3) points of the figure, Y up
     """
@@ -124,7 +124,7 @@ def _head_height(points: Doubles) -> float:
 
 
 def _area_normals(corners: Doubles) -> Doubles:
-    """Return the normals of triangles (f, 3, 3) with twice the area as their length, as columns (3, f)."""
+    """Return normals of triangles (f, 3, 3) as columns (3, f) whose lengths are twice the triangle areas."""
     a, b, c = np.moveaxis(corners, 0, -1)
     return cross_columns(b - a, c - a)
 
@@ -132,7 +132,7 @@ def _area_normals(corners: Doubles) -> Doubles:
 def _sample_surface(corners: Doubles, normals: Doubles) -> tuple[Doubles, Doubles]:
     """Return points (n, 3) that are spread evenly over triangles (f, 3, 3), and their unit normals.
 
-    normals : normals of the triangles with twice the area as their length, as columns (3, f)
+    normals : (3, f) normals of the triangles, whose lengths are twice the triangle areas
     """
     areas = np.sqrt(dot_columns(normals, normals))
     total = np.cumsum(areas)
@@ -160,7 +160,7 @@ def _asymmetry(points: Doubles, mirrored_axis: int) -> float:
 
 
 def _normal_variation(points: Doubles, normals: Doubles) -> float:
-    """Return the variation of normals (n, 3) at points (n, 3) within small cells, 0 to 1 [-]."""
+    """Return how much normals (n, 3) at points (n, 3) vary within small cells of space, 0 to 1 [-]."""
     keys = np.floor(points / _VARIATION_CELL_SIDE).astype(np.int64) @ [1, 1 << 20, 1 << 40]
     cells = np.unique(keys, return_inverse=True)[1].reshape(-1)
     sums: Doubles = np.stack([np.bincount(cells, one) for one in normals.T])
@@ -168,7 +168,7 @@ def _normal_variation(points: Doubles, normals: Doubles) -> float:
 
 
 def _ridge_height(points: Doubles, front_axis: int) -> float:
-    """Return the largest distance at any height by which the middle of a face protrudes beyond its sides.
+    """Return the largest distance by which the middle of a face protrudes beyond its sides at any height.
 
     points : (n, 3) points of the front or back of a head
     front_axis : index of the coordinate along which the face may look

@@ -1,4 +1,4 @@
-"""Relation of a head to the vertices of its mesh file."""
+"""Correspondence between the points of a head and the vertices of its mesh file."""
 
 from __future__ import annotations
 
@@ -10,14 +10,15 @@ from dermis.base.summary import ShortRepr
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FileVertices(ShortRepr):
-    """Vertices of a mesh file from which the points of a head come, for mesh sequences.
+    """Correspondence between the vertices of a mesh file and the points of a head, for mesh sequences.
 
     A vertex of the file may belong to several points, where coincident sheets of the surface were separated,
     or to no point.
 
     count : number of vertices that the triangles of the file use
-    vertex, point : (n,) vertex indices in the file, and the head's point at each of these vertices
-    triangles : (f, 3) triangles of the head before any subdivision, as indices in `vertex`
+    vertex : (n,) vertex indices in the file
+    point : (n,) index of the head's point at each of these vertices
+    triangles : (f, 3) triangles of the head before any subdivision, as indices into `vertex`
     to_head : (3, 3) rotation from the axes of the file to the axes of the head
     """
 

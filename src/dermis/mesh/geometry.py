@@ -15,7 +15,7 @@ T = TypeVar("T", np.float32, np.float64)
 
 
 def weld(vertex_rows: ArrayLike) -> Ints:
-    """Return the index of each row (v, k) among the unique rows, (v,); rows are compared in float32.
+    """Return for each row (v, k) its index among the unique rows, (v,); rows are compared in float32.
 
     vertex_rows : positions [mm], or positions and uv side by side
     """
@@ -30,7 +30,10 @@ def weld(vertex_rows: ArrayLike) -> Ints:
 
 
 def compact_vertices(triangles: NDArray[np.integer]) -> tuple[Index, Index]:
-    """Return the indices (n,) of vertices that triangles use, and the triangles (f, 3) with new indices."""
+    """Return the indices (n,) of vertices that triangles use, and the triangles with new indices.
+
+    triangles : (f, 3) vertex indices, which the result replaces by positions in the returned array
+    """
     used = np.zeros(int(triangles.max()) + 1, bool)
     used[triangles] = True
     return np.flatnonzero(used).astype(np.int64), (np.cumsum(used) - 1)[triangles]
@@ -39,11 +42,11 @@ def compact_vertices(triangles: NDArray[np.integer]) -> tuple[Index, Index]:
 def merge_near_points(
     positions: Doubles, triangles: NDArray[np.integer], spacing: float
 ) -> tuple[Doubles, Index]:
-    """Merge the points of each cell of a grid into their mean; return the points and the triangles (f, 3).
+    """Replace the points in each cell of a grid by their mean; return the points and the triangles (f, 3).
 
     positions : (v, 3) vertex positions
     triangles : (f, 3) vertex indices; some of the returned triangles have coincident corners
-    spacing : side of the cells
+    spacing : length of the sides of the cells
     """
     cell = np.floor(positions / spacing).astype(np.int64)
     cell -= cell.min(axis=0)
@@ -57,17 +60,18 @@ def merge_near_points(
 def edges(triangles: NDArray[np.integer]) -> tuple[Index, Index, Index]:
     """Return the unique edges (e, 2) of triangles, the edge of each side (3f,) and the sides per edge (e,).
 
-    triangles : (f, 3) point indices
+    The sides from corner 0 to corner 1 of all triangles come first, then the sides from 1 to 2, then from 2
+    to 0.
 
-    Sides are ordered as all 0-1, then all 1-2, then all 2-0.
+    triangles : (f, 3) point indices
     """
     return unique_sides(np.vstack((triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]])))
 
 
 def edge_keys(corners: NDArray[np.integer]) -> Index:
-    """Return a key (f, 3) for each triangle side, which is equal for all sides of an edge.
+    """Return a key (f, 3) for each triangle side; sides on the same edge have the same key.
 
-    corners : (f, 3) point indices; side k runs from corner k to the next
+    corners : (f, 3) point indices; side k runs from corner k to the next corner
     """
     start = corners.astype(np.int64)
     end = start[:, [1, 2, 0]]
@@ -75,7 +79,7 @@ def edge_keys(corners: NDArray[np.integer]) -> Index:
 
 
 def triangle_keys(corners: NDArray[np.integer], point_count: int) -> Index:
-    """Return a key (f,) for each triangle, which is equal for triangles with the same three points.
+    """Return a key (f,) for each triangle; triangles with the same three points have the same key.
 
     corners : (f, 3) point indices
     point_count : number of points, at most two million
@@ -101,8 +105,9 @@ def unique_sides(sides: NDArray[np.integer]) -> tuple[Index, Index, Index]:
 def vertex_normals(positions: Floats, point: Ints, triangles: Ints) -> Floats:
     """Return vertex normals (v, 3): normalised sums of face normals, weighted by the corner angles.
 
-    Vertices of one point share a normal, so that there is no crease at a uv seam. The normal is +Z where the
-    sum is 0. Weights by angle, unlike weights by area, do not depend on how the surface is triangulated.
+    All vertices of a point have the same normal, so that there is no crease at a uv seam. The normal is +Z
+    where the sum is 0. Unlike weights by area, weights by angle do not depend on how the surface is
+    triangulated.
 
     positions : (v, 3) [mm]
     point : (v,) index of the point of each vertex
@@ -125,7 +130,12 @@ def vertex_normals(positions: Floats, point: Ints, triangles: Ints) -> Floats:
 
 
 def sum_by_index(row_index: NDArray[np.integer], row_values: Doubles, sum_count: int) -> Doubles:
-    """Sum rows of `row_values` (n, k) of equal `row_index` (n,); sum i of (sum_count, k) is for index i."""
+    """Return the sums (sum_count, k) of rows that have the same index.
+
+    row_index : (n,) index of the sum to which each row is added
+    row_values : (n, k) rows
+    sum_count : number of sums
+    """
     columns = [np.bincount(row_index, weights=column, minlength=sum_count) for column in row_values.T]
     return np.column_stack(columns)
 
@@ -162,13 +172,13 @@ def normalise_vectors(vectors: Doubles, fallback: Doubles) -> Doubles:
 
 
 def tangents(positions: Floats, uv: Floats, normals: Floats, triangles: Ints) -> tuple[Floats, Floats]:
-    """Return the derivatives of the position by u and by v at each vertex, (v, 3) each [mm per unit of uv].
+    """Return the derivatives (v, 3) of the position with respect to u and to v at each vertex.
 
-    The derivatives are means over the triangles of a vertex, weighted by area; triangles without uv area are
-    ignored. A vertex whose triangles all lack uv area gets two orthogonal unit vectors, to avoid divisions by
-    0.
+    The derivatives [mm per unit of uv] are area-weighted means over the triangles of a vertex; triangles
+    without uv area are ignored. A vertex whose triangles all lack uv area gets two orthogonal unit vectors,
+    to avoid divisions by 0.
 
-    positions, normals : (v, 3) [mm], and unit vectors
+    positions, normals : (v, 3) positions [mm] and unit normals
     uv : (v, 2)
     triangles : (f, 3) vertex indices
     """
@@ -187,7 +197,7 @@ def tangents(positions: Floats, uv: Floats, normals: Floats, triangles: Ints) ->
 
 
 def _nonzero_tangents(dpdu: Doubles, dpdv: Doubles, normals: Doubles) -> tuple[Floats, Floats]:
-    """Return tangents without zero vectors, (v, 3) each.
+    """Return tangents (v, 3) along u and along v, neither of which is zero.
 
     Where `dpdu` or `dpdv` is 0, both are replaced by orthogonal vectors of length 1 in the tangent plane.
     """
@@ -224,7 +234,7 @@ def cross_columns(a: NDArray[T], b: NDArray[T]) -> NDArray[T]:
 def label_components(
     node_count: int, link_start: NDArray[np.integer], link_end: NDArray[np.integer]
 ) -> Index:
-    """Return for each node of a graph the number of its connected component, (n,).
+    """Return for each node of a graph the index of its connected component, (n,).
 
     Components are numbered in the order in which they first appear.
 
@@ -248,7 +258,7 @@ def label_components(
 
 
 def expand_runs(run_start: Index, run_length: Index) -> tuple[Index, Index]:
-    """Return the integers of r runs of consecutive integers, preceded by the index of each integer's run.
+    """Expand r runs of consecutive integers; return for each integer the index of its run, and the integer.
 
     run_start, run_length : (r,) first integer and length of each run
     """
@@ -258,7 +268,7 @@ def expand_runs(run_start: Index, run_length: Index) -> tuple[Index, Index]:
 
 
 def fibonacci_sphere(vector_count: int) -> Doubles:
-    """Return unit vectors (vector_count, 3), even over the sphere, on a golden-angle spiral about +Y.
+    """Return unit vectors (vector_count, 3) spread evenly over the sphere, on a spiral about +Y.
 
     Source: [Keinert2015].
     """

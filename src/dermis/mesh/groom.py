@@ -1,4 +1,4 @@
-"""Grooms: hair that a device grows from guide curves, which are bound to the skin of a mesh of quads."""
+"""Grooms: hair that the device grows from guide curves, which move with the skin of a quad mesh."""
 
 from __future__ import annotations
 
@@ -21,12 +21,14 @@ GUIDE_ANCHORS = 4
 class Guides:
     """Guide curves of `GUIDE_KNOTS` knots from root to tip; each knot follows the quads nearest to it.
 
+    The arrays are for g guides, k knots per guide and a quads per knot.
+
     corner : (g, k, a, 4) control points at the corners of the quads, in order around each quad
-    local_mm : (g, k, a, 3) position of the knot in the frame of each quad: along it, across it, and along its
-        normal, from the mean of its corners [mm]
-    weight : (g, k, a) weight of each quad, with a sum of 1 [-]
-    rest_mm : (g, k, 4) position of the knot on the mean person at rest, and its height above the skin [mm]
-    cut : (g,) fraction of each guide from its root to where the style cuts it [-]
+    local_mm : (g, k, a, 3) position of each knot relative to each quad: components along the quad, across it
+        and along its normal, from the mean of the corners [mm]
+    weight : (g, k, a) weights of the quads, which add up to 1 for each knot [-]
+    rest_mm : (g, k, 4) position of each knot on the mean person at rest, and its height above the skin [mm]
+    cut : (g,) fraction of the length of each guide at which the style cuts it [-]
     """
 
     corner: Ints
@@ -42,12 +44,13 @@ class StrandRoots:
 
     roots : n roots on quads of the control mesh
     guide, guide_weight : (n, 4) guides between which each strand is interpolated, and their weights
-    clump : (n,) strand at the middle of the clump to which each strand belongs
-    place : (n, 4) angle from the front [degrees], and height above the midpoint of the eyes [mm], by which
-        the hairline decides whether the strand grows; thinning on a receding crown, 0 to 1; and position
-        between the nape, 0, and the top of the head, 1
-    along_mm : (n,) position of the clump along its row, by which the braids of a row continue each other [mm]
-    part : (n,) index of the part of the groom, such as scalp and beard
+    clump : (n,) index of the strand in the middle of the clump to which each strand belongs
+    place : (n, 4) place of each root on the head: angle from the front [degrees]; height above the midpoint
+        of the eyes [mm], to be compared with the height of the hairline; thinning of the hair if the crown
+        recedes, 0 to 1; and position from the nape (0) to the top of the head (1)
+    along_mm : (n,) position of each clump along its cornrow, so that the braids of consecutive clumps join
+        [mm]
+    part : (n,) index of the part of the groom, such as scalp or beard
     """
 
     roots: Roots
@@ -65,13 +68,14 @@ class StrandRoots:
 
 @dataclass(frozen=True, eq=False)
 class Groom:
-    """Hair of a person: the tables of a style, which people share, and the numbers of the person.
+    """Hair of a person: guides and roots that all people with a style share, and parameters of the person.
 
-    guides, roots : tables of the style
-    parameters : (p,) structured array, one element for each part of the groom
-    strands : number of strands to grow, the first of `roots`; they are wider, to keep coverage
+    guides, roots : guides and possible strands of the style
+    parameters : (p,) structured array with the parameters of each part of the groom, such as scalp or beard
+    strands : number of possible strands to use, from the start of `roots`; if some are unused, the strands
+        are widened to keep coverage
     knots : number of knots per strand
-    hairline_mm : (91,) height of the hairline by angle from the front, every 2 degrees [mm]
+    hairline_mm : (91,) heights of the hairline at angles of 0 to 180 degrees from the front [mm]
     centre_mm : (3,) centre of the roots on the mean person [mm]
     """
 
@@ -86,13 +90,14 @@ class Groom:
     def refined(self, mesh: Mesh, levels: int) -> Groom:
         """Return this groom with roots on the Catmull-Clark subdivision of a mesh.
 
-        The guides follow the control points, which the subdivided mesh has too.
+        The guides stay the same, because they follow control points, which the subdivided mesh keeps.
 
-        mesh, levels : mesh before subdivision, and number of subdivision steps
+        mesh : mesh before subdivision
+        levels : number of subdivision steps
         """
         roots = replace(self.roots, roots=refine_roots(mesh, self.roots.roots, levels))
         return replace(self, roots=roots)
 
     def __len__(self) -> int:
-        """Return the number of strands, of which the look of the person may leave out some."""
+        """Return the number of strands, including strands that the look of the person leaves out."""
         return self.strands

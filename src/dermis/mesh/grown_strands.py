@@ -1,4 +1,4 @@
-"""Strands grown from a groom without a device, for exports and path tracing, as in strands_grow.wgsl."""
+"""Strands grown from a groom on the CPU, as strands_grow.wgsl grows them, for exports and path tracing."""
 
 from __future__ import annotations
 
@@ -31,10 +31,11 @@ _FALLBACK_AXIS = np.array([0.31, 0.2, 0.93])
 def grow_strands(
     groom: Groom, mesh: Mesh, points_mm: NDArray[np.floating], max_strands: int = MAX_EXPORTED_STRANDS
 ) -> Strands:
-    """Return the strands of a groom on a posed skin; those that the person's look leaves out are missing.
+    """Return the strands of a groom on a posed skin, without strands that the person's look leaves out.
 
-    mesh, points_mm : mesh of quads in which the strands are rooted, and its points (p, 3) in a pose [mm]
-    max_strands : largest number of strands, which are wider where they stand for more
+    mesh : mesh of quads in which the strands are rooted
+    points_mm : (p, 3) points of the mesh in a pose [mm]
+    max_strands : largest number of strands; if the groom has more, the strands are widened to keep coverage
     """
     count = min(len(groom), max_strands)
     guides = _posed_guides(groom, points_mm)
@@ -59,7 +60,7 @@ def grow_strands(
 
 
 def hair_strands(head: Head, points_mm: NDArray[np.floating] | None = None) -> Strands | None:
-    """Return the strands of a head's hair as exports show it, None for a head without hair.
+    """Return the strands of a head's hair for exports and path tracing; None for a head without hair.
 
     points_mm : (p, 3) points of the mesh in a pose; at rest by default [mm]
     """
@@ -80,7 +81,7 @@ def hair_cover(groom: Groom, mesh: Mesh) -> Doubles:
 
 
 def absorbed_by_hair(groom: Groom) -> float:
-    """Return the fraction of diffuse light that a hair absorbs, as a mean over the channels."""
+    """Return the fraction of diffuse light that a hair absorbs, averaged over channels and groom parts."""
     parts = groom.parameters
     chord = 0.5 * np.pi * (parts["radius_mm"] / parts["hairs_per_strand"])[:, None]
     absorption = np.maximum((1.0 - parts["grey"][:, None]) * parts["dark"], parts["white"])
@@ -88,7 +89,11 @@ def absorbed_by_hair(groom: Groom) -> float:
 
 
 class _Curves(NamedTuple):
-    """Points of curves between guides: position, skin normal and tangent (n, k, 3), height (n, k) [mm]."""
+    """Points of n curves that are interpolated between guides.
+
+    position, normal, tangent : (n, k, 3) positions [mm], skin normals and tangents at the points
+    height : (n, k) heights of the points above the skin [mm]
+    """
 
     position: Doubles
     height: Doubles
@@ -97,7 +102,10 @@ class _Curves(NamedTuple):
 
 
 def _posed_guides(groom: Groom, points_mm: NDArray[np.floating]) -> tuple[Doubles, Doubles]:
-    """Return the knots (g, k, 3) of the guides on a posed skin, and the normals of the skin there."""
+    """Return the knots (g, k, 3) of the guides on a posed skin [mm], and unit normals of the skin below them.
+
+    points_mm : (p, 3) points of the mesh in a pose [mm]
+    """
     guides = groom.guides
     a, b, c, d = np.moveaxis(points_mm.astype(np.float64)[guides.corner], -2, 0)
     along = _unit((b - a) + (c - d))
@@ -125,11 +133,13 @@ def _grow(
     frames: Doubles,
     middle_mm: Doubles,
 ) -> tuple[NDArray[np.float32], Doubles, Doubles, Doubles]:
-    """Return knots (n, k, 3) in the root frames, radii (n, k), absorptions (n, 3) and covers (n,) of strands.
+    """Return the knots, radii, absorption coefficients and covers of n strands, see `Strands`.
 
-    guides : knots and skin normals of the posed guides
+    guides : knots of the posed guides, and skin normals below the knots
     index : (n,) indices of the strands
-    root_mm, frames, middle_mm : positions and frames of their roots, and roots of the middles of their clumps
+    root_mm : (n, 3) positions of the roots [mm]
+    frames : (n, 3, 3) root frames of the strands
+    middle_mm : (n, 3) roots of the strands in the middle of the clumps [mm]
     """
     roots, seed = groom.roots, groom.parameters["seed"].astype(np.uint32) * np.uint32(131071)
     part = groom.parameters[roots.part[index]]
@@ -164,7 +174,13 @@ def _column(part: NDArray[np.void], name: str) -> Doubles:
 
 
 def _random(strand: Words, stream: int) -> Doubles:
-    """Return a uniform random number (n,) of each strand, 0 to 1. Source: PCG hash [JarzynskiOlano2020]."""
+    """Return a uniform random number (n,) for each strand, 0 to 1.
+
+    strand : (n,) numbers that identify the strands
+    stream : number that selects one of several random numbers of a strand
+
+    Source: PCG hash [JarzynskiOlano2020].
+    """
     with np.errstate(over="ignore"):
         state = (strand * np.uint32(64) + np.uint32(stream)) * np.uint32(747796405) + np.uint32(2891336453)
         word = ((state >> ((state >> np.uint32(28)) + np.uint32(4))) ^ state) * np.uint32(277803737)
@@ -182,7 +198,7 @@ def _above_hairline(groom: Groom, index: Ints) -> Doubles:
 
 
 def _growing(groom: Groom, count: int) -> Ints:
-    """Return the indices of the strands, of the first `count`, that grow."""
+    """Return the indices of the strands that grow, among the first `count` strands."""
     index = np.arange(count, dtype=np.int32)
     roots, part = groom.roots, groom.parameters[groom.roots.part[:count]]
     fade = _smoothstep(*_HAIRLINE_FADE_MM, _above_hairline(groom, index))
@@ -193,7 +209,13 @@ def _growing(groom: Groom, count: int) -> Ints:
 
 
 def _lengths(groom: Groom, index: Ints, part: NDArray[np.void], number: Words, above: Doubles) -> Doubles:
-    """Return the length (n,) of each strand as a fraction of its guides."""
+    """Return the length (n,) of each strand as a fraction of the length of its guides.
+
+    index : (n,) indices of the strands
+    part : (n,) parameters of the part of the groom to which each strand belongs
+    number : (n,) numbers that identify the strands, for `_random`
+    above : (n,) heights of the roots above the hairline [mm]
+    """
     roots = groom.roots
     cut = (roots.guide_weight[index] * groom.guides.cut[roots.guide[index]]).sum(axis=1)
     sides = 1.0 - part["fade"] * (1.0 - roots.place[index, 3])
@@ -205,7 +227,13 @@ def _lengths(groom: Groom, index: Ints, part: NDArray[np.void], number: Words, a
 def _curves(
     groom: Groom, guides: tuple[Doubles, Doubles], index: Ints, u: Doubles, root_mm: Doubles
 ) -> _Curves:
-    """Return the curves of strands between their guides, at positions u (n, k) along them from 0 to 1."""
+    """Return curves of strands, interpolated between the guides of each strand.
+
+    guides : knots of the posed guides, and skin normals below the knots
+    index : (n,) indices of the strands
+    u : (n, k) positions of points along the guides, 0 at the root to 1 at the tip
+    root_mm : (n, 3) positions of the roots [mm]
+    """
     knots, normals = guides
     at = np.clip(u, 0.0, 1.0) * (GUIDE_KNOTS - 1)
     first = np.minimum(at.astype(np.int64), GUIDE_KNOTS - 2)
@@ -236,7 +264,7 @@ def _curves(
 
 
 def _axes_across(at: _Curves) -> tuple[Doubles, Doubles]:
-    """Return two unit vectors (n, k, 3) across curves."""
+    """Return two unit vectors (n, k, 3) per point of curves, orthogonal to the curve and to each other."""
     side = np.cross(at.tangent, at.normal)
     upright = (side**2).sum(axis=-1, keepdims=True) < 0.08
     side = _unit(np.where(upright, np.cross(at.tangent, _FALLBACK_AXIS), side))
@@ -244,7 +272,12 @@ def _axes_across(at: _Curves) -> tuple[Doubles, Doubles]:
 
 
 def _rope_offsets(number: Words, part: NDArray[np.void], s: Doubles) -> Doubles:
-    """Return the offsets (2, n, k) of strands in twisted or braided ropes [mm]."""
+    """Return the offsets (2, n, k) of strands from the middle of their twisted or braided ropes [mm].
+
+    number : (n,) numbers that identify the strands, for `_random`
+    part : (n,) parameters of the part of the groom to which each strand belongs
+    s : (n, k) lengths from the root along the rope [mm]
+    """
     rope = np.maximum(_column(part, "rope_mm"), 1e-6)
     radius, turn = rope * np.sqrt(_random(number, 4))[:, None], 2 * np.pi * _random(number, 5)[:, None]
     bundle = np.floor(3.0 * _random(number, 6))[:, None]
@@ -257,7 +290,12 @@ def _rope_offsets(number: Words, part: NDArray[np.void], s: Doubles) -> Doubles:
 
 
 def _curl_offsets(number: Words, clump: Words, part: NDArray[np.void], s: Doubles) -> Doubles:
-    """Return the offsets (2, n, k) of strands by their curls [mm]."""
+    """Return the offsets (2, n, k) by which curls displace the points of strands [mm].
+
+    number, clump : (n,) numbers that identify the strands and their clumps, for `_random`
+    part : (n,) parameters of the part of the groom to which each strand belongs
+    s : (n, k) lengths from the root along the strand [mm]
+    """
     pitch = _column(part, "pitch_mm") * (0.85 + 0.3 * _random(clump, 8))[:, None]
     phase = 2 * np.pi * (s / pitch + (_random(clump, 9) + part["incoherence"] * _random(number, 7))[:, None])
     radius = _column(part, "curl_mm") * (0.75 + 0.5 * _random(number, 10))[:, None]
@@ -266,7 +304,12 @@ def _curl_offsets(number: Words, clump: Words, part: NDArray[np.void], s: Double
 
 
 def _frizz_offsets(number: Words, part: NDArray[np.void], s: Doubles) -> Doubles:
-    """Return smooth random offsets (2, n, k) of strands [mm]."""
+    """Return smooth random offsets (2, n, k) by which frizz displaces the points of strands [mm].
+
+    number : (n,) numbers that identify the strands, for `_random`
+    part : (n,) parameters of the part of the groom to which each strand belongs
+    s : (n, k) lengths from the root along the strand [mm]
+    """
     amount = part["frizz_mm"] * np.where(_random(number, 11) < part["flyaways"], 5.0, 1.0)
     amount = amount[:, None] * np.minimum(s / 25.0, 1.0)
     x, y = (2 * np.pi * _random(number, stream)[:, None] for stream in (12, 13))
@@ -278,7 +321,13 @@ def _frizz_offsets(number: Words, part: NDArray[np.void], s: Doubles) -> Doubles
 
 
 def _absorption(number: Words, part: NDArray[np.void]) -> Doubles:
-    """Return the absorption (n, 3) of strands that each stand for white and pigmented hairs [1/mm]."""
+    """Return the absorption coefficients (n, 3) of strands [1/mm].
+
+    Each strand represents several hairs, some of which may be white.
+
+    number : (n,) numbers that identify the strands, for `_random`
+    part : (n,) parameters of the part of the groom to which each strand belongs
+    """
     white = sum(_random(number, 20 + k) < part["grey"] for k in range(_COLOURED_HAIRS)) / _COLOURED_HAIRS
     white = np.asarray(white)[:, None]
     dark = part["dark"] * np.exp(0.12 * _random_normal(number, 26))[:, None]

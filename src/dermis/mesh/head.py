@@ -38,7 +38,7 @@ class Head:
     attribution : str, optional
         Credit that pictures of the head require, empty if there is none.
     rig : Rig, optional
-        Morph targets and bones; None for a head whose poses state the positions of all its points.
+        Morph targets and bones; None for a head that can only be posed by new positions of its points.
     eyes : Eyes, optional
         Eyeballs of realistic shape.
     strands : Strands, optional
@@ -46,13 +46,13 @@ class Head:
     hair : Groom, optional
         Scalp hair and beard, whose strands the device grows.
     note : str, optional
-        Parts of the file that are not used, with reasons; empty if there is none.
+        Text about parts of the file that are not used, with reasons; empty if all parts are used.
     levels : int, optional
         Levels of subdivision of the mesh.
     template : Head, optional
         Head of the same topology and uv layout, whose atlas and tables this head uses.
     file_vertices : FileVertices, optional
-        Vertices of the mesh file from which the points come, for mesh sequences.
+        Correspondence between points and vertices of the mesh file, for mesh sequences.
 
     Examples
     --------
@@ -88,7 +88,7 @@ class Head:
 
     @cached_property
     def control(self) -> Rig:
-        """Return the rig; for a head without a rig, a rig of its points without targets or bones."""
+        """Return the rig; a head without a rig gets a rig of its points that has no targets and no bones."""
         if self.rig is not None:
             return self.rig
         return Rig(self.mesh.points_mm.astype(np.float32))
@@ -103,7 +103,10 @@ class Head:
 
     @property
     def topology(self) -> Head:
-        """Return the head that provides atlas and tables: the template of the rig, or else `bare`."""
+        """Return the head whose atlas and tables this head uses.
+
+        This is the template if the rig has the same template, and `bare` otherwise.
+        """
         template = self.template
         if template is None or self.rig is None or self.rig.template is not template.rig:
             return self.bare
@@ -113,7 +116,7 @@ class Head:
     def positions_mm(self) -> Floats:
         """Return the points (n, 3) of the mesh as loaded, before any subdivision [mm].
 
-        Points of fitted eyeballs, which are not in the file, are left out, see `Rig.rigid_followers`.
+        Points of fitted eyeballs are left out, because they are not in the file, see `Rig.rigid_followers`.
         """
         positions = self.control.positions_mm
         return positions[: self.control.file_point_count] if self.control.rigid_followers else positions
@@ -159,7 +162,7 @@ class Head:
 
     @property
     def seen_positions_mm(self) -> Floats:
-        """Return the vertices relative to the centre: their right, up and front components, (v, 3) [mm]."""
+        """Return the right, up and front components (v, 3) of the vertices, relative to the centre [mm]."""
         positions = self.mesh.positions - np.array(self.centre_mm, dtype=np.float32)
         return positions if self.skull_mm is not None else positions @ self.axes.T.astype(np.float32)
 
@@ -172,7 +175,7 @@ class Head:
     def frontmost(self, x_mm: float, y_mm: float) -> tuple[float, float, float]:
         """Return the position (x, y, z) of the frontmost vertex near a point seen from the front [mm].
 
-        Both are relative to the head's centre.
+        The position is relative to the head's centre.
 
         x_mm, y_mm : position to the right and upwards, relative to the head's centre [mm]
         """

@@ -17,10 +17,11 @@ _MEAN_SAMPLES_PER_SIDE, _MAX_SAMPLE_DISTANCE_TEXELS = 64, 16
 
 @dataclass(frozen=True, repr=False)
 class PartMaps(ShortRepr):
-    """Texture maps that all groups of triangles except skin share, in one common uv layout.
+    """Texture maps, in one common uv layout, of all groups of triangles except skin.
 
-    colour : (H, W, 4) base colour, linear Rec. 709, and opacity; surfaces are cut out below 0.5 [-]
-    surface : (H, W, 4) slopes as in `Maps.normal`, perceptual roughness and metalness [-]
+    colour : (H, W, 4) base colour, linear Rec. 709, and opacity; surfaces are cut out where opacity is below
+        0.5 [-]
+    surface : (H, W, 4) two slopes as in `Maps.normal`, perceptual roughness and metalness [-]
     emission : (H, W, 3) emitted radiance; None if no group emits light
     """
 
@@ -31,7 +32,7 @@ class PartMaps(ShortRepr):
 
 @dataclass(frozen=True, repr=False)
 class Maps(ShortRepr):
-    """Texture maps of the skin; None for a map that a head does not have.
+    """Texture maps of the skin; a map that a head does not have is None.
 
     Row 0 is the top of the map; sizes may differ from map to map.
 
@@ -61,7 +62,7 @@ class Maps(ShortRepr):
 
     @cached_property
     def mean_colour(self) -> Doubles | None:
-        """Return the mean (3,) of the colour map, leaving out unused (black) texels; None without a map."""
+        """Return the mean colour (3,) of the colour map without unused (black) texels; None without a map."""
         if self.colour is None:
             return None
         stride = int(

@@ -27,7 +27,7 @@ class Material:
     name : name of the group in the file
     kind : "skin" is rendered with subsurface scattering, "opaque" with a diffuse and a specular lobe
     colour : diffuse albedo where there is no colour map, linear Rec. 709 [-]
-    part : part of the mouth, which selects a colour in mouth.wgsl; None for other surfaces
+    part : name of a part of the mouth, which selects a colour in mouth.wgsl; None for other surfaces
     eye : whether the file declares the group to be an eyeball
     has_maps : whether `Maps.parts` contains the colour and surface of an opaque group, already multiplied by
         the factors of the file's material
@@ -84,7 +84,7 @@ class Mesh(ShortRepr):
 
     @property
     def cut_out(self) -> Mask:
-        """Return the mask (f,) of triangles that an opacity map cuts out in part, such as hair cards."""
+        """Return a mask (f,) of triangles, such as hair cards, from which an opacity map cuts out parts."""
         return np.array([one.has_maps and one.opacity_cutoff > 0 for one in self.materials])[self.material]
 
     @property
@@ -112,7 +112,7 @@ class Mesh(ShortRepr):
 
     @cached_property
     def topology_key(self) -> bytes:
-        """Return a digest that is the same for all meshes that differ only in positions of points."""
+        """Return a digest that is the same for all meshes that differ only in the positions of points."""
         digest = hashlib.blake2b(digest_size=16)
         for part in (self.uv, self.point, self.triangles, self.material):
             digest.update(np.ascontiguousarray(part).tobytes())
@@ -120,12 +120,12 @@ class Mesh(ShortRepr):
 
     @property
     def dpdu(self) -> Floats:
-        """Return the derivative of the position by u, (v, 3), averaged over adjacent faces [mm]."""
+        """Return the face-averaged derivatives (v, 3) of the position with respect to u [mm]."""
         return self._tangents[0]
 
     @property
     def dpdv(self) -> Floats:
-        """Return the derivative of the position by v, (v, 3), averaged over adjacent faces [mm]."""
+        """Return the face-averaged derivatives (v, 3) of the position with respect to v [mm]."""
         return self._tangents[1]
 
     @cached_property
@@ -135,7 +135,7 @@ class Mesh(ShortRepr):
 
 
 def _valid_normals(file_normals: Floats, computed_normals: Floats) -> Floats:
-    """Return the file's normals (v, 3), replaced by computed normals where not finite or not of unit length.
+    """Return the file's normals (v, 3), with computed normals in place of those that are not unit vectors.
 
     file_normals, computed_normals : (v, 3) normals of the file, and normals computed from the triangles
     """
@@ -157,13 +157,13 @@ def build_mesh(
     point: ArrayLike | None = None,
     quads: ArrayLike = (),
 ) -> Mesh:
-    """Build a `Mesh` from arrays; points are welded and normals are computed if these arguments are None.
+    """Build a `Mesh` from arrays.
 
     positions : (v, 3) finite [mm]
     uv : (v, 2) v down
     triangles : (f, 3) vertex indices, at least one triangle
     material : (f,) index into `materials`
-    normals : (v, 3) used where they are finite and of unit length, computed elsewhere
+    normals : (v, 3) unit normals; computed instead where they are invalid, or everywhere if None
     point : (v,) index of the unique position; if None, equal positions are welded
     quads : (q, 2) pairs of triangles that are a quad, see `Mesh`
     """

@@ -30,7 +30,7 @@ class MorphTargets(ShortRepr):
 
     @cached_property
     def index(self) -> dict[str, int]:
-        """Return the index of each target by its name."""
+        """Return a dictionary from the name of each target to its index."""
         return {name: index for index, name in enumerate(self.names)}
 
     @cached_property

@@ -137,7 +137,7 @@ def extreme_points(positions: Floats, direction_count: int = _COARSE_DIRECTION_C
 
 
 def find_outline_points(positions: Floats, targets: MorphTargets, skeleton: Skeleton | None) -> Intp:
-    """Return the indices of a rig's points that are outermost in some direction in one of many poses.
+    """Return the indices of a rig's points that are outermost in some direction in some pose.
 
     The poses are the rest pose, each morph target alone, and random poses.
 
@@ -164,7 +164,7 @@ def find_outline_points(positions: Floats, targets: MorphTargets, skeleton: Skel
 def _select_extreme(
     selected_points: Mask, positions: Floats, direction_count: int = _DIRECTION_COUNT
 ) -> None:
-    """Select points that exceed the bounds of selected points in one of `direction_count` directions.
+    """Select more points: those that exceed the bounds of the selected points in some direction.
 
     selected_points : (p,) mask of the selected points, which this function extends
     positions : (p, 3) positions of all points
@@ -178,10 +178,10 @@ def _select_extreme(
 def _project_on_directions(positions: Floats, direction_count: int) -> Iterator[Floats]:
     """Yield the projections of points (p, 3) on unit vectors, for blocks of n directions, (n, p) each.
 
-    direction_count : number of all directions
+    A block is small enough for NumPy to multiply it on one thread. Several threads would wait for each other
+    on busy cores.
 
-    A block is so small that NumPy multiplies it on one thread; several threads would wait for each other on
-    busy cores.
+    direction_count : total number of directions
     """
     block = max(1, _NUMBERS_PER_BLOCK // len(positions))
     for start in range(0, direction_count, block):

@@ -35,12 +35,12 @@ class Pose(ShortRepr):
     weights : mapping of str to float, optional
         Weights of morph targets by name, mostly 0 to 1; targets that are left out keep their weight at rest.
     bones : mapping of str to array_like, optional
-        Bones by name: either three angles [degrees] about the head's own axes (x: nod, y: turn, z: tilt)
-        relative to the rest pose, applied about z first, then x, then y; or a (4, 4) matrix from the bone's
-        space to its parent's space, in the units of the file, as in animations.
+        Rotations of bones by name. A rotation is either three angles [degrees] about the head's own axes (x:
+        nod, y: turn, z: tilt) relative to the rest pose, applied about z first, then x, then y; or a (4, 4)
+        matrix from the bone's space to its parent's space, in the units of the file, as in animations.
     positions_mm : (n, 3) array, optional
-        Rest positions of all points of the control mesh, in the order of `Head.positions_mm` [mm]: another
-        person of the same topology, or a motion from another program.
+        Rest positions of all points of the control mesh, in the order of `Head.positions_mm` [mm], such as
+        those of another person with the same topology, or of a motion from another program.
 
     Raises
     ------
@@ -182,7 +182,7 @@ def _bone_transforms(
     """Return the transforms (n, 4, 4) in head space that move bones from the rest pose to the pose [mm].
 
     ordered_bones : (n,) index and name of each bone, parents before children
-    bone_values : angles or matrix of each bone by name, see `Pose`
+    bone_values : mapping from bone name to angles or matrix, see `Pose`
     """
     changes = np.empty((len(ordered_bones), 4, 4))
     rows: list[list[float]] = []
@@ -243,7 +243,7 @@ def _refuse_weights(
 
 
 def _refuse_name(culprit: str, unknown_name: object, known_names: Iterable[str], name_noun: str) -> NoReturn:
-    """Raise DermisError for an unknown name, and propose similar known names.
+    """Raise DermisError for an unknown name; the message suggests similar known names.
 
     name_noun : "bone" or "morph target"
     """

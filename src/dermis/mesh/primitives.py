@@ -55,12 +55,12 @@ def plane(size_mm: float, segments: int = 1, uv_scale: float = 1.0) -> Mesh:
 def uv_sphere(radius_mm: float, segments: int = 64, rings: int = 32) -> Mesh:
     """Return a sphere about the origin with latitude-longitude uv; v is 0 at +Y, the north pole.
 
-    u goes around +Y from -Z via -X. The seam is at -Z, so u = 0.5 faces +Z. Each triangle at a pole has a
-    separate apex vertex, with u at the middle of the triangle's base, so that no triangle is degenerate in
-    uv.
+    u runs around +Y, from the seam at -Z via -X, so u = 0.5 faces +Z. Each triangle at a pole has a separate
+    apex vertex, with u at the middle of the triangle's base, so that no triangle is degenerate in uv.
 
     radius_mm : radius [mm]
-    segments, rings : number of cells around the axis, and from pole to pole, at least 3 and 2
+    segments : number of cells around the axis, at least 3
+    rings : number of cells from pole to pole, at least 2
     """
     if not (radius_mm > 0 and segments >= 3 and rings >= 2):
         actual = f"got {radius_mm} mm, {segments} and {rings}"

@@ -79,7 +79,7 @@ class BoneRotation(NamedTuple):
 class RigidFollowers(NamedTuple):
     """Points that follow other points as one rigid body, such as the points of a fitted eyeball.
 
-    leaders : (n,) indices of the points to follow, which are in the file
+    leaders : (n,) indices of the points that are followed; these points are in the file
     points : (m,) indices of the points that follow the leaders
     """
 
@@ -97,7 +97,7 @@ class Rig(ShortRepr):
     bone_rotations : rotations of bones by morph targets
     rigid_followers : points that are not in the file, such as fitted eyeballs; they follow the file's points
     contact : lids that must stay outside the eyeballs; None if lids may intersect eyeballs
-    template : rig of the same topology whose outline points are used, together with the extreme points of
+    template : rig of the same topology, whose outline points are used in addition to the extreme points of
         this rig; None to search for outline points
     """
 
@@ -135,18 +135,18 @@ class Rig(ShortRepr):
 
     @property
     def target_index(self) -> dict[str, int]:
-        """Return the index of each target by its name."""
+        """Return a dictionary from the name of each target to its index."""
         return self.targets.index
 
     @cached_property
     def outline(self) -> RigOutline:
-        """Return the outline of the rig; the outline points are searched once and cached on disk."""
+        """Return the outline of the rig; the search for outline points is done once and cached on disk."""
         return rig_outline(self.positions_mm, self.targets, self.skeleton, self._outline_points)
 
     def outline_mm(self, motion: Motion) -> Floats:
         """Return points (s, 3) that bound the head in a pose in every direction, to about a millimetre [mm].
 
-        If `motion` has rest positions of its own, their extreme points are added.
+        If `motion` replaces the rest positions, the extreme points of the new positions are added.
         """
         if motion.positions_mm is self.positions_mm:
             return self.outline.pose(motion.weights, motion.matrices)
@@ -247,7 +247,7 @@ class Rig(ShortRepr):
         return np.asarray(dense)
 
     def pose(self, weights: Doubles, matrices: Doubles | None = None) -> Doubles:
-        """Return all control points in a pose, (p, 3) [mm]; the reference for the computation on the device.
+        """Return all control points (p, 3) in a pose [mm], as a reference for the computation on the device.
 
         weights : (t,) weights of the targets, relative to the rest pose
         matrices : (b, 3, 4) matrices of the bones, from `Skeleton.matrices`; None for the rest pose

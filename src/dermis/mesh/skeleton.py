@@ -49,7 +49,7 @@ class Skeleton(ShortRepr):
 
     @cached_property
     def index(self) -> dict[str, int]:
-        """Return the index of each bone by its name."""
+        """Return a dictionary from the name of each bone to its index."""
         return {name: index for index, name in enumerate(self.names)}
 
     @cached_property
@@ -64,7 +64,7 @@ class Skeleton(ShortRepr):
         return origins
 
     def bone_rotation(self, bone_index: int, degrees: Sequence[float]) -> list[float]:
-        """Return the head-space matrix that rotates about a bone's joint at rest, as 16 numbers by rows.
+        """Return the head-space matrix that rotates about a bone's joint at rest, as 16 numbers row by row.
 
         degrees : angles about x, y and z, see `angles_matrix`
         """
@@ -77,7 +77,7 @@ class Skeleton(ShortRepr):
         """Return the transforms (n, 4, 4) in head space that move n bones from their rest pose [mm].
 
         bones : (n,) indices of the bones
-        local_transforms : (n, 4, 4) new transforms from the space of each bone to its parent's
+        local_transforms : (n, 4, 4) new transforms from the space of each bone to the space of its parent
         """
         index = list(bones)
         return np.asarray(self._parent_to_head[index] @ local_transforms @ self._head_to_bone[index])
@@ -164,7 +164,7 @@ class Skeleton(ShortRepr):
 
     @cached_property
     def follower_counts(self) -> Doubles:
-        """Return the number of points that each bone and its descendants move, weighted, (b,)."""
+        """Return for each bone the sum (b,) of the skin weights of the bone and of its descendants."""
         own = np.bincount(self.bone.ravel(), self.weight.ravel(), minlength=len(self.names))
         return np.array([own[bones].sum() for bones in self._descendants])
 

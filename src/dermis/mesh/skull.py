@@ -1,4 +1,4 @@
-"""Position of the skull in a mesh: a head, a bust, or a body that stands or has a head bone or eyes."""
+"""Position of the skull in a mesh, which may be a head, a bust or a body."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def principal_sizes(positions: Floats) -> Doubles:
 
 
 def is_standing_figure(positions: Floats, triangles: Ints) -> bool:
-    """Return whether a mesh has a small head above a narrow neck and wide shoulders, like a standing person.
+    """Return whether a mesh looks like a standing person: a small head, a narrow neck and wide shoulders.
 
     positions : (v, 3) vertices of any unit, Y up
     triangles : (f, 3) vertex indices
@@ -85,12 +85,12 @@ def skull_below(positions: NDArray[np.floating], crown_height: float) -> Point:
 def body_skull(positions: Floats, triangles: Ints, eyes: Floats) -> Point | None:
     """Return the centre of the skull of a body: at the level of its eyes, or at the top of a standing figure.
 
-    positions : (v, 3) vertices, Y up [mm]
-    triangles : (f, 3) vertex indices
-    eyes : (n, 3) vertices of eyeballs [mm]
-
     The result is None for a mesh without eyes that is not a standing figure, and for a mesh smaller than a
     body.
+
+    positions : (v, 3) vertices, Y up [mm]
+    triangles : (f, 3) vertex indices
+    eyes : (n, 3) vertices of eyeballs [mm]; empty if unknown
     """
     if np.ptp(positions[:, 1]) < _MIN_BODY_HEIGHT_MM:
         return None
@@ -133,7 +133,7 @@ def facing_axes(positions: Floats, normals: Floats) -> Doubles:
 
 
 class _Section(NamedTuple):
-    """Section of a mesh with a horizontal plane, seen from the front.
+    """Intersection of a mesh with a horizontal plane, seen from the front.
 
     parts : number of separate intervals along x
     width : total length of the intervals
@@ -146,7 +146,7 @@ class _Section(NamedTuple):
 
 
 def _horizontal_section(positions: Doubles, cut_triangles: Ints, height: float) -> _Section:
-    """Return the section of a mesh with the horizontal plane at a height.
+    """Return the intersection of a mesh with the horizontal plane at a height.
 
     cut_triangles : (n, 3) vertex indices of the triangles that the plane cuts
     """

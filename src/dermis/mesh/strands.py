@@ -20,8 +20,8 @@ class Roots(NamedTuple):
     """Points on the quads of a mesh at which strands are rooted.
 
     quad : (n,) row of `Mesh.quads`
-    position : (n, 2) bilinear coordinates in the quad, 0 to 1: from its first corner to the second and to the
-        last
+    position : (n, 2) bilinear coordinates in the quad, 0 to 1: from the first to the second corner, and from
+        the first to the last corner
     """
 
     quad: Ints
@@ -33,8 +33,8 @@ class Strands(ShortRepr):
     """Hair strands: thin round fibres, each a polyline of k knots.
 
     roots : root of each strand
-    knots_mm : (n, k, 3) knots from root to tip in the frame of the root: along the quad, across, and along
-        the normal
+    knots_mm : (n, k, 3) knots from root to tip in the frame of the root: components along the quad, across
+        it, and along its normal
     radius_mm : (n, k) radius of the fibre at the knots
     absorption : (n, 3) absorption coefficient of the fibre [1/mm]
     cover : (n,) projected area of the hair around each root, per area of skin; None if negligible [-]
@@ -112,7 +112,8 @@ def quad_weights(bilinear_position: NDArray[np.floating]) -> Doubles:
 def cover_of_points(mesh: Mesh, roots: Roots, area_mm2: Doubles) -> Doubles:
     """Return the projected area of the strands rooted around each point of a mesh, per area of skin (p,) [-].
 
-    Half of the area of a strand seen from the side counts, for inclined hair. It covers skin at the root.
+    The projected area is half the area of a strand seen from the side, because hair is inclined. All of it is
+    assigned to the skin at the root.
 
     area_mm2 : (n,) area of each strand seen from the side [mm2]
     """
@@ -150,9 +151,10 @@ def _root_positions(mesh: Mesh, roots: Roots, points_mm: NDArray[np.floating]) -
 
 
 def interpolate_quads(bilinear_position: NDArray[np.floating], corner_values: Doubles) -> Doubles:
-    """Interpolate c quantities bilinearly from the corners of n quads (c, 4, n) to a point in each, (c, n).
+    """Interpolate quantities bilinearly from the corners of quads to one point in each quad, (c, n).
 
-    bilinear_position : (n, 2) bilinear coordinates, see `Roots`
+    bilinear_position : (n, 2) bilinear coordinates of the points, see `Roots`
+    corner_values : (c, 4, n) values of c quantities at the corners of n quads
     """
     weight = quad_weights(bilinear_position).T
     result: Doubles = weight[0] * corner_values[:, 0]

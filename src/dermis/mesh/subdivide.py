@@ -38,11 +38,11 @@ class SubdividedMesh(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Refinement:
-    """Subdivision of all meshes of one topology: v finer vertices at q finer points.
+    """Subdivision of all meshes of one topology, from p control points to v vertices at q points.
 
     weights : (q, p) weights of the control points in each finer point
     stencils : the same weights in the format of a rig
-    uv, point : (v, 2) and (v,) uv and point of the finer vertices
+    uv, point : (v, 2) uv and (v,) point of each vertex of the finer mesh
     triangles, material, quads : arrays of the finer mesh, see `Mesh`
     """
 
@@ -62,7 +62,7 @@ class Refinement:
 
 
 def subdivide_head(head: Head, levels: int | Callable[[Head], int]) -> Head:
-    """Return a head with a subdivided mesh, whose control points the head's rig moves.
+    """Return a head with a subdivided mesh; the head's rig continues to move the control points.
 
     head : head that is not subdivided yet
     levels : 0 to 3, or a function that returns the levels for the head
@@ -95,10 +95,10 @@ def _check_levels(levels: int) -> int:
 def subdivide(mesh: Mesh, levels: int) -> SubdividedMesh:
     """Return a mesh subdivided `levels` times, with smoothed positions and linearly interpolated uv.
 
-    A mesh of more quads than triangles is subdivided by the rules of Catmull and Clark and moved to the limit
-    surface; any other by the rules of Loop. Positions depend on points and not on vertices, so that uv seams
-    neither crack nor crease; open borders are smoothed as curves. Normals and tangents are computed from the
-    result; normals of the file are dropped.
+    A mesh that has more quads than triangles is subdivided by the rules of Catmull and Clark, and its points
+    are moved to the limit surface. Other meshes are subdivided by the rules of Loop. Positions depend on
+    points and not on vertices, so that uv seams neither crack nor crease; open borders are smoothed as
+    curves. Normals and tangents are computed from the subdivided mesh; normals of the file are dropped.
 
     levels : 0 to 3, each of which multiplies the number of triangles by four
     """
@@ -109,7 +109,7 @@ def subdivide(mesh: Mesh, levels: int) -> SubdividedMesh:
 
 
 def refinement(mesh: Mesh, levels: int) -> Refinement:
-    """Return the subdivision of all meshes with this mesh's topology; `subdivide` states its rules.
+    """Return the subdivision of all meshes with this mesh's topology; see `subdivide` for its rules.
 
     levels : 1 to 3
     """
@@ -147,7 +147,7 @@ def _cached_refinement(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
 
 @logged_step("subdividing the mesh")
 def _compute_refinement(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
-    """Return the arrays of a subdivision by name: corners of finer faces, and control point weights.
+    """Return the arrays of a subdivision by name, such as the corners of the finer faces.
 
     by_quads : whether to use Catmull and Clark's rules instead of Loop's
     """
@@ -174,7 +174,7 @@ def _compute_refinement(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
 
 
 def polygons(mesh: Mesh) -> tuple[Index, Index, Ints]:
-    """Return a mesh as polygons: corner vertices (n,), number of corners (f,) and material of each (f,).
+    """Return a mesh as f polygons: all corner vertices (n,), the numbers of corners (f,), the materials (f,).
 
     Triangles that belong to no quad come first, then quads.
     """
@@ -187,12 +187,12 @@ def polygons(mesh: Mesh) -> tuple[Index, Index, Ints]:
 
 
 def coarse_triangles(head: Head, min_faces: int, tolerance_mm: float) -> Ints:
-    """Return triangles (t, 3) that cover a subdivided head with fewer levels of subdivision in flat regions.
+    """Return triangles (t, 3) for a subdivided head, with fewer levels of subdivision in flat regions.
 
     The indices refer to the vertices of the subdivided mesh. Triangles with an opacity map are left out.
 
     min_faces : smallest number of faces of the coarsest level
-    tolerance_mm : largest distance of a vertex that is left out from the coarse edge that replaces it
+    tolerance_mm : largest distance between a vertex that is dropped and the coarse edge that replaces it
     """
     mesh, levels = head.mesh, head.levels
     by_quads = len(mesh.quads) > 0
@@ -210,7 +210,7 @@ def coarse_triangles(head: Head, min_faces: int, tolerance_mm: float) -> Ints:
 
 
 def _coarsen_triangles(triangles: Ints, positions_mm: Floats, levels: int, tolerance_mm: float) -> Ints:
-    """Leave out levels of Loop subdivision in flat regions.
+    """Return triangles with fewer levels of Loop subdivision in flat regions.
 
     Loop's rules divide a triangle into four, the first three of which are at its corners.
 
@@ -226,7 +226,7 @@ def _coarsen_triangles(triangles: Ints, positions_mm: Floats, levels: int, toler
 
 
 def _coarsen_quads(quads: Corners, positions_mm: Floats, levels: int, tolerance_mm: float) -> Ints:
-    """Leave out levels of Catmull-Clark subdivision in flat regions; the result is triangles.
+    """Return triangles with fewer levels of Catmull-Clark subdivision in flat regions.
 
     The rules divide a polygon into quads, one from each corner to its centre.
 
@@ -251,7 +251,7 @@ def _coarsen_quads(quads: Corners, positions_mm: Floats, levels: int, tolerance_
 def _deviation_mm(
     positions_mm: Floats, middle_vertex: Corners, start_vertex: Corners, end_vertex: Corners
 ) -> Floats:
-    """Return the distance of the vertices in the middle of coarse edges from the edges' midpoints [mm].
+    """Return the distance between the middle vertex of each coarse edge and the midpoint of this edge [mm].
 
     middle_vertex, start_vertex, end_vertex : indices of the vertices in the middle and at both ends of edges
     """

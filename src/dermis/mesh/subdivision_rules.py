@@ -34,7 +34,7 @@ class Cage(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Sides:
-    """Half-edges of all faces, called sides, from each corner to the next, and the edges that they are on.
+    """The n half-edges of all faces, called sides, which run from each corner to the next, and their e edges.
 
     point_count : number of points
     start : (n,) point where each side starts
@@ -43,8 +43,8 @@ class _Sides:
     ends : (e, 2) points at the ends of each edge
     edge : (n,) edge of each side
     border : (e,) mask of edges whose number of sides is not two
-    seam_edges, seam_edge : edges as pairs of vertices, and the index of each side's edge in these pairs; an
-        edge on a uv seam occurs twice, once for each chart
+    seam_edges : edges as pairs of vertices; an edge on a uv seam occurs twice, once for each chart
+    seam_edge : (n,) index of each side's edge in `seam_edges`
     """
 
     point_count: int
@@ -163,12 +163,12 @@ def catmull_clark_limit(cage: Cage) -> csr_array:
 
 
 def _inner_edge_weights(sides: _Sides, edge_weight: float) -> Doubles:
-    """Return an array (n,) over sides that is `edge_weight` on inner edges and 0 on borders."""
+    """Return for each side the weight of its edge, (n,): `edge_weight` on inner edges and 0 on borders."""
     return np.where(sides.border, 0, edge_weight)[sides.edge]
 
 
 def _inner_point_weights(sides: _Sides, point_weight: Doubles) -> Doubles:
-    """Return for each side the weight of the point where it starts, (n,), 0 for points on borders.
+    """Return for each side the weight of the point where it starts, (n,): 0 for points on borders.
 
     point_weight : (p,) weight of each point
     """
@@ -176,7 +176,7 @@ def _inner_point_weights(sides: _Sides, point_weight: Doubles) -> Doubles:
 
 
 def _edge_end_weights(sides: _Sides, edge_weight: Doubles) -> csr_array:
-    """Return the matrix (e, p) that has the weight of each edge at both end points of the edge.
+    """Return a matrix (e, p) with a row for each edge, which contains its weight at its two end points.
 
     edge_weight : (e,) weight of each edge
     """
@@ -192,7 +192,7 @@ def _old_point_weights(
     """Return the weights (p, p) of old points in the new positions of the old points.
 
     inner_weight, neighbour_weight : (p,) weights of an inner point itself, and of each of its neighbours
-    border_weight : weight of each of the two neighbours of a border point on the border
+    border_weight : weight, at a border point, of each of its two neighbours on the border
     """
     is_inner, is_border = (sides.border_valence == 0) & (sides.valence > 0), sides.border_valence == 2
     both, other = sides.ends.T.ravel(), sides.ends[:, ::-1].T.ravel()

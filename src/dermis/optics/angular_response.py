@@ -21,11 +21,12 @@ CACHED_COLUMN_COUNT = 256
 
 
 def interpolate_table(column_at: Callable[[float], Floats], table_position: float) -> Floats:
-    """Interpolate a table over [0, 1] linearly at one position, between the two nearest columns.
+    """Return the column of a table at a position, interpolated linearly between the two nearest columns.
 
-    column_at : function that returns the column, an array, at a multiple of 1 / INTERPOLATION_STEPS; the
-        function should cache its results
-    table_position : position in the table; values outside [0, 1] are clamped
+    The positions of the table's columns are the multiples of 1 / INTERPOLATION_STEPS from 0 to 1.
+
+    column_at : function from such a position to the column, an array; it should cache its results
+    table_position : position between 0 and 1; values outside this range are clamped
     """
     scaled = min(max(table_position, 0.0), 1.0) * INTERPOLATION_STEPS
     low = min(int(scaled), INTERPOLATION_STEPS - 1)
@@ -37,10 +38,12 @@ def interpolate_table(column_at: Callable[[float], Floats], table_position: floa
 
 
 def interpolate_columns(column_at: Callable[[float], Floats], table_positions: ArrayLike) -> Floats:
-    """Interpolate a table over [0, 1] at c positions; the last axis of the result has one entry per position.
+    """Return the columns of a table at c positions, interpolated as in `interpolate_table`.
 
-    column_at : function that returns the column at a multiple of 1 / INTERPOLATION_STEPS, see
-        `interpolate_table`
+    The columns are stacked along the last axis of the result.
+
+    column_at : function from a position to the column there, see `interpolate_table`
+    table_positions : (c,) positions between 0 and 1
     """
     values = np.atleast_1d(np.asarray(table_positions, np.float64)).tolist()
     return np.stack([interpolate_table(column_at, value) for value in values], axis=-1)
@@ -48,13 +51,13 @@ def interpolate_columns(column_at: Callable[[float], Floats], table_positions: A
 
 @dataclass(frozen=True)
 class AngularResponse:
-    """Directional factors of the reflectance of a half-space, by which a shader scales diffuse light.
+    """Factors that describe how the reflectance of a half-space depends on direction.
 
-    The reflectance for an incident direction is `relative_reflectance` times the reflectance at normal
-    incidence. Light that scattered several times emerges uniformly in all directions. Light that scattered
-    once adds `single_scattering` times the difference between the kernel 1/(a + b) and the mean of this
-    kernel over exit directions, where a and b are the cosines of the incident and the exit direction below
-    the surface.
+    A shader multiplies diffuse light by them. The reflectance for an incident direction is
+    `relative_reflectance` times the reflectance at normal incidence. Light that scattered several times
+    emerges uniformly in all directions. Light that scattered once adds `single_scattering` times the
+    difference between the kernel 1/(a + b) and the mean of this kernel over exit directions, where a and b
+    are the cosines of the incident and the exit direction below the surface.
 
     eta : index of refraction relative to air [-]
     relative_reflectance : (DIRECTION_ROWS, c) reflectance relative to normal incidence, at incident cosines
@@ -85,8 +88,9 @@ def angular_response(total_reflectance: ArrayLike, eta: float) -> AngularRespons
 
 
 def h_function(cosine: ArrayLike, albedo: float) -> Floats:
-    """Return Chandrasekhar's H function of a half-space at cosines from its normal [-].
+    """Return Chandrasekhar's H function of a half-space [-].
 
+    cosine : cosines of angles to the normal
     albedo : single-scattering albedo [-]
 
     Source: [Chandrasekhar1960] section 39, the integral over the imaginary axis.
@@ -100,32 +104,37 @@ def h_function(cosine: ArrayLike, albedo: float) -> Floats:
 
 
 def directional_reflectance(cosine: ArrayLike, albedo: float, eta: float) -> Floats:
-    """Return the reflectance of a half-space for light at incident cosines in air [-].
+    """Return the reflectance of a half-space for given directions of incident light [-].
 
+    cosine : cosine of the angle of incidence in air
     albedo : single-scattering albedo of the half-space [-]
+    eta : index of refraction relative to air [-]
     """
     return _HalfSpace(albedo, eta).reflectance(refracted_cosine(cosine, eta))
 
 
 def mean_single_scattering_kernel(cosine: ArrayLike, eta: float) -> Floats:
-    """Return the mean of 1/(a + b) over exit directions, for light that arrives at a given cosine in air [-].
+    """Return the mean of 1/(a + b) over exit directions [-].
 
-    a and b are the cosines of the incident and the exit direction below the surface.
+    Here, a and b are the cosines of the incident and the exit direction below the surface.
+
+    cosine : cosine of the angle of incidence in air
+    eta : index of refraction relative to air [-]
     """
     a, critical = np.maximum(refracted_cosine(cosine, eta), 1e-4), critical_cosine(eta)
     return np.asarray(2.0 * eta**2 * (1.0 - critical - a * np.log((a + 1.0) / (a + critical))))
 
 
 def refracted_cosine(cosine: ArrayLike, eta: float) -> Floats:
-    """Return the cosine to the normal below the surface of light refracted from given cosines in air [-]."""
+    """Return the cosine of the angle of refraction below the surface, from the cosine of incidence in air."""
     return np.asarray(np.sqrt(1.0 - (1.0 - np.asarray(cosine, np.float64) ** 2) / eta**2))
 
 
 class _HalfSpace:
     """Isotropically scattering half-space below a smooth surface, at discrete directions.
 
-    The operator R describes reflection by the medium, the operator r internal reflection by the surface. The
-    series of multiple reflections R + R r R + ... is summed by solving one linear system.
+    The operator R describes reflection by the medium, and the operator r internal reflection by the surface.
+    One linear system is solved to sum the series R + R r R + ... of multiple reflections.
     """
 
     def __init__(self, albedo: float, eta: float) -> None:
@@ -141,17 +150,19 @@ class _HalfSpace:
         )
 
     def _reflected_radiance(self, mu: Floats, H: Floats) -> Floats:
-        """Return pi times the radiance that the medium reflects in each direction, (directions, n) [-].
+        """Return pi times the radiance that the medium reflects into each of the discrete directions [-].
 
-        mu : (n,) cosines of the incident light below the surface
+        The result (d, n) has a row for each discrete direction and a column for each incident direction.
+
+        mu : (n,) cosines of the directions of incident light below the surface
         H : (n,) H function at these cosines
         """
         return 0.25 * self._albedo * np.outer(self._H, H) / np.maximum(self._mu[:, None] + mu, 1e-12)
 
     def reflectance(self, cosine: ArrayLike) -> Floats:
-        """Return the fraction of the light entering at given cosines that is scattered back out [-].
+        """Return the fraction of the entering light that leaves again, for given directions [-].
 
-        cosine : cosines of the entering light to the normal, measured below the surface
+        cosine : cosines of the angles between the entering light and the normal, below the surface
         """
         mu = np.atleast_1d(np.asarray(cosine, np.float64))
         source = self._reflected_radiance(mu, h_function(mu, self._albedo))
@@ -159,16 +170,18 @@ class _HalfSpace:
         return np.asarray(leaving.reshape(np.shape(cosine)))
 
     def diffuse_reflectance(self) -> float:
-        """Return the fraction of the light entering from a uniform sky that is scattered back out [-]."""
+        """Return the fraction of the light entering from a uniform sky that leaves again [-]."""
         return float((self.leaving * self.reflectance(self._mu)).sum() / self.leaving.sum())
 
 
 @lru_cache(maxsize=CACHED_COLUMN_COUNT)
 def _response_column(eta: float, total_reflectance: float) -> Floats:
-    """Return the fields of `AngularResponse` for one channel as a column of a table, (DIRECTION_ROWS + 2,).
+    """Return fields of `AngularResponse` for one channel, as one column (DIRECTION_ROWS + 2,) of a table.
 
-    The first DIRECTION_ROWS elements are `relative_reflectance`, the last two are
+    The first DIRECTION_ROWS elements are `relative_reflectance`; the last two are
     `relative_diffuse_reflectance` and `single_scattering`.
+
+    total_reflectance : reflectance of the half-space for light at normal incidence [-]
     """
     albedo = albedo_for_reflectance(total_reflectance, eta)
     space = _HalfSpace(albedo, eta)
@@ -188,9 +201,9 @@ def _mean_kernel(eta: float) -> float:
 
 
 def albedo_for_reflectance(total_reflectance: float, eta: float) -> float:
-    """Return the single-scattering albedo of the half-space with a given reflectance at normal incidence [-].
+    """Return the single-scattering albedo for which a half-space has a given reflectance [-].
 
-    The reflectance of an isotropically scattering half-space is inverted numerically.
+    The exact reflectance of an isotropically scattering half-space is inverted numerically.
 
     total_reflectance : reflectance for light at normal incidence [-]
     eta : index of refraction relative to air [-]
@@ -211,7 +224,11 @@ def albedo_for_reflectance(total_reflectance: float, eta: float) -> float:
 
 
 def internal_reflectance(cosine: Floats, eta: float) -> Floats:
-    """Return the Fresnel reflectance for unpolarised light that meets the surface from below [-]."""
+    """Return the Fresnel reflectance of the surface for unpolarised light from below [-].
+
+    cosine : cosines of angles to the normal below the surface
+    eta : index of refraction relative to air [-]
+    """
     outside = np.sqrt(np.maximum(1.0 - eta**2 * (1.0 - cosine**2), 0.0))
     across = (eta * cosine - outside) / np.maximum(eta * cosine + outside, 1e-12)
     along = (cosine - eta * outside) / np.maximum(cosine + eta * outside, 1e-12)
@@ -219,14 +236,14 @@ def internal_reflectance(cosine: Floats, eta: float) -> Floats:
 
 
 def critical_cosine(eta: float) -> float:
-    """Return the cosine from the normal at which total internal reflection begins [-]."""
+    """Return the cosine of the critical angle, at which total internal reflection begins [-]."""
     return float(np.sqrt(1.0 - 1.0 / eta**2))
 
 
 def gauss_legendre(
     lower_limit: float, upper_limit: float, node_count: int = _QUADRATURE_NODES
 ) -> tuple[Floats, Floats]:
-    """Return nodes and weights of Gauss-Legendre quadrature between two limits, (node_count,) each."""
+    """Return nodes (node_count,) and weights (node_count,) of Gauss-Legendre quadrature in an interval."""
     nodes, weights = _unit_gauss_legendre(node_count)
     return lower_limit + 0.5 * (upper_limit - lower_limit) * (nodes + 1.0), 0.5 * (
         upper_limit - lower_limit

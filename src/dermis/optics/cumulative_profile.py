@@ -1,4 +1,4 @@
-"""Cumulative diffusion profiles, by which diffusion models and renderers are compared."""
+"""Cumulative diffusion profiles, a common form for comparing diffusion models and renderers."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _EDGE_RESPONSE_ANGLE_COUNT = 256  # samples of the integral in `edge_response`
 
 
 def cumulative_radii() -> Floats:
-    """Return the radii at which every cumulative profile is sampled, (n,) [mm]: 0, then log-spaced."""
+    """Return the radii (n,) at which every cumulative profile is sampled, 0 and then log-spaced [mm]."""
     return np.concatenate([[0.0], np.geomspace(_MIN_RADIUS_MM, _MAX_RADIUS_MM, _RADIUS_COUNT)])
 
 
@@ -37,10 +37,10 @@ class CumulativeProfile:
     def from_function(
         cls, fraction_within: Callable[[Floats], Floats], energy: ArrayLike
     ) -> CumulativeProfile:
-        """Sample a function of radius as a cumulative profile.
+        """Return a cumulative profile that samples a function of the radius.
 
-        fraction_within : function from radii (n,) [mm] to the fraction of the emerging light within each,
-            (n, 3) [-]
+        fraction_within : function from radii (n,) [mm] to the fractions (n, 3) of the emerging light that
+            leave within them [-]
         energy : (3,) all emerging light, divided by the light that enters [-]
         """
         grid = cumulative_radii()
@@ -48,10 +48,10 @@ class CumulativeProfile:
 
     @classmethod
     def from_radial_profile(cls, profile: RadialProfile, entering_fraction: float = 1.0) -> CumulativeProfile:
-        """Accumulate the ring energies of a three-channel radial profile into a cumulative profile.
+        """Return the cumulative profile of a radial profile with three channels.
 
         entering_fraction : fraction of the incident light that enters, if the profile is per incident power;
-            `energy` is the profile's total divided by this fraction [-]
+            1 if the profile is per power that enters [-]
         """
         total = profile.total
         energy_within = np.concatenate([np.zeros((1, 3)), np.cumsum(profile.ring_energy, axis=0)])
@@ -60,18 +60,18 @@ class CumulativeProfile:
         return cls.from_function(lambda r: interpolate_cumulative(r, profile.edges_mm, fraction), energy)
 
     def fraction_within(self, radius_mm: ArrayLike) -> Floats:
-        """Return the fraction of all emerging light that leaves within each radius, (..., 3) [-]."""
+        """Return the fraction (..., 3) of all emerging light that leaves within each radius [-]."""
         r = np.asarray(radius_mm, np.float64)
         columns = [np.interp(r, self.radii_mm, self.fraction[:, i]) for i in range(3)]
         return np.stack(columns, axis=-1)
 
     def edge_response(self, distance_mm: ArrayLike) -> Floats:
-        """Return the radiosity near a straight shadow edge, relative to full light, (..., 3) [-].
+        """Return the radiosity (..., 3) near a straight shadow edge, relative to full light [-].
 
         distance_mm : signed distances x from the edge, positive in the uniformly lit half-plane [mm]
 
-        With the fraction P(r) of light within a radius r, the response is 1/2 + 1/pi int_0^(pi/2) P(x / sin
-        t) dt at x > 0, and 1 minus the response at -x elsewhere.
+        With the fraction P(r) of the light within a radius r, the response at x > 0 is 1/2 plus 1/pi times
+        the integral of P(x / sin t) over t from 0 to pi/2. The response at -x is 1 minus the response at x.
         """
         x = np.asarray(distance_mm, np.float64)
         t = (np.arange(_EDGE_RESPONSE_ANGLE_COUNT) + 0.5) * (0.5 * np.pi / _EDGE_RESPONSE_ANGLE_COUNT)
@@ -79,11 +79,11 @@ class CumulativeProfile:
         return np.asarray(0.5 + 0.5 * np.sign(x)[..., None] * mean)
 
     def radius_at_fraction(self, light_fraction: float) -> Floats:
-        """Return the radius within which a given fraction of the emerging light leaves, (3,) [mm]."""
+        """Return the radius (3,) within which a given fraction of the emerging light leaves [mm]."""
         return np.array([np.interp(light_fraction, self.fraction[:, i], self.radii_mm) for i in range(3)])
 
     def with_energy(self, energy: ArrayLike) -> CumulativeProfile:
-        """Return a profile with the same fractions of light within radii and another total reflectance.
+        """Return a profile with another total reflectance and the same fractions of light within radii.
 
         energy : (3,) new total reflectance [-]
         """
@@ -91,7 +91,7 @@ class CumulativeProfile:
 
 
 def interpolate_cumulative(radius_mm: Floats, edges_mm: Floats, fraction_within_edges: Floats) -> Floats:
-    """Interpolate tabulated fractions of light within radii by a monotonic spline, (n, c) [-].
+    """Return the fractions (n, c) of light within radii, by monotonic splines through tabulated values [-].
 
     radius_mm : (n,) radii of the result [mm]
     edges_mm : (k,) tabulated radii, the first 0 [mm]

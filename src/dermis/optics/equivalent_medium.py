@@ -1,4 +1,4 @@
-"""Homogeneous medium equivalent to a diffusion profile, and its lateral offset of oblique light."""
+"""Homogeneous medium equivalent to a diffusion profile, and the lateral shift of obliquely incident light."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ _OFFSET_ABSORPTION_WEIGHT = 0.35  # of absorption in the published formula of th
 
 
 def equivalent_medium(profile: GaussianSum, total_reflectance: Floats, eta: float) -> Medium:
-    """Return the half-space with a given reflectance that spreads light as widely as a profile.
+    """Return the half-space that has a given reflectance and spreads light as widely as a given profile.
 
-    The width is the inverse of the frequency at which the Hankel transform of R(r) has fallen to half of its
-    value at 0.
+    The width of a profile R(r) is defined as the inverse of the frequency at which the Hankel transform of
+    R(r) has fallen to half of its value at frequency 0.
 
     profile : diffusion profile
     total_reflectance : (c,) reflectance of the half-space for light at normal incidence [-]
@@ -46,12 +46,12 @@ def equivalent_medium(profile: GaussianSum, total_reflectance: Floats, eta: floa
 
 @lru_cache(maxsize=CACHED_COLUMN_COUNT)
 def _half_space_column(eta: float, from_photons: bool, total_reflectance: float) -> Floats:
-    """Return albedo and inverse width of the half-space with a given reflectance, as a table column (2,).
+    """Return two numbers (2,), as a table column, for the half-space with a given reflectance.
 
-    The first element is the square root of 1 minus the single-scattering albedo [-], the second the frequency
-    at which the Hankel transform of R(r) has fallen to half of its value at 0 [1/mean free path]. If
-    `from_photons` is true and a table of photon counts exists, R(r) is from this table, otherwise from
-    layered diffusion.
+    The first number is the square root of 1 minus the single-scattering albedo [-]. The second number is the
+    frequency, per mean free path, at which the Hankel transform of R(r) has fallen to half of its value at
+    frequency 0. R(r) comes from a table of photon counts if `from_photons` is true and the table exists, and
+    else from layered diffusion.
     """
     albedo = albedo_for_total(total_reflectance, eta, from_photons)
     kind = tabulated_kind_for_index(eta) if from_photons else None
@@ -68,7 +68,7 @@ def albedo_for_total(total_reflectance: float, eta: float, from_photons: bool = 
 
     total_reflectance : reflectance for light at normal incidence [-]
     eta : index of refraction relative to air [-]
-    from_photons : whether to invert tables of photon counts where they exist, instead of layered diffusion
+    from_photons : whether to invert a table of photon counts, if one exists, instead of layered diffusion
     """
     from scipy.optimize import brentq
 
@@ -106,7 +106,10 @@ def _gaussian_transform(gaussians: tuple[tuple[float, float], ...], frequency: f
 
 
 def _cumulative_transform(cumulative: CumulativeProfile, frequency: float) -> float:
-    """Return the Hankel transform of a profile's first channel at a frequency, divided by its total [-]."""
+    """Return the Hankel transform of a profile's first channel, relative to its value at frequency 0 [-].
+
+    frequency : frequency [1/mm]
+    """
     from scipy.special import j0
 
     edges = cumulative.radii_mm
@@ -115,7 +118,7 @@ def _cumulative_transform(cumulative: CumulativeProfile, frequency: float) -> fl
 
 
 def _reflectance_transform(medium: Medium, frequency: float) -> float:
-    """Return the Hankel transform of R(r) of a half-space with one channel at one frequency [-].
+    """Return the Hankel transform of R(r) of a half-space with one channel, at one frequency [-].
 
     frequency : frequency [1/mm]
     """
@@ -133,12 +136,13 @@ def _half_frequency(transform: Callable[[float], float]) -> float:
 
 
 def oblique_offset_mm(medium: Medium) -> float:
-    """Return the distance from entry point to mean exit point of grazing light, averaged over channels [mm].
+    """Return the lateral shift of grazing light, as the mean over all channels [mm].
+
+    This is the distance from the entry point to the mean exit point. For light at an angle t to the normal,
+    the mean exit point is shifted by sin t times this distance along the surface, in the direction in which
+    the light travels.
 
     medium : medium with one layer
-
-    For light at an angle t from the normal, the mean exit point is sin t times this distance further along
-    the surface, in the direction in which the light travels.
 
     Source: [WangJacques1995].
     """

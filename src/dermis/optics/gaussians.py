@@ -22,13 +22,13 @@ _PROFILE_TABLE_ADVICE = "Correct the profile's table"
 
 @dataclass(frozen=True)
 class GaussianSum:
-    """Diffusion profile R(r) = sum of w exp(-r^2 / 2v) / (2 pi v) over Gaussians.
+    """Diffusion profile R(r), a sum of Gaussians w exp(-r^2 / 2v) / (2 pi v).
 
     name : name of the preset or file
     variance_mm2 : (k,) variances v, increasing [mm2]
-    weight : (k, c) weights w, the light that each Gaussian spreads in c channels; the renderer needs three,
-        linear Rec. 709 [-]
-    from_photons : whether the sum was fitted to photon counts, not to diffusion
+    weight : (k, c) weights w, the light that each Gaussian spreads in c channels; the renderer needs three
+        channels, in linear Rec. 709 [-]
+    from_photons : whether the sum was fitted to photon counts instead of a diffusion model
 
     Source: [dEonLuebke2007] section 14.4.
 
@@ -46,7 +46,7 @@ class GaussianSum:
     from_photons: bool = False
 
     def __post_init__(self) -> None:
-        """Check variances and weights."""
+        """Raise DermisError for invalid variances or weights."""
         variance, weight = self.variance_mm2, self.weight
         if variance.ndim != 1 or weight.ndim != 2 or len(variance) != len(weight) or weight.size == 0:
             actual = f"got shapes {variance.shape} and {weight.shape}"
@@ -74,22 +74,22 @@ class GaussianSum:
 
     @property
     def albedo(self) -> Floats:
-        """Return the total reflectance of each channel, the sum of its weights [-]."""
+        """Return the total reflectance (c,), the sum of all weights in each channel [-]."""
         return np.asarray(self.weight.sum(axis=0))
 
     def radiant_exitance(self, radius_mm: ArrayLike) -> Floats:
-        """Return the profile R(r) at distances r from a narrow beam of unit power, (..., c) [1/mm2]."""
+        """Return the profile R(r), (..., c), at distances r from a narrow beam of unit power [1/mm2]."""
         r = np.asarray(radius_mm, dtype=np.float64)[..., None]
         gaussians = np.exp(-(r**2) / (2 * self.variance_mm2)) / (2 * np.pi * self.variance_mm2)
         return np.asarray(gaussians @ self.weight)
 
     def energy_within(self, radius_mm: ArrayLike) -> Floats:
-        """Return the light that emerges within distances r of the beam, (..., c) [-]."""
+        """Return the light (..., c) that emerges within distances r of the beam [-]."""
         r = np.asarray(radius_mm, dtype=np.float64)[..., None]
         return np.asarray(-np.expm1(-(r**2) / (2 * self.variance_mm2)) @ self.weight)
 
     def hankel(self, frequency: ArrayLike) -> Floats:
-        """Return the Hankel transform of R(r) at frequencies s [1/mm], (..., c) [-].
+        """Return the Hankel transform (..., c) of R(r) at frequencies s [1/mm].
 
         The transform is the integral of 2 pi r R(r) J0(s r) over r, with the Bessel function J0.
         """
@@ -97,9 +97,9 @@ class GaussianSum:
         return np.asarray(np.exp(-self.variance_mm2 * s**2 / 2) @ self.weight)
 
     def inner_product(self, other_profile: GaussianSum) -> Floats:
-        """Return the integral of r R(r) S(r) over r, where S is another sum of Gaussians, (c,) [1/mm2].
+        """Return the integral (c,) of r R(r) S(r) over r, where S(r) is another sum of Gaussians [1/mm2].
 
-        Such products give the least-squares error between two profiles.
+        The squared error between two profiles is a sum of such integrals.
         """
         gram = 1 / (4 * np.pi**2 * np.add.outer(self.variance_mm2, other_profile.variance_mm2))
         return np.asarray(np.einsum("ic,ij,jc->c", self.weight, gram, other_profile.weight))

@@ -36,9 +36,9 @@ _RELATIVE_LOG_RADIUS_STEP = 0.02  # step of log r, divided by the square root of
 
 
 class _PhotonTable(NamedTuple):
-    """Monte Carlo photon counts of half-spaces by a = sqrt(1 - albedo), with splines between table rows.
+    """Monte Carlo photon counts of half-spaces as functions of a = sqrt(1 - albedo), interpolated by splines.
 
-    root_absorption : (m,) values of a, increasing [-]
+    root_absorption : (m,) values of a in the table, increasing [-]
     edges : (k,) radii of the ring edges [mean free path]
     fraction : function from a to the fraction of the emerging light within each edge
     totals : function from a to the total reflectance
@@ -51,9 +51,9 @@ class _PhotonTable(NamedTuple):
 
 
 def tabulated_kind_for_index(eta: float) -> HalfSpaceKind | None:
-    """Return the kind of perpendicularly lit half-space that is tabulated for an index of refraction.
+    """Return the tabulated kind of half-space, lit perpendicularly, for an index of refraction.
 
-    The result is None if no table exists for the index.
+    The result is None if no table exists for this index.
     """
     return "skin" if eta == SKIN_ETA else "matched" if eta == 1.0 else None
 
@@ -63,6 +63,7 @@ def half_space(
 ) -> CumulativeProfile:
     """Return the cumulative profile of a half-space in three channels from a photon-count table.
 
+    half_space_kind : surface and illumination of the half-space
     albedo : (3,) single-scattering albedo, clamped to the range of the table [-]
     mean_free_path_mm : (3,) mean free path [mm]
 
@@ -78,7 +79,7 @@ def half_space(
 def fractions_within(
     half_space_kind: HalfSpaceKind, albedo: ArrayLike, mean_free_path_mm: ArrayLike
 ) -> Callable[[Floats], Floats]:
-    """Return a function from radii (n,) [mm] to the fraction of the emerging light within each, (n, 3) [-].
+    """Return a function from radii (n,) [mm] to the fractions (n, 3) of the emerging light within them [-].
 
     half_space_kind : surface and illumination of the half-space
     albedo : (3,) single-scattering albedo, clamped to the range of the table [-]
@@ -99,7 +100,7 @@ def fractions_within(
 
 
 def tabulated_albedo(half_space_kind: HalfSpaceKind, total_reflectance: ArrayLike) -> Floats:
-    """Return the single-scattering albedos of half-spaces with given total reflectances, from a table [-].
+    """Return the single-scattering albedos for which half-spaces have given reflectances, from a table [-].
 
     half_space_kind : surface and illumination of the half-spaces
     """
@@ -114,7 +115,7 @@ def _table_position(table: _PhotonTable, albedo: ArrayLike) -> Floats:
 
 
 def _root_absorption(albedo: ArrayLike) -> Floats:
-    """Return the square root of 1 - albedo, in which totals and profiles are smooth up to an albedo of 1."""
+    """Return sqrt(1 - albedo); as functions of it, totals and profiles are smooth up to an albedo of 1."""
     return np.sqrt(np.maximum(1.0 - np.asarray(albedo, np.float64), 0.0))
 
 
@@ -137,7 +138,8 @@ def _photon_table(half_space_kind: HalfSpaceKind) -> _PhotonTable:
 def has_photon_table(medium: Medium) -> bool:
     """Return whether a photon-count table covers a medium.
 
-    Covered are half-spaces with three channels whose index of refraction and reduced albedos are in a table.
+    The medium must be a half-space with three channels, and a table must contain its index of refraction and
+    its reduced albedos.
     """
     layer = medium.layers[0]
     single = len(medium.layers) == 1 and medium.semi_infinite and medium.channels == 3
@@ -149,7 +151,7 @@ def has_photon_table(medium: Medium) -> bool:
 def tabulated_cumulative(medium: Medium) -> CumulativeProfile | None:
     """Return the cumulative profile of a medium from a photon-count table, or None if no table covers it.
 
-    Scattering is replaced by isotropic scattering with the same reduced coefficients.
+    The table is for isotropic scattering, with the reduced coefficients of the medium.
     """
     kind, layer = tabulated_kind_for_index(medium.eta), medium.layers[0]
     if kind is None or not has_photon_table(medium):
@@ -160,7 +162,7 @@ def tabulated_cumulative(medium: Medium) -> CumulativeProfile | None:
 def tabulated_profile(medium: Medium) -> RadialProfile | None:
     """Return the radial profile of a medium from a photon-count table, or None if no table covers it.
 
-    Scattering is replaced by isotropic scattering with the same reduced coefficients.
+    The table is for isotropic scattering, with the reduced coefficients of the medium.
     """
     cumulative, kind, layer = (
         tabulated_cumulative(medium),

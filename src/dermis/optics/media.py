@@ -1,4 +1,4 @@
-"""Turbid media: layers with absorption and scattering coefficients, by name and from TOML files."""
+"""Turbid media, as layers with absorption and scattering coefficients; published media, and TOML files."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Layer:
     sigma_a : (c,) absorption coefficients [1/mm]
     sigma_s_prime : (c,) reduced scattering coefficients [1/mm]
     thickness_mm : thickness; infinity for a half-space [mm]
-    name : name of the layer in tables and messages
+    name : name of the layer, shown in tables and messages
 
     Source: [Jensen2001] section 2 for the symbols.
     """
@@ -52,27 +52,27 @@ class Layer:
 
     @property
     def sigma_t_prime(self) -> Floats:
-        """Return the reduced extinction coefficient, absorption plus reduced scattering, (c,) [1/mm]."""
+        """Return the reduced extinction coefficient (c,), absorption plus reduced scattering [1/mm]."""
         return self.sigma_a + self.sigma_s_prime
 
     @property
     def alpha_prime(self) -> Floats:
-        """Return the reduced albedo: reduced scattering divided by reduced extinction, (c,) [-]."""
+        """Return the reduced albedo (c,), reduced scattering divided by reduced extinction [-]."""
         return self.sigma_s_prime / self.sigma_t_prime
 
     @property
     def mean_free_path_mm(self) -> Floats:
-        """Return the reduced mean free path, the inverse of the reduced extinction, (c,) [mm]."""
+        """Return the reduced mean free path (c,), the inverse of the reduced extinction [mm]."""
         return 1.0 / self.sigma_t_prime
 
     @property
     def D(self) -> Floats:
-        """Return the diffusion coefficient 1 / (3 sigma_t'), (c,) [mm]."""
+        """Return the diffusion coefficient (c,), 1 / (3 sigma_t') [mm]."""
         return 1.0 / (3.0 * self.sigma_t_prime)
 
     @property
     def sigma_tr(self) -> Floats:
-        """Return the effective transport coefficient sqrt(3 sigma_a sigma_t'), (c,) [1/mm]."""
+        """Return the effective transport coefficient (c,), sqrt(3 sigma_a sigma_t') [1/mm]."""
         return np.sqrt(3.0 * self.sigma_a * self.sigma_t_prime)
 
 
@@ -94,7 +94,7 @@ class Medium:
     sources: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Check the index of refraction and the layers."""
+        """Raise DermisError for an invalid index of refraction or invalid layers."""
         if not self.layers:
             refuse(self.name, "at least one layer", "got none", "Add one")
         checked_number(f"{self.name}: index of refraction", self.eta, *_ETA_RANGE)
@@ -105,7 +105,7 @@ class Medium:
 
     @property
     def channels(self) -> int:
-        """Return the number of channels or wavelengths of the layers."""
+        """Return the number of channels or wavelengths, which is the same for all layers."""
         return len(self.layers[0].sigma_a)
 
     @property
@@ -118,7 +118,7 @@ class Medium:
         return replace(self, eta=eta)
 
     def channel(self, channel_index: int) -> Medium:
-        """Return the medium with only one of its channels or wavelengths."""
+        """Return the medium with one of its channels or wavelengths only."""
         channel = slice(channel_index, channel_index + 1)
         layers = tuple(
             replace(layer, sigma_a=layer.sigma_a[channel], sigma_s_prime=layer.sigma_s_prime[channel])
@@ -151,7 +151,10 @@ def _check_layer(culprit: str, layer: Layer, is_last: bool) -> None:
 
 @cache
 def published_media() -> Mapping[str, Medium]:
-    """Return the published media by name, such as "skin1" or "dj3", with the index of refraction of skin."""
+    """Return the published media, a dictionary from a name such as "skin1" or "dj3" to the medium.
+
+    All of them have the index of refraction of skin.
+    """
     named: dict[str, Medium] = {}
     for table, sources in _TABLE_SOURCES.items():
         for name, layers in _read_media(table).items():
@@ -163,8 +166,9 @@ def published_media() -> Mapping[str, Medium]:
 def medium_from_toml(path: Path, document: Mapping[str, Any]) -> Medium:
     """Return the medium that a parsed TOML file describes.
 
-    document : optional `name` and `eta`, and `[[layers]]`, topmost first, with `absorption_per_mm` and
-        `scattering_per_mm` (lists of 3), and `thickness_mm` in all layers but the last
+    document : content of the file: optionally `name` and `eta`, and `[[layers]]`, topmost first. Each layer
+        has `absorption_per_mm`, `scattering_per_mm` (lists of 3 numbers) and, except for the last layer,
+        `thickness_mm`
 
     Raises DermisError for missing or unknown entries, and for values out of range.
     """
@@ -217,12 +221,12 @@ def _read_media(table_name: str) -> dict[str, list[Layer]]:
 
 
 def albedo_from_colour(diffuse_reflectance: ArrayLike, g: float = 0.0) -> Floats:
-    """Return the single-scattering albedo of the half-space with a given diffuse reflectance [-].
+    """Return the single-scattering albedo for which a half-space has a given diffuse reflectance [-].
 
-    diffuse_reflectance : diffuse reflectance of any shape, 0 to 1 [-]
+    diffuse_reflectance : diffuse reflectances from 0 to 1, an array of any shape [-]
     g : mean cosine of the scattering angle [-]
 
-    Source: van de Hulst's formula inverted, [dEon2016] eq. 53.7.
+    Source: [dEon2016] eq. 53.7, the inverse of van de Hulst's formula.
     """
     C = np.clip(np.asarray(diffuse_reflectance, np.float64), 0.0, 1.0)
     s = 4.09712 + 4.20863 * C - np.sqrt(9.59217 + 41.6808 * C + 17.7126 * C**2)

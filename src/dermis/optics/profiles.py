@@ -46,9 +46,9 @@ def load_profile(
 ) -> GaussianSum:
     """Return the diffusion profile of a preset or a file as a sum of Gaussians.
 
-    For tissue, whose files contain no Gaussians, six Gaussians are fitted to its diffusion profile. The
-    profile comes from tables of photon counts if the tissue is a homogeneous half-space, otherwise from
-    layered diffusion.
+    If the preset or file describes a tissue, six Gaussians are fitted to the diffusion profile of the tissue.
+    This profile comes from tables of photon counts if they cover the tissue, and from layered diffusion
+    otherwise.
 
     Parameters
     ----------
@@ -56,9 +56,9 @@ def load_profile(
         Preset ("gpu-gems-3", "dj3", "spectral" ...), or a file: .csv, or .toml as written by
         ``dermis profile``.
     pigments : Mapping of str to float, optional
-        Values that replace fields of the `SkinParameters` of a skin made of pigments.
+        For a skin made of pigments, values that replace fields of its `SkinParameters`.
     initial : GaussianSum, optional
-        Fit of a similar skin, from which the new fit starts; this is several times faster.
+        Fit of a similar skin, as start of the new fit, which is then several times faster.
 
     Returns
     -------
@@ -93,7 +93,7 @@ def load_profile(
 
 
 def find_gaussians(name: str | Path) -> GaussianSum | None:
-    """Return the Gaussians stored in a preset or file, or None for tissue, to which Gaussians must be fitted.
+    """Return the Gaussians that a preset or file contains, or None if it describes a tissue instead.
 
     Raises DermisError for an unknown name, and for Gaussians that are not a valid profile.
     """
@@ -115,9 +115,10 @@ def find_gaussians(name: str | Path) -> GaussianSum | None:
 
 @lru_cache(_MAX_CACHED_FILES)
 def _read_gaussians(path: Path, file_state: tuple[int, ...]) -> GaussianSum | None:
-    """Return the Gaussians of a file, or None for tissue; the result is cached for later frames.
+    """Return the Gaussians in a file, or None if it describes a tissue; cache the result for later frames.
 
-    file_state : state of the file as returned by `_file_state`, so that a changed file is read again
+    file_state : state of the file from `_file_state`; if it differs from that of the cached result, the file
+        is read again
     """
     if path.suffix.lower() == ".toml":
         document = read_toml(path)
@@ -126,7 +127,7 @@ def _read_gaussians(path: Path, file_state: tuple[int, ...]) -> GaussianSum | No
 
 
 def _file_state(path: Path) -> tuple[int, ...]:
-    """Return modification time, size and inode of a file, to detect changes; empty if it does not exist."""
+    """Return a file's modification time, size and inode, to detect changes; () if there is no such file."""
     try:
         status = path.stat()
     except (OSError, ValueError):  # no such file, an invalid name, or a folder without access
@@ -137,7 +138,7 @@ def _file_state(path: Path) -> tuple[int, ...]:
 def write_profile(path: Path, profile: GaussianSum, metadata: Mapping[str, Any]) -> None:
     """Write a sum of Gaussians to a .toml file atomically.
 
-    metadata : further entries of the file by key: text, numbers, and lists of these
+    metadata : dictionary from key to value of further entries: text, numbers, and lists of these
 
     Raises DermisError when the file cannot be written.
     """
@@ -171,10 +172,10 @@ def fit_profile(
 ) -> GaussianSum:
     """Fit six Gaussians to the diffusion profile of a tissue, computed by the tissue's default model.
 
-    Fits to photon counts keep the total reflectance: counted profiles are steeper than profiles of diffusion
-    models, and an unconstrained fit would lose up to 2 % of the light.
+    Fits to photon counts keep the total reflectance. Counted profiles are steeper than the profiles of
+    diffusion models, so an unconstrained fit would lose up to 2 % of the light.
 
-    similar_fit : fit of a similar tissue, from which the new fit starts; this is several times faster
+    similar_fit : fit of a similar tissue, as start of the new fit, which is then several times faster
 
     Raises DermisError when the fit is not a valid profile.
     """
@@ -187,7 +188,7 @@ def fit_radial(
     """Fit six Gaussians to a radial profile; fits to photon counts keep the total reflectance.
 
     profile_name : name of the fitted profile
-    similar_fit : fit of a similar profile, from which the new fit starts; this is several times faster
+    similar_fit : fit of a similar profile, as start of the new fit, which is then several times faster
     """
     return _fit_rings(radial.rings(), radial.model, profile_name, similar_fit)
 

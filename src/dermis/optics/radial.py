@@ -22,14 +22,14 @@ class RadialProfile:
     name : name of the medium
     model : name of the model that computed the profile
     radius_mm : (n,) radii r, increasing [mm]
-    reflectance : (n, c) R(r) [1/mm2]
+    reflectance : (n, c) profile R(r) at these radii [1/mm2]
     total : (c,) total reflectance, the integral of 2 pi r R(r) [-]
     edges_mm : (k + 1,) radii of the ring edges, starting at 0 [mm]
     ring_energy : (k, c) light that emerges through each ring [-]
     standard_error : (n, c) standard error of R(r) if it is from photon counts, else None [1/mm2]
     total_error : (c,) standard error of the total if it is from photon counts, else None [-]
-    incident : whether R(r) is per incident power (surface reflection excluded) instead of per power that
-        enters
+    incident : whether R(r) is per incident power instead of per power that enters; surface reflection is not
+        included in R(r) in either case
     warnings : known inaccuracies of the profile, shown to the user
     sources : keys of the bibliography
     """
@@ -49,7 +49,7 @@ class RadialProfile:
 
     @property
     def finite_at_centre(self) -> bool:
-        """Return whether R(r) is finite at r = 0, so that it can be fitted at points."""
+        """Return whether R(r) is finite at r = 0; only then can it be fitted at points."""
         return self.model not in ("layered", "montecarlo", "counted")
 
     def points(self) -> PointTarget:
@@ -57,29 +57,34 @@ class RadialProfile:
         return PointTarget(self.radius_mm, self.reflectance, self.total)
 
     def rings(self) -> RingTarget:
-        """Return the ring energies as the target of a fit, also valid if R(r) is infinite at r = 0."""
+        """Return the ring energies as the target of a fit; R(r) may be infinite at r = 0."""
         return RingTarget(self.edges_mm, self.ring_energy, self.total)
 
 
 def ring_edges(ring_count: int = 120) -> Floats:
-    """Return the radii that bound a disc and the log-spaced rings around it, (ring_count + 1,) [mm]."""
+    """Return the radii (ring_count + 1,) that bound a disc and the log-spaced rings around it [mm]."""
     return np.concatenate([[0.0], np.geomspace(1e-3, MAX_RADIUS_MM, ring_count)])
 
 
 def radius_grid(radius_count: int = 600) -> Floats:
-    """Return the log-spaced radii at which profiles are sampled, (radius_count,) [mm]."""
+    """Return the log-spaced radii (radius_count,) at which profiles are sampled [mm]."""
     return np.geomspace(MIN_RADIUS_MM, MAX_RADIUS_MM, radius_count)
 
 
 def resample_profile(radius_mm: Floats, grid_mm: Floats, values: Floats) -> Floats:
-    """Resample values (m, c) from a log-spaced grid to n radii by a cubic spline in log r, (n, c)."""
+    """Return values (n, c) at n radii, by cubic splines in log r through the values at a grid.
+
+    radius_mm : (n,) radii [mm]
+    grid_mm : (m,) log-spaced radii of the grid [mm]
+    values : (m, c) values at the radii of the grid
+    """
     from scipy.interpolate import CubicSpline
 
     return np.asarray(CubicSpline(np.log(grid_mm), values)(np.log(radius_mm)))
 
 
 def enclosed_energy(radius_mm: Floats, grid_mm: Floats, reflectance: Floats) -> Floats:
-    """Return the light that emerges within each of n radii, the integral of 2 pi r R(r), (n, c) [-].
+    """Return the light (n, c) that emerges within each of n radii, the integral of 2 pi r R(r) [-].
 
     radius_mm : (n,) radii [mm]
     grid_mm : (m,) log-spaced radii of the samples [mm]

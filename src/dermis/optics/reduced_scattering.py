@@ -1,4 +1,4 @@
-"""Errors for scattering coefficients that are not reduced; their messages state the reduced values."""
+"""Checks that scattering coefficients are reduced; the messages of the errors state the reduced values."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ _MAX_LISTED_THICKNESS_MM = 1e4  # thicker layers of MCML files stand for semi-in
 
 
 def check_reduced(culprit: str, layer_entries: Mapping[str, object]) -> None:
-    """Raise an error for a layer that states an anisotropy: its scattering is probably not reduced.
+    """Raise DermisError if a layer states an anisotropy, because its scattering is then probably not reduced.
 
-    culprit : file or layer, for the message
-    layer_entries : entries of the layer, with "scattering_per_mm"
+    culprit : name of the file or layer, for the message
+    layer_entries : entries of the layer in the file, including "scattering_per_mm"
     """
     key = next((key for key in _ANISOTROPY_KEYS if key in layer_entries), None)
     if key is None:
@@ -39,7 +39,7 @@ def check_reduced(culprit: str, layer_entries: Mapping[str, object]) -> None:
 
 
 def refuse_mcml(path: Path) -> NoReturn:
-    """Raise an error for a file of MCML; its message states the layers in the units of this package.
+    """Raise DermisError for a file of MCML; the message states its layers in the units of this package.
 
     Source: [Wang1995] for the format: refractive index, absorption, scattering [1/cm], g and thickness [cm].
     """
@@ -57,7 +57,7 @@ def refuse_mcml(path: Path) -> NoReturn:
 
 
 def _layer_entries(eta: float, mu_a: float, mu_s: float, g: float, thickness_cm: float) -> str:
-    """Convert a layer of MCML to the keys and values of the TOML files of this package."""
+    """Return a layer of MCML as text, with the keys and units of this package's TOML files."""
     thickness = (
         f"thickness_mm {10 * thickness_cm:.4g}"
         if 10 * thickness_cm <= _MAX_LISTED_THICKNESS_MM
@@ -74,7 +74,7 @@ def _reduced_scattering(mu_s: float, g: float) -> float:
 
 
 def _parse_numbers(cells: list[str]) -> list[float]:
-    """Return the numbers in cells of text; an empty list if any cell is not a number."""
+    """Return the numbers in cells of text, or an empty list if any cell is not a number."""
     try:
         return [float(cell) for cell in cells]
     except ValueError:

@@ -31,12 +31,14 @@ class ColourTable:
     colours: Floats
 
     def lookup(self, melanin: Floats, blood: Floats) -> Floats:
-        """Interpolate the diffuse reflectance (k, 3) of k skins, linear Rec. 709 [-].
+        """Return the diffuse reflectance (k, 3) of k skins, interpolated in the table, linear Rec. 709 [-].
 
-        melanin, blood : (k,) fractions of the epidermal and of the dermal volume, 0 to 1 [-]
+        melanin : (k,) fraction of the epidermal volume that is melanosomes, 0 to 1 [-]
+        blood : (k,) fraction of the dermal volume that is blood, 0 to 1 [-]
 
-        Interpolation is bilinear in the square roots, in which reflectance is nearly linear. The error is at
-        most 0.0015 for fractions of at least 0.001, and at most 0.006 for smaller fractions of blood.
+        Interpolation is bilinear in the square roots of the fractions; reflectance is nearly linear in them.
+        The error is at most 0.0015 for fractions of at least 0.001, and at most 0.006 for smaller fractions
+        of blood.
         """
         n = len(self.colours)
         (i, u), (j, v) = (_cell_and_offset(fraction, n) for fraction in (melanin, blood))
@@ -48,26 +50,26 @@ class ColourTable:
 
 
 def _cell_and_offset(pigment_fraction: Floats, node_count: int) -> tuple[NDArray[np.int64], Floats]:
-    """Return the table cell of each fraction (k,), and the position within the cell from 0 to 1, (k, 1)."""
+    """Return the table cell (k,) of each fraction, and the fraction's position (k, 1) in it, from 0 to 1."""
     position = np.sqrt(np.clip(pigment_fraction, 0.0, 1.0)) * (node_count - 1)
     cell = np.minimum(position.astype(np.int64), node_count - 2)
     return cell, (position - cell)[:, None]
 
 
 def colour_table(parameters: SkinParameters, node_count: int = _COLOUR_TABLE_NODES) -> ColourTable:
-    """Compute the diffuse reflectance of skins over melanin and blood by layered diffusion.
+    """Return the diffuse reflectance of skins for a grid of melanin and blood, by layered diffusion.
 
     parameters : parameters of the skins; melanin and blood are ignored
-    node_count : number of fractions along each axis of the table
+    node_count : number n of fractions along each axis of the table
     """
     colours = spectral_table(parameters, node_count) @ rgb_weights(WAVELENGTHS_NM).T
     return ColourTable(np.maximum(colours, 0.0))
 
 
 def spectral_table(parameters: SkinParameters, node_count: int = _COLOUR_TABLE_NODES) -> Floats:
-    """Return the diffuse reflectance of skins over melanin and blood at `WAVELENGTHS_NM`, (n, n, 31) [-].
+    """Return the diffuse reflectance spectra (n, n, 31) of skins for a grid of melanin and blood [-].
 
-    parameters, node_count : as in `colour_table`; the fractions along the axes are the same
+    The wavelengths are `WAVELENGTHS_NM`. The parameters and the grid are those of `colour_table`.
     """
     epidermis, dermis = dj2006_layers(parameters, np.linspace(0.0, 1.0, node_count) ** 2)
     blood = np.arange(node_count)
@@ -82,9 +84,9 @@ def spectral_table(parameters: SkinParameters, node_count: int = _COLOUR_TABLE_N
 
 
 def _select_rows(layer: Layer, row_indices: NDArray[np.int64]) -> Layer:
-    """Return one layer whose channels are the concatenated coefficients of selected rows of stacked layers.
+    """Return one layer that has the coefficients of several layers, one after the other, as its channels.
 
-    layer : stacked layers, with coefficients (n, c)
-    row_indices : indices of the rows, which may repeat
+    layer : n layers in one, with coefficients (n, c)
+    row_indices : rows of the coefficients to take, which may repeat
     """
     return replace(layer, **{name: getattr(layer, name)[row_indices].ravel() for name in _COEFFICIENT_FIELDS})

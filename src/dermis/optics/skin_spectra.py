@@ -1,4 +1,4 @@
-"""Diffuse reflectance spectra of many skins at once; the pigments differ between the skins."""
+"""Diffuse reflectance spectra of many skins with different pigments, computed at once."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ def skin_reflectance(
     baseline: ArrayLike,
     scattering: ArrayLike = 1.0,
 ) -> Floats:
-    """Return the diffuse reflectance of n "dj2006" skins by layered diffusion, (n, 31) per incident light.
+    """Return the diffuse reflectance (n, 31) of n "dj2006" skins by layered diffusion, per incident light.
 
-    All arguments are (n,) arrays or numbers. Surface reflection is not included.
+    All arguments are numbers or arrays (n,). Surface reflection is not included.
 
     melanin : fraction of the epidermal volume that is melanosomes [-]
     blood_fraction : fraction of the dermal volume that is blood [-]
     oxygen : fraction of oxygenated haemoglobin [-]
-    eumelanin_fraction : fraction of melanosomes with eumelanin [-]
+    eumelanin_fraction : fraction of the melanosomes that contain eumelanin [-]
     epidermis_mm : thickness of the epidermis [mm]
     baseline : absorption of bloodless tissue relative to [Jacques1998] [-]
     scattering : scattering of both layers relative to [DonnerJensen2006] [-]
@@ -59,11 +59,11 @@ def two_layer_reflectance(
     epidermis_mm: ArrayLike,
     scattering_ratio: float = DERMIS_SCATTERING_RATIO,
 ) -> Floats:
-    """Return the diffuse reflectance of an epidermis on a semi-infinite dermis, (n, c) per incident light.
+    """Return the diffuse reflectance (n, c) of an epidermis on a semi-infinite dermis, per incident light.
 
-    epidermis, dermis : (n, c) absorption coefficients [1/mm]
+    epidermis, dermis : (n, c) absorption coefficients of the layers [1/mm]
     sigma_s_prime : (n, c) or (c,) reduced scattering coefficient of the epidermis [1/mm]
-    epidermis_mm : (n, 1) thicknesses, or one number [mm]
+    epidermis_mm : (n, 1) thicknesses of the epidermis, or one number [mm]
     scattering_ratio : scattering coefficient of the dermis relative to the epidermis [-]
     """
     upper, lower = Layer(epidermis, sigma_s_prime), Layer(dermis, scattering_ratio * sigma_s_prime)
@@ -72,5 +72,5 @@ def two_layer_reflectance(
 
 
 def _as_column(value: ArrayLike) -> Floats:
-    """Return an (n,) array as (n, 1), and a number unchanged."""
+    """Return a value as an array with one more axis at the end: (n,) becomes (n, 1)."""
     return np.asarray(value, np.float64)[..., None]

@@ -37,16 +37,18 @@ _MIN_REFLECTANCE = 1e-12
 class PhaseMatrices:
     """Phase function averaged over azimuth, as matrices between m discrete directions.
 
-    Light in the forward peak of the phase function is treated as unscattered. The scaled medium without the
-    peak therefore scatters less than the true medium.
+    Light in the forward peak of the phase function is treated as unscattered. The medium is therefore
+    replaced by a scaled medium, which has no such peak and scatters less than the true medium.
 
     albedo : single-scattering albedo of the scaled medium [-]
-    extinction : extinction coefficient of the scaled medium relative to the reduced extinction coefficient
+    extinction : extinction coefficient of the scaled medium, relative to the reduced extinction coefficient
         [-]
-    unscaled_extinction : extinction coefficient of the true medium relative to the reduced extinction
+    unscaled_extinction : extinction coefficient of the true medium, relative to the reduced extinction
         coefficient [-]
-    backward, forward : (m, m) phase function between two cosines, for scattering that reverses the sign of
-        the travel along the normal (backward) or keeps the sign (forward); 1 for isotropic scattering [-]
+    backward : (m, m) phase function between two directions, for light that turns from downwards to upwards or
+        vice versa; 1 for isotropic scattering [-]
+    forward : (m, m) phase function between two directions, for light that continues downwards or upwards; 1
+        for isotropic scattering [-]
     """
 
     albedo: float
@@ -62,7 +64,7 @@ def phase_matrices(albedo: float, g: float, cosine: Floats, polynomial_count: in
     albedo : reduced albedo [-]
     g : mean cosine of the scattering angle, at least 0 and less than 1 [-]
     cosine : (m,) cosines of the directions from the normal
-    polynomial_count : number of polynomials; the rest of the series is treated as unscattered light
+    polynomial_count : number of polynomials; scattering by the rest of the series is treated as no scattering
 
     Sources: [HenyeyGreenstein1941]; [Wiscombe1977] for the truncated forward peak.
     """
@@ -85,10 +87,10 @@ def phase_matrices(albedo: float, g: float, cosine: Floats, polynomial_count: in
 class Slabs:
     """Power reflected and transmitted by slabs in air, for n thicknesses and m incident directions.
 
-    cosine : (m,) cosines of incident light after refraction into the slab [-]
-    flux : (m,) fraction of the light that enters from a uniform sky at each cosine; sums to 1 [-]
-    reflected, transmitted : (n, m) fraction of the light that has scattered and leaves on the side of entry,
-        or on the far side [-]
+    cosine : (m,) cosines of the directions, after refraction into the slab [-]
+    flux : (m,) fraction of the light entering from a uniform sky that has each direction; the sum is 1 [-]
+    reflected : (n, m) fraction of the entering light that scatters and leaves on the side of entry [-]
+    transmitted : (n, m) fraction of the entering light that scatters and leaves on the far side [-]
     """
 
     cosine: Floats
@@ -104,14 +106,14 @@ def solve_slabs(
     direction_nodes: int = DIRECTION_NODES,
     g: float = 0.0,
 ) -> Slabs:
-    """Compute reflection and transmission of slabs by adding and doubling.
+    """Return the reflection and transmission of slabs, computed by adding and doubling.
 
     The result is exact except for the discretisation of directions.
 
-    albedo : single-scattering albedo; the reduced albedo if scattering is anisotropic [-]
-    optical_depth : (n,) thickness in (reduced) mean free paths, above 0 [-]
+    albedo : single-scattering albedo, or the reduced albedo if scattering is anisotropic [-]
+    optical_depth : (n,) thicknesses in mean free paths, reduced if scattering is anisotropic, above 0 [-]
     eta : index of refraction relative to the air on both sides, at least 1 [-]
-    direction_nodes : number of directions that leave the slab, and of directions that are totally reflected
+    direction_nodes : number of directions that escape from the slab, and also of totally reflected directions
     g : mean cosine of the scattering angle, at least 0 [-]
 
     Source: [Chandrasekhar1960] section 50 for the addition of layers.
@@ -133,7 +135,7 @@ def solve_doubled_slabs(
 ) -> Slabs:
     """Solve slabs and all their successive doublings, in the time that the thickest slabs alone would take.
 
-    albedo, eta, direction_nodes, g : arguments of `solve_slabs`
+    albedo, eta, direction_nodes, g : as in `solve_slabs`
     smallest_depth : (n,) optical depths of similar size [-]
     doubling_count : number d of doublings; the result has n (d + 1) slabs, ordered by the number of
         doublings, then by `smallest_depth`
@@ -151,10 +153,10 @@ def half_space_radiance(
 ) -> tuple[Floats, Floats, Floats]:
     """Return discrete directions in a half-space, their shares of uniform light, and the emerging radiance.
 
-    Returns cosines (m,) of the directions below the surface; the fraction (m,) of the light entering from a
-    uniform sky that travels in each direction; and the emerging radiance (m, m) by exit and entry direction.
-    The radiance is scaled so that the mean over exit directions, weighted by the fractions, is the
-    reflectance.
+    The results are the cosines (m,) of the directions below the surface; the fraction (m,) of the light
+    entering from a uniform sky that has each direction; and the emerging radiance (m, m) for each exit
+    direction (row) and entry direction (column). The radiance is scaled so that its mean over exit
+    directions, weighted by the fractions, is the reflectance.
     """
     transport = _Transport.create(albedo, eta, direction_nodes, g)
     doublings = transport.doubling_count(DEEP_OPTICAL_DEPTH)
@@ -171,10 +173,10 @@ class _Transport:
     """Discrete directions in a medium, with internal reflection at its faces and scattering between them.
 
     mu : (m,) cosines from the normal [-]
-    flux : (m,) fraction of uniform light inside the medium at each cosine [-]
+    flux : (m,) share of each direction in the flux of uniform light inside the medium [-]
     internal : (m,) reflectance of the faces from inside [-]
     escapes : (m,) mask of the directions that are not totally reflected at a face
-    phase : phase function between the cosines
+    phase : phase function between the directions
     """
 
     mu: Floats
@@ -190,17 +192,18 @@ class _Transport:
         return cls(mu, 2.0 * weight * mu, internal, escapes, phase_matrices(albedo, g, mu, nodes))
 
     def doubling_count(self, depth: float) -> int:
-        """Return how often a slab thin enough for single scattering must be doubled to reach a given depth.
+        """Return how many doublings turn a slab thin enough for single scattering into one of a given depth.
 
-        depth : thickness in reduced mean free paths [-]
+        depth : thickness after the doublings, in reduced mean free paths [-]
         """
         return int(np.ceil(np.log2(max(depth * self.phase.extinction / _MIN_OPTICAL_DEPTH, 1.0))))
 
 
 def _slabs_in_air(transport: _Transport, R: Floats, T: Floats, unscattered: Floats) -> Slabs:
-    """Return slabs between two faces, lit from air, from the operators of the medium without faces.
+    """Return the reflection and transmission of slabs with faces to air, from those of slabs without faces.
 
-    R, T : (n, m, m) reflection and transmission: pi times the radiance per power from each direction
+    R, T : (n, m, m) reflection and transmission without faces, as pi times the radiance for unit power from
+        each direction
     unscattered : (n, m) fraction of light that crosses the slab without scattering [-]
     """
     flux, escapes = transport.flux, transport.escapes
@@ -218,7 +221,7 @@ def _slabs_in_air(transport: _Transport, R: Floats, T: Floats, unscattered: Floa
 
 
 def _unscattered_exit(unscattered: Floats, internal: Floats) -> tuple[Floats, Floats]:
-    """Return the unscattered light that leaves on the side of entry and on the far side, (n, m) each [-].
+    """Return the fractions (n, m) of light that leave unscattered on the side of entry and the far side [-].
 
     unscattered : (n, m) fraction of light that crosses the slab without scattering [-]
     internal : (m,) reflectance of a face from inside [-]
@@ -228,9 +231,9 @@ def _unscattered_exit(unscattered: Floats, internal: Floats) -> tuple[Floats, Fl
 
 
 def _direction_quadrature(eta: float, direction_nodes: int) -> tuple[Floats, Floats]:
-    """Return nodes and weights over cosines in a medium: directions that escape, then all other directions.
+    """Return quadrature nodes and weights for the cosines of directions in a medium.
 
-    A direction escapes if it is not totally reflected at the face.
+    Directions that escape come first, then those that are totally reflected at the faces, if there are any.
     """
     critical = critical_cosine(eta)
     spans = [(critical, 1.0), (0.0, critical)] if critical > 0.0 else [(0.0, 1.0)]
@@ -244,8 +247,8 @@ def _doubling_steps(
 ) -> Iterator[tuple[Floats, Floats, Floats]]:
     """Yield reflection, transmission and unscattered light of thin slabs, and again after each doubling.
 
-    Reflection and transmission are (n, m, m): pi times the radiance per power from each direction.
-    Unscattered light is (n, m).
+    Reflection and transmission (n, m, m) are pi times the radiance for unit power from each direction. The
+    unscattered light (n, m) is the fraction that crosses the slab without scattering.
 
     tau : (n,) initial thicknesses in reduced mean free paths
     """
@@ -268,15 +271,15 @@ def _doubling_steps(
 def _add_faces(
     up: Floats, down: Floats, unscattered: Floats, internal: Floats, R: Floats, T: Floats
 ) -> tuple[Floats, Floats]:
-    """Add internal reflection at the upper and the lower face to a slab, for unit power in each direction.
+    """Return the scattered light that meets the faces of slabs, including internal reflections.
 
-    R, T : (n, m, m) reflection and transmission of the slab without faces, as pi times the radiance
-    up, down : (n, m, m) R and T as operators, multiplied by the flux of the directions
+    The results (n, m, m) are pi times the radiance at the upper face and at the lower face, for unit power
+    from each direction.
+
+    up, down : (n, m, m) `R` and `T` as operators, multiplied by the flux of the directions
     unscattered : (n, m) fraction of light that crosses the slab without scattering [-]
     internal : (m,) reflectance of a face from inside [-]
-
-    Returns pi times the scattered radiance that meets the upper face from below, and the lower face from
-    above.
+    R, T : (n, m, m) reflection and transmission of the slabs without faces, as pi times the radiance
     """
     if not internal.any():
         return R, T
@@ -295,17 +298,17 @@ def _add_faces(
 def anisotropic_response(total_reflectance: ArrayLike, eta: float, g: float) -> AngularResponse:
     """Return the angular response of half-spaces with anisotropic scattering.
 
-    The reduced absorption and scattering coefficients equal those of isotropically scattering half-spaces
-    with the reflectances `total_reflectance`.
+    Their reduced absorption and scattering coefficients equal those of isotropically scattering half-spaces
+    with the reflectance `total_reflectance`.
 
     total_reflectance : (c,) reflectance of the isotropic half-spaces for light at normal incidence [-]
     eta : index of refraction relative to air, at least 1 [-]
     g : mean cosine of the scattering angle, at least 0 [-]
 
-    The kernel 1/(a + b), where a and b are the cosines of the incident and the exit direction, is fitted to
-    the emerging radiance by least squares, once for the mean cosine g and once for 0. The difference of the
-    two coefficients is added to the single-scattering factor of `angular_response`, which is for isotropic
-    scattering.
+    The kernel 1/(a + b), where a and b are the cosines of the incident and the exit direction, is multiplied
+    by a factor that is fitted to the emerging radiance by least squares, once for the mean cosine g and once
+    for isotropic scattering. The difference of these two factors is added to the single-scattering factor of
+    `angular_response`, which is for isotropic scattering.
     """
     isotropic = angular_response(total_reflectance, eta)
     if g == 0.0:
@@ -321,12 +324,12 @@ def anisotropic_response(total_reflectance: ArrayLike, eta: float, g: float) -> 
 
 @lru_cache(maxsize=CACHED_COLUMN_COUNT)
 def _response_column(eta: float, g: float, total_reflectance: float) -> Floats:
-    """Return the fields of `AngularResponse` for one channel as a column of a table, (DIRECTION_ROWS + 2,).
+    """Return fields of `AngularResponse` for one channel, as one column (DIRECTION_ROWS + 2,) of a table.
 
-    The first DIRECTION_ROWS elements are `relative_reflectance`, the last two are
+    The first DIRECTION_ROWS elements are `relative_reflectance`; the last two are
     `relative_diffuse_reflectance` and `single_scattering`.
 
-    total_reflectance : total diffuse reflectance of the half-space [-]
+    total_reflectance : reflectance of the isotropic half-space for light at normal incidence [-]
     """
     a, fraction, radiance = half_space_radiance(
         albedo_for_reflectance(total_reflectance, eta), eta, DIRECTION_NODES, g
@@ -347,11 +350,13 @@ def _response_column(eta: float, g: float, total_reflectance: float) -> Floats:
 
 
 def _interpolate_over_cosines(sample_cosine: Floats, sample_values: Floats, cosine: Floats) -> Floats:
-    """Interpolate samples over cosines linearly, and extrapolate beyond them by a polynomial.
+    """Return a function of the cosine, interpolated linearly between samples.
+
+    Beyond the first and the last sample, the function is extrapolated by a polynomial.
 
     sample_cosine : (m,) cosines of the samples
-    sample_values : (m,) samples
-    cosine : cosines of the result
+    sample_values : (m,) values of the samples
+    cosine : cosines at which the function is returned
     """
     order = np.argsort(sample_cosine)
     x, y = sample_cosine[order], sample_values[order]

@@ -1,4 +1,4 @@
-"""Light through thin parts such as ears: weights of Gaussians as a function of the thickness."""
+"""Light through thin parts such as ears, as weights of Gaussians that depend on the thickness."""
 
 from __future__ import annotations
 
@@ -42,17 +42,18 @@ _FIT_FREQUENCIES = np.geomspace(
 
 @dataclass(frozen=True, eq=False)
 class ThinParts:
-    """Transmittance and lost reflectance of thin parts as weights of Gaussians, by thickness of the part.
+    """Light that thin parts transmit, and light that they fail to reflect, for a range of thicknesses.
 
-    The thicknesses are evenly spaced in the square root. The weights are those of k Gaussians in 3 channels,
-    and relative to the reflectance of a half-space of the medium.
+    Row 0 of each table is for the thickness 0, and the last row for `max_thickness_mm`; the square roots of
+    the thicknesses are evenly spaced. The light is given as weights of k Gaussians in 3 channels, relative to
+    the reflectance of a half-space of the medium.
 
-    max_thickness_mm : thickness at the last index; the thickness at index 0 is 0 [mm]
+    max_thickness_mm : largest thickness [mm]
     transmitted : (THICKNESS_ROWS, k, 3) weights of the light that leaves on the far side [-]
-    lost : (THICKNESS_ROWS, k, 3) weights of the light that a half-space would reflect and the thin part does
-        not; lost light is spread like transmitted light [-]
-    directionality : (THICKNESS_ROWS,) how strongly transmittance depends on the incident direction, from 1
-        (as in deep slabs, see `oblique_transmittance`) over 0 (not at all) to -1 (in the opposite sense) [-]
+    lost : (THICKNESS_ROWS, k, 3) weights of the light that a half-space would reflect but the thin part does
+        not; lost light spreads as widely as transmitted light [-]
+    directionality : (THICKNESS_ROWS,) how strongly transmittance depends on the incident direction: 1 if as
+        in deep slabs (see `oblique_transmittance`), 0 if not at all, and below 0 if in the opposite sense [-]
     """
 
     max_thickness_mm: float
@@ -64,7 +65,7 @@ class ThinParts:
 def solve_thin_parts(
     medium: Medium, variance_mm2: Floats, max_thickness_mm: float, g: float = 0.0
 ) -> ThinParts:
-    """Compute transmittance and lost reflectance of slabs of a single-layer medium, by thickness.
+    """Return transmitted and lost light of slabs of a medium with one layer, for a range of thicknesses.
 
     variance_mm2 : (k,) variances of the Gaussians that spread light [mm2]
     max_thickness_mm : largest thickness [mm]
@@ -92,15 +93,15 @@ def solve_thin_parts(
 def oblique_transmittance(
     total_reflectance: Floats, eta: float, from_photons: bool = False, g: float = 0.0
 ) -> Floats:
-    """Return the relative transmittance of deep slabs by incident direction, (DIRECTION_ROWS, c) [-].
+    """Return the relative transmittance (DIRECTION_ROWS, c) of deep slabs for each incident direction [-].
 
-    The relative transmittance for a direction is t / r: t is the slab's transmittance for the direction
-    divided by its transmittance for uniform light, and r is the same quotient for the reflectance of a
-    half-space. The square roots of the incident cosines in air are evenly spaced from 0 to 1.
+    The relative transmittance is t / r. Here, t is the transmittance of the slab for the direction, divided
+    by the slab's transmittance for uniform light, and r is the same quotient for the reflectance of a
+    half-space. The square roots of the cosines of incidence in air are evenly spaced from 0 to 1.
 
     total_reflectance : (c,) reflectance of the half-space for light at normal incidence [-]
     eta : index of refraction relative to air [-]
-    from_photons : whether the diffusion profile comes from photon counts, not from a diffusion model
+    from_photons : whether the diffusion profile comes from photon counts instead of a diffusion model
     g : mean cosine of the scattering angle [-]
     """
     return interpolate_columns(partial(_oblique_column, eta, from_photons, g), total_reflectance)
@@ -116,16 +117,19 @@ def _oblique_column(eta: float, from_photons: bool, g: float, total_reflectance:
 
 
 def _deep_transmittance(albedo: float, eta: float, direction_nodes: int, g: float) -> tuple[Slabs, Floats]:
-    """Return a half-space as `Slabs`, and `oblique_transmittance` of deep slabs at its incident cosines."""
+    """Return a half-space, and the relative transmittance of deep slabs for its incident directions.
+
+    For the definition of relative transmittance, see `oblique_transmittance`.
+    """
     half_space = solve_slabs(albedo, DEEP_OPTICAL_DEPTH, eta, direction_nodes, g)
     deep = solve_slabs(albedo, _DEEP_SLAB_DEPTH, eta, direction_nodes, g)
     return half_space, _relative_transmittance(deep, half_space)[0]
 
 
 def _relative_transmittance(slabs: Slabs, half_space: Slabs) -> Floats:
-    """Return the directional transmittance of slabs divided by a half-space's reflectance, (n, m) [-].
+    """Return the transmittance (n, m) of n slabs for m directions, divided by a half-space's reflectance [-].
 
-    Transmittance and reflectance are first divided by their values for uniform light.
+    Before that, transmittance and reflectance are divided by their values for uniform light.
     """
     reflected = half_space.reflected[0] / (half_space.reflected @ half_space.flux)
     transmitted = np.maximum(slabs.transmitted @ slabs.flux, _MIN_TRANSMITTANCE)[:, None]
@@ -133,13 +137,13 @@ def _relative_transmittance(slabs: Slabs, half_space: Slabs) -> Floats:
 
 
 class _SlabTotals(NamedTuple):
-    """Transmittance and lost reflectance of n slabs in one channel under uniform light, (n,) each.
+    """Transmittance and lost reflectance of n slabs in one channel under uniform light.
 
-    transmittance : transmitted power, divided by incident power [-]
-    relative_transmittance : transmittance divided by the reflectance of the half-space [-]
-    lost : reflectance lost by the finite thickness, divided by the reflectance of the half-space [-]
-    directionality : how strongly transmittance depends on the incident direction: 1 as in deep slabs, 0 not
-        at all [-]
+    transmittance : (n,) transmitted fraction of the power that enters [-]
+    relative_transmittance : (n,) transmittance divided by the reflectance of the half-space [-]
+    lost : (n,) reflectance that is lost due to the finite thickness, divided by the reflectance of the
+        half-space [-]
+    directionality : (n,) how strongly transmittance depends on the incident direction, see `ThinParts` [-]
     """
 
     transmittance: Floats
@@ -149,7 +153,7 @@ class _SlabTotals(NamedTuple):
 
 
 def _slab_totals(layer: Layer, thickness_mm: Floats, eta: float, g: float) -> Iterator[_SlabTotals]:
-    """Yield the slab totals of each channel, by cubic interpolation between cached optical depths."""
+    """Yield the totals of slabs for each channel, interpolated by cubic splines between cached depths."""
     from scipy.interpolate import CubicSpline
 
     roots = np.sqrt(1.0 - layer.alpha_prime).tolist()
@@ -162,9 +166,9 @@ def _slab_totals(layer: Layer, thickness_mm: Floats, eta: float, g: float) -> It
 
 @lru_cache(maxsize=CACHED_COLUMN_COUNT)
 def _totals_column(eta: float, g: float, root_absorption: float) -> Floats:
-    """Return the four fields of `_SlabTotals` at `_OPTICAL_DEPTHS`, (n, 4), for one albedo.
+    """Return the four fields (n, 4) of `_SlabTotals` at `_OPTICAL_DEPTHS`, as a table column for one albedo.
 
-    root_absorption : square root of 1 minus the reduced albedo, in which the totals are tabulated [-]
+    root_absorption : square root of 1 minus the reduced albedo, the coordinate of the table [-]
     """
     albedo = min(max(1.0 - root_absorption**2, MIN_EQUIVALENT_ALBEDO), MAX_EQUIVALENT_ALBEDO)
     slabs = solve_doubled_slabs(albedo, _MIN_OPTICAL_DEPTHS, _DOUBLING_COUNT, eta, _DIRECTION_NODES, g)
@@ -179,9 +183,13 @@ def _totals_column(eta: float, g: float, root_absorption: float) -> Floats:
 
 
 def _spread_weights(medium: Medium, thickness_mm: Floats, variance_mm2: Floats) -> Floats:
-    """Fit weights of Gaussians to the normalised transmittance profile of each thickness, (n, k).
+    """Return weights (n, k) of k Gaussians that fit the transmittance profiles of n slabs.
 
-    The weights of each thickness sum to 1.
+    The profiles are normalised, so the weights of each slab sum to 1.
+
+    medium : medium with one layer, of which the first channel is used
+    thickness_mm : (n,) thicknesses of the slabs [mm]
+    variance_mm2 : (k,) variances of the Gaussians [mm2]
     """
     from scipy.optimize import nnls
 

@@ -1,4 +1,4 @@
-"""Tissue by name or file: media whose channels are colours, and skins made of pigments by wavelength."""
+"""Tissues from presets and files: media with colours as channels, and skins made of pigments."""
 
 from __future__ import annotations
 
@@ -40,16 +40,16 @@ ProfileModel = DiffusionModel | Literal["counted"]
 
 @dataclass(frozen=True)
 class Tissue:
-    """Medium, with the conversion of its channels to red, green and blue.
+    """Medium with the conversion of its channels to red, green and blue.
 
     Parameters
     ----------
     medium : Medium
         Layers with three channels, or with one channel for each wavelength.
     rgb : numpy.ndarray, optional
-        (3, c) weights from the wavelengths to red, green and blue [-]; None if the channels are colours.
+        (3, c) weights that convert wavelengths to red, green and blue [-]; None if the channels are colours.
     parameters : SkinParameters, optional
-        Parameters of a skin made of pigments.
+        Parameters of a skin made of pigments; None for other media.
 
     Examples
     --------
@@ -64,7 +64,7 @@ class Tissue:
     parameters: SkinParameters | None = None
 
     def __repr__(self) -> str:
-        """Return name, layers and ranges of the coefficients in three lines."""
+        """Return a text of three lines with the name, the layers and the ranges of the coefficients."""
         layers = self.medium.layers
         a = np.array([layer.sigma_a for layer in layers])
         s = np.array([layer.sigma_s_prime for layer in layers])
@@ -81,9 +81,9 @@ class Tissue:
         return "\n".join([heading, f"  {thicknesses}", f"  {', '.join(ranges)}"])
 
     def spectrum(self, model: DiffusionModel = "layered", clamp: Clamp = "layer") -> Floats | None:
-        """Return the total diffuse reflectance at `WAVELENGTHS_NM`, (31,), per incident light [-].
+        """Return the total diffuse reflectance (31,) at `WAVELENGTHS_NM`, per incident light [-].
 
-        Surface reflection is not included. The result is None for a medium in colour channels.
+        Surface reflection is not included. The result is None for a medium whose channels are colours.
         """
         if self.rgb is None:
             return None
@@ -102,13 +102,13 @@ class Tissue:
 
     @property
     def default_model(self) -> ProfileModel:
-        """Return the default profile model: tabulated photon counts if they exist, else diffusion."""
+        """Return the default profile model: "counted" if there are photon counts, else "layered"."""
         return COUNTED_MODEL if self.rgb is None and has_photon_table(self.medium) else "layered"
 
     def profile(self, model: ProfileModel | None = None, clamp: Clamp = "layer") -> RadialProfile:
         """Return the diffusion profile R(r) of the tissue in linear Rec. 709.
 
-        R(r) is per power that enters the tissue; for a skin made of pigments, per incident power.
+        R(r) is per power that enters the tissue or, for a skin made of pigments, per incident power.
 
         model : model that computes the profile; by default `default_model`
         clamp : position of the multipole's source in layers thinner than a mean free path
@@ -126,16 +126,17 @@ class Tissue:
         return profile
 
     def rings(self) -> RingTarget:
-        """Return the light through concentric rings, from the default model, as the target of a fit."""
+        """Return the light through concentric rings by the default model, as the target of a fit."""
         model = self.default_model
         if model == COUNTED_MODEL:
             return self.profile().rings()
         return diffusion_rings(self.medium, model, rgb_weights=self.rgb)
 
     def transmittance(self, thickness_mm: ArrayLike) -> Floats:
-        """Return the transmittance of slabs of the tissue, (n, 3) [-].
+        """Return the transmittance (n, 3) of slabs of the tissue [-].
 
-        The transmittance is per power that enters the slab; for a skin made of pigments, per incident power.
+        The transmittance is per power that enters the slab or, for a skin made of pigments, per incident
+        power.
 
         thickness_mm : (n,) thicknesses of the slabs [mm]
         """
@@ -160,9 +161,10 @@ def load_tissue(
     name : str or Path
         Preset ("skin1", "dj3", "spectral" ...), or a .toml file.
     structure : {"dj2006", "donner2008", "biospec"}, optional
-        Layer structure of a skin made of pigments; by default the one stated in the file, or "dj2006".
+        Layer structure of a skin made of pigments; by default the structure that the file states, or else
+        "dj2006".
     pigments : Mapping of str to float, optional
-        Values that replace fields of the `SkinParameters` of the preset or file.
+        For a skin made of pigments, values that replace fields of its `SkinParameters`.
 
     Returns
     -------
@@ -209,7 +211,10 @@ def load_tissue(
 
 
 def _checked_pigments(pigments: Mapping[str, Any]) -> dict[str, Any]:
-    """Return pigments as a dictionary, after checking that all keys are fields of `SkinParameters`."""
+    """Return pigments as a dictionary.
+
+    Raises DermisError unless all keys are fields of `SkinParameters`.
+    """
     names = SkinParameters.__dataclass_fields__
     if not isinstance(pigments, Mapping) or not pigments.keys() <= names.keys():
         refuse("pigments", f"some of {', '.join(names)}", f"got {format_value(pigments)}", "Correct them")

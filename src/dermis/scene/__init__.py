@@ -42,7 +42,10 @@ __all__ = [  # in addition to those of dermis.scene.lights
 
 
 def __getattr__(name: str) -> Any:
-    """Return a public object, whose module is imported on first use to keep the command line's help fast."""
+    """Return a public object of this package.
+
+    The object's module is imported on first use, so the help of the command line stays fast.
+    """
     if new := successor(__name__, name):
         return __getattr__(new)
     home = next((home for home, names in _NAMES_BY_MODULE.items() if name in names), "lights")

@@ -31,7 +31,7 @@ class Window(NamedTuple):
     """Image rectangle of a camera, in the plane at distance 1 in front of the camera.
 
     The picture coordinates (x, y), each from -1 at the left or bottom to 1 at the right or top, correspond to
-    the point ((x + shift[0]) half[0], (y + shift[1]) half[1]) of this plane.
+    the point ((x + shift[0]) half[0], (y + shift[1]) half[1]) in this plane.
 
     half : half width and half height of the rectangle
     shift : offset of the rectangle from the optical axis, in units of `half`
@@ -85,7 +85,7 @@ class Camera(FrozenModel):
     def from_opencv(cls, K: ArrayLike, R: ArrayLike, t: ArrayLike, size: tuple[int, int]) -> Camera:
         """Return the camera of an OpenCV calibration without lens distortion.
 
-        A calibration with distortion is valid for undistorted pictures.
+        If lens distortion was part of the calibration, the camera fits the undistorted pictures.
 
         Parameters
         ----------
@@ -106,15 +106,15 @@ class Camera(FrozenModel):
         Raises
         ------
         DermisError
-            For a K with skew, an R that is not a rotation, and arrays of another shape.
+            For a K with skew, an R that is not a rotation, and arrays with another shape.
         """
         return cls(**from_opencv(K, R, t, size))
 
     def to_opencv(self, size: tuple[int, int]) -> OpenCvCamera:
         """Return K, R and t of OpenCV: X_cam = R X + t, x to the right, y down, z forward.
 
-        X is in mm from the head's centre, like all positions of a scene. Pixel centres have integer
-        coordinates: the upper left pixel is at (0, 0), the corner of the picture at (-0.5, -0.5).
+        X is a position relative to the head's centre [mm], like all positions in a scene. Pixel centres have
+        integer coordinates: the upper left pixel is at (0, 0), the corner of the picture at (-0.5, -0.5).
 
         Parameters
         ----------
@@ -131,7 +131,7 @@ class Camera(FrozenModel):
 
     @property
     def half_view_tangent(self) -> float:
-        """Return the tangent of half the vertical angle of view, as if the camera had no lens shift."""
+        """Return the tangent of half the vertical angle of view, ignoring any lens shift."""
         return 0.5 * self.frame_mm / math.dist(self.position, self.target)
 
     half_tangent = renamed_attribute("half_tangent", "half_view_tangent")
@@ -230,7 +230,7 @@ def full_body(head: Head) -> Camera:
     Returns
     -------
     Camera
-        Camera at a distance of 1.1 m, or of three times the size of the mesh if the mesh is larger.
+        Camera at a distance of 1.1 m, or of three times the size of the mesh if that is farther.
 
     Examples
     --------
@@ -245,7 +245,10 @@ def full_body(head: Head) -> Camera:
 
 
 def cheek(head: Head) -> Camera:
-    """Return a camera for a close-up of the left cheek, where the studio's key light grazes pores."""
+    """Return a camera for a close-up of the left cheek.
+
+    The key light of the light preset "studio" grazes the pores there.
+    """
     beside = (40.0, -35.0) if head.skull_mm is not None else (0.0, 0.0)
     focus = _to_scene(head, head.frontmost(*beside))
     view_direction = _to_scene(head, _direction_at_azimuth(58.0))
@@ -275,7 +278,7 @@ CAMERA_PRESETS = {
 
 
 def camera_preset(preset_name: str, head: Head) -> Camera:
-    """Return the camera of a preset, placed for a head.
+    """Return the camera that a preset places for a head.
 
     Raises DermisError for a name that is not in `CAMERA_PRESETS`.
     """
@@ -303,9 +306,9 @@ def _camera_at_azimuth(head: Head, azimuth_degrees: float) -> Camera:
 
 
 def _show_all(head: Head, azimuth_degrees: float) -> Camera:
-    """Return a camera that shows all of a mesh with a margin, from an azimuth relative to the front.
+    """Return a camera that shows all of a mesh with a margin.
 
-    azimuth_degrees : azimuth of the camera, 0 in front of the head [degrees]
+    azimuth_degrees : azimuth of the camera: 0 in front of the head, 90 at its left side [degrees]
     """
     x, _, z = _direction_at_azimuth(azimuth_degrees)
     # rows: to the right, up and towards the camera
@@ -325,7 +328,7 @@ def _show_all(head: Head, azimuth_degrees: float) -> Camera:
 
 
 def _to_scene(head: Head, vector: Vector) -> Vector:
-    """Return a vector in the scene from its components to the right, upwards and to the front of a head."""
+    """Convert a vector from the axes of a head (left, up, front) to the axes of the scene."""
     return _vector_tuple(np.array(vector) @ head.axes)
 
 

@@ -20,7 +20,7 @@ _NEAR_CENTRE_MM = 5.0  # a position this close to the head's centre is a mistake
 
 
 def as_head(head: object) -> Head:
-    """Return a head from a `Head`, a `Human`, or a name or file for `load_head`.
+    """Return a head from a `Head`, a `Human`, or a name or file name that `load_head` accepts.
 
     Raises DermisError for any other object.
     """
@@ -91,12 +91,12 @@ def as_environment(environment: object) -> Environment | None:
 
 
 def as_model(settings_class: type[P], field_values: object, argument_name: str, example_text: str) -> P:
-    """Return settings of a given class.
+    """Return an instance of a settings class from an instance or from field values.
 
     settings_class : class of the settings, such as `Skin`
-    field_values : instance of the class, or a mapping from field names to values
-    argument_name : name of the argument of `Scene`, for the error message
-    example_text : example of fields with values, for the error message
+    field_values : instance, which is returned unchanged, or a mapping from field names to values
+    argument_name : name of the `Scene` argument, for the error message
+    example_text : example of field values, such as 'profile="medium"', for the error message
 
     Raises DermisError for any other object.
     """

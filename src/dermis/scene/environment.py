@@ -13,7 +13,8 @@ from dermis.scene.frozen_model import FrozenModel, slider
 class Environment(FrozenModel):
     """Panorama of distant light around the head.
 
-    The centre of the panorama lies behind the head, so it is the background of a camera in front of the face.
+    The centre of the panorama lies behind the head. A camera in front of the face therefore shows this part
+    of the panorama as background.
 
     Examples
     --------

@@ -43,7 +43,7 @@ class Keywords:
 
 
 class Reason(str):
-    """Annotation of a numeric field that gives the reason for its bounds, for error messages."""
+    """Annotation of a numeric field: the reason for the field's bounds, which error messages quote."""
 
     __slots__ = ()
 
@@ -51,7 +51,7 @@ class Reason(str):
 class InvalidFieldsError(DermisError):
     """Error for field values that a settings class rejects.
 
-    messages : text with the expected and the actual value of each rejected field, by field name
+    messages : dictionary from the name of each rejected field to a text with expected and actual value
     """
 
     def __init__(self, settings_name: str, message_of_field: dict[str, str]) -> None:
@@ -108,14 +108,14 @@ def field_keywords(model: type[BaseModel], field: str) -> tuple[str, ...]:
 
 
 def field_bounds(field_info: FieldInfo) -> tuple[float | None, float | None]:
-    """Return the lower and the upper bound of a numeric field, each None if the field has no such bound."""
+    """Return the lower and the upper bound of a numeric field; a missing bound is None."""
     low = [getattr(one, name) for one in field_info.metadata for name in ("ge", "gt") if hasattr(one, name)]
     high = [getattr(one, name) for one in field_info.metadata for name in ("le", "lt") if hasattr(one, name)]
     return next(iter(low), None), next(iter(high), None)
 
 
 def messages_by_field(errors: list[ErrorDetails], model: type[BaseModel]) -> dict[str, str]:
-    """Convert validation errors of pydantic to messages for users, by dotted field name."""
+    """Convert validation errors of pydantic to a dictionary from dotted field names to messages for users."""
     return {".".join(str(part) for part in one["loc"]): _format_error(one, model) for one in errors}
 
 
@@ -147,7 +147,7 @@ def _format_error(pydantic_error: ErrorDetails, model: type[BaseModel]) -> str:
 def _range_text(location: tuple[int | str, ...], model: type[BaseModel]) -> str:
     """Return the range of a number as text, such as "a number from 0 to 1"; "" for a number without bounds.
 
-    The reason for the bounds is added in parentheses.
+    If the field has a `Reason` for its bounds, the text ends with this reason in parentheses.
 
     location : path of the number in the model: the field name, then indices
     """
@@ -185,7 +185,7 @@ def _length_text(pydantic_error: ErrorDetails, model: type[BaseModel]) -> str:
 
 
 def _unknown_field_message(field_name: str, model: type[Any]) -> str:
-    """Return the message for an unknown field, which suggests a similar name or a class with this field."""
+    """Return the message for an unknown field name; suggest a similar name, or a class with this field."""
     known, finding = list(model.model_fields), "but this name is unknown"
     plain = field_name[:_MAX_NAME_LENGTH].lower().replace("-", "_")
     similar = difflib.get_close_matches(plain, known, 1, 0.7)

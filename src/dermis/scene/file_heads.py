@@ -40,9 +40,11 @@ MapFile = str | os.PathLike[str] | None
 class MapOptions:
     """Maps that users choose for the skin.
 
-    files : picture files by role, in place of pictures of the mesh file; None keeps the mesh file's picture
-    height_mm, normal_y : see `load_maps`
-    skin_site : name of a measured colour for skin without a picture, see `measured_tone`
+    files : dictionary from each role, such as "colour", to the user's picture file, or to None to keep the
+        mesh file's picture
+    height_mm : height of one grey level of the height map, see `load_maps` [mm]
+    normal_y : direction of green in the normal map, see `load_maps`
+    skin_site : name of the measured colour that skin without a picture gets, see `measured_tone`
     """
 
     files: Mapping[str, MapFile]
@@ -52,20 +54,20 @@ class MapOptions:
 
     @property
     def user_files(self) -> dict[str, MapFile]:
-        """Return the files that the user has chosen, by role."""
+        """Return a dictionary from roles to the files that the user has chosen."""
         return {role: file for role, file in self.files.items() if file is not None}
 
     @property
     def replaced_roles(self) -> set[str]:
-        """Return the roles for which the user's files replace pictures of the mesh file."""
+        """Return the roles in which the user's files replace pictures of the mesh file."""
         relief = {"normal", "height", "bump"}
         return {*self.user_files, *(relief if relief & self.user_files.keys() else ())}
 
     def load(self, files: Mapping[str, Any]) -> Maps:
         """Load the user's files and, for all other roles, the pictures of the mesh.
 
-        files : pictures of the mesh by role, and under "height_mm" the height of one grey level of the height
-            map
+        files : dictionary from roles to pictures of the mesh file; its entry "height_mm" is the height of one
+            grey level of the height map [mm]
         """
         chosen: dict[str, Any] = {
             role: files.get(role) if file is None else file for role, file in self.files.items()
@@ -77,7 +79,7 @@ class MapOptions:
     def relief_mm(self, files: Mapping[str, Any]) -> float | None:
         """Return the height of one grey level of the height map, from the user or from the mesh file [mm].
 
-        files : pictures and "height_mm" of the mesh, as for `load`
+        files : dictionary with the pictures and the "height_mm" of the mesh file, as for `load`
         """
         mesh_relief_mm = files.get("height_mm") if self.files["height"] is None else None
         return mesh_relief_mm if self.height_mm is None else self.height_mm
@@ -88,7 +90,7 @@ def load_file_head(
 ) -> tuple[Head, EyeLook]:
     """Return the head of a sample or a mesh file, and the eye look that the file states.
 
-    sample_or_path : name of the sample or of the file
+    sample_or_path : name of the sample, or path of the mesh file
     mesh_options : keyword arguments of `load_rigged`
     """
     sample = SAMPLES.get(sample_or_path)
@@ -115,7 +117,7 @@ def _load_mesh(path: Path, culprit: str, mesh_options: dict[str, Any]) -> Rigged
 
 
 def _load_sample(sample: Sample, mesh_options: dict[str, Any], map_options: MapOptions) -> Head:
-    """Return the head of a sample, whose unit and maps are known."""
+    """Return the head of a sample; the package knows the unit and the maps of each sample."""
     if sample.kind != "head":
         hint = f"Use one of {', '.join(name for name, one in SAMPLES.items() if one.kind == 'head')}"
         refuse(sample.name, "a head", f"this sample is an {sample.kind}", hint)
@@ -137,7 +139,10 @@ def _load_sample(sample: Sample, mesh_options: dict[str, Any], map_options: MapO
 def _with_materials(
     rigged: RiggedMesh, materials: Sequence[FileMaterial], path: Path, map_options: MapOptions
 ) -> tuple[Mesh, Maps, list[str]]:
-    """Return the mesh and the maps of a file with materials, and notes on properties that are not drawn."""
+    """Return the mesh and the maps of a file with materials, and notes for the user.
+
+    The notes name properties of the materials that are not drawn.
+    """
     direct = direct_material(rigged, materials)
     pack_skin = direct is None and not map_options.user_files
     mesh, packed, notes = with_file_textures(rigged, materials, pack_skin)
@@ -150,7 +155,7 @@ def _with_materials(
 
 
 def _direct_maps(path: Path, material: FileMaterial, map_options: MapOptions) -> tuple[Maps, list[str]]:
-    """Return the maps of a material whose pictures serve as maps of the skin, and notes on omitted maps."""
+    """Return skin maps from the unchanged pictures of a material, and notes on maps that are not used."""
     if path.suffix.lower() != ".obj" or not material.name:
         return with_factors(map_options.load(material.skin_pictures()), material, map_options.user_files), []
     mtl_maps, faults = obj_maps(

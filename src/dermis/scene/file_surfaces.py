@@ -21,7 +21,7 @@ _SURFACE_ROLES: tuple[Role, ...] = ("normal", "roughness", "metalness")
 
 
 def with_missing_uv(rigged: RiggedMesh) -> RiggedMesh:
-    """Return a mesh with a new uv layout for skin groups without uv, and with a note on these groups."""
+    """Return a mesh in which skin groups without uv have a new uv layout and are named in a note."""
     mesh, surface = rigged.mesh, rigged.surface
     bare = np.array(
         [own.kind == "skin" and not has for own, has in zip(mesh.materials, surface.has_uv, strict=True)]
@@ -41,7 +41,8 @@ def with_missing_uv(rigged: RiggedMesh) -> RiggedMesh:
 def direct_material(rigged: RiggedMesh, materials: Sequence[FileMaterial]) -> FileMaterial | None:
     """Return the material whose pictures serve unchanged as skin maps; None if pictures must be packed.
 
-    rigged, materials : mesh and materials of a file
+    rigged : mesh of the file
+    materials : materials of the file
     """
     mesh, surface = rigged.mesh, rigged.surface
     skin = _materials_of_kind(mesh, "skin")
@@ -61,9 +62,10 @@ def direct_material(rigged: RiggedMesh, materials: Sequence[FileMaterial]) -> Fi
 def with_factors(maps: Maps, material: FileMaterial, user_roles: Collection[str]) -> Maps:
     """Return the maps of a skin material, multiplied by the factors of the material in the file.
 
-    The product of roughness map and roughness factor is squared, as files store the root of the roughness m.
+    The product of roughness map and roughness factor is squared, as files store the square root of the
+    roughness m.
 
-    user_roles : roles of maps that the user replaces; factors do not apply to the maps of these roles
+    user_roles : roles of the maps that the user replaces; these maps are not multiplied
     """
     changed: dict[str, Any] = {}
     if (
@@ -98,12 +100,13 @@ def _has_colours(mesh: Mesh, surface: FileSurface, material_mask: Mask) -> bool:
 def with_file_textures(
     rigged: RiggedMesh, materials: Sequence[FileMaterial], pack_skin: bool
 ) -> tuple[Mesh, Maps, tuple[str, ...]]:
-    """Pack the pictures of materials; return the mesh with uv in common maps, the maps, and notes.
+    """Pack pictures of materials into common maps; return the mesh with uv in these, the maps, and notes.
 
-    The notes are sentences for users about lost detail.
+    The notes tell users which detail was lost.
 
-    rigged, materials : mesh and materials of a file
-    pack_skin : whether the maps of the skin are packed, see `direct_material`
+    rigged : mesh of the file
+    materials : materials of the file
+    pack_skin : whether pictures of the skin are packed too; False if `direct_material` returns a material
     """
     mesh, maps, notes = rigged.mesh, Maps(), list[str]()
     if pack_skin:
@@ -125,7 +128,7 @@ def with_file_textures(
 
 
 def _with_mean_colours(mesh: Mesh, materials: list[Material], maps: PartMaps) -> list[Material]:
-    """Return materials with the mean colour of the maps, for programs that do not read the maps."""
+    """Return materials in the mean colour of their maps, for programs that do not read the maps."""
     size = np.array(maps.colour.shape[1::-1])
     coloured = []
     for index, material in enumerate(materials):
@@ -158,9 +161,9 @@ def _with_uv(mesh: Mesh, packed: PackedTextures) -> Mesh:
 
 
 def _with_cached_outline(mesh: Mesh, changed_mesh: Mesh) -> Mesh:
-    """Give a changed mesh the outline that is cached for the original mesh, and return the changed mesh.
+    """Give a changed mesh the cached outline of the original mesh, and return the changed mesh.
 
-    changed_mesh : mesh with the shape of `mesh`
+    changed_mesh : copy of `mesh` with the same shape, but changed uv or materials
     """
     vars(changed_mesh)["outline"] = mesh.outline
     return changed_mesh
@@ -214,9 +217,9 @@ def unused_properties(
 ) -> str:
     """Return a note on properties of a file's materials that are not drawn; empty if all are drawn.
 
-    file_index : (m,) for each material of the mesh, index of the material in the file, or -1 if there is none
+    file_index : (m,) index in the file of each material of the mesh, -1 for a material that the file lacks
     user_roles : roles of skin maps that the user replaces
-    is_packed : whether the pictures of several skin materials are packed
+    is_packed : whether pictures of the skin materials are packed into common maps
     """
     if any(one.maps is not None for one in materials):  # this package wrote the file
         return ""
@@ -237,7 +240,7 @@ def unused_properties(
 
 
 def _replaced_by_skin(material: FileMaterial) -> list[str]:
-    """Return the properties of a material that the settings of the skin replace."""
+    """Return names of the material properties that are replaced by the skin settings."""
     replaced = []
     if "roughness" not in material.textures and material.roughness not in (None, 1.0):
         replaced.append(f"roughness {material.roughness:g}")

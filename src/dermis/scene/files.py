@@ -42,7 +42,8 @@ def load_lights(name: str | Path, head: Head | None = None) -> tuple[Light, ...]
     name : str or path
         Name of a preset ("studio", "window", ...) or a file.
     head : Head, optional
-        Head for which the lights of a preset are placed: farther away for a body that is larger than a metre.
+        Head for which the lights of a preset are placed; lights for a body larger than a metre are farther
+        away.
 
     Returns
     -------
@@ -69,7 +70,7 @@ def load_lights(name: str | Path, head: Head | None = None) -> tuple[Light, ...]
 
 
 def load_camera(preset_or_path: str | Path, head: Head) -> Camera:
-    """Return the camera of a preset, placed for the head, or of the [camera] table in a TOML file."""
+    """Return the camera of a preset, placed for a head, or the camera of a TOML file's [camera] table."""
     preset = find_preset(str(preset_or_path))
     if preset is not None:
         return preset(head)
@@ -89,11 +90,13 @@ def load_scene(
 ) -> tuple[Scene, Settings]:
     r"""Load a scene and its settings from a TOML file.
 
-    Tables: [head] (`name` of a file or a sample, options of `load_head`, and `regions`, a table for
-    `with_regions`), [pose] (`weights` and `bones` by name), [skin] or skin = "deck-2007", [[lights]] or
-    lights = "preset", [environment], [camera] or camera = "preset", [render]. Missing keys have their
-    defaults. File names are relative to the folder of the file. A scene with an environment has no other
-    lights unless the file names them.
+    The tables of the file are [head], [pose], [skin], [[lights]], [environment], [camera] and [render]. The
+    table [head] has the `name` of a sample or a mesh file, options of `load_head`, and `regions`, the table
+    of face regions for `with_regions`. The table [pose] has the subtables `weights` and `bones`, whose keys
+    are names of morph targets and bones. The name of a preset can replace three of the tables, as in skin =
+    "deck-2007", lights = "studio" and camera = "portrait". Missing keys have their default values. File names
+    are relative to the folder of the scene file. A scene with an environment has no lights unless the file
+    specifies lights.
 
     Parameters
     ----------
@@ -102,10 +105,11 @@ def load_scene(
     head : Head, optional
         Head to use instead of loading the head of the file's [head] table.
     camera : str, optional
-        Name of the camera for which the subdivision levels of the head are chosen, instead of the file's
-        camera.
+        Name of the camera for which the subdivision levels of the head are chosen; by default the camera of
+        the scene file.
     size : (int, int), optional
-        Picture size for which the subdivision levels are chosen, instead of the file's size [pixel].
+        Picture size for which the subdivision levels are chosen; by default the size in the scene file
+        [pixel].
 
     Returns
     -------
@@ -190,11 +194,13 @@ def head_and_skin(
 ) -> tuple[Head, Skin]:
     """Return the head of a [head] table, and the skin settings of the head.
 
-    If the [head] table names a table of face regions, the returned skin has the mean rho_s of the regions.
+    If the [head] table names a table of face regions, rho_s of the returned skin is the mean over the
+    regions.
 
     skin : skin settings of the scene file
     scene_folder : folder to which file names are relative
-    picture : camera and size for which subdivision levels are chosen if the table does not state them
+    picture : camera and picture size for which subdivision levels are chosen if the table does not state
+        levels
 
     Raises DermisError for files that cannot be used.
     """
@@ -231,7 +237,7 @@ def _parse_skin(path: Path, skin_entry: Any) -> Skin:
 
 
 def _resolve_skin_files(scene_folder: Path, skin: Skin) -> Skin:
-    """Return a skin in which names of profile files are resolved relative to a folder."""
+    """Return a skin in which relative names of profile files are resolved against a folder."""
     others = tuple(_resolve_file(scene_folder, name) for name in skin.other_profiles)
     mixture_map = skin.profile_map and _resolve_file(scene_folder, skin.profile_map)
     names = {

@@ -109,7 +109,7 @@ class FrozenModel(BaseModel, metaclass=_Documented):
     """Names that other programs use, and the fields that they correspond to."""
 
     def __init__(self, *value: Any, **data: Any) -> None:
-        """Set fields by keyword; a single required field may be given as a positional argument."""
+        """Set fields passed as keywords; a single required field may be passed as a positional argument."""
         model = type(self)
         if value:
             data[_positional_field(model, value)] = value[0]
@@ -127,7 +127,7 @@ class FrozenModel(BaseModel, metaclass=_Documented):
         refuse(owner, "no assignment, as settings are immutable", f"got one to {name}", advice)
 
     def replace(self, **values: Any) -> Self:
-        """Return a validated copy in which the given fields have new values."""
+        """Return a validated copy in which the fields passed as keywords have new values."""
         return type(self)(**{name: getattr(self, name) for name in self.model_fields_set} | values)
 
     def __eq__(self, other: object) -> bool:
@@ -151,16 +151,16 @@ class SliderRange(NamedTuple):
 
 
 def slider(low: float, high: float, *, logarithmic: bool = False) -> dict[str, Any]:
-    """Return the `json_schema_extra` that gives a field a slider range narrower than the bounds.
+    """Return the `json_schema_extra` that gives a field a slider range narrower than its bounds.
 
     low, high : values at the ends of the slider
-    logarithmic : whether the slider is logarithmic
+    logarithmic : whether equal steps of the slider are equal ratios of the value
     """
     return {"slider": SliderRange(low, high, logarithmic)}
 
 
 def field_help(model: type[BaseModel], field: str) -> str:
-    """Return the help text of a field in one line, with a summary of each registered name that it accepts."""
+    """Return the help text of a field as one line; add a summary of each registered name that is accepted."""
     info = model.model_fields[field]
     text = re.sub(r"\s+", " ", info.description or "")
     summaries = [one for named in _registry_names(info) for one in named.registry.summaries()]
@@ -168,7 +168,7 @@ def field_help(model: type[BaseModel], field: str) -> str:
 
 
 def field_choices(model: type[BaseModel], field: str) -> tuple[str, ...]:
-    """Return the words that a text field accepts; empty for fields of any text or of other types."""
+    """Return the words that a text field accepts; empty if it accepts any text or is not a text field."""
     info = model.model_fields[field]
     for named in _registry_names(info):
         return named.names
@@ -252,7 +252,7 @@ def accepted_values(model: type[BaseModel], field: str) -> str:
 
 
 def format_default(default: Any) -> str:
-    """Return a default value as typed on the command line; "" for None, booleans and missing defaults."""
+    """Return a default value as a user types it on the command line; "" for None, booleans and no default."""
     if isinstance(default, tuple):
         return ("x" if all(isinstance(one, int) for one in default) else ",").join(
             map(format_default, default)

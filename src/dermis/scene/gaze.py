@@ -1,4 +1,4 @@
-"""Poses in which the eyes look at a point, with the eyelids following."""
+"""Poses in which the eyes look at a point and the eyelids follow."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ _NO_EYES_ADVICE = "Take the parametric human, or name the groups of the file's e
 def looking_at(head: Head, target_mm: ArrayLike, pose: Pose | Mapping[str, float] | None = None) -> Pose:
     """Return a pose in which both eyes look at a point and the lids follow.
 
-    Gaze targets (morph targets such as ARKit's eyeLook...) turn the eyes if the head has gaze targets,
-    otherwise the bones of the eyes do.
+    If the head has gaze targets (morph targets such as ARKit's eyeLookUpLeft), they turn the eyes; otherwise
+    the bones of the eyes do.
 
     target_mm : (3,) point to look at, relative to the head's centre [mm]
-    pose : pose of the head in which the gaze is replaced; None for the rest pose
+    pose : pose whose gaze is replaced; None for the rest pose
 
     Raises DermisError for heads without anatomical eyes and for invalid points.
     """
@@ -66,9 +66,10 @@ def looking_at(head: Head, target_mm: ArrayLike, pose: Pose | Mapping[str, float
 
 
 def _eyelid_rotations(rig: Rig, side_name: str) -> list[BoneRotation]:
-    """Return the morph targets with which the lids of an eye follow the gaze, if a bone turns the eye.
+    """Return the morph targets that move the lids of an eye when a bone turns the eye.
 
-    Each morph target comes with the rotation by which it turns the eye of the parametric human.
+    Each result contains a morph target, and the rotation of the parametric human's eye at which this target
+    has full weight.
 
     side_name : "Left" or "Right"
     """
@@ -100,7 +101,7 @@ def _unit_vector(vector: Doubles) -> Doubles:
 
 
 def _gaze_weights(target_rotations: list[BoneRotation], eye_angles: tuple[float, float]) -> dict[str, Any]:
-    """Return the weights of gaze targets, by name, that turn an eye by given angles.
+    """Return a dictionary from names of gaze targets to the weights that turn an eye by given angles.
 
     eye_angles : angles about x and y [rad]
     """

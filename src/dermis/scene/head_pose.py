@@ -16,8 +16,9 @@ _HEAD_BONE = "head"
 def head_pose(scene: Scene) -> Doubles:
     """Return the transform (R | t), (3, 4), from the head in rest pose to the camera: X_cam = R X + t [mm].
 
-    X is a point of the rigid head, relative to the centre of the head in rest pose: x to the head's left, y
-    up, z to the front. The head moves with the bone "head"; without such a bone, the head does not move.
+    X is a point of the head, relative to the centre of the head in rest pose: x to the head's left, y up, z
+    to the front. The head is treated as a rigid body that moves with the bone "head"; without such a bone, it
+    does not move.
     """
     rotation, shift = _camera_extrinsics(scene)
     head_rotation, head_shift = _rigid_motion(scene)
@@ -27,7 +28,7 @@ def head_pose(scene: Scene) -> Doubles:
 def gaze_directions(scene: Scene) -> Doubles | None:
     """Return the gaze directions (2, 3) of the left and the right eye, as unit vectors in camera space.
 
-    None for heads without anatomical eyes.
+    The result is None for heads without anatomical eyes.
     """
     head, motion = scene.head, _pose_motion(scene)
     if head.eyes is None:

@@ -1,4 +1,4 @@
-"""The [head] table of a scene file: its fields, and checks of combinations of fields."""
+"""The [head] table of a scene file: its fields, and checks that its fields can be combined."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def _eye_limits(field_name: str) -> Any:
 
 
 class EyeTable(FrozenModel):
-    """Eye settings in a [head] table; a field that is None keeps the value of the head's eye look."""
+    """Eye settings in a [head] table; for a field that is None, the value of the head's eye look is kept."""
 
     eumelanin: Annotated[float | None, _eye_limits("eumelanin")] = None
     """Eumelanin of the iris, from 0 for blue to 1 for the darkest brown."""

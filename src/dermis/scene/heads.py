@@ -68,8 +68,9 @@ def load_head(
 ) -> Head:
     r"""Load a head: the parametric human, a sample or a file.
 
-    Options replace what a sample, a glTF file or the .mtl of an OBJ file specifies. Morph targets and bones
-    of a glTF file move the head (`Pose`); its rest pose has the default weights of the file.
+    Options take precedence over what a sample, a glTF file or the .mtl of an OBJ file specifies. Morph
+    targets and bones of a glTF file can move the head (`Pose`). In rest pose, the morph targets have the
+    default weights of the file.
 
     Parameters
     ----------
@@ -79,43 +80,47 @@ def load_head(
     colour, normal, height, specular, roughness : str or path, optional
         Image files of the maps; see `dermis.formats.maps.load_maps`.
     skin_site : str, optional
-        Measured colour of skin that has no picture: a site of the body, such as "palm", "back of hand" or
-        "inner arm", alone or after a group of people, as in "south asian palm" [Lu2025].
+        Site of the body whose measured colour is used for skin that has no picture: "palm", "back of hand",
+        "inner arm" and others. The name of a group of people may precede the site, as in "south asian palm"
+        [Lu2025].
     height_mm : float, optional
-        Relief of one grey level of an 8-bit height map [mm].
+        Height that one grey level of an 8-bit height map represents [mm].
     unit_mm : float, optional
-        Length of the unit of the file [mm]; by default 1000 for glTF, and what the file states for USD. OBJ,
-        PLY and STL state no unit: it is 1 if the mesh then measures 100 to 1000 mm, else it is guessed from
-        the size, with a note.
+        Length of one unit of the file [mm]. The default for glTF is 1000; a USD file states its unit. OBJ,
+        PLY and STL files state no unit: the default is 1 if the mesh then measures 100 to 1000 mm, otherwise
+        the unit is guessed from the size of the mesh, with a note for the user.
     v_origin : {"auto", "top", "bottom"}
-        Row of the maps at v = 0; "auto" follows the format.
+        Row of the maps at v = 0; "auto" follows the convention of the file format.
     up : {"y", "z", "x", "-y", "-z", "-x"}, optional
-        Upward axis of the file; by default the axis that USD states, for other formats y.
+        Upward axis of the file; by default the axis that a USD file states, or y for other formats.
     front : {"auto", "z", "-y", "x", "-z", "y", "-x"}
-        Axis of the file along which the face looks; "auto" uses, in this order: the axis that VRM states, the
-        axis indicated by eyes or by the shape of the head (with a note), -y if z is up, as in Blender, and z.
+        Axis of the file along which the face looks. "auto" uses the first of these that applies: the axis
+        that a VRM file states; the axis that the eyes or the shape of the head indicate (with a note for the
+        user); -y if z is up, as in Blender; z.
     normal_y : {"up", "down"}
         Direction of green in the normal map: "up" (OpenGL) or "down" (DirectX).
     skin_groups : str or sequence of str
-        Groups of the file (materials, meshes, OBJ groups) that are skin; all others are then drawn with their
-        own materials. By default skin is recognised by names, or by the groups that cover the head.
+        Groups of the file (materials, meshes, OBJ groups) that are skin; all other groups are then drawn with
+        the materials of the file. By default, skin is recognised by group names, or as the groups that cover
+        the head.
     opaque : str or sequence of str
-        Groups of the file that are not skin, to correct the automatic choice. Two balls in groups named as
-        eyes become the package's eyes and need not be listed.
+        Groups of the file that are not skin, to correct the automatic choice. Eyeballs that the package
+        replaces (see `eyes`) need not be listed.
     eyes : {"fitted", "plain"}
-        "fitted" replaces two balls in groups named as eyes by the package's eyes, "plain" keeps the file's.
+        "fitted" replaces two balls, in groups whose names denote eyes, by the package's eyes; "plain" keeps
+        the eyes of the file.
     eye_groups : str or sequence of str
-        Groups of the file that contain eyeballs, whatever their names; they may also contain the rest of the
-        head.
+        Groups of the file that contain eyeballs, whatever the names of the groups; a group may also contain
+        the rest of the head.
     eye : mapping, optional
-        Overrides of the look of the eyes: fields of `EyeLook`.
+        Dictionary from fields of `EyeLook` to values that override the look of the eyes.
     subdivide : int, "auto" or callable
-        Levels of subdivision, 0 to 3: Catmull-Clark for meshes of quads, else Loop; at least 1 for the human.
-        "auto" uses as many as the outline needs to look smooth in a portrait of 1024x1024 pixels; for other
-        pictures pass `SmoothIn(camera, size)`.
+        Number of subdivision levels, 0 to 3, and at least 1 for the human. Meshes of quads are subdivided by
+        Catmull-Clark, other meshes by Loop. "auto" uses as many levels as the outline needs to look smooth in
+        a portrait of 1024x1024 pixels; for other pictures pass `SmoothIn(camera, size)`.
     regions : {"auto", "none"}
-        "auto" sets roughness and strength by region of the face if the regions are known and the head has no
-        roughness map; "none" keeps them uniform.
+        "auto" gives each region of the face its own roughness and specular strength if the regions are known
+        and the head has no roughness map; "none" keeps roughness and strength uniform.
 
     Returns
     -------
@@ -130,7 +135,7 @@ def load_head(
     Warns
     -----
     DermisWarning
-        For maps of an .mtl file that are not used.
+        For maps that an .mtl file names but that are not used.
 
     Examples
     --------
@@ -181,7 +186,7 @@ def is_person_name(head_name: str) -> bool:
 def _with_look(head: Head, look: Mapping[str, float] | None) -> Head:
     """Return the head with some fields of its eye look replaced.
 
-    look : new values of fields of `EyeLook`, by field name; None to change nothing
+    look : dictionary from fields of `EyeLook` to new values; None to change nothing
 
     Raises DermisError for a head without anatomical eyes, and for unknown or invalid fields.
     """
@@ -219,10 +224,10 @@ def _load_human(
     mesh_options: dict[str, Any],
     levels: SubdivisionLevels,
 ) -> Head:
-    """Return the head of a parametric human in the layout "own".
+    """Return the head of a parametric human in the uv layout "own".
 
     head_name : "human", "human:SEED", or a person's .json file
-    maps : map files that replace painted maps, by role
+    maps : dictionary from roles to map files that replace painted maps
     mesh_options : options that apply only to mesh files; DermisError is raised unless all have their defaults
     levels : subdivision levels, or a function of the head that returns them
     """

@@ -29,9 +29,9 @@ def light_stage(count: int) -> list[DirectionalLight]:
 def light_stage_weights(lights: Sequence[DirectionalLight], environment: Environment) -> NDArray[np.float64]:
     """Return weights (n, 3) with which the lights of a light stage reproduce an environment, linear Rec. 709.
 
-    The weight of a light is the irradiance from all directions to which this light is the nearest. The
-    picture under the environment is the sum of the pictures under the single lights, multiplied by the
-    weights.
+    The weight of a light is the irradiance from all directions for which this light is the nearest. To obtain
+    the picture under the environment, multiply the picture under each light by the light's weight, and add
+    the products.
 
     Raises DermisError when the panorama cannot be read.
     """

@@ -44,7 +44,7 @@ _BRIGHTNESS_SYNONYMS = ("brightness", "color", "colour", "energy", "intensity", 
 
 
 def _equal_channels(number_or_colour: Any) -> Any:
-    """Return a number as three equal channels (red, green, blue); return other values unchanged."""
+    """Convert a number to three equal channels (red, green, blue); return other values unchanged."""
     return (
         (number_or_colour,) * 3
         if isinstance(number_or_colour, int | float) and not isinstance(number_or_colour, bool)
@@ -199,7 +199,7 @@ class DirectionalLight(_LightBase):
 
     @property
     def sources(self) -> tuple[str, ...]:
-        """Return the bibliography keys of the shading method; none for a light without angular size."""
+        """Return the bibliography keys of the shading method; empty for a light without angular size."""
         return ("Roberts2018",) if self.angle_degrees > 0 else ()
 
 
@@ -269,13 +269,13 @@ def light_presets() -> list[str]:
 
 
 def preset_lights(preset_name: str, head: Head | None = None) -> tuple[Light, ...]:
-    """Return the lights of a light preset, placed for a head.
+    """Return the lights that a light preset places for a head.
 
-    head : head that is lit; None for a head of ordinary size that faces +Z
+    head : head to light; None for a head of ordinary size that faces +Z
 
-    For a body larger than a metre, the lights are farther away and larger in proportion. For a flat piece of
-    skin, the lights are on the side to which the skin faces. Narrow spots keep their distance, as they are
-    aimed at a part of the head.
+    For a body larger than a metre, the lights are proportionally farther away and larger, except for narrow
+    spot lights, which light only a part of the head. For a flat piece of skin, the lights are on the side
+    that the skin faces.
     """
     if preset_name == NO_LIGHTS:
         return ()
@@ -320,7 +320,7 @@ def studio(head: Head | None = None) -> tuple[Light, ...]:
     Parameters
     ----------
     head : Head, optional
-        Head for which the lights are placed: farther away for a body that is larger than a metre.
+        Head for which the lights are placed; lights for a body larger than a metre are farther away.
 
     Returns
     -------

@@ -32,20 +32,21 @@ class Scene:
     head : Head, Human, str or path
         A head, a person, or a name or file that `load_head` accepts.
     lights : sequence of lights, light or str, optional
-        Lights or the name of a preset; by default the preset "studio", or no lights with an environment.
+        Lights or the name of a preset; by default the preset "studio", or no lights if there is an
+        environment.
     camera : Camera, str or callable, optional
         A camera, the name of a preset, or a function of the head; by default `portrait`.
     skin : Skin or mapping, optional
-        Skin settings, or values of fields of `Skin` by name; by default `Skin()`.
+        Skin settings, or a mapping from fields of `Skin` to values; by default `Skin()`.
     environment : Environment, str or path, optional
         An environment or the name of its panorama.
     pose : Pose or mapping, optional
-        Pose of the head, or weights of its morph targets by name; by default the rest pose.
+        Pose of the head, or a mapping from morph targets to weights; by default the rest pose.
 
     Raises
     ------
     DermisError
-        For a pose that the head cannot take, and for arguments of other types.
+        For a pose that the head cannot assume, and for arguments of other types.
 
     Examples
     --------
@@ -92,7 +93,7 @@ class Scene:
         return scene if isinstance(scene, Scene) else cls(scene)  # type: ignore[arg-type]
 
     def replace(self, **parts: Any) -> Scene:
-        """Return a validated copy in which the given fields, such as skin or lights, have new values."""
+        """Return a validated copy in which the fields passed as keywords, such as skin, have new values."""
         return replace(self, **parts)
 
     def _set_field(self, field_name: str, field_value: object) -> None:

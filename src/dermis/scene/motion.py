@@ -38,23 +38,26 @@ def load_motion(
     Parameters
     ----------
     path : str or path
-        A glTF file: the head's own file, or a file with the same names of nodes or targets ("file.glb#clip"
-        selects one of several clips); a CSV file of Live Link Face; results of MediaPipe's face landmarker in
-        JSON; or a sequence of mesh files of one topology: a folder, "face_%05d.obj" or "face_*.ply".
+        One of: a glTF file whose nodes or morph targets have the same names as in the head's file
+        ("file.glb#clip" selects one of several clips); a CSV file of Live Link Face; a JSON file with results
+        of MediaPipe's face landmarker; a sequence of mesh files with the topology of the head, written as a
+        folder, "face_%05d.obj" or "face_*.ply".
     head : Head
         Head that moves.
     clip : str, optional
         Name of the clip in a glTF file.
     fps : float, optional
-        Frame rate of a sequence (by default 30), of a CSV file whose timecode does not imply it, or of
-        results without times.
+        Frame rate of a mesh sequence (by default 30), of a CSV file whose timecode does not imply a frame
+        rate, or of MediaPipe results without times [1/s].
     unit_mm : float, optional
-        Length of the unit of a sequence's files [mm]; by default the length that makes the meshes as large as
-        the head.
+        Length of one unit in the files of a mesh sequence [mm]; by default the length for which the meshes
+        are as large as the head.
     up : {"y", "z", "x", "-y", "-z", "-x"}, optional
-        Upward axis of a sequence's files; without `up` and `front`, they have the axes of the head's file.
+        Upward axis of the files of a mesh sequence; without `up` and `front`, these files have the axes of
+        the head's file.
     front : {"auto", "z", "-y", "x", "-z", "y", "-x"}
-        Axis of a sequence's files along which the face looks; with `up` given, "auto" is -y for z up, else z.
+        Axis along which the face looks in the files of a mesh sequence. If `up` is given, "auto" means -y for
+        z up, and z for other upward axes.
 
     Returns
     -------
@@ -65,8 +68,8 @@ def load_motion(
     Raises
     ------
     DermisError
-        For files that cannot be read, naming the line, and for motion that matches no target or bone of the
-        head.
+        For files that cannot be read, with the number of the faulty line, and for motion without any target
+        or bone of the head.
 
     Examples
     --------

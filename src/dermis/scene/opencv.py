@@ -37,7 +37,9 @@ class OpenCvCamera(NamedTuple):
 def from_opencv(K: ArrayLike, R: ArrayLike, t: ArrayLike, size: tuple[int, int]) -> dict[str, Any]:
     """Return the fields of a `Camera` from OpenCV matrices.
 
-    K, R, t : intrinsic matrix [pixel], rotation, and translation [mm], see `OpenCvCamera`
+    K : intrinsic matrix [pixel], see `OpenCvCamera`
+    R : rotation from the scene to the camera
+    t : translation [mm]
     size : width and height of the picture [pixel]
 
     Raises DermisError for matrices that do not describe a pinhole camera.
@@ -70,8 +72,8 @@ def from_opencv(K: ArrayLike, R: ArrayLike, t: ArrayLike, size: tuple[int, int])
 def intrinsics(lens: tuple[float, tuple[float, float], float], picture_size: tuple[int, int]) -> Doubles:
     """Return the intrinsic matrix K (3, 3) of a camera [pixel].
 
-    lens : tangent of half the vertical angle of view; principal point as fractions of width and height from
-        the upper left corner; and width of a pixel divided by its height
+    lens : three values: the tangent of half the vertical angle of view; the principal point, measured from
+        the upper left corner in fractions of width and height; the width of a pixel divided by its height
     picture_size : width and height of the picture [pixel]
     """
     half_view_tangent, principal_point, pixel_aspect = lens
@@ -85,7 +87,7 @@ def extrinsics(position: ArrayLike, target: ArrayLike, up: ArrayLike) -> tuple[D
     """Return the rotation R (3, 3) and translation t (3,) [mm] of a camera that looks at a target.
 
     position, target : (3,) positions of camera and target [mm]
-    up : (3,) direction that is up in the picture
+    up : (3,) direction in the scene that points up in the picture
     """
     forward = _normalise(np.subtract(target, position))
     right = _normalise(np.cross(forward, np.asarray(up, np.float64)))

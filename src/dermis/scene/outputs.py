@@ -50,9 +50,9 @@ class Output:
     background : float
         Pixel value where there is neither head nor hair.
     quantisation : Quantisation, optional
-        Quantisation in PNG files; without it only 8-bit outputs can be written as PNG.
+        Quantisation in PNG files; an output without quantisation can be written as PNG only if it has 8 bits.
     shader : Path, optional
-        File of `fn NAME_output`, if it is not in the shader of the stage.
+        File that contains `fn NAME_output`, if the function is not in the shader of the stage.
 
     Examples
     --------

@@ -13,7 +13,7 @@ def skin_of(person: Human, base: Skin | None = None) -> Skin:
     In darker skin, light scatters less far. The settings do not change the colour of the skin, as the painted
     maps of the person determine this colour.
 
-    base : skin settings whose other fields are kept; None for the default skin
+    base : skin settings from which all other fields are taken; None for the default skin
     """
     look = person.look
     pigments = Pigments(

@@ -1,4 +1,7 @@
-"""Side of the atlas that a picture resolves, the default of software adapters, which diffuse light slowly."""
+"""Side of the atlas that suits the resolution of a picture.
+
+Software adapters, which diffuse light slowly, use this side by default.
+"""
 
 from __future__ import annotations
 
@@ -17,10 +20,10 @@ _MIN_ATLAS_SIDE = 1024  # coarser texels would blur the light of the narrowest p
 
 
 def resolved_atlas_side(scene: Scene, settings: Settings) -> int:
-    """Return the side of the smallest atlas with a texel for every three pixels [texel].
+    """Return the side of the smallest atlas with at least one texel per three pixels of the picture [texel].
 
-    It is a power of two, at least 1024 and at most the side in `settings`. Pixels are measured at the target
-    of the camera, and texels by the area of the skin.
+    The side is a power of two, at least 1024 and at most the side in `settings`. The size of a pixel on the
+    skin is taken at the target of the camera; the size of a texel follows from the area of the skin.
     """
     pixels_per_mm = settings.size[1] / scene.camera.frame_mm
     side = (

@@ -25,9 +25,9 @@ _PATH_FIELDS = {"profile", "profile_map", "other_profiles", "name"}
 
 
 def save_scene(path: Path, scene: Scene, settings: Settings, head: Mapping[str, Any]) -> None:
-    """Write a scene to a TOML file in an atomic write, so that `dermis render` draws the same picture.
+    """Write a scene atomically to a TOML file, from which `dermis render` draws the same picture.
 
-    head : [head] table of the scene with absolute file names
+    head : [head] table of the scene, with absolute file names
 
     Raises DermisError when the file cannot be written.
     """
@@ -36,11 +36,11 @@ def save_scene(path: Path, scene: Scene, settings: Settings, head: Mapping[str, 
 
 
 def scene_text(scene: Scene, settings: Settings, head: Mapping[str, Any]) -> str:
-    """Return a scene as the text of a TOML file.
+    """Return the TOML text that describes a scene.
 
-    head : [head] table of the scene with absolute file names
+    head : [head] table of the scene, with absolute file names
 
-    Raises DermisError for a pose with positions of points, which do not fit into a scene file.
+    Raises DermisError for a pose given as point positions, which scene files cannot contain.
     """
     excluded = _FIELDS_SET_BY_REGIONS if has_region_table(head) else set()
     parts = [] if scene.lights else ['lights = "none"\n']

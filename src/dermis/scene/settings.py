@@ -54,7 +54,7 @@ else:
 
 
 def _square_size(typed_size: Any) -> Any:
-    """Return an integer as the width and height of a square; return other values unchanged."""
+    """Convert an integer to the width and height of a square; return other values unchanged."""
     return (typed_size, typed_size) if isinstance(typed_size, int) else typed_size
 
 

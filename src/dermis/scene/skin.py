@@ -60,7 +60,7 @@ class Pigments(FrozenModel):
     """Absorption of tissue without blood and melanin, relative to that of [Jacques1998]."""
 
     def overrides(self) -> dict[str, float]:
-        """Return the values that override pigments of the profile, by field name: all fields except None."""
+        """Return a dictionary from field names to the values that override pigments of the profile."""
         return self.model_dump(exclude={"structure"}, exclude_none=True)
 
 
@@ -191,7 +191,7 @@ class Skin(FrozenModel):
 def lobe_name(skin: Skin) -> str:
     """Return the name of the specular lobe of a skin, or of the default lobe if the skin has none.
 
-    Wet materials, such as eyes, have a lobe even if the skin has none.
+    The default is needed because wet materials, such as eyes, have a lobe even if the skin has none.
     """
     from dermis.specular.models import MODELS
 

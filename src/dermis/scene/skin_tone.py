@@ -34,15 +34,16 @@ def default_skin_colour() -> Doubles:
 def with_skin_tone(
     mesh: Mesh, maps: Maps, skin_site: str | None = None, colour_map_chosen: bool = False
 ) -> tuple[Maps, str]:
-    """Return maps in which a uniform colour replaces a missing colour map, and a note for the user or "".
+    """Return maps in which a uniform colour replaces a missing colour map, and a note for the user.
 
-    skin_site : name of a measured colour, which replaces the materials' colour, see `measured_tone`
+    skin_site : name of a measured colour to use instead of the materials' colours, see `measured_tone`
     colour_map_chosen : whether the user has chosen the colour map
 
-    The colour is the mean colour of the skin's materials. A material with no colour, white, or the default
-    grey of Blender counts with the colour of the default skin. Maps with a colour map are returned unchanged.
+    By default, the uniform colour is the mean colour of the skin's materials. In this mean, a material
+    without a colour, or with white or Blender's default grey, has the colour of the default skin. Maps with a
+    colour map are returned unchanged. The note is "" if there is nothing to say.
 
-    Raises DermisError for a site of skin together with a colour map, and for unknown sites.
+    Raises DermisError for an unknown `skin_site`, and for a `skin_site` together with a colour map.
     """
     if colour_map_chosen or (maps.colour is not None and maps.colour.shape[:2] != (1, 1)):
         if skin_site is not None:

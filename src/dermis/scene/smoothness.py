@@ -1,4 +1,4 @@
-"""Subdivision levels with which the silhouette of a head looks smooth in a picture."""
+"""Choice of the subdivision levels at which the silhouette of a head looks smooth in a picture."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ _NEAR_PLANE_MM = 1.0
 
 @dataclass(frozen=True)
 class SmoothIn:
-    """Choice of the subdivision levels with which the outline of a head looks smooth in a picture.
+    """Choice of the subdivision levels at which the outline of a head looks smooth in a picture.
 
-    An instance is a function of the head, which `load_head` accepts as `subdivide`. The result depends only
-    on the camera, the size and the head in rest pose.
+    An instance can be called with a head and returns the levels; `load_head` accepts it as `subdivide`. The
+    result depends only on the camera, the size and the head in rest pose.
 
     camera : function that returns a camera for the head before subdivision
     size : width and height of the picture [pixel]
@@ -59,7 +59,8 @@ class SmoothIn:
 def resolve_levels(subdivide: Subdivide) -> SubdivisionLevels:
     """Return subdivision levels, or a function of the head that returns the levels.
 
-    subdivide : levels or function, which are returned unchanged, or "auto" for `SmoothIn()`
+    subdivide : number of levels or a function, which are returned unchanged, or "auto", which gives
+        `SmoothIn()`
 
     Raises DermisError for other text.
     """
@@ -76,7 +77,8 @@ class Silhouette(NamedTuple):
     """Silhouette edges of a mesh in a picture: edges between a front-facing and a back-facing triangle.
 
     length_px : (e,) length of each edge [pixel]
-    deviation_px : (e,) largest distance of each edge from the smooth curve through its ends [pixel]
+    deviation_px : (e,) largest distance between each edge and the smooth curve through the edge's ends
+        [pixel]
     """
 
     length_px: Doubles
@@ -94,12 +96,12 @@ class Silhouette(NamedTuple):
 
 
 def silhouette(mesh: Mesh, K: Doubles, R: Doubles, t: Doubles, picture_size: tuple[int, int]) -> Silhouette:
-    """Return the silhouette edges of a mesh that lie in the picture, including occluded edges.
+    """Return the silhouette edges of a mesh that lie within the picture, including occluded edges.
 
-    Edges of eyeballs are omitted. A smooth curve through two points with unit normals n0 and n1 deviates from
-    the chord d by |(n1 - n0) . d| / 8.
+    Edges of eyeballs are omitted. If d is the vector along an edge, and n0 and n1 are the unit normals at the
+    ends of the edge, then the smooth curve through the ends deviates from the edge by |(n1 - n0) . d| / 8.
 
-    K, R, t : matrices of the camera in OpenCV's convention, for positions of the mesh [mm]
+    K, R, t : camera matrices in OpenCV's convention, which apply to the mesh's positions in mm
     picture_size : width and height of the picture [pixel]
     """
     camera_points = mesh.points_mm @ R.T + t
@@ -123,7 +125,7 @@ def silhouette(mesh: Mesh, K: Doubles, R: Doubles, t: Doubles, picture_size: tup
 
 
 def smooth_levels(typical_deviation_px: float, triangle_count: int) -> int:
-    """Return the smallest number of subdivision levels with which a silhouette looks smooth.
+    """Return the smallest number of subdivision levels at which a silhouette looks smooth.
 
     typical_deviation_px : deviation of the silhouette before subdivision; each level divides it by 4 [pixel]
     triangle_count : number of triangles before subdivision; each level multiplies it by 4

@@ -31,7 +31,7 @@ def picture_sources(
 ) -> tuple[str, ...]:
     """Return the bibliography keys of all methods used for a picture, without duplicates.
 
-    relief : whether the head has a normal map or a height map
+    relief : whether the head has a normal map or height map
 
     Raises DermisError for an unknown profile.
     """
@@ -59,7 +59,7 @@ def scattering_sources(settings: Settings) -> tuple[str, ...]:
 
 
 def profile_sources(skin: Skin) -> tuple[str, ...]:
-    """Return the bibliography keys of a skin's diffusion profile; none for a user's table of Gaussians."""
+    """Return the bibliography keys of a skin's diffusion profile; empty for a user's table of Gaussians."""
     from dermis.optics.profiles import find_gaussians
     from dermis.scene.tissue import skin_tissue
 

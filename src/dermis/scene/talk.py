@@ -1,7 +1,7 @@
 """Settings that reproduce faults and historical methods of the 2007 talk, for comparison.
 
-The settings are fields of `Skin` and `Settings` because the gallery draws pictures with them. Help texts and
-the viewer list these fields last, under a separate heading.
+These settings are fields of `Skin` and `Settings`, as the gallery uses them to draw its pictures. Help texts
+and the viewer list the fields last, under a separate heading.
 
 Source: [dEonLuebke2007].
 """

@@ -12,10 +12,10 @@ from dermis.scene.skin import Pigments, Skin, TissueLayer
 
 
 def skin_tissue(skin: Skin) -> Tissue:
-    """Return the tissue of a skin: the profile's tissue, overridden by pigments or layers of the skin.
+    """Return the tissue of a skin: the tissue of its profile, overridden by the skin's pigments or layers.
 
-    Raises DermisError for a profile that is not a tissue, and for pigments or layers that the tissue does not
-    have.
+    Raises DermisError for a profile that does not describe a tissue, and for overrides of pigments or layers
+    that the tissue lacks.
     """
     if skin.layers:
         return load_tissue(skin.profile).with_layers(_to_media_layers(skin.layers))
@@ -24,9 +24,9 @@ def skin_tissue(skin: Skin) -> Tissue:
 
 
 def tissue_layers(skin: Skin) -> tuple[TissueLayer, ...]:
-    """Return the layers of a skin's tissue; empty for a tissue described by spectra, not RGB coefficients.
+    """Return the layers of a skin's tissue; empty for a tissue given by spectra instead of RGB coefficients.
 
-    Raises DermisError for a profile that is not a tissue.
+    Raises DermisError for a profile that does not describe a tissue.
     """
     if skin.layers:
         return skin.layers

@@ -1,6 +1,6 @@
 """Deterministic formatting of plain Python objects as TOML.
 
-Data sets are identified by the hash of this text, so its format must not depend on a library.
+The hash of this text identifies a data set, so the format must not depend on the version of a library.
 """
 
 from __future__ import annotations

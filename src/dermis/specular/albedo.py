@@ -1,4 +1,4 @@
-"""Directional albedo of specular lobes: the reflected fraction of light, which does not enter the skin."""
+"""Directional albedo of specular lobes: the fraction of the incident light that a lobe reflects."""
 
 from __future__ import annotations
 
@@ -31,18 +31,19 @@ def directional_albedo(
 ) -> Floats:
     """Return the directional-hemispherical reflectance rho_dt of a lobe of specular strength rho_s = 1 [-].
 
-    cos_theta : cosine of the exitant angle or, equally for reciprocal models, of the incident angle
+    cos_theta : cosine of the angle between normal and viewer or, for reciprocal lobes, normal and light
     m : roughness; broadcast against cos_theta [-]
-    lobe : BRDF that is integrated
+    lobe : BRDF to integrate
     fresnel : Fresnel reflectance of the lobe
     nodes : number of quadrature nodes along and across the plane of incidence
 
-    The integral runs over the slopes (x, y) of the half vector, where lobes are smooth and of width m. The
-    light is above the surface for slopes within a circle of radius 1 / cos theta around (tan theta, 0).
-    Gauss-Legendre rules in atan(x / m) and atan(y / m) over this circle resolve narrow peaks and grazing
-    angles, unlike the 80 x 80 directions of the published rule.
+    The integral is taken over the slopes (x, y) of the half vector. As a function of these slopes, a lobe is
+    smooth and about m wide. The light is above the surface if the slopes are within a circle of radius 1 /
+    cos theta around (tan theta, 0). Over this circle, Gauss-Legendre rules in atan(x / m) and atan(y / m)
+    resolve narrow peaks and grazing angles. The 80 x 80 directions of the published method do not resolve
+    them.
 
-    Source: [dEonLuebke2007] section 14.3 for the quantity.
+    Source: [dEonLuebke2007] section 14.3, for the definition of rho_dt.
     """
     cosine, roughness = np.broadcast_arrays(np.asarray(cos_theta, float), np.asarray(m, float))
     c, m = np.clip(cosine[..., None, None], _MIN_COSINE, 1.0), roughness[..., None, None]
@@ -63,9 +64,9 @@ def directional_albedo(
 def _slope_quadrature(
     low_slope: Floats, high_slope: Floats, m: Floats, node_count: int
 ) -> tuple[Floats, Floats]:
-    """Return quadrature nodes and weights for slopes from `low_slope` to `high_slope`, on the last axis.
+    """Return quadrature nodes and weights for slopes from `low_slope` to `high_slope`, along the last axis.
 
-    The nodes are dense within m of slope 0, where lobes of roughness m have their peak.
+    The nodes are dense within m of slope 0, where a lobe of roughness m peaks.
     """
     nodes_unit, weight = np.polynomial.legendre.leggauss(node_count)
     first, last = np.arctan(low_slope / m), np.arctan(high_slope / m)

@@ -14,7 +14,8 @@ _BECKMANN_TABLE_EXPONENT = 0.1
 def beckmann(cos_h: ArrayLike, m: ArrayLike) -> NDArray[np.float64]:
     """Return the Beckmann distribution exp(-tan^2 / m^2) / (m^2 cos^4) without its factor 1/pi [-].
 
-    cos_h : cosine between normal and half vector; the tangent in the formula is of the same angle
+    cos_h : cosine of the angle between normal and half vector; the formula contains the cosine and the
+        tangent of this angle
     m : roughness, the root mean square slope [-]
 
     Source: [Beckmann1963], in the form of [dEonLuebke2007] section 14.3.
@@ -30,9 +31,9 @@ def beckmann(cos_h: ArrayLike, m: ArrayLike) -> NDArray[np.float64]:
 def beckmann_table(table_side: int = BECKMANN_TABLE_SIZE) -> NDArray[np.float32]:
     """Return beckmann(cos_h, m)^0.1 / 2 as a table (table_side, table_side) for the shader.
 
-    Columns are cos_h from 0 to 1 inclusive, so that the peak of the highlight is in the table; rows are m at
-    texel centres. The power flattens the peak for accurate interpolation; the shader decodes a value t as (2
-    t)^10.
+    Each row has one roughness m, the value at the texel's centre. Along a row, cos_h increases from 0 to 1
+    inclusive, so the table contains the peak of the highlight. The exponent 0.1 flattens the peak, which
+    makes interpolation accurate. The shader recovers the distribution from a table value t as (2t)^10.
 
     Source: [dEonLuebke2007] section 14.3.
     """

@@ -21,13 +21,14 @@ def blinn_phong_exponent(m: ArrayLike) -> Floats:
 
 
 def blinn_phong(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
-    """Return the normalised Blinn-Phong BRDF F (s + 2) / 8 pi (n.h)^s [1/sr].
+    """Return the normalised Blinn-Phong BRDF F (s + 2) / (8 pi) (n.h)^s [1/sr].
 
     m : roughness, from which `blinn_phong_exponent` yields s; broadcast against the angles [-]
     fresnel : function that returns F from the cosine v.h
 
-    The factor (s + 2) / 8 pi is a quarter of the factor that normalises the slope distribution. The lobe has
-    no masking and no division by n.l n.v, so it fades at grazing angles, where the lobe of skin does not.
+    The factor (s + 2) / (8 pi) is a quarter of the factor (s + 2) / (2 pi), which normalises the slope
+    distribution. The BRDF contains neither masking nor a division by n.l n.v. It therefore fades at grazing
+    angles, unlike the specular reflection of skin.
 
     Source: [Blinn1977]; the distribution as normalised in [Walter2007] section 5.2.
     """
@@ -37,12 +38,13 @@ def blinn_phong(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Fl
 
 
 def blinn_phong_plain(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
-    """Return the original Blinn-Phong highlight F (n.h)^s as a BRDF, divided by pi n.l [1/sr].
+    """Return the BRDF F (n.h)^s / (pi n.l) of the original Blinn-Phong highlight [1/sr].
 
     m : roughness, from which `blinn_phong_exponent` yields s; broadcast against the angles [-]
 
-    The original highlight has no factor n.l, so the BRDF is not reciprocal. Early renderers added the
-    highlight to a diffuse term without 1/pi; here both terms are divided by pi.
+    The original highlight F (n.h)^s was not multiplied by n.l, so its BRDF contains 1 / n.l and is not
+    reciprocal. Early renderers added the highlight to a diffuse term without the factor 1/pi; here both terms
+    have this factor.
 
     Source: [Blinn1977].
     """

@@ -19,14 +19,15 @@ _NORMAL = np.array([0.0, 0.0, 1.0])
 
 
 def normal_incidence_peak(model: str, m: float) -> float:
-    """Return the BRDF of a model for light and view along the normal, for rho_s = 1 [1/sr]."""
+    """Return the BRDF of a model with rho_s = 1 when light and viewer are both on the normal [1/sr]."""
     return float(MODELS[model].lobe(cosines(_NORMAL, _NORMAL, _NORMAL), m))
 
 
 def reciprocity_error(model: str) -> float:
     """Return a BRDF's largest change when light and view are exchanged, relative to the BRDF's maximum [-].
 
-    Light and view are random directions up to 85 degrees from the normal. All compared roughnesses are tried.
+    Light and view are random directions up to 85 degrees from the normal. The result is the maximum over all
+    compared roughnesses.
     """
     rng = np.random.default_rng(1)
     l, v = (_random_directions(rng) for _ in range(2))

@@ -27,7 +27,7 @@ class Cosines:
 
     @property
     def is_above(self) -> NDArray[np.bool_]:
-        """Return the mask of directions for which both light and view are above the surface."""
+        """Return the mask of array elements for which light and viewer are both above the surface."""
         return (self.n_l > 0.0) & (self.n_v > 0.0)
 
     above = renamed_attribute("above", "is_above")

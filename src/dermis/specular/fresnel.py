@@ -22,7 +22,7 @@ SKIN_ETA = 1.4
 def schlick(cos_theta: ArrayLike, f0: float = SKIN_F0) -> Floats:
     """Return Schlick's approximation of the Fresnel reflectance [-].
 
-    cos_theta : cosine between view and half vector
+    cos_theta : cosine of the angle between view and half vector
     f0 : reflectance at normal incidence [-]
 
     Source: [Schlick1994].
@@ -35,7 +35,7 @@ def schlick(cos_theta: ArrayLike, f0: float = SKIN_F0) -> Floats:
 def dielectric(cos_theta: ArrayLike, eta: float = SKIN_ETA) -> Floats:
     """Return the exact Fresnel reflectance for unpolarised light from air onto a dielectric [-].
 
-    cos_theta : cosine between view and half vector
+    cos_theta : cosine of the angle between view and half vector
     eta : index of refraction of the dielectric, 1 or more [-]
 
     Source: [CookTorrance1982], in the form for unpolarised light.
@@ -52,9 +52,11 @@ FRESNEL: dict[str, Fresnel] = {"schlick": schlick, "exact": dielectric}
 
 
 def hemispherical_reflectance(fresnel: Fresnel = dielectric, node_count: int = 64) -> float:
-    """Return the reflectance 2 int F(mu) mu dmu of a smooth surface under a uniform sky [-].
+    """Return the reflectance of a smooth surface under a uniform sky [-].
 
-    fresnel : function that returns F from the cosine mu of incidence
+    The result is twice the integral of F(mu) mu over mu from 0 to 1.
+
+    fresnel : function that returns the Fresnel reflectance F from the cosine mu of the angle of incidence
     node_count : number of quadrature nodes
     """
     x, w = np.polynomial.legendre.leggauss(node_count)
@@ -64,13 +66,14 @@ def hemispherical_reflectance(fresnel: Fresnel = dielectric, node_count: int = 6
 
 @dataclass(frozen=True)
 class EnergyScheme:
-    """Energy conservation scheme, which reduces diffuse light by the light that the specular lobe reflects.
+    """Energy conservation scheme: reduces diffuse light by the light that the specular lobe reflects.
 
     The diffuse BRDF is albedo / pi times (1 - k rho_dt(n.l)) (1 - k rho_dt(n.v)) / c, with the directional
     albedo rho_dt of the lobe and k = `loss` times the specular strength rho_s. The divisor c is 1 minus k
     times the mean albedo if `returns_internal_light` is true, otherwise 1.
 
-    loss : factor of the reflected light: 0 for no conservation, 1 for the light of the lobe, pi as published
+    loss : factor on the reflected light that is subtracted: 0 subtracts nothing, 1 subtracts exactly the
+        light that the lobe reflects, and pi is the published factor
     returns_internal_light : whether light that the surface reflects back into the skin leaves the skin later;
         if False, this light is lost
     """

@@ -25,7 +25,8 @@ _REFERENCE_FIBRE_RADIUS_MM = 0.04  # radius of a hair; the absorptions above are
 class FibreParameters(NamedTuple):
     """Widths of the scattering lobes of a hair fibre.
 
-    variance : longitudinal variance of the lobes R, TT, TRT and of all lobes with more internal reflections
+    variance : longitudinal variances of the lobes R, TT and TRT, and of all lobes with more internal
+        reflections
     width : scale of the azimuthal logistic distribution [rad]
     """
 
@@ -36,9 +37,10 @@ class FibreParameters(NamedTuple):
 def fibre_parameters(
     longitudinal_roughness: float = LONGITUDINAL_ROUGHNESS, azimuthal_roughness: float = AZIMUTHAL_ROUGHNESS
 ) -> FibreParameters:
-    """Return the lobe widths of a fibre from the perceptual roughness along and around the fibre's axis.
+    """Return the lobe widths of a fibre from its perceptual roughness along and around its axis.
 
-    longitudinal_roughness, azimuthal_roughness : longitudinal and azimuthal roughness, 0 to 1 [-]
+    longitudinal_roughness : roughness along the axis, 0 to 1 [-]
+    azimuthal_roughness : roughness around the axis, 0 to 1 [-]
 
     Source: [Chiang2016] equations 7 and 8.
     """
@@ -52,7 +54,7 @@ def fibre_parameters(
 
 
 def hair_constants() -> dict[str, float]:
-    """Return the values of the placeholders in hair.wgsl, by name."""
+    """Return a dictionary from the names of the placeholders in hair.wgsl to their values."""
     default = fibre_parameters()
     return {
         "hair_eta": KERATIN_ETA,
@@ -68,7 +70,7 @@ def absorption_per_mm(eumelanin: ArrayLike, pheomelanin: ArrayLike) -> Floats:
     """Return the absorption coefficient (..., 3) inside hairs from their pigment concentrations [1/mm].
 
     eumelanin : concentration of brown pigment: 0.3 is blond, 1.3 brown, 8 black
-    pheomelanin : concentration of red pigment: 2 without eumelanin is red
+    pheomelanin : concentration of red pigment: 2 without eumelanin gives red hair
 
     Source: [dEon2011] section 6.1.
     """
@@ -79,9 +81,10 @@ def absorption_per_mm(eumelanin: ArrayLike, pheomelanin: ArrayLike) -> Floats:
 
 
 def longitudinal_scattering(sin_i: ArrayLike, sin_o: ArrayLike, variance: float) -> Floats:
-    """Return the longitudinal scattering function, whose integral over the light's sine sin_i is 1 [-].
+    """Return the longitudinal scattering function, whose integral over sin_i is 1 [-].
 
-    sin_i, sin_o : sines of the inclinations of light and view, towards the tip of the fibre
+    sin_i : sine of the angle by which the direction to the light is inclined towards the tip of the fibre
+    sin_o : sine of the same angle for the direction to the viewer
     variance : variance of the lobe
 
     Source: [dEon2011] equation 7.
@@ -98,7 +101,7 @@ def longitudinal_scattering(sin_i: ArrayLike, sin_o: ArrayLike, variance: float)
 
 
 def azimuthal_logistic(x: ArrayLike, width: float) -> Floats:
-    """Return the logistic distribution of azimuths x, truncated to (-pi, pi) [1/rad].
+    """Return the density at azimuth x of the logistic distribution truncated to (-pi, pi) [1/rad].
 
     width : scale of the distribution [rad]
 
@@ -121,12 +124,12 @@ def fresnel(cosine: ArrayLike) -> Floats:
 
 
 def lobe_fractions(sin_o: ArrayLike, absorption_depth: ArrayLike, h: ArrayLike) -> list[Floats]:
-    """Return the fractions (..., 3) of light in the lobes R, TT and TRT, and in all further lobes together.
+    """Return four arrays (..., 3): fractions of light in the lobes R, TT and TRT and in all further lobes.
 
-    R is reflected light, TT transmitted light, and TRT light that is reflected once inside the fibre. Without
-    absorption, the fractions sum to 1.
+    R is reflected light, TT is transmitted light, and TRT is light reflected once inside the fibre. Without
+    absorption, the four fractions sum to 1.
 
-    sin_o : sine of the inclination of the view
+    sin_o : sine of the angle by which the direction to the viewer is inclined towards the tip of the fibre
     absorption_depth : (..., 3) absorption coefficient times the radius of the fibre [-]
     h : offset of the incident ray from the fibre's axis, in units of the fibre's radius, -1 to 1 [-]
 
@@ -153,13 +156,14 @@ def fibre_scattering(
 ) -> Floats:
     """Return the radiance (..., 3) of a fibre per unit of irradiance, averaged over the fibre's width [1/sr].
 
-    sin_i, sin_o : sines of the inclinations of light and view, towards the tip of the fibre
-    phi : azimuth from light to view around the fibre [rad]
+    sin_i : sine of the angle by which the direction to the light is inclined towards the tip of the fibre
+    sin_o : sine of the same angle for the direction to the viewer
+    phi : azimuth around the fibre from light to viewer [rad]
     absorption_depth : (3,) absorption coefficient times the radius of the fibre [-]
     parameters : widths of the lobes
 
-    Irradiance refers to a plane that faces the light. The cosine of incidence on the fibre is included:
-    without absorption, the integral of the result over all light directions is 1.
+    Irradiance is measured on a plane that faces the light. The result includes the cosine of incidence on the
+    fibre, so its integral over all light directions is 1 without absorption.
 
     Source: [Marschner2003], with the terms of [dEon2011, Chiang2016].
     """
@@ -179,8 +183,9 @@ def fibre_scattering(
 
 
 def tilted_sine(sin_o: ArrayLike, p: int) -> Floats:
-    """Return the sine of the view's inclination, corrected for the tilt of the cuticle's scales.
+    """Return the sine of the viewer's inclination for one lobe, corrected for the tilt of the cuticle scales.
 
+    sin_o : sine of the angle by which the direction to the viewer is inclined towards the tip of the fibre
     p : index of the lobe: 0 for R, 1 for TT, 2 for TRT, 3 for all further lobes
     """
     angle = np.arcsin(np.clip(np.asarray(sin_o, float), -1, 1))

@@ -14,13 +14,13 @@ from dermis.specular.models import Model
 
 
 def kelemen(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
-    """Return the BRDF D F / (4 pi (v.h)^2) for rho_s = 1, without the cosine of the light [1/sr].
+    """Return the BRDF D F / (4 pi (v.h)^2) for rho_s = 1, without the factor n.l [1/sr].
 
     m : roughness of the Beckmann distribution D; broadcast against the angles [-]
     fresnel : function that returns F from the cosine v.h
 
-    The denominator equals pi |l + v|^2. The published shader omits 1/pi in the Beckmann distribution and in
-    the diffuse term; here both terms have the factor 1/pi, so the ratio of the two terms is as published.
+    The denominator equals pi |l + v|^2. The published shader omits the factor 1/pi in both the Beckmann
+    distribution and the diffuse term; here both have it, so their ratio is as published.
 
     Source: [Kelemen2001]; [dEonLuebke2007] section 14.3.
     """

@@ -1,4 +1,4 @@
-"""Registry of the specular models by their names in scene files."""
+"""Registry of specular models under the names that scene files use."""
 
 from __future__ import annotations
 
@@ -18,14 +18,15 @@ if TYPE_CHECKING:
 
 
 class Lobe(Protocol):
-    """Specular BRDF for rho_s = 1, without the cosine of the light [1/sr]; 0 below the surface."""
+    """Specular BRDF for rho_s = 1, without the factor n.l [1/sr]; 0 below the surface."""
 
     def __call__(self, angles: Cosines, m: ArrayLike, fresnel: Fresnel = ...) -> Floats:
         """Return the BRDF for arrays of cosines.
 
         angles : cosines between normal, light, view and half vector
         m : roughness, broadcast against the angles [-]
-        fresnel : function from the cosine between view and half vector to the Fresnel reflectance
+        fresnel : function that returns the Fresnel reflectance from the cosine v.h between view and half
+            vector
         """
 
 
@@ -33,21 +34,21 @@ class Lobe(Protocol):
 class Model:
     """Specular model: a lobe, its shader and its description.
 
-    The shader has the file name of the lobe's module and defines `fn NAME(a: Angles, m: f32) -> f32`, where
-    NAME is the model's name in scene files with underscores for hyphens.
+    The shader file is named after the lobe's Python module. It defines `fn NAME(a: Angles, m: f32) -> f32`,
+    where NAME is the model's name in scene files with underscores for hyphens.
 
     Parameters
     ----------
     lobe : Lobe
         BRDF in NumPy.
     note : str
-        Short description; for a lobe that is not reciprocal, with the reason why the lobe is not reciprocal.
+        Short description; for a lobe that is not reciprocal, it includes the reason.
     reciprocal : bool
         Whether the BRDF is unchanged when light and view are exchanged.
     sources : tuple of str
         Keys of the bibliography.
     numbers : mapping
-        Values of the placeholders in the shader, by name.
+        Dictionary from the names of the placeholders in the shader to their values.
 
     Examples
     --------

@@ -12,12 +12,13 @@ from dermis.specular.models import Model
 
 
 def phong(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
-    """Return the Phong BRDF F (s + 2) / 2 pi (r.v)^s with the mirrored light direction r [1/sr].
+    """Return the Phong BRDF F (s + 2) / (2 pi) (r.v)^s [1/sr].
 
-    The factor (s + 2) / 2 pi makes the lobe reflect F at normal incidence.
+    The vector r is the light direction mirrored at the normal. The factor (s + 2) / (2 pi) makes the lobe
+    reflect the fraction F at normal incidence.
 
     m : roughness; s is a quarter of `blinn_phong_exponent(m)`, as r rotates twice as far as the half vector
-    fresnel : function that returns F from the cosine v.h, which keeps the BRDF reciprocal
+    fresnel : function that returns F from the cosine v.h; this cosine keeps the BRDF reciprocal
 
     Source: [LafortuneWillems1994].
     """
@@ -27,12 +28,12 @@ def phong(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
 
 
 def phong_plain(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
-    """Return the highlight W(i) (r.v)^s of 1975 as a BRDF, divided by pi n.l [1/sr].
+    """Return the BRDF W(i) (r.v)^s / (pi n.l) of the original Phong highlight [1/sr].
 
-    r is the light direction mirrored at the normal, s a quarter of `blinn_phong_exponent(m)`, and W(i) the
-    Fresnel reflectance at the angle of incidence i. W(i) and the division by n.l make the BRDF not
-    reciprocal. The original highlight was added to a diffuse term without 1/pi; here both terms are divided
-    by pi.
+    Here r is the light direction mirrored at the normal, s is a quarter of `blinn_phong_exponent(m)`, and
+    W(i) is the Fresnel reflectance at the angle of incidence i. Because of W(i) and the division by n.l, the
+    BRDF is not reciprocal. Phong added the highlight to a diffuse term without the factor 1/pi; here both
+    terms have this factor.
 
     Source: [Phong1975].
     """

@@ -44,7 +44,7 @@ def masked_lobe(
 ) -> Floats:
     """Return the BRDF D F G1(l) G1(v) / (4 n.l n.v) for any distribution D and masking G1 [1/sr].
 
-    distribution_times_pi : values of pi D, as `beckmann` returns
+    distribution_times_pi : values of pi D, such as the result of `beckmann`
     fresnel : function that returns F from the cosine v.h
     masking : function that returns G1 from the cosine n.l or n.v
     """
@@ -55,10 +55,10 @@ def masked_lobe(
 def smith_masking(cos_theta: ArrayLike, m: ArrayLike) -> Floats:
     """Return Smith's masking G1, the fraction of facets visible from a direction [-].
 
-    cos_theta : cosine of the direction from the normal
+    cos_theta : cosine of the angle between the direction and the normal
     m : roughness of Beckmann's slope distribution, for which G1 is exact [-]
 
-    Source: [Smith1967]; [Walter2007] section 5.2, before its rational approximation.
+    Source: [Smith1967]; [Walter2007] section 5.2, without the rational approximation given there.
     """
     from scipy.special import erf
 

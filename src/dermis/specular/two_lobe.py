@@ -1,4 +1,4 @@
-"""Two-lobe model of game engines: a narrow and a wide Beckmann lobe with common Smith masking."""
+"""Two-lobe model of game engines: a narrow and a wide Beckmann lobe that share one Smith masking function."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ MIN_ROUGHNESS, MAX_ROUGHNESS = 0.05, 1.0
 def two_lobe(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
     """Return the BRDF of a mixture of a narrow and a wide Beckmann slope distribution [1/sr].
 
-    m : roughness, broadcast against the angles; NARROW_FACTOR m and WIDE_FACTOR m are clamped to 0.05 to 1
-        [-]
-    fresnel : function from the cosine v.h to the Fresnel reflectance
+    m : roughness, broadcast against the angles; the roughnesses of the two lobes are NARROW_FACTOR m and
+        WIDE_FACTOR m, clamped to the range 0.05 to 1 [-]
+    fresnel : function that returns the Fresnel reflectance from the cosine v.h
 
     Source: [EpicGames2025] for the two lobes; [Walter2007] section 5 for the BRDF.
     """
@@ -39,10 +39,10 @@ def two_lobe(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Float
 def two_lobe_masking(cos_theta: ArrayLike, m: ArrayLike) -> Floats:
     """Return the masking G1 of the two-lobe mixture, the fraction of facets visible from a direction [-].
 
-    Smith's 1 / G1 - 1 is an integral over the slope distribution. Therefore 1 / G1 is mixed with the same
-    weights as the slope distributions.
+    In Smith's model, 1 / G1 - 1 is an integral over the slope distribution. The 1 / G1 of the mixture is
+    therefore the mean of the 1 / G1 of both lobes, with the weights of the lobes.
 
-    cos_theta : cosine of the direction from the normal
+    cos_theta : cosine of the angle between the direction and the normal
     m : roughness of the model, from which the roughnesses of the two lobes are computed [-]
     """
     return np.asarray(1.0 / _mix_lobes(lambda rough: 1.0 / smith_masking(cos_theta, rough), m))
@@ -51,7 +51,7 @@ def two_lobe_masking(cos_theta: ArrayLike, m: ArrayLike) -> Floats:
 def _mix_lobes(lobe_quantity: Callable[[Floats], Floats], roughness: ArrayLike) -> Floats:
     """Return the mean of a quantity over the narrow and the wide lobe, with the weights of the lobes.
 
-    lobe_quantity : function of the roughness of a lobe
+    lobe_quantity : function that returns the quantity from the roughness of a lobe
     roughness : roughness of the model [-]
     """
     factors = NARROW_FACTOR, WIDE_FACTOR

@@ -17,16 +17,16 @@ _UNFINISHED_NAME_PATTERN = re.compile(r"\.(.+)-[0-9a-f]{12}\.unfinished")
 
 
 def temporary_path(final_path: Path) -> Path:
-    """Return an unused hidden path beside `final_path`, for a file or folder that will be renamed."""
+    """Return an unused hidden path beside `final_path`, at which to write content before renaming it."""
     return final_path.with_name(f".{final_path.name}-{secrets.token_hex(6)}.unfinished")
 
 
 def atomic_write(final_path: Path, write_content: Callable[[Path], object]) -> None:
-    """Write a file completely or not at all, through a temporary file that is renamed.
+    """Write a file completely or not at all, by writing a temporary file and then renaming it.
 
-    Another process may remove the temporary file during a cleanup; the file is then written again.
+    If another process removes the temporary file during a cleanup, the file is written again.
 
-    write_content : function that writes the content to the path that it receives
+    write_content : function that writes the content to the path passed to it
 
     Raises DermisError if the file cannot be written.
     """
@@ -49,10 +49,10 @@ def atomic_write(final_path: Path, write_content: Callable[[Path], object]) -> N
 
 
 def move_into_place(temporary_file: Path, final_path: Path, replaces_folder: bool = True) -> None:
-    """Rename a temporary file or folder to its final path, and replace a file or folder at this path.
+    """Rename a temporary file or folder to its final path, replacing what was at that path.
 
-    replaces_folder : whether to replace a folder that is not empty; if False, such a folder is kept and
-        OSError is raised
+    replaces_folder : whether to replace a non-empty folder; if False, the folder is kept and OSError is
+        raised
 
     Raises OSError if the file or folder cannot be renamed.
     """
@@ -84,7 +84,7 @@ def flush_to_disk(path: Path) -> None:
 
 
 def remove_path(path: Path) -> None:
-    """Remove a file, or a folder with all content; do nothing if the path does not exist."""
+    """Remove a file, or a folder and its content; do nothing if the path does not exist."""
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path, ignore_errors=True)
         return
@@ -93,7 +93,7 @@ def remove_path(path: Path) -> None:
 
 
 def unfinished_files(folder: Path) -> dict[Path, str]:
-    """Return the temporary paths that interrupted writes left in a folder, with the final names."""
+    """Return the temporary paths that interrupted writes left in a folder, each with its final file name."""
     with contextlib.suppress(OSError):
         found = {path: _UNFINISHED_NAME_PATTERN.fullmatch(path.name) for path in sorted(folder.iterdir())}
         return {path: match[1] for path, match in found.items() if match}

@@ -28,7 +28,7 @@ def face_points(head: Head, direction_count: int = 64) -> NDArray[np.int32]:
 
     A camera that shows all these points shows the whole face.
 
-    direction_count : number of directions; the farthest point in each direction is on the hull
+    direction_count : number of directions; the point that lies farthest in each direction is included
     """
     positions = head.control.positions_mm - np.array(head.centre_mm, np.float32)
     low, high = np.array(_FACE_BOX_MM, np.float32)
@@ -45,8 +45,8 @@ def sampled_camera(
 ) -> Camera:
     """Return the camera with an image's sampled parameters, moved so that the whole face is in the picture.
 
-    If the picture would cut off the face, the visible frame is enlarged and the offset of the face is
-    reduced.
+    If the picture would cut off the face, the camera shows a larger area, and the face is placed closer to
+    the picture's centre.
 
     face_point_indices : control points of the face, from `face_points`
     motion : displacement of the control points by the pose
@@ -65,7 +65,7 @@ def sampled_camera(
     )
 
     def aim(offset_fraction: float) -> AimOffset:
-        """Return the aim offset of the camera for a fraction of the sampled offset of the face."""
+        """Return the aim offset of the camera at which the face has a fraction of its sampled offset."""
         return -0.5 * frame * offset_fraction * offset[0], -0.5 * frame * offset_fraction * offset[1]
 
     fraction, low, high = 1.0, 0.0, 1.0
@@ -84,10 +84,10 @@ def _aim_camera(
     """Return a camera that looks at a point beside the centre of the face.
 
     centre : (3,) centre of the face [mm]
-    axes : (3, 3) rows: directions to the right, upwards, and back towards the camera
+    axes : (3, 3) axes of the camera as rows, from `_camera_axes`
     distance_mm : distance of the camera from the centre of the face [mm]
-    frame_mm : visible height at the centre of the face, for a camera that looks at this centre [mm]
-    aim_offset : offset of the point from the centre of the face, to the right and upwards [mm]
+    frame_mm : visible height at the centre of the face, for a camera aimed at this centre [mm]
+    aim_offset : offset of the camera's target from the centre of the face, to the right and upwards [mm]
     """
     scale = math.hypot(distance_mm, *aim_offset) / distance_mm  # keeps the angle of view
     return Camera(
@@ -101,7 +101,7 @@ def _aim_camera(
 def _max_projected_coordinate(
     positions_mm: Doubles, distance_mm: float, aim_offset: AimOffset, frame_mm: float, aspect: float
 ) -> float:
-    """Return the largest coordinate of projected points, 0 at the picture's centre and 1 at an edge.
+    """Return the largest absolute picture coordinate of the points: 0 at the centre, 1 at an edge.
 
     positions_mm : (n, 3) positions to the right, upwards and towards the camera, relative to the face's
         centre [mm]
@@ -123,9 +123,9 @@ def _max_projected_coordinate(
 
 
 def _camera_axes(yaw_deg: float, pitch_deg: float, roll_deg: float) -> Doubles:
-    """Return the axes of a camera as rows (3, 3): right, up, and back, from the face to the camera.
+    """Return the axes of a camera as rows (3, 3): right, up, and back (from the face to the camera).
 
-    The roll turns the axes right and up clockwise, as seen by the camera.
+    The roll turns the right and up axes clockwise, as seen by the camera.
     """
     back = np.array(direction_from_angles(yaw_deg, pitch_deg))
     yaw, roll = math.radians(yaw_deg), math.radians(roll_deg)

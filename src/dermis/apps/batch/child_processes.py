@@ -109,8 +109,8 @@ def _allow_children() -> Iterator[None]:
 def _limit_blas_to_one_thread() -> Iterator[None]:
     """Limit BLAS in child processes to one thread, unless the user has set a number of threads.
 
-    By default each process starts a thread per core, and for small linear systems these threads spend most of
-    the processor time on waiting.
+    By default, BLAS starts one thread per core in each process. For small linear systems, these threads spend
+    most of their time waiting for each other.
     """
     unset = [name for name in _BLAS_THREAD_VARIABLES if name not in os.environ]
     os.environ.update(dict.fromkeys(unset, "1"))

@@ -30,7 +30,8 @@ class DaskCluster:
 
     address : address of the scheduler; None if `file` is given
     file : scheduler file, written by `dask scheduler --scheduler-file`
-    adapter : adapters to use, as in `SlotRequest`; the workers of a host use the matching adapters in turn
+    adapter : adapters to use, as in `SlotRequest`; the workers of a host are assigned the matching adapters
+        in turn
     """
 
     address: str | None
@@ -43,7 +44,7 @@ class DaskCluster:
         tasks : parts to render and shards to verify
 
         Raises DermisError if no worker can be reached, if a worker does not share the disk, and for errors
-        that another attempt cannot solve.
+        that would recur on another attempt.
         """
         import_extra("distributed", "--scheduler and --cluster")
         from dermis.apps.batch.dask_worker import PartPlugin
@@ -104,7 +105,7 @@ def _check_shared_disk(client: Client, marker_file: Path) -> None:
 
 
 def _submit_tasks(client: Client, plugin_name: str, tasks: Sequence[Shard]) -> Iterator[WorkerEvent]:
-    """Submit parts to render and shards to verify as dask tasks, and yield each task's completion event.
+    """Submit the tasks to dask, and yield an event whenever a task is complete.
 
     plugin_name : name of the `PartPlugin` that processes the tasks
     """

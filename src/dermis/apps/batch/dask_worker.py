@@ -35,7 +35,7 @@ class _PluginState:
 
     child : worker process, started for the first task
     lock : lock that is held while a task is processed
-    cleanup : context managers and callbacks that are released together with the process
+    cleanup : context managers to leave, and callbacks to call, when the process is stopped
     stopped : event that is set when the run has ended and rendering must stop
     """
 
@@ -53,11 +53,13 @@ class _PluginState:
 class PartPlugin(WorkerPlugin):  # type: ignore[misc]
     """Plugin that runs a rendering process beside a dask worker, from the first task to the end of the run.
 
-    The process renders as without dask; the dask worker only waits for the process.
+    The process renders just as it would without dask; the dask worker only waits for it.
 
-    spec_toml : spec as TOML, with the hashes of the files that it names
+    spec_toml : spec as TOML, with the hashes of the files named in the spec
     folder : folder to which file names in the spec are relative
-    out, encoders, keep_going : output folder and options of the run, as in `RunOptions`
+    out : output folder of the run
+    encoders : number of encoder processes, as in `RunOptions`
+    keep_going : whether to omit images that cannot be rendered, as in `RunOptions`
     adapter : adapters to use, as in `DaskCluster`
     """
 
@@ -87,9 +89,9 @@ class PartPlugin(WorkerPlugin):  # type: ignore[misc]
             self._state.lock.release()
 
     def process(self, task: Shard) -> WorkerEvent:
-        """Process a task, see `Worker.process`, and return its completion or refusal event.
+        """Process a task as `Worker.process` does, and return the event of its completion or its refusal.
 
-        Raises LostProcessError if the process or its device was lost, after which dask retries the task.
+        Raises LostProcessError if the process or its device was lost; dask then retries the task.
         """
         state = self._state
         with state.lock:
@@ -123,7 +125,7 @@ class PartPlugin(WorkerPlugin):  # type: ignore[misc]
         return WorkerEvent(refusal="the run: expected to continue, but it has ended. Run the command again.")
 
     def _start(self) -> ChildProcess:
-        """Start the rendering process on the adapter that belongs to this dask worker's rank on this host."""
+        """Start the rendering process, on an adapter chosen by the rank of this dask worker on its host."""
         cleanup = self._state.cleanup
         rank = cleanup.enter_context(local_rank())
         adapters = similar_adapters(self.adapter)
@@ -151,7 +153,7 @@ def path_exists(file_path: str) -> bool:
 
 @contextmanager
 def local_rank() -> Iterator[int]:
-    """Yield the smallest rank, from 0, that no other process of this user holds on this host.
+    """Yield the smallest rank, counted from 0, that no other process of this user holds on this host.
 
     Dask workers on one host choose different adapters by rank. A process holds a rank by locking a file; the
     system releases the lock when the process exits. Where file locks are not available, the rank is 0.

@@ -36,8 +36,9 @@ TableRows = Iterable[Sequence[object]]
 def write_datasheet(out: Path, spec: Spec) -> None:
     """Write README.md and dataset.json of a data set from its spec, index and shards.
 
-    Both files depend only on the spec and on the shards. Raises DermisError if the index is missing or
-    nothing can be written.
+    Both files depend only on the spec and on the shards.
+
+    Raises DermisError if the index is missing, or if a file cannot be written.
     """
     existing = [shard for shard in list_shards(spec) if shard_exists(out, shard, spec)]
     text = _readme_text(
@@ -140,8 +141,8 @@ def _markdown_table(column_names: Sequence[str], table_rows: TableRows) -> str:
 class OutputFormat(TypedDict):
     """File format of an output array, for programs that read the data set.
 
-    A stored level encodes the value (level - zero) * step; a step of 1 and a zero of 0 mean that values are
-    stored unscaled.
+    A stored number `level` stands for the value (level - zero) * step. A step of 1 and a zero of 0 mean that
+    values are stored unscaled.
     """
 
     file: str
@@ -172,7 +173,7 @@ def output_formats(spec: Spec) -> dict[str, OutputFormat]:
 
 
 def label_names(spec: Spec) -> dict[str, dict[int, str]]:
-    """Return the class names of each label output of the spec, by pixel value."""
+    """Return, for each label output of the spec, a dictionary from pixel value to class name."""
     by_output: dict[str, dict[int, str]] = {}
     for one in label_classes():
         for output, level in zip(_LABEL_OUTPUTS, (one.number, one.face_synthetics), strict=True):
@@ -193,7 +194,7 @@ def landmark_names(set_name: str, spec: Spec) -> list[str]:
 
 
 def licences(spec: Spec) -> Iterator[tuple[str, str, str]]:
-    """Yield asset, author and licence of every head, person and environment that the spec can render."""
+    """Yield name, author and licence of every asset (head, person, environment) that the spec can use."""
     author, _, licence = MAKEHUMAN_CREDIT.rpartition(", ")
     yield "people: the parametric human", author, licence
     for parameter in ("person.head", "environment.name"):

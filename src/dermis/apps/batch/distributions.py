@@ -1,4 +1,4 @@
-"""Probability distributions of a spec: a constant, or a TOML table such as {uniform = [0, 1]}."""
+"""Probability distributions in a spec, written as a constant or a TOML table such as {uniform = [0, 1]}."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def require(condition: bool, expected_text: str) -> None:
 
 
 class Distribution(ABC):
-    """Base class of the distributions from which a parameter is sampled."""
+    """Base class of the distributions from which parameters are sampled."""
 
     @property
     @abstractmethod
@@ -48,7 +48,7 @@ class Distribution(ABC):
 
 @dataclass(frozen=True)
 class Constant(Distribution):
-    """Distribution with a single number or text."""
+    """Distribution whose samples are always the same number or text."""
 
     value: SampleValue
 
@@ -75,7 +75,7 @@ class Uniform(Distribution):
     logarithmic: bool = False
 
     def __post_init__(self) -> None:
-        """Check that the limits are ordered, and that limits of logarithms are positive."""
+        """Check that the limits are ordered and, if the distribution is logarithmic, positive."""
         require(self.low < self.high, "a lower limit that is less than the upper limit")
         require(self.low > 0 or not self.logarithmic, "limits above 0 for log_uniform")
 
@@ -98,7 +98,7 @@ class Uniform(Distribution):
 
 @dataclass(frozen=True)
 class Normal(Distribution):
-    """Normal distribution, clamped to six standard deviations."""
+    """Normal distribution, clamped at six standard deviations from the mean."""
 
     mean: float
     sd: float
@@ -125,7 +125,7 @@ class Normal(Distribution):
 
 @dataclass(frozen=True)
 class TruncatedNormal(Distribution):
-    """Normal distribution restricted to an interval and rescaled, so that only numbers inside occur."""
+    """Normal distribution restricted to an interval and renormalised."""
 
     mean: float
     sd: float
@@ -146,8 +146,8 @@ class TruncatedNormal(Distribution):
     def _limit_probabilities(self) -> tuple[float, float]:
         """Return the cumulative probabilities of the untruncated normal distribution at both limits.
 
-        If both limits exceed the mean, both are first mirrored about the mean, and the mirrored limits swap
-        places. The probabilities are then below 0.5; the difference of two probabilities near 1 would lose
+        If both limits exceed the mean, they are first mirrored about the mean, and the lower and the upper
+        limit are swapped. This keeps the probabilities below 0.5; near 1, their difference would lose
         precision.
         """
         low, high = (self.low - self.mean) / self.sd, (self.high - self.mean) / self.sd

@@ -21,9 +21,9 @@ _SPARE_MEMORY_BYTES = 1 << 18  # spare bytes, so that slightly larger jobs do no
 class EncoderPool:
     """Pool of processes that encode images as files; the images are assigned to the processes in turn.
 
-    process_count : number of processes; with 0, the calling process encodes
-    encode : picklable function that takes the arguments in a job and returns the number and the files of an
-        image
+    process_count : number of processes; if 0, the calling process encodes the images
+    encode : picklable function, called with the arguments in a job, that returns the number and the files of
+        an image
     """
 
     def __init__(self, process_count: int, encode: Callable[..., EncodedImage]) -> None:
@@ -35,7 +35,7 @@ class EncoderPool:
 
         jobs : arguments of `encode` for each image
 
-        Raises LostProcessError if a process dies, and every DermisError that `encode` raises.
+        Raises LostProcessError if a process dies, and any DermisError that `encode` raises.
         """
         if not self._count:
             yield from (self._encode(*job) for job in jobs)
@@ -113,7 +113,7 @@ class _EncoderProcess:
 
 
 def _job_buffers(job: EncoderJob) -> list[memoryview]:
-    """Return a job as buffers for shared memory: a pickle without arrays, then the bytes of each array."""
+    """Return a job as buffers for shared memory: a pickle of all but the arrays, then the arrays' bytes."""
     arrays: list[pickle.PickleBuffer] = []
     pickled = pickle.dumps(job, protocol=5, buffer_callback=arrays.append)
     return [memoryview(pickled), *(array.raw() for array in arrays)]

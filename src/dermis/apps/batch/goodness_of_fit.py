@@ -36,12 +36,13 @@ class FitTest(NamedTuple):
     """Result of testing the samples of a parameter against its distribution.
 
     parameter : name of the parameter
-    sample_count : number of samples: images, or people for a parameter of a person
-    expected, observed : mean and standard deviation of numbers, or probabilities of texts, in the
-        distribution and in the samples
-    distance : Kolmogorov-Smirnov distance, or largest difference of two probabilities [-]
-    expected_distance : mean distance for `sample_count` random samples of the distribution; 0 for a single
-        text [-]
+    sample_count : number of samples: one per image, or one per person for a parameter of people
+    expected : mean and standard deviation of the distribution, or, for texts, the probability of each
+    observed : mean and standard deviation of the samples, or, for texts, the fraction of each
+    distance : Kolmogorov-Smirnov distance, or, for texts, the largest difference between the expected and the
+        observed probability of a text [-]
+    expected_distance : mean distance for `sample_count` random samples of the distribution; 0 if only one
+        text is possible [-]
     p_value : p-value of the distance, or of a chi-square test of the probabilities [-]
     """
 
@@ -90,11 +91,11 @@ def fit_test(parameter: str, distribution: Distribution, samples: Samples) -> Fi
 
 
 def cumulative_probability(distribution: Distribution, numbers: Array, *, is_inclusive: bool) -> Array:
-    """Return the cumulative probability of a numeric distribution at each x.
+    """Return the cumulative probability of a numeric distribution at each number x.
 
-    numbers : (n,) numbers
-    is_inclusive : whether to return P(X <= x) instead of P(X < x); the two differ where x is a constant of
-        the distribution
+    numbers : (n,) numbers x
+    is_inclusive : whether to return P(X <= x) instead of P(X < x); these differ only if the distribution
+        gives x itself a non-zero probability
     """
     match distribution:
         case Constant(value):
@@ -147,7 +148,7 @@ def _parameter_test(parameter: str, distribution: Distribution, samples: Samples
 
 
 def _number_test(parameter: str, distribution: Distribution, sorted_samples: Array) -> FitTest:
-    """Return the Kolmogorov-Smirnov test of sorted samples that were rounded to six digits."""
+    """Return the Kolmogorov-Smirnov test of sorted samples, rounded to six significant digits."""
     count, error = len(sorted_samples), _RELATIVE_ROUNDING_ERROR * np.abs(sorted_samples)
     up_to = np.searchsorted(sorted_samples, sorted_samples, "right") / count
     below = np.searchsorted(sorted_samples, sorted_samples, "left") / count

@@ -1,4 +1,4 @@
-"""Index of a data set: a Parquet table of the sampled parameters of each image, and column statistics."""
+"""Index of a data set: a Parquet table with the parameters of each image; summaries of its columns."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def write_index(out: Path, spec: Spec) -> Path:
 
 
 def open_index(out: Path, purpose: str) -> pyarrow.parquet.ParquetFile:
-    """Return the Parquet file of a data set's index, opened for reading by columns.
+    """Open the index of a data set and return its Parquet file, from which single columns can be read.
 
     purpose : what pyarrow is needed for, for the message if pyarrow is missing
 
@@ -64,7 +64,7 @@ def open_index(out: Path, purpose: str) -> pyarrow.parquet.ParquetFile:
 
 
 def parameter_summaries(out: Path) -> Iterator[tuple[str, int, str]]:
-    """Yield name, number of images and a summary of the samples of each parameter in the index.
+    """Yield the name of each parameter in the index, the number of images with it, and a summary as text.
 
     Raises DermisError if there is no index.
     """
@@ -114,7 +114,7 @@ def _flatten_matrix(matrix: object) -> object:
 
 
 def _index_schema(out: Path, spec: Spec) -> pyarrow.Schema:
-    """Return names and types of the index columns; columns of parameters are sorted by name."""
+    """Return names and types of the index columns, with the columns of parameters sorted by name."""
     arrow = import_extra("pyarrow", "the index of a data set")
     kinds: dict[str, set[type]] = {}
     for rows in _rows_of_shards(out, spec):

@@ -42,7 +42,7 @@ def direction_from_angles(yaw_deg: float, pitch_deg: float) -> tuple[float, floa
 
 @lru_cache(maxsize=64)
 def blackbody_colour(temperature_k: float) -> tuple[float, float, float]:
-    """Return the colour of a black body by Planck's law: linear Rec. 709 of luminance 1, white at 6500 K.
+    """Return the colour of a black body in linear Rec. 709 with luminance 1; at 6500 K, it is white.
 
     temperature_k : temperature [K]
     """
@@ -55,7 +55,7 @@ def blackbody_colour(temperature_k: float) -> tuple[float, float, float]:
 
 
 def _area_lamp(lamp_parameters: Mapping[str, float], rig_turn_deg: float, rig_strength: float) -> Light:
-    """Return a square area light of a sampled rig, which faces the centre of the head.
+    """Return a lamp of a sampled rig: a square area light that faces the centre of the head.
 
     lamp_parameters : sampled parameters of the lamp, by key of `LampTable`
     rig_turn_deg : rotation of the rig about the upward axis [degrees]
@@ -78,7 +78,7 @@ def _preset_lights(preset_name: str) -> tuple[Light, ...]:
 
 
 def _rotate_light(light: Light, turn_deg: float, rig_strength: float) -> Light:
-    """Return a light of a preset rig, rotated about the upward axis and scaled by a strength."""
+    """Return a light of a preset rig, rotated about the upward axis, with its irradiance scaled."""
     sine, cosine = sin(radians(turn_deg)), cos(radians(turn_deg))
     values: dict[str, object] = {"irradiance": tuple(rig_strength * one for one in light.irradiance)}
     for name in _LIGHT_VECTOR_FIELDS:

@@ -24,7 +24,7 @@ _MAX_HALF_FLOAT = 65504.0
 def file_format(output_name: str, encoding: Encoding) -> str:
     """Return the file format in which an output is stored: png, exr or npy.
 
-    encoding : requested format; for png, outputs that do not fit into 16-bit integers become exr
+    encoding : requested format; if it is png, outputs that 16-bit integers cannot hold are stored as exr
     """
     output = OUTPUTS[output_name]
     if encoding == "npy" or not output.channels:
@@ -34,7 +34,10 @@ def file_format(output_name: str, encoding: Encoding) -> str:
 
 
 def storage_description(output_name: str, encoding: Encoding) -> str:
-    """Return a text that says how an output is stored, such as "16-bit PNG, level x 1/64"."""
+    """Return a text that says how an output is stored, such as "16-bit PNG, level x 1/64".
+
+    In this example, a value of the output is 1/64 of the stored integer ("level").
+    """
     output, kind = OUTPUTS[output_name], file_format(output_name, encoding)
     if kind == "png" and output.quantisation is not None:
         step, zero = output.quantisation
@@ -47,7 +50,7 @@ def storage_description(output_name: str, encoding: Encoding) -> str:
 
 
 def encode_output(output_name: str, output_array: Array, encoding: Encoding) -> bytes:
-    """Return the file of an output array (h, w) or (h, w, c), in the format given by `file_format`.
+    """Return an output array (h, w) or (h, w, c) as the bytes of a file in the format from `file_format`.
 
     Raises DermisError for numbers that are not finite.
     """

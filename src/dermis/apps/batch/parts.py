@@ -1,4 +1,4 @@
-"""Joining of complete parts to a shard, and reuse of images that were rendered before a data set grew."""
+"""Joining of complete parts into a shard, and reuse of images that were rendered before a data set grew."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class KeptImages(NamedTuple):
     """Images at the beginning of a part that were rendered before the data set grew.
 
     path : shard or part that contains these images; None if there are no such images
-    stop : number after the last of these images; the first is the first image of the part
+    stop : number after the last of these images
     """
 
     path: Path | None
@@ -40,7 +40,7 @@ class KeptImages(NamedTuple):
 
 
 def kept_images(out: Path, part: Part, spec: Spec) -> KeptImages:
-    """Return those images of a part that exist because they were rendered before the data set grew."""
+    """Return the images of a part that were already rendered before the data set grew."""
     for piece in (part, shard_at(part.index, spec)):
         path = shard_path(out, piece, spec)
         with suppress(DermisError):
@@ -57,7 +57,7 @@ def _matches_sha256(path: Path, expected_sha256: str) -> bool:
 
 
 def copy_images(writer: ShardWriter, source_path: Path, first_image: int, stop_image: int) -> None:
-    """Copy a range of images from a shard or part, and the reasons for images that were left out there.
+    """Copy a range of images from a shard or part, and the reasons recorded for images missing from it.
 
     first_image, stop_image : first image number, and the number after the last image
 

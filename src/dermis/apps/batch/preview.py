@@ -55,7 +55,7 @@ class ParameterRow(TypedDict):
 
 
 class Estimate(TypedDict):
-    """Estimated size and duration of a data set, from its first images at full size.
+    """Size and duration of a data set, estimated by rendering its first images at full size.
 
     measured : number of rendered images
     hours : duration with one worker

@@ -134,7 +134,7 @@ def decode_image(files: Mapping[str, object], culprit: object = "") -> Image:
 
 
 def read_record(json_bytes: bytes, culprit: object) -> Record:
-    """Return the record of an image from the bytes of its JSON file, without a check of the landmarks.
+    """Return the record of an image from the bytes of its JSON file, without checking the landmarks.
 
     culprit : name of the file in error messages
 
@@ -158,10 +158,11 @@ def read_record(json_bytes: bytes, culprit: object) -> Record:
 
 @contextmanager
 def shard_files(path: Path) -> Iterator[dict[str, FileReaders]]:
-    """Yield functions that read the files of a shard, as nested dictionaries: image key, then file suffix.
+    """Open a shard, and yield functions that read its files, indexed by image key and file suffix.
 
-    The functions can be called inside the with block. Raises DermisError if the shard is truncated, or if the
-    path is not a shard.
+    The functions can be called inside the with block.
+
+    Raises DermisError if the shard is truncated, or if the path is not a shard.
     """
     if path.is_dir():
         names = sorted(one.name for one in path.iterdir())
@@ -205,7 +206,7 @@ def _read_tar_member(path: Path, tar_file: BinaryIO, member: TarMember) -> bytes
 
 
 def _select_shards(path: Path, shards: Iterable[int] | None) -> list[Path]:
-    """Return the paths of shards to read: shards of a data set, or `path` alone if it is a shard.
+    """Return the paths of the shards to read: those in the folder `path`, or `path` if it is itself a shard.
 
     shards : numbers of the shards; None for all shards of the data set
     """

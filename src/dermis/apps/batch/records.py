@@ -41,7 +41,7 @@ class LandmarksRecord(TypedDict):
 
 
 class Record(TypedDict):
-    """Description of one image as stored in its JSON file: parameters, tone, camera, pose and landmarks."""
+    """Description of one image as stored in its JSON file: parameters, skin tone, camera, pose, landmarks."""
 
     number: int
     parameters: Parameters

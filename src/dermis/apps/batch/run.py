@@ -37,7 +37,7 @@ class WorkerPool(Protocol):
     """Protocol of worker pools: `ProcessPool` on this machine, or `DaskCluster` on several."""
 
     def render(self, options: RunOptions, tasks: Sequence[Shard]) -> Iterator[WorkerEvent]:
-        """Process the tasks as `Worker.process` does, and render damaged parts again; yield events."""
+        """Process the tasks as `Worker.process` does, render damaged parts again, and yield all events."""
         ...
 
 
@@ -87,8 +87,9 @@ def run(
     """Render missing parts of a data set; if the data set is then complete, write index and datasheet.
 
     pool : workers that render the parts
-    shard_selection : (i, n) selects every n-th shard from shard i, so that n runs can share a data set
-    part_selection : (i, n) selects every n-th part of these shards, from part i
+    shard_selection : (i, n) selects every n-th shard, starting with shard i, so that n runs can share a data
+        set
+    part_selection : (i, n) selects every n-th part of these shards, starting with part i
     on_progress : function called whenever images were rendered or a shard was verified
 
     Raises DermisError for errors of the spec, the disk or the machine; complete parts are kept.
@@ -171,7 +172,7 @@ def _must_grow(existing_toml: str, spec: Spec, out: Path) -> bool:
 
 
 def _remove_joined_parts(out: Path, spec: Spec, complete_shards: Iterable[Shard]) -> None:
-    """Remove parts whose shard exists, because a run was interrupted after it had joined the parts."""
+    """Remove the parts of complete shards, left over by a run that was interrupted after joining them."""
     if files := part_files(out):
         complete_shards = set(complete_shards)
         for number, path in files.items():

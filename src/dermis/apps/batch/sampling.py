@@ -1,4 +1,4 @@
-"""Sampling of each image's parameters by hashing, so that they do not depend on machine and order."""
+"""Sampling of the parameters of images by hashing, independently of the machine and of the images' order."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ _CONDITIONAL_PARAMETERS: tuple[tuple[str | tuple[str, ...], Callable[[Parameters
 
 
 def table_numbers(parameters: Mapping[str, float | int | str], table_name: str) -> dict[str, float]:
-    """Return the numeric parameters of a spec table by key, without the table's name.
+    """Return the numeric parameters of a spec table, with the name of the table removed from their names.
 
     table_name : dotted name of the table, such as "light.key"
     """
@@ -57,7 +57,7 @@ def table_numbers(parameters: Mapping[str, float | int | str], table_name: str) 
 
 
 def hashed_uniform(seed: int, image_or_person: int, parameter: str) -> float:
-    """Return a uniform random number in (0, 1) that depends on a seed, an image and a parameter only.
+    """Return a uniform random number in (0, 1) that depends only on a seed, an image and a parameter.
 
     The random number is a BLAKE2b hash of the three arguments as text. Random numbers for different arguments
     are therefore independent.
@@ -73,7 +73,7 @@ def hashed_uniform(seed: int, image_or_person: int, parameter: str) -> float:
 def round_significant(number: float) -> float:
     """Return a number with six significant digits.
 
-    Later digits of logarithms and roots differ between machines.
+    After the sixth digit, computed logarithms and roots can differ between machines.
     """
     return float(f"{number:.6g}") + 0.0  # no -0.0
 
@@ -96,7 +96,7 @@ class Movement:
 
 @cache
 def load_movements() -> Mapping[str, tuple[Movement, ...]]:
-    """Return the facial movements of mixture.csv by part of the face."""
+    """Return the facial movements in mixture.csv, grouped by part of the face."""
     by_part: dict[str, tuple[Movement, ...]] = {}
     for row in read_rows(str(__package__), "mixture"):
         words = row["moves"].split()
@@ -141,7 +141,7 @@ def expression_weights(
     target_weights : weights of the expression by name of the morph target; a name without Left or Right
         moves both sides
     intensity : factor of all weights [-]
-    asymmetry : relative increase of weights on the left and decrease on the right [-]
+    asymmetry : relative increase of the weights on the left side, and decrease of those on the right [-]
     variation : standard deviation of the logarithm of each weight [-]
     sample_normal : function that returns a standard normal random number for a target name
     """
@@ -229,7 +229,7 @@ class Sampler:
         return float(ndtri(self._uniform(image_number, parameter)))
 
     def _target_weights(self, image_number: int, sampled_parameters: Parameters) -> dict[str, float]:
-        """Return the weights, in an image, of all morph targets that the spec can move.
+        """Return the weights that all morph targets used by the spec have in one image.
 
         image_number : number of the image
         sampled_parameters : parameters of the image that have been sampled so far
@@ -259,7 +259,7 @@ class Sampler:
 
     @cached_property
     def targets(self) -> tuple[str, ...]:
-        """Return the sorted names of all morph targets that the spec can move."""
+        """Return the sorted names of all morph targets that the spec can use."""
         names = set(table_values(self.distributions, "pose"))
         for name in map(str, self.distributions["expression.name"].support):
             if name == RANDOM_EXPRESSION:

@@ -47,7 +47,7 @@ class _Person:
 
     points : control points that must stay in the picture, see `face_points`
     bones : fraction of the head's rotation that each bone performs, by bone name
-    skin : skin of the person, before the spec's [skin] is applied
+    skin : skin of the person, before the [skin] table of the spec is applied
     """
 
     head: Head
@@ -116,12 +116,12 @@ class SceneBuilder:
         return _Person(head, face_points(head), find_rotation_bones(head.control.skeleton).head, skin)
 
     def _resolve_file(self, head_or_panorama: float | str) -> str:
-        """Return the path of a head or panorama in the spec's folder, or the name if there is no file."""
+        """Return the path of a file in the spec's folder, or the name itself if there is no such file."""
         file = self.spec.folder / str(head_or_panorama)
         return str(file) if is_file(file) else str(head_or_panorama)
 
     def _pose_weights(self, parameters: Parameters, head: Head) -> dict[str, float]:
-        """Return the sampled weights of morph targets that the head has or that the [pose] table names."""
+        """Return the non-zero weights of morph targets that the head has or that the [pose] table names."""
         posed = self.spec.pose_targets
         return {
             name: weight
@@ -138,7 +138,7 @@ class SceneBuilder:
 
 
 def sampled_person(parameters: Parameters) -> Human:
-    """Return the random person of the sampled seed, whose fields are replaced by sampled parameters."""
+    """Return the random person for the sampled seed, with sampled parameters in place of random fields."""
     fields: dict[str, object] = {}
     appearance: dict[str, dict[str, object]] = {}
     for name, value in table_values(parameters, "person").items():
@@ -154,7 +154,7 @@ def sampled_person(parameters: Parameters) -> Human:
 def _subdivision_levels(picture_size: tuple[int, int]) -> int:
     """Return the number of times that heads are subdivided for a picture size [pixel].
 
-    The number is equal for all sampled people, so that all their heads have the same topology.
+    The number is the same for all sampled people, so that all their heads have the same topology.
     """
     return max(MIN_HUMAN_LEVELS, SmoothIn(size=picture_size)(Human().head(subdivide=0)))
 
@@ -168,7 +168,7 @@ def _hair_count_fraction(picture_size: tuple[int, int]) -> float:
 
 
 def _head_rotation(parameters: Parameters) -> NDArray[np.float64]:
-    """Return the rotation matrix (3, 3) of the head by its sampled pitch, yaw and roll."""
+    """Return the rotation matrix (3, 3) of the head for its sampled pitch, yaw and roll."""
     head = table_numbers(parameters, "head")
     return np.array(angles_matrix((head["pitch_deg"], head["yaw_deg"], head["roll_deg"])))
 

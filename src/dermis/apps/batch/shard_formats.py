@@ -34,7 +34,7 @@ class ShardManifest:
     first, stop : first image number, and the number after the last image
     left_out : numbers of the images that could not be rendered, with the reasons
     sha256 : SHA-256 of all bytes before the manifest
-    made_with : adapter, and versions of the software that rendered
+    made_with : adapter and software versions with which the images were rendered
     """
 
     spec: str
@@ -176,7 +176,7 @@ def tar_sha256(tar_file: BinaryIO, byte_count: int) -> str:
 
 
 def _tar_entry(file_name: str, content: bytes) -> tuple[bytes, bytes, bytes]:
-    """Return header, content, and padding to the block size, of a file in a tar archive."""
+    """Return the three parts of a file in a tar archive: header, content, and padding to the block size."""
     head = tarfile.TarInfo(file_name)
     head.size = len(content)
     return head.tobuf(tarfile.USTAR_FORMAT), content, bytes(-len(content) % _TAR_BLOCK_BYTES)
@@ -210,7 +210,7 @@ class FolderWriter:
         return self._hash.hexdigest()
 
     def finish(self, manifest: bytes) -> None:
-        """Write the manifest; the hash in the manifest reveals files that are lost in a power failure."""
+        """Write the manifest; its hash will show whether files were lost in a power failure."""
         self.add(MANIFEST_NAME, manifest)
         flush_to_disk(self._path / MANIFEST_NAME)
         flush_to_disk(self._path)
@@ -220,7 +220,7 @@ class FolderWriter:
 
 
 def folder_sha256(folder: Path, file_names: Iterable[str]) -> str:
-    """Return the SHA-256 of the named files in a folder, computed as by `FolderWriter.sha256`.
+    """Return the SHA-256 of the named files in a folder, computed in the same way as `FolderWriter.sha256`.
 
     Raises DermisError if a file cannot be read.
     """
@@ -231,5 +231,5 @@ def folder_sha256(folder: Path, file_names: Iterable[str]) -> str:
 
 
 def _file_hash_input(file_name: str, content: bytes) -> bytes:
-    """Return the bytes with which a file contributes to the SHA-256 of its folder."""
+    """Return the bytes by which a file enters the SHA-256 of its folder: name, size and content."""
     return f"{file_name} {len(content)}\n".encode() + content

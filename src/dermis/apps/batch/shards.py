@@ -64,11 +64,11 @@ def shard_at(shard_number: int, spec: Spec) -> Shard:
 
 
 def list_parts(shard: Shard, spec: Spec) -> list[Part]:
-    """Return the parts of a shard in order: 16 images each, or up to 32 so that parts contain whole people.
+    """Return the parts of a shard in order.
 
-    The number of a part's first image is a multiple of the part size, except for the first part of a shard.
-    The first and the last part of a shard may be smaller. People with more than 32 images are split between
-    parts.
+    The part size is the smallest multiple of the number of images per person that is between 16 and 32, or 16
+    if there is none. Except for the first part of a shard, every part starts at an image number that is a
+    multiple of the part size. The first and the last part may therefore be smaller.
     """
     group = spec.images_per_person
     size = -(-_MIN_PART_IMAGES // group) * group if group <= _MAX_PART_IMAGES else _MIN_PART_IMAGES
@@ -94,7 +94,7 @@ def image_key(image_number: int) -> str:
 
 
 class ShardWriter:
-    """Context manager that writes a shard or a part, which is renamed to its final path on a normal exit.
+    """Context manager that writes a shard or a part, and renames it to its final path on a normal exit.
 
     adapter : name of the adapter that renders the images, for the manifest; "" if all images are copied
 
@@ -146,7 +146,7 @@ class ShardWriter:
             self._made_with = {**self._made_with, name: _VERSION_SEPARATOR.join(merged)}
 
     def __exit__(self, exception_type: type[BaseException] | None, *_: object) -> None:
-        """Write the manifest and rename the shard to its final path; after an error, remove the shard."""
+        """Write the manifest and rename the shard to its final path; on an error, remove the shard."""
         try:
             if exception_type is None:
                 self._files.finish(self._manifest_bytes())
@@ -187,8 +187,9 @@ def read_manifest(path: Path) -> ShardManifest:
 def shard_exists(out: Path, shard: Shard, spec: Spec) -> bool:
     """Return whether a complete shard or part exists at its final path.
 
-    A shard that was written before the data set grew, and has fewer images, is not complete. Raises
-    DermisError for a shard of another data set.
+    A shard is not complete if it was written before the data set grew and therefore has too few images.
+
+    Raises DermisError for a shard of another data set.
     """
     path = shard_path(out, shard, spec)
     try:

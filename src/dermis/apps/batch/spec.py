@@ -1,4 +1,4 @@
-"""Specification ("spec") of a data set: distributions of people, faces, lights and cameras, with one seed."""
+"""Specification ("spec") of a data set: distributions of people, faces, lights and cameras, and a seed."""
 
 from __future__ import annotations
 
@@ -137,7 +137,7 @@ class Spec(FrozenModel):
 
     @property
     def landmark_tables(self) -> Mapping[str, str]:
-        """Return the source of each landmark set by name: a preset set's name, or a landmark table's path."""
+        """Return a dictionary from landmark set name to source: a preset name, or the path of a table."""
         return {name: name if name in LANDMARK_SETS else str(self.folder / name) for name in self.landmarks}
 
     @property
@@ -148,16 +148,16 @@ class Spec(FrozenModel):
     def parameters(self, k: int) -> Parameters:
         """Return the sampled parameters of image k by name: texts, and numbers with six significant digits.
 
-        The parameters are equal on every machine and in any order of images. Changing or adding a
-        distribution changes no other parameter. Parameters that an image does not use, such as those of
-        unused lamps, are omitted.
+        The parameters are the same on every machine and for any order of images. Changing or adding the
+        distribution of one parameter does not change the samples of the others. Parameters that an image does
+        not use, such as the parameters of unused lamps, are omitted.
 
         Raises DermisError if k is not the number of an image.
         """
         return self._sampler.parameters(checked_integer("image", k, 0, self.count - 1))
 
     def to_toml(self) -> str:
-        """Return the canonical TOML with all values, which `parse_spec` converts to an equal spec."""
+        """Return the spec as canonical TOML with all values, from which `parse_spec` makes an equal spec."""
         values = plain_values(self)
         values = {"count": values.pop("count"), "seed": values.pop("seed"), "size": self.size} | values
         values["render"] = self.render.model_dump(exclude=set(NON_RENDER_SETTINGS), exclude_none=True)
@@ -192,9 +192,9 @@ def _table_distributions(table_name: str, table_value: object) -> dict[str, Dist
 def load_spec(path: str | Path, **values: object) -> Spec:
     """Return the spec in a TOML file; paths in the file are relative to the folder of the file.
 
-    values : `count`, `seed`, `size` or `format`, in place of the values in the file
+    values : `count`, `seed`, `size` or `format`, replacing the values in the file
 
-    Raises DermisError with table and key for values that cannot be rendered, and for missing files.
+    Raises DermisError, naming table and key, for values that cannot be rendered; also for missing files.
     """
     path = checked_path(path, "a spec of a data set in TOML")
     data = read_toml(path, "a spec of a data set in TOML")
@@ -330,7 +330,7 @@ def _match_files(pattern: str, folder: Path, dotted_name: str) -> FileChoice:
 
 
 def _file_hashes(file_names: Iterable[str], folder: Path) -> dict[str, str]:
-    """Return the SHA-256 of each name that is a file in the spec's folder, sorted by name."""
+    """Return the SHA-256 of each named file that exists in the spec's folder, sorted by name."""
     found = {}
     for name in sorted(set(file_names)):
         if is_file(folder / name):

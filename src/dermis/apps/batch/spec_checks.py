@@ -1,4 +1,4 @@
-"""Checks of a spec: consistency between tables, and whether names exist and models accept the values."""
+"""Checks of a spec: that its tables are consistent, its names exist, and models accept its values."""
 
 from __future__ import annotations
 
@@ -163,7 +163,8 @@ def _check_table(
     """Raise DermisError for unknown keys of a spec table, and for distributions whose limits a model rejects.
 
     allowed_keys : allowed keys of the table
-    make_model : class or function that makes the model; called with each limit of a distribution
+    make_model : class or function that makes the model; called with the key and each limit of its
+        distribution
     """
     for name, distribution in table_values(distributions, table_name).items():
         if name not in allowed_keys:

@@ -1,4 +1,4 @@
-"""Tables of a spec: their keys with bounds, and correlations between parameters."""
+"""Tables of a spec: the keys of each table with their bounds, and correlations between parameters."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ class DistributionField:
     def check(self, spec_value: object) -> Distribution | None:
         """Return the distribution that a value describes; None for an omitted field.
 
-        Raises ValueError for a value that is not a distribution, and for a distribution out of bounds; the
-        message states the valid values.
+        Raises ValueError, with the valid values, if `spec_value` is not a distribution, or if the
+        distribution can give samples that the field does not allow.
         """
         if spec_value is None:
             return None
@@ -62,7 +62,7 @@ class NumberField(DistributionField):
         self.ge, self.le, self.reason = lower_bound, upper_bound, reason
 
     def check_support(self, distribution: Distribution) -> None:
-        """Raise ValueError if the distribution can give texts or numbers out of bounds."""
+        """Raise ValueError if the distribution can give texts, or numbers that are out of bounds."""
         if any(isinstance(bound, str) or not self.ge <= bound <= self.le for bound in distribution.support):
             reason = f" ({self.reason})" if self.reason else ""
             note = "" if isinstance(distribution, Constant) else _DISTRIBUTION_RANGE_NOTE
@@ -96,8 +96,8 @@ class CorrelationGroup(FrozenModel):
     """Correlated parameters: a Gaussian copula, which preserves the distribution of each parameter.
 
     For each parameter, a standard normal number is drawn; the numbers of different parameters are correlated.
-    The parameter's sample is the quantile at the cumulative probability of this number. A larger number
-    therefore gives a larger sample, or a later alternative of a choice.
+    The parameter's sample is the quantile of its distribution at the cumulative probability of this number. A
+    larger number therefore gives a larger sample, or a later alternative of a choice.
     """
 
     of: tuple[str, ...]
@@ -133,8 +133,8 @@ class CorrelationGroup(FrozenModel):
     def cholesky_rows(self) -> dict[str, dict[str, float]]:
         """Return the row of the correlation matrix's Cholesky factor for each parameter.
 
-        A row is a dictionary of weights by parameter name. Each parameter has an independent normal number;
-        the sum of these numbers with the weights of a row is the correlated normal number of the row's
+        A row is a dictionary of weights by parameter name. Each parameter has an independent normal number.
+        The sum of these numbers, weighted by the row of a parameter, is the correlated normal number of this
         parameter.
         """
         lower = np.linalg.cholesky(self.matrix)
@@ -148,7 +148,7 @@ T = TypeVar("T")
 
 
 def table_values(values_by_dotted_name: Mapping[str, T], table_name: str) -> dict[str, T]:
-    """Return the entries of one spec table, by key without the name of the table.
+    """Return the entries of one spec table, with the name of the table removed from their names.
 
     values_by_dotted_name : entries of all tables by dotted name, such as "light.key.size_mm"
     table_name : dotted name of the table, such as "light.key"
@@ -225,7 +225,7 @@ class ExpressionTable(FrozenModel):
 
 
 class HeadRotationTable(FrozenModel):
-    """Spec table of the head's rotation by the neck."""
+    """Spec table of the rotation of the head on the neck."""
 
     yaw_deg: Annotated[Distribution, NumberField(-60, 60, "degrees: range of the neck")] = Constant(0.0)
     """Rotation to the head's left [degrees]."""

@@ -58,7 +58,7 @@ class RunOptions:
 
     spec : spec of the data set
     out : folder of the data set
-    encoders : number of encoder processes per worker; with 0, the worker encodes itself
+    encoders : number of encoder processes per worker; if 0, the worker encodes the images
     keep_going : whether images that cannot be rendered are omitted and recorded, instead of ending the run
     """
 
@@ -86,12 +86,12 @@ class WorkerEvent:
 
     images : number of images rendered since the last event
     done : part that is complete, or shard that was verified
-    rendered : number of images of the part `done` that were rendered, and not found on the disk
+    rendered : number of images of the part `done` that were rendered, rather than found on the disk
     failed : images of the part `done` that could not be rendered
     missing : damaged parts that must be rendered again; for a damaged shard, all parts of the shard
     note : warning for the user
-    retry : reason for which the worker exits; another worker must continue the tasks of this worker
-    refusal : reason for which the run ends
+    retry : reason why the worker exits; another worker must continue the tasks of this worker
+    refusal : reason why the run must end
     """
 
     images: int = 0
@@ -137,10 +137,10 @@ class Worker:
         return renderer
 
     def process(self, tasks: Iterable[Shard], send_event: Callable[[WorkerEvent], None]) -> None:
-        """Render the parts among the tasks, join the parts of complete shards, and verify the shards.
+        """Process the tasks: render each part, join the parts of complete shards, and verify each shard.
 
-        The next task is requested while frames of the previous task are in flight. Without the option
-        `keep_going`, a failed image raises DermisError.
+        The next task is requested while frames of the previous task are still being rendered. Without the
+        option `keep_going`, a failed image raises DermisError.
 
         send_event : function called with each event
 
@@ -182,9 +182,10 @@ class Worker:
         unwritten_parts: deque[tuple[Part, KeptImages]],
         send_event: Callable[[WorkerEvent], None],
     ) -> Iterator[int]:
-        """Yield the numbers of the images to render; process at once the tasks that need no rendering.
+        """Yield the numbers of the images to render; complete tasks that need no rendering immediately.
 
-        unwritten_parts : queue to which each part to write is appended, with the images to copy into the part
+        unwritten_parts : queue to which each part that must be written is appended, with the images to copy
+            into this part
         """
         out, spec = self._options.out, self._options.spec
         for task in tasks:
@@ -208,7 +209,7 @@ class Worker:
     def _encoder_jobs(
         self, numbers: Iterator[int], failures: list[Failure]
     ) -> Iterator[tuple[int, Observation, Parameters, SkinTone | None]]:
-        """Yield number, observation, parameters and tone of each image that can be rendered, in order.
+        """Yield number, observation, parameters and skin tone of each image that can be rendered, in order.
 
         numbers : numbers of the images to render
         failures : list to which images that cannot be rendered are appended
@@ -235,9 +236,10 @@ class Worker:
     def _plan_images(
         self, numbers: Iterator[int], in_flight: deque[_PlannedImage], failures: list[Failure]
     ) -> Iterator[_PlannedImage]:
-        """Yield each image that can be rendered, after appending the image to `in_flight`.
+        """Yield each image whose scene can be built, after appending the image to `in_flight`.
 
         numbers : numbers of the images still to plan
+        in_flight : queue of the images that are being rendered
         failures : list to which images that cannot be rendered are appended
         """
         for number in numbers:
@@ -254,7 +256,7 @@ class Worker:
             yield plan
 
     def _render_images(self, plans: Iterable[_PlannedImage]) -> Iterator[Observation]:
-        """Render the planned images and yield their pictures with outputs.
+        """Render the planned images; yield the picture and the output arrays of each.
 
         Images without a background get an alpha channel.
         """
@@ -299,7 +301,7 @@ def run_worker(pipe: Connection, slot: WorkerSlot, options: RunOptions) -> None:
 
 
 def available_tasks(pipe: Connection) -> Iterator[Shard]:
-    """Wait for the next task of a worker and yield the task, then all tasks that arrived meanwhile."""
+    """Wait for the next task of a worker and yield it, then yield all further tasks that have arrived."""
     yield pipe.recv()
     while pipe.poll():
         yield pipe.recv()

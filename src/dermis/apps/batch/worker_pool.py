@@ -24,8 +24,8 @@ _MAX_ENCODERS_PER_WORKER = 8  # per worker: more would wait for the renderer
 class SlotRequest:
     """Requested number and adapters of the workers; None selects a default for this machine.
 
-    adapter : "auto", "cpu", a number such as "#1", or a part of an adapter's name; of the matching adapters,
-        those of the same kind as the best adapter are used
+    adapter : "auto", "cpu", a number such as "#1", or a part of an adapter's name; if several adapters match,
+        all that are of the same kind as the best one are used
     numbers : numbers of the adapters to use, in place of `adapter`
     workers : total number of workers
     workers_per_gpu : workers on each adapter, if `workers` is None
@@ -48,11 +48,11 @@ class SlotRequest:
         return [similar_adapters(f"#{number}")[0] for number in self.numbers]
 
     def slots(self) -> tuple[list[WorkerSlot], int]:
-        """Return one slot per worker, with adapters in turn, and the number of encoder processes per worker.
+        """Return one slot per worker, and the number of encoder processes per worker.
 
-        A software adapter shares the processor cores with Python and the encoders. By default there is one
-        worker for every two cores, the threads of all workers together use all cores, and each worker encodes
-        its images itself.
+        The adapters are assigned to the workers in turn. A software adapter shares the processor cores with
+        Python and the encoders; by default, there is then one worker for every two cores, the threads of all
+        workers together use all cores, and each worker encodes its images itself.
         """
         adapters, cores = self.adapters(), available_cores()
         software = adapters[0].kind == "CPU"
@@ -80,7 +80,7 @@ class ProcessPool:
     def render(self, options: RunOptions, tasks: Sequence[Shard]) -> Iterator[WorkerEvent]:
         """Process the tasks on all slots, and yield the events of the workers as they arrive.
 
-        Raises DermisError for errors that another attempt cannot solve, after all workers have been stopped.
+        Raises DermisError, after stopping all workers, for errors that would recur on another attempt.
         """
         pool = _PoolState(options, tasks, list(self.slots))
         try:
@@ -146,8 +146,9 @@ class _PoolState:
     def _gets_another_task(self, worker: _WorkerProcess) -> bool:
         """Return whether to send a worker another task.
 
-        A worker without tasks gets one. A worker with one task, in its first attempt, gets a second task, so
-        that frames stay in flight between the tasks, unless the queue has fewer tasks than there are workers.
+        A worker without tasks gets a task if the queue has one. A worker with one task gets a second task, so
+        that it renders without a pause between the two, but only if the first task never failed before and
+        the queue has at least as many tasks as there are workers.
         """
         if not worker.tasks:
             return bool(self._queue)
@@ -160,7 +161,10 @@ class _PoolState:
         self._free_slots.append(worker.slot)
 
     def _return_tasks(self, worker: _WorkerProcess, reason: str) -> None:
-        """Put the tasks of a worker that exits back into the queue."""
+        """Put the tasks of an exiting worker back into the queue.
+
+        Raises DermisError if the task in progress has failed `MAX_TASK_ATTEMPTS` times.
+        """
         current, *unstarted = worker.tasks
         if self._attempts[current] >= MAX_TASK_ATTEMPTS:
             raise DermisError(

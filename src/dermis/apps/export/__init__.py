@@ -1,1 +1,1 @@
-"""Export of skins and heads to other programs, with an estimate of the remaining error."""
+"""Export of skins and heads to other programs, with predicted errors of the skin rendered there."""

@@ -1,4 +1,4 @@
-"""Fits of a program's diffusion profile to the reference profile of a skin, and the remaining errors."""
+"""Fitting of other programs' diffusion profiles to a skin's reference profile, and errors of the fits."""
 
 from __future__ import annotations
 
@@ -46,8 +46,8 @@ def burley_curve(d_mm: ArrayLike, energy: ArrayLike) -> CumulativeProfile:
 def fit_burley_width(curve: CumulativeProfile) -> Floats:
     """Return the widths d (3,) of the Burley profiles closest to a cumulative profile [mm].
 
-    For each channel, the largest difference between the two cumulative profiles is minimised. A sum of
-    squared differences would depend on the spacing of the radii.
+    For each channel, the largest difference between the cumulative Burley profile and `curve` is minimised. A
+    sum of squared differences would depend on the spacing of the radii.
     """
     median = np.array([np.interp(0.5, curve.fraction[:, i], curve.radii_mm) for i in range(3)])
     middle = np.log(median / _BURLEY_MEDIAN_RADIUS)
@@ -67,7 +67,8 @@ def gaussian_curve(variance_mm2: Floats, gaussian_weight: Floats, energy: Floats
     """Return the cumulative profile of a sum of Gaussians.
 
     variance_mm2 : (n,) variances of the Gaussians [mm2]
-    gaussian_weight : (n, 3) weight of each Gaussian in red, green and blue; only their ratios matter [-]
+    gaussian_weight : (n, 3) weight of each Gaussian in red, green and blue; only the ratios of the weights
+        matter [-]
     energy : (3,) total energy of the curve: emerging light per incident light [-]
     """
     fraction = gaussian_weight / gaussian_weight.sum(axis=0)
@@ -96,7 +97,7 @@ def scale_lengths(unit_profile: CumulativeProfile, scale_mm: ArrayLike) -> Cumul
 def fit_scale(curve: CumulativeProfile, unit_profile: CumulativeProfile) -> Floats:
     """Return the lengths (3,) by which the radii of `unit_profile` are multiplied to match `curve` [mm].
 
-    In each channel, the largest difference between the two cumulative profiles is minimised.
+    In each channel, the largest difference between `curve` and the scaled `unit_profile` is minimised.
     """
     middle = np.log(curve.radius_at_fraction(0.5) / unit_profile.radius_at_fraction(0.5))
     return _fit_scale_in_range(
@@ -124,7 +125,7 @@ def fit_homogeneous_medium(
     """Return the homogeneous medium whose cumulative profile is closest to a reference profile.
 
     curve : reference profile
-    energy : (3,) emerging light per incident light of the medium, by default the energy of `curve` [-]
+    energy : (3,) light that leaves the medium per incident light; by default the energy of `curve` [-]
     half_space_kind : surface and illumination of the half-space, see `half_space`
     """
     albedo = tabulated_albedo(half_space_kind, curve.energy if energy is None else energy)
@@ -155,17 +156,17 @@ def _bisect_minimax(
     max_log_length: Floats,
     bisection_steps: int,
 ) -> Floats:
-    """Return the lengths (3,) that scale a cumulative profile closest to a reference profile, per channel.
+    """Return the lengths (3,) by which a cumulative profile is scaled to match a reference profile.
 
-    The largest absolute difference between the cumulative profiles is minimised. A longer length widens the
-    scaled profile, so less light lies within each radius: the largest excess over the reference decreases,
-    and the largest deficit increases. The best length is therefore the one at which excess and deficit are
-    equal.
+    The largest absolute difference between the cumulative profiles is minimised in each channel. A longer
+    length widens the scaled profile, so less light lies within each radius: the largest excess over the
+    reference decreases, and the largest deficit increases. The best length is therefore the one at which
+    excess and deficit are equal.
 
-    cdf_difference : function that takes the logarithms of the lengths (3,) and returns, at n radii, the
-        fraction of light within the radius (n, 3): scaled profile minus reference profile
+    cdf_difference : function that takes the logarithms of the lengths (3,) and returns the scaled cumulative
+        profile minus the reference profile, at n radii (n, 3)
     min_log_length, max_log_length : (3,) bounds of the logarithms of the lengths
-    bisection_steps : number of times that the interval is halved
+    bisection_steps : number of times that the interval between the bounds is halved
     """
     for _ in range(bisection_steps):
         middle = 0.5 * (min_log_length + max_log_length)
@@ -181,9 +182,10 @@ def _bisect_minimax(
 def fit_length_scale(
     curve: CumulativeProfile, colour_channel: int, unit_cdf: Callable[[Floats], Floats]
 ) -> float:
-    """Return the length that multiplies a profile's radii to match one channel of `curve` [mm].
+    """Return the length by which a profile's radii are multiplied to match one channel of `curve` [mm].
 
-    The sum of squared differences is minimised, at radii spaced evenly in log r.
+    The sum of squared differences between the cumulative profiles is minimised, at radii spaced evenly in log
+    r.
 
     colour_channel : index of the channel of `curve`, 0 for red
     unit_cdf : cumulative profile for a length of 1: a function that takes radii (n,) and returns the fraction
@@ -208,7 +210,7 @@ def fit_length_scale(
 
 @dataclass(frozen=True)
 class CurveError:
-    """Errors of the profile that a program renders, relative to the reference profile, per colour channel.
+    """Errors of the profile that a program renders, relative to the reference profile, by colour channel.
 
     cdf : (3,) largest difference between the fractions of light within a radius [-]
     edge : (3,) largest difference between the diffused light near a straight edge, such as a shadow edge [-]

@@ -1,4 +1,4 @@
-"""Registry of export targets by name; each target's module defines an instance of the target as `TARGET`."""
+"""Registry of export targets; the module of each target defines the registered object as `TARGET`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Export of a skin or head to another program, with a report of the error that remains there."""
+"""Export of a skin or head to another program, with a report of the errors in its skin rendering."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ class ExportReport:
     target, title, version, variant : name, title, version and variant of the target program; the variant is
         empty if the target has no variants
     subject : name of the exported skin or head
-    model : name of the model of the skin's reference profile
+    model : name of the model from which the skin's reference profile was computed
     parameters : exported parameters
     naive_parameters : parameters that a user might choose without knowing their meaning in the program
     d_mm : (3,) width of the Burley profile closest to the reference profile [mm]
-    error, naive_error : errors of the profile that the program renders with the exported and with the naive
-        parameters, predicted by the formulas of the program
+    error, naive_error : errors of the profile that the program renders with the exported parameters, and with
+        the naive parameters; predicted by the formulas of the program
     limitations : sentences on what the program cannot reproduce
-    untested : whether the parameters were never used in the program itself
+    untested : whether the export has never been tried in the program itself
     files : paths of all written files
     """
 
@@ -102,7 +102,7 @@ class ExportReport:
         return [*lines, "", *self.limitation_texts()]
 
     def limitation_texts(self) -> list[str]:
-        """Return sentences on the remaining error of this skin and on the program's limitations."""
+        """Return sentences on the error of the exported skin and on the program's limitations."""
         worst = int(self.error.cdf.argmax())
         error = float(self.error.cdf[worst])
         if error < _NOTABLE_PROFILE_ERROR:
@@ -140,7 +140,7 @@ def _format_channels(channel_values: Floats) -> str:
 
 
 def _as_single_line(text: str) -> str:
-    """Return a text without backticks and line breaks, which would end a line or a code block of Markdown."""
+    """Return a text with line breaks and backticks replaced, as these could end a code block of Markdown."""
     return text.replace("`", "'").replace("\n", " ").replace("\r", " ")
 
 
@@ -163,28 +163,29 @@ def export_skin(
     Parameters
     ----------
     subject : str, Path or Subject
-        A profile by name ("skin1", "light", ...) or file, a head by name or file, or a loaded `Subject`.
+        Name or file of a profile ("skin1", "light", ...), name or file of a head, or a loaded `Subject`.
     to : str
         Name of the target, such as "unity" or "blender".
     output : str or Path
         File, or folder if the name has no suffix. The report is written as Markdown and JSON beside the file
         or into the folder.
     version : str, optional
-        Version of the program; the newest supported one by default.
+        Version of the program; by default the newest supported version.
     variant : str, optional
         Variant of the target, such as a scattering method; the target's first variant by default.
     model : {"montecarlo", "layered", "multipole", "dipole", "better-dipole"}, optional
         Model of the diffusion profile. By default tabulated Monte Carlo for homogeneous media of the package,
         layered diffusion for other tissue, and the Gaussians themselves for a table of Gaussians.
     profile : str or Path, optional
-        Skin of a head. By default a parametric person has skin with its own pigments, and other heads have
-        the default skin.
+        Name or file of the profile of a head's skin. By default, the skin of a parametric person has the
+        pigments of that person, and other heads have the default skin.
     library : str or Path, optional
-        Folder node_modules of npm with the JavaScript library of a page; the page then embeds the library.
+        npm folder node_modules with the JavaScript library of a web page. The page then embeds the library;
+        by default, the page loads the library from a public server.
     side : int, default 2048
-        Side of painted maps [texel].
+        Side of the maps that are generated for the export [texel].
     adapter : str, default "auto"
-        Adapter on which maps are painted.
+        Graphics adapter on which maps are generated.
     **head
         Options of `load_head`.
 

@@ -15,7 +15,7 @@ from dermis.scene.lights import Light
 def supported_lights(
     lights: Iterable[Light], supported_kinds: Container[str], program_name: str
 ) -> list[Light]:
-    """Replace lights that a program does not support by point or directional lights, with a warning.
+    """Return lights with unsupported kinds replaced by supported ones; issue a warning for each replacement.
 
     supported_kinds : kinds of light that the program supports, at least "point" and "directional"
     program_name : name of the program, for the warnings

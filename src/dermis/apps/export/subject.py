@@ -50,10 +50,10 @@ _MAX_IDENTIFIER_LENGTH = 40
 class Subject:
     """Skin to export, optionally with a head.
 
-    name : name given by the user; must be escaped wherever it is written
-    curve : cumulative reference profile; energy is emerging light per incident light
-    albedo : (3,) base colour: mean of the head's colour map, or the energy of the profile; linear Rec. 709
-        [-]
+    name : name given by the user; it can be any text, so it must be escaped in written files
+    curve : cumulative reference profile; its energy is the emerging light per incident light
+    albedo : (3,) base colour: mean of the head's colour map or, without such a map, the energy of the
+        profile; linear Rec. 709 [-]
     model : model of the profile, such as "montecarlo" or "layered"; "table" for a table of Gaussians
     tissue : tissue of the skin; None for a table of Gaussians
     scene : scene with the head and its skin; None for a skin without a head
@@ -83,7 +83,7 @@ class Subject:
 
     @property
     def identifier(self) -> str:
-        """Return the name in ASCII letters, digits and underscores, for names of files and materials."""
+        """Return the name for files and materials, reduced to ASCII letters, digits and underscores."""
         name = re.sub(r"[^A-Za-z0-9]+", "_", Path(self.name).stem or self.name).strip("_")[
             :_MAX_IDENTIFIER_LENGTH
         ]
@@ -101,9 +101,9 @@ class Subject:
     def rescale_energy(self, curve: CumulativeProfile) -> CumulativeProfile:
         """Return `curve` with an energy that can be compared with the energy of the reference profile.
 
-        The albedo of a subject can differ from the energy of the reference profile, and a program may return
-        more or less light than this albedo. The new energy is (energy of `curve`) / albedo * (energy of the
-        reference profile).
+        The albedo of the subject can differ from the energy of the reference profile, and the program's skin
+        may return more or less light than this albedo. The new energy is (energy of `curve`) / albedo *
+        (energy of the reference profile).
 
         curve : cumulative profile that the program renders for the subject's albedo
         """
@@ -135,10 +135,13 @@ class Subject:
         return replace(self, scene=replace(self.scene, head=painted))
 
     def encode_maps(self) -> dict[str, bytes]:
-        """Return the maps of the head as PNG files by role: colour, normal, roughness, specular and height.
+        """Return a dictionary from role to PNG file for the maps of the head.
+
+        The roles are colour, normal, roughness, specular and height.
 
         The colour is sRGB, and the green channel of the normal map points up. Roughness, which is Beckmann's
-        m, and specular strength are linear. Heights are scaled to their range and stored in 16 bits.
+        m, and specular strength are linear. Heights are stored in 16 bits: 0 is the lowest height of the map,
+        and 65535 the highest.
         """
         if self.head is None:
             return {}
@@ -149,12 +152,13 @@ class Subject:
 def load_subject(
     source: str | Path, *, profile: str | Path | None = None, model: ModelName | None = None, **head: Any
 ) -> Subject:
-    """Load a skin or a head by name or from a file, and return it with its reference profile.
+    """Load a skin or a head, given by name or file, and return it with the reference profile of its skin.
 
-    source : a profile by name ("skin1", "dj3", "light", "gpu-gems-3") or file (.toml, .csv), or a head:
-        "human", "human:7", a person's .json, a sample, or a mesh (.glb, .obj, .usdz, ...)
-    profile : profile of a head's skin, by name or file; by default, a parametric person has skin with that
-        person's pigments, and other heads have the default skin
+    source : name ("skin1", "dj3", "light", "gpu-gems-3") or file (.toml, .csv) of a profile, or a head:
+        "human", "human:7", a person's .json file, the name of a sample, or a mesh file (.glb, .obj, .usdz,
+        ...)
+    profile : name or file of the profile of a head's skin; by default, the skin of a parametric person has
+        the pigments of that person, and other heads have the default skin
     model : model of the reference profile, see `reference_curve`
     head : options of `load_head`
 

@@ -25,7 +25,7 @@ class Parameter:
     """Named parameter of a program's skin material.
 
     name : name in the program
-    value : number, (red, green, blue), switch or text
+    value : number, tuple of red, green and blue, Boolean, or text
     unit : "mm", "m", "cm", "-" ...
     meaning : short description of its meaning in the program
     """
@@ -51,7 +51,7 @@ def get_numbers(parameters: Parameters, parameter_name: str) -> tuple[float, ...
 
 
 def replace_values(parameters: Parameters, new_values: Mapping[str, ParameterValue]) -> Parameters:
-    """Return a copy of `parameters` with new values, given by parameter name in `new_values`."""
+    """Return a copy of `parameters` with the values in `new_values`, which maps parameter names to values."""
     return tuple(replace(one, value=new_values.get(one.name, one.value)) for one in parameters)
 
 
@@ -154,7 +154,7 @@ class Target(ABC):
         Parameters
         ----------
         folder : str or Path
-            The folder node_modules of npm that contains the library.
+            npm folder node_modules that contains the library.
 
         Returns
         -------
@@ -251,7 +251,7 @@ class Target(ABC):
         Returns
         -------
         tuple of Parameter
-            Naive parameters, with the names that `parameters` uses.
+            Naive parameters, with the same names as the fitted parameters.
         """
 
     @abstractmethod
@@ -261,7 +261,7 @@ class Target(ABC):
         Parameters
         ----------
         parameters : tuple of Parameter
-            Parameters from `parameters` or `naive_parameters`.
+            Result of the method `parameters` or `naive_parameters`.
         subject : Subject
             Skin to export.
         version : str
@@ -270,7 +270,7 @@ class Target(ABC):
         Returns
         -------
         CumulativeProfile
-            Fraction of the light that leaves within each radius, by channel.
+            Fraction of the emerging light that leaves within each radius, in each channel.
         """
 
     @abstractmethod
@@ -282,10 +282,10 @@ class Target(ABC):
         subject : Subject
             Skin to export.
         parameters : tuple of Parameter
-            Parameters from `parameters`.
+            Result of the method `parameters`.
         output : Path
-            Empty folder if the name has no suffix. Otherwise a file in an empty folder; further files may be
-            written into this folder. The caller moves all files to the final output.
+            Path of an empty folder if the name has no suffix; otherwise path of a new file in an empty
+            folder, into which further files may be written. The caller moves all files to the final output.
         version : str
             Version of the program.
 
@@ -297,7 +297,7 @@ class Target(ABC):
 
 
 class JsonTarget(Target):
-    """Base class of targets that write a JSON file of parameters; the parameters were not tried."""
+    """Base class of targets that write a JSON file of parameters, which were not tested in the program."""
 
     suffixes = (".json", "")
     untested = True

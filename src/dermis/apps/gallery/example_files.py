@@ -1,4 +1,4 @@
-"""Example files as other programs write them: an avatar with hair cards, and two scans."""
+"""Example files like those that other programs write: an avatar with hair cards, and two scans."""
 
 from __future__ import annotations
 
@@ -35,9 +35,11 @@ _HAIR_CARD_COLUMNS = 8  # number of cards side by side in a picture of hairs
 
 
 class _Surface(NamedTuple):
-    """Part of an avatar as a mesh.
+    """Mesh of one part of an avatar.
 
-    points_mm, normals, uv : (v, 3) positions [mm], (v, 3) unit normals and (v, 2) uv of the vertices
+    points_mm : (v, 3) positions of the vertices [mm]
+    normals : (v, 3) unit normals of the vertices
+    uv : (v, 2) uv of the vertices
     triangles : (f, 3) vertex indices
     """
 
@@ -48,9 +50,9 @@ class _Surface(NamedTuple):
 
 
 class _Glb:
-    """Contents of a .glb file to which meshes with pictures are added.
+    """Contents of a .glb file, to which textured meshes can be added.
 
-    data : content of an existing file; empty for a new file
+    encoded_glb : bytes of an existing file; empty for a new file
     """
 
     def __init__(self, encoded_glb: bytes = b"") -> None:
@@ -68,7 +70,7 @@ class _Glb:
         self._buffer = BufferBuilder(bytearray(encoded_glb[28 + length :]), views, accessors)
 
     def add(self, mesh_name: str, surface: _Surface, picture: Bytes, roughness: float) -> None:
-        """Add a mesh with a picture (h, w, 4), which hides parts of the mesh where alpha is low."""
+        """Add a mesh textured with a picture (h, w, 4); where alpha is low, the mesh is invisible."""
         add_rows = self._buffer.add_accessor
         attributes = {
             "POSITION": add_rows((surface.points_mm / 1000.0).astype("<f4"), with_bounds=True),
@@ -95,7 +97,7 @@ class _Glb:
         return path
 
     def _append(self, list_name: str, **json_entry: Any) -> int:
-        """Append an entry to a list of the file's JSON, and return the index of the entry.
+        """Append an entry to a list in the JSON of the file, and return the index of the entry.
 
         list_name : name of the list, such as "meshes"
         """
@@ -104,9 +106,9 @@ class _Glb:
 
 
 def write_avatar(studio: Studio, folder: Path) -> Path:
-    """Write an avatar with a sweater and hair cards as .glb; return the path of the file.
+    """Write an avatar with a sweater and hair cards as a .glb file; return the path of the file.
 
-    Hair, brows and lashes are hair cards: ribbons with pictures of several hairs.
+    Hair, brows and lashes consist of hair cards: ribbons that each show a picture of several hairs.
     """
     plain = Human(sex=0.1, age=26).head()
     painted, eyes = paint_head(studio.renderer.device, plain, 1024)
@@ -120,7 +122,10 @@ def write_avatar(studio: Studio, folder: Path) -> Path:
 
 
 def write_pictures(head: Head, folder: Path) -> Path:
-    """Write a head's skin as three meshes, each with a picture cut from the colour map; return the path."""
+    """Write a head's skin as a .glb file with three meshes, each with its own part of the colour map.
+
+    Returns the path of the file.
+    """
     mesh, colour = head.mesh, _colour_map_srgb(head)
     file = _Glb()
     corner = mesh.triangles[_is_skin(head)]
@@ -140,7 +145,7 @@ def write_pictures(head: Head, folder: Path) -> Path:
 
 
 def write_vertex_colours(head: Head, folder: Path) -> Path:
-    """Write a head with vertex colours and without uv as a .ply file, and return the path."""
+    """Write a head with vertex colours, and without uv, as a .ply file; return the path of the file."""
     mesh, colour = head.mesh, _colour_map_srgb(head)
     y, x = (mesh.uv[:, ::-1] * np.array(colour.shape[:2]) - 0.5).clip(0).astype(int).T
     kinds = [f"property float {axis}" for axis in "xyz"]
@@ -156,7 +161,7 @@ def write_vertex_colours(head: Head, folder: Path) -> Path:
 
 
 def unpack_mesh(mesh_name: str, folder: Path) -> Path:
-    """Write the mesh of a hand or of a body as an .obj file and return its path.
+    """Write the mesh of a hand or of a body as an .obj file; return the path of the file.
 
     mesh_name : "hand" or "body"
     """
@@ -177,7 +182,7 @@ def _colour_map_srgb(head: Head) -> Bytes:
 
 
 def _hair_cards(paths: Doubles, outward: Doubles, width_mm: float) -> _Surface:
-    """Return hair cards: ribbons along paths, each with a random column of `_hair_card_picture`.
+    """Return hair cards: ribbons along paths, each textured with a random card of `_hair_card_picture`.
 
     paths : (n, k, 3) points of each path from root to tip [mm]
     outward : (n, k, 3) outward directions at these points
@@ -209,12 +214,12 @@ def _hair_card_picture(
     seed: int,
     taper_fraction: float = 0.15,
 ) -> Bytes:
-    """Return a picture (h, w, 4) of hair cards side by side, with hairs that end at different lengths.
+    """Return a picture (h, w, 4) of several hair cards side by side, with hairs of different lengths.
 
     colour : mean colour of the hairs, linear Rec. 709
     hair_count : number of hairs in each hair card
     picture_size : height and width of the picture [pixel]
-    taper_fraction : part of the picture height over which a hair becomes thinner towards the tip [-]
+    taper_fraction : fraction of the picture's height over which a hair gets thinner towards its tip [-]
     """
     rng, (height, width) = np.random.default_rng(seed), picture_size
     picture = np.zeros((height, width, 4), np.uint8)
@@ -239,9 +244,9 @@ def _covers_face(points_mm: Doubles) -> Mask:
 
 
 def _scalp_hair_paths(head: Head) -> tuple[Doubles, Doubles]:
-    """Return paths (n, k, 3) and outward directions (n, k, 3) of long hair that falls from a parting.
+    """Return the paths (n, k, 3) of long hair that falls from a parting, and outward directions (n, k, 3).
 
-    Each path follows the surface of the head at a random distance, and turns downwards step by step.
+    Each path follows the surface of the head at a random distance from it, and gradually turns downwards.
     """
     assert head.hair is not None
     rng, mesh = np.random.default_rng(3), head.mesh
@@ -283,7 +288,7 @@ def _scalp_hair_paths(head: Head) -> tuple[Doubles, Doubles]:
 
 
 def _brow_and_lash_paths(head: Head) -> tuple[Doubles, Doubles]:
-    """Return paths (n, k, 3) and outward directions (n, k, 3) for every third hair of brows and lashes."""
+    """Return the paths (n, k, 3) of every third brow and lash hair, and outward directions (n, k, 3)."""
     assert head.strands is not None
     paths = head.strands.knot_positions_mm(head.mesh, head.mesh.points_mm)[::3].astype(float)
     facing = paths[:, -1:] - paths[:, :1] + np.array([0.0, 0.0, 6.0])
@@ -306,7 +311,7 @@ def _sweater(head: Head) -> _Surface:
 
 
 def _sweater_picture(picture_size: tuple[int, int] = (1024, 2048)) -> Bytes:
-    """Return striped knitwear (h, w, 4) that is cut out at the neck."""
+    """Return a picture (h, w, 4) of striped knitwear, transparent where the neck shows."""
     y, x = np.mgrid[0 : picture_size[0], 0 : picture_size[1]] / np.array(picture_size).reshape(2, 1, 1)
     y_mm, angle = -90.0 - 260.0 * y, 2.0 * np.pi * (x - 0.5)
     neck_mm = -128.0 - 24.0 * np.maximum(np.cos(angle), 0.0)

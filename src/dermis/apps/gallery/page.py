@@ -32,7 +32,7 @@ _TEX_SYMBOLS = {
 
 
 def write_page(path: Path, pictures: Sequence[GalleryPicture], head: str, adapter: str) -> None:
-    """Write the HTML page with all pictures atomically.
+    """Write the HTML page with all pictures, either completely or not at all.
 
     pictures : pictures in the order of the page
     head : name of the head in the pictures
@@ -69,7 +69,7 @@ def _section_html(picture: GalleryPicture) -> str:
 
 
 def _equation_html(equation: str) -> str:
-    """Convert a one-line equation to HTML, where _ begins a subscript and ^ begins a superscript."""
+    """Convert a one-line equation, in which _ begins a subscript and ^ a superscript, to HTML."""
     equation = re.sub(r"_(\w+)", r"<sub>\1</sub>", html.escape(equation))
     return re.sub(r"\^\(([^)]*)\)|\^(\w+)", lambda found: f"<sup>{found[1] or found[2]}</sup>", equation)
 
@@ -154,7 +154,7 @@ def _read_resource(file_name: str) -> str:
 
 
 def format_reference(bibliography_key: str) -> str:
-    """Format a work of the bibliography in one line: authors, title, year.
+    """Format a work from the bibliography on one line: authors, title, year.
 
     Raises DermisError for a key that is not in the bibliography.
     """

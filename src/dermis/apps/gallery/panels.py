@@ -23,19 +23,21 @@ _CAPTION_HEIGHT_PX, _CAPTION_FONT_SIZE, _TEXT_COLOUR, _BACKGROUND = 24, 14, (200
 
 
 def to_srgb8(image: Image) -> SrgbImage:
-    """Convert an image to 8-bit sRGB; floating-point images are linear light."""
+    """Convert an image to 8-bit sRGB; a floating-point image is taken to be linear light."""
     if image.dtype == np.uint8:
         return np.asarray(image, np.uint8)
     return encode_srgb8(np.maximum(image, 0.0).astype(np.float32))
 
 
 def first_frame(panel: Panel) -> Image:
-    """Return a panel that is a picture, or the first frame of a panel that is an animation."""
+    """Return the first frame if a panel is an animation, otherwise the panel itself."""
     return panel[0] if isinstance(panel, list) else panel
 
 
 def panel_sheet(panels: Panels, columns: int = 0) -> SrgbImage:
-    """Arrange panels with captions in rows of one sRGB image (h, w, 3); animations show their first frame.
+    """Arrange panels with captions in rows and return an sRGB image (h, w, 3).
+
+    An animation is represented by its first frame.
 
     columns : number of panels in a row; 0 for a single row
     """
@@ -123,7 +125,7 @@ _DISPLAY_QUANTILES = 0.02, 0.98  # quantiles of non-zero values that are shown a
 def output_image(output_name: str, output_array: NDArray[Any]) -> NDArray[np.uint8]:
     """Convert a render output to an image (h, w, 3): light to sRGB, labels to random colours.
 
-    Other outputs, such as depth, are scaled from black at a low quantile to white at a high quantile.
+    Other outputs, such as depth, are scaled so that a low quantile is black and a high quantile is white.
 
     output_name : name of the render output, such as "depth"
     output_array : (h, w) or (h, w, c) array of the output

@@ -1,4 +1,4 @@
-"""Gallery scripts: descriptions from their docstrings, the pictures that they draw, and WebP files."""
+"""Gallery scripts: their descriptions, taken from docstrings, and the pictures they draw, as WebP files."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Script:
     path : file of the script
     title : first line of the docstring
     caption : explanation below the first line of the docstring
-    deck : slides of the 2007 talk that the picture shows, by row in the table of slides, such as "S11"
+    deck : slides of the 2007 talk that the picture reproduces, as rows in the table of slides, such as "S11"
     equation : equation of the technique; "" for a script without an equation
     sources : keys of the bibliography
     slider : captions of two panels that the page compares with a slider; None without a slider
@@ -49,11 +49,11 @@ class Script:
 
     @property
     def name(self) -> str:
-        """Return the name of the script: the file name without suffix."""
+        """Return the name of the script: its file name without suffix."""
         return self.path.stem
 
     def draw(self, studio: Studio) -> Panels:
-        """Run the script, and return the panels of the picture by caption.
+        """Run the script, and return a dictionary from caption to panel.
 
         Raises DermisError when a package or file that the script needs is missing.
         """
@@ -81,11 +81,11 @@ def read_script(path: Path) -> Script:
 
 
 def find_scripts(selection: Sequence[str] = ()) -> list[Script]:
-    """Return the gallery scripts in the order of their numbers.
+    """Return the selected gallery scripts in the order of their numbers.
 
-    selection : numbers, names or parts of names that select scripts; all scripts if empty
+    selection : numbers, names or parts of names of scripts; empty for all scripts
 
-    Raises DermisError for a selection that matches no script.
+    Raises DermisError if a number or name in the selection matches no script.
     """
     scripts = [read_script(path) for path in sorted(scripts_folder().glob("[0-9]*.py"))]
     for wanted in selection:
@@ -100,16 +100,16 @@ def find_scripts(selection: Sequence[str] = ()) -> list[Script]:
 
 
 def _matches_selection(script: Script, number_or_text: str) -> bool:
-    """Return whether a script has the selected number, or a name that contains the selected text."""
+    """Return whether a script has the given number, or a name that contains the given text."""
     if number_or_text.isdecimal():
         return int(number_or_text) == int(script.name.partition("_")[0])
     return number_or_text != "" and number_or_text in script.name
 
 
 def draw_script(draw: Callable[[Studio], Panels]) -> None:
-    """Draw the picture of the running script and write it as PNG.
+    """Draw the picture of the gallery script that calls this function, and write it as PNG.
 
-    The command line is: python gallery/NN_name.py OUTPUT [HEAD].
+    The file and the head are read from the command line: python gallery/NN_name.py OUTPUT [HEAD].
 
     draw : function of the script that returns its panels
     """
@@ -136,14 +136,14 @@ _WEBP_QUALITY, _ANIMATION_FRAME_MS = 86, 80
 
 @dataclass(frozen=True)
 class GalleryPicture:
-    """Picture that a gallery script has drawn, as WebP files, or the reason why the script drew no picture.
+    """Picture that a gallery script drew, as WebP files, or the reason why it drew none.
 
     script : gallery script
     panels : WebP file of each panel, by caption
     size : width and height of the first panel [pixel]
     seconds : run time of the script [s]
     frame_ms : median time of the frames that the script rendered; None if it rendered no frame [ms]
-    fault : reason for a missing picture; "" if there is a picture
+    fault : reason why there is no picture; "" if there is a picture
     """
 
     script: Script
@@ -155,7 +155,7 @@ class GalleryPicture:
 
 
 def draw_pictures(scripts: Sequence[Script], studio: Studio) -> Iterator[GalleryPicture]:
-    """Run the scripts and yield a picture for each; if a script fails, its picture has only the reason."""
+    """Run the scripts and yield their pictures; the picture of a script that fails only holds the reason."""
     for script in scripts:
         started, studio.frames_ms = time.perf_counter(), []
         try:

@@ -21,10 +21,10 @@ _SCANNED_HEAD_NAME = "lee_perry_smith"
 
 
 class Studio:
-    """Renderer with the head that gallery pictures show, passed to each script.
+    """Renderer for gallery pictures, and the head that they show; passed to each script.
 
-    name : name of the head; by default the scan lee_perry_smith if it is downloaded, else the human
-    side : side of a panel [pixel]
+    name : name of the head; by default the scan lee_perry_smith if it was downloaded, otherwise the human
+    side : width and height of a panel [pixel]
     adapter : "auto", "cpu" or part of the name of an adapter
     settings : fields of `Settings` that override the values chosen by scripts
     """
@@ -43,7 +43,7 @@ class Studio:
         return Renderer(self.adapter)
 
     def head(self, head_name: str | None = None, **options: Any) -> Head:
-        """Load a head and subdivide it once.
+        """Load a head, subdivided once.
 
         head_name : name of the head; by default the head of the gallery
         options : arguments of `load_head`
@@ -51,14 +51,14 @@ class Studio:
         return self._load(head_name or self.name, subdivide=1, **options)
 
     def coloured_head(self) -> Head:
-        """Return the gallery's head with a colour map, which is painted if the head has procedural maps."""
+        """Return the gallery's head with a colour map, which is painted first if the maps are procedural."""
         head = self.head()
         return with_painted_maps(self.renderer.device, head, 1024) if head.maps.is_painted else head
 
     def render(self, scene: Scene, scale: float = 1.0, **settings: Any) -> NDArray[np.uint8]:
         """Render a scene to 8-bit sRGB, (h, w, 3).
 
-        scale : side of the image relative to the side of a gallery panel [-]
+        scale : width and height of the image, relative to those of a gallery panel [-]
         settings : fields of `Settings`
         """
         return self._draw(scene, scale, settings).srgb8()
@@ -66,16 +66,16 @@ class Studio:
     def linear(self, scene: Scene, scale: float = 1.0, **settings: Any) -> NDArray[np.float32]:
         """Render a scene to linear Rec. 709, (h, w, 3).
 
-        scale : side of the image relative to the side of a gallery panel [-]
+        scale : width and height of the image, relative to those of a gallery panel [-]
         settings : fields of `Settings`
         """
         return self._draw(scene, scale, settings).linear()
 
     def view(self, scene: Scene, view: str, scale: float = 1.0, **settings: Any) -> NDArray[np.uint8]:
-        """Render an intermediate result of the frame as the viewer shows it, in 8-bit sRGB, (h, w, 3).
+        """Render an intermediate result of a frame to 8-bit sRGB, (h, w, 3), as the viewer does.
 
         view : name of the view in the viewer, such as "blur 3"
-        scale : side of the image relative to the side of a gallery panel [-]
+        scale : width and height of the image, relative to those of a gallery panel [-]
         settings : fields of `Settings`
         """
         from dermis.apps.viewer.state import PART_VIEWS
@@ -93,9 +93,9 @@ class Studio:
         return self.renderer.reopening_device.run(draw_view)
 
     def light_map(self, scene: Scene, pyramid_level: int, **settings: Any) -> NDArray[np.float32]:
-        """Return the diffused irradiance on the atlas, divided by pi, (n, n, 3).
+        """Return the blurred irradiance in the atlas, divided by pi, (n, n, 3).
 
-        pyramid_level : pyramid level: 0 for the light that enters, higher for light blurred by more Gaussians
+        pyramid_level : 0 for the light as it enters the skin, higher for light blurred more strongly
         settings : fields of `Settings`
         """
         from dermis.gpu import download
@@ -114,8 +114,8 @@ class Studio:
     def settings(self, scale: float = 1.0, **settings: Any) -> Settings:
         """Return the settings with which a panel is rendered.
 
-        scale : side of the image relative to the side of a gallery panel [-]
-        settings : fields of `Settings` that override the gallery's defaults
+        scale : width and height of the image, relative to those of a gallery panel [-]
+        settings : fields of `Settings` that replace the defaults of the gallery
         """
         side = round(scale * self.side)
         defaults: dict[str, Any] = {"size": (side, side), "atlas": 1024}

@@ -18,7 +18,7 @@ _INSTALL_HINT = (
 
 
 class BlenderTask(NamedTuple):
-    """Description of a task of Blender, for error messages.
+    """What Blender is run for, as the error messages name it.
 
     renderer : name of the program in the message
     goal : purpose as an infinitive, such as "to render the head"
@@ -31,7 +31,7 @@ class BlenderTask(NamedTuple):
 
 
 def blender_python(python: str | Path | None = None) -> Path:
-    """Return the path of a Python with bpy: the argument, or by default the variable DERMIS_BLENDER_PYTHON.
+    """Return the path of a Python with bpy, by default from the environment variable DERMIS_BLENDER_PYTHON.
 
     Raises DermisError when there is no such file.
     """
@@ -46,7 +46,7 @@ def blender_python(python: str | Path | None = None) -> Path:
 def run_blender(
     python: Path, script: Path, options: Sequence[str], timeout_s: float, task: BlenderTask
 ) -> None:
-    """Run a script in Blender's Python, without the user's modules and those beside the script.
+    """Run a script in Blender's Python, which can import neither the user's modules nor the script's folder.
 
     options : command-line arguments of the script
 

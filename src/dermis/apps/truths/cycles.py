@@ -1,6 +1,7 @@
 """Images of a scene by Blender's Cycles, with random-walk or Burley subsurface scattering.
 
-Blender's Python runs `cycles_script.py` in a separate process on a folder with the described scene.
+The scene is written to a folder. `cycles_script.py`, which Blender's Python runs in a separate process, reads
+it and writes the images there.
 """
 
 from __future__ import annotations
@@ -114,15 +115,16 @@ def cycles_passes(
 
     medium : material of the skin: a `Lambertian`, `BeckmannSurface` or `PrincipledSkin`, or a medium with a
         single layer. The medium's index of refraction is ignored, as Cycles' random walks end at an
-        index-matched surface. Its colour in Cycles is its diffuse reflectance, and its radius is 4 pi mean
-        free paths
+        index-matched surface. Cycles gets the medium's diffuse reflectance as subsurface colour, and 4 pi
+        mean free paths as subsurface radius
     samples : paths per pixel of each pass
     settings : settings of the frame, of which only the size is used
     method : subsurface method of Cycles
     seed : random seed of the first pass; each further pass uses the next number
-    python : path of a Python with `bpy`; by default the variable DERMIS_BLENDER_PYTHON
+    python : path of a Python with `bpy`; by default from the environment variable DERMIS_BLENDER_PYTHON
 
-    Raises DermisError when there is no such Python, when Cycles fails, and for more than one layer.
+    Raises DermisError when there is no such Python, when Cycles fails, and when the medium has several
+    layers.
     """
     for sample_count in samples:
         _check_samples(sample_count)
@@ -177,7 +179,7 @@ def read_passes(folder: Path, samples: Sequence[int], picture_size: tuple[int, i
 
 @dataclass(frozen=True)
 class BeckmannSurface:
-    """Skin with surface reflection alone: a black body with a boundary of index 1.4 and Beckmann facets.
+    """Skin with surface reflection alone: black below a rough boundary of Beckmann facets and index 1.4.
 
     The head's normal map is applied.
 
@@ -191,7 +193,8 @@ class BeckmannSurface:
 class PrincipledSkin:
     """Skin as Blender users model it: Principled BSDF, a random walk below a rough boundary of index 1.4.
 
-    The head's normal map is applied. Cycles uses GGX facets here; light that they reflect does not enter.
+    The head's normal map is applied. Cycles uses GGX facets here; only light that the facets do not reflect
+    enters the skin.
 
     colour : (h, w, 3) diffuse reflectance, linear Rec. 709 [-]
     radius_mm : (3,) subsurface radius of Cycles, 4 pi mean free paths [mm]
@@ -211,9 +214,9 @@ CYCLES_METHOD_NAMES = {"random-walk": "RANDOM_WALK", "burley": "BURLEY"}
 def describe_scene(
     scene: Scene, medium: SkinMaterial, subsurface_method: str, picture_size: tuple[int, int]
 ) -> tuple[SceneDict, dict[str, NumericArray]]:
-    """Return the JSON description of a scene for Cycles, except its passes, and the scene's arrays by name.
+    """Return the contents of the files scene.json and arrays.npz for Cycles, apart from the list of passes.
 
-    They are stored in scene.json and arrays.npz.
+    The second result is a dictionary from name to array.
 
     picture_size : width and height of the picture [pixel]
     """
@@ -265,12 +268,12 @@ def _diffuse_material(colour: Sequence[float]) -> SceneDict:
 def _skin_material(medium: SkinMaterial, subsurface_method: str) -> SceneDict:
     """Return the description of the skin's material for Cycles, with colour and subsurface radius.
 
-    The colour is the diffuse reflectance of the medium, the radius 4 pi mean free paths. Cycles divides radii
-    by 4 pi, and derives the albedo of its random walk from the colour by a fit, which inverts
-    `diffuse_albedo` within 1 %. The walk is therefore through this medium, but light enters and leaves
-    through a Lambertian surface. The method "burley" is the profile of [ChristensenBurley2015] for this
-    colour and radius. A ball under uniform light returns its colour within 3 % by the random walk, within 0.5
-    % by the profile.
+    The colour is the diffuse reflectance of the medium, and the radius is 4 pi mean free paths. Cycles
+    divides the radius by 4 pi, and derives the albedo of its random walk from the colour by a fit, which
+    inverts `diffuse_albedo` within 1 %. The random walk therefore takes place in this medium, but light
+    enters and leaves the medium through a Lambertian surface. The method "burley" uses the profile of
+    [ChristensenBurley2015] for the same colour and radius. The reflectance of a ball under uniform light
+    differs from the given colour by up to 3 % with the random walk, and by up to 0.5 % with the profile.
     """
     if isinstance(medium, Lambertian):
         return _diffuse_material(medium.albedo)

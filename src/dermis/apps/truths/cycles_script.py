@@ -1,8 +1,8 @@
-"""Script that renders a described scene with Cycles, run by Blender's Python: cycles_script.py FOLDER.
+"""Script that renders a scene with Cycles; Blender's Python runs it as cycles_script.py FOLDER.
 
 FOLDER contains scene.json and arrays.npz, written by the module `cycles`. The script adds pass_K.exr
-(radiance and coverage) and finally done.json (Blender's version, times of the passes). It imports nothing of
-dermis, which Blender's Python does not have.
+(radiance and coverage) for each pass K, and finally done.json (Blender's version, times of the passes). It
+does not import dermis, which Blender's Python does not have.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def make_material(description: dict[str, Any], maps: dict[str, Any]) -> Any:
     """Return a new material.
 
     description : shader and parameters of the material
-    maps : image arrays by name
+    maps : dictionary from name to image array
     """
     material = bpy.data.materials.new(description["name"])
     material.use_nodes = True
@@ -153,7 +153,7 @@ def add_light(description: dict[str, Any]) -> None:
 def shape_stripe(light: Any, stripe: dict[str, Any]) -> None:
     """Turn a distant point light into a stripe light by shader nodes.
 
-    Its irradiance is Gaussian across the stripe and constant along it.
+    The irradiance is then Gaussian across the stripe and constant along the stripe.
     """
     light.use_nodes = True
     nodes, links = light.node_tree.nodes, light.node_tree.links

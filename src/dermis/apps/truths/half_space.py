@@ -13,12 +13,13 @@ _H_FUNCTION_ITERATIONS = 500
 
 
 def h_function(cosine: ArrayLike, albedo: float) -> Floats:
-    """Return Chandrasekhar's H function, by which a half-space's reflection is given in closed form [-].
+    """Return Chandrasekhar's H function, from which the reflection of a half-space is computed [-].
 
-    cosine : cosines of angles to the normal, of any shape
+    cosine : cosines of angles to the normal, an array of any shape
     albedo : single-scattering albedo, below 1 [-]
 
-    Source: [Chandrasekhar1960] section 38, in its form without cancellation, iterated on Gaussian nodes.
+    Source: [Chandrasekhar1960] section 38: the form of the integral equation in which no digits cancel,
+    solved by iteration at Gaussian nodes.
     """
     if not 0.0 <= albedo < 1.0:
         refuse("half-space", "an albedo from 0 to below 1", f"got {albedo:g}", "Correct it")
@@ -52,7 +53,8 @@ def diffuse_albedo(albedo: float) -> float:
 def reflected_radiance(cosine_in: ArrayLike, cosine_out: ArrayLike, albedo: float) -> Floats:
     """Return the ratio of the radiance that a half-space reflects to the irradiance of parallel light [1/sr].
 
-    cosine_in, cosine_out : cosines between light and normal, and between view and normal
+    cosine_in : cosine of the angle between light and normal
+    cosine_out : cosine of the angle between view and normal
     albedo : single-scattering albedo [-]
 
     Source: [Chandrasekhar1960] section 33: S / (4 pi cosine_in cosine_out), with his scattering function S.

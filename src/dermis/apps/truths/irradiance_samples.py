@@ -27,7 +27,7 @@ class MeshPoints:
     barycentric: Floats
 
     def interpolate(self, mesh: Mesh, vertex_values: NDArray[np.floating]) -> Floats:
-        """Return vertex values interpolated at the points, (n, k).
+        """Return the values (n, k) at the points, interpolated from vertex values.
 
         vertex_values : (v, k) values at the vertices of the mesh
         """
@@ -39,7 +39,7 @@ IrradianceFunction = Callable[[MeshPoints], Floats]
 
 @dataclass(frozen=True)
 class IrradianceSamples:
-    """Irradiance on a surface of small triangles, linear within each.
+    """Irradiance on a surface of small triangles, interpolated linearly on each triangle.
 
     positions : (n, 3) sample positions [mm]
     triangles : (m, 3) sample indices of the corners; the triangles cover the surface without overlaps
@@ -58,18 +58,18 @@ def sample_irradiance(
     min_spacing_mm: float | None = None,
     contrast_threshold: float = 0.05,
 ) -> IrradianceSamples:
-    """Return irradiance samples on a mesh, whose triangles are subdivided without smoothing.
+    """Return irradiance samples at the corners of small triangles that subdivide the skin of a mesh.
 
     light : function of `MeshPoints` that returns irradiance (n, 3); called for new points only
     spacing_mm : longest side of a small triangle [mm]
-    min_spacing_mm : length down to which sides with a high contrast are halved further; None to stop at
-        `spacing_mm` [mm]
-    contrast_threshold : least high contrast: difference of irradiance between the ends of a side, relative
-        to the largest irradiance [-]
+    min_spacing_mm : shortest side that further halving may produce where the irradiance changes much along a
+        side; None for no further halving [mm]
+    contrast_threshold : change of irradiance between the ends of a side above which the side is halved
+        further, relative to the largest irradiance [-]
 
-    For equal numbers of samples, linear interpolation between triangle corners has a smaller error than
+    For the same number of samples, linear interpolation between triangle corners has a smaller error than
     random points, evenly distributed points [Turk1992] or triangle centroids. A sum over points without
-    interpolation misses the profile's peak between them.
+    interpolation misses the peak of the diffusion profile where it lies between two points.
 
     Source: [JensenBuhler2002] for sampling the irradiance on the surface.
     """
@@ -175,7 +175,7 @@ def _halve_edges(
 
 
 def _sample_points(subdivision: _Subdivision, first_index: int = 0) -> MeshPoints:
-    """Return the samples from index `first_index` on as points on the mesh."""
+    """Return the positions on the mesh of all samples from index `first_index` onwards."""
     count = subdivision.sample_count
     face, barycentric = np.empty(count, np.int64), np.empty((count, 3))
     face[subdivision.corners] = subdivision.face[:, None]

@@ -47,8 +47,8 @@ def mitsuba_emitter(mi: Mitsuba, light: Light, light_number: int) -> SceneDict:
     mi : module `mitsuba` with a variant set
     light_number : position of the light in the scene, from 1, for messages
 
-    Raises DermisError for a light without shadows, which a path tracer does not support, and for an unknown
-    kind of light: references use no approximations.
+    Raises DermisError for a light without shadows, which a path tracer does not support, and for a kind of
+    light that this module does not convert.
     """
     _check_shadows(light, light_number, "path tracing")
     return MITSUBA[light.kind](mi, light, f"light {light_number}")
@@ -78,7 +78,7 @@ def mitsuba_point(mi: Mitsuba, light: PointLight, label: str) -> SceneDict:
 
 
 def mitsuba_spot(mi: Mitsuba, light: SpotLight, label: str) -> SceneDict:
-    """Return a Mitsuba projector for a spot light, whose smooth edge Mitsuba's spot light does not have."""
+    """Return a Mitsuba projector in place of a spot light; Mitsuba's own spot light has no smooth edge."""
     tangent = np.tan(np.radians(light.outer_degrees))
     along = tangent * ((np.arange(_SPOT_SLIDE_SIDE) + 0.5) / _SPOT_SLIDE_SIDE * 2.0 - 1.0)
     cosine = 1.0 / np.sqrt(1.0 + along[:, None] ** 2 + along[None, :] ** 2)
@@ -204,9 +204,10 @@ def _cycles_point_light(
 
 
 def facing_irradiance(width: float, height: float, distance: float) -> float:
-    """Return the irradiance that a rectangle of radiance 1 causes on a parallel surface before its centre.
+    """Return the irradiance that a rectangle of radiance 1 causes on a parallel surface facing its centre.
 
-    width, height, distance : size of the rectangle, and its distance from the surface, all in the same unit
+    width, height : size of the rectangle
+    distance : distance between rectangle and surface, in the same unit as the size
 
     Source: view factor from a corner, [Baum1989].
     """

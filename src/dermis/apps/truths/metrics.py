@@ -1,4 +1,4 @@
-"""Differences between an image and a reference: relative error without noise, energy ratio, FLIP."""
+"""Differences between an image and a reference: relative error corrected for noise, energy ratio, FLIP."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ZERO_DIFFERENCE_GREY = 0.5
 
 
 class Estimate(NamedTuple):
-    """Estimated value with its standard error, which is 0 where the reference has no noise."""
+    """Estimated value with its standard error, which is 0 if the reference has no noise."""
 
     value: float
     standard_error: float
@@ -30,9 +30,9 @@ class Estimate(NamedTuple):
 
 @dataclass(frozen=True)
 class FlipDifference:
-    """Perceived difference of two pictures by FLIP, from 0 to 1.
+    """Perceived difference between two pictures by FLIP, from 0 to 1.
 
-    mean : mean of the pixels in the mask
+    mean : mean difference of the pixels in the mask
     error : (h, w) difference of each pixel; 0 outside the mask
     pixels_per_degree : assumed resolution at the viewer's eye
     """
@@ -49,29 +49,33 @@ def relative_rmse(
     variance: ArrayLike | None = None,
     image_variance: ArrayLike | None = None,
 ) -> Estimate:
-    """Return the relative root mean square error, corrected for the noise of the reference [-].
+    """Return the relative root mean square error of an image, corrected for the noise of the reference [-].
 
-    It is the root of the sum of squared differences divided by the sum of the reference's squares.
+    The error is sqrt(E), where E is sum((image - reference)²) / sum(reference²) without noise.
 
     image, reference : (h, w) or (h, w, c) linear images; all channels are summed
     mask : (h, w) pixels to compare
-    variance : unbiased estimate of the variance of each value of `reference`: the variance of its samples
-        divided by their number
-    image_variance : variance of each value of `image`, whose noise is then removed too
+    variance : (h, w) or (h, w, c) unbiased estimate of the variance of each value of `reference`: the
+        variance between its samples, divided by the number of samples
+    image_variance : variance of each value of `image`; when given, the noise of the image is removed too
 
-    Let T = t + n be the reference, with noise n of mean 0 and variance s², and D = I - T the difference. Then
-    mean(D²) = mean((I - t)²) + s² and mean(T²) = mean(t²) + s², so E = sum(D² - s²) / sum(T² - s²) is free of
-    noise. A pixel contributes U = D² - s² - E (T² - s²) to the error of E; its random part is -2 n (I - t + E
-    t) + (1 - E)(n² - s²). For normal n its variance is 4 s² (I - t + E t)² + 2 (1 - E)² s⁴, with the unbiased
-    estimate 4 s² (D + E T)² - 2 (1 - E)² s⁴. Skewed noise is removed as well, but makes this standard error
-    too small, by 7 to 16 % for means of 64 exponential samples. Pixels are independent; channels may share
-    paths, so their standard deviations are added, which overestimates by at most sqrt(c). The root's standard
-    error is the larger of its distances to sqrt(E + e) and sqrt(E - e), where e is the error of E; 0 replaces
-    the latter if E < e.
+    Let the reference be T = t + n with noise n of mean 0 and variance s², and let D = I - T. On average, D²
+    is (I - t)² + s² and T² is t² + s², so noise does not bias the estimate E = sum(D² - s²) / sum(T² - s²).
 
-    Noise of variance v in the image adds v to D², and 4 v D² - 4 v s² - 2 v² to the estimate of U's variance.
-    Only the first term is counted, because few passes estimate v² badly: the standard error is then too large
-    rather than too small.
+    Each pixel contributes U = D² - s² - E (T² - s²) to the error e of E.
+    The random part of U is -2 n (I - t + E t) + (1 - E)(n² - s²).
+    For normally distributed n, the variance of U is 4 s² (I - t + E t)² + 2 (1 - E)² s⁴.
+    Its unbiased estimate is 4 s² (D + E T)² - 2 (1 - E)² s⁴.
+    For skewed noise, E is still unbiased but e is too small, by 7 to 16 % if the reference is the mean of 64
+    exponentially distributed samples.
+
+    Pixels are independent of one another. Channels may share paths, so the standard deviations of the
+    channels are added, which overestimates e by at most sqrt(c). The standard error of sqrt(E) is the larger
+    of its distances to sqrt(E + e) and to sqrt(max(E - e, 0)).
+
+    Noise of variance v in the image adds v to D², and 4 v D² - 4 v s² - 2 v² to the estimate of the variance
+    of U. Only 4 v D² is counted, because v² is poorly known after few passes; the standard error is then too
+    large rather than too small.
     """
     I, T, s2 = _masked_pixels(image, reference, mask, variance)
     v = _masked_pixels(image, reference, mask, image_variance)[2]
@@ -91,9 +95,9 @@ def energy_ratio(
 ) -> Estimate:
     """Return the ratio of the sum of the image to the sum of the reference [-].
 
-    The parameters are those of `relative_rmse`. The ratio and the reference's sum have the same relative
-    error. The variance of that sum is the sum of the pixels' variances; channels may share paths, so their
-    standard deviations are added.
+    The parameters are those of `relative_rmse`. The relative standard error of the ratio equals that of the
+    reference's sum. In each channel, the variances of the pixels are added; the standard deviations of the
+    channels are then added, because channels may share paths.
     """
     I, T, s2 = _masked_pixels(image, reference, mask, variance)
     total = float(T.sum())
@@ -104,7 +108,7 @@ def energy_ratio(
 
 
 def _sum_standard_error(variance: Floats) -> float:
-    """Return an upper bound of the standard error of a sum over pixels with correlated channels.
+    """Return an upper bound of the standard error of a sum over pixels whose channels may be correlated.
 
     variance : (n, c) variance of each pixel and channel
     """
@@ -114,7 +118,7 @@ def _sum_standard_error(variance: Floats) -> float:
 def _masked_pixels(
     image: ArrayLike, reference: ArrayLike, mask: Mask | None, variance: ArrayLike | None
 ) -> tuple[Floats, Floats, Floats]:
-    """Return image, reference and variance as (n, c) arrays of the pixels in the mask."""
+    """Return the values of image, reference and variance at the n pixels in the mask, each (n, c)."""
     I, T = np.asarray(image, np.float64), np.asarray(reference, np.float64)
     s2 = np.zeros_like(T) if variance is None else np.asarray(variance, np.float64)
     if I.shape != T.shape or s2.shape != T.shape or I.ndim not in (2, 3):
@@ -144,10 +148,12 @@ def flip(
 ) -> FlipDifference:
     """Return the FLIP error of a picture (h, w, 3) against a reference.
 
-    image, reference : sRGB in 0..1 as displayed, after exposure and tone curve; with `high_dynamic_range`
-        linear Rec. 709 of 0 or more, compared at all exposures that suit the reference
+    image, reference : (h, w, 3) sRGB values in 0..1 as displayed, after exposure and tone curve; with
+        `high_dynamic_range`, linear Rec. 709 values of 0 or more
     mask : (h, w) pixels to compare; elsewhere the image is set to the reference
     pixels_per_degree : assumed resolution at the eye
+    high_dynamic_range : whether to compare at all exposures that suit the reference, and to keep
+        the largest error of each pixel
 
     Raises DermisError when the package flip-evaluator is not installed.
 
@@ -180,10 +186,11 @@ def _checked_picture(
 
 
 def signed_difference(image: ArrayLike, reference: ArrayLike, difference_gain: float = 4.0) -> Floats:
-    """Return an sRGB picture (h, w, 3) of image minus reference, mid-grey where they are equal.
+    """Return an sRGB picture (h, w, 3) of image minus reference, mid-grey where both are equal.
 
-    image, reference : (h, w, 3) linear Rec. 709 of 0 or more; 1 is white
-    difference_gain : factor of the difference between sRGB values, which are perceptually even
+    image, reference : (h, w, 3) linear Rec. 709 values; 1 is white
+    difference_gain : factor by which the differences are multiplied. They are taken between sRGB values, so
+        equal differences look about equally large
     """
     I, T = np.asarray(image, np.float64), np.asarray(reference, np.float64)
     if I.shape != T.shape or I.ndim != 3 or I.shape[2] != 3:

@@ -43,7 +43,7 @@ _REPORTED_FOLDED_FRACTION = 1e-3  # folded fraction of a surface above which a n
 
 @dataclass(frozen=True)
 class Lambertian:
-    """Lambertian skin without scattering or interreflection, in place of a medium.
+    """Lambertian skin without scattering or interreflection, to be used in place of a medium.
 
     albedo : diffuse reflectance, linear Rec. 709 [-]
     """
@@ -72,9 +72,9 @@ def mitsuba_variant(mi: Mitsuba, variant_name: str) -> Iterator[None]:
 
 
 def check_traceable(medium: Medium | Lambertian) -> None:
-    """Raise DermisError for media that have a refracting surface or a number of channels other than three.
+    """Raise DermisError for a medium that has a refracting surface or does not have three channels.
 
-    No path connects to a point light through a refracting surface.
+    Paths cannot connect to a point light through a refracting surface.
     """
     if isinstance(medium, Medium) and medium.eta != 1.0:
         actual = f"its index is {medium.eta:g}"
@@ -87,7 +87,7 @@ def check_traceable(medium: Medium | Lambertian) -> None:
 def radiance_scene(
     mi: Mitsuba, scene: Scene, medium: Medium | Lambertian, picture_size: tuple[int, int]
 ) -> tuple[MitsubaObject, tuple[str, ...]]:
-    """Return the Mitsuba scene of the radiance image, and notes on changes made to the head."""
+    """Return the Mitsuba scene that renders radiance, and notes for the user on changes made to the head."""
     shapes, notes = _head_shapes(mi, scene.head, medium)
     depth_limit = {"max_depth": _DIRECT_LIGHT_DEPTH} if isinstance(medium, Lambertian) else {}
     # Spectral MIS, because sampling by the extinction of one channel makes the others noisy.
@@ -103,7 +103,7 @@ def radiance_scene(
 def mitsuba_scene(
     mi: Mitsuba, scene: Scene, integrator: SceneDict, shapes: SceneDict, picture_size: tuple[int, int]
 ) -> MitsubaObject:
-    """Return a Mitsuba scene of given shapes with the lights, environment and camera of a dermis scene."""
+    """Return a Mitsuba scene of given shapes, with the lights, environment and camera of a dermis scene."""
     lights = {f"light_{k}": mitsuba_emitter(mi, light, k) for k, light in enumerate(scene.lights, start=1)}
     if scene.environment is not None:
         lights["environment"] = mitsuba_environment(mi, scene.environment)
@@ -144,7 +144,7 @@ def mitsuba_sensor(
 
 
 def _head_shapes(mi: Mitsuba, head: Head, medium: Medium | Lambertian) -> tuple[SceneDict, tuple[str, ...]]:
-    """Return the shapes of skin and opaque materials, and notes on changes made to the head.
+    """Return the shapes of skin and opaque materials, and notes for the user on changes made to the head.
 
     Positions are relative to the head's centre.
     """
@@ -162,7 +162,7 @@ def _head_shapes(mi: Mitsuba, head: Head, medium: Medium | Lambertian) -> tuple[
 
 
 def emissive_skin(mi: Mitsuba, head: Head) -> SceneDict:
-    """Return shapes of the head whose skin emits radiance 1, with all other materials black."""
+    """Return the head's shapes with skin that emits radiance 1 and with all other materials black."""
     shapes = {}
     for k, material in enumerate(head.mesh.materials):
         attributes = {"bsdf": _diffuse_bsdf(mi, 0.0)}
@@ -185,10 +185,10 @@ def _diffuse_bsdf(mi: Mitsuba, reflectance: SceneDict | float) -> MitsubaObject:
 def _material_mesh(
     mi: Mitsuba, head: Head, material_index: int, **attributes: MitsubaObject
 ) -> MitsubaObject:
-    """Return the triangles of a material as a Mitsuba mesh with the head's normals.
+    """Return the head's triangles of one material as a Mitsuba mesh with the head's normals.
 
-    material_index : index of the material
-    attributes : BSDF, emitter and media
+    material_index : index of the material in the head's mesh
+    attributes : BSDF, emitter and media of the Mitsuba mesh
     """
     mesh = head.mesh
     used, corners = np.unique(mesh.triangles[mesh.material == material_index], return_inverse=True)
@@ -197,7 +197,7 @@ def _material_mesh(
 
 
 def layer_interfaces(mi: Mitsuba, head: Head, medium: Medium) -> tuple[SceneDict, tuple[str, ...]]:
-    """Return closed surfaces around the skin and between its layers, and notes on changes to the head."""
+    """Return closed surfaces around and between the skin's layers, and notes for the user on changes made."""
     skin = closed_skin(head.mesh, head.name)
     skin = replace(skin, positions=(skin.positions - np.array(head.centre_mm)).astype(np.float32))
     notes = [f"{skin.caps} openings closed, {skin.cap_area:.0f} mm2"] if skin.caps else []
@@ -215,7 +215,7 @@ def layer_interfaces(mi: Mitsuba, head: Head, medium: Medium) -> tuple[SceneDict
 def inner_interfaces(
     mi: Mitsuba, skin_surface: ClosedSurface, medium: Medium, media: Sequence[MitsubaObject], head_name: str
 ) -> tuple[SceneDict, tuple[str, ...]]:
-    """Return the closed surfaces below each layer of finite thickness, and notes on surfaces that fold over.
+    """Return the closed surfaces below each layer of finite thickness, and notes on those that fold over.
 
     skin_surface : closed skin surface relative to the head's centre
     media : Mitsuba's media of the layers of `medium`
@@ -237,7 +237,7 @@ def inner_interfaces(
 
 
 def interface_gap_mm(mi: Mitsuba, skin_surface: ClosedSurface) -> Doubles:
-    """Return the distance (p,) between the two surfaces that form an interface between media [mm].
+    """Return at each point the distance (p,) between the two surfaces that form an interface [mm].
 
     skin_surface : closed skin surface relative to the head's centre
     """
@@ -262,7 +262,7 @@ def homogeneous_medium(layer: Layer) -> SceneDict:
 def interface_mesh(mi: Mitsuba, closed_surface: ClosedSurface, media: SceneDict) -> MitsubaObject:
     """Return a closed surface as an invisible Mitsuba mesh between two media.
 
-    media : exterior and interior medium; None for vacuum
+    media : dictionary with the "exterior" and the "interior" medium; None for vacuum
     """
     non_vacuum = {side: medium for side, medium in media.items() if medium is not None}
     invisible = mi.load_dict({"type": "null"})
@@ -281,9 +281,10 @@ def mesh_shape(
 ) -> MitsubaObject:
     """Return triangles as a Mitsuba mesh.
 
-    vertices, normals, uv : positions (v, 3), normals (v, 3) and uv (v, 2) of the vertices; normals are None
-        for flat shading, uv are None without textures
+    vertices : (v, 3) positions of the vertices
     triangles : (f, 3) vertex indices
+    normals : (v, 3) normals of the vertices; None for flat shading
+    uv : (v, 2) texture coordinates of the vertices; None if there are no textures
     attributes : BSDF, emitter and media
     """
     properties = mi.Properties()

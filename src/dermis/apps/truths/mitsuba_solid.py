@@ -24,7 +24,8 @@ class ClosedSurface:
 
     positions : (p, 3) vertex positions [mm]
     triangles : (f, 3) vertex indices
-    caps, cap_area : number of openings that were closed, and the area of their caps [mm2]
+    caps : number of openings that were closed
+    cap_area : total area of the triangles that close these openings [mm2]
     """
 
     positions: Floats
@@ -38,7 +39,7 @@ def closed_skin(mesh: Mesh, head_name: str) -> ClosedSurface:
 
     head_name : name of the head, for messages
 
-    Raises DermisError when the skin encloses no volume: an open surface, or one with inward normals.
+    Raises DermisError when the skin encloses no volume, because it is open or its normals point inwards.
     """
     skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
     if not skin.any():
@@ -57,14 +58,14 @@ def closed_skin(mesh: Mesh, head_name: str) -> ClosedSurface:
 def offset_inwards(
     closed_surface: ClosedSurface, depth_mm: Doubles, head_name: str
 ) -> tuple[ClosedSurface, float]:
-    """Return a surface offset inwards by a depth at each point, and the fraction of it that folds over.
+    """Return a surface offset inwards by a depth at each point, and the fraction of its area that folds over.
 
     depth_mm : (p,) depth of each point; negative for an offset outwards [mm]
     head_name : name of the head, for messages
 
-    Raises DermisError when more than 2 % of the surface folds over, or no volume is left. Thin
-    parts whose opposite sides intersect after the offset are not detected: all parts must be thicker than
-    twice the depth.
+    Raises DermisError when more than 2 % of the surface folds over, or no volume is left. All parts must be
+    thicker than twice the depth; thinner parts, whose opposite sides cross after the offset, are not
+    detected.
     """
     shifted = (closed_surface.positions - depth_mm[:, None] * _mitre_vectors(closed_surface)).astype(
         np.float32
@@ -84,9 +85,9 @@ def offset_inwards(
 
 
 def _mitre_vectors(closed_surface: ClosedSurface) -> Doubles:
-    """Return for each point the outward vector (p, 3) that moves all faces around the point by 1.
+    """Return for each point the outward shift (p, 3) that offsets the planes of the adjacent faces by 1.
 
-    At sharp edges it is longer than 1, but at most 2.
+    At sharp edges the shift is longer than 1, but at most 2.
     """
     points = np.arange(len(closed_surface.positions), dtype=np.int32)
     normals = vertex_normals(closed_surface.positions, points, closed_surface.triangles).astype(np.float64)
@@ -115,7 +116,9 @@ def _close_openings(positions: Floats, triangles: Index) -> ClosedSurface:
 
 
 def _boundary_edges(triangles: Index, point_count: int) -> NDArray[np.int64]:
-    """Return directed edges (n, 2) that lack an opposite edge, each repeated for every missing opposite edge.
+    """Return the directed edges (n, 2) that triangles use more often than their reverses.
+
+    An edge is repeated as often as its reverse is missing.
 
     point_count : number of points
     """
@@ -129,7 +132,7 @@ def _boundary_edges(triangles: Index, point_count: int) -> NDArray[np.int64]:
 
 
 def _edge_components(edges: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the index (n,) of the connected component, here an opening, to which each edge belongs.
+    """Return for each edge the index (n,) of its connected component, the outline of one opening.
 
     edges : (n, 2) point indices of the edges
     """
@@ -144,7 +147,7 @@ def _edge_components(edges: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def _area_vectors(corners: Floats) -> Doubles:
-    """Return the normals of triangles (f, 3), with twice the triangle's area as their length.
+    """Return the normals (f, 3) of triangles, each as long as twice the area of its triangle.
 
     corners : (f, 3, 3) corner positions
     """

@@ -18,19 +18,22 @@ _MAX_OCTREE_DEPTH = 20  # levels of three bits each, so that keys have 60 bits
 
 
 class Octree(NamedTuple):
-    """Nodes of an octree in depth-first order; triangles are sorted in the order of the nodes.
+    """Octree of n nodes in depth-first order over m triangles, which are sorted in the order of the nodes.
 
-    first, end : (n,) range of the node's triangles
-    next_node : (n,) next node that is not inside this one
-    centre : (n, 3) centroid of the light inside, weighted by irradiance and area [mm]
-    radius : (n,) radius of a ball around the centre that contains the node's triangles and its three points
-        [mm]
-    points, flux : (n, 3, 3) three points that replace the node's light [mm], and their flux by channel, which
-        may be below 0 [mm²]
-    second_moment : (n,) mean square distance of the light from the centre, plus that of the points; like
-        the next two, an error bound of the points in the worst channel [mm²]
-    moment_error : (n,) difference between the second moments of the light and of the points [mm²]
-    centroid_error : (n,) distance between the centroids of the light and of the points [mm]
+    Three points with a flux approximate the light of all triangles of a node. `second_moment`, `moment_error`
+    and `centroid_error` bound the error of this approximation, each in its worst channel.
+
+    first : (n,) index of the node's first triangle
+    end : (n,) index after the node's last triangle
+    next_node : (n,) index of the next node that is not inside this node
+    centre : (n, 3) mean position on the node's triangles, weighted by irradiance [mm]
+    radius : (n,) radius of a ball around the centre that contains the node's triangles and points [mm]
+    points : (n, 3, 3) positions of the three points [mm]
+    flux : (n, 3, 3) flux of each point by channel, which may be below 0 [mm²]
+    second_moment : (n,) mean square distance of the triangles' light from the centre, plus the same mean for
+        the points [mm²]
+    moment_error : (n,) difference between the second moments of the triangles' light and of the points [mm²]
+    centroid_error : (n,) distance between the centroids of the triangles' light and of the points [mm]
     corners : (m, 3, 3) corners of the triangles [mm]
     irradiance : (m, 3, 3) irradiance at the corners
     area : (m,) areas of the triangles [mm²]
@@ -54,8 +57,8 @@ class Octree(NamedTuple):
 def build_octree(samples: IrradianceSamples) -> Octree:
     """Return the octree over the triangles of irradiance samples.
 
-    Source: [JensenBuhler2002], with three points for each node and error bounds that decide when to descend
-    into its children.
+    Source: [JensenBuhler2002]. Here, three points replace the light of a node, and error bounds decide
+    whether the children of a node are visited.
     """
     middle = np.mean(samples.positions, axis=0)  # moments about a distant origin would lose precision
     corners = (np.asarray(samples.positions, np.float64) - middle)[samples.triangles]
@@ -87,9 +90,9 @@ def build_octree(samples: IrradianceSamples) -> Octree:
 
 
 def _morton_keys(points: Floats) -> Index:
-    """Return the Morton key (m,) of each point, by which points are sorted into octree cells.
+    """Return the Morton key (m,) of each point; sorting by keys groups the points into octree cells.
 
-    A key interleaves the bits of the cell's indices along z, y and x, level by level.
+    A key interleaves the bits of a cell's indices along z, y and x.
 
     points : (m, 3) positions
     """
@@ -104,7 +107,7 @@ def _morton_keys(points: Floats) -> Index:
 
 
 def _octree_nodes(morton_keys: Index) -> tuple[Index, Index, Index]:
-    """Return the first triangle, the end of the triangles and the next node of each node, see `Octree`.
+    """Return the arrays `first`, `end` and `next_node` of the nodes, as defined in `Octree`.
 
     morton_keys : (m,) sorted keys of the triangles
     """
@@ -139,10 +142,14 @@ def _point_approximation(
 ) -> tuple[Floats, Floats, Floats, Floats, Floats, Floats]:
     """Return centre, points, flux and the three error bounds of the nodes, as defined in `Octree`.
 
-    corners : relative to the middle of all triangles
+    The points preserve the flux of each channel, the centroid of each channel in the plane of the points, and
+    the second moments of the sum of all channels. For white light on a flat surface, all moments up to the
+    second order are exact.
 
-    The points preserve each channel's flux and its centroid within their plane, and the second moments of the
-    sum of all channels. For white light this is exact up to the second order.
+    corners : (m, 3, 3) corners of the triangles, relative to the middle of all triangles [mm]
+    irradiance : (m, 3, 3) irradiance at the corners
+    area : (m,) areas of the triangles [mm²]
+    first_triangle, end_triangle : (n,) range of each node's triangles
     """
     flux, first_moments, second_moments = _central_moments(
         corners, irradiance, area, first_triangle, end_triangle
@@ -172,10 +179,10 @@ _TRIANGLE_POINTS = np.sqrt(2) * np.column_stack((np.sin(_TRIANGLE_ANGLES), np.co
 def _central_moments(
     corners: Floats, irradiance: Floats, area: Floats, first_triangle: Index, end_triangle: Index
 ) -> tuple[Floats, list[Floats], list[Floats]]:
-    """Return moments of orders 0, 1 and 2 of the light in each node, by channel.
+    """Return the moments of orders 0, 1 and 2 of the light in each of n nodes, about the node's centre.
 
-    They are the flux (n, 3); a list of the first moments about the centre (n, 3) of each channel, then the
-    centre itself; and the second moments about the centre (n, 3, 3) of each channel.
+    The results are the flux (n, 3) by channel; a list with the first moments (n, 3) of each channel and, as
+    last entry, the centres (n, 3); and a list with the second moments (n, 3, 3) of each channel.
     """
     moments = [_triangle_moments(corners, irradiance[..., c], area) for c in range(3)]
     sums = [
@@ -196,14 +203,14 @@ def _central_moments(
 
 
 def _triangle_moments(corners: Floats, irradiance: Floats, area: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return integrals over triangles: of irradiance E, of E times position x, and of E times x xᵀ.
+    """Return three integrals over each triangle: of irradiance E, of E times position x, of E times x xᵀ.
 
     corners : (m, 3, 3) corner positions
     irradiance : (m, 3) irradiance of one channel at the corners
     area : (m,) areas of the triangles
 
-    The integral of a product of three barycentric weights is 1/10, 1/30 or 1/60 of the area when three, two
-    or none of them are the same; of two weights, 1/6 or 1/12.
+    The integral of a product of three barycentric weights is 1/10 of the area if all three are the same, 1/30
+    if two are the same, and 1/60 if all differ. For two weights, it is 1/6 if they are the same, else 1/12.
     """
     sum_light, sum_position = irradiance.sum(axis=1), corners.sum(axis=1)
     weighted = (irradiance[:, None] @ corners)[:, 0]
@@ -220,7 +227,13 @@ def _point_flux(
 ) -> Floats:
     """Return the flux (n, 3, 3) of each node's points by channel.
 
-    It preserves each channel's flux, and its centroid in the plane of the points.
+    In each channel, the points have the flux of the node and, in their plane, the centroid of the node's
+    light.
+
+    flux : (n, 3) flux of each node by channel
+    first_moments : first moments (n, 3) of each channel about the node's centre
+    axis_lengths : (n, 2) standard deviations of the node's light along its two longer principal axes
+    principal_axes : (n, 3, 2) these axes as columns
     """
     moment = np.einsum("cna,naj->ncj", np.array(first_moments), principal_axes)
     lengths = axis_lengths[:, None]
@@ -231,7 +244,7 @@ def _point_flux(
 def _reduce_nodes(
     operation: np.ufunc, triangle_values: Floats, first_triangle: Index, end_triangle: Index
 ) -> Floats:
-    """Return the values of each node's triangles reduced by a NumPy ufunc, such as np.add.
+    """Return for each node the values of its triangles, reduced by a NumPy ufunc such as np.add.
 
     triangle_values : (m, ...) values of the triangles
     first_triangle, end_triangle : (n,) range of each node's triangles

@@ -1,8 +1,9 @@
 """Gathering of light from an octree of triangles, compiled by numba: import this inside functions.
 
-A node, a triangle or a sub-triangle that is far enough is replaced by three points with the same flux and
-nearly the same centroid and second moments. The error is at most the node's `second_moment` times the
-profile's curvature, plus its `centroid_error` times the slope.
+Light is gathered at a point of the surface. A node, a triangle or a sub-triangle that is far enough from this
+point is replaced by three points with the same flux and nearly the same centroid and second moments. The
+error is at most `second_moment` of the node times the curvature of the profile, plus `centroid_error` of the
+node times the slope of the profile.
 """
 
 from __future__ import annotations
@@ -24,10 +25,11 @@ _MAX_NESTED_SPLITS = 20
 
 
 class TriangleStack(NamedTuple):
-    """Stack of sub-triangles that are still to be gathered.
+    """Stack of sub-triangles whose light is still to be gathered.
 
-    Its fields are the corners of the sub-triangles (p, 3, 3) [mm], the irradiance at the corners (p, 3, 3),
-    and their areas (p,) [mm²].
+    corners : (p, 3, 3) corners of the sub-triangles [mm]
+    irradiance : (p, 3, 3) irradiance at the corners
+    area : (p,) areas of the sub-triangles [mm²]
     """
 
     corners: Floats
@@ -39,10 +41,11 @@ class TriangleStack(NamedTuple):
 def gather_exitance(
     points: Floats, tree: Octree, profile_table: ProfileTable, error_bound: float, exitance: Floats
 ) -> int:
-    """Add the exitance at each point to `exitance` (n, 3); return the number of visited nodes and triangles.
+    """Add the exitance at each point to `exitance`; return the number of nodes and triangles visited.
 
     points : (n, 3) positions [mm]
     error_bound : largest total error, relative to the profile's energy times the irradiance near a point [-]
+    exitance : (n, 3) exitance by channel
     """
     size = 3 * _MAX_NESTED_SPLITS + 4
     stack = TriangleStack(np.empty((size, 3, 3)), np.empty((size, 3, 3)), np.empty(size))
@@ -95,7 +98,10 @@ def _gather_triangle(
     triangle_stack: TriangleStack,
     exitance: Floats,
 ) -> int:
-    """Add the light of a triangle, split until its parts are far enough; return the number of parts."""
+    """Add to `exitance` the light that reaches a point from a triangle; return the number of parts visited.
+
+    The triangle is split until each part is small enough for its distance from the point.
+    """
     triangle_stack.corners[0], triangle_stack.irradiance[0], triangle_stack.area[0] = (
         tree.corners[triangle_index],
         tree.irradiance[triangle_index],
@@ -141,9 +147,9 @@ def _add_side_midpoints(
     profile_table: ProfileTable,
     exitance: Floats,
 ) -> None:
-    """Add the light of one sub-triangle of the stack, evaluated at the midpoints of its sides.
+    """Add the light of one sub-triangle of the stack, with its flux split among the midpoints of its sides.
 
-    This quadrature is exact to second order in the product of irradiance and profile.
+    This quadrature is exact if the product of irradiance and profile is a polynomial of second order.
     """
     corners, irradiance, scale = (
         triangle_stack.corners[stack_index],
@@ -163,7 +169,7 @@ def _add_side_midpoints(
 
 @compiled
 def _split_triangle(stack_index: int, triangle_stack: TriangleStack) -> None:
-    """Replace a sub-triangle of the stack by its four quarters, at `stack_index` to `stack_index` + 3."""
+    """Replace the sub-triangle at `stack_index` by its four quarters, stored from `stack_index` onwards."""
     triangle_stack.area[stack_index : stack_index + 4] = 0.25 * triangle_stack.area[stack_index]
     for values in (triangle_stack.corners, triangle_stack.irradiance):
         for axis in range(3):
@@ -198,9 +204,9 @@ def _distance(point: Floats, x: float, y: float, z: float) -> float:
 
 @compiled
 def _table_rows(distance: float, ball_radius: float, profile_table: ProfileTable) -> tuple[int, int]:
-    """Return the rows of the profile's table that bracket all radii to points of a ball.
+    """Return the rows of the profile's table that bracket the distances of all points of a ball.
 
-    distance : distance of the ball's centre [mm]
+    distance : distance of the ball's centre from the point at which light is gathered [mm]
     ball_radius : radius of the ball [mm]
     """
     last = len(profile_table.error_density) - 1
@@ -218,7 +224,7 @@ def _add_flux(
     profile_table: ProfileTable,
     exitance: Floats,
 ) -> None:
-    """Add each channel's flux times the profile at a distance, interpolated in its table, to `exitance`."""
+    """Add to `exitance`, for each channel, the flux times the profile interpolated at a distance."""
     row_position = math.sqrt(distance) * profile_table.rows_per_root
     row = int(row_position)
     if row < len(profile_table.R) - 1:

@@ -74,23 +74,24 @@ def path_trace(
 ) -> PathTraced:
     """Return the path-traced image of a scene with a medium inside its skin.
 
-    Maps, profile and surface reflection are ignored. Light passes the surface without refraction, so that
-    paths connect to point lights from inside the medium; compare with profiles for eta 1. Lights are
-    invisible and do not shadow one another.
+    Maps, diffusion profile and surface reflection of the scene are ignored. Light passes the surface without
+    refraction, so that paths can connect to point lights from inside the medium; compare such images with
+    frames whose profile has eta 1. Lights are invisible and do not shadow one another.
 
-    medium : index-matched (eta 1), isotropic medium with three channels; layers become nested bodies, whose
-        interfaces are the skin offset inwards by the depths of the layers. Or a `Lambertian`, for directly
-        lit skin without scattering
-    samples : smallest number of paths per pixel, in passes of 4. Passes are cached on disk by the scene's
-        content, so a later call with more samples adds to them
+    medium : index-matched (eta 1), isotropically scattering medium with three channels; the interfaces
+        between its layers are copies of the skin, offset inwards by the depths of the layers. Or a
+        `Lambertian`, for directly lit skin without scattering
+    samples : smallest number of paths per pixel; each pass traces 4. Passes are cached on disk under a hash
+        of the scene, so a later call with more samples only adds the missing passes
     settings : settings of the frame, of which only the size is used
     variant : variant of Mitsuba; "llvm_ad_rgb" takes half the time for many samples but needs a recent LLVM
-        (14 and 15 end the process), "cuda_ad_rgb" needs an NVIDIA GPU
-    use_cache : whether to read and write passes on disk; without it `seconds` is the time of this call
+        (14 and 15 end the process), and "cuda_ad_rgb" needs an NVIDIA GPU
+    use_cache : whether to read and write passes on disk; without the cache, `PathTraced.seconds` is the
+        duration of this call
     progress : function called with the number of finished passes and the number of all passes
 
-    Raises DermisError when Mitsuba is missing, and for what it cannot trace: a surface without volume, media
-    under a refracting surface, lights without shadows.
+    Raises DermisError when Mitsuba is missing, or when it cannot trace the scene: for a skin surface that
+    encloses no volume, a medium under a refracting surface, or a light without shadows.
 
     Sources: [Jakob2022], [Miller2019].
     """
@@ -124,8 +125,8 @@ def render_passes(
     """Return the mean of at least `min_pass_count` passes of Mitsuba, including cached ones.
 
     cache_key : name of the cached passes; None for no cache
-    build_radiance, build_coverage : functions that build Mitsuba's scenes of the radiance, with notes, and of
-        the skin's coverage of each pixel
+    build_radiance : function that builds the Mitsuba scene that renders radiance, and returns notes with it
+    build_coverage : function that builds the Mitsuba scene whose image is the skin's coverage of each pixel
     """
     passes = load_passes(cache_key, picture_size) if cache_key else None
     if passes is None or passes.count < min_pass_count:
@@ -150,7 +151,7 @@ def render_passes(
 def pass_count(samples: int) -> int:
     """Return the number of passes that have at least `samples` paths per pixel in total.
 
-    Raises DermisError for a number below 1 or too large.
+    Raises DermisError when `samples` is below 1 or too large.
     """
     if not (isinstance(samples, int | np.integer) and 1 <= samples <= _MAX_SAMPLES_PER_PIXEL):
         refuse(
@@ -216,7 +217,7 @@ class PassStatistics:
     def empty(
         cls, picture_size: tuple[int, int], mask: NDArray[np.floating], notes: tuple[str, ...]
     ) -> PassStatistics:
-        """Return the state before the first pass.
+        """Return statistics of no passes.
 
         picture_size : width and height of the image [pixel]
         """
@@ -229,7 +230,7 @@ class PassStatistics:
         return self.spread / (self.count * (self.count - 1))
 
     def add(self, image: Doubles, seconds: float) -> None:
-        """Update mean and squared deviations with a pass (h, w, 3), by [Welford1962]."""
+        """Add the image (h, w, 3) of a pass to the mean and to the squared deviations, by [Welford1962]."""
         self.count += 1
         self.seconds += seconds
         delta = image - self.mean
@@ -276,7 +277,7 @@ def scene_key(
 
 
 def load_passes(cache_key: str, picture_size: tuple[int, int]) -> PassStatistics | None:
-    """Return the cached passes with a key and picture size; None if the cache has no such passes."""
+    """Return the cached passes for a key and a picture size, or None if the cache has no such passes."""
     found = load_arrays(_CACHE_FOLDER, cache_key, ("mean", "spread", "mask", "notes", "count", "seconds"))
     if found is None or found["mean"].shape != (picture_size[1], picture_size[0], 3):
         return None
@@ -286,7 +287,7 @@ def load_passes(cache_key: str, picture_size: tuple[int, int]) -> PassStatistics
 
 
 def save_passes(cache_key: str, passes: PassStatistics) -> None:
-    """Write passes to the cache, ignoring errors of the disk."""
+    """Write passes to the cache, and ignore errors of the file system."""
     try_save_arrays(
         _CACHE_FOLDER, cache_key, {name: np.asarray(value) for name, value in vars(passes).items()}
     )

@@ -25,7 +25,7 @@ MAX_PHOTON_EVENTS = 100_000
 class LayerStack(NamedTuple):
     """Optical properties of each layer and of the air on both sides, and the depths of the faces.
 
-    The properties have shape (layers + 2,), the depths (layers + 1,).
+    The properties are arrays of the shape (layers + 2,), and the depths have the shape (layers + 1,).
     """
 
     eta: Floats
@@ -36,13 +36,14 @@ class LayerStack(NamedTuple):
 
 
 class PhotonTally(NamedTuple):
-    """Numbers of photons by how their walk ended.
+    """Numbers of photons whose walk ended in each of several ways.
 
-    reflected, transmitted : (rings + 1,) left above or below after scattering, by ring of the exit point; the
-        last entry is beyond the last ring
-    unscattered : (2,) left above and below without scattering
-    absorbed : (layers,) absorbed in each layer
-    unfinished : (1,) dropped after `MAX_PHOTON_EVENTS` events
+    reflected : (rings + 1,) photons that left above after scattering, by the ring around the axis in which
+        they left; the last entry counts photons that left beyond the last ring
+    transmitted : (rings + 1,) photons that left below after scattering, counted in the same way
+    unscattered : (2,) photons that left above and below without scattering
+    absorbed : (layers,) photons that were absorbed in each layer
+    unfinished : (1,) photons that were dropped after `MAX_PHOTON_EVENTS` events
     """
 
     reflected: Counts
@@ -72,7 +73,7 @@ def next_uint64(rng: RandomState) -> np.uint64:
 
 @compiled
 def random_uniform(rng: RandomState) -> float:
-    """Return a random number strictly between 0 and 1, whose logarithm is finite and not 0."""
+    """Return a random number strictly between 0 and 1, so that its logarithm is finite and below 0."""
     return ((next_uint64(rng) >> np.uint64(12)) + 0.5) * 2.0**-52
 
 
@@ -80,7 +81,7 @@ def random_uniform(rng: RandomState) -> float:
 def refract(cosine: float, eta: float) -> tuple[float, float]:
     """Return the Fresnel reflectance of unpolarised light and the cosine of the refracted ray [-].
 
-    The cosine is 0 for total reflection.
+    For total reflection, the cosine of the refracted ray is returned as 0.
 
     eta : index of refraction on the near side divided by that on the far side
 
@@ -103,7 +104,7 @@ def scatter_direction(x: float, y: float, z: float, g: float, rng: RandomState) 
 
     g : mean cosine of the scattering angle [-]
 
-    Source: [HenyeyGreenstein1941]; [Marsaglia1972] for the azimuth, [Duff2017] for the frame.
+    Source: [HenyeyGreenstein1941]; [Marsaglia1972] for the azimuth, [Duff2017] for the coordinate frame.
     """
     while True:
         a, b = 2.0 * random_uniform(rng) - 1.0, 2.0 * random_uniform(rng) - 1.0
@@ -126,7 +127,7 @@ def scatter_direction(x: float, y: float, z: float, g: float, rng: RandomState) 
 
 @compiled
 def _ring_index(x: float, y: float, squared_ring_edges: Floats) -> int:
-    """Return the index of the ring around the axis that contains a point (x, y); n beyond the last ring.
+    """Return the index of the ring around the axis that contains a point (x, y), or n beyond the last ring.
 
     squared_ring_edges : (n + 1,) squared radii of the ring edges
     """
@@ -149,7 +150,7 @@ def _tally_exit(
 def _trace_photon(
     layer_stack: LayerStack, squared_ring_edges: Floats, rng: RandomState, tally: PhotonTally
 ) -> None:
-    """Trace one photon, which enters on the axis at normal incidence, until it leaves or is absorbed.
+    """Trace one photon that enters on the axis at normal incidence, and count in the tally how its walk ends.
 
     squared_ring_edges : (n + 1,) squared radii of the ring edges
     """
@@ -196,11 +197,11 @@ def trace_photons(
     rng: RandomState,
     tally: PhotonTally,
 ) -> None:
-    """Trace a number of photons and add them to the tally by how their walks end.
+    """Trace a number of photons, and count in the tally how their walks end.
 
     squared_ring_edges : (n + 1,) squared radii of the ring edges
 
-    Source: [Wang1995], except that absorption removes a photon completely or not at all.
+    Source: [Wang1995]. Unlike there, absorption removes a photon completely or not at all.
     """
     # Weights that shrink at each scattering, as in the source, hardly reduce the variance of R(r) in equal
     # time for skin. Whole photons are integer counts: they conserve energy exactly, their sums do not depend

@@ -1,4 +1,4 @@
-"""Diffusion profiles as dense tables with bounds of their derivatives, for surface integrals."""
+"""Diffusion profiles as dense tables with upper bounds of their derivatives, for surface integrals."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ need not be opened."""
 
 @dataclass(frozen=True)
 class GaussianSum:
-    """Diffusion profile R(r) = sum of weight exp(-r² / 2v) / (2 pi v), not the renderer's own class.
+    """Diffusion profile R(r), the sum of weight exp(-r² / 2v) / (2 pi v) over Gaussians.
 
-    It is separate so that the reference shares no code with the renderer.
+    The renderer uses another class, so that the reference shares no code with the renderer.
 
     weight : (k, 3) energy of each Gaussian, by channel [-]
     variance_mm2 : (k,) variance v of each Gaussian [mm²]
@@ -40,7 +40,7 @@ class GaussianSum:
         return float(np.sqrt(-2 * np.log(_RELATIVE_GAUSSIAN_CUTOFF) * np.max(self.variance_mm2)))
 
     def derivatives(self, radius_mm: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return R(r), dR/dr and d²R/dr² at radii (n,), each (n, 3) [mm^-2, mm^-3, mm^-4]."""
+        """Return R(r), dR/dr and d²R/dr², each (n, 3), at n radii [mm^-2, mm^-3, mm^-4]."""
         r, v = radius_mm[:, None], np.asarray(self.variance_mm2)
         gaussian = np.exp(-(r**2) / (2 * v)) / (2 * np.pi * v)
         weight = np.asarray(self.weight)
@@ -51,7 +51,7 @@ class GaussianSum:
 class RadialTable:
     """Diffusion profile R(r) by monotone cubic interpolation of a table.
 
-    It is constant below the first radius and 0 beyond the last.
+    The profile is constant below the first radius and 0 beyond the last.
 
     radius_mm : (n,) increasing radii, 0 or more [mm]
     reflectance : (n, 3) R(r) at these radii [mm^-2]
@@ -66,7 +66,7 @@ class RadialTable:
         return float(self.radius_mm[-1])
 
     def derivatives(self, radius_mm: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return R(r), dR/dr and d²R/dr² at radii (n,), each (n, 3) [mm^-2, mm^-3, mm^-4]."""
+        """Return R(r), dR/dr and d²R/dr², each (n, 3), at n radii [mm^-2, mm^-3, mm^-4]."""
         from scipy.interpolate import PchipInterpolator
 
         r, R = np.asarray(self.radius_mm, np.float64), np.asarray(self.reflectance, np.float64)
@@ -81,14 +81,16 @@ Profile = GaussianSum | RadialTable
 
 
 class ProfileTable(NamedTuple):
-    """Diffusion profile tabulated by the square root of the radius, with bounds of its derivatives.
+    """Diffusion profile R(r) in rows evenly spaced in the square root of r, with bounds of its derivatives.
 
-    There are `rows_per_root` rows per mm^(1/2).
+    Each bound holds for this and all larger radii and for all channels, relative to the channel's energy.
 
-    R : (rows, 3) profile [mm^-2], 0 in the last row
-    slope : (rows,) upper bound of |dR/dr| from this radius on, divided by the profile's energy [mm^-3]
-    curvature : (rows,) upper bound of half the largest second derivative, divided by the energy [mm^-4]
-    error_density : (rows,) density of the permitted error, decreasing, with integral 1 over the plane [mm^-2]
+    rows_per_root : number of rows per unit of the square root of the radius [mm^(-1/2)]
+    R : (rows, 3) profile, 0 in the last row [mm^-2]
+    slope : (rows,) upper bound of |dR/dr| [mm^-3]
+    curvature : (rows,) upper bound of half the second derivative in any direction [mm^-4]
+    error_density : (rows,) share of the permitted error per area at this radius; it decreases with the
+        radius, and its integral over the plane is 1 [mm^-2]
     """
 
     rows_per_root: float
@@ -101,9 +103,9 @@ class ProfileTable(NamedTuple):
 def tabulate_profile(profile: Profile) -> ProfileTable:
     """Return the table of a profile, with the permitted error distributed over the radii.
 
-    A patch of second moment m about its centre, replaced by a point there, causes an error of up to m times
-    the curvature. The fewest patches for a given sum of such errors have m proportional to 1 /
-    sqrt(curvature) (Lagrange), so the permitted error is distributed in this way.
+    Replacing a patch of second moment m by a point at its centre causes an error of up to m times the
+    curvature. For a given sum of these errors, the number of patches is smallest if m is proportional to
+    1 / sqrt(curvature) (Lagrange). The permitted error is therefore proportional to sqrt(curvature).
     """
     end = profile.end_mm
     root = np.linspace(0.0, np.sqrt(end), TABLE_ROWS)
@@ -129,10 +131,10 @@ def tabulate_profile(profile: Profile) -> ProfileTable:
 
 
 def _bound_from_radius_on(radial_values: Floats, energy: Floats, has_energy: NDArray[np.bool_]) -> Floats:
-    """Return the largest value (rows,) of any channel from each radius on, after division by its energy.
+    """Return for each row the largest value (rows,) that any channel has at this or a larger radius.
 
     radial_values : (rows, 3) function of the radius by channel
-    energy : (3,) energy of the profile by channel, by which its values are divided
+    energy : (3,) energy of the profile by channel; the values of each channel are divided by it
     has_energy : (3,) mask of channels with energy
     """
     largest = np.max(radial_values[:, has_energy] / energy[has_energy], axis=1)
@@ -150,9 +152,9 @@ def _error_density(curvature: Floats, r: Floats) -> Floats:
 
 
 def _plane_integral(radial_values: Floats, r: Floats) -> Floats:
-    """Return the integral of radial functions over the plane: of 2 pi r f(r) dr, for each column.
+    """Return the integrals (k,) of radial functions f over the plane: of 2 pi r f(r) dr.
 
-    radial_values : (rows, k) functions f at the radii r
+    radial_values : (rows, k) values of k functions at the radii r
     """
     rings = np.pi * np.diff(r**2)[:, None]
     return np.asarray((0.5 * (radial_values[1:] + radial_values[:-1]) * rings).sum(axis=0))

@@ -29,9 +29,9 @@ _CYCLES_FROM_DERMIS_AXES = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1
 
 
 def check_camera(camera: Camera, renderer: str) -> None:
-    """Raise DermisError for a shifted principal point or non-square pixels, which references lack.
+    """Raise DermisError for a shifted principal point or non-square pixels, which references do not support.
 
-    renderer : name of the renderer in the message
+    renderer : name of the renderer that the message mentions
     """
     if camera.principal_point != (0.5, 0.5) or camera.pixel_aspect != 1.0:
         expected = f"a principal point in the middle and square pixels, for {renderer}"
@@ -45,7 +45,7 @@ def mitsuba_rgb(colour: Iterable[float]) -> SceneDict:
 
 
 def mitsuba_look_at(mi: Mitsuba, origin: Vector, target: Vector, up: Vector = _UP_AXIS) -> MitsubaObject:
-    """Return Mitsuba's transform of an object at `origin` that looks along +Z towards `target`, Y upwards."""
+    """Return Mitsuba's transform of an object at `origin`, with +Z towards `target` and Y upwards."""
     forward = np.subtract(target, origin)
     if np.linalg.norm(np.cross(forward, up)) < 1e-6 * np.linalg.norm(forward) * np.linalg.norm(up):
         up = (1.0, 0.0, 0.0)
@@ -89,7 +89,7 @@ def mitsuba_projector(
 
 
 def cycles_look_at(position: Vector, forward: Vector, up: Vector = _UP_AXIS) -> list[list[float]]:
-    """Return the world matrix, in Cycles' units, of an object that looks along -Z with Y upwards."""
+    """Return the world matrix, in Cycles' units, of an object whose -Z axis is `forward`, with Y upwards."""
     right, upwards, view_direction = camera_axes(forward, up)
     matrix = np.eye(4)
     matrix[:3] = np.column_stack([right, upwards, -view_direction, np.divide(position, UNIT_MM)])
@@ -97,7 +97,7 @@ def cycles_look_at(position: Vector, forward: Vector, up: Vector = _UP_AXIS) -> 
 
 
 def camera_axes(forward: Vector, up: Vector) -> tuple[Floats, Floats, Floats]:
-    """Return the unit vectors of a camera to the right, upwards and forward."""
+    """Return three unit vectors of a camera, which point to the right, upwards and forward."""
     view_direction = np.asarray(forward, np.float64) / np.linalg.norm(forward)
     right = np.cross(view_direction, up)
     if np.linalg.norm(right) < 1e-6 * np.linalg.norm(up):
@@ -167,9 +167,9 @@ def _environment_rotation(environment: Environment) -> Floats:
 
 
 def _move_rows_to_poles(panorama: Floats) -> Floats:
-    """Return a panorama resampled so that its first and last rows are at the poles, as in Mitsuba.
+    """Return a panorama resampled to h + 1 rows, the first and the last at the poles, as in Mitsuba.
 
-    panorama : (h, w, 3) radiance at the centres of rows; the result has h + 1 rows
+    panorama : (h, w, 3) radiance at the centres of rows
     """
     between_rows = 0.5 * (panorama[1:] + panorama[:-1])
     return np.concatenate((panorama[:1], between_rows, panorama[-1:]))

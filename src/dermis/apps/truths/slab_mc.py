@@ -34,7 +34,7 @@ _REPORTED_PHOTON_LOSS = 1e-3  # fraction of dropped photons from which on a warn
 
 
 def default_ring_edges() -> Floats:
-    """Return the default radii of ring edges: a disc of 0.001 mm and 92 rings, each 12 % wider [mm]."""
+    """Return the default radii of ring edges: 0, then 0.001 mm, then each 12 % larger, up to 40 mm [mm]."""
     return np.concatenate([[0.0], np.geomspace(1e-3, 40.0, 93)])
 
 
@@ -49,7 +49,7 @@ def trace_slab(
 
     layers : layers, topmost first; interfaces between unequal indices of refraction reflect and refract
     photons : number of photons; standard errors are proportional to 1 / sqrt(photons)
-    seed : random seed, which gives equal results on any number of processors
+    seed : random seed; the results do not depend on the number of processors
     edges_mm : (n + 1,) radii of the ring edges, from 0; None for `default_ring_edges` [mm]
     progress : function called with the number of finished batches and the number of all batches
 
@@ -71,8 +71,8 @@ def trace_medium(
 ) -> list[SlabResult]:
     """Run `trace_slab` for each channel of a medium, with independent random numbers.
 
-    g : mean cosine of the scattering angle in all layers, whose scattering coefficient is the reduced one
-        divided by 1 - g [-]
+    g : mean cosine of the scattering angle in all layers; the scattering coefficient is the reduced
+        scattering coefficient divided by 1 - g [-]
     """
     check_anisotropy(g)
     results: list[SlabResult] = []
@@ -97,10 +97,10 @@ def monte_carlo_profile(
 ) -> RadialProfile:
     """Return the diffusion profile of a medium by Monte Carlo, averaged over rings, with standard errors.
 
-    rgb : (3, c) weights that convert wavelengths to linear Rec. 709; the profile is then normalised by the
-        incident power, otherwise by the power that enters the medium
+    rgb : (3, c) weights that convert wavelengths to linear Rec. 709; the profile is then relative to the
+        incident power. None for a profile of the medium's channels, relative to the power that enters
     photons : number of photons per channel or wavelength
-    g : mean cosine of the scattering angle; the reduced scattering coefficient is kept [-]
+    g : mean cosine of the scattering angle; the reduced scattering coefficient does not depend on it [-]
 
     Source: [Wang1995].
     """
@@ -257,7 +257,8 @@ def check_anisotropy(g: float) -> None:
 class ScatteringLayer:
     """Homogeneous layer at one wavelength, with the phase function of Henyey and Greenstein.
 
-    sigma_a, sigma_s : absorption and (not reduced) scattering coefficient, 0 or more [1/mm]
+    sigma_a : absorption coefficient, 0 or more [1/mm]
+    sigma_s : scattering coefficient, not reduced, 0 or more [1/mm]
     thickness_mm : thickness; infinite for a half-space [mm]
     g : mean cosine of the scattering angle [-]
     eta : index of refraction relative to air [-]
@@ -291,7 +292,7 @@ class ScatteringLayer:
 
     @property
     def albedo(self) -> float:
-        """Return the single-scattering albedo, 0 without extinction [-]."""
+        """Return the single-scattering albedo, or 0 if the extinction is 0 [-]."""
         return self.sigma_s / self.sigma_t if self.sigma_t > 0.0 else 0.0
 
 
@@ -299,16 +300,17 @@ class ScatteringLayer:
 class SlabResult:
     """Reflected, transmitted and absorbed fractions of the beam's power; `_se` marks standard errors [-].
 
-    The specular, total, unscattered, absorbed and unfinished fractions sum to 1. The errors are binomial, and
-    0 where no photon arrived.
+    The specular, total, unscattered, absorbed and unfinished fractions sum to 1. The standard errors are
+    those of a binomial distribution, and 0 where no photon was counted.
 
     photons : number of photons traced, all of which entered the stack
     edges_mm : (n + 1,) radii of the ring edges, from 0 [mm]
-    specular : fraction reflected by the top face
+    specular : fraction that the top face reflects
     reflectance, transmittance : (n,) R(r) and T(r) of scattered light, averaged over each ring [1/mm2]
-    total_reflectance, total_transmittance : scattered light that leaves above and below, at any radius
-    overflow_reflectance, overflow_transmittance : the part of these totals beyond the last ring
-    unscattered_reflectance, unscattered_transmittance : light that left on the axis without scattering
+    total_reflectance, total_transmittance : fractions that scatter and leave above and below, at any radius
+    overflow_reflectance, overflow_transmittance : parts of these totals that leave beyond the last ring
+    unscattered_reflectance, unscattered_transmittance : fractions that leave above and below on the axis,
+        without scattering
     absorbed : (layers,) fraction absorbed in each layer
     unfinished : fraction dropped after `MAX_PHOTON_EVENTS` events; above 0 only where almost nothing absorbs
     """

@@ -1,7 +1,8 @@
-"""Diffusion of light along a surface by the heat equation: the exact result of a blur on any uv map.
+"""Diffusion of light along a surface by the heat equation: what a blur on any uv map should result in.
 
-A Gaussian of variance v on a surface is heat diffused for the time v/2. The heat equation is solved on the
-triangles themselves, so no uv map, seam or stretch plays a part. Open borders are insulated (Neumann).
+Blurring along a surface by a Gaussian of variance v is the diffusion of heat for the time v/2. The heat
+equation is solved on the triangles of the surface, so the result depends on no uv map, seam or stretch. No
+light leaves through open borders (Neumann condition).
 """
 
 from __future__ import annotations
@@ -39,20 +40,20 @@ def diffuse_on_surface(
     variances_mm2: ArrayLike,
     steps: int = TIME_STEPS_PER_LEVEL,
 ) -> Floats:
-    """Return vertex values blurred along the surface by a Gaussian of each variance, (k, n, c).
+    """Return vertex values (k, n, c), blurred along the surface by a Gaussian of each of k variances.
 
-    The blur by each variance, called a level, starts from the result of the next smaller variance. Time steps
-    are by TR-BDF2, which is of second order and, unlike the Crank-Nicolson scheme, does not oscillate around
-    points of light.
+    The blur by each variance, called a level, starts from the result of the next smaller variance. Each time
+    step uses TR-BDF2, a scheme of second order that, unlike the Crank-Nicolson scheme, does not oscillate
+    near points of light.
 
     positions : (n, 3) vertex positions without duplicates, see `welded_surface` [mm]
     triangles : (f, 3) vertex indices
-    values : (n, c) values at the vertices, linear in between
+    values : (n, c) values at the vertices, interpolated linearly on the triangles
     variances_mm2 : (k,) increasing variances above 0 [mm2]
     steps : number of time steps per level
 
-    Raises DermisError when edges are longer than half the standard deviation that a level adds;
-    `refine_patch` makes them shorter.
+    Raises DermisError when an edge is longer than half the standard deviation that a level adds to the level
+    before; `refine_patch` makes edges shorter.
 
     Source: [Bank1985] for TR-BDF2, [BobenkoSpringborn2007] for the Laplacian.
     """
@@ -81,9 +82,9 @@ def longest_edge_mm(positions: ArrayLike, triangles: ArrayLike) -> float:
 
 
 def resolved_levels(variances_mm2: ArrayLike, edge_mm: float) -> NDArray[np.bool_]:
-    """Return the mask (k,) of blur levels that edges of a given length resolve.
+    """Return the mask (k,) of blur levels that are resolved by edges of a given length.
 
-    A level is resolved if the standard deviation that it adds is at least two edge lengths.
+    A level is resolved if it adds a standard deviation of at least two edge lengths to the level before.
 
     variances_mm2 : (k,) increasing variances above 0 [mm2]
     edge_mm : length of the longest edge, see `longest_edge_mm` [mm]
@@ -96,9 +97,9 @@ def resolved_levels(variances_mm2: ArrayLike, edge_mm: float) -> NDArray[np.bool
 
 
 def max_edge_mm(variances_mm2: ArrayLike) -> float:
-    """Return the longest edge that resolves all blur levels [mm].
+    """Return the largest edge length that resolves all blur levels [mm].
 
-    It is half the smallest standard deviation that a level adds.
+    It is half the smallest standard deviation that a level adds to the level before.
 
     variances_mm2 : (k,) increasing variances above 0 [mm2]
     """
@@ -107,7 +108,7 @@ def max_edge_mm(variances_mm2: ArrayLike) -> float:
 
 
 def patch_margin_mm(variances_mm2: ArrayLike) -> float:
-    """Return how far a patch must extend beyond its radius: four sigmas of the widest level [mm].
+    """Return by how much a patch must extend beyond its ball: four sigmas of the widest blur level [mm].
 
     variances_mm2 : (k,) increasing variances [mm2]
     """
@@ -117,7 +118,7 @@ def patch_margin_mm(variances_mm2: ArrayLike) -> float:
 def _diffuse(
     mass: csc_array, stiffness: csc_array, values: Floats, variance: float, step_count: int
 ) -> Floats:
-    """Return vertex values after diffusion by the heat equation for the time variance/2.
+    """Return vertex values after diffusion by the heat equation for the time variance / 2.
 
     mass, stiffness : matrices from `mass_and_stiffness`
     step_count : number of time steps
@@ -134,7 +135,7 @@ def _diffuse(
 
 
 def _lu_solver(matrix: csc_array) -> Callable[[Floats], Floats]:
-    """Return a function that solves a linear system, by sparse LU factorisation without pivoting.
+    """Return a function that solves the linear system of a matrix, by sparse LU without pivoting.
 
     matrix : symmetric, positive definite matrix
     """
@@ -219,9 +220,9 @@ class IntrinsicTriangulation:
 
 
 def intrinsic_triangulation(positions: Floats, triangles: Index) -> IntrinsicTriangulation:
-    """Return the edge lengths of a triangle mesh as a triangulation.
+    """Return the intrinsic triangulation of a triangle mesh.
 
-    A tiny length is added to all edges if a triangle is degenerate.
+    If a triangle is degenerate, a tiny length is added to all edges.
 
     positions : (n, 3) vertex positions [mm]
     triangles : (f, 3) vertex indices
@@ -237,9 +238,9 @@ def intrinsic_triangulation(positions: Floats, triangles: Index) -> IntrinsicTri
 def intrinsic_delaunay(surface: IntrinsicTriangulation) -> IntrinsicTriangulation:
     """Return the intrinsic Delaunay triangulation of a surface, by edge flips.
 
-    The two angles opposite each edge then sum to at most pi, so that heat flows from hot to cold along every
-    edge, however obtuse the mesh's angles. Borders are not flipped, nor edges where more than two triangles
-    meet or two have opposite orientations.
+    The two angles opposite each edge then sum to at most pi, so heat flows from hot to cold along every edge,
+    even if the mesh has obtuse angles. An edge is not flipped if it lies on a border, if more than two
+    triangles share it, or if its two triangles have opposite orientations.
 
     Source: [BobenkoSpringborn2007]; [Fisher2007] for flips by lengths.
     """
@@ -257,7 +258,7 @@ def intrinsic_delaunay(surface: IntrinsicTriangulation) -> IntrinsicTriangulatio
 
 
 def _interior_edges(corners: Index, side_edges: Index, edge_count: int) -> NDArray[np.bool_]:
-    """Return the mask (e,) of edges shared by exactly two triangles of equal orientation.
+    """Return the mask (e,) of edges that exactly two triangles of equal orientation share.
 
     corners, side_edges : vertex and edge indices of the triangles' sides, as in `IntrinsicTriangulation`
     edge_count : number of edges
@@ -269,10 +270,11 @@ def _interior_edges(corners: Index, side_edges: Index, edge_count: int) -> NDArr
 
 
 def _independent_flips(side_edges: Index, non_delaunay: NDArray[np.bool_], cotangent_weight: Floats) -> Index:
-    """Return non-Delaunay edges that can be flipped together, as no two share a triangle.
+    """Return non-Delaunay edges that can be flipped together, because no two of them share a triangle.
 
-    The result (2, m) has the indices of their two sides in `side.ravel()`. Each triangle votes for its worst
-    edge; edges with both votes are taken. The worst of all edges is among them.
+    Each triangle votes for its worst edge, and edges with the votes of both triangles are taken. The worst
+    edge of all is always among them. The result (2, m) has for each edge the indices of its two triangle
+    sides in `side_edges.ravel()`.
 
     side_edges : (f, 3) edge index of each side
     non_delaunay : (e,) mask of non-Delaunay edges
@@ -291,9 +293,9 @@ def _independent_flips(side_edges: Index, non_delaunay: NDArray[np.bool_], cotan
 
 
 def _flip_edges(triangulation: IntrinsicTriangulation, side_pairs: Index) -> None:
-    """Replace each edge ab, between triangles abc and bad, by the edge cd, in place.
+    """Replace each given edge ab, shared by triangles abc and bad, by the edge cd, in place.
 
-    side_pairs : (2, m) indices of the sides of these edges
+    side_pairs : (2, m) indices of the two triangle sides of each edge, from `_independent_flips`
     """
     (left, i), (right, j) = (np.divmod(side_index, 3) for side_index in side_pairs)
     a, b, c = (triangulation.corners[left, (i + k) % 3] for k in range(3))
@@ -320,22 +322,23 @@ def _flip_edges(triangulation: IntrinsicTriangulation, side_pairs: Index) -> Non
 def _apex_coordinates(
     base_length: Floats, start_side_length: Floats, end_side_length: Floats
 ) -> tuple[Floats, Floats]:
-    """Return the apex of triangles as its position along the base and its height above it [mm].
+    """Return the position of each triangle's apex along the base, and its height above the base [mm].
 
     base_length : length of the base [mm]
-    start_side_length, end_side_length : lengths of the sides from start and end of the base to the apex [mm]
+    start_side_length : length of the side from the start of the base to the apex [mm]
+    end_side_length : length of the side from the end of the base to the apex [mm]
     """
     along = (base_length**2 + start_side_length**2 - end_side_length**2) / (2 * base_length)
     return along, np.sqrt(np.maximum(start_side_length**2 - along**2, 0))
 
 
 def mass_and_stiffness(surface: IntrinsicTriangulation, vertex_count: int) -> tuple[csc_array, csc_array]:
-    """Return mass matrix M [mm2] and stiffness matrix K [-] of linear finite elements, each (n, n).
+    """Return the mass matrix M [mm2] and the stiffness matrix K [-] of linear finite elements, each (n, n).
 
     The heat equation is M du/dt = -K u for vertex values u. M is the mean of the lumped and the consistent
-    mass matrix. Their errors in the speed of heat are opposite and, on regular triangles, cancel to fourth
-    order in the edge length. The rows of M sum to the vertices' areas, those of K to 0. A vertex without
-    triangles keeps its value.
+    mass matrix. The errors that these two matrices cause in the speed of heat are opposite; on regular
+    triangles they cancel to fourth order in the edge length. Each row of M sums to the area of its vertex,
+    and each row of K sums to 0. A vertex without triangles keeps its value.
 
     vertex_count : number n of vertices
 
@@ -351,8 +354,8 @@ def mass_and_stiffness(surface: IntrinsicTriangulation, vertex_count: int) -> tu
     def assemble(off_diagonal: Floats, diagonal: Floats) -> csc_array:
         """Return a sparse symmetric matrix (n, n), summed over the sides of all triangles.
 
-        off_diagonal : (f, 3) entry between start and end of each side
-        diagonal : (f, 3) entry of the vertex at its start
+        off_diagonal : (f, 3) entry between the vertices at the start and the end of each side
+        diagonal : (f, 3) entry of the vertex at the start of each side
         """
         rows = np.concatenate([index.ravel() for index in (start, end, start)])
         columns = np.concatenate([index.ravel() for index in (end, start, start)])

@@ -29,15 +29,16 @@ def integrate_exitance(
 
     points : (n, 3) positions x on the surface [mm]
     samples : irradiance E, linear on small triangles; the caller chooses them small enough for the light
-    profile : profile R, a function of the Euclidean distance, so that light also passes through thin parts
-    error : expected root mean square error of the integral relative to its mean, 1e-5 to 0.05 [-]
+    profile : profile R, a function of the Euclidean distance, so light also passes through thin parts
+    error : expected root mean square error of the integral relative to its mean, from 1e-5 to 0.05 [-]
 
-    A node of the octree, a triangle or a part of a triangle is replaced by three points if Taylor's remainder
-    is below its share of an error bound, and is opened or split otherwise, so the profile's steep centre is
-    integrated as finely as it needs. The bound would be exact if no errors cancelled; nearly all do, so the
-    relation between the bound and `error` is measured.
+    A node of the octree, a triangle or a part of a triangle is replaced by three points if the remainder of
+    Taylor's theorem is below its share of an error bound. Otherwise, the children of the node are visited, or
+    the triangle is split. The steep centre of the profile is thus integrated finely enough. Nearly all errors
+    cancel, so the actual error is much smaller than the bound; which bound leads to a given `error` was
+    measured.
 
-    Source: [JensenBuhler2002], with the remainder in place of the solid angle.
+    Source: [JensenBuhler2002], but with Taylor's remainder as criterion in place of the solid angle.
     """
     positions = np.ascontiguousarray(points, dtype=np.float64)
     if positions.ndim != 2 or positions.shape[1] != 3 or not np.isfinite(positions).all():
@@ -68,7 +69,7 @@ def integrate_exitance(
 
 
 def _weight_error_bounds(tree: Octree, error_weight: float) -> Octree:
-    """Return the octree with a larger weight of `moment_error` and `centroid_error`, which do not cancel.
+    """Return the octree with `moment_error` and `centroid_error` weighted more, because they hardly cancel.
 
     The weighted `moment_error` is added to `second_moment`.
 

@@ -1,4 +1,4 @@
-"""Patch of a surface with unchanged shape, subdivided until its edges are short enough for diffusion."""
+"""Patch of a surface, subdivided without change of shape until its edges are short enough for diffusion."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ _BARYCENTRIC_TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class SurfacePatch:
-    """Small triangles of a patch, and the mesh triangles that they subdivide.
+    """Patch of a surface as small triangles, with the mesh triangles that they subdivide.
 
     positions : (n, 3) vertex positions [mm]
-    triangles : (f, 3) vertex indices
+    triangles : (f, 3) vertex indices of the small triangles
     parent : (f,) index of the mesh triangle that contains each small triangle
-    weights : (f, 3, 3) barycentric weights of each corner in the parent
+    weights : (f, 3, 3) barycentric weights of each small triangle's corners in its mesh triangle
     centre_mm, radius_mm : ball inside which results are valid; the patch extends beyond it [mm]
     """
 
@@ -40,7 +40,7 @@ class SurfacePatch:
         return np.asarray(np.linalg.norm(positions - self.centre_mm, axis=1) <= self.radius_mm)
 
     def vertex_barycentrics(self) -> tuple[Index, Floats]:
-        """Return a mesh triangle (n,) that contains each vertex, and the barycentric weights in it (n, 3)."""
+        """Return a mesh triangle (n,) that contains each vertex, and the vertex's weights (n, 3) in it."""
         triangle, weights = np.zeros(len(self.positions), np.int64), np.zeros((len(self.positions), 3))
         triangle[self.triangles] = self.parent[:, None]
         # A vertex shared by several parents gets its weights in the parent that it was assigned to.
@@ -49,10 +49,12 @@ class SurfacePatch:
         return triangle, weights
 
     def locate(self, triangle: Index, barycentric: Floats) -> tuple[Index, Floats]:
-        """Return the small triangle (m,) at each point, -1 outside the patch, and barycentric weights (m, 3).
+        """Return the small triangle (m,) of each point and the point's barycentric weights (m, 3) in it.
 
-        triangle : (m,) mesh triangles of the points
-        barycentric : (m, 3) weights in the mesh triangles
+        The index of the triangle is -1 outside the patch.
+
+        triangle : (m,) mesh triangle that contains each point
+        barycentric : (m, 3) barycentric weights of each point in its mesh triangle
         """
         order = np.argsort(self.parent, kind="stable")
         first = np.searchsorted(self.parent[order], triangle, "left")
@@ -73,10 +75,11 @@ class SurfacePatch:
         return fine_triangle, weights
 
     def interpolate(self, vertex_values: Floats, small_triangles: Index, barycentric: Floats) -> Floats:
-        """Return vertex values interpolated at points from `locate`, (..., m, c).
+        """Return vertex values interpolated at m points, (..., m, c).
 
-        vertex_values : (..., n, c) vertex values
-        small_triangles, barycentric : (m,) small triangles and (m, 3) weights of the points
+        vertex_values : (..., n, c) values at the vertices of the patch
+        small_triangles : (m,) small triangle of each point, from `locate`
+        barycentric : (m, 3) barycentric weights of each point in its small triangle
         """
         corners = self.triangles[small_triangles]
         return sum(
@@ -88,8 +91,8 @@ def mesh_patch(mesh: Mesh, centre_mm: ArrayLike, radius_mm: float, variances_mm2
     """Return a patch of a mesh, with welded uv seams, on which light can be blurred by given variances.
 
     centre_mm, radius_mm : ball inside which results are valid; an infinite radius takes the whole mesh [mm]
-    variances_mm2 : (k,) increasing variances; the smallest difference of successive ones determines the edge
-        length, and the largest variance the margin [mm2]
+    variances_mm2 : (k,) increasing variances; the smallest difference between successive variances determines
+        the edge length, and the largest variance determines the margin [mm2]
 
     Short edges over a wide margin are costly: use separate patches for narrow and wide levels.
     """
@@ -107,16 +110,18 @@ def refine_patch(
 ) -> SurfacePatch:
     """Return the surface within radius plus margin of a centre, with edges of at most `max_edge_mm`.
 
-    Edges that are too long are halved in both of their triangles, so no crack opens. New vertices lie on the
-    old flat triangles, so the surface keeps its shape.
+    Edges that are too long are halved in both adjacent triangles, so no crack opens. New vertices lie on the
+    mesh triangles, so the surface keeps its shape.
 
-    positions, triangles : (n, 3) positions [mm] and (f, 3) vertex indices of the surface, with welded seams
-    centre_mm : (3,) centre of the ball; Euclidean distances never exceed those along the surface [mm]
-    radius_mm : radius of the ball inside which results are valid; infinite for the whole surface [mm]
-    max_edge_mm, margin_mm : edge length and margin, from `max_edge_mm` and `patch_margin_mm` [mm]
+    positions : (n, 3) vertex positions of the surface, with welded seams [mm]
+    triangles : (f, 3) vertex indices of the surface
+    centre_mm : (3,) centre of the ball inside which results are valid [mm]
+    radius_mm : Euclidean radius of this ball; infinite for the whole surface [mm]
+    max_edge_mm : largest edge length, from the function `max_edge_mm` [mm]
+    margin_mm : distance by which the patch extends beyond the ball, from `patch_margin_mm` [mm]
 
-    Raises DermisError when there is no surface in reach, or when there would be more than 8 million
-    triangles.
+    Raises DermisError when no triangle is within radius plus margin of the centre, or when there would be
+    more than 8 million triangles.
     """
     vertices, corners = np.asarray(positions, np.float64), np.asarray(triangles, np.int64)
     centre = np.asarray(centre_mm, np.float64)
@@ -146,11 +151,13 @@ def _triangles_in_reach(
 ) -> NDArray[np.bool_]:
     """Return the mask (f,) of triangles whose bounding balls are within reach of the centre.
 
-    Raises DermisError when there is none, or when splitting those entirely within reach would give too many
-    triangles. The estimate assumes equilateral triangles with edges of `edge_mm`, the largest ones possible.
-
     corners : (f, 3, 3) corner positions [mm]
-    reach_mm : distance from the centre [mm]
+    reach_mm : largest distance from the centre [mm]
+    edge_mm : largest edge length after splitting [mm]
+
+    Raises DermisError when no triangle is within reach, or when splitting the triangles entirely within reach
+    would result in too many triangles. Their number is estimated for equilateral triangles, which need the
+    fewest.
     """
     midpoint = corners.mean(axis=1)
     size = np.linalg.norm(corners - midpoint[:, None], axis=2).max(axis=1)

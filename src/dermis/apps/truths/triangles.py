@@ -24,7 +24,9 @@ Two halved sides leave a quadrilateral; the last entry splits it along the other
 
 
 def triangle_edges(positions: Floats, corners: Index) -> tuple[Index, Index, Floats]:
-    """Return the ends (e, 2) of edges, the edge of each triangle side (f, 3), and edge lengths (e,) [mm].
+    """Return the ends (e, 2) and the lengths (e,) of the edges, and the edge of each triangle side (f, 3).
+
+    The order of the results is ends, edge indices of the sides, and lengths [mm].
 
     positions : (n, 3) vertex positions [mm]
     corners : (f, 3) vertex indices; side k runs from corner k to corner k + 1
@@ -37,15 +39,16 @@ def triangle_edges(positions: Floats, corners: Index) -> tuple[Index, Index, Flo
 def split_triangles(
     corners: Index, barycentric: Floats, side_midpoints: Index, positions: Floats | None = None
 ) -> tuple[Index, Index, Floats]:
-    """Split triangles at halved sides; return new triangles (m, 3), their parents (m,) and weights.
+    """Split triangles at halved sides; return the new triangles with their parents and weights.
 
-    The weights (m, 3, 3) are barycentric weights of the new corners in the coarse triangle.
+    The results are the vertex indices (m, 3) of the new triangles; the index (m,) of the triangle that each
+    of them is a part of; and the barycentric weights (m, 3, 3) of their corners in the coarse triangle.
 
-    corners : (f, 3) vertex indices
-    barycentric : (f, 3, 3) barycentric weights of the corners in a coarse triangle
+    corners : (f, 3) vertex indices of the triangles
+    barycentric : (f, 3, 3) barycentric weights of the triangles' corners in a coarse triangle
     side_midpoints : (f, 3) index of the vertex at the middle of each side; -1 for sides that are not halved
-    positions : (n, 3) positions of all vertices; quadrilaterals are then split along the shorter diagonal
-        [mm]
+    positions : (n, 3) positions of all vertices; with these, quadrilaterals are split along their shorter
+        diagonal [mm]
     """
     halved = side_midpoints >= 0
     count = halved.sum(axis=1)

@@ -1,6 +1,7 @@
 """Monte Carlo simulation of light across the border of two adjacent half-spaces, compiled by numba.
 
-The left medium fills x < 0, the right one x > 0, both z > 0; both scatter isotropically.
+The left medium fills x < 0 and the right medium x > 0, both below the surface (z > 0). Both scatter
+isotropically.
 """
 
 from __future__ import annotations
@@ -25,9 +26,9 @@ Counts = NDArray[np.int64]
 
 @compiled
 def _trace_photon(x: float, sigma_t: Floats, albedo: Floats, eta: float, rng: RandomState) -> float:
-    """Return the x at which a photon leaves the surface [mm]; NaN if it is absorbed.
+    """Return the x coordinate where a photon leaves through the surface, or NaN if it is absorbed [mm].
 
-    x : position where the photon enters, at normal incidence [mm]
+    x : x coordinate where the photon enters at normal incidence [mm]
     sigma_t, albedo : (2,) extinction coefficient and single-scattering albedo of the two media
     eta : index of refraction of both media
     """
@@ -68,11 +69,12 @@ def tally_exits(
     rng: RandomState,
     tally: Counts,
 ) -> None:
-    """Trace photons, and add to `tally` (n, n) how many of those entering each strip leave from each strip.
+    """Trace photons that enter each of n strips of the surface, and count the strips where they leave.
 
     photon_count : number of photons that enter each strip
     sigma_t, albedo : (2,) extinction coefficient and single-scattering albedo of the two media
-    edges_mm : (n + 1,) x of the strips' edges, evenly spaced [mm]
+    edges_mm : (n + 1,) x coordinates of the strips' edges, evenly spaced [mm]
+    tally : (n, n) number of photons that entered one strip (row) and left from another (column)
     """
     strip_count = len(edges_mm) - 1
     width = (edges_mm[-1] - edges_mm[0]) / strip_count
@@ -93,12 +95,13 @@ def strip_transfer(
     seed: int = 0,
     eta: float = 1.4,
 ) -> Floats:
-    """Return the fraction (n, n) of light entering strip i at normal incidence that leaves from strip j [-].
+    """Return the fraction (n, n) of the light entering strip i (row) that leaves from strip j (column) [-].
 
-    The border between the media runs along x = 0; light that leaves beyond the outer edges is not counted.
+    The strips divide the surface along x, and the border between the media is at x = 0. Light enters at
+    normal incidence. Light that leaves beyond the outermost edges is not counted.
 
     sigma_a, sigma_s_prime : (2,) absorption and reduced scattering coefficient of the two media [1/mm]
-    edges_mm : (n + 1,) x of the strips' edges, evenly spaced [mm]
+    edges_mm : (n + 1,) x coordinates of the strips' edges, evenly spaced [mm]
     photon_count : number of photons that enter each strip
 
     Source: [Wang1995], with a second medium.

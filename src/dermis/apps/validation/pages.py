@@ -28,7 +28,7 @@ SOFTWARE_WEBGL = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "
 def in_checkout(path: Path) -> Path:
     """Check that a path exists in the checkout of the project, and return it.
 
-    Raises DermisError where the package is installed without a checkout of the project.
+    Raises DermisError if the package is installed without a checkout of the project.
     """
     if not path.exists():
         refuse(path.name, "a checkout of the project", f"there is no {path}", _CHECKOUT_HINT)
@@ -36,9 +36,11 @@ def in_checkout(path: Path) -> Path:
 
 
 def add_tests_to_path() -> None:
-    """Make the modules in the folder tests importable, because some measurements use meshes that they build.
+    """Make the modules in the folder `tests` importable.
 
-    Raises DermisError where the tests are missing.
+    Some measurements use meshes that these modules build.
+
+    Raises DermisError if the tests are missing.
     """
     folder = str(in_checkout(CHECKOUT / "tests"))
     if folder not in sys.path:
@@ -64,7 +66,7 @@ def write_page(page: Path, page_text: str) -> None:
 
 
 def template_path(page: Path) -> Path:
-    """Return the path of the template from which a page is written, docs/templates/NAME.md."""
+    """Return the path of a page's template, docs/templates/NAME.md."""
     return page.parent / "templates" / page.name
 
 

@@ -1,4 +1,4 @@
-"""Reflectance spectra of the International Skin Spectra Archive, with the person, group and site of each."""
+"""Reflectance spectra of the International Skin Spectra Archive, each with its person, group and site."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Archive(NamedTuple):
 
     @property
     def cielab(self) -> Doubles:
-        """Return the colours (n, 3) under D65, CIELAB."""
+        """Return the CIELAB colours (n, 3) of the spectra under D65."""
         return lab(self.spectra @ rgb_weights(WAVELENGTHS_NM).T)
 
     def rows(self, selection: NDArray[np.bool_] | NDArray[np.int64]) -> Archive:

@@ -26,9 +26,9 @@ _DIVIDER_GRAB_RADIUS_PX = 8.0  # distance from the divider within which a pointe
 class Controls:
     """Conversion of input events to steps of the undo history.
 
-    displayed_state : function that returns the state on screen; during playback, it differs from the state
-        of the history
-    light : index of the light that Shift-drag moves; an index after the last light means the environment
+    displayed_state : function that returns the state on screen, which is not the current state of the history
+        while a motion plays
+    light : index of the light that Shift-drag moves; an index after the last light selects the environment
     """
 
     def __init__(
@@ -79,7 +79,7 @@ class Controls:
         self._pinch = _measure_pinch(event)
 
     def _release(self, event: Event, picture_size: Point) -> None:
-        """End a drag at the position of the release, which may differ from the position of the last move."""
+        """End a drag where the pointer was released, which may differ from its last reported position."""
         if self._pressed_button and not self._pinch and (event["x"], event["y"]) != self._pointer_position:
             self._drag(event, picture_size)
         self._pressed_button, self._pinch = 0, None
@@ -102,7 +102,7 @@ class Controls:
         self.history.change(new_state, f"drag {self._gesture_count}")
 
     def _pan_and_zoom(self, pinch: tuple[float, float, float] | None, picture_size: Point) -> None:
-        """Pan and zoom with two fingers; lifting one finger does not move the picture.
+        """Pan and zoom by moving two fingers; when one of them is lifted, the picture does not jump.
 
         pinch : midpoint (x, y) and distance of the two fingers [logical pixel]; None for fewer than two
             fingers
@@ -116,10 +116,10 @@ class Controls:
         self._pinch = pinch
 
     def _zoom(self, distance_factor: float, pointer: Point, picture_size: Point, gesture_name: str) -> None:
-        """Move the camera nearer or farther, or scale the atlas around the pointer.
+        """Move the camera nearer or farther; in the atlas view, scale the atlas around the pointer.
 
         distance_factor : factor by which the visible height is multiplied; a factor below 1 zooms in
-        gesture_name : name of the gesture, which is undone in one step
+        gesture_name : name of the gesture; all changes by one gesture are undone together
         """
         state = self.history.state
         if state.view == ATLAS_VIEW_NAME:
@@ -133,9 +133,9 @@ class Controls:
         self.history.change(new_state, gesture_name)
 
     def _drag_unit_length(self, picture_size: Point) -> float:
-        """Return the length by which drags are divided [logical pixel].
+        """Return the unit of length for drags [logical pixel].
 
-        The length is the height of the picture, or, in the atlas view, the shorter side of the picture.
+        The unit is the height of the picture or, in the atlas view, the shorter side of the picture.
         """
         return max(1.0, min(picture_size) if self.history.state.view == ATLAS_VIEW_NAME else picture_size[1])
 
@@ -160,10 +160,10 @@ class Controls:
 
 
 class SplitView:
-    """Before/after comparison: a frozen state left of a divider, and the live state right of the divider.
+    """Before/after comparison: a frozen state to the left of a divider, and the live state to its right.
 
-    frozen_state : state on the left, rendered with the live camera; None without a divider
-    divider_position : fraction of the picture width left of the divider
+    frozen_state : state to the left of the divider, rendered with the live camera; None without a divider
+    divider_position : fraction of the picture's width that lies to the left of the divider
     is_dragged : whether the divider is being dragged
     """
 
@@ -173,7 +173,7 @@ class SplitView:
         self.is_dragged = False
 
     def freeze(self, state: ViewerState) -> None:
-        """Show a divider, with the given state left of the divider."""
+        """Show a divider, with the given state to its left."""
         self.frozen_state = state
 
     def release(self) -> None:
@@ -181,7 +181,7 @@ class SplitView:
         self.frozen_state, self.is_dragged = None, False
 
     def handle(self, event: Event, width: float) -> bool:
-        """Process a pointer event; return whether the event drags the divider.
+        """Process a pointer event; return whether it drags the divider.
 
         width : logical width of the picture
         """
@@ -207,9 +207,10 @@ def picture_event(event: Event, picture_left: float) -> Event:
 
 
 def _pan(state: ViewerState, right_shift: float, down_shift: float) -> ViewerState:
-    """Return the state with the camera, or the displayed part of the atlas, moved along with the pointer.
+    """Return the state with the camera, or the displayed part of the atlas, moved by a drag of the pointer.
 
-    right_shift, down_shift : motion of the pointer, divided by `Controls._drag_unit`
+    right_shift : motion of the pointer to the right, in units of `Controls._drag_unit_length`
+    down_shift : motion of the pointer downwards, in the same units
     """
     if state.view == ATLAS_VIEW_NAME:
         return state.with_atlas_view(state.atlas_view.panned(right_shift, down_shift))

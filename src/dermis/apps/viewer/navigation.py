@@ -22,16 +22,17 @@ _EASING_TIME_S = 0.05  # time constant with which the displayed camera approache
 
 
 def camera_axes(camera: Camera) -> tuple[Floats, Floats, Floats]:
-    """Return the unit vectors of a camera: right and up in the image plane, and forward."""
+    """Return three unit vectors of a camera: right and up in the image plane, and the forward direction."""
     forward = _normalise(np.subtract(camera.target, camera.position))
     right = _normalise(np.cross(forward, camera.up))
     return right, np.cross(right, forward), forward
 
 
 def orbit(camera: Camera, yaw_rad: float, pitch_rad: float) -> Camera:
-    """Orbit the camera around its target, without passing over the top or bottom.
+    """Orbit the camera around its target; the camera stops short of the positions directly above and below.
 
-    yaw_rad, pitch_rad : angles by which the camera moves to the right and up [rad]
+    yaw_rad : angle by which the camera moves to the right [rad]
+    pitch_rad : angle by which the camera moves up [rad]
     """
     up = _normalise(np.array(camera.up, dtype=np.float64))
     offset = np.subtract(camera.position, camera.target)
@@ -47,7 +48,8 @@ def orbit(camera: Camera, yaw_rad: float, pitch_rad: float) -> Camera:
 def pan(camera: Camera, right: float, up: float) -> Camera:
     """Shift the camera and its target parallel to the image plane.
 
-    right, up : shifts, in fractions of the height of the visible frame
+    right : shift to the right, as a fraction of the visible height
+    up : shift upwards, as a fraction of the visible height
     """
     x, y, _ = camera_axes(camera)
     shift = camera.frame_mm * (right * x + up * y)
@@ -55,7 +57,7 @@ def pan(camera: Camera, right: float, up: float) -> Camera:
 
 
 def dolly(camera: Camera, distance_factor: float) -> Camera:
-    """Move the camera nearer (factor below 1) or farther; closer than 90 mm, zoom the lens instead.
+    """Move the camera nearer (factor below 1) or farther; at distances below 90 mm, zoom the lens instead.
 
     distance_factor : factor by which the visible height at the target is multiplied [-]
     """
@@ -71,13 +73,13 @@ def dolly(camera: Camera, distance_factor: float) -> Camera:
 
 
 def focus(camera: Camera, point: ArrayLike) -> Camera:
-    """Shift the camera so that a point becomes the target; direction and distance are unchanged."""
+    """Shift the camera so that a point becomes its target, without changing its direction or distance."""
     shift = np.subtract(point, camera.target)
     return _with_position_and_target(camera, np.array(camera.position) + shift, point)
 
 
 class CameraEasing:
-    """Smooth motion of the displayed camera towards the camera of the state, at any frame rate."""
+    """Smooth motion of the displayed camera towards the state's camera, independent of the frame rate."""
 
     def __init__(self, camera: Camera) -> None:
         self.camera = camera
@@ -94,11 +96,11 @@ class CameraEasing:
 
 
 def interpolate_cameras(start_camera: Camera, end_camera: Camera, fraction: float) -> Camera:
-    """Interpolate between two cameras; return `end_camera` itself when the difference is invisible.
+    """Interpolate between two cameras; return `end_camera` itself if the result would look the same.
 
-    Directions are rotated, distances and frame sizes are scaled.
+    The view direction is rotated, and the distance and the visible height are scaled.
 
-    fraction : position between the cameras, from 0 to 1
+    fraction : position between the cameras, from 0 (start) to 1 (end)
     """
     if fraction >= 1.0:
         return end_camera
@@ -128,13 +130,14 @@ def interpolate_cameras(start_camera: Camera, end_camera: Camera, fraction: floa
 
 
 def pick(scene: Scene, camera: Camera, x: float, y: float, aspect: float) -> Floats | None:
-    """Return the surface point at a position in the image [mm]; None if the ray misses the head.
+    """Return the surface point [mm] at a position in the image; None if no surface is visible there.
 
     The point is relative to the centre of the head.
 
     scene : scene with the posed head
-    camera : camera, which replaces the scene's camera
-    x, y : position in the image, from -1 (left, bottom) to 1
+    camera : camera to use instead of the scene's camera
+    x : horizontal position in the image, from -1 (left) to 1 (right)
+    y : vertical position in the image, from -1 (bottom) to 1 (top)
     aspect : ratio of image width to height [-]
 
     Source: [MollerTrumbore1997].
@@ -160,8 +163,9 @@ def pick(scene: Scene, camera: Camera, x: float, y: float, aspect: float) -> Flo
 def drag_light(state: ViewerState, light_index: int, right: float, up: float) -> ViewerState:
     """Orbit a light around its target in the direction of a drag, or rotate the environment.
 
-    light_index : index of the light; an index after the last light means the environment
-    right, up : angles of the drag, to the right and up on screen [rad]
+    light_index : index of the light; an index after the last light selects the environment
+    right : angle by which the light moves to the right on screen, or by which the environment turns [rad]
+    up : angle by which the light moves up on screen; ignored for the environment [rad]
     """
     if light_index < len(state.scene.lights):
         lights = list(state.scene.lights)
@@ -179,8 +183,8 @@ def orbit_light(light: Light, camera: Camera, right_rad: float, up_rad: float) -
 
     The rotation changes the direction of a directional light, and the position of any other light.
 
-    right_rad, up_rad : angles [rad]; positive angles move a light between target and camera to the right and
-        up on screen
+    right_rad : angle by which a light in front of the target moves to the right on screen [rad]
+    up_rad : angle by which a light in front of the target moves up on screen [rad]
     """
     x, y, _ = camera_axes(camera)
     rotation = _rotation_matrix(y, right_rad) @ _rotation_matrix(x, -up_rad)
@@ -191,7 +195,7 @@ def orbit_light(light: Light, camera: Camera, right_rad: float, up_rad: float) -
 
 
 def _cameras_nearly_equal(first_camera: Camera, second_camera: Camera) -> bool:
-    """Return whether the difference of two cameras is too small to see."""
+    """Return whether the difference between two cameras is too small to see."""
     shifts = (
         np.subtract(first_camera.position, second_camera.position),
         np.subtract(first_camera.target, second_camera.target),

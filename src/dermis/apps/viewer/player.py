@@ -1,4 +1,4 @@
-"""Playback of a motion over the viewer state; on pause, the pose becomes a step of the undo history."""
+"""Playback of a motion in the viewer; when it pauses, its pose becomes a step of the undo history."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from dermis.scene.motion import load_motion
 
 
 class MotionFile:
-    """Motion file, with a cache of the clip that was last loaded from the file for a head.
+    """Motion file, with a cache of the clip last loaded from it.
 
     path : file that `load_motion` accepts
-    fps : frame rate of files without times [1/s]
+    fps : frame rate to assume if the file contains no times [1/s]
     """
 
     def __init__(self, motion_path: str | Path, fps: float | None = None) -> None:
@@ -25,7 +25,7 @@ class MotionFile:
         self._last: tuple[Head, Clip] | None = None
 
     def load_clip(self, head: Head) -> Clip:
-        """Return the clip that the file contains for a head; the clip for the last head is cached.
+        """Return the clip in the file, loaded for a head; the clip for the last head is cached.
 
         Raises DermisError if the file cannot be read, or if the motion moves no morph target or bone of the
         head.
@@ -36,11 +36,11 @@ class MotionFile:
 
 
 class MotionPlayer:
-    """Player of a motion, with its current time and the displayed state.
+    """Player of a motion, which knows the current time in the motion and the state to display.
 
-    While the motion plays, the current pose of the motion replaces the pose of the state on screen; other
-    controls can still change the state. When the motion pauses or ends, the current pose becomes a step of
-    the undo history.
+    While the motion plays, its current pose is displayed instead of the pose of the state; the rest of the
+    state can still be changed. When the motion pauses or ends, its current pose becomes a step of the undo
+    history.
 
     motion : motion to play; None if there is no motion
     clock : function that returns the time [s]
@@ -69,7 +69,7 @@ class MotionPlayer:
 
     @property
     def has_motion(self) -> bool:
-        """Return whether a motion is loaded, even if it does not suit the current head."""
+        """Return whether a motion is loaded, even if it cannot be played on the current head."""
         return self._motion is not None
 
     @property
@@ -92,7 +92,7 @@ class MotionPlayer:
 
     @property
     def displayed_state(self) -> ViewerState:
-        """Return the current state; while the motion plays, the state has the current pose of the motion."""
+        """Return the current state, with the motion's current pose while the motion plays."""
         state = self._history.state
         clip = self.clip if self.is_playing else None
         if clip is None:
@@ -122,9 +122,9 @@ class MotionPlayer:
         self.play(0.0)
 
     def play(self, start_s: float | None = None) -> None:
-        """Play the motion from a given time; at the end of the motion, start from the beginning.
+        """Play the motion from a given time; if that time is the end of the motion, play from the beginning.
 
-        start_s : time to start from; None for the current time [s]
+        start_s : time in the motion to start from; None for the current time [s]
         """
         if self.clip is None:
             return
@@ -145,7 +145,7 @@ class MotionPlayer:
             self._history.change(displayed)
 
     def toggle(self) -> None:
-        """Pause the motion if it plays, else play it."""
+        """Pause the motion if it is playing; otherwise play it."""
         if self.is_playing:
             self.pause()
         else:
@@ -154,7 +154,7 @@ class MotionPlayer:
     def advance(self) -> None:
         """Advance the motion to the current time of the clock.
 
-        The time of the motion starts after the first frame, because that frame may take long.
+        The time of the motion starts to run after the first frame, because drawing that frame may take long.
         """
         now, clip = self._clock(), self.clip if self.is_playing else None
         if clip is None or self._starting:
@@ -170,7 +170,7 @@ class MotionPlayer:
             self.pause()
 
     def state_at(self, seconds: float) -> ViewerState:
-        """Stop playing, and return the state with the pose of the motion at a given time.
+        """Stop playing, and return the state with the pose that the motion has at a given time.
 
         seconds : time in the motion [s]
 

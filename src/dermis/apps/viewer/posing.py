@@ -18,12 +18,12 @@ REST_POSE = Pose()
 
 
 def target_weight(scene: Scene, target_name: str) -> float:
-    """Return the weight of a morph target in a scene: the weight in the pose, or else the rest weight."""
+    """Return the weight of a morph target in a scene's pose, or its rest weight if the pose has none."""
     return float(_pose_or_rest(scene).weights.get(target_name, _rest_weight(scene.head, target_name)))
 
 
 def with_target_weight(scene: Scene, target_name: str, new_weight: float) -> Pose | None:
-    """Return the pose of a scene with a new weight of one morph target; None for the rest pose."""
+    """Return the pose of a scene with a new weight for one morph target; None if this is the rest pose."""
     weights = dict(_pose_or_rest(scene).weights)
     weights.pop(target_name, None)
     if new_weight != _rest_weight(scene.head, target_name):
@@ -34,7 +34,7 @@ def with_target_weight(scene: Scene, target_name: str, new_weight: float) -> Pos
 def bone_angles(scene: Scene, bone_name: str) -> Angles:
     """Return the angles by which a bone is rotated about the head's x, y and z axes [degrees].
 
-    A rotation that the pose stores as a matrix is converted.
+    If the pose stores the rotation as a matrix, the matrix is converted to angles.
     """
     rotation, skeleton = _pose_or_rest(scene).bones.get(bone_name), scene.head.control.skeleton
     if rotation is None or skeleton is None:
@@ -48,7 +48,7 @@ def bone_angles(scene: Scene, bone_name: str) -> Angles:
 
 
 def with_bone_angles(scene: Scene, bone_name: str, angles_degrees: Angles) -> Pose | None:
-    """Return the pose of a scene with new angles of one bone; None if this is the rest pose.
+    """Return the pose of a scene with new angles for one bone; None if this is the rest pose.
 
     angles_degrees : rotation about the head's x, y and z axes [degrees]
     """
@@ -60,9 +60,9 @@ def with_bone_angles(scene: Scene, bone_name: str, angles_degrees: Angles) -> Po
 
 
 def rest_pose(scene: Scene) -> Pose | None:
-    """Return the pose of a scene without morph target weights and bone rotations.
+    """Return the pose of a scene without its morph target weights and bone rotations.
 
-    The vertex positions that the pose of a person may contain are kept. None is the rest pose of the head.
+    If the pose contains vertex positions, they are kept; otherwise the result is None, meaning the rest pose.
     """
     return _none_if_rest(replace(_pose_or_rest(scene), weights={}, bones={}))
 
@@ -70,7 +70,7 @@ def rest_pose(scene: Scene) -> Pose | None:
 def poses_equal(
     first_pose: Pose | Mapping[str, float] | None, second_pose: Pose | Mapping[str, float] | None
 ) -> bool:
-    """Return whether two poses are equal; arrays of vertex positions must be the same object."""
+    """Return whether two poses are equal; their arrays of vertex positions must be the same object."""
     if first_pose is second_pose:
         return True
     first, second = Pose.coerce(first_pose) or REST_POSE, Pose.coerce(second_pose) or REST_POSE
@@ -83,7 +83,7 @@ def poses_equal(
 
 
 def posed_positions(scene: Scene) -> NDArray[np.floating]:
-    """Return the (v, 3) vertex positions of the posed mesh, as the device computes them [mm]."""
+    """Return the vertex positions (v, 3) of the posed mesh, equal to those computed on the device [mm]."""
     mesh, vertex_motion = scene.head.mesh, scene.motion
     if vertex_motion is None:
         return mesh.positions

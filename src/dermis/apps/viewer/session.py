@@ -1,4 +1,4 @@
-"""Viewing session: state, controls, player and renderer of the viewer, which window and panel share."""
+"""Viewing session: the state, controls, player and renderer that the viewer's window and panel share."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ LoadedHead = Head | ViewerState
 
 
 class HeadLoader:
-    """Loader of heads in a background thread, while the picture stays interactive.
+    """Loader of heads in a background thread, so that the picture stays interactive.
 
     recent : paths of opened files, the most recent first
-    request_frame : function that requests a frame, called from another thread when a head is loaded
+    request_frame : function that requests a frame, called from another thread when a head has been loaded
     """
 
     def __init__(self) -> None:
@@ -58,15 +58,15 @@ class HeadLoader:
         return f"opening {self.display_name(self._name)} ..." if self._future else ""
 
     def display_name(self, name_or_path: str) -> str:
-        """Return the name of a head for display; files are shown without their folder."""
+        """Return the name of a head for display; for a file, the file name without its folder."""
         return Path(self.uploaded_name(name_or_path)).name
 
     def uploaded_name(self, name_or_path: str) -> str:
-        """Return the original name of an uploaded file from its path; other names are returned unchanged."""
+        """Return the original name of an uploaded file, given its path; return other names unchanged."""
         return self._original_names.get(name_or_path, name_or_path)
 
     def open(self, name_or_path: str, uploaded_as: str = "") -> None:
-        """Start to load a head or a scene; a load that has not started yet is cancelled.
+        """Start to load a head or a scene; cancel an earlier request whose loading has not begun.
 
         name_or_path : name of a built-in head or sample, or path of a mesh or scene file
         uploaded_as : original name of an uploaded file
@@ -80,9 +80,9 @@ class HeadLoader:
         self._future.add_done_callback(lambda _: self.request_frame())
 
     def take_loaded(self, state: ViewerState) -> ViewerState | None:
-        """Return the state with a newly loaded head; None if no load has ended since the last call.
+        """Return the state with a newly loaded head or scene; None if none was loaded since the last call.
 
-        state : current state, in which the head is replaced
+        state : current state; a loaded head replaces the head of this state, a loaded scene the whole state
 
         Raises DermisError if the head cannot be loaded.
         """
@@ -111,7 +111,7 @@ def _load_head_or_scene(name_or_path: str) -> LoadedHead:
 def _with_head(state: ViewerState, head: Head, head_name: str) -> ViewerState:
     """Return the state with another head.
 
-    The pose is kept if both heads have the same morph targets and bones.
+    The pose is kept if both heads have the same morph targets and bones, unless it contains vertex positions.
 
     head_name : name or path from which the new head was loaded
     """
@@ -134,24 +134,26 @@ _log = logging.getLogger(__name__)
 
 
 class Session:
-    """Viewing session: undo history, controls and player that change the state, and renderer of the state.
+    """Viewing session: undo history, controls, motion player and renderer.
 
     motion : motion to play; None if there is no motion
     clock : function that returns the time [s]
 
     split : before/after comparison
-    status, message : text over the picture: state of the adapter, and result of the last action
-    scene_file, picture_file : file names typed in the panel for the scene and for screenshots
-    picture_size : size of screenshots, (0, 0) for the size of the view [pixel]
+    status : text over the picture about the adapter
+    message : text over the picture about the last action
+    scene_file : file name of the scene, typed in the panel
+    picture_file : file name of screenshots, typed in the panel
+    picture_size : size of screenshots; (0, 0) for the size of the view [pixel]
     view_size : size of the view [pixel]
     heads : loader of heads in the background
-    head_file : file name of a head typed in the panel
-    request_file : function that asks a web page to upload a file; None if the panel has a field for the path
-        of a file instead
+    head_file : file name of a head, typed in the panel
+    request_file : function that asks a web page to upload a file; None if the user types a path in the panel
+        instead
     offer_download : function that sends the name and bytes of a file to a web page; None if files are written
         to paths instead
-    motion_file : file name of a motion typed in the panel
-    search : text by which morph targets and bones are filtered
+    motion_file : file name of a motion, typed in the panel
+    search : text typed in the panel; only morph targets and bones whose names contain it are listed
     positions : positions of the panel's controls in the window, by label
     """
 
@@ -196,7 +198,7 @@ class Session:
         self.message = ""
 
     def report_error(self, failure: str, error: Exception) -> None:
-        """Report an unexpected error, once: over the picture, and with its traceback in the log.
+        """Report an unexpected error once, as text over the picture and with its traceback in the log.
 
         failure : what cannot be done, such as "The head cannot be opened"
         """
@@ -219,7 +221,7 @@ class Session:
         self.message = f"saved {path}"
 
     def load(self, path: Path) -> None:
-        """Replace the state by the state in a scene file.
+        """Replace the state with the state in a scene file.
 
         Raises DermisError if the file is not a scene.
         """
@@ -229,7 +231,7 @@ class Session:
         self.message = f"loaded {path}"
 
     def take_head(self) -> None:
-        """Show the head that was loaded in the background, or the reason why the head cannot be loaded."""
+        """Show the head that was loaded in the background, or the reason why it cannot be loaded."""
         try:
             state = self.heads.take_loaded(self.state)
         except DermisError as error:
@@ -295,7 +297,7 @@ def apply_regions(
     """Return the state with roughness and specular maps from a table of face regions, or without such maps.
 
     table_name : name of the table, "auto" or "none"
-    known_states : states whose heads are reused if the heads already have these maps
+    known_states : states whose heads are reused if they already have these maps
 
     Raises DermisError for heads without known regions and for heads created in memory.
     """

@@ -34,11 +34,11 @@ _MIN_ATLAS_SPAN, _MAX_ATLAS_SPAN = 2.0**-10, 2.0
 
 @dataclass(frozen=True)
 class AtlasView:
-    """Part of the atlas that fills the picture in the view "atlas".
+    """Part of the atlas that the view "atlas" shows.
 
     layer : map to show, one of `views.ATLAS_LAYERS`
     centre : uv at the centre of the picture, u to the right and v down [-]
-    span : length in the atlas that the picture's shorter side shows; 1 is the side of the atlas [-]
+    span : length shown along the picture's shorter side, as a fraction of the side of the atlas [-]
     """
 
     layer: str = "irradiance"
@@ -46,9 +46,10 @@ class AtlasView:
     span: float = 1.05
 
     def panned(self, right: float, down: float) -> AtlasView:
-        """Return the view moved along with a drag.
+        """Return the view moved by a drag of the pointer.
 
-        right, down : motion of the pointer, in fractions of the picture's shorter side
+        right : motion of the pointer to the right, as a fraction of the picture's shorter side
+        down : motion of the pointer downwards, as a fraction of the picture's shorter side
         """
         u, v = self.centre
         return self._with_centre(u - self.span * right, v - self.span * down)
@@ -56,9 +57,9 @@ class AtlasView:
     def zoomed(self, span_factor: float, x: float, y: float) -> AtlasView:
         """Return the view zoomed around the cursor.
 
-        span_factor : factor by which the visible extent is multiplied; a factor below 1 zooms in
-        x, y : cursor relative to the centre of the picture, right and down, in fractions of the picture's
-            shorter side
+        span_factor : factor by which the visible length is multiplied; a factor below 1 zooms in
+        x, y : position of the cursor, to the right of and below the picture's centre, as fractions of the
+            picture's shorter side
         """
         span = min(_MAX_ATLAS_SPAN, max(_MIN_ATLAS_SPAN, span_factor * self.span))
         (u, v), reduction = self.centre, self.span - span
@@ -80,12 +81,13 @@ PART_VIEWS = {"diffuse": "diffuse", "specular": "specular"}
 class ViewerState:
     """State of the viewer: the scene, the render settings, and the view that is displayed.
 
-    settings : render settings; `size` is ignored because the window determines it
-    head : [head] table of a scene file from which the head was loaded
-    view : one of `views.VIEW_NAMES`: the picture or an intermediate result
-    rig : name of the light preset, empty for custom lights
+    settings : render settings; their `size` is ignored, because the window determines the size
+    head : table from which the head was loaded, with the keys of the [head] table of a scene file; empty for
+        a head created in memory
+    view : picture or intermediate result to display, one of `views.VIEW_NAMES`
+    rig : name of the light preset; empty for custom lights
     atlas_view : part of the atlas that the view "atlas" shows
-    seconds : time in the motion at which the pose was taken [s]
+    seconds : time in the motion from which the pose was taken [s]
     """
 
     scene: Scene
@@ -98,7 +100,7 @@ class ViewerState:
 
     @property
     def head_table(self) -> Table:
-        """Return the [head] table with the head's subdivision level; empty for a head created in memory."""
+        """Return the table `head` plus the head's subdivision level; empty for a head created in memory."""
         return self.head and {"subdivide": self.scene.head.levels, **self.head}
 
     def with_skin(self, **fields: object) -> ViewerState:
@@ -124,7 +126,7 @@ class ViewerState:
     def with_lights(self, lights: Sequence[Light], rig: str = "") -> ViewerState:
         """Return a copy with other lights.
 
-        rig : name of the preset of these lights, empty for custom lights
+        rig : name of the light preset; empty for custom lights
         """
         return replace(self._with_scene(lights=tuple(lights)), rig=rig)
 
@@ -151,11 +153,11 @@ class ViewerState:
         return replace(self, atlas_view=atlas_view)
 
     def with_pose(self, pose: Pose | None) -> ViewerState:
-        """Return a copy with another pose; None for the rest pose."""
+        """Return a copy with another pose, where None means the rest pose."""
         return self._with_scene(pose=pose)
 
     def with_motion(self, clip: Clip, seconds: float) -> ViewerState:
-        """Return a copy posed by a motion; morph targets and bones that the motion does not move are kept.
+        """Return a copy posed by a motion; morph targets and bones not in the motion keep their values.
 
         seconds : time in the motion [s]
 
@@ -165,9 +167,9 @@ class ViewerState:
         return replace(self.with_pose(pose), seconds=seconds)
 
     def with_head(self, head: Head, head_table: Table, rho_s: float) -> ViewerState:
-        """Return a copy with another head, or with other maps of the head.
+        """Return a copy with another head, or with other maps for the same head.
 
-        head_table : [head] table of a scene file from which the head was loaded
+        head_table : table from which the head was loaded, with the keys of the [head] table of a scene file
         rho_s : mean specular strength [-]
         """
         skin = validated_copy(self.scene.skin, rho_s=rho_s)
@@ -178,7 +180,7 @@ class ViewerState:
 
 
 def states_equal(first_state: ViewerState, second_state: ViewerState) -> bool:
-    """Return whether two states are equal; their heads must be the same object."""
+    """Return whether two states are equal; heads only count as equal if they are the same object."""
 
     def compared_values(state: ViewerState) -> tuple[object, ...]:
         scene = state.scene
@@ -200,8 +202,9 @@ def validated_copy(values: P, **fields: object) -> P:
 def save_state(path: Path, state: ViewerState) -> None:
     """Write a state as a scene file that `dermis render` and `dermis view` can open.
 
-    Views of intermediate results are not saved. Raises DermisError for a head created in memory and if the
-    path cannot be written.
+    A view of an intermediate result is not saved.
+
+    Raises DermisError if the head was created in memory, or if the file cannot be written.
     """
     if not state.head:
         refuse(path, "a head from a file or a sample", "it was created in memory", "Write it to a file first")
@@ -210,7 +213,7 @@ def save_state(path: Path, state: ViewerState) -> None:
 
 
 def _load_named_state(name_or_path: str) -> ViewerState:
-    """Return the state of a built-in head, sample or mesh file in studio light, or of a scene file."""
+    """Return the state of a scene file, or of a built-in head, a sample or a mesh file in studio light."""
     if Path(name_or_path).suffix.lower() == ".toml":
         return load_state(Path(name_or_path))
     path = str(Path(name_or_path).resolve()) if Path(name_or_path).is_file() else name_or_path
@@ -220,7 +223,7 @@ def _load_named_state(name_or_path: str) -> ViewerState:
 def make_state(subject: Head | Human | Scene | ViewerState | str | os.PathLike[str]) -> ViewerState:
     """Return the initial state of a viewer for a head, person or scene.
 
-    subject : head, person, scene, or the name or file of one of these; a viewer state is returned unchanged
+    subject : head, person or scene, or its name or file; a viewer state is returned unchanged
 
     Raises DermisError for a subject of another type, and if a named subject cannot be loaded.
     """
@@ -242,7 +245,7 @@ def make_state(subject: Head | Human | Scene | ViewerState | str | os.PathLike[s
 def load_state(path: Path, current: ViewerState | None = None) -> ViewerState:
     """Return the state of a scene file.
 
-    current : state whose head is reused if the file has an equal [head] table
+    current : state whose head is reused if it was loaded from an equal [head] table
 
     Raises DermisError if the file is not a scene.
     """
@@ -255,10 +258,12 @@ def load_state(path: Path, current: ViewerState | None = None) -> ViewerState:
 
 
 def initial_state(scene: Scene, settings: Settings, head_table: Table, rig_name: str) -> ViewerState:
-    """Return the initial state of a scene; `Settings.parts` becomes the view "diffuse" or "specular".
+    """Return the initial state of a scene.
 
-    head_table : [head] table of a scene file from which the head was loaded
-    rig_name : name of the light preset, empty for custom lights
+    If `settings.parts` selects only the diffuse or only the specular light, that becomes the displayed view.
+
+    head_table : table from which the head was loaded, with the keys of the [head] table of a scene file
+    rig_name : name of the light preset; empty for custom lights
     """
     view = settings.parts if settings.parts in PART_VIEWS else PICTURE_VIEW_NAME
     return ViewerState(scene, validated_copy(settings, parts="all"), head_table, view, rig_name)
@@ -270,7 +275,7 @@ _MAX_UNDO_STEPS = 200
 class UndoHistory:
     """Undo history of viewer states.
 
-    A gesture such as a drag changes the state many times and is undone in one step.
+    A gesture, such as a drag, changes the state many times; all these changes are undone in one step.
     """
 
     def __init__(self, state: ViewerState) -> None:
@@ -285,7 +290,7 @@ class UndoHistory:
 
     @property
     def states(self) -> list[ViewerState]:
-        """Return all stored states, including those that were undone."""
+        """Return all stored states, including the states that were undone."""
         return [*self._past, *self._undone]
 
     @property
@@ -295,13 +300,13 @@ class UndoHistory:
 
     @property
     def can_redo(self) -> bool:
-        """Return whether the last step was an undo."""
+        """Return whether there is an undone state that can be restored."""
         return bool(self._undone)
 
     def change(self, state: ViewerState, gesture: str = "") -> None:
         """Add a state; within one gesture, the new state replaces the last state.
 
-        gesture : name of the gesture, empty for a change that is undone separately
+        gesture : name of the gesture; empty for a change that is undone separately
         """
         if states_equal(state, self.state):
             return

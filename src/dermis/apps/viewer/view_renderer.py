@@ -43,9 +43,9 @@ _FRAME_STREAK_LENGTH = (
 
 @dataclass(frozen=True)
 class Quality:
-    """Upper limits of the render settings in motion; still frames are rendered without limits.
+    """Upper limits of render settings for frames in motion; still frames are rendered without limits.
 
-    scale : factor of the image size [-]
+    scale : factor by which the width and height of the image are multiplied [-]
     samples, atlas, shadow_size : maximum values of the fields of `Settings` with these names
     """
 
@@ -68,7 +68,7 @@ _BEST_QUALITY_LEVEL_ON_CPU = 2
 
 
 class QualityController:
-    """Controller that adapts the quality of frames in motion to the times of the last frames.
+    """Controller that adapts the quality of frames in motion to the time that the last frames took.
 
     software : whether the adapter renders on the CPU
     """
@@ -85,9 +85,9 @@ class QualityController:
         return QUALITY_LEVELS[self._level]
 
     def record_frame_time(self, frame_ms: float) -> None:
-        """Record the time of a frame in motion, and change the quality after several slow or fast frames.
+        """Record how long a frame in motion took; after several slow or fast frames, change the quality.
 
-        frame_ms : time of the frame without setup [ms]
+        frame_ms : time taken by the frame, without its setup [ms]
         """
         is_slow = frame_ms > _SLOW_FRAME_RATIO * self._budget_ms
         is_fast = frame_ms < _FAST_FRAME_RATIO * self._budget_ms
@@ -100,7 +100,7 @@ class QualityController:
             self._streak = 0
 
     def limited_settings(self, settings: Settings, view_size: tuple[int, int], is_moving: bool) -> Settings:
-        """Return the settings of a frame for a window size, with quality limits while the picture changes.
+        """Return the settings of a frame for a view size, with limited quality while the picture changes.
 
         is_moving : whether the picture is changing
         """
@@ -127,7 +127,7 @@ _FROZEN_DIVIDER_SIDE = (
 
 @dataclass(frozen=True)
 class FrozenImage:
-    """Image of a frozen state, with the camera and settings of its rendering."""
+    """Image of a frozen state, with the camera and settings that it was rendered with."""
 
     state: ViewerState
     camera: Camera
@@ -140,7 +140,7 @@ class ViewRenderer:
 
     adapter : "auto", "cpu" or part of an adapter's name
 
-    is_preparing : whether `prepare` is running, during which nothing else may be drawn
+    is_preparing : whether `prepare` is running; nothing else may be drawn during that time
     """
 
     def __init__(self, adapter: str = "auto") -> None:
@@ -160,7 +160,7 @@ class ViewRenderer:
         self._atlas_state: tuple[ViewerState, str] | None = None
 
     def prepare(self, state: ViewerState, on_resources_ready: Callable[[], None] = lambda: None) -> None:
-        """Render small images of a state, in motion and still, to create all resources and shaders.
+        """Create all resources and shaders for a state by rendering small images at motion and full quality.
 
         on_resources_ready : function called when the resources of the head have been created
 
@@ -184,9 +184,9 @@ class ViewRenderer:
         view_size: tuple[int, int],
         is_moving: bool,
     ) -> Images:
-        """Return the image of the live state, and the image of the frozen state or None.
+        """Return the images of the live state and of the frozen state (None if there is no frozen state).
 
-        is_moving : whether the picture is changing, which limits its quality
+        is_moving : whether the picture is changing; if so, its quality is limited
 
         Raises DermisError if a state cannot be rendered or the device fails.
         """
@@ -201,8 +201,8 @@ class ViewRenderer:
     ) -> Texture:
         """Return a texture of sRGB bytes for a state; the last texture is reused if nothing has changed.
 
-        view_size : size of the view; in motion the texture may be smaller [pixel]
-        is_moving : whether the picture is changing, which limits its quality
+        view_size : size of the view; while the picture is changing, the texture may be smaller [pixel]
+        is_moving : whether the picture is changing; if so, its quality is limited
 
         Raises DermisError if the state cannot be rendered or the device fails.
         """
@@ -225,7 +225,7 @@ class ViewRenderer:
     def _frozen_image(
         self, frozen_state: ViewerState, camera: Camera, view_size: tuple[int, int], is_moving: bool
     ) -> Texture:
-        """Return a copy of the image of the frozen state, rendered again when the camera moves."""
+        """Return a copy of the image of the frozen state, reused until the camera or the settings change."""
         settings, frozen = self._settings(frozen_state, view_size, is_moving), self._frozen
         still_settings = self._settings(frozen_state, view_size, is_moving=False)
         is_cached = frozen and frozen.state is frozen_state and frozen.camera == camera
@@ -238,7 +238,7 @@ class ViewRenderer:
         return image_copy
 
     def _settings(self, state: ViewerState, view_size: tuple[int, int], is_moving: bool) -> Settings:
-        """Return the settings of a frame with quality limits in motion, except for the atlas view."""
+        """Return the settings of a frame; in motion, their quality is limited, except in the atlas view."""
         return self.quality_controller.limited_settings(
             state.settings, view_size, is_moving and state.view != ATLAS_VIEW_NAME
         )
@@ -276,11 +276,11 @@ class ViewRenderer:
 
     @property
     def exposure(self) -> float:
-        """Return the exposure factor of the last frame, metered or fixed [-]."""
+        """Return the exposure factor of the last frame, whether metered or fixed [-]."""
         return self.rendered.exposure if self.rendered else 1.0
 
     def read(self, image: Texture) -> NDArray[np.uint8]:
-        """Download an image, and return the (h, w, 3) sRGB bytes of the image."""
+        """Download an image from the device, and return it as sRGB bytes (h, w, 3)."""
         return np.ascontiguousarray(download(self.renderer.device, image)[..., :3])
 
     def _draw(self, state: ViewerState, divider_side: str = "") -> Texture:
@@ -298,9 +298,9 @@ class ViewRenderer:
         return self._views.draw(state.scene, settings, state.view, divider_side)
 
     def _has_atlas_light(self, state: ViewerState, divider_side: str) -> bool:
-        """Return whether the atlas already holds the light of a state, so that no frame must be rendered.
+        """Return whether the atlas already holds the light of a state, so no frame needs to be rendered.
 
-        divider_side : name of the state's side of the divider, empty for the live side
+        divider_side : name of the side of the divider that shows the state; empty for the live side
         """
         if self._atlas_state is None or self._atlas_state[1] != divider_side:
             return False
@@ -308,7 +308,7 @@ class ViewRenderer:
 
 
 def copy_texture(device: Device, source_texture: Texture, target_texture: Texture | None = None) -> Texture:
-    """Return a copy of a texture of bytes.
+    """Copy a texture with 8-bit channels, and return the copy.
 
     target_texture : texture to reuse if its size matches
     """
@@ -326,11 +326,11 @@ T = TypeVar("T")
 
 
 class HeadPreparation:
-    """Preparation of new heads for rendering, in a thread that handles one head at a time.
+    """Preparation of new heads for rendering, one at a time, in a separate thread.
 
     Nothing else is drawn while a head is being prepared.
 
-    request_frame : function that requests a frame, called from another thread when a preparation ends
+    request_frame : function that requests a frame, called from that thread when a preparation ends
     """
 
     def __init__(self, request_frame: Callable[[], None]) -> None:
@@ -342,19 +342,19 @@ class HeadPreparation:
 
     @property
     def is_running(self) -> bool:
-        """Return whether a head is being prepared, or has been prepared but has not yet been drawn."""
+        """Return whether a head is being prepared, or has been prepared but not yet drawn."""
         return self._future is not None
 
     def reset(self) -> None:
-        """Discard the prepared meshes and the held image, because the renderer has been replaced."""
+        """Discard the prepared meshes and the image shown during preparation; the renderer was replaced."""
         self._ready_mesh = self._future = self._next_mesh = self._held_image = None
 
     def prepare_head(self, view_renderer: ViewRenderer, state: ViewerState) -> Texture | None:
-        """Start to prepare a new head; return the last image until the preparation has ended.
+        """Start to prepare the head of a state if it is new; return None once the state can be drawn.
 
-        state : state with the head
+        Until then, return the last image, to be shown in the meantime.
 
-        Returns None once `state` can be drawn. Raises the exception that stopped a preparation, once.
+        Raises the exception that stopped a preparation, once.
         """
         if self._future is not None:
             if not self._future.done():
@@ -374,7 +374,7 @@ class HeadPreparation:
 
 
 def run_in_thread(task: Callable[[], T]) -> Future[T]:
-    """Run a function in a daemon thread and return its future result."""
+    """Run a function in a daemon thread, and return a future for its result."""
     future: Future[T] = Future()
     future.set_running_or_notify_cancel()
 

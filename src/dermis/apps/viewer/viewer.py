@@ -30,7 +30,8 @@ class Patch(NamedTuple):
     """Image that is scaled to a viewport of the target and clipped to a scissor rectangle.
 
     image : texture of sRGB bytes
-    viewport, scissor : left, top, width and height in the target [pixel]
+    viewport : left, top, width and height of the viewport [pixel]
+    scissor : left, top, width and height of the scissor rectangle [pixel]
     """
 
     image: Texture
@@ -98,12 +99,13 @@ class Viewer:
     canvas : canvas of any backend of rendercanvas
     adapter : "auto", "cpu" or part of an adapter's name
     clock : function that returns the time [s]
-    motion : motion to play
+    motion : motion to play; None if there is no motion
     view_renderer : renderer that has already prepared the state; None to create a renderer
 
-    `failure` is the error that closed the canvas because the device failed twice or could not be reopened.
+    failure : error that closed the canvas, because the device failed twice or could not be reopened; None if
+        there was no such error
 
-    Raises DermisError without an adapter, ImportError without the extra `viewer`.
+    Raises DermisError if there is no adapter, and ImportError if the extra `viewer` is not installed.
     """
 
     def __init__(
@@ -137,7 +139,7 @@ class Viewer:
         canvas.request_draw(self.draw)
 
     def draw(self) -> None:
-        """Draw a frame into the canvas; reopen a device that was lost."""
+        """Draw a frame into the canvas; reopen the device if it was lost."""
         try:
             with converted_gpu_failures(self.session.view_renderer.renderer.device):
                 self._draw(self._clock())
@@ -154,7 +156,7 @@ class Viewer:
 
     @property
     def is_still(self) -> bool:
-        """Return whether the picture on screen is final, so that no frame is needed until a change."""
+        """Return whether the picture on screen is final, so no frame is needed until something changes."""
         state, view_renderer = self.session.displayed_state, self.session.view_renderer
         is_settled = self._last_state is state and self._easing.camera == state.scene.camera
         is_final = view_renderer.is_current or self._rejected_state is state
@@ -178,19 +180,19 @@ class Viewer:
         self.panel.draw(target, self.canvas.get_logical_size(), self.canvas.get_pixel_ratio())
 
     def _panel_width(self) -> int:
-        """Return the width by which the panel narrows the picture [pixel]."""
+        """Return the width that the panel takes away from the picture [pixel]."""
         width = self.panel.width(self.canvas.get_logical_size())
         return round(float(self.canvas.get_pixel_ratio()) * width)
 
     def _picture_size(self) -> tuple[int, int]:
-        """Return the width and height of the picture, the window beside the panel [pixel]."""
+        """Return the width and height of the picture: the part of the window beside the panel [pixel]."""
         width, height = self.canvas.get_physical_size()
         return max(1, width - self._panel_width()), max(1, height)
 
     def _patches(
         self, live_image: Texture, frozen_image: Texture | None, canvas_size: tuple[int, int]
     ) -> list[Patch]:
-        """Return patches that show the live image, and the frozen image left of the divider.
+        """Return patches that show the live image and, if there is one, the frozen image left of the divider.
 
         canvas_size : width and height of the picture [pixel]
         """
@@ -208,7 +210,7 @@ class Viewer:
     def _render_images(
         self, state: ViewerState, camera: Camera, picture_size: tuple[int, int], is_moving: bool
     ) -> Images:
-        """Return the live and frozen images, or the last image and None if `state` cannot be rendered."""
+        """Return the live and the frozen image; if `state` cannot be rendered, the last image and None."""
         import wgpu
 
         session = self.session
@@ -273,7 +275,7 @@ class Viewer:
     def _on_picture_event(self, event: Event) -> None:
         """Handle an event over the picture.
 
-        During a drag, positions are relative to the left edge of the picture at the start of the drag.
+        During a drag, positions stay relative to where the picture's left edge was at the start of the drag.
         """
         width, height = self.canvas.get_logical_size()
         left = self.panel.width((width, height))
@@ -285,7 +287,7 @@ class Viewer:
             self.session.controls.handle(shifted, size)
 
     def _configure_canvas(self) -> None:
-        """Configure the canvas and the panel for the device of the renderer."""
+        """Configure the canvas and the panel for the device that the renderer uses."""
         device = self.session.view_renderer.renderer.device
         format_ = str(self._context.get_preferred_format(device.adapter.handle)).removesuffix("-srgb")
         self._context.configure(device=device.handle, format=format_)
@@ -293,7 +295,7 @@ class Viewer:
         self.panel.open(device, format_)
 
     def _connect_page(self) -> Callable[[], None]:
-        """Connect uploads and downloads of a web page; return the function that requests a frame."""
+        """Connect the session to a web page's uploads and downloads; return a function to request a frame."""
         canvas, session = self.canvas, self.session
         session.offer_download = getattr(canvas, "offer_download", None)
         session.request_file = getattr(canvas, "request_file", None)
@@ -304,7 +306,7 @@ class Viewer:
         return session.heads.request_frame
 
     def _reopen_device(self, error: DermisError) -> None:
-        """Reopen the device after the device was lost or ran out of memory."""
+        """Reopen the device after it was lost or ran out of memory."""
         import wgpu
 
         self._failures += 1

@@ -64,7 +64,7 @@ class IntermediateViews:
         """Return an image of sRGB bytes that shows an intermediate result of the last frame on the head.
 
         view_name : name of the view, one of `VIEW_NAMES`
-        divider_side : name of the side of the divider, empty for the live side
+        divider_side : name of the side of the divider that is drawn; empty for the live side
 
         Raises DermisError if the technique does not compute the intermediate result.
         """
@@ -89,7 +89,7 @@ class IntermediateViews:
     ) -> Texture:
         """Return an image of sRGB bytes that shows a part of the atlas of the last frame.
 
-        divider_side : name of the side of the divider, empty for the live side
+        divider_side : name of the side of the divider that is drawn; empty for the live side
 
         Raises DermisError if the technique does not compute the displayed map.
         """
@@ -101,7 +101,7 @@ class IntermediateViews:
         return self._render(self._atlas_shader, {"atlas_view": record, "layer": layer}, settings.size)
 
     def _render(self, shader: ComputeProgram, bindings: Bindings, image_size: tuple[int, int]) -> Texture:
-        """Run a shader that writes an image to its binding `bytes`, and return the texture bound there."""
+        """Run a shader that writes an image to its binding `bytes`, and return the image's texture."""
         device = self._renderer.device
         if self._image is None or self._image.size[:2] != image_size:
             self._image = make_texture(device, image_size, "rgba8uint")
@@ -114,10 +114,10 @@ class IntermediateViews:
     def _atlas_layer(
         self, inputs: FrameInputs, layer_name: str, settings: Settings
     ) -> tuple[TextureOrView, float]:
-        """Return the atlas texture that a view shows, and a scale for the display of the texture.
+        """Return the texture of an atlas layer, and a scale for displaying it.
 
-        For light, the scale is the factor by which texels are multiplied for display. For stretch, it is the
-        mean number of texels per mm, and for thickness 1.
+        For layers with light, the scale is the factor by which texels are multiplied for display. For the
+        layer "stretch", it is the mean number of texels per mm; for other layers, it is 1.
         """
         if layer_name in LEVEL_VIEWS:
             level, blur = LEVEL_VIEWS[layer_name], next(iter(inputs.blurs), None)
@@ -138,7 +138,7 @@ class IntermediateViews:
         return self._thickness(inputs) if layer_name == "thickness" else self._empty_texture, 1.0
 
     def _exposure(self, inputs: FrameInputs) -> float:
-        """Return the exposure factor of the last frame, metered or fixed [-]."""
+        """Return the exposure factor of the last frame, whether metered or fixed [-]."""
         meter, exposure = inputs.resources.post.meter, inputs.settings.exposure
         return read_meter(self._renderer.device, meter) if meter else float(exposure)
 
@@ -155,7 +155,7 @@ class IntermediateViews:
         return draw_thickness(self._renderer.device, translucency, self._thickness_maps[translucency.pairs])
 
     def _mean_density(self, stretch: Texture) -> float:
-        """Return the geometric mean of the texel densities in a stretch map [texels/mm]."""
+        """Return the geometric mean of all texel densities in a stretch map [texels/mm]."""
         if stretch not in self._density:
             metric = download(self._renderer.device, stretch)[..., :2].astype(np.float64)
             covered = metric[(metric > 0.0).all(axis=-1)]
@@ -164,12 +164,12 @@ class IntermediateViews:
 
 
 def draw_thickness(device: Device, translucency: Translucency, target_texture: Texture) -> Texture:
-    """Compute the least tissue thickness below each cell of the coarse atlas; return it in a texture [mm].
+    """Fill a texture with the tissue thickness at each cell of the coarse atlas, and return it [mm].
 
-    The thickness is the least depth of a cell below the tangent planes of the cell's source cells, and at
-    most the radius within which source cells are searched.
+    The thickness at a cell is its smallest depth below the tangent planes of its source cells, at which
+    transmitted light enters. The thickness is at most the radius within which source cells are searched.
 
-    target_texture : texture to fill, with one texel per cell; cells without pairs are unchanged
+    target_texture : texture to fill, with one texel per cell; cells without source cells are unchanged
     """
     pairs, shader = translucency.pairs, program(device, Path(__file__).parent / "thickness.wgsl")
     count = pairs.receivers[1]

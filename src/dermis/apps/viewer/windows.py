@@ -32,9 +32,9 @@ def show_window(
     """Show the viewer in a desktop window, and return when the window is closed.
 
     window_size : width and height of the window [logical pixel]
-    motion : motion to play
+    motion : motion to play; None if there is no motion
 
-    Raises DermisError without a display, a device or the extra `viewer`.
+    Raises DermisError if there is no display or no device, or if the extra `viewer` is not installed.
     """
     backend = _load_backend("glfw", ("glfw",), "viewer")
     with warnings.catch_warnings(record=True) as caught:  # without a display glfw only warns
@@ -53,7 +53,7 @@ def show_window(
 
 @contextmanager
 def _without_signal_handlers() -> Iterator[None]:
-    """Disable the signal handlers of rendercanvas, which could close the window in the middle of a frame."""
+    """Disable the signal handlers of rendercanvas; they could close the window in the middle of a frame."""
     loops: Any = importlib.import_module("rendercanvas.core.loop")
     original, loops.HANDLED_SIGNALS = loops.HANDLED_SIGNALS, ()
     try:
@@ -78,12 +78,12 @@ def serve(
 
     load_state : function that loads the initial state and motion, called in a thread
     window_size : width and height of the canvas until a page reports the size of its window [logical pixel]
-    port : port number, 0 for any free port
-    announce_url : function called first, with the URL and whether other machines can reach the URL
-    require_token : whether the URL has a token even if only this machine can reach it
+    port : port number; 0 for any free port
+    announce_url : function called before serving, with the URL and whether other machines can reach it
+    require_token : whether the URL contains a token even if only this machine can reach it
 
-    Raises every exception of `load_state`, and DermisError if the address cannot be used, without a device or
-    without the extra `viewer`.
+    Raises DermisError if the address cannot be used, if there is no device, or if the extra `viewer` is not
+    installed. Exceptions of `load_state` are passed on.
     """
     _load_backend("http", ("uvicorn", "websockets"), "viewer")
     from dermis.apps.viewer.browser.canvas import PageCanvas
@@ -114,8 +114,8 @@ def view(
 ) -> Any:
     """Return a notebook widget that shows a head interactively.
 
-    The widget is an anywidget: display it as the last line of a cell. Its attribute `viewer` is the `Viewer`,
-    with the current state in `viewer.session.state`.
+    To display the widget (an anywidget), make it the last line of a cell. Its attribute `viewer` is the
+    `Viewer`, with the current state in `viewer.session.state`.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def view(
     size : (int, int), optional
         Width and height of the widget [logical pixel].
     motion : str, optional
-        Motion file that `load_motion` accepts; empty for none.
+        Motion file that `load_motion` accepts; by default, there is no motion.
 
     Returns
     -------
@@ -137,7 +137,7 @@ def view(
     Raises
     ------
     DermisError
-        If `subject` is of another type, if it cannot be loaded, or without the extra `notebook`.
+        If `subject` is of another type or cannot be loaded, or if the extra `notebook` is not installed.
 
     Examples
     --------
@@ -155,7 +155,7 @@ def view(
 
 
 def _notebook_canvas(backend: Any) -> Any:
-    """Return the notebook widget class of rendercanvas, with workarounds for two bugs of rendercanvas."""
+    """Return the notebook widget class of rendercanvas, with workarounds for two bugs in rendercanvas."""
 
     class NotebookCanvas(backend.AnywidgetRenderCanvas):  # type: ignore[misc]
         def _rfb_handle_msg(self, widget: object, content: Event, buffers: list[bytes]) -> None:
@@ -176,7 +176,7 @@ def _load_backend(module_name: str, required_packages: tuple[str, ...], extra: s
     """Import and return a module of rendercanvas; raise DermisError if packages are missing.
 
     required_packages : import names of the packages that the module needs
-    extra : extra of dermis that installs these packages
+    extra : extra of dermis that installs these packages, named in the error message
     """
     for package in (*required_packages, "imgui_bundle", "rendercanvas"):
         try:

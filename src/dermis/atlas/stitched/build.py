@@ -39,9 +39,10 @@ LAYOUT_ARRAY_NAMES = "piece", "scale", "origins"
 
 
 def find_pieces(surface: FlatSurface) -> tuple[Index, Doubles]:
-    """Divide charts into pieces; return piece indices (f,) and uv scales (f,) that even out texel density.
+    """Divide charts into pieces; return a piece index (f,) and a uv scale (f,) for each triangle.
 
     A piece is a chart, or a part of a chart whose uv is mirrored. Triangles in no piece have the index -1.
+    Scaling uv by these factors gives all pieces a similar texel density.
     """
     mirrored = (surface.area_uv < 0).astype(np.int64)
     neighbour = surface.uv_neighbour
@@ -76,7 +77,7 @@ def _merge_specks(surface: FlatSurface, chart: Index, piece: Index) -> Index:
 def _uv_density(surface: FlatSurface, piece: Index) -> tuple[Doubles, float]:
     """Return the uv density of each triangle's piece (f,), and the mean over all pieces [1/mm].
 
-    The density is the length in uv of 1 mm on the surface: the square root of the ratio of uv area to surface
+    The density is the length in uv of 1 mm on the surface, the square root of uv area divided by surface
     area.
     """
     inside, index = piece >= 0, np.maximum(piece, 0)
@@ -89,8 +90,8 @@ def _uv_density(surface: FlatSurface, piece: Index) -> tuple[Doubles, float]:
 def build_stitched(mesh: Mesh, atlas_side: int, gutter_mm: float) -> Atlas | None:
     """Build the atlas of a stitched layout, in which gutters show the surface across the seams of each chart.
 
-    Charts are moved apart to make space for the gutters. The result is None if the charts do not fit into the
-    texels.
+    Charts are moved apart to make space for the gutters. The result is None if the charts with their gutters
+    do not fit into the map.
 
     atlas_side : texels along each side of the map
     gutter_mm : width of the gutters [mm]
@@ -120,12 +121,15 @@ def build_stitched(mesh: Mesh, atlas_side: int, gutter_mm: float) -> Atlas | Non
 
 
 def layout_table(gutter_mm: float) -> str:
-    """Return the name of the table with the pieces and their positions in maps of at least 512 texels."""
+    """Return the name of the table with the stitched layout for maps of at least 512 x 512 texels.
+
+    The table contains the pieces of the charts and their positions.
+    """
     return f"layout {_LAYOUT_VERSION} {gutter_mm:g}"
 
 
 def find_stitched_layout(mesh: Mesh, gutter_mm: float) -> dict[str, NDArray[Any]]:
-    """Return the table of `layout_table` for a mesh: piece indices (f,), and scale and origins of the layout.
+    """Return the arrays of the table `layout_table` for a mesh: piece indices (f,), scale and origins.
 
     Raises ValueError if the charts do not fit.
     """

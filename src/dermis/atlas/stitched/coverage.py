@@ -1,4 +1,4 @@
-"""Surface points at the texels of chart pieces and gutters, with texel stretch and edge distances."""
+"""Surface points at the texels of chart pieces and gutters, with stretch and edge distances of the texels."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ from dermis.base.arrays import Floats, Index, Ints, Mask
 class Coverage:
     """Surface points that the texels of an (h, w) grid show.
 
-    The anchor of a texel is the nearest point of the piece to which the texel belongs: inside the piece the
-    anchor is the point that the texel shows, in the gutter a point on the border.
+    The anchor of a texel is the nearest point of the piece to which the texel belongs. For a texel inside the
+    piece, the anchor is the point that the texel shows; for a gutter texel, it is a point on the border.
 
     triangle : (h, w) index of the triangle that the texel shows, -1 if there is none
     weights : (h, w, 2) barycentric weights of that triangle's second and third corner
     anchor_triangle : (h, w) index of the anchor's triangle, -1 if there is none
-    anchor_weights : (h, w, 2) barycentric weights of the anchor
-    piece : (h, w) piece to which the texel or gutter belongs, -1 if there is none
-    gutter : (h, w) mask of gutter texels, which copy light
-    distance_mm : (h, w) distance from the piece on the surface [mm]
+    anchor_weights : (h, w, 2) barycentric weights of the anchor in its triangle
+    piece : (h, w) piece to which the texel belongs, -1 if there is none
+    gutter : (h, w) mask of gutter texels, into which light is copied
+    distance_mm : (h, w) distance of the texel from the piece, measured on the surface [mm]
     """
 
     triangle: Ints
@@ -82,7 +82,7 @@ def compute_coverage(
 
 
 def _add_gutters(coverage: Coverage, piece: Index, texels: GutterTexels) -> None:
-    """Add the rim and gutter texels around pieces of charts to the coverage of the pieces alone."""
+    """Add rim and gutter texels to a coverage that so far contains only the pieces of charts."""
     y, x = texels.y, texels.x
     coverage.triangle[y, x], coverage.weights[y, x] = texels.triangle, texels.weights
     coverage.anchor_triangle[y, x] = texels.anchor_triangle
@@ -102,7 +102,7 @@ def _add_gutters(coverage: Coverage, piece: Index, texels: GutterTexels) -> None
 
 
 def hidden_triangles(surface: FlatSurface, piece: Index, packing: Packing, atlas_side: int) -> Mask:
-    """Return the mask (f,) of triangles most of whose texels are owned by other triangles of their piece."""
+    """Return the mask (f,) of triangles that other triangles of their piece mostly hide in uv."""
     members = np.flatnonzero(piece >= 0)
     owner = rasterise_texel_triangles(
         packing.corners, _drawing_order(surface, piece, members), (atlas_side, atlas_side)
@@ -113,7 +113,7 @@ def hidden_triangles(surface: FlatSurface, piece: Index, packing: Packing, atlas
 def _drawing_order(surface: FlatSurface, piece: Index, member_triangles: Index) -> Index:
     """Return triangle indices sorted so that triangles mirrored within their piece come first.
 
-    Texels that mirrored triangles share with other triangles are thus owned by the other triangles.
+    Other triangles are drawn later and therefore own the texels that they share with mirrored triangles.
 
     member_triangles : (t,) indices of the triangles
     """
@@ -123,21 +123,22 @@ def _drawing_order(surface: FlatSurface, piece: Index, member_triangles: Index) 
 
 
 def _mirrored_triangles(surface: FlatSurface, piece: Index, member_triangles: Index) -> Mask:
-    """Return the mask (t,) of triangles that are mirrored in uv, compared with most of their piece.
+    """Return the mask (t,) of triangles that are mirrored in uv relative to most triangles of their piece.
 
-    piece, member_triangles : (t,) piece and index of each triangle
+    piece : (t,) piece of each triangle to examine
+    member_triangles : (t,) indices of these triangles
     """
     total = np.bincount(piece, surface.area_uv[member_triangles])
     return np.asarray(np.sign(total)[piece] != np.sign(surface.area_uv[member_triangles]))
 
 
 def _repeat_edge(coverage: Coverage, piece: Index, beyond_end: Mask, y: Index, x: Index) -> None:
-    """Copy neighbouring texels to gutter texels just beyond an edge where the surface ends.
+    """Copy neighbouring texels to gutter texels just beyond an edge at which the surface ends.
 
     A blur along the edge then reads the same light from a gutter as from the rim of a piece.
 
     beyond_end : (h, w) mask of texels beyond the end of the surface
-    y, x : (n,) row and column of the gutter texels in this mask
+    y, x : (n,) rows and columns of the gutter texels to fill, all of which are in this mask
     """
     last = np.array(beyond_end.shape) - 1
     piece_of_texel, from_y, from_x = piece[coverage.anchor_triangle[y, x]], y.copy(), x.copy()
@@ -151,7 +152,7 @@ def _repeat_edge(coverage: Coverage, piece: Index, beyond_end: Mask, y: Index, x
 
 
 def texel_metric(surface: FlatSurface, packing: Packing, coverage: Coverage) -> Floats:
-    """Return texels per mm along u and v, and the cosine of the angle between them, (h, w, 3).
+    """Return texels per mm along u and v, and the cosine of the angle between u and v, (h, w, 3).
 
     A gutter texel has the metric of its anchor, the nearest point of its chart.
     """
@@ -166,11 +167,11 @@ def texel_metric(surface: FlatSurface, packing: Packing, coverage: Coverage) -> 
 
 
 def edge_distances(surface: FlatSurface, packing: Packing, coverage: Coverage) -> NDArray[np.uint16]:
-    """Return the number of texels of the same piece before a gap, in four directions, (h, w, 4).
+    """Return for each texel the distance in four directions to the end of its piece or to a gap, (h, w, 4).
 
-    The directions are left, right, up and down. There is a gap between two texels if their surface points are
-    farther apart than `gap_limit_mm` and their anchors are farther apart than either texel is from its
-    anchor.
+    The unit is a texel, and the directions are left, right, up and down. There is a gap between two texels if
+    their surface points are farther apart than `gap_limit_mm` and their anchors are farther apart than either
+    texel is from its anchor.
     """
     anchor = coverage.anchor_triangle
     owner = np.where(anchor >= 0, np.where(coverage.distance_mm > 0, -1, anchor), -2)

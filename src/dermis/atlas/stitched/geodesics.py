@@ -25,16 +25,16 @@ _MAX_CROSSED_EDGES = 4096
 
 
 class Geodesics(NamedTuple):
-    """State of the geodesics that have not reached their end.
+    """State of the geodesics that have not yet ended.
 
-    Points are complex numbers in the plane of a geodesic's first triangle, with the start at 0.
+    Points are complex numbers in the plane of the first triangle of the geodesic; the start is at 0.
 
     ray : index of each geodesic in the arrays of `trace_geodesics`
     triangle : index of the current triangle
     exit_side : side (0, 1, 2) through which the geodesic leaves this triangle
     side_start, side_end : end points of that side
     direction : vector from the start to the target
-    orientation : 1, or -1 in triangles that face opposite to the first triangle
+    orientation : 1, or -1 if the current triangle faces the opposite way to the first triangle
     """
 
     ray: Index
@@ -70,7 +70,7 @@ class GeodesicEnds(NamedTuple):
         third_weight: Doubles,
         reached_target: bool,
     ) -> None:
-        """Store the ends of the selected geodesics.
+        """Store where some geodesics end.
 
         rays : geodesics that end in their current triangle
         first_corner : corner (0, 1, 2) of the triangle with the weight 1 - second_weight - third_weight
@@ -109,7 +109,7 @@ def trace_geodesics(
 def _leave_first_triangle(
     adjacency: Adjacency, triangle: Index, start: Complex, target: Complex, ends: GeodesicEnds
 ) -> Geodesics:
-    """Return the geodesics that leave their first triangle, and store the ends of all other geodesics."""
+    """Return the geodesics that leave their first triangle; store the ends of all others in `ends`."""
     corners = _as_complex(adjacency.planar_corners[triangle])
     start = start + START_SHIFT * (corners @ np.array(INNER_POINT_WEIGHTS) - start)
     corners, direction = corners - start[:, None], target - start
@@ -127,7 +127,7 @@ def _leave_first_triangle(
 
 
 def _cross_edge(adjacency: Adjacency, rays: Geodesics, ends: GeodesicEnds) -> Geodesics:
-    """Continue geodesics into the next triangle, and store the ends of the geodesics that end there."""
+    """Continue geodesics into the next triangle; store in `ends` where geodesics end there."""
     neighbour = adjacency.neighbour[rays.triangle, rays.exit_side]
     ended = (neighbour < 0) | ~adjacency.passable[neighbour]
     if ended.any():

@@ -38,9 +38,9 @@ class Border(NamedTuple):
 class Packing(NamedTuple):
     """Positions of f triangles on the texel grid of the atlas.
 
-    corners : (f, 3, 2) corners [texel], integers at texel centres
+    corners : (f, 3, 2) corners [texel]; texel centres are at integers
     texels_per_uv : (f,) texels per unit of the mesh's uv
-    texels_per_mm : (f,) texels per mm on the surface, averaged over the triangle's piece
+    texels_per_mm : (f,) texels per mm on the surface; all triangles of a piece have the piece's average
     """
 
     corners: Doubles
@@ -49,17 +49,17 @@ class Packing(NamedTuple):
 
 
 class GutterWidth(NamedTuple):
-    """Width of gutters on the surface [mm], and the largest width on the grid [texel]."""
+    """Width of gutters on the surface [mm], and their largest allowed width on the grid [texel]."""
 
     gutter_mm: float
     max_texels: float
 
 
 def find_border(surface: FlatSurface, piece: Index, member_triangles: Index) -> Border:
-    """Return the triangle sides at which pieces of charts end.
+    """Return the triangle sides that form the borders of chart pieces.
 
     piece : (f,) piece of each triangle, -1 if there is none
-    member_triangles : (t,) indices of the triangles whose sides are examined, each in a piece
+    member_triangles : (t,) indices of the triangles whose sides are examined; each triangle is in a piece
     """
     neighbour = surface.uv_neighbour[member_triangles]
     row, index = np.nonzero(
@@ -71,7 +71,7 @@ def find_border(surface: FlatSurface, piece: Index, member_triangles: Index) -> 
 
 
 def border_sides(surface: FlatSurface, border: Border, packing: Packing, width: GutterWidth) -> BorderSides:
-    """Return positions, surface metric and gutter width of the border sides on the texel grid."""
+    """Return the border sides on the texel grid, with surface metric and gutter width."""
     triangle, both = border.triangle, (border.side, (border.side + 1) % 3)
     ends = np.stack([packing.corners[triangle, k] for k in both], axis=1)
     steps = np.stack([surface.uv_steps[triangle, k] for k in both], axis=1)
@@ -107,11 +107,11 @@ class GutterTexels(NamedTuple):
 
     y, x : row and column
     rim : mask of texels that bilinear interpolation within the piece reads
-    distance_mm : distance from the piece on the surface [mm]
-    anchor_triangle, anchor_weights : nearest point on the border: triangle index, and barycentric weights of
-        this triangle's second and third corner
-    triangle, weights : end of the geodesic from the anchor to the texel: triangle index and barycentric
-        weights
+    distance_mm : distance of the texel from the piece, measured on the surface [mm]
+    anchor_triangle : index of the triangle with the anchor, the border point nearest to the texel
+    anchor_weights : barycentric weights of this triangle's second and third corner at the anchor
+    triangle : index of the triangle in which the geodesic from the anchor to the texel ends
+    weights : barycentric weights of this triangle's second and third corner at the end of the geodesic
     complete : mask of texels that the geodesic reached before the surface ended
     """
 
@@ -146,9 +146,9 @@ def trace_gutter(
 def trace_from_border(
     surface: FlatSurface, border: Border, sides: BorderSides, nearest: NearestPoints, texels: NDArray[Any]
 ) -> tuple[GeodesicEnds, Doubles]:
-    """Trace geodesics from nearest border points to texels; return the ends, and the weights of the starts.
+    """Trace geodesics from border points to texels; return their ends, and the weights of the border points.
 
-    The weights (n, 2) of a start are those of the second and third corner of the border triangle.
+    The weights (n, 2) are the barycentric weights of the second and third corner of the border triangle.
 
     sides : border sides on the texel grid
     nearest : nearest border point of each texel
@@ -173,7 +173,7 @@ def border_points(sides: BorderSides, nearest: NearestPoints) -> Doubles:
 
 
 def border_steps(sides: BorderSides, nearest: NearestPoints) -> Doubles:
-    """Return the surface vectors (n, 2, 2) of one-texel steps to the right and down at border points [mm]."""
+    """Return, at border points, the surface vectors (n, 2, 2) of a texel step to the right and down [mm]."""
     first, second = np.moveaxis(sides.steps[nearest.side], 1, 0)
     return _interpolate_linearly(first, second, nearest.fraction[:, None, None])
 

@@ -16,7 +16,8 @@ class BorderSides(NamedTuple):
     """Border sides (k,) of chart pieces on the texel grid, with surface metric and gutter width.
 
     ends : (k, 2, 2) positions of both end points [texel]
-    steps : (k, 2, 2, 2) surface vectors of a texel step to the right and down, at both end points [mm]
+    steps : (k, 2, 2, 2) surface vectors of a texel step to the right and of a step down, at both end points
+        [mm]
     gutter_mm : (k,) width of the gutter on the surface [mm]
     max_texels : (k,) largest width of the gutter on the grid [texel]
     """
@@ -33,7 +34,7 @@ class NearestPoints(NamedTuple):
     texel : flat index of the texel
     side : index of the border side
     fraction : position of the point along the side, 0 to 1 [-]
-    distance_mm : distance from texel to point by the surface metric at the side [mm]
+    distance_mm : distance between texel and border point in the surface metric of the side [mm]
     rim : mask of texels that bilinear interpolation at some point of the border reads
     """
 
@@ -47,8 +48,9 @@ class NearestPoints(NamedTuple):
 class _SideMetric(NamedTuple):
     """Surface metric at the border sides (k,), by which texel offsets are measured in mm.
 
-    x, y, down : a step (dx, dy) [texel] has the length of the vector (x dx + y dy, down dy) [mm]
-    along : (k, 2) fraction of the side's length that a texel step along x and along y covers
+    x, y, down : (k,) coefficients: the texel offset (dx, dy) is as long as the vector (x dx + y dy, down dy)
+        [mm]
+    along : (k, 2) progress along the side, as a fraction of its length, for a texel step in x and in y
     half_extent : (k, 2) margin around the side's bounding box that contains its gutter [texel]
     """
 
@@ -107,7 +109,7 @@ def _side_metric(sides: BorderSides) -> _SideMetric:
 def _candidate_texels(
     sides: BorderSides, metric: _SideMetric, grid_shape: tuple[int, ...]
 ) -> tuple[Index, Index, Index]:
-    """Return all pairs of a border side and a texel that may be in its gutter: side, x and y, (n,) each."""
+    """Return candidates for gutter texels, as three arrays (n,): border side, x and y."""
     height, width = grid_shape
     low = np.ceil(sides.ends.min(axis=1) - metric.half_extent)
     high = np.floor(sides.ends.max(axis=1) + metric.half_extent)

@@ -1,4 +1,4 @@
-"""Cuts through charts whose gutters would otherwise overlap each other."""
+"""Cuts that divide a chart if parts of its gutter would otherwise overlap each other."""
 
 from __future__ import annotations
 
@@ -50,10 +50,10 @@ _MAX_RELATIVE_AREA_GROWTH = 0.25  # largest growth of the area of all pieces by 
 
 
 class Conflicts(NamedTuple):
-    """Pairs of border points of a chart piece whose gutters meet, although they are apart on the surface.
+    """Pairs of border points of a chart piece that are apart on the surface although their gutters meet.
 
-    first, second : (n, 2) both border points of each pair, at the scale of the grid [texel]
-    inside : (m, 2) texels of the piece
+    first, second : (n, 2) positions of the two border points of each pair, in uv scaled to texels [texel]
+    inside : (m, 2) texels that the piece covers, in the same coordinates [texel]
     texels_per_uv : texels per unit of uv
     texel_mm : side of a texel on the surface [mm]
     """
@@ -74,9 +74,11 @@ class _PieceGrid(NamedTuple):
     """Texel grid with one piece and its gutters.
 
     owner : (h, w) triangle that owns the texel, -1 in gutters, -2 elsewhere
-    row : (h, w) index of each texel in `anchored`, where the texels of the piece precede the gutter texels
-    anchored : texels of piece and gutters with their anchors
-    packing, border, sides : position, border and border sides of the piece on the grid
+    row : (h, w) index of each texel in `anchored`
+    anchored : texels of the piece, followed by gutter texels, with their anchors
+    packing : position of the piece on the grid
+    border : border of the piece
+    sides : border sides on the grid
     nearest : nearest border points of the gutter texels
     """
 
@@ -160,7 +162,8 @@ def _gap_pairs(surface: FlatSurface, mapped: Mask, grid: _PieceGrid) -> tuple[In
 def _texel_points(surface: FlatSurface, mapped: Mask, grid: _PieceGrid, chosen_texels: Index) -> Doubles:
     """Return the surface points (n, 3) of all texels of the grid, NaN for points that are not computed [mm].
 
-    Points are computed for the texels in `chosen_texels`, except for texels beyond the end of the surface.
+    Points are computed only for the texels in `chosen_texels`, and not for texels beyond the end of the
+    surface.
     """
     owner, texels = grid.owner[grid.owner >= 0], grid.anchored.texels
     points, is_chosen = np.full((len(texels), 3), np.nan), np.zeros(len(texels), np.bool_)
@@ -176,7 +179,7 @@ def _texel_points(surface: FlatSurface, mapped: Mask, grid: _PieceGrid, chosen_t
 
 
 def cut_overlaps(surface: FlatSurface, piece: Index, gutter_mm: float) -> Index:
-    """Cut charts along straight lines until few of their gutters overlap; return piece indices (f,).
+    """Cut charts along straight lines until gutters hardly overlap; return piece indices (f,).
 
     piece : (f,) piece of each triangle before the cuts, -1 if there is none
     gutter_mm : width of the gutters [mm]
@@ -202,7 +205,8 @@ def cut_overlaps(surface: FlatSurface, piece: Index, gutter_mm: float) -> Index:
 def _cut_length_mm(surface: FlatSurface, member_triangles: Index, part_of_triangle: Index) -> float:
     """Return the length of all triangle sides along which a chart piece is cut into parts [mm].
 
-    member_triangles, part_of_triangle : (t,) indices of the piece's triangles, and the part of each
+    member_triangles : (t,) indices of the piece's triangles
+    part_of_triangle : (t,) index of the part to which each of these triangles belongs
     """
     part_of = np.full(len(surface.uv), -1, np.int64)
     part_of[member_triangles] = part_of_triangle
@@ -269,9 +273,10 @@ def _within_reach(points: Doubles, others: Doubles, reach: float) -> Mask:
 def _conflict_strip(
     surface: FlatSurface, member_triangles: Index, overlap: Conflicts, half_mask: Mask, gutter_texels: float
 ) -> Mask:
-    """Return the mask (t,) of triangles near meeting gutters, on one side of a line through the piece.
+    """Return the mask (t,) of triangles that are near meeting gutters and on one side of a line.
 
-    The chosen side is where the triangles near meeting gutters have the smaller area.
+    The line divides the piece. Of its two sides, the side on which such triangles have the smaller area is
+    chosen.
 
     half_mask : (t,) mask of triangles on one side of the line
     gutter_texels : gutter width [texel]
@@ -286,9 +291,10 @@ def _conflict_strip(
 
 
 def _best_line(overlap: Conflicts, gutter_texels: float) -> tuple[Doubles, float, int]:
-    """Return the line that separates the most conflicts per length of the cut along it.
+    """Return the line that separates the most conflicts relative to the length of a cut along the line.
 
-    Returns normal and offset of the line, and the number of conflicts that the line separates.
+    A line separates a conflict if the two border points of the conflict are on different sides. Returns the
+    line's normal and offset, and the number of separated conflicts.
     """
     close = overlap.inside[
         _within_reach(overlap.inside, np.concatenate((overlap.first, overlap.second)), gutter_texels)

@@ -104,7 +104,7 @@ class _PieceMask(NamedTuple):
     """Cells that a piece with its gutter occupies at one scale.
 
     spans : (m, 3) row, first and last column of each run of cells
-    margin : (2,) distance from the first cell to the origin of the piece's uv [cell]
+    margin : (2,) distance from the first column and row to the origin of the piece's uv [cell]
     scale : cells per unit of the piece's scaled uv
     """
 
@@ -114,7 +114,9 @@ class _PieceMask(NamedTuple):
 
 
 class PieceLayout(NamedTuple):
-    """Positions of packed pieces on the grid of cells, 512 x 512 for maps of 512 texels and more.
+    """Positions of packed pieces on a grid of cells.
+
+    The grid has 512 x 512 cells for maps of at least 512 x 512 texels.
 
     scale : cells per unit of the pieces' scaled uv
     origins : (p, 2) position of the origin of each piece's uv [cell]
@@ -135,9 +137,10 @@ def pack_pieces(
     """Pack chart pieces with their gutters at the largest common scale; return None if they do not fit.
 
     triangle_piece : (f,) index of each triangle's piece from 0, -1 for triangles in no piece
-    uv_scale : (f,) factor of each triangle's uv that evens out texel density
+    uv_scale : (f,) factor by which each triangle's uv is scaled so that all pieces have a similar texel
+        density
     map_side : texels along each side of the map
-    layout : known result of `find_layout`, which is slow; None to compute it
+    layout : result of `find_layout` if it is known; None to call this slow function
     """
     groups, pieces = _prepare_pieces(surface, triangle_piece, uv_scale)
     packing = Packing(np.zeros(surface.uv.shape), *np.zeros((2, len(triangle_piece))))
@@ -190,7 +193,7 @@ def _single_piece(
 
 
 def _find_layout(pieces: list[_Piece], map_side: int, width: GutterWidth) -> PieceLayout | None:
-    """Return the layout with the largest scale that the search finds, or None if the pieces never fit."""
+    """Return the layout with the largest scale that the search finds, or None if no scale fits."""
     cells = min(map_side, MAX_CELLS_PER_SIDE)
     width = width._replace(max_texels=width.max_texels * cells / map_side)
     area = sum(float(np.abs(one.surface.area_uv).sum()) * one.scale**2 for one in pieces)
@@ -204,9 +207,9 @@ def _find_layout(pieces: list[_Piece], map_side: int, width: GutterWidth) -> Pie
 
 
 def _find_largest_scale(masks: list[_PieceMask], cells_per_side: int, max_scale: float) -> PieceLayout | None:
-    """Return the layout with the largest scale below a maximum, for the best of several orders of pieces.
+    """Return the layout with the largest scale below a maximum, for the best of several packing orders.
 
-    The best order is searched with coarse cells.
+    The best order is determined with coarse cells.
     """
     coarse, best = None, 0
     for order in range(_ORDER_COUNT):
@@ -244,7 +247,12 @@ def _bisect_scale(
     order_index: int,
     bisection_count: int,
 ) -> PieceLayout | None:
-    """Return the layout with the largest scale between two bounds, or None if no trial fits."""
+    """Return the layout with the largest scale that bisection finds, or None if no trial fits.
+
+    scale_bounds : lowest and highest scale
+    order_index : index of the packing order, see `_try_scale`
+    bisection_count : number of trials
+    """
     (low, high), best = scale_bounds, None
     for _ in range(bisection_count):
         middle = (low + high) / 2
@@ -262,8 +270,8 @@ def _try_scale(
     """Return the layout of the pieces at one scale, or None if they do not fit.
 
     scale : cells per unit of the pieces' scaled uv
-    order_index : index of the packing order: order // 2 selects the sort key (area, height, width), odd
-        orders place by columns
+    order_index : index of the packing order: order_index // 2 selects the sort key (0 area, 1 height, 2
+        width); if the index is odd, pieces are placed column by column instead of row by row
     """
     shapes, low = zip(*(_scaled_mask(one, scale / one.scale) for one in masks), strict=True)
     if order_index % 2 == 1:
@@ -281,7 +289,10 @@ def _try_scale(
 
 
 def _scaled_mask(mask: _PieceMask, scale: float) -> tuple[Mask, Doubles]:
-    """Return the mask (h, w) of all cells that a piece touches at another scale, and its scaled margin."""
+    """Return the mask (h, w) of all cells that a piece touches after scaling, and its scaled margin.
+
+    scale : factor from the scale of `mask` to the new scale
+    """
     row, first, last = (mask.spans.T - mask.margin[[1, 0, 0], None]) * scale
     top, bottom = np.floor(row).astype(int), np.ceil(row + scale).astype(int) - 1
     left, right = np.floor(first).astype(int), np.ceil(last + scale).astype(int) - 1

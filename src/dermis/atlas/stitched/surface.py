@@ -17,11 +17,13 @@ _MIN_SIDE_LENGTH_MM = 1e-9
 
 
 class Adjacency(NamedTuple):
-    """Adjacency of triangles, by which geodesics cross edges; sides are 01, 12 and 20 of each triangle.
+    """Adjacency of triangles, used to continue geodesics across edges.
+
+    The sides 0, 1 and 2 of a triangle connect the corners 01, 12 and 20.
 
     planar_corners : (f, 3, 2) corners in the triangle's own plane, counter-clockwise from outside [mm]
     neighbour : (f, 3) index of the triangle across each side, -1 if there is none
-    neighbour_side : (f, 3) side of the neighbour at the shared edge
+    neighbour_side : (f, 3) side of the neighbour that is the shared edge
     flipped : (f, 3) mask of neighbours that face the opposite way
     apex : (f, 3, 2) third corner relative to each side: coordinates along the side and to its left, as
         fractions of the side's length
@@ -38,7 +40,9 @@ class Adjacency(NamedTuple):
 
 @dataclass(frozen=True)
 class FlatSurface:
-    """Triangles of a mesh with their planar corners, uv metric and neighbours; sides are 01, 12 and 20.
+    """Triangles of a mesh with their planar corners, uv metric and neighbours.
+
+    The sides 0, 1 and 2 of a triangle connect the corners 01, 12 and 20.
 
     corners : (f, 3, 3) positions of the corners [mm]
     uv : (f, 3, 2) uv of the corners in the mesh's own layout
@@ -95,7 +99,7 @@ def interpolate_corners(
 
 
 def flat_surface(mesh: Mesh) -> FlatSurface:
-    """Flatten each triangle of a mesh into its plane, and compute uv metric and neighbours."""
+    """Represent each triangle of a mesh in its own plane, and compute uv metric and neighbours."""
     corners = mesh.positions[mesh.triangles].astype(np.float64)
     uv = mesh.uv[mesh.triangles].astype(np.float64)
     skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
@@ -137,7 +141,7 @@ def _planar_corners(corners: Doubles) -> tuple[Doubles, Doubles]:
 def side_neighbours(mesh: Mesh) -> tuple[Ints, NDArray[np.int8], Mask]:
     """Return the neighbour across each side: triangle, side of the shared edge, and flip, (f, 3) each.
 
-    The triangle is -1 without a neighbour. The flip is true if the neighbour faces the opposite way.
+    The triangle is -1 if there is no neighbour. The flip is true if the neighbour faces the opposite way.
     """
     points, count = mesh.point[mesh.triangles].astype(np.int64), len(mesh.triangles)
     side = np.arange(3 * count)
@@ -154,7 +158,7 @@ def side_neighbours(mesh: Mesh) -> tuple[Ints, NDArray[np.int8], Mask]:
 
 
 def _apexes(planar_corners: Doubles) -> Doubles:
-    """Return the third corner relative to each side (f, 3, 2), along and to the left of the side.
+    """Return the third corner relative to each side (f, 3, 2): coordinates along the side and to its left.
 
     The coordinates are fractions of the side's length.
     """
@@ -171,9 +175,9 @@ def _uv_steps(
 ) -> tuple[Doubles, Doubles]:
     """Return the fields `uv_steps` and `uv_metric` of `FlatSurface`.
 
-    Both are averages over the triangles around a vertex that have the same orientation in uv.
+    Both fields are averaged over those triangles around a vertex that have the same orientation in uv.
 
-    planar_corners, plane_axes : planar corners and axes from `_planar_corners`
+    planar_corners, plane_axes : results of `_planar_corners`
     """
     count = len(mesh.positions)
     corner = mesh.triangles + count * (area_uv < 0)[:, None].astype(np.int32)

@@ -16,7 +16,7 @@ _INNER_MARGIN_TEXELS = 1e-3  # texel centres this far inside an edge are not in 
 
 
 def rasterise_texel_triangles(corners: Doubles, drawn_triangles: Index, grid_shape: tuple[int, int]) -> Ints:
-    """Draw triangles; return for each texel centre (h, w) the last triangle that covers it, -1 without any.
+    """Draw triangles; return the last triangle that covers each texel centre (h, w), -1 if there is none.
 
     corners : (f, 3, 2) corners of all triangles [texel]
     drawn_triangles : (t,) indices in drawing order
@@ -28,7 +28,7 @@ def rasterise_texel_triangles(corners: Doubles, drawn_triangles: Index, grid_sha
 
 
 def mostly_hidden_triangles(corners: Doubles, drawn_triangles: Index, texel_triangle: Ints) -> Mask:
-    """Return the mask (f,) of triangles most of whose texels are owned by other triangles.
+    """Return the mask (f,) of triangles for which other triangles own most of the covered texels.
 
     corners : (f, 3, 2) corners of all triangles [texel]
     drawn_triangles : (t,) indices of the drawn triangles
@@ -70,7 +70,7 @@ class AnchoredTexels(NamedTuple):
 
 
 def unconnected_pairs(surface: FlatSurface, texel_triangle: Ints, axis: int) -> tuple[Index, Index]:
-    """Return the flat indices (n,) of both texels of each adjacent pair whose triangles share no side in uv.
+    """Find pairs of adjacent texels whose triangles share no side in uv; return two flat indices (n,).
 
     texel_triangle : (h, w) triangle that owns the texel, -1 in gutters, -2 elsewhere
     axis : 0 for texels adjacent along x, 1 along y
@@ -104,7 +104,7 @@ def anchors_diverge(first_texels: AnchoredTexels, second_texels: AnchoredTexels)
 
 
 def gap_limit_mm(first_texels: AnchoredTexels, second_texels: AnchoredTexels, axis: int) -> Doubles:
-    """Return the largest distance (n,) between the surface points of adjacent texels without a gap [mm].
+    """Return the distance (n,) of surface points beyond which there is a gap between adjacent texels [mm].
 
     axis : 0 for texels adjacent along x, 1 along y
     """

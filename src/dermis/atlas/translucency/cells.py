@@ -32,24 +32,24 @@ _SAME_POINT_TEXELS = 0.1  # largest distance in the atlas at which a texel and a
 class Cells:
     """Division of an atlas into side x side cells, and of the cells into tiles, for light through thin parts.
 
-    Cells are numbered row by row. Arrays that are sorted by tile have an array `..._first`: the entries of
-    tile k start at `first[k]` and end at `first[k + 1]`. The shape of the surface only affects the size of
-    the cells.
+    Cells are numbered row by row. An array that is sorted by tile comes with an array `..._first`: the
+    entries of tile k start at index `..._first[k]` and end before index `..._first[k + 1]`. The shape of the
+    surface only affects the size of the cells.
 
     size : texels along each side of the atlas
     side : cells along each side of the atlas
     max_sigma_mm : standard deviation of the widest Gaussian [mm]
     cell_mm : median side of a cell on the surface [mm]
-    stride : distance between the texels over which a source cell averages light [texel]
+    stride : a source cell averages the light of every `stride`-th texel along each axis [texel]
     receiver_mask : (side, side) mask of the cells that receive light: cells with lit texels, and their
         neighbours
     receivers, receiver_first : (m,) uint32 packed x and y of the receiving cells, sorted by tile
-    receiver_points : (m, 2) uint32 triangle at the centre of each receiving cell, and packed barycentric
-        weights
+    receiver_points : (m, 2) uint32 surface point at the centre of each receiving cell: triangle index, and
+        packed barycentric weights
     sources, source_first : (n,) indices of the cells with lit texels, sorted by tile
     triangles, triangle_first : (k,) uint32 indices of the triangles that overlap each tile
-    gutter_copies, gutter_copy_first : (c, 2) uint32 packed x and y of gutter texels and of the texels that
-        they copy, sorted by cell
+    gutter_copies, gutter_copy_first : (c, 2) uint32 packed x and y of a gutter texel, and of the texel that
+        it copies, sorted by cell
     """
 
     size: int
@@ -82,8 +82,8 @@ class Cells:
 def divide_into_cells(atlas: Atlas, max_sigma_mm: float, relative_cell_size: float = 1.0) -> Cells:
     """Divide an atlas into cells for the light that Gaussians spread through thin parts.
 
-    max_sigma_mm : standard deviation of the widest Gaussian, clipped so that pairs are at most 32 mm apart
-        [mm]
+    max_sigma_mm : standard deviation of the widest Gaussian, clipped so that the light enters and leaves at
+        most 32 mm apart [mm]
     relative_cell_size : cell size relative to the default [-]
     """
     sigma_mm, texel_mm = min(max_sigma_mm, _MAX_SIGMA_MM), _texel_mm(atlas)
@@ -163,7 +163,7 @@ def _source_cells(lit_mask: Mask, tiles_per_side: int) -> tuple[Index, Index]:
 
 
 def _tile_of(atlas: Atlas, points: Words, cells_per_side: int, tiles_per_side: int) -> Ints:
-    """Return the index (m,) of the tile in which each surface point lies in the atlas.
+    """Return the index (m,) of the atlas tile that contains each surface point.
 
     A point that a gutter texel shows is in the tile of the texel whose light the gutter texel copies.
 
@@ -210,10 +210,10 @@ def _gutter_copies(atlas: Atlas, cells_per_side: int) -> tuple[Index, Words]:
 
 
 def _rim_texels(atlas: Atlas) -> tuple[NDArray[np.uint16], Floats]:
-    """Return lit texels at chart rims that show a point elsewhere in the atlas, and this point's position.
+    """Return lit texels at chart rims, and the position elsewhere in the atlas of the point each one shows.
 
-    Both arrays are (r, 2): texel indices, and positions in the atlas [texel]. Such texels are outside the
-    triangles of their chart, but interpolation reads them.
+    Both arrays are (r, 2): texel indices, and positions [texel]. Rim texels are outside the triangles of
+    their chart, but interpolation inside the chart reads them.
     """
     inner, view = np.pad(atlas.lit, GUTTER_TEXELS), np.lib.stride_tricks.sliding_window_view
     for axis in (0, 1):
@@ -227,7 +227,7 @@ def _rim_texels(atlas: Atlas) -> tuple[NDArray[np.uint16], Floats]:
 
 
 def _atlas_uv(atlas: Atlas, triangle: NDArray[np.integer], weights: Words) -> list[Floats]:
-    """Return u and v in the atlas of points on triangles, v down.
+    """Return the atlas coordinates u and v (v down) of points on triangles.
 
     triangle : (m,) triangle indices
     weights : (m,) packed weights of the second and third corner

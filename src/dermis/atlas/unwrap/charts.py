@@ -14,7 +14,7 @@ _BEND_DISTANCE_FACTOR = (
 
 
 def opposite_sides(triangles: Index) -> Index:
-    """Return for each triangle side the index of the neighbour's side at the same edge, (3 f,).
+    """Return, for each triangle side, the index of the neighbour's side at the same edge, (3 f,).
 
     Sides are numbered as in `geometry.edges`: all 01, then all 12, then all 20. For a side without exactly
     one neighbour, the result is the index of the side itself.
@@ -61,7 +61,7 @@ def merge_strays(triangle_chart: Index, triangles: Index) -> Index:
 
 
 def _smooth_borders(triangle_chart: Index, triangles: Index) -> Index:
-    """Assign each triangle to the prevailing chart among the triangles around it, (f,)."""
+    """Assign each triangle to the most frequent chart among the triangles around it, (f,)."""
     corner = triangles.ravel()
     triangle_count = np.maximum(np.bincount(corner), 1)[:, None]
     weight = np.eye(int(triangle_chart.max()) + 1)[triangle_chart]
@@ -96,12 +96,12 @@ def _stray_triangles(triangle_chart: Index, adjacent_triangles: Index) -> Mask:
 def grow_charts(positions: Doubles, triangles: Index, chart_count: int, seed: int = 0) -> Index:
     """Grow about `chart_count` charts from random triangles; return the chart of each triangle (f,).
 
-    Distances increase across bends, so that borders tend to follow them.
+    Distances are increased across bends of the surface, so chart borders tend to follow the bends.
 
     positions : (n, 3) vertices [mm]
     triangles : (f, 3) vertex indices
     chart_count : number of charts; each connected component of the mesh has at least one
-    seed : seed of the random triangles
+    seed : seed of the random choice of triangles
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import dijkstra

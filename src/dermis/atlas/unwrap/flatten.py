@@ -35,8 +35,8 @@ def planar_triangles(corners: NDArray[np.floating]) -> Complexes:
 def affine_coefficients(shapes: Complexes, positions: Complexes) -> tuple[Complexes, Complexes]:
     """Return a and b (f,) of the maps z -> a z + b conj(z) + c from `shapes` to `positions`.
 
-    The singular values of a map are |a| + |b| and |a| - |b|; the second is negative where the map mirrors the
-    triangle. The nearest rotation is a / |a|.
+    The singular values of a map are |a| + |b| and |a| - |b|. The second value is negative if the map mirrors
+    the triangle. The nearest rotation is a / |a|.
 
     shapes, positions : (f, 3) corners of the triangles as complex numbers, before and after the map
     """
@@ -62,9 +62,9 @@ def singular_values(corners: NDArray[np.floating], uv: NDArray[np.floating]) -> 
 def untangle(positions: Doubles, triangles: Index) -> Doubles:
     """Move inner points of a flat mesh until few or no triangles are mirrored; return positions (n, 2).
 
-    Points around mirrored triangles are moved to the mean of their neighbours, which mirrors no triangle
-    within a convex outline [Tutte1963]. More and more points are moved until no triangle is mirrored. Points
-    of the border do not move.
+    Points around mirrored triangles are moved to the mean of their neighbours. Inside a convex outline, this
+    mirrors no triangle [Tutte1963]. If triangles are still mirrored, more points around them are moved.
+    Points of the border do not move.
 
     positions : (n, 2) points, x to the right, y up
     triangles : (f, 3) point indices
@@ -107,18 +107,18 @@ def _average_neighbours(positions: Doubles, edge_points: Index, free_points: Mas
 
 
 def flatten(points: Doubles, triangles: Index, length_ratio: Doubles, stretch_weight: Doubles) -> Doubles:
-    """Flatten a surface into the plane with little stretch; return positions (n, 2) [mm times density].
+    """Flatten a surface into the plane with little stretch; return positions (n, 2) [mm].
 
     The plane is seen from outside, x to the right and y up. Connected components are flattened together, each
     with its own origin.
 
     points : (n, 3) vertices [mm]
     triangles : (f, 3) vertex indices
-    length_ratio : (f,) desired ratio of length in the plane to length on the surface [-]
-    stretch_weight : (f,) importance of each triangle's stretch [-]
+    length_ratio : (f,) desired length in the plane per length on the surface [-]
+    stretch_weight : (f,) weight of each triangle's stretch in the minimised sum [-]
 
     The initial map is a least squares conformal map [Levy2002] in the Hermitian form of [Mullen2008]. The map
-    is then made as rigid as possible [Liu2008], with higher weights for strongly compressed triangles as in
+    is then made as rigid as possible [Liu2008], with higher weights for strongly compressed triangles, as in
     [Rabinovich2017].
     """
     shapes = planar_triangles(points[triangles])
@@ -146,7 +146,7 @@ def _cotangents(shapes: Complexes) -> Doubles:
 
 
 def _laplacian(triangles: Index, weights: Doubles, vertex_count: int) -> Any:
-    """Return the sparse (n, n) Laplacian of a mesh with weights (f, 3) on the triangle sides."""
+    """Return the sparse (n, n) Laplacian of a mesh whose triangle sides have weights (f, 3)."""
     from scipy.sparse import coo_array
 
     start, end, weight = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel(), weights.ravel()
@@ -215,7 +215,7 @@ def _rigid_step(
     """Return complex positions after some as-rigid-as-possible iterations with fixed weights.
 
     shapes : (f, 3) desired shape and size of the triangles
-    stretch_weight : (f,) importance of each triangle's stretch [-]
+    stretch_weight : (f,) weight of each triangle's stretch in the minimised sum [-]
     """
     n, cot = len(positions), _cotangents(shapes) * stretch_weight[:, None]
     free = np.ones(n, dtype=bool)

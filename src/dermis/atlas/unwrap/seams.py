@@ -23,9 +23,9 @@ def border_edges(triangles: Index) -> tuple[Index, Index]:
 
 
 def split_at_seams(triangles: Index, triangle_chart: Index) -> tuple[Index, Index]:
-    """Split vertices at seams; return triangles of new vertices (f, 3), and the old vertex of each (v,).
+    """Split vertices at seams; return new vertex indices (f, 3), and the old index of each new vertex (v,).
 
-    Two triangles share the vertices of their common edge only if they belong to one chart.
+    Afterwards, two triangles share the vertices of their common edge only if they belong to the same chart.
 
     triangles : (f, 3) old vertex indices
     triangle_chart : (f,) chart of each triangle
@@ -62,7 +62,7 @@ def faulty_triangles(positions: Doubles, triangles: Index, triangle_chart: Index
 
 
 def crossing_edges(edges: Doubles) -> Mask:
-    """Return the mask (k,) of edges that cross another edge between its ends.
+    """Return the mask (k,) of edges that cross another edge at a point between the ends of both edges.
 
     edges : (k, 2, 2) end points of the edges
     """
@@ -83,9 +83,9 @@ class FlatCharts(NamedTuple):
     """Charts flattened into the plane, before they are packed.
 
     corners : (f, 3) vertex indices of each triangle
-    point : (v,) index of the mesh point at which each vertex is
+    point : (v,) index of the mesh point at which each vertex lies
     uv_mm : (v, 2) positions, x to the right and y up, each chart with its own origin [mm]
-    chart : (f,) connected chart of each triangle, numbered from 0
+    chart : (f,) index of each triangle's chart from 0; each chart is connected
     faulty : (f,) mask of triangles that are mirrored, collapsed, or at a self-crossing of the chart's border
     """
 
@@ -103,9 +103,11 @@ class ChartMesh(NamedTuple):
     triangles: Index
 
     def flatten(self, triangle_chart: Index) -> FlatCharts:
-        """Flatten charts, given as the chart of each triangle (f,), and mark faulty triangles.
+        """Flatten charts and mark faulty triangles.
 
-        Closed pieces are opened: their first triangle becomes a chart.
+        triangle_chart : (f,) chart of each triangle
+
+        A closed piece, which has no border, is opened: its first triangle becomes a separate chart.
         """
         corners, point = split_at_seams(self.triangles, triangle_chart)
         piece = vertex_components(corners, len(point))[corners[:, 0]]
@@ -124,7 +126,7 @@ class ChartMesh(NamedTuple):
 
 
 def flatten_charts(mesh: ChartMesh, triangle_chart: Index) -> FlatCharts:
-    """Flatten charts so that no triangle is faulty; charts are divided differently where necessary.
+    """Flatten charts so that no triangle is faulty; change the division into charts where necessary.
 
     triangle_chart : (f,) chart of each triangle
     """
@@ -135,9 +137,9 @@ def flatten_charts(mesh: ChartMesh, triangle_chart: Index) -> FlatCharts:
 
 
 def _repair_charts(mesh: ChartMesh, flat: FlatCharts, change_count: int) -> Index:
-    """Return the chart of each triangle (f,) after charts were repaired, so that no triangle is faulty.
+    """Return the chart of each triangle (f,) after a repair of charts with faulty triangles.
 
-    Faulty triangles are first moved to adjacent charts; if that does not suffice, charts are split.
+    The first repairs move faulty triangles to adjacent charts; later repairs split the charts.
 
     change_count : number of repairs made so far
     """

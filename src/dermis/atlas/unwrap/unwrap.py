@@ -1,4 +1,4 @@
-"""Unwrapping of a mesh into a uv layout, with charts that are given or grown from random seeds; packing."""
+"""Unwrapping of a mesh into packed charts, which the caller specifies or which grow from random triangles."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ _MIN_CHART_AREA_MM2 = 1e-6
 
 
 def pack_charts(outlines: list[Doubles], padding: float) -> tuple[float, Doubles]:
-    """Pack charts into the unit square; return the scale of all charts and the offset (c, 2) of each chart.
+    """Pack charts into the unit square; return a common scale, and the offset (c, 2) of each chart.
 
-    Each chart is dropped onto the charts below, at the column where it comes to rest lowest [Levy2002]; the
-    best of several orders is returned.
+    Each chart is dropped onto the charts below, in the column where it comes to rest lowest [Levy2002].
+    Several orders of the charts are tried, and the best result is returned.
 
     outlines : edges (k, 2, 2) of each chart's border, counter-clockwise
     padding : width of the empty space between charts as a fraction of the square's side; half as much is left
@@ -124,7 +124,7 @@ class UvLayout:
 
     uv : (v, 2) uv of each vertex, u to the right, v down
     triangles : (f, 3) vertex indices, in the order of the mesh's triangles
-    point : (v,) index of the mesh point at which each vertex is
+    point : (v,) index of the mesh point at which each vertex lies
     chart : (f,) chart of each triangle, numbered from 0
     """
 
@@ -143,13 +143,14 @@ def unwrap(
 ) -> UvLayout:
     """Unwrap a mesh into a uv layout in which no triangle is mirrored and no two triangles overlap.
 
-    Where the border of a flattened chart crosses itself, triangles are moved to an adjacent chart; a chart
-    that does not flatten even then is split.
+    If a flattened chart has mirrored triangles, or its border crosses itself, the faulty triangles are moved
+    to adjacent charts. A chart that is still faulty is split.
 
     positions : (n, 3) points of the mesh [mm]
     triangles : (f, 3) point indices; each triangle must have an area
-    triangle_chart : (f,) desired chart of each triangle; a chart in several pieces becomes several charts
-    up_direction : (3,), or (f, 3) per triangle, direction in space that points up on the map
+    triangle_chart : (f,) desired chart of each triangle; a chart that is not connected becomes several charts
+    up_direction : direction in space that points up on the map: (3,) for all triangles, or (f, 3) for each
+        one
     padding : empty space between charts as a fraction of the map's side
 
     Raises DermisError if a triangle has no area or if there are too many charts for one map.
@@ -172,7 +173,7 @@ def _check_areas(positions: Doubles, triangles: Index) -> None:
 def _orient_charts(flat: FlatCharts, upright_coordinate: Doubles) -> Doubles:
     """Rotate each chart so that `upright_coordinate` increases upwards; return positions (v, 2).
 
-    upright_coordinate : (f, 3) coordinate in space along the upright direction, at the corners [mm]
+    upright_coordinate : (f, 3) coordinate of each triangle corner along the up direction in space [mm]
     """
     z = flat.uv_mm[:, 0] + 1j * flat.uv_mm[:, 1]
     z3 = z[flat.corners]
@@ -203,7 +204,7 @@ def _packed_uv(uv_mm: Doubles, flat: FlatCharts, padding: float) -> Doubles:
 
 
 def unwrap_mesh(mesh: Mesh) -> Mesh:
-    """Return a mesh with a new uv layout of about 16 random charts, independent of its own uv.
+    """Return a mesh with a new uv layout of about 16 random charts; the old uv has no influence.
 
     The triangles and their order are unchanged. Triangles without an area have the uv (0, 0).
     """

@@ -49,7 +49,7 @@ class _Keyframes(NamedTuple):
 
 
 def clip_names(path: Path) -> tuple[str, ...]:
-    """Return the names of a file's animation clips; "clip 0", by its index, for a clip without a name."""
+    """Return the names of a file's animation clips; unnamed clips are called "clip 0", "clip 1" etc."""
     return _document_clip_names(read_document(path))
 
 
@@ -114,8 +114,9 @@ def _weight_track(
 ) -> AnimationTrack:
     """Return the track of the morph target weights of a node.
 
-    culprit : clip and channel, named in errors
-    mesh_targets : names of morph targets by mesh index; this function adds the names of the node's mesh
+    culprit : names of the clip and the channel, for errors
+    mesh_targets : dictionary from mesh index to the names of the morph targets; this function adds the mesh
+        of the node
     """
     mesh = document.items("nodes")[node].get("mesh")
     if mesh is not None and mesh not in mesh_targets:
@@ -130,10 +131,10 @@ def _weight_track(
 
 
 def _merge_tracks(animated_property: str, keyframes_by_name: list[tuple[str, _Keyframes]]) -> AnimationTrack:
-    """Merge animated nodes or targets with equal key times into one track.
+    """Merge the keyframes of nodes or morph targets with equal key times into one track.
 
-    animated_property : animated property, see `AnimationTrack`
-    keyframes_by_name : name and keyframes of each node or target
+    animated_property : `path` of the track, see `AnimationTrack`
+    keyframes_by_name : name and keyframes of each node or morph target
     """
     keys = keyframes_by_name[0][1]
     values = np.stack([own.values for _, own in keyframes_by_name], axis=-2)
@@ -142,9 +143,9 @@ def _merge_tracks(animated_property: str, keyframes_by_name: list[tuple[str, _Ke
 
 
 def _read_keyframes(document: Document, sampler: Tree, component_count: int, culprit: str) -> _Keyframes:
-    """Read times (k,) and values (k, n) of a sampler; values of a cubic spline are (k, 3, n) with tangents.
+    """Read the times (k,) and values (k, n) of a sampler; cubic splines also have tangents, (k, 3, n).
 
-    component_count : n, number of components per key
+    component_count : number n of components per key
     """
     kind = sampler.get("interpolation", "LINEAR")
     if kind not in get_args(Interpolation):
@@ -166,7 +167,9 @@ def _read_keyframes(document: Document, sampler: Tree, component_count: int, cul
 
 @dataclass(frozen=True, eq=False)
 class AnimationCurve:
-    """Values as functions of time for m nodes that have the same keys, with n components each.
+    """Animated property of m nodes with the same key times, as a function of time.
+
+    A value has n components; the weights of n morph targets are one value (m = 1).
 
     times_s : (k,) times of the keys, not decreasing [s]
     values : (k, m, n) values at the keys; for a cubic spline (k, 3, m, n): in-tangent, value, out-tangent
@@ -182,7 +185,7 @@ class AnimationCurve:
     is_rotation: bool = False
 
     def sample(self, seconds: float) -> Doubles:
-        """Return the values at a time [s], (m, n); constant before the first and after the last key."""
+        """Return the values (m, n) at a time [s], constant before the first and after the last key."""
         index = int(np.searchsorted(self.times_s, seconds, side="right")) - 1
         keys = self.values[:, _SPLINE_VALUE] if self.kind == "CUBICSPLINE" else self.values
         if index < 0 or index + 1 >= len(self.times_s):

@@ -24,7 +24,7 @@ _MAX_UINT16_VERTICES = 65535  # most vertices with 16-bit indices, of which 6553
 
 @dataclass
 class BufferBuilder:
-    """Binary buffer of an exported glTF file that grows, with its buffer views and accessors."""
+    """Growing binary buffer of an exported glTF file, with its buffer views and accessors."""
 
     data: bytearray = field(default_factory=bytearray)
     views: list[Tree] = field(default_factory=list)
@@ -45,9 +45,9 @@ class BufferBuilder:
     def add_accessor(
         self, elements: Numbers, buffer_target: int | None = None, *, with_bounds: bool = False
     ) -> int:
-        """Append n elements of k components, (n, k), and return the index of their accessor.
+        """Append elements to the buffer and return the index of their accessor.
 
-        elements : float32 or unsigned integers
+        elements : (n, k) n elements of k components, float32 or unsigned integers
         buffer_target : `VERTEX_TARGET` or `INDEX_TARGET`; None for other data
         with_bounds : whether to store each component's minimum and maximum, which glTF requires for positions
         """
@@ -72,7 +72,7 @@ class BufferBuilder:
 
         The arrays are stored as sparse accessors, or as dense accessors if these are smaller.
 
-        moved_vertex : (m,) indices of the rows that are not 0, in increasing order, the same for all arrays
+        moved_vertex : (m,) indices of the rows that may differ from 0, increasing, the same for all arrays
         displacements : for each array, the values (m, 3) of the rows in `moved_vertex`
         vertex_count : number of vertices
         """
@@ -95,7 +95,7 @@ class BufferBuilder:
         return accessors
 
     def _zero_accessor(self, vertex_count: int) -> int:
-        """Return the index of an accessor of zero vectors (vertex_count, 3) without space in the buffer."""
+        """Return the index of an accessor of `vertex_count` zero vectors that uses no buffer space."""
         if vertex_count not in self._zero_accessors:
             zeros = np.broadcast_to(np.zeros(1, "<f4"), (vertex_count, 3))
             self._zero_accessors[vertex_count] = self._append_accessor(
@@ -134,7 +134,7 @@ def _index_dtype(vertex_count: int) -> str:
 def resolve_textures(json_value: Any, texture_indices: Mapping[str, int]) -> Any:
     """Return a JSON tree in which references {"index": picture name} become glTF texture indices.
 
-    texture_indices : texture index by picture name
+    texture_indices : dictionary from picture name to texture index
     """
     if isinstance(json_value, Mapping):
         return {

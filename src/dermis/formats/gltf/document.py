@@ -66,14 +66,14 @@ class Document:
         return listed
 
     def item(self, array_name: str, object_index: object) -> Tree:
-        """Return the object with an index in a top-level array of the JSON tree, such as "meshes".
+        """Return the object at `object_index` in a top-level array of the JSON tree, such as "meshes".
 
         Raises ValueError for an invalid index.
         """
         return self.items(array_name)[checked_index(object_index, len(self.items(array_name)), array_name)]
 
     def read_buffer(self, buffer_index: int) -> bytes:
-        """Return the bytes of a buffer from the .glb file, a data URI or another file."""
+        """Return the bytes of a buffer, which may be in the .glb file, in a data URI or in another file."""
         if buffer_index not in self._buffers:
             uri = self.item("buffers", buffer_index).get("uri")
             if uri is None and buffer_index > 0:
@@ -110,7 +110,7 @@ class Document:
         accessor |= {"bufferView": len(views) - 1, "byteOffset": 0}
 
     def read_values(self, accessor_index: int) -> Numbers:
-        """Return n elements of k components of an accessor in their stored type, (n, k)."""
+        """Return the elements (n, k) of an accessor in their stored type: n elements of k components."""
         accessor, shape = self.item("accessors", accessor_index), self.accessor_shape(accessor_index)
         kind = np.dtype(_COMPONENT_TYPES[accessor["componentType"]])
         self._read_components += max(shape[0] * shape[1], _MIN_COMPONENTS_PER_READ)
@@ -131,7 +131,7 @@ class Document:
         return self._substitute_sparse(values, accessor["sparse"])
 
     def read_floats(self, accessor_index: int) -> Doubles:
-        """Return n elements of k components of an accessor as floats, (n, k).
+        """Return the elements (n, k) of an accessor as floats: n elements of k components.
 
         Normalised integers are decoded to [0, 1] or [-1, 1].
         """
@@ -155,7 +155,7 @@ class Document:
     def _view_array(
         self, location: Tree, array_shape: tuple[int, int], dtype: np.dtype[np.number], stride_bytes: int = 0
     ) -> Numbers:
-        """Return an array of `array_shape` (n, k) and type `dtype` from a buffer view.
+        """Return an array of shape `array_shape`, (n, k), and type `dtype` from a buffer view.
 
         location : JSON object with "bufferView" and "byteOffset"
         stride_bytes : distance between the starts of rows [byte]; 0 if they are contiguous
@@ -206,7 +206,7 @@ def _checked_byte_or_value_count(json_number: object) -> int:
 def read_document(path: Path) -> Document:
     """Read a .glb, .vrm or .gltf file.
 
-    Raises DermisError when the file is not glTF, truncated, or too large.
+    Raises DermisError when the file is not a glTF file, is truncated, or is too large.
     """
     data = read_file(path, "a glTF file", MAX_FILE_BYTES)
     with parsing(path, "a glTF file", *MALFORMED_DATA_ERRORS):
@@ -237,9 +237,9 @@ def _parse_json_tree(path: Path, json_text: bytes) -> Tree:
 
 
 def _glb_chunks(glb_data: bytes) -> list[tuple[int, bytes]]:
-    """Return type and bytes of each chunk of a .glb file.
+    """Return the type and the bytes of each chunk of a .glb file, the last chunk first.
 
-    The order is reversed, so that a dict made of the list keeps the first chunk of each type.
+    In a dictionary made from this list, the first chunk of each type in the file replaces later chunks.
     """
     chunks, offset = [], 12
     while offset + 8 <= len(glb_data):

@@ -1,4 +1,4 @@
-"""Decompression of the geometry of glTF files that is compressed by Draco."""
+"""Decompression of Draco-compressed geometry in glTF files."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _SIZE_ADVICE = "Decimate it, or export without compression"
 
 
 class _Primitive(NamedTuple):
-    """Compressed primitive: its JSON tree, and the tree of its compression extension."""
+    """Compressed primitive: its JSON tree, and the JSON tree of its compression extension."""
 
     tree: Tree
     extension: Tree
@@ -33,7 +33,7 @@ def decompress(document: Document) -> None:
     Primitives that are also stored without compression are left as they are.
 
     Raises DermisError if the package DracoPy is missing, for damaged data, and for data whose size differs
-    from the size that its accessors state.
+    from the size that the accessors state.
     """
     found = [
         _compressed_primitive(document, one)
@@ -63,7 +63,7 @@ def _compressed_primitive(document: Document, primitive: Tree) -> _Primitive | N
 
 
 def _check_sizes(document: Document, primitives: list[Tree]) -> None:
-    """Refuse more vertices or triangles than allowed, by the sizes that accessors state."""
+    """Refuse primitives with too many vertices or triangles in total, according to their accessors."""
     vertices = [document.item("accessors", one["attributes"]["POSITION"])["count"] for one in primitives]
     corners = [document.item("accessors", one["indices"])["count"] for one in primitives if "indices" in one]
     limits.check_limit(document.path, sum(vertices), limits.MAX_VERTICES, "vertices", _SIZE_ADVICE)

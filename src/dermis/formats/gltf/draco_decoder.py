@@ -11,8 +11,8 @@ from dermis.base.native_decoding import answer_request
 def decode(request: Arrays) -> Arrays:
     """Return the attributes and triangles of compressed meshes.
 
-    An array is called MESH/ATTRIBUTE: the name of the mesh in the request, a slash, and the attribute's
-    identifier, or "triangles".
+    The request contains the compressed bytes of each mesh under a name. The result contains arrays with names
+    such as "NAME/triangles" and "NAME/0", where 0 is the identifier of an attribute.
     """
     import DracoPy
 

@@ -26,7 +26,7 @@ def embedded_materials(path: Path) -> tuple[FileMaterial, ...]:
 
 
 def embedded_eye_look(path: Path) -> EyeLook:
-    """Return the eye parameters in the person description of a .glb or .gltf file, or the defaults.
+    """Return the eye parameters from the person description in a .glb or .gltf file; defaults without one.
 
     Raises DermisError for invalid parameters.
     """

@@ -1,4 +1,4 @@
-"""Materials of exported glTF heads: plain glTF materials, with all maps of this package in the extras."""
+"""Materials of exported glTF heads: plain glTF materials, whose extras hold all maps of this package."""
 
 from __future__ import annotations
 
@@ -34,8 +34,9 @@ class SkinAdditions:
 
     surface : members for `pbrMetallicRoughness`, which replace the base colour texture; empty to keep this
         texture
-    extensions, extras : members for the material's `extensions` and `extras`, by name
-    pictures : PNG files by name; textures reference a picture as {"index": name}
+    extensions : dictionary from name to member for the material's `extensions`
+    extras : dictionary from name to member for the material's `extras`
+    pictures : dictionary from name to PNG file; textures reference a picture as {"index": name}
     """
 
     surface: FrozenTree = field(default_factory=dict)
@@ -44,9 +45,9 @@ class SkinAdditions:
     pictures: Mapping[str, bytes] = field(default_factory=dict)
 
     def apply_to(self, material: FrozenTree) -> Tree:
-        """Return a glTF material with these properties.
+        """Return a copy of a glTF material with these properties added.
 
-        A base colour texture that `surface` replaces moves to the extras.
+        If `surface` replaces the base colour texture, the texture moves to the extras.
         """
         extended = dict(material) | {"extensions": {**material.get("extensions", {}), **self.extensions}}
         surface = dict(material["pbrMetallicRoughness"])
@@ -60,11 +61,12 @@ class SkinAdditions:
 
 
 def skin_pictures(maps: Maps, slopes: Floats | None = None) -> tuple[dict[str, bytes], Tree]:
-    """Return PNG files of a skin's maps by name, and the entries of the material's extras by map role.
+    """Return the maps of a skin as PNG files by name, and the entries of the material's extras by map role.
 
-    The extras reference pictures as {"index": name}; `embedded_materials` reads them.
+    The extras reference pictures as {"index": name}; `embedded_materials` reads these entries.
 
-    slopes : (n, n, 2) slopes of the relief, written as normal map for other programs if `maps` has none
+    slopes : (n, n, 2) slopes of the relief, from which a normal map for other programs is made if `maps`
+        contains none
     """
     pictures: dict[str, Numbers] = {}
     roles: Tree = {}
@@ -101,7 +103,7 @@ def surface_material(
 
     The textures of the material reference pictures by name, as {"index": name}.
 
-    roles : entries of the extras of skin, see `skin_pictures`
+    roles : entries of the skin material's extras, see `skin_pictures`
     roughness : Beckmann's m of skin without a roughness map [-]
     """
     if material.kind != "skin":
@@ -123,7 +125,10 @@ def surface_material(
 
 
 def part_pictures(parts: PartPictures) -> dict[str, bytes]:
-    """Return the PNG files of parts that are not skin, by name; the colour has alpha if a part needs it."""
+    """Return the pictures of parts that are not skin, as PNG files by name.
+
+    The colour picture has an alpha channel if any part needs alpha.
+    """
     found = parts.encode(("cutout", "surface", "normal", "emission"))
     if "cutout" not in found:
         found |= parts.encode(("colour",))
@@ -175,7 +180,7 @@ def eye_material(material: Material) -> Tree:
     """Return the glTF material of a textured eyeball, whose tear film is a clear coat.
 
     The normal map applies to the surface below the clear coat. Programs that support clear coat show
-    highlights only on the coat; other programs show highlights on the surface below.
+    highlights only on the coat; other programs show highlights on the surface below the coat.
     """
     surface = _base_material(material, _TEAR_FILM_ROUGHNESS) | {"baseColorTexture": {"index": EYE_PICTURE}}
     del surface["baseColorFactor"]

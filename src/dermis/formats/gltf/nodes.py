@@ -20,8 +20,8 @@ class Nodes:
     names : (n,) unique names
     parent : (n,) index of each node's parent, -1 for a root
     order : (n,) node indices, parents before children
-    local, world : (n, 4, 4) transforms at rest from a node's space to the space of its parent, and to scene
-        space
+    local : (n, 4, 4) transforms at rest from each node's space to the space of its parent
+    world : (n, 4, 4) transforms at rest from each node's space to scene space
     scene_nodes : indices of the nodes of the scene, in the order in which meshes are read; None if the file
         has no scenes
     """
@@ -34,7 +34,7 @@ class Nodes:
     scene_nodes: tuple[int, ...] | None
 
     def ancestors(self, node: int) -> list[int]:
-        """Return the indices of a node, its parent and so on up to the root."""
+        """Return the index of a node, followed by the indices of its ancestors up to the root."""
         path = [node]
         while self.parent[path[-1]] >= 0:
             path.append(self.parent[path[-1]])

@@ -33,7 +33,7 @@ class PrimitiveSource(Protocol):
     """Geometry that can be written as a glTF primitive with morph targets."""
 
     def add_primitive(self, binary: BufferBuilder) -> Tree:
-        """Append vertices and triangles to the buffer; return the primitive without material and targets."""
+        """Append vertices and triangles to the buffer; return the primitive, without material or targets."""
         ...
 
     def add_target(self, binary: BufferBuilder, vertex_target: VertexTarget) -> dict[str, int]:
@@ -64,10 +64,10 @@ class SurfacePrimitive:
         return np.unique(self._head.mesh.triangles[self.faces])
 
     def add_primitive(self, binary: BufferBuilder) -> Tree:
-        """Append vertices and triangles to the buffer; return the primitive without material and targets.
+        """Append vertices and triangles to the buffer; return the primitive, without material or targets.
 
         The extras of the primitive record whether its triangles form quads, and whether no other primitive
-        shares its points.
+        shares points with it.
         """
         used, mesh = self.vertices, self._head.mesh
         index = binary.add_triangles(np.searchsorted(used, mesh.triangles[self.faces]), len(used))
@@ -82,7 +82,7 @@ class SurfacePrimitive:
         return primitive | ({"extras": {"dermis": extras}} if extras else {})
 
     def add_target(self, binary: BufferBuilder, vertex_target: VertexTarget) -> dict[str, int]:
-        """Append position and normal displacements to the buffer; return accessors by attribute name."""
+        """Append displacements of positions and normals to the buffer; return accessor indices by name."""
         used = np.flatnonzero(np.isin(vertex_target.vertex, self.vertices, assume_unique=True))
         row = np.searchsorted(self.vertices, vertex_target.vertex[used])
         columns = [to_metres(vertex_target.delta_mm[used]), vertex_target.normal[used]]
@@ -122,7 +122,7 @@ class HairPrimitive:
         return replace(self.deformable.head.mesh, positions=self.deformable.positions_mm).points_mm
 
     def add_primitive(self, binary: BufferBuilder) -> Tree:
-        """Append vertices and triangles to the buffer; return the primitive without material and targets.
+        """Append vertices and triangles to the buffer; return the primitive, without material or targets.
 
         The extras of the primitive mark it as hair, so that `read_gltf` skips it.
         """
@@ -136,7 +136,7 @@ class HairPrimitive:
         return {"attributes": attributes, "indices": index, "extras": {"dermis": {"hair": True}}}
 
     def add_target(self, binary: BufferBuilder, vertex_target: VertexTarget) -> dict[str, int]:
-        """Append position displacements to the buffer and return their accessor; normals do not change."""
+        """Append displacements of positions to the buffer; return their accessor index under "POSITION"."""
         delta, mesh = np.zeros_like(self._rest_points), self.deformable.head.mesh
         delta[mesh.point[vertex_target.vertex]] = vertex_target.delta_mm
         vertex, displacement = self.fibres.displacements_at(self._rest_points, delta)
@@ -162,9 +162,11 @@ def _vertex_attributes(
 def _bone_attributes(
     binary: BufferBuilder, deformable: DeformableMesh, vertex_index: NDArray[np.integer]
 ) -> dict[str, int]:
-    """Append joints and weights of vertices to the buffer; return their accessors, {} without a skeleton.
+    """Append joints and weights of vertices to the buffer; return accessor indices by attribute name.
 
     vertex_index : (v,) indices of the vertices in the mesh
+
+    The result is empty for a mesh without a skeleton.
     """
     if deformable.rig.skeleton is None:
         return {}
@@ -177,9 +179,9 @@ def _bone_attributes(
 
 @dataclass(frozen=True, eq=False)
 class FibreTubes:
-    """Tubes around n hairs with m vertices each; a tube is rigid and follows the skin quad at its root.
+    """Tubes around n hairs with m vertices each; a tube is rigid and follows the skin at its root.
 
-    mesh : skin on which the hairs grow
+    mesh : mesh of the skin on which the hairs grow
     """
 
     strands: Strands
@@ -230,7 +232,7 @@ class FibreTubes:
 
     @cached_property
     def _tube_rings(self) -> tuple[Doubles, Doubles]:
-        """Return tube vertices relative to the roots [mm] and normals, (n, m, 3) each, in root frames."""
+        """Return the vertices [mm] and normals of the tubes, (n, m, 3) each, in the frames of the roots."""
         knots = self.strands.knots_mm.astype(np.float64)
         tangent = np.gradient(knots, axis=1)
         tangent /= np.maximum(np.linalg.norm(tangent, axis=2, keepdims=True), _MIN_VECTOR_LENGTH)
@@ -262,7 +264,8 @@ class FibreTubes:
 
         Returns vertex indices (k,) and displacements (k, 3) [mm].
 
-        points_mm, delta_mm : (p, 3) points of the mesh at rest, and their displacements
+        points_mm : (p, 3) points of the mesh at rest
+        delta_mm : (p, 3) displacements of these points
         """
         first, second = self.mesh.quads[self.strands.roots.quad].T
         corners = self.mesh.point[np.column_stack([self.mesh.triangles[first], self.mesh.triangles[second]])]
@@ -294,7 +297,7 @@ class FibreTubes:
         return np.asarray((start[:, None, None] + np.concatenate(faces)).reshape(-1, 3), np.int64)
 
     def colours(self) -> tuple[Floats, Floats]:
-        """Return a palette of c linear hair colours (1, c, 3), and the tube vertices' uv (n m, 2)."""
+        """Return a palette (1, c, 3) of c linear hair colours, and the uv (n m, 2) of tube vertices in it."""
         absorbance = self.strands.absorption * self.strands.radius_mm.max(axis=1, keepdims=True)
         albedo = np.exp(-_HAIR_ALBEDO_EXPONENT * np.sqrt(absorbance.astype(np.float64)))
         order = np.argsort(albedo.sum(axis=1), kind="stable")

@@ -95,12 +95,12 @@ MATERIAL_EXTENSIONS = keys_of(GLTF_MATERIALS)
 
 
 def read_materials(document: Document) -> tuple[FileMaterial, ...]:
-    """Return the materials of a file in its order."""
+    """Return the materials of a file in the order of the file."""
     return tuple(_MaterialReader(document, material).read() for material in document.items("materials"))
 
 
 class _MaterialReader:
-    """Reader of one material; it collects the properties without effect, which a note lists."""
+    """Reader of one material, which also lists properties without effect for a note to the user."""
 
     def __init__(self, document: Document, material: Tree) -> None:
         self.document, self.material = document, material
@@ -158,7 +158,7 @@ class _MaterialReader:
         return maps if height_mm is None else maps | {"height_mm": height_mm}
 
     def _from_glossiness(self, glossiness_extension: Tree) -> Tree:
-        """Return metallic-roughness properties of a specular-glossiness material."""
+        """Return the metallic-roughness properties that approximate a specular-glossiness material."""
         pbr = {
             "baseColorFactor": glossiness_extension.get("diffuseFactor", [1.0, 1.0, 1.0, 1.0]),
             "metallicFactor": 0.0,
@@ -194,7 +194,7 @@ class _MaterialReader:
         return r, g, b
 
     def _read_texture(self, reference: Tree | None, channel: int | None) -> Texture | None:
-        """Return the texture that a material references; None without reference or readable picture.
+        """Return the texture that a material references; None without a reference or a picture.
 
         channel : see `Texture`
         """
@@ -231,9 +231,9 @@ class _MaterialReader:
 
 
 def read_picture(document: Document, image_index: Any) -> EmbeddedPicture:
-    """Return an image of a document, selected by index; its format is detected from its content.
+    """Return an image of a document; the picture format is detected from the bytes of the image.
 
-    image_index : index of the image
+    image_index : index of the image in the document
 
     Raises DermisError for an image file outside the folder of the document.
     """

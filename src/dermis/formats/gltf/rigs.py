@@ -30,7 +30,8 @@ _VERTICES_PER_BATCH = 1 << 16
 class SkinInfluences(NamedTuple):
     """Bones that move each vertex, and their weights, which sum to 1.
 
-    bone, weight : (v, 4) bone indices, and their weights
+    bone : (v, 4) bone indices
+    weight : (v, 4) weights of these bones
     """
 
     bone: Index
@@ -41,9 +42,9 @@ class SkinInfluences(NamedTuple):
 class Armature:
     """Bones of a glTF scene: joints of skins, and animated nodes.
 
-    bone_of_node : bone index by node index
-    static_bone : index of the root bone that was added for meshes that no bone moves; None without it
-        needed
+    bone_of_node : dictionary from node index to bone index
+    static_bone : index of the root bone that was added for meshes that no bone moves; None if there are no
+        such meshes
     """
 
     bones: Bones
@@ -51,10 +52,10 @@ class Armature:
     static_bone: int | None
 
     def bone_for_node(self, nodes: Nodes, node: int) -> int | None:
-        """Return the bone that moves the mesh of a node without a skin; None if there is none.
+        """Return the bone that moves the mesh of a node, if the mesh has no skin; None if no bone moves it.
 
-        The bone belongs to the node itself, or to the nearest ancestor with a bone. Without such an
-        ancestor the bone is `static_bone`.
+        The bone belongs to the node itself, or to the nearest ancestor that has a bone. If no ancestor has a
+        bone, the result is `static_bone`.
         """
         bones = (self.bone_of_node[k] for k in nodes.ancestors(node) if k in self.bone_of_node)
         return next(bones, self.static_bone)
@@ -87,7 +88,10 @@ def read_armature(document: Document, nodes: Nodes) -> Armature | None:
 
 
 def _with_static_root(bones: Bones) -> Bones:
-    """Add a root bone at the origin above all bones, for meshes that no bone moves; return all bones."""
+    """Return the bones, preceded by a new root bone at the origin for meshes that no bone moves.
+
+    bones : bones whose parent indices already count the new bone as bone 0
+    """
     name = node_names([{"name": known} for known in (*bones.names, _STATIC_BONE_NAME)])[-1]
     parent = np.concatenate([[-1], bones.parent]).astype(np.int32)
     local, world = (np.concatenate([np.eye(4)[None], one]) for one in (bones.local, bones.world))
@@ -160,9 +164,9 @@ def _check_weights(
 
 
 def _strongest_influences(joint: Index, weight: Doubles) -> tuple[Index, Doubles]:
-    """Return the joints of the four largest weights of each vertex, and these weights, (v, 4) each.
+    """Return the joints with the four largest weights at each vertex, and these weights, (v, 4) each.
 
-    The weights are normalised to sum 1.
+    The weights are normalised to sum to 1.
     """
     if weight.shape[1] > BONES_PER_POINT:
         order = np.argsort(-weight, axis=1, kind="stable")[:, :BONES_PER_POINT]
@@ -187,8 +191,8 @@ class VertexDisplacements(NamedTuple):
 def target_names(mesh: Tree) -> tuple[str, ...]:
     """Return the names of a mesh's morph targets.
 
-    Most programs write the names as "targetNames" in the mesh's extras; a target without a name is called
-    "target 0", by its index.
+    Most programs write the names as "targetNames" in the mesh's extras; targets without names are called
+    "target 0", "target 1" and so on.
     """
     counts = [len(primitive.get("targets", [])) for primitive in mesh["primitives"]]
     extras = mesh.get("extras")
@@ -208,7 +212,7 @@ def read_targets(
     all_target_names : names of the morph targets of the mesh
     vertex_count : number of vertices of the primitive
 
-    Raises DermisError if the number of displacements is not `vertex_count` or values are not finite.
+    Raises DermisError if the number of displacements is not `vertex_count`, or if values are not finite.
     """
     displacements: dict[str, VertexDisplacements] = {}
     for name, target in zip(all_target_names, primitive.get("targets", []), strict=False):
@@ -229,8 +233,8 @@ def read_targets(
 def default_weights(document: Document, nodes: Nodes) -> dict[str, float]:
     """Return the default weights of the scene's morph targets by name; weights of 0 are omitted.
 
-    Weights of a node override the weights of its mesh. Targets with the same name in several meshes are one
-    target; the first weight is used.
+    Weights of a node override the weights of its mesh. Morph targets that have the same name in several
+    meshes are treated as one target, with the weight that is found first.
     """
     defaults: dict[str, float] = {}
     names: dict[int, tuple[str, ...]] = {}

@@ -118,7 +118,7 @@ class _SceneReader:
     """Reader of the primitives of a glTF scene as mesh parts.
 
     weights : default weights of morph targets by name
-    notes : notes on content that was not read, as keys
+    notes : dictionary whose keys are notes to the user on content that was not read
     """
 
     document: Document
@@ -141,9 +141,10 @@ class _SceneReader:
             yield part
 
     def _check_count(self, item_noun: str, count: int) -> None:
-        """Refuse more triangles, vertices or displacements than allowed, before the scene fills the memory.
+        """Refuse a scene with more than the allowed number of parts, triangles, vertices or displacements.
 
-        item_noun : name of the limit, a key of `_MAX_SCENE_COUNTS`
+        item_noun : what is counted, a key of `_MAX_SCENE_COUNTS`
+        count : number of these
         """
         advice = "Export the head alone, or decimated"
         limits.check_limit(self.document.path, count, _MAX_SCENE_COUNTS[item_noun], item_noun, advice)
@@ -191,7 +192,7 @@ class _SceneReader:
     def _read_primitive(
         self, mesh: Tree, target_names: tuple[str, ...], primitive: Tree
     ) -> tuple[MeshPart, dict[str, VertexDisplacements]]:
-        """Return a primitive in mesh space, deformed by the default weights, and all its morph targets."""
+        """Return a primitive in mesh space, with the default weights applied, and its morph targets."""
         attributes = primitive["attributes"]
         self._check_count("vertices", self.document.item("accessors", attributes["POSITION"])["count"])
         positions = self.document.read_floats(attributes["POSITION"]).reshape(-1, 3)
@@ -291,8 +292,8 @@ def _transform_part(
 def _nearest_rigid(matrix: Doubles) -> Doubles:
     """Return the rigid transform that a matrix (4, 4) approximates up to rounding errors.
 
-    Matrices that are not nearly rigid are returned unchanged. The rounding errors come from exporters, which
-    write scales like 1.0000001.
+    Matrices that are not nearly rigid are returned unchanged. Rounding errors are common, as exporters write
+    scales like 1.0000001.
     """
     deviation = np.abs(matrix[:3, :3] @ matrix[:3, :3].T - np.eye(3)).max()
     if not 1e-13 < deviation < 1e-5:
@@ -336,8 +337,8 @@ def _skin_part(
 def _normal_matrix(linear_transform: Doubles) -> Doubles:
     """Return the matrices (..., 3, 3) that transform normals for linear transforms (..., 3, 3).
 
-    The matrices are scaled so that a uniform scale preserves the length of normals. Cofactors are used
-    because cofactors exist for singular transforms, too.
+    The matrices are scaled so that a uniform scale preserves the length of normals. They consist of cofactors
+    instead of inverses, because cofactors also exist for singular transforms.
     """
     rows = [linear_transform[..., k, :] for k in range(3)]
     cofactors = np.stack([np.cross(rows[(i + 1) % 3], rows[(i + 2) % 3]) for i in range(3)], axis=-2)

@@ -1,4 +1,4 @@
-"""Notes on the content of glTF files that is not read."""
+"""Notes for the user on content of glTF files that is not read."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _POINT_AND_LINE_MODES = range(4)  # modes of primitives
 def note_unread(document: Document, nodes: Nodes, read_extensions: Collection[str]) -> Iterator[str]:
     """Yield notes on lights, cameras, points, lines, further scenes and extensions that are not read.
 
-    read_extensions : names of the extensions that are read, or noted elsewhere
+    read_extensions : names of the extensions that are read, or that have notes from elsewhere
     """
     listed_nodes = document.items("nodes")
     in_scene = [listed_nodes[k] for k in nodes.scene_nodes or ()]

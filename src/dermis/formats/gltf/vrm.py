@@ -1,4 +1,4 @@
-"""VRM avatars: the direction of their face, their expressions, and properties that are not read."""
+"""VRM avatars: the direction in which they face, their expressions, and notes on unread properties."""
 
 from __future__ import annotations
 
@@ -52,8 +52,8 @@ _MAX_TARGET_WEIGHT = 100.0
 class Avatar:
     """Properties that a VRM file adds to glTF; the defaults describe glTF files without VRM.
 
-    expressions : for each mesh (Python's `id` of its JSON tree), the expressions by name; an expression maps
-        the index of a morph target to its weight
+    expressions : dictionary from `id(tree)`, where `tree` is the JSON tree of a mesh, to the expressions of
+        the mesh: a dictionary from expression name to the weights by morph target index
     """
 
     axes: Axes = DEFAULT_AXES
@@ -68,7 +68,7 @@ class Avatar:
         target_names : names of the morph targets of the mesh
         targets : morph targets of the primitive, by name
 
-        An expression with the name of a morph target is omitted.
+        Expressions that have the same name as a morph target are omitted.
 
         Raises ValueError if the expressions displace too many vertices.
         """
@@ -105,7 +105,9 @@ class _TargetBind(NamedTuple):
     """Morph target that an expression moves.
 
     name : name of the expression
-    target : index of the target in the mesh
+    mesh : JSON tree of the mesh with the morph target
+    target : index of the morph target in the mesh
+    weight : weight that the expression gives the morph target
     """
 
     name: str
@@ -115,7 +117,7 @@ class _TargetBind(NamedTuple):
 
 
 def _vrm_0_binds(document: Document, avatar: Tree) -> Iterator[_TargetBind]:
-    """Yield the morph targets of all expressions in VRM 0.x, whose weights are percentages.
+    """Yield the morph targets of all expressions in a VRM 0.x file, where weights are percentages.
 
     avatar : VRM extension of the file
     """
@@ -128,7 +130,7 @@ def _vrm_0_binds(document: Document, avatar: Tree) -> Iterator[_TargetBind]:
 
 
 def _vrm_1_binds(document: Document, avatar: Tree) -> Iterator[_TargetBind]:
-    """Yield the morph targets of all expressions in VRM 1.0.
+    """Yield the morph targets of all expressions in a VRM 1.0 file.
 
     avatar : VRM extension of the file
     """
@@ -174,7 +176,7 @@ def _avatar_notes(extensions: Tree, avatar: Tree, is_vrm_0: bool) -> Iterator[st
 def _sum_displacements(
     weighted_displacements: Sequence[tuple[VertexDisplacements, float]],
 ) -> VertexDisplacements:
-    """Return the weighted sum of displacements."""
+    """Return the weighted sum of the displacements of several morph targets."""
     vertex, row = np.unique(
         np.concatenate([own.vertex for own, _ in weighted_displacements]), return_inverse=True
     )

@@ -46,13 +46,13 @@ def encode_head(
     eyes: EyeTextures | None = None,
     skin_additions: SkinAdditions | None = None,
 ) -> bytes:
-    """Encode a head as a .glb file in metres: one primitive per material, with morph targets and a skin.
+    """Encode a head as a .glb file in metres, with one primitive per material, morph targets and joints.
 
     Hairs become thin tubes, which this package does not read back. Equal heads give identical bytes.
 
     roughness : Beckmann's m of skin without a roughness map [-]
     weights : default weights of morph targets by name, which override the weights of the rest pose
-    slopes : (n, n, 2) slopes of the relief, written as normal map for programs that read no height map
+    slopes : (n, n, 2) slopes of the relief, written as a normal map for programs that read no height map
     notes : entries for the extras of the file's "asset"
     eyes : maps of the eyeballs; None for eyes in a uniform colour
     skin_additions : properties to add to the material of skin
@@ -101,7 +101,7 @@ def _primitive_sources(
     """Return the geometry and the material of each glTF primitive, as two lists in the same order.
 
     pictures : PNG files by name; this function adds the pictures of eyes, hairs and parts that are not skin
-    roles : entries of the extras of skin, see `skin_pictures`
+    roles : entries of the skin material's extras, see `skin_pictures`
     """
     head = deformable.head
     eye_materials = [] if eyes is None or head.eyes is None else head.eyes.material.tolist()
@@ -145,7 +145,7 @@ def _gltf_mesh(
 ) -> Tree:
     """Return the glTF mesh with its primitives, morph targets and default weights.
 
-    parts : geometry of each primitive; the material of a primitive has the same index
+    parts : geometry of each primitive; primitive i has material i
     """
     primitives = [part.add_primitive(binary) | {"material": number} for number, part in enumerate(parts)]
     mesh: Tree = {"name": _mesh_name(deformable.head), "primitives": primitives}
@@ -169,7 +169,7 @@ def _mesh_name(head: Head) -> str:
 def _gltf_nodes(head: Head, binary: BufferBuilder) -> tuple[list[Tree], list[int], list[Tree]]:
     """Return the glTF nodes, the indices of the root nodes, and the list of skins.
 
-    The nodes are the bones, then the mesh. There is one skin, or none if the head has no bones.
+    The nodes are the bones, then the mesh. There is one skin; a head without bones has no skin.
     """
     skeleton = head.control.skeleton
     if skeleton is None:

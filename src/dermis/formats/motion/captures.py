@@ -1,4 +1,4 @@
-"""Facial captures: blend shape names are matched to morph targets, and head and eye rotations to bones."""
+"""Facial captures: matching of blend shapes to morph targets, and of head and eye rotations to bones."""
 
 from __future__ import annotations
 
@@ -61,8 +61,8 @@ class CaptureSamples:
     times_s : (k,) times of the frames, not decreasing [s]
     names : (n,) names of the blend shapes
     weights : (k, n) weights of the blend shapes
-    angles : Euler angles (k, 3) of bones of the head, by bone name [degrees]
-    unused_names : names of the file's columns of angles for which the head has no bone
+    angles : dictionary from bone name to Euler angles (k, 3) [degrees]
+    unused_names : names of angle columns in the file for which the head has no bone
     """
 
     times_s: Doubles
@@ -75,7 +75,7 @@ class CaptureSamples:
 def capture_clip(culprit: object, clip_name: str, samples: CaptureSamples, head: Head) -> Clip:
     """Return a facial capture as a clip for a head, linearly interpolated between frames.
 
-    culprit : the capture's file, for errors
+    culprit : file of the capture, for errors
     clip_name : name of the clip
 
     Raises DermisError when no name matches the head.
@@ -106,7 +106,7 @@ def capture_clip(culprit: object, clip_name: str, samples: CaptureSamples, head:
 
 
 def refuse_unmatched(culprit: object, capture_names: Sequence[str], head: Head) -> None:
-    """Raise the error for a motion in which no name matches a morph target or bone of the head."""
+    """Raise an error for a motion in which no name matches a morph target or bone of the head."""
     targets = _short_list(head.targets) if head.targets else "none"
     actual = f"it has {_short_list(capture_names)} and the head {targets}"
     advice = "Use a head with targets of these names, such as those of ARKit"
@@ -141,7 +141,7 @@ def to_seconds(culprit: object, times: Doubles, unit: float | None) -> Doubles:
 
 
 def assumed_rate(culprit: object, fps: float | None, default_fps: float) -> float:
-    """Return the frame rate of a capture without times: `fps`; if it is None, `default_fps`, with a note."""
+    """Return the frame rate of a capture without times: `fps`, or `default_fps` with a note to the user."""
     if fps is None:
         assumed = f"{default_fps:g} frames per second are assumed"
         notify(f"{culprit}: it has no times; {assumed}, which fps (--motion-fps) changes")
@@ -149,9 +149,10 @@ def assumed_rate(culprit: object, fps: float | None, default_fps: float) -> floa
 
 
 def note_lost_frames(culprit: object, lost_frame_count: int, frame_count: int) -> None:
-    """Issue a note on the number of frames that show no face; none if all frames show a face.
+    """Issue a note on the number of frames that show no face, unless all frames show a face.
 
-    lost_frame_count, frame_count : number of frames without a face, and of all frames
+    lost_frame_count : number of frames without a face
+    frame_count : number of all frames
     """
     if lost_frame_count:
         notify(
@@ -160,7 +161,9 @@ def note_lost_frames(culprit: object, lost_frame_count: int, frame_count: int) -
 
 
 def fill_gaps(times_s: Doubles, channels: Doubles) -> Doubles:
-    """Replace NaN in values (k, n) by linear interpolation over time, and by constants at both ends.
+    """Return values (k, n) in which NaN is replaced by linear interpolation over time.
+
+    Before the first and after the last known value, values are constant.
 
     times_s : (k,) times of the rows [s]
     """
@@ -184,7 +187,8 @@ def to_fractions(culprit: object, weights: Doubles) -> Doubles:
 def check_weights(culprits: Sequence[object], shape_names: Sequence[str], shape_weights: Doubles) -> None:
     """Refuse implausibly large blend shape weights (k, n); NaN marks missing weights and is accepted.
 
-    culprits, shape_names : (k,) frames and (n,) blend shapes, for errors
+    culprits : (k,) names of the frames, for errors
+    shape_names : (n,) names of the blend shapes, for errors
     """
     invalid = np.argwhere(np.abs(shape_weights) > MAX_WEIGHT)
     if len(invalid):
@@ -197,7 +201,8 @@ def check_weights(culprits: Sequence[object], shape_names: Sequence[str], shape_
 def check_size(culprit: object, frame_count: int, column_count: int) -> None:
     """Refuse a capture with too many frames or too many columns.
 
-    frame_count, column_count : numbers of frames and of columns read so far
+    frame_count : number of frames read so far
+    column_count : number of columns read so far
     """
     if frame_count > MAX_CAPTURE_FRAMES or column_count > MAX_CAPTURE_COLUMNS:
         expected = f"at most {MAX_CAPTURE_FRAMES:,} frames of {MAX_CAPTURE_COLUMNS} numbers"
@@ -211,10 +216,10 @@ def _short_list(names: Sequence[str]) -> str:
 
 
 def match_targets(shape_names: Iterable[str], target_names: Sequence[str]) -> dict[str, str]:
-    """Return the head's morph target for each blend shape name; names without a match are omitted.
+    """Return a dictionary from blend shape names to the matching morph targets of the head.
 
-    EyeBlinkLeft, eyeBlink_L and blendShape1.eye_blink_left all match eyeBlinkLeft; an identical name has
-    priority.
+    Names without a match are omitted. For example, EyeBlinkLeft, eyeBlink_L and blendShape1.eye_blink_left
+    all match eyeBlinkLeft; an identical name has priority.
     """
     exact, folded, plain = (
         {key(target): target for target in reversed(target_names)}
@@ -229,9 +234,9 @@ def match_targets(shape_names: Iterable[str], target_names: Sequence[str]) -> di
 
 
 def _plain_shape_name(shape_name: str) -> str:
-    """Return a blend shape name in a form for comparison.
+    """Normalise a blend shape name for comparison.
 
-    The form has lower case, no prefix, and "left" or "right" for L or R.
+    The result is in lower case, without a prefix, and with "left" or "right" for L or R.
     """
     last = shape_name.rpartition(".")[2]
     side = re.fullmatch(r"(.+)[_\-. ]([lrLR])", last)
@@ -243,8 +248,9 @@ def _plain_shape_name(shape_name: str) -> str:
 class RotationBones:
     """Bones of a skeleton that perform the rotations of head and eyes in a capture.
 
-    head : fraction of the head's rotation by bone name; empty if there is neither a head nor a neck bone
-    eyes : name of the eye bone for "left" and "right"
+    head : dictionary from bone name to the fraction of the head's rotation that the bone performs; empty if
+        there is neither a head nor a neck bone
+    eyes : dictionary from "left" and "right" to the name of the eye bone
     """
 
     head: Mapping[str, float]
@@ -254,10 +260,10 @@ class RotationBones:
 def find_rotation_bones(skeleton: Skeleton | None) -> RotationBones:
     """Find the head, neck and eye bones of a skeleton by name; prefixes of common programs are ignored.
 
-    Head, mixamorig:Head and CC_Base_Head are heads; neck, Neck1 and DEF-neck.002 are necks if they are
-    ancestors of the head; LeftEye and eye.L are eyes. The head bone gets half of the head's rotation and the
-    neck bones share the other half. If there is only a head bone, or only neck bones, these bones get the
-    whole rotation.
+    For example, Head, mixamorig:Head and CC_Base_Head are names of head bones; neck, Neck1 and DEF-neck.002
+    are neck bones if they are ancestors of the head bone; LeftEye and eye.L are eye bones. The head bone gets
+    half of the head's rotation and the neck bones share the other half. If there is only a head bone, or only
+    neck bones, these bones get the whole rotation.
     """
     if skeleton is None:
         return RotationBones({}, {})
@@ -283,7 +289,8 @@ def find_rotation_bones(skeleton: Skeleton | None) -> RotationBones:
 def head_bone_angles(bones: RotationBones, rotations: Doubles) -> dict[str, Doubles]:
     """Return the Euler angles (k, 3) [degrees] of the head and neck bones, by bone name.
 
-    rotations : (k, 4) quaternions of the head's rotation in a capture, which the bones perform together
+    rotations : (k, 4) quaternions of the head's rotation in a capture, which the head and neck bones
+        perform together
     """
     parts = bones.head.items()
     return {name: _euler_angles(_partial_rotation(rotations, fraction)) for name, fraction in parts}
@@ -321,7 +328,7 @@ def _bone_ancestors(skeleton: Skeleton, bone: int) -> set[int]:
 
 
 def _bone_words(bone_name: str) -> tuple[list[str], str]:
-    """Return the words of a bone's name without numbers and prefixes, and the side "left", "right" or ""."""
+    """Return the words of a bone's name without numbers and prefixes, and its side: "left", "right" or ""."""
     separated = re.sub(r"(?<=[a-z])(?=[A-Z])|[\W_]|\d+", " ", bone_name.rpartition(":")[2])
     words = [word for word in separated.lower().split() if not _PREFIX_WORDS.fullmatch(word)]
     sides = [_SIDE_OF_WORD[word] for word in words if word in _SIDE_OF_WORD]

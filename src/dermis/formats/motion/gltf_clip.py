@@ -30,9 +30,8 @@ class _UsedTrack(NamedTuple):
     """Animation curve, restricted to the bones or morph targets that the head has.
 
     path : "translation", "rotation", "scale" or "weights"
-    columns : indices in the track of the bones or morph targets that the head has
-    indices : for each of these columns, the index of its bone or morph target among all animated bones or
-        morph targets of the head
+    columns : indices of these bones or morph targets in the track
+    indices : indices of the same bones or morph targets among all animated bones or morph targets of the head
     """
 
     path: str
@@ -82,7 +81,7 @@ def load_gltf_clip(path: Path, head: Head, clip_name: str | None) -> Clip:
 
 
 def _used_names(tracks: list[AnimationTrack], head_names: tuple[str, ...]) -> list[str]:
-    """Return the names of animated bones or morph targets that the head has."""
+    """Return the names of animated bones or morph targets that the head has, without duplicates."""
     return [
         name for name in dict.fromkeys(name for track in tracks for name in track.names) if name in head_names
     ]
@@ -94,7 +93,7 @@ def _used_track(track: AnimationTrack, used_names: list[str]) -> _UsedTrack:
 
 
 def _rest_transforms(skeleton: Skeleton, bones: list[str]) -> _BoneTransforms:
-    """Return translations, rotations and scales at rest of the named bones."""
+    """Return the translations, rotations and scales of the named bones at rest."""
     local = skeleton.local[[skeleton.index[name] for name in bones]]
     linear = local[:, :3, :3]
     scale = np.linalg.norm(linear, axis=1)

@@ -74,11 +74,12 @@ class _CaptureTable(NamedTuple):
 def load_live_link(path: Path, head: Head, fps: float | None = None) -> Clip:
     """Load a CSV file of Live Link Face as a clip for a head.
 
-    Columns are identified by name, in any order: Timecode or another time, blend shapes, and angles [rad]
-    HeadPitch, HeadYaw and HeadRoll about the head's x, y and z axes, and LeftEyePitch and so on. The
-    angles rotate the bones found by `find_rotation_bones`. Columns are separated by commas, semicolons or
-    tabs. Empty cells and frames without a face are interpolated, weights in percent and angles in degrees are
-    converted, each with a note.
+    Columns are separated by commas, semicolons or tabs, and identified by name, in any order. They contain
+    the Timecode or another time, the weights of blend shapes, and angles [rad]. HeadPitch, HeadYaw and
+    HeadRoll are the angles about the head's x, y and z axes; LeftEyePitch and similar columns are the angles
+    of the eyes. The angles rotate the bones found by `find_rotation_bones`. Empty cells and frames without a
+    face are interpolated; weights in percent and angles in degrees are converted. Notes tell the user of such
+    changes.
 
     fps : frame rate of the timecode; by default estimated from its largest frame number
 
@@ -129,7 +130,7 @@ def _has_text(table_row: Sequence[str]) -> bool:
 
 
 def _check_row(culprit: str, header: Sequence[str], table_row: list[str], count_column: int | None) -> None:
-    """Refuse a row with too many or too few cells; complete a row that has no blend shapes.
+    """Refuse a row with too many or too few cells; pad a row that states that it has no blend shapes.
 
     count_column : index of the column that states the number of blend shapes; None if there is none
     """
@@ -156,7 +157,10 @@ def _check_header(culprit: str, header: Sequence[str]) -> None:
 def _row_values(
     culprit: str, header: Sequence[str], table_row: Sequence[str], column_index: Sequence[int]
 ) -> Doubles:
-    """Return the values of a row, NaN for empty cells; numbers may have a decimal comma."""
+    """Return the values of the columns `column_index` of a row; empty cells are NaN.
+
+    Numbers may have a decimal comma.
+    """
     values = np.full(len(column_index), np.nan)
     for index, column in enumerate(column_index):
         cell = table_row[column].strip()
@@ -172,7 +176,7 @@ def _complete_table(
 ) -> _CaptureTable:
     """Return a table without gaps, with weights as fractions and angles in radians.
 
-    line_numbers : name of each row, for errors
+    line_numbers : file and line of each row, for errors
     has_shape_count : (k,) mask of rows that state a number of blend shapes above 0
     """
     values, names = capture_table.values, capture_table.names
@@ -198,10 +202,10 @@ def _complete_table(
 
 
 def _rows_without_face(cell_values: Doubles, is_angle: Mask, has_shape_count: Mask) -> Mask:
-    """Return the mask (k,) of rows without a face: empty rows, and rows of zeros that no face would have.
+    """Return the mask (k,) of rows without a face: rows of empty cells, and certain rows of zeros.
 
-    Rows of zeros show no face if most other rows have a rotated head, or if the rows of zeros state no number
-    of blend shapes and other rows do.
+    Rows of zeros show no face if most other rows contain rotations. They also show no face if they state no
+    number of blend shapes although other rows do.
     """
     numbers = np.nan_to_num(cell_values)
     zero = np.asarray(~numbers.any(axis=1))
@@ -216,7 +220,7 @@ def _row_times(
 ) -> Doubles:
     """Return the time of each row [s]; times continue to increase when the timecode passes midnight.
 
-    line_numbers : name of each row, for errors
+    line_numbers : file and line of each row, for errors
     time_cells : time of each row: a timecode or a number, as text
     time_column : normalised name of the column of times or frame numbers; None if there is no such column
     fps : frame rate of the timecode; None to estimate it
@@ -264,7 +268,7 @@ def _parse_time(culprit: str, cell: str) -> float:
 def _timecode_rate(timecodes: Sequence[_Timecode]) -> float:
     """Estimate the frame rate of timecodes: the lowest common rate above the largest frame number.
 
-    If no full second was recorded, the rate is at least that of the app, 60.
+    If the recording lasts less than a second, the result is at least 60, the rate of the app.
     """
     largest = max(int(code.frames) for code in timecodes)
     seconds_advance = any(after.seconds > before.seconds for before, after in pairwise(timecodes))
@@ -275,7 +279,7 @@ def _timecode_rate(timecodes: Sequence[_Timecode]) -> float:
 def _bone_angles(
     capture_table: _CaptureTable, bones: RotationBones
 ) -> tuple[dict[str, Doubles], tuple[str, ...]]:
-    """Return angles (k, 3) by bone name [degrees], and the angle columns for which the head has no bone."""
+    """Return the angles (k, 3) of bones by name [degrees], and the angle columns that fit no bone."""
     columns = {plain_key(name): k for k, name in enumerate(capture_table.names)}
     angles: dict[str, Doubles] = {}
     unused: list[str] = []

@@ -66,9 +66,10 @@ class _CapturedFrame(NamedTuple):
     number : number of the frame
     time : time of the frame, in the unit `unit`; NaN if the frame has none
     unit : unit of the time [s]; None if it is not stated
-    columns, weights : (n,) indices of the blend shapes of the frame, and their weights; empty without a face
+    columns : (n,) column indices of the blend shapes of the frame; empty without a face
+    weights : (n,) weights of these blend shapes
     matrix : (4, 4) facial transformation; None if the frame has none
-    faces : number of faces
+    faces : number of faces in the frame
     """
 
     culprit: str
@@ -84,14 +85,14 @@ class _CapturedFrame(NamedTuple):
 def load_mediapipe(path: Path, head: Head, fps: float | None = None) -> Clip:
     """Load results of MediaPipe's face landmarker as a clip for a head.
 
-    The file has one result per line, a list of results, or an object that contains such a list. Keys may be
-    spelled as in any of MediaPipe's APIs, such as face_blendshapes and faceBlendshapes. Blend shapes are
-    {name: score}, or a list of names and scores for each face; facial transformations (4, 4) are nested or
-    flat lists or objects with data, and rotate the bones found by `find_rotation_bones`; "time" [s],
-    "timestamp_ms" and similar keys are times. Only the first face is used. Frames without a face are
-    interpolated. Notes state all assumptions.
+    The file contains one result per line, a list of results, or an object that contains such a list. Keys may
+    be spelled as in any of MediaPipe's APIs, such as face_blendshapes and faceBlendshapes. The blend shapes
+    of a result are {name: score}, or a list of names and scores for each face. A facial transformation is a
+    matrix (4, 4) as a nested or flat list, or as an object that contains the list; it rotates the bones found
+    by `find_rotation_bones`. Times have keys such as "time" [s] and "timestamp_ms". Only the first face is
+    used. Frames without a face are interpolated. Notes state all assumptions.
 
-    fps : frame rate if the frames have no time; by default the rate that the file states, or 30
+    fps : frame rate if the frames state no times; by default the rate that the file states, or else 30
 
     Raises DermisError for a file without a face, and for invalid frames; the message names the frame.
     """
@@ -124,7 +125,7 @@ def load_mediapipe(path: Path, head: Head, fps: float | None = None) -> Clip:
 
 
 def _read_records(path: Path) -> tuple[float | None, Iterator[tuple[str, object]]]:
-    """Return the frame rate that a file states, and its frames, each with its name for errors."""
+    """Return the frame rate that a file states, and the name (for errors) and content of each frame."""
     text = read_text(path, _EXPECTED_CONTENT, MAX_CLIP_BYTES)
     lines = ((f"{path}, line {k}", line) for k, line in enumerate(io.StringIO(text), 1) if line.strip())
     first, second = next(lines, None), next(lines, None)
@@ -173,9 +174,9 @@ def _frame_list(document: object) -> list[object]:
 def _parse_frame(
     culprit: str, frame_index: int, json_record: object, shape_columns: dict[str, int]
 ) -> _CapturedFrame:
-    """Return a frame, without faces if the record has neither blend shapes nor a facial transformation.
+    """Return a frame; it has no faces if its record has neither blend shapes nor a transformation.
 
-    shape_columns : column index by blend shape name; missing names are added
+    shape_columns : dictionary from blend shape name to column index; this function adds missing names
     """
     if isinstance(json_record, list):
         json_record = {"blendshapes": json_record}
@@ -208,9 +209,10 @@ def _parse_frame(
 
 
 def _first_face(json_faces: object) -> tuple[object, int]:
-    """Return the blend shapes of the first face, or None if there is no face, and the number of faces.
+    """Return the blend shapes of the first face, and the number of faces.
 
-    json_faces : blend shapes of one face, an object around their list, or a list of such values, one per face
+    json_faces : blend shapes of one face, or an object that contains their list, or a list of such values for
+        several faces; None without a face
     """
     faces = 1
     while True:
@@ -229,7 +231,7 @@ def _first_face(json_faces: object) -> tuple[object, int]:
 
 
 def _is_list_object(json_value: object) -> bool:
-    """Return whether a value is an object around the blend shapes: MediaPipe's lists, or a Java Optional."""
+    """Return whether a value is an object that wraps blend shapes, as MediaPipe and Java's Optional do."""
     return isinstance(json_value, dict) and (
         bool(json_value.keys() & _CATEGORY_LIST_KEYS) or json_value.keys() == {"value"}
     )
@@ -256,13 +258,13 @@ def _shape_scores(culprit: str, shapes: object) -> dict[str, float]:
 
 
 def _facial_transformation(culprit: str, json_matrix: object) -> Doubles | None:
-    """Return the facial transformation (4, 4) of the first face, None if there is none.
+    """Return the facial transformation (4, 4) of the first face; None if the frame has none.
 
     The translation is in the last column of the result. A flat list without a translation is taken to be in
     column-major order, as MediaPipe's APIs return it.
 
-    json_matrix : matrix as a nested or flat list, an object that contains the matrix, or a list of
-        matrices or such objects
+    json_matrix : matrix as a nested or flat list, or an object that contains such a list, or a list of
+        several matrices or objects, one for each face
     """
     by_columns = False
     while isinstance(json_matrix, dict) or (
@@ -291,13 +293,13 @@ def _facial_transformation(culprit: str, json_matrix: object) -> Doubles | None:
 
 
 def _is_row(json_value: object) -> bool:
-    """Return whether the first entry of a list is a row or a number of one matrix, not a whole matrix."""
+    """Return whether an entry of a list is a row or a number of a matrix, as opposed to a whole matrix."""
     is_nested = isinstance(json_value, list) and (len(json_value) != 4 or isinstance(json_value[0], list))
     return not is_nested and not isinstance(json_value, dict)
 
 
 def _frame_times(path: Path, frames: Sequence[_CapturedFrame], fps: float | None) -> Doubles:
-    """Return the times of the frames (k,), which do not decrease [s]."""
+    """Return the times (k,) of the frames [s], after checking that they do not decrease."""
     times = np.array([frame.time for frame in frames])
     missing = np.isnan(times)
     if missing.all():
@@ -320,7 +322,7 @@ def _frame_times(path: Path, frames: Sequence[_CapturedFrame], fps: float | None
 def _head_angles(
     path: Path, frames: Sequence[_CapturedFrame], times: Doubles, bones: RotationBones
 ) -> tuple[dict[str, Doubles], tuple[str, ...]]:
-    """Return angles (k, 3) by bone name [degrees], and the rotations for which the head has no bone."""
+    """Return the angles (k, 3) of bones by name [degrees], and the rotations that fit no bone."""
     matrices = [frame.matrix for frame in frames if frame.matrix is not None]
     if not matrices or not bones.head:
         return {}, ("bone for the matrix",) if matrices else ()

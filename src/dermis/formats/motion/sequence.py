@@ -45,9 +45,11 @@ def is_sequence(path: Path) -> bool:
 
 
 def frame_files(path: Path) -> list[Path]:
-    """Return the mesh files in a folder or with names that match a pattern, sorted by number.
+    """Return the mesh files in a folder, or whose names match a pattern, sorted by number.
 
-    path : folder, or pattern such as face_%05d.obj or face_*.obj; the number is the last in the name
+    path : folder, or pattern such as face_%05d.obj or face_*.obj
+
+    Files are sorted by the last number in their names.
 
     Raises DermisError when there are no files, or files of several formats.
     """
@@ -86,15 +88,16 @@ def load_sequence(
 ) -> Clip:
     """Load a sequence of mesh files, one per frame, as a clip for a head with the same topology.
 
-    The vertices of the files must have the order of the head's file.
+    The vertices must have the same order in the files as in the head's file.
 
     fps : frame rate, by default 30
     unit_mm : unit of the files [mm]; by default a unit in which the first mesh is about as large as the head
-    up, front : axes of the files that point upwards and along which the face looks; by default the axes of
-        the head's file
+    up : axis of the files that points upwards; by default the up axis of the head's file
+    front : axis of the files along which the face looks; by default the front of the head's file
 
-    Raises DermisError for files that are not frames of that head; the first, the middle and the last file are
-    read immediately, all other files on demand.
+    The first, the middle and the last file are read immediately, all other files on demand.
+
+    Raises DermisError for files that do not have the topology of the head.
     """
     files, rate = frame_files(path), DEFAULT_FRAME_RATE if fps is None else fps
     axes, source = Axes(up, front), head.file_vertices
@@ -121,7 +124,7 @@ def load_sequence(
 
 @dataclass(eq=False)
 class _FrameCache:
-    """Point positions of a head in the frames of a sequence, read on demand; three frames are cached."""
+    """Positions of the points of a head in each frame of a sequence, read on demand, with a small cache."""
 
     files: Sequence[Path]
     head: Head
@@ -178,7 +181,7 @@ class _FrameCache:
 
 
 def _unit_of_head(mesh_file: Path, head: Head, reader: FrameReader) -> float:
-    """Return the unit with which the mesh in a file is about as large as a head [mm].
+    """Return the unit with which the mesh in a file is about as large as the head [mm].
 
     The unit of the file's format is preferred; if another unit is chosen, a note states it.
     """
@@ -226,7 +229,7 @@ class FrameVertices(NamedTuple):
 
 
 class _ObjPattern(NamedTuple):
-    """All of an OBJ file except its positions, to recognise files that differ only in positions.
+    """Fingerprint of an OBJ file that does not depend on its positions and normals.
 
     digest : hash of all lines except `v` and `vn`
     line_count : number of `v` lines
@@ -242,8 +245,8 @@ class _ObjPattern(NamedTuple):
 class FrameReader:
     """Reader of the mesh files of a sequence, which have the same topology.
 
-    If an OBJ file differs from the first file only in positions, only its positions are parsed, which is 20
-    times as fast.
+    OBJ files that differ from the first file only in positions and normals are read 20 times as fast, because
+    only the positions are parsed.
 
     unit_mm : length of the files' unit [mm]; None for the default of the format
     to_head : (3, 3) rotation from the axes of the files to the axes of the head
@@ -282,7 +285,7 @@ class FrameReader:
         return FrameVertices(positions[used], corners.astype(np.int32), part.uv[used].astype(np.float32))
 
     def _read_pattern(self, path: Path, unit: float) -> _ObjPattern | None:
-        """Return the pattern of the first file; None if its `v` lines are not the positions of the mesh."""
+        """Return the pattern of the first file; None if the pattern does not reproduce the positions."""
         assert self._first is not None
         data = read_obj_text(path).encode()
         pattern = _find_pattern(path, data)
@@ -308,8 +311,8 @@ def _find_pattern(path: Path, obj_bytes: bytes) -> _ObjPattern:
 
     obj_bytes : text of the file in UTF-8
 
-    The file is parsed with the index of each `v` line as its x coordinate, so that the x of a parsed vertex
-    is the index of its line.
+    The file is parsed after the x coordinate of each `v` line was replaced by the index of the line. The x
+    coordinate of a parsed vertex then tells from which line the vertex comes.
     """
     positions, digest = _split_vertex_lines(obj_bytes)
     count = iter(range(len(positions)))
@@ -321,7 +324,7 @@ def _find_pattern(path: Path, obj_bytes: bytes) -> _ObjPattern:
 
 
 def _parse_positions(obj_bytes: bytes, pattern: _ObjPattern) -> Doubles | None:
-    """Return the vertex positions (v, 3) of an OBJ file in its units; None for a file without the pattern.
+    """Return the vertex positions (v, 3) of an OBJ file in file units; None if its pattern differs.
 
     obj_bytes : bytes of the file
     pattern : pattern of the first file of the sequence

@@ -1,1 +1,1 @@
-"""Reading of USD scenes; the package usd-core runs in a separate process with limits."""
+"""Reading of USD scenes; the package usd-core runs in a separate process with resource limits."""

@@ -31,7 +31,7 @@ _SEVERAL_UV_NOTE = "faces of one mesh read different texture coordinates: those 
 
 
 class _Primvar(NamedTuple):
-    """Primitive variable: values (n, k), and the index of each corner's value (c,)."""
+    """Primitive variable: values (n, k), and the index (c,) of the value of each corner."""
 
     values: Doubles
     corner_index: Index
@@ -40,8 +40,9 @@ class _Primvar(NamedTuple):
 class _Faces(NamedTuple):
     """Polygons of a mesh.
 
-    counts, start : (n,) number of corners of each polygon, and its first corner
-    vertex : (c,) vertex of each corner
+    counts : (n,) number of corners of each polygon
+    start : (n,) index of the first corner of each polygon
+    vertex : (c,) vertex index of each corner
     """
 
     counts: Index
@@ -49,7 +50,7 @@ class _Faces(NamedTuple):
     vertex: Index
 
     def corner_elements(self, interpolation: str) -> Index | None:
-        """Return the index of the primvar element for each corner (c,); None for an unknown interpolation."""
+        """Return the index (c,) of the primvar element at each corner; None for an unknown interpolation."""
         corners = len(self.vertex)
         return {
             "constant": np.zeros(corners, np.int64),
@@ -66,7 +67,7 @@ class _Faces(NamedTuple):
 
 
 class _SceneReader:
-    """Reader of the meshes of a stage; collects arrays, materials and notes."""
+    """Reader of the meshes of a stage, which collects arrays, materials and notes for the user."""
 
     def __init__(self, path: Path, stage: Usd.Stage, layer_folder: Path) -> None:
         task = f"{path}: USD scenes"
@@ -83,7 +84,10 @@ class _SceneReader:
         self.vertices = self.triangles = 0
 
     def read(self) -> Arrays:
-        """Return the arrays of all meshes by name, mesh number first, and the scene as JSON, "scene"."""
+        """Return the arrays of all meshes, and the scene as JSON under the name "scene".
+
+        The name of an array begins with the number of the mesh.
+        """
         meshes, unread = list[Tree](), Counter[str]()
         for count, prim in enumerate(self._prims()):
             limits.check_limit(self.path, count, limits.MAX_NODES, "prims", "Export the head alone")
@@ -124,7 +128,7 @@ class _SceneReader:
         return not is_hidden and shown.ComputeVisibility(self.time) != "invisible"
 
     def _add_mesh(self, mesh: UsdGeom.Mesh, mesh_number: str) -> Tree:
-        """Add the arrays of a mesh to the answer, and return its names and materials."""
+        """Add the arrays of a mesh to `arrays`; return the name, materials and colour of the mesh."""
         prim, matrix = mesh.GetPrim(), np.array(self.transform_cache.GetLocalToWorldTransform(mesh.GetPrim()))
         points, faces = self._points_and_faces(mesh)
         materials, group = self._material_groups(prim, len(faces.counts))
@@ -148,7 +152,7 @@ class _SceneReader:
         return {"name": prim.GetName(), "materials": materials, "colour": colour}
 
     def _points_and_faces(self, mesh: UsdGeom.Mesh) -> tuple[Doubles, _Faces]:
-        """Return points (v, 3) and polygons of a mesh, after checks of their number and indices."""
+        """Return the points (v, 3) and polygons of a mesh, after checking their number and indices."""
         attributes = mesh.GetPointsAttr(), mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr()
         given = [attribute.Get(self.time) for attribute in attributes]
         points = np.array(given[0] or [], np.float64).reshape(-1, 3)
@@ -172,9 +176,9 @@ class _SceneReader:
         return np.arange(len(faces.vertex))
 
     def _material_groups(self, prim: Usd.Prim, face_count: int) -> tuple[list[int], Index]:
-        """Return the list of a mesh's materials (-1: none), and each face's index in this list (count,).
+        """Return the material indices of a mesh, and the position of each face's material in this list.
 
-        Faces that are holes have the index -1.
+        The material index -1 means no material. The positions have the shape (face_count,); holes have -1.
         """
         binding = self.shade.MaterialBindingAPI(prim)
         materials, group = [self._bound_material_index(binding)], np.zeros(face_count, np.int64)
@@ -204,7 +208,7 @@ class _SceneReader:
         return self.material_index[key]
 
     def _find_uv(self, prim: Usd.Prim, faces: _Faces, materials: list[int]) -> _Primvar | None:
-        """Return the uv set that the materials name, or a uv set with a usual name; None without uv."""
+        """Return the uv set that the materials name, else a uv set with a common name; None without uv."""
         named = dict.fromkeys(one for k in materials if k >= 0 and (one := self.materials[k].get("uv")))
         if len(named) > 1:
             self.notes[_SEVERAL_UV_NOTE] = None
@@ -239,7 +243,7 @@ class _SceneReader:
         return _Primvar(primvar_values, element_index)
 
     def _read_normals(self, mesh: UsdGeom.Mesh, faces: _Faces) -> _Primvar | None:
-        """Return the normals of a mesh; None for a mesh without normals or a subdivision surface."""
+        """Return the normals of a mesh; None for a subdivision surface, and for a mesh without normals."""
         if mesh.GetSubdivisionSchemeAttr().Get(self.time) != "none":
             return None
         primvars = self.geom.PrimvarsAPI(mesh.GetPrim())

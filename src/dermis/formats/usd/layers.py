@@ -23,7 +23,7 @@ _LAYER_ADVICE = "Flatten it into one file (usdcat --flatten), or export a .usdz"
 
 
 class OpenedStage(NamedTuple):
-    """Stage of a USD file, and the folder of its layers, to which the layers of a package are copied."""
+    """Stage of a USD file, and the folder that contains its layers or, for a package, copies of them."""
 
     stage: Usd.Stage
     folder: Path
@@ -64,9 +64,9 @@ def _extract_layers(file: Path, path: Path, layer_folder: Path) -> Path:
 
 
 def _check_layers(path: Path, root_layer: Path, layer_folder: Path) -> None:
-    """Refuse a file with layers outside its folder, before they are opened.
+    """Refuse a file that references layers outside its folder, before these layers are opened.
 
-    root_layer : root layer
+    root_layer : file of the root layer
     layer_folder : folder that must contain all layers
     """
     sdf: Any = import_extra("pxr.Sdf", f"{path}: USD scenes")

@@ -94,7 +94,7 @@ def _material_groups(mesh: Tree, materials: Sequence[FileMaterial]) -> list[Mate
 def _mesh_parts(
     path: Path, decoded_arrays: Arrays, array_prefix: str, groups: list[MaterialGroup]
 ) -> tuple[list[MeshPart], list[str]]:
-    """Return the parts of a mesh, one for each group, and notes.
+    """Return the parts of a mesh, one for each group, and notes on polygons without three corners or uv.
 
     decoded_arrays : arrays of all meshes, see `_SceneReader.read`
     array_prefix : prefix of the names of this mesh's arrays
@@ -133,7 +133,7 @@ def _select_polygons(corner_counts: Index, corners: Index, polygon_mask: Mask) -
 
 
 class _UsdPictures:
-    """Pictures of a USD file, from its package or from its folder and subfolders.
+    """Pictures of a USD file, which are in its package, or in its folder and subfolders.
 
     data : bytes of the file
     """
@@ -174,7 +174,7 @@ class _UsdPictures:
         return "folder of the file" if self.package is None else "package"
 
     def _find_picture(self, picture_name: str) -> PathLike | None:
-        """Return the picture with a name relative to the layers; None for a missing picture."""
+        """Return the picture that a name refers to, in the package or the folder; None if it is missing."""
         if self.package is None:
             return find_referenced_file(self.path, picture_name) if picture_name else None
         if picture_name not in self.sizes:

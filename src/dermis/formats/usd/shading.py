@@ -60,7 +60,7 @@ _BLACK = (0.0, 0.0, 0.0)
 
 
 class _InputSource(NamedTuple):
-    """Output of a shader to which an input is connected."""
+    """Shader output to which an input of another shader is connected."""
 
     shader: UsdShade.Shader
     output: str
@@ -69,7 +69,7 @@ class _InputSource(NamedTuple):
 class MaterialReader:
     """Reader of the materials of a stage.
 
-    folder : folder of the layers, to which the names of pictures are relative
+    folder : folder of the layers; names of pictures are relative to this folder
     """
 
     def __init__(self, path: Path, layer_folder: Path, time: Usd.TimeCode) -> None:
@@ -100,7 +100,7 @@ class MaterialReader:
         return _emission_to_colour(tree)
 
     def _add_source(self, tree: Tree, input_name: str, role: str, input_source: _InputSource) -> None:
-        """Add the texture or the vertex colours to which an input is connected."""
+        """Add to a material tree the texture or vertex colours to which an input is connected."""
         kind = str(input_source.shader.GetIdAttr().Get())
         if kind.startswith("UsdPrimvarReader_float") and role == "colour":
             tree |= {
@@ -157,7 +157,10 @@ class MaterialReader:
         return [a, -b, b + x, -d, e, 1.0 - e - y]
 
     def _add_opacity(self, tree: Tree, surface: UsdShade.Shader, input_values: Mapping[str, Any]) -> None:
-        """Add the opacity; a picture is only supported if it is the alpha channel of the colour's picture."""
+        """Add the opacity to a material tree.
+
+        A picture of the opacity is only supported if it is the alpha channel of the colour picture.
+        """
         source, cutoff = self._connected_source(surface, "opacity"), input_values["opacityThreshold"]
         colour = tree["textures"].get("colour")
         if source is not None:
@@ -181,7 +184,7 @@ class MaterialReader:
                 tree["unused"].append(text)
 
     def _picture_name(self, texture: UsdShade.Shader) -> str:
-        """Return a picture's name relative to the folder of the layers; names outside are unchanged."""
+        """Return a picture's name relative to the folder of the layers, unchanged if it is elsewhere."""
         for attribute in self._value_attributes(texture, "file"):
             layer, asset = attribute.GetPropertyStack(self.time)[0].layer, attribute.Get(self.time)
             name = str(asset.path) if asset else ""
@@ -190,7 +193,7 @@ class MaterialReader:
         return ""
 
     def _value_attributes(self, shader: UsdShade.Shader, input_name: str) -> list[Usd.Attribute]:
-        """Return the attributes from which an input gets its value, found through its connections."""
+        """Return the attributes from which an input gets its value, directly or through connections."""
         entry = shader.GetInput(input_name)
         found: list[Usd.Attribute] = list(entry.GetValueProducingAttributes()) if entry else []
         return found
@@ -204,7 +207,7 @@ class MaterialReader:
         return None
 
     def _constant_value(self, shader: UsdShade.Shader, input_name: str, default: Any) -> Any:
-        """Return the constant value of an input as numbers, or the default."""
+        """Return the constant value of an input as numbers; `default` if it has none."""
         for attribute in self._value_attributes(shader, input_name):
             if attribute.GetName().startswith("inputs:") and (value := attribute.Get(self.time)) is not None:
                 numbers = tuple(map(float, value)) if isinstance(default, tuple) else float(value)
@@ -220,7 +223,7 @@ class MaterialReader:
 
 
 def _emission_to_colour(tree: Tree) -> Tree:
-    """Return a material whose emission picture is its colour if the colour is black, as in unlit scans."""
+    """Use the emission picture as the colour picture if the colour is black, as in unlit scans."""
     textures = tree["textures"]
     if "emission" in textures and "colour" not in textures and tuple(tree["colour"]) == _BLACK:
         textures["colour"], tree["colour"] = textures.pop("emission"), tree["emission"]

@@ -1,1 +1,1 @@
-"""Lights of the frame: a module and a shader for each kind of light, and the records that all kinds share."""
+"""Lights of the frame: a module and a shader for each kind of light, and uniform records of all lights."""

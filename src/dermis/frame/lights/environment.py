@@ -1,4 +1,4 @@
-"""Environment on the device: prefiltered panorama, and its suns as lights."""
+"""Environment on the device: a prefiltered panorama, whose suns are rendered as lights."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ _MAX_BACKGROUND_ROWS = 2048  # limit of a panorama in the background
 
 @dataclass(frozen=True, eq=False)
 class EnvironmentMap:
-    """Prefiltered panorama on the device, and its suns.
+    """Prefiltered panorama on the device, and the suns that were cut out of the panorama.
 
-    panorama : texture with one layer of irradiance, then reflections by roughness; black without an
-        environment
-    suns : bright peaks that were cut out of the panorama to be rendered as lights
+    panorama : texture whose first layer holds irradiance, and whose further layers hold reflections for
+        increasing roughness; black without an environment
+    suns : bright peaks of the panorama, which are rendered as lights
     peak_irradiance : largest irradiance in the panorama without its suns [-]
     """
 
@@ -37,7 +37,7 @@ class EnvironmentMap:
 
 
 def load_environment_map(device: Device, environment_name: str | None) -> EnvironmentMap:
-    """Return the prefiltered panorama of an environment, or a black panorama for the name None.
+    """Return the prefiltered panorama of an environment, or a black panorama if the name is None.
 
     Raises DermisError when there is no such environment.
     """
@@ -70,7 +70,8 @@ def _upload_layers(device: Device, layers: Sequence[NDArray[np.float32]] | NDArr
 def _with_border(panorama: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return a panorama with a border of one texel for filters.
 
-    Columns wrap around. Beyond a pole, the border continues on the opposite side of the sphere.
+    On the left and right, the border wraps around. Beyond a pole, the border continues on the opposite side
+    of the sphere.
     """
     half = panorama.shape[1] // 2
     rows = np.concatenate(
@@ -89,9 +90,11 @@ def add_suns(memo: Memo, scene: Scene, environment_map: EnvironmentMap) -> Scene
 
 
 def peak_irradiance(scene: Scene, environment_map: EnvironmentMap) -> float:
-    """Return an upper bound of the irradiance: a surface that faces all lights and the brightest sky [-].
+    """Return an upper bound of irradiance [-].
 
-    scene : scene that has the suns of its environment among its lights
+    The bound is the irradiance of a surface that faces every light and the brightest part of the environment.
+
+    scene : scene whose lights include the suns of its environment
     """
     environment = environment_map.peak_irradiance * scene.environment.exposure if scene.environment else 0.0
     return environment + sum(max(light.irradiance) for light in scene.lights)

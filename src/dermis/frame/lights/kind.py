@@ -1,4 +1,4 @@
-"""Interface of a kind of light in the frame; the shader is the WGSL file beside the module of the kind."""
+"""Interface of a kind of light in the frame; each kind is a module with a WGSL file beside it."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ L = TypeVar("L", bound=Light)
 class Kind(Generic[L]):
     """Kind of light in the frame; this base class is a punctual light that sets no further shader members.
 
-    The shader has the name of the module with the suffix .wgsl. With NAME as in scene files, but with
-    underscores for hyphens, it defines
+    The shader has the name of the module, with the suffix .wgsl. It defines the following function, where
+    NAME is the name of the kind in scene files, with hyphens replaced by underscores:
 
         fn NAME_incident(light: Light, p: vec3f, part: u32) -> Incident
 
     Attributes
     ----------
     always : bool
-        Whether all shaders include this kind of light; other kinds are compiled only for scenes with them.
+        Whether all shaders include this kind of light; if False, only shaders of scenes that use it do.
     punctual : bool
         Whether all light comes from one position or from one direction; False for area lights.
     round : bool
-        Whether the shape seen from the head is a disc instead of a rectangle.
+        Whether the light appears as a disc from the head, instead of as a rectangle.
     sheet : bool
-        Whether irradiance is a Gaussian along the shader member `half_u`, so that blurs of it are exact.
+        Whether irradiance is a Gaussian along the shader member `half_u`, so that it can be blurred exactly.
 
     Examples
     --------
@@ -113,7 +113,7 @@ class Kind(Generic[L]):
         Returns
         -------
         dict
-            Values by the names of the members.
+            Dictionary from the name of a member to its value.
         """
         return {}
 
@@ -153,7 +153,7 @@ def override_name(kind_name: str) -> str:
 
 
 def light_shaders() -> list[ShaderListMember]:
-    """Return the shaders of all kinds of lights, which lights.wgsl includes and numbers in this order."""
+    """Return the shaders of all kinds of lights, in the order that lights.wgsl numbers them."""
     return [
         ShaderListMember(
             name, kind.shader, (("override", override_name(name)), ("always", str(kind.always).lower()))

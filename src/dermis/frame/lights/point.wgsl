@@ -1,4 +1,4 @@
-// Point light; it falls off with the square of the distance.
+// Point light, whose irradiance falls with the square of the distance.
 
 fn point_incident(light: Light, p: vec3f, part: u32) -> Incident {
     let d = light.position - p;

@@ -39,7 +39,7 @@ _SUN_SHADOW_RAY_COUNT = 32  # shadow rays to a sun
 
 
 def light_shader_constants() -> dict[str, float]:
-    """Return the values that `//#fill` lines insert in lights.wgsl and soft_shadows.wgsl, by name."""
+    """Return the named values that `//#fill` lines insert into lights.wgsl and soft_shadows.wgsl."""
     return {"max_lights": _MAX_LIGHTS, "max_rays": _SHADOW_RAY_COUNT, "min_rays": _MIN_SHADOW_RAY_COUNT}
 
 
@@ -62,7 +62,7 @@ def sun_lights(suns: tuple[Sun, ...], environment: Environment) -> tuple[Directi
 
 
 def light_constants(scene: Scene) -> tuple[tuple[str, int], ...]:
-    """Return the pipeline constants of lighting.wgsl that enable what the scene's lights and skin need."""
+    """Return the pipeline constants of lighting.wgsl that a scene's lights and skin need."""
     each = [(KINDS[light.kind], light) for light in scene.lights]
     used_kinds = sorted({light.kind for kind, light in each if not kind.always})
     flags = {
@@ -75,9 +75,9 @@ def light_constants(scene: Scene) -> tuple[tuple[str, int], ...]:
 
 
 def oblique_constants(constants: Constants) -> Constants:
-    """Return `constants`, plus the constant that enables oblique incidence if HALF_SPACE is among them.
+    """Return `constants`; if they contain HALF_SPACE, add the constant that enables oblique incidence.
 
-    Only passes that know the shape of the surface around a point may use the result.
+    The result is only for passes that know the shape of the surface around a point.
     """
     return (*constants, ("OBLIQUE", 1)) if ("HALF_SPACE", 1) in constants else constants
 
@@ -88,7 +88,7 @@ def light_part_counts(scene: Scene) -> tuple[int, ...]:
 
 
 def light_shadow_views(scene: Scene, outline: Outline, map_side: int) -> list[ShadowView | None]:
-    """Return the view of the shadow map of each part of each light, None for lights without shadows.
+    """Return, for each part of each light, the view of the shadow map, None for lights without shadows.
 
     outline : outline of the head's shape
     map_side : side of the shadow maps [texels]
@@ -124,7 +124,7 @@ def light_records(
 ) -> UniformRecord:
     """Return the uniform record `Lights` of all lights of the scene.
 
-    shadow_views : view of the shadow map of each part of each light, from `light_shadow_views`
+    shadow_views : result of `light_shadow_views`
     """
     record = program.record("Lights", sample_points=light_sample_points())
     lights = record["light"]
@@ -142,9 +142,10 @@ def light_records(
 
 @cache
 def light_sample_points() -> Floats:
-    """Return evenly spread sample points of area lights, (64, 4) from -1 to 1 [Roberts2018].
+    """Return 64 evenly spread sample points of area lights, (64, 4) [Roberts2018].
 
-    Columns are x and y on the unit disc, then x and y on the square.
+    A row holds the coordinates x and y of a point on the unit disc, then x and y of a point on the square
+    from -1 to 1.
     """
     even = (0.5 + np.arange(_SHADOW_RAY_COUNT)[:, None] * [0.7548776662, 0.5698402910]) % 1.0
     phi = 2.0 * np.pi * even[:, 1]
@@ -155,7 +156,8 @@ def light_sample_points() -> Floats:
 def _light_members(light: Light, centre: Triple, view: ShadowView | None, part_count: int) -> Members:
     """Return the members of the shader struct `Light`; members that are left out are 0.
 
-    part_count : number of parts into which the light is divided, this part included
+    light : light, or one part of a divided light
+    part_count : number of parts of the light, 1 if it is not divided
     """
     kind, parallel = KINDS[light.kind], isinstance(light, DirectionalLight)
     distance, texel, position = 1.0, 1.0, (0.0, 0.0, 0.0)

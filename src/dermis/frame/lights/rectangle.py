@@ -19,7 +19,7 @@ class _Rectangle(Kind[RectangleLight]):
     round = False
 
     def parts(self, light: RectangleLight) -> list[Light]:
-        """Divide the rectangle into at most 3 x 3 parts no wider or higher than 0.35 of the distance."""
+        """Divide the rectangle into at most 3 x 3 parts, preferably with sides below 0.35 of the distance."""
         path = vector_between(light.position, light.target)
         distance = math.hypot(*path)
         columns, rows = (_part_count(side, distance) for side in (light.width_mm, light.height_mm))
@@ -57,7 +57,10 @@ KIND = _Rectangle()
 
 
 def _part_count(side_mm: float, distance_mm: float) -> int:
-    """Return the number of parts along one side of a rectangle, seen from a distance."""
+    """Return the number of parts along one side of a rectangle.
+
+    side_mm : length of the side [mm]
+    distance_mm : distance from the rectangle to its target [mm]"""
     return min(max(math.ceil(side_mm / (_MAX_PART_SIDE_PER_DISTANCE * distance_mm)), 1), _MAX_PARTS_PER_SIDE)
 
 
@@ -67,7 +70,7 @@ def facing_irradiance(width_mm: float, height_mm: float, distance_mm: float) -> 
     width_mm, height_mm : sides of the rectangle [mm]
     distance_mm : distance of the point from the centre [mm]
 
-    Source: the view factor of a corner, [Baum1989].
+    Source: [Baum1989], for the four quarters of the rectangle, which have a corner opposite the point.
     """
     a, b = 0.5 * width_mm / distance_mm, 0.5 * height_mm / distance_mm
     across, along = math.hypot(1.0, a), math.hypot(1.0, b)

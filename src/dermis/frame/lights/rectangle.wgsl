@@ -1,4 +1,4 @@
-// Uniform rectangle, sampled by Lambertian points at the centres of its parts.
+// Uniform rectangle, divided into parts that are each replaced by a Lambertian point light at the centre of the part.
 
 fn rectangle_incident(light: Light, p: vec3f, part: u32) -> Incident {
     let position = part_centre(part, light.side);

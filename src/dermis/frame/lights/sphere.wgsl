@@ -1,5 +1,5 @@
-// Uniform sphere: directions of equal projected solid angle in its cone, by the concentric map from the square to the
-// disc [ShirleyChiu1997]. Their total irradiance is exact for surfaces that see the whole sphere.
+// Uniform sphere, sampled by directions of equal projected solid angle in the cone of the sphere; the concentric map from the
+// square to the disc distributes them [ShirleyChiu1997]. The total irradiance is exact for surfaces that see the whole sphere.
 
 fn sphere_incident(light: Light, p: vec3f, part: u32) -> Incident {
     let d = light.position - p;

@@ -1,4 +1,4 @@
-// Sheet of parallel light: a Gaussian across it, 1/e^2 at its edges, and constant along it.
+// Sheet of parallel light: its irradiance is constant along the sheet, and a Gaussian across it, which is 1/e^2 at the edges.
 
 const STRIPE_VARIANCE: f32 = 0.25; // relative to the square of the half width
 

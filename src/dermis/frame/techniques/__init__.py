@@ -1,1 +1,1 @@
-"""Scattering techniques: one Python module for each, with its shaders beside it."""
+"""Scattering techniques: one Python module for each technique, with its shaders beside the module."""

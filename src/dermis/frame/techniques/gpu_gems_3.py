@@ -34,7 +34,7 @@ TexturePair = tuple[TextureOrView, TextureOrView]
 class StretchedLevels(PyramidLevels):
     """Pyramid levels with textures for a stretch map that is blurred together with the light.
 
-    stretch : blurred stretch map, and the map that is blurred along u only
+    stretch : blurred stretch map, and the stretch map that is blurred only along u
     """
 
     stretch: TexturePair | None = None
@@ -60,7 +60,7 @@ class GpuGems3(AtlasTechnique):
         return float(TEXEL_FORMAT_BYTES[HALF_TEXEL_FORMAT] * (levels + 4))
 
     def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
-        """Return how often the resolution of each level is halved: never, all levels have full resolution."""
+        """Return 0 for each level, because all levels have full resolution."""
         return (0,) * (len(split.blurred_mm2) + 1)
 
     def blur_levels(self, graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blur) -> None:
@@ -108,7 +108,7 @@ class GpuGems3(AtlasTechnique):
         into: TexturePair,
         side: int,
     ) -> None:
-        """Declare one blur pass, which writes a texture of light and one of the stretch map.
+        """Declare one blur pass, which writes blurred light and the blurred stretch map.
 
         bound : resources that the shader reads
         into : textures for blurred light and for the blurred stretch map

@@ -1,4 +1,4 @@
-// Blur of light and of the stretch map along one axis as published in 2007, with its known flaws.
+// Blur of light and of the stretch map along one axis as published in 2007, including its known flaws.
 //#include "gpu_gems_3_taps.wgsl"
 
 @group(0) @binding(4) var blurred: texture_storage_2d<rgba16float, write>;

@@ -26,11 +26,11 @@ class OneBlur(TextureSpace):
         return AtlasTechnique.split(self, profile, normalise)
 
     def relights_narrowest(self, profile: GaussianSum) -> bool:
-        """Return whether unblurred light replaces the narrowest Gaussian: False, as all light is blurred."""
+        """Return False: no unblurred light replaces the narrowest Gaussian, because all light is blurred."""
         return False
 
     def stretch(self, settings: Settings) -> str:
-        """Return the stretch correction, "none": blurs assume the same texel density over the whole map."""
+        """Return the stretch correction "none": blurs assume the same texel density over the whole map."""
         return "none"
 
 

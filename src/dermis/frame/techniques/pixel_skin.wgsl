@@ -1,4 +1,4 @@
-// Skin of all samples of a pixel.
+// Combines the skin in all samples of a pixel.
 
 const MAX_SLOPE: f32 = 4.0; // largest ratio of a change of depth to the width within one surface
 const MAX_STEP: f32 = 2.0; // step in depth that light below the skin can cross [mm]

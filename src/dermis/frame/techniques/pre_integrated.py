@@ -34,8 +34,8 @@ _MAX_PENUMBRA_MM = 8.0
 class PreIntegratedTables(TechniqueResources):
     """Tables of scattered light for a profile, which the shading pass reads.
 
-    table : texture with the rows of `sphere_table`, then one row of `shadow_edge_row` for each width of
-        shadow filter
+    table : texture with the rows of `sphere_table`, followed by a result of `shadow_edge_row` for each of
+        several widths of the shadow filter
     penumbra_width_mm : distance over which light scatters across the edge of a shadow [mm]
     relief_mm : (3,) standard deviations of the Gaussians that smooth the relief for red, green and blue [mm]
     """
@@ -46,7 +46,7 @@ class PreIntegratedTables(TechniqueResources):
 
 
 class PreIntegratedSkin(Technique):
-    """Scattering that is read from tables: by the curvature of the surface, and across shadow edges."""
+    """Scattering that is read from tables: one for curved surfaces, and one for the edges of shadows."""
 
     sources = ("Penner2011",)
     needs_curvature = True
@@ -95,12 +95,13 @@ def pre_integrate(device: Device, profile: GaussianSum) -> PreIntegratedTables:
 
 
 def sphere_table(profile: GaussianSum) -> Floats:
-    """Return max(N.L, 0) after scattering on spheres, (n, m, c): rows by curvature, columns by N.L [-].
+    """Return the irradiance max(N.L, 0) after scattering on spheres, (n, m, c) [-].
 
-    N is the normal and L the direction to the light; N.L is from -1 to 1, curvature from 0 to
-    `MAX_CURVATURE_PER_MM`. Light spreads by straight distance: on a sphere of radius r, a Gaussian of
-    variance v is exp(r^2/v (cos a - 1)) at the central angle a, normalised over the sphere. [Penner2011]
-    integrates around a ring instead, which does not conserve energy.
+    N is the normal and L the direction to the light. The n rows are for curvatures from 0 to
+    `MAX_CURVATURE_PER_MM`, the m columns for N.L from -1 to 1. How far light spreads depends on straight
+    distance: on a sphere of radius r, a Gaussian of variance v is exp(r^2/v (cos a - 1)) at the central angle
+    a, normalised over the sphere. [Penner2011] integrates around a ring instead, which does not conserve
+    energy.
     """
     cosines = np.linspace(-1.0, 1.0, _COSINE_COUNT)
     rows = [np.repeat(np.maximum(cosines, 0.0)[:, None], len(profile.albedo), axis=1)]
@@ -112,7 +113,9 @@ def sphere_table(profile: GaussianSum) -> Floats:
 
 
 def scattered_cosine(cosines: ArrayLike, concentration: float) -> Floats:
-    """Return max(N.L, 0) convolved on the sphere with exp(k cos a), normalised; a is the central angle [-].
+    """Return max(N.L, 0) convolved on the sphere with the normalised kernel exp(k cos a) [-].
+
+    The angle a is the angle at the centre of the sphere.
 
     cosines : values of N.L at which the result is evaluated [-]
     concentration : k, the squared radius of the sphere divided by the variance of the Gaussian [-]
@@ -132,9 +135,9 @@ def scattered_cosine(cosines: ArrayLike, concentration: float) -> Floats:
 
 
 def shadow_edge_row(profile: GaussianSum, radius_mm: float, half_width_mm: float = 0.0) -> Floats:
-    """Return light after scattering across a straight shadow edge, (m, c) from dark to lit [-].
+    """Return the light scattered across a straight shadow edge, at m points from dark to lit, (m, c) [-].
 
-    radius_mm : distance from the edge of the first and of the last entry [mm]
+    radius_mm : distance of the first point and of the last point from the edge [mm]
     half_width_mm : half width of the tent filter that already softens the edge [mm]
     """
     kernel = preintegrated_kernel(profile)
@@ -158,7 +161,7 @@ def penumbra_width_mm(profile: GaussianSum) -> float:
 def half_light_sigma_mm(profile: GaussianSum) -> Floats:
     """Return the (c,) standard deviations of Gaussians with the profile's half-light radii [mm].
 
-    The half-light radius is that within which half of the light emerges.
+    The half-light radius is the radius within which half of the light emerges.
     """
     radius = np.geomspace(1e-3, 100.0, 2048)
     within = profile.energy_within(radius) / profile.albedo

@@ -1,5 +1,5 @@
-// Scattered light on curved skin and across shadow edges from tables of the profile [Penner2011]: `scattered` is the texture
-// of the tables, `shade.pre` has their scales.
+// Light scattered on curved skin and across shadow edges, from tables of the profile [Penner2011]: `scattered` is the texture
+// of the tables, and `shade.pre` contains their scales.
 
 override PRE_INTEGRATED: bool = false;
 

@@ -1,4 +1,5 @@
-// Picture of skin with screen-space scattering: diffused light times its transmittance, plus the other light.
+// Picture of skin with screen-space scattering: diffused light times its transmittance towards the camera, plus all other
+// light.
 
 @group(0) @binding(0) var surface: texture_2d<f32>; // light that does not scatter; alpha is coverage
 @group(0) @binding(1) var subsurface: texture_2d<f32>; // light below the skin, diffused

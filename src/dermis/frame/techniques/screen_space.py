@@ -38,14 +38,15 @@ _KERNEL_ENTRY_COUNT = 256
 
 @dataclass(frozen=True, eq=False)
 class SubsurfaceLayers(TechniqueResources):
-    """Textures of the light below the skin in the picture, and textures needed to diffuse this light.
+    """Textures of the subsurface light in the picture, and textures with which this light is diffused.
 
-    layers : light below the skin with its depth [mm], and the fraction of this light that leaves towards the
-        camera
-    subsurface, transmittance : views of these two layers
-    scratch : light that is diffused along rows but not yet along columns
-    result : finished picture, None for outputs, which need only the light below the skin
-    kernel : kernel of the profile, None for outputs, which use the kernel of the picture
+    layers : texture of two layers: subsurface light, with the depth of the surface [mm] as alpha; and the
+        fraction of this light that leaves towards the camera
+    subsurface : view of the first layer
+    transmittance : view of the second layer
+    scratch : texture for light that is diffused along rows, but not yet along columns
+    result : texture of the finished picture, None for outputs, which need only the subsurface light
+    kernel : kernel of the profile, None for outputs, which are diffused with the kernel of the picture
     """
 
     layers: Texture
@@ -58,7 +59,7 @@ class SubsurfaceLayers(TechniqueResources):
 
 @dataclass(frozen=True, eq=False)
 class Kernel:
-    """Diffusion kernel, integrated from 0 to a distance, as a texture over the square root of the distance.
+    """Texture of the integrals of the diffusion kernel from 0 to several distances, see `kernel_table`.
 
     reach_mm : distance of the last entry [mm]
     """
@@ -68,7 +69,7 @@ class Kernel:
 
 
 class ScreenSpace(Technique):
-    """Technique that diffuses the light below the skin over the pixels of the picture [Jimenez2015]."""
+    """Technique that diffuses subsurface light over the pixels of the picture [Jimenez2015]."""
 
     sources = ("Jimenez2015",)
     shade_constants = (("SPLIT", 1),)
@@ -85,11 +86,11 @@ class ScreenSpace(Technique):
         return memo.get(make_subsurface_layers, device, settings.size, False, caller_name="outputs")
 
     def subsurface_layers(self, resources: TechniqueResources | None) -> Texture | None:
-        """Return texture layers: light below the skin, and its fraction that leaves towards the camera."""
+        """Return the texture of subsurface light, which is `SubsurfaceLayers.layers`."""
         return resources.layers if isinstance(resources, SubsurfaceLayers) else None
 
     def finish(self, graph: Graph, inputs: FrameInputs, radiance: Texture) -> Texture:
-        """Declare the passes that diffuse the light below the skin, and return the finished picture."""
+        """Declare the passes that diffuse the subsurface light, and return the finished picture."""
         layers = inputs.resources.technique
         assert isinstance(layers, SubsurfaceLayers) and layers.kernel is not None
         return draw(graph, layers, layers.kernel, inputs.window, radiance)
@@ -115,7 +116,7 @@ TECHNIQUE = ScreenSpace()
 def make_subsurface_layers(
     device: Device, picture_size: tuple[int, int], with_result: bool = True
 ) -> SubsurfaceLayers:
-    """Create the textures for a picture of size (width, height), without a kernel.
+    """Create the textures of `SubsurfaceLayers` for a picture of size (width, height), without a kernel.
 
     with_result : whether a texture for the finished picture is needed
     """
@@ -138,7 +139,7 @@ def draw(
     """Declare the passes that diffuse the light of `layers`, and return the finished picture.
 
     window : rectangle of the image plane that the picture shows
-    surface_light : shaded picture without the light below the skin
+    surface_light : shaded picture without the subsurface light
     """
     assert layers.result is not None
     draw_blur(graph, layers, kernel, window)
@@ -180,7 +181,7 @@ def draw_blur(graph: Recorder, layers: SubsurfaceLayers, kernel: Kernel, window:
 def kernel_table(kernel: SeparableKernel) -> tuple[NDArray[np.float64], float]:
     """Return (1, n, 4) integrals of the kernel from 0 to each of n distances, and the last distance [mm].
 
-    Distances are evenly spaced in their square root.
+    The square roots of the distances are evenly spaced.
     """
     reach = _kernel_reach_mm(kernel)
     fractions = kernel.half_line_integral(reach * np.linspace(0.0, 1.0, _KERNEL_ENTRY_COUNT) ** 2)
@@ -189,7 +190,7 @@ def kernel_table(kernel: SeparableKernel) -> tuple[NDArray[np.float64], float]:
 
 
 def _kernel_reach_mm(kernel: SeparableKernel) -> float:
-    """Return the distance beyond which each channel has at most 0.05 % of its light per side [mm]."""
+    """Return the distance beyond which at most 0.05 % of a channel's light lies on either side [mm]."""
     distance = np.geomspace(_MIN_KERNEL_REACH_MM, _MAX_KERNEL_REACH_MM, 4096)
     beyond = (0.5 - kernel.half_line_integral(distance)).max(axis=1) > _MAX_TAIL_FRACTION
     return float(distance[min(int(beyond.sum()), len(distance) - 1)])

@@ -1,4 +1,4 @@
-// Separable kernel along one axis: diffuses light below the skin along the rows or columns of the picture [Jimenez2015].
+// Separable diffusion kernel along one axis: diffuses subsurface light along the rows or columns of the picture [Jimenez2015].
 
 override AXIS: u32 = 0u; // 0 along rows, 1 along columns
 

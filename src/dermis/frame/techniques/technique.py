@@ -1,4 +1,4 @@
-"""Base classes of scattering techniques: one without scattering, and one that diffuses over the atlas."""
+"""Base classes of scattering techniques: one without scattering, one that diffuses light over the atlas."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _RELIT_VARIANCE_MM2 = 0.1**2
 
 
 class Technique(TechniqueTraits):
-    """Technique by which light scatters below the skin; in this base class all light leaves where it enters.
+    """Technique that computes subsurface scattering; in this base class, all light leaves where it enters.
 
     The name of a technique is its key in `dermis.scene.techniques.TECHNIQUES`.
 
@@ -52,25 +52,27 @@ class Technique(TechniqueTraits):
         """Create the textures of the blur pyramid, minimal for techniques that blur no light over the atlas.
 
         side : side of the atlas [texels]
-        halvings : how often the resolution of each level is halved, for each layout
+        halvings : for each layout, the number of times that the resolution of each level is halved
         """
         return make_levels(device, side, halvings, FLOAT_TEXEL_FORMAT)
 
     def make_sum(self, device: Device, side: int) -> Texture:
-        """Create the texture for the exitance of scattered light, side x side texels."""
+        """Create the texture for the exitance of scattered light, of side x side texels."""
         return combine.make_blur_sum(device, side)
 
     def add_intermediate_levels(
         self, split: ProfileSplit, atlas: AtlasTextures, edge: str
     ) -> tuple[ProfileSplit, tuple[int, ...]]:
-        """Insert Gaussians of weight 0 that make blurs cheaper (here none); return the split and new levels.
+        """Insert Gaussians of weight 0 that make blurs cheaper; return the new split and the inserted levels.
+
+        In this base class, no Gaussians are inserted.
 
         edge : filter mode at the edges of charts
         """
         return split, ()
 
     def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
-        """Return how often the resolution of each level is halved, starting with the unblurred level.
+        """Return how many times the resolution of each level is halved; level 0 is the unblurred light.
 
         edge : filter mode at the edges of charts
         """
@@ -85,7 +87,7 @@ class Technique(TechniqueTraits):
     def make_subsurface_layers(
         self, memo: Memo, device: Device, settings: Settings
     ) -> TechniqueResources | None:
-        """Return textures for outputs of the light below the skin, None for techniques that need none."""
+        """Return textures in which subsurface light is diffused for outputs, None if none are needed."""
         return None
 
     def write_view_record(
@@ -98,7 +100,7 @@ class Technique(TechniqueTraits):
         """
 
     def subsurface_layers(self, resources: TechniqueResources | None) -> Texture | None:
-        """Return the texture to which shading writes light below the skin, None if it goes to the picture."""
+        """Return the texture to which shading writes subsurface light, None to add it to the picture."""
         return None
 
     def scatter(self, graph: Graph, inputs: FrameInputs) -> Texture:
@@ -146,9 +148,10 @@ class AtlasTechnique(Technique):
         return bool(profile.variance_mm2[0] <= _RELIT_VARIANCE_MM2)
 
     def split(self, profile: GaussianSum, normalise: bool) -> ProfileSplit:
-        """Split a profile into the narrow Gaussian that is relit, if any, and the Gaussians that blur.
+        """Split a profile into the narrow Gaussian that is relit (if any) and the Gaussians that blur.
 
-        normalise : whether the weights of each channel sum to 1, so that only the colour map sets the albedo
+        normalise : whether to scale the weights of each channel to a sum of 1, so that only the colour map
+            sets the albedo
         """
         profile = self.gaussians(profile)
         weight = channel_weights(profile, normalise)
@@ -162,14 +165,14 @@ class AtlasTechnique(Technique):
         return make_levels(device, side, halvings, level_format(device))
 
     def texel_bytes(self, levels: int) -> float:
-        """Return the peak memory per atlas texel on a software adapter, with temporary textures [bytes]."""
+        """Return the peak memory per texel on a software adapter, including temporary textures [bytes]."""
         mips = sum(0.25**halving for halving in range(MAX_ATLAS_HALVINGS + 1))
         return TEXEL_FORMAT_BYTES[FLOAT_TEXEL_FORMAT] * (
             levels + 2 * mips
         )  # upper bound, as if no level were halved
 
     def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
-        """Return how often the resolution of each level is halved, starting with the unblurred level.
+        """Return how many times the resolution of each level is halved; level 0 is the unblurred light.
 
         edge : filter mode at the edges of charts
         """
@@ -177,7 +180,7 @@ class AtlasTechnique(Technique):
         return choose_halvings(split.blurred_mm2, atlas.median_texels_per_mm, max_halvings)
 
     def scatter(self, graph: Graph, inputs: FrameInputs) -> Texture:
-        """Declare the passes that compute, blur and sum the light of each layout, and blend two layouts."""
+        """Declare the passes that compute, blur and sum the light of each layout and blend two layouts."""
         resources = inputs.resources
         levels, layouts, mixture = resources.diffusion.levels, inputs.layouts, resources.diffusion.mixture
         if not inputs.blurs:
@@ -221,7 +224,7 @@ class AtlasTechnique(Technique):
         thin: Translucency | None,
         into: TextureOrView,
     ) -> None:
-        """Declare the passes that sum the blurred levels as exitance, light through thin parts included.
+        """Declare the passes that sum the blurred levels as exitance, including light through thin parts.
 
         thin : resources of the light through thin parts, None if no light crosses thin parts
         into : texture for the exitance
@@ -239,11 +242,11 @@ class AtlasTechnique(Technique):
         layout: int,
         into: Texture,
     ) -> None:
-        """Declare the passes that add the other profiles of a mixture to the exitance of the first.
+        """Declare the passes that add the other profiles of a mixture to the exitance of the first profile.
 
-        Transport is reciprocal: light from y leaves at x as much as light from x leaves at y. So each
-        Gaussian has the weight (w(x) + w(y)) / 2, where w is the blend weight, x the exit point and y the
-        entry point.
+        Light transport is reciprocal: the fraction of light from y that leaves at x equals the fraction from
+        x that leaves at y. Therefore each Gaussian has the weight (w(x) + w(y)) / 2, where w is the blend
+        weight, x the exit point and y the entry point.
 
         layout : index of the atlas layout
         into : texture for the exitance

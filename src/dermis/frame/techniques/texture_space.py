@@ -27,7 +27,8 @@ class TextureSpace(AtlasTechnique):
     def split(self, profile: GaussianSum, normalise: bool) -> ProfileSplit:
         """Split a profile into relit and blurred Gaussians; `fine` corrects light that varies within a texel.
 
-        normalise : whether the weights of each channel sum to 1, so that only the colour map sets the albedo
+        normalise : whether to scale the weights of each channel to a sum of 1, so that only the colour map
+            sets the albedo
         """
         split = super().split(profile, normalise)
         relit_mm2 = float(profile.variance_mm2[0]) if self.relights_narrowest(profile) else 0.0

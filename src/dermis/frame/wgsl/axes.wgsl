@@ -1,4 +1,4 @@
-// Two unit vectors orthogonal to a third one and to each other. Source: [Duff2017].
+// Two unit vectors that are orthogonal to a given unit vector and to each other. Source: [Duff2017].
 
 fn beside(w: vec3f) -> mat2x3f {
     let s = select(-1.0, 1.0, w.z >= 0.0);

@@ -1,4 +1,4 @@
-// Index of an invocation in a grid of workgroups over a long list.
+// Index into a list for an invocation in a grid of workgroups.
 
 const EACH: u32 = 64u; // invocations of a workgroup
 

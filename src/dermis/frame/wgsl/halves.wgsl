@@ -1,4 +1,5 @@
-// Floats rounded to the nearest half floats. Some adapters truncate when they store halves, and each pass would lose energy.
+// Floats rounded to the nearest half floats. Some adapters truncate when they store half floats, so that each pass would lose
+// energy.
 
 const LARGEST_HALF: f32 = 65504.0;
 

@@ -1,4 +1,4 @@
-// Lights of all kinds: incident light at a point.
+// Lights of all kinds, and the light that arrives from each at a point.
 //#include "axes.wgsl"
 //#include "shadows/shadows.wgsl"
 //#include "shadows/soft_shadows.wgsl"

@@ -1,4 +1,4 @@
-// Light read from a pyramid level, filtered by the sampler or in the shader.
+// Light read from a pyramid level, interpolated by the sampler or in the shader.
 //#if FILTERED_SOURCE
 // Level in a format that all GPUs can filter.
 

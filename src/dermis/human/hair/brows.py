@@ -32,7 +32,8 @@ class SurfacePoints(NamedTuple):
     """Sampled skin points with their normals and tangents.
 
     position_mm, normal : (n, 3) positions [mm] and unit normals
-    derivative_x, derivative_y : (n, 3) derivatives of the position by x and y of the front plane [-]
+    derivative_x, derivative_y : (n, 3) derivatives of the position with respect to x and y of the front plane
+        [-]
     """
 
     position_mm: Doubles
@@ -74,8 +75,10 @@ def _grid_axes() -> tuple[Doubles, Doubles]:
 class BrowSurface:
     """Skin around the brows of a person as a height field, which hairs follow as they grow.
 
-    node_mm, normal : (2 n, 3) nodes of `grid_points` projected onto the skin [mm], and the skin normals at
-        these nodes; first all nodes of the left brow, then all nodes of the right brow, mirrored in x
+    The 2 n nodes are those of the left brow, followed by the mirrored nodes of the right brow.
+
+    node_mm : (2 n, 3) nodes of `grid_points`, projected onto the skin [mm]
+    normal : (2 n, 3) unit normals of the skin at the nodes
     """
 
     def __init__(self, node_mm: Doubles, normal: Doubles) -> None:
@@ -87,9 +90,9 @@ class BrowSurface:
         self._node = np.concatenate([node_mm, normal, *slopes, plane], axis=1)
 
     def sample(self, side: Doubles, x: Doubles, y: Doubles) -> SurfacePoints:
-        """Return the skin at points (n,) of the front plane, which are clamped to the grid.
+        """Return the skin at n points of the front plane; points outside the grid are moved to its border.
 
-        side : (n,) 1 for the left brow, -1 for the right
+        side : (n,) 1 for the left brow, -1 for the right brow
         x, y : (n,) coordinates in the front plane, x outwards from the middle of the face [mm]
         """
         grid = (np.stack([x, y]) - np.array(_GRID_LOW)[:, None]) / _GRID_CELL_MM
@@ -107,10 +110,11 @@ class BrowSurface:
 
 
 def sample_positions(rng: np.random.Generator) -> tuple[Doubles, Doubles, Doubles, Doubles]:
-    """Return random root positions of brow hairs as arrays u, v, x and y (n,).
+    """Return random root positions of n brow hairs as four arrays u, v, x and y (n,).
 
-    u is the position along the brow, 0 to 1 from its inner end, v the position across it, -1 to 1 from the
-    lower to the upper edge, and x and y are coordinates in the front plane of the left brow [mm].
+    The position along the brow, u, runs from 0 at the inner end to 1 at the outer end. The position across
+    the brow, v, is -1 at the lower edge and 1 at the upper edge. The coordinates x and y are those of the
+    left brow in the front plane [mm].
     """
     u = rng.random(4 * _MAX_HAIRS)
     accepted = rng.random(len(u)) < np.interp(
@@ -154,8 +158,10 @@ def hair_count(look: HairLook) -> int:
 def sample_shapes(u: Doubles, v: Doubles, rng: np.random.Generator, look: HairLook) -> Doubles:
     """Return random shape parameters (5, n) of brow hairs.
 
-    The rows are the angle of the hair at its root, measured in the front plane from outwards to upwards, the
-    change of this angle along the hair [rad], the length, the height above the skin and the root radius [mm].
+    The five rows are: the angle of the hair at its root [rad], the change of this angle from root to tip
+    [rad], the length of the hair [mm], its height above the skin [mm], and its radius at the root [mm]. The
+    angle is measured in the front plane; it is 0 for a hair that points outwards and pi / 2 for a hair that
+    points up.
 
     u, v : (n,) positions along and across the brow, from `sample_positions`
     """

@@ -35,10 +35,9 @@ _MIN_BEARD = 0.02  # zone amount above which quads may have a beard
 class HairDensity(NamedTuple):
     """Relative density of scalp hair or beard over the skin.
 
-    relative : function that returns the relative density (n,), 0 to 1, at points (n, 4): position on the
-        average person, and distance inside the border of the lips [mm]
-    candidates : (p,) mask of control points near hair; quads without such a point are skipped, as no hair
-        grows there
+    relative : function from points (n, 4) to their relative density (n,), 0 to 1; the columns of the points
+        are a position on the average person and the distance inside the border of the lips [mm]
+    candidates : (p,) mask of the control points near hair; no hair grows on quads without such a point
     """
 
     relative: Callable[[Doubles], Doubles]
@@ -48,7 +47,7 @@ class HairDensity(NamedTuple):
 def sample_roots(mesh: Mesh, density: HairDensity, per_cm2: float, rng: np.random.Generator) -> Roots:
     """Return random, evenly distributed hair roots, ordered by quad.
 
-    No hair grows on ears, on lips and in the mouth.
+    No hair grows on the ears, on the lips or in the mouth.
 
     mesh : control mesh of the person
     density : relative density over the skin
@@ -94,7 +93,14 @@ def hairline_waves(points: Doubles) -> Doubles:
 
 
 def zone_amounts(name: str, recession: float, points: Doubles) -> Doubles:
-    """Return the change (n,) of an amount, such as that of hair, by all zones that a recession changes."""
+    """Return the change (n,) in an amount, such as hair density, that receding hair causes at points.
+
+    The change is the sum over those Gaussian zones of the face that depend on the recession.
+
+    name : one of `ZONE_AMOUNTS`
+    recession : recession of the hairline, 0 to 1, see `SkinLook`
+    points : (n, 3 or more) positions on the average person [mm]
+    """
     column = _amount_column(name)
     receding = zone_table(recession)[:, column] != zone_table()[:, column]
     return _sum_zones(name, zone_table(recession)[receding], points)
@@ -142,13 +148,16 @@ def _beard_amount(points: Doubles) -> Doubles:
 
 
 def smoothstep(low: float, high: float, x: Doubles) -> Doubles:
-    """Return the smooth Hermite transition from 0 at `low` to 1 at `high`."""
+    """Return a smooth Hermite transition of x from 0 at `low` to 1 at `high`."""
     t = np.clip((x - low) / (high - low), 0.0, 1.0)
     return np.asarray(t * t * (3.0 - 2.0 * t))
 
 
 def quad_areas_cm2(control_mesh: Mesh, quad: Index) -> Doubles:
-    """Return the areas (n,) of quads of a control mesh, given by their indices (n,) [cm2]."""
+    """Return the areas (n,) of quads of a control mesh [cm2].
+
+    quad : (n,) indices of the quads
+    """
     corner_points = control_mesh.points_mm.T.take(quad_corners(control_mesh, quad).T, axis=1)
     a, b, c, d = corner_points.swapaxes(0, 1)
     across = cross_columns(c - a, d - b)
@@ -172,7 +181,10 @@ def _sum_zones(name: str, rows: Floats, points: Doubles) -> Doubles:
 
 @cache
 def skin_vertices_near_hair(root_finder: RootFinder) -> Index:
-    """Return the indices of subdivided vertices within reach of brow hairs; `SkinSurface` needs no others."""
+    """Return the indices of the vertices of the subdivided mesh that brow hairs may touch.
+
+    A `SkinSurface` for brow hairs needs only these vertices.
+    """
     from scipy.spatial import cKDTree
 
     brow_points = quad_corners(root_finder.mesh, root_finder.brow_grid_roots.quad)
@@ -189,7 +201,10 @@ def _amount_column(name: str) -> int:
 
 @cache
 def average_points() -> Doubles:
-    """Return the average person's control points (p, 4): position and distance inside the lip border [mm]."""
+    """Return the control points (p, 4) of the average person.
+
+    The columns are the position and the distance inside the border of the lips [mm].
+    """
     points_mm, distances = average_surface()
     lips = distances[:, BORDER_FIELDS.index("lips")]
     return np.asfortranarray(np.column_stack([points_mm, lips]), np.float64)

@@ -94,7 +94,7 @@ def _grow_lashes(
 
 
 def _split_group(group: HairGroup, counts: list[int]) -> Iterator[HairGroup]:
-    """Yield consecutive slices of a hair group; `counts` are their numbers of hairs."""
+    """Yield consecutive slices of a hair group; `counts` holds the number of hairs in each slice."""
     for end, count in zip(np.cumsum(counts).tolist(), counts, strict=True):
         part = slice(end - count, end)
         roots = Roots(group.roots.quad[part], group.roots.position[part])
@@ -115,7 +115,8 @@ def _hair_group(
 def _join_groups(groups: list[HairGroup], absorption: Doubles) -> Strands:
     """Return the strands of several hair groups as one object.
 
-    absorption : (n, 3) absorption coefficients of single hairs [1/mm]; wider strands get lower coefficients
+    absorption : (n, 3) absorption coefficients of single hairs [1/mm]; a strand that represents several hairs
+        gets a lower coefficient
     """
     roots = _concatenate(group.roots for group in groups)
     knots, radius = (np.concatenate([group[k] for group in groups]) for k in (1, 2))
@@ -130,7 +131,7 @@ def _concatenate(parts: Iterable[Roots]) -> Roots:
 
 
 def _repeat_per_hair(groups: list[HairGroup], name: str) -> Doubles:
-    """Return a scalar field of hair groups, such as "cover", repeated for each hair of its group (n,)."""
+    """Return a scalar field of hair groups, such as "cover", as one value for each hair (n,)."""
     return np.concatenate([np.full(len(group.radius), getattr(group, name)) for group in groups])
 
 

@@ -1,4 +1,4 @@
-"""Guide hairs: curves combed over the mean person, bent by gravity, kept outside the skin and cut."""
+"""Guide hairs: curves that are combed over the mean person, bent by gravity, and cut."""
 
 from __future__ import annotations
 
@@ -39,13 +39,15 @@ _TIE_RADIUS_MM, _TIE_REACH_MM = (
 
 
 class Growth(NamedTuple):
-    """State of growing guides.
+    """State of g guides while they grow.
 
-    root_mm, root_normal : (g, 3) roots on the mean person, and the normals of the skin there
-    position_mm, direction : (g, 3) ends of the guides and unit directions of growth
-    skin_normal, height_mm : (g, 3) normals of the skin below the ends, and (g,) heights above it
-    length_mm : (g,) length so far
-    tied_mm : (g,) length at which the guide passed its tie, infinite before
+    root_mm, root_normal : (g, 3) roots on the mean person [mm], and unit normals of the skin at the roots
+    position_mm : (g, 3) current ends of the guides [mm]
+    direction : (g, 3) unit directions of growth at the ends
+    skin_normal, height_mm : (g, 3) unit normals of the skin below the ends, and (g,) heights of the ends
+        above it [mm]
+    length_mm : (g,) current lengths [mm]
+    tied_mm : (g,) length at which each guide reached the tie of its style [mm]; infinite before that
     """
 
     root_mm: Doubles
@@ -59,7 +61,7 @@ class Growth(NamedTuple):
 
 
 def smoothstep(low: float, high: float, x: Doubles) -> Doubles:
-    """Return the smooth Hermite transition from 0 at `low` to 1 at `high`, in either order."""
+    """Return a smooth Hermite transition of x from 0 at `low` to 1 at `high`; `low` may exceed `high`."""
     t = np.clip((x - low) / (high - low), 0.0, 1.0)
     return np.asarray(t * t * (3.0 - 2.0 * t))
 
@@ -70,9 +72,10 @@ def unit(vectors: Doubles) -> Doubles:
 
 
 def parting_side(points_mm: Doubles, style: Style) -> Doubles:
-    """Return the side (n,) of the parting of points (n, 3): 1 left, -1 right, 0 behind and below it.
+    """Return the side of the parting on which points (n, 3) lie, as an array (n,): 1 left, -1 right.
 
-    The parting runs from the forehead to the whorl and turns to the middle of the head there.
+    Points behind or below the parting get 0. The parting runs back from the forehead to the whorl, where it
+    bends to the middle of the head.
     """
     x, y, z = points_mm.T
     return np.where(
@@ -83,20 +86,20 @@ def parting_side(points_mm: Doubles, style: Style) -> Doubles:
 
 
 def row_of(points_mm: Doubles) -> Doubles:
-    """Return the position (n,) of points across cornrows, in rows."""
+    """Return the position (n,) of points across the cornrows, in multiples of the distance between rows."""
     x, y = points_mm[:, 0], points_mm[:, 1] - _SKULL_CENTRE_MM[1]
     return np.asarray(np.arctan2(x, np.maximum(y, -60.0) + 75.0) * 110.0 / ROW_MM)
 
 
 def fringe_weight(points_mm: Doubles, style: Style) -> Doubles:
-    """Return how much hair with roots at points (n, 3) belongs to the fringe, 0 to 1, as an array (n,)."""
+    """Return how far hair with roots at points (n, 3) belongs to the fringe, as weights (n,) from 0 to 1."""
     if style.fringe_y_mm is None:
         return np.zeros(len(points_mm))
     return smoothstep(-48.0, -34.0, points_mm[:, 2]) * smoothstep(56.0, 44.0, np.abs(points_mm[:, 0]))
 
 
 def _fall(points: Doubles, style: Style) -> Doubles:
-    """Return the directions (n, 3) of hair that falls to both sides of a parting."""
+    """Return the directions (n, 3) of hair that falls to either side of a parting."""
     x, y, z = points.T
     side, top = (
         np.where(x > style.parting_mm * smoothstep(-140.0, -95.0, z), 1.0, -1.0),
@@ -111,21 +114,21 @@ def _fall(points: Doubles, style: Style) -> Doubles:
 
 
 def _back(points: Doubles, style: Style) -> Doubles:
-    """Return the directions (n, 3) of hair combed back, and down at the nape and below the temples."""
+    """Return the directions (n, 3) of hair combed back, and combed down at the nape and below the temples."""
     x, y, z = points.T
     down = np.maximum(smoothstep(60.0, -10.0, y), smoothstep(-100.0, -150.0, z))
     return np.stack([x / 400.0, -0.9 * down, -1.0 + 0.75 * smoothstep(-110.0, -150.0, z)], axis=1)
 
 
 def _spiral(points: Doubles, style: Style) -> Doubles:
-    """Return the directions (n, 3) of uncombed hair: away from the whorl, down at sides and nape."""
+    """Return the directions (n, 3) of uncombed hair: away from the whorl, and downwards at sides and nape."""
     away = points - _WHORL_MM
     low = 70.0 * smoothstep(40.0, -30.0, points[:, 1])
     return np.asarray(away + np.stack([0.0 * low, -low, -0.3 * low], axis=1))
 
 
 def _twist(points: Doubles, style: Style) -> Doubles:
-    """Return the directions (n, 3) of ropes that fall to all sides of the head."""
+    """Return the directions (n, 3) of hair in twisted ropes, which fall to all sides of the head."""
     away = points - np.array([0.0, 100.0, -70.0])
     return np.asarray(away * [1.0, 0.6, 0.9])
 
@@ -140,7 +143,7 @@ def _to_tie(points: Doubles, style: Style) -> Doubles:
 
 
 def _rows(points: Doubles, style: Style) -> Doubles:
-    """Return the directions (n, 3) of cornrows: to the back along curves of equal `row_of`."""
+    """Return the directions (n, 3) of hair in cornrows: backwards along curves of constant `row_of`."""
     x, y, z = points.T
     angle = np.arctan2(x, np.maximum(y - _SKULL_CENTRE_MM[1], -60.0) + 75.0)
     down = smoothstep(-90.0, -150.0, z)
@@ -166,7 +169,7 @@ def body_surface(root_finder: RootFinder, ears: bool = True) -> SkinSurface:
     """Return the skin of the mean person: head, neck and shoulders.
 
     root_finder : root finder of the mean person
-    ears : False puts a smooth surface in place of the ears
+    ears : whether the skin has ears; if False, a smooth surface replaces them
     """
     mesh = root_finder.mean_mesh
     skin = np.unique(mesh.triangles[mesh.material == 0])
@@ -197,13 +200,15 @@ def _quadratic_terms(points: Doubles) -> Doubles:
 
 
 def ear_weight(points: Doubles) -> Doubles:
-    """Return a weight (n,) of points (n, 3): 1 at the middle of an ear, falling smoothly to 0 around it."""
+    """Return weights (n,) of points (n, 3): 1 at the middle of an ear, falling smoothly to 0 away from it."""
     away = (np.abs(points) * [1, 0, 0] + points * [0, 1, 1] - _EAR_CENTRE_MM) / _EAR_SPREAD_MM
     return np.asarray(np.exp(-(away[:, 1:] ** 2).sum(axis=1)))
 
 
 def grow_guides(root_finder: RootFinder, points: Doubles, style: Style) -> tuple[Doubles, Doubles, Doubles]:
-    """Return the knots (g, k, 3), the skin normals below them (g, k, 3) and their heights (g, k) [mm].
+    """Return the knots (g, k, 3) of guides [mm], with skin normals (g, k, 3) and heights (g, k) [mm].
+
+    The normals are those of the skin below the knots, and the heights are measured from this skin.
 
     points : (g, 3) roots on the skin of the mean person [mm]
     """
@@ -231,7 +236,10 @@ def _first_direction(points: Doubles, normals: Doubles, style: Style) -> Doubles
 
 
 def _advance(surface: SkinSurface, state: Growth, step: float, style: Style) -> Growth:
-    """Return the guides after one step of growth [mm]."""
+    """Return the state of guides after one step of growth.
+
+    step : length of the step [mm]
+    """
     direction, length, tied = _steer(state, style), state.length_mm + step, state.tied_mm
     if style.comb == "gather":
         near = (
@@ -265,7 +273,7 @@ def _advance(surface: SkinSurface, state: Growth, step: float, style: Style) -> 
 
 
 def _steer(state: Growth, style: Style) -> Doubles:
-    """Return the unit directions (g, 3) of the next step."""
+    """Return the unit directions (g, 3) in which guides grow in the next step."""
     free = np.minimum(state.length_mm / 60.0, 1.0)[:, None] + 0.15
     pull = 4.0 * style.gravity * free * np.array([0.0, -1.0, 0.0])
     if style.comb in ("gather", "rows", "back"):
@@ -282,7 +290,10 @@ def _steer(state: Growth, style: Style) -> Doubles:
 
 
 def _tie_offsets(state: Growth, style: Style) -> Doubles:
-    """Return the places (g, 3) of guides in the tie, relative to its middle, towards their roots [mm]."""
+    """Return the points (g, 3) where guides pass through the tie of a ponytail, relative to its middle [mm].
+
+    Each guide passes the middle of the tie on the side where its root is.
+    """
     outward = unit(np.array(style.tie_mm) - _SKULL_CENTRE_MM)
     away = tangent_component(
         state.root_mm - np.array(style.tie_mm), np.broadcast_to(outward, state.root_mm.shape)
@@ -292,7 +303,10 @@ def _tie_offsets(state: Growth, style: Style) -> Doubles:
 
 
 def _tail(state: Growth, style: Style, pull: Doubles) -> Doubles:
-    """Return the directions (g, 3) of hair behind its tie: outward, then down and slightly apart."""
+    """Return the directions (g, 3) of hair beyond its tie: outwards, then down and slightly apart.
+
+    pull : (g, 3) vectors of the pull of gravity
+    """
     outward = unit(np.array(style.tie_mm) - _SKULL_CENTRE_MM)[None]
     since = np.maximum(state.length_mm - np.where(np.isfinite(state.tied_mm), state.tied_mm, 0.0), 0.0)[
         :, None
@@ -303,12 +317,18 @@ def _tail(state: Growth, style: Style, pull: Doubles) -> Doubles:
 
 
 def _since_tie(state: Growth, length: Doubles) -> Doubles:
-    """Return the length (g,) of guides behind their tie, 0 before it, at a length from the root [mm]."""
+    """Return the length (g,) of each guide beyond its tie [mm]; 0 for guides that have not reached the tie.
+
+    length : (g,) lengths from the roots [mm]
+    """
     return np.maximum(length - np.where(np.isfinite(state.tied_mm), state.tied_mm, length), 0.0)
 
 
 def _bun(state: Growth, length: Doubles, style: Style) -> Doubles:
-    """Return points (g, 3) of hair that winds around a bun behind its tie, at lengths (g,) [mm]."""
+    """Return points (g, 3) of guides that are wound into a bun beyond their tie [mm].
+
+    length : (g,) lengths from the roots to the points [mm]
+    """
     outward = unit(np.array(style.tie_mm) - _SKULL_CENTRE_MM)
     side = unit(np.cross(outward, [0.0, 1.0, 0.0]))
     up = np.cross(side, outward)
@@ -325,7 +345,7 @@ def _bun(state: Growth, length: Doubles, style: Style) -> Doubles:
 
 
 def _clear_face(points: Doubles) -> Doubles:
-    """Return points (g, 3) moved sideways out of an elliptic cylinder around the face."""
+    """Return points (g, 3) after moving them sideways out of an elliptic cylinder around the face [mm]."""
     x, y, z = points.T
     along = np.clip((z - _FACE_CENTRE_Z) / _FACE_RADII_MM[1], -1.0, 1.0)
     grown = smoothstep(*_FACE_TOP_MM, y) * smoothstep(-40.0, -5.0, z)
@@ -335,7 +355,7 @@ def _clear_face(points: Doubles) -> Doubles:
 
 
 def cut_fractions(knots: Doubles, style: Style) -> Doubles:
-    """Return the fraction (g,) of each guide from its root to where the style cuts it.
+    """Return the fraction (g,) of the length of each guide at which the style cuts it; 1 for uncut guides.
 
     knots : (g, k, 3) knots of the guides on the mean person [mm]
     """
@@ -356,7 +376,13 @@ def cut_fractions(knots: Doubles, style: Style) -> Doubles:
 
 
 def _first_below(knots: Doubles, level: Doubles) -> Doubles:
-    """Return the fraction (g,) of each curve (g, k, 3) at which it first falls below a height (g,) [mm]."""
+    """Return the fraction (g,) of the length of each curve at which it first falls below a height.
+
+    The fraction is 1 for curves that do not fall below the height.
+
+    knots : (g, k, 3) knots of the curves [mm]
+    level : (g,) height for each curve [mm]
+    """
     y = knots[..., 1] - level[:, None]
     crosses = (y[:, 1:] < 0) & (y[:, :-1] >= 0)
     first = crosses.argmax(axis=1)
@@ -370,8 +396,10 @@ def bind_guides(
 ) -> Guides:
     """Return guides whose knots follow the nearest quads of the skin.
 
-    control_mesh, points_mm : control mesh, and its points (p, 3) on the subdivided mean person [mm]
-    knots, heights : (g, k, 3) knots and (g, k) their heights above the skin, see `grow_guides` [mm]
+    control_mesh : control mesh of the mean person
+    points_mm : (p, 3) positions of the control points on the subdivided mean person [mm]
+    knots : (g, k, 3) knots from `grow_guides` [mm]
+    heights : (g, k) heights of the knots above the skin, from `grow_guides` [mm]
     cut : (g,) fractions from `cut_fractions`
     """
     from scipy.spatial import cKDTree
@@ -394,7 +422,12 @@ def bind_guides(
 
 
 def quad_frames(corners_mm: Doubles) -> tuple[Doubles, Doubles]:
-    """Return the middles (q, 3) and frames (q, 3, 3) of quads (q, 4, 3); rows of a frame are its axes."""
+    """Return the centres (q, 3) [mm] and the coordinate frames (q, 3, 3) of quads.
+
+    The rows of a frame are its axes: along the quad, across it, and along its normal.
+
+    corners_mm : (q, 4, 3) corners of the quads [mm]
+    """
     a, b, c, d = corners_mm.swapaxes(0, 1)
     along = unit((b - a) + (c - d))
     normal = np.cross(c - a, d - b)

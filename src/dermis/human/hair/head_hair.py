@@ -1,4 +1,4 @@
-"""Groom of scalp hair and beard: the tables of a style, and the numbers by which a person's hair differs."""
+"""Groom of scalp hair and beard: tables that depend on the style only, and parameters of the person."""
 
 from __future__ import annotations
 
@@ -50,12 +50,13 @@ PART_DTYPE = np.dtype(
 def make_groom(
     look: HairLook, recession: float, root_finder: RootFinder, levels: int, hair_fraction: float = 1.0
 ) -> Groom | None:
-    """Return the scalp hair and beard of a person, None for a bald person without a beard.
+    """Return the scalp hair and beard of a person; None for a bald person without a beard.
 
     recession : recession of the hairline, 0 to 1, see `SkinLook`
     root_finder : root finder of the mean person
     levels : subdivision levels of the person's mesh
-    hair_fraction : fraction of the strands to grow; they are widened by its inverse to keep coverage
+    hair_fraction : fraction of the strands to grow; the strands are widened by the inverse of this fraction,
+        so that coverage stays the same
     """
     scalp, bearded = styles().get(look.style), look.beard_mm > 0.0
     if look.density == 0.0:
@@ -91,9 +92,10 @@ def _part(
     thinning: float = 0.0,
     hairline: float = 0.0,
 ) -> tuple[object, ...]:
-    """Return the numbers of a part of a groom as a row of `PART_DTYPE`.
+    """Return the parameters of one part of a groom, scalp hair or beard, as a row of `PART_DTYPE`.
 
-    densities : possible strands and hairs [1/cm2], and the fraction of the strands that grow
+    densities : number of possible strands per area [1/cm2], number of hairs per area [1/cm2], and fraction of
+        the possible strands that grow
     """
     strands_per_cm2, hairs_per_cm2, density = densities
     hairs_per_strand = hairs_per_cm2 / strands_per_cm2
@@ -134,7 +136,10 @@ def _part(
 
 
 def _knot_count(parameters: NDArray[np.void]) -> int:
-    """Return the number of knots with which all strands of a groom show their length and their curls."""
+    """Return the number of knots per strand that is enough for the length and the curls of all strands.
+
+    parameters : (p,) rows of `PART_DTYPE`
+    """
     lengths, pitches, curls, ropes = (
         parameters[name] for name in ("length_mm", "pitch_mm", "curl_mm", "rope_mm")
     )

@@ -58,7 +58,7 @@ LOWER_LASHES = LashRow(
 
 
 def sample_positions(row: LashRow, rng: np.random.Generator) -> tuple[Doubles, Doubles]:
-    """Return random root positions of lashes: along the edge of the lid and from the edge into the skin.
+    """Return random root positions of lashes along the edge of the lid, and from the edge into the skin.
 
     Both arrays (n,) are coordinates for `RootFinder.lid_edge_roots`, 0 to 1.
     """
@@ -70,11 +70,11 @@ def sample_positions(row: LashRow, rng: np.random.Generator) -> tuple[Doubles, D
 def sample_shapes(row: LashRow, u: Doubles, rng: np.random.Generator, first_clump: int) -> Doubles:
     """Return random shape parameters (7, n) of lashes.
 
-    The rows are the splay [-], the elevations of the first and the last segment [rad], the length and the
-    root radius [mm], the index of the clump that the lash sticks to, and the attraction of its tip to the
-    clump, 0 to 1.
+    The seven rows are: the splay [-], the elevation of the first segment [rad], the elevation of the last
+    segment [rad], the length [mm], the radius at the root [mm], the index of the clump to which the lash
+    sticks, and the attraction of the tip to this clump, 0 to 1.
 
-    u : (n,) positions along the lid's edge, from `sample_positions`
+    u : (n,) positions along the edge of the lid, from `sample_positions`
     first_clump : index of the first clump of this row
     """
     n, fraction = len(u), (u - row.start) / (row.end - row.start)
@@ -92,9 +92,10 @@ def sample_shapes(row: LashRow, u: Doubles, rng: np.random.Generator, first_clum
 def grow_lashes(root_mm: Doubles, eye_mm: Doubles, side: Doubles, shape: Doubles) -> tuple[Doubles, Doubles]:
     """Return the knots (n, k, 3) and radii (n, k) of lashes [mm].
 
-    root_mm, eye_mm : (n, 3) roots on the lids, and for each lash the centre of its eye [mm]
-    side : (n,) 1 for lashes of the left eye, -1 for the right
-    shape : (7, n) shape parameters from `sample_shapes`; each clump must belong to one lid
+    root_mm : (n, 3) roots on the lids [mm]
+    eye_mm : (n, 3) centre of the eye to which each lash belongs [mm]
+    side : (n,) 1 for lashes of the left eye, -1 for lashes of the right eye
+    shape : (7, n) shape parameters from `sample_shapes`; the lashes of a clump must be on the same lid
     """
     splay, first, last, length, radius, clump, pull = shape
     ahead = root_mm - eye_mm
@@ -114,10 +115,11 @@ def grow_lashes(root_mm: Doubles, eye_mm: Doubles, side: Doubles, shape: Doubles
 
 
 def _clump_tips(knots: Doubles, clump: NDArray[np.int64], strength: Doubles, t: Doubles) -> Doubles:
-    """Return knots (n, k, 3) with the tips of the lashes in each clump pulled towards their mean tip.
+    """Return knots (n, k, 3) of lashes whose tips are pulled towards the mean tip of their clump.
 
-    clump, strength : (n,) index of the clump of each lash, and attraction of the lash to the clump, 0 to 1
-    t : (k,) position along the lash, 0 at the root, 1 at the tip
+    clump : (n,) index of the clump of each lash
+    strength : (n,) attraction of each lash to its clump, 0 to 1
+    t : (k,) position of the knots along the lash, from 0 at the root to 1 at the tip
     """
     count = np.maximum(np.bincount(clump), 1)
     mean = np.stack([np.bincount(clump, knots[:, -1, c]) / count for c in range(3)], axis=-1)

@@ -48,14 +48,14 @@ class HairLook:
     density : float
         Density of the hair of the head, 0 to 1; 1 is 200 hairs per cm2 [-].
     curl : float
-        From straight, 0, to tightly coiled, 1 [-].
+        Curl, from 0 (straight) to 1 (tightly coiled) [-].
     fade : float, optional
-        How much shorter hair is at the sides and the nape than on top, 0 to 1; by default that of the style.
-        Styles of hair of equal length have none [-].
+        How much shorter hair is at the sides and the nape than on top, 0 to 1; by default the usual fade of
+        the style. Has no effect in styles that have no fade [-].
     beard_mm : float
         Length of the beard, 0 to 150; 0 for none [mm].
     bushy : float
-        Bushiness of the brows, from 0, sparse and short, to 1, dense and long [-].
+        Bushiness of the brows, from 0 (sparse and short) to 1 (dense and long) [-].
     grey : float
         Fraction of hairs without pigment, 0 to 1 [-].
     eumelanin, pheomelanin : float
@@ -88,9 +88,9 @@ class HairLook:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Replace missing values by those of the style.
+        """Replace a missing length or fade by the usual value of the style.
 
-        Raises DermisError for an unknown style, fields out of range, and hair too long for its style.
+        Raises DermisError for an unknown style, for values out of range, and for hair too long for its style.
         """
         if self.style not in HAIR_STYLES:
             refuse(
@@ -133,7 +133,7 @@ def typical_hair(demographics: Demographics, eumelanin: float, pheomelanin: floa
 def sample_hair(rng: np.random.Generator, demographics: Demographics, typical: HairLook) -> HairLook:
     """Return a random hair look around the typical hair look of a person.
 
-    Styles have the chances of styles.toml, which are chosen, not measured; only men have beards. The order of
+    The probabilities of the styles are artist's values from styles.toml. Only men have beards. The order of
     random draws does not depend on the person.
     """
     n, style_chance, beard_chance = rng.normal(size=4), rng.random(), rng.random()
@@ -156,9 +156,11 @@ def sample_hair(rng: np.random.Generator, demographics: Demographics, typical: H
 
 
 def _style_at(chance: float, man: bool, tight: bool) -> str:
-    """Return the hair style at a position from 0 to 1 along the chances of all styles.
+    """Return the hair style that a uniformly distributed number selects by the probabilities of the styles.
 
-    man, tight : sex of the person, and whether the hair is tightly coiled
+    chance : uniformly distributed number, 0 to 1
+    man : whether the person is a man
+    tight : whether the hair is tightly coiled
     """
     worn = {name: one for name, one in styles().items() if (one.tight if tight else one.loose)}
     chances = np.array([_BALD_CHANCES[man], *(one.men if man else one.women for one in worn.values())])
@@ -174,5 +176,5 @@ def sample_recession(rng: np.random.Generator, demographics: Demographics) -> fl
 
 
 def stubble_visibility(hair: HairLook) -> float:
-    """Return the visibility of shaved hair below the skin: from 0.15 for white hair to 1 for dark hair."""
+    """Return how visible shaved hair is below the skin, from 0.15 for white hair to 1 for dark hair."""
     return min(1.0, 0.15 + (hair.eumelanin + 0.3 * hair.pheomelanin) * (1.0 - hair.grey) / _DARK_EUMELANIN)

@@ -48,7 +48,7 @@ class _LidEdge(NamedTuple):
 
     lengths_mm : (m,) arc length from the first point to each point [mm]
     quad : (m - 1,) index of the adjacent quad of each segment
-    frame : (m - 1, 4, 2) corners of this quad in its own coordinates, 0 to 1: first the two ends of the
+    frame : (m - 1, 4, 2) bilinear coordinates of the corners of this quad, 0 or 1: first the two ends of the
         segment, then the two opposite corners
     """
 
@@ -58,10 +58,10 @@ class _LidEdge(NamedTuple):
 
 
 class RootFinder:
-    """Finder of hair roots on a quad mesh, by position in the front plane or along the edge of a lid.
+    """Finder of hair roots on a quad mesh, from a position in the front plane or along the edge of a lid.
 
     mesh : control mesh
-    points_mm : (p, 3) positions of its control points [mm]
+    points_mm : (p, 3) positions of the control points [mm]
     eyes_mm : (2, 3) centres of the left and the right eye [mm]
     subdivided_mesh : subdivided mesh of the same person
     """
@@ -72,9 +72,9 @@ class RootFinder:
         self._lid_edges: dict[tuple[tuple[int, ...], float], _LidEdge] = {}
 
     def front_roots(self, x: Doubles, y: Doubles) -> tuple[Roots, NDArray[np.bool_]]:
-        """Return the roots at points (n,) of the front plane, and a mask (n,) of points that hit the mesh.
+        """Return the roots at n positions in the front plane, and a mask (n,) of the valid roots.
 
-        Of several triangles at a point, the foremost is taken.
+        Each root is on the foremost triangle at its position. A root is invalid where there is no triangle.
 
         x, y : (n,) coordinates in the front plane [mm]
         """
@@ -108,7 +108,7 @@ class RootFinder:
 
     @cached_property
     def mean_mesh(self) -> Mesh:
-        """Return the control mesh after one subdivision; its first points are the control points."""
+        """Return the control mesh after one level of subdivision; its first points are the control points."""
         return subdivide(self.mesh, 1)[0]
 
     @cached_property
@@ -120,12 +120,12 @@ class RootFinder:
         )[0]
 
     def lid_edge_roots(self, lid: lashes.LashRow, side: float, u: Doubles, across: Doubles) -> Roots:
-        """Return lash roots along a lid's edge, on the adjacent quads of the outer side of the lid.
+        """Return lash roots along the edge of a lid, on the adjacent quads of the outer side of the lid.
 
-        lid : row of lashes whose edge is used
-        side : 1 for the left eye, -1 for the right
-        u : (n,) position along the edge, as a fraction of its arc length
-        across : (n,) distance from the edge into the quad: 0 on the edge, 1 on the opposite side of the quad
+        lid : row of lashes on the lid
+        side : 1 for the left eye, -1 for the right eye
+        u : (n,) positions along the edge, as fractions of its arc length
+        across : (n,) distances from the edge: 0 on the edge, 1 on the opposite side of the adjacent quad
         """
         key = lid.edge_points, side
         if key not in self._lid_edges:
@@ -192,7 +192,11 @@ def _bounding_box(corner: Doubles) -> tuple[Doubles, Doubles]:
 
 
 def _mirrored_points(points_mm: Doubles, index: Index) -> Index:
-    """Return the indices of the points that are mirror images in x of given points of a symmetric head."""
+    """Return for points of a symmetric head the indices of their mirror images in x.
+
+    points_mm : (p, 3) all points of the head [mm]
+    index : indices of the points to mirror
+    """
     from scipy.spatial import cKDTree
 
     return np.asarray(cKDTree(points_mm).query(points_mm[index] * [-1, 1, 1])[1], np.int64)

@@ -17,9 +17,10 @@ _NEIGHBOURS = 6  # vertices whose tangent planes are averaged
 
 
 class SkinSurface:
-    """Smooth skin surface for projections, interpolated from vertices and their normals.
+    """Smooth skin surface onto which points can be projected, interpolated from vertices and their normals.
 
-    positions_mm, normals : (n, 3) points of the surface [mm], and unit normals there
+    positions_mm : (n, 3) vertices [mm]
+    normals : (n, 3) unit normals at the vertices
     """
 
     def __init__(self, positions_mm: NDArray[np.floating], normals: NDArray[np.floating]) -> None:
@@ -66,9 +67,10 @@ class RootFrames:
 
 
 class GrowthSurface:
-    """Surface that hair grows on: the subdivided head with its control mesh.
+    """Surface on which hair grows: the subdivided head with its control mesh.
 
-    head, control_mesh : subdivided head, and its mesh before subdivision, on whose quads roots are defined
+    head : subdivided head
+    control_mesh : mesh of the head before subdivision, on whose quads the roots are defined
     skin : smooth surface over which hairs lie
     hair_fraction : fraction of hairs to generate; the hairs are widened by the inverse of this fraction, so
         that coverage stays the same
@@ -85,19 +87,20 @@ class GrowthSurface:
         return self._columns.T
 
     def root_frames(self, roots: Roots) -> RootFrames:
-        """Return roots on control quads with their positions and frames on the subdivided mesh."""
+        """Convert roots on control quads to roots on the subdivided mesh, with positions and frames."""
         finer = refine_roots(self.control_mesh, roots, self._levels)
         return RootFrames(finer, *root_frames(self._mesh, finer, self.points_mm))
 
 
 class HairGroup(NamedTuple):
-    """Hairs that share pigment and coverage, such as one brow, one row of lashes, or the beard.
+    """Hairs that share pigment and coverage, such as one brow or one row of lashes.
 
     roots : roots of the n hairs on the subdivided mesh
-    knots, radius : (n, k, 3) knot positions in the root frames, see `Strands`, and (n, k) radii [mm]
+    knots : (n, k, 3) positions of the knots in the root frames, see `Strands` [mm]
+    radius : (n, k) radii of the hairs at the knots [mm]
     pigment_factor : pigment concentrations relative to those of the person's look [-]
     hairs_per_strand : number of real hairs that each strand represents
-    cover : optical coverage of the roots by surrounding hair, see `Strands` [-]
+    cover : area of skin that the hairs cover around their roots, per area of skin, see `Strands` [-]
     """
 
     roots: Roots

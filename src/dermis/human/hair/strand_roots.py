@@ -1,4 +1,4 @@
-"""Possible strands of a hair style: roots on the scalp or the chin, their guides and their clumps."""
+"""Possible strands of a hair style: their roots on scalp or chin, their guides and their clumps."""
 
 from __future__ import annotations
 
@@ -40,8 +40,10 @@ _ROOT_FIELDS = "quad", "position", "guide", "guide_weight", "clump", "place", "a
 
 
 class StyleTables(NamedTuple):
-    """Guides and roots of the parts of a groom, which all people with these styles share.
+    """Guides and roots of scalp hair and beard, shared by all people with the same styles.
 
+    guides : guide curves of all parts
+    roots : possible strands of all parts
     centre_mm : (3,) mean position of the roots on the mean person [mm]
     """
 
@@ -54,8 +56,8 @@ class StyleTables(NamedTuple):
 def style_tables(scalp: Style | None, bearded: bool, root_finder: RootFinder, levels: int) -> StyleTables:
     """Return the guides and the roots of a hair style and a beard.
 
-    scalp : style of the hair of the head, None for a bald head
-    bearded : whether roots of a beard are included
+    scalp : style of the hair of the head; None for a bald head
+    bearded : whether to include the beard
     root_finder : root finder of the mean person
     levels : subdivision levels of the mesh on whose quads the roots lie
     """
@@ -87,7 +89,7 @@ def _cached_part(style: Style, root_finder: RootFinder) -> Arrays:
 
 
 def _make_part(style: Style, root_finder: RootFinder) -> Arrays:
-    """Compute the guides and the roots of one style: arrays by the names of their fields."""
+    """Return the guides and the roots of one style as a dictionary from field name to array."""
     mesh, rng = root_finder.mesh, np.random.default_rng(_SEED)
     beard = style is BEARD
     where = density.beard_density() if beard else density.scalp_density(0.0)
@@ -121,11 +123,13 @@ def _make_part(style: Style, root_finder: RootFinder) -> Arrays:
 
 
 def _agreeing_weights(weight: Doubles, guide: NDArray[np.int64], knots: Doubles) -> Doubles:
-    """Return the weights (n, 4) of guides without those that part from the guide with the largest weight.
+    """Return the weights (n, 4) of the guides of strands, reduced to 0 for guides far from the main guide.
 
-    A mean of guides that go to opposite sides of the head would lead through the head.
+    The main guide of a strand is the guide with the largest weight. A strand between two guides on opposite
+    sides of the head would otherwise pass through the head.
 
-    knots : (g, k, 3) knots of the guides [mm]
+    weight, guide : (n, 4) original weights of the guides, and their indices
+    knots : (g, k, 3) knots of all guides [mm]
     """
     main = np.take_along_axis(guide, weight.argmax(axis=1)[:, None], axis=1)
     some = knots[:, :: GUIDE_KNOTS // 8]
@@ -135,9 +139,10 @@ def _agreeing_weights(weight: Doubles, guide: NDArray[np.int64], knots: Doubles)
 
 
 def _places(weight: Doubles, corners: Doubles) -> Doubles:
-    """Return the field `place` of `StrandRoots`.
+    """Return the field `place` (n, 4) of `StrandRoots`.
 
-    weight, corners : (n, 4) weights of the corners of quads, and (n, 4, 4) their `average_points`
+    weight : (n, 4) weights of the corners of the quad on which each strand is rooted
+    corners : (n, 4, 4) rows of `average_points` at these corners
     """
     points = np.einsum("nk,nkc->nc", weight, corners)
     angle = density.hairline_angle(points)
@@ -150,11 +155,13 @@ def _places(weight: Doubles, corners: Doubles) -> Doubles:
 def _clump_middles(
     root_mm: Doubles, half_mm: Doubles, style: Style, rng: np.random.Generator
 ) -> NDArray[np.int64]:
-    """Return the strand (n,) in the middle of each strand's clump.
+    """Return for each strand the index (n,) of the strand in the middle of its clump.
 
-    Clumps of cornrows lie one behind the other along the rows; others are the cells around random strands.
+    In cornrows, the middle is the nearest strand on the centreline of the row. In other styles, random
+    strands are middles, and each strand belongs to the nearest of them.
 
-    root_mm, half_mm : (n, 3) roots on the mean person and points at half the length of the guides [mm]
+    root_mm : (n, 3) roots on the mean person [mm]
+    half_mm : (n, 3) points of the strands at half the length of their guides [mm]
     """
     from scipy.spatial import cKDTree
 

@@ -1,4 +1,4 @@
-"""Hair styles: numbers by which guide hairs are combed and cut, read from styles.toml."""
+"""Hair styles: parameters by which guide hairs are combed and cut, read from styles.toml."""
 
 from __future__ import annotations
 
@@ -14,26 +14,32 @@ Comb = Literal["up", "fall", "back", "rows", "gather", "twist", "beard"]
 
 @dataclass(frozen=True)
 class Style:
-    """Hair style, as numbers on the average person.
+    """Hair style, described by parameters on the average person.
 
-    comb : field of directions along which guide hairs are combed
-    max_length_mm, length_mm : length of the guides, and length of the hair unless a person's look states one
-    tilt : direction of hair that stands up, from the normal of the skin, 0, to its natural fall, 1
-    lift : rise of combed hair at its root, as the tangent of the angle to the skin
-    parting_mm : x of the parting
-    volume_mm : height of the outermost hair over the skin
-    stiffness, gravity : inertia of the direction along a guide per 5 mm, and pull of gravity
-    cut_y_mm : height at which hair is cut level; None for hair cut by length
-    fringe_y_mm : height at which hair over the forehead is cut; None without a fringe
-    round : roundness of the outline, 0 to 1; 1 cuts standing hair to an ellipsoid
-    layers : random shortening of strands, as a fraction of their length
-    fade : shortening at the sides and the nape, unless a person's look states it
-    clump, clump_mm : pull of tips towards the middle of a clump, 0 to 1, and size of the clumps
-    rope_mm, braid : radius of ropes of hair, which are twisted or braided of three bundles; 0 for loose hair
-    tie_mm, coil_mm : position at which hair is gathered, and radius of a bun around it; 0 for a tail
-    crown : additional recession of the hair at the crown and the temples
-    women, men : chances of the style, relative to each other
-    tight, loose : whether tightly coiled hair and other hair is worn in this style
+    comb : name of the direction field along which guide hairs are combed
+    max_length_mm : length of the guides
+    length_mm : usual length of the hair, which `HairLook` may replace
+    tilt : tangent of the angle between standing hair and the normal of the skin
+    lift : tangent of the angle between combed hair and the skin at the root
+    parting_mm : x coordinate of the parting
+    volume_mm : height of the outermost hair above the skin
+    stiffness : weight of the previous direction of a guide, against gravity, in each step of growth
+    gravity : strength of gravity
+    cut_y_mm : height at which hair is cut level; None for hair that is not cut level
+    fringe_y_mm : height at which hair over the forehead is cut; None for a style without a fringe
+    round : size of the ellipsoid to which standing hair is cut, 0 to 1; 0 for no such cut
+    layers : largest random shortening of strands, as a fraction of their length
+    fade : usual shortening of the hair at the sides and the nape, 0 to 1, which `HairLook` may replace
+    clump : pull of strands towards the middle of their clump, 0 to 1
+    clump_mm : size of the clumps
+    rope_mm : radius of the ropes into which hair is twisted or braided; 0 for loose hair
+    braid : whether ropes are braids of three bundles instead of twists
+    tie_mm : position at which hair is gathered
+    coil_mm : radius of a bun around the tie; 0 for a tail
+    crown : minimum recession of the hair at crown and temples, which the recession of `SkinLook` may exceed
+    women, men : relative probabilities of the style among women and among men
+    tight : whether tightly coiled hair is worn in this style
+    loose : whether hair that is not tightly coiled is worn in this style
     """
 
     comb: Comb
@@ -65,7 +71,7 @@ class Style:
 
 @cache
 def styles() -> dict[str, Style]:
-    """Return the hair styles by name."""
+    """Return a dictionary from name to hair style."""
     text = resources.files(__package__).joinpath("styles.toml").read_text("utf-8")
     rows = tomllib.loads(text)
     return {name: Style(**{**row, "tie_mm": tuple(row.get("tie_mm", _NO_TIE))}) for name, row in rows.items()}

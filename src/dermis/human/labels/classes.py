@@ -11,9 +11,9 @@ from dermis.base.tables import read_rows
 class LabelClass(NamedTuple):
     """Class of the surface that a pixel shows.
 
-    number : pixel value in the output `label`
-    face_synthetics : pixel value in the output `label_face_synthetics`: the number of the class in the data
-        set FaceSynthetics
+    number : number of the class, which is the pixel value in the output `label`
+    face_synthetics : number of the class in the data set FaceSynthetics, which is the pixel value in the
+        output `label_face_synthetics`
     """
 
     number: int
@@ -34,5 +34,5 @@ def label_classes() -> tuple[LabelClass, ...]:
 
 @cache
 def class_number(class_name: str) -> int:
-    """Return the number of a label class by its name."""
+    """Return the number of the label class with the name `class_name`."""
     return next(one.number for one in label_classes() if one.name == class_name)

@@ -1,4 +1,4 @@
-"""Label classes of meshes, as signed distances to the borders of facial parts, and of hairs."""
+"""Label classes of hairs and meshes; the borders of facial parts on a mesh are signed distance fields."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ _LABEL_CACHE_LOCK = Lock()
 
 @cache
 def label_fields() -> Doubles:
-    """Return signed distances (k, p) of control points to the borders of the classes `HUMAN_FIELDS` [mm].
+    """Return signed distances (k, p) of control points to the borders of the classes in `HUMAN_FIELDS` [mm].
 
     Distances are positive inside a class.
     """
@@ -112,7 +112,10 @@ def hair_classes(head: Head) -> NDArray[np.uint8]:
 
 @cache
 def _quad_hair_classes() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """Return the classes (q,) of brow or lash hairs, and of scalp or beard hairs, on each control quad."""
+    """Return for each control quad the class of fine hair (brow or lash) and of other hair (scalp or beard).
+
+    Both arrays are (q,).
+    """
     mesh = average_head().mesh
     around = quad_corners(mesh, np.arange(len(mesh.quads)))
     middle = average_head().positions_mm.astype(np.float64)[around].mean(axis=1)
@@ -142,7 +145,7 @@ def _ear_field() -> Doubles:
 def _brow_field(points: Doubles) -> Doubles:
     """Return the signed distance (p,) of points (p, 3) to the brow outlines, positive inside [mm].
 
-    The distance is measured in the front plane and bounded by the nearest of four edges.
+    It is measured in the front plane, as the smallest of the signed distances to four edges of the brow.
     """
     x, y = np.abs(points[:, 0]), points[:, 1]
     low, high = (brows.brow_outline(side) for side in (-1.0, 1.0))
@@ -156,7 +159,7 @@ _LABEL_CACHE: dict[bytes, MeshLabels] = {}
 
 
 class MeshLabels(NamedTuple):
-    """Label classes of a mesh, whose borders may cross triangles.
+    """Label classes of a mesh; borders between classes may cross triangles.
 
     base : (t,) class of each triangle where no field is positive
     classes : (k,) class of each field; a surface point has the class of its first positive field
@@ -170,7 +173,7 @@ class MeshLabels(NamedTuple):
 
 
 def mesh_labels(head: Head) -> MeshLabels:
-    """Return the label classes of a head; the result for parametric humans is cached by mesh topology."""
+    """Return the label classes of a head; for parametric humans the result is cached by mesh topology."""
     if not is_human(head):
         return _build_labels(head)
     digest = hashlib.blake2b(head.mesh.triangles.tobytes(), digest_size=16).digest()
@@ -204,9 +207,10 @@ def _material_class(material: Material) -> str:
 
 
 def _iris_fields(head: Head) -> dict[str, Doubles]:
-    """Return the signed distances (p,) of eyeball points to the border of the iris, by class name.
+    """Return for each iris class the signed distances (p,) of the head's points to the border of the iris.
 
-    Distances are positive inside the iris, in mm of an eye of average size.
+    Distances are positive inside the iris, in mm of an eye of average size. Points outside the eyeball get a
+    large negative value.
     """
     if head.eyes is None:
         return {}
@@ -225,7 +229,10 @@ def _iris_fields(head: Head) -> dict[str, Doubles]:
 
 
 def _skin_fields(head: Head) -> dict[str, Doubles]:
-    """Return the signed distances (p,) of skin points to the borders of facial parts, by class name [mm]."""
+    """Return for each class of skin parts the signed distances (p,) of the head's points to its border [mm].
+
+    Points that are not on the skin get a large negative value.
+    """
     mesh = head.mesh
     count = int(mesh.point.max()) + 1
     if is_human(head):
@@ -245,9 +252,10 @@ def _skin_fields(head: Head) -> dict[str, Doubles]:
 
 
 def _warped_fields(head: Head, landmarks: Mapping[str, tuple[float, float, float]]) -> dict[str, Doubles]:
-    """Return the label fields of a head of another topology, mapped from the average human by landmarks.
+    """Return a dictionary from class name to the label field (p,) of a head of another topology [mm].
 
-    Each point is warped onto the average human by the landmarks, and takes the fields of the nearest point.
+    Each point is warped onto the average human by the landmarks, and gets the fields of the nearest point
+    there.
     """
     from scipy.spatial import cKDTree
 

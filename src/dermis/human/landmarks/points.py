@@ -25,12 +25,12 @@ _EXPECTED_CONTENT = "landmarks in CSV: rows of name,vertex"
 
 @dataclass(frozen=True, eq=False)
 class LandmarkPoints:
-    """Landmarks of a mesh as weighted means of four of its points, which follow expressions and poses.
+    """Landmarks of a mesh, which move with expressions and poses as weighted means of four mesh points.
 
     names : names of the n landmarks in the order of the set
-    point, weight : (n, 4) indices of the mesh points and their weights
-    material : (n,) a landmark counts as visible only where the material with this index is seen; -1 for any
-        material
+    point, weight : (n, 4) indices of the mesh points, and their weights
+    material : (n,) index of the material that must be seen at a landmark for it to count as visible; -1 if
+        any material will do
     """
 
     names: tuple[str, ...]

@@ -43,16 +43,17 @@ _CACHE_VERSION = 2  # increment when `with_regions` returns different maps for t
 def with_regions(head: Head, table: RegionTable | str | Path = DEFAULT_TABLE_NAME) -> tuple[Head, float]:
     """Return a head with roughness and specular maps by region of the face.
 
-    The specular map contains rho_s itself. As the renderer scales specular maps to a mean of `Skin.rho_s`,
-    set `rho_s` to the returned mean. Existing roughness and specular maps of the head contribute their fine
-    detail, as a factor relative to their local mean.
+    The specular map contains rho_s itself. The renderer scales specular maps to a mean of `Skin.rho_s`, so
+    set `Skin.rho_s` to the returned mean. Fine detail of existing roughness and specular maps is kept:
+    the new map is multiplied by the ratio of the existing map to its local mean.
 
     Parameters
     ----------
     head : Head
         Head with known regions: the human, a sample, or a head with landmarks or labels in the table.
     table : RegionTable, str or path
-        Roughness and strength of each region: a table, its TOML file, or "default" for the package's table.
+        Roughness and specular strength of each region: a table, the path of a TOML file, or "default" for the
+        package's table.
 
     Returns
     -------
@@ -95,7 +96,7 @@ def with_regions(head: Head, table: RegionTable | str | Path = DEFAULT_TABLE_NAM
 def _region_map(
     atlas: Atlas, points: NDArray[np.float64], region_values: NDArray[np.float64], own_map: Floats | None
 ) -> Floats:
-    """Return a map (h, w) of a regional quantity, multiplied by the fine detail of the head's own map.
+    """Return a map (h, w) of a regional quantity, multiplied by the fine detail of an existing map.
 
     points : (n, 3) positions of the covered texels of the atlas [mm]
     region_values : (n,) quantity at these texels, smoothed across region borders
@@ -166,8 +167,8 @@ def gaussian_mean(points: Doubles, point_values: Doubles, sigma_mm: float) -> Do
 def with_default_regions(head: Head) -> Head:
     """Return a head with roughness and specular maps from the package's region table.
 
-    A head with unknown regions or with a roughness map is returned unchanged, and an existing specular map is
-    kept. The specular map is relative: the renderer scales it to a mean of the skin's rho_s.
+    A head with unknown regions or with a roughness map is returned unchanged. An existing specular map is
+    kept. A new specular map is relative, because the renderer scales it to a mean of `Skin.rho_s`.
     """
     if head.maps.has_roughness or known_landmarks(head) is None:
         return head

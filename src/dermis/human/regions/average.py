@@ -63,12 +63,15 @@ def _bare_head(levels: int) -> Head:
 
 
 def landmark_indices() -> dict[str, int]:
-    """Return the index of the control point at each skin landmark, by landmark name."""
+    """Return a dictionary from the name of each skin landmark to the index of its control point."""
     return {row["landmark"]: int(row["point"]) for row in read_rows(__package__, "points")}
 
 
 def human_landmarks(head: Head) -> dict[str, Doubles]:
-    """Return the positions (3,) of skin landmarks and eye centres of a parametric human, by name [mm]."""
+    """Return a dictionary from name to position (3,) of the skin landmarks and eye centres of a human [mm].
+
+    head : head of the parametric human
+    """
     positions_mm = head.positions_mm.astype(np.float64)
     landmarks = {name: positions_mm[point] for name, point in landmark_indices().items()}
     mesh = head.mesh
@@ -102,9 +105,9 @@ def control_quads(head: Head, triangle_index: NDArray[Any]) -> NDArray[np.int64]
 
 
 def average_positions(head: Head) -> Doubles:
-    """Return where the vertices of a parametric human lie on the average human (v, 3) [mm].
+    """Return for each vertex of a parametric human the corresponding point (v, 3) of the average human [mm].
 
-    Regions defined on the average human are looked up at these positions.
+    Regions defined on the average human are looked up at these points.
     """
     points_mm = average_head().positions_mm.astype(np.float64)
     stencils = head.control.stencils
@@ -126,7 +129,7 @@ def classify_surface(points: Doubles, quad_index: NDArray[np.int64]) -> NDArray[
 
 @cache
 def part_quads() -> Mapping[str, NDArray[np.int64]]:
-    """Return the indices of the control quads of lips, ears and the inside of the mouth, by part name."""
+    """Return a dictionary from part (lips, ears, inside of the mouth) to the indices of its control quads."""
     runs_by_part: dict[str, list[NDArray[np.int64]]] = {}
     for row in read_rows(__package__, "parts"):
         runs_by_part.setdefault(row["part"], []).append(np.arange(int(row["first"]), int(row["last"]) + 1))

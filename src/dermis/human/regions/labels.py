@@ -1,4 +1,4 @@
-"""Region labels of atlas texels, from a label map or by a landmark warp onto the average human."""
+"""Region labels of atlas texels, from a label map or from landmarks that map a head to the average human."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _WARP_SMOOTHING = 1.0  # for landmarks picked by hand; 0 would interpolate them 
 
 
 def load_landmarks(path: Path) -> Landmarks:
-    """Load landmark positions by name from a CSV file with columns landmark,x,y,z.
+    """Load a dictionary from landmark name to position from a CSV file with columns landmark,x,y,z.
 
     Positions are relative to the centre of the head [mm].
     """
@@ -60,7 +60,7 @@ def known_landmarks(head: Head) -> Landmarks | None:
 
 @cache
 def average_landmarks() -> Landmarks:
-    """Return the positions of all supported landmarks on the average human, by name [mm]."""
+    """Return a dictionary from landmark name to position on the average human [mm]."""
     return _landmark_tuples(human_landmarks(average_head()))
 
 
@@ -122,10 +122,11 @@ def _check_landmarks(head: Head, landmarks: Landmarks, reference_landmarks: Land
 
 
 def label_texels(head: Head, atlas: Atlas, region_table: RegionTable) -> NDArray[np.uint8]:
-    """Return the region (n,) of each covered atlas texel in row order, as indices into `REGIONS`.
+    """Return the region (n,) of each covered atlas texel in row order, as an index into `REGIONS`.
 
-    The first of these sources that exists is used: label map or landmarks of the table, label map of the
-    head, landmarks known to the package. Raises DermisError for a head without any of these sources.
+    The first available source is used: the label map of the table, the landmarks of the table, the label map
+    of the head, the regions of the parametric human, landmarks known to the package. Raises DermisError for a
+    head without any of these sources.
     """
     if region_table.labels is not None:
         return _labels_from_map(load_labels(region_table.labels), atlas, str(region_table.labels))

@@ -65,9 +65,9 @@ def nose_distance_mm(points: Doubles) -> Doubles:
 
 
 def neck_distance_mm(points: Doubles) -> Doubles:
-    """Return the vertical distance (n,) of each point below the line from jaw to skull [mm].
+    """Return the vertical distances (n,) of points from the line between jaw and skull [mm].
 
-    The distance is positive on the neck and negative on the head.
+    The distance is positive below the line, on the neck, and negative above the line, on the head.
 
     points : (n, 3) positions on the average human [mm]
     """
@@ -125,7 +125,7 @@ class RegionTable:
 
     values : (10, 2) Beckmann roughness m and specular strength rho_s [-], in the order of `REGIONS`
     landmarks : CSV file of the head's landmarks, for heads unknown to the package
-    labels : label map of the head, whose texels are indices into `REGIONS`; replaces landmarks
+    labels : label map of the head, whose texels are indices into `REGIONS`; used instead of landmarks
     """
 
     values: NDArray[np.float64]

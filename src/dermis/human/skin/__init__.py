@@ -1,1 +1,1 @@
-"""Skin of the human: pigments, marks and relief, as the parameters from which the frame paints maps."""
+"""Skin of the human: parameters of pigments, marks and relief, from which the skin maps are painted."""

@@ -1,4 +1,4 @@
-"""Tables of skin colours by melanin and blood, cached by eumelanin, oxygen and thickness of the epidermis."""
+"""Tables of skin colours as functions of melanin and blood, cached for each set of other pigments."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _COLOUR_TABLE_LOCK = Lock()  # two threads may request the same table
 
 
 def skin_colour_table(eumelanin: float, oxygen: float, epidermis_mm: float) -> ColourTable:
-    """Return the table of skin colours by melanin and blood fraction; tables are cached."""
+    """Return the table of skin colours as a function of melanin and blood fraction; tables are cached."""
     with _COLOUR_TABLE_LOCK:
         return _cached_colour_table(eumelanin, oxygen, epidermis_mm)
 

@@ -1,4 +1,4 @@
-"""Zones, hairline and folds of the average face for skin painting, and their changes with expressions."""
+"""Zones, hairline and folds of the average face for skin painting, and how expressions change them."""
 
 from __future__ import annotations
 
@@ -47,9 +47,10 @@ _TEMPLE_DEGREES, _TEMPLE_WIDTH_DEGREES, _FOREHEAD_WIDTH_DEGREES = 33.0, 15.0, 38
 
 
 def movement_weights(target_names: tuple[str, ...], target_weights: Floats) -> Floats:
-    """Return the strength (m,) of each movement in `MOVEMENTS`, 0 to 1, from morph target weights.
+    """Return the strength (m,) of each facial movement in `MOVEMENTS`, 0 to 1, from morph target weights.
 
-    target_names, target_weights : names of the t morph targets, and their weights (t,)
+    target_names : names of the t morph targets
+    target_weights : (t,) weights of the targets
     """
     return np.asarray(np.clip(_movement_matrix(target_names) @ target_weights, 0.0, 1.0), np.float32)
 
@@ -68,10 +69,11 @@ def _movement_matrix(target_names: tuple[str, ...]) -> Floats:
 def zone_table(recession: float = 0.0, sites: SiteDifferences | None = None) -> Floats:
     """Return the Gaussian zones of the face as rows (k, 24) for the paint shader.
 
-    Columns: centre [mm], a zero, inverse radii [1/mm], a zero, and the sixteen `ZONE_AMOUNTS`.
+    The columns are the centre (3) [mm], a zero, the inverse radii (3) [1/mm], a zero, and the sixteen
+    `ZONE_AMOUNTS`.
 
     recession : thinning of hair at the crown, 0 to 1, see `SkinLook`
-    sites : differences of pigments between measured sites; None for equal pigments
+    sites : differences in pigments between measured sites; None for the same pigments everywhere
     """
     rows = read_rows(__package__, "zones")
     for row in rows:
@@ -89,10 +91,11 @@ def zone_table(recession: float = 0.0, sites: SiteDifferences | None = None) -> 
 
 @cache
 def _site_amounts() -> NDArray[np.float64]:
-    """Return the amounts (k, 7) of k zones that paint a difference of 1 at one site and of 0 at other sites.
+    """Return the amounts (k, 7) of the k zones that produce a pigment difference of 1 at each of seven sites.
 
-    Each column is for one site: the cheek and `FACE_SITES`. The zones of a site share its difference. As
-    zones overlap, the shares are adjusted so that the sum of all zones is exact at the places of the sites.
+    Column 0 is for the cheek, the other columns are for `FACE_SITES`. Zones with the amounts of one column
+    add up to exactly 1 at the position of its site and to 0 at the positions of the other sites, although the
+    zones overlap.
     """
     zones, names = read_rows(__package__, "zones"), (_REFERENCE_SITE, *FACE_SITES)
     places = {row["site"]: row for row in read_rows(__package__, "sites")}
@@ -105,9 +108,11 @@ def _site_amounts() -> NDArray[np.float64]:
 
 @lru_cache(maxsize=_MAX_CACHED_TABLES)
 def hairline_heights(recession: float = 0.0) -> Floats:
-    """Return the height (91,) of the hairline above y = 0, by angle from the front, every 2 degrees [mm].
+    """Return the heights (91,) of the hairline above y = 0 [mm].
 
-    recession : recession of the hairline, 0 to 1, which starts at the temples, see `SkinLook`
+    The heights are for angles around the head from 0 (front) to 180 (back) in steps of 2 degrees.
+
+    recession : recession of the hairline, 0 to 1, which is strongest at the temples, see `SkinLook`
     """
     from scipy.interpolate import PchipInterpolator
 
@@ -122,11 +127,11 @@ def hairline_heights(recession: float = 0.0) -> Floats:
 class Folds(NamedTuple):
     """Skin folds, such as the nasolabial fold, as polylines on the left half of the average face.
 
-    knots : (k, 4) points of all polylines [mm], and their position along the fold, 0 to 1
-    curves : (c, 8) for each fold: centre and radius of a bounding sphere [mm]; width of the fold, and its
-        depth in a young and in an old face [mm]; index plus 1 of the movement that deepens the fold, 0 if no
-        movement does
-    first : (c + 1,) index of the first knot of each fold, followed by the number of knots
+    knots : (k, 4) points of all polylines [mm], and the position of each point along its fold, 0 to 1
+    curves : (c, 8) parameters of each fold: centre (3) and radius of its bounding sphere [mm]; its width
+        [mm]; its depth in a young face and in an old face [mm]; and index plus 1 of the movement that deepens
+        it, or 0 if no movement does
+    first : (c + 1,) index of the first knot of each fold, and the number of knots at the end
     """
 
     knots: Floats
@@ -152,9 +157,9 @@ def fold_curves() -> Folds:
 
 @cache
 def table_sizes() -> dict[str, int]:
-    """Return the sizes of the tables of zones, folds, knots and hairline, without computing their splines.
+    """Return the number of zones, folds, fold knots and hairline samples, for use as shader constants.
 
-    The shaders need these sizes as constants, and an import of SciPy, which computes the splines, is slow.
+    The sizes are found without computing splines, because that would import SciPy, which is slow.
     """
     lengths = Counter(row["fold"] for row in read_rows(__package__, "folds")).values()
     knots = sum(map(_sample_count, lengths))
@@ -167,7 +172,7 @@ def table_sizes() -> dict[str, int]:
 
 
 def _sample_count(knot_count: int) -> int:
-    """Return the number of samples of a spline with a given number of knots."""
+    """Return the number of samples that represent a spline with `knot_count` knots."""
     return _FOLD_SAMPLES_PER_SEGMENT * (knot_count - 1) + 1
 
 

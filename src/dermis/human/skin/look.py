@@ -119,7 +119,7 @@ class SkinLook:
 
 
 def _checked_sites(site_differences: Any) -> SiteDifferences:
-    """Return the differences between sites, converted if they are a mapping, as in files of people."""
+    """Return differences between sites as `SiteDifferences`; files of people contain them as mappings."""
     known = [one.name for one in fields(SiteDifferences)]
     if isinstance(site_differences, Mapping) and site_differences.keys() <= set(known):
         return SiteDifferences(**site_differences)
@@ -132,11 +132,11 @@ def _checked_sites(site_differences: Any) -> SiteDifferences:
 class Demographics(NamedTuple):
     """Ancestry, sex and age of a person, from which typical looks of skin, eyes and hair are derived.
 
-    african, asian, caucasian : fractions of the ancestries of the shape, with a sum of 1
-    sex : from 0, female, to 1, male [-]
+    african, asian, caucasian : ancestry fractions of the shape, which add up to 1
+    sex : sex, from 0 (female) to 1 (male) [-]
     age : age [years]
-    skin_groups : weights of the measured groups that the skin follows, see `measured.group_weights`
-    ita : individual typology angle (ITA) that the cheek must have; None for no condition [degrees]
+    skin_groups : weights of the measured groups that determine the skin, see `measured.group_weights`
+    ita : individual typology angle (ITA) of the cheek [degrees]; None if it is not fixed
     """
 
     african: float
@@ -191,13 +191,13 @@ def _pigment_arguments(demographics: Demographics) -> tuple[Mapping[str, float],
 
 
 def typical_eyes(demographics: Demographics) -> EyeLook:
-    """Return the typical eye look: brown irises, which are lighter with more European ancestry."""
+    """Return the typical eye look: brown irises, lighter for a larger fraction of European ancestry."""
     redness = 0.15 + 0.2 * (demographics.age - YOUNG_AGE) / (OLD_AGE - YOUNG_AGE)
     return EyeLook(eumelanin=demographics.pigmented_mean(_TYPICAL_IRIS_EUMELANIN), redness=redness)
 
 
 def sample_eyes(rng: np.random.Generator, demographics: Demographics) -> EyeLook:
-    """Return a random eye look around the typical look; European ancestry gives irises of all colours."""
+    """Return a random eye look around the typical look; Europeans have irises of all colours."""
     typical = typical_eyes(demographics)
     spread = 0.08 + 0.28 * pigment_ancestry(demographics.skin_groups)[2]
     eumelanin = _clamp(typical.eumelanin + spread * rng.normal(), 0.0, 1.0)
@@ -208,7 +208,7 @@ def sample_eyes(rng: np.random.Generator, demographics: Demographics) -> EyeLook
 def sample_skin(
     rng: np.random.Generator, pigment_rng: np.random.Generator, demographics: Demographics
 ) -> SkinLook:
-    """Return a random skin look of a person, with pigments and their differences between sites as measured.
+    """Return a random skin look of a person; pigments and site differences are distributed as measured.
 
     The order of random draws does not depend on the person.
 

@@ -1,4 +1,4 @@
-"""Pigments of measured people by ancestry, sex, age, site and skin tone, from a table of an archive.
+"""Pigments of human skin by ancestry, sex, age, site and skin tone, from measured people.
 
 The table `measured.json` is written by `python -m dermis.apps.validation.people table` from the spectra of
 the International Skin Spectra Archive, by inversion of the package's own model [Lu2025].
@@ -94,7 +94,7 @@ class SiteDifferences:
     Parameters
     ----------
     cheekbone, forehead, chin, nose_tip, ear_lobe, neck : tuple of float
-        Difference in melanin and in blood [doublings], and in oxygen saturation [-], site minus cheek.
+        Three differences, site minus cheek: melanin [doublings], blood [doublings], oxygen saturation [-].
 
     Examples
     --------
@@ -125,17 +125,20 @@ class SiteDifferences:
             object.__setattr__(self, one.name, checked)
 
     def array(self) -> Doubles:
-        """Return the differences (6, 3) in the order of `FACE_SITES`."""
+        """Return the differences as an array (6, 3) in the order of `FACE_SITES`."""
         return np.array([getattr(self, name) for name in FACE_SITES], np.float64)
 
 
 class _Group(NamedTuple):
     """Distribution of the pigments in one group of people.
 
+    The four variables are those of `MeasuredTable`.
+
     quantiles : (4, k) quantiles of the four variables
     ita : (k,) quantiles of the ITA [degrees]
     correlation : (5, 5) correlation of the normal scores of the four variables and of the ITA
-    sites : (12, 3) differences between each site and the cheek: melanin, blood [doublings] and oxygen [-]
+    sites : (12, 3) differences between each site and the cheek: melanin [doublings], blood [doublings] and
+        oxygen [-]
     """
 
     quantiles: Doubles
@@ -147,15 +150,17 @@ class _Group(NamedTuple):
 class MeasuredTable(NamedTuple):
     """Distributions of the pigments of measured people.
 
-    The variables are log2 of melanin, log2 of blood, oxygen, and log2 of the thickness [mm] at the cheek.
+    The four variables describe the cheek: log2 of melanin, log2 of blood, oxygen, and log2 of the thickness
+    of the epidermis in mm.
 
     probabilities : (k,) probabilities of the quantiles
-    groups : distribution by name of the group
-    sex, age : (4,) differences of the variables: male minus female, and old minus young
+    groups : mapping from group name to distribution
+    sex, age : (4,) changes of the variables from female to male, and from young to old
     mean_age_term : mean of `age_term` over the ages that `Human.drawn` samples
-    site_slope : (12, 2) change of a site's difference in melanin and in blood, divided by the deviation of
-        the cheek from its median [-]
-    site_spread : (12, 2) standard deviation of these differences around their mean [doublings]
+    site_slope : (12, 2) change of each site's difference in melanin per doubling of the cheek's melanin, and
+        the same for blood [-]
+    site_spread : (12, 2) standard deviations of the differences in melanin and in blood between people
+        [doublings]
     """
 
     probabilities: Doubles
@@ -181,8 +186,8 @@ class MeasuredTable(NamedTuple):
         """Return the four variables (n, 4) of n people from a mixture of groups.
 
         weights : weight of each group in the mixture
-        sex, age : (n,) or one number
-        normal_scores : (n, 4) standard normal scores of the people, correlated as in the archive
+        sex, age : (n,) sex and age of each person, or one number for all
+        normal_scores : (n, 4) standard normal scores of the variables of each person, correlated as measured
         """
         from scipy.special import ndtri
 
@@ -192,10 +197,13 @@ class MeasuredTable(NamedTuple):
         return np.asarray(values + sexes[..., None] * self.sex + terms[..., None] * self.age)
 
     def site_variables(self, weights: Weights, cheek_variables: Doubles, normals: Doubles) -> Doubles:
-        """Return the differences of all sites from the cheek (n, 12, 3): melanin, blood [doublings], oxygen.
+        """Return the differences (n, 12, 3) between all sites and the cheek.
 
+        The differences are in melanin [doublings], blood [doublings] and oxygen [-].
+
+        weights : weight of each group in the mixture
         cheek_variables : (n, 4) variables of the cheek
-        normals : (n, 12, 2) independent standard normal numbers, zeros for typical people
+        normals : (n, 12, 2) independent samples of the standard normal distribution, zeros for typical people
         """
         middle = self.mixture("quantiles", weights)[:2, len(self.probabilities) // 2]
         deviation = np.clip(
@@ -210,7 +218,7 @@ class MeasuredTable(NamedTuple):
 
 @cache
 def measured_table() -> MeasuredTable:
-    """Return the table of measured people in the package."""
+    """Return the package's table of measured people."""
     text = resources.files("dermis.human").joinpath("data", "measured.json").read_text("utf-8")
     return parse_table(json.loads(text))
 
@@ -229,9 +237,9 @@ def parse_table(document: Mapping[str, Any]) -> MeasuredTable:
 
 
 def age_term(age: ArrayLike) -> Doubles:
-    """Return the progress of ageing of skin colour, 0 up to 38 years and 1 from 65 years.
+    """Return the progress of ageing in skin colour: 0 up to 38 years, rising to 1 at 65 years and above.
 
-    In the archive the cheek has the same colour up to about forty and is 4 to 5 L* darker after sixty.
+    In the archive, the cheek keeps its colour up to about forty years and is 4 to 5 L* darker after sixty.
     """
     t = np.clip((np.asarray(age, np.float64) - 38.0) / 27.0, 0.0, 1.0)
     return np.asarray(t * t * (3.0 - 2.0 * t))
@@ -240,7 +248,10 @@ def age_term(age: ArrayLike) -> Doubles:
 def group_weights(
     african: float, asian: float, caucasian: float, skin_ancestry: str = ""
 ) -> dict[str, float]:
-    """Return the weights of the measured groups for ancestry fractions, or for a named skin ancestry."""
+    """Return a dictionary from measured group to weight, for ancestry fractions or for a skin ancestry.
+
+    skin_ancestry : name of the ancestry of the skin, which replaces the fractions; "" for none
+    """
     if skin_ancestry:
         return _spread_union(skin_ancestry, 1.0)
     parts = {"african": african, "asian": asian, "caucasian": caucasian}
@@ -263,7 +274,12 @@ def pigment_ancestry(weights: Weights) -> tuple[float, float, float]:
 
 
 def likely_groups(ita: float) -> dict[str, float]:
-    """Return the probability of each group for a person of a given ITA, if all groups are equally common."""
+    """Return a dictionary from group to the probability that a person with an ITA belongs to the group.
+
+    All groups are taken as equally common.
+
+    ita : individual typology angle [degrees]
+    """
     table = measured_table()
     density = {}
     for name, group in table.groups.items():
@@ -278,16 +294,21 @@ def likely_groups(ita: float) -> dict[str, float]:
 def typical_pigments(
     weights: Weights, sex: float, age: float, ita: float | None = None
 ) -> tuple[MeasuredPigments, SiteDifferences]:
-    """Return the median pigments of people of a mixture of groups, by sex, age and, optionally, ITA."""
+    """Return the median pigments and site differences for a sex, an age and, optionally, an ITA.
+
+    weights : weight of each measured group
+    """
     return _pigments_and_sites(weights, sex, age, ita, np.zeros(4), None)
 
 
 def sample_pigments(
     rng: np.random.Generator, weights: Weights, sex: float, age: float, ita: float | None = None
 ) -> tuple[MeasuredPigments, SiteDifferences]:
-    """Return random pigments of a person from a mixture of groups, with correlations as measured.
+    """Return random pigments and site differences of a person; pigments are correlated as measured.
 
     The number of random draws does not depend on the arguments.
+
+    weights : weight of each measured group
     """
     return _pigments_and_sites(
         weights, sex, age, ita, rng.standard_normal(4), rng.standard_normal((len(SITES), 2))
@@ -348,10 +369,12 @@ def _clipped_pigments(pigment_values: Doubles) -> MeasuredPigments:
 def with_ita(
     pigments: MeasuredPigments, ita: float, eumelanin: float = DEFAULT_SKIN.eumelanin
 ) -> MeasuredPigments:
-    """Return pigments with the melanin fraction that results in a given ITA.
+    """Return pigments whose melanin fraction is changed so that the skin has the ITA `ita`.
 
-    If no melanin fraction does, other pigments change too: very light skin gets less blood with more oxygen,
-    very dark skin a thicker epidermis.
+    If no melanin fraction gives this ITA, other parameters change too: very light skin gets less blood with
+    more oxygen, and very dark skin gets a thicker epidermis.
+
+    ita : individual typology angle [degrees]
     """
     for _ in range(_MAX_ITA_STEPS):
         table = skin_colour_table(eumelanin, pigments.oxygen, pigments.epidermis_mm)
@@ -377,13 +400,13 @@ def with_ita(
 
 
 def _ita_score(ita: float, weights: Weights) -> float:
-    """Return the standard normal score of an ITA among people of a mixture of groups, at most 2.9."""
+    """Return the standard normal score of an ITA in a mixture of groups, limited to the range -2.9 to 2.9."""
     quantiles = measured_table().mixture("ita", weights)
     return float(np.clip(_ita_scores(np.array([ita]), quantiles)[0], -_MAX_NORMAL_SCORE, _MAX_NORMAL_SCORE))
 
 
 def _ita_scores(ita: Doubles, quantiles: Doubles) -> Doubles:
-    """Return standard normal scores of ITAs, interpolated and linearly extrapolated from quantiles."""
+    """Return the standard normal scores of ITAs by interpolation and linear extrapolation of quantiles."""
     from scipy.special import ndtri
 
     nodes = ndtri(measured_table().probabilities)
@@ -399,15 +422,15 @@ def symmetric_square_root(covariance: Doubles) -> Doubles:
 
 
 class MeasuredCell(NamedTuple):
-    """Medians of one group, site, sex and age group of the archive.
+    """Medians of the measured people of one group, sex and age group, at one site.
 
-    group, site : as in `GROUP_OF_CODE` and `SITES`
-    sex : "F" or "M", "" for both
-    age_group : "1" (under 20), "2" (20 to 29) ... "6" (over 60), "" for all
-    people : number of measured people; 0 for a cell with too few people, whose medians are estimated from all
-        groups
-    cielab : (3,) colour under D65, without surface reflection
-    pigments : pigments by the package's model
+    group : one of the values of `GROUP_OF_CODE`
+    site : one of `SITES`
+    sex : "F" or "M", or "" for both
+    age_group : "1" (under 20), "2" (20 to 29) ... "6" (over 60), or "" for all ages
+    people : number of measured people; 0 if they are too few, and the medians are estimated from all groups
+    cielab : (3,) CIELAB colour under D65, without surface reflection
+    pigments : pigments that the package's model infers from the measurements
     """
 
     group: str
@@ -421,7 +444,7 @@ class MeasuredCell(NamedTuple):
 
 @cache
 def measured_cells() -> tuple[MeasuredCell, ...]:
-    """Return the medians of measured skin by group and site, also for each sex and age group.
+    """Return the medians of measured skin for each group and site, in total and for each sex and age group.
 
     Source: [Lu2025].
     """
@@ -441,7 +464,7 @@ class MeasuredTone(NamedTuple):
     """Colour of a site of the body.
 
     colour : (3,) diffuse reflectance, linear Rec. 709 [-]
-    note : sentence that says whose skin it is, and names its pigments
+    note : text for the user about the origin of the colour and the pigments of such skin
     """
 
     colour: Doubles
@@ -480,6 +503,6 @@ def measured_tone(tone_name: str) -> MeasuredTone:
 
 @cache
 def typical_sites() -> SiteDifferences:
-    """Return the median differences between sites over all groups, with equal weights."""
+    """Return the median differences between sites, averaged over all groups with equal weights."""
     count = len(GROUP_OF_CODE)
     return typical_pigments(dict.fromkeys(GROUP_OF_CODE.values(), 1.0 / count), 0.5, 30.0)[1]

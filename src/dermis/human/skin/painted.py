@@ -37,7 +37,7 @@ def oxygen_range(look: SkinLook) -> tuple[float, float]:
 
 
 def painted_colour_tables(look: SkinLook) -> NDArray[np.float32]:
-    """Return three colour tables (3, n, n, 3) by pigment fractions, as in `ColourTable`.
+    """Return three colour tables (3, n, n, 3), indexed by pigment fractions as in `ColourTable`.
 
     The first two tables are for skin at the two ends of `oxygen_range`, the third table is for lips.
     """

@@ -27,9 +27,9 @@ _CREST_LIMITS_MM = 0.15, 0.8  # limits of the lid distance in the crest column
 
 @cache
 def average_surface() -> tuple[Floats, Floats]:
-    """Return the average person's control points (p, 3) and their distances (p, 3) to three borders [mm].
+    """Return the average person's control points (p, 3), and their distances (p, 3) to three borders [mm].
 
-    The borders and the signs of the distances are those of `BORDER_FIELDS`.
+    `BORDER_FIELDS` names the three borders and states the signs of the distances.
     """
     points_mm, fields = _load_array("places"), _load_array("fields")
     rings = lid_rings()
@@ -81,7 +81,7 @@ class PaintedSurface:
 
 
 def painted_surface(mesh: Mesh, stencils: Stencils | None) -> PaintedSurface:
-    """Return the skin triangles of a human's mesh, which are equal for all people and cached by topology.
+    """Return the skin triangles of a human's mesh; they are the same for all people and cached by topology.
 
     stencils : subdivision stencils that give the points of the mesh; None without subdivision
     """

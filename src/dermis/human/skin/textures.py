@@ -125,7 +125,7 @@ DOT_LAYERS = (  # artist's values
 
 @cache
 def noise_table() -> NDArray[np.float32]:
-    """Return a row (n, 16) for each octave of each noise, as spot.wgsl reads it.
+    """Return the octaves of all noises as rows (n, 16), in the format that spot.wgsl reads.
 
     Columns 0 to 11 are three rows of four: the 3x3 matrix from the noise's space to its lattice [1/mm], each
     row followed by one scalar. The scalars are the feature size [mm] below which texels do not resolve the
@@ -155,7 +155,7 @@ def _octave_rows() -> Iterator[tuple[NDArray[np.float64], float, float, int, int
 
 
 def dot_table() -> NDArray[np.float32]:
-    """Return a row (d, 4) for each layer of dots: spacing [mm], minimum and maximum radius, edge warp [mm].
+    """Return the layers of dots as rows (d, 4): spacing [mm], minimum radius, maximum radius, edge warp [mm].
 
     The radii are fractions of the spacing.
     """

@@ -123,7 +123,7 @@ def _add_gaze(
 ) -> tuple[DetectedEyeball, DetectedEyeball]:
     """Return the left and the right eyeball, with their gaze and the points of cornea and iris.
 
-    left, right : connected components that are the scleras
+    left, right : connected components that are the left and the right sclera
     pieces : all connected components of the eyes; components inside a sclera belong to the same eyeball
     """
     positions = mesh.points_mm
@@ -147,7 +147,7 @@ class Sphere(NamedTuple):
     """Sphere fitted to points.
 
     centre, radius : (3,) centre and radius of the sphere [mm]
-    deviation : distance from the sphere that 85 % of the surface does not exceed, divided by the radius [-]
+    deviation : distance from the sphere within which 85 % of the surface lies, divided by the radius [-]
     """
 
     centre: Doubles

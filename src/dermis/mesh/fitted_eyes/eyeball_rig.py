@@ -60,7 +60,7 @@ def with_eyeballs(rig: Rig, eyeballs: Sequence[FittedEyeball]) -> Rig:
 def _with_eye_bones(rig: Rig, eyeballs: Sequence[FittedEyeball]) -> tuple[Skeleton, list[int]]:
     """Return a skeleton that moves the fitted eyeballs, and the index of the bone of each eyeball.
 
-    A new bone is added for an eyeball that shares its bone in the file with other points.
+    An eyeball gets a new bone if its bone in the file also moves other points.
     """
     skeleton = rig.skeleton or _single_bone(len(rig.positions_mm))
     bones = _eye_bones(skeleton, eyeballs)
@@ -101,7 +101,7 @@ def _single_bone(point_count: int) -> Skeleton:
 
 
 def _eye_bones(skeleton: Skeleton, eyeballs: Sequence[FittedEyeball]) -> list[int]:
-    """Return for each eyeball the index of the bone that moves only this eyeball; -1 if there is none."""
+    """Return for each eyeball the index of the bone that moves nothing else; -1 if there is no such bone."""
     count, bones = len(skeleton.names), list[int]()
     total = np.bincount(skeleton.bone.ravel(), skeleton.weight.ravel(), minlength=count)
     for eyeball in eyeballs:
@@ -113,7 +113,7 @@ def _eye_bones(skeleton: Skeleton, eyeballs: Sequence[FittedEyeball]) -> list[in
 
 
 def _follower_counts(skeleton: Skeleton, eyeball: FittedEyeball) -> Doubles:
-    """Return the sum (b,) of the weights with which points of the file's eyeball follow each bone."""
+    """Return for each bone the sum (b,) of its skin weights over the points of the file's eyeball."""
     bone, weight = skeleton.bone[eyeball.replaced_points], skeleton.weight[eyeball.replaced_points]
     return np.bincount(bone.ravel(), weight.ravel(), len(skeleton.names)).astype(np.float64)
 
@@ -141,8 +141,8 @@ def _rigid_targets(
 ) -> tuple[list[BoneRotation], dict[int, Doubles]]:
     """Return the rotation and translation that best fit how each morph target moves the file's eyeball.
 
-    Rotations are rotations of the eyeball's bone. Translations (3,) [mm] are keyed by the index of the
-    target. Targets that do not move the eyeball are left out.
+    The rotations are those of the eyeball's bone. The translations are a dictionary from target index to
+    vector (3,) [mm]. Targets that do not move the eyeball are left out.
 
     bone_name : name of the eyeball's bone
     origin_mm : (3,) position of the bone's joint [mm]
@@ -171,7 +171,7 @@ def _with_shifts(
 ) -> MorphTargets:
     """Return morph targets that also translate the points of a fitted eyeball.
 
-    shift_of_target : translation (3,) by target index [mm]
+    shift_of_target : dictionary from target index to translation (3,) [mm]
     eyeball_points : (n,) indices of the control points of the eyeball
     """
     if not shift_of_target:

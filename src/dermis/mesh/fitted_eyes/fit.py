@@ -42,7 +42,7 @@ class _EyeShape(NamedTuple):
     adult size, and an eye smaller than an adult's is scaled as a whole.
 
     axis : (3,) unit vector from the centre to the cornea
-    radius_mm, centre_offset_mm : ball of the eye before scaling, see `Eyes` [mm]
+    radius_mm, centre_offset_mm : radius and offset of the ball before scaling, see `Eyes` [mm]
     scale : size of the eye relative to an adult's, at most 1 [-]
     """
 
@@ -56,9 +56,10 @@ class _EyeShape(NamedTuple):
 def with_fitted_eyes(head: Head, coarse: Mesh | None = None, look: EyeLook | None = None) -> Head:
     """Return a head whose two eyeballs from a file are replaced by standard eyeballs with a cornea.
 
-    The fitted eyeballs have the radius and position of the file's eyeballs, look along the axis of the file's
-    corneas or else straight ahead, and move rigidly by the bones and morph targets of the file's eyeballs. If
-    two eyeballs are not found in the file, the head is returned unchanged, with the reason in its `note`.
+    The fitted eyeballs have the radius and position of the file's eyeballs, and move rigidly with the bones
+    and morph targets of these. They look along the axes of the file's corneas or, for eyeballs without
+    corneas, through the opening of the lids. If the file does not have two eyeballs, the head is returned
+    unchanged, with the reason in its `note`.
 
     coarse : for a subdivided head, its mesh before subdivision, in which the lids still touch the eyeballs
     look : appearance of the eyes
@@ -107,7 +108,7 @@ def _ball_triangles(
 def _eye_shapes(corners_mm: Doubles, balls: tuple[DetectedEyeball, DetectedEyeball]) -> list[_EyeShape]:
     """Return the shapes of both eyes.
 
-    The axis of an eyeball without a cornea points through the opening of the lids in front of it.
+    If an eyeball of the file has no cornea, its axis points through the opening of the lids.
 
     corners_mm : (f, 3, 3) corners of all triangles that are not eyeballs
     """

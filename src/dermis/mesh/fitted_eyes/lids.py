@@ -44,7 +44,7 @@ class Lids:
 
     @cached_property
     def ball_front(self) -> Doubles:
-        """Return how far in front of the ball's centre each ray hits the ball, (n,) [mm]; 0 for a miss."""
+        """Return how far in front of its centre the ball is hit by each ray, (n,) [mm]; 0 for a miss."""
         return np.asarray(np.sqrt(np.maximum(self.ball.radius**2 - (self.ray_positions**2).sum(axis=1), 0.0)))
 
     @cached_property
@@ -67,7 +67,9 @@ class Lids:
         return front
 
     def _candidate_pairs(self, corners: Doubles) -> tuple[Index, Index]:
-        """Return triangles and rays, as pairs in which the ray is within the triangle's bounding box.
+        """Return pairs of triangles and rays as two arrays of indices.
+
+        In each pair, the ray passes through the bounding box of the triangle.
 
         corners : (f, 3, 3) corners of the triangles [mm]
         """
@@ -82,10 +84,10 @@ class Lids:
 
     @property
     def opening_angles(self) -> tuple[float, float]:
-        """Return the angles (side, up) at which an eye looks through the middle of the lids' opening [rad].
+        """Return the angles (side, up) of an eye that looks through the middle of the lids' opening [rad].
 
         The angles are 0 if lids are missing on some side. In files, the lids are the best indication of the
-        gaze, as eyeballs and lids seldom have the same centre.
+        gaze, because eyeballs and lids seldom have the same centre.
         """
         angles = []
         for axis, other, shift in ((0, 1, 0.0), (1, 0, _IRIS_RISE_FRACTION)):
@@ -111,7 +113,10 @@ class Lids:
         return angles[0], angles[1]
 
     def direction(self, angle_across: float, angle_up: float) -> Doubles:
-        """Return the unit vector (3,) in head space at angles to the side and up from the front [rad]."""
+        """Return the unit vector (3,) in head space that is turned sideways and upwards from straight ahead.
+
+        angle_across, angle_up : angles by which the vector is turned sideways and upwards [rad]
+        """
         local = (
             np.sin(angle_across) * np.cos(angle_up),
             np.sin(angle_up),

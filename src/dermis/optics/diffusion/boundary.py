@@ -1,4 +1,4 @@
-"""Fresnel reflection at the smooth surface of a medium, and the boundary mismatch A of diffusion."""
+"""Fresnel reflection at the smooth surface of a medium, and the boundary mismatch A of diffusion theory."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def normal_reflectance(eta: float) -> float:
 
 
 def fresnel(cosine: ArrayLike, eta: float) -> Floats:
-    """Return the Fresnel reflectance for unpolarised light at cosines of incidence [-].
+    """Return the Fresnel reflectance for unpolarised light [-].
 
     cosine : cosine of the angle of incidence, 0 to 1
     eta : index of refraction behind the surface, divided by the index in front of it; less than 1 for light
@@ -36,9 +36,9 @@ def fresnel(cosine: ArrayLike, eta: float) -> Floats:
 
 @cache
 def internal_moment(cosine_power: int, eta: float, node_count: int = 64) -> float:
-    """Return the moment int F(mu) mu^order dmu of the internal Fresnel reflectance F [-].
+    """Return a moment of the internal Fresnel reflectance F: the integral of F(mu) mu^p from mu = 0 to 1 [-].
 
-    cosine_power : power of the cosine mu, which is integrated from 0 to 1
+    cosine_power : power p of the cosine mu
     eta : index of refraction relative to air [-]
     node_count : number of quadrature nodes
 
@@ -58,8 +58,8 @@ def internal_moment(cosine_power: int, eta: float, node_count: int = 64) -> floa
 def diffuse_reflectance(eta: float, integral_method: DiffuseIntegral = "polynomial") -> float:
     """Return the reflectance F_dr of the surface for diffuse light from inside the medium [-].
 
-    integral_method : "polynomial", the fit used by the published dipole and multipole, or "exact", the
-        integral
+    integral_method : "polynomial" for the polynomial fit that the published dipole and multipole use, or
+        "exact" for the integral
 
     Source: [Egan1973]; as printed in [Jensen2001].
     """
@@ -71,12 +71,12 @@ def diffuse_reflectance(eta: float, integral_method: DiffuseIntegral = "polynomi
 
 
 def boundary_mismatch(eta: float, integral_method: DiffuseIntegral = "polynomial") -> float:
-    """Return the boundary mismatch A = (1 + F_dr) / (1 - F_dr); 1 at an index-matched surface [-].
+    """Return the boundary mismatch A = (1 + F_dr) / (1 - F_dr), which is 1 at an index-matched surface [-].
 
-    Diffusion extrapolates the fluence to zero at the distance 2 A D above the surface. F_dr is the
-    `diffuse_reflectance` from inside.
+    F_dr is the `diffuse_reflectance`. In diffusion theory, the extrapolated fluence is zero above the
+    surface, at the distance 2 A D.
 
-    integral_method : "polynomial" or "exact" computation of F_dr
+    integral_method : "polynomial" or "exact", see `diffuse_reflectance`
 
     Source: [Jensen2001] section 2.3.
     """

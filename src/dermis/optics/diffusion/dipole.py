@@ -10,7 +10,7 @@ from dermis.optics.media import Floats, Layer
 
 
 def source_depths(layer: Layer, A: float) -> tuple[Floats, Floats]:
-    """Return the depth of the real source and the height of its image above the surface, (c,) each [mm].
+    """Return the depth (c,) of the real source, and the height (c,) of its image above the surface [mm].
 
     A : boundary mismatch [-]
 
@@ -21,13 +21,13 @@ def source_depths(layer: Layer, A: float) -> tuple[Floats, Floats]:
 
 
 def point_source_flux(radius_mm: ArrayLike, depth_mm: Floats, sigma_tr: Floats) -> Floats:
-    """Return the flux through the surface from a unit point source in an infinite medium, (n, c) [1/mm2].
+    """Return the flux (n, c) through the surface from a unit point source in an infinite medium [1/mm2].
 
     radius_mm : (n,) distances along the surface [mm]
     depth_mm : (c,) depth of the source; negative for a source above the surface [mm]
     sigma_tr : (c,) effective transport coefficient [1/mm]
 
-    Source: [Jensen2001] eq. 4 without the misprinted factor: see [JensenBuhler2002] eq. 5.
+    Source: [Jensen2001] eq. 4, with its misprinted factor left out as in [JensenBuhler2002] eq. 5.
     """
     rho = np.sqrt(np.asarray(radius_mm, dtype=np.float64)[..., None] ** 2 + depth_mm**2)
     attenuation = np.exp(-sigma_tr * rho)
@@ -35,7 +35,7 @@ def point_source_flux(radius_mm: ArrayLike, depth_mm: Floats, sigma_tr: Floats) 
 
 
 def reflectance(radius_mm: ArrayLike, layer: Layer, A: float) -> Floats:
-    """Return the diffusion profile R(r) of the standard dipole per power that enters, (n, c) [1/mm2].
+    """Return the diffusion profile R(r), (n, c), of the standard dipole per power that enters [1/mm2].
 
     radius_mm : (n,) distances r from the beam [mm]
     A : boundary mismatch [-]
@@ -50,7 +50,7 @@ def reflectance(radius_mm: ArrayLike, layer: Layer, A: float) -> Floats:
 
 
 def reflectance_hankel(frequency: ArrayLike, layer: Layer, A: float) -> Floats:
-    """Return the Hankel transform of the dipole's R(r) at frequencies s [1/mm], (n, c) [-].
+    """Return the Hankel transform (n, c) of the dipole's R(r) at frequencies s [1/mm].
 
     The transform is the integral of 2 pi r R(r) J0(s r) over r, with the Bessel function J0.
     """
@@ -60,14 +60,14 @@ def reflectance_hankel(frequency: ArrayLike, layer: Layer, A: float) -> Floats:
 
 
 def total_reflectance(layer: Layer, A: float) -> Floats:
-    """Return the total reflectance of the dipole model per power that enters, (c,) [-]."""
+    """Return the total reflectance (c,) of the dipole model per power that enters [-]."""
     return np.asarray(reflectance_hankel(0.0, layer, A))
 
 
 def better_dipole_reflectance(
     radius_mm: ArrayLike, layer: Layer, eta: float, source_count: int = 100
 ) -> Floats:
-    """Return R(r) of the better dipole, for light that scattered at least twice, (n, c) [1/mm2].
+    """Return R(r), (n, c), of the better dipole for light that scattered at least twice [1/mm2].
 
     R(r) is per power that enters.
 
@@ -75,7 +75,7 @@ def better_dipole_reflectance(
     eta : index of refraction relative to air [-]
     source_count : number of point sources along the beam
 
-    Source: [dEonIrving2011] with the corrections of [Habel2013], as the dipole term of [Pharr2023].
+    Source: [dEonIrving2011] with the corrections of [Habel2013]; the same as the dipole term in [Pharr2023].
     """
     r = np.asarray(radius_mm, dtype=np.float64)
     F1, F2 = internal_moment(1, eta), internal_moment(2, eta)

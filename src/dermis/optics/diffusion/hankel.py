@@ -1,4 +1,4 @@
-"""Numerical inverse Hankel transform, from transforms of radial profiles to R(r), on log-spaced grids."""
+"""Numerical inverse Hankel transform of radial profiles, on log-spaced grids of frequencies and radii."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ NEAR_ZERO_FREQUENCY = np.array([1e-8])
 
 @cache
 def transform_frequencies() -> Floats:
-    """Return the log-spaced frequencies s of the input of `inverse_transform` [1/mm].
+    """Return the log-spaced frequencies at which `inverse_transform` expects its input [1/mm].
 
     The shape is (TRANSFORM_SAMPLE_COUNT,).
     """
@@ -41,9 +41,9 @@ def transform_radii() -> Floats:
 
 
 def inverse_transform(transform: Floats) -> Floats:
-    """Return R(r) at `transform_radii` from its Hankel transform, (TRANSFORM_SAMPLE_COUNT, c) [1/mm2].
+    """Return R(r), (TRANSFORM_SAMPLE_COUNT, c), at `transform_radii` from its Hankel transform [1/mm2].
 
-    transform : (TRANSFORM_SAMPLE_COUNT, c) Hankel transform at `transform_frequencies` [-]
+    transform : (TRANSFORM_SAMPLE_COUNT, c) Hankel transform of R(r) at `transform_frequencies` [-]
 
     The relative error is 1e-8 where R(r) is within six decades of its maximum; elsewhere the error is 1e-9 of
     the maximum.

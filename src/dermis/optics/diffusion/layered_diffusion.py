@@ -1,9 +1,9 @@
 """Diffusion in layered media, with continuous fluence and flux at each interface.
 
-In the Hankel domain the fluence phi(z) of each layer satisfies D phi'' - D q^2 phi = -S(z), with q^2 =
-sigma_tr^2 + s^2 at the frequency s and the source S of light that scattered for the first time. A recursion
-from bottom to top propagates the boundary condition D phi' = W - Z phi, which all lower layers impose on a
-face.
+In the Hankel domain, the fluence phi(z) in each layer satisfies D phi'' - D q^2 phi = -S(z). Here, q^2 is
+sigma_tr^2 + s^2 at the frequency s, and S is the source of light that has just scattered for the first time.
+At each face, the layers below impose the boundary condition D phi' = W - Z phi. A recursion computes Z and W
+of the faces from bottom to top.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _NEAR_ZERO_FREQUENCY = np.array([1e-8])  # so low that a Hankel transform equals
 
 
 class _Sublayer(NamedTuple):
-    """Layer, or one of the two parts into which a layer is divided at the point source."""
+    """Layer, or the part of a layer above or below the point source."""
 
     layer: Layer
     thickness_mm: float | Floats
@@ -30,20 +30,20 @@ class _Sublayer(NamedTuple):
 
 
 class _Face(NamedTuple):
-    """Boundary condition D phi' = W - Z phi for the fluence phi at a face; lower layers set Z and W."""
+    """Boundary condition D phi' = W - Z phi for the fluence phi at a face; Z and W depend on lower layers."""
 
     Z: Floats
     W: Floats
 
 
 class _DownwardTransfer(NamedTuple):
-    """Coefficients that yield the fluence at the lower face of a sublayer from the fluence at its upper face.
+    """Coefficients for computing the fluence at the lower face of a sublayer from that at its upper face.
 
     E : attenuation exp(-q d) across the thickness d of the sublayer [-]
     rho : reflection coefficient of the lower face for the solution that decays downwards [-]
     common : 1 / (1 + E^2 rho), the sum of the reflections between both faces [-]
-    beta : part of the fluence at the lower face that grows towards this face, caused by sources
-    lower : particular solution at the lower face, which is 0 at the upper face
+    beta : amplitude, at the lower face, of the solution that grows downwards; only the part due to sources
+    lower : value at the lower face of the particular solution that is 0 at the upper face
 
     All coefficients are 0 for a semi-infinite sublayer. Only the last sublayer of a medium can be
     semi-infinite.
@@ -63,14 +63,14 @@ class _DownwardTransfer(NamedTuple):
 def solve_layers(
     frequency: ArrayLike, medium: Medium, A: float, source_kind: Source = "beam"
 ) -> tuple[Floats, Floats]:
-    """Return the Hankel transforms of R(r) and T(r) of a layered medium, (n, c) each [-].
+    """Return the Hankel transforms (n, c) of R(r) and of T(r) of a layered medium [-].
 
-    R(r) and T(r) are the profiles at the upper and the lower face per power that enters.
+    R(r) and T(r) are the profiles at the upper and the lower face, per power that enters.
 
     frequency : (n,) frequencies s > 0 [1/mm]
     A : boundary mismatch with air; internal interfaces are index-matched [-]
-    source_kind : "beam" distributes first scattering along the beam, so that R(r) diverges logarithmically at
-        r = 0; "point" places first scattering one mean free path deep, so that R(r) is finite
+    source_kind : "beam" if light first scatters along the beam, in which case R(r) diverges logarithmically
+        at r = 0; "point" if all light first scatters one mean free path deep, in which case R(r) is finite
 
     Source: [Haskell1994] for the boundary, [Kienle1998] for layers, [Farrell1992] for the beam.
     """
@@ -78,22 +78,23 @@ def solve_layers(
 
 
 def solve_reflectance(frequency: ArrayLike, medium: Medium, A: float, source_kind: Source = "beam") -> Floats:
-    """Return the Hankel transform of R(r) of a layered medium, (n, c) [-].
+    """Return the Hankel transform (n, c) of R(r) of a layered medium [-].
 
-    R(r) is per power that enters. This is faster than `solve_layers`, which also computes T(r).
+    R(r) is per power that enters. This function is faster than `solve_layers`, which also computes T(r).
 
     frequency : (n,) frequencies s > 0 [1/mm]
     A : boundary mismatch with air [-]
-    source_kind : "beam" or "point", the distribution of first scattering, see `solve_layers`
+    source_kind : "beam" or "point", the place where light first scatters, see `solve_layers`
     """
     return _solve_upwards(frequency, _sublayers(medium, source_kind), medium.channels, A)[0] / (2.0 * A)
 
 
 def solve_two_layers(upper_layer: Layer, thickness_mm: ArrayLike, lower_layer: Layer, A: float) -> Floats:
-    """Return the total reflectance of n upper layers on half-spaces, per power that enters, (n, c) [-].
+    """Return the total reflectance (n, c) of n skins with two layers, per power that enters [-].
 
-    upper_layer, lower_layer : layers with coefficients (n, c), or (c,) if these are the same for all n skins
+    upper_layer : upper layers, with coefficients (n, c), or (c,) if they are the same for all skins
     thickness_mm : (n, 1) thicknesses of the upper layers, or one number [mm]
+    lower_layer : semi-infinite lower layers, with coefficients (n, c) or (c,)
     A : boundary mismatch with air [-]
     """
     d = np.asarray(thickness_mm, dtype=np.float64)
@@ -109,7 +110,7 @@ def solve_two_layers(upper_layer: Layer, thickness_mm: ArrayLike, lower_layer: L
 def solve_thicknesses(
     frequency: ArrayLike, layer: Layer, thickness_mm: Floats, A: float
 ) -> tuple[Floats, Floats]:
-    """Return the Hankel transforms of R(r) and T(r) of n slabs of one material, (n, m, c) each [-].
+    """Return the Hankel transforms (n, m, c) of R(r) and of T(r) of n slabs of one material [-].
 
     frequency : (m,) frequencies s > 0 [1/mm]
     layer : absorption and scattering of the slabs; its field `thickness_mm` is ignored
@@ -135,7 +136,7 @@ def _solve_sublayers(
 def _solve_upwards(
     frequency: ArrayLike, sublayers: list[_Sublayer], channel_count: int, A: float
 ) -> tuple[Floats, list[_DownwardTransfer]]:
-    """Return the fluence at the surface, and the downward transfer through each sublayer, topmost first."""
+    """Return the fluence at the surface, and the transfer through each sublayer, topmost sublayer first."""
     s = np.asarray(frequency, dtype=np.float64)[..., None]
     zero = np.zeros((*s.shape[:-1], channel_count))
     face, transfers = _Face(zero + 1.0 / (2.0 * A), zero), list[_DownwardTransfer]()
@@ -146,13 +147,13 @@ def _solve_upwards(
 
 
 def _propagate_up(s: Floats, sublayer: _Sublayer, lower_face: _Face) -> tuple[_Face, _DownwardTransfer]:
-    """Propagate the boundary condition from a sublayer's lower to its upper face.
+    """Propagate the boundary condition from the lower face of a sublayer to its upper face.
 
     s : frequencies [1/mm]
     lower_face : boundary condition at the lower face
 
-    Returns the boundary condition at the upper face, and the transfer of the fluence from the upper to the
-    lower face.
+    Returns the boundary condition at the upper face, and the coefficients that transfer the fluence from the
+    upper to the lower face.
     """
     layer, d = sublayer.layer, sublayer.thickness_mm
     D, sigma_t = layer.D, layer.sigma_t_prime
@@ -187,10 +188,10 @@ def _beam_sublayers(medium: Medium) -> Iterator[_Sublayer]:
 
 
 def _point_sublayers(medium: Medium) -> Iterator[_Sublayer]:
-    """Yield two sublayers per layer; the layer that contains the point source is divided at its depth.
+    """Yield two sublayers per layer.
 
-    The source is at the depth where the optical depth reaches 1. A layer without the source is divided in the
-    middle.
+    The layer that contains the point source is divided at the source, where the optical depth is 1. All other
+    layers are divided in the middle, or at a depth of 1 mm if they are semi-infinite.
     """
     depth = np.zeros(medium.channels)
     zero = np.zeros(medium.channels)

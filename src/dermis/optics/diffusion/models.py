@@ -1,4 +1,4 @@
-"""Diffusion profiles of media by a named diffusion model, and the measured errors of these models."""
+"""Diffusion profiles of media by one of several diffusion models, and the measured errors of these models."""
 
 from __future__ import annotations
 
@@ -55,8 +55,9 @@ def diffusion_profile(
     medium : stack of layers
     model : "dipole" and "better-dipole" require one half-space; the other models accept any stack
     clamp : position of the multipole's source in layers thinner than a mean free path, see `Slab`
-    rgb_weights : (3, c) weights from wavelengths to linear Rec. 709; the result then has three channels and
-        is per incident power
+    rgb_weights : (3, c) weights that convert wavelengths to linear Rec. 709; the result then has three
+        channels and is per incident power. By default, the result has the medium's channels and is per power
+        that enters
 
     Raises DermisError when the model is not valid for the medium.
 
@@ -85,7 +86,7 @@ def diffusion_rings(
     clamp: Clamp = "layer",
     rgb_weights: Floats | None = None,
 ) -> RingTarget:
-    """Return only the ring energies that `diffusion_profile` computes, to fit many media faster."""
+    """Return only the ring energies of `diffusion_profile`; this is faster, for fits to many media."""
     grid, values, total = _sampled_profile(medium, model, clamp, rgb_weights)
     edges = ring_edges()
     return RingTarget(edges, np.diff(enclosed_energy(edges, grid, values), axis=0), total)
@@ -94,7 +95,7 @@ def diffusion_rings(
 def _sampled_profile(
     medium: Medium, model: DiffusionModel, clamp: Clamp, rgb_weights: Floats | None
 ) -> tuple[Floats, Floats, Floats]:
-    """Return radii r (n,) [mm], R(r) at these radii (n, c) [1/mm2], and the total reflectance (c,) [-]."""
+    """Return radii r (n,) [mm], the profile R(r) (n, c) [1/mm2] and the total reflectance (c,) [-]."""
     if model in ("dipole", "better-dipole"):
         _check_half_space(medium, model)
     closed_form = rgb_weights is None and len(medium.layers) == 1 and model in ("dipole", "multipole")
@@ -118,7 +119,7 @@ def _sampled_profile(
 
 
 def hankel_transform(medium: Medium, model: DiffusionModel, clamp: Clamp, frequency: Floats) -> Floats:
-    """Return the Hankel transform of a model's R(r) at frequencies s > 0 [1/mm], (n, c) [-]."""
+    """Return the Hankel transform (n, c) of a model's R(r) at n frequencies above 0 [1/mm]."""
     if model in ("layered", "layered-point"):
         A = boundary_mismatch(medium.eta, "exact")
         source: layered_diffusion.Source = "beam" if model == "layered" else "point"
@@ -162,9 +163,9 @@ def _medium_warnings(medium: Medium, model: DiffusionModel, clamp: Clamp) -> lis
 
 
 def _first_event_albedo(medium: Medium) -> Floats:
-    """Return the fraction of events in the first mean free path below the surface that scatter, (c,) [-].
+    """Return the fraction (c,) of all events in the first mean free path that are scattering events [-].
 
-    The other events absorb.
+    All other events are absorption.
     """
     depth, scattered = np.zeros(medium.channels), np.zeros(medium.channels)
     for layer in medium.layers:
@@ -174,7 +175,7 @@ def _first_event_albedo(medium: Medium) -> Floats:
 
 
 def _result_warnings(total_reflectance: Floats, ring_energy: Floats) -> Sequence[str]:
-    """Return warnings about negative reflectances, and about totals that differ from the sum of the rings."""
+    """Return warnings about negative reflectances, and about rings that do not sum to the total."""
     warnings = missing_light_warnings(total_reflectance, ring_energy)
     if (total_reflectance < 0.0).any():
         warnings.append(f"a total reflectance is negative: {np.round(total_reflectance, 4).tolist()}")
@@ -192,12 +193,13 @@ def _result_warnings(total_reflectance: Floats, ring_energy: Floats) -> Sequence
 
 
 def gaussian_transmittance(profile: GaussianSum, thickness_mm: ArrayLike) -> Floats:
-    """Return the transmittance of slabs lit uniformly from behind, from a sum of Gaussians, (n, 3) [-].
+    """Return an approximate transmittance (n, 3) of slabs that are lit uniformly from behind [-].
 
+    profile : profile R(r) as a sum of Gaussians
     thickness_mm : (n,) thicknesses d of the slabs [mm]
 
-    R is evaluated at the distance sqrt(r^2 + d^2), where a Gaussian G(v, r) of variance v becomes exp(-d^2 /
-    2v) G(v, r): each weight is multiplied by this factor.
+    For the transmitted light, R is evaluated at the distance sqrt(r^2 + d^2). A Gaussian G(v, r) of variance
+    v then becomes exp(-d^2 / 2v) G(v, r), so each weight is multiplied by exp(-d^2 / 2v).
 
     Source: [dEonLuebke2007] section 14.5.
     """
@@ -208,11 +210,11 @@ def gaussian_transmittance(profile: GaussianSum, thickness_mm: ArrayLike) -> Flo
 def slab_transmittance(
     medium: Medium, thickness_mm: ArrayLike, model: Literal["layered", "multipole"] = "layered"
 ) -> Floats:
-    """Return the transmittance of the medium cut off at each thickness, per power that enters, (n, c) [-].
+    """Return the transmittance (n, c) of a medium that is cut off at a thickness, per power that enters [-].
 
-    thickness_mm : (n,) thicknesses of the slab [mm]
-    model : "layered" includes unscattered light, attenuated by the reduced extinction; "multipole" scatters
-        all light at one depth, which is inaccurate for layers thinner than a mean free path
+    thickness_mm : (n,) thicknesses at which the medium is cut off [mm]
+    model : "layered" includes unscattered light, attenuated by the reduced extinction; "multipole" assumes
+        that all light scatters at one depth, which is inaccurate for layers thinner than a mean free path
 
     Source: [DonnerJensen2005] eq. 7, 8 for the multipole.
     """
@@ -232,7 +234,10 @@ def slab_transmittance(
 
 
 def truncated_medium(medium: Medium, thickness_mm: float) -> Medium:
-    """Return the part of a medium above a depth [mm], with air below it; thinner media are returned whole."""
+    """Return the part of a medium above a depth, with air below it; a thinner medium is returned whole.
+
+    thickness_mm : depth at which the medium is cut off [mm]
+    """
     if not 0.0 < thickness_mm < np.inf:
         refuse("thickness", "a length above 0 mm", f"got {thickness_mm:g}", "Correct it")
     layers, remaining_mm = [], thickness_mm
@@ -248,8 +253,8 @@ def truncated_medium(medium: Medium, thickness_mm: float) -> Medium:
 class ModelError:
     """Relative error of a diffusion model's ring energies, with Monte Carlo as the reference.
 
-    smallest, largest : (3,) smallest and largest error over the tissues, in red, green and blue [-]
-    tissues : names of the tissues on which the error was measured
+    smallest, largest : (3,) smallest and largest error of the tissues, in red, green and blue [-]
+    tissues : names of the tissues for which the error was measured
     """
 
     smallest: Floats
@@ -260,8 +265,8 @@ class ModelError:
 def measured_model_error(model_name: str, tissue_name: str = "") -> ModelError | None:
     """Return the measured error of a diffusion model, or None if the model was never measured.
 
-    tissue_name : name of a tissue; if it is empty or was not measured, the error ranges over all measured
-        tissues
+    tissue_name : name of a tissue; if the name is empty or the tissue was not measured, the result covers all
+        measured tissues
     """
     by_tissue = {name: error for (name, key), error in _measured_errors().items() if key == model_name}
     if tissue_name in by_tissue:

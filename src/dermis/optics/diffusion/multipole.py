@@ -1,4 +1,4 @@
-"""Multipole model: slabs as series of mirror images at both faces, and stacks of slabs."""
+"""Multipole model: light in a slab as a series of point sources mirrored at both faces; stacks of slabs."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ Clamp = Literal["none", "layer"]
 
 @dataclass(frozen=True)
 class Slab:
-    """Layer between two faces, for which the multipole model is solved.
+    """Layer between two faces, as input of the multipole model.
 
     layer : absorption, scattering and thickness; the thickness may be infinite
     A_top, A_bottom : boundary mismatch of the upper and the lower face; 1 at index-matched faces [-]
-    clamp : "none" puts the source one mean free path deep as published, even below the slab; "layer" keeps
-        the source inside the slab
+    clamp : "none" for a source one mean free path deep as published, which may be below the slab; "layer" for
+        a source at this depth, but not below the slab
 
     Source: [DonnerJensen2005] section 3.1; boundaries after [Contini1997].
     """
@@ -34,18 +34,18 @@ class Slab:
 
     @property
     def source_mm(self) -> Floats:
-        """Return the depth of the real point source below the upper face, (c,) [mm]."""
+        """Return the depth (c,) of the real point source below the upper face [mm]."""
         l, d = self.layer.mean_free_path_mm, self.layer.thickness_mm
         return np.minimum(l, d) if self.clamp == "layer" else l
 
     @property
     def z_b(self) -> tuple[Floats, Floats]:
-        """Return the distances above and below the slab where fluence extrapolates to 0, (c,) each [mm]."""
+        """Return the distances (c,) above and below the slab where the extrapolated fluence is 0 [mm]."""
         return 2.0 * self.A_top * self.layer.D, 2.0 * self.A_bottom * self.layer.D
 
     @property
     def period_mm(self) -> Floats:
-        """Return the distance in depth after which the mirror images repeat, (c,) [mm]."""
+        """Return the depth interval (c,) after which the mirror images repeat [mm]."""
         return np.asarray(2.0 * (self.layer.thickness_mm + sum(self.z_b)))
 
     def flipped(self) -> Slab:
@@ -54,7 +54,7 @@ class Slab:
 
 
 def reflectance_hankel(frequency: ArrayLike, slab: Slab) -> Floats:
-    """Return the Hankel transform of R(r) of a slab at frequencies [1/mm], in closed form, (n, c) [-]."""
+    """Return the Hankel transform (n, c) of R(r) of a slab at frequencies [1/mm], in closed form."""
     if np.isinf(slab.layer.thickness_mm):
         return dipole.reflectance_hankel(frequency, slab.layer, slab.A_top)
     l, top = slab.source_mm, slab.z_b[0]
@@ -62,7 +62,7 @@ def reflectance_hankel(frequency: ArrayLike, slab: Slab) -> Floats:
 
 
 def transmittance_hankel(frequency: ArrayLike, slab: Slab) -> Floats:
-    """Return the Hankel transform of T(r) of a slab at frequencies [1/mm], in closed form, (n, c) [-]."""
+    """Return the Hankel transform (n, c) of T(r) of a slab at frequencies [1/mm], in closed form."""
     l, top, d = slab.source_mm, slab.z_b[0], slab.layer.thickness_mm
     if np.isinf(d):
         return np.zeros((*np.shape(frequency), len(l)))
@@ -70,10 +70,10 @@ def transmittance_hankel(frequency: ArrayLike, slab: Slab) -> Floats:
 
 
 def reflectance(radius_mm: ArrayLike, slab: Slab, tolerance: float = 1e-8) -> Floats:
-    """Return the reflected profile R(r) of a slab per power that enters, (n, c) [1/mm2].
+    """Return the reflected profile R(r), (n, c), of a slab per power that enters [1/mm2].
 
     radius_mm : (n,) distances r from the beam [mm]
-    tolerance : upper bound on the light of the image sources that are omitted, per power that enters [-]
+    tolerance : upper bound of the light from all image sources that are left out, per power that enters [-]
 
     Source: [DonnerJensen2005] eq. 2-6.
     """
@@ -84,13 +84,13 @@ def reflectance(radius_mm: ArrayLike, slab: Slab, tolerance: float = 1e-8) -> Fl
 
 
 def transmittance(radius_mm: ArrayLike, slab: Slab, tolerance: float = 1e-8) -> Floats:
-    """Return the transmitted profile T(r) of a slab per power that enters, (n, c) [1/mm2].
+    """Return the transmitted profile T(r), (n, c), of a slab per power that enters [1/mm2].
 
     radius_mm : (n,) distances r from the beam [mm]
-    tolerance : upper bound on the light of the image sources that are omitted, per power that enters [-]
+    tolerance : upper bound of the light from all image sources that are left out, per power that enters [-]
 
-    A source that the clamp moves onto the lower face emits half of its light directly. This peak at r = 0 is
-    missing here, but included in `transmittance_hankel`.
+    If the clamp moves the source onto the lower face, half of the source's light leaves directly at r = 0.
+    This light is missing here, but `transmittance_hankel` includes it.
 
     Source: [DonnerJensen2005] eq. 7, 8.
     """
@@ -101,13 +101,14 @@ def transmittance(radius_mm: ArrayLike, slab: Slab, tolerance: float = 1e-8) -> 
 
 
 def _image_sum(frequency: ArrayLike, slab: Slab, real_source: Floats, image_source: Floats) -> Floats:
-    """Return the Hankel transform of R(r) or T(r) of two periodic series of point sources.
+    """Return the Hankel transform (n, c) of R(r) or T(r) of a slab: a series of sources minus their images.
 
-    With the depth z of a source, the period P and q^2 = sigma_tr^2 + s^2, each series is half the albedo
-    times the sum over i of sign(z + i P) exp(-|z + i P| q). The result is the series of real sources minus
-    the series of their images.
+    Each series is half the albedo times the sum over all integers i of sign(z + i P) exp(-|z + i P| q). Here,
+    z is the signed distance from the face to one source, P is the period, and q^2 = sigma_tr^2 + s^2 at the
+    frequency s.
 
-    real_source, image_source : (c,) signed distances from the face to one real source and to one image [mm]
+    frequency : (n,) frequencies s [1/mm]
+    real_source, image_source : (c,) signed distances z of one real source and of one image [mm]
     """
     q = np.sqrt(slab.layer.sigma_tr**2 + np.asarray(frequency, dtype=np.float64)[..., None] ** 2)
     P = slab.period_mm
@@ -133,12 +134,12 @@ def _image_series(
 
 
 def image_pairs_needed(slab: Slab, tolerance: float, max_pairs: int = 2000) -> int:
-    """Return the number of image pairs on each side of a slab that keeps the omitted light below `tolerance`.
+    """Return how many image pairs are needed on each side, so that the rest has less light than `tolerance`.
 
-    An image at depth z contributes exp(-|z| sigma_tr) / 2, so the omitted light is at most a geometric
-    series. Without absorption the geometric series does not converge, but opposite images cancel: the flux of
-    a pair falls with the inverse cube of its distance, and after `max_pairs` pairs it is 1e-7 of the flux of
-    the first pair.
+    An image at depth z contributes exp(-|z| sigma_tr) / 2, so the light of the other images is at most a
+    geometric series. Without absorption, this series does not converge, and the result is `max_pairs`. The
+    two images of a pair nearly cancel: the flux of a pair falls with the inverse cube of its distance, and
+    after 2000 pairs it is 1e-7 of the flux of the first pair.
     """
     decay = float((slab.period_mm * slab.layer.sigma_tr).min())
     if decay <= 0.0:
@@ -149,10 +150,10 @@ def image_pairs_needed(slab: Slab, tolerance: float, max_pairs: int = 2000) -> i
 
 @dataclass(frozen=True)
 class StackResponse:
-    """Hankel transforms of reflectance and transmittance of a stack of layers, (n, c) each [-].
+    """Hankel transforms (n, c) of the reflectance and the transmittance of a stack of layers [-].
 
-    R_above, T_down : reflectance and transmittance for light from above
-    R_below, T_up : reflectance and transmittance for light from below
+    R_above, T_down : transforms of reflectance and transmittance for light from above
+    R_below, T_up : transforms of reflectance and transmittance for light from below
     """
 
     R_above: Floats
@@ -175,7 +176,7 @@ class StackResponse:
 
 
 def stack_response(frequency: ArrayLike, medium: Medium, A: float, clamp: Clamp = "layer") -> StackResponse:
-    """Return the reflectance and transmittance of all layers of a medium at frequencies s [1/mm].
+    """Return the response of the stack of all layers of a medium, at frequencies s [1/mm].
 
     A : boundary mismatch with air, above and below; internal interfaces are index-matched [-]
     clamp : position of the source in layers thinner than a mean free path, see `Slab`

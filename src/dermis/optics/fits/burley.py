@@ -1,4 +1,4 @@
-"""Burley's diffusion profile of two exponentials: its fits, and the settings for Unity and Unreal Engine."""
+"""Burley's diffusion profile of two exponentials: fits to data, and settings for Unity and Unreal Engine."""
 
 from __future__ import annotations
 
@@ -31,18 +31,18 @@ class BurleyProfile:
     shape: Floats
 
     def radiant_exitance(self, radius_mm: ArrayLike) -> Floats:
-        """Return the profile R(r) at distances r > 0 from a narrow beam of unit power, (..., c) [1/mm2]."""
+        """Return the profile R(r), (..., c), at distances r > 0 from a narrow beam of unit power [1/mm2]."""
         r = np.asarray(radius_mm, dtype=np.float64)[..., None]
         sr = self.shape * r
         return np.asarray(self.albedo * self.shape * (np.exp(-sr) + np.exp(-sr / 3.0)) / (8.0 * np.pi * r))
 
     def energy_within(self, radius_mm: ArrayLike) -> Floats:
-        """Return the light that emerges within distances r of the beam, (..., c) [-]."""
+        """Return the light (..., c) that emerges within distances r of the beam [-]."""
         sr = self.shape * np.asarray(radius_mm, dtype=np.float64)[..., None]
         return np.asarray(-self.albedo * (np.expm1(-sr) + 3.0 * np.expm1(-sr / 3.0)) / 4.0)
 
     def hankel(self, frequency: ArrayLike) -> Floats:
-        """Return the Hankel transform of R(r) at frequencies k [1/mm], (..., c) [-].
+        """Return the Hankel transform (..., c) of R(r) at frequencies k [1/mm].
 
         The transform is the integral of 2 pi r R(r) J0(k r) over r, with the Bessel function J0.
         """
@@ -51,7 +51,7 @@ class BurleyProfile:
         return np.asarray(self.albedo * s / 4.0 * (1.0 / np.hypot(s, k) + 1.0 / np.hypot(s / 3.0, k)))
 
     def radius_at_fraction(self, fraction: float) -> Floats:
-        """Return the radius within which a given fraction of the emerging light leaves, (c,) [mm]."""
+        """Return the radius (c,) within which a given fraction of the emerging light leaves [mm]."""
         # With t = exp(-s r / 3), the fraction outside r is (t^3 + 3 t) / 4; a hyperbolic sine solves this
         # cubic.
         t = 2.0 * np.sinh(np.arcsinh(2.0 * (1.0 - fraction)) / 3.0)
@@ -59,7 +59,7 @@ class BurleyProfile:
 
 
 def shape_factor(albedo: ArrayLike) -> Floats:
-    """Return Burley's shape s times the mean free path, for a narrow beam at normal incidence [-].
+    """Return Burley's shape s, multiplied by the mean free path, for a narrow beam at normal incidence [-].
 
     albedo : total reflectance A [-]
 
@@ -70,7 +70,7 @@ def shape_factor(albedo: ArrayLike) -> Floats:
 
 
 def shape_factor_diffuse(albedo: ArrayLike) -> Floats:
-    """Return Burley's shape s times the diffuse mean free path 1 / sigma_tr [-].
+    """Return Burley's shape s, multiplied by the diffuse mean free path 1 / sigma_tr [-].
 
     albedo : total reflectance A [-]
 
@@ -95,7 +95,7 @@ class BurleyFit:
 
 
 def fit_burley(target: RingTarget) -> BurleyFit:
-    """Fit Burley's profile to ring energies with the smallest error; each channel keeps its total."""
+    """Fit Burley's profile to ring energies with the smallest error, without changing any channel's total."""
     shape = np.array([_fit_shape(target.channel(i)) for i in range(len(target.total))])
     profile = BurleyProfile(target.total, shape)
     return BurleyFit(
@@ -127,8 +127,8 @@ class UnityParameters:
     scattering_colour : scattering distance 1 / s of each channel, divided by the largest of the three
         distances, linear Rec. 709 [-]
     multiplier_mm : largest scattering distance 1 / s [mm]
-    max_radius_mm : radius within which 99.7 % of the light of the widest channel leaves; displayed in the
-        editor [mm]
+    max_radius_mm : radius within which 99.7 % of the widest channel's light leaves, as shown in the editor
+        [mm]
     """
 
     scattering_colour: tuple[float, ...]
@@ -137,10 +137,10 @@ class UnityParameters:
 
 
 def unity_parameters(profile: BurleyProfile) -> UnityParameters:
-    """Return the settings of Unity's diffusion profile; the albedo belongs in Unity's base colour.
+    """Return the settings of Unity's diffusion profile, to be used with the albedo as Unity's base colour.
 
-    According to Unity's source (DiffusionProfileSettings.cs), the shape s of Burley's profile is 1 / (colour
-    times multiplier), in millimetres at scale 1.
+    According to Unity's source code (DiffusionProfileSettings.cs), the shape s of Burley's profile is
+    1 / (colour times multiplier), where the multiplier is in millimetres at scale 1.
     """
     _check_rgb(profile)
     distance = 1.0 / profile.shape
@@ -172,11 +172,11 @@ class UnrealParameters:
 def unreal_parameters(profile: BurleyProfile) -> UnrealParameters:
     """Return the subsurface profile settings of Unreal Engine that reproduce a fitted Burley profile.
 
-    According to public copies of its source (SubsurfaceProfile.cpp, BurleyNormalizedSSS.cpp), the engine
-    obtains the diffuse mean free path by multiplying the mean free path l (colour times distance) by
-    `shape_factor_diffuse` / (0.6 `shape_factor`). The shape s is `shape_factor_diffuse` divided by the
-    diffuse mean free path, so s = 0.6 `shape_factor` / l. The kernel divides millimetres by ten to get scene
-    units, so scale 1 is life-size for centimetres.
+    According to public copies of the engine's source code (SubsurfaceProfile.cpp, BurleyNormalizedSSS.cpp),
+    the engine gets the diffuse mean free path from the mean free path l (colour times distance), multiplied
+    by `shape_factor_diffuse` / (0.6 `shape_factor`). The shape s is `shape_factor_diffuse` divided by the
+    diffuse mean free path, so s = 0.6 `shape_factor` / l. The engine's kernel divides millimetres by ten to
+    get scene units, so a scene in centimetres is life-size at scale 1.
     """
     _check_rgb(profile)
     mean_free_path = 0.1 * UNREAL_SHAPE_RATIO * shape_factor(profile.albedo) / profile.shape

@@ -64,15 +64,15 @@ def fit_gaussians(
 
     target : R(r) at points, or light through rings
     terms : number of Gaussians in each channel, 1 to 8
-    shared : whether all channels use the same variances, chosen for the root mean square of the channels'
-        errors; otherwise each channel has its own variances and the weight 0 at the variances of the other
-        channels
+    shared : whether all channels use the same variances, which then minimise the root mean square of the
+        channels' errors. Otherwise, each channel has separate variances, and the weight 0 for the variances
+        of other channels
     keep_energy : whether the weights must sum to the target's total reflectance
-    similar_fit : fit of a similar profile, from whose variances the search starts; this is several times
-        faster, but the best fit may be missed
+    similar_fit : fit of a similar profile; the search starts from its variances, which is several times
+        faster but may miss the best fit
     profile_name : name of the fitted profile
 
-    Raises DermisError for an invalid number of terms, and for profiles that Gaussians cannot fit.
+    Raises DermisError for an invalid number of terms, and when no Gaussians fit the profile.
 
     Source: [dEonLuebke2007] section 14.4 for the error that is minimised.
     """
@@ -103,7 +103,7 @@ def _fit_group(
 ) -> tuple[Floats, Floats]:
     """Fit k Gaussians to the channels of a target; return variances (k,) and weights (k, c).
 
-    start_variances_mm2 : (k,) variances to start from [mm2], or None
+    start_variances_mm2 : (k,) variances from which the search starts; None for several default starts [mm2]
     """
     norm = np.linalg.norm(target.samples, axis=0)
     design, samples = _with_energy_equation(target) if keep_energy else (target.design, target.samples)
@@ -137,18 +137,18 @@ def _initial_variances(target: FitTarget, gaussian_count: int) -> list[Floats]:
 
 
 def _log_variance_bounds(target: FitTarget) -> tuple[float, float]:
-    """Return the smallest and largest log variance of a fit.
+    """Return the logarithms of the smallest and the largest variance that a fit may use.
 
-    The standard deviations range from half the first radius of the target to its last radius.
+    Standard deviations range from half the first radius of the target to the last radius of the target.
     """
     radius = target.radius_mm if isinstance(target, PointTarget) else target.edges_mm[1:]
     return float(2.0 * np.log(radius[0] / 2.0)), float(np.log(min(radius[-1] ** 2, MAX_VARIANCE_MM2)))
 
 
 def _with_energy_equation(target: FitTarget) -> tuple[DesignFunction, Floats]:
-    """Return a target's design and samples with one more equation: the weights sum to the total.
+    """Return a target's design and samples with one more equation: the weights must sum to the total.
 
-    The weight of the equation is so large that the total is met almost exactly.
+    The equation has so large a weight that it is fulfilled almost exactly.
     """
     width = target.mean_radius_at([0.5]) ** 2 / 2.0
     stiffness = _ENERGY_EQUATION_WEIGHT * float(np.linalg.norm(target.design(width)[0]))
@@ -164,9 +164,9 @@ def _with_energy_equation(target: FitTarget) -> tuple[DesignFunction, Floats]:
 def _variances_of_fit(
     similar_fit: GaussianSum | None, channel: int | None, gaussian_count: int
 ) -> Floats | None:
-    """Return the variances of a similar fit, from which a new fit starts.
+    """Return the variances of a similar fit as the start of a new fit.
 
-    The result is None without a similar fit, or if its number of Gaussians is not `gaussian_count`.
+    The result is None if there is no similar fit, or if its number of Gaussians is not `gaussian_count`.
 
     similar_fit : similar fit, or None
     channel : index of the channel whose Gaussians are used; None to use the Gaussians of all channels
@@ -179,7 +179,7 @@ def _variances_of_fit(
 
 
 def _combine_fits(fits: list[tuple[Floats, Floats]], profile_name: str) -> GaussianSum:
-    """Combine fits of separate channels into one sum of Gaussians, in which channels share equal variances.
+    """Combine fits of separate channels into one sum of Gaussians, in which equal variances occur once.
 
     fits : variances (k,) and weights (k, c) of each fit
     """
@@ -195,10 +195,9 @@ def _combine_fits(fits: list[tuple[Floats, Floats]], profile_name: str) -> Gauss
 
 
 def single_gaussian(profile: GaussianSum) -> GaussianSum:
-    """Fit one Gaussian to a profile, keeping each channel's total, by least squares over the plane.
+    """Fit one Gaussian to a profile by least squares over the plane, without changing any channel's total.
 
-    The result reproduces early skin shading, in which light maps were blurred once [Borshukov2003;
-    Green2004].
+    The result reproduces early skin shading, which blurred light maps once [Borshukov2003; Green2004].
     """
     from scipy.optimize import minimize_scalar
 
@@ -217,9 +216,10 @@ def single_gaussian(profile: GaussianSum) -> GaussianSum:
 def shared_gaussians(
     profiles: Sequence[GaussianSum], gaussian_count: int = SHARED_GAUSSIAN_COUNT
 ) -> tuple[GaussianSum, ...]:
-    """Fit several profiles with one set of variances, so that one series of blurs serves all profiles.
+    """Fit several profiles with one set of variances, so that all profiles can use the same series of blurs.
 
-    The total reflectances are preserved. Profiles that already share their variances are returned unchanged.
+    The total reflectances do not change. Profiles that already have the same variances are returned
+    unchanged.
     """
     first = profiles[0].variance_mm2
     if all(np.array_equal(first, one.variance_mm2) for one in profiles):
@@ -249,6 +249,6 @@ def _hashable_sum(profile: GaussianSum) -> _HashableSum:
 
 
 def _combined_ring_target(profiles: Sequence[GaussianSum]) -> RingTarget:
-    """Return ring energies of several profiles as one target, which has the channels of all profiles."""
+    """Return the ring energies of several profiles as one target with the channels of all profiles."""
     within = np.hstack([one.energy_within(_RING_EDGES_MM) for one in profiles])
     return RingTarget(_RING_EDGES_MM, np.diff(within, axis=0), np.hstack([one.albedo for one in profiles]))

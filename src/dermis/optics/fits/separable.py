@@ -23,7 +23,7 @@ _START_LIGHT_FRACTIONS = (
 
 @dataclass(frozen=True)
 class SeparableKernel:
-    """Kernel A a(x) a(y) with a(x) = sum of w exp(-x^2 / 2v) / sqrt(2 pi v); not radially symmetric.
+    """Kernel A a(x) a(y), where a(x) is a sum of w exp(-x^2 / 2v) / sqrt(2 pi v); not radially symmetric.
 
     albedo : (c,) total reflectance A [-]
     variance_mm2 : (k, c) variances v, increasing with k [mm2]
@@ -37,17 +37,17 @@ class SeparableKernel:
     weight: Floats
 
     def half_line_integral(self, offset_mm: ArrayLike) -> Floats:
-        """Return the integral of a(x) from 0 to an offset, (..., c), at most 1/2 [-]."""
+        """Return the integral (..., c) of a(x) from 0 to an offset, at most 1/2 [-]."""
         from scipy.special import erf
 
         x = np.asarray(offset_mm, dtype=np.float64)[..., None, None]
         return np.asarray(0.5 * (self.weight * erf(x / np.sqrt(2.0 * self.variance_mm2))).sum(axis=-2))
 
     def sector_energy(self, edges_mm: Floats) -> Floats:
-        """Return the light through equal sectors of each ring, (n, SECTORS_PER_QUADRANT, c) [-].
+        """Return the light (n, SECTORS_PER_QUADRANT, c) through equal sectors of n rings [-].
 
-        Each quadrant of a ring is divided into SECTORS_PER_QUADRANT sectors; the light of the four quadrants
-        is added.
+        Each quadrant of a ring is divided into SECTORS_PER_QUADRANT sectors, and the light of corresponding
+        sectors in the four quadrants is added.
 
         edges_mm : (n + 1,) radii of the ring edges [mm]
         """
@@ -71,9 +71,9 @@ class SeparableFit:
 
 
 def preintegrated_kernel(profile: GaussianSum) -> SeparableKernel:
-    """Return the kernel whose a(x) is the profile R integrated over y, normalised to unit integral.
+    """Return the separable kernel whose a(x) is the integral of a profile over y, normalised to 1.
 
-    The kernel is exact where light varies along x or y alone.
+    The kernel is exact where light varies only along x or only along y.
 
     Source: [Jimenez2015].
     """
@@ -82,13 +82,13 @@ def preintegrated_kernel(profile: GaussianSum) -> SeparableKernel:
 
 
 def evaluate_kernel(kernel: SeparableKernel, target: RingTarget) -> SeparableFit:
-    """Compute the errors of a separable kernel relative to the ring energies of a profile."""
+    """Return a separable kernel together with its errors relative to the ring energies of a profile."""
     error = ring_error(target, kernel.sector_energy(target.edges_mm))
     return SeparableFit(kernel, error, kernel.albedo / target.total - 1.0)
 
 
 def fit_separable(target: RingTarget) -> SeparableFit:
-    """Fit a separable kernel of two Gaussians to ring energies, keeping each channel's total.
+    """Fit a separable kernel of two Gaussians to ring energies, with the target's total in each channel.
 
     Source: [Jimenez2015], the artist-friendly model.
     """
@@ -101,7 +101,7 @@ def fit_separable(target: RingTarget) -> SeparableFit:
 
 
 def _fit_channel(target: RingTarget) -> Floats:
-    """Fit one channel; return the weight of the first Gaussian and both log variances, (3,)."""
+    """Fit one channel; return three numbers, the first Gaussian's weight and both variances' logarithms."""
     from scipy.optimize import least_squares
 
     scale = np.sqrt(SECTORS_PER_QUADRANT) / np.linalg.norm(target.energy)
@@ -122,9 +122,10 @@ def _fit_channel(target: RingTarget) -> Floats:
 
 
 def _sector_fractions(edges_mm: Floats, variance: Floats, weight: Floats) -> Floats:
-    """Return the fraction of one channel's light in each ring and sector, (n, SECTORS_PER_QUADRANT) [-].
+    """Return the fraction (n, SECTORS_PER_QUADRANT) of one channel's light in each ring and sector [-].
 
-    variance, weight : (k,) Gaussians of a(x)
+    edges_mm : (n + 1,) radii of the ring edges [mm]
+    variance, weight : (k,) variances [mm2] and weights of the Gaussians of a(x)
     """
     cells = np.zeros((len(edges_mm) - 1, SECTORS_PER_QUADRANT))
     for i in range(len(variance)):
@@ -136,8 +137,9 @@ def _sector_fractions(edges_mm: Floats, variance: Floats, weight: Floats) -> Flo
 
 
 def _elliptic_sectors(edges_mm: Floats, variance_x_mm2: float, variance_y_mm2: float) -> Floats:
-    """Return the fraction of an elliptic Gaussian's light in each ring and sector, (n, SECTORS_PER_QUADRANT).
+    """Return the fraction (n, SECTORS_PER_QUADRANT) of an elliptic Gaussian in each ring and sector [-].
 
+    edges_mm : (n + 1,) radii of the ring edges [mm]
     variance_x_mm2, variance_y_mm2 : variances along x and y [mm2]
     """
     x, w = np.polynomial.legendre.leggauss(_QUADRATURE_NODES)

@@ -1,4 +1,4 @@
-"""Data that fits approximate: R(r) at points, or the light that emerges through rings."""
+"""Data to which profiles are fitted: R(r) at points, or the light that emerges through rings."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from dermis.optics.media import Floats
 
 @dataclass(frozen=True)
 class PointTarget:
-    """Diffusion profile R(r) at points as the target of a fit, if R(r) is finite at r = 0.
+    """Diffusion profile R(r) at points as the target of a fit, for profiles that are finite at r = 0.
 
     radius_mm : (n,) radii r, increasing, preferably log-spaced from 1e-4 to 60 [mm]
     reflectance : (n, c) R(r) in c channels [1/mm2]
@@ -29,7 +29,7 @@ class PointTarget:
     kind: ClassVar[Literal["pointwise"]] = "pointwise"
 
     def __post_init__(self) -> None:
-        """Check shapes and values of the arrays."""
+        """Raise DermisError for arrays with wrong shapes or values."""
         _check_target(self.kind, self.radius_mm, self.reflectance, self.total)
         if not self.radius_mm[0] > 0.0:
             refuse("radii of a profile", "numbers above 0", f"got {self.radius_mm[0]:g}", "Leave it out")
@@ -43,11 +43,13 @@ class PointTarget:
 
     @cached_property
     def samples(self) -> Floats:
-        """Return weighted samples of R, whose squares sum to the integral of r R^2, (n, c)."""
+        """Return samples (n, c) of R, weighted so that their squares sum to the integral of r R^2."""
         return self._sqrt_quadrature_weights[:, None] * self.reflectance
 
     def design(self, variance_mm2: Floats) -> tuple[Floats, Floats]:
-        """Return weighted samples of unit Gaussians and their derivatives by log variance, (n, k) each.
+        """Return weighted samples (n, k) of k unit Gaussians, and their derivatives (n, k).
+
+        The derivatives are those with respect to the logarithm of the variance.
 
         variance_mm2 : (k,) variances of the Gaussians [mm2]
         """
@@ -56,7 +58,9 @@ class PointTarget:
         return gaussians, gaussians * (u - 1.0)
 
     def error(self, variance_mm2: Floats, weight: Floats) -> Floats:
-        """Return E = sqrt(integral of r (fit - R)^2 / integral of r R^2) of a sum of Gaussians, (c,) [-].
+        """Return the relative error (c,) of a sum of Gaussians [-].
+
+        It is sqrt(integral of r (fit - R)^2 / integral of r R^2).
 
         Source: [dEonLuebke2007] section 14.4.
         """
@@ -64,7 +68,7 @@ class PointTarget:
         return np.asarray(np.sqrt((residual**2).sum(axis=0) / (self.samples**2).sum(axis=0)))
 
     def mean_radius_at(self, fractions: Sequence[float]) -> Floats:
-        """Return the radii within which given fractions of the light emerge, for the mean of channels [mm].
+        """Return the radii within which given fractions of the light emerge, on average over channels [mm].
 
         fractions : increasing fractions of the light, 0 to 1 [-]
         """
@@ -72,7 +76,7 @@ class PointTarget:
         return _radii_at_fractions(fractions, self.radius_mm, rate)
 
     def channel(self, channel_index: int) -> PointTarget:
-        """Return the part of the target with only one channel, to fit this channel separately."""
+        """Return the target with only one of its channels, to fit this channel separately."""
         channel = slice(channel_index, channel_index + 1)
         return PointTarget(self.radius_mm, self.reflectance[:, channel], self.total[channel])
 
@@ -95,18 +99,20 @@ class RingTarget:
     kind: ClassVar[Literal["annulus"]] = "annulus"
 
     def __post_init__(self) -> None:
-        """Check shapes and values of the arrays."""
+        """Raise DermisError for arrays with wrong shapes or values."""
         _check_target(self.kind, self.edges_mm[1:], self.energy, self.total)
         if not 0.0 <= self.edges_mm[0] < self.edges_mm[1]:
             refuse("edges of rings", "numbers that increase from 0", f"got {self.edges_mm[:2]}", "Sort them")
 
     @property
     def samples(self) -> Floats:
-        """Return the ring energies, whose squared errors a fit minimises, (n, c) [-]."""
+        """Return the ring energies (n, c); a fit minimises the sum of their squared errors [-]."""
         return self.energy
 
     def design(self, variance_mm2: Floats) -> tuple[Floats, Floats]:
-        """Return ring energies of unit Gaussians and their derivatives by log variance, (n, k) each.
+        """Return ring energies (n, k) of k unit Gaussians, and their derivatives (n, k).
+
+        The derivatives are those with respect to the logarithm of the variance.
 
         variance_mm2 : (k,) variances of the Gaussians [mm2]
         """
@@ -115,24 +121,24 @@ class RingTarget:
         return -np.diff(outside, axis=0), -np.diff(u * outside, axis=0)
 
     def error(self, variance_mm2: Floats, weight: Floats) -> Floats:
-        """Return the relative error `ring_error` of a sum of Gaussians, (c,) [-]."""
+        """Return the relative error (c,) of a sum of Gaussians, as defined by `ring_error` [-]."""
         return ring_error(self, self.design(variance_mm2)[0] @ weight)
 
     def mean_radius_at(self, fractions: Sequence[float]) -> Floats:
-        """Return the radii within which given fractions of the light emerge, for the mean of channels [mm].
+        """Return the radii within which given fractions of the light emerge, on average over channels [mm].
 
         fractions : increasing fractions of the light, 0 to 1 [-]
         """
         return _radii_at_fractions(fractions, self.edges_mm[1:], np.abs(self.energy))
 
     def channel(self, channel_index: int) -> RingTarget:
-        """Return the part of the target with only one channel, to fit this channel separately."""
+        """Return the target with only one of its channels, to fit this channel separately."""
         channel = slice(channel_index, channel_index + 1)
         return RingTarget(self.edges_mm, self.energy[:, channel], self.total[channel])
 
 
 def ring_error(target: RingTarget, fitted_energy: Floats) -> Floats:
-    """Return the relative error E_b = sqrt(sum of (fit - target)^2 / sum of target^2) over rings, (c,) [-].
+    """Return the relative error (c,) of ring energies, sqrt(sum of (fit - target)^2 / sum of target^2) [-].
 
     fitted_energy : (n, c) light of the fit through each ring; or (n, m, c) light through m equal sectors of
         each ring, for kernels that are not radially symmetric

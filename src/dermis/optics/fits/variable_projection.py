@@ -1,7 +1,7 @@
-"""Nonlinear least squares over the variances of Gaussians, with optimal weights at each step.
+"""Nonlinear least squares for the variances of Gaussians, with optimal weights at each step.
 
 Sources: [GolubPereyra1973] for the method, [Kaufman1975] for its derivatives, [Marquardt1963] for the steps,
-[Anderson1965] for their extrapolation.
+[Anderson1965] for the extrapolation of steps.
 """
 
 from __future__ import annotations
@@ -23,12 +23,13 @@ _QR_ROWS_PER_BLOCK = 512
 
 
 class WeightedFit(NamedTuple):
-    """Gaussians of the current step with optimal weights, and derivatives for the next step.
+    """Gaussians at one step, with optimal weights and with derivatives for the next step.
 
     log_variance : (k,) logarithms of the variances
     weight : (k, c) weights in c channels
     cost : sum of squared residuals
-    gradient, curvature : (k,) gradient and (k, k) Gauss-Newton matrix of half the cost by log variance
+    gradient : (k,) gradient of half the cost with respect to the logarithms
+    curvature : (k, k) Gauss-Newton matrix of half the cost with respect to the logarithms
     """
 
     log_variance: Floats
@@ -45,13 +46,13 @@ def minimise(
     log_variance_bounds: tuple[float, float],
     cost_tolerance: float = COST_TOLERANCE,
 ) -> WeightedFit:
-    """Return the fit at a local minimum of the squared residuals, reached by descent from start variances.
+    """Return the fit at a local minimum of the squared residuals, found by descent from given variances.
 
-    design : function from variances to the samples of unit Gaussians (n, k), and their derivatives by log
-        variance
+    design : function from k variances to the samples (n, k) of unit Gaussians, and to the derivatives (n, k)
+        of these samples with respect to the logarithms of the variances
     samples : (n, c) data to fit
-    log_variance : (k,) logarithms of the start variances
-    log_variance_bounds : smallest and largest log variance
+    log_variance : (k,) logarithms of the variances from which the descent starts
+    log_variance_bounds : smallest and largest logarithm of a variance
     cost_tolerance : relative decrease of the cost below which the descent stops
     """
     fit = _optimal_weights(design, samples, log_variance)
@@ -85,10 +86,10 @@ def _marquardt_step(fit: WeightedFit, damping: float) -> Floats:
 def _anderson_step(
     log_variance: Floats, step: Floats, last_log_variance: Floats, last_step: Floats
 ) -> Floats:
-    """Return the step of Anderson acceleration, extrapolated from the last two steps [Anderson1965].
+    """Return a step extrapolated from the last two steps by Anderson acceleration [Anderson1965].
 
-    Plain steps neglect the curvature of the residuals and converge linearly; one extrapolated step replaces a
-    dozen plain steps.
+    Plain steps neglect the curvature of the residuals and converge linearly. One extrapolated step replaces
+    about a dozen plain steps.
     """
     change = step - last_step
     size = float(change @ change)
@@ -98,7 +99,7 @@ def _anderson_step(
 
 
 def _optimal_weights(design: DesignFunction, samples: Floats, log_variance: Floats) -> WeightedFit:
-    """Compute optimal non-negative weights for given variances, with cost and derivatives."""
+    """Return the fit for given variances, with optimal non-negative weights, cost and derivatives."""
     columns, slopes = design(np.exp(log_variance))
     k = len(log_variance)
     size = np.linalg.norm(columns, axis=0)
@@ -117,8 +118,8 @@ def _optimal_weights(design: DesignFunction, samples: Floats, log_variance: Floa
 def qr_factor(matrix: Floats) -> Floats:
     """Return the upper triangular factor R of the QR factorisation of a tall matrix.
 
-    Blocks of rows are factorised separately, because BLAS would start threads for the whole matrix that cost
-    more than they save.
+    Blocks of rows are factorised separately. For the whole matrix, BLAS would start threads, which would cost
+    more time than they save.
     """
     blocks = np.array_split(matrix, -(-len(matrix) // _QR_ROWS_PER_BLOCK))
     factors = [np.asarray(np.linalg.qr(block, mode="r")) for block in blocks]

@@ -1,1 +1,1 @@
-"""Skin made of pigments: spectra of melanin and blood, and the layered media that contain them."""
+"""Skin made of pigments: spectra of melanin and blood, and layered media that contain these pigments."""

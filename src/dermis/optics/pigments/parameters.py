@@ -1,4 +1,4 @@
-"""Parameters of skins made of pigments: the default skin, and the named skins of the presets.
+"""Parameters of skins made of pigments: the default skin, and the skins of the presets.
 
 All defaults of `SkinParameters` are here. NumPy is not imported, so that help texts appear quickly.
 """
@@ -22,19 +22,19 @@ _EPIDERMIS_RANGE_MM = 1e-3, 2.0
 
 @dataclass(frozen=True)
 class SkinParameters:
-    """Pigments and epidermal thickness of a skin, from which its layers are computed.
+    """Pigments and epidermal thickness of a skin, from which the layers of the skin are computed.
 
     melanin : fraction of the epidermal volume that is melanosomes, 0 to 1 [-]
-    eumelanin : fraction of melanosomes with eumelanin; the rest have pheomelanin, 0 to 1 [-]
+    eumelanin : fraction of the melanosomes that contain eumelanin; all others contain pheomelanin, 0 to 1 [-]
     blood : fraction of the dermal volume that is blood, 0 to 1 [-]
     oxygen : fraction of oxygenated haemoglobin, 0 to 1 [-]
     epidermis_mm : thickness of the epidermis; measured values are 0.05 to 0.1 [mm]
-    epidermal_blood : fraction of the epidermal volume that is blood, in "donner2008" only, 0 to 1 [-]
+    epidermal_blood : fraction of the epidermal volume that is blood, 0 to 1; only "donner2008" uses it [-]
     baseline : absorption of tissue without blood and melanin, relative to [Jacques1998], 0 to 1 [-]
     oiliness : specular strength rho_s of the surface, 0 to 1; it does not affect light below the surface [-]
 
-    The defaults of baseline, epidermis_mm and oxygen fit the spectra of measured people best, see
-    docs/measured.md.
+    The defaults of baseline, epidermis_mm and oxygen are those that fit the spectra of measured people best,
+    see docs/measured.md.
 
     Source: [DonnerJensen2006, DonnerJensen2006a]; [Donner2008] for blood in the epidermis; [Lu2025] for the
     defaults.
@@ -50,7 +50,7 @@ class SkinParameters:
     oiliness: float = 0.3
 
     def __post_init__(self) -> None:
-        """Check the ranges of all fields."""
+        """Raise DermisError for a field out of range."""
         for name in _FRACTION_FIELDS:
             checked_number(_option_name(name), getattr(self, name), 0.0, 1.0, "a fraction")
         checked_number(_option_name("epidermis_mm"), self.epidermis_mm, *_EPIDERMIS_RANGE_MM, "mm")
@@ -65,7 +65,7 @@ def _option_name(field_name: str) -> str:
 
 
 def _donner_jensen_skin(melanin: float, eumelanin: float, blood: float) -> SkinParameters:
-    """Return a skin of [DonnerJensen2006a], with oxygenation and epidermal thickness from public code."""
+    """Return a skin of [DonnerJensen2006a]; its oxygenation and epidermal thickness are from public code."""
     return SkinParameters(melanin, eumelanin, blood, oxygen=0.75, epidermis_mm=0.25, baseline=1.0)
 
 

@@ -1,4 +1,4 @@
-"""Distribution of the pigments of people's skins: one mixture of normal distributions for all people."""
+"""Distribution of pigments in people's skin: a mixture of normal distributions for all people together."""
 
 from __future__ import annotations
 
@@ -21,11 +21,12 @@ PRIOR_COLUMNS = ("weight", *PRIOR_NAMES, *_COVARIANCE_COLUMNS)
 
 @dataclass(frozen=True, eq=False)
 class SkinPrior:
-    """Mixture of k normal distributions of the logarithms of the parameters `PRIOR_NAMES`.
+    """Joint distribution of the parameters `PRIOR_NAMES`, a mixture of k normal distributions.
 
-    For oxygen, the value itself is normally distributed, not its logarithm.
+    The normal distributions are those of the parameters' logarithms, except for oxygen, where the value
+    itself is normally distributed.
 
-    weight : (k,) weights, with a sum of 1
+    weight : (k,) weights, which sum to 1
     mean : (k, 4) means
     covariance : (k, 4, 4) covariances
     """
@@ -35,14 +36,14 @@ class SkinPrior:
     covariance: Floats
 
     def moments(self, parameter_name: str) -> tuple[float, float]:
-        """Return mean and standard deviation of the logarithm of a parameter, or of oxygen itself."""
+        """Return mean and standard deviation of a parameter's logarithm; for oxygen, of the value itself."""
         i = PRIOR_NAMES.index(parameter_name)
         mean = float(self.weight @ self.mean[:, i])
         second = float(self.weight @ (self.covariance[:, i, i] + self.mean[:, i] ** 2))
         return mean, float(np.sqrt(second - mean**2))
 
     def conditioned_on(self, melanin: float, blood: float) -> SkinPrior:
-        """Return the distribution of skins whose melanin and blood fractions are known [-]."""
+        """Return the distribution of skins with given fractions of melanin and blood [-]."""
         log_fractions = np.log(np.maximum([melanin, blood], _MIN_PIGMENT_FRACTION))
         weight, mean, covariance = [], [], []
         for w, m, C in zip(self.weight, self.mean, self.covariance, strict=True):
@@ -56,7 +57,10 @@ class SkinPrior:
         return SkinPrior(weights / weights.sum(), np.array(mean), np.array(covariance))
 
     def sample(self, skin_count: int, seed: int = 0) -> dict[str, Floats]:
-        """Draw random skins: (skin_count,) values of each of `PRIOR_NAMES`, oxygen clipped to 0 to 1."""
+        """Return random skins as a dictionary from each of `PRIOR_NAMES` to values (skin_count,).
+
+        Oxygen is clipped to the range from 0 to 1.
+        """
         rng = np.random.default_rng(seed)
         component = rng.choice(len(self.weight), size=skin_count, p=self.weight)
         values, vectors = np.linalg.eigh(self.covariance)
@@ -70,9 +74,9 @@ class SkinPrior:
 
 @cache
 def skin_prior() -> SkinPrior:
-    """Return the distribution of people's pigments, over all groups and sites of the archive.
+    """Return the distribution of pigments over all groups of people and sites of the body in an archive.
 
-    Source: [Lu2025], whose spectra are converted to pigments by the package's model.
+    Source: [Lu2025]; the package's skin model converts the spectra of this archive to pigments.
     """
     rows = read_rows("dermis.optics", "data/skin_priors")
     count = len(PRIOR_NAMES)
@@ -85,10 +89,12 @@ def skin_prior() -> SkinPrior:
 
 
 def prior_points(parameter_values: dict[str, Floats]) -> Floats:
-    """Convert the parameters of n skins to points (n, 4) in the coordinates of `SkinPrior`.
+    """Return the parameters of n skins as points (n, 4) in the coordinates of `SkinPrior`.
 
-    parameter_values : (n,) values of each of `PRIOR_NAMES`; points contain the logarithms of these values,
-        but oxygen itself
+    The coordinates are the logarithms of the parameters, except for oxygen, where the coordinate is the
+    value.
+
+    parameter_values : dictionary from each of `PRIOR_NAMES` to values (n,)
     """
     columns = [np.log(np.maximum(parameter_values[name], _MIN_PIGMENT_FRACTION)) for name in PRIOR_NAMES]
     columns[_OXYGEN_INDEX] = parameter_values["oxygen"]

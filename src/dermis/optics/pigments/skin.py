@@ -1,4 +1,4 @@
-"""Layered structures of skin, from pigments to the absorption and scattering spectrum of each layer."""
+"""Layered structures of skin: from pigments to the absorption and scattering spectra of each layer."""
 
 from __future__ import annotations
 
@@ -42,14 +42,15 @@ def spectral_medium(
 ) -> Medium:
     """Return the medium of a skin made of pigments, with one channel for each wavelength.
 
-    structure : "dj2006" is an epidermis on a semi-infinite dermis; "donner2008" has a thin melanin sheet
-        between them and blood in both; "biospec" has a stratum corneum, an epidermis and two dermal layers
+    structure : "dj2006" is an epidermis on a semi-infinite dermis; "donner2008" has blood in both epidermis
+        and dermis, and a thin melanin sheet between them; "biospec" has a stratum corneum, an epidermis and
+        two dermal layers
     parameters : pigment fractions and epidermal thickness
     wavelength_nm : (n,) wavelengths from 380 to 780 [nm]
-    scattering : function from wavelengths to the reduced scattering of the epidermis
+    scattering : function from wavelengths to the reduced scattering coefficient of the epidermis
 
     All layers have the same index of refraction. The thin layers of "donner2008" and "biospec" require the
-    model "layered": the multipole is inaccurate for them.
+    model "layered", because the multipole is inaccurate for thin layers.
 
     Raises DermisError for an unknown structure and for wavelengths out of range.
 
@@ -72,7 +73,7 @@ def spectral_medium(
 def _build_dj2006(
     parameters: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats
 ) -> tuple[Layer, ...]:
-    """Return epidermis and dermis after [DonnerJensen2006]."""
+    """Return an epidermis and a dermis after [DonnerJensen2006]."""
     return _epidermis_layer(parameters, wavelength_nm, sigma_s_prime), _dermis_layer(
         parameters, wavelength_nm, sigma_s_prime
     )
@@ -81,7 +82,7 @@ def _build_dj2006(
 def _build_donner2008(
     parameters: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats
 ) -> tuple[Layer, ...]:
-    """Return epidermis, melanin sheet and dermis after equations 11 and 12 of [Donner2008]."""
+    """Return an epidermis, a melanin sheet and a dermis after equations 11 and 12 of [Donner2008]."""
     melanin = parameters.melanin * melanosome(wavelength_nm, parameters.eumelanin)
     sheet_sigma_a = LEAKED_MELANIN * melanin * parameters.epidermis_mm / _MELANIN_SHEET_MM
     return (
@@ -95,7 +96,7 @@ def _build_donner2008(
 def _build_biospec(
     parameters: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats
 ) -> tuple[Layer, ...]:
-    """Return four skin layers after [KrishnaswamyBaranoski2004], with constants of its author's code."""
+    """Return four skin layers after [KrishnaswamyBaranoski2004], with constants from an author's code."""
     reticular = replace(parameters, blood=_RETICULAR_BLOOD_RATIO * parameters.blood)
     return (
         Layer(
@@ -150,11 +151,11 @@ def _bloodless_absorption(parameters: SkinParameters, wavelength_nm: Floats) -> 
 
 
 def dj2006_layers(parameters: SkinParameters, pigment_fractions: Floats) -> tuple[Layer, Layer]:
-    """Return epidermis and dermis of "dj2006" for n pigment fractions, with coefficients (n, 31).
+    """Return the epidermis and the dermis of "dj2006" for n pigment fractions, with coefficients (n, 31).
 
-    parameters : the other parameters of the skins; its fields `melanin` and `blood` are ignored
-    pigment_fractions : (n,) melanin fractions of the epidermis, which are also the blood fractions of the
-        dermis [-]
+    parameters : parameters of the skins; its fields `melanin` and `blood` are ignored
+    pigment_fractions : (n,) fractions, used both as melanin fractions of the epidermis and as blood fractions
+        of the dermis [-]
     """
     column, scattering = pigment_fractions[:, None], donner_jensen_2006(WAVELENGTHS_NM)
     epidermal = _epidermal_absorption(parameters, column, WAVELENGTHS_NM)

@@ -30,9 +30,9 @@ DERMIS_SCATTERING_RATIO: Final = 0.5
 
 
 def visible_wavelengths(wavelength_nm: ArrayLike) -> Floats:
-    """Return wavelengths as an array after checking that they are from 380 to 780 nm.
+    """Return wavelengths as an array.
 
-    Raises DermisError for other wavelengths.
+    Raises DermisError unless all wavelengths are from 380 to 780 nm.
     """
     wavelength = np.asarray(wavelength_nm, dtype=np.float64)
     inside = (wavelength >= SHORTEST_NM) & (wavelength <= LONGEST_NM)
@@ -43,11 +43,11 @@ def visible_wavelengths(wavelength_nm: ArrayLike) -> Floats:
 
 
 def interpolate_spectrum(table_name: str, column_name: str, wavelength_nm: ArrayLike) -> Floats:
-    """Interpolate a spectrum from the file data/spectra/`table_name`.csv linearly, in the unit of the file.
+    """Return values of a spectrum in data/spectra, interpolated linearly, in the unit of the file.
 
     table_name : name of the file, without folder and suffix
     column_name : heading of the column with the spectrum
-    wavelength_nm : wavelengths of any shape, from 380 to 780 [nm]
+    wavelength_nm : wavelengths from 380 to 780, an array of any shape [nm]
     """
     columns = _spectrum_columns(table_name)
     wavelength = visible_wavelengths(wavelength_nm)
@@ -55,14 +55,14 @@ def interpolate_spectrum(table_name: str, column_name: str, wavelength_nm: Array
 
 
 def rgb_weights(wavelength_nm: Floats = WAVELENGTHS_NM) -> Floats:
-    """Return the matrix (3, n) from reflectance spectra under D65 to linear Rec. 709 [-].
+    """Return the matrix (3, n) that converts reflectance spectra, lit by D65, to linear Rec. 709 [-].
 
-    A constant spectrum of 1 becomes white. Spectra are linear between the wavelengths and constant beyond
-    them. Some weights are negative, because monochromatic colours are outside Rec. 709.
+    A constant spectrum of 1 becomes white. Spectra are taken as linear between the wavelengths and as
+    constant beyond them. Some elements are negative, because monochromatic colours are outside Rec. 709.
 
     wavelength_nm : (n,) wavelengths of the spectra, increasing, from 380 to 780 [nm]
 
-    Source: [CIE2004] for the observer of 1931 and D65, [SRGB1999] for the primaries.
+    Source: [CIE2004] for the CIE 1931 observer and D65, [SRGB1999] for the primaries.
     """
     grid = visible_wavelengths(wavelength_nm)
     if grid.ndim != 1 or len(grid) == 0 or (np.diff(grid) <= 0.0).any():
@@ -74,13 +74,13 @@ def rgb_weights(wavelength_nm: Floats = WAVELENGTHS_NM) -> Floats:
 
 
 def _weighted_colour_matching() -> Floats:
-    """Return the CIE 1931 colour-matching functions x, y and z times the spectrum of D65, (3, 81)."""
+    """Return the CIE 1931 colour-matching functions (3, 81), each multiplied by the spectrum of D65."""
     columns = _spectrum_columns("cie-1931-d65")
     return np.array([columns[name] for name in ("x_bar", "y_bar", "z_bar")]) * columns["d65"]
 
 
 def _primaries_xyz() -> Floats:
-    """Return the matrix (3, 3) whose columns are XYZ of the Rec. 709 primaries, each with luminance 1."""
+    """Return a matrix (3, 3) with the XYZ colours of the Rec. 709 primaries as columns, at luminance 1."""
     x, y = _PRIMARIES_XY.T
     return np.array([x / y, np.ones(3), (1.0 - x - y) / y])
 
@@ -92,7 +92,7 @@ def _spectrum_columns(table_name: str) -> dict[str, Floats]:
 
 
 def eumelanin(wavelength_nm: ArrayLike) -> Floats:
-    """Return the absorption coefficient of melanosomes with eumelanin, the brown to black melanin [1/mm].
+    """Return the absorption coefficient of melanosomes with eumelanin, which is brown to black [1/mm].
 
     Source: [Jacques1998], as in [DonnerJensen2006].
     """
@@ -100,7 +100,7 @@ def eumelanin(wavelength_nm: ArrayLike) -> Floats:
 
 
 def pheomelanin(wavelength_nm: ArrayLike) -> Floats:
-    """Return the absorption coefficient of melanosomes with pheomelanin, the yellow to red melanin [1/mm].
+    """Return the absorption coefficient of melanosomes with pheomelanin, which is yellow to red [1/mm].
 
     Source: [DonnerJensen2006], as quoted by public code.
     """
@@ -108,9 +108,9 @@ def pheomelanin(wavelength_nm: ArrayLike) -> Floats:
 
 
 def melanosome(wavelength_nm: ArrayLike, eumelanin_fraction: float) -> Floats:
-    """Return the absorption coefficient of a mixture of eumelanin and pheomelanin melanosomes [1/mm].
+    """Return the absorption coefficient of melanosomes with a mixture of eumelanin and pheomelanin [1/mm].
 
-    eumelanin_fraction : fraction of melanosomes with eumelanin, 0 to 1 [-]
+    eumelanin_fraction : fraction of the melanosomes that contain eumelanin, 0 to 1 [-]
 
     Source: [DonnerJensen2006].
     """
@@ -119,10 +119,10 @@ def melanosome(wavelength_nm: ArrayLike, eumelanin_fraction: float) -> Floats:
 
 
 def baseline_absorption(wavelength_nm: ArrayLike) -> Floats:
-    """Return the absorption coefficient of bloodless skin without melanin, measured on rats [1/mm].
+    """Return the absorption coefficient of skin without blood and melanin, measured on rats [1/mm].
 
-    Some public code has -lambda - 154 instead of -(lambda - 154), which leaves little more than the constant
-    0.0244.
+    Some public code has -lambda - 154 in place of -(lambda - 154). This mistake leaves little more than the
+    constant 0.0244.
 
     Source: [Jacques1998] section 1.1.
     """
@@ -159,8 +159,9 @@ def blood(wavelength_nm: ArrayLike, oxygen: float) -> Floats:
 def water(wavelength_nm: ArrayLike) -> Floats:
     """Return the absorption coefficient of water, 4 pi k / lambda [1/mm].
 
-    k is the imaginary part of the index of refraction. No skin structure uses this spectrum: up to 700 nm it
-    is less than 3 % of `baseline_absorption`, which was measured on moist tissue.
+    Here, k is the imaginary part of the index of refraction. No skin structure uses this spectrum: up to 700
+    nm, it is less than 3 % of `baseline_absorption`, which was measured on moist tissue and so includes
+    water.
 
     Source: [HaleQuerry1973].
     """
@@ -171,10 +172,10 @@ def water(wavelength_nm: ArrayLike) -> Floats:
 def donner_jensen_2006(wavelength_nm: ArrayLike) -> Floats:
     """Return the reduced scattering coefficient of the epidermis after [DonnerJensen2006] [1/mm].
 
-    The unit could not be checked against the paper and is taken to be 1/mm. Some implementations take 1/cm
-    and then replace the law, because it gives a tenth of the scattering of skin. With 1/mm, half of the law,
-    which applies to the dermis, equals the law 73.7 lambda^-0.22 + 1.1e12 lambda^-4 [1/cm] for skin after
-    [Bashkatov2005]: 3 per mm at 550 nm.
+    The unit could not be checked against the paper, and is taken to be 1/mm. Some implementations take it to
+    be 1/cm. They then use another law, because the scattering would be a tenth of that of skin. In 1/mm, half
+    of this law, which applies to the dermis, equals the law of [Bashkatov2005] for skin. This is
+    73.7 lambda^-0.22 + 1.1e12 lambda^-4 [1/cm], or 3 per mm at 550 nm.
 
     Source: [DonnerJensen2006], as quoted by public code.
     """
@@ -185,8 +186,8 @@ def donner_jensen_2006(wavelength_nm: ArrayLike) -> Floats:
 def jacques_1998(wavelength_nm: ArrayLike) -> Floats:
     """Return the reduced scattering coefficient of skin after [Jacques1998] [1/mm].
 
-    The law is the sum of Mie scattering by large and Rayleigh scattering by small fibres, equal in epidermis
-    and dermis.
+    The law is the sum of Mie scattering by large fibres and Rayleigh scattering by small fibres. It is the
+    same for epidermis and dermis.
     """
     wavelength = visible_wavelengths(wavelength_nm)
     return np.asarray(2e4 * wavelength**-1.5 + 2e11 * wavelength**-4.0)

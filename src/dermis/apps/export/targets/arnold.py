@@ -1,7 +1,7 @@
 """Export to Arnold's standard_surface as a JSON file of parameters, following the published documentation.
 
 The mean free path of a channel is the parameter subsurface_radius times subsurface_scale, in scene units. The
-parameter subsurface_color is converted to a single-scattering albedo by tabulated random walks in an
+parameter subsurface_color is converted to a single-scattering albedo with a table of random walks in an
 index-matched medium.
 """
 
@@ -21,7 +21,7 @@ _MM_PER_CM, _MIN_ALBEDO = 10.0, 1e-3
 
 
 class Arnold(JsonTarget):
-    """Export of the parameters of standard_surface with subsurface random walk, for scenes in cm."""
+    """Export of parameters of standard_surface with random-walk subsurface scattering, for scenes in cm."""
 
     name = "arnold"
     title = "Arnold"

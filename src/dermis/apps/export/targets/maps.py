@@ -94,7 +94,7 @@ class MapFolder(Target):
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the maps' size, the direction of green in normals, and whether to show diffused light."""
+        """Return the maps' size, the direction of green in normal maps, and whether light is diffused."""
         return (
             Parameter("size", self.side, "texel", "side of the maps"),
             Parameter(
@@ -113,7 +113,7 @@ class MapFolder(Target):
         return replace_values(self.parameters(subject, version), {_SCATTERING_PARAMETER_NAME: False})
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the profile of the renderer's sum of Gaussians, or a step at radius 0 without diffusion."""
+        """Return the profile of the renderer's sum of Gaussians or, without diffusion, a step at radius 0."""
         energy = subject.curve.energy
         if not get_value(parameters, _SCATTERING_PARAMETER_NAME) or subject.scene is None:
             return CumulativeProfile.from_function(lambda r: np.tile(r[:, None] > 0.0, 3), energy)
@@ -143,7 +143,7 @@ def encode_map_exr(map_name: str, texels: Floats) -> bytes:
 
 
 def quantise_map(texels: Floats, encoding: PngEncoding) -> tuple[NDArray[np.uint8 | np.uint16], Ranges]:
-    """Return the integer levels of a map for PNG, and the JSON entries by which they are decoded."""
+    """Return the integer levels of a map for PNG, and the JSON entries that say how to decode the levels."""
     if encoding == "colour":
         return encode_srgb8(np.clip(texels, 0.0, 1.0)), {"png": "sRGB"}
     if encoding == "light":
@@ -164,7 +164,7 @@ def quantise_map(texels: Floats, encoding: PngEncoding) -> tuple[NDArray[np.uint
 def orient_green(normals: Floats, normal_y: NormalY) -> Floats:
     """Return normals whose y, the green channel, points towards row 0 of the map or away from row 0.
 
-    normal_y : "up" for row 0, as in OpenGL, or "down" for the opposite, as in DirectX
+    normal_y : "up" if y is to point towards row 0, as in OpenGL; "down" if away from row 0, as in DirectX
     """
     if normal_y == "up":
         return normals
@@ -193,7 +193,7 @@ def check_side(map_side: object) -> int:
 
 
 def bake_maps(renderer: Renderer, scene: Scene, settings: Settings, map_side: int) -> BakedMaps:
-    """Return the skin's maps with the scene's light baked, including the height map if the head has one.
+    """Return the skin's maps: material, baked light of the scene, and heights if the head has a height map.
 
     map_side : side of the maps [texel]
     """
@@ -236,7 +236,7 @@ def _maps_description(
 ) -> dict[str, object]:
     """Return the description of all maps for maps.json: layout, lights, units and ranges.
 
-    map_entries : unit, meaning, range and PNG encoding of each map, by name of the map
+    map_entries : dictionary from the name of each map to its unit, meaning, range and PNG encoding
     """
     return {
         "format": "dermis maps 1",
@@ -258,7 +258,10 @@ def _maps_description(
 
 
 def resample(texels: Floats, new_side: int) -> Floats:
-    """Return a map (h, w) resampled to a square: halved by averaging if possible, then interpolated linearly.
+    """Return a map (h, w) resampled to a square map.
+
+    The map is halved by averaging while both sides are even and at least twice the new side, and then
+    interpolated linearly.
 
     new_side : side of the returned map [texel]
     """

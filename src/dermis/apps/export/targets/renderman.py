@@ -1,8 +1,8 @@
-"""Export to RenderMan: parameters of PxrSurface by its published documentation, not tested in RenderMan.
+"""Export to RenderMan: parameters of PxrSurface, based on published documentation and not tested.
 
 The diffuse mean free path is subsurfaceDmfp times subsurfaceDmfpColor times unitLength, in mm. In
-[ChristensenBurley2015], by the authors of the material, the Burley profile has the width d = dmfp / s(A),
-where A is the albedo and s Burley's factor for diffuse mean free paths.
+[ChristensenBurley2015], by the authors of the material, the Burley profile for a diffuse mean free path dmfp
+has the width d = dmfp / s(A). A is the albedo, and s is Burley's factor for diffuse mean free paths.
 """
 
 from __future__ import annotations

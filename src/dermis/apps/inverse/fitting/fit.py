@@ -1,4 +1,4 @@
-"""Fit of light and skin to a photograph, which starts from a coarse search over suns and pigments."""
+"""Fit of light and skin to a photograph; a coarse search over suns and pigments finds where to start."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ WhitePoint = Sequence[float] | Literal["specular"]
 
 
 def candidate_suns(camera_direction: Floats) -> Floats:
-    """Return directions (k, 3) towards suns that light the side of the face that a camera sees.
+    """Return directions (k, 3) towards possible suns that light the side of the face seen by a camera.
 
     camera_direction : (3,) unit vector from the face to the camera
     """
@@ -70,9 +70,9 @@ def candidate_suns(camera_direction: Floats) -> Floats:
 
 
 def neighbouring_suns(sun_directions: Floats) -> Floats:
-    """Return the given sun directions (k, 3) and two rings of directions around each, (n, 3).
+    """Return candidates (n, 3) for a finer search: the given directions and two rings around each of them.
 
-    They are the candidates of a finer search.
+    sun_directions : (k, 3) unit vectors towards suns
     """
     azimuth = np.linspace(0.0, 2.0 * np.pi, _SUNS_PER_RING, endpoint=False)
     ring = np.stack([np.cos(azimuth), np.sin(azimuth)], axis=-1)
@@ -83,15 +83,16 @@ def neighbouring_suns(sun_directions: Floats) -> Floats:
 
 
 class InitialGuess:
-    """Coarse search for suns and pigments, from which a fit starts.
+    """Coarse search for suns and pigments; its result is the start of a fit.
 
-    For each light alone, diffuse and specular radiance are rendered once; other pigments and strengths only
-    scale them. Each trial then solves small normal equations without rendering.
+    The diffuse and the specular radiance under each light alone are rendered once. Other pigments and
+    specular strengths only scale these radiances, so each trial solves small normal equations without
+    rendering.
 
     frames : renderer of the face
-    point : pigments and candidate suns of the rendered frames
-    target : (p, 3) radiance of the photograph's pixels in the mask
-    weight : (p, 3) inverse standard deviations of the pixels
+    point : pigments and candidate suns for which the frames are rendered
+    photo_radiance : (p, 3) radiance of the photograph's pixels in the mask
+    pixel_weight : (p, 3) inverse standard deviations of these pixels
     """
 
     def __init__(
@@ -111,7 +112,7 @@ class InitialGuess:
         self._table = skin_colour_table(fixed["eumelanin"], fixed["oxygen"], fixed["epidermis_mm"])
 
     def best(self, sun_count: int, melanin_grid: Floats = _MELANIN_GRID) -> FitPoint:
-        """Return the pigments, specular strength and `sun_count` suns with the smallest residual.
+        """Return the point whose pigments, specular strength and `sun_count` suns have the smallest residual.
 
         melanin_grid : melanin fractions to try
         """
@@ -123,10 +124,11 @@ class InitialGuess:
         return replace(self.point, logs=log_skin, suns=self.point.suns[suns])
 
     def minima(self, best: FitPoint) -> list[Floats]:
-        """Return the ranges of melanin around the local minima of the residual, the lowest minimum first.
+        """Return a range of melanin fractions around each local minimum of the residual, lowest first.
 
-        Dark skin in strong light and pale skin in weak light can both be minima. Minima whose residual is
-        much larger than the smallest are left out; the range of a single minimum is the whole grid.
+        Both dark skin in strong light and pale skin in weak light can be a minimum. Minima with a residual
+        much larger than the smallest residual are left out. If one minimum remains, its range is the whole
+        grid.
 
         best : result of `best`
         """
@@ -147,16 +149,19 @@ class InitialGuess:
     def _trials(
         self, log_skin: Floats, sun_indices: list[int], melanin_grid: Floats
     ) -> tuple[list[Floats], Floats]:
-        """Return skins (n lists of 4 logarithms) with all pigments of the grid, and their squared residuals.
+        """Return all skins on a grid as n arrays of 4 logarithms, and the squared residual (n,) of each skin.
 
-        log_skin : (4,) logarithms of the skin unknowns, whose roughness is kept
+        The grid spans melanin, blood and specular strength.
+
+        log_skin : (4,) logarithms of the skin unknowns, of which only the roughness is used
+        sun_indices : indices of the candidate suns
         """
         grid = product(np.log(melanin_grid), np.log(_BLOOD_GRID), np.log(_SPECULAR_STRENGTH_GRID))
         trials = [np.array([m, b, log_skin[2], s]) for m, b, s in grid]
         return trials, np.array([self._squared_residual(one, sun_indices) for one in trials])
 
     def _select_suns(self, log_skin: Floats, sun_count: int) -> list[int]:
-        """Return the indices of the suns with the smallest residual, selected greedily.
+        """Return the indices of `sun_count` suns with a small residual, each chosen as the best next sun.
 
         log_skin : (4,) logarithms of the skin unknowns
         """
@@ -167,9 +172,10 @@ class InitialGuess:
         return selected
 
     def _squared_residual(self, log_skin: Floats, sun_indices: list[int]) -> float:
-        """Return the squared residual of the best light strengths for a skin and a set of suns.
+        """Return the squared residual for a skin and a set of suns, with the best light strengths.
 
-        Diffuse radiance is scaled by the skin's colour, specular radiance by its specular strength.
+        The rendered diffuse radiance is scaled to the colour of the skin, and the rendered specular radiance
+        to its specular strength.
 
         log_skin : (4,) logarithms of the skin unknowns
         sun_indices : indices of the candidate suns
@@ -209,20 +215,21 @@ def fit(
 ) -> FitResult:
     """Fit light and skin to a photograph of a head of known shape.
 
-    All light has one colour. The strength of the light and the exposure are one unknown, as a photograph
-    cannot separate them.
+    All lights have the same colour. The exposure is given, because a photograph cannot tell the exposure from
+    the strength of the light.
 
     Parameters
     ----------
     photo : str, Path or array_like
-        File (JPEG, HEIC, PNG, TIFF, WebP, AVIF, EXR or HDR), which is turned by its EXIF and converted by its
-        colour profile; or pixels (h, w, 3): bytes in sRGB, floats linear.
+        File (JPEG, HEIC, PNG, TIFF, WebP, AVIF, EXR or HDR), which is turned upright by its EXIF data and
+        converted by its colour profile; or an array (h, w, 3) of sRGB bytes or of linear floats.
     head : Scene, Head, Human, str or Path
         A scene or its file (.toml), a head or anything that `load_head` accepts, or a `Human`.
     camera : Camera, str, Path or None
-        A camera, the name of a preset or a file; None for the scene's own.
+        A camera, or the name of a preset or of a file; None for the camera of the scene.
     landmarks : str, Path or None
-        File of landmarks in the photograph, from which the camera and the shape of a `Human` are found.
+        File of landmarks in the photograph. If given, the camera is found from the landmarks, and for a
+        `Human` also the shape.
     suns : int
         Number of directional lights besides the ambient light, 0 to 2.
     exposure : float
@@ -232,26 +239,26 @@ def fit(
     noise : float
         Relative standard deviation of a pixel [-].
     robust : float
-        Number of standard deviations above which the weight of a residual decreases [Huber1964].
+        Number of standard deviations beyond which residuals have less weight [Huber1964].
     side : int
         Longer side to which the photograph is reduced for the fit [pixel].
     atlas : int
         Side of the renderer's atlas [texel].
     adapter : str
-        "auto", "cpu" or part of the name of an adapter.
+        "auto", "cpu" or part of an adapter's name.
     progress : callable
-        Called with the number of finished steps and the number of all steps.
+        Function called with the number of finished steps and the number of all steps.
 
     Returns
     -------
     FitResult
-        Light, skin, their uncertainties and the fitted picture.
+        Light and skin with their uncertainties, and the fitted picture.
 
     Raises
     ------
     DermisError
-        For files and arrays that are not pictures, numbers out of range, pictures without skin, and for the
-        errors of `dermis.Renderer`.
+        For files and arrays that are not pictures, for numbers out of range, for pictures without skin, and
+        when `dermis.Renderer` raises it.
 
     References
     ----------
@@ -306,7 +313,10 @@ def fit(
 
 
 def _assumed_sd(subject: FitSubject, point: FitPoint) -> dict[str, float]:
-    """Return standard deviations of the logarithms of pigments, due to assumed skin parameters."""
+    """Return a dictionary from pigment name to the standard deviation due to assumed skin parameters.
+
+    The standard deviations are those of the pigments' logarithms.
+    """
     pigments = subject.scene.skin.pigments
     assert pigments is not None
     fixed = {name: getattr(pigments, name) for name in ("eumelanin", *FIXED_PARAMETERS)}
@@ -316,10 +326,10 @@ def _assumed_sd(subject: FitSubject, point: FitPoint) -> dict[str, float]:
 
 
 def note_residual(photo_source: object, residual: float) -> None:
-    """Issue a note if the residual of a fit is so large that the picture does not show the head.
+    """Notify the user if the residual of a fit is so large that the picture probably shows something else.
 
-    photo_source : name of the photograph, for the note
-    residual : median relative residual of blocks of the picture [-]
+    photo_source : name of the photograph, for the notification
+    residual : median relative residual over blocks of the picture [-]
     """
     if residual > _MAX_BLOCK_RESIDUAL:
         notify(
@@ -331,7 +341,7 @@ def note_residual(photo_source: object, residual: float) -> None:
 
 
 def _find_skin(frames: FaceRenderer, photo: Photograph) -> FitPoint:
-    """Set the renderer's mask to pixels of lit skin, and return the prior's skin with the candidate suns."""
+    """Set the renderer's mask to the pixels of lit skin; return the prior's skin with all candidate suns."""
     camera = frames.scene.camera
     view_direction = np.subtract(camera.position, camera.target)
     candidate = prior_point(candidate_suns(view_direction / np.linalg.norm(view_direction)))
@@ -346,7 +356,7 @@ def _find_skin(frames: FaceRenderer, photo: Photograph) -> FitPoint:
 
 
 def _initial_points(problem: FitProblem, candidate: FitPoint, sun_count: int) -> list[FitPoint]:
-    """Return the points at which fits start: local minima of a coarse search, with suns of a finer one."""
+    """Return the points where fits start: minima of a coarse search, refined by a search near their suns."""
     frames, target, weight = problem.frames, problem.target, problem.initial_weights()
     coarse = InitialGuess(frames, candidate, target, weight)
     best = coarse.best(sun_count)
@@ -361,9 +371,9 @@ def _initial_points(problem: FitProblem, candidate: FitPoint, sun_count: int) ->
 
 
 def _checked_white(white_point: WhitePoint) -> Floats:
-    """Return the user's colour of the light (3,), scaled so that green is 1.
+    """Return the light's colour (3,) as the user gives it, scaled to green 1; (1, 1, 1) for "specular".
 
-    For "specular" it is (1, 1, 1).
+    Raises DermisError for any other value.
     """
     if isinstance(white_point, str):
         if white_point != "specular":

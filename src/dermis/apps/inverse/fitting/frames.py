@@ -1,4 +1,4 @@
-"""Frames of a face under each light alone, whose linear combination approximates a photograph."""
+"""Frames of a face under each light alone; linear combinations of these frames approximate a photograph."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class FaceRenderer:
 
     renderer : renderer that draws the frames
     scene : head, camera and pose, without lights and environment
-    settings : size of the frames and quality
+    settings : size and quality of the frames
     folder : temporary folder for the panoramas of ambient light
     mask : (h, w) skin pixels that are compared with the photograph, set by `find_mask`
     frame_count : number of frames drawn so far
@@ -47,8 +47,9 @@ class FaceRenderer:
     frame_count: int = 0
 
     def find_mask(self, point: FitPoint, unclipped_pixels: Floats) -> None:
-        """Set the mask to the skin pixels (h, w) that are neither clipped nor seen at grazing angles.
+        """Set the mask (h, w) to the pixels of skin that are neither clipped nor seen at grazing angles.
 
+        point : unknowns of the fit, of which the skin is used
         unclipped_pixels : (h, w) fraction of each pixel of the photograph in which no channel is clipped
         """
         scene = with_skin(self._with_lights(()), point)
@@ -62,14 +63,14 @@ class FaceRenderer:
     def basis(self, point: FitPoint) -> Floats:
         """Render the face under each light alone; return the radiance (9 + k, p, 3) of the p masked pixels.
 
-        The first nine lights are ambient lobes of radiance 1, the others suns of irradiance 1.
+        The first nine lights are ambient lobes of radiance 1; the other k lights are suns of irradiance 1.
         """
         return np.stack(
             [self._masked_radiance(scene, view) for scene, view in self._single_light_scenes(point)]
         )
 
     def diffuse_and_specular(self, point: FitPoint) -> tuple[Floats, Floats]:
-        """Return the diffuse and the specular radiance under each light alone, (9 + k, p, 3) each."""
+        """Return the diffuse radiance (9 + k, p, 3) and the specular radiance under each light alone."""
         scenes = []
         for scene, view in self._single_light_scenes(point):
             rendered = self._draw(scene, view, ("diffuse", "specular"))
@@ -86,10 +87,10 @@ class FaceRenderer:
         return self._masked_radiance(self.lit_scene(point, light_strengths, frame_name), "together")
 
     def lit_scene(self, point: FitPoint, light_strengths: Floats, panorama_name: str = "light") -> Scene:
-        """Return the scene with the skin of `point` and all lights, and write the ambient light's panorama.
+        """Return the scene with the skin of `point` and all lights; write the panorama of its ambient light.
 
         light_strengths : (9 + k,) strengths of ambient lobes and suns
-        panorama_name : file name of the panorama in the folder, without suffix
+        panorama_name : file name of the panorama in `folder`, without suffix
         """
         suns = sun_lights(point.suns, light_strengths[AMBIENT_LOBE_COUNT:], np.ones(3))
         radiance = panorama(light_strengths[:AMBIENT_LOBE_COUNT])
@@ -102,7 +103,7 @@ class FaceRenderer:
         return np.asarray(self._draw(scene, "together").linear(), np.float64)
 
     def _single_light_scenes(self, point: FitPoint) -> list[tuple[Scene, str]]:
-        """Return a scene for each light alone, with the name under which the renderer caches its frame."""
+        """Return for each light a scene with this light alone, and the name for caching the scene's frame."""
         base = with_skin(self._with_lights(()), point)
         scenes = []
         for k in range(AMBIENT_LOBE_COUNT):

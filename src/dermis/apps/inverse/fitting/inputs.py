@@ -33,8 +33,8 @@ _MIN_PHOTO_SIDE = 16
 class Photograph:
     """Photograph in linear light, at full or reduced size.
 
-    linear : (h, w, 3) linear Rec. 709 as in the file, including exposure and white balance
-    unclipped : (h, w) fraction of each pixel's area that is opaque, and in which no channel is clipped
+    linear : (h, w, 3) values in linear Rec. 709; exposure and white balance are still those of the file
+    unclipped : (h, w) fraction of each pixel's area that is opaque and has no clipped channel
     """
 
     linear: Floats
@@ -46,7 +46,7 @@ class Photograph:
         return self.linear.shape[1], self.linear.shape[0]
 
     def within(self, max_side: int) -> Photograph:
-        """Return the photograph reduced by area averaging to a longer side of at most `max_side` pixels."""
+        """Return the photograph, reduced if its longer side has more than `max_side` pixels."""
         width, height = self.size
         if max(width, height) <= max_side:
             return self
@@ -59,8 +59,8 @@ class Photograph:
 def read_photograph(source: str | Path | EmbeddedPicture | ArrayLike) -> Photograph:
     """Read a photograph from a file or an array, and convert it to linear light.
 
-    source : file, which is turned by its EXIF and converted by its colour profile; or (h, w, 3) bytes in
-        sRGB, or floats in linear Rec. 709
+    source : file, which is turned upright by its EXIF data and converted by its colour profile; or an array
+        (h, w, 3) of integers in sRGB or of floats in linear Rec. 709
 
     Raises DermisError if the source is not a picture.
     """
@@ -91,7 +91,7 @@ def read_photograph(source: str | Path | EmbeddedPicture | ArrayLike) -> Photogr
 
 
 def _area_average(picture: Floats, new_size: tuple[int, int]) -> Floats:
-    """Downsample a picture (h, w, c): each pixel of the result is the mean over the area that it covers.
+    """Return a picture (h, w, c) downsampled to means over the area that each new pixel covers.
 
     new_size : width and height of the result [pixel]
     """
@@ -114,9 +114,10 @@ class FitSubject:
     """Head in a photograph, with its camera, as a scene without light.
 
     scene : head, camera, pose and surface
-    person : parametric person whose skin is painted, None for other heads
-    table : table [head] of the scene's file; empty for a head without a name or file, which cannot be saved
-    known : names of the pigments that the scene states; the values of the others are assumed
+    person : parametric person with painted skin; None for other heads
+    table : table [head] for the scene file of the result; empty if the head has neither a name nor a file, in
+        which case the result cannot be saved
+    known : names of the pigments that the scene states; the values of all other pigments are assumed
     """
 
     scene: Scene
@@ -129,9 +130,9 @@ def fit_subject(head_or_scene: object, camera: object = None) -> FitSubject:
     """Return the head, camera and pose to fit, from a scene, a head or a person.
 
     head_or_scene : a scene or its file (.toml), a head or anything that `load_head` accepts, or a `Human`
-    camera : a camera, the name of a preset or a file; None for the scene's own
+    camera : a camera, or the name of a preset or of a file; None for the camera of the scene
 
-    Raises DermisError for sources and cameras of other types.
+    Raises DermisError when either argument has another type.
     """
     table: Mapping[str, object] = {}
     if isinstance(head_or_scene, str | os.PathLike) and Path(head_or_scene).suffix.lower() == ".toml":
@@ -159,7 +160,7 @@ def _as_camera(camera_source: object, head: Head) -> Camera | Callable[[Head], C
 
 
 def _painted_person(head: Head) -> Human | None:
-    """Return the person whose shape and painted skin a head has, or None for other heads."""
+    """Return the person whose shape and painted skin a head has, or None if there is no such person."""
     maps = head.maps
     if not isinstance(maps, PaintedMaps) or maps.colour is not None or not is_person_name(head.name):
         return None
@@ -170,7 +171,11 @@ def _painted_person(head: Head) -> Human | None:
 
 
 def _without_light(scene: Scene) -> Scene:
-    """Return the scene without light; the pigments that a fit keeps fixed are those of the head."""
+    """Return the scene without light, with the pigments that a fit keeps fixed.
+
+    Each of these pigments has the value that the scene states. If the scene states none, it has the value of
+    the painted person, or else a default.
+    """
     fixed_pigments = {name: getattr(DEFAULT_SKIN, name) for name in ("epidermis_mm", "eumelanin", "oxygen")}
     if isinstance(scene.head.maps, PaintedMaps):
         look = scene.head.maps.look

@@ -1,4 +1,4 @@
-"""Readers of landmarks in a photograph: tables, iBUG's .pts files, JSON of MediaPipe and dermis render."""
+"""Readers of landmark files: tables, iBUG's .pts files, and JSON written by MediaPipe or dermis render."""
 
 from __future__ import annotations
 
@@ -44,11 +44,11 @@ _MAX_RELATIVE_COORDINATE = 2.0  # largest coordinate that is taken as relative t
 
 
 class _Points(NamedTuple):
-    """Landmarks of a file.
+    """Landmarks as read from a file.
 
     pixels : (n, 2) coordinates, NaN for missing landmarks [pixel]
-    names : names of the landmarks; None if they are all landmarks of a known set, in the order of that set
-    set_name : name of the set, if the file states it
+    names : names of the landmarks; None if the file has all landmarks of a known set, in the set's order
+    set_name : name of the landmark set; None if the file does not state it
     """
 
     pixels: Floats
@@ -57,13 +57,15 @@ class _Points(NamedTuple):
 
 
 def read_landmarks(path: str | Path, photo_size: tuple[int, int]) -> tuple[str, dict[str, Floats]]:
-    """Read landmarks in a photograph; return the name of the landmark set, and each landmark's pixel (2,).
+    """Read landmarks in a photograph; return the name of the landmark set and the landmarks' positions.
 
-    Pixel coordinates are 0 at the centre of the first pixel; in .pts files they are 1 there.
+    The positions are a dictionary from landmark name to pixel coordinates (2,). The centre of the first pixel
+    has the coordinates 0, 0; in .pts files it has 1, 1.
 
-    photo_size : width and height of the photograph, by which relative coordinates are multiplied [pixel]
+    photo_size : width and height of the photograph; relative coordinates are multiplied by it [pixel]
 
-    Raises DermisError for files without landmarks, for unknown sets, and for landmarks of another picture.
+    Raises DermisError for files without landmarks, for unknown sets, and for landmarks outside the
+    photograph.
     """
     text = read_text(path, _EXPECTED_FILE_FORMATS)
     lines = [line.strip() for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
@@ -90,7 +92,7 @@ def read_landmarks(path: str | Path, photo_size: tuple[int, int]) -> tuple[str, 
 
 
 def _identify_landmarks(path: str | Path, file_landmarks: _Points) -> tuple[str, Sequence[str]]:
-    """Return the name of the landmark set of a file, and the names of its landmarks in the set."""
+    """Return the name of a file's landmark set, and the name in this set of each landmark in the file."""
     count, names = len(file_landmarks.pixels), file_landmarks.names
     if file_landmarks.set_name is not None:
         if file_landmarks.set_name not in LANDMARK_SETS:
@@ -121,10 +123,11 @@ def _identify_landmarks(path: str | Path, file_landmarks: _Points) -> tuple[str,
 
 
 def _identify_five_landmarks(pixels: Floats) -> tuple[str, Sequence[int]]:
-    """Return the landmark set to which five points belong by their arrangement, and the landmark numbers.
+    """Return the landmark set that five points belong to, and the number of each point in this set.
 
-    They are those of dlib if the first four are on a line, as the corners of the eyes are. Left and right are
-    exchanged if the file starts with the other side.
+    If the first four points lie on a line, they are the corners of the eyes, as in the files of dlib.
+    Otherwise, they are eyes, nose and mouth, as face detectors write them. If the file starts with the other
+    side of the face than usual, the numbers of left and right are exchanged.
     """
     spread = np.linalg.svd(pixels[:4] - pixels[:4].mean(axis=0), compute_uv=False)
     is_dlib = bool(spread[1] < _MAX_EYE_LINE_DEVIATION * spread[0])
@@ -146,7 +149,10 @@ def _from_pts(path: str | Path, lines: Sequence[str]) -> _Points:
 
 
 def _from_table(path: str | Path, lines: list[str], photo_size: tuple[int, int]) -> _Points:
-    """Return the landmarks of a table with commas, semicolons, tabs or spaces; a header is optional."""
+    """Return the landmarks of a table, which may have a header.
+
+    The columns are separated by commas, semicolons, tabs or spaces.
+    """
     if not lines:
         refuse(path, _EXPECTED_FILE_FORMATS, "it is empty", "Find the landmarks again")
     has_separator = re.search("[,;\t]", lines[0]) is not None
@@ -170,7 +176,7 @@ def _from_table(path: str | Path, lines: list[str], photo_size: tuple[int, int])
 def _from_named_columns(
     path: str | Path, header: Sequence[str], table_rows: list[list[str]], photo_size: tuple[int, int]
 ) -> _Points:
-    """Return the landmarks of a table with columns name, x, y or, as by OpenFace, x_0, y_0 and so on."""
+    """Return the landmarks of a table with columns x, y and name, or x_0, y_0, x_1, ... as in OpenFace."""
     if "x_0" in header:
         if len(table_rows) > 1:
             notify(f"{path}: the first of its {len(table_rows)} rows is used")
@@ -211,7 +217,10 @@ def _parse_number(cell: str) -> float:
 
 
 def _to_pixels(path: str | Path, coordinates: Floats, photo_size: tuple[int, int]) -> Floats:
-    """Return coordinates (n, 2) in pixels; convert coordinates relative to the photograph, with a note."""
+    """Return coordinates (n, 2) in pixels.
+
+    Small coordinates are taken as relative to the size of the photograph; the user is notified of this.
+    """
     if coordinates.ndim != 2 or not np.nanmax(np.abs(coordinates), initial=0.0) <= _MAX_RELATIVE_COORDINATE:
         return coordinates
     notify(f"{path}: its coordinates are taken as relative to the size of the photograph")
@@ -219,7 +228,7 @@ def _to_pixels(path: str | Path, coordinates: Floats, photo_size: tuple[int, int
 
 
 def _from_json(path: str | Path, json_value: Any, photo_size: tuple[int, int]) -> _Points:
-    """Return the landmarks of JSON written by `dermis render --landmarks` or by an API of MediaPipe."""
+    """Return the landmarks in JSON that was written by `dermis render --landmarks` or by MediaPipe."""
     if (
         isinstance(json_value, Mapping)
         and isinstance(json_value.get("landmarks"), Mapping)

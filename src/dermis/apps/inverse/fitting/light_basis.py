@@ -1,4 +1,4 @@
-"""Basis of ambient light, nine lobes of second-order spherical harmonics, and fits of light strengths."""
+"""Nine lobes of second-order spherical harmonics as a basis of ambient light, and fits of light strengths."""
 
 from __future__ import annotations
 
@@ -20,9 +20,10 @@ _CANDIDATE_LOBE_COUNT = 400
 
 
 def lobe_radiance(lobe_axes: Floats, directions: Floats) -> Floats:
-    """Return the radiance (..., k) of ambient lobes in given directions, 1 at a lobe's axis and 0 opposite.
+    """Return the radiance (..., k) of ambient lobes in given directions.
 
-    These are the sharpest lobes that second-order harmonics represent.
+    The radiance is 1 along the axis of a lobe and 0 in the opposite direction. These lobes are the sharpest
+    that spherical harmonics of second order can represent.
 
     lobe_axes : (k, 3) unit vectors along the axes of the lobes
     directions : (..., 3) unit vectors
@@ -32,7 +33,7 @@ def lobe_radiance(lobe_axes: Floats, directions: Floats) -> Floats:
 
 @cache
 def lobe_directions() -> Floats:
-    """Return the axes (9, 3) of the nine ambient lobes, selected greedily to be linearly independent."""
+    """Return the axes (9, 3) of nine ambient lobes, selected one by one to be linearly independent."""
     candidates = fibonacci_sphere(_CANDIDATE_LOBE_COUNT)
     selected = [int(np.argmax(candidates[:, 2]))]
     for _ in range(AMBIENT_LOBE_COUNT - 1):  # add the candidate that the selected lobes approximate worst
@@ -45,9 +46,9 @@ def lobe_directions() -> Floats:
 
 @cache
 def lobe_mixtures() -> tuple[Floats, Floats]:
-    """Return weights (9, n) that express n evenly distributed lobes by the 9 ambient lobes, and the n axes.
+    """Return n evenly distributed lobes as mixtures of the 9 ambient lobes of `lobe_directions`.
 
-    The ambient lobes are those of `lobe_directions`. The axes of the distributed lobes have the shape (n, 3).
+    The results are the weights (9, n) of the ambient lobes, and the axes (n, 3) of the distributed lobes.
     """
     towards = fibonacci_sphere(_DISTRIBUTED_LOBE_COUNT)
     samples = fibonacci_sphere(_CANDIDATE_LOBE_COUNT)
@@ -57,9 +58,9 @@ def lobe_mixtures() -> tuple[Floats, Floats]:
 
 
 def panorama(lobe_strengths: Floats) -> Floats:
-    """Return a panorama (h, w) of ambient radiance, the weighted sum of the 9 ambient lobes, at least 0.
+    """Return a panorama (h, w) of ambient radiance: the weighted sum of the 9 ambient lobes, clipped at 0.
 
-    lobe_strengths : (9,) weights of the lobes with the axes `lobe_directions`
+    lobe_strengths : (9,) weights of the lobes, whose axes are `lobe_directions`
     """
     texels = texel_directions(PANORAMA_ROWS, 2 * PANORAMA_ROWS)
     return np.maximum(lobe_radiance(lobe_directions(), texels) @ lobe_strengths, 0.0)
@@ -69,9 +70,9 @@ _REGULARISATION = 1e-9
 
 
 def solve_strengths(A: Floats, b: Floats) -> Floats:
-    """Return the light strengths x (9 + k,) that minimise |A x - b| with non-negative light everywhere.
+    """Return the light strengths x (9 + k,) that minimise |A x - b|, without negative light in any direction.
 
-    The first nine strengths are those of ambient lobes, the others those of k suns.
+    The first nine strengths belong to the ambient lobes, and the other k to suns.
 
     A : (m, 9 + k) radiance of pixels under each light alone, weighted by inverse standard deviations
     b : (m,) radiance of the photograph, with the same weights
@@ -80,9 +81,10 @@ def solve_strengths(A: Floats, b: Floats) -> Floats:
 
 
 def solve_normal_equations(gram: Floats, right_side: Floats) -> Floats:
-    """Return the light strengths (9 + k,) as `solve_strengths` does, from its normal equations.
+    """Return the light strengths (9 + k,) of `solve_strengths` from its normal equations.
 
-    gram, right_side : (9 + k, 9 + k) A' A and (9 + k,) A' b
+    gram : (9 + k, 9 + k) product A' A
+    right_side : (9 + k,) product A' b
     """
     from scipy.optimize import nnls
 
@@ -93,11 +95,10 @@ def solve_normal_equations(gram: Floats, right_side: Floats) -> Floats:
 
 
 def mixing_matrix(sun_count: int) -> Floats:
-    """Return the matrix (9 + k, n + k) that converts strengths of distributed lobes to ambient lobes.
+    """Return the matrix (9 + k, n + k) that converts strengths of n distributed lobes to the 9 ambient lobes.
 
-    The n distributed lobes are those of `lobe_mixtures`, and the 9 ambient lobes those of `lobe_directions`;
-    the strengths of k suns follow in both and do not change. Non-negative strengths of the distributed lobes
-    make ambient light non-negative.
+    The distributed lobes are those of `lobe_mixtures`; if their strengths are not negative, the ambient light
+    is not negative in any direction. The strengths of k suns come after those of the lobes and do not change.
 
     sun_count : number k of suns
     """
@@ -111,9 +112,9 @@ def mixing_matrix(sun_count: int) -> Floats:
 def squared_residual(
     gram: Floats, right_side: Floats, target_square_sum: float, light_strengths: Floats
 ) -> float:
-    """Return the squared residual |A x - b|^2 of light strengths x from the normal equations.
+    """Return the squared residual |A x - b|^2 of light strengths x, computed from the normal equations.
 
-    gram, right_side, target_square_sum : A' A, A' b and b' b, see `solve_strengths`
+    gram, right_side, target_square_sum : A' A, A' b and b' b for the A and b of `solve_strengths`
     light_strengths : (9 + k,) strengths x
     """
     return float(

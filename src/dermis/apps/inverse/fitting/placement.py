@@ -1,4 +1,4 @@
-"""Camera and identity of a head from landmarks in a photograph, by least squares."""
+"""Fit of the camera and of a person's identity to landmarks in a photograph, by least squares."""
 
 from __future__ import annotations
 
@@ -35,15 +35,15 @@ _PORTRAIT_HEIGHT_MM = 300.0
 
 
 def align_to_landmarks(subject: FitSubject, landmarks: str | Path, photo_size: tuple[int, int]) -> FitSubject:
-    """Fit the camera, and the identity of a human, to landmarks in a photograph; return the changed subject.
+    """Fit the camera to landmarks in a photograph, and for a `Human` also the shape; return the new subject.
 
-    For a human, ancestry, sex, age, weight, muscle and details of the face are unknowns, with priors centred
-    on the given person. Other heads keep their shape and need a file with landmarks of the head.
+    For a `Human`, ancestry, sex, age, weight, muscle and details of the face are unknowns, with priors
+    centred on the given person. Other heads keep their shape; the positions of their landmarks must be known.
 
     landmarks : file with landmarks in the photograph
     photo_size : width and height of the photograph [pixel]
 
-    Raises DermisError for files without landmarks, and for heads without landmarks.
+    Raises DermisError when the file or the head has no landmarks.
     """
     name, pixels_by_name = read_landmarks(landmarks, photo_size)
     person, head = subject.person, subject.scene.head
@@ -70,10 +70,10 @@ class _LandmarkModel:
     """Linear model of landmark positions on a head, as a function of the identity of a person.
 
     names : names of the n landmarks
-    positions : (n, 3) positions at the mean of the priors, relative to the head's centre [mm]
-    derivatives : (u, n, 3) derivatives of the positions by the u unknowns, each of which is measured in
-        standard deviations of its prior [mm]
-    prior : person at the mean of the priors, None for heads of fixed shape
+    positions : (n, 3) positions for the mean of the priors, relative to the head's centre [mm]
+    derivatives : (u, n, 3) derivatives of the positions with respect to the u unknowns; each unknown is
+        measured in standard deviations of its prior [mm]
+    prior : person at the mean of the priors; None for heads of fixed shape
     details : names of the MakeHuman targets that are unknowns
     """
 
@@ -87,10 +87,10 @@ class _LandmarkModel:
     def for_head(
         cls, person: Human | None, head: Head, set_name: str, pixels_by_name: dict[str, Floats]
     ) -> _LandmarkModel:
-        """Return the model of a person, or of a head of fixed shape, for the landmarks in a photograph.
+        """Return the model of a person, or of a head of fixed shape, for the landmarks found in a photograph.
 
         set_name : name of the landmark set
-        pixels_by_name : pixel (2,) of each landmark
+        pixels_by_name : dictionary from landmark name to pixel coordinates (2,)
         """
         plain = head if person is None else replace(person, targets={}).head(subdivide=0)
         points = landmark_points(plain, set_name)
@@ -118,14 +118,13 @@ class _LandmarkModel:
 
     @property
     def unknown_count(self) -> int:
-        """Return the number u of unknowns of the identity, 0 for heads of fixed shape."""
+        """Return the number of unknowns of the identity, which is 0 for heads of fixed shape."""
         return len(self.derivatives)
 
     def person(self, identity: Floats) -> Human:
         """Return the person with a given identity.
 
-        identity : (u,) differences of the unknowns from those of `prior`, each in standard deviations of its
-            prior
+        identity : (u,) differences of the unknowns from their values in `prior`, in standard deviations
         """
         assert self.prior is not None
         macro: dict[str, Any] = {
@@ -143,9 +142,9 @@ class _LandmarkModel:
 def _derivative(
     model: _LandmarkModel, person_landmarks: Callable[[Human], Floats], unknown_index: int
 ) -> Floats:
-    """Return the derivative (n, 3) of landmark positions by one unknown of the identity.
+    """Return the derivative (n, 3) of landmark positions with respect to one unknown of the identity.
 
-    The finite difference steps upwards, or downwards if the prior is at the upper limit of the unknown.
+    The step of the finite difference is upwards, or downwards if the unknown is at its upper limit.
 
     person_landmarks : function that returns the landmark positions (n, 3) of a person [mm]
     """
@@ -159,7 +158,7 @@ def _derivative(
 
 
 def _log_focal(photo_size: tuple[int, int]) -> float:
-    """Return the logarithm of the focal length of a usual portrait [pixel], the mean of the prior.
+    """Return the mean of the prior: the logarithm of the focal length of a usual portrait, in pixels.
 
     photo_size : width and height of the photograph [pixel]
     """
@@ -187,7 +186,10 @@ def _landmark_positions(
 def _fit_camera_and_identity(
     model: _LandmarkModel, pixels: Floats, photo_size: tuple[int, int], start: Floats
 ) -> Floats:
-    """Fit camera and identity to landmarks; return rotation, translation, log focal length and identity.
+    """Fit camera and identity to landmarks; return the unknowns (7 + u,).
+
+    They are a rotation vector (3), a translation (3) [mm], the logarithm of the focal length in pixels, and
+    the u unknowns of the identity.
 
     pixels : (n, 2) landmarks in the photograph
     photo_size : width and height of the photograph [pixel]
@@ -211,8 +213,8 @@ def _fit_camera_and_identity(
 def _project_landmarks(camera_unknowns: Floats, positions: Floats, photo_size: tuple[int, int]) -> Floats:
     """Project positions (n, 3) into the photograph; return pixels (n, 2).
 
-    camera_unknowns : (7 + u,) unknowns in the order of `_fit_camera_and_identity`, of which the camera's
-        seven are used
+    camera_unknowns : (7 + u,) unknowns in the order of `_fit_camera_and_identity`; only the first seven,
+        which describe the camera, are used
     """
     from scipy.spatial.transform import Rotation
 

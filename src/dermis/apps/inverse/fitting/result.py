@@ -1,4 +1,4 @@
-"""Result of a fit: light and skin with uncertainties, and files in which they are saved."""
+"""Result of a fit: light and skin with their uncertainties, and the files in which it is saved."""
 
 from __future__ import annotations
 
@@ -45,14 +45,14 @@ class FitResult:
     subject : head, person, camera and pose
     point : skin unknowns and directions towards the suns
     strengths : (9 + k,) strengths of the ambient lobes and of the suns
-    white : (3,) colour of the light in linear Rec. 709, green 1
+    white : (3,) colour of the light in linear Rec. 709, scaled to green 1
     exposure : ratio of the photograph's linear values to the radiance [-]
     size : width and height of the photograph [pixel]
     uncertainty : standard deviations of the unknowns
-    photo, picture : (h, w, 3) photograph and fitted picture at the size of the fit, linear, with exposure and
-        white balance
+    photo : (h, w, 3) photograph at the size of the fit, linear
+    picture : (h, w, 3) fitted picture, linear, with the exposure and white balance of the photograph
     mask : (h, w) mask of the fitted pixels
-    residual : median relative difference of photograph and fitted picture in the mask [-]
+    residual : median relative difference between photograph and fitted picture in the mask [-]
     frames : number of frames that were rendered
     seconds : duration of the fit [s]
     """
@@ -74,19 +74,19 @@ class FitResult:
 
     @property
     def values(self) -> dict[str, float]:
-        """Return the fitted skin: melanin, blood, roughness and rho_s by name [-]."""
+        """Return the fitted skin as a dictionary with melanin, blood, roughness and rho_s [-]."""
         return self.point.values()
 
     @property
     def suns(self) -> list[tuple[Floats, float]]:
-        """Return the unit vector towards each sun, and the sun's irradiance at normal incidence."""
+        """Return for each sun the unit vector towards it and its irradiance at normal incidence."""
         return list(zip(self.point.suns, map(float, self.strengths[AMBIENT_LOBE_COUNT:]), strict=True))
 
     def summary(self) -> dict[str, Any]:
-        """Return the fitted unknowns with uncertainties and priors, as they are written to fit.json.
+        """Return the content of fit.json: the fitted unknowns with their uncertainties and priors.
 
-        Standard deviations are relative for the skin and in degrees for directions. The ones of melanin and
-        blood include errors of the renderer, and errors due to assumed oxygen and epidermal thickness.
+        Standard deviations are relative for the skin, and in degrees for directions. For melanin and blood,
+        they include errors of the renderer and errors due to the assumed oxygen and epidermal thickness.
         """
         uncertainty, sd = self.uncertainty, self.uncertainty.sd
         skin = {}
@@ -139,9 +139,9 @@ class FitResult:
 
 
 def save_fit(folder: Path, fit_result: FitResult) -> list[Path]:
-    """Write scene.toml with the files that it needs, fit.json, and pictures, each file atomically.
+    """Write scene.toml with the files that it needs, fit.json, and pictures; return the paths of all files.
 
-    Returns the paths of the written files.
+    Each file is written atomically.
 
     Raises DermisError when the disk is full, or the folder cannot be written to.
     """
@@ -173,7 +173,7 @@ def save_fit(folder: Path, fit_result: FitResult) -> list[Path]:
 
 
 def fitted_scene(fit_result: FitResult, folder: Path) -> Scene:
-    """Return the scene with the fitted skin and lights; the ambient light is read from `folder`/light.exr."""
+    """Return the scene with the fitted skin and lights, and with light.exr in `folder` as environment."""
     suns = sun_lights(fit_result.point.suns, fit_result.strengths[AMBIENT_LOBE_COUNT:], fit_result.white)
     has_sky = panorama(fit_result.strengths[:AMBIENT_LOBE_COUNT]).max() > 0.0
     ambient = Environment(name=str(folder / "light.exr")) if has_sky else None
@@ -182,9 +182,9 @@ def fitted_scene(fit_result: FitResult, folder: Path) -> Scene:
 
 
 def result_pictures(fit_result: FitResult) -> dict[str, Floats]:
-    """Return the photograph, the fitted picture, and their difference within the mask, linear, by name.
+    """Return a dictionary from name to linear picture: photograph, fitted picture, and their difference.
 
-    In the difference, grey means equal.
+    The difference is grey where both are equal, and outside the mask.
     """
     peak = max(float(np.percentile(fit_result.photo[fit_result.mask], 99.5)), 1e-9)
     difference = np.where(fit_result.mask[..., None], (fit_result.photo - fit_result.picture) / peak, 0.0)

@@ -1,4 +1,6 @@
-"""Least squares over skin and light: strengths linearly, other unknowns by damped Gauss-Newton steps."""
+"""Least-squares fit of skin and light.
+
+Light strengths are linear unknowns. All other unknowns are found by damped Gauss-Newton steps."""
 
 from __future__ import annotations
 
@@ -38,14 +40,14 @@ _MAX_UNKNOWN_STEP = 0.7  # largest step of a logarithm or of a direction [rad]
 
 @dataclass(frozen=True, eq=False)
 class FitState:
-    """Current unknowns of a fit, with the light strengths that fit best and the residual.
+    """Unknowns of a fit at one step, with the light strengths that fit best and the residual.
 
     point : skin, directions of the suns, and colour of the light
     strengths : (9 + k,) strengths of the ambient lobes and of the suns
     basis : (9 + k, p, 3) radiance of the masked pixels under each light alone
-    residual : (p, 3) difference of the photograph's and the model's radiance
-    weight : (p, 3) inverse standard deviation of each pixel, reduced for outliers
-    cost : sum of squared weighted residuals and of squared deviations from the priors
+    residual : (p, 3) radiance of the photograph minus radiance of the model
+    weight : (p, 3) inverse standard deviation of each pixel, lowered for outliers
+    cost : sum of the squared weighted residuals and of the squared deviations from the priors' means
     """
 
     point: FitPoint
@@ -58,13 +60,13 @@ class FitState:
 
 @dataclass(frozen=True, eq=False)
 class FitProblem:
-    """Photograph to fit, with its noise and the renderer of the face.
+    """Photograph to fit, with its noise, and the renderer of the face.
 
     frames : renderer of the face
-    target : (p, 3) radiance of the masked pixels, divided by exposure and the given colour of the light
-    noise : relative standard deviation of a pixel
+    target : (p, 3) values of the photograph's masked pixels, divided by exposure and given light colour
+    noise : relative standard deviation of a pixel [-]
     free_white : whether the colour of the light is an unknown
-    robust : number of standard deviations above which the weight of a residual decreases
+    robust : number of standard deviations beyond which residuals have less weight
     """
 
     frames: FaceRenderer
@@ -80,15 +82,15 @@ class FitProblem:
         )
 
     def initial_weights(self) -> Floats:
-        """Return the inverse standard deviations (p, 3) of pixels, by the brightness of the photograph."""
+        """Return the inverse standard deviations (p, 3) of pixels from their brightness in the photograph."""
         return self.weights(self.target.mean(axis=1, keepdims=True) * np.ones(3))
 
     def state(self, point: FitPoint, pixel_weight: Floats) -> FitState:
-        """Render the face at a point, and return the state with the best light strengths there."""
+        """Render the face for the unknowns of `point`; return the state with the best light strengths."""
         return self._state(point, self.frames.basis(point) * light_tint(point), pixel_weight)
 
     def reweighted_state(self, fit_state: FitState) -> FitState:
-        """Return the state with pixel weights for the brightness of the model, reduced for outliers."""
+        """Return the state with new pixel weights: from the model's brightness, and lower for outliers."""
         weights = self.weights(np.maximum(self.target - fit_state.residual, 0.0))
         scaled = np.abs(fit_state.residual * weights)
         limit = self.robust * max(_MAD_TO_SD * float(np.median(scaled)), 1.0)
@@ -104,7 +106,9 @@ class FitProblem:
         return FitState(point, x, basis, residual, pixel_weight, cost)
 
     def derivatives(self, fit_state: FitState, frame_name: str) -> Floats:
-        """Return derivatives of the radiance by the u unknowns, (p, 3, u), from finite differences of frames.
+        """Return the derivatives (p, 3, u) of the radiance with respect to the u unknowns.
+
+        Most of them are finite differences between frames.
 
         frame_name : file name of the ambient light's panorama, without suffix
         """
@@ -123,14 +127,14 @@ class FitProblem:
         return np.moveaxis(derivatives, 0, -1)
 
     def steps(self, sun_angle_count: int) -> list[float]:
-        """Return the steps of the finite differences, for the skin unknowns and the directions of suns.
+        """Return the step of the finite difference for each skin unknown and each angle of a sun.
 
         sun_angle_count : number of angles that describe the directions of all suns
         """
         return [one.step for one in SKIN_UNKNOWNS] + [SUN_STEP_RAD] * sun_angle_count
 
     def prior_sd(self, sun_angle_count: int) -> Floats:
-        """Return the standard deviations of the priors of all unknowns (u,).
+        """Return the standard deviation (u,) of each unknown's prior.
 
         sun_angle_count : number of angles that describe the directions of all suns
         """
@@ -140,23 +144,26 @@ class FitProblem:
         )
 
     def prior_offsets(self, point: FitPoint) -> Floats:
-        """Return the differences of the unknowns from the means of their priors (u,), 0 for suns."""
+        """Return the difference (u,) of each unknown from the mean of its prior, 0 for suns."""
         skin = point.logs - np.log([one.prior_median for one in SKIN_UNKNOWNS])
         return np.concatenate([skin, np.zeros(2 * len(point.suns)), point.white])
 
 
 def light_tint(point: FitPoint) -> Floats:
-    """Return the ratio (3,) of the fitted light colour to the light colour from the user; 1 for green."""
+    """Return the ratio (3,) of the fitted light colour to the light colour given by the user; green is 1."""
     return np.array([np.exp(point.white[0]), 1.0, np.exp(point.white[1])])
 
 
 def solve_fit(
     problem: FitProblem, start: FitPoint, progress: Callable[[int, int], None] = lambda done, of: None
 ) -> tuple[FitState, Floats]:
-    """Minimise the cost from a start point; return the best state, and derivatives of the radiance (p, 3, u).
+    """Minimise the cost from a start point; return the best state and derivatives of the radiance.
 
-    The derivatives are those at the best state or one step before. Light strengths are eliminated by variable
-    projection [GolubPereyra1973] with Kaufman's derivative [Kaufman1975].
+    The derivatives (p, 3, u) with respect to the u unknowns are taken at the best state or one step before.
+    Light strengths are eliminated by variable projection [GolubPereyra1973] with Kaufman's derivative
+    [Kaufman1975].
+
+    progress : function called with the number of finished steps and the largest number of steps
     """
     state = problem.reweighted_state(problem.state(start, problem.initial_weights()))
     damping = _INITIAL_DAMPING
@@ -176,7 +183,10 @@ def solve_fit(
 def _try_steps(
     problem: FitProblem, fit_state: FitState, derivatives: Floats, damping: float
 ) -> tuple[FitState | None, Floats, float]:
-    """Try damped steps; return a state of lower cost or None, the step to this state, and the new damping."""
+    """Try steps with increasing damping until one lowers the cost.
+
+    Returns the state of lower cost, or None if no step lowers the cost; the step; and the next damping.
+    """
     H, g = _normal_equations(problem, fit_state, derivatives)
     for _ in range(_MAX_DAMPING_TRIALS):
         step = np.asarray(np.linalg.solve(H + damping * np.diag(np.diag(H)), g), np.float64)
@@ -191,7 +201,10 @@ def _try_steps(
 
 
 def _normal_equations(problem: FitProblem, fit_state: FitState, derivatives: Floats) -> tuple[Floats, Floats]:
-    """Return the Gauss-Newton matrix and the negative gradient of half the cost, without light strengths."""
+    """Return the Gauss-Newton matrix and the negative gradient of half the cost.
+
+    Both are for the unknowns other than light strengths, which are eliminated.
+    """
     J = (derivatives * fit_state.weight[..., None]).reshape(-1, derivatives.shape[-1])
     J, r = _eliminate_lights(fit_state, J)
     prior_sd = problem.prior_sd(2 * len(fit_state.point.suns))
@@ -200,9 +213,9 @@ def _normal_equations(problem: FitProblem, fit_state: FitState, derivatives: Flo
 
 
 def _eliminate_lights(fit_state: FitState, J: Floats) -> tuple[Floats, Floats]:
-    """Return weighted derivatives without the part that light strengths compensate, and weighted residuals.
+    """Return weighted derivatives without the part that light strengths can undo, and weighted residuals.
 
-    Suns of strength 0 cannot become weaker and are not eliminated.
+    The strength of a sun is not eliminated if it is 0, because it cannot decrease.
 
     J : (3 p, u) derivatives of the radiance, multiplied by the weights
     """
@@ -223,16 +236,15 @@ _MIN_NOTABLE_CORRELATION = 0.95
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """Uncertainty of the unknowns of a fit by name.
+    """Uncertainty of a fit's unknowns.
 
-    Standard deviations of the skin and of the light's colour are those of logarithms; those of directions are
-    angles [rad].
-
-    sd : standard deviations, from residuals that are correlated within blocks of the picture, from errors of
-        the renderer, and from parameters of the skin that are assumed
+    sd : dictionary from unknown to standard deviation. It is that of the logarithm for the skin and for the
+        light's colour, and an angle for directions [rad]. It accounts for residuals that are correlated
+        within blocks of the picture, for errors of the renderer and for assumed parameters of the skin
     undetermined : unknowns whose standard deviation exceeds half that of their prior, and unknowns at a limit
     correlated : pairs of unknowns that the photograph cannot separate, with their correlation
-    singular_values : singular values of the derivatives in units of the priors, largest first
+    singular_values : singular values of the weighted derivatives, with each unknown in standard deviations of
+        its prior, largest first
     """
 
     sd: dict[str, float]
@@ -248,10 +260,13 @@ def fit_uncertainty(
     derivatives: Floats,
     assumed_sd: Mapping[str, float] = NO_ASSUMED_SD,
 ) -> Uncertainty:
-    """Return the uncertainty of all unknowns, with residuals correlated within blocks of pixels [White1980].
+    """Return the uncertainty of all unknowns.
 
-    derivatives : (p, 3, u) derivatives of the radiance by the unknowns
-    assumed_sd : standard deviations of the logarithms of pigments due to assumed parameters of the skin
+    Residuals are taken as correlated within blocks of pixels, and as independent otherwise [White1980].
+
+    derivatives : (p, 3, u) derivatives of the radiance with respect to the unknowns
+    assumed_sd : dictionary from pigment to the standard deviation of its logarithm that is due to assumed
+        parameters of the skin
     """
     sun_angles = 2 * len(fit_state.point.suns)
     suns = [f"sun {k + 1} {axis}" for k in range(sun_angles // 2) for axis in ("across", "along")]
@@ -286,7 +301,7 @@ def fit_uncertainty(
 
 
 def block_residual(problem: FitProblem, fit_state: FitState) -> float:
-    """Return the median relative residual of blocks of the picture, which hardly depends on noise [-]."""
+    """Return the median relative residual over blocks of the picture, which hardly depends on noise [-]."""
     block = _pixel_blocks(problem.frames)
     residual, target = (
         np.stack([np.bincount(block, column) for column in values.T])
@@ -297,7 +312,7 @@ def block_residual(problem: FitProblem, fit_state: FitState) -> float:
 
 
 def _pixel_blocks(frames: FaceRenderer) -> NDArray[np.int64]:
-    """Return the index of the block of the picture that contains each masked pixel (p,)."""
+    """Return for each masked pixel the index (p,) of the block of the picture that contains the pixel."""
     rows, columns = np.nonzero(frames.mask)
     side = max(1, max(frames.mask.shape) // _BLOCKS_PER_SIDE)
     return np.asarray(rows // side * (_BLOCKS_PER_SIDE * 2) + columns // side, np.int64)

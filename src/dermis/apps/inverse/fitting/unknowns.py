@@ -1,4 +1,4 @@
-"""Unknowns of a fit with their priors, and the skin and suns of a scene for given unknowns."""
+"""Unknowns of a fit with their priors, and how they change the skin and the suns of a scene."""
 
 from __future__ import annotations
 
@@ -20,12 +20,13 @@ SUN_DIAMETER_DEGREES = 0.53
 
 @dataclass(frozen=True)
 class SkinUnknown:
-    """Unknown parameter of the skin, which is fitted as its logarithm.
+    """Unknown parameter of the skin, of which the logarithm is fitted.
 
     name : name of the parameter
-    prior_median, prior_sd : median of the prior, and standard deviation of the logarithm
-    low, high : smallest and largest value
-    step : step of finite differences of the logarithm
+    prior_median : median of the parameter's prior
+    prior_sd : prior standard deviation of the parameter's logarithm
+    low, high : smallest and largest value of the parameter
+    step : step of the logarithm for finite differences
     """
 
     name: str
@@ -39,7 +40,7 @@ class SkinUnknown:
 def _measured_unknown(
     pigment_name: str, lower_limit: float, upper_limit: float, log_step: float
 ) -> SkinUnknown:
-    """Return an unknown pigment whose prior is its distribution among measured people of all groups."""
+    """Return an unknown pigment; its prior is the pigment's distribution in measured people of all groups."""
     mean, sd = skin_prior().moments(pigment_name)
     return SkinUnknown(pigment_name, float(np.exp(mean)), sd, lower_limit, upper_limit, log_step)
 
@@ -67,7 +68,8 @@ class FitPoint:
 
     logs : (4,) logarithms of `SKIN_UNKNOWNS`
     suns : (k, 3) unit vectors towards the suns
-    white : (2,) logarithms of the ratios red/green and blue/green of the light, relative to the given colour
+    white : (2,) logarithms of the light's ratios red/green and blue/green, relative to the colour that the
+        user gives
     """
 
     logs: Floats
@@ -75,14 +77,14 @@ class FitPoint:
     white: Floats
 
     def values(self) -> dict[str, float]:
-        """Return the parameters of the skin by name."""
+        """Return a dictionary from name to value of each skin parameter."""
         return {one.name: float(np.exp(log)) for one, log in zip(SKIN_UNKNOWNS, self.logs, strict=True)}
 
     def stepped(self, unknowns_step: Floats) -> FitPoint:
-        """Return the point after a step, with the skin clipped to its limits.
+        """Return the point after a step, with the skin parameters clipped to their limits.
 
-        unknowns_step : (4 + 2 k + 2,) steps of the skin's logarithms, of the suns along two tangents each,
-            and of the light's colour
+        unknowns_step : (4 + 2 k + 2,) steps of the logarithms of 4 skin parameters, of each of k suns along
+            2 tangents of its direction, and of the 2 logarithms of the light's colour
         """
         skin, count = len(SKIN_UNKNOWNS), len(self.suns)
         low, high = np.log([one.low for one in SKIN_UNKNOWNS]), np.log([one.high for one in SKIN_UNKNOWNS])
@@ -96,7 +98,7 @@ class FitPoint:
 
 
 def prior_point(sun_directions: Floats) -> FitPoint:
-    """Return the point at the medians of the priors, with given suns (k, 3)."""
+    """Return the point with all skin unknowns at the medians of their priors, and with given suns (k, 3)."""
     return FitPoint(np.log([one.prior_median for one in SKIN_UNKNOWNS]), sun_directions, np.zeros(2))
 
 
@@ -114,9 +116,9 @@ def tangents(directions: Floats) -> Floats:
 def with_skin(scene: Scene, point: FitPoint) -> Scene:
     """Return the scene with the skin that the unknowns of a fit describe.
 
-    A painted person is painted with the pigments of `point`, but diffused with the profile of pigments
-    rounded to a coarse grid, as profiles are slow to compute. Other heads get the uniform colour of the
-    pigments, since the pigments of their colour map are unknown.
+    A person with painted skin is painted with the pigments of `point`. The diffusion profile, which is slow
+    to compute, is that of pigments rounded to a coarse grid. Other heads get the uniform colour of the
+    pigments in place of their colour map, whose pigments are unknown.
     """
     numbers = point.values()
     skin_values: dict[str, object] = {name: numbers[name] for name in ("roughness", "rho_s")}
@@ -137,11 +139,11 @@ def with_skin(scene: Scene, point: FitPoint) -> Scene:
 def sun_lights(
     sun_directions: Floats, irradiances: Sequence[float] | Floats, light_colour: Floats
 ) -> list[DirectionalLight]:
-    """Return directional lights with given directions, irradiance at normal incidence, and colour.
+    """Return directional lights from given directions.
 
     sun_directions : (k, 3) unit vectors towards the suns
-    irradiances : (k,) irradiance of each sun
-    light_colour : (3,) colour of all suns, by which the irradiance is multiplied
+    irradiances : (k,) irradiance of each sun at normal incidence
+    light_colour : (3,) colour of all suns; their irradiance is multiplied by it
     """
     return [
         DirectionalLight(

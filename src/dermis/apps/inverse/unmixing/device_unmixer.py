@@ -1,4 +1,4 @@
-"""Unmixing and recolouring of pictures on the device, in strips of rows, and estimation of shading."""
+"""Unmixing and recolouring of pictures on the device, in strips of rows, and estimation of their shading."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _TEXTURE_FORMAT = "rgba32float"
 
 
 class Unmixer:
-    """Inversion of a skin model on the device: melanin and blood of each texel's colour.
+    """Inversion of a skin model on the device: from the colour of each texel to its melanin and blood.
 
     device : device on which pictures are unmixed
     model : table of skin colours that is inverted
@@ -63,7 +63,7 @@ class Unmixer:
         of melanin and blood. The residual is the colour divided by the model's colour.
 
         colours : (h, w, 3) diffuse reflectance, linear Rec. 709 [-]
-        progress : called with the number of finished rows and the number of all rows
+        progress : function called with the number of finished rows and the number of all rows
         """
         height, width = colours.shape[:2]
         estimate, sd, residual = (np.empty((height, width, n), np.float32) for n in (3, 2, 3))
@@ -81,10 +81,10 @@ class Unmixer:
         return estimate, sd, residual
 
     def record(self, command_list: CommandList, colours: Texture) -> tuple[Texture, Texture]:
-        """Record the pass that unmixes a texture of colours into two textures, and return these.
+        """Record the pass that unmixes a texture of colours into two textures; return the two textures.
 
-        The first texture has melanin, blood and their standard deviations, the second one the residual and
-        the third unknown. The next call with this size overwrites both.
+        The first texture has melanin, blood and their standard deviations. The second texture has the
+        residual and the third unknown. The next call for a texture of the same size overwrites both.
         """
         size = colours.size[:2]
         shader = _unmixing_program(self.device, "unmix", self.model)
@@ -111,12 +111,12 @@ def recolour(
     factors: Floats,
     added_fractions: Floats,
 ) -> Pixels:
-    """Return the model's colours (h, w, 3) for changed pigments, times the residual of the original colours.
+    """Return the model's colours (h, w, 3) for changed pigments, multiplied by the residual.
 
-    estimate : (h, w, 3) melanin, blood and the third unknown
+    estimate : (h, w, 3) melanin, blood and the third unknown before the change
     residual : (h, w, 3) original colour divided by the model's colour
-    factors : (3,) factors of melanin, blood and the third unknown
-    added_fractions : (3,) constants that are added to the three products
+    factors : (3,) factors by which melanin, blood and the third unknown are multiplied
+    added_fractions : (3,) constants that are then added to them
     """
     table, shader = _table_texture(device, model), _unmixing_program(device, "recolour", model)
     change = shader.record("Change", factors=factors, added=added_fractions)
@@ -136,7 +136,7 @@ def recolour(
 
 
 def row_strips(height: int, width: int) -> Iterator[slice]:
-    """Return slices of rows of a picture, each small enough for the device's memory."""
+    """Return ranges of a picture's rows, each small enough for the device's memory."""
     rows = max(1, _MAX_STRIP_TEXELS // width)
     return (slice(first, min(first + rows, height)) for first in range(0, height, rows))
 
@@ -186,8 +186,12 @@ _RELATIVE_SHADING_BLUR = 1.0 / 24.0  # standard deviation of the blur, relative 
 def estimate_shading(device: Device, colours: Pixels, skin: SkinParameters, relative_noise: float) -> Pixels:
     """Return the low-frequency shading of each texel (h, w), with mean 1 over the skin [-].
 
-    It is the part of the brightness that melanin and blood do not explain, in a downsampled picture that is
-    then low-pass filtered. The weights of the filter are larger where a colour is close to that of a skin.
+    In a downsampled picture, shading is the part of the brightness that melanin and blood do not explain. It
+    is then low-pass filtered, with larger weights for texels whose colour is close to a skin colour.
+
+    colours : (h, w, 3) diffuse reflectance times shading, linear Rec. 709
+    skin : parameters of the skin other than melanin and blood
+    relative_noise : relative standard deviation of a channel [-]
     """
     small = _block_means(colours)
     estimate, _, residual = Unmixer(device, skin_model(skin, "shade"), relative_noise).unmix(small)
@@ -199,7 +203,7 @@ def estimate_shading(device: Device, colours: Pixels, skin: SkinParameters, rela
 
 
 def _block_means(colours: Pixels) -> Pixels:
-    """Downsample a picture to at most about 256 texels along the longer side by means over blocks."""
+    """Return a picture reduced by averaging over blocks, to about 256 texels along its longer side."""
     block = max(1, max(colours.shape[:2]) // _SHADING_MAP_SIDE)
     height, width = (max(1, side // block) for side in colours.shape[:2])
     cropped = colours[: height * block, : width * block] if block > 1 else colours
@@ -220,7 +224,7 @@ def _weighted_blur(
 
 
 def _upsample(block_means: NDArray[np.float64], picture_shape: tuple[int, int]) -> Pixels:
-    """Upsample a picture of block means bilinearly to a given height and width."""
+    """Return a picture of block means interpolated bilinearly to a given height and width."""
     from scipy.ndimage import map_coordinates
 
     output = np.empty(picture_shape, np.float32)

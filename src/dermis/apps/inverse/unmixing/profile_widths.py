@@ -1,4 +1,4 @@
-"""Diffusion profile that varies over a picture: three profiles, and a map that mixes them by texel."""
+"""Diffusion profile that varies over a picture: in each texel, a mixture of three profiles."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ _UNIT_SUM_EQUATION_WEIGHT = 1e4  # weight of the equation by which the mixture w
 
 @dataclass(frozen=True, eq=False)
 class ProfileMixture:
-    """Three profiles with common variances, and a map of their weights.
+    """Three diffusion profiles with the same variances, and a map of their weights.
 
-    profiles : pale skin without blood, pale skin with blood, dark skin with blood
-    weights : (h, w, 2) weights of the second and the third profile; the first profile has the rest [-]
-    error : (3,) relative root-mean-square error of the mixture in the energies that emerge through rings,
-        over a grid of pigments [-]
+    profiles : profiles of pale skin without blood, of pale skin with blood, and of dark skin with blood
+    weights : (h, w, 2) weights of the second and the third profile; all weights sum to 1 [-]
+    error : (3,) relative root-mean-square error of the mixture over a grid of pigments, by channel; it
+        compares the energies that emerge through rings [-]
     single_error : (3,) the same error if one profile, from the middle of the grid, is used everywhere [-]
     """
 
@@ -50,12 +50,12 @@ class ProfileMixture:
     single_error: Floats
 
     def summary(self) -> dict[str, list[float]]:
-        """Return the errors of the mixture and of a single profile, as they are written to JSON."""
+        """Return the errors of the mixture and of a single profile, for a JSON file."""
         return {"mixed": self.error.tolist(), "one_profile": self.single_error.tolist()}
 
 
 def profile_mixture(unmixed: UnmixResult) -> ProfileMixture:
-    """Compute three profiles and their weights in each texel from unmixed melanin and blood.
+    """Return three profiles, and their weights in each texel from the texel's melanin and blood.
 
     Raises DermisError for a picture without skin.
     """
@@ -81,7 +81,7 @@ def profile_mixture(unmixed: UnmixResult) -> ProfileMixture:
 
 
 def save_mixture(folder: Path, mixture: ProfileMixture) -> list[Path]:
-    """Write the three profiles and the map of weights, each file atomically; return the files' paths.
+    """Write the three profiles and the map of weights atomically; return the paths of the files.
 
     Raises DermisError when the disk is full, or the folder cannot be written to.
     """
@@ -105,17 +105,18 @@ def _spectral_tissue(skin: SkinParameters, melanin: float, blood: float) -> Tiss
 
 
 def _ring_fractions(tissue: Tissue) -> Floats:
-    """Return the fraction (n, 3) of a tissue's diffuse reflectance that emerges through each ring."""
+    """Return the fraction (n, 3) of a tissue's diffuse reflectance that emerges through each of n rings."""
     rings = tissue.rings()
     return np.asarray(rings.energy / rings.total)
 
 
 def _mixture_weights(node_fractions: Floats, corner_fractions: Floats) -> Floats:
-    """Return the weights (n, k) with which mixtures of k corner profiles fit the ring fractions of n nodes.
+    """Return weights (n, k) with which mixtures of k profiles approximate n skins, the nodes of a grid.
 
-    The weights are non-negative and sum to 1 for each node.
+    The mixtures fit the fractions of light that emerge through rings. The weights of each node are not
+    negative and sum to 1.
 
-    node_fractions : ring fractions of n pigment mixtures
+    node_fractions : ring fractions of the skins at the n nodes
     corner_fractions : ring fractions of the k profiles that are mixed
     """
     from scipy.optimize import nnls
@@ -133,15 +134,19 @@ def _mixture_weights(node_fractions: Floats, corner_fractions: Floats) -> Floats
 
 
 def _rms_error(mixed_fractions: Floats, node_fractions: Floats) -> Floats:
-    """Return the relative root-mean-square error of ring fractions over all nodes, by channel (3,)."""
+    """Return the relative root-mean-square error (3,) of ring fractions over all nodes, by channel."""
     squares = ((mixed_fractions - node_fractions) ** 2).sum(axis=1) / (node_fractions**2).sum(axis=1)
     return np.asarray(np.sqrt(squares.mean(axis=0)))
 
 
 def _interpolate_map(node_weights: Floats, pigment_axes: Sequence[Floats], unmixed: UnmixResult) -> Pixels:
-    """Interpolate mixture weights from the grid of pigments to each texel, (h, w, 2).
+    """Return mixture weights (h, w, 2) of each texel, interpolated from the nodes of a pigment grid.
 
-    The grid is regular in the logarithms of melanin and blood.
+    The nodes are evenly spaced in the logarithms of melanin and blood.
+
+    node_weights : (m, b, 2) weights of the second and the third profile at the nodes
+    pigment_axes : melanin fractions (m,) and blood fractions (b,) of the nodes
+    unmixed : melanin and blood of each texel
     """
     from scipy.interpolate import RegularGridInterpolator
 

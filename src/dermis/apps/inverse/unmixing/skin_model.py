@@ -1,4 +1,4 @@
-"""Model of skin colours as functions of melanin, blood and a third unknown, and its inverse in float64."""
+"""Model of skin colour as a function of melanin, blood and a third unknown, and its inversion in float64."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ _LOG_SHADE_RANGE = -3.0, 1.5  # limits of the logarithm of the shading
 
 @dataclass(frozen=True, eq=False)
 class SkinModel:
-    """Table of skin colours over melanin, blood and a third unknown, by which colours are unmixed.
+    """Table of skin colours over melanin, blood and a third unknown; colours are unmixed by inverting it.
 
-    log_colours : (k, n, n, 3) logarithms of diffuse reflectance in linear Rec. 709, over k oxygenated
-        fractions, n melanin and n blood fractions; the oxygenated fractions and the square roots of the
-        others are evenly spaced from 0 to 1
+    log_colours : (k, n, n, 3) logarithms of diffuse reflectance in linear Rec. 709, for k oxygenated
+        fractions, n melanin fractions and n blood fractions. The oxygenated fractions, the square roots of
+        the melanin fractions and those of the blood fractions are evenly spaced from 0 to 1
     third : third unknown: "oxygen" is the oxygenated fraction of haemoglobin; "shade" is the logarithm of a
-        factor common to all channels, such as uneven light in a photograph; "none" is no unknown
+        factor common to all channels, such as uneven light in a photograph; "none" is no third unknown
     third_range : smallest and largest value of the third unknown
     prior_mean, prior_sd : mean and standard deviation of the third unknown's prior
     """
@@ -47,10 +47,10 @@ class SkinModel:
     prior_sd: float
 
     def evaluate(self, unknowns: Floats) -> tuple[Floats, Floats]:
-        """Return the logarithms (t, 3) of colours, and their derivatives by the unknowns (t, 3, 3).
+        """Return the logarithms (t, 3) of colours, and their derivatives (t, 3, 3).
 
-        The second axis of the derivatives is the channel, the third the unknown. The table is interpolated
-        linearly.
+        The second axis of the derivatives is the channel, and the third axis is the unknown. The table is
+        interpolated linearly.
 
         unknowns : (t, 3) square roots of the melanin and blood fractions, and the third unknown
         """
@@ -76,10 +76,10 @@ class SkinModel:
         return result, np.stack([by_p, by_q, by_t], axis=-1)
 
     def colours(self, melanin: Floats, blood: Floats, third_unknown: Floats | float | None = None) -> Floats:
-        """Return the diffuse reflectance (t, 3) of skins, linear Rec. 709 [-].
+        """Return the diffuse reflectance (t, 3) of t skins, linear Rec. 709 [-].
 
         melanin, blood : (t,) volume fractions [-]
-        third_unknown : third unknown; by default the mean of its prior
+        third_unknown : value of the third unknown; by default the mean of its prior
         """
         last = np.broadcast_to(self.prior_mean if third_unknown is None else third_unknown, np.shape(melanin))
         x = np.stack([np.sqrt(melanin), np.sqrt(blood), last], axis=-1)
@@ -87,7 +87,7 @@ class SkinModel:
 
 
 def _node_below(axis_fraction: Floats, node_count: int) -> tuple[NDArray[np.int64], Floats]:
-    """Return the table node below each position in [0, 1], and the fraction of the way to the next node."""
+    """Return the node below each position in [0, 1], and the fraction of the way from it to the next node."""
     position = np.clip(axis_fraction, 0.0, 1.0) * (node_count - 1)
     node = np.clip(position.astype(np.int64), 0, max(node_count - 2, 0))
     return node, position - node
@@ -98,9 +98,9 @@ def _lerp(node_values: Floats, fraction: Floats) -> Floats:
 
 
 def skin_model(skin: SkinParameters = DEFAULT_SKIN, third_unknown: ThirdUnknown = "none") -> SkinModel:
-    """Return the model of skins with any melanin and blood, computed by layered diffusion.
+    """Return the model of skins with all fractions of melanin and blood, computed by layered diffusion.
 
-    skin : parameters of the skins that do not vary; its melanin and blood are ignored
+    skin : parameters that do not vary; its melanin and blood are ignored
     third_unknown : unknown besides melanin and blood; "none" keeps the oxygenation of `skin`
 
     Raises DermisError for other names of the third unknown.
@@ -148,8 +148,8 @@ class PigmentEstimate:
 
     melanin, blood : (t,) volume fractions [-]
     third : (t,) third unknown of the model
-    melanin_sd, blood_sd : (t,) lower bounds of the standard deviations due to noise, by the Cramér-Rao bound
-        with the priors of blood and of the third unknown [-]
+    melanin_sd, blood_sd : (t,) lower bounds of the standard deviations due to noise: the Cramér-Rao bound,
+        which includes the priors of blood and of the third unknown [-]
     residual : (t, 3) colour divided by the model's colour [-]
     """
 
@@ -162,7 +162,7 @@ class PigmentEstimate:
 
 
 def inverse_variances(colours: Floats, relative_noise: float) -> Floats:
-    """Return the inverse variances (t, 3) of the logarithms of noisy colours.
+    """Return the inverse variance (t, 3) of the logarithm of each channel of noisy colours.
 
     colours : (t, 3) diffuse reflectance, linear Rec. 709 [-]
     relative_noise : relative standard deviation of a channel [-]
@@ -173,11 +173,12 @@ def inverse_variances(colours: Floats, relative_noise: float) -> Floats:
 def solve_pigments(
     model: SkinModel, colours: Floats, relative_noise: float = 0.01, start: Floats | None = None
 ) -> PigmentEstimate:
-    """Estimate the most probable melanin, blood and third unknown of colours, in float64.
+    """Return the most probable melanin, blood and third unknown of each colour, computed in float64.
 
-    The cost is the sum of squared differences of logarithms, each divided by its variance, and of squared
-    deviations from the priors of blood and of the third unknown. It is minimised by Gauss-Newton steps
-    with Levenberg's damping; unknowns at a limit are fixed there.
+    The cost has a squared difference between the logarithms of the colour and of the model's colour for each
+    channel, and squared deviations from the prior means of blood and of the third unknown. Each term is
+    divided by its variance. The cost is minimised by Gauss-Newton steps with Levenberg's damping; an unknown
+    at a limit stays fixed if the step would cross the limit.
 
     colours : (t, 3) diffuse reflectance, linear Rec. 709 [-]
     relative_noise : relative standard deviation of a channel [-]
@@ -201,7 +202,7 @@ def solve_pigments(
 
 
 def _initial_guess(model: SkinModel, log_colours: Floats) -> Floats:
-    """Return the unknowns (t, 3) of the skin on a coarse grid whose colour is nearest.
+    """Return for each colour the unknowns (t, 3) of the skin with the nearest colour on a coarse grid.
 
     log_colours : (t, 3) logarithms of the colours
     """
@@ -227,7 +228,10 @@ def _clip_unknowns(model: SkinModel, unknowns: Floats) -> Floats:
 def _damped_step(
     model: SkinModel, unknowns: Floats, log_colours: Floats, colour_weights: Floats, damping: Floats
 ) -> Floats:
-    """Return the damped Gauss-Newton step of each colour's unknowns (t, 3), 0 for unknowns at a limit."""
+    """Return the damped Gauss-Newton step (t, 3) of each colour's unknowns.
+
+    The step is 0 for an unknown at a limit that it would cross.
+    """
     H, g = _normal_equations(model, unknowns, log_colours, colour_weights)
     diagonal = np.einsum("tii->ti", H)
     diagonal *= 1.0 + damping[:, None]

@@ -1,4 +1,4 @@
-"""Tables of measured reflectance spectra: their pigments by inversion of the spectral model of skin."""
+"""Reader of tables of reflectance spectra, and estimation of pigments from these spectra."""
 
 from __future__ import annotations
 
@@ -43,9 +43,9 @@ _MAX_REFLECTANCE = 1.5
 
 @dataclass(frozen=True, eq=False)
 class SpectraTable:
-    """Reflectance spectra of a file.
+    """Reflectance spectra read from a file.
 
-    labels : for each spectrum, the cells that are not reflectances, by heading
+    labels : for each spectrum, a dictionary from heading to cell for the cells that are not reflectances
     reflectance : (n, 31) reflectance factors at `WAVELENGTHS_NM`, NaN for spectra with missing values [-]
     """
 
@@ -56,10 +56,11 @@ class SpectraTable:
 def read_spectra(path: str | Path) -> SpectraTable:
     """Read a table of reflectance spectra, plain or compressed by gzip.
 
-    Headings or the first column are the wavelengths: r400, 400, 400 nm. Reflectance is interpolated linearly
-    to 400 to 700 nm by 10 nm; values in percent are recognised. Lines that start with # are comments.
+    The headings or the cells of the first column are wavelengths such as r400, 400 or 400 nm. Reflectance is
+    interpolated linearly to wavelengths from 400 to 700 nm in steps of 10 nm. Values in percent are
+    recognised. Lines that start with # are comments.
 
-    Raises DermisError for files that are not such tables, and for wavelengths that do not cover the range.
+    Raises DermisError when the file is not such a table, or when its wavelengths do not cover this range.
     """
     rows = _read_cells(path)
     columns = {k: nm for k, cell in enumerate(rows[0]) if (nm := _parse_wavelength_nm(cell)) is not None}
@@ -87,7 +88,10 @@ def read_spectra(path: str | Path) -> SpectraTable:
 
 
 def _read_cells(path: str | Path) -> list[list[str]]:
-    """Return the cells of a table, all rows as long as the first one."""
+    """Return the cells of a table whose rows all have the same length.
+
+    Raises DermisError for other files.
+    """
     with open_regular_file(path, _EXPECTED_TABLE) as file:
         packed = file.read(2) == b"\x1f\x8b"
         file.seek(0)
@@ -112,7 +116,7 @@ def _read_cells(path: str | Path) -> list[list[str]]:
 
 
 def _parse_wavelength_nm(cell: str) -> float | None:
-    """Return the wavelength of a heading [nm]; None for other headings."""
+    """Return the wavelength that a heading states [nm], or None if it states no wavelength."""
     match = _WAVELENGTH_PATTERN.fullmatch(cell)
     return float(match[1]) if match and 200.0 <= float(match[1]) <= 3000.0 else None
 
@@ -126,7 +130,7 @@ def _parse_number(cell: str) -> float:
 
 
 def _check_wavelengths(path: str | Path, wavelengths_nm: Floats) -> None:
-    """Refuse wavelengths that do not cover 400 to 700 nm at steps of at most 20 nm."""
+    """Raise DermisError unless the wavelengths cover 400 to 700 nm in steps of at most 20 nm."""
     expected = "wavelengths from 400 to 700 nm, at most 20 nm apart, as headings or in the first column"
     if len(wavelengths_nm) < _MIN_BAND_COUNT:
         refuse(path, expected, f"it has {len(wavelengths_nm)}", "Write headings such as 400 or r400")
@@ -146,11 +150,11 @@ def _check_wavelengths(path: str | Path, wavelengths_nm: Floats) -> None:
 
 @dataclass(frozen=True, eq=False)
 class UnmixedSpectra:
-    """Pigments of the spectra of a table.
+    """Pigments estimated from a table of spectra.
 
-    labels : for each spectrum, the cells that are not reflectances, by heading
-    names : parameters that were found
-    fit : parameters of the complete spectra, those without missing values
+    labels : for each spectrum, a dictionary from heading to cell for the cells that are not reflectances
+    names : names of the parameters that were estimated
+    fit : parameters of the complete spectra, which have no missing values
     complete : indices of the complete spectra in the table
     """
 
@@ -160,9 +164,10 @@ class UnmixedSpectra:
     complete: list[int]
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return a row per spectrum: number, labels, parameters, RMS residual, CIEDE2000 error and residual.
+        """Return a dictionary per spectrum: number, labels, parameters, and the errors of the fit.
 
-        Spectra with missing values have only their number and labels.
+        The errors are the RMS residual, the CIEDE2000 difference and the residual at each wavelength. For
+        spectra with missing values, there are only number and labels.
         """
         rows: list[dict[str, Any]] = [
             {"row": number, "labels": labels} for number, labels in enumerate(self.labels, 1)
@@ -175,7 +180,7 @@ class UnmixedSpectra:
         return rows
 
     def summary(self) -> dict[str, Any]:
-        """Return the number of spectra, and percentiles of parameters and errors over them."""
+        """Return the number of spectra, and percentiles of the parameters and errors of all spectra."""
         values = self.fit.values | {"rms": self.fit.rms, "delta_e": self.fit.delta_e()}
         percentiles = {}
         for name in (*self.names, "rms", "delta_e"):
@@ -193,12 +198,12 @@ def unmix_spectra(
 ) -> UnmixedSpectra:
     """Estimate the pigments of each reflectance spectrum of a table.
 
-    path : table, see `read_spectra`
-    find : key of `SPECTRAL_SETS`
-    skin : parameters that are not found
-    surface : reflection of the surface in the spectra, which is subtracted; 0 for spectra without it [-]
+    path : file with the table, see `read_spectra`
+    find : parameters to estimate, as a key of `SPECTRAL_SETS`
+    skin : values of all other parameters
+    surface : surface reflection that is subtracted from the spectra; 0 if they do not include it [-]
 
-    Raises DermisError as `read_spectra` does, and for a surface reflectance out of range.
+    Raises DermisError when `read_spectra` does, and for an unknown `find` or a `surface` out of range.
     """
     if find not in SPECTRAL_SETS:
         refuse("--find", ", ".join(SPECTRAL_SETS), f"got {find!r}", "Choose one of them")
@@ -219,5 +224,5 @@ def unmix_spectra(
 
 
 def _spectra_batches(spectra: Floats) -> list[Floats]:
-    """Return spectra in batches whose fits need little memory."""
+    """Return the spectra in batches, each small enough to be fitted with little memory."""
     return np.array_split(spectra, -(-len(spectra) // _SPECTRA_PER_BATCH))

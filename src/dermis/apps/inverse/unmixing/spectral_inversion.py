@@ -1,4 +1,4 @@
-"""Inversion of spectral models of skin: parameters of measured reflectance spectra or of their colours."""
+"""Inversion of spectral models of skin: from reflectance spectra, or their colours, to skin parameters."""
 
 from __future__ import annotations
 
@@ -35,8 +35,10 @@ class SpectralUnknown:
     """Parameter of a spectral model that a fit varies.
 
     name : name of the parameter
-    low, high, start : smallest and largest value, and the value to start from
-    scale : coordinate in which the parameter is varied: its square root, its logarithm, or itself
+    low, high : smallest and largest value
+    start : value from which a fit starts
+    scale : coordinate in which the fit varies the parameter: its square root ("root"), its logarithm ("log"),
+        or the value itself ("linear")
     """
 
     name: str
@@ -46,17 +48,17 @@ class SpectralUnknown:
     scale: Literal["root", "log", "linear"] = "linear"
 
     def coordinates(self, parameter_values: Floats | np.float64) -> Floats:
-        """Return the coordinates of values."""
+        """Return the coordinates, on this parameter's scale, of given parameter values."""
         if self.scale == "log":
             return np.asarray(np.log(parameter_values))
         return np.asarray(np.sqrt(parameter_values) if self.scale == "root" else parameter_values)
 
     def coordinate(self, parameter_value: float) -> float:
-        """Return the coordinate of a value."""
+        """Return the coordinate, on this parameter's scale, of a parameter value."""
         return float(self.coordinates(np.float64(parameter_value)))
 
     def values(self, coordinates: Floats) -> Floats:
-        """Return the values (n,) of coordinates (n,)."""
+        """Return the parameter values (n,) at given coordinates (n,), the inverse of `coordinates`."""
         if self.scale == "log":
             return np.exp(coordinates)
         return np.asarray(coordinates**2 if self.scale == "root" else coordinates)
@@ -81,10 +83,11 @@ FIVE_UNKNOWNS = (*THREE_UNKNOWNS, "scattering", "epidermis_mm")
 
 @dataclass(frozen=True, eq=False)
 class SpectralFit:
-    """Parameters of n skins that fit their spectra or colours.
+    """Parameters of n skins, fitted to their spectra or colours.
 
-    values : (n,) parameters by name
-    measured, model : (n, 31) diffuse reflectance, without surface reflection [-]
+    values : dictionary from parameter name to fitted values (n,)
+    measured : (n, 31) measured diffuse reflectance, without surface reflection [-]
+    model : (n, 31) diffuse reflectance of the model for the fitted values [-]
     """
 
     values: dict[str, Floats]
@@ -93,29 +96,32 @@ class SpectralFit:
 
     @property
     def residual(self) -> Floats:
-        """Return the measured minus the model's reflectance (n, 31) [-]."""
+        """Return the measured reflectance minus that of the model, (n, 31) [-]."""
         return self.measured - self.model
 
     @property
     def rms(self) -> Floats:
-        """Return the root mean square of the residual over wavelengths (n,) [-]."""
+        """Return for each skin the root mean square (n,) of the residual over all wavelengths [-]."""
         return np.asarray(np.sqrt((self.residual**2).mean(axis=1)))
 
     def weighted_residual(self, criterion: Criterion) -> Floats:
-        """Return the residuals whose squares a fit minimises: (n, 31) for spectra, (n, 1) for colours."""
+        """Return the residuals for a criterion: reflectances (n, 31), or CIEDE2000 differences (n, 1)."""
         return self.residual if criterion == "spectrum" else self.delta_e()[:, None]
 
     def delta_e(self, colour_weights: Floats | None = None) -> Floats:
-        """Return the CIEDE2000 difference (n,) of the model's colour from the measured one.
+        """Return the CIEDE2000 difference (n,) between the model's colour and the measured colour.
 
-        colour_weights : (3, 31) weights from spectra to linear Rec. 709, by default those of D65
+        colour_weights : (3, 31) weights that convert spectra to linear Rec. 709; by default those of D65
         """
         w = rgb_weights() if colour_weights is None else colour_weights
         return delta_e_2000(self.model @ w.T, self.measured @ w.T)
 
 
 def skin_model_spectra(skin: SkinParameters = DEFAULT_SKIN) -> SpectralModel:
-    """Return the package's spectral model of skin; `skin` gives the parameters that a call omits."""
+    """Return the package's spectral model of skin.
+
+    skin : parameters that are used where a call of the model omits them
+    """
 
     def reflectance(parameter_values: ParameterValues) -> Floats:
         def parameter(name: str) -> Floats:
@@ -146,10 +152,11 @@ def invert_spectra(
 
     spectra : (n, 31) diffuse reflectance at `WAVELENGTHS_NM`, without surface reflection [-]
     model : function from parameters to spectra
-    unknowns : parameters that vary; the others are the model's own
-    criterion : "spectrum" minimises the RMS difference, "colour" the difference of colours under D65 in a
-        space whose small distances are those of CIEDE2000
-    start : (n,) values to start from, by name
+    unknowns : parameters that vary; the model supplies all others
+    criterion : "spectrum" minimises the RMS difference of the spectra; "colour" minimises the difference of
+        their colours under D65, in a space where small distances equal CIEDE2000 differences
+    start : dictionary from parameter name to the values (n,) from which the fit starts; by default, each
+        starts from the `start` of its unknown
     max_steps : largest number of steps
     """
     first = {} if start is None else start
@@ -180,10 +187,10 @@ def fit_skin(
     criterion: Criterion = "spectrum",
     skin: SkinParameters = DEFAULT_SKIN,
 ) -> SpectralFit:
-    """Fit parameters of the package's skin to each of n spectra, see `invert_spectra`.
+    """Fit parameters of the package's skin model to each of n spectra, as `invert_spectra` does.
 
-    unknown_names : parameters that vary, of `UNKNOWNS`
-    skin : parameters that do not vary
+    unknown_names : names in `UNKNOWNS` of the parameters that vary
+    skin : values of the parameters that do not vary
     """
     return invert_spectra(
         spectra, skin_model_spectra(skin), [UNKNOWNS[name] for name in unknown_names], criterion
@@ -197,13 +204,14 @@ def least_squares(
     upper_limits: Floats,
     max_steps: int = _MAX_STEPS,
 ) -> Floats:
-    """Minimise n sums of squares at once by Gauss-Newton steps with Levenberg's damping.
+    """Solve n independent least-squares problems at once; return the unknowns (n, u).
 
-    residual : function from points (n, u) to residuals (n, r)
-    start_unknowns : (n, u) points to start from
-    lower_limits, upper_limits : (u,) limits; coordinates at a limit are fixed while the step points outwards
+    Gauss-Newton steps with Levenberg's damping are used.
 
-    Returns the points (n, u).
+    residual : function from the unknowns (n, u) to the residuals (n, r)
+    start_unknowns : (n, u) unknowns from which the search starts
+    lower_limits, upper_limits : (u,) limits of the unknowns; an unknown at a limit stays fixed if the step
+        would cross the limit
     """
     count = start_unknowns.shape[1]
     damping = np.full(len(start_unknowns), 1e-2)
@@ -239,7 +247,7 @@ def least_squares(
 def _derivatives(
     residual: Callable[[Floats], Floats], unknowns: Floats, residuals: Floats, upper_limits: Floats
 ) -> Floats:
-    """Return the derivatives (n, r, u) of residuals by finite differences that stay within the limits."""
+    """Return the derivatives (n, r, u) of residuals, by finite differences that stay within the limits."""
     columns = []
     for i in range(unknowns.shape[1]):
         step = np.where(
@@ -252,9 +260,10 @@ def _derivatives(
 
 
 def colour_metric(lab_colours: Floats) -> Floats:
-    """Return matrices (n, 3, 3) that turn small L*a*b* differences into vectors whose length is CIEDE2000.
+    """Return matrices (n, 3, 3) that convert small L*a*b* differences to a space with CIEDE2000 distances.
 
-    The rotation term, which only blue colours have, is left out.
+    The length of a converted difference is the CIEDE2000 difference, without the rotation term, which only
+    matters for blue colours.
 
     lab_colours : (n, 3) L*a*b* of the colours
 

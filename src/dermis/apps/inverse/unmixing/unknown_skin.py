@@ -1,4 +1,4 @@
-"""Uncertainty of pigments because oxygen and epidermal thickness of a person are not known."""
+"""Uncertainty of pigments that is due to the unknown oxygen and epidermal thickness of a person."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ def unknown_skin_sd(
     known_parameters: Collection[str] = (),
     is_oxygen_fitted: bool = False,
 ) -> dict[str, float]:
-    """Return the relative standard deviations of melanin and blood that result from assumed skin parameters.
+    """Return the relative standard deviations of melanin and blood that are due to assumed skin parameters.
 
-    Skins sampled from the prior are unmixed as if they had the parameters of `skin`. The result is the root
-    mean square of the logarithm of the ratio of found to true pigments, over those samples whose found
-    pigments are near the given pigments.
+    Skins are sampled from the prior, and unmixed as if they had the parameters of `skin`. The error of a
+    sample is the logarithm of the ratio of found to true pigment. The result is the root mean square of this
+    error over the samples whose found pigments are near `melanin` and `blood`.
 
-    melanin, blood : pigments that were found
-    skin : parameters that the inversion assumes
-    known_parameters : names of `FIXED_PARAMETERS` that are known of the person
-    is_oxygen_fitted : whether the inversion also estimates oxygen
+    melanin, blood : volume fractions that were found in a picture [-]
+    skin : parameters that are assumed for unmixing
+    known_parameters : those of the `FIXED_PARAMETERS` that are known for the person
+    is_oxygen_fitted : whether unmixing also estimates oxygen
     """
     if set(FIXED_PARAMETERS) <= set(known_parameters):
         return {"melanin": 0.0, "blood": 0.0}
@@ -54,9 +54,9 @@ def unknown_skin_sd(
 def _unmixed_sample(
     skin: SkinParameters, known_parameters: tuple[str, ...], is_oxygen_fitted: bool
 ) -> tuple[Floats, Floats]:
-    """Return the logarithms (n, 2) of pigments found for samples of the prior, and their errors (n, 2).
+    """Unmix skins sampled from the prior; return the logarithms (n, 2) found and their errors (n, 2).
 
-    The pigments are melanin and blood.
+    The logarithms are those of melanin and blood.
     """
     true = skin_prior().sample(_SAMPLE_COUNT)
     values = true | {name: np.full(_SAMPLE_COUNT, getattr(skin, name)) for name in known_parameters}

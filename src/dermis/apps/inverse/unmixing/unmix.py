@@ -44,18 +44,18 @@ _RECOLOUR_FACTOR_RANGE = 0.0, 100.0
 class FractionChange:
     """Change of a map of volume fractions, by a factor or to a given median.
 
-    A map is raised to a larger median by adding a constant, because a factor would amplify the noise of pale
-    skin. It is lowered to a smaller median by a factor.
+    For a larger median, a constant is added to the map, because a factor would amplify the noise of pale
+    skin. For a smaller median, the map is multiplied by a factor.
 
-    factor : factor of all fractions, if no median is given [-]
-    median : median of the changed map, or None [-]
+    factor : factor of all fractions; only used if `median` is None [-]
+    median : median of the map after the change; None to use `factor` [-]
     """
 
     factor: float = 1.0
     median: float | None = None
 
     def scale_and_offset(self, map_median: float) -> tuple[float, float]:
-        """Return the factor for a map with a given median, and the constant that is added afterwards."""
+        """Return the factor by which a map with a given median is multiplied, and the constant then added."""
         if self.median is None:
             return self.factor, 0.0
         if self.median < map_median:
@@ -65,10 +65,10 @@ class FractionChange:
 
 @dataclass(frozen=True)
 class PigmentChange:
-    """Change of the pigments of a skin, for recolouring.
+    """Change of a skin's pigments, for recolouring.
 
-    melanin, blood : changes of the maps
-    oxygen, eumelanin : new fractions as in `SkinParameters`; None leaves a fraction unchanged [-]
+    melanin, blood : changes of the maps of melanin and blood
+    oxygen, eumelanin : new values of these parameters of `SkinParameters`; None for no change [-]
     """
 
     melanin: FractionChange = FractionChange()
@@ -82,9 +82,9 @@ class PigmentChange:
         return replace(skin, **{name: one for name, one in changed.items() if one is not None})
 
     def scales_and_offsets(self, melanin: float, blood: float) -> tuple[Floats, Floats]:
-        """Return factors (3,) and constants (3,) for melanin, blood and the third unknown.
+        """Return factors (3,) and added constants (3,) for the maps of melanin, blood and the third unknown.
 
-        melanin, blood : medians of the maps before the change [-]
+        melanin, blood : medians of these maps before the change [-]
         """
         pairs = self.melanin.scale_and_offset(melanin), self.blood.scale_and_offset(blood), (1.0, 0.0)
         factors, added = np.array(pairs).T
@@ -92,7 +92,7 @@ class PigmentChange:
 
 
 def parse_fraction_change(option_name: str, option_text: str) -> FractionChange:
-    """Parse the text of an option: "x2" multiplies the fraction by 2, "0.1" sets its median to 0.1.
+    """Parse an option's text: "x2" multiplies a map of fractions by 2, "0.1" sets its median to 0.1.
 
     Raises DermisError for any other text.
     """
@@ -113,17 +113,19 @@ def parse_fraction_change(option_name: str, option_text: str) -> FractionChange:
 
 @dataclass(frozen=True, eq=False)
 class UnmixResult:
-    """Maps of the pigments of a picture of skin, (h, w) with row 0 at the top, as found by `dermis.unmix`.
+    """Pigment maps of a picture of skin, as found by `dermis.unmix`; row 0 of each map is at the top.
 
-    melanin, blood : volume fractions of melanosomes in the epidermis and of blood in the dermis [-]
-    melanin_sd, blood_sd : lower bounds of their standard deviations due to noise, by the Cramér-Rao bound [-]
-    residual : (h, w, 3) colour divided by the model's colour; it contains paint, hair and all else that is
-        not skin [-]
-    third : oxygenated fraction of haemoglobin, None if it was not requested [-]
-    shading : shading by which the colours were divided, None if it was not requested [-]
-    skin : parameters of the model's skins
+    melanin : (h, w) volume fraction of melanosomes in the epidermis [-]
+    blood : (h, w) volume fraction of blood in the dermis [-]
+    melanin_sd, blood_sd : (h, w) lower bounds of the standard deviations of melanin and blood that are due to
+        noise (Cramér-Rao bound) [-]
+    residual : (h, w, 3) colour divided by the model's colour, which shows all that is not skin, such as paint
+        and hair [-]
+    third : (h, w) oxygenated fraction of haemoglobin; None if it was not requested [-]
+    shading : (h, w) shading by which the colours were divided; None if it was not requested [-]
+    skin : parameters of the model's skins other than melanin and blood
     model : model of skin colours
-    devices : devices used so far, by requested adapter; they stay open
+    devices : dictionary from requested adapter to the device used for it; the devices stay open
     """
 
     melanin: Pixels
@@ -138,7 +140,7 @@ class UnmixResult:
     devices: dict[str, LazyDevice] = field(default_factory=dict)
 
     def maps(self) -> dict[str, Pixels]:
-        """Return the maps that were computed, by the names of their files."""
+        """Return a dictionary from file name, without suffix, to map for all maps that were computed."""
         names = "melanin", "blood", "melanin_sd", "blood_sd", "residual"
         named = {name: getattr(self, name) for name in names}
         optional = {"oxygen": self.third, "shading": self.shading}
@@ -147,9 +149,9 @@ class UnmixResult:
     def summary(self) -> dict[str, Any]:
         """Return medians of the pigments, colour differences, skin tone, and the fraction of skin texels.
 
-        They are computed from every n-th texel, with 512 along the longer side; black texels do not count as
-        skin. "sd" is the standard deviation due to noise. "skin_sd" is the one due to oxygen and epidermal
-        thickness, which are assumed here, but vary among people as measured.
+        They are computed from every n-th texel, about 512 along the longer side. Black texels do not count as
+        skin. "sd" is the standard deviation due to noise. "skin_sd" is the standard deviation due to the
+        values assumed for oxygen and epidermal thickness, which vary among people.
         """
         step = max(1, max(self.melanin.shape) // _SUMMARY_SIDE)
         maps = {name: one[::step, ::step].astype(np.float64) for name, one in self.maps().items()}
@@ -176,14 +178,14 @@ class UnmixResult:
         return result
 
     def recoloured(self, change: PigmentChange = PigmentChange(), adapter: str = "auto") -> Pixels:
-        """Return the colours (h, w, 3) of this skin with other pigments, linear Rec. 709.
+        """Return the colours (h, w, 3) of this skin with changed pigments, linear Rec. 709.
 
-        The residual is kept, and so is shading that was not removed.
+        The residual is kept. Shading is kept too, unless `dermis.unmix` removed it.
 
         change : change of the pigments
-        adapter : "auto", "cpu" or part of the name of an adapter
+        adapter : "auto", "cpu" or part of an adapter's name
 
-        Raises DermisError as `dermis.gpu.open_device` does.
+        Raises DermisError when `dermis.gpu.open_device` does.
         """
         lazy_device = self.devices.setdefault(adapter, LazyDevice(adapter))
         return lazy_device.run(lambda device: self._recoloured(device, change))
@@ -205,7 +207,7 @@ class UnmixResult:
         return np.asarray(np.abs(logs).max(axis=-1) < _MAX_LOG_RESIDUAL)
 
     def _skin_median(self, fraction_map: Pixels) -> float:
-        """Return the median of a map over the skin texels."""
+        """Return the median of a map over the skin texels, or over all texels if none is skin."""
         skin = self.skin_texels()
         return float(np.median(fraction_map[skin] if skin.any() else fraction_map))
 
@@ -234,16 +236,17 @@ def unmix(
     skin : SkinParameters
         Epidermal thickness, eumelanin and oxygen of the model's skins; melanin and blood are ignored.
     third : {"none", "oxygen"}
-        "oxygen" also estimates the oxygenated fraction of haemoglobin, with a prior whose mean is the
-        fraction of `skin`, and whose width is that of measured people; "none" keeps the fraction of `skin`.
+        "oxygen" also estimates the oxygenated fraction of haemoglobin; the mean of its prior is the fraction
+        in `skin`, and the standard deviation is that among measured people. "none" keeps the fraction in
+        `skin`.
     noise : float
         Relative standard deviation of a channel [-].
     shading : bool
-        Whether to estimate low-frequency shading and divide the picture by it.
+        Whether to estimate low-frequency shading, and to divide the picture by this shading.
     adapter : str
-        "auto", "cpu" or part of the name of an adapter.
+        "auto", "cpu" or part of an adapter's name.
     progress : callable
-        Called with the number of finished rows and the number of all rows.
+        Function called with the number of finished rows and the number of all rows.
 
     Returns
     -------
@@ -253,8 +256,8 @@ def unmix(
     Raises
     ------
     DermisError
-        For files and arrays that are not colour pictures, numbers out of range, and for the
-        errors of `dermis.gpu.open_device`.
+        For files and arrays that are not colour pictures, for numbers out of range, and when
+        `dermis.gpu.open_device` raises it.
 
     References
     ----------
@@ -308,12 +311,12 @@ def save_maps(
     recoloured: NDArray[np.float32] | None = None,
     linear: bool = False,
 ) -> list[Path]:
-    """Write all maps as EXR files, the summary, and the recoloured picture, each file atomically.
+    """Write all maps as EXR files, the summary, and the recoloured picture; return the paths of all files.
 
-    recoloured : (h, w, 3) recoloured picture in linear Rec. 709, or None
+    Each file is written atomically.
+
+    recoloured : (h, w, 3) recoloured picture in linear Rec. 709; None to write no such picture
     linear : whether the recoloured picture is written as EXR instead of PNG
-
-    Returns the paths of the written files.
 
     Raises DermisError when the disk is full, or the folder cannot be written to.
     """
@@ -333,7 +336,7 @@ def save_maps(
 
 
 def __getattr__(name: str) -> Any:
-    """Return an object of this module by the name that it had in the last release."""
+    """Return the object of this module that had a given name in the last release."""
     if new := successor(__name__, name):
         return globals()[new]
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

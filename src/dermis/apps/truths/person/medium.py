@@ -1,4 +1,4 @@
-"""Layers below a person's painted skin: their coefficients, and a grid of albedos in the deepest."""
+"""Layers of a person's skin: their coefficients, and a grid of albedos in the deepest layer."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _STACK_TABLE_STEPS = 20
 
 
 def uniform_skin(colour: ArrayLike, distance_mm: ArrayLike, eta: float) -> Medium:
-    """Return the homogeneous skin with a given colour and mean distance between entry and exit of light.
+    """Return a homogeneous skin with a given colour and a given mean distance from entry to exit of light.
 
     colour : (3,) reflectance of light at normal incidence [-]
     distance_mm : (3,) mean lateral offset of exit points at normal incidence [mm]
@@ -55,10 +55,10 @@ def uniform_skin(colour: ArrayLike, distance_mm: ArrayLike, eta: float) -> Mediu
 
 
 def pigmented_skin(parameters: SkinParameters, colour: ArrayLike, eta: float) -> Medium:
-    """Return an epidermis over a dermis in three channels, with a given colour.
+    """Return a skin of epidermis and dermis with a given colour, in three channels.
 
-    The spectra of both layers are averaged over the sensitivity of each channel, where it is positive. The
-    absorption of the dermis is then replaced by that for which the skin has the colour.
+    The spectra of both layers are averaged with the positive part of each channel's sensitivity. The albedo
+    of the dermis is then replaced by the albedo for which the whole skin has the given colour.
 
     parameters : pigments and thickness of the epidermis
     colour : (3,) reflectance of light at normal incidence [-]
@@ -77,7 +77,7 @@ def pigmented_skin(parameters: SkinParameters, colour: ArrayLike, eta: float) ->
 
 
 def with_deepest_albedo(medium: Medium, albedo: ArrayLike) -> Medium:
-    """Return a medium whose last layer has another single-scattering albedo (3,), at the same extinction."""
+    """Return a medium with a new single-scattering albedo (3,) in its last layer, at the same extinction."""
     *above, last = medium.layers
     extinction, albedo = last.sigma_t_prime, np.asarray(albedo)
     return replace(
@@ -90,11 +90,11 @@ def with_deepest_albedo(medium: Medium, albedo: ArrayLike) -> Medium:
 
 
 def deepest_albedo(medium: Medium, colour: ArrayLike) -> Doubles:
-    """Return the single-scattering albedos of the last layer with which a medium has given colours [-].
+    """Return single-scattering albedos of a medium's last layer for which the medium has given colours [-].
 
-    Colours that the layers above rule out get the nearest possible one.
+    If the layers above rule out a colour, the albedo for the nearest possible colour is returned.
 
-    medium : layers in three channels; the albedo of the last one is ignored
+    medium : layers in three channels; the albedo of the last layer is ignored
     colour : (..., 3) reflectance of light at normal incidence, relative to the light that enters [-]
     """
     wanted = np.asarray(colour, np.float64)
@@ -116,7 +116,7 @@ def deepest_albedo(medium: Medium, colour: ArrayLike) -> Doubles:
 
 @cache
 def _reflectance_table(layers: tuple[tuple[float, float, float], ...], eta: float) -> Doubles:
-    """Return the reflectance of a stack for each tabulated albedo of its last layer, by photon counts [-].
+    """Return the counted reflectance of a stack of layers for each tabulated albedo of its last layer [-].
 
     layers : absorption and scattering [1/mm] and thickness [mm] of each layer
     """
@@ -140,7 +140,7 @@ def _half_space_albedo(colour: ArrayLike, eta: float) -> Doubles:
 def _half_space_reflectance_table(eta: float) -> tuple[Doubles, Doubles]:
     """Return reflectances of half-spaces at normal incidence, and sqrt(1 - single-scattering albedo) of each.
 
-    They are exact for an index of refraction of 1, and counted photons for `SKIN_ETA`.
+    The reflectances are exact for an index of refraction of 1, and counted by Monte Carlo for `SKIN_ETA`.
     """
     roots = np.linspace(1.0, _MIN_ABSORPTION_ROOT, _HALF_SPACE_TABLE_STEPS)
     if eta == 1.0:
@@ -170,9 +170,10 @@ def _mean_exit_distance(albedo: float, eta: float) -> float:
 def skin_media(mi: Mitsuba, person: Person, camera: Camera, medium: Medium) -> list[MitsubaObject]:
     """Return Mitsuba's media of the layers of a skin, topmost first.
 
-    The last one has a grid of albedos around the camera's target, from the painted colours.
+    The deepest layer has a grid of albedos around the camera's target, which give the skin its painted
+    colours.
 
-    medium : layers of skin of the mean colour
+    medium : layers of a skin that has the mean colour
     """
     *above, last = medium.layers
     low, high = _voxel_box(person, camera)
@@ -191,10 +192,7 @@ def skin_media(mi: Mitsuba, person: Person, camera: Camera, medium: Medium) -> l
 
 
 def _voxel_box(person: Person, camera: Camera) -> tuple[Doubles, Doubles]:
-    """Return the low and high corner (3,) of a box around the visible part of the head [mm].
-
-    Albedos vary inside this box, and are constant outside.
-    """
+    """Return the low and high corner (3,) of the box of the albedo grid, around the visible skin [mm]."""
     half_side = max(_HALF_SIDE_PER_FRAME_HEIGHT * camera.frame_mm, _MIN_HALF_SIDE_MM)
     skin = person.mesh.positions[np.unique(_skin_triangles(person))]
     middle = np.array(camera.target, np.float64)
@@ -204,7 +202,7 @@ def _voxel_box(person: Person, camera: Camera) -> tuple[Doubles, Doubles]:
 
 
 def _skin_triangles(person: Person) -> NDArray[np.int32]:
-    """Return the vertex indices (f, 3) of the triangles of skin."""
+    """Return the vertex indices (f, 3) of the skin's triangles."""
     mesh = person.mesh
     kinds = np.array([one.kind == "skin" for one in mesh.materials])
     return np.asarray(mesh.triangles[kinds[mesh.material]])
@@ -213,7 +211,7 @@ def _skin_triangles(person: Person) -> NDArray[np.int32]:
 def colour_grid(person: Person, low_corner: Doubles, high_corner: Doubles, voxels_per_side: int) -> Doubles:
     """Return the colour (z, y, x, 3) of each cell of a box, averaged over the nearest points of the skin.
 
-    Cells farther from the skin than the colour reaches have the mean colour.
+    Cells more than about 3 mm from the skin have the mean colour.
 
     low_corner, high_corner : (3,) corners of the box [mm]
     voxels_per_side : number of cells along the longest side
@@ -243,7 +241,7 @@ def colour_grid(person: Person, low_corner: Doubles, high_corner: Doubles, voxel
 def _skin_samples(
     person: Person, low_corner: Doubles, high_corner: Doubles, cell_mm: float
 ) -> tuple[Doubles, Doubles]:
-    """Return random positions (n, 3) on the skin in a box, and the skin's colours (n, 3) there.
+    """Return random positions (n, 3) on the skin in a box, and the skin's colours (n, 3) at these positions.
 
     The random seed is fixed.
 

@@ -56,17 +56,17 @@ def path_trace_person(
 ) -> PathTraced:
     """Return the path-traced image of the person in a scene, with the given textures.
 
-    The skin consists of layers under the two specular lobes of the frame. With an index of refraction of 1
-    the reflection is added to light that passes the surface without refraction; with `SKIN_ETA` the surface
-    is a rough boundary that refracts. The albedo of the deepest layer is a grid of painted colours. The
-    cornea refracts, and the iris is a painted disc behind it, so lights must have a size. The skin settings
+    The skin consists of layers below a surface that reflects by the two specular lobes of the frame. If the
+    medium has an index of refraction of 1, light also passes this surface without refraction. If it has
+    `SKIN_ETA`, the surface refracts. The deepest layer has a grid of albedos, from the painted colours.
+    Lights must have a size, because the cornea refracts the light on its way to the iris. The skin settings
     of the scene are ignored.
 
     textures : textures of skin, eyes and teeth
-    medium : layers of skin of the mean colour, see `uniform_skin` and `pigmented_skin`; None for Lambertian
-        skin of the painted colours
+    medium : layers of a skin that has the mean colour, see `uniform_skin` and `pigmented_skin`; None for
+        Lambertian skin with the painted colours
     size : width and height of the image [pixel]
-    max_depth : largest number of scattering events plus 1, 2 for direct light; None for no limit
+    max_depth : largest number of scattering events plus 1, so 2 for direct light; None for no limit
     samples, variant, use_cache, progress : as in `path_trace`
 
     Raises DermisError when Mitsuba is missing, and for heads without modelled eyes.
@@ -98,7 +98,7 @@ def person_scene(
     picture_size: tuple[int, int],
     max_depth: int | None = None,
 ) -> tuple[MitsubaObject, tuple[str, ...]]:
-    """Return the Mitsuba scene of a person's radiance image, and notes on changes made to the head.
+    """Return the Mitsuba scene that renders a person's radiance, and notes on changes made to the head.
 
     medium, max_depth : as in `path_trace_person`
     """
@@ -120,7 +120,7 @@ def person_scene(
 def _opaque_parts(mi: Mitsuba, person: Person) -> SceneDict:
     """Return the Mitsuba shapes of materials other than skin and eyes.
 
-    Teeth and tongue are under saliva, all others diffuse.
+    Teeth and tongue are coated with saliva; all other materials are diffuse.
     """
     shapes = {}
     mesh = person.mesh
@@ -152,7 +152,7 @@ def _opaque_bsdf(mi: Mitsuba, person: Person, material: Material) -> SceneDict:
 
 
 def _emissive_head(mi: Mitsuba, person: Person) -> SceneDict:
-    """Return the shape of the head without hair, which emits radiance 1, for the image of the coverage."""
+    """Return the head without hair as a shape that emits radiance 1, to render its coverage of the pixels."""
     emitter, mesh = mi.load_dict({"type": "area", "radiance": 1.0}), person.mesh
     return {"head": mesh_shape(mi, mesh.positions, mesh.triangles, mesh.normals, emitter=emitter)}
 

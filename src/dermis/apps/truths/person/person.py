@@ -21,14 +21,15 @@ Doubles = NDArray[np.float64]
 class SkinTextures:
     """Textures of skin, eyes and teeth of a person, linear Rec. 709, row 0 at v = 0.
 
-    colour, roughness : (n, n, 3) and (n, n) maps of the skin by its uv [-]
+    colour : (n, n, 3) colour map of the skin [-]
+    roughness : (n, n) roughness map of the skin [-]
     strength : (n, n) specular strength of the skin, `Surface.rho_s` of the frame [-]
     height_mm : (n, n) relief of the skin [mm]
     iris : (k, k, 3) texture of the iris plane, from -reach_mm to reach_mm along x and y of the eye
     reach_mm : half the side of the iris texture [mm]
-    white : (k, k, 3) texture of the eyeball in polar coordinates around its axis: the distance from the
-        middle is proportional to the angle from the axis, and 180 degrees are 0.49 of the side
-    teeth : (k, k, 3) textures of the upper and of the lower teeth by their uv
+    white : (k, k, 3) texture of the eyeball in polar coordinates: the distance from the middle of the texture
+        is proportional to the angle from the eye's axis; 180 degrees are 0.49 of the texture's side
+    teeth : textures (k, k, 3) of the upper and of the lower teeth
     """
 
     colour: Floats
@@ -71,9 +72,9 @@ class HairFibres:
 class Person:
     """Posed head with its textures; positions are relative to the head's centre [mm].
 
-    eyes : (m, 4, 4) transforms from head space to the space of each eye, in which every eye has
-        the size of an average eye [mm] and z is along its axis
-    eye_materials : (m,) material indices of the eyes, whose triangles are replaced by refracting eyeballs
+    eyes : (m, 4, 4) transforms from head space to the space of each eye. There, the eye has the size of an
+        average eye [mm], and its axis is z
+    eye_materials : (m,) indices of the eyes' materials; refracting eyeballs replace their triangles
     """
 
     name: str
@@ -94,7 +95,7 @@ class Person:
 
 
 def posed_person(scene: Scene, textures: SkinTextures) -> Person:
-    """Return the posed head of a scene with textures, as input of the path tracer.
+    """Return the posed head of a scene together with its textures, as input of the path tracer.
 
     Raises DermisError for a head without modelled eyes.
     """

@@ -39,9 +39,10 @@ def mitsuba_texture(mi: Mitsuba, texels: NDArray[np.floating]) -> SceneDict:
 def coat_bsdf(mi: Mitsuba, textures: SkinTextures) -> MitsubaObject:
     """Return the BSDF of skin that reflects by the frame's two lobes and transmits without refraction.
 
-    Paths cannot connect to a point light through a refracting surface. Therefore most light passes this
-    surface undeflected. A small fraction meets a rough dielectric, whose reflectance is divided by this
-    fraction. The reflection is added to the light from below, which loses only the small fraction.
+    Paths cannot connect to a point light through a refracting surface, so most paths pass this surface
+    undeflected. A small fraction of the paths is reflected by the lobes, whose reflectance is divided by this
+    fraction. The reflection then has its full strength, and light from below is weakened by this fraction
+    only.
     """
     mirror_fraction = 1.0 - COAT_TRANSMITTANCE
     coat = {
@@ -53,7 +54,10 @@ def coat_bsdf(mi: Mitsuba, textures: SkinTextures) -> MitsubaObject:
 
 
 def _reflection_lobes_bsdf(mi: Mitsuba, textures: SkinTextures, path_fraction: float) -> SceneDict:
-    """Return the two lobes of `specular.two_lobe` in relief, with their reflectance divided by a fraction."""
+    """Return the BSDF of skin with relief that reflects by the two lobes of `specular.two_lobe`.
+
+    path_fraction : fraction of the paths that meet this BSDF; the reflectance is divided by it [-]
+    """
     lobe = {
         "distribution": "beckmann",
         "type": "roughconductor",
@@ -72,10 +76,10 @@ def _reflection_lobes_bsdf(mi: Mitsuba, textures: SkinTextures, path_fraction: f
 def refracting_bsdfs(mi: Mitsuba, textures: SkinTextures) -> tuple[MitsubaObject, MitsubaObject]:
     """Return the BSDFs of skin with a refracting surface, for light from outside and from inside.
 
-    From outside, a fraction of the light meets the rough lobes of `coat_bsdf`, the rest a smooth dielectric
-    that transmits only. From inside, all light meets a smooth dielectric. The transmission is that of a
-    boundary that reflects with a strength of 1. Lights must have a size, because no path connects to a point
-    light through this boundary.
+    From outside, a fraction of the paths is reflected by the rough lobes of `coat_bsdf`, and the rest meets a
+    smooth dielectric that transmits only. From inside, all paths meet a smooth dielectric. The light that is
+    transmitted does not depend on the specular strength. Lights must have a size, because paths cannot
+    connect to a point light through this boundary.
     """
     indices = {"int_ior": COAT_INDEX, "ext_ior": 1.0}
     # A blend with a perfectly smooth dielectric would be up to 20 % too bright in Mitsuba 3.9.
@@ -92,7 +96,7 @@ def refracting_bsdfs(mi: Mitsuba, textures: SkinTextures) -> tuple[MitsubaObject
 
 
 def painted_diffuse_bsdf(mi: Mitsuba, textures: SkinTextures) -> MitsubaObject:
-    """Return the BSDF of skin that reflects by the frame's two lobes over a Lambertian base of its colour."""
+    """Return the BSDF of skin with the frame's two specular lobes over a Lambertian base, as painted."""
     fraction = 1.0 - COAT_TRANSMITTANCE
     base = {
         "type": "diffuse",
@@ -103,7 +107,7 @@ def painted_diffuse_bsdf(mi: Mitsuba, textures: SkinTextures) -> MitsubaObject:
 
 
 def diffuse_skin_shapes(mi: Mitsuba, person: Person) -> SceneDict:
-    """Return the skin without volume, with `painted_diffuse_bsdf`."""
+    """Return the skin as an open surface with the BSDF `painted_diffuse_bsdf`, without a medium inside."""
     triangles = person.mesh.triangles[_skin_mask(person)]
     vertices, corners = np.unique(triangles, return_inverse=True)
     positions, normals, uv = (
@@ -116,11 +120,11 @@ def diffuse_skin_shapes(mi: Mitsuba, person: Person) -> SceneDict:
 def skin_shapes(
     mi: Mitsuba, person: Person, medium: Medium, media: Sequence[MitsubaObject]
 ) -> tuple[SceneDict, tuple[str, ...]]:
-    """Return closed surfaces around the layers of the skin, and notes on changes to the head.
+    """Return closed surfaces around the layers of the skin, and notes for the user on changes to the head.
 
-    Each interface consists of two surfaces as in `mitsuba_scene`. The outermost upper surface has the
-    reflection of the skin; both outermost surfaces refract if the medium has an index above 1, and light from
-    inside then meets the lower one.
+    Each interface consists of an upper and a lower surface, as in `mitsuba_scene`. The upper surface of the
+    outermost interface reflects like skin. If the medium has an index of refraction above 1, both surfaces of
+    this interface refract: the upper one light from outside, the lower one light from inside.
 
     medium : layers of the skin
     media : Mitsuba's media of these layers
@@ -154,10 +158,10 @@ def _skin_mask(person: Person) -> NDArray[np.bool_]:
 def _painted_mesh(
     mi: Mitsuba, person: Person, surface: ClosedSurface, bsdf: MitsubaObject, medium: MitsubaObject
 ) -> MitsubaObject:
-    """Return the skin moved to a closed surface as a Mitsuba mesh, with the head's normals and uv.
+    """Return the skin's triangles at the positions of a closed surface, with the head's normals and uv.
 
-    surface : `closed_skin` of the head, offset
-    medium : medium inside it
+    surface : closed surface of the head, from `closed_skin` and `offset_inwards`
+    medium : Mitsuba's medium inside the surface
     """
     mesh, triangles = person.mesh, person.mesh.triangles[_skin_mask(person)]
     vertices, corners = np.unique(triangles, return_inverse=True)
@@ -186,7 +190,7 @@ _IRIS_GAP_MM = 0.02  # between the edge of the disc and the eyeball [mm]
 
 
 def eyeball_mesh() -> tuple[Doubles, Index, Doubles, Doubles]:
-    """Return an eyeball's positions [mm], triangles, normals and polar uv, in the space of the eye."""
+    """Return an eyeball mesh in the space of the eye: positions [mm], triangles, normals and polar uv."""
     limbus = np.arctan2(LIMBUS_MM + 2 * LIMBUS_BLUR_MM, np.sqrt(SCLERA_MM**2 - LIMBUS_MM**2))
     angle = np.concatenate(
         [np.linspace(0.0, limbus, _CORNEA_STEPS, endpoint=False), np.linspace(limbus, np.pi, _SCLERA_STEPS)]
@@ -216,16 +220,17 @@ def _grid_triangles(row_count: int, column_count: int) -> Index:
 
 
 def cornea_weight(axis_distance_mm: Doubles, z_mm: Doubles) -> Doubles:
-    """Return the weight of the clear cornea against the white sclera, smooth around the limbus [-].
+    """Return the weight of the cornea, from 1 (clear cornea), smoothly across the limbus, to 0 (sclera) [-].
 
-    axis_distance_mm, z_mm : distance from the eye's axis, and position along it [mm]
+    axis_distance_mm : distance from the eye's axis [mm]
+    z_mm : position along the axis [mm]
     """
     t = np.clip((axis_distance_mm - LIMBUS_MM + LIMBUS_BLUR_MM) / (2 * LIMBUS_BLUR_MM), 0.0, 1.0)
     return np.where(z_mm > 0.0, 1.0 - t * t * (3.0 - 2.0 * t), 0.0)
 
 
 def cornea_weight_map() -> Doubles:
-    """Return `cornea_weight` as a texture (n, n) by the polar uv of the eyeball."""
+    """Return `cornea_weight` as a texture (n, n) over the polar uv of the eyeball."""
     u = (np.arange(_CORNEA_TEXTURE_SIDE) + 0.5) / _CORNEA_TEXTURE_SIDE - 0.5
     angle = np.minimum(np.hypot(*np.meshgrid(u, u)) / EYE_UV_RADIUS, 1.0) * np.pi
     radius = profile_mm(angle)
@@ -233,7 +238,7 @@ def cornea_weight_map() -> Doubles:
 
 
 def iris_disc() -> tuple[Doubles, Index, float]:
-    """Return the iris as a disc in its plane: positions, triangles and radius, up to the eyeball [mm]."""
+    """Return the iris as a disc that nearly touches the eyeball: positions [mm], triangles, radius [mm]."""
     radius = float(np.sqrt(SCLERA_MM**2 - iris_mm() ** 2)) - _IRIS_GAP_MM
     azimuth = 2.0 * np.pi * np.arange(_EYEBALL_STEPS_AROUND) / _EYEBALL_STEPS_AROUND
     rim = np.stack(
@@ -297,7 +302,7 @@ _MIN_HAIR_RADIUS_MM = 1e-3
 def hair_shapes(mi: Mitsuba, hairs: HairFibres, shape_name: str = "hairs") -> SceneDict:
     """Return hair fibres as Mitsuba shapes, one for each group of fibres with similar absorption.
 
-    shape_name : prefix of the shapes' names, before their numbers
+    shape_name : prefix of the shapes' names, which end in a number
     """
     shapes = {}
     # Mitsuba's unit of length is the radius.
@@ -320,10 +325,10 @@ def hair_shapes(mi: Mitsuba, hairs: HairFibres, shape_name: str = "hairs") -> Sc
 
 
 def absorption_groups(optical_depth: NDArray[np.floating]) -> list[NDArray[np.int64]]:
-    """Return the fibre indices of at most `MAX_HAIR_GROUPS` groups with similar absorption.
+    """Return at most `MAX_HAIR_GROUPS` groups of fibres with similar absorption, each as fibre indices.
 
-    optical_depth : (n, 3) absorption coefficient times radius of each fibre; its sum over the channels is
-        compared [-]
+    optical_depth : (n, 3) absorption coefficient of each fibre times its radius; fibres are grouped by the
+        sum of the channels [-]
     """
     order = np.argsort(optical_depth.sum(axis=1), kind="stable")
     return [group for group in np.array_split(order, min(MAX_HAIR_GROUPS, len(order))) if len(group)]
@@ -345,7 +350,7 @@ def write_curves(path: Path, knots_mm: Doubles, radius_mm: NDArray[np.floating])
 
 
 def bspline_control_points(knots: Doubles) -> Doubles:
-    """Return the control points (n, k + 2, c) of uniform cubic B-splines through knots, straight at the ends.
+    """Return the control points (n, k + 2, c) of uniform cubic B-splines through knots, uncurved at the ends.
 
     knots : (n, k, c) points through which the curves pass
     """

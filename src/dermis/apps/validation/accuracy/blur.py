@@ -51,13 +51,16 @@ MIN_FACING_COSINE = 0.4  # least cosine between the normal at a seam and the lig
 
 
 def blur(adapter: str = "auto") -> None:
-    """Print the tables of points of light, curvature and seams; the last two need the folder tests."""
+    """Print the tables of points of light, curvature and seams.
+
+    The tables of curvature and seams need the folder `tests` of a checkout.
+    """
     print_tables({name: str(text) for name, text in point_tables(open_device(adapter)).items()})
     print_tables(surface_tables(adapter))
 
 
 def point_tables(device: Device) -> dict[str, object]:
-    """Return Markdown rows on blurred points of light for docs/templates/accuracy.md, by placeholder name."""
+    """Return texts on blurred light for docs/templates/accuracy.md, keyed by placeholder."""
     return {
         "rows": "\n".join(point_row(device, density) for density in (0.75, 1.0, 1.5, 3.0, 6.0, 12.0)),
         "leaning": "\n".join(sheared_row(device, degrees) for degrees in (90, 80, 60, 45)),
@@ -70,7 +73,7 @@ def blurred_levels(device: Device, mesh: Mesh, irradiance: Array, stretch_mode: 
     """Return all pyramid levels (n, n) of light blurred on the atlas of a mesh, at full resolution.
 
     irradiance : (n, n) irradiance
-    stretch_mode : stretch map of the blur, "full" or "axes" (without the angle between u and v)
+    stretch_mode : stretch map that the blur uses: "full", or "axes", which ignores the angle between u and v
     """
     levels, blur = blur_light(
         device, mesh, build_atlas(mesh, len(irradiance)), irradiance[..., None], stretch_mode
@@ -101,6 +104,8 @@ def point_row(device: Device, texels_per_mm: float) -> str:
 
 def sheared_row(device: Device, shear_degrees: float) -> str:
     """Return a Markdown row with the ratios of a blurred point's two principal widths to the exact width.
+
+    Ratios for the stretch map "axes" come first, then ratios for the stretch map "full".
 
     shear_degrees : angle between the uv axes on the flat surface [degrees]
     """
@@ -139,10 +144,10 @@ def surface_tables(adapter: str) -> dict[str, str]:
 
 
 def harmonic_row(renderer: Renderer, radius_mm: float) -> str:
-    """Return a Markdown row with the fraction of light proportional to x that a blur on a sphere preserves.
+    """Return a Markdown row with the factors by which blurs on a sphere scale light proportional to x.
 
-    The blur by the widest Gaussian is computed on the atlas, by the heat equation on the sphere, and by a
-    Gaussian of the chord length.
+    The widest Gaussian is applied in three ways: on the atlas, by the heat equation on the sphere, and as a
+    function of the chord length.
     """
     from atlas_reading import shown
     from cut_meshes import cut_sphere
@@ -165,7 +170,7 @@ def blur_light(
 ) -> tuple[PyramidLevels, Blur]:
     """Blur grey light (n, n, 1) on the atlas of a mesh by all Gaussians of `BLUR_PROFILE` but the narrowest.
 
-    stretch_mode : stretch map of the blur, "full" or "axes" (without the angle between u and v)
+    stretch_mode : stretch map that the blur uses: "full", or "axes", which ignores the angle between u and v
     """
     textures, variance = upload_atlas(device, atlas, stretch_mode), BLUR_PROFILE.variance_mm2[1:]
     max_halvings = len(textures.mips_for("repeated")) - 1
@@ -199,7 +204,7 @@ def widest_level(renderer: Renderer, levels: PyramidLevels, blur: Blur) -> Array
 def seam_rows(renderer: Renderer) -> list[str]:
     """Return Markdown rows with the discontinuity of scattered light across seams, for several meshes.
 
-    Each cell has the mean and the 95th percentile, relative to the light [%].
+    Each cell has the mean and the 95th percentile of the discontinuity relative to the light [%].
     """
     from cut_meshes import cut_sphere
 
@@ -278,7 +283,7 @@ def seam_side_points(head: Head, point_filter: PointFilter) -> tuple[Points, Poi
 
 
 def striped_scene(head: Head) -> Scene:
-    """Return a scene with sharp stripes of light from front and back, and a little uniform light."""
+    """Return a scene with sharp stripes of light and a little even light, from the front and the back."""
     x = head.mesh.positions[:, 0] - head.centre_mm[0]
     positions = np.arange(max(x.min(), -90.0), min(x.max(), 90.0), STRIPE_SPACING_MM)
     stripe = partial(StripeLight, up=(0.4, 1, 0), width_mm=STRIPE_WIDTH_MM, shadows=False)
@@ -298,11 +303,11 @@ def seam_jumps(
     first_side: Points,
     second_side: Points,
 ) -> Array:
-    """Return the relative difference of scattered red light between the two sides of each seam.
+    """Return the relative differences of scattered red light between corresponding points across seams.
 
-    seam_method : seam method
+    seam_method : key of `SEAM_METHODS`
     atlas_side : side of the atlas [texel]
-    first_side, second_side : corresponding points on the two sides
+    first_side, second_side : corresponding points on the two sides of seams
     """
     from atlas_reading import lit_at
 

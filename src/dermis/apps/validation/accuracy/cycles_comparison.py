@@ -1,4 +1,4 @@
-"""Highlights and skins rendered by dermis, compared with those of Cycles for docs/accuracy.md.
+"""Highlights and skins rendered by dermis, compared with renderings by Cycles for docs/accuracy.md.
 
 Both comparisons need Blender's Python, so the page shows their last results (benchmarks/results).
 """
@@ -55,9 +55,10 @@ class HighlightRow(TypedDict):
 
     view : camera preset
     model : model of surface reflection
-    energy : reflected light relative to Cycles [-]
-    grain, grain_of_cycles : contrast of fine detail in the two pictures [-]
-    correlation : correlation of the two pictures where they are bright [-]
+    energy : ratio of the reflected light to that of Cycles [-]
+    grain : contrast of fine detail in the picture by dermis [-]
+    grain_of_cycles : contrast of fine detail in the picture by Cycles [-]
+    correlation : correlation of the two pictures in bright pixels [-]
     """
 
     view: str
@@ -69,7 +70,7 @@ class HighlightRow(TypedDict):
 
 
 class SkinRender(NamedTuple):
-    """Picture (h, w, 3) in linear light, and the fraction of its light that the surface reflects [-]."""
+    """Picture (h, w, 3) in linear light, and the fraction of its light that is surface reflection [-]."""
 
     picture: Picture
     reflected: float
@@ -84,7 +85,7 @@ def highlights(adapter: str = "auto") -> None:
 
 
 def looks(adapter: str = "auto") -> None:
-    """Render skins by dermis and by Cycles; write results/look.json and docs/images/look.webp."""
+    """Render skins by dermis and by Cycles; write benchmarks/results/look.json and docs/images/look.webp."""
     in_checkout(LOOK_PICTURE.parent)
     renderer, rows, panels = dermis.Renderer(adapter), list[dict[str, object]](), dict[str, Picture]()
     renders = {head: skin_renders(renderer, head) for head in HEAD_NAMES}
@@ -125,7 +126,7 @@ def scan_with_normal_map() -> Head:
 
 
 def relief_slopes(mesh: Mesh, height_map: Picture) -> Picture:
-    """Return the slopes (n, n, 2) along u and v of a height map, in the form of a normal map.
+    """Return the slopes (n, n, 2) of a height map, as stored in `Maps.normal`.
 
     height_map : (n, n) height map [mm]
     """
@@ -135,7 +136,7 @@ def relief_slopes(mesh: Mesh, height_map: Picture) -> Picture:
 
 
 def grain_contrast(picture: Picture, lit: NDArray[np.bool_]) -> float:
-    """Return the contrast of fine detail: the relative RMS difference of a picture from its blur.
+    """Return the contrast of fine detail: the relative RMS difference between a picture and its blurred copy.
 
     lit : (h, w) mask of the pixels to compare
     """
@@ -156,7 +157,7 @@ def traced_highlights(scene: Scene, settings: Settings, lobes: tuple[tuple[float
 
 
 def highlight_rows(renderer: dermis.Renderer, head: Head, view: str) -> list[HighlightRow]:
-    """Return the comparison of highlights for each model of surface reflection.
+    """Return the comparison of highlights with Cycles for each model of surface reflection.
 
     view : camera preset
     """
@@ -184,7 +185,7 @@ def highlight_rows(renderer: dermis.Renderer, head: Head, view: str) -> list[Hig
 
 
 def render_skin(renderer: dermis.Renderer, scene: Scene) -> SkinRender:
-    """Render a scene by dermis, and its surface reflection alone for the reflected fraction."""
+    """Render a scene by dermis, and again with surface reflection alone to find the reflected fraction."""
     options = {"size": (LOOK_SIDE, LOOK_SIDE), "atlas": 1024, "strands": False}
     settings = Settings.model_validate(options), Settings.model_validate(options | {"parts": "specular"})
     picture, surface_pass = (renderer.draw(scene, one).linear() for one in settings)
@@ -192,7 +193,7 @@ def render_skin(renderer: dermis.Renderer, scene: Scene) -> SkinRender:
 
 
 def render_cycles_skin(scene: Scene, skin: PrincipledSkin) -> SkinRender:
-    """Render a scene by Cycles, and again with black skin for the fraction that the surface reflects."""
+    """Render a scene by Cycles, and again with black skin to find the fraction that the surface reflects."""
     settings = Settings(size=(LOOK_SIDE, LOOK_SIDE))
     black = replace(skin, colour=np.zeros_like(skin.colour))
     (image_pass,) = cycles_passes(scene, skin, [HIGHLIGHT_PATHS], settings)
@@ -219,10 +220,10 @@ def with_normal_map(head: Head) -> Head:
 
 
 def principled_skin(head: Head) -> PrincipledSkin:
-    """Return the Cycles material with the head's colours and the mean exit offset of its profile in dermis.
+    """Return a Cycles material that has a head's colours and scatters light as far as the default skin.
 
-    By Burley's profile, the mean distance between entry and exit is 2.5 d, where d is the mean free path
-    divided by a factor that depends on the colour.
+    For Burley's profile, the mean distance between entry and exit of light is 2.5 d, where d is the mean free
+    path divided by a factor that depends on the colour.
     """
     assert head.maps.colour is not None and head.maps.mean_colour is not None
     profile, colour = load_profile(Skin().profile), head.maps.mean_colour
@@ -233,7 +234,9 @@ def principled_skin(head: Head) -> PrincipledSkin:
 
 
 def skin_renders(renderer: dermis.Renderer, head_title: str) -> dict[str, list[SkinRender]]:
-    """Render a head with the skin of the 2007 talk, the default skin and Cycles; return them by view.
+    """Return three renderings of a head for each view, as a dictionary from view to renderings.
+
+    The first has the skin of the 2007 talk, the second the default skin, and the third is by Cycles.
 
     head_title : key of `HEAD_NAMES`
     """

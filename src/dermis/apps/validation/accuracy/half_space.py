@@ -39,7 +39,7 @@ def half_space(adapter: str = "auto") -> None:
 
 
 def direction_table(head: Head, adapter: str) -> str:
-    """Return a Markdown table of how reflection depends on direction, by channel, for two skins."""
+    """Return a Markdown table of reflection by direction, and of the errors of two kinds of skin."""
     layer = published_media()["skin1"].layers[0]
     albedo = layer.sigma_s_prime / (layer.sigma_a + layer.sigma_s_prime)
     forward = layer.sigma_s_prime / (layer.sigma_a * (1.0 - FORWARD_G) + layer.sigma_s_prime)
@@ -69,10 +69,10 @@ def _oblique_ratio(albedo: float, eta: float) -> float:
 
 
 def _direction_errors(albedo: float) -> tuple[float, float]:
-    """Return errors of Lambertian and of half-space skin, over all directions of light and view in air [-].
+    """Return relative RMS errors of Lambertian and of half-space skin over directions of light and view [-].
 
-    The reference below the surface is the exact radiance of the index-matched half-space with all internal
-    reflections.
+    The reference combines the exact radiance of an index-matched half-space with all internal reflections at
+    the surface.
 
     albedo : single-scattering albedo [-]
     """
@@ -137,7 +137,9 @@ def _reflected_fraction(cosine: float, albedo: float, mean_cosine: float, eta: f
 
 
 def _scattered_cosines(downward_cosines: Floats, g: float, rng: np.random.Generator) -> Floats:
-    """Return the cosines (n,) to the downward axis after scattering, by [HenyeyGreenstein1941].
+    """Return the cosines (n,) between photons and the downward axis after scattering.
+
+    Scattering angles are distributed according to [HenyeyGreenstein1941].
 
     downward_cosines : (n,) cosines before scattering
     g : mean cosine of the scattering angle [-]
@@ -152,7 +154,10 @@ def _scattered_cosines(downward_cosines: Floats, g: float, rng: np.random.Genera
 
 
 def _studio_ratios(head: Head, adapter: str) -> tuple[list[float], list[float]]:
-    """Return ratios of half-space to Lambertian skin in studio light: median, 99th percentile, by channel."""
+    """Return the median and the 99th percentile of brightness ratios by channel, in studio light.
+
+    The ratios are those of half-space skin to Lambertian skin in the pixels of a picture.
+    """
     renderer, settings = Renderer(adapter), Settings(size=(256, 298), atlas=1024)
 
     def picture(direction: Literal["lambertian", "half-space"]) -> Floats:

@@ -45,7 +45,7 @@ def light(adapter: str = "auto") -> None:
 
 
 def sample_panorama(layer: Array, directions: Array) -> Array:
-    """Return the radiance (n, 3) of a panorama in given directions, interpolated as by the shader.
+    """Return the radiance (n, 3) of a panorama in given directions, interpolated as in the shader.
 
     layer : (h, w, 3) panorama
     directions : (n, 3) directions
@@ -69,9 +69,9 @@ def normalise(vectors: Array) -> Array:
 
 @cache
 def panorama(panorama_name: str, row_count: int = 256) -> tuple[Array, Array, Prefiltered]:
-    """Return directions (n, 3) and light (n, 3) of a panorama's texels, and its prefiltered form.
+    """Return directions (n, 3) and light (n, 3) of a panorama's texels, and the prefiltered panorama.
 
-    Light is radiance times solid angle, without suns.
+    Light is radiance times solid angle; suns are removed.
     """
     radiance = resample_panorama(split_suns(load_panorama(panorama_name))[0], row_count)
     light = radiance * texel_solid_angles(*radiance.shape[:2])[..., None]
@@ -96,7 +96,9 @@ def irradiance_error(panorama_name: str, normal_count: int = 200) -> float:
 def reflection_error(
     panorama_name: str, roughness_m: float, view_degrees: float, normal_count: int = 320
 ) -> float:
-    """Return the relative RMS error of the radiance that a lobe reflects of a panorama, over random normals.
+    """Return the relative RMS error of the reflection of a panorama in a lobe, over random normals.
+
+    Lookups in the prefiltered panorama are compared with a sum over all texels.
 
     roughness_m : roughness of the lobe
     view_degrees : angle between view and normal [degrees]
@@ -127,7 +129,8 @@ def reflected_radiance(
 
     Texels where the lobe is below 1e-10 of its peak are skipped.
 
-    directions, light : (n, 3) directions of the texels, and their radiance times solid angle
+    directions : (n, 3) directions of the texels
+    light : (n, 3) radiance of the texels, multiplied by their solid angles
     normal, view : (3,) unit vectors
     roughness_m : roughness of the lobe
     """
@@ -153,9 +156,11 @@ def lobe_parameters(cosine: float, roughness_m: float) -> Array:
 
 
 def lobe_radiance(layers: Array, directions: Array, roughness_m: float) -> Array:
-    """Return the prefiltered radiance under isotropic lobes, interpolated by roughness.
+    """Return the radiance (k, 3) of a prefiltered panorama in the directions of isotropic lobes.
 
-    layers : (n, h, w, 3) panorama at each prefiltered roughness
+    The two layers nearest in roughness are interpolated.
+
+    layers : (n, h, w, 3) layers of the prefiltered panorama, in order of roughness
     directions : (k, 3) directions of the lobes
     roughness_m : roughness of the lobes
     """
@@ -169,9 +174,9 @@ def lobe_radiance(layers: Array, directions: Array, roughness_m: float) -> Array
 def furnace_extremes(
     renderer: dermis.Renderer, head: Head, energy_scheme: str, **setting_values: str
 ) -> Array:
-    """Return minimum, mean and maximum ratio of outgoing to incoming radiance on a white head.
+    """Return minimum, mean and maximum ratio of outgoing to incoming radiance on a head in uniform light.
 
-    The light is uniform.
+    The colour of the head is white.
 
     energy_scheme : energy conservation scheme
     """
@@ -185,7 +190,7 @@ def furnace_extremes(
 
 
 def furnace_rows(renderer: dermis.Renderer) -> str:
-    """Return the Markdown rows of the white furnace: minimum, mean and maximum by energy scheme."""
+    """Return Markdown rows with the results of `furnace_extremes` for several heads and settings."""
     ball = dermis.Head("ball", uv_sphere(115.0), dermis.load_head("lee_perry_smith", subdivide=0).maps)
     ball = replace(ball, maps=replace(ball.maps, normal=None, height=None, specular=None, roughness=None))
     heads = {"sphere": ball, "scan": dermis.load_head("lee_perry_smith", regions="none", subdivide=0)}
@@ -207,7 +212,7 @@ def furnace_rows(renderer: dermis.Renderer) -> str:
 
 
 def as_point_lights(light: RectangleLight, lights_per_side: int = 8) -> list[PointLight]:
-    """Return a grid of point lights, each with its own shadow map, that replaces a rectangle light.
+    """Return a grid of point lights in place of a rectangle light; each has its own shadow map.
 
     lights_per_side : number of point lights along each side
     """
@@ -227,11 +232,11 @@ def as_point_lights(light: RectangleLight, lights_per_side: int = 8) -> list[Poi
 
 
 def soft_shadow_error(renderer: dermis.Renderer, light_preset: str) -> tuple[float, float]:
-    """Return bias and RMS error of an area light's shadows against those of 64 point lights [-].
+    """Return the bias and the RMS error of an area light's shadows, divided by the mean radiance [-].
 
-    Both are divided by the mean radiance.
+    The reference has 64 point lights in place of the area light.
 
-    light_preset : light preset
+    light_preset : name of the light preset
     """
     light = load_lights(light_preset)[0]
     assert isinstance(light, RectangleLight)
@@ -247,7 +252,10 @@ def soft_shadow_error(renderer: dermis.Renderer, light_preset: str) -> tuple[flo
 
 
 def occlusion_error(renderer: dermis.Renderer) -> float:
-    """Return the RMS error of the visible sky fraction on the scanned head, against 1024 directions [-]."""
+    """Return the RMS error of the visible sky fraction on the scanned head [-].
+
+    The reference is computed with 1024 directions.
+    """
     head = dermis.load_head("lee_perry_smith", subdivide=0)
     inputs = renderer.prepare(Scene(head), Settings(size=(64, 64), atlas=512, samples=1))
     texels, atlas = inputs.layouts[0].atlas.resources["atlas"], cached_atlas(head.mesh, 512, "stitched")

@@ -1,4 +1,4 @@
-"""Pictures of posed heads, compared with those of heads loaded in the posed shape, for docs/motion.md."""
+"""Pictures of posed heads, compared with pictures of heads loaded in the same shape, for docs/motion.md."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def rebuilt_head(head: Head, point_positions: Points) -> Head:
 
 
 def posed_points(head: Head, person_points: Points, target_weights: Mapping[str, float]) -> Points:
-    """Return the positions of a person's points with an expression [mm].
+    """Return the positions (p, 3) of a person's points in an expression [mm].
 
     person_points : (p, 3) positions in the rest pose [mm]
     target_weights : morph target weights of the expression
@@ -108,7 +108,7 @@ def posed_points(head: Head, person_points: Points, target_weights: Mapping[str,
 def picture_error(
     renderer: Renderer, head: Head, person_points: Points, target_weights: Mapping[str, float], view_name: str
 ) -> float:
-    """Return the relative RMSE between pictures of a posed head and of a head loaded in that shape.
+    """Return the relative RMSE between pictures of a posed head and of a head loaded in the posed shape.
 
     person_points : (p, 3) positions in the rest pose [mm]
     target_weights : morph target weights of the expression
@@ -125,18 +125,21 @@ def picture_error(
 
 
 def _with_centre(head: Head, shaped_head: Head) -> Head:
-    """Set a head's centre, to which lights and cameras are relative, to that of a shape; return the head."""
+    """Set the centre of a head to the centre of `shaped_head`, and return the head.
+
+    Lights and cameras are relative to the centre.
+    """
     for one in (head, head.bare):
         vars(one)["centre_mm"] = shaped_head.centre_mm
     return head
 
 
 def expression_rows(renderer: Renderer, head: Head, persons: Mapping[str, Points]) -> Iterator[str]:
-    """Yield Markdown rows, one per expression: the largest picture error over all people.
+    """Yield Markdown rows, one per expression, with the largest picture error over all people.
 
     Heads are seen from the front and from the back.
 
-    persons : positions in the rest pose by name of the person [mm]
+    persons : dictionary from the name of a person to positions in the rest pose [mm]
     """
     worst = dict.fromkeys(LIGHT_AND_CAMERA, 0.0)
     for name, weights in EXPRESSIONS.items():
@@ -150,7 +153,7 @@ def expression_rows(renderer: Renderer, head: Head, persons: Mapping[str, Points
 
 
 def deformation_rows(renderer: Renderer, head: Head) -> Iterator[str]:
-    """Yield Markdown rows, one per deformation: strain, and picture errors from front and back."""
+    """Yield Markdown rows, one per deformation, with the strain and the errors of a front and a back view."""
     gauge = StrainGauge(head)
     for name, deform in DEFORMATIONS.items():
         points = deform(head.positions_mm)
@@ -159,7 +162,10 @@ def deformation_rows(renderer: Renderer, head: Head) -> Iterator[str]:
 
 
 def _with_thinner_ears(point_positions: Points, thickness_fraction: float) -> Points:
-    """Return points (p, 3) of the scan with thinner ears: points at its sides are scaled along z."""
+    """Return the points (p, 3) of the scan with thinner ears: points at the sides are scaled along z.
+
+    thickness_fraction : fraction of the thickness that is removed
+    """
     ear = np.clip((np.abs(point_positions[:, :1]) - 65.0) / 10.0, 0.0, 1.0)
     return (point_positions * (1.0 - ear * [0.0, 0.0, thickness_fraction])).astype(np.float32)
 
@@ -167,7 +173,7 @@ def _with_thinner_ears(point_positions: Points, thickness_fraction: float) -> Po
 def seam_rows(renderer: Renderer, head: Head, persons: Mapping[str, Points]) -> Iterator[str]:
     """Yield Markdown rows with discontinuities across seams: at rest, in expressions, and for other people.
 
-    persons : positions in the rest pose by name of the person [mm]
+    persons : dictionary from the name of a person to positions in the rest pose [mm]
     """
     rest_points = head.positions_mm
     yield _seam_row(renderer, "at rest", head, head, None)
@@ -183,7 +189,7 @@ def seam_rows(renderer: Renderer, head: Head, persons: Mapping[str, Points]) -> 
 def _seam_row(renderer: Renderer, row_title: str, head: Head, shaped_head: Head, pose: Pose | None) -> str:
     """Return a Markdown row with the discontinuity of light across the seams of a posed head.
 
-    shaped_head : head loaded in the shape of the pose, whose points define the seams
+    shaped_head : head loaded in the shape of the pose, on which points beside seams are found
     """
     cells = []
     for where in (blur.neck_points, blur.back_points):
@@ -210,11 +216,11 @@ def occlusion_table(renderer: Renderer, head: Head) -> Iterator[str]:
 def occlusion_rows(
     renderer: Renderer, head: Head, poses_and_shaped_heads: Mapping[str, tuple[Pose, Head]]
 ) -> Iterator[str]:
-    """Yield Markdown rows with RMS errors of the visible sky fraction in poses.
+    """Yield Markdown rows, one per pose, with RMS errors of the visible sky fraction.
 
-    Errors are over all texels, and over texels where the fraction changes between rest and pose.
+    Each error is given over all texels, and over those where the fraction differs from the rest pose.
 
-    poses_and_shaped_heads : poses by name, each with the head loaded in its shape
+    poses_and_shaped_heads : dictionary from the name of a pose to the pose and the head loaded in its shape
     """
     scene, fine = (
         Scene(head, environment=Environment(name="uniform")),
@@ -235,11 +241,12 @@ def occlusion_rows(
 
 
 def baked_occlusion(renderer: Renderer, head: Head, shaped_head: Head, *directions_and_side: int) -> Floats:
-    """Return the visible sky fraction (n, n) of a shape, baked in the atlas of a head; NaN off the surface.
+    """Return the visible sky fraction (n, n) of a head, baked in an atlas; NaN in texels without a surface.
 
-    head : head whose atlas is used
-    shaped_head : head loaded in the shape of a pose
-    directions_and_side : number of directions and side of depth maps [texel]; by default, those of frames
+    head : head at rest, whose atlas is used
+    shaped_head : head loaded in the shape of a pose, whose occlusion is computed
+    directions_and_side : number of directions, and side of the depth maps [texel]; by default, the values
+        that frames use
     """
     inputs = renderer.prepare(Scene(head), BAKE_SETTINGS)
     texels, atlas = (
@@ -259,7 +266,7 @@ def baked_occlusion(renderer: Renderer, head: Head, shaped_head: Head, *directio
 
 
 def frame_occlusion(renderer: Renderer, scene: Scene, occlusion_mode: str) -> Floats:
-    """Return the visible sky fraction (n, n) on the atlas that a frame of the scene uses.
+    """Return the map (n, n) of the visible sky fraction with which a frame of the scene is shaded.
 
     occlusion_mode : occlusion mode of the settings
     """

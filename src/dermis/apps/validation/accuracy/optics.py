@@ -1,4 +1,4 @@
-"""Errors of diffusion models, and of fits to their profiles, against Monte Carlo."""
+"""Errors of diffusion models against Monte Carlo, and of fits to the profiles of these models."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def counted_table() -> str:
 def fits_table() -> str:
     """Return Markdown rows with errors of fitted Gaussians and Burley profiles, by tissue.
 
-    The fits are to the ring energies of layered diffusion.
+    Both are fitted to the ring energies of layered diffusion.
     """
     rows = []
     for name in COMPARED_TISSUES:
@@ -109,9 +109,9 @@ def fits_table() -> str:
 
 
 def pointwise_table() -> str:
-    """Return Markdown rows with shape and energy errors of six Gaussians with shared variances.
+    """Return Markdown rows with shape and energy errors of fits of six Gaussians to points of profiles.
 
-    Only profiles that are finite at radius 0 are compared.
+    The channels share the variances of the Gaussians. Only profiles that are finite at radius 0 are fitted.
     """
     rows = []
     for name, model, clamp in (
@@ -132,7 +132,7 @@ def pointwise_table() -> str:
 
 
 def transmission_table() -> str:
-    """Return Markdown rows with transmitted light by thickness: Monte Carlo, slabs and Gaussians."""
+    """Return Markdown rows, one per thickness, with transmitted light by Monte Carlo, slabs and Gaussians."""
     rows = []
     for name in ("skin1", "dj3"):
         tissue = tissue_by_name(name)
@@ -155,7 +155,7 @@ def transmission_table() -> str:
 def error_against_published_sum(profile: RadialProfile) -> Floats:
     """Return the error in shape of a profile against the published Gaussians of GPU Gems 3, by channel.
 
-    The profile is scaled to total energy 1 in each channel.
+    In each channel, the profile is scaled to a total energy of 1.
     """
     r, log_r = profile.radius_mm[:, None], np.log(profile.radius_mm)
     table = load_profile("gpu-gems-3").radiant_exitance(profile.radius_mm)
@@ -164,7 +164,10 @@ def error_against_published_sum(profile: RadialProfile) -> Floats:
 
 
 def published_errors() -> str:
-    """Return text with errors of diffusion models for published layers, against the published Gaussians."""
+    """Return text with the errors of diffusion models for the tissue "dj3".
+
+    The errors are computed by `error_against_published_sum`.
+    """
     variants: tuple[tuple[str, DiffusionModel, Clamp], ...] = (
         ("multipole as printed", "multipole", "none"),
         ("multipole", "multipole", "layer"),

@@ -1,7 +1,7 @@
-"""People by dermis and by path tracing with the same model of the skin, for docs/path_traced.md.
+"""People rendered by dermis and by path tracing, with the same model of the skin, for docs/path_traced.md.
 
 Each comparison is written to a file of results when it is finished, and paths are cached while they are
-traced, so that an interrupted run continues where it stopped. The page is written from the file.
+traced, so an interrupted run continues where it stopped. The page is written from the file of results.
 """
 
 from __future__ import annotations
@@ -83,11 +83,12 @@ _HEAD_MEDIA = "dj3", "skin1"
 
 @dataclass(frozen=True)
 class Measurement:
-    """One comparison of a person by dermis with path tracing.
+    """Comparison of one view of a person, rendered by dermis and by path tracing.
 
     person : key of `_PEOPLE`
     view : key of `ALL_VIEWS`
-    cause : cause of error that both sides leave out, or None
+    truth : kind of path-traced reference
+    cause : cause of error that is left out of both pictures, or None
     """
 
     person: PersonName
@@ -113,13 +114,13 @@ def measurements() -> list[Measurement]:
 
 
 class Measuring:
-    """Comparisons of people with path tracing, whose figures are kept in a file.
+    """Measurements of people and heads rendered by dermis and by path tracing, with common options.
 
     renderer : renderer of the frames
     side : side of the pictures [pixel]
     samples : paths per pixel
     variant : variant of Mitsuba
-    folder : folder for profiles
+    folder : folder for the files of diffusion profiles
     """
 
     def __init__(
@@ -131,7 +132,7 @@ class Measuring:
         self._skins: dict[tuple[str, str], SharedSkin] = {}
 
     def measure(self, measurement: Measurement) -> Figures:
-        """Return the figures of a comparison, and keep its pictures in the cache."""
+        """Return the figures of a comparison; pictures that the page shows are kept in the cache."""
         head, textures = self._person(measurement.person)
         skin = self._shared_skin(measurement.person, head, measurement.truth)
         subject = PersonSubject(view_scene(head, ALL_VIEWS[measurement.view]), textures)
@@ -172,10 +173,11 @@ class Measuring:
         return self._skins[key]
 
     def measure_head(self, head_name: str, light_name: str, medium: Medium) -> Figures:
-        """Return the figures of a head without maps or surface reflection, of an index-matched medium.
+        """Return the figures of a comparison of a head without maps or surface reflection.
 
         head_name : key of `_HEAD_FILES`
         light_name : key of `scenes.LIGHTS`
+        medium : index-matched medium of the head
         """
         settings = Settings(size=(self.side, self.side), samples=4)
         with medium_scene(_load_named_head(head_name), light_name, default_region(light_name), medium) as (
@@ -229,7 +231,7 @@ def save_panels(view_name: str, comparison: PersonComparison) -> None:
 
 
 def picture_sheet(view_names: Sequence[str]) -> bytes:
-    """Return a sheet of views from the cache as a WebP file: frame, path-traced picture and difference."""
+    """Return a WebP file that shows views from the cache: frame, path-traced picture and difference."""
     panels: dict[str, NDArray[np.uint8]] = {}
     for view in view_names:
         found = load_arrays(_PANEL_FOLDER, _panel_key(view), _PANEL_NAMES)
@@ -245,7 +247,7 @@ def _panel_key(view_name: str) -> str:
 
 
 def sheet_bytes(panels: Panels, columns: int) -> bytes:
-    """Return pictures on a sheet as a WebP file of at most `MAX_SHEET_BYTES`."""
+    """Return a WebP file of at most `MAX_SHEET_BYTES` that shows pictures side by side."""
     picture = np.asarray(panel_sheet(panels, columns))
     for quality in (80, 65, 50, 35, 20):
         data = encode_webp(picture, quality)
@@ -286,9 +288,9 @@ def person(
     variant: str = "auto",
     seconds: float = 0.0,
 ) -> None:
-    """Compare people with path tracing, keep the figures, and write docs/path_traced.md.
+    """Compare people rendered by dermis with path tracing, and write docs/path_traced.md.
 
-    Comparisons that the file of results already has at the same size and with as many paths are skipped.
+    A comparison is skipped if the file of results already has it at the same size and with as many paths.
     Needs Mitsuba, and DERMIS_DATA or a network for the panoramas and the heads.
 
     Parameters
@@ -327,7 +329,10 @@ _Job = tuple[str, str, Callable[[], Figures]]
 
 
 def _measurement_jobs(measuring: Measuring) -> list[_Job]:
-    """Return group, key and function of all comparisons; the human with everything first, then heads."""
+    """Return the group, key and function of each comparison, in the order in which they are run.
+
+    The most important comparisons of people are first, then heads, then other comparisons of people.
+    """
     people: list[_Job] = [("people", one.key, partial(measuring.measure, one)) for one in measurements()]
     heads: list[_Job] = [
         (
@@ -369,12 +374,12 @@ def with_error(estimate: Sequence[float] | Estimate | None, digits: int = 3) -> 
 
 
 def _error_cells(figures: Figures | None) -> str:
-    """Return the cells of relative RMSE and energy of a comparison."""
+    """Return table cells with the relative RMSE and the energy ratio of a comparison."""
     return f"{with_error(figures['error'])} | {figures['energy'][0]:.3f}" if figures else f"{NOT_MEASURED} | "
 
 
 def view_rows(people: Figures) -> str:
-    """Return Markdown rows of all views of the human, with the errors for each truth."""
+    """Return Markdown rows, one per view of the human, with the errors against each path-traced reference."""
     lines = []
     for view, where in ALL_VIEWS.items():
         rows = {truth: people.get(Measurement("human", view, truth).key) for truth in TRUTHS}
@@ -388,14 +393,14 @@ def view_rows(people: Figures) -> str:
 
 
 def people_rows(people: Figures) -> str:
-    """Return Markdown rows of the other people."""
+    """Return Markdown rows with the errors of all people except "human"."""
     keys = [(one, view) for one in get_args(PersonName)[1:] for view in _PEOPLE_VIEWS]
     rows = ((one, view, people.get(Measurement(one, view, "matched").key)) for one, view in keys)
     return "\n".join(f"| {one} | {view} | {_error_cells(row)} |" for one, view, row in rows)
 
 
 def head_rows(heads: Figures) -> str:
-    """Return Markdown rows of heads without maps."""
+    """Return Markdown rows with the errors of heads without maps, by head and medium."""
     lines = []
     for medium in _HEAD_MEDIA:
         for name in _HEAD_FILES:
@@ -419,7 +424,7 @@ def region_table(people: Figures) -> str:
 
 
 def cause_table(people: Figures) -> str:
-    """Return a Markdown table of relative RMSE and energy without each cause of error."""
+    """Return a Markdown table of relative RMSE and energy, with one cause of error left out in each row."""
     lines = [
         f"| left out on both sides | {' | '.join(f'{view} | energy' for view in _ABLATED_VIEWS)} |",
         "|---" * (2 * len(_ABLATED_VIEWS) + 1) + "|",
@@ -431,7 +436,7 @@ def cause_table(people: Figures) -> str:
 
 
 def iris_cells(people: Figures) -> dict[str, str]:
-    """Return errors of the iris in the eye view for the template, keyed by placeholder."""
+    """Return texts with the errors of the iris in the view "eye", keyed by placeholder."""
     row = people.get(Measurement("human", "eye", "matched").key) or {}
     iris = row.get("iris", {})
     names = "right", "down", "brightness", "left_half", "right_half"

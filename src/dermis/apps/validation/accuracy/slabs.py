@@ -44,7 +44,7 @@ def slabs(adapter: str = "auto") -> None:
 
 
 def exact_response(medium: Medium, thickness_mm: float, g: float = 0.0) -> Array:
-    """Return reflectance and transmittance of a slab by adding and doubling, (2, angles, 3).
+    """Return reflectance and transmittance (2, angles, 3) of a slab by adding and doubling.
 
     thickness_mm : thickness of the slab [mm]
     g : mean cosine of the scattering angle; the medium's scattering coefficient already has the factor 1 - g
@@ -76,9 +76,12 @@ def rendered_response(renderer: dermis.Renderer, skin: Skin, thickness_mm: float
 
 
 def skins_by_direction(medium: Medium, folder: str) -> dict[str, Skin]:
-    """Return skins with a medium's profile whose light leaves as Lambertian or as from a half-space, by name.
+    """Return two skins that have the diffusion profile of a medium, keyed by their setting `direction`.
 
-    folder : folder for the file of the profile
+    Light leaves the skin "lambertian" with equal radiance in all directions. Light leaves the skin
+    "half-space" with the angular distribution of a half-space.
+
+    folder : folder in which the file of the profile is written
     """
     file = Path(folder) / f"{medium.name}_{medium.eta:g}.toml"
     fit = fit_gaussians(diffusion_profile(medium).rings(), GAUSSIAN_TERMS, profile_name=medium.name)
@@ -105,7 +108,7 @@ def error_rows(renderer: dermis.Renderer) -> str:
 def forward_error_rows(renderer: dermis.Renderer) -> str:
     """Return Markdown rows with the errors of half-space skin against forward-scattering slabs.
 
-    The skin ignores forward scattering, or takes it into account by the setting `anisotropy`.
+    Half of the rows ignore forward scattering; the others account for it by the skin's `anisotropy`.
     """
     rows = []
     with tempfile.TemporaryDirectory() as folder:
@@ -122,9 +125,9 @@ def forward_error_rows(renderer: dermis.Renderer) -> str:
 
 
 def forward_direction_rows() -> str:
-    """Return Markdown rows with errors of radiance below the surface of forward-scattering skin1.
+    """Return Markdown rows with errors of radiance below the surface of the medium "skin1".
 
-    Errors are over all directions of light and view.
+    The medium is taken as forward-scattering. Each error is over all directions of light and view.
     """
     rows = []
     for g in (0.0, FORWARD_G):
@@ -151,7 +154,10 @@ def _direction_pairs_error(albedo: float, eta: float, g: float) -> float:
 
 
 def _error_cells(response: Array, reference: Array) -> str:
-    """Return table cells for transmittance, then reflectance: RMS error, and ratio of red light by angle."""
+    """Return table cells with the RMS error and, for each angle, the ratio of red light to the reference.
+
+    Cells of transmittance come first, then cells of reflectance.
+    """
     flux, cells = np.sqrt(np.cos(np.radians(INCIDENT_DEGREES)))[:, None], []
     for side in (1, 0):
         ours, exact = response[side], reference[side]

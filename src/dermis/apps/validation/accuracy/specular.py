@@ -33,14 +33,14 @@ def specular() -> None:
 
 
 def read_albedo(lobe_model: str, cosine: Floats, roughness_m: Floats) -> Floats:
-    """Return directional and mean albedo (..., 2) of a lobe, interpolated in its table as by the shader."""
+    """Return directional and mean albedo (..., 2) of a lobe, interpolated in its table as in the shader."""
     axes = np.sqrt(TABLE_ROUGHNESSES), np.sqrt(TABLE_COSINES)
     coordinates = np.stack(np.broadcast_arrays(np.sqrt(roughness_m), np.sqrt(cosine)), axis=-1)
     return np.asarray(RegularGridInterpolator(axes, albedo_table(lobe_model).astype(float))(coordinates))
 
 
 def albedo_rows() -> str:
-    """Return Markdown rows by lobe: errors of quadrature and of table interpolation, and computing time."""
+    """Return Markdown rows, one per lobe: errors of quadrature and of table interpolation, computing time."""
     m, c = np.linspace(0.1, 0.5, 17)[:, None], np.linspace(0.05, 1.0, 39)
     rows = []
     for name, model in MODELS.items():
@@ -66,12 +66,13 @@ def beckmann_table_error() -> float:
 
 
 def furnace_cell(energy_scheme: EnergyScheme, roughness_m: float, rho_s: float) -> str:
-    """Return a table cell with minimum, mean and maximum of the ratio of outgoing to incoming light.
+    """Return a table cell with the minimum, mean and maximum ratio of outgoing to incoming light.
 
-    The light is uniform, and the surface a white sphere.
+    The surface is a white sphere in uniform light.
 
     energy_scheme : energy conservation scheme
-    roughness_m, rho_s : roughness and specular strength of the surface
+    roughness_m : roughness of the surface
+    rho_s : specular strength of the surface
     """
     albedo, mean = (read_albedo("kelemen", VIEW_COSINES, np.array(roughness_m))[..., k] for k in (0, 1))
     exact = directional_albedo(VIEW_COSINES, roughness_m)
@@ -81,7 +82,7 @@ def furnace_cell(energy_scheme: EnergyScheme, roughness_m: float, rho_s: float) 
 
 
 def furnace_rows() -> str:
-    """Return the Markdown rows of the white furnace, by energy conservation scheme."""
+    """Return the Markdown rows of the white furnace, one for each energy conservation scheme."""
     return "\n".join(
         f"| {name} | {' | '.join(furnace_cell(model, m, rho_s) for m, rho_s in ROUGHNESS_AND_STRENGTH)} |"
         for name, model in ENERGY_MODELS.items()

@@ -80,14 +80,14 @@ def _compare(
 
 
 def technique_row(first_cell: str, comparison_row: ComparisonRow) -> str:
-    """Return a Markdown row with a given first cell and the errors of a technique."""
+    """Return a Markdown row with `first_cell` and the errors of a technique."""
     return f"| {first_cell} | " + " | ".join(cells(comparison_row)) + " |"
 
 
 def technique_rows(
     head: Head, reference_name: str, medium: str, adapter: str, model: ModelName | None = None
 ) -> tuple[str, dict[str, Comparison]]:
-    """Return Markdown rows of all techniques under each light, and the comparisons by light.
+    """Return Markdown rows of all techniques under each light, and a dictionary from light to comparison.
 
     reference_name : name of the reference
     medium : name of the medium
@@ -105,7 +105,10 @@ def technique_rows(
 
 
 def fine_atlas_row(head: Head, adapter: str) -> str:
-    """Return a Markdown row of errors against the heat equation, for the laser and an atlas side of 2048."""
+    """Return a Markdown row with the errors of texture-space diffusion on an atlas of side 2048.
+
+    The light is the laser, and the reference is the heat equation on the surface.
+    """
     settings, only = SETTINGS.model_copy(update={"atlas": 2048}), ("texture-space",)
     comparison = _compare(
         head, "heat", only, "laser", adapter, region="ear", settings=settings, model="layered"
@@ -116,7 +119,7 @@ def fine_atlas_row(head: Head, adapter: str) -> str:
 def profile_model_rows(head: Head, path_traced: dict[str, dict[str, Comparison]], adapter: str) -> str:
     """Return Markdown rows of errors against path tracing, by scattering model of the profile.
 
-    path_traced : comparisons in which techniques use Monte Carlo profiles, by medium and light
+    path_traced : comparisons with Monte Carlo profiles, keyed by medium, then by light
     """
     rows, techniques = [], ("texture-space", "screen-space")
     for light in SAMPLES_BY_LIGHT:
@@ -139,11 +142,12 @@ def _error_and_energy_cells(comparison: Comparison, comparison_row: ComparisonRo
 
 
 def lambertian_limit(head: Head, medium: str, path_traced: Comparison, adapter: str) -> str:
-    """Return text with the least error that Lambertian skin can have under the front light, and its energy.
+    """Return text with the least error that Lambertian skin can have under the front light.
 
-    Its albedo is the directional albedo of a half-space.
+    This error is reached by skin whose albedo is the directional albedo of a half-space; the text also has
+    the energy of this skin.
 
-    path_traced : comparison with path tracing in this light
+    path_traced : comparison with path tracing under this light
     """
     renderer = dermis.Renderer(adapter)
     scene = comparison_scene(head, "front", default_region("front"), "gpu-gems-3")
@@ -171,9 +175,11 @@ def lambertian_limit(head: Head, medium: str, path_traced: Comparison, adapter: 
 
 
 def direction_rows(head: Head, lights: dict[str, int], settings: Settings, adapter: str) -> str:
-    """Return Markdown rows that compare Lambertian and half-space skin with path tracing, on head and ball.
+    """Return Markdown rows that compare Lambertian and half-space skin with path tracing.
 
-    lights : paths per pixel by name of the light
+    The skins are compared on the head under each of `lights`, and on a ball.
+
+    lights : dictionary from the name of a light to the number of paths per pixel
     """
     lines = [DIRECTION_HEADER]
     for light, samples in lights.items():

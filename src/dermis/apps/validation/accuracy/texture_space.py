@@ -62,9 +62,9 @@ def tables(head: Head, settings: Settings, adapter: str) -> dict[str, str]:
 
 
 def render(subject: ComparisonSubject, technique: str, **changed_settings: object) -> Floats:
-    """Return the linear radiance (h, w, 3) of a technique, sampled like the references.
+    """Return the linear radiance (h, w, 3) of a technique.
 
-    They have one sample per pixel and no interreflection.
+    Like the references, the image has one sample per pixel and no interreflection.
 
     changed_settings : further settings
     """
@@ -80,7 +80,7 @@ def atlas_rows(
     normalised_image: ReferenceImage,
     light_name: str,
 ) -> list[str]:
-    """Return Markdown rows with errors of texture space by atlas size, against two references.
+    """Return Markdown rows with errors of texture-space diffusion by atlas size, against two references.
 
     Each error is also given as a ratio to the error of an image without scattering.
 
@@ -101,7 +101,7 @@ def atlas_rows(
 def zero_width_row(subject: ComparisonSubject, light_name: str) -> str:
     """Return a Markdown row with the sampling error of the surface integral.
 
-    It is the difference between the integral of a very narrow profile and the irradiance.
+    The error is the difference between the integral of a very narrow profile and the irradiance.
     """
     narrow_profile = GaussianSum("narrow", np.array([0.05**2]), np.ones((1, 3)))
     reference = surface_integral(replace(subject, profile=narrow_profile), 0)
@@ -111,7 +111,7 @@ def zero_width_row(subject: ComparisonSubject, light_name: str) -> str:
 
 
 def uniform_light_integral(subject: ComparisonSubject) -> Floats:
-    """Return the light (h, w, 3) that leaves under an irradiance of 1 everywhere, by the surface integral."""
+    """Return the surface integral (h, w, 3) for an irradiance of 1 everywhere and an albedo of 1."""
     samples = irradiance_samples(subject)
     uniform_samples = replace(samples, irradiance=np.ones_like(samples.irradiance))
     visible = surface_points(subject.renderer, subject.scene, subject.settings)
@@ -131,9 +131,10 @@ def mean_and_percentile(uniform_light: Floats) -> str:
 
 
 def region_rows(subject: ComparisonSubject, integral_image: ReferenceImage, light_name: str) -> list[str]:
-    """Return Markdown rows by region of the face: errors of texture space, and of a perfect map.
+    """Return Markdown rows with errors of texture-space diffusion, one row per region of the face.
 
-    Diffusion on the surface itself, by the heat equation, represents a perfect map.
+    The rows also have the errors that diffusion would have in a perfect uv map, that is, on the surface
+    itself, by the heat equation.
     """
     landmarks = known_landmarks(subject.scene.head)
     assert landmarks is not None

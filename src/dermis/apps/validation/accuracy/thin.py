@@ -92,7 +92,10 @@ def integrated_light(mesh: Mesh, light_direction: Array, points: Array, spacing_
 
 
 def slab_rows(renderer: dermis.Renderer) -> str:
-    """Return Markdown rows with light through slabs far from their rim, by dermis and by the profile."""
+    """Return Markdown rows with the light through slabs as rendered by dermis and as given by the profile.
+
+    The light is measured far from the rim of the slabs.
+    """
     rows = []
     for thickness in THICKNESSES_MM:
         beam = np.array([0.0, 0.0, 1.0])
@@ -111,7 +114,8 @@ def light_across_air(mesh: Mesh, light_direction: Array, points: Array, normals:
     Light crosses air if the straight path between source and point leaves the body.
 
     light_direction : (3,) direction of the light
-    points, normals : (n, 3) positions and surface normals
+    points : (n, 3) positions
+    normals : (n, 3) surface normals
     """
 
     def light(points: MeshPoints) -> Array:
@@ -151,11 +155,11 @@ def comparison_cells(
 ) -> str:
     """Return table cells with energy ratio and relative RMSE against the surface integral.
 
-    Frames without light through thin parts come first, then frames with it.
+    Cells of a frame without light through thin parts come first, then cells of a frame with this light.
 
-    point_filter : selects the compared points by position and normal
+    point_filter : function that returns the mask of the points to compare, given positions and normals
     spacing_mm : largest distance of the irradiance samples [mm]
-    compares_without_air : whether to add the energy ratio against an integral without light across air
+    compares_without_air : whether to add the energy ratio to an integral that leaves out light across air
     """
     cells = []
     for transmission in ("none", "thin"):

@@ -1,1 +1,1 @@
-"""Benchmark of frame times on this machine by stage, compared with the limit by memory bandwidth."""
+"""Benchmark of frame times by stage on this machine, compared with limits set by memory bandwidth."""

@@ -1,4 +1,4 @@
-"""Benchmark cases: a base frame, frames that each vary one parameter, and their scenes."""
+"""Benchmark cases and their scenes: a base frame, and frames that each differ from it in one parameter."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ class BenchmarkCase:
     atlas : side of the atlas [texel]
     gaussians : number of Gaussians of the diffusion profile
     lights : number of spot lights with shadows
-    environment : name of a panorama; "" for none
-    subdivide : subdivision level of the head, each with four times the triangles
-    targets : number of morph targets that move in each frame, with four bones; 0 for a static head
+    environment : name of a panorama, or "" for no environment
+    subdivide : subdivision level of the head; each level has four times the triangles of the previous level
+    targets : number of morph targets that move in each frame, together with four bones; 0 for a static head
     samples : samples per pixel
     technique : scattering technique of `Settings`, or `FRAGMENT_TECHNIQUE`
     varies : name of the parameter that differs from the base frame; "" for the base frame
@@ -59,7 +59,7 @@ class BenchmarkCase:
 
 @dataclass(frozen=True)
 class BenchmarkPreset:
-    """Set of benchmark cases: a base frame, and for each of its parameters the alternatives to measure."""
+    """Set of benchmark cases: a base frame, and other values to measure for each of its parameters."""
 
     base_case: BenchmarkCase
     image: tuple[tuple[int, int], ...]
@@ -116,11 +116,11 @@ def case_settings(case: BenchmarkCase) -> Settings:
 
 
 def case_scenes(case: BenchmarkCase, head: Head, folder: Path, scene_count: int) -> list[Scene]:
-    """Return consecutive scenes of a case, so that no frame can reuse results of the frame before.
+    """Return consecutive scenes of a case that all differ, so no frame can reuse results of another frame.
 
     Camera and lights move in each scene, and so does the head if the case has morph targets.
 
-    folder : folder for the file of the profile
+    folder : folder in which the file of the diffusion profile is written
     scene_count : number of scenes
     """
     skin, camera = Skin(profile=str(_profile_file(case.gaussians, folder))), portrait(head)
@@ -144,7 +144,10 @@ def _shift_along_x(position: tuple[float, float, float], shift_mm: float) -> tup
 
 
 def _spot_lights(light_count: int) -> list[PointLight]:
-    """Return a given number of spot lights: those of the studio preset, then copies turned about the head."""
+    """Return the spot lights of the studio preset, then copies that are rotated about the head.
+
+    light_count : number of lights to return
+    """
     rig = [light for light in studio() if isinstance(light, PointLight)]
     return [
         _rotate_light(rig[k % len(rig)], _RIG_ROTATION_DEGREES * (k // len(rig))) for k in range(light_count)
@@ -167,7 +170,7 @@ def _profile_file(gaussian_count: int, folder: Path) -> Path:
 
 
 def with_gaussian_count(profile: GaussianSum, gaussian_count: int) -> GaussianSum:
-    """Return a profile resampled to `gaussian_count` Gaussians, with unchanged albedo and widest Gaussian."""
+    """Return a profile with `gaussian_count` Gaussians, but the same albedo and the same widest Gaussian."""
     if gaussian_count == len(profile.variance_mm2):
         return profile
     known = np.log(profile.variance_mm2)
@@ -232,7 +235,7 @@ def _synthetic_targets(point_positions: Doubles, target_count: int) -> MorphTarg
 
 
 def _bone_chain(point_positions: Doubles) -> Skeleton:
-    """Return a vertical chain of bones; each point is weighted between the two nearest ones in height.
+    """Return a vertical chain of bones; each point is moved by the two bones that are nearest in height.
 
     point_positions : (p, 3) positions of the points in the rest pose [mm]
     """

@@ -1,4 +1,4 @@
-"""Lower bounds ("floors") of stage times: the time to copy the bytes that a stage must move."""
+"""Lower bounds ("floors") of stage times, derived from the bytes that a stage must read and write."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class FrameTraffic:
 
 
 def frame_traffic(device: Device, inputs: FrameInputs, vertex_count: int) -> FrameTraffic:
-    """Return the inputs of a frame that has been drawn, with the counts that its memory traffic depends on.
+    """Return the inputs of a drawn frame, with the counts on which the frame's memory traffic depends.
 
     vertex_count : number of vertices of the mesh
     """
@@ -60,8 +60,9 @@ def frame_traffic(device: Device, inputs: FrameInputs, vertex_count: int) -> Fra
 def stage_bytes(traffic: FrameTraffic) -> dict[str, float]:
     """Return the least memory traffic of each stage: inputs read once and results written once [byte].
 
-    Only texels with a surface and pixels of the head count where others are not needed. Repeated reads within
-    a stage or a blur, scratch space between two passes, and tables that fit in caches are not counted.
+    Texels without a surface and pixels without the head are not counted if a stage does not need them.
+    Repeated reads within a stage or a blur, scratch data between passes, and tables that fit in caches are
+    not counted either.
     """
     inputs, picture = traffic.inputs, traffic.inputs.resources.post.picture
     pixels, shadow = picture.size[0] * picture.size[1], inputs.resources.shadow_maps.texture
@@ -104,9 +105,9 @@ def _scattering_bytes(traffic: FrameTraffic, shadow_bytes: int) -> dict[str, flo
 
 
 def _blur_surface_bytes(inputs: FrameInputs, texel_count: int) -> float:
-    """Return the bytes that blurs read about the surface: stretch, extent of charts, and gutters.
+    """Return the bytes that blurs read besides light: stretch map, extent of charts, and gutters.
 
-    The passes of GPU Gems 3 blur the stretch map along with the light instead.
+    For the passes of GPU Gems 3, return the bytes for blurring the stretch map along with the light.
 
     texel_count : number of atlas texels that show the surface
     """
@@ -127,7 +128,8 @@ def _blur_surface_bytes(inputs: FrameInputs, texel_count: int) -> float:
 def _translucency_bytes(translucency: Translucency, levels: PyramidLevels, blur: Blur) -> float:
     """Return the memory traffic of translucency: pairs with their texels, source light, transmitted light.
 
-    Tables of slabs depend on the direction of the light at the sources, so they also read the surface there.
+    If pairs are weighted by tables of slabs, the surface at the sources is read too, because these tables
+    depend on the direction of the light.
     """
     pairs, halving = translucency.pairs, blur.halvings[blur.profile_levels[1 + translucency.source_level]]
     receivers, sources = pairs.receivers[1], pairs.sources[1]
@@ -139,13 +141,13 @@ def _translucency_bytes(translucency: Translucency, levels: PyramidLevels, blur:
 
 
 def _map_bytes(inputs: FrameInputs, point_count: int) -> int:
-    """Return the bytes of the head's maps that are read for a number of surface points, one texel each."""
+    """Return the bytes read from the head's maps for a number of surface points, one texel per point."""
     textures = [cast(Texture, inputs.bindings[name]) for name in _MAP_BINDINGS]
     return sum(texel_bytes(one) * min(point_count, one.size[0] * one.size[1]) for one in textures)
 
 
 def copy_rate(device: Device) -> float:
-    """Return the memory bandwidth, reads and writes, of a pass that copies a texture [byte/s].
+    """Return the memory bandwidth of a pass that copies a texture; reads and writes are counted [byte/s].
 
     Raises DermisError when the device has no timestamps.
     """

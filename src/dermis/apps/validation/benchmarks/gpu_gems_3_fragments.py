@@ -97,7 +97,10 @@ class FragmentPasses(GpuGems3):
         into: TexturePair,
         side: int,
     ) -> None:
-        """Record the render pass of a blur along one axis, into a texture of light and one of stretch."""
+        """Record the render pass of a blur along one axis.
+
+        into : textures of light and stretch to write
+        """
         assert isinstance(graph, Graph) and isinstance(shader, RenderProgram)
         graph.fill("diffuse", shader, bound, into)
 

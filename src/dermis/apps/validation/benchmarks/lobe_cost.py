@@ -25,10 +25,10 @@ _POINTS_PER_SIDE_ON_CPU, _LIGHTS_PER_POINT_ON_CPU = 256, 16
 
 
 def lobe_cost_ns(device: Device) -> dict[tuple[str, str], float]:
-    """Return the device time per evaluation by lobe model and Fresnel term [ns].
+    """Return the device time per evaluation of each lobe model with each Fresnel term [ns].
 
-    It is the inverse throughput of the whole device, less the cost of the loop without the lobe. The keys are
-    names in MODELS and FRESNEL.
+    The time is the inverse throughput of the whole device, minus the time of the loop without the lobe. The
+    keys are pairs of names in MODELS and FRESNEL.
     """
     on_cpu = device.adapter.kind == "CPU"
     side, lights = (
@@ -59,10 +59,12 @@ def lobe_cost_ns(device: Device) -> dict[tuple[str, str], float]:
 
 
 def _pass_ms(device: Device, program: ComputeProgram, bound: JsonObject, side: int) -> float:
-    """Return the time of one compute pass by timestamps, or by `perf_counter` without them [ms].
+    """Return the time of one compute pass [ms].
 
-    bound : resources by the names of their bindings
-    side : side of the square of invocations
+    The time is measured by timestamps, or by `perf_counter` on devices without timestamps.
+
+    bound : dictionary from the name of a binding to its resource
+    side : number of invocations along each of two axes
     """
     frame = CommandList(device)
     started = time.perf_counter()

@@ -32,9 +32,9 @@ class FrameCounts:
     """Numbers of frames to draw for the measurements of a case.
 
     warmup : frames before any measurement, because an idle GPU has a reduced clock rate
-    between : frames between two frames whose stages are timed, to keep the clock rate up
+    between : frames drawn before each frame whose stages are timed, to keep the clock rate up
     timed : frames whose stages are timed
-    sequence : consecutive frames from which the mean time of one is derived
+    sequence : consecutive frames over which the time of a frame is averaged
     """
 
     warmup: int = 100
@@ -56,15 +56,15 @@ _MAX_CASE_S = 30.0  # time limit for the frames of one case
 
 @dataclass(frozen=True)
 class BenchmarkRow:
-    """Measured times of one benchmark case, which are medians, and its memory.
+    """Measurements of one benchmark case: medians of times, and memory.
 
     triangles : number of triangles of the head
     frame_ms : elapsed time per frame in a sequence, with several frames in flight
-    gpu_ms : device time by stage, with a separate pass for each, and "total"; on GPUs the total is measured
-        in other frames, whose stages share a pass as usual, and is less than the sum
-    floor_ms : lower bound of each stage's time, by its memory traffic, and "total"
+    gpu_ms : device time of each stage, measured in separate passes, and "total"; on GPUs, the total is
+        measured in frames whose stages share a pass as usual, and is less than the sum of the stages
+    floor_ms : lower bound of each stage's time, derived from its memory traffic, and their sum as "total"
     python_ms : host time to prepare, record and submit a frame while the device is idle
-    image_ms : time from the end of a frame to its picture in NumPy
+    image_ms : time from the end of a frame until its picture is in NumPy
     memory_mb : memory of textures and buffers [MB]
     """
 
@@ -87,15 +87,15 @@ class BenchmarkRow:
 def measure_case(
     renderer: Renderer, case: BenchmarkCase, head: Head, folder: Path, bytes_per_s: float, counts: FrameCounts
 ) -> BenchmarkRow:
-    """Draw many frames of a case with moving camera and lights, and return its measurements.
+    """Draw many frames of a case with moving camera and lights, and return the measurements of the case.
 
-    A slow device draws fewer frames.
+    On a slow device, fewer frames are drawn.
 
-    folder : folder for the file of the profile
+    folder : folder in which the file of the diffusion profile is written
     bytes_per_s : memory bandwidth of a copy [byte/s]
     counts : numbers of frames to draw
 
-    Raises DermisError for frames that the device cannot hold.
+    Raises DermisError if the device cannot draw the frames, for example for lack of memory.
     """
     with converted_gpu_failures(renderer.device), TECHNIQUES.including(FRAGMENT_TECHNIQUE, FRAGMENT_PASSES):
         return _measure_case(renderer, case, head, folder, bytes_per_s, counts)
@@ -185,7 +185,7 @@ def _elapsed_ms(timed_function: Callable[[], object]) -> float:
 def _floor_ms(
     stage_bytes: dict[str, float], gpu_ms: dict[str, float], bytes_per_s: float
 ) -> dict[str, float]:
-    """Return the lower bound of each drawn stage's time, and their sum as "total" [ms].
+    """Return the lower bound of the time of each measured stage, and the sum of the bounds as "total" [ms].
 
     stage_bytes : memory traffic by stage [byte]
     gpu_ms : measured device time by stage

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 def benchmark_json(benchmark: Benchmark) -> JsonObject:
-    """Return the benchmark as a JSON object; times in ms."""
+    """Return the benchmark as a JSON object, with times in milliseconds."""
     return {
         "head": benchmark.head,
         "adapter": benchmark.adapter,
@@ -84,9 +84,10 @@ def cells(benchmark_row: BenchmarkRow) -> tuple[str, ...]:
 
 
 def stage_table(benchmark: Benchmark) -> list[tuple[str, ...]]:
-    """Return the table of the base frame by stage, with the titles as its first row.
+    """Return a table of the stages of the base frame, with column titles as its first row.
 
-    The columns are device time, lower bound, their ratio, and the times of the passes of GPU Gems 3.
+    The columns are the device time, its lower bound, the ratio of the two, and the device times with the
+    passes of GPU Gems 3.
     """
     if benchmark.base_row is None:
         return []
@@ -104,7 +105,7 @@ def stage_table(benchmark: Benchmark) -> list[tuple[str, ...]]:
 
 
 def published_text(benchmark: Benchmark) -> str:
-    """Return a sentence with the relative time of the passes of GPU Gems 3, if they were measured."""
+    """Return a sentence with the relative time of the passes of GPU Gems 3; empty without measurements."""
     names = {GPU_GEMS_3: "as compute", FRAGMENT_TECHNIQUE: "as fragments"}
     ratios = {form: benchmark.ratio(name) for name, form in names.items()}
     parts = [f"{ratio:.2f} times as long {form}" for form, ratio in ratios.items() if ratio is not None]

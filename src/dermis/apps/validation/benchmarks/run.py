@@ -60,16 +60,19 @@ class Benchmark:
 
     @property
     def base_row(self) -> BenchmarkRow | None:
-        """Return the measurements of the base frame, which other cases vary; None if it was skipped."""
+        """Return the measurements of the base frame; None if the base frame was skipped."""
         return next((row for row in self.rows if not row.case.varies), None)
 
     def row_of(self, technique: str) -> BenchmarkRow | None:
-        """Return the measurements of the base frame with another technique; None if it was skipped."""
+        """Return the measurements of the base frame with another technique; None if the case was skipped."""
         rows = (row for row in self.rows if row.case.varies == "technique")
         return next((row for row in rows if row.case.technique == technique), None)
 
     def ratio(self, technique: str) -> float | None:
-        """Return the ratio of device times: the base frame with another technique to the base frame."""
+        """Return the device time of the base frame with another technique, relative to the base frame.
+
+        Returns None if one of the two was not measured.
+        """
         other = self.row_of(technique)
         return other.gpu_ms["total"] / self.base_row.gpu_ms["total"] if other and self.base_row else None
 
@@ -117,7 +120,7 @@ def _measure_cases(
     bytes_per_s: float,
     progress: ProgressCallback,
 ) -> tuple[list[BenchmarkRow], list[SkippedCase]]:
-    """Return the measurements of cases that the device can draw, and the other cases with the reasons.
+    """Return the measurements of the cases that could be drawn, and the skipped cases with the reasons.
 
     load_case_head : function that returns the head for a subdivision level
     bytes_per_s : memory bandwidth of a copy [byte/s]

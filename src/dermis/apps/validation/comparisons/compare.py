@@ -35,9 +35,11 @@ _EXPOSURE_PERCENTILE = 99.0
 class ComparisonRow:
     """Errors of a technique against a reference, with standard errors where the reference has noise.
 
-    relrmse, relrmse_se : ratio of the root mean square error to the root mean square of the reference [-]
-    flip : mean perceived difference from 0 to 1 by FLIP; None without the package flip-evaluator
-    energy_ratio, energy_ratio_se : ratio of the technique's total light to that of the reference [-]
+    relrmse : ratio of the root mean square error to the root mean square of the reference [-]
+    relrmse_se : standard error of `relrmse` [-]
+    flip : mean perceived difference by FLIP, from 0 to 1; None without the package flip-evaluator
+    energy_ratio : ratio of the technique's total light to the total light of the reference [-]
+    energy_ratio_se : standard error of `energy_ratio` [-]
     ms : device time of a frame [ms]
     """
 
@@ -90,12 +92,16 @@ def compare(
     samples: int = 64,
     adapter: str = "auto",
 ) -> Comparison:
-    """Compare techniques with a reference, in the profile's own colour and without surface reflection.
+    """Compare techniques with a reference.
+
+    The skin has the colour of its diffusion profile, and no surface reflection.
 
     against : name of the reference in `references.REFERENCES`
-    light, region : names in `scenes.LIGHTS` and `scenes.REGIONS`
-    medium : name of a medium; its surface is made index-matched
-    direction : angular distribution of the light that leaves the rendered skin; None for the reference's
+    light : name of the light in `scenes.LIGHTS`
+    region : name of the visible region in `scenes.REGIONS`
+    medium : name of a medium, which is made index-matched
+    direction : angular distribution of the light that leaves the rendered skin; None for the same
+        distribution as in the reference
     model : scattering model of the medium's profile; see `medium_gaussians` for the default
     samples : paths per pixel of a path-traced reference
 
@@ -132,9 +138,10 @@ def comparison_subject(
     adapter: str,
     model: ModelName | None = None,
 ) -> Iterator[ComparisonSubject]:
-    """Yield the subject of a comparison; its profile is a temporary file, deleted when the context ends.
+    """Yield the subject of a comparison.
 
-    The parameters are those of `compare`.
+    The diffusion profile is in a temporary file, which is deleted when the context ends. The parameters are
+    described in `compare`.
     """
     index_matched = published_media()[medium].with_eta(1.0)
     with medium_scene(head, light, region, index_matched, model) as (scene, profile):
@@ -155,9 +162,9 @@ def check_names(reference_name: str, light_name: str, region_name: str, medium_n
 
 
 def _render(subject: ComparisonSubject, technique: str, reference: ReferenceImage) -> tuple[Floats, float]:
-    """Render a technique; return its linear radiance, and the device time of a frame at 4 samples [ms].
+    """Return the linear radiance rendered by a technique, and the device time of a frame at 4 samples [ms].
 
-    reference : reference image, which determines samples, translucency and interreflection
+    reference : reference image; the frame has the same translucency and interreflection
     """
     disabled: dict[str, object] = {} if reference.has_translucency else {"transmission": "none"}
     disabled |= {} if reference.has_interreflection else {"interreflection": False}

@@ -43,12 +43,13 @@ class PersonComparison:
     """View of a person rendered by dermis and by path tracing, with the errors of dermis.
 
     name : name of the view
-    ours, reference : (h, w, 3) linear radiance by dermis, and by path tracing
+    ours : (h, w, 3) linear radiance by dermis
+    reference : (h, w, 3) linear radiance by path tracing
     variance : (h, w, 3) variance of the reference's noise
     mask : (h, w) pixels that are compared
     relrmse : relative RMSE within the mask [-]
     energy : ratio of the total light by dermis to that of the reference, within the mask [-]
-    energy_by_channel : the same ratio in red, green and blue [-]
+    energy_by_channel : `energy` in red, green and blue [-]
     samples : paths per pixel
     seconds : duration of path tracing [s]
     """
@@ -96,10 +97,10 @@ CAUSES: tuple[Cause, ...] = get_args(Cause)
 
 @dataclass(frozen=True, eq=False)
 class SharedSkin:
-    """Skin that frame and path tracer share: its layers, and the profile that is computed from the layers.
+    """Skin of both the frame and the path-traced reference, as a medium and as a diffusion profile.
 
-    medium : layers of skin of the mean colour
-    profile : file with the Gaussians that fit photon counts of these layers
+    medium : layers of skin, with the mean colour of the person
+    profile : file with the Gaussians that are fitted to photon counts of these layers
     """
 
     medium: Medium
@@ -107,11 +108,12 @@ class SharedSkin:
 
 
 def shared_skin(renderer: Renderer, head: Head, truth: TruthName, folder: Path) -> SharedSkin:
-    """Return the skin of a person for a kind of path-traced reference, with the profile in a file.
+    """Return the skin of a person for a kind of path-traced reference, and write its diffusion profile.
 
-    In homogeneous skin, light exits at the same mean distance from its entry as by the published profile.
+    In homogeneous skin, the mean distance between entry and exit of light is that of the default skin.
 
-    folder : existing folder of the file
+    truth : kind of path-traced reference
+    folder : existing folder in which the file of the profile is written
     """
     maps, eta = head.maps, SKIN_ETA if truth == "refracting" else 1.0
     assert isinstance(maps, PaintedMaps)
@@ -129,9 +131,9 @@ def shared_skin(renderer: Renderer, head: Head, truth: TruthName, folder: Path) 
 
 @dataclass(frozen=True, eq=False)
 class PersonSubject:
-    """Scene of a person, and the person's textures, as input of frame and path tracer.
+    """Scene of a person and textures of the skin, from which both dermis and the path tracer render.
 
-    cause : cause of error that both leave out, or None
+    cause : cause of error that is left out of both pictures, or None
     """
 
     scene: Scene
@@ -140,7 +142,7 @@ class PersonSubject:
 
 
 def without_cause(subject: PersonSubject, cause: Cause) -> PersonSubject:
-    """Return a subject without a cause of error, in the frame and in the path-traced reference."""
+    """Return a subject for which a cause of error is left out of both the frame and the reference."""
     scene, textures, head = subject.scene, subject.textures, subject.scene.head
     maps, flat = head.maps, np.ones((1, 1), np.float32)
     assert isinstance(maps, PaintedMaps)
@@ -162,11 +164,12 @@ def without_cause(subject: PersonSubject, cause: Cause) -> PersonSubject:
 def render_subject_frame(
     renderer: Renderer, subject: PersonSubject, skin: SharedSkin | None, settings: Settings
 ) -> Floats:
-    """Return the linear radiance (h, w, 3) of the frame, with the skin of a path-traced reference.
+    """Return the linear radiance (h, w, 3) of a subject's frame.
 
-    Without refraction, the light from below is that of skin without a surface, and the reflection is added.
+    If the skin does not refract, the radiance is the sum of two frames: light scattered by skin without
+    surface reflection, and surface reflection alone.
 
-    skin : skin that the path tracer has; None for the default skin
+    skin : skin of the path-traced reference; None for the default skin
     """
     scene, cause = subject.scene, subject.cause
     if cause in ("scattering", "bounces"):
@@ -249,7 +252,7 @@ def path_trace_subject(
     variant: MitsubaVariant = "scalar_rgb",
     progress: Callable[[int, int], None] | None = None,
 ) -> PathTraced:
-    """Path-trace a person with the skin that the frame has.
+    """Path-trace a person with the same skin as in the frame.
 
     picture_size : width and height of the picture [pixel]
     samples : paths per pixel
@@ -281,9 +284,9 @@ def path_trace_view(
     *,
     variant: MitsubaVariant = "scalar_rgb",
 ) -> PathTraced:
-    """Path-trace a person of homogeneous skin that reflects with a strength of 1 and does not refract.
+    """Path-trace a person with homogeneous skin that has a specular strength of 1 and does not refract.
 
-    In the medium, light exits at the same mean distance from its entry as by the profile of the scene's skin.
+    The mean distance between entry and exit of light is that of the diffusion profile of the scene's skin.
 
     textures : maps of the skin as dermis paints them, but with colours under uniform light
     picture_size : width and height of the picture [pixel]
@@ -299,13 +302,16 @@ def path_trace_view(
 
 
 def mean_distance_mm(profile: GaussianSum) -> Floats:
-    """Return the mean lateral distance (3,) between entry and exit of light by a profile [mm]."""
+    """Return the mean distance (3,) between entry and exit of light for a diffusion profile [mm]."""
     weight, width = profile.weight, np.sqrt(0.5 * np.pi * profile.variance_mm2)
     return np.asarray((weight * width[:, None]).sum(axis=0) / weight.sum(axis=0))
 
 
 def at_normal_incidence(diffuse_reflectance: ArrayLike) -> Floats:
-    """Convert reflectances of half-spaces of index 1 from uniform light to light at normal incidence [-]."""
+    """Convert reflectances of half-spaces in uniform light to their reflectances at normal incidence [-].
+
+    The half-spaces are index-matched.
+    """
     albedo = 1.0 - np.linspace(1.0, 0.01, 48) ** 2
     uniform, normal = (
         [float(f(one)) for one in albedo] for f in (diffuse_albedo, partial(directional_albedo, 1.0))
@@ -344,10 +350,12 @@ _MIN_RELATIVE_HIGHLIGHT = 1.6  # least brightness of highlights, relative to the
 class IrisErrors(NamedTuple):
     """Errors of an iris as rendered by dermis against the path-traced reference.
 
-    right, down : shift of the reference's pupil from that of dermis [pixel]
-    brightness : ratio of the mean brightness by dermis to that of the reference, on the ring of the iris
-        without highlights [-]
-    left_half, right_half : the brightness ratio on each half of the ring [-]
+    right : shift of the reference's pupil relative to the pupil by dermis, positive to the right [pixel]
+    down : shift of the reference's pupil relative to the pupil by dermis, positive downwards [pixel]
+    brightness : ratio of the iris's mean brightness by dermis to its mean brightness in the reference;
+        highlights are left out [-]
+    left_half : `brightness` of the left half of the iris [-]
+    right_half : `brightness` of the right half of the iris [-]
     """
 
     right: Estimate
@@ -360,7 +368,7 @@ class IrisErrors(NamedTuple):
 def iris_errors(comparison: PersonComparison, frame_mm: float) -> IrisErrors:
     """Return the errors of an iris, in pictures whose centre shows an eye from the front.
 
-    frame_mm : visible height [mm]
+    frame_mm : height of the visible area [mm]
     """
     ours, reference = comparison.ours.mean(axis=2), comparison.reference.mean(axis=2)
     noise = comparison.variance.mean(axis=2)  # an upper bound, since channels may share paths
@@ -376,9 +384,11 @@ def iris_errors(comparison: PersonComparison, frame_mm: float) -> IrisErrors:
 
 
 def _without_highlights(image: Floats, iris_ring: Mask) -> Mask:
-    """Return the mask (h, w) of pixels outside highlights, which are found in a blurred picture.
+    """Return the mask (h, w) of pixels outside highlights.
 
-    iris_ring : (h, w) mask of the iris, whose median brightness determines the threshold
+    In a highlight, the blurred image is much brighter than the median of the iris.
+
+    iris_ring : (h, w) mask of the iris
     """
     from scipy.ndimage import gaussian_filter
 

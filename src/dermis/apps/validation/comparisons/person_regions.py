@@ -1,4 +1,4 @@
-"""Regions of the face and of the light in a picture of a person, for tables of errors by place."""
+"""Regions of a picture of a person, by part of the face and by lighting, for tables of errors."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Regions:
     masks: dict[str, Mask]
 
     def light_ratios(self, pair: PersonComparison) -> dict[str, Estimate]:
-        """Return the frame's light divided by the reference's light, for each large region [-]."""
+        """Return the frame's light divided by the reference's light, for regions with enough pixels [-]."""
         found = {}
         for name, mask in self.masks.items():
             inside = mask & pair.mask
@@ -54,9 +54,9 @@ class Regions:
 def picture_regions(renderer: Renderer, scene: Scene, picture_side: int) -> Regions:
     """Return the regions of the skin that a square picture of a parametric human shows.
 
-    Regions by light follow the first light of the scene: "rim" is skin seen at a grazing angle, "terminator"
-    skin that the light grazes, "shadowed side" skin that faces away from the light. Normals are those of the
-    rest pose.
+    Besides parts of the face, there is "rim", skin seen at a grazing angle, and regions by the direction of
+    the scene's first light: "lit side" is skin that faces this light, "terminator" is skin that the light
+    grazes, and "shadowed side" is skin that faces away from it. Normals are those of the rest pose.
 
     picture_side : side of the picture [pixel]
     """
@@ -90,7 +90,10 @@ def picture_regions(renderer: Renderer, scene: Scene, picture_side: int) -> Regi
 
 
 def _nearest_zone(positions_mm: Floats) -> NDArray[np.int64]:
-    """Return the index of the region whose zone has the largest weight at points (n, 3)."""
+    """Return the index (n,) of the region whose zone is nearest to each point.
+
+    positions_mm : (n, 3) points
+    """
     rows = {row["zone"]: row for row in read_rows("dermis.human.skin", "zones")}
     mirrored = np.abs(positions_mm[:, :1])
     points = np.concatenate([mirrored, positions_mm[:, 1:]], axis=1)

@@ -33,7 +33,7 @@ _SETTINGS = Settings(size=(16, 16), atlas=64, samples=1, shadow_size=64)
 
 
 def person_textures(renderer: Renderer, scene: Scene, texture_side: int = 2048) -> SkinTextures:
-    """Return the colours, roughness and relief that frames of the scene show in the rest pose.
+    """Return the colours, roughness and relief of a person's skin, as frames show them in the rest pose.
 
     texture_side : side of the skin's maps, a power of two from 256 to 4096 [texel]
 
@@ -63,10 +63,12 @@ def _paint_textures(renderer: Renderer, scene: Scene, look: SkinLook, texture_si
 
 
 def _detail_heights_mm(pores: Floats, furrows: Floats, density: Floats) -> Floats:
-    """Return the heights (n, n) of pores and furrows finer than the maps, tiled as in skin.wgsl [mm].
+    """Return the heights (n, n) of pores and furrows that are too fine for the head's maps [mm].
+
+    The patterns are tiled as in skin.wgsl.
 
     pores, furrows : (n, n) weights of the two patterns
-    density : (n, n) binary logarithm of mm per unit of uv
+    density : (n, n) binary logarithm of the length on the surface per unit of uv [mm]
     """
     side = len(pores)
     density = np.clip(density, *_LOG2_MM_PER_UV_RANGE)  # undefined outside the charts

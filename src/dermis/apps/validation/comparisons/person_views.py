@@ -1,4 +1,4 @@
-"""Cameras, lights and poses in which people by dermis and by path tracing are compared."""
+"""Cameras, lights and poses for comparisons of people rendered by dermis and by path tracing."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _LIPS_FRAME_MM, _EAR_FRAME_MM = 72.0, 120.0
 
 @dataclass(frozen=True)
 class View:
-    """View of a person in which frame and path tracing are compared.
+    """View of a person for comparing a frame of dermis with path tracing.
 
     camera : function that returns the camera for a head
     light : name of a light preset or of a panorama
@@ -100,7 +100,7 @@ PANORAMAS = ("royal_esplanade", "lebombo", UNIFORM_PANORAMA)
 def view_scene(head: Head, view: View) -> Scene:
     """Return the scene of a view, with softboxes in place of point lights.
 
-    A path that leaves an eye through its cornea cannot hit a point light.
+    Point lights are replaced because a path that leaves an eye through its cornea cannot hit them.
     """
     pose = None if view.pose is None else Pose(expression(view.pose))
     camera = view.camera(head)

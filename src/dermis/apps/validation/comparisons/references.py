@@ -49,14 +49,15 @@ class ComparisonSubject:
 class ReferenceImage:
     """Reference image, the variance of its noise, and the assumptions under which it was computed.
 
-    image, variance : (h, w, 3) linear radiance, and the variance of its noise
+    image : (h, w, 3) linear radiance
+    variance : (h, w, 3) variance of the noise of `image`
     mask : (h, w) pixels to compare
-    samples : samples per pixel that a technique's image needs for a fair comparison
+    samples : samples per pixel at which techniques are rendered for a fair comparison
     seconds : duration of the computation [s]
     notes : sentences for the report
-    has_translucency : whether it includes light through thin parts
-    has_interreflection : whether it includes light from skin to skin through the air
-    direction : angular distribution of the light that leaves its skin, as in `Skin`
+    has_translucency : whether the image includes light through thin parts
+    has_interreflection : whether the image includes light from skin to skin through the air
+    direction : angular distribution of the light that leaves the skin, as in `Skin`
     """
 
     image: Floats
@@ -71,9 +72,11 @@ class ReferenceImage:
 
 
 def surface_integral(subject: ComparisonSubject, samples: int) -> ReferenceImage:
-    """Return the reference image by an integral of the profile over the surface, with Euclidean distances.
+    """Return the reference image obtained by integrating the profile over the surface.
 
-    samples : ignored, as there is no noise
+    The profile is a function of Euclidean distance.
+
+    samples : ignored, because the integral has no noise
     """
     started = time.perf_counter()
     visible = surface_points(subject.renderer, subject.scene, subject.settings)
@@ -89,7 +92,7 @@ def surface_heat(subject: ComparisonSubject, samples: int) -> ReferenceImage:
 
     Only the surroundings of the camera's target are computed.
 
-    samples : ignored, as there is no noise
+    samples : ignored, because the solution has no noise
     """
     target = subject.scene.camera.target
     return surface_heat_around(subject, target, _HEAT_PATCH_RADIUS_MM, irradiance_samples(subject))
@@ -102,9 +105,10 @@ def surface_heat_around(
     light: IrradianceSamples,
     min_variance_mm2: float = _MIN_VARIANCE_MM2,
 ) -> ReferenceImage:
-    """Return the reference image by the heat equation on the surface, around a visible point.
+    """Return the reference image obtained by the heat equation on the surface, around a visible point.
 
-    Each Gaussian of the profile corresponds to diffusion along the surface for some time.
+    Each Gaussian of the profile is replaced by diffusion along the surface for a time proportional to its
+    variance.
 
     target_mm : point relative to the head's centre; the nearest visible point is the centre of the patch [mm]
     radius_mm : radius of the patch in which pixels are compared [mm]
@@ -148,7 +152,7 @@ def irradiance_samples(subject: ComparisonSubject) -> IrradianceSamples:
 
 
 def path_traced_reference(subject: ComparisonSubject, samples: int) -> ReferenceImage:
-    """Return the reference image by path tracing in the medium, without the assumptions of a profile.
+    """Return the reference image obtained by path tracing in the medium, without a diffusion profile.
 
     samples : paths per pixel
     """
@@ -159,7 +163,7 @@ def path_traced_reference(subject: ComparisonSubject, samples: int) -> Reference
 
 
 def cycles_reference(subject: ComparisonSubject, samples: int) -> ReferenceImage:
-    """Return the image by Cycles with random walks through the medium, to compare with another renderer.
+    """Return the image that Cycles renders with random walks through the medium.
 
     samples : paths per pixel
     """
@@ -194,7 +198,8 @@ def _integrate_gaussians(
 
     points : (n, 3) positions [mm]
     light : irradiance on the surface
-    gaussian_weight, variance_mm2 : (k, 3) weights and (k,) variances of the Gaussians
+    gaussian_weight : (k, 3) weights of the Gaussians
+    variance_mm2 : (k,) variances of the Gaussians [mm^2]
     """
     from dermis.apps.truths.radial_table import GaussianSum as Profile
     from dermis.apps.truths.surface_integral import integrate_exitance
@@ -207,7 +212,7 @@ def _integrate_gaussians(
 def hit_positions(subject: ComparisonSubject, visible: SurfacePoints) -> Floats:
     """Return the positions (n, 3) where rays through pixel centres meet the head [mm].
 
-    visible : triangles and barycentric weights of these positions
+    visible : triangle and barycentric weights of each position
     """
     mesh = subject.scene.head.mesh
     corners = mesh.positions[mesh.triangles[visible.triangle]].astype(np.float64)

@@ -54,7 +54,7 @@ LIGHTS: dict[str, Callable[[Head], tuple[Light, ...]]] = {
 
 
 def _ear_position(head: Head) -> tuple[float, float, float]:
-    """Return the leftmost point of the head at the height of its ears, relative to its centre [mm]."""
+    """Return the leftmost point of a head at the height of the ears, relative to the head's centre [mm]."""
     points = head.mesh.positions - head.centre_mm
     height_offset = np.abs(points[:, 1])
     at_ear_height = points[height_offset <= max(_MAX_EAR_HEIGHT_MM, float(height_offset.min()))]
@@ -88,9 +88,10 @@ REGIONS: dict[str, Callable[[Head], Camera]] = {
 
 
 def comparison_scene(head: Head, light: str, region: str, profile: str) -> Scene:
-    """Return a scene of a head without maps or surface reflection, in the profile's own colour.
+    """Return a scene of a head in the colour of its diffusion profile, without maps or surface reflection.
 
-    light, region : names in LIGHTS and REGIONS
+    light : name of the light in LIGHTS
+    region : name of the visible region in REGIONS
     profile : name or file of the diffusion profile
     """
     plain_head = Head(head.name, head.mesh, Maps(), head.attribution)
@@ -102,9 +103,9 @@ def comparison_scene(head: Head, light: str, region: str, profile: str) -> Scene
 def medium_scene(
     head: Head, light: str, region: str, medium: Medium, model: ModelName | None = None
 ) -> Iterator[tuple[Scene, GaussianSum]]:
-    """Yield a `comparison_scene` with a medium's profile, and the profile.
+    """Yield a `comparison_scene` with the diffusion profile of a medium, and the profile itself.
 
-    The profile is in a temporary file, which is deleted when the context ends.
+    The scene reads the profile from a temporary file, which is deleted when the context ends.
     """
     profile = medium_gaussians(medium, model)
     with tempfile.TemporaryDirectory() as folder:

@@ -1,1 +1,1 @@
-"""Errors of exported skins and heads, measured in other programs."""
+"""Skins and heads exported to other programs, rendered there, and compared with dermis."""

@@ -66,12 +66,12 @@ def babylon_page(library: Path) -> Iterator[Page]:
 def measured_radiance(
     page: Page, profile_colour: Floats, meters_per_unit: float, pixel_mm: float, azimuth: float
 ) -> Floats:
-    """Return the radiance (side, side, 3) that Babylon.js draws, relative to that far inside the light.
+    """Return the radiance (side, side, 3) that Babylon.js draws, relative to that of a fully lit plane.
 
     Row 0 is at the bottom.
 
     profile_colour : diffusion profile, which Babylon.js expresses as a colour
-    meters_per_unit : metersPerUnit of the scene, in which a unit is a millimetre
+    meters_per_unit : setting metersPerUnit of Babylon.js; the unit of the scene is a millimetre
     pixel_mm : size of a pixel [mm]
     azimuth : direction across the edge of the light [rad]
     """
@@ -91,10 +91,10 @@ def predicted_radiance(
 ) -> Floats:
     """Return the radiance (side, side, 3) predicted from the shader's sample positions.
 
-    Positions are rounded to whole pixels.
+    Sample positions are rounded to whole pixels.
 
     profile_colour : diffusion profile, which Babylon.js expresses as a colour
-    meters_per_unit : metersPerUnit of the scene, in which a unit is a millimetre
+    meters_per_unit : setting metersPerUnit of Babylon.js; the unit of the scene is a millimetre
     pixel_mm : size of a pixel [mm]
     azimuth : direction across the edge of the light [rad]
     """
@@ -112,7 +112,7 @@ def predicted_radiance(
 def edge_profile(
     picture: Floats, pixel_mm: float, azimuth: float, x_mm: Floats, half_width_mm: float
 ) -> Floats:
-    """Return the mean radiance (n, 3) at distances from the edge of the light, within a strip across it.
+    """Return the mean radiance (n, 3) at distances from the edge of the light, in a strip across the edge.
 
     picture : (side, side, 3) radiance
     pixel_mm : size of a pixel [mm]
@@ -137,7 +137,7 @@ def edge_responses(page: Page, profile_colour: Floats, meters_per_unit: float, d
     The result also has the largest errors against the prediction and against exact Burley profiles.
 
     profile_colour : diffusion profile, which Babylon.js expresses as a colour
-    meters_per_unit : metersPerUnit of the scene, in which a unit is a millimetre
+    meters_per_unit : setting metersPerUnit of Babylon.js; the unit of the scene is a millimetre
     d_mm : (3,) widths of the Burley profiles, by channel [mm]
     """
     widest = float(d_mm.max())
@@ -184,7 +184,7 @@ def fitted_widths(x_mm: Floats, edge_response: Floats) -> list[float]:
 
 
 def exported_skin(page: Page, skin_name: str) -> JsonObject:
-    """Return the edge responses of a skin with exported parameters, and their errors against its profile."""
+    """Return the edge responses of an exported skin, and their errors against the skin's own profile."""
     subject, target = load_subject(skin_name), TARGETS["babylon"].with_variant(None)
     rows = target.parameters(subject, target.resolve_version(None))
     colour = np.array(get_numbers(rows, "subSurface.scatteringDiffusionProfile"))
@@ -203,8 +203,8 @@ DIFFUSION_COLOURS = {"white": (1, 1, 1), "grey": (0.5, 0.5, 0.5), "coloured": (1
 def babylon() -> None:
     """Measure light across the edge of a half-lit plane; write benchmarks/results/engines_babylon.json.
 
-    DERMIS_BABYLON names the folder that npm has installed the package babylonjs into. Chromium draws with its
-    software WebGL.
+    The environment variable DERMIS_BABYLON names the folder into which npm has installed the package
+    babylonjs. Chromium draws with its software WebGL.
     """
     with babylon_page(babylon_library()) as page:
         plain = {

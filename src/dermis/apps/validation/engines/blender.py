@@ -54,11 +54,11 @@ def blender(python_45: Path, python_52: Path, *parts: Measurement) -> None:
     Parameters
     ----------
     python_45:
-        A Python with the module bpy of Blender 4.5.
+        Python program that has the module bpy of Blender 4.5.
     python_52:
-        A Python with the module bpy of Blender 5.2.
+        Python program that has the module bpy of Blender 5.2.
     parts:
-        Measurements to make; results of the others stay as they are [all].
+        Measurements to make [all]; other measurements keep their last results.
     """
     pythons = {"4.5": blender_python(python_45), "5.2": blender_python(python_52)}
     parts = parts or get_args(Measurement)
@@ -91,7 +91,7 @@ def column_positions() -> Floats:
 def measure_edge(python: Path, version: str, subsurface_method: str, skin_name: str) -> JsonObject:
     """Return the measured and the predicted edge response of a skin, and their errors.
 
-    python : Python with Blender's module bpy
+    python : Python program that has Blender's module bpy
     skin_name : name of the skin
     """
     subject, target = load_subject(skin_name), TARGET.with_variant(subsurface_method)
@@ -141,7 +141,7 @@ def binned_response(curve: CumulativeProfile, d_mm: Floats) -> Floats:
 
 
 def measure_heads(pythons: dict[str, Path]) -> Iterator[JsonObject]:
-    """Yield the differences of Cycles from dermis in outline and colour, for a head without hair."""
+    """Yield differences in outline and colour between pictures of a bald head by Cycles and by dermis."""
     subject = load_subject("human").with_painted_maps(EXPORTED_MAP_SIDE, "auto")
     assert subject.scene is not None
     head = replace(subject.scene.head, hair=None, strands=None)

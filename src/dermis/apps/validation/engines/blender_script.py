@@ -1,7 +1,8 @@
 """Script that renders a half-lit plane of exported skin in Cycles, run by Blender's Python: SCRIPT FOLDER.
 
 FOLDER contains skin.py, as written by `dermis export --to blender`, and passes.json. The script adds
-done.json: Blender's version and, for each pass, the radiance of each column of pixels. Light is at x > 0.
+done.json: Blender's version and, for each pass, the radiance of each column of pixels. The plane is lit where
+x > 0.
 """
 
 from __future__ import annotations
@@ -60,7 +61,7 @@ def main(folder: Path) -> None:
 
 
 def set_channel(shader: Any, description: dict[str, Any], channel: int) -> None:
-    """Give all channels the colour and radius of one channel, so that all paths contribute to it.
+    """Give all channels the colour and radius of one channel, so that all paths help to measure this channel.
 
     description : subsurface parameters of the exported skin
     """
@@ -70,9 +71,9 @@ def set_channel(shader: Any, description: dict[str, Any], channel: int) -> None:
 
 
 def add_rectangle(skin: Any, material: Any, left_m: float, right_m: float, height_m: float) -> Any:
-    """Add a horizontal rectangle between two x coordinates at a height, all in metres.
+    """Add a horizontal rectangle between two x coordinates, at a height; return its object.
 
-    skin : module of the exported script
+    skin : exported script, imported as a module
     """
     mesh = bpy.data.meshes.new("rectangle")
     corners = [
@@ -101,7 +102,7 @@ def column_radiance(
 ) -> Any:
     """Render a picture across the edge of the light, and return the mean radiance of each pixel column.
 
-    skin : module of the exported script
+    skin : exported script, imported as a module
     width_m : width of the picture [m]
     """
     camera.ortho_scale = width_m

@@ -1,4 +1,4 @@
-"""Predicted errors of skins in glTF's draft of volume scattering, for several choices of its parameters."""
+"""Predicted scattering errors of skins exported to glTF's draft extension for volume scattering."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ GLTF_TARGET_VERSION = TARGET.versions[-1]
 
 
 def skin_results(skin_name: str) -> JsonObject:
-    """Return the fitted glTF parameters of a skin, and the predicted errors of several choices.
+    """Return the fitted glTF parameters of a skin, and the predicted errors for three sets of parameters.
 
-    The choices are fitted parameters, parameters set without a fit, and fitted parameters in which the albedo
+    The sets are fitted parameters, parameters chosen without a fit, and fitted parameters in which the albedo
     replaces the multiple-scattering colour.
     """
     subject = load_subject(skin_name)
@@ -42,7 +42,7 @@ def skin_results(skin_name: str) -> JsonObject:
 
 
 def gltf() -> None:
-    """Predict the errors of skins in glTF's draft and write benchmarks/results/engines_gltf.json."""
+    """Predict scattering errors of skins exported to glTF; write benchmarks/results/engines_gltf.json."""
     figures = {
         "version": GLTF_TARGET_VERSION,
         "draft": DRAFT_NOTICE,

@@ -1,7 +1,7 @@
 """Pictures of one exported head, with the same camera and lights, by dermis, Cycles, Babylon.js and Mitsuba.
 
-Hair is omitted, because each program draws it differently. Lights are directional, like those of the page
-that is exported for Babylon.js.
+Hair is omitted, because each program draws it differently. Lights are directional, as on the page that is
+exported for Babylon.js.
 """
 
 from __future__ import annotations
@@ -48,9 +48,9 @@ Floats = NDArray[np.float64]
 def heads() -> None:
     """Render one head in all installed programs and compare each picture with that of dermis.
 
-    Writes benchmarks/results/engines_heads.json and docs/images/engines_heads.webp. DERMIS_BLENDER_PYTHONS
-    names Pythons with bpy 4.5 and 5.2, separated by a comma; DERMIS_BABYLON a folder that npm has installed
-    babylonjs into. Needs Mitsuba.
+    Writes benchmarks/results/engines_heads.json and docs/images/engines_heads.webp. Needs Mitsuba. Other
+    programs are found by environment variables: DERMIS_BLENDER_PYTHONS names Python programs that have bpy
+    4.5 and 5.2, separated by a comma; DERMIS_BABYLON names a folder into which npm installed babylonjs.
     """
     in_checkout(PICTURE.parent)
     subject = load_subject("human").with_painted_maps(EXPORTED_MAP_SIDE, "auto")
@@ -71,9 +71,11 @@ def heads() -> None:
 
 
 def available_renderers(subject: Subject, dermis_picture: Floats) -> dict[str, Callable[[], list[Floats]]]:
-    """Return, by name of each installed program, a function that renders linear pictures (h, w, 4).
+    """Return a dictionary from the name of each installed program to a function that renders with it.
 
-    dermis_picture : (h, w, 4) picture by dermis, whose alpha replaces that of programs without alpha
+    The functions return linear pictures (h, w, 4), one per random seed.
+
+    dermis_picture : (h, w, 4) picture by dermis, whose alpha is used for programs without alpha
     """
     result: dict[str, Callable[[], list[Floats]]] = {}
     named = [one for one in os.environ.get("DERMIS_BLENDER_PYTHONS", "").split(",") if one]
@@ -146,8 +148,8 @@ def render_cycles(
 ) -> list[Floats]:
     """Return linear pictures (h, w, 4) of the exported scene by Cycles, one per random seed.
 
-    subsurface_method : variant of the target "blender"
-    python : Python with Blender's module bpy
+    subsurface_method : name of a variant of the export target "blender"
+    python : Python program that has Blender's module bpy
     """
     with TemporaryDirectory() as folder_name:
         folder = Path(folder_name) / "head"
@@ -169,7 +171,7 @@ def render_cycles(
 
 
 def compare_pictures(dermis_picture: Floats, other_picture: Floats) -> JsonObject:
-    """Return the differences of another program from dermis in outline, colour and relative RMSE.
+    """Return differences between another program's pictures and dermis: outline, colour, relative RMSE.
 
     dermis_picture : (h, w, 4) picture by dermis
     other_picture : (seeds, h, w, 4) pictures of the other program with different random seeds

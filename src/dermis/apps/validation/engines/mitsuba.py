@@ -1,7 +1,7 @@
 """Edge responses of exported skin in Mitsuba: light scattered across the edge of a half-lit plane.
 
-A lamp covers half of a plane of the exported medium and almost touches it. By reciprocity, the radiance along
-the normal at a distance from the lamp's edge is the edge response of the profile.
+A lamp covers half of a plane of the exported medium, almost touching the plane. By reciprocity, the radiance
+along the normal, at each distance from the lamp's edge, is the edge response of the diffusion profile.
 """
 
 from __future__ import annotations
@@ -48,10 +48,10 @@ def half_lit_plane(
 ) -> MitsubaObject:
     """Return a scene of the plane z = 0, lit where x > 0, in an orthographic view around the edge.
 
-    The camera is below the surface, because light along the normal crosses a smooth surface undeflected; a
-    rough surface deflects it, so there the camera is above.
+    The camera is below a smooth surface, because light along the normal crosses this surface undeflected.
+    The camera is above a rough surface, which deflects light.
 
-    d_mm : Burley width of the profile; the view spans 3 d on each side of the edge [mm]
+    d_mm : Burley width d of the profile; the view spans 3 d on each side of the edge [mm]
     is_black : whether the medium absorbs all light, so that only the surface reflects
     """
     transform = mi.ScalarTransform4f

@@ -1,4 +1,4 @@
-"""Predicted errors of skins in OpenPBR, MaterialX and pbrt, and validation of the exported files."""
+"""Predicted scattering errors of skins exported to OpenPBR, MaterialX and pbrt, and checks of the files."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ _MISSING_PLUGIN_ERROR = "MissingShaderIdInRegistry"  # reported for a plug-in th
 
 
 def skin_errors() -> JsonObject:
-    """Return exported radii and predicted errors of each skin in OpenPBR, MaterialX and pbrt.
+    """Return the radii of each skin as exported to OpenPBR and pbrt, and the predicted scattering errors.
 
-    Errors are given for fitted parameters, for parameters set without a fit, and for fitted radii that are
-    interpreted as widths of a Burley profile.
+    Errors are given for fitted parameters, for parameters chosen without a fit, and for fitted radii that a
+    program interprets as widths of a Burley profile.
     """
     results: JsonObject = {}
     for name in COMPARED_SKINS:
@@ -56,7 +56,7 @@ def skin_errors() -> JsonObject:
 
 
 def validate_files() -> JsonObject:
-    """Validate exported MaterialX and USD files; return errors, and the versions of the libraries."""
+    """Validate exported MaterialX and USD files; return the errors found and the libraries' versions."""
     MaterialX = import_extra("MaterialX", "checking its files")
     import_extra("pxr", "checking USD")
     from pxr import Usd, UsdValidation
@@ -87,7 +87,7 @@ def float_list(numbers: ArrayLike) -> list[float]:
 
 
 def error_table(results: JsonObject) -> list[str]:
-    """Return a Markdown table of the largest edge errors by skin and interpretation of the parameters."""
+    """Return a Markdown table of the largest errors of edge responses, with one row for each skin."""
     lines = [
         "| skin | radius [mm] | OpenPBR's random walk | diffuse mean free path typed in"
         " | radius interpreted as a profile | pbrt | diffuse mean free path typed in |",
@@ -103,9 +103,10 @@ def error_table(results: JsonObject) -> list[str]:
 
 
 def openpbr() -> None:
-    """Predict the errors of skins, print them and write benchmarks/results/engines_openpbr.json.
+    """Predict the scattering errors of exported skins, and write benchmarks/results/engines_openpbr.json.
 
-    Needs the packages usd-core and MaterialX. No renderer of these formats is run.
+    The errors are also printed. Needs the packages usd-core and MaterialX; no renderer of these formats is
+    run.
     """
     write_results(RESULTS_FILE, {"libraries": validate_files(), "skins": skin_errors()}, 4)
     print_lines(*error_table(read_results(RESULTS_FILE)["skins"]))

@@ -1,7 +1,8 @@
 """Command that renders one head by dermis, Cycles and Mitsuba on one CPU and reports times and errors.
 
-It takes about twelve minutes on two idle cores, one or two with --quick. It needs the sample data, Mitsuba,
-and for Cycles a Python with bpy, named by DERMIS_BLENDER_PYTHON. Times differ from run to run, images do not.
+The command takes about twelve minutes on two idle cores, or one to two minutes with --quick. It needs the
+sample data and Mitsuba. Cycles needs a Python program that has the module bpy; the environment variable
+DERMIS_BLENDER_PYTHON names this program. Times differ from run to run, images do not.
 """
 
 from __future__ import annotations

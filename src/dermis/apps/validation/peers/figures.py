@@ -1,4 +1,4 @@
-"""Noise and errors of dermis, Cycles and Mitsuba, and the time that Cycles needs for dermis's error."""
+"""Noise and errors of dermis, Cycles and Mitsuba, and the time in which Cycles reaches dermis's error."""
 
 from __future__ import annotations
 
@@ -27,10 +27,13 @@ class RendererRow:
     """Times and errors of a renderer with one setting.
 
     setting : technique of dermis, or paths per pixel of a path tracer
-    seconds, core_seconds : elapsed and CPU time of one image [s]; None if the row is an average of other
-        images and was not itself rendered
+    seconds : elapsed time of one image [s]; None if the image is an average of other images
+    core_seconds : CPU time of one image [s]; None if the image is an average of other images
     noise : relative RMSE of the image's own noise [-]
-    relrmse, energy_ratio : errors against the reference, with standard errors; None for the reference itself
+    relrmse : relative RMSE against the reference [-]; None for the reference itself
+    relrmse_se : standard error of `relrmse`
+    energy_ratio : ratio of the total light to that of the reference [-]; None for the reference itself
+    energy_ratio_se : standard error of `energy_ratio`
     """
 
     renderer: str
@@ -46,7 +49,7 @@ class RendererRow:
 
 @dataclass(frozen=True)
 class MeanImage:
-    """Mean of all passes of a Cycles method, and the variance of its noise, each (h, w, 3)."""
+    """Mean image (h, w, 3) of all passes of a Cycles method, and the variance (h, w, 3) of its noise."""
 
     image: Floats
     variance: Floats
@@ -91,11 +94,11 @@ def common_mask(renders: PeerRenders) -> Mask:
 
 
 def mean_of_passes(passes_by_turn: Sequence[Sequence[CyclesPass]]) -> MeanImage:
-    """Return the mean of all passes of a method, and the variance of its noise.
+    """Return the mean image of all passes of a Cycles method, and the variance of its noise.
 
     The variance follows from the differences between passes with equal numbers of paths and different seeds.
 
-    passes_by_turn : for each seed, one pass for each number of paths
+    passes_by_turn : list for each of two seeds, with one pass for each number of paths
     """
     levels = [level[0].samples for level in zip(*passes_by_turn, strict=True)]
     image, variance = np.zeros(passes_by_turn[0][0].image.shape), np.zeros(passes_by_turn[0][0].image.shape)
@@ -124,16 +127,18 @@ def samples_for_noise(
 ) -> float:
     """Return the number of paths per pixel at which the noise reaches a given value.
 
-    Noise is assumed proportional to 1 / sqrt(N), from the measured N whose noise is most similar.
+    Noise is extrapolated in proportion to 1 / sqrt(N), from the measured number of paths N whose noise is
+    nearest to the target.
 
-    samples, noise_by_samples : measured numbers of paths N, and their noise
+    samples : measured numbers of paths N
+    noise_by_samples : noise for each of `samples`
     """
     nearest = int(np.abs(np.log(np.divide(noise_by_samples, target_noise))).argmin())
     return float(samples[nearest] * (noise_by_samples[nearest] / target_noise) ** 2)
 
 
 def _signal_energy(mean: MeanImage, mask: Mask) -> float:
-    """Return the sum of squares of a picture over a mask, minus the part that is due to noise."""
+    """Return the sum of squares of a picture within a mask, minus the part that is due to noise."""
     return float((mean.image**2 - mean.variance)[mask].sum())
 
 
@@ -172,7 +177,10 @@ def _mitsuba_row(renders: PeerRenders, mask: Mask) -> RendererRow:
 def _cycles_rows(
     renders: PeerRenders, subsurface_method: str, mean: MeanImage, mask: Mask
 ) -> list[RendererRow]:
-    """Return rows of Cycles: one for each number of paths, and one for the mean of all, without noise."""
+    """Return rows of Cycles: one for each number of paths, and one for the mean image.
+
+    The noise of the mean image is subtracted from its errors.
+    """
     reference, rows = renders.reference, []
     for level in zip(*renders.cycles[subsurface_method], strict=True):
         pairs = [(one.image, reference.image, mask, reference.variance) for one in level]
@@ -198,9 +206,9 @@ def _cycles_rows(
 def _equal_error_costs(
     renders: PeerRenders, mean: MeanImage, dermis_row: RendererRow, mask: Mask
 ) -> JsonObject:
-    """Return the paths and the time that a random walk needs for dermis's error, and for low noise.
+    """Return the cost of Cycles' random walk at the error of dermis, and the cost at low noise.
 
-    dermis_row : row of dermis, whose error against the reference is the goal
+    dermis_row : row of dermis; its error against the reference is the target for Cycles
     """
     reference, levels = renders.reference, list(zip(*renders.cycles["random-walk"], strict=True))
     bias = relative_rmse(mean.image, reference.image, mask, reference.variance, mean.variance).value
@@ -219,9 +227,9 @@ def _equal_error_costs(
 def _cycles_cost(
     paths_per_pixel: float, passes: Sequence[CyclesPass], dermis_row: RendererRow
 ) -> dict[str, float]:
-    """Return the time of Cycles for a number of paths per pixel, and its ratio to a frame of dermis.
+    """Return the time of Cycles for a number of paths per pixel, also relative to a frame of dermis.
 
-    passes : measured passes, from whose time per path the cost is extrapolated
+    passes : measured passes, whose mean time per path is used
     """
     seconds = paths_per_pixel * statistics.mean(one.seconds / one.samples for one in passes)
     core_seconds = paths_per_pixel * statistics.mean(one.core_seconds / one.samples for one in passes)

@@ -1,4 +1,4 @@
-"""Renderings of a scene by dermis, Cycles and Mitsuba in turns, so that slow phases affect all three."""
+"""Interleaved renderings of a scene by dermis, Cycles and Mitsuba, so that all are slowed down alike."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ CYCLES_METHODS: tuple[SubsurfaceMethod, ...] = ("random-walk", "burley")
 
 @dataclass(frozen=True)
 class RenderVariant:
-    """Settings of dermis that are compared: technique, atlas and angular distribution of skin.
+    """Variant of dermis that is compared with other renderers.
 
     technique : scattering technique
     atlas : side of the atlas [texel]
@@ -60,12 +60,12 @@ _PROGRESS_STEPS_BY_RENDERER = {"ours": 35, "random-walk": 5, "burley": 2, "path-
 
 @dataclass(frozen=True)
 class PeerPlan:
-    """Sizes and numbers of the renderings.
+    """Size of the images, and numbers of paths and frames, for a comparison of renderers.
 
     side : side of the square image [pixel]
     samples : paths per pixel of each pass of Cycles
     paths : paths per pixel of Mitsuba
-    frames : timed frames of dermis in each turn, after one that is not timed
+    frames : timed frames of dermis in each turn, drawn after an untimed frame
     """
 
     side: int = 512
@@ -98,10 +98,12 @@ class FrameTimes:
 class PeerRenders:
     """Pictures and times of all renderers for one scene.
 
-    light, region : names of the scene's light and of the visible region
-    ours : frames of dermis by names in `DERMIS_VARIANTS` and `GPU_GEMS_3_VARIANTS`
-    cycles : passes of Cycles by method: for each seed, one pass for each number in `PeerPlan.samples`
-    left_out : reason why a method of Cycles is missing, by method
+    light : name of the scene's light
+    region : name of the visible region
+    ours : dictionary from a name in `DERMIS_VARIANTS` or `GPU_GEMS_3_VARIANTS` to frames of dermis
+    cycles : dictionary from a method of Cycles to its passes: a list for each seed, with one pass for each
+        number in `PeerPlan.samples`
+    left_out : dictionary from a missing method of Cycles to the reason why it is missing
     reference : path-traced image by Mitsuba
     reference_core_seconds : CPU time of Mitsuba, including loading of the scene [s]
     """
@@ -162,7 +164,7 @@ def render_peers(
 def _cycles_passes(
     scene: Scene, medium: Medium, plan: PeerPlan, settings: Settings, method: SubsurfaceMethod, seed: int
 ) -> list[CyclesPass]:
-    """Render the passes of Cycles after an untimed one, in which Cycles builds the scene.
+    """Render the passes of Cycles after an untimed pass in which Cycles builds the scene.
 
     seed : random seed of the first pass
     """
@@ -172,9 +174,9 @@ def _cycles_passes(
 def _add_frames(
     dermis_frames: dict[str, FrameTimes], renderer: Renderer, scene: Scene, plan: PeerPlan
 ) -> None:
-    """Time further frames of each variant of dermis; each recomputes all stages, with warm caches.
+    """Time further frames of each variant of dermis; each frame recomputes all stages, with warm caches.
 
-    dermis_frames : frames by variant, to which times are added
+    dermis_frames : dictionary from variant to frames, to which the times are added
     """
     for name, variant in (DERMIS_VARIANTS | GPU_GEMS_3_VARIANTS).items():
         values = {"technique": variant.technique, "atlas": variant.atlas}

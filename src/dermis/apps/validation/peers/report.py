@@ -49,11 +49,12 @@ def peers(
     lights:
         Names of lights, separated by commas: front, back or laser.
     quick:
-        A small image with few paths, to check that everything works. Writes only the file of -o.
+        Render a small image with few paths, to check that everything works. Writes only the file of -o.
     side:
         Side of the images [pixel; 512, or 160 with --quick].
     output:
-        JSON file of the results [benchmarks/results/peers.json, and docs/peers.md beside it].
+        JSON file of the results [benchmarks/results/peers.json]. With another file, docs/peers.md is not
+        written.
     adapter:
         Adapter of dermis: cpu, so that all renderers use the same processor.
     """

@@ -1,1 +1,1 @@
-"""Skin of measured people: tables of a spectral archive, and drawn people compared with it."""
+"""Skin of people in a spectral archive: tables for the package, and comparison with drawn people."""

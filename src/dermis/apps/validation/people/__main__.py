@@ -1,6 +1,6 @@
 """Commands that compare randomly drawn people with a spectral archive of measured people.
 
-They need the archive in the folder DERMIS_DATA, see docs/measured.md.
+The commands need the archive in the folder DERMIS_DATA, see docs/measured.md.
 """
 
 from __future__ import annotations

@@ -35,7 +35,8 @@ class DrawnPeople(NamedTuple):
     """Colours of n people of one group at the sites of `HEAD_SITES`.
 
     cielab : (n, 7, 3) colours under D65
-    age, sex : (n,) age [years] and sex
+    age : (n,) ages [years]
+    sex : (n,) sexes, 0 for female and 1 for male
     """
 
     cielab: Doubles
@@ -44,7 +45,7 @@ class DrawnPeople(NamedTuple):
 
 
 def site_variables(look: SkinLook) -> Doubles:
-    """Return the variables (7, 4) of `model_spectra` for a skin look at each of `HEAD_SITES`."""
+    """Return the variables (7, 4) of `model_spectra` for a skin look, one row for each of `HEAD_SITES`."""
     differences = np.vstack([np.zeros(3), look.sites.array()])
     cheek = np.log2([look.melanin, look.blood])
     oxygen = np.clip(look.oxygen + differences[:, 2], 0.0, 1.0)
@@ -54,7 +55,7 @@ def site_variables(look: SkinLook) -> Doubles:
 
 @logged_step("drawing people")
 def draw_people(group: str, seeds: Sequence[int]) -> DrawnPeople:
-    """Return randomly drawn people of a measured group, with colours by the model, without rendering."""
+    """Return randomly drawn people of a measured group; the spectral model gives their colours."""
     drawn = [Human.drawn(seed, skin_ancestry=group) for seed in seeds]
     variables = np.concatenate([site_variables(one.look) for one in drawn])
     colours = model_lab(variables).reshape(len(drawn), len(HEAD_SITES), 3)
@@ -62,7 +63,7 @@ def draw_people(group: str, seeds: Sequence[int]) -> DrawnPeople:
 
 
 def draw_all(seed_count: int = _SEED_COUNT) -> dict[str, DrawnPeople]:
-    """Return people of all groups, drawn with the same seeds."""
+    """Return a dictionary from each group to drawn people; all groups have the same random seeds."""
     return {group: draw_people(group, range(seed_count)) for group in GROUP_OF_CODE.values()}
 
 
@@ -78,7 +79,7 @@ def people(seeds: int = _SEED_COUNT) -> None:
 
 
 def page(seeds: int = _SEED_COUNT) -> None:
-    """Measure the variation of people and write docs/measured.md.
+    """Compare drawn people with the archive, and write docs/measured.md.
 
     Parameters
     ----------
@@ -124,7 +125,7 @@ def cheek_table(archive: Archive, drawn: Mapping[str, DrawnPeople]) -> str:
 def two_sample_distance(first_sample: Doubles, second_sample: Doubles) -> tuple[float, float, float]:
     """Return the energy distance of two samples, and its mean and 95 % quantile for equal populations.
 
-    The last two are estimated by permutation.
+    The mean and the quantile are estimated by permutation.
     """
     rng, both = np.random.default_rng(0), np.concatenate([first_sample, second_sample])
     permuted = []
@@ -141,7 +142,11 @@ def two_sample_distance(first_sample: Doubles, second_sample: Doubles) -> tuple[
 def site_differences(
     archive: Archive, drawn: Mapping[str, DrawnPeople]
 ) -> Iterator[tuple[str, str, int, Doubles, Doubles]]:
-    """Yield group, site, number of people, measured median (3,), and drawn minus measured median (3,)."""
+    """Yield the difference of median colours between drawn people and the archive, by group and site.
+
+    Each item is a group, a site, the number of measured people, the measured median (3,), and the median of
+    drawn people minus the measured median (3,).
+    """
     for code, group in GROUP_OF_CODE.items():
         for k, site in enumerate(HEAD_SITES):
             measured = _measured_colours(archive, code, site)
@@ -152,7 +157,7 @@ def site_differences(
 
 
 def sites_table(archive: Archive, drawn: Mapping[str, DrawnPeople]) -> str:
-    """Return a Markdown table of medians by group and site, and of the differences of drawn people."""
+    """Return a Markdown table of the items of `site_differences`."""
     lines = [
         "| group | site | people | archive: L*, a*, b* | drawn minus archive | |",
         "|---|---|---|---|---|---|",
@@ -170,7 +175,10 @@ def sites_table(archive: Archive, drawn: Mapping[str, DrawnPeople]) -> str:
 
 
 def sex_age_table(archive: Archive, drawn: Mapping[str, DrawnPeople]) -> str:
-    """Return a Markdown table of colour differences of the cheek by sex and age, averaged over the groups."""
+    """Return a Markdown table of the cheek's colour differences between sexes and between ages.
+
+    The differences are averaged over the groups.
+    """
     lines = ["| difference | archive: L*, a*, b* | drawn |", "|---|---|---|"]
     for name in ("men minus women", "from 55 years minus below 45"):
         both = []
@@ -192,7 +200,10 @@ def sex_age_table(archive: Archive, drawn: Mapping[str, DrawnPeople]) -> str:
 
 
 def empty_cells(archive: Archive) -> str:
-    """Return text that lists sites without measurements by group; the package uses pooled values there."""
+    """Return text that lists, for each group, the sites without measurements.
+
+    The package uses pooled values for these sites.
+    """
     parts = []
     for code, group in GROUP_OF_CODE.items():
         empty = [

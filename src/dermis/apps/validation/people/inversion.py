@@ -1,4 +1,4 @@
-"""Pigments of measured spectra in the variables of the table of measured people, and their colours."""
+"""Conversion between spectra of skin and the four variables of the table of measured people."""
 
 from __future__ import annotations
 
@@ -26,9 +26,10 @@ _INDEPENDENT_WAVELENGTHS = 9.0  # number of wavelengths whose errors are indepen
 
 
 def model_spectra(variables: Doubles) -> Doubles:
-    """Return the diffuse reflectance (n, 31) of the package's skins, clipped to the limits of the inversion.
+    """Return the diffuse reflectance (n, 31) of skins, by the package's spectral model.
 
-    variables : (n, 4) log2 of melanin and of blood, oxygen, log2 of the thickness [mm]
+    variables : (n, 4) log2 of the melanin fraction, log2 of the blood fraction, oxygenation, and log2 of the
+        thickness of the epidermis in mm; clipped to the limits of the inversion
     """
     melanin, blood, oxygen, mm = np.clip(variables, _MIN_VARIABLES, _MAX_VARIABLES).T
     values = {"melanin": np.exp2(melanin), "blood": np.exp2(blood), "oxygen": oxygen}
@@ -36,12 +37,14 @@ def model_spectra(variables: Doubles) -> Doubles:
 
 
 def model_lab(variables: Doubles) -> Doubles:
-    """Return the CIELAB colours (n, 3) of skins; variables as in `model_spectra`."""
+    """Return the CIELAB colours (n, 3) of skins, whose variables are described in `model_spectra`."""
     return lab(model_spectra(variables) @ rgb_weights(WAVELENGTHS_NM).T)
 
 
 def invert_spectra(reflectance: Doubles) -> Doubles:
-    """Return the variables (n, 4) of `model_spectra` that match spectra, colours before shapes.
+    """Return the variables (n, 4) of `model_spectra` that fit spectra best.
+
+    Agreement of colours has precedence over agreement of the shapes of spectra.
 
     reflectance : (n, 31) at `WAVELENGTHS_NM`, without surface reflection [-]
     """

@@ -116,7 +116,7 @@ def build_table(archive: Archive, variables: Doubles) -> dict[str, Any]:
 
 
 def person_medians(archive: Archive, variables: Doubles, site_index: int) -> tuple[Archive, Doubles]:
-    """Return one measurement for each person at a site: the one in the middle by lightness."""
+    """Return one measurement for each person at a site: the measurement of median lightness."""
     rows = np.flatnonzero(archive.site == site_index)
     order = rows[np.lexsort((archive.cielab[rows, 0], archive.person[rows]))]
     people, first, counts = np.unique(archive.person[order], return_index=True, return_counts=True)
@@ -131,7 +131,10 @@ def _by_group(archive: Archive) -> Iterator[tuple[str, NDArray[np.bool_]]]:
 
 
 def _sex_age_effects(cheek: Archive, variables: Doubles) -> tuple[Doubles, Doubles]:
-    """Return the effects (4,) of sex and of `age_term`, by least squares with an intercept for each group."""
+    """Return the effects (4,) of sex and of `age_term` on the variables.
+
+    The effects are fitted by least squares, with an intercept for each group.
+    """
     known = np.isfinite(cheek.sex) & np.isfinite(cheek.age)
     levels = (cheek.group[known, None] == np.array(list(GROUP_OF_CODE))).astype(np.float64)
     terms = np.column_stack([levels, cheek.sex[known], age_term(cheek.age[known])])
@@ -160,8 +163,9 @@ def _normal_scores(variables: Doubles, archive_rows: Archive) -> Doubles:
 def _site_differences(archive: Archive, variables: Doubles) -> tuple[Doubles, Doubles, Doubles]:
     """Return how sites differ from the cheek: medians (g, 12, 3), slopes (12, 2) and spreads (12, 2).
 
-    A slope is the change of the difference with the deviation of the cheek from the median of its group.
-    Cells with too few people are mixed with the mean of the other groups, weighted by people.
+    A slope says how the difference of a person changes with the deviation of the person's cheek from the
+    median of the group. If a group has too few people, its median is blended with the mean of the other
+    groups, weighted by their numbers of people.
     """
     shifts, counts = np.zeros((len(GROUP_OF_CODE), len(SITES), 3)), np.zeros((len(GROUP_OF_CODE), len(SITES)))
     slope, spread = np.zeros((len(SITES), 2)), np.zeros((len(SITES), 2))
@@ -195,7 +199,7 @@ def _winsorised(samples: Doubles) -> Doubles:
 
 
 def _population() -> tuple[Doubles, Doubles]:
-    """Return ages and sexes (n,) of adults as `Human.drawn` samples them."""
+    """Return ages and sexes (n,) of adults, distributed as in `Human.drawn`."""
     rng = np.random.default_rng(0)
     return 25.0 + 65.0 * rng.beta(1.2, 2.2, _POPULATION_SIZE), rng.integers(0, 2, _POPULATION_SIZE).astype(
         np.float64
@@ -203,10 +207,10 @@ def _population() -> tuple[Doubles, Doubles]:
 
 
 def _calibrate(document: dict[str, Any], archive: Archive, ages: Doubles, sexes: Doubles) -> None:
-    """Correct quantiles and site differences until median colours of drawn people equal the archive's.
+    """Adjust quantiles and site differences so that median colours of drawn people equal the archive's.
 
-    Spectra do not determine the thickness of the epidermis: the one with which the sites of the head agree
-    best is chosen.
+    The table `document` is changed in place. Spectra do not determine the thickness of the epidermis, so
+    several values are tried, and the value that best reproduces the colours of the head is kept.
     """
     rng = np.random.default_rng(1)
     population = _Population(
@@ -227,7 +231,11 @@ def _calibrate(document: dict[str, Any], archive: Archive, ages: Doubles, sexes:
 
 
 class _Population(NamedTuple):
-    """Ages, sexes (n,) and random scores (n, 4), (n, 12, 2) of the people for whom medians are calibrated."""
+    """People for whom medians are calibrated: ages and sexes (n,), and random numbers.
+
+    normals : (n, 4) standard normal random numbers for the variables of the cheek
+    site_normals : (n, 12, 2) standard normal random numbers for the differences of sites
+    """
 
     ages: Doubles
     sexes: Doubles
@@ -238,7 +246,7 @@ class _Population(NamedTuple):
 def _calibrate_group(
     document: dict[str, Any], group_name: str, group_archive: Archive, people: _Population
 ) -> float:
-    """Calibrate one group in place, and return the sum of squared errors of medians of the head [CIELAB]."""
+    """Calibrate one group in place, and return the sum of squared errors of median colours on the head."""
     group = document["groups"][group_name]
     target, loss = np.median(group_archive.cielab[group_archive.site == _CHEEK_SITE_INDEX], axis=0), 0.0
     shift, error = _matching_shift(_drawn_cheeks(document, group_name, people)[1], target, 3)
@@ -260,18 +268,18 @@ def _calibrate_group(
 
 
 def _drawn_cheeks(document: dict[str, Any], group: str, people: _Population) -> tuple[MeasuredTable, Doubles]:
-    """Return the parsed table, and the variables (n, 4) of the cheeks of drawn people of a group."""
+    """Return the parsed table, and the variables (n, 4) of the cheeks of people drawn from a group."""
     found, weights = parse_table(document), {group: 1.0}
     scores = people.normals @ symmetric_square_root(found.mixture("correlation", weights)[:4, :4])
     return found, found.variables(weights, people.sexes, people.ages, scores)
 
 
 def _matching_shift(variables: Doubles, target_colour: Doubles, people_count: int) -> tuple[Doubles, Doubles]:
-    """Return the shift (4,) of variables that moves a median colour to a target, and the error left (3,).
+    """Return the shift (4,) of variables that brings their median colour to a target, and the error left.
 
     variables : (n, 4) variables of people
     target_colour : (3,) median colour to reach [CIELAB]
-    people_count : number of variables that may be shifted
+    people_count : number of variables that may be shifted, counted from the first
     """
     shift, used = np.zeros(4), np.arange(4) < people_count
 
@@ -296,7 +304,10 @@ def _matching_shift(variables: Doubles, target_colour: Doubles, people_count: in
 
 
 def cells_text(archive: Archive, variables: Doubles, measured_table: MeasuredTable) -> str:
-    """Return the CSV table of medians and covariances by group and site, and by sex and by age group."""
+    """Return a CSV table of medians and covariances, with one row for each group and site.
+
+    Further rows are for one sex or one age group.
+    """
     out = StringIO()
     out.write(_CELLS_CSV_HEADER)
     writer = csv.writer(out, lineterminator="\n")
@@ -359,7 +370,7 @@ def _cell_row(
 
 
 def _pooled_cell(measured_table: MeasuredTable, group: str, site_index: int) -> list[str]:
-    """Return median colour and pigments of a site without measurements by the pooled model."""
+    """Return the median colour and pigments that the table predicts for a site without measurements."""
     y = measured_table.variables({group: 1.0}, 0.5, 30.0, np.zeros((1, 4)))
     y[:, :3] += measured_table.site_variables({group: 1.0}, y, np.zeros((1, len(SITES), 2)))[:, site_index]
     colour, (melanin, blood, oxygen, thickness) = model_lab(y)[0], y[0]

@@ -1,1 +1,1 @@
-"""Viewer as a web page: the HTTP canvas of rendercanvas, behind a server that validates all requests."""
+"""Viewer as a web page: a canvas based on rendercanvas, and a server that validates all requests."""

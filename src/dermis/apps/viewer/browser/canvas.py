@@ -1,4 +1,4 @@
-"""HTTP canvas of rendercanvas that encodes images in threads and sends a first frame to every new page."""
+"""Canvas for web pages, based on rendercanvas, with image encoding in threads."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _MAX_ENCODERS = 2  # frames encoded at the same time while the next one is rende
 
 
 class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
-    """Canvas that web pages display; a slow page skips frames, and later receives the newest frame."""
+    """Canvas displayed by web pages; a page that is too slow skips frames and then gets the newest one."""
 
     def __init__(self, **kwargs: object) -> None:
         self._encoders = ThreadPoolExecutor(_MAX_ENCODERS, "encoder")
@@ -39,16 +39,16 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
         super().__init__(**kwargs)
 
     def send_stage(self, stage_name: str, stage_number: int, stage_count: int) -> None:
-        """Send the progress of the preparation to all pages, which display it until the first picture.
+        """Send the progress of the preparation to all pages; they display it until the first picture.
 
         stage_name : name of the stage, such as "compiling shaders"
-        stage_number : position of the stage in the order of stages, from 1
-        stage_count : number of all stages
+        stage_number : position of the stage, counted from 1
+        stage_count : number of stages
         """
         self._broadcast({"type": "stage", "text": stage_name, "number": stage_number, "total": stage_count})
 
     def send_failure(self, failure_text: str) -> None:
-        """Send an error message to all pages, which display it instead of a picture."""
+        """Send an error message to all pages; they display it instead of a picture."""
         self._broadcast({"type": "failure", "text": failure_text})
 
     def _broadcast(self, message: dict[str, object]) -> None:
@@ -75,7 +75,7 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
             asgi.send_all(self._startup_message)
 
     def offer_download(self, file_name: str, content: bytes) -> None:
-        """Send a file to the page that has control, which offers it as a download."""
+        """Send a file to the page that has control; the page offers it to the user as a download."""
         asgi.send_to({"type": "download", "name": file_name, "nbuffers": 1}, [content], self._active_client)
 
     def _on_event(self, event: dict[str, Any], id: int) -> None:
@@ -91,7 +91,7 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
             self._send_last_frame_to_ready_clients()  # it was encoded while this page was not ready
 
     def _maybe_draw(self) -> None:
-        """Draw a frame, unless too many frames are being encoded or not yet confirmed by the page."""
+        """Draw a frame, unless too many frames are being encoded or wait for the page's confirmation."""
         info = self._frame_info_per_client.get(self._active_client)
         if info and info["sent"] - info["confirmed"] + self._encoding_count >= self._max_buffered_frames:
             self._pending_maybe_draw = False  # retried after the next frame is encoded or confirmed
@@ -113,12 +113,12 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
         future.add_done_callback(partial(self._send_frame, self._drawn_number, is_lossless_redraw))
 
     def _cancel_lossless_draw(self) -> None:
-        """Cancel the lossless frame that follows a still picture, even if its encoding has begun."""
+        """Cancel the lossless redraw of the last frame, even if it is already being encoded."""
         self._lossless_number = 0
         super()._cancel_lossless_draw()
 
     def _send_frame(self, frame_number: int, is_lossless: bool, encoded_frame: asyncio.Future[bytes]) -> None:
-        """Send an encoded frame to all pages, unless a newer frame has been sent.
+        """Send an encoded frame to all pages, unless a newer frame has already been sent.
 
         frame_number : number of the frame, in the order of drawing
         is_lossless : whether the frame is encoded as PNG
@@ -145,7 +145,7 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
 
 
 def encode_image(pixels: NDArray[np.uint8], *, is_lossless: bool) -> bytes:
-    """Encode an (h, w, 4) image without alpha as PNG (lossless) or JPEG."""
+    """Encode an image (h, w, 4), without its alpha channel, as PNG (lossless) or JPEG."""
     from PIL import Image
 
     height, width = pixels.shape[:2]

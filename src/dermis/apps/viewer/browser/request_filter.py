@@ -25,7 +25,7 @@ ShortText = Annotated[str, Field(max_length=32)]
 
 
 class _StrictModel(BaseModel):
-    """Model that ignores unknown fields and accepts finite numbers only."""
+    """Base class of the models of messages: unknown fields are ignored, and numbers must be finite."""
 
     model_config = ConfigDict(strict=True, extra="ignore", allow_inf_nan=False)
 
@@ -88,7 +88,7 @@ class TextInput(_TimedMessage):
 
 
 class Resize(_TimedMessage):
-    """Event of a new page size, in logical and physical pixels with their ratio."""
+    """Event of a new page size: in logical pixels, in physical pixels, and the ratio of the two."""
 
     type: Literal["resize"]
     width: Coordinate
@@ -121,7 +121,7 @@ _MESSAGE_PARSER: TypeAdapter[Any] = TypeAdapter(
 
 
 def checked_message(message_text: object) -> str | None:
-    """Return a page's message without unknown fields, or None if the message is invalid.
+    """Return a message from a page without its unknown fields, or None if the message is invalid.
 
     message_text : untrusted message of any type
     """
@@ -182,7 +182,7 @@ class RequestFilter:
             await self._app(scope, receive, send)
 
     def _refusal_reason(self, scope: Message) -> str:
-        """Return the reason for which a request is rejected, or an empty string for an accepted request."""
+        """Return the reason why a request is rejected, or an empty string if it is accepted."""
         host = next(iter(_header_values(scope, b"host")), "")
         if not self._token and not is_local(_host_name(host)):
             return _WRONG_HOST_REASON  # DNS rebinding: the name of another site resolves to this machine
@@ -206,7 +206,7 @@ class RequestFilter:
         return hmac.compare_digest(received_token.encode(), self._token.encode())
 
     def _add_cookie(self, send: Send) -> Send:
-        """Return a `send` function that also sets the token cookie, hidden from scripts and other sites."""
+        """Return a `send` function that also sets the token cookie, invisible to scripts and other sites."""
         cookie = f"{self._cookie}={self._token}; Path=/; HttpOnly; SameSite=Strict".encode()
 
         async def send_with_cookie(message: Message) -> None:
@@ -218,7 +218,7 @@ class RequestFilter:
 
 
 def is_local(host: str) -> bool:
-    """Return whether a host name or address can be reached from this machine only."""
+    """Return whether a host name or address can be reached only from this machine."""
     if host == "localhost":
         return True
     try:
@@ -239,7 +239,7 @@ def _host_name(host: str) -> str:
 
 
 def _drop_invalid_messages(receive: Receive) -> Receive:
-    """Return a `receive` function that skips invalid messages of the page."""
+    """Return a `receive` function that skips invalid messages from the page."""
 
     async def next_message() -> Message:
         while True:

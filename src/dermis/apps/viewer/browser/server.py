@@ -37,7 +37,7 @@ class LimitedConnection(H11Protocol):  # type: ignore[misc]
         self._deadline: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:
-        """Accept a connection, or drop the connection if too many others are open."""
+        """Accept a connection, or drop it if too many connections are open."""
         super().connection_made(transport)
         if len(self.connections) > MAX_CONNECTIONS:
             transport.abort()
@@ -50,7 +50,7 @@ class LimitedConnection(H11Protocol):  # type: ignore[misc]
         super().connection_lost(exc)
 
     def handle_events(self) -> None:
-        """Handle received data, and limit the time until the headers of a request are complete."""
+        """Handle received data, and limit how long the headers of a request may take to arrive."""
         super().handle_events()
         if self.conn.their_state is not h11.IDLE or self.timeout_keep_alive_task is not None:
             self._cancel_deadline()
@@ -159,17 +159,17 @@ class Address(NamedTuple):
 
     @property
     def url(self) -> str:
-        """Return the URL of the page, with the name of this machine if all interfaces are served."""
+        """Return the URL of the page, with this machine's name if all network interfaces are served."""
         name = socket.gethostname() if self.host in _ALL_INTERFACES else self.host
         host = f"[{name}]" if ":" in name else name
         return f"http://{host}:{self.port}/" + (f"?token={self.token}" if self.token else "")
 
 
 def bind(host: str, port: int, *, require_token: bool = False) -> tuple[socket.socket, Address]:
-    """Return a listening socket and its address; the address has a token unless the host is local.
+    """Return a listening socket and its address, which includes a token if the host is not local.
 
-    port : port number, 0 for any free port
-    require_token : whether the address has a token even if the host is local
+    port : port number; 0 for any free port
+    require_token : whether the address includes a token even if the host is local
 
     Raises DermisError if the address cannot be used.
     """
@@ -187,7 +187,7 @@ def bind(host: str, port: int, *, require_token: bool = False) -> tuple[socket.s
 
 
 def make_server(address: Address, canvas: PageCanvas, upload_folder: Path) -> uvicorn.Server:
-    """Return a uvicorn server of the canvas and its page, with request validation and uploads.
+    """Return a uvicorn server that serves the canvas and its page, validates requests and accepts uploads.
 
     upload_folder : empty folder for uploaded files
     """
@@ -221,7 +221,7 @@ def run_server(
 
     start_coroutine : function that returns the coroutine
 
-    The result is None if the server exits before the coroutine ends. Raises the exceptions of the coroutine.
+    If the server exits before the coroutine ends, the result is None. Exceptions of the coroutine are raised.
     """
 
     async def serve_and_run() -> T | None:

@@ -35,9 +35,9 @@ class Uploads:
     """ASGI middleware that receives files at upload/NAME from the page that has control.
 
     app : application that handles all other requests
-    canvas : `PageCanvas` whose ticket the page must send, and which receives the path and name of each file
-    folder : folder for the received files; files are named by numbers, and the name given by the page is only
-        displayed
+    canvas : canvas that issues the upload ticket that a page must send, and that opens each received file
+    folder : folder for the received files; the file names that pages send are only displayed, and not used in
+        paths
     """
 
     def __init__(self, app: App, canvas: PageCanvas, folder: Path) -> None:
@@ -66,7 +66,9 @@ class Uploads:
     def _accept_upload(
         self, file_name: str, headers: dict[bytes, bytes]
     ) -> tuple[str, Callable[[Path, str], None]]:
-        """Return the suffix of an upload, one of `HEAD_FILE_SUFFIXES`, and the function that opens the file.
+        """Return the suffix of an upload and the function that opens the uploaded file.
+
+        The suffix is one of `HEAD_FILE_SUFFIXES`.
 
         Raises DermisError for an upload that is not permitted.
         """
@@ -154,7 +156,7 @@ class Uploads:
 
 
 def _printable_name(file_name: str) -> str:
-    """Return a file name with printable characters only, shortened for messages."""
+    """Return a file name for messages: shortened, with unprintable characters replaced."""
     return "".join(character if character.isprintable() else "_" for character in file_name)[
         -_MAX_DISPLAYED_NAME_CHARACTERS:
     ]

@@ -39,17 +39,17 @@ _MAX_VISIBLE_LIST_ROWS = 14
 
 @dataclass(frozen=True)
 class FieldStyle:
-    """Presentation of a field in the panel, where it differs from the defaults that follow from the model.
+    """Presentation of a field in the panel, where it differs from the defaults derived from the model.
 
-    label : label to show; of "text###key", only the text is shown, and the key identifies the control in
+    label : label to show; in "text###key", only the text is shown, and the key identifies the control in
         `Session.positions` and in the undo history
     value_range : range of the slider; None for the range that the model declares for the field
-    unit : displayed unit, in units of the field; 0.01 displays a fraction in percent
+    unit : displayed unit, in units of the field; for example, 0.01 displays a fraction in percent
     number_format : printf format of the number
     options : integers to choose from in a drop-down list
     names : text to show for each keyword that the field accepts
-    custom_value : for a field whose value may be a keyword or custom: function that returns the value with
-        which a custom value starts
+    custom_value : for a field that accepts keywords: function that returns the initial value when the user
+        replaces the keyword by a custom value; None if custom values are not offered
     """
 
     label: str = ""
@@ -76,9 +76,9 @@ def draw_fields(
     """Draw a control for each field of a model; fields without a suitable control are skipped.
 
     make_state : function that returns a state, given the new value of a field as keyword argument
-    styles : presentation of fields by their names
-    field_names : names of the fields to draw, None for all
-    label_suffix : "##id" that distinguishes controls with equal labels
+    styles : presentation of each field that differs from the defaults, by field name
+    field_names : names of the fields to draw; None for all fields
+    label_suffix : suffix "##id" that is not shown and distinguishes controls with equal labels
     """
     for name in type(model).model_fields if field_names is None else field_names:
         _draw_field(session, model, name, make_state, styles.get(name, _DEFAULT_STYLE), label_suffix)
@@ -161,14 +161,14 @@ def _draw_keywords(
 
 
 def _field_label(field_name: str) -> str:
-    """Return the label of a field: the field's name with spaces and without the suffix of a unit."""
+    """Return the label of a field: its name with spaces, and without a suffix for the unit."""
     for unit in _UNIT_FORMATS:
         field_name = field_name.removesuffix(unit)
     return field_name.replace("_", " ")
 
 
 def draw_tooltip(tooltip_text: str) -> None:
-    """Draw a tooltip for the last control while the pointer rests on it."""
+    """Draw a tooltip for the control drawn last, while the pointer rests on it."""
     if not tooltip_text or not imgui.is_item_hovered() or imgui.is_any_mouse_down():
         return
     imgui.begin_tooltip()
@@ -221,7 +221,7 @@ def clamp(value: float, value_range: SliderRange) -> float:
 
 
 def edit_value(session: Session, label: str, change_and_value: tuple[bool, Any], with_value: ToState) -> None:
-    """Change the state to the new value of a control; all changes of one drag are undone together.
+    """Apply the new value of a control to the state; all changes of one drag are undone together.
 
     change_and_value : whether the control has changed, and its value
     with_value : function that returns a state, given the new value
@@ -244,7 +244,7 @@ def draw_combo(
 ) -> None:
     """Draw a drop-down list, and change the state when a name is chosen.
 
-    choices : choices; "" is a separator
+    choices : names to choose from; "" draws a separator
     with_value : function that returns a state, given the chosen name
     display_names : text to show for each name whose text differs from the name
     """
@@ -259,7 +259,7 @@ def choose_name(
     """Draw a drop-down list; return the name that was clicked, or None if no name was clicked.
 
     current : name that is selected now
-    choices : choices; "" is a separator
+    choices : names to choose from; "" draws a separator
     display_names : text to show for each name whose text differs from the name
     """
     chosen = None
@@ -279,7 +279,7 @@ def choose_name(
 
 
 def draw_button(session: Session, label: str) -> bool:
-    """Draw a button; return whether the button was pressed."""
+    """Draw a button; return whether it was pressed."""
     pressed = imgui.button(label)
     record_position(session, label)
     return bool(pressed)
@@ -292,7 +292,7 @@ def begin_plot(
 
     axis_labels : labels of the horizontal and of the vertical axis
     x_range : ends of the horizontal axis
-    highest_value : value slightly above which the vertical axis ends
+    highest_value : highest value to plot; the vertical axis ends slightly above it
     """
     if not implot.begin_plot(f"##{label}", imgui.ImVec2(-1.0, _PLOT_HEIGHT_PX), _PLOT_FLAGS):
         return False
@@ -303,11 +303,11 @@ def begin_plot(
 
 
 def record_position(session: Session, label: str) -> None:
-    """Record the position of the last control in the window, so that scripts can click on it.
+    """Record the position of the control drawn last, so that scripts can click on the control.
 
-    The position is in the left part of the control, because the right part may be the label of the control.
+    The position is near the left end of the control, because the label may take up its right part.
 
-    label : label whose part after "###", if any, is the key of the position
+    label : label of the control; its part after "###", if any, is the key under which the position is stored
     """
     low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
     x = float(low.x) + min(20.0, 0.5 * float(high.x - low.x))

@@ -54,7 +54,8 @@ ReportError = Callable[[Exception], None]
 class ImguiFrames:
     """Dear ImGui context, with the GPU resources that draw the layouts.
 
-    report_error : function that receives errors raised during a layout; later frames are still drawn
+    report_error : function called with each error that is raised during a layout; later frames are still
+        drawn
     """
 
     def __init__(self, report_error: ReportError) -> None:
@@ -76,7 +77,7 @@ class ImguiFrames:
         self._imgui_backend = ImguiWgpuBackend(device.handle, target_format)
 
     def enter(self) -> None:
-        """Make this the current context of Dear ImGui."""
+        """Make the context of this object the current context of Dear ImGui."""
         imgui.set_current_context(self._context)
         implot.set_current_context(self._plot_context)
 
@@ -100,7 +101,7 @@ class ImguiFrames:
             self._recreate_context()
 
     def render(self, target_view: TextureView) -> None:
-        """Draw the last layout over the target; draw nothing if that layout failed."""
+        """Draw the last layout over the content of the target; draw nothing if that layout failed."""
         if not self._has_layout:
             return
         encoder = self._device.handle.create_command_encoder()
@@ -111,7 +112,7 @@ class ImguiFrames:
         self._device.handle.queue.submit([encoder.finish()])
 
     def _recreate_context(self) -> None:
-        """Replace the context after an error of Dear ImGui; open sections of the panel are reset."""
+        """Replace the context after an error in Dear ImGui; the sections return to their initial state."""
         self._has_layout = False
         implot.destroy_context(self._plot_context)
         imgui.destroy_context(self._context)
@@ -120,7 +121,7 @@ class ImguiFrames:
 
 @contextmanager
 def recover_imgui(report_error: ReportError) -> Iterator[None]:
-    """Close the windows, tables, styles and ids that an exception inside the block left open."""
+    """Close all windows, tables, styles and ids that an exception inside the with block left open."""
     state = imgui.internal.ErrorRecoveryState()
     imgui.internal.error_recovery_store_state(state)
     try:
@@ -141,7 +142,7 @@ _SCROLL_PER_WHEEL_UNIT = 0.01
 def feed_pointer(event: Event, lay_out_frame: Callable[[], None]) -> None:
     """Pass a pointer event, one of the types in `POINTER_EVENTS`, to Dear ImGui.
 
-    lay_out_frame : function that lays out the panel with the events so far
+    lay_out_frame : function that lays out the panel, using all events received so far
     """
     kind = event["event_type"]
     imgui.get_io().add_mouse_pos_event(event["x"], event["y"])
@@ -157,11 +158,11 @@ def feed_pointer(event: Event, lay_out_frame: Callable[[], None]) -> None:
 
 
 def feed_key(event: Event, lay_out_frame: Callable[[], None]) -> None:
-    """Pass a key or character to Dear ImGui, and lay out the panel at once.
+    """Pass a key or character event to Dear ImGui, and lay out the panel immediately.
 
-    Without this layout, a press and a release of a key between two frames would cancel out.
+    Otherwise the press and the release of a key between the same two frames would cancel each other.
 
-    lay_out_frame : function that lays out the panel with the events so far
+    lay_out_frame : function that lays out the panel, using all events received so far
     """
     io, kind = imgui.get_io(), event["event_type"]
     if kind == "char":

@@ -48,7 +48,7 @@ _HELP_WIDTH, _SHORTCUT_COLUMN_FRACTION = 460.0, 0.4
 
 
 def draw_divider(split: SplitView, picture_left: float, window_size: tuple[float, float]) -> None:
-    """Draw the divider between before and after, with a handle in its centre.
+    """Draw the divider of the before/after comparison, with a handle in its centre.
 
     picture_left : left edge of the picture
     window_size : width and height of the window [logical pixel]
@@ -99,7 +99,7 @@ def draw_messages(
 
 
 def draw_help(picture_left: float, window_size: tuple[float, float]) -> None:
-    """Draw the list of shortcuts in the centre of the picture; pointer events pass through the list.
+    """Draw the list of shortcuts in the centre of the picture; the list does not react to the pointer.
 
     picture_left : left edge of the picture
     window_size : width and height of the window [logical pixel]
@@ -138,10 +138,10 @@ _PANEL_BUTTON_MARGIN, _PANEL_BUTTON_ALPHA = 8.0, 0.6  # of the button that opens
 class Panel:
     """Control panel with its sections.
 
-    The panel decides which input events are for the panel, and which events are for the picture.
+    The panel decides which input events it processes itself, and which are left to the picture.
 
-    is_visible : whether the panel is shown in a wide window
-    is_drawer_open : whether the panel is shown in a narrow window, as a drawer over the picture
+    is_visible : whether the panel is shown while the window is wide, beside the picture
+    is_drawer_open : whether the panel is shown while the window is narrow, as a drawer over the picture
     """
 
     def __init__(self, session: Session) -> None:
@@ -161,14 +161,14 @@ class Panel:
         self._frames.open(device, target_format)
 
     def width(self, window_size: tuple[float, float]) -> float:
-        """Return the width by which the panel narrows the picture, 0 for a drawer [logical pixel].
+        """Return the width that the panel takes away from the picture, 0 for a drawer [logical pixel].
 
         window_size : width and height of the window [logical pixel]
         """
         return 0.0 if is_drawer(window_size) else self._covered_width(window_size)
 
     def _covered_width(self, window_size: tuple[float, float]) -> float:
-        """Return the width of the window that the panel covers, 0 for a hidden panel [logical pixel].
+        """Return the width of the part of the window that the panel covers, 0 if hidden [logical pixel].
 
         window_size : width and height of the window [logical pixel]
         """
@@ -185,7 +185,7 @@ class Panel:
             self.is_visible = not self.is_visible
 
     def handle_event(self, event: Event, window_size: tuple[float, float]) -> bool:
-        """Process an input event of the panel; return False for an event that is for the picture.
+        """Process an input event if it concerns the panel; return False if it concerns the picture.
 
         window_size : width and height of the window [logical pixel]
         """
@@ -209,7 +209,7 @@ class Panel:
         return bool(imgui.get_io().want_text_input)  # of the current context, which the frame may replace
 
     def draw(self, target_view: TextureView, window_size: tuple[float, float], pixel_ratio: float) -> None:
-        """Draw the panel over the target.
+        """Draw the panel over the content of the target.
 
         window_size : width and height of the window [logical pixel]
         """
@@ -242,7 +242,7 @@ class Panel:
         return True
 
     def _close_topmost(self) -> bool:
-        """Close the popup, the help or the search, whichever is on top; return False if nothing is open."""
+        """Close the popup, else the help, else clear the search; return False if nothing was open."""
         if self._has_popup:
             imgui.internal.close_popup_to_level(0, False)
             self._has_popup = False
@@ -255,7 +255,7 @@ class Panel:
         return True
 
     def _is_over_panel(self, x: float, y: float, window_size: tuple[float, float]) -> bool:
-        """Return whether a position is over the panel; Dear ImGui could answer this only one frame later.
+        """Return whether the pointer is over the panel; Dear ImGui would only know this one frame later.
 
         x, y : position of the pointer in the window
         window_size : width and height of the window [logical pixel]
@@ -265,7 +265,7 @@ class Panel:
         return x < width or on_button or self._has_popup or bool(imgui.is_any_item_active())
 
     def _draw_windows(self, window_size: tuple[float, float]) -> None:
-        """Draw the panel, or the button that opens it, and the overlays."""
+        """Draw the panel (or, if it is hidden, the button that opens it) and the overlays."""
         vertical_padding = _TOUCH_PADDING if is_drawer(window_size) else imgui.get_style().frame_padding.y
         padding = imgui.ImVec2(imgui.get_style().frame_padding.x, vertical_padding)
         imgui.push_style_var(int(imgui.StyleVar_.frame_padding), padding)
@@ -284,7 +284,7 @@ class Panel:
         )
 
     def _draw_panel_button(self) -> None:
-        """Draw the button that opens the panel in the corner of the picture."""
+        """Draw the button in the corner of the picture that opens the panel."""
         self._has_popup = False
         imgui.set_next_window_pos(imgui.ImVec2(0.0, 0.0))
         flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_background
@@ -337,7 +337,7 @@ class Panel:
             self.toggle()
 
     def _scroll_by_touch(self) -> None:
-        """Scroll the panel by a drag that began outside all controls, because touch screens have no wheel."""
+        """Scroll the panel by a drag that began outside all controls, for touch screens without a wheel."""
         if imgui.is_mouse_clicked(0):
             self._scrolls = imgui.is_window_hovered() and not imgui.is_any_item_hovered()
         if self._scrolls and imgui.is_mouse_down(0):

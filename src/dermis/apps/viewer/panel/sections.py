@@ -110,7 +110,7 @@ def _draw_light_selector(session: Session) -> None:
 
 
 def _draw_light(session: Session, light_index: int, light: Light) -> None:
-    """Draw the fields of a light, except its position, which is changed by Shift-drag."""
+    """Draw controls for all fields of a light but its position, which the user changes by Shift-drag."""
     strength = max(*light.irradiance, 1e-6)
 
     def make_state(**fields: object) -> ViewerState:
@@ -137,7 +137,7 @@ def _draw_light(session: Session, light_index: int, light: Light) -> None:
 
 
 def _cone_styles(light: Light) -> dict[str, FieldStyle]:
-    """Return slider ranges with which a spotlight's outer cone stays wider than the inner cone."""
+    """Return slider ranges that keep the outer cone of a spotlight wider than its inner cone."""
     if not isinstance(light, SpotLight):
         return {}
     inner = SliderRange(0.5, light.outer_degrees - _MIN_CONE_DIFFERENCE_DEGREES)
@@ -168,7 +168,7 @@ def _draw_environment(session: Session) -> None:
 
 
 def has_expressions(session: Session) -> bool:
-    """Return whether the head has morph targets or bones, for which sliders are drawn."""
+    """Return whether the head has morph targets or bones, and so needs sliders for them."""
     head = session.state.scene.head
     return bool(head.targets or head.bones)
 
@@ -179,7 +179,7 @@ def can_move(session: Session) -> bool:
 
 
 def draw_expressions(session: Session) -> None:
-    """Draw sliders of the morph targets and bones whose names match the search."""
+    """Draw sliders for the morph targets and bones whose names match the search."""
     head = session.state.scene.head
     flags = int(imgui.InputTextFlags_.escape_clears_all)
     _, session.search = imgui.input_text_with_hint("##search", "search", session.search, flags)
@@ -225,7 +225,7 @@ def draw_motion(session: Session) -> None:
 
 
 def _animated_names(session: Session) -> frozenset[str]:
-    """Return the names of morph targets and bones that the playing motion moves; their sliders are locked."""
+    """Return the names of all morph targets and bones that the playing motion sets, to lock their sliders."""
     clip = session.player.clip if session.player.is_playing else None
     return frozenset() if clip is None else frozenset((*clip.targets, *clip.bones))
 
@@ -243,9 +243,9 @@ def _draw_target_weight(session: Session, target_name: str, animated_names: froz
 
 
 def _draw_bone_angles(session: Session, bone_name: str, animated_names: frozenset[str]) -> None:
-    """Draw a slider for each of the three angles of a bone; a drag changes only the angle of one slider.
+    """Draw a slider for each of the three angles of a bone; a drag changes only one of the angles.
 
-    animated_names : names of morph targets and bones that the playing motion moves
+    animated_names : names of the morph targets and bones that the playing motion sets
     """
     angles = posing.bone_angles(session.displayed_state.scene, bone_name)
 
@@ -340,7 +340,7 @@ def draw_view(session: Session) -> None:
 
 
 def draw_comparison(session: Session) -> None:
-    """Draw the buttons of the before/after comparison: freeze the state, swap the sides, end."""
+    """Draw the buttons that freeze the state for a before/after comparison, swap its sides, and end it."""
     split, state = session.split, session.state
     if draw_button(session, "freeze"):
         split.freeze(session.displayed_state)
@@ -358,7 +358,7 @@ def draw_comparison(session: Session) -> None:
 
 
 def draw_technique(session: Session) -> None:
-    """Draw the settings that no other section shows, drop-down lists first.
+    """Draw controls for the settings that no other section shows, drop-down lists first.
 
     A new field of `Settings` appears in this section unless another section shows it.
     """
@@ -372,14 +372,14 @@ def draw_technique(session: Session) -> None:
 
 
 def draw_picture(session: Session) -> None:
-    """Draw the settings that convert radiance to the picture: exposure, tone curve, bloom, ..."""
+    """Draw controls for the conversion of radiance to the picture: exposure, tone curve, bloom, ..."""
     draw_fields(
         session, session.state.settings, session.state.with_settings, _SETTING_STYLES, _PICTURE_SETTINGS
     )
 
 
 def draw_talk(session: Session) -> None:
-    """Draw the skin fields and settings that reproduce faults shown in the talk of 2007, for comparison."""
+    """Draw controls for the skin fields and settings that reproduce faults shown in the talk of 2007."""
     state, skin, settings = session.state, session.state.scene.skin, session.state.settings
     draw_fields(session, skin, state.with_skin, SURFACE_STYLES, fields_under(COMPARISONS, type(skin)))
     names = fields_under(COMPARISONS, type(settings))
@@ -440,7 +440,7 @@ def stage_series(frame_times_ms: Sequence[dict[str, float]]) -> dict[str, Floats
 def _plot_stacked_areas(
     times_ms: dict[str, Floats], colours: Sequence[tuple[float, float, float]], total_ms: Floats
 ) -> None:
-    """Plot the times of stages as stacked areas, with the last frame at the right edge.
+    """Plot the times of stages over the frames as stacked areas, with the last frame at the right edge.
 
     times_ms : (n,) times of each stage, by stage name [ms]
     colours : colour of each stage

@@ -78,7 +78,7 @@ def draw_profile(session: Session) -> None:
 
 
 def draw_surface(session: Session) -> None:
-    """Draw all fields of `Skin` that the profile section does not draw."""
+    """Draw controls for all fields of `Skin` that the profile section does not show."""
     state, earlier_states = session.state, session.history.states
     for name in fields_under("", type(state.scene.skin)):
         if name == "rho_s":
@@ -95,7 +95,7 @@ def draw_surface(session: Session) -> None:
 
 
 def _draw_tone(session: Session) -> None:
-    """Draw the description of the mean colour of the head's skin."""
+    """Draw a text that describes the mean colour of the head's skin."""
     colour = session.state.scene.head.maps.mean_colour
     if colour is not None:
         imgui.text_disabled(skin_tone(colour).as_text())
@@ -147,7 +147,7 @@ def _plot_profile(session: Session) -> None:
 
 @lru_cache(maxsize=16)
 def _profile_layers(profile_name: str) -> tuple[TissueLayer, ...]:
-    """Return the tissue layers of a named profile, or () for a sum of Gaussians; the results are cached."""
+    """Return the tissue layers of a named profile, or () if the profile is a sum of Gaussians (cached)."""
     try:
         return tissue_layers(Skin(profile=profile_name))
     except (
@@ -157,7 +157,7 @@ def _profile_layers(profile_name: str) -> tuple[TissueLayer, ...]:
 
 
 def _draw_layers(session: Session, layers: Layers) -> None:
-    """Draw the coefficients of all tissue layers, the topmost first."""
+    """Draw controls for the coefficients of all tissue layers, starting with the topmost layer."""
     for index, layer in enumerate(layers):
         depth = "semi-infinite" if layer.thickness_mm is None else f"{layer.thickness_mm:.3g} mm"
         is_open = imgui.tree_node_ex(f"layer{index}", 0, f"{index + 1} {layer.name}, {depth}")

@@ -1,4 +1,4 @@
-"""Atlas on the device: layouts, stretch maps, gutters that are stitched across seams, and blended layouts."""
+"""Atlas on the device: its layouts, their blend, stretch maps, and gutters that are stitched across seams."""
 
 from dermis.frame.features.atlas.textures import atlas_constants as shader_constants
 

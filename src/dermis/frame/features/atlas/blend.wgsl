@@ -1,4 +1,5 @@
-// Near the seams of one layout, fades its light to that of a second layout with other seams.
+// Replaces, near the seams of one atlas layout, its light by the light of a second layout with other seams; the transition is
+// smooth.
 //#include "shape/geometry.wgsl"
 //#include "bilinear.wgsl"
 //#include "edges.wgsl"

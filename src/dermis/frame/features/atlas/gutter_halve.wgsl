@@ -1,4 +1,5 @@
-// List of gutter texels at half the resolution: each has the mean of the sources of its four or fewer finer texels.
+// List of gutter texels at half the resolution: the source of each is the mean of the sources of the (up to four) finer gutter
+// texels in it.
 //#include "each.wgsl"
 
 //#fill const SAME_SOURCE: f32 = {same_source}; // distance from the first source within which the others are averaged [texels]

@@ -1,4 +1,5 @@
-// Source of each gutter texel: a straight path over the surface, from triangle to triangle, from the edge of its chart.
+// Finds the source of each gutter texel: follows a straight path over the surface, from triangle to triangle, which starts at
+// the edge of the chart.
 //#include "shape/geometry.wgsl"
 //#include "each.wgsl"
 

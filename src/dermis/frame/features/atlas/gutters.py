@@ -1,6 +1,6 @@
-"""Gutters of a stitched atlas: texels beside the charts that copy light from sources across the seams.
+"""Gutters of a stitched atlas: texels beside the charts that copy light from points across the seams.
 
-The sources are traced over the surface of each person at rest.
+These points, the sources, are found by tracing paths over the surface of each person at rest.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ _NO_NEIGHBOUR_WORD = 0xFFFFFFFF  # word of a triangle edge without skin across i
 
 @dataclass(frozen=True, eq=False)
 class GutterTracing:
-    """Inputs of the passes that trace paths from charts to the sources of gutter texels, constant for a mesh.
+    """Constant inputs of the passes that trace paths from charts to the sources of gutter texels.
 
     starts : buffer of the start of each path, for gutter_trace.wgsl
-    sides : buffer of the triangle across each edge of each triangle, for gutter_trace.wgsl
-    halvings : for each coarser resolution of the atlas, the buffers of gutter_halve.wgsl by name: they list
-        the finer gutter texels that each coarser gutter texel averages
+    sides : buffer of the neighbouring triangle across each edge of each triangle, for gutter_trace.wgsl
+    halvings : a dictionary for each coarser resolution of the atlas, from names in gutter_halve.wgsl to the
+        buffers that list the finer gutter texels averaged by each coarser gutter texel
     """
 
     starts: Buffer
@@ -60,8 +60,8 @@ def with_separate_gutters(device: Device, textures: AtlasTextures) -> AtlasTextu
 def _start_words(atlas: Atlas) -> Words:
     """Return (a, 5) words for gutter_trace.wgsl, one row for the path to each gutter texel.
 
-    The words are the packed texel, the triangle where the path starts, its two packed barycentric weights,
-    and the (x, y) source to use if tracing fails, as floats.
+    The words are the packed texel, the triangle where the path starts, the two packed barycentric weights
+    of the start, and as floats the source position (x, y) to use if tracing fails.
     """
     root = np.full((atlas.size, atlas.size), -1, np.int64)
     root[atlas.outside[:, 1], atlas.outside[:, 0]] = np.arange(len(atlas.outside))
@@ -77,7 +77,8 @@ def _start_words(atlas: Atlas) -> Words:
 def _side_words(mesh: Mesh) -> Words:
     """Return (f, 3) words for gutter_trace.wgsl: the packed neighbour across each edge of each triangle.
 
-    A word holds the neighbouring triangle, its edge, and whether its orientation is reversed.
+    A word packs the index of the neighbouring triangle, the index of the shared edge in that triangle, and
+    whether the orientation of the neighbour is reversed.
     """
     neighbour, neighbour_side, flipped = side_neighbours(mesh)
     skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
@@ -86,7 +87,7 @@ def _side_words(mesh: Mesh) -> Words:
 
 
 def _halving_buffers(device: Device, finer: AtlasTextures, coarser: AtlasTextures) -> Bindings:
-    """Upload for each texel of the coarser gutter the list of finer gutter texels that it averages."""
+    """Upload, for each coarser gutter texel, the list of finer gutter texels that it averages."""
     width = int(finer.gutter_texels.max()) + 1
 
     def texel_index(texels: NDArray[np.integer]) -> NDArray[np.int64]:
@@ -105,7 +106,7 @@ def _halving_buffers(device: Device, finer: AtlasTextures, coarser: AtlasTexture
 def draw(graph: Recorder, atlas: AtlasTextures, tracing: GutterTracing, rest_head: HeadGeometry) -> None:
     """Declare the passes that trace the source of each gutter texel, at all resolutions of the atlas.
 
-    atlas : result of `with_separate_gutters`, whose gutter buffers are filled
+    atlas : result of `with_separate_gutters`; the passes fill its gutter buffers
     rest_head : surface of the person at rest
     """
     device, size = graph.device, (("SIZE", atlas.resources["atlas"].size[0]),)

@@ -28,10 +28,11 @@ class LitAtlas:
 
     atlas : textures of the atlas
     head : triangles with their coordinates in the atlas
-    bindings : geometry, maps, lights, shadows and environment by their names in the shaders
-    surfaces : texture of the surface at each texel, packed by surface_texels.wgsl
+    bindings : dictionary from names in the shaders to resources: geometry, maps, lights, shadows, environment
+    surfaces : texture of the surface properties at each texel, packed by surface_texels.wgsl
     scattered : texture of the exitance of light that scattered below the surface
-    gutter_update : inputs of the passes that trace gutters for each person, None for constant gutters
+    gutter_update : inputs of the passes that trace the gutters for each person, None if the gutters are
+        constant
     """
 
     atlas: AtlasTextures

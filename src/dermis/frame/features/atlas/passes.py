@@ -38,14 +38,14 @@ def draw_coarser_stretch_maps(graph: Recorder, atlas: AtlasTextures) -> None:
 
 
 def _placeholder_edge_map(device: Device) -> Texture:
-    """Return a 1 x 1 texture to bind as `edge_map` for shaders that do not read the distances to edges."""
+    """Return a 1 x 1 placeholder for `edge_map`, for shaders that do not read the distances to edges."""
     return device.cached("no edges", lambda: make_texture(device, (1, 1), "r32float", content_source="map"))
 
 
 def draw_gutters(
     graph: Recorder, stage_name: str, atlas: AtlasTextures, light_texture: TextureOrView, texel_format: str
 ) -> None:
-    """Declare the passes that copy light of a texture from across the seams to its gutters.
+    """Declare the passes that copy light from across the seams to the gutters of a texture.
 
     The light is first copied to a buffer, because a pass cannot read and write the same texture.
 
@@ -70,10 +70,10 @@ def draw_gutters(
 def draw_blend(
     graph: Recorder, first_layout: LitAtlas, second_layout: LitAtlas, blended_light: Texture
 ) -> None:
-    """Declare the pass that fades from the light of the first layout to the light of the second near seams.
+    """Declare the pass that, near the seams of a layout, fades to the light of a layout with other seams.
 
-    first_layout, second_layout : layouts with different seams; the second is shown only near the seams of the
-        first
+    first_layout : layout whose light is used away from its seams
+    second_layout : layout whose light is used near the seams of the first layout
     blended_light : texture for the result, as large as the atlas of the first layout
     """
     bound = {

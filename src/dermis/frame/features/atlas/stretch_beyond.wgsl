@@ -1,4 +1,4 @@
-// Stretch of gutter texels: that of the nearest point on the edge of the chart.
+// Stretch of gutter texels, which is copied from the nearest point on the edge of the chart.
 //#include "texel_stretch.wgsl"
 //#include "each.wgsl"
 

@@ -1,4 +1,4 @@
-// Stretch at half the resolution: mean of four texels, or of those outside gutters if there are any.
+// Stretch at half the resolution: the mean of four texels. Gutter texels only count if all four texels are in gutters.
 //#include "halves.wgsl"
 //#include "reach.wgsl"
 

@@ -30,7 +30,7 @@ SAME_SOURCE_TEXELS = 4.0
 
 
 def atlas_constants() -> dict[str, int | float]:
-    """Return the values that `//#fill` lines insert in shaders of the atlas, by name."""
+    """Return the named values that `//#fill` lines insert into shaders of the atlas."""
     _, inner_b, inner_c = INNER_POINT_WEIGHTS
     tracing = {
         "inward": START_SHIFT,
@@ -45,17 +45,19 @@ def atlas_constants() -> dict[str, int | float]:
 class AtlasTextures:
     """Textures and buffers of an atlas.
 
-    resources : textures by their names in shaders: atlas, stretch_map (filled by `draw_stretch`), reach_map,
-        and edge_map for two layouts or feathered seams; coarser resolutions only have stretch_map and
-        reach_map
+    resources : dictionary from names in shaders to textures: atlas, stretch_map (filled by `draw_stretch`),
+        reach_map and, for two layouts or feathered seams, edge_map; coarser resolutions have only
+        stretch_map and reach_map
     sheared : whether blurs account for an angle between the u and v directions that is not a right angle
     stretch_constants : pipeline constants of the stretch passes
-    stretch_sources : buffer of gutter texels and the surface points whose stretch they copy, None if there
+    stretch_sources : buffer of gutter texels and of the surface points whose stretch they copy, None if there
         are no gutters
-    gutter, gutter_light : buffers of the gutter texels and of their light, None if there are no gutters
-    gutter_texels : (a, 2) gutter texels, x and y
+    gutter : buffer of the gutter texels, None if there are no gutters
+    gutter_light : buffer of the light of the gutter texels, None if there are no gutters
+    gutter_texels : (a, 2) coordinates x and y of the gutter texels
     coarser : the atlas at half, a quarter, ... of the resolution; only for stitched layouts
-    median_texels_per_mm : median over texels of the smaller density, along u or v, at rest [texels/mm]
+    median_texels_per_mm : median over texels of min(density along u, density along v), for the head at rest
+        [texels/mm]
     """
 
     resources: dict[str, Texture]
@@ -84,8 +86,8 @@ def upload_atlas(
 ) -> AtlasTextures:
     """Upload an atlas, with an empty stretch map that `draw_stretch` fills.
 
-    stretch_correction : "full" includes the angle between u and v, "axes" assumes right angles, "none"
-        assumes the same texel density everywhere
+    stretch_correction : "full" includes the angle between u and v, "axes" assumes that u and v are
+        perpendicular, "none" assumes the same texel density everywhere
     seam_method : how seams are treated; determines whether an edge map is uploaded, and whether seams are
         feathered
     """
@@ -118,12 +120,12 @@ def _rms_density(stretch: NDArray[np.float16]) -> float:
 
 
 def _median_density(stretch: NDArray[np.float16], inside_mask: NDArray[np.bool_]) -> float:
-    """Return the median over texels of the smaller of the densities along u and v [texels/mm].
+    """Return the median over texels of min(density along u, density along v) [texels/mm].
 
-    inside_mask : mask of the texels to count: texels inside charts, gutters excluded
+    inside_mask : mask of the texels inside charts, which excludes gutters
 
-    Non-negative half floats are ordered like their 16-bit patterns, and a histogram of the patterns is faster
-    than sorting.
+    The median is read from a histogram of the bit patterns, which is faster than sorting; non-negative half
+    floats have the same order as their bit patterns.
     """
     words = stretch.view(np.uint16)
     counts = np.bincount(np.minimum(words[..., 0], words[..., 1])[inside_mask], minlength=1 << 16)
@@ -156,16 +158,19 @@ def _upload_mip(
 
 
 def _stretch_sources(atlas: Atlas) -> NDArray[np.uint32]:
-    """Return (r, 3) words for stretch_beyond.wgsl: gutter texels, and the surface points that they copy.
+    """Return (r, 3) words for stretch_beyond.wgsl, one row for each gutter texel.
 
-    The words are the packed texel, the triangle, and two packed barycentric weights.
+    The words are the packed texel, and the surface point whose stretch it copies: the triangle, and two
+    packed barycentric weights.
     """
     (x, y), (second, third) = (pair.T.astype(np.uint32) for pair in (atlas.outside, atlas.border_weights))
     return np.stack([x | (y << 16), atlas.border_triangle.astype(np.uint32), second | (third << 16)], axis=1)
 
 
 def _upload_coarser(device: Device, mip: AtlasMip) -> tuple[AtlasTextures, ...]:
-    """Upload the atlas at half, a quarter, ... of its resolution, computed or read from the disk cache."""
+    """Upload the atlas at half, a quarter, ... of its resolution.
+
+    The data are computed or read from the disk cache."""
     parts = [field.name for field in fields(AtlasMip)]
     count = 0
     while count < MAX_ATLAS_HALVINGS and len(mip.reach) % (2 << count) == 0:
@@ -210,9 +215,10 @@ class AtlasMip:
     """Masks and gutters of an n x n atlas at one resolution.
 
     covered : (n, n) mask of the texels that hold light, gutters included
-    lit : (n, n) mask of the texels whose own surface is lit, gutters excluded
+    lit : (n, n) mask of the texels where lighting is computed, gutters excluded
     reach : (n, n, 4) number of connected texels of the same chart to the left, right, up and down
-    gutter, source : (a, 2) gutter texels (x, y), and the positions whose light they copy [texels]
+    gutter : (a, 2) coordinates x and y of the gutter texels
+    source : (a, 2) positions from which the gutter texels copy light [texels]
     """
 
     covered: NDArray[np.bool_]
@@ -225,7 +231,8 @@ class AtlasMip:
 def halve_mip(atlas_mip: AtlasMip) -> AtlasMip:
     """Return the masks and gutters of an atlas at half its resolution.
 
-    Gutter texels next to a chart become averages of finer texels; gutter texels farther away stay stitched.
+    A gutter texel next to a chart becomes the average of finer texels; a gutter texel farther away still
+    copies light from across the seam.
     """
     from scipy.ndimage import binary_dilation
 
@@ -243,14 +250,14 @@ def halve_mip(atlas_mip: AtlasMip) -> AtlasMip:
 
 
 def _square_texels(texel_values: NDArray[np.generic]) -> NDArray[np.generic]:
-    """Split an (n, n) image into 2 x 2 squares: (4, n/2, n/2), the first axis over the texels of a square."""
+    """Rearrange an (n, n) image as (4, n/2, n/2); the first axis counts the texels of a 2 x 2 square."""
     return np.stack([texel_values[y::2, x::2] for y in (0, 1) for x in (0, 1)])
 
 
 def _halved_reach(reach: NDArray[np.uint16], measured_texels: NDArray[np.bool_]) -> NDArray[np.uint16]:
     """Return the reach of each 2 x 2 square of texels, (n/2, n/2, 4) [squares].
 
-    The reach of a square is the smallest reach of those of its texels that are in `measured_texels`.
+    The reach of a square is the smallest reach of its texels; texels outside `measured_texels` do not count.
 
     reach : (n, n, 4) reach of each texel, see `AtlasMip` [texels]
     measured_texels : (4, n/2, n/2) mask of texels, as split by `_square_texels`
@@ -270,7 +277,7 @@ def _halved_reach(reach: NDArray[np.uint16], measured_texels: NDArray[np.bool_])
 def _halved_gutter(
     mip: AtlasMip, stitched_squares: NDArray[np.bool_]
 ) -> tuple[NDArray[np.uint16], NDArray[np.float32]]:
-    """Return the (x, y) of stitched squares, and the mean position of the sources of their texels."""
+    """Return the coordinates (x, y) of stitched 2 x 2 squares, and the mean source of each square."""
     x, y = (mip.gutter.astype(np.int64) // 2).T
     used = stitched_squares[y, x]
     source = mip.source[used].astype(np.float64)

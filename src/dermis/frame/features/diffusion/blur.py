@@ -57,10 +57,11 @@ def draw(graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blu
 def _halve(
     graph: Recorder, levels: PyramidLevels, finer_level: TextureOrView, level_index: int, halvings: int
 ) -> TextureOrView:
-    """Average texels of a level to fill level k at half its resolution; return the view of level k.
+    """Declare the pass that stores a copy of a level at half its resolution; return a view of the copy.
 
     finer_level : view of the level at the finer resolution
-    halvings : how often the resolution of the result is halved
+    level_index : index of the level
+    halvings : number of times that the resolution of the copy is halved from full resolution
     """
     halved = levels.layer(level_index, halvings)
     shader = program(graph.device, "diffusion/diffuse_halve.wgsl", (), levels.texel, levels.texel)
@@ -101,7 +102,7 @@ def _kernel_texture(device: Device) -> Texture:
 def _spread_members(
     variance_mm2: NDArray[np.float64], halvings: tuple[int, ...]
 ) -> Iterator[dict[str, float]]:
-    """Yield, for each blurred level, the variances of the shader's struct `Spread`, resampling included."""
+    """Yield, for each blurred level, the members of the shader struct `Spread`, which are variances."""
     source_mm2 = previous_resampling = previous_mm2 = 0.0
     for variance, (source_halvings, level_halvings) in zip(variance_mm2, pairwise(halvings), strict=True):
         halved = level_halvings > source_halvings

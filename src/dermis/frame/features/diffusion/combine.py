@@ -25,12 +25,13 @@ def draw(
     transmitted_light: Texture | None = None,
     lost_fraction: Texture | None = None,
 ) -> None:
-    """Declare the passes that sum all blurred levels by their weights, from coarse to fine resolution.
+    """Declare the passes that compute the weighted sum of all blurred levels, from coarse to fine resolution.
 
     summed_light : texture for the sum
-    transmitted_light : texture of light through thin parts, which is added; None without such light
-    lost_fraction : texture of the fraction of blurred light that thin parts do not return; None without thin
-        parts
+    transmitted_light : texture of light through thin parts, which is added to the sum; None if no light
+        crosses thin parts
+    lost_fraction : texture of the fraction of blurred light that thin parts do not return; None if there are
+        no thin parts
     """
     device, halvings = graph.device, blur.halvings[1 : len(blur.weight) + 1]
     coarsest = max(halvings)

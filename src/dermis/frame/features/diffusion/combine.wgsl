@@ -1,5 +1,5 @@
-// Weighted sum of the blurred levels of one resolution, without the light that thin parts transmit, plus the sum of the coarser
-// levels and the transmitted light.
+// Weighted sum of the blurred levels of one resolution, reduced by the light that thin parts do not return, plus the sum of
+// the coarser levels and the light through thin parts.
 //#include "source.wgsl"
 //#include "store.wgsl"
 //#include "bilinear.wgsl"

@@ -1,4 +1,5 @@
-// One axis of a Gaussian blur: along u, or along v sheared as the surface is; the variance is given in mm^2.
+// Gaussian blur along one axis: u, or v with a shear that corrects for the angle between u and v on the surface. The variance
+// is given in mm^2.
 //#include "source.wgsl"
 //#include "store.wgsl"
 //#include "atlas/reach.wgsl"

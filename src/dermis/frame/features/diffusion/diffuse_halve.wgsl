@@ -1,4 +1,4 @@
-// Light at half the resolution: the mean of the texels with surface among each 2 x 2.
+// Light at half the resolution: each texel is the mean of those texels in its 2 x 2 square that show surface.
 //#include "source.wgsl"
 //#include "store.wgsl"
 

@@ -40,7 +40,7 @@ _MIN_VARIANCE_RATIO = 1.5  # least ratio of the variances of an intermediate lev
 def tap_count(variance: float, truncation_sigmas: float = KERNEL_TRUNCATION_SIGMAS) -> int:
     """Return the number of taps of a Gaussian kernel on each side of its centre.
 
-    variance : variance of the kernel [step^2], where a step is the distance between taps
+    variance : variance of the kernel, in units of the squared distance between taps
     truncation_sigmas : half-width of the kernel in standard deviations
     """
     return math.ceil(truncation_sigmas * math.sqrt(variance))
@@ -48,13 +48,13 @@ def tap_count(variance: float, truncation_sigmas: float = KERNEL_TRUNCATION_SIGM
 
 @cache
 def kernel_table() -> NDArray[np.float32]:
-    """Return the (rows, columns) table of q with which kernels w(n) = q^(n^2) have exact variance [-].
+    """Return a table of the ratio q for which the kernel w(n) = q^(n^2) has a given variance [-].
 
-    w(n) is the weight of the tap n steps from the centre, so q = w(1) / w(0). Rows are variances in steps of
-    1/64 step^2, columns are numbers of taps on each side of the centre.
+    w(n) is the weight of tap n on either side of the centre, so q = w(1) / w(0). Row i is for a variance of
+    i / 64, in units of the squared distance between taps; column j is for j taps on each side of the centre.
 
     Sampling and truncation reduce the variance of a Gaussian, especially of a narrow Gaussian. Therefore q is
-    solved, for each number of taps, such that the kernel has the desired variance.
+    determined numerically, such that the truncated kernel has exactly the desired variance.
     """
     variance = np.arange(MAX_TABLE_VARIANCE * ROWS_PER_UNIT + 2)[:, None] / ROWS_PER_UNIT
     n = np.arange(_MAX_TAP_COUNT + 1)
@@ -80,15 +80,15 @@ def add_intermediate_levels(
 ) -> tuple[NDArray[np.float64], tuple[int, ...]]:
     """Return the variances of the cheapest chain of blurs [mm^2], and the indices of its intermediate levels.
 
-    Blurs of intermediate width let later levels use half the resolution, which saves texel reads.
+    An intermediate level is an additional blur; the levels after it can use half the resolution, which saves
+    texel reads.
 
     variance_mm2 : (k,) increasing variances of the profile's levels [mm^2]
     texels_per_mm : texel density of the atlas at full resolution
-    max_halvings : how often the resolution may be halved
+    max_halvings : largest number of times that the resolution may be halved
 
-    An intermediate level is just wide enough for the next level to have half the resolution, by the rule of
-    `choose_halvings`, and its standard deviation is at least one texel at its own resolution. Index 0 is the
-    unblurred level.
+    An intermediate level is blurred just enough for `choose_halvings` to halve the resolution of the next
+    level, and its standard deviation is at least one texel of its resolution. Level 0 is the unblurred light.
     """
     profile_mm2 = tuple(float(v) for v in variance_mm2)
     return _add_intermediate_levels(profile_mm2, float(texels_per_mm), max_halvings)
@@ -118,11 +118,11 @@ def _add_intermediate_levels(
 
 
 def chain_cost(variance_mm2: list[float], texels_per_mm: float, max_halvings: int) -> float:
-    """Estimate the texel reads of a chain of blurs, per texel of the full resolution.
+    """Estimate the number of texel reads of a chain of blurs, per texel of the full resolution.
 
     variance_mm2 : increasing variances of the levels [mm^2]
     texels_per_mm : texel density of the atlas at full resolution
-    max_halvings : how often the resolution may be halved
+    max_halvings : largest number of times that the resolution may be halved
     """
     halvings = choose_halvings(np.array(variance_mm2), texels_per_mm, max_halvings)
     cost = 0.0

@@ -27,12 +27,13 @@ _CACHED_BLEND_MAPS = 4
 class Mixture:
     """Textures for skin where a map blends a first profile with one or two others.
 
-    uv_weights : texture of the blend weights of the other profiles over uv
-    entering : one pyramid for each other profile: the light that enters, times the profile's blend weight
-    atlas_weights : textures of these blend weights over the atlas, one for each layout
-    sums : texture array of exitance. Layer 0 holds all light, scattered by the first profile. Each other
-        profile has two layers with the change that its scattering makes: to all light, and to the light in
-        its `entering` pyramid
+    uv_weights : texture over uv of the blend weights of all profiles but the first
+    entering : for each profile but the first, a blur pyramid of the entering light times the profile's blend
+        weight
+    atlas_weights : for each layout, a texture over the atlas of the same blend weights
+    sums : texture array of exitance. Layer 0 holds the exitance if all light scatters by the first profile.
+        For each other profile, two layers hold the exitance by that profile minus the exitance by the first:
+            one layer for all light, one layer for the light in the profile's pyramid in `entering`
     """
 
     uv_weights: Texture
@@ -53,8 +54,8 @@ def make_mixture(
 ) -> Mixture:
     """Allocate the textures of a mixture of profiles.
 
-    uv_weights : texture of the blend weights over uv
-    entering_light : pyramids for the light that enters, one for each profile but the first
+    uv_weights : texture over uv of the blend weights
+    entering_light : blur pyramids of the entering light, one for each profile but the first
     layout_count : number of atlas layouts
     """
     side, texel = entering_light[0].size, entering_light[0].texel
@@ -90,7 +91,7 @@ def upload_blend_weights(device: Device, blend_weights: NDArray[np.float32]) -> 
 
 
 def load_blend_weights(image_path: str) -> NDArray[np.float32]:
-    """Return the (h, w, 2) blend weights in an image file, cached until the file changes.
+    """Return the (h, w, 2) blend weights of an image file; the result is cached until the file changes.
 
     image_path : path of the image
 
@@ -130,7 +131,7 @@ def draw_blend_weights(graph: Recorder, layout: LitAtlas, mixture: Mixture, layo
 def draw_entering_light(
     graph: Recorder, levels: PyramidLevels, mixture: Mixture, layout_index: int, profile_index: int
 ) -> None:
-    """Declare the pass that fills level 0 of another profile with the entering light times its blend weight.
+    """Declare the pass that fills level 0 of a profile's pyramid with entering light times blend weight.
 
     levels : pyramid whose level 0 holds all light that enters
     layout_index : index of the atlas layout
@@ -145,7 +146,7 @@ def draw_entering_light(
 
 
 def draw(graph: Recorder, mixture: Mixture, layout_index: int, blended_exitance: Texture) -> None:
-    """Declare the pass that blends the sums of all profiles; the alpha channel packs the blend weights.
+    """Declare the pass that blends the sums of all profiles; alpha stores the packed blend weights.
 
     layout_index : index of the atlas layout
     blended_exitance : texture for the blended exitance

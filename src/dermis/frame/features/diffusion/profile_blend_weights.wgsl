@@ -1,4 +1,4 @@
-// Blend weights of other profiles at each texel of the atlas, from a map over uv.
+// Blend weights of all profiles but the first at each texel of the atlas, from a map over uv.
 //#include "shape/geometry.wgsl"
 //#include "store.wgsl"
 

@@ -1,4 +1,4 @@
-// Light that enters skin of another profile: all light that enters, times the blend weight of the profile.
+// Entering light for one of the profiles after the first: all light that enters, times the blend weight of that profile.
 //#include "source.wgsl"
 //#include "store.wgsl"
 

@@ -1,4 +1,4 @@
-// Light that leaves skin of mixed profiles: the mean of blending by the weights at the exit and at the entry point.
+// Exitance of skin with blended profiles: the mean of two blends, with the weights at the exit point and at the entry point.
 //#include "packed_blend_weights.wgsl"
 
 override OTHERS: u32; // profiles besides the first

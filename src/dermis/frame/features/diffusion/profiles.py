@@ -1,4 +1,4 @@
-"""Diffusion profiles of skin, fitted again when pigments or layers change between frames."""
+"""Diffusion profiles of skin, which are fitted again when pigments or layers change between frames."""
 
 from __future__ import annotations
 
@@ -23,9 +23,10 @@ _CACHED_FIT_COUNT = 4  # the current skin, one to compare with, and two previous
 class SkinProfiles:
     """Cache of the diffusion profiles of the last few skins.
 
-    A fit that starts from a similar profile is several times faster. Skin described by pigments alone starts
-    from the published profile, so that results do not depend on the people rendered before. Skin that defines
-    its layers or its structure starts from the last fit of skin with as many layers.
+    A fit with a similar profile as initial guess is several times faster. For skin described by pigments
+    alone, the guess is the published profile, so that results do not depend on the people rendered before.
+    For skin that defines its layers or its structure, the guess is the last fit of a skin with the same
+    number of layers.
     """
 
     def __init__(self) -> None:

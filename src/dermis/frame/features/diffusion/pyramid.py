@@ -26,11 +26,12 @@ MIN_WEIGHT_SUM = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class PyramidLevels:
-    """Textures of the blur pyramid: unblurred light as level 0, its blurred levels, and scratch space.
+    """Textures of the blur pyramid: unblurred light as level 0, the blurred levels, and scratch space.
 
-    stacks : one texture array for each resolution, finest first, with a layer for each of its levels; at
-        coarser resolutions, layer 0 is a reduced copy of the last level of the next finer resolution
-    first : index of the level in layer 0 of each stack
+    stacks : one texture array for each resolution, finest first, with a layer for each level of that
+        resolution; at coarser resolutions, layer 0 is a reduced copy of the last level of the next finer
+        resolution
+    first : for each stack, the index of the level in layer 0
     scratch : texture for light that is blurred along u but not yet along v
     size : side of the atlas at full resolution [texels]
     texel : texture format
@@ -44,14 +45,14 @@ class PyramidLevels:
     _views: dict[tuple[int, int], TextureView] = field(default_factory=dict)
 
     def layer(self, level_index: int, halvings: int = 0) -> TextureView:
-        """Return a view of level k in the stack whose resolution is halved `halvings` times."""
+        """Return a view of a level in the stack whose resolution is halved `halvings` times."""
         if (level_index, halvings) not in self._views:
             layer = level_index - self.first[halvings]
             self._views[level_index, halvings] = make_view(self.stacks[halvings], layer=layer)
         return self._views[level_index, halvings]
 
     def scratch_view(self, halvings: int = 0) -> TextureView:
-        """Return a view of the scratch texture at the resolution that is halved `halvings` times."""
+        """Return a view of the scratch texture at a resolution that is halved `halvings` times."""
         if (-1, halvings) not in self._views:
             self._views[-1, halvings] = make_view(self.scratch, mip=halvings)
         return self._views[-1, halvings]
@@ -61,13 +62,14 @@ class PyramidLevels:
 class Blur:
     """Gaussian blurs of one atlas layout.
 
-    variance_mm2, weight : (k,) increasing variances [mm^2] and (k, 3) weights [-] of the Gaussians
-    halvings : how often the resolution of each level is halved, starting with the unblurred level
+    variance_mm2 : (k,) variances of the Gaussians, increasing [mm^2]
+    weight : (k, 3) weights of the Gaussians [-]
+    halvings : (k + 1,) number of times that the resolution of each level is halved; level 0 is unblurred
     scale : factor from irradiance to the texels of the levels
-    edge : texels that blurs read beyond a chart and its gutter: "repeated", "cleared" or "skipped"
-    clear : irradiance that blurs read from empty texels when the edge is "cleared"
+    edge : how blurs treat texels beyond a chart and its gutter: "repeated", "cleared" or "skipped"
+    clear : irradiance that blurs read from empty texels if `edge` is "cleared"
     intermediate_levels : indices of levels without weight, which only serve as the source of wider blurs
-    weight_changes : (k, 3) difference of weights from the first profile, one array for each other profile
+    weight_changes : for each profile but the first, its (k, 3) weights minus the weights of the first profile
     """
 
     variance_mm2: Floats
@@ -89,7 +91,7 @@ def make_levels(device: Device, atlas_side: int, halvings: Halvings, texel_forma
     """Allocate the textures of a blur pyramid.
 
     atlas_side : side of the atlas at full resolution [texels]
-    halvings : how often the resolution of each level is halved, for each layout
+    halvings : for each layout, the number of times that the resolution of each level is halved
     texel_format : texture format
     """
     ranges = levels_by_resolution(halvings)
@@ -119,8 +121,8 @@ def make_levels(device: Device, atlas_side: int, halvings: Halvings, texel_forma
 def levels_by_resolution(halvings: Halvings) -> tuple[range, ...]:
     """Return the range of levels that each resolution stores, finest first.
 
-    A coarser resolution also stores a reduced copy of the last finer level. Each range covers the levels of
-    all layouts.
+    At a coarser resolution, the range begins with the last finer level, of which a reduced copy is stored.
+    Each range covers the levels of all layouts.
     """
     coarsest = max(map(max, halvings))
     return tuple(
@@ -136,7 +138,7 @@ def half_precision_scale(texel_format: str, irradiance_sum: float) -> float:
     """Return the factor that brings irradiance into the range of half floats; 1 for 32-bit floats.
 
     texel_format : texture format of the levels
-    irradiance_sum : sum of the irradiances of all lights; skin close to a light receives more
+    irradiance_sum : sum of the irradiances of all lights; skin close to a light receives more than this sum
 
     The factor is a power of two, so that scaling is exact.
     """
@@ -148,15 +150,16 @@ def half_precision_scale(texel_format: str, irradiance_sum: float) -> float:
 def choose_halvings(
     variance_mm2: NDArray[np.float64], texels_per_mm: float, max_halvings: int
 ) -> tuple[int, ...]:
-    """Return how often the resolution of each level may be halved, starting with the unblurred level.
+    """Return how many times the resolution of each level may be halved; level 0 is the unblurred light.
 
     variance_mm2 : (k,) increasing variances of the blurred levels [mm^2]
     texels_per_mm : texel density of the atlas at full resolution
-    max_halvings : how often any level may be halved
+    max_halvings : largest number of times that the resolution of any level may be halved
 
-    A level is halved once the standard deviation of its source reaches a multiple of the squared texel side:
-    twice the texel side needs four times the blur. The error where texels are sparse then stays the same
-    fraction of the image (docs/performance.md lists the errors).
+    Each level is computed by blurring the previous level, whose standard deviation [mm] must be at least
+    `MIN_SMOOTHNESS` times the squared side of a texel [mm^2]. A texel side twice as large thus needs four
+    times the blur. Where texels are sparse, the error then stays the same fraction of the image
+    (docs/performance.md lists the errors).
     """
     halvings = [0]
     for source_mm2 in (0.0, *variance_mm2[:-1]):

@@ -32,7 +32,7 @@ class BlurScheme(Protocol):
         """
 
     def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
-        """Return how often the resolution of each level is halved, starting with the unblurred level.
+        """Return how many times the resolution of each level is halved; level 0 is the unblurred light.
 
         edge : filter mode at the edges of charts
         """
@@ -42,7 +42,7 @@ class BlurScheme(Protocol):
 class Resources:
     """Resources of the diffusion.
 
-    levels : textures of the blur pyramid, which all layouts use in turn
+    levels : textures of the blur pyramid, which the layouts use one after another
     blurs : Gaussian blurs of each atlas layout, empty when no light is blurred
     mixture : textures of profiles that are blended by a map, None for a single profile
     """

@@ -1,5 +1,5 @@
-// Smooths the displacement of the guides from rest along each guide. Knots far from the skin follow quads that change abruptly
-// along the guide, such as from the jaw to the shoulder; those near the skin keep their place.
+// Smooths the displacement from rest along each guide. Knots far from the skin need this, because the quads that they follow
+// may change abruptly along the guide, such as from the jaw to the shoulder. Knots near the skin are not moved.
 //#include "each.wgsl"
 
 //#fill const GUIDE_KNOTS: u32 = {guide_knots}; // of each guide

@@ -62,10 +62,10 @@ def pose_guides(graph: Recorder, tables: StrandTables, shape: Shape) -> None:
 def pose_strands(
     graph: Recorder, tables: StrandTables, shape: Shape, posed: Buffer, coarse: StrandCounts
 ) -> None:
-    """Declare the passes that move fine strands with the skin, and grow coarse ones between posed guides.
+    """Declare the passes that move fine strands with the skin, and grow coarse strands between posed guides.
 
-    posed : buffer of the strands
-    coarse : number of coarse strands to grow in place of all, and of their knots
+    posed : buffer to which the posed strands are written
+    coarse : number of coarse strands to grow, and number of knots of each
     """
     shared: Bindings = {"points": shape.surface["points"], "hairs": tables.record(coarse), "posed": posed}
     if tables.fine.hairs:
@@ -109,7 +109,7 @@ def draw(
     shading : resources of the lighting, uniform record of the shading pass, and constants of the lights
     visibility : texture of the triangle at each sample
     radiance : texture of the picture without hair
-    labels : resources with which the pass labels pixels of hair, None without label outputs
+    labels : resources with which the pass labels pixels of hair, None if no labels are requested
     """
     tables, picture, (lighting, view, light_constants) = strands.tables, strands.picture, shading
     shape, head = geometry
@@ -169,8 +169,8 @@ def _pixel_mm(view: UniformRecord, tables: StrandTables, height: int) -> float:
 def _max_segments_in_tile(tables: StrandTables, segments: int, pixel_mm: float) -> int:
     """Estimate the number of strand segments in a crowded tile of the picture.
 
-    The tile is assumed to hold all fine segments, and several times the mean number of coarse segments per
-    tile.
+    The tile is assumed to contain all segments of fine strands, and several times the mean number of segments
+    of coarse strands per tile.
 
     segments : number of segments of all strands that are drawn
     pixel_mm : side of a pixel at the depth of the strands [mm]
@@ -181,13 +181,13 @@ def _max_segments_in_tile(tables: StrandTables, segments: int, pixel_mm: float) 
 
 
 def rows_per_invocation(device: Device, segments: int) -> int:
-    """Return how many pixels of a column one shader invocation draws, a power of two.
+    """Return the number of vertically adjacent pixels that one shader invocation draws, a power of two.
 
     segments : estimate of the largest number of segments in a tile
 
-    On software adapters, an invocation without hair costs as much as one with hair, unless a loop skips its
-    pixels. Software adapters also end all loops of a shader after 65,535 iterations in total, which limits
-    the rows. Powers of two limit the number of shader variants.
+    On software adapters, pixels without hair are only cheap if they are skipped in a loop over several
+    pixels. Software adapters also end the loops of a shader after 65,535 iterations in total, which limits
+    the number of pixels. Powers of two limit the number of shader variants.
     """
     if device.adapter.kind != "CPU":
         return 1

@@ -54,11 +54,13 @@ _HAIRS_DTYPE = np.dtype([*((name, "u4") for name in _COUNT_MEMBERS), ("width_sca
 
 
 class Detail(NamedTuple):
-    """Detail in which coarse strands are grown on a kind of adapter.
+    """Level of detail of coarse strands on one kind of adapter.
 
-    drawn_knots : largest number of knots of all drawn strands
-    casters, caster_knots : largest number of strands that cast the shadows of all, and of their knots
-    width_px, segment_px : least width of the drawn strands, and least length of their segments [pixel]
+    drawn_knots : largest total number of knots of the drawn strands
+    casters : largest number of strands that cast shadows, in place of all strands
+    caster_knots : largest number of knots of each of these strands
+    width_px : least width of drawn strands [pixel]
+    segment_px : least length of the segments of drawn strands [pixel]
     """
 
     drawn_knots: int
@@ -89,7 +91,7 @@ class StrandCounts(NamedTuple):
 class StrandCapacity(NamedTuple):
     """Number of strands and knots that the buffers of hair can hold.
 
-    fine : strands of brows and lashes
+    fine : number of strands of brows and lashes
     knots : total number of knots of fine and coarse strands
     """
 
@@ -111,9 +113,9 @@ class StrandPicture:
     """Lists of the strand segments in each tile of the picture, and the picture with hair.
 
     chains : buffer of the first link of each linked list of segments, see strands_bin.wgsl
-    links : buffer of the links of these lists: a segment and the next link
+    links : buffer of the links of these lists; a link consists of a segment and the index of the next link
     result : texture of the picture with hair
-    chains_per_tile : number of linked lists of a tile, which are filled and drawn in parallel
+    chains_per_tile : number of linked lists per tile; the lists of a tile are filled and drawn in parallel
     """
 
     chains: Buffer
@@ -123,7 +125,7 @@ class StrandPicture:
 
 
 def strand_counts(strands: Strands | None) -> StrandCounts:
-    """Return the number of strands, which is 0 for None, and the number of knots of each strand."""
+    """Return the number of strands, 0 if there are none, and the number of knots of each strand."""
     return StrandCounts(0, 2) if strands is None else StrandCounts(*strands.radius_mm.shape)
 
 
@@ -137,13 +139,13 @@ def coarse_counts(device: Device, head: Head) -> StrandCounts:
 
 
 def caster_counts(device: Device, coarse: StrandCounts) -> StrandCounts:
-    """Return the number of coarse strands that cast the shadows of all, and the number of knots of each."""
+    """Return the number of coarse strands that cast shadows in place of all, and of the knots of each."""
     detail = adapter_detail(device)
     return StrandCounts(min(coarse.hairs, detail.casters), min(coarse.knots, detail.caster_knots))
 
 
 def adapter_detail(device: Device) -> Detail:
-    """Return the detail of hair on a device."""
+    """Return the level of detail of hair on a device."""
     return _SOFTWARE_DETAIL if device.adapter.kind == "CPU" else _GPU_DETAIL
 
 
@@ -180,7 +182,7 @@ def make_strand_picture(device: Device, capacity: StrandCapacity, size: tuple[in
 def chains_per_tile(device: Device, tiles: int) -> int:
     """Return the number of linked lists of segments per tile of the picture.
 
-    The number is 1 on software adapters, and where a buffer cannot hold more lists.
+    The number is 1 on software adapters, and if a buffer cannot hold more lists.
 
     tiles : number of tiles of the picture
     """
@@ -205,7 +207,7 @@ def _make_buffer(device: Device, words: int) -> Buffer:
 
 @dataclass(frozen=True, eq=False)
 class GuideTables:
-    """Guides of a style in buffers, by the names of guides_pose.wgsl and strands_grow.wgsl."""
+    """Buffers of the guides of a hair style, named as in guides_pose.wgsl and strands_grow.wgsl."""
 
     anchors: Buffer
     guide_rest: Buffer
@@ -216,7 +218,7 @@ class GuideTables:
 
 @dataclass(frozen=True, eq=False)
 class GroomTables:
-    """Groom of a person in buffers: the tables of the style, and the numbers of the person."""
+    """Buffers of a person's groom: tables of the hair style, and parameters such as length and colour."""
 
     style: GuideTables
     roots: Buffer
@@ -226,19 +228,23 @@ class GroomTables:
 
 @dataclass(frozen=True, eq=False)
 class StrandTables:
-    """Strands of a head in buffers, with the counts and mean values from which strands are drawn.
+    """Buffers of a head's strands, with the values that determine how many strands are drawn.
 
-    strands, knots : tables of the fine strands at rest and of their knots, see strands_pose.wgsl
+    Fine strands are brows and lashes; coarse strands are scalp hair and beard.
+
+    strands : buffer of the fine strands at rest, see strands_pose.wgsl
+    knots : buffer of the knots of the fine strands at rest, see strands_pose.wgsl
     buffers : buffers that each frame fills
-    fine : number of strands and knots of brows and lashes
-    coarse : largest number of strands and knots of the hair on head and chin
-    casters : number of strands and knots of the hair that cast the shadows of all of it
-    detail : detail in which the hair is drawn
-    groom : tables from which the hair grows; None without any
-    possible : number of strands of which the hair consists
-    centre_mm : (3,) centre of the roots of the hair at rest [mm]
-    length_mm, width_mm : length of the hair, and mean width of a strand [mm]
-    cover : projected area of hair per area of skin around a root [-]
+    fine : number of fine strands, and of the knots of each
+    coarse : largest number of coarse strands to draw, and largest number of knots of each
+    casters : number of coarse strands that cast shadows in place of all, and of the knots of each
+    detail : level of detail of the coarse strands
+    groom : tables from which coarse strands grow, None if there are no coarse strands
+    possible : total number of coarse strands of the person
+    centre_mm : (3,) centre of the roots of the coarse strands at rest [mm]
+    length_mm : length of the part of the hair with the longest strands [mm]
+    width_mm : width of a strand in this part [mm]
+    cover : projected area of hair per area of skin in this part [-]
     """
 
     strands: Buffer
@@ -256,7 +262,9 @@ class StrandTables:
     cover: float
 
     def record(self, coarse: StrandCounts) -> UniformRecord:
-        """Return the uniform record of the struct Hairs in strand_knots.wgsl for some coarse strands."""
+        """Return the uniform record of the struct Hairs in strand_knots.wgsl.
+
+        coarse : number of coarse strands to draw, and number of knots of each"""
         width_scale = self.possible / max(1, coarse.hairs)
         values = self.fine.hairs, coarse.hairs, coarse.hairs, self.fine.knots, coarse.knots, width_scale
         return np.array(values, _HAIRS_DTYPE)
@@ -266,10 +274,10 @@ class StrandTables:
 class Resources:
     """Resources of the passes of hair.
 
-    tables : strands of the head in buffers
-    picture : segment lists and the texture with hair
+    tables : buffers of the strands of the head
+    picture : lists of strand segments, and the texture of the picture with hair
     shadows : buffer of the deep opacity maps of all lights
-    skin_albedo : (3,) mean albedo of the skin below the strands, which reflects light onto them [-]
+    skin_albedo : (3,) mean albedo of the skin, which reflects light onto the strands [-]
     """
 
     tables: StrandTables
@@ -279,7 +287,7 @@ class Resources:
 
 
 def shader_constants() -> dict[str, float]:
-    """Return the values that `//#fill` lines insert in the hair shaders, by name."""
+    """Return the named values that `//#fill` lines insert into the hair shaders."""
     opacity = {"strand_window": DEEP_OPACITY_WIDTH, "strand_layers": DEEP_OPACITY_LAYERS}
     words = {"strand_window_words": DEEP_OPACITY_HEADER_WORDS, "strand_window_knots": WINDOW_KNOTS}
     guides = {"guide_anchors": GUIDE_ANCHORS, "guide_knots": GUIDE_KNOTS}
@@ -287,7 +295,7 @@ def shader_constants() -> dict[str, float]:
 
 
 def has_strands(head: Head, settings: Settings) -> bool:
-    """Return whether a head has strands, and the settings show them."""
+    """Return whether a head has strands and the settings show strands."""
     return settings.strands and any(part is not None and len(part) > 0 for part in (head.strands, head.hair))
 
 
@@ -315,11 +323,11 @@ def drawn_counts(tables: StrandTables, pixel_mm: float) -> StrandCounts:
 def make_strand_tables(
     device: Device, head: Head, coarse: StrandCounts, buffers: StrandBuffers, groom: GroomTables | None
 ) -> StrandTables:
-    """Upload the fine strands of a head, and collect the tables of its hair.
+    """Upload the fine strands of a head, and collect the tables of its coarse strands.
 
-    coarse : numbers from `coarse_counts`
+    coarse : result of `coarse_counts`
     buffers : buffers that each frame fills
-    groom : tables from which the hair grows; None without any
+    groom : tables from which coarse strands grow, None if there are no coarse strands
 
     Raises DermisError for strands that are rooted in another mesh.
     """
@@ -347,7 +355,7 @@ def make_strand_tables(
 
 
 def make_guide_tables(device: Device, guides: Guides) -> GuideTables:
-    """Upload the guides of a style, and allocate a buffer for the guides in a pose."""
+    """Upload the guides of a hair style, and allocate buffers for the posed guides."""
     anchors = np.empty(guides.weight.shape, _ANCHOR_DTYPE)
     anchors["corner"] = guides.corner
     anchors["local"][..., :3], anchors["local"][..., 3] = guides.local_mm, guides.weight
@@ -357,7 +365,7 @@ def make_guide_tables(device: Device, guides: Guides) -> GuideTables:
 
 
 def make_strand_roots(device: Device, roots: StrandRoots, mesh: Mesh) -> Buffer:
-    """Upload the roots of the possible strands of a style.
+    """Upload the roots of all strands that a hair style can have.
 
     mesh : mesh of quads in which the strands are rooted
     """
@@ -369,9 +377,10 @@ def make_strand_roots(device: Device, roots: StrandRoots, mesh: Mesh) -> Buffer:
 
 
 def make_groom_tables(device: Device, groom: Groom, style: GuideTables, roots: Buffer) -> GroomTables:
-    """Upload the numbers of a person's groom.
+    """Upload the parameters of a person's groom, such as colour and length.
 
-    style, roots : tables of the style, which people share
+    style : guides of the hair style, shared by all people with that style
+    roots : buffer of the strand roots of the hair style, shared by the same people
     """
     parts = device.buffer(groom.parameters.view(np.float32), "STORAGE")
     return GroomTables(style, roots, parts, device.buffer(groom.hairline_mm, "STORAGE"))
@@ -389,7 +398,7 @@ def _fill_rows(rows: NDArray[np.void], head: Head, strands: Strands) -> None:
 
 
 def _knot_rows(strands: Strands) -> NDArray[np.float32]:
-    """Return the positions and radii of all knots, (n k, 4) for n strands of k knots [mm]."""
+    """Return positions and radii of all knots, as (n k, 4) for n strands with k knots each [mm]."""
     rows = np.empty((*strands.radius_mm.shape, 4), np.float32)
     rows[..., :3], rows[..., 3] = strands.knots_mm, strands.radius_mm
     return rows.reshape(-1, 4)

@@ -1,4 +1,4 @@
-// Fragments of strands over a pixel: the nearest ones are kept and composited over the picture.
+// Fragments of strands in a pixel: the nearest fragments are kept and composited over the picture.
 //#include "shape/geometry.wgsl"
 //#include "strand_view.wgsl"
 //#include "strand_tiles.wgsl"

@@ -1,5 +1,5 @@
-// Layout of strands in buffers: normal of the skin, absorption and the knots from root to tip. Fine strands, brows and lashes,
-// come first, then the coarse ones of head and beard, some in place of all.
+// Layout of strands in buffers: normal of the skin, absorption, and the knots from root to tip. Fine strands (brows and
+// lashes) come first, then coarse strands (scalp hair and beard); if only some coarse strands are drawn, they are wider.
 
 const ROWS_BEFORE: u32 = 2u; // rows of a strand before its knots: normal of the skin, and radius by which light is absorbed,
 // 0 for that of the knots; absorption [1/mm] and cover by other hair

@@ -1,5 +1,6 @@
-// Columns of pixels for each invocation. The including shader defines `draw_pixel` for pixels that strands may cover, and
-// `pass_through` for all others: a loop skips these, as software adapters run both sides of a branch.
+// Loop over the column of pixels that one invocation draws. The including shader defines `draw_pixel` for pixels that strands
+// may cover, and `pass_through` for all other pixels. These are skipped in a loop, because software adapters run both sides of
+// a branch.
 //#include "strand_fragments.wgsl"
 
 override ROWS: u32 = 1u; // pixels of an invocation; see `rows_per_invocation`

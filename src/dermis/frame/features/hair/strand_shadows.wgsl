@@ -1,4 +1,4 @@
-// Shadows of strands: cover by hair on the way of light to a point.
+// Shadows of strands: the amount of hair between a light and a point.
 //#include "strand_window.wgsl"
 
 override STRANDS: bool = false; // whether there are strands

@@ -1,6 +1,6 @@
-// Segments of a tile, drawn by a workgroup. The invocations of its first layer each follow one linked list of the tile; the
-// segments are distributed among the layers, each of which has an invocation for each pixel. The including shader defines
-// `visit_segment`, and `begin_pixel`, which is called before the first segment.
+// Draws the segments of a tile by a workgroup, whose invocations form several layers of one invocation per pixel. Invocations
+// of the first layer load segments, each from one linked list of the tile; the loaded segments are distributed among the
+// layers. The including shader defines `visit_segment`, and `begin_pixel`, which is called before the first segment.
 //#include "strand_fragments.wgsl"
 
 const LANES: u32 = STRAND_TILE * STRAND_TILE; // invocations of a layer: the pixels of a tile

@@ -1,5 +1,5 @@
-// Deep opacity map of each light: cover by strands in layers of depth, in the window of its shadow map that holds all strands.
-// Source: [YukselKeyser2008].
+// Deep opacity map of each light: the cover by strands in several layers of depth, within the window of the light's shadow map
+// that contains all strands. Source: [YukselKeyser2008].
 //#include "lights.wgsl"
 
 //#fill const STRAND_WINDOW: u32 = {strand_window}; // texels across, half as many down

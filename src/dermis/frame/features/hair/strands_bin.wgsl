@@ -1,4 +1,4 @@
-// Lists each segment in the tiles of the picture that it may cover.
+// Adds each segment to the lists of those tiles of the picture that it may cover.
 //#include "each.wgsl"
 //#include "strand_view.wgsl"
 //#include "strand_tiles.wgsl"

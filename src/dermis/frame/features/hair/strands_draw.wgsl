@@ -1,4 +1,5 @@
-// Draws strands over the picture: each pixel keeps its nearest fragments and composites them over the radiance behind.
+// Draws strands over the picture: each pixel keeps its nearest fragments and composites them over the radiance behind the
+// hair.
 //#include "strand_rows.wgsl"
 //#include "strand_labels.wgsl"
 

@@ -1,4 +1,4 @@
-// Draws strands over the picture by tiles: a workgroup draws the segments of a tile.
+// Draws strands over the picture; each workgroup draws the segments of one tile.
 //#include "strand_team.wgsl"
 //#include "strand_labels.wgsl"
 

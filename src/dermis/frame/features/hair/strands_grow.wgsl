@@ -1,5 +1,5 @@
-// Grows the coarse strands of a groom: each is interpolated between four guides, drawn into its clump, curled and varied at
-// random. Strands that the hairline or the density of a person leaves out get a negative radius.
+// Grows the coarse strands of a groom: each strand is interpolated between four guides, drawn into its clump, curled and
+// randomly varied. Strands that a person does not have, because of the hairline or a lower density, get a negative radius.
 //#include "each.wgsl"
 //#include "strand_knots.wgsl"
 

@@ -1,5 +1,5 @@
-// Radiance of each knot towards the eye by dual scattering, and its position in the picture. Light that other strands have
-// scattered arrives around the direction of the light, and from the hair behind [Zinke2008].
+// Radiance of each knot towards the eye by dual scattering, and the position of the knot in the picture. Light scattered by
+// other strands arrives from directions near that of the light, and from the hair behind [Zinke2008].
 //#include "each.wgsl"
 //#include "irradiance/lighting.wgsl"
 //#include "hair.wgsl"

@@ -1,4 +1,4 @@
-// Poses the strands: each follows the quad of the skin in which it is rooted.
+// Poses the strands: each strand follows the quad of the skin in which it is rooted.
 //#include "each.wgsl"
 //#include "strand_knots.wgsl"
 

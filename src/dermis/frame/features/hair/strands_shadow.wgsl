@@ -1,5 +1,5 @@
-// Fills the deep opacity maps: first the depth of the nearest strand in each texel, then the cover of each layer behind it.
-// Sums of integers do not depend on the order.
+// Fills the deep opacity maps: first the depth of the nearest strand in each texel, then the cover of each layer behind this
+// depth. Integers are summed, so that the result does not depend on the order of strands.
 //#include "each.wgsl"
 //#include "shape/geometry.wgsl"
 //#include "surface/surface.wgsl"

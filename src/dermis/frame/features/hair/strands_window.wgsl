@@ -1,4 +1,4 @@
-// Computes the bounds of all strands on the shadow map of each light, by workgroups and then by atomic minima and maxima.
+// Computes the bounds of all strands on the shadow map of each light: within each workgroup, then by atomic minima and maxima.
 //#include "shape/geometry.wgsl"
 //#include "surface/surface.wgsl"
 //#include "strand_knots.wgsl"

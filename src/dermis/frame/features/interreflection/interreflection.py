@@ -23,7 +23,7 @@ _INVOCATIONS_PER_PATCH = 16  # shader invocations per patch or cell
 
 
 def shader_constants() -> dict[str, int]:
-    """Return the values that `//#fill` lines insert in the interreflection shaders, by name."""
+    """Return the named values that `//#fill` lines insert into the interreflection shaders."""
     return {"linked_side": CELLS_PER_SIDE, "linked_samples": SAMPLES_PER_PATCH}
 
 
@@ -32,16 +32,17 @@ class InterreflectionBuffers:
     """Buffers of interreflection, which do not depend on the appearance of the skin.
 
     sample_points : buffer of the surface points at which patches are lit, and the number of points
-    patch_links : buffers of the form factors between patches, by their names in shaders
-    cell_links : buffers of the form factors from atlas cells to patches, by their names in shaders
-    stores_means : whether cells store the mean exitance of the patches they see, instead of the sum of
+    patch_links : dictionary from names in shaders to buffers of the form factors between patches
+    cell_links : dictionary from names in shaders to buffers of the form factors from atlas cells to patches
+    stores_means : whether a cell stores the mean exitance of the patches that it sees, instead of the sum of
         exitance times form factor
     sample_exitance : buffer of the exitance of the sample points
     direct_exitance : buffer of the exitance of the patches by direct light
-    uniform_exitance : buffer of the exitance of the patches in uniform irradiance 1
-    bounced_exitance : two buffers of the exitance of the patches after a bounce, used in turn
+    uniform_exitance : buffer of the exitance of the patches under a uniform irradiance of 1
+    bounced_exitance : two buffers of the exitance of the patches after a bounce; bounces alternate between
+        them
     from_skin : buffer of the light that reaches each cell from other skin
-    no_light : buffer of zeros in place of `from_skin` while the sample points are lit
+    no_light : buffer of zeros that takes the place of `from_skin` while the sample points are lit
     """
 
     sample_points: tuple[Buffer, int]
@@ -63,7 +64,7 @@ class InterreflectionBuffers:
 
 
 class Interreflection(NamedTuple):
-    """Buffers of interreflection, and the (3,) albedo of the profile, that is, the sum of its weights [-]."""
+    """Buffers of interreflection, and the (3,) albedo of the profile, which is the sum of its weights [-]."""
 
     buffers: InterreflectionBuffers
     albedo: NDArray[np.float64]
@@ -175,7 +176,7 @@ def draw(graph: Recorder, bindings: Bindings, interreflection: Interreflection, 
 
 
 def _draw_bounces(graph: Recorder, buffers: InterreflectionBuffers) -> None:
-    """Declare the passes that let light bounce between the patches, and gather it in the atlas cells."""
+    """Declare the passes in which light bounces between patches and then reaches the atlas cells."""
     device = graph.device
     team = (
         1 if device.adapter.kind == "CPU" else _INVOCATIONS_PER_PATCH

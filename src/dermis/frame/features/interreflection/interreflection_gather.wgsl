@@ -1,4 +1,4 @@
-// Irradiance of each cell of the uv square by the light of all patches in view.
+// Irradiance of each cell of the uv square by the light of all patches that the cell sees.
 //#include "links.wgsl"
 
 override MEAN: bool = false; // whether to store the mean radiance of the patches in view, instead of the sum by form factors

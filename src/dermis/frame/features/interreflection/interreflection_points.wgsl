@@ -1,4 +1,4 @@
-// Exitance at the sample points of the patches: by direct light, and by uniform light.
+// Exitance at the sample points of the patches under direct light, and under uniform light.
 //#include "irradiance/lighting.wgsl"
 //#include "irradiance/fine_light.wgsl"
 //#include "each.wgsl"

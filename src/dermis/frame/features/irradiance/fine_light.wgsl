@@ -1,5 +1,5 @@
-// Light finer than the texels of the atlas, for stripes, whose shape is known: difference between the exact convolution by
-// the Gaussians of the profile and the interpolated levels of the atlas.
+// Correction for light that varies within a texel of the atlas, for light stripes, whose shape is known: the exact convolution
+// by the Gaussians of the profile minus the interpolated levels of the atlas.
 
 struct Fine {
     count: u32, // number of levels, 0 for none

@@ -1,4 +1,4 @@
-"""Irradiance on the atlas, and the parameters of light that varies within a texel."""
+"""Irradiance over the atlas, and parameters of the correction for light that varies within a texel."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LIGHT_FILTER_SIGMA_TEXELS = 0.5
 
 
 def fine_light_constants() -> dict[str, float]:
-    """Return the values that `//#fill` lines insert in fine_light.wgsl, by name."""
+    """Return the named values that `//#fill` lines insert into fine_light.wgsl."""
     return {"fine_levels": MAX_FINE_GAUSSIANS}
 
 
@@ -26,8 +26,9 @@ def fine_light_members(
 ) -> dict[str, float | NDArray[np.floating]]:
     """Return the members of the shader struct `Fine`, which corrects light that varies within a texel.
 
-    variance_mm2, weight : (k,) variances [mm2] and (k, 3) weights [-] of the Gaussians that blur
-    relit_mm2 : variance of the Gaussian that is relit in the picture instead of blurred [mm2]
+    variance_mm2 : (k,) variances of the Gaussians that blur [mm2]
+    weight : (k, 3) weights of the Gaussians that blur [-]
+    relit_mm2 : variance of the relit Gaussian, whose light is evaluated per pixel instead of blurred [mm2]
     """
     count = min(len(variance_mm2), MAX_FINE_GAUSSIANS)
     level = np.zeros((MAX_FINE_GAUSSIANS, 4), np.float32)
@@ -57,9 +58,9 @@ def draw(
     irradiance_texture : texture of `atlas_side` x `atlas_side` texels to write to
     atlas_side : side of the atlas [texels]
     texel_format : format of the texture
-    irradiance_scale : factor from irradiance to the texels of `irradiance_texture`
-    filter_sigma_texels : standard deviation of the filter of light finer than texels [texels]; 0 samples
-        texel centres, for textures whose adjacent texels are not adjacent on the surface
+    irradiance_scale : factor by which irradiance is multiplied before it is stored
+    filter_sigma_texels : standard deviation of the filter for light that varies within a texel [texels]. 0
+        samples only texel centres; this is required if adjacent texels are not adjacent on the surface
     """
     if filter_sigma_texels:  # neighbouring texels are neighbours on the surface
         constants = oblique_constants(constants)

@@ -1,4 +1,4 @@
-// Light of all sources at a point of the head: the part that enters the skin, and the part that the surface reflects.
+// Light of all sources at a point of the head: the part that enters the skin, and the part that is reflected at the surface.
 //#include "shape/geometry.wgsl"
 //#include "bilinear.wgsl"
 //#include "surface/skin.wgsl"

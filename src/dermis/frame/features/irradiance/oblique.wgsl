@@ -1,5 +1,6 @@
 // Oblique incidence: light travels along its direction before it scatters, so that its mean exit point is offset from the
-// entry point. A point is lit as the surface at that offset towards the light. Source: [WangJacques1995].
+// entry point. At a point, the entering light is therefore evaluated for the surface at this offset towards the light. Source:
+// [WangJacques1995].
 //#include "lights.wgsl"
 
 override OBLIQUE: bool = false; // whether the pass provides the shape of the surface around a point

@@ -1,4 +1,4 @@
-// Surface at texels of the atlas and at their neighbours.
+// Surface at a texel of the atlas and at its neighbours.
 //#include "surface/packed_surface.wgsl"
 //#include "oblique.wgsl"
 

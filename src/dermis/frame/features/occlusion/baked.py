@@ -55,12 +55,14 @@ def bake_occlusion(
     direction_count: int = SKY_DIRECTION_COUNT,
     depth_map_side: int = DEPTH_MAP_SIDE,
 ) -> NDArray[np.float32]:
-    """Return the cosine-weighted visible fraction of the sky (rows, result_side), NaN without a surface [-].
+    """Return the cosine-weighted visible fraction of the sky at texels and vertices, (rows, result_side) [-].
 
-    Depth maps are drawn from directions all around. A point sums the directions in which it is visible. The
-    first `result_side` rows are texels of the atlas, the other rows hold the vertices of the mesh.
+    Depth maps of the head are drawn from directions all around it. For each point, the cosines of the
+    directions from which the point is visible are summed, and divided by the sum of all cosines. The first
+    `result_side` rows of the result are the texels of the atlas, NaN where there is no surface; the other
+    rows hold the vertices of the mesh.
 
-    bindings : resources of the lighting; the resources of geometry and lights are replaced
+    bindings : resources of the lighting, in which geometry and lights are replaced
     surface_texels : texture of the surface point of each atlas texel
     result_side : side of the atlas in the result [texels]
     direction_count : number of depth maps
@@ -108,9 +110,9 @@ def _light_record(shader: ComputeProgram, shadow_views: list[ShadowView]) -> Uni
 
 
 def fill_gaps(baked_occlusion: NDArray[np.float32], result_side: int) -> NDArray[np.float32]:
-    """Return a baked occlusion map whose empty texels are filled from the nearest texel with a value.
+    """Return a baked occlusion map whose empty texels have the value of the nearest texel on the surface.
 
-    The last row of the atlas is repeated, as a border for filters between texels and vertices.
+    The last row of the atlas is repeated, so that filters at the edge of the atlas do not read vertices.
 
     baked_occlusion : (rows, result_side) result of `bake_occlusion`, NaN where there is no surface
     result_side : side of the atlas in the result [texels]
@@ -135,8 +137,8 @@ def cached_occlusion_map(
 ) -> Texture:
     """Return a texture of the visible fraction of the sky at texels and vertices, baked or read from disk.
 
-    hair : hair of the head, which dims the sky on the skin below it
-    bindings : resources of the lighting; the resources of geometry and lights are replaced
+    hair : hair of the head, which hides a part of the sky from the skin below it
+    bindings : resources of the lighting, in which geometry and lights are replaced
     surface_texels : texture of the surface point of each atlas texel
     """
     side = min(atlas.size, _MAX_OCCLUSION_MAP_SIDE)
@@ -157,13 +159,12 @@ def cached_occlusion_map(
 def _hair_transmittance(
     mesh: Mesh, hair: Groom, packed_texels: NDArray[np.uint32], result_side: int
 ) -> NDArray[np.float32]:
-    """Return the fraction of the light of the sky that passes the hair, in the layout of `fill_gaps` [-].
+    """Return the fraction of the sky's light that passes through the hair, in the layout of `fill_gaps` [-].
 
-    The hair of the scalp and the beard absorbs diffuse light as a plane layer over its roots; strands scatter
-    what they do not absorb.
+    Scalp hair and beard are modelled as a plane layer over the roots, which absorbs some of the diffuse
+    light; light that is not absorbed is scattered and reaches the skin.
 
-    packed_texels : (s, s, 2) triangle + 1 and packed barycentric weights of each atlas texel, as on the
-        device
+    packed_texels : (s, s, 2) words of the atlas texels: triangle index plus 1, and packed barycentric weights
     result_side : side of the atlas in the result [texels]
     """
     absorbed = absorbed_by_hair(hair)

@@ -1,4 +1,4 @@
-"""Ambient occlusion of a moving head: the baked map, corrected by the change at the vertices since rest."""
+"""Ambient occlusion of a moving head: the map baked at rest, corrected by the changes at the vertices."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ _OCCLUDER_MIN_FACES_AND_MAX_ERROR = (5_000, 0.4)
 
 
 class SkyViews(NamedTuple):
-    """Orthographic views of a head from directions all around, for depth maps of the sky's visibility.
+    """Orthographic views of a head from directions all around it, for the depth maps of ambient occlusion.
 
     views : matrices from world to clip space
-    to_map : (k, 3, 4) matrices from points to column [texel], row [texel] and depth
+    to_map : (k, 3, 4) matrices from world positions to column [texel], row [texel] and depth
     to_sky : (k, 3) unit vectors from the head to the viewpoint
-    steps_mm : (k, 2, 3) vectors from a texel to the next texel on its right, and to the next texel above [mm]
+    steps_mm : (k, 2, 3) vectors in world space from a texel to its right and to its upper neighbour [mm]
     """
 
     views: Views
@@ -55,11 +55,12 @@ class SkyViews(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class RotationAnchors:
-    """Control points from whose motion the rotation of a head is estimated.
+    """Control points whose motion determines the estimated rotation of a head.
 
-    points : (s,) indices of control points
-    offsets : (s, 3) vectors from the weighted mean position at rest, times the weight of the point [mm]
-    outline : positions of these points, with the bones that move them
+    points : (s,) indices of the control points
+    offsets : (s, 3) vectors from the weighted mean position to each point at rest, times the point's weight
+        [mm]
+    outline : positions of the points, and the bones that move them
     """
 
     points: NDArray[np.intp]
@@ -68,7 +69,7 @@ class RotationAnchors:
 
 
 def sky_views(outline: Outline, rotation: Floats) -> SkyViews:
-    """Return orthographic views from directions all around, each as narrow as the shape allows.
+    """Return orthographic views from directions all around the head, each as narrow as the shape allows.
 
     rotation : (3, 3) rotation of the head, which also rotates the view directions
     """
@@ -92,13 +93,13 @@ def sky_views(outline: Outline, rotation: Floats) -> SkyViews:
 
 @lru_cache(maxsize=1)
 def _view_axes() -> Floats:
-    """Return the axes right, up and forward of all views of a head at rest, (k, 3, 3) unit vectors."""
+    """Return the right, up and forward axes of all views of a head at rest, (k, 3, 3) unit vectors."""
     up = np.array([0.0, 1.0, 0.0])
     return np.array([view_axes_array(-to_sky, up) for to_sky in fibonacci_sphere(SKY_VIEW_COUNT)])
 
 
 def make_anchors(head: Head) -> RotationAnchors:
-    """Return the anchors of a head, with Gaussian weights about its centre: shoulders count little."""
+    """Return the anchors of a head, weighted by a Gaussian around its centre (shoulders count little)."""
     rig = head.control
     points = np.unique(np.linspace(0, len(rig.positions_mm) - 1, _MAX_ANCHOR_COUNT).astype(np.intp))
     positions = rig.positions_mm[points].astype(np.float64)
@@ -126,7 +127,8 @@ class MovingOcclusion:
     """Resources from which the occlusion map of a moving head is updated.
 
     rest_map : texture of the occlusion map that was baked at rest
-    corners : texture of the vertices around each texel and their weights, see moving_occlusion_corners.wgsl
+    corners : texture of the vertices around each texel, and of their weights, see
+        moving_occlusion_corners.wgsl
     """
 
     rest_map: Texture
@@ -137,8 +139,8 @@ class MovingOcclusion:
 class VertexSkyVisibility:
     """Visible fraction of the sky at the vertices of a head, and depth maps from which it is computed.
 
-    layers : depth maps from directions all around
-    occluders : simplified triangles of the head that are drawn in the depth maps
+    layers : depth maps from directions all around the head
+    occluders : triangles of the simplified head, which are drawn into the depth maps
     visibility : buffer of two fractions for each vertex: at rest and in the current shape
     vertices : number of vertices
     """
@@ -188,7 +190,8 @@ def draw(
     """Declare the passes that update the occlusion maps of all atlas layouts for the current shape.
 
     views_record : uniform record of the views, from `sky_record`
-    occlusion_maps : atlas layouts, each with the resources that update its map, or None
+    occlusion_maps : each atlas layout with the resources that update its occlusion map, None if the layout
+        has no map to update
     """
     _draw_vertices(graph, vertex_visibility, views, views_record, occlusion_maps[0][0].head)
     for layout, occlusion in occlusion_maps:
@@ -199,9 +202,9 @@ def draw(
 def _draw_map(
     graph: Recorder, vertex_visibility: VertexSkyVisibility, layout: LitAtlas, occlusion: MovingOcclusion
 ) -> None:
-    """Declare the passes that update the occlusion map of a layout from its vertices.
+    """Declare the passes that update the occlusion map of a layout from the values at the vertices.
 
-    The pass that finds the vertices around each texel runs only once, as its inputs are constant.
+    The pass that finds the vertices around each texel runs only once, because its inputs are constant.
     """
     moving_map = cast(Texture, layout.bindings["occlusion_map"])
     bindings: Bindings = {
@@ -244,7 +247,7 @@ def _draw_vertices(
     """Declare the passes that compute the visible fraction of the sky at the vertices of a shape.
 
     views_record : uniform record of the views, from `sky_record`
-    is_at_rest : whether the shape is at rest, so that the fractions are stored as the fractions at rest
+    is_at_rest : whether to store the fractions as those of the head at rest
     """
     draw_layers(
         graph,

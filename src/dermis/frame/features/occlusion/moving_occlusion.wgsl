@@ -1,4 +1,4 @@
-// Sky visibility of a moving head at texels and vertices: the baked map, corrected by the change at the vertices.
+// Sky visibility of a moving head at texels and vertices: the map baked at rest, corrected by the changes at the vertices.
 
 const MAX_GAIN: f32 = 2.0; // largest ratio of the change at a texel to that at its vertices, which limits noise
 

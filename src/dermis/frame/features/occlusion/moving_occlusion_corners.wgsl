@@ -1,4 +1,4 @@
-// Vertices and barycentric weights of each texel of an occlusion map.
+// For each texel of an occlusion map, the surrounding vertices and their barycentric weights.
 //#include "shape/geometry.wgsl"
 
 const NO_VERTEX: u32 = 0xffffffffu;

@@ -1,4 +1,5 @@
-// Sky visibility at each vertex: the cosine-weighted fraction of depth maps from all around in which it is visible.
+// Sky visibility at each vertex: the cosine-weighted fraction of the depth maps, drawn from all directions, in which the
+// vertex is visible.
 //#include "shape/geometry.wgsl"
 //#include "each.wgsl"
 

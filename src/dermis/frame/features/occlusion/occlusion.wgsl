@@ -1,4 +1,5 @@
-// Sky visibility at texels of the atlas and at vertices: sums of the cosines of visible directions, and of all directions.
+// Sky visibility at texels of the atlas and at vertices: sums of the cosines of the directions from which a point is visible,
+// and of all directions.
 //#include "shape/geometry.wgsl"
 //#include "surface/skin.wgsl"
 //#include "lights.wgsl"

@@ -1,4 +1,4 @@
-// Sky visibility at a point of a triangle, from the atlas or interpolated between its corners.
+// Sky visibility at a point of a triangle, read from the atlas or interpolated between the corners of the triangle.
 //#include "irradiance/lighting.wgsl"
 
 // t: corners of the triangle, w: barycentric weights

@@ -1,4 +1,4 @@
-"""Outputs of a frame besides its picture, and the readback of picture and outputs."""
+"""Outputs of a frame besides its picture, and the readback of the picture and the outputs."""
 
 from dermis.frame.features.outputs.labels import shader_constants
 from dermis.frame.features.outputs.resources import Resources, make

@@ -1,4 +1,4 @@
-// Outputs of the mesh at the centre of each pixel.
+// Outputs that depend on the mesh alone, at the centre of each pixel.
 //#include "each_hit.wgsl"
 
 //#include <geometry_outputs>

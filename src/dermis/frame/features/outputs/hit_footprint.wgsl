@@ -1,4 +1,4 @@
-// Footprint of a pixel in the maps.
+// Area of the maps that a pixel covers, for outputs.
 //#include "surface_hit.wgsl"
 //#include "shading/footprint.wgsl"
 

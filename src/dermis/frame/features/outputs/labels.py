@@ -23,10 +23,10 @@ LABEL_STAGE = "label"
 class LabelBuffers:
     """Buffers that label.wgsl and strand_labels.wgsl read and write.
 
-    tables : label tables of the mesh by their names in label.wgsl
-    field_count : number of distance fields, whose zeros bound classes within triangles
-    hair_classes : class of each strand, None without hair
-    hair_labels : class of the hair in each pixel, written by the hair pass
+    tables : dictionary from names in label.wgsl to label tables of the mesh
+    field_count : number of distance fields; their zero lines are borders of classes within triangles
+    hair_classes : buffer of the class of each strand, None if the head has no hair
+    hair_labels : buffer of the class of the hair in each pixel, written by the hair pass
     """
 
     tables: MutableBindings
@@ -35,7 +35,7 @@ class LabelBuffers:
     hair_labels: Buffer
 
     def hair_bindings(self, centre_triangles: Texture) -> Bindings | None:
-        """Return the resources with which the hair pass labels pixels, None without hair.
+        """Return the resources with which the hair pass labels pixels, None if there is no hair.
 
         centre_triangles : texture of the triangle at the centre of each pixel
         """
@@ -65,7 +65,7 @@ def make_label_buffers(memo: Memo, device: Device, request: FrameRequest) -> Lab
 
 
 def shader_constants() -> dict[str, int]:
-    """Return the values that `//#fill` lines insert in the label shaders, by name."""
+    """Return the named values that `//#fill` lines insert into the label shaders."""
     names = "right_brow", "left_brow", "hair", "beard", "lashes"
     return {f"class_{name}": class_number(name) for name in names} | {"class_count": len(label_classes())}
 
@@ -79,7 +79,7 @@ def draw_labels(graph: Recorder, planes: Planes, buffers: LabelBuffers, inputs: 
 
 
 def _upload_tables(device: Device, labels: MeshLabels) -> MutableBindings:
-    """Upload the label tables of a mesh, and the FaceSynthetics number of each class of dermis."""
+    """Upload the label tables of a mesh, and for each class of dermis its number in FaceSynthetics."""
     face_synthetics = [one.face_synthetics for one in label_classes()]
     arrays = {
         "label_base": labels.base.astype(np.uint32),

@@ -1,4 +1,4 @@
-"""Landmark outputs: positions of landmarks in the scene, and whether they are visible."""
+"""Landmark outputs: positions and visibility of landmarks in the scene."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _FLOATS_PER_LANDMARK = 4  # x, y, z and visibility
 class LandmarkBuffers:
     """Buffers of the landmarks of all requested sets.
 
-    sets : surface points of the landmarks by the names of the sets
+    sets : dictionary from the name of a set to the surface points of its landmarks
     table : buffer of the surface points, read by landmarks.wgsl
     results : buffer of positions and visibility, written by landmarks.wgsl
     count : number of landmarks of all sets
@@ -40,7 +40,9 @@ class LandmarkBuffers:
     count: int
 
     def positions(self, result_bytes: NDArray[np.uint8]) -> LandmarkPositions:
-        """Return the positions and visibility of the landmarks of each set, from the bytes of `results`."""
+        """Return the positions and the visibility of the landmarks of each set.
+
+        result_bytes : content of the buffer `results`"""
         rows, first, positions = result_bytes.view(np.float32).reshape(-1, _FLOATS_PER_LANDMARK), 0, {}
         for name, points in self.sets.items():
             positions[name] = points.names, rows[first : first + len(points.names)]

@@ -39,12 +39,13 @@ _MAX_VISIBILITY_LIGHTS = 64  # as in visibility.wgsl
 
 @dataclass(frozen=True, eq=False)
 class LightOutputs:
-    """Resources for outputs of light and skin, apart from the planes into which they are written.
+    """Resources for outputs of light and skin, apart from the buffers into which the outputs are written.
 
     light_part_counts : number of parts into which the shader divides each light
-    transmitted : textures of the light through thin parts: one per layout, and the blend of several layouts
-    thickness : texture of the thickness of the tissue, None if it is not requested
-    pigments : melanin and blood fractions of uniform skin [-], None for painted maps or if they are not
+    transmitted : textures of the light through thin parts: one for each layout and, if there are several
+        layouts, one for their blend
+    thickness : texture of the tissue thickness, None if the thickness is not requested
+    pigments : melanin and blood fractions of uniform skin [-], None for painted maps or if pigments are not
         requested
     """
 
@@ -59,9 +60,9 @@ def make_light_outputs(
 ) -> LightOutputs:
     """Return the resources of the requested outputs of light and skin.
 
-    translucency : translucency of each layout
+    translucency : for each layout, the resources of light through thin parts, None if no light crosses them
 
-    Raises DermisError for outputs that the technique, the lights or the skin do not have.
+    Raises DermisError for outputs that the technique, the lights or the skin cannot provide.
     """
     requested, cached, pairs = set(request.outputs), memo.get, _translucent_pairs(request, translucency)
     if "visibility" in requested and not request.light_part_counts:
@@ -84,7 +85,7 @@ def make_light_outputs(
 def draw_light(graph: Recorder, planes: Planes, resources: LightOutputs, inputs: StageInputs) -> None:
     """Declare the passes that shade pixel centres for outputs of light.
 
-    Techniques in screen space also diffuse the light below the skin over the picture.
+    Screen-space techniques also diffuse the subsurface light over the picture.
     """
     device, diffusion = graph.device, inputs.picture_diffusion
     shader = stage_program(device, planes, inputs.constants)
@@ -102,7 +103,7 @@ def draw_light(graph: Recorder, planes: Planes, resources: LightOutputs, inputs:
 
 
 def draw_visibility(graph: Recorder, planes: Planes, resources: LightOutputs, inputs: StageInputs) -> None:
-    """Declare the pass that computes how much of each light a pixel sees, as a fraction."""
+    """Declare the pass that computes which fraction of each light the surface in a pixel sees."""
     shader, counts = stage_program(graph.device, planes, inputs.constants), resources.light_part_counts
     ends = np.zeros(_MAX_VISIBILITY_LIGHTS, np.uint32)
     ends[: len(counts)] = np.cumsum(counts)
@@ -118,7 +119,7 @@ def draw_pigments(graph: Recorder, planes: Planes, resources: LightOutputs, inpu
 
 
 def draw_thickness(graph: Recorder, planes: Planes, resources: LightOutputs, inputs: StageInputs) -> None:
-    """Declare the passes that measure the thickness of the tissue at thin parts, and write it to pixels."""
+    """Declare the passes that measure the tissue thickness of thin parts, and write it for each pixel."""
     assert inputs.translucency is not None and resources.thickness is not None
     measure_thickness(graph, inputs.translucency, resources.thickness)
     shader = stage_program(graph.device, planes)
@@ -127,7 +128,7 @@ def draw_thickness(graph: Recorder, planes: Planes, resources: LightOutputs, inp
 
 
 def make_thickness_map(device: Device, pairs: PairBuffers) -> Texture:
-    """Return a texture of the coarse atlas, filled with the largest thickness that pairs can measure [mm]."""
+    """Return a texture over the coarse atlas, filled with the largest measurable thickness [mm]."""
     surface = pairs.cells.receiver_mask
     texels = np.zeros((*surface.shape, 4), np.float32)
     texels[..., 0], texels[..., 3] = pairs.cells.radius_mm * surface, surface
@@ -153,7 +154,7 @@ def measure_thickness(graph: Recorder, translucency: Translucency, thickness_map
 
 
 def _shading_bindings(shader: ComputeProgram, inputs: StageInputs) -> MutableBindings:
-    """Return the resources of the shading, with factor 1 for light below the skin and for reflected light."""
+    """Return the resources of the shading, with factors of 1 for subsurface light and reflected light."""
     shade: UniformRecord = np.ndarray((), inputs.view.dtype, bytearray(inputs.view.tobytes()))
     shade["light_factors"] = 1.0
     return inputs.bindings(shader) | {"shade": shade, "scattered": inputs.scattered}
@@ -194,7 +195,7 @@ def _uniform_pigments(request: FrameRequest) -> tuple[float, float] | None:
 
 
 def _pigment_parameters(skin: Skin) -> SkinParameters | None:
-    """Return the pigments from which the profile of a skin is computed, None for other profiles."""
+    """Return the pigments from which the profile of a skin is computed, None if there are none."""
     try:
         return skin_tissue(skin).parameters
     except DermisError:  # profiles that are no tissue, such as the default

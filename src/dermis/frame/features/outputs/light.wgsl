@@ -1,4 +1,4 @@
-// Outputs of light at the centre of each pixel, by the shading of the picture.
+// Outputs of light at the centre of each pixel, computed by the functions that shade the picture.
 //#include "shading/shading.wgsl"
 //#include "surface_hit.wgsl"
 //#include "planes.wgsl"

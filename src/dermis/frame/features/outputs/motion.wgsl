@@ -1,4 +1,4 @@
-// Motion vectors: offset of the visible points in the picture since the previous scene.
+// Motion vectors: displacement in the picture of each visible point since the previous scene.
 //#include "each_hit.wgsl"
 
 //#include <motion_outputs>

@@ -1,4 +1,4 @@
-// Packs pixels to bytes with straight alpha: colours are divided by the coverage.
+// Packs pixels to bytes with straight alpha, which means that colours are divided by the coverage.
 //#include "post/encoding.wgsl"
 
 const ROW: u32 = 1024u; // invocations of a row

@@ -1,4 +1,4 @@
-"""Planar buffer for the outputs of a stage, with one plane per channel, and the pass that fills it."""
+"""Buffer for the outputs of a stage, one image after another, and the pass that fills the buffer."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ PlaneArray = NDArray[Any]  # callers know the dtype by the output's name
 
 @dataclass(frozen=True, eq=False)
 class Planes:
-    """Planar buffer for the outputs of a stage: one plane of pixels per channel.
+    """Buffer for the outputs of a stage: one image after another, with interleaved channels.
 
-    stage : name of the shader that fills the planes
-    channels : number of channels of each output, in the order of the planes
+    stage : name of the shader that fills the buffer
+    channels : number of channels of each output, in the order of the buffer
     size : (width, height) [pixel]
     buffer : one word per pixel and channel, see planes.wgsl
     """
@@ -36,11 +36,11 @@ class Planes:
 
     @property
     def constants(self) -> Constants:
-        """Return the pipeline constants that tell the shader the index of the first plane of each output."""
+        """Return the pipeline constants that tell the shader where each output starts in the buffer."""
         return tuple((f"{name.upper()}_FIRST", first) for name, first in self._first_channels().items())
 
     def first_channel_constant(self, output_name: str) -> Constants:
-        """Return the pipeline constant that tells the shader the index of the first plane of an output."""
+        """Return the pipeline constant that tells the shader where an output starts in the buffer."""
         return ((f"{output_name.upper()}_FIRST", self._first_channels()[output_name]),)
 
     def byte_range(self, output_name: str) -> tuple[int, int]:
@@ -62,7 +62,7 @@ class Planes:
     def array(self, output_name: str, output_bytes: NDArray[np.uint8]) -> PlaneArray:
         """Return one output as an (h, w) or (h, w, channels) array.
 
-        output_bytes : bytes of this output, in the range `byte_range`
+        output_bytes : bytes of the buffer in the range that `byte_range` returns
         """
         output, (width, height) = OUTPUTS[output_name], self.size
         kind = np.dtype(output.kind).kind
@@ -84,12 +84,12 @@ def make_planes(
     channel_counts: tuple[tuple[str, int], ...],
     picture_size: tuple[int, int],
 ) -> Planes:
-    """Allocate the planes of a stage for a picture of size (width, height).
+    """Allocate the buffer for the outputs of a stage, for a picture of size (width, height).
 
-    stage_name : name of the shader that fills the planes
+    stage_name : name of the shader that fills the buffer
     channel_counts : (name, number of channels) of each output
 
-    Raises DermisError if the planes do not fit in one buffer of the device.
+    Raises DermisError if the outputs do not fit in one buffer of the device.
     """
     pixels, count = picture_size[0] * picture_size[1], max(1, sum(number for _, number in channel_counts))
     if _WORD_BYTES * count * pixels > device.max_storage_bytes:
@@ -118,6 +118,6 @@ def stage_program(device: Device, planes: Planes, constants: Constants = ()) -> 
 def draw_planes(graph: Recorder, planes: Planes, shader: ComputeProgram, bindings: Bindings) -> None:
     """Declare the pass that computes the outputs of a stage for each pixel.
 
-    bindings : resources of the shader, apart from the planes
+    bindings : resources of the shader, apart from the buffer of outputs
     """
     graph.compute("outputs", shader, {**bindings, "planes": planes.buffer}, planes.size)

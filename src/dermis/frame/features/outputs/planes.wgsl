@@ -1,4 +1,4 @@
-// Buffer of outputs, one after the other; each is an image of interleaved channels.
+// Buffer of the outputs of a stage, one output after the other; each output is an image with interleaved channels.
 
 const NOT_REQUESTED: u32 = 0xffffffffu; // first channel of an output that is not requested
 

@@ -33,8 +33,9 @@ class Readback:
     size : (width, height) [pixel]
     kind : dtype of the picture
     channels : number of channels of the picture: 3, or 4 with alpha
-    words : size of the packed picture in words of four bytes; the outputs follow it in the downloaded bytes
-    outputs : resources of the outputs that are read back too, None for the picture alone
+    words : size of the packed picture in words of four bytes; in the downloaded bytes, the outputs follow the
+        picture
+    outputs : resources of the outputs that are read back with the picture, None for the picture alone
     """
 
     fetched: BufferReadback
@@ -45,13 +46,16 @@ class Readback:
     outputs: Resources | None = None
 
     def image(self) -> PictureArray:
-        """Wait for the picture and return it as an (h, w, channels) array; can be called once."""
+        """Wait for the picture and return it as an (h, w, channels) array.
+
+        This method can be called only once."""
         return self._image(self.fetched.array())
 
     def image_and_outputs(self) -> tuple[PictureArray, dict[str, PlaneArray], LandmarkPositions]:
-        """Wait for the readback; return the picture, outputs by name, and landmarks by the name of their set.
+        """Wait for the readback; return the picture, and dictionaries of outputs and of landmark sets.
 
-        Call either this method or `image`, and only once.
+        The keys are the names of the outputs and of the sets. Call either this method or `image`, and only
+        once.
         """
         raw, start, arrays = self.fetched.array(), _WORD_BYTES * self.words, dict[str, PlaneArray]()
         if self.outputs is None:
@@ -82,9 +86,9 @@ def start_readback(
     """Pack the picture and its outputs, and start their readback.
 
     as_linear : whether to read linear floats instead of sRGB bytes
-    alpha_settings : settings of the picture, to read its coverage as alpha: floats are premultiplied, bytes
-        are not; None for three channels
-    outputs : resources of the outputs to read back too, None for the picture alone
+    alpha_settings : settings of the picture if its coverage is to be read as alpha, else None. Floats are
+        multiplied by alpha, bytes are not
+    outputs : resources of the outputs to read back with the picture, None for the picture alone
 
     Raises DermisError if the data do not fit in one buffer of the device.
     """
@@ -124,7 +128,7 @@ def _check_size(
 
 
 def _packed_buffer(device: Device, picture: Picture, word_count: int) -> Buffer:
-    """Return the buffer for the packed picture; it is kept with the picture for later readbacks.
+    """Return the buffer for the packed picture; the buffer is kept with the picture for later readbacks.
 
     word_count : size of the packed picture [4 bytes]
     """

@@ -23,10 +23,12 @@ class Resources:
 
     names : names of the outputs in the order of the request
     planes : buffers of the outputs, one for each stage
-    centres : triangle at the centre of each pixel; None if the only sample of a pixel is at its centre
-    previous : shape of the head in the previous scene, None without motion vectors
+    centres : texture of the triangle at each pixel centre, None if the only sample of a pixel is at its
+        centre
+    previous : shape of the head in the previous scene, None if no motion vectors are requested
     light : resources for outputs of light and skin
-    labels, landmarks : buffers of labels and landmarks, None if they are not requested
+    labels : buffers of the labels, None if no labels are requested
+    landmarks : buffers of the landmarks, None if no landmarks are requested
     """
 
     names: tuple[str, ...]
@@ -44,7 +46,7 @@ class Resources:
         return [*(planes.buffer for planes in self.planes), *landmarks]
 
     def planes_of_output(self, output_name: str) -> Planes:
-        """Return the planes of the stage that computes an output."""
+        """Return the buffer of the stage that computes an output."""
         return next(planes for planes in self.planes if output_name in planes.channels)
 
 
@@ -57,9 +59,10 @@ def make(
 ) -> Resources | None:
     """Return the resources of the requested outputs, None if none are requested.
 
-    translucency : translucency of each layout
+    translucency : for each layout, the resources of light through thin parts, None if no light crosses them
 
-    Raises DermisError if outputs do not fit in one buffer of the device, or the scene does not have them.
+    Raises DermisError if the outputs do not fit in one buffer of the device, or if the scene cannot provide
+    them.
     """
     if not request.outputs and not request.landmarks:
         return None

@@ -1,4 +1,4 @@
-// Adds light that was diffused over the picture to the diffuse output.
+// Adds light that was diffused over the picture to the output of diffuse light.
 //#include "planes.wgsl"
 
 override DIFFUSE_FIRST: u32 = NOT_REQUESTED;

@@ -37,11 +37,11 @@ class PreviousScene:
 
 @dataclass(frozen=True, eq=False)
 class PictureDiffusion:
-    """Diffusion of the light below the skin over the picture, by a technique in screen space.
+    """Diffusion of subsurface light over the picture, by a screen-space technique.
 
-    layers : texture in which the shading stores the light below the skin
-    diffuse : function that declares the passes; it returns textures of the diffused light and of the fraction
-        of this light that leaves towards the camera
+    layers : texture in which the shading stores the subsurface light
+    diffuse : function that declares the passes; it returns textures of the diffused light, and of the
+        fraction of this light that leaves towards the camera
     """
 
     layers: Texture
@@ -56,19 +56,19 @@ class StageInputs:
     view : uniform record of the struct Shade
     centre_mm : centre of the head, the origin of positions of the scene [mm]
     constants : pipeline constants of the lights, the surface and the technique
-    scattered : texture of the light below the skin over the atlas, or tables of pre-integrated skin
+    scattered : texture of scattered light over the atlas, or tables of pre-integrated skin
     camera : projection of the camera, with the positions of samples in a pixel
     head : triangles of the head
-    visibility : triangle at each sample of the picture
-    centres : triangle at the centre of each pixel; `visibility` if the only sample is there
+    visibility : texture of the triangle at each sample of the picture
+    centres : texture of the triangle at each pixel centre; equals `visibility` if this is the only sample
     shape : current shape of the head
     picture : textures of the finished picture
     has_hair : whether hair is drawn
-    previous : pose and camera of the previous scene, None without motion vectors
-    translucency : resources of light through thin parts for the first layout, None without such light
-    picture_diffusion : diffusion over the picture, None for techniques without it
-    sum_transmitted : function that sums the light through thin parts in the given textures of the atlas, and
-        returns the texture that combines all layouts
+    previous : pose and camera of the previous scene, None if no motion vectors are requested
+    translucency : resources of light through thin parts for the first layout, None if no light crosses them
+    picture_diffusion : diffusion over the picture, None unless the technique works in screen space
+    sum_transmitted : function that fills the given textures of the atlas with the light through thin parts,
+        and returns the texture that combines all layouts
     """
 
     lighting: Bindings

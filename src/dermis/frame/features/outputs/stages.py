@@ -1,4 +1,4 @@
-"""Stages that compute outputs, by the names of their shaders, and the passes that they declare."""
+"""Stages that compute outputs, and the passes that they declare; each stage has the name of its shader."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def _labels_hair(resources: Resources | None, inputs: StageInputs) -> bool:
 
 
 def _draw_centres(graph: Graph, inputs: StageInputs) -> None:
-    """Declare the passes that find the triangle at the centre of each pixel, unless a sample is there."""
+    """Declare the passes that find the triangle at each pixel centre, unless the only sample is there."""
     if inputs.centres is not inputs.visibility:
         draw_layers(graph, "outputs", inputs.centres, Views(inputs.camera.clips, PIXEL_CENTRE), inputs.head)
 
@@ -116,7 +116,7 @@ DRAW_STAGES: Registry[DrawStage] = Registry(
 
 
 def shader_lists() -> Mapping[str, Callable[[], Sequence[ShaderListMember]]]:
-    """Return the outputs of each stage, which `//#each` lines of features/outputs/STAGE.wgsl expand."""
+    """Return a list of outputs for each stage, over which `//#each` lines in STAGE.wgsl loop."""
     stages = {one.stage for one in OUTPUTS.values()}
     return {f"{stage}_outputs": partial(_stage_members, stage) for stage in sorted(stages)}
 

@@ -1,4 +1,4 @@
-// Outputs of the surface with relief at the centre of each pixel.
+// Outputs of the surface including its relief, at the centre of each pixel.
 //#include "hit_footprint.wgsl"
 //#include "surface/skin.wgsl"
 //#include "each_hit.wgsl"

@@ -1,4 +1,5 @@
-// Thickness of the tissue below each cell of the coarse atlas, from the cells on the far side that it forms translucent pairs with.
+// Thickness of the tissue below each cell of the coarse atlas, measured to the cells on the far side with which it forms
+// translucent pairs.
 //#include "translucency/translucent_pair.wgsl"
 //#include "each.wgsl"
 

@@ -1,4 +1,5 @@
-// Multiplies the translucent output, the fraction that leaves towards the eye, by the light through thin parts.
+// Multiplies the translucent output by the light through thin parts; until then, the output holds the fraction that leaves
+// towards the eye.
 //#include "bilinear.wgsl"
 //#include "surface_hit.wgsl"
 //#include "planes.wgsl"

@@ -1,4 +1,4 @@
-// Visible fraction of each light at the centre of each pixel, in the shadows of head and hair.
+// Fraction of each light that is visible at the centre of each pixel, where head and hair may cast shadows.
 //#include "shading/shading.wgsl"
 //#include "surface_hit.wgsl"
 //#include "planes.wgsl"

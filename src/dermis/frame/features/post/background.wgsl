@@ -1,4 +1,4 @@
-// Background where the head does not cover the picture: a colour, a studio backdrop, or the environment.
+// Background, where the head does not cover the picture: a colour, a studio backdrop, or the environment.
 //#include "shape/geometry.wgsl"
 //#include "bilinear.wgsl"
 //#include "surface/skin.wgsl"

@@ -1,4 +1,4 @@
-"""Bloom, the light that a lens scatters: a sum of Gaussians of the whole picture, without a threshold."""
+"""Bloom, the light that a lens scatters: a sum of Gaussian blurs of the picture, without a threshold."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-// A step of the bloom: halves a picture by a binomial filter, or adds an enlarged smaller picture.
+// One step of the bloom: halves a picture by a binomial filter, or adds a smaller picture, enlarged.
 //#include "bilinear.wgsl"
 
 override WIDEN: bool = false; // false: halve; true: add the smaller picture

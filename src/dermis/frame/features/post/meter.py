@@ -1,4 +1,4 @@
-"""Incident exposure meter: it measures the irradiance of the skin, so that dark skin is rendered dark."""
+"""Exposure meter, which measures the irradiance (not the radiance) of skin, so that dark skin stays dark."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MIN_HIGHLIGHT_FACTOR = 0.5
 
 
 def shader_constants() -> dict[str, float]:
-    """Return the values that `//#fill` lines insert in the shaders of the exposure meter, by name."""
+    """Return the named values that `//#fill` lines insert into the shaders of the exposure meter."""
     highlights = {"meter_clipping": MAX_CLIPPED_FRACTION, "meter_stopped_down": MIN_HIGHLIGHT_FACTOR}
     return {"meter_side": METER_SIDE, "meter_key": METERED_IRRADIANCE, **highlights}
 

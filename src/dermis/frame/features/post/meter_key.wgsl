@@ -1,4 +1,5 @@
-// Exposure by the measurements: the root mean square of the light becomes the key value, unless highlights clip.
+// Exposure computed from the measurements: the root mean square of the metered light becomes the key value, but with less
+// exposure if highlights would clip.
 
 //#fill const METER_SIDE: u32 = {meter_side}u;
 //#fill const KEY: f32 = {meter_key}; // value of white skin in the metered light

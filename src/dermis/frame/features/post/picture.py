@@ -20,7 +20,8 @@ class Picture:
     exposed : linear light after exposure
     bytes : sRGB bytes
     size : (width, height) [pixel]
-    packed : buffers into which the picture is packed for readback, by their size [4 bytes]
+    packed : dictionary from a size [4 bytes] to the buffer of that size in which the picture is packed for
+        readback
     """
 
     radiance: Texture
@@ -46,7 +47,7 @@ def make_picture(device: Device, picture_size: tuple[int, int]) -> Picture:
 def draw(
     graph: Recorder, radiance: Texture, picture: Picture, settings: Settings, meter: Meter | None = None
 ) -> None:
-    """Declare the pass of exposure, tone curve and encoding, which fills `exposed` and `bytes` of a picture.
+    """Declare the pass that fills `exposed` and `bytes` of a picture: exposure, tone curve and encoding.
 
     meter : exposure meter, None for a fixed exposure
     """
@@ -59,5 +60,5 @@ def draw(
 
 
 def encoding_members(settings: Settings) -> dict[str, int]:
-    """Return the members of shader records that choose the tone curve and the sRGB encoding."""
+    """Return the members of uniform records that choose the tone curve and the sRGB encoding."""
     return {"tone": _TONE_CURVES.index(settings.tone), "encoded": int(settings.gamma == "right")}

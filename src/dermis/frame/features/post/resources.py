@@ -22,7 +22,7 @@ class Resources:
 
     meter : exposure meter, None for a fixed exposure
     backdrop : textures of the background, None for a black or transparent background
-    bloom : textures of the bloom, None without bloom
+    bloom : textures of the bloom, None if there is no bloom
     """
 
     picture: Picture
@@ -76,7 +76,7 @@ def draw(
 def _backdrop(memo: Memo, device: Device, request: FrameRequest) -> Backdrop | None:
     """Return the textures of the background, None for a black or transparent background.
 
-    A sharp environment needs its unfiltered panorama.
+    The unfiltered panorama is only loaded for a sharp background.
     """
     settings, environment = request.settings, request.environment
     if settings.background == "none":

@@ -1,4 +1,4 @@
-"""Properties and light of the skin at texels of baked maps, computed by the code that shades the picture."""
+"""Properties and light of the skin at texels of baked maps, computed by the same code as the picture."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ BAKED_CHANNEL_COUNT = sum(BAKED_CHANNELS.values())
 
 
 def shader_constants() -> dict[str, int]:
-    """Return the values that `//#fill` lines insert in bake.wgsl, by name."""
+    """Return the named values that `//#fill` lines insert into bake.wgsl."""
     return {"baked_numbers": BAKED_CHANNEL_COUNT}
 
 
@@ -61,7 +61,7 @@ def bake(
     constants : pipeline constants of the shading
     bindings : resources of the frame that shading.wgsl and bake.wgsl read
     packed_points : (n, 4) packed surface points, from `point_words`
-    texel_side_uv : side of a texel in uv, the inverse of the number of texels along the map [-]
+    texel_side_uv : side of a texel in uv, which is 1 divided by the side of the map in texels [-]
     pigments : melanin and blood fractions of uniform skin [-]; None to read them from painted maps
     """
     shader = program(device, "shading/bake.wgsl", constants)

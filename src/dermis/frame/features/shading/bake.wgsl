@@ -1,4 +1,4 @@
-// Properties and light at points of the surface instead of the picture, seen along the normal.
+// Properties and light at points of the surface, seen along the normal, instead of at pixels of the picture.
 //#include "shading.wgsl"
 //#include "each.wgsl"
 

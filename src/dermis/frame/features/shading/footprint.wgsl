@@ -1,4 +1,4 @@
-// Footprint of a part of the picture in the maps.
+// Area of the maps that a part of the picture covers.
 
 const FINEST_RATIO: f32 = 4.0; // largest ratio of the sides of a footprint that one map sample covers
 

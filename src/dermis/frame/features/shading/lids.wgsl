@@ -1,4 +1,4 @@
-// Distances of points of an eye from the edges of the lids, which are in `shade.lids`.
+// Distances from points of an eye to the edges of the eyelids, which are stored in `shade.lids`.
 //#include "eye.wgsl"
 
 const LID_POINTS: u32 = 56u; // points of the edges around an eye

@@ -1,4 +1,4 @@
-// Sets of up to 64 samples as bits.
+// Sets of up to 64 samples, stored as bits.
 
 // One bit of 64.
 fn bit_of(index: u32) -> vec2u {

@@ -40,9 +40,9 @@ def draw(
     lighting : resources of the lighting
     view : uniform record of the struct Shade
     constants : pipeline constants of the lights, the surface and the technique
-    scattered : texture of the light below the skin over the atlas, or tables of pre-integrated skin
-    subsurface : texture layers that receive the subsurface light and the fraction of that light that leaves
-        towards the camera; the image is then without this light. None to add the light to the image
+    scattered : texture of scattered light over the atlas, or tables of pre-integrated skin
+    subsurface : texture for the subsurface light (layer 0) and the fraction of that light that leaves towards
+        the camera (layer 1), which is then left out of the image; None to add this light to the image
     """
     device, (width, height) = graph.device, picture_size
     bindings = {**lighting, "shade": view, "visibility_buffer": visibility.texture, "scattered": scattered}
@@ -53,5 +53,5 @@ def draw(
 
 
 def placeholder_subsurface_layers(device: Device) -> Texture:
-    """Return a placeholder for the layers of light below the skin, for techniques outside screen space."""
+    """Return a placeholder for the layers of subsurface light, which only screen-space techniques use."""
     return device.cached("nothing apart", lambda: make_texture(device, (1, 1), "rgba32float", layer_count=2))

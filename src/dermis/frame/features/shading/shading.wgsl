@@ -1,5 +1,5 @@
-// Shading of a point of the surface: light scattered below the skin, relit at its finest level, and the specular reflection. The
-// picture and the outputs of light call the same functions.
+// Shading of a point of the surface: light scattered below the skin, with its finest Gaussian evaluated per pixel, and the
+// specular reflection. The picture and the outputs of light call the same functions.
 //#include "irradiance/lighting.wgsl"
 //#include "parts.wgsl"
 //#include "mouth.wgsl"

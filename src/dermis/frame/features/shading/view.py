@@ -54,8 +54,8 @@ class EyePoses(NamedTuple):
     """Poses of the modelled eyes of a head.
 
     frames : (2, 4, 4) matrices from the space of the head to the space of each eye
-    edges_mm : (2, r, 3) points along the edges of the lids around each eye [mm]; None where they are unknown,
-        as for heads from files
+    edges_mm : (2, r, 3) points along the edges of the eyelids [mm]; None if they are unknown, as for heads
+        from files
     """
 
     frames: NDArray[np.float64]
@@ -71,7 +71,7 @@ def pinhole(camera: Camera, head: Head, settings: Settings) -> Pinhole:
 
 
 def camera_views(pinhole: Pinhole, outline: Outline, sample_count: int) -> Views:
-    """Return the projection of a camera, with the positions of all samples in a pixel.
+    """Return the projection of a camera, and the positions of the samples within a pixel.
 
     sample_count : number of samples per pixel
     """
@@ -81,7 +81,7 @@ def camera_views(pinhole: Pinhole, outline: Outline, sample_count: int) -> Views
 
 
 def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: ProfileSplit) -> UniformRecord:
-    """Return the uniform record of the struct Shade without its camera: samples, weights and materials.
+    """Return the uniform record of the struct Shade: samples, weights and materials, but no camera.
 
     Raises DermisError for a head with too many materials.
     """
@@ -143,5 +143,5 @@ def with_camera(view: UniformRecord, pinhole: Pinhole, eyes: EyePoses | None) ->
 
 
 def ray_record(shader: ComputeProgram, view: UniformRecord) -> UniformRecord:
-    """Copy the camera rays of a Shade record to a record of the struct Rays, for other shaders."""
+    """Return a record of the struct Rays, for shaders that need only the camera rays of a Shade record."""
     return shader.record("Rays", **{name: view[name] for name in _CAMERA_RAY_MEMBERS})

@@ -1,5 +1,5 @@
-// Nearest depth in squares of 4, 8, 16, 32 and 64 texels of each shadow map: squares without occluders are skipped.
-// The squares of 4 texels are stored on the left, the larger ones below each other on their right.
+// Nearest depth in squares of 4, 8, 16, 32 and 64 texels of each shadow map, so that squares without occluders can be skipped.
+// The squares of 4 texels are stored on the left; larger squares are stored on their right, one size below the other.
 
 @group(0) @binding(0) var maps: texture_2d_array<f32>;
 @group(0) @binding(1) var maps_sampler: sampler; // non-filtering

@@ -20,8 +20,8 @@ class ShadowMaps:
     """Shadow maps of all lights.
 
     layers : depth map of each light
-    bounds : texture of the nearest depth in squares of each map, for several sizes of squares; area lights
-        read it to skip squares without occluders
+    bounds : texture of the nearest depth in each square of a map, for several sizes of squares; area lights
+        use this texture to skip squares without occluders
     """
 
     layers: ViewLayers

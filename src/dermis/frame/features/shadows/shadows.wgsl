@@ -1,4 +1,4 @@
-// Visibility of a light from a point, by the light's shadow map.
+// Visibility of a light from a point, read from the light's shadow map.
 
 // The point is moved off the surface by the width of the filter to avoid self-shadowing.
 fn visibility(light: Light, point: Point, l: vec3f) -> f32 {

@@ -1,4 +1,4 @@
-// Visibility of an area light from a point: shadow rays marched through the light's shadow map.
+// Visibility of an area light from a point, by shadow rays that march through the light's shadow map.
 
 const STEPS: u32 = 8u; // steps of a shadow ray
 const NEAR_STEPS: u32 = 2u; // first steps, near the point's own surface

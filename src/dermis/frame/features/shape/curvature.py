@@ -24,13 +24,15 @@ _CURVATURE_STAGE = "curvature"
 
 @dataclass(frozen=True, eq=False)
 class Curvature:
-    """Smoothed root mean square of the two principal curvatures at the vertices; 1/r on a sphere [1/mm].
+    """Smoothed root mean square of the two principal curvatures at each vertex [1/mm].
+
+    On a sphere of radius r, this curvature is 1/r.
 
     smoothed : buffer of the smoothed curvature, one float per vertex
     scratch : buffer for intermediate steps of the smoothing
-    tables : buffers of the triangles and neighbours of each vertex, by their names in the shaders
-    steps : number of smoothing steps; together they have the standard deviation `SMOOTHING_SIGMA_MM` on the
-        head at rest
+    tables : dictionary from names in the shaders to buffers of the triangles and neighbours of each vertex
+    steps : number of smoothing steps; all steps together have the standard deviation `SMOOTHING_SIGMA_MM` on
+        the head at rest
     vertices : number of vertices
     """
 
@@ -69,7 +71,7 @@ def placeholder_curvature(device: Device) -> Buffer:
 def _smoothing_steps(mesh: Mesh, edge_points: Index, directed_edges: Index) -> int:
     """Return the number of smoothing steps whose combined standard deviation is `SMOOTHING_SIGMA_MM`.
 
-    edge_points : (e, 2) points of the edges of the mesh
+    edge_points : (e, 2) indices of the two points of each edge of the mesh
     directed_edges : (2 e, 2) the edges in both directions, sorted by their first point
     """
     points = mesh.points_mm

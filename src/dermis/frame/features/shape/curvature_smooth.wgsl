@@ -1,4 +1,4 @@
-// One smoothing step of the curvature: mean over each point and its neighbours.
+// One smoothing step of the curvature: the mean over each point and its neighbours.
 //#include "each.wgsl"
 
 @group(0) @binding(0) var<storage, read> around: array<vec4u>; // ranges of the triangles and of the neighbours of each vertex

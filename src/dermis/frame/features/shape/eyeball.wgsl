@@ -1,4 +1,4 @@
-// Shape of an eyeball, in mm of an average eye around the centre of the ball.
+// Shape of an eyeball [mm], in the size of an average eye, around the centre of the ball.
 
 //#fill const SCLERA_MM: f32 = {sclera_mm}; // radius of the ball
 //#fill const CORNEA_MM: f32 = {cornea_mm}; // radius of the cornea's front

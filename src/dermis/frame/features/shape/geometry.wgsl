@@ -1,4 +1,4 @@
-// Surface points of the mesh by triangle and barycentric weights.
+// Surface points of the mesh, given by triangle and barycentric weights.
 //#include "mesh_textures.wgsl"
 
 override MESH_IN_BUFFERS: bool = false; // whether the mesh is read from buffers, which is faster on GPUs

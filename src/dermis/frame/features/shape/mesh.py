@@ -23,10 +23,10 @@ _TRIANGLES_PER_ROW = 2048  # width of the texture; shaders query it
 class HeadGeometry:
     """Triangles and vertices of a head on the device.
 
-    resources : textures and buffers by their names in geometry.wgsl
+    resources : dictionary from names in geometry.wgsl to textures and buffers
     indices : index buffer for the rasteriser
     triangles : number of triangles
-    has_cutouts : whether the opacity of some parts has holes, see cutouts.wgsl
+    has_cutouts : whether the opacity maps of some parts cut holes into these parts, see cutouts.wgsl
     """
 
     resources: dict[str, Texture | Buffer]
@@ -59,8 +59,8 @@ def upload_geometry(
 ) -> HeadGeometry:
     """Upload the triangles of a head with their atlas coordinates, and add the vertices of its shape.
 
-    part_maps : maps of the parts that are not skin, whose opacity cuts holes into some of them; without maps,
-        parts with holes are left out
+    part_maps : maps of the parts that are not skin, whose opacity may cut holes into a part; if None, parts
+        with holes are left out
     """
     table, cut_out = _triangle_table(mesh, atlas), mesh.cut_out
     if part_maps is None or not cut_out.any():
@@ -72,7 +72,7 @@ def upload_geometry(
 
 
 def upload_triangles(device: Device, triangle_vertices: NDArray[np.integer]) -> HeadGeometry:
-    """Upload only the (t, 3) vertex indices of triangles, for depth passes of a simplified mesh."""
+    """Upload only the (t, 3) vertex indices of triangles, to draw the depths of a simplified mesh."""
     table = np.zeros((3, len(triangle_vertices), 4), dtype=np.uint32)
     table[0, :, :3] = triangle_vertices
     return _upload_table(device, table, {})

@@ -1,4 +1,4 @@
-// Mesh as two textures, of triangles and of vertices.
+// Mesh as two textures: one of triangles, one of vertices.
 
 @group(0) @binding(0) var triangle_table: texture_2d<u32>; // three tables above each other
 @group(0) @binding(1) var vertex_table: texture_2d<f32>; // four texels: position u, normal v, dpdu, dpdv

@@ -32,14 +32,17 @@ MIN_TANGENT = 1e-3
 class ShapeTables:
     """Buffers of a head's mesh and rig that are constant over frames, and the sizes of their contents.
 
-    morphs : morph targets and bone weights by their names in shape_pose.wgsl, empty for heads that do not
-        move
-    stencils : subdivision weights of control points by their names in shape_refine.wgsl, empty without
-        subdivision
-    surface : vertices and triangles by their names in shape_vertices.wgsl
-    control, points, vertices : numbers of control points, of points after subdivision, and of vertices
-    targets, bones : numbers of morph targets and of bones
-    has_contacts : whether some points, such as points of the lids, are kept outside the eyeballs
+    morphs : dictionary from names in shape_pose.wgsl to morph targets and bone weights, empty for heads that
+        do not move
+    stencils : dictionary from names in shape_refine.wgsl to subdivision weights of control points, empty
+        without subdivision
+    surface : dictionary from names in shape_vertices.wgsl to vertices and triangles
+    control : number of control points
+    points : number of points after subdivision
+    vertices : number of vertices
+    targets : number of morph targets
+    bones : number of bones
+    has_contacts : whether some points, such as points of the eyelids, are kept outside the eyeballs
     """
 
     morphs: dict[str, Buffer]
@@ -58,9 +61,11 @@ class Shape:
     """Buffers that the passes of a shape read and write.
 
     rest : buffer of the control points at rest, written in each frame
-    weights, matrices : buffers of morph weights and bone matrices, written in each frame
-    morphs, stencils, surface : resources of shape_pose.wgsl, shape_refine.wgsl and shape_vertices.wgsl, by
-        their names there; empty for a pass that is not needed
+    weights : buffer of the morph weights, written in each frame
+    matrices : buffer of the bone matrices, written in each frame
+    morphs : dictionary from names in shape_pose.wgsl to resources, empty if the pass is not needed
+    stencils : dictionary from names in shape_refine.wgsl to resources, empty if the pass is not needed
+    surface : dictionary from names in shape_vertices.wgsl to resources
     tables : buffers that are constant over frames
     """
 
@@ -74,7 +79,7 @@ class Shape:
 
     @property
     def vertices(self) -> dict[str, Texture | Buffer]:
-        """Return the textures and buffers of the vertices, by their names in the shaders that read them."""
+        """Return a dictionary from names in shaders to the textures and buffers of the vertices."""
         return {name: self.surface[name] for name in VERTEX_RESOURCES}
 
 
@@ -131,7 +136,9 @@ def _upload_tables(device: Device, tables: dict[str, NDArray[np.generic]]) -> di
 
 
 def _vertex_resources(device: Device, vertex_count: int) -> dict[str, Texture | Buffer]:
-    """Create the vertex texture (for software), the vertex buffer (for GPUs) and the tangent lengths."""
+    """Create the texture and the buffer of vertices, and the buffer of tangent lengths.
+
+    Software adapters store vertices in the texture, GPUs in the buffer; the unused one is minimal."""
     rows, software = -(-vertex_count // VERTICES_PER_ROW), device.adapter.kind == "CPU"
     table = make_texture(device, (4 * VERTICES_PER_ROW, rows if software else 1), "rgba32float")
     words = np.zeros((1 if software else rows * VERTICES_PER_ROW, 4, 4), np.float32)
@@ -156,9 +163,9 @@ def _morph_tables(rig: Rig) -> dict[str, NDArray[np.generic]]:
 
 
 def displacements(targets: MorphTargets, template_targets: MorphTargets) -> NDArray[np.float32]:
-    """Return the (n, 4) displacements [mm] and target indices, ordered by point, for shape_pose.wgsl.
+    """Return (n, 4) displacements [mm] with morph target indices, ordered by point, for shape_pose.wgsl.
 
-    template_targets : targets that displace the same points; their order is used for all people of a template
+    template_targets : morph targets of the template, which displace the same points and define the order
     """
     target_index = np.repeat(np.arange(len(targets.names), dtype=np.uint32), np.diff(targets.first))
     order = template_targets.point_order
@@ -169,7 +176,7 @@ def displacements(targets: MorphTargets, template_targets: MorphTargets) -> NDAr
 
 
 def _bone_influences(skeleton: Skeleton | None, point_count: int) -> Words:
-    """Return (p, 8) words: the indices of four bones per point, and their weights as float bits.
+    """Return (p, 8) words: for each point, four bone indices, and the bone weights as float bits.
 
     point_count : number of points
     """
@@ -180,10 +187,10 @@ def _bone_influences(skeleton: Skeleton | None, point_count: int) -> Words:
 
 
 def _contact_words(contact: LidContact | None, point_count: int) -> Words:
-    """Return (p, 3) words that keep points outside the eyeballs, zeros for points without contact.
+    """Return (p, 3) words with which the shader keeps points outside the eyeballs, zeros for other points.
 
-    The words are the indices of the front and back point of the eyeball, and the least distance from the
-    eyeball as float bits [mm].
+    The words are the indices of the front and back point of the eyeball, and the bits of a float: the least
+    distance from the eyeball [mm].
     """
     if contact is None:
         return np.zeros((1, 3), np.uint32)
@@ -201,7 +208,7 @@ def _stencil_tables(stencils: Stencils) -> dict[str, NDArray[np.generic]]:
 
 
 def _surface_tables(mesh: Mesh) -> dict[str, NDArray[np.generic]]:
-    """Return the tables of shape_vertices.wgsl by name: vertices, triangle corners and ranges of corners.
+    """Return the named tables of shape_vertices.wgsl: vertices, triangle corners and ranges of corners.
 
     Corners are ordered by point and then by vertex, so that the corners of a vertex are contiguous.
     """
@@ -223,7 +230,7 @@ def _surface_tables(mesh: Mesh) -> dict[str, NDArray[np.generic]]:
 
 
 def run_bounds(sorted_values: NDArray[np.integer], run_values: NDArray[np.integer]) -> Words:
-    """Return the (n, 2) start and end of the run of each of n values in a sorted array."""
+    """Return, for each of n values, the start and end of the run of this value in a sorted array, (n, 2)."""
     ends = [np.searchsorted(sorted_values, run_values, side) for side in ("left", "right")]
     return np.stack(ends, axis=1).astype(np.uint32)
 
@@ -231,7 +238,8 @@ def run_bounds(sorted_values: NDArray[np.integer], run_values: NDArray[np.intege
 def normals_in_vertex_frames(mesh: Mesh) -> Doubles:
     """Return the (v, 3) normals of a mesh, in coordinates that are constant while the surface deforms.
 
-    The axes at a vertex are its smooth normal, the u direction orthogonal to it, and their cross product.
+    The axes at a vertex are the smooth normal, the u direction made orthogonal to the normal, and the cross
+    product of these two axes.
     """
     smooth = vertex_normals(mesh.positions, mesh.point, mesh.triangles).astype(np.float64)
     axis = np.eye(3)[np.abs(smooth).argmin(axis=1)]
@@ -245,17 +253,20 @@ def normals_in_vertex_frames(mesh: Mesh) -> Doubles:
 
 
 def _run_offsets(sorted_index: NDArray[np.integer], run_count: int) -> Words:
-    """Return (run_count + 1,) offsets: starts of the runs of 0, 1, ... in a sorted array, and its length."""
+    """Return the start of each run of 0, 1, ... in a sorted array, then the length of the array.
+
+    The shape of the result is (run_count + 1,)."""
     return np.concatenate([[0], np.cumsum(np.bincount(sorted_index, minlength=run_count))]).astype(np.uint32)
 
 
 class MotionBytes(NamedTuple):
     """Pose of a shape as bytes for the shaders.
 
-    positions : three floats per control point: its position at rest [mm]
-    weights : one float per morph target
-    matrices : twelve floats per bone: the matrix from rest to pose, row by row [mm]
-    displacements : result of `displacements` for a person who uses the buffers of a template, else empty
+    positions : position of each control point at rest, three floats [mm]
+    weights : weight of each morph target, one float
+    matrices : matrix of each bone, from rest to pose, twelve floats row by row [mm]
+    displacements : result of the function `displacements` for a person who uses the buffers of a template,
+        else empty
     """
 
     positions: bytes
@@ -265,7 +276,7 @@ class MotionBytes(NamedTuple):
 
     @property
     def at_rest(self) -> MotionBytes:
-        """Return the rest pose of the head: its control points without morph weights and bone matrices."""
+        """Return the rest pose of the head: control points, but no morph weights and bone matrices."""
         return MotionBytes(self.positions)
 
 
@@ -287,7 +298,7 @@ def make_rest_shape(device: Device, tables: ShapeTables) -> Shape:
 
 
 def evaluate_rest_shape(device: Device, tables: ShapeTables, positions_mm: NDArray[np.float32]) -> Shape:
-    """Create the shape of a person at rest, and compute its vertices at once.
+    """Create the shape of a person at rest, and compute its vertices immediately.
 
     positions_mm : (p, 3) control points [mm]
     """

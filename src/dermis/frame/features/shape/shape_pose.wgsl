@@ -1,4 +1,4 @@
-// Control points moved by morph targets, then by bones; lids are kept outside the eyeballs.
+// Control points, moved first by morph targets and then by bones; points of the eyelids are kept outside the eyeballs.
 //#include "each.wgsl"
 //#include "eyeball.wgsl"
 

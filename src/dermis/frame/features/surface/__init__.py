@@ -1,4 +1,4 @@
-"""Surface of the skin: specular lobe, maps from files, painted maps, and the surface at atlas texels."""
+"""Surface of the skin: specular lobes, maps from files, painted maps, and properties at atlas texels."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -13,5 +13,5 @@ def shader_constants() -> Mapping[str, float]:
 
 
 def shader_lists() -> Mapping[str, Callable[[], Sequence[ShaderListMember]]]:
-    """Return the lobes, and the lists of painted skin such as noises, that `//#each` lines expand."""
+    """Return the lists over which `//#each` lines in shaders loop: lobes, and lists of painted skin."""
     return {"lobes": lobe_shaders, **painting_lists()}

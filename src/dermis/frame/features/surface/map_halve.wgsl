@@ -1,4 +1,5 @@
-// Map at half the resolution: each texel is the mean over its area, which is up to three finer texels wide for odd sizes.
+// Map at half the resolution: each texel is the mean over its area, which spans up to three finer texels if the finer size is
+// odd.
 //#include "store.wgsl"
 
 @group(0) @binding(0) var finer: texture_2d<f32>;

@@ -1,4 +1,4 @@
-// Slopes and their squares; their means over a footprint give its normal and roughness [OlanoBaker2010].
+// Slopes and their squares; the means of both over a footprint give the normal and the roughness there [OlanoBaker2010].
 //#include "store.wgsl"
 
 @group(0) @binding(0) var slopes: texture_2d<f32>;

@@ -33,7 +33,7 @@ _MEAN_GRID_SIDE = 512  # side of the grid over which the mean of a map is comput
 class UploadedMaps:
     """Maps of a head on the device.
 
-    bindings : textures and samplers by their names in skin.wgsl
+    bindings : dictionary from names in skin.wgsl to textures and samplers
     expression_maps : painted maps that expressions change, None if no map changes
     """
 
@@ -51,7 +51,8 @@ def upload_maps(
 ) -> UploadedMaps:
     """Upload or paint the maps of a head, with their sampler and the table of Beckmann's distribution.
 
-    use_colour : False replaces the colour map by white, for profiles that contain the colour
+    use_colour : whether to use the colour map; False replaces it by white, for profiles that contain the
+        colour
     decode_srgb : False treats the sRGB values of the colour map as linear, a mistake shown in the talk
         [dEonLuebke2007]
     painted_side : side of painted maps [texels]
@@ -69,9 +70,9 @@ def upload_maps(
 
 
 def detail_bindings(device: Device, has_fine_relief: bool) -> MutableBindings:
-    """Return the tiled texture of relief finer than maps and its sampler, by their names in skin.wgsl.
+    """Return the tiled texture of relief that is finer than the maps, and its sampler, named as in skin.wgsl.
 
-    has_fine_relief : False gives a flat texture, for skin without such relief
+    has_fine_relief : whether the skin has such relief; if False, the texture is flat
     """
     slopes = detail_slopes() if has_fine_relief else np.zeros((1, 1, 4), np.float32)
     repeat = {f"address_mode_{axis}": "repeat" for axis in "uv"}
@@ -82,7 +83,7 @@ def detail_bindings(device: Device, has_fine_relief: bool) -> MutableBindings:
 def _paint_maps(
     device: Device, head: Head, maps: PaintedMaps, use_colour: bool, paint_options: tuple[int, bool]
 ) -> tuple[MutableBindings, ExpressionMaps | None]:
-    """Paint the maps for which the head has no file; return bindings, and the maps that expressions change.
+    """Paint the maps for which the head has no file; return them, and the maps that expressions change.
 
     paint_options : side [texels], and whether expressions change the maps
     """
@@ -99,7 +100,7 @@ def _paint_maps(
 
 
 def _painted_surface(head: Head) -> PaintedSurface:
-    """Return the mesh over which skin is painted: that of the template, which all its people share."""
+    """Return the mesh over which skin is painted; all people of a template share the mesh of the template."""
     return painted_surface(head.topology.mesh, head.topology.control.stencils)
 
 
@@ -132,7 +133,7 @@ def has_parts(head: Head) -> bool:
 
 
 def _part_bindings(device: Device, maps: PartMaps | None) -> MutableBindings:
-    """Upload the maps of parts that are not skin as layers of one texture, by its name in parts.wgsl."""
+    """Upload the maps of parts that are not skin as layers of one texture, named as in parts.wgsl."""
     if maps is None:
         flat = np.zeros((1, 1, 4), np.float32)
         return {"part_maps": map_mips.upload_layers(device, [flat, flat], "part maps")}
@@ -147,7 +148,7 @@ def _factor_channel(factor_map: NDArray[np.float32] | None) -> NDArray[np.float3
 
 
 def _relative_to_mean(factor_map: NDArray[np.float32] | None, mesh: Mesh) -> NDArray[np.float32]:
-    """Return a map divided by its mean over the surface, a factor for uniform specular strength [-]."""
+    """Return a map divided by its mean over the surface, as a factor of the skin's specular strength [-]."""
     if factor_map is None:
         return _factor_channel(None)
     texel, triangle = rasterise(mesh, _MEAN_GRID_SIDE, np.arange(len(mesh.triangles)))

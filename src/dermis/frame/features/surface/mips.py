@@ -53,7 +53,7 @@ def upload_colours(device: Device, colour_map: Floats) -> Texture:
 
 
 def upload_slopes(device: Device, slopes: Floats | None) -> Texture:
-    """Upload (h, w, 2) slopes and their squares with mip levels; shaders derive the slope variance.
+    """Upload (h, w, 2) slopes and their squares, with mip levels that give the variance of slopes.
 
     slopes : slopes along u and v, None for a flat texture
     """
@@ -79,7 +79,7 @@ def upload_detail(device: Device, slopes: Floats) -> Texture:
 
 
 def upload_layers(device: Device, layer_maps: Sequence[Floats], texture_name: str) -> Texture:
-    """Upload maps (h, w, 4) of one size as layers of a texture of half floats, with all mip levels.
+    """Upload (h, w, 4) maps of equal size as the layers of a half-float texture with all mip levels.
 
     texture_name : name of the texture, for error messages
     """
@@ -101,9 +101,9 @@ def upload_layers(device: Device, layer_maps: Sequence[Floats], texture_name: st
 
 
 def make_relief(device: Device, height_map: Floats | None) -> Texture:
-    """Compute a texture of the slopes of a height map and their squares, with all mip levels.
+    """Compute a texture of slopes and squared slopes from a height map, with all mip levels.
 
-    height_map : (h, w) heights whose differences are slopes [mm/texel], None for a flat texture
+    height_map : (h, w) heights, None for a flat texture
 
     Heights are extrapolated linearly beyond the edges.
     """
@@ -123,7 +123,7 @@ def make_relief(device: Device, height_map: Floats | None) -> Texture:
 def relief_from_buffers(
     device: Device, height_bands: Iterable[Buffer], map_shape: tuple[int, ...], rows_per_band: int
 ) -> Texture:
-    """Compute a texture of the slopes of a height map and their squares, from heights in buffers.
+    """Compute a texture of slopes and squared slopes from a height map in several buffers.
 
     height_bands : buffers of consecutive rows, with a border of one texel on all sides
     map_shape : (h, w) of the height map
@@ -142,7 +142,7 @@ def relief_from_buffers(
 def fill_relief(recorder: Recorder, relief: MippedTexture, heights: Buffer) -> None:
     """Declare the passes that fill a relief texture of even size from the heights in one buffer.
 
-    relief : texture for the slopes and their squares
+    relief : texture for slopes and squared slopes
     heights : buffer of heights with a border of one texel on all sides [mm]
     """
     _draw_slopes(recorder, relief, heights, 0, relief.size[1])

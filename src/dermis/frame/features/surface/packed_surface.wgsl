@@ -1,4 +1,4 @@
-// Surface at a texel of the atlas for the lighting passes, packed into 32 bytes.
+// Surface properties at a texel of the atlas, packed into 32 bytes for the lighting passes.
 //#include "shape/geometry.wgsl"
 //#include "skin.wgsl"
 

@@ -30,18 +30,18 @@ _MAX_OBLIQUE_OFFSET_MM = 3.0  # limit of the offset of oblique light, as the sur
 
 
 def lobe_shaders() -> list[ShaderListMember]:
-    """Return the shaders of the specular lobes, which lobe.wgsl includes and numbers in this order."""
+    """Return the shaders of the specular lobes in the order in which lobe.wgsl includes and numbers them."""
     return [ShaderListMember(name, model.shader) for name, model in MODELS.items()]
 
 
 def lobe_constants() -> dict[str, float]:
-    """Return the values that `//#fill` lines insert in lobe.wgsl and in the shaders of the lobes, by name."""
+    """Return the named values that `//#fill` lines insert into lobe.wgsl and the shaders of the lobes."""
     model_numbers = {name: number for model in MODELS.values() for name, number in model.numbers.items()}
     return {"root_of_first_row": MIN_ROUGHNESS_ROOT, **model_numbers}
 
 
 def eye_constants() -> dict[str, float]:
-    """Return the values that `//#fill` lines insert in eye.wgsl and mouth.wgsl, by name."""
+    """Return the named values that `//#fill` lines insert into eye.wgsl and mouth.wgsl."""
     return {
         "cornea_at": cornea_centre_mm(),
         "limbus_mm": LIMBUS_MM,
@@ -64,7 +64,7 @@ def fill_eye(record: UniformRecord, look: EyeLook) -> None:
 
 
 def surface_constants(skin: Skin) -> tuple[tuple[str, int], ...]:
-    """Return the pipeline constants of lobe.wgsl for a skin, without constants that have the default 0."""
+    """Return the pipeline constants of lobe.wgsl for a skin, except constants that equal their default 0."""
     numbers = {"MODEL": MODELS.names.index(lobe_name(skin)), "EXACT_FRESNEL": int(skin.fresnel == "exact")}
     return tuple((name, number) for name, number in numbers.items() if number)
 
@@ -74,9 +74,9 @@ def skin_record(
 ) -> UniformRecord:
     """Return the uniform record of the shader struct `Skin`.
 
-    Members with the name of a field or property of `Skin` are copied from it, all other members are derived.
+    Members named like a field or property of `Skin` are copied from it; all other members are derived.
 
-    light_count : number of lights, where each part of a divided light counts
+    light_count : number of lights; each part of a divided light counts as one
     """
     members = struct_dtype(program.source.text, "Skin").names or ()
     values = {name: getattr(skin, name) for name in members if hasattr(skin, name)}
@@ -99,7 +99,7 @@ def _derived_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, 
 
 
 def mean_half_space(skin: Skin, maps: Maps, profile: GaussianSum) -> tuple[Floats, float]:
-    """Return the (3,) reflectance and the index of refraction of a half-space of mean skin colour [-]."""
+    """Return the (3,) reflectance and the refractive index of a half-space of mean skin colour [-]."""
     if skin.albedo == "profile":
         colour = np.asarray(profile.albedo, np.float64)
     elif maps.mean_colour is None:
@@ -110,7 +110,7 @@ def mean_half_space(skin: Skin, maps: Maps, profile: GaussianSum) -> tuple[Float
 
 
 def _direction_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, ArrayLike]:
-    """Return the members that direction.wgsl reads: reflectance and transmittance by the direction of light.
+    """Return the members for direction.wgsl: reflectance and transmittance for each light direction.
 
     Both are computed for a half-space with the mean colour of the skin.
     """
@@ -132,9 +132,9 @@ def _direction_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str
 
 
 def _relief_band(maps: Maps) -> float:
-    """Return the mip level of the height map that has the size of the normal map; -1 without such a level.
+    """Return the mip level at which the height map is as large as the normal map, -1 if there is none.
 
-    Only relief finer than that level is taken from the height map and added to the normal map. With -1, all
+    Only relief finer than that level is taken from the height map and added to the normal map; otherwise all
     relief of the height map is added.
     """
     if maps.normal is None or maps.height is None:

@@ -1,4 +1,5 @@
-// Slopes of a height map along +u and down [mm/texel] by Scharr's filter, their squares, and the first mip level.
+// Slopes of a height map along u and down the map [mm/texel] by Scharr's filter, the squares of the slopes, and the first mip
+// level.
 //#include "store.wgsl"
 
 @group(0) @binding(0) var<storage, read> top: array<u32>; // first row of the band

@@ -1,4 +1,4 @@
-// Maps of the skin: colour, relief as a surface gradient, gloss.
+// Maps of the skin: colour, gloss, and relief as a surface gradient.
 //#include "surface.wgsl"
 
 @group(0) @binding(3) var map_sampler: sampler;

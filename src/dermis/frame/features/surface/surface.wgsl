@@ -1,4 +1,4 @@
-// Parameters of the skin, and the tables of its surface.
+// Parameters of the skin's surface, and tables that describe its reflection.
 //#include "bilinear.wgsl"
 
 const PI: f32 = 3.14159265358979;

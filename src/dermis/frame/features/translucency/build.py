@@ -47,7 +47,7 @@ _CELL_COARSENING_FACTOR = 1.5  # factor of the cell side when memory does not ho
 
 
 def thin_part_tables(memo: Memo, request: FrameRequest) -> ThinParts | None:
-    """Return the transmittance of thin parts by thickness, None for skin with Lambertian reflectance."""
+    """Return the transmittance of thin parts as a function of thickness, None for Lambertian skin."""
     if request.skin.direction != "half-space":
         return None
     split, maps = request.split, request.head.maps
@@ -66,14 +66,16 @@ def _level_tables(
     variance_mm2: Floats,
     weight: Floats,
 ) -> ThinParts:
-    """Return the transmittance of thin parts by thickness, as weights of the blurred levels.
+    """Return the transmittance of thin parts as a function of thickness, as weights of the blurred levels.
 
     The weights are scaled so that no level loses more light than it has.
 
-    colour, eta : (3,) diffuse reflectance [-] and index of refraction of the half-space
+    colour : (3,) diffuse reflectance of the half-space [-]
+    eta : index of refraction of the half-space [-]
     g : anisotropy [-]
     total_weight : (3,) sums of the weights of all Gaussians of the profile [-]
-    variance_mm2, weight : (k,) variances [mm^2] and (k, 3) weights of the blurred levels
+    variance_mm2 : (k,) variances of the blurred levels [mm^2]
+    weight : (k, 3) weights of the blurred levels [-]
     """
     reach = min(_MAX_THICKNESS_SIGMAS * float(np.sqrt(variance_mm2[-1])), _MAX_THICKNESS_MM)
     tables = solve_thin_parts(equivalent_medium(profile, colour, eta), variance_mm2, reach, g)
@@ -98,10 +100,11 @@ def make_translucency(
     """Return the resources for light that is transmitted through thin parts of a head.
 
     surface : resources of geometry.wgsl and of the atlas, for the current shape
-    rest_surface : the same resources for the shape in which pairs are searched
-    variance_mm2, weight : (k,) variances [mm^2] and (k, 3) weights of the blurred levels
-    thickness_tables : transmittance by thickness; None to weight pairs by the Gaussians of their straight
-        distance
+    rest_surface : resources of geometry.wgsl and of the atlas, for the shape in which pairs are searched
+    variance_mm2 : (k,) variances of the blurred levels [mm^2]
+    weight : (k, 3) weights of the blurred levels [-]
+    thickness_tables : transmittance as a function of thickness; if None, the weight of a pair is computed
+        from the Gaussians and the straight distance between its cells
     shares_pairs : whether skins with similar profiles use the same pairs; true for skins that may change
         between frames
     layout_key : name of the atlas layout in the cache
@@ -117,14 +120,16 @@ def make_translucency(
 
 
 def _cell_divisions(atlas: Atlas) -> Callable[[float], Cells]:
-    """Return a function that divides an atlas into cells for a width, and caches the last few divisions."""
+    """Return a function that divides an atlas into cells for the width of the widest Gaussian [mm].
+
+    The function caches its last few results."""
     return lru_cache(_CACHED_PAIR_SEARCHES)(partial(divide_into_cells, atlas))
 
 
 class PairCache:
-    """Cache of the translucent pairs of a surface, for the last few divisions into cells.
+    """Cache of the translucent pairs of a surface, for the last few divisions of its atlas into cells.
 
-    surface : resources of geometry.wgsl and of the atlas, for the search
+    surface : resources of geometry.wgsl and of the atlas, for the shape in which pairs are searched
     """
 
     def __init__(self, device: Device, surface: Bindings, atlas: Atlas) -> None:
@@ -153,7 +158,7 @@ def rounded_width(widest_sigma_mm: float) -> float:
 
 @logged_step("finding the thin parts")
 def find_pairs(device: Device, surface: Bindings, atlas: Atlas, cells: Cells) -> PairBuffers:
-    """Find the translucent pairs of a surface, with coarser cells if a buffer cannot hold all pairs."""
+    """Find the translucent pairs of a surface; coarser cells are used if a buffer cannot hold all pairs."""
     table, times = search_pairs(device, surface, cells), count(1)
     while table is None:
         cells = divide_into_cells(atlas, cells.max_sigma_mm, _CELL_COARSENING_FACTOR ** next(times))
@@ -178,8 +183,8 @@ def make_pair_buffers(device: Device, cells: Cells, pair_table: PairTable) -> Pa
 def _receiver_ranges(cells: Cells, pair_table: PairTable) -> NDArray[np.uint32]:
     """Return (m, 3) words: the packed cell of each receiver, and the first and end index of its pairs.
 
-    Without receivers, the table is one row of zeros. Receivers with many pairs come first: invocations that
-    run side by side then take about equally long, and the last workgroups are short.
+    If there are no receivers, the result is one row of zeros. Receivers with many pairs come first, so that
+    invocations of the same workgroup take about equally long, and the last workgroups finish fastest.
     """
     first, end = pair_table.first[:-1], pair_table.first[1:]
     order = np.argsort(first - end, kind="stable")
@@ -188,7 +193,7 @@ def _receiver_ranges(cells: Cells, pair_table: PairTable) -> NDArray[np.uint32]:
 
 
 def _zero_light(device: Device, surface_mask: NDArray[np.bool_]) -> Texture:
-    """Return a black texture with alpha 1 where the mask shows surface, over the coarse atlas."""
+    """Return a black texture over the coarse atlas, whose alpha is 1 where the mask shows surface."""
     light = np.zeros((*surface_mask.shape, 4), np.float32)
     light[..., 3] = surface_mask
     texture = make_texture(device, surface_mask.shape, "rgba32float")
@@ -205,9 +210,10 @@ def with_profile(
 ) -> Translucency:
     """Return a copy of the translucency resources with the weights of a profile.
 
-    variance_mm2, weight : (k,) variances [mm^2] and (k, 3) weights of the blurred levels
-    thickness_tables : transmittance by thickness; None to weight pairs by the Gaussians of their straight
-        distance
+    variance_mm2 : (k,) variances of the blurred levels [mm^2]
+    weight : (k, 3) weights of the blurred levels [-]
+    thickness_tables : transmittance as a function of thickness; if None, the weight of a pair is computed
+        from the Gaussians and the straight distance between its cells
     """
     fraction = weight / np.maximum(weight.sum(axis=0), MIN_WEIGHT_SUM)
     transmitted = weight if thickness_tables is None else thickness_tables.transmitted

@@ -1,4 +1,4 @@
-// Light packed in two words: three floats without sign and with 13 bits of mantissa, which needs no common scale.
+// Light packed in two words: three unsigned floats with 13 bits of mantissa each, which need no common scale.
 
 const DROPPED_BITS: u32 = 10u; // of the mantissa
 const HIGH_HALF: u32 = 0xffe00000u; // the upper 11 of the remaining 21 bits

@@ -1,4 +1,4 @@
-"""Shape in which translucent pairs are searched: the head at rest, or a shape too different from it."""
+"""Choice of the shape in which translucent pairs are searched: the head at rest, or another shape."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _STRAIN_QUANTILE = 0.9  # quantile of the changes of length; it ignores the few 
 
 
 class StrainGauge:
-    """Short lengths on the surface of a head at rest, by which its strain in other shapes is measured."""
+    """Short distances on a head at rest, with which the distances in other shapes are compared."""
 
     def __init__(self, head: Head) -> None:
         from scipy.spatial import cKDTree
@@ -30,7 +30,7 @@ class StrainGauge:
         self._rest_lengths = self._lengths(self._rest_mm, self._pairs)
 
     def strain(self, positions_mm: Floats) -> float:
-        """Return the relative change of length that nine in ten lengths do not exceed [-].
+        """Return the strain of a shape: the relative change that nine in ten distances do not exceed [-].
 
         positions_mm : (p, 3) control points of another shape [mm]
         """
@@ -46,10 +46,9 @@ class StrainGauge:
 def pair_positions_mm(memo: Memo, request: FrameRequest) -> Floats | None:
     """Return the control points of the shape in which pairs are searched [mm], None for the head at rest.
 
-    Pairs of the topology follow other shapes, such as the frames of a mesh sequence: only their weights
-    change. Pairs are searched separately for a shape that strains the surface by more than
-    `MAX_SHARED_PAIR_STRAIN`.
-    People of one template always share the pairs of the template.
+    Pairs found for the head at rest are reused for other shapes of the same topology, such as the frames of a
+    mesh sequence; only the weights of the pairs are computed again. A new search is made for a shape whose
+    strain exceeds `MAX_SHARED_PAIR_STRAIN`. People of one template always share the pairs of the template.
     """
     positions = request.rest_positions_mm
     if positions is None or request.is_shared:

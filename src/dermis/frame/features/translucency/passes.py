@@ -33,7 +33,7 @@ _MIN_SOURCE_SMOOTHNESS = (
 
 
 def make_element_buffer(device: Device, element_count: int, element_bytes: int = 4) -> Buffer:
-    """Allocate a buffer for elements of `element_bytes` each, but for at least one element."""
+    """Allocate a buffer for a number of elements of `element_bytes` bytes each; the buffer is never empty."""
     return device.storage_buffer(element_bytes * max(1, element_count))
 
 
@@ -48,8 +48,8 @@ def draw_points(
 ) -> None:
     """Declare the pass that writes the current positions and normals of receivers or sources.
 
-    The pass also writes the area of sources, or the metric of receivers, which maps offsets in the atlas to
-    lengths.
+    For sources, the pass also writes the area; for receivers, it writes the metric, which converts offsets in
+    the atlas to lengths.
 
     cell_role : "receiver" or "source"
     surface : resources of geometry.wgsl and of the atlas
@@ -70,7 +70,8 @@ def draw(
 ) -> Texture:
     """Declare the passes that sum the light from all sources at each receiver; return the sums.
 
-    levels, blur : blurred light over the atlas, which enters at the sources
+    levels : blurred light over the atlas; light enters the sources from one of the levels
+    blur : Gaussian blurs of the levels
     constants : pipeline constants that replace the defaults of translucency.wgsl
 
     Source: [JensenBuhler2002; dEonLuebke2007].
@@ -102,9 +103,9 @@ def draw(
 def draw_direction_factors(
     graph: Recorder, layout: LitAtlas, thin_parts: Translucency, constants: Constants
 ) -> None:
-    """Declare the pass that computes how incident directions change the light that each source transmits.
+    """Declare the pass that computes how directions of light change the transmission of each source.
 
-    The factors apply to deep slabs.
+    The resulting factors apply to deep slabs.
 
     constants : pipeline constants of the lights
     """
@@ -128,10 +129,10 @@ def sum_pairs(
     constants: Constants = (),
     stage_name: str = "translucency",
 ) -> None:
-    """Declare the pass that sums the light of the sources at each receiver, weighted by pair.
+    """Declare the pass that sums, at each receiver, the light of the sources times the weights of the pairs.
 
     source_light : buffer of the light of each source
-    light_sums : texture of the coarse atlas
+    light_sums : texture over the coarse atlas for the sums
     constants : pipeline constants that replace the defaults of translucency.wgsl
     stage_name : name of the stage in timings
     """
@@ -192,9 +193,11 @@ def weight_bindings(
 ) -> Bindings:
     """Return the uniform record and the transmittance table of a profile for translucency_weights.wgsl.
 
-    variance_mm2, weight : (k,) variances [mm^2] and (k, 3) weights of the blurred levels
-    thickness_tables : tables by thickness, None to weight pairs by Gaussians
-    transmittance : (THICKNESS_ROWS, k, 3) table to use, `transmitted` or `lost` of `thickness_tables`
+    variance_mm2 : (k,) variances of the blurred levels [mm^2]
+    weight : (k, 3) weights of the blurred levels [-]
+    thickness_tables : transmittance as a function of thickness; if None, pairs are weighted by the Gaussians
+    transmittance : (THICKNESS_ROWS, k, 3) table to use: `thickness_tables.transmitted` or
+        `thickness_tables.lost`
     """
     gaussian = np.zeros((MAX_GAUSSIANS, 4), np.float32)
     gaussian[: len(weight), :3], gaussian[: len(weight), 3] = weight, variance_mm2
@@ -214,10 +217,10 @@ def weight_bindings(
 def _transmittance_table(
     gaussian_count: int, thickness_tables: ThinParts | None, transmittance: Floats | None
 ) -> NDArray[np.float32]:
-    """Return the (rows k, 4) transmittance by thickness and Gaussian, with the directionality as alpha.
+    """Return the transmittance for each thickness and each of k Gaussians, (THICKNESS_ROWS k, 4).
 
-    Only the first Gaussian of each thickness holds the directionality. Without `thickness_tables`, the result
-    is one row of zeros.
+    The fourth channel holds the directionality for the first Gaussian of each thickness, else 0. Without
+    `thickness_tables`, the result is one row of zeros.
     """
     if thickness_tables is None or transmittance is None:
         return np.zeros((1, 4), np.float32)

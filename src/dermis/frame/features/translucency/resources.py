@@ -1,4 +1,4 @@
-"""Resources of translucency: pairs of cells on both faces of thin parts, and the light between them."""
+"""Resources of translucency: pairs of cells on opposite faces of thin parts, and transmitted light."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ class PairBuffers:
     """Translucent pairs of a surface: source cells, where light enters, and receiver cells, where it leaves.
 
     cells : cells of the coarse atlas
-    receivers, sources : buffers of the cells that are in pairs, each with its number of rows, see
-        translucency_receivers.wgsl and translucency_sources.wgsl
-    pairs : buffer of source, receiver and offset in the atlas, see translucency_weights.wgsl
+    receivers : buffer of the receiver cells, and its number of rows, see translucency_receivers.wgsl
+    sources : buffer of the source cells, and its number of rows, see translucency_sources.wgsl
+    pairs : buffer of the source, receiver and offset in the atlas of each pair, see translucency_weights.wgsl
     count : number of pairs
-    receiver_ranges : buffer of receiver cells and the range of their pairs, see translucency.wgsl
-    transmitted : texture of the coarse atlas: transmitted light, and alpha 1 where there is surface
-    lost : texture of the coarse atlas: fraction of blurred light that thin tissue does not return, and alpha
-        1 where there is surface
+    receiver_ranges : buffer of each receiver cell and the range of its pairs, see translucency.wgsl
+    transmitted : texture over the coarse atlas of transmitted light; alpha is 1 where there is surface
+    lost : texture over the coarse atlas of the fraction of blurred light that thin tissue does not return;
+        alpha is 1 where there is surface
     """
 
     cells: Cells
@@ -39,17 +39,18 @@ class Translucency:
 
     pairs : translucent pairs
     surface : resources of geometry.wgsl and of the atlas, for the current shape
-    receiver_points, source_points : buffers of the current positions and normals of receivers and sources
-    weights : buffer of the fraction of light that passes between the cells of each pair
+    receiver_points : buffer of the current positions and normals of the receivers
+    source_points : buffer of the current positions and normals of the sources
+    weights : buffer of the fraction of light that passes from source to receiver, for each pair
     source_light : buffer of the light that enters at each source
-    unit_light : buffer of light 1 at all sources
-    direction_factors : buffer of factors by which the directions of each source's light change its
+    unit_light : buffer that holds light of 1 at all sources
+    direction_factors : buffer of one factor per source: how the directions of its incident light change the
         transmission through deep slabs
-    weight_bindings : resources of the profile for translucency_weights.wgsl, for transmitted light
-    loss_bindings : resources of the profile for translucency_weights.wgsl, for light that is not returned
+    weight_bindings : resources of translucency_weights.wgsl for transmitted light
+    loss_bindings : resources of translucency_weights.wgsl for light that thin tissue does not return
     gaussian_count : number of Gaussians that blur light
-    uses_tables : whether transmittance is read from tables by thickness
-    source_level : index of the blurred level whose light enters at sources, 0 for the narrowest
+    uses_tables : whether transmittance is read from tables as a function of thickness
+    source_level : index of the blurred level whose light enters at sources; 0 is the narrowest blur
     """
 
     pairs: PairBuffers

@@ -1,5 +1,5 @@
-// Direction factor of each source: transmittance of a deep slab for its light, relative to that for uniform light of the
-// same diffuse reflectance.
+// Direction factor of each source: transmittance of a deep slab for the light at the source, relative to the transmittance for
+// uniform light with the same diffuse reflectance.
 //#include "irradiance/lighting.wgsl"
 //#include "irradiance/texels_beside.wgsl"
 //#include "packed_light.wgsl"

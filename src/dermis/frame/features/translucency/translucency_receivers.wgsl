@@ -1,4 +1,4 @@
-// Current positions of receivers: the middles of cells where light through thin parts leaves.
+// Current positions of receivers: the centres of cells where light leaves thin parts.
 //#include "shape/geometry.wgsl"
 //#include "translucent_pair.wgsl"
 //#include "cells.wgsl"

@@ -1,4 +1,5 @@
-// Weight of each translucent pair: light through the tissue, without what the blurs carry along the surface.
+// Weight of each translucent pair: the fraction of light that crosses the tissue, minus the fraction that blurs over the atlas
+// already carry along the surface.
 //#include "translucent_pair.wgsl"
 //#include "packed_pair.wgsl"
 

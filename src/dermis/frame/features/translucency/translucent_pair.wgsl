@@ -1,4 +1,4 @@
-// Sources, where light enters a thin part, and receivers, where it leaves; and the geometry of a pair of both.
+// Sources, where light enters a thin part; receivers, where it leaves; and the geometry of a pair of source and receiver.
 //#include "translucent_source.wgsl"
 
 struct Receiver {

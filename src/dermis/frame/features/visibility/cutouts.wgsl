@@ -1,4 +1,4 @@
-// Holes of parts that are cut out by their opacity, such as cards of lashes and hair.
+// Holes that the opacity map cuts into some parts, such as cards of eyelashes and hair.
 //#include "bilinear.wgsl"
 
 override CUTOUTS: bool = false; // whether the head has such parts

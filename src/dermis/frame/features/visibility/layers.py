@@ -53,9 +53,11 @@ class ViewLayers:
     size : (width, height) of each layer [pixels]
     count : number of layers in use
     triangles : whether layers store triangle indices instead of depth
-    depth : depth attachments of the rasteriser, one per layer, or one for all layers if `triangles`
-    targets : colour targets of the rasteriser, one per layer
-    nearness, triangle_ids, tiles : buffers of the compute pass; `triangle_ids` is allocated when it is needed
+    depth : depth attachments of the rasteriser: one for each layer, or a single one if `triangles`
+    targets : colour targets of the rasteriser, one for each layer; None for layers of depth
+    nearness : buffer of the compute pass: depth of each sample, in some modes packed with the triangle
+    triangle_ids : buffer of the compute pass with the triangle of each sample, allocated on first use
+    tiles : buffer of the compute pass with the state of each tile
     """
 
     texture: Texture
@@ -77,11 +79,13 @@ def make_layers(
     store_triangles: bool,
     use_compute_pass: bool | None = None,
 ) -> ViewLayers:
-    """Allocate `layer_count` layers of size (width, height); layers too large for a buffer are rasterised.
+    """Allocate `layer_count` layers of size (width, height).
+
+    If the layers do not fit in a buffer, they are filled by the rasteriser.
 
     store_triangles : whether the layers store triangle indices instead of depth
-    use_compute_pass : whether to use the compute pass instead of the rasteriser; None to choose by the
-        adapter
+    use_compute_pass : whether to use the compute pass instead of the rasteriser; None selects the faster one
+        for the adapter
     """
     use_compute_pass = device.adapter.kind != "CPU" if use_compute_pass is None else use_compute_pass
     fits = 4 * layer_size[0] * layer_size[1] * layer_count <= device.max_storage_bytes
@@ -181,7 +185,10 @@ def _draw_compute(graph: Recorder, stage: str, layers: ViewLayers, views: Views,
 
 
 def _pass_modes(layers: ViewLayers, triangle_count: int, clip_matrices: Matrix) -> tuple[int, ...]:
-    """Return the modes of visibility_buffer.wgsl: one pass if depth and triangle fit in a word, else two.
+    """Return the modes in which the passes of visibility_buffer.wgsl run.
+
+    One pass is enough if only depth is stored, or if depth and triangle fit in one word; otherwise the first
+    pass records depth and the second records triangles.
 
     triangle_count : number of triangles
     clip_matrices : (k, 4, 4) matrices from world to clip space
@@ -209,7 +216,7 @@ def _draw_raster(
 def _raster_program(device: Device, store_triangles: bool, has_cutouts: bool) -> RenderProgram:
     """Return the program that rasterises triangles or depth.
 
-    has_cutouts : whether a fragment shader leaves holes, also where only depth is drawn
+    has_cutouts : whether a fragment shader cuts holes, even if only depth is drawn
     """
 
     def make() -> RenderProgram:
@@ -240,9 +247,10 @@ def _views_record(
 
 
 def _depth_range_mm(clip_matrix: Matrix) -> float:
-    """Return the length of the longest depth step, extrapolated to the range of depths from 0 to 1 [mm].
+    """Return an upper bound of the distance per unit of depth [mm].
 
-    Divided by the number of steps, it bounds the error of an integer depth.
+    Divided by the number of integer steps from depth 0 to depth 1, the result bounds the error of an integer
+    depth.
 
     clip_matrix : (4, 4) matrix from world to clip space
     """
@@ -262,7 +270,9 @@ def _depth_range_mm(clip_matrix: Matrix) -> float:
 def _split_work(triangle_count: int, view_count: int, sample_count: int) -> tuple[Constants, int]:
     """Return the pipeline constants and the number of workgroups of the compute pass, tuned on an H200.
 
-    triangle_count, view_count, sample_count : number of triangles, of views, and of samples per pixel
+    triangle_count : number of triangles
+    view_count : number of views
+    sample_count : number of samples per pixel
     """
     fewest, most = _TRIANGLES_PER_WORKGROUP_RANGE
     per_group = min(

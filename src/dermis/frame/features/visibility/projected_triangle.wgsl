@@ -1,4 +1,5 @@
-// Setup of triangles in a view: barycentric weights and depth as planes over its pixels, and blocks that a triangle may cover.
+// Setup of triangles in a view: barycentric weights and depth as linear functions of the pixel position, and the blocks of
+// pixels that a triangle may cover.
 //#include "shape/geometry.wgsl"
 //#include "views.wgsl"
 //#include "cutouts.wgsl"

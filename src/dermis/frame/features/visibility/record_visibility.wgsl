@@ -1,4 +1,4 @@
-// Records the nearest surface of each sample by atomic maxima, which do not depend on the order of triangles.
+// Records the nearest surface of each sample by atomic maxima, so that the result does not depend on the order of triangles.
 //#include "views.wgsl"
 
 override RECORDED: u32 = 0u; // what is recorded of a sample

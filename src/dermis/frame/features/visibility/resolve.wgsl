@@ -1,5 +1,5 @@
-// Copies buffers to the layers of a texture, with a workgroup for each tile: tiles where something was drawn are copied, tiles
-// that hold something of the last frame are cleared, all others are up to date.
+// Copies buffers to the layers of a texture, one workgroup per tile. Tiles in which something was drawn are copied, tiles that
+// still show the last frame are cleared, and all other tiles are already empty.
 //#include "tiles.wgsl"
 
 @group(0) @binding(34) var<storage, read_write> tiles: array<u32>;

@@ -1,4 +1,4 @@
-// Tiles of the pixels of a view, so that empty ones are skipped.
+// Tiles of the pixels of a view, so that empty tiles can be skipped.
 //#include "views.wgsl"
 
 const TILE: vec2u = vec2u(64u, 32u); // pixels

@@ -1,6 +1,6 @@
-// Rasterises triangles in compute: the nearest depth of each sample, and its triangle.
-// A workgroup takes some triangles of one view, and one invocation sets up each of them. It draws a small triangle at once; for
-// others it lists the blocks of pixels that they may cover, which are drawn by teams of invocations.
+// Rasterises triangles in a compute pass: the nearest depth of each sample, and its triangle. A workgroup processes some
+// triangles of one view, and one invocation sets up each triangle. The invocation draws a small triangle immediately; for a
+// large triangle, it lists the blocks of pixels that may be covered, which teams of invocations then draw.
 //#include "projected_triangle.wgsl"
 //#include "record_visibility.wgsl"
 //#include "tiles.wgsl"

@@ -1,4 +1,4 @@
-// Rasterises the nearest surface: its depth and its triangle.
+// Rasterises the nearest surface in each pixel: its depth and its triangle.
 //#include "shape/mesh_textures.wgsl"
 //#include "views.wgsl"
 //#include "cutouts.wgsl"

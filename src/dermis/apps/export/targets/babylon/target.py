@@ -2,8 +2,8 @@
 
 The formulas follow the shader subSurfaceScattering of babylonjs 9.28.0 and 9.34.0. A diffusion profile is set
 as a colour c. The samples lie on a spiral, with radii distributed by a Burley profile of width max(c). The
-samples are weighted by Burley's profile with S = c, whose width is 1/c in each channel. The shader confuses
-half a pixel with a pixel, so all widths are twice as large as metersPerUnit specifies.
+weights of the samples follow a Burley profile that has the width 1/c in each channel. The shader confuses
+half a pixel with a pixel, so all widths are twice as large as they should be for the given metersPerUnit.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class Babylon(EnginePage):
         return _profile_parameters(subject, k / d, RENDERED_WIDTH_RATIO / k)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the Burley widths [mm] as the colour, and metersPerUnit 1, as the scene is in metres."""
+        """Return the Burley widths [mm] as the colour, and 1 as metersPerUnit, as the scene is in metres."""
         return _profile_parameters(subject, fit_burley_width(subject.curve), 1.0)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
@@ -120,7 +120,7 @@ def spiral_samples(
 def burley_radii(enclosed_fraction: ArrayLike) -> tuple[Floats, Floats]:
     """Return the radii r within which given fractions of a Burley profile of width 1 lie, and 1 / (r p(r)).
 
-    p(r) is the density of the light per radius. The weight of a sample at r is proportional to 1/(r p(r)).
+    p(r) is the probability density of r. The weight of a sample at radius r is proportional to 1 / (r p(r)).
     """
     u = 1.0 - np.asarray(enclosed_fraction, np.float64)
     g = 1.0 + 4.0 * u * (2.0 * u + np.sqrt(1.0 + 4.0 * u * u))
@@ -130,7 +130,7 @@ def burley_radii(enclosed_fraction: ArrayLike) -> tuple[Floats, Floats]:
 
 
 def spiral_curve(profile_colour: ArrayLike, meters_per_unit: float, energy: ArrayLike) -> CumulativeProfile:
-    """Return the cumulative profile of the shader's samples, averaged over all rotations of their spiral.
+    """Return the cumulative profile of the shader's samples, averaged over all rotations of the spiral.
 
     profile_colour : (3,) diffusion profile as Babylon.js defines it: inverse widths
     meters_per_unit : value of metersPerUnit

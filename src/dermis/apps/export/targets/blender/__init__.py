@@ -1,1 +1,1 @@
-"""Export to Blender: a script or .blend with the material, the head, its lights and camera."""
+"""Export to Blender: a Python script or .blend file with the head, its skin material, lights and a camera."""

@@ -51,7 +51,7 @@ def parse_options(arguments: list[str]) -> argparse.Namespace:
 
 
 def check_version() -> None:
-    """Exit with an error if the parameters have another meaning in the running version of Blender."""
+    """Exit with an error if the parameters are not valid in the running version of Blender."""
     (first, end), version = EXPORT["versions"], bpy.app.version[:2]
     if version < tuple(first) or (end is not None and version >= tuple(end)):
         until = "" if end is None else f" and before {end[0]}.{end[1]}"
@@ -63,7 +63,7 @@ def check_version() -> None:
 
 
 def data_folder() -> Path:
-    """Return the folder of the head and panorama files, also if Blender's text editor runs the script."""
+    """Return the folder of the head and panorama files; this also works in Blender's text editor."""
     texts = [Path(bpy.path.abspath(text.filepath)) for text in bpy.data.texts if text.filepath]
     folders = [Path(__file__).resolve().parent, *(file.parent for file in texts)]
     name = EXPORT["head"] or EXPORT["world"].get("panorama")
@@ -71,7 +71,7 @@ def data_folder() -> Path:
 
 
 def set_units(scene: Any) -> None:
-    """Set the name of the scene, and its unit of length to the metre."""
+    """Name the scene, and set the unit of length of the scene to metres."""
     scene.name = EXPORT["name"]
     scene.unit_settings.system = "METRIC"
     scene.unit_settings.scale_length = 1.0
@@ -122,7 +122,7 @@ def make_skin() -> Any:
 def set_skin(shader: Any) -> None:
     """Set the exported inputs of a Principled BSDF node, and convert the roughness from Beckmann to GGX.
 
-    If a roughness map is connected, the map is multiplied by the factor of this conversion.
+    If a roughness map is connected, the map is multiplied by the conversion factor.
 
     shader : Principled BSDF node
     """

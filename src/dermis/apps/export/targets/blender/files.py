@@ -127,7 +127,7 @@ def _write_script_files(
 
 
 def _encode_head(subject: Subject, scene: Scene) -> bytes:
-    """Return the head with its morph targets, bones, eyes and hairs as .glb."""
+    """Return a .glb file of the head with morph targets, bones, eyes and hairs."""
     return encode_head(
         scene.head,
         roughness=scene.skin.roughness,
@@ -138,7 +138,7 @@ def _encode_head(subject: Subject, scene: Scene) -> bytes:
 
 
 def skin_slots(head: Head) -> list[int]:
-    """Return the indices of the skin materials in the .glb, where materials without triangles are omitted."""
+    """Return the indices of the skin materials in the .glb file, which omits materials without triangles."""
     used = np.unique(head.mesh.material)
     return [slot for slot, kind in enumerate(used) if head.mesh.materials[kind].kind == "skin"]
 
@@ -146,7 +146,7 @@ def skin_slots(head: Head) -> list[int]:
 def script_text(export_data: Mapping[str, object]) -> str:
     """Return the text of the Blender script with the exported parameters and scene as Python literals.
 
-    Texts are written as literals, so that a name cannot inject code.
+    Text is written as a Python literal, so that a name cannot inject code.
 
     export_data : numbers, texts, and nested lists and dictionaries of numbers and texts
     """
@@ -167,7 +167,7 @@ def script_text(export_data: Mapping[str, object]) -> str:
 
 
 def _ball_scene(ball: Head) -> Scene:
-    """Return studio lights and a camera in front of a ball."""
+    """Return a scene with a ball, studio lights, and a camera in front of the ball."""
     return Scene(ball, camera=Camera(position=(0.0, 0.0, _BALL_DISTANCE_MM), frame_mm=_BALL_FRAME_MM))
 
 

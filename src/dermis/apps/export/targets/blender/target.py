@@ -65,7 +65,7 @@ def burley_shape_factor(base_colour: ArrayLike) -> Floats:
 
 
 def legacy_albedo(base_colour: ArrayLike) -> Floats:
-    """Return the single-scattering albedo for a base colour, as fitted in Cycles before 5.2 [-]."""
+    """Return the single-scattering albedo for a base colour by the formula of Cycles before 5.2 [-]."""
     A = np.asarray(base_colour, np.float64)
     blend = A**0.25
     dim = 1.8260523782 * np.arctan(5.112467903288 * A) ** 1.09686102424
@@ -83,8 +83,8 @@ def hulst_albedo(base_colour: ArrayLike) -> Floats:
 def skin_path_ratio(base_colour: ArrayLike, eta: float) -> Floats:
     """Return the ratio of mean free path to subsurface radius in Cycles' method RANDOM_WALK_SKIN [-].
 
-    Cycles interprets the radius as a diffuse mean free path. Cycles derives the single-scattering albedo from
-    the base colour: the albedo at which the diffuse reflectance of a dipole equals the colour.
+    Cycles interprets the radius as a diffuse mean free path. From the base colour, Cycles derives the
+    single-scattering albedo at which the diffuse reflectance of a dipole equals this colour.
 
     base_colour : base colour [-]
     eta : value of Subsurface IOR
@@ -116,7 +116,8 @@ def walk_cdf(radius: ArrayLike, albedo: float, walk_entry: WalkEntry) -> Floats:
 
     radius : radii [mean free paths]
     albedo : single-scattering albedo [-]
-    walk_entry : direction in which light enters: "straight" for RANDOM_WALK, "skin" for RANDOM_WALK_SKIN
+    walk_entry : how a walk enters the medium: "straight" (along the normal) for RANDOM_WALK, "skin" for
+        RANDOM_WALK_SKIN
     """
     walk_albedo = max(albedo, MIN_ALBEDO)
     radii, fraction_within = _interpolate_walk_table(round(walk_albedo, 7), walk_entry)
@@ -130,7 +131,7 @@ def walk_cdf(radius: ArrayLike, albedo: float, walk_entry: WalkEntry) -> Floats:
 def _interpolate_walk_table(albedo: float, walk_entry: WalkEntry) -> tuple[Floats, Floats]:
     """Return radii [mean free paths] and the fraction of light within each radius [-], for one albedo.
 
-    The tabulated random walks are interpolated to this albedo, and to radii that are eight times as dense.
+    The tabulated fractions are interpolated to this albedo, and to eight times as many radii.
     """
     from scipy.interpolate import PchipInterpolator
 
@@ -144,7 +145,7 @@ def _interpolate_walk_table(albedo: float, walk_entry: WalkEntry) -> tuple[Float
 
 @cache
 def _load_walk_table() -> dict[WalkEntry, tuple[Floats, Floats, Floats]]:
-    """Return the tables of Cycles' random walks, one for each direction in which light enters.
+    """Return the tables of Cycles' random walks, one for each way in which a walk enters the medium.
 
     A table consists of sqrt(1 - albedo) (n,) [-], radii (m,) [mean free paths], and the fraction of light
     that leaves within each radius (n, m) [-].
@@ -165,7 +166,7 @@ class RandomWalk(NamedTuple):
     """Random walk of Cycles for one channel of a base colour.
 
     albedo : single-scattering albedo [-]
-    entry : direction in which light enters: "straight" along the normal, or "skin" for RANDOM_WALK_SKIN
+    entry : how a walk enters the medium: "straight" (along the normal), or "skin" for RANDOM_WALK_SKIN
     """
 
     albedo: float
@@ -226,9 +227,10 @@ class Blender(Target):
         return CumulativeProfile.from_function(fraction_within, energy)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
-        """Write the Python script and its head and maps, or the .blend file that the script saves.
+        """Write the Python script with the files that it reads, or run the script to write a .blend file.
 
-        Raises DermisError for a .blend if DERMIS_BLENDER_PYTHON does not name a Python with bpy.
+        Raises DermisError for a .blend file if DERMIS_BLENDER_PYTHON is not the path of a Python interpreter
+        with the module bpy.
         """
         method = self.variant.replace("-", "_").upper()
         return write_scene(subject, parameters, output, method, self._valid_versions(version))
@@ -285,7 +287,7 @@ class Blender(Target):
         return [RandomWalk(float(one), "straight" if plain else "skin") for one in albedos]
 
     def _unit_cdfs(self, subject: Subject, version: str) -> list[Cdf]:
-        """Return each channel's cumulative profile, a function of the radius in units of `_unit_lengths`."""
+        """Return each channel's cumulative profile as a function of radius in units of `_unit_lengths`."""
         if self.variant in ("burley", "eevee"):
             return [burley_cdf] * 3
         return [walk.cdf for walk in self._random_walks(subject, version)]

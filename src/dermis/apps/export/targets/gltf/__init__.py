@@ -1,1 +1,1 @@
-"""Export to glTF: a .glb file whose skin material scatters or transmits light by extensions."""
+"""Export to glTF: a .glb file whose skin material has glTF extensions for scattering or transmission."""

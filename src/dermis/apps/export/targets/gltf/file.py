@@ -21,9 +21,9 @@ _MULTISCATTER_TABLE_STEPS = 1024
 
 
 def encode_glb(subject: Subject, extensions: Extensions, draft_notice: str) -> bytes:
-    """Return the head with eyes, hairs, morph targets and bones, or a ball for a skin without head, as .glb.
+    """Return a .glb file of the head with eyes, hairs and rig, or of a ball for a skin without a head.
 
-    extensions : JSON of each extension of the skin's material, by name
+    extensions : dictionary from the name of each extension of the skin's material to its JSON
     draft_notice : notice that an extension is a draft, stored in the file; "" if all extensions are ratified
     """
     head = subject.head_or_ball

@@ -48,13 +48,13 @@ class Gltf(Target):
     part_limitations = ""
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the volume whose random walk is closest to the reference, or the transmittance of an ear."""
+        """Return the parameters of the volume closest to the reference, or of the transmission of an ear."""
         if self.variant == TRANSMISSION_VARIANT:
             return _diffuse_parameters(subject, *_ear_transmission(subject))
         return _scatter_parameters(fit_volume(subject.curve, subject.albedo))
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the skin's colour for all colours, and the mean exit radius as attenuation distance."""
+        """Return the skin's colour as each colour, and the mean exit radius as the attenuation distance."""
         if self.variant == TRANSMISSION_VARIANT:
             return _diffuse_parameters(subject, _NAIVE_TRANSMISSION_FACTOR, subject.albedo)
         radius_m = 1e-3 * float(2.5 * fit_burley_width(subject.curve).max())
@@ -69,7 +69,7 @@ class Gltf(Target):
         return subject.rescale_energy(volume_curve(_parameter_volume(parameters)))
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
-        """Write a .glb file whose skin material has the extensions; programs may ignore the extensions."""
+        """Write a .glb file whose skin material has the extensions, which programs may ignore."""
         extensions: dict[str, dict[str, ParameterValue | list[float]]] = {
             "KHR_materials_ior": {"ior": SKIN_ETA}
         }

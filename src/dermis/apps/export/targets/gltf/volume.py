@@ -19,8 +19,8 @@ _MAX_COLOUR = 1.0 - 1e-12
 class Volume(NamedTuple):
     """Parameters of KHR_materials_volume and KHR_materials_scatter that determine the diffusion profile.
 
-    distance_m, colour : attenuationDistance [m], and attenuationColor (3,): the transmittance over this
-        distance
+    distance_m : attenuationDistance [m]
+    colour : (3,) attenuationColor: transmittance of the medium over the attenuation distance [-]
     multiscatter : (3,) multiscatterColorFactor: diffuse reflectance of the medium without its surface [-]
     """
 
@@ -35,7 +35,7 @@ class Volume(NamedTuple):
 
 
 def volume_from_paths(mean_free_path_mm: ArrayLike, multiscatter: ArrayLike) -> Volume:
-    """Return the volume with given mean free paths; the attenuation distance is the longest mean free path.
+    """Return the volume with given mean free paths, the longest of which is the attenuation distance.
 
     mean_free_path_mm : (3,) mean free paths [mm]
 

@@ -22,7 +22,9 @@ _SEGMENTS_PER_EDGE = 4  # segments per edge
 
 
 def skin_meshes(backend: XmlBackend, head: Head) -> dict[str, bytes]:
-    """Return the skin's surfaces as PLY files by shape name, relative to the head's centre [mm].
+    """Return a dictionary from shape name to the PLY file of a surface of the skin.
+
+    Positions are in mm, relative to the head's centre.
 
     "skin" has normals and uv, and "caps" closes the openings of "skin". "upper" and "upper_caps" lie slightly
     outside "skin" and "caps", and are the outer layer of the index-matched surface.
@@ -51,8 +53,8 @@ class SubdividedTriangles(NamedTuple):
     """Triangles of a mesh, each divided evenly into smaller triangles.
 
     triangle : (n,) index of the original triangle that contains each new vertex
-    weights : (n, 3) barycentric weights of each new vertex in that original triangle
-    corners : (m, 3) vertex indices of the new triangles, among the new vertices
+    weights : (n, 3) barycentric weights of each new vertex in the original triangle
+    corners : (m, 3) indices of the new vertices at the corners of each new triangle
     """
 
     triangle: NDArray[np.int64]
@@ -63,10 +65,12 @@ class SubdividedTriangles(NamedTuple):
 def subdivide_triangles(
     triangles: NDArray[np.integer], segments_per_edge: int = _SEGMENTS_PER_EDGE
 ) -> SubdividedTriangles:
-    """Divide each triangle into segments^2 smaller triangles; different original triangles share no vertices.
+    """Divide each triangle evenly into `segments_per_edge` squared smaller triangles.
+
+    Neighbouring original triangles share no new vertices.
 
     triangles : (t,) indices of the original triangles
-    segments_per_edge : number of segments per edge
+    segments_per_edge : number of segments into which each edge is divided
     """
     grid = [(i, j) for i in range(segments_per_edge + 1) for j in range(segments_per_edge + 1 - i)]
     at = {point: index for index, point in enumerate(grid)}
@@ -89,10 +93,10 @@ def subdivide_triangles(
 
 
 def coloured_meshes(renderer: Renderer, scene: Scene, materials: Iterable[int]) -> dict[int, bytes]:
-    """Return a PLY file with the triangles of each material, relative to the head's centre [mm].
+    """Return a dictionary from material index to a PLY file of the triangles with this material.
 
-    The triangles are subdivided and have a colour per vertex instead of maps. The files are keyed by material
-    index.
+    The triangles are subdivided, with a colour at each vertex instead of maps. Positions are in mm, relative
+    to the head's centre.
 
     materials : indices of the materials
     """

@@ -53,15 +53,16 @@ class IsotropicMedium(NamedTuple):
 class SkinAppearance(NamedTuple):
     """Media and textures of the skin, and the meshes of the head's other materials.
 
-    media : medium of the skin for each surface model in `BOUNDARIES`
+    media : dictionary from each surface model in `BOUNDARIES` to the medium of the skin
     roughness : Beckmann m, a number or a map (n, n)
     transmittance : (n, n, 3) map by which a refracting surface scales light on entry and again on exit; None
         for uniform skin
     dimming : (n, n) fraction of the emerging light that an index-matched surface absorbs; None for uniform
         skin
-    opaque : PLY file of each material except skin, by material index
-    pictured : roles of a material's pictures, by material index; materials without pictures are absent
-    pictures : PNG files of the pictures that all materials share, by role
+    opaque : dictionary from material index to PLY file, for all materials except skin
+    pictured : dictionary from material index to the roles of the material's pictures; materials without
+        pictures are absent
+    pictures : dictionary from role to PNG file of the pictures, which all materials share
     """
 
     media: Mapping[Boundary, IsotropicMedium]
@@ -86,8 +87,8 @@ def scene_files(
     picture_size : width and height of the picture [pixel]
     samples_per_pixel : number of paths that Mitsuba traces for each pixel
 
-    Raises DermisError if the scene has lights without shadows, a camera with a shifted lens, or skin that
-    does not enclose a volume, which Mitsuba does not support.
+    Raises DermisError for what Mitsuba does not support: lights without shadows, a camera with a shifted
+    lens, and skin that does not enclose a volume.
     """
     backend = XmlBackend()
     meshes = skin_meshes(backend, scene.head)
@@ -113,7 +114,10 @@ def scene_files(
 
 
 def medium_description(medium: IsotropicMedium) -> SceneDict:
-    """Return Mitsuba's description of a homogeneous medium [mm]; the scale is the largest extinction."""
+    """Return Mitsuba's description of a homogeneous medium, in mm.
+
+    The largest extinction coefficient is the medium's scale, by which Mitsuba multiplies the coefficients.
+    """
     extinction = np.asarray(medium.sigma_t)
     return {
         "type": "homogeneous",
@@ -131,7 +135,7 @@ def surface_bsdf(
     """Return Mitsuba's description of the skin's surface, or of the outer layer of an index-matched surface.
 
     boundary : surface model of the skin
-    transmittance : texture that scales light on entry and again on exit; None for 1
+    transmittance : texture that scales light on entry and again on exit; None for a factor of 1
     roughness : Beckmann m, a number or a texture
     """
     facets = {"distribution": "beckmann", "alpha": roughness}
@@ -149,7 +153,7 @@ def surface_bsdf(
 def _lower_surface_bsdf(has_dimming: bool) -> SceneDict:
     """Return Mitsuba's description of the inner layer of an index-matched surface.
 
-    This layer absorbs part of the light that leaves the skin, where the skin is darker than its medium.
+    Where the skin is darker than its medium, this layer absorbs part of the light that leaves the skin.
 
     has_dimming : whether the skin has a texture of the absorbed fraction
     """
@@ -206,7 +210,7 @@ def _skin_elements(
 ) -> list[ET.Element]:
     """Return the XML elements of the skin with one surface model: medium, surface and shapes.
 
-    meshes : PLY files of the skin's surfaces by shape name
+    meshes : dictionary from shape name to the PLY file of a surface of the skin
     """
     roughness = appearance.roughness if isinstance(appearance.roughness, float) else _exr_texture("roughness")
     transmittance = None if appearance.transmittance is None else _exr_texture("passing")

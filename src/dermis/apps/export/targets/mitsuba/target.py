@@ -1,8 +1,8 @@
 """Export to Mitsuba 3: a scene whose skin is a homogeneous medium, as Mitsuba has no diffusion profiles.
 
-A refracting surface of index 1.4 around the medium corresponds to tissue. Lights cannot be
-sampled through a refracting surface, and random rays only hit environments and area lights. Point and spot
-lights therefore need the index-matched surface, for which another medium is fitted.
+Like real skin, the medium can have a refracting surface with an index of 1.4. Mitsuba cannot sample lights
+through such a surface, and rays in random directions hit only environments and area lights. Point and spot
+lights therefore need an index-matched surface, for which another medium is fitted.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ class Mitsuba(Target):
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the medium fitted to the profile and to the lightest skin; textures darken other skin."""
+        """Return the parameters of the medium, fitted to the profile and the colour of the lightest skin."""
         boundary, colours = self._boundary, skin_colours(subject)
         medium = fit_medium(subject.curve, colours, boundary)
         transmittance = colours.transmittance(boundary)
@@ -131,13 +131,14 @@ class Mitsuba(Target):
 
 
 def fit_medium(curve: CumulativeProfile, colours: SkinColours, boundary: Boundary) -> IsotropicMedium:
-    """Return the medium whose profile under a surface is closest to `curve`, with the lightest skin's colour.
+    """Return the medium that has the colour of the lightest skin and a profile closest to `curve`.
 
-    Heads are lit from all directions. Under an index-matched surface, skin returns up to a quarter more of
-    oblique light than of light along the normal; under a refracting surface, both are equal.
+    The colour applies to light from all directions, as heads are lit from all sides. Under an index-matched
+    surface, skin returns up to a quarter more of obliquely incident light than of light incident along the
+    normal; under a refracting surface, the fractions are equal.
 
     curve : reference profile
-    boundary : surface model of the skin
+    boundary : model of the surface above the medium
     """
     energy = colours.medium_colour(boundary) / _boundary_transmittance(boundary)
     if boundary == "matched":
@@ -151,12 +152,12 @@ def _half_space_kind(boundary: Boundary) -> HalfSpaceKind:
 
 
 def _boundary_transmittance(boundary: Boundary) -> float:
-    """Return the fraction of light that a matched surface transmits, or 1 for a refracting surface [-]."""
+    """Return the transmittance of an index-matched surface, or 1 for a refracting surface [-]."""
     return 1.0 - MATCHED_REFLECTANCE if boundary == "matched" else 1.0
 
 
 def _pictured_parts(subject: Subject) -> dict[int, set[PartRole]]:
-    """Return the roles of each part's pictures by material index, without the materials of eyeballs."""
+    """Return a dictionary from material index to picture roles, for parts with pictures except eyeballs."""
     head, pictures = subject.head_or_ball, subject.part_pictures
     if pictures is None:
         return {}
@@ -166,7 +167,7 @@ def _pictured_parts(subject: Subject) -> dict[int, set[PartRole]]:
 
 
 def _opaque_meshes(scene: Scene, adapter: str, picture_materials: Container[int]) -> dict[int, bytes]:
-    """Return a PLY file for each of the head's materials except skin, by material index.
+    """Return a dictionary from material index to PLY file, for the head's materials except skin.
 
     picture_materials : indices of the materials with pictures; files of other materials have vertex colours
     """
@@ -193,7 +194,7 @@ class SkinColours:
     The medium has the brightest colour, and textures darken this colour to the colours of the skin's map.
 
     mean, brightest : (3,) mean and brightest colour, linear Rec. 709; equal for uniform skin
-    lightness_ratio : luminance of the lightest texels relative to the mean [-]
+    lightness_ratio : luminance of the lightest texels, relative to the mean luminance [-]
     """
 
     mean: Floats
@@ -204,7 +205,7 @@ class SkinColours:
         """Return the colour (3,) of the medium without textures.
 
         Under an index-matched surface, textures can only change lightness, so the colour is the mean colour
-        at the luminance of the lightest texels.
+        scaled to the luminance of the lightest texels.
         """
         return np.minimum(self.lightness_ratio * self.mean if boundary == "matched" else self.brightest, 0.97)
 
@@ -230,7 +231,7 @@ def skin_colours(subject: Subject) -> SkinColours:
 
 
 def mean_roughness(subject: Subject) -> float:
-    """Return the Beckmann roughness m of the skin where no roughness map sets it."""
+    """Return the Beckmann roughness m of the skin, used where no roughness map sets the roughness."""
     return float(subject.skin.smoothing * subject.skin.roughness)
 
 

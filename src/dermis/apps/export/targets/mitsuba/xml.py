@@ -66,7 +66,7 @@ class Bitmap:
 
 @dataclass
 class XmlBackend:
-    """Substitute for the module `mitsuba`, with which functions describe scenes without Mitsuba installed.
+    """Substitute for the module `mitsuba` in functions that describe scenes; needs no installed Mitsuba.
 
     bitmaps : images of the elements converted so far, in the order in which the images are written
     """
@@ -86,10 +86,10 @@ class Ref:
 
 @dataclass(frozen=True)
 class Override:
-    """Property whose value `mitsuba -D NAME=...` sets.
+    """Property of a scene whose value is set on the command line by `mitsuba -D NAME=VALUE`.
 
     kind : type of the property, such as "integer"
-    name : name of the option
+    name : NAME in that command
     """
 
     kind: str
@@ -99,7 +99,7 @@ class Override:
 def object_element(description: Mapping[str, object], object_name: str, backend: XmlBackend) -> ET.Element:
     """Return the XML element of an object described by a dictionary.
 
-    description : properties of the object; "type" is the plugin
+    description : properties of the object; "type" is the name of the plugin
     object_name : name of the object in the parent element; "" for an object without a name
     backend : collector of the images that the description contains
     """

@@ -19,7 +19,7 @@ from dermis.base.errors import refuse
 
 
 def build_document(materials: Sequence[OpenPbrMaterial], shader: str, file_prefix: str) -> MaterialX.Document:
-    """Return a validated MaterialX document of materials; lengths are in metres, colours linear Rec. 709.
+    """Return a validated MaterialX document with the materials, in metres and linear Rec. 709.
 
     shader : MaterialX node category of the surface shaders, `OPEN_PBR` or `STANDARD_SURFACE`
     file_prefix : prefix of the file names of the maps beside the document
@@ -69,7 +69,7 @@ def _add_material(
 def _add_map(graph: MaterialX.NodeGraph, role: str, map_path: str, shader: str) -> MaterialX.Output:
     """Add the nodes that read a map file to a graph, and return their output.
 
-    role : role of the map, such as "colour", which determines the type and colour space of the map's node
+    role : role of the map, such as "colour"; determines the type and colour space of the map's node
     map_path : path of the map
     shader : MaterialX node category of the surface shaders
     """

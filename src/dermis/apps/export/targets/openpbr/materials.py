@@ -1,4 +1,4 @@
-"""OpenPBR materials of a head: values of their inputs, maps that set inputs, and the files of these maps."""
+"""OpenPBR materials of a head: values of inputs, maps that set inputs, and the files of these maps."""
 
 from __future__ import annotations
 
@@ -105,11 +105,11 @@ MAP_TYPES: Mapping[str, MapType] = {
 
 @dataclass(frozen=True)
 class OpenPbrMaterial:
-    """OpenPBR material: values of its inputs, and the maps that set other inputs.
+    """OpenPBR material: its inputs, each of which is set by a value or a map.
 
     name : name of the material; any text
     values : value of each input without a map; lengths in metres
-    maps : role of the map of each input with a map, such as "colour"
+    maps : for each input that a map sets, the role of this map, such as "colour"
     """
 
     name: str
@@ -149,7 +149,7 @@ def skin_material(
 
 
 def opaque_material(material: Material) -> OpenPbrMaterial:
-    """Return the OpenPBR material of teeth, tongue, lashes or another material of the head except skin."""
+    """Return the OpenPBR material of a part of the head that is not skin, such as teeth, tongue or lashes."""
     name = material.name.casefold()
     roughness = next(
         (value for part, value in _ROUGHNESS_BY_KIND.items() if part in name), _DEFAULT_PART_ROUGHNESS
@@ -197,7 +197,7 @@ def hair_material(absorption: Floats, radius_mm: float) -> OpenPbrMaterial:
 
 
 def map_arrays(maps: Maps, skin: Skin, slopes: Floats | None = None) -> dict[str, Floats]:
-    """Return the maps of a skin by role, with the values that OpenPBR expects.
+    """Return a dictionary from role to map of a skin, with the values that OpenPBR expects.
 
     slopes : (n, n, 2) slopes of the relief, used if `maps` has no normals
     """
@@ -217,7 +217,7 @@ def map_arrays(maps: Maps, skin: Skin, slopes: Floats | None = None) -> dict[str
 
 
 def encode_map_files(arrays: Mapping[str, Floats]) -> dict[str, bytes]:
-    """Return maps as 8-bit PNG files by role."""
+    """Return a dictionary from the role of each map to the map as an 8-bit PNG file."""
     with ThreadPoolExecutor() as pool:  # compression releases the interpreter lock
         return dict(zip(arrays, pool.map(_encode_map_png, arrays, arrays.values()), strict=True))
 
@@ -236,7 +236,7 @@ def file_prefix(file: Path, subject: Subject) -> str:
 
 
 def write_maps(subject: Subject, folder: Path, prefix: str) -> dict[str, Path]:
-    """Write the maps of the head's skin as PNG files, and return their paths by role.
+    """Write the maps of the head's skin as PNG files, and return a dictionary from role to path.
 
     prefix : prefix of the file names
     """
@@ -253,7 +253,7 @@ def write_part_pictures(
     """Write the pictures of parts that are not skin as PNG files, and return their paths.
 
     prefix : prefix of the file names
-    roles : further roles of pictures to write, which OpenPBR does not use
+    roles : additional roles whose pictures are written although OpenPBR does not use them
     """
     if subject.part_pictures is None:
         return []
@@ -262,7 +262,7 @@ def write_part_pictures(
 
 
 def mesh_materials(subject: Subject, mfp_mm: Doubles, roles: Iterable[str]) -> dict[int, OpenPbrMaterial]:
-    """Return the OpenPBR materials of the subject's mesh by material index.
+    """Return a dictionary from material index in the subject's mesh to OpenPBR material.
 
     mfp_mm : (3,) mean free paths of the skin [mm]
     roles : roles of the maps that replace uniform values of the skin

@@ -83,14 +83,14 @@ class OpenPbr(Target):
         return surface_parameters(subject, self.shader, path, meaning)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return published diffuse mean free paths as the radius, which is a mean free path in OpenPBR."""
+        """Return published diffuse mean free paths as the radius, where OpenPBR expects mean free paths."""
         meaning = "diffuse mean free path, as published"
         return surface_parameters(subject, self.shader, published_mean_free_path_mm(subject), meaning)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative profile that the renderer will show for the exported radii.
 
-        It is MaterialX's Burley profile if `is_profile`, otherwise the profile of a random walk.
+        This is MaterialX's Burley profile if `is_profile` is true, otherwise the profile of a random walk.
         """
         radius = get_radii_mm(parameters, self.shader)
         if self.is_profile:
@@ -117,7 +117,7 @@ def surface_parameters(subject: Subject, shader: str, radius_mm: Floats, meaning
 
     shader : node category of the surface, `OPEN_PBR` or `STANDARD_SURFACE`
     radius_mm : (3,) subsurface radii [mm]
-    meaning : meaning of the largest radius, for the report
+    meaning : meaning of the parameter with the largest radius, for the report
     """
     longest, skin, colour = float(radius_mm.max()), subject.skin, flat_tuple(subject.clipped_albedo())
     roughness = float(np.sqrt(skin.roughness * skin.smoothing))
@@ -150,7 +150,7 @@ def get_radii_mm(parameters: Parameters, shader: str) -> Floats:
 
 
 def fitted_mean_free_path_mm(subject: Subject) -> Floats:
-    """Return the mean free paths (3,) of the random walk closest to the subject's profile [mm]."""
+    """Return the mean free paths (3,) for which a random walk is closest to the subject's profile [mm]."""
     return fit_homogeneous_medium(subject.curve, subject.albedo, "walk").mfp_mm
 
 
@@ -177,8 +177,8 @@ def lowest_layer(subject: Subject) -> Layer | None:
 def walk_curve(colour: Floats, mfp_mm: Floats, subject: Subject) -> CumulativeProfile:
     """Return the cumulative profile of a random walk whose albedo is derived from the base colour.
 
-    The albedo is given by van de Hulst's formula. `Subject.rescale_energy` sets the energy of the profile,
-    which therefore includes the error of this formula.
+    The albedo is given by van de Hulst's formula. The energy of the profile, from `Subject.rescale_energy`,
+    therefore includes the error of this formula.
 
     colour : (3,) base colour
     mfp_mm : (3,) mean free paths [mm]

@@ -1,1 +1,1 @@
-"""Web pages based on a JavaScript library, with the code that Babylon.js and three.js share."""
+"""Code shared by the exports to web pages that use a JavaScript library, Babylon.js or three.js."""

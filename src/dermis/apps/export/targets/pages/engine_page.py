@@ -38,12 +38,12 @@ _PAGE_FOLDER = Path(__file__).parent
 
 @dataclass(frozen=True)
 class LibraryFile:
-    """JavaScript file of an npm package, with a hash by which the content of the file is checked.
+    """JavaScript file of an npm package, with a hash to check the content of the file.
 
     package, version : name and version of the package
     path : path of the file within the package
     sha384 : SHA-384 of the file, in base64
-    name : name by which modules of the page import the file; "" for a script without imports
+    name : name under which modules of the page import the file; "" for a script that is not imported
     """
 
     package: str
@@ -59,7 +59,7 @@ class LibraryFile:
 
     @property
     def integrity(self) -> str:
-        """Return the value of the HTML attribute `integrity`, by which the browser checks the file."""
+        """Return the value of the HTML attribute `integrity`, with which the browser checks the file."""
         return f"sha384-{self.sha384}"
 
     @property
@@ -85,7 +85,8 @@ class LibraryFile:
 class EnginePage(Target):
     """Base class of exports to a web page that draws a head with a JavaScript library.
 
-    library_folder : folder node_modules of npm whose files are embedded; None loads them from a public server
+    library_folder : npm folder node_modules with the library that the page embeds; None if the page loads the
+        library from a public server
     """
 
     library_folder: Path | None = None
@@ -101,7 +102,7 @@ class EnginePage(Target):
     """Files of the library, by version."""
 
     def with_library(self, folder: str | Path) -> EnginePage:
-        """Return the target with an npm folder whose library is embedded in the page."""
+        """Return a copy of the target that embeds the library from an npm folder in the page."""
         return replace(self, library_folder=Path(folder))
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
@@ -150,7 +151,8 @@ def module_url(module_text: str, import_names: Mapping[str, str]) -> str:
     """Return a JavaScript module as a data URL, with its imports renamed to names that the page defines.
 
     module_text : source of the module
-    import_names : names that the page defines, by the name in the import statements of the module
+    import_names : mapping from a name in the import statements of the module to the name that the page
+        defines
     """
     for old, new in import_names.items():
         module_text = re.sub(rf"(\bfrom\s*)(['\"]){re.escape(old)}\2", rf"\1\2{new}\2", module_text)
@@ -166,7 +168,7 @@ def material_parameters(subject: Subject) -> Parameters:
 
 
 def page_camera(scene: Scene, centre_mm: Sequence[float]) -> Json:
-    """Return the scene's camera as JSON: positions in the page's scene [m], vertical angle of view [rad].
+    """Return the scene's camera as JSON, with positions in the page's scene [m] and angle of view [rad].
 
     centre_mm : (3,) point of the scene that is the origin of the page's scene [mm]
     """

@@ -1,4 +1,4 @@
-"""HTML files with embedded scripts and styles, and a Content-Security-Policy that forbids further ones."""
+"""HTML files with embedded scripts and styles, and a Content-Security-Policy that forbids all others."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def render_page(
     script : script from `escape_script`
     policy : directives of the Content-Security-Policy except script-src and style-src
     script_sources : sources that script-src allows in addition to the embedded script
-    placeholder_texts : HTML or data of the template's other placeholders, by name
+    placeholder_texts : HTML or data for each of the template's other placeholders
     """
     style = (folder / "page.css").read_text("utf-8")
     allowed = " ".join([csp_hash(script), *script_sources])
@@ -45,10 +45,10 @@ def render_page(
 
 
 def escape_script(script: str) -> str:
-    """Return a script that can be placed in a <script> element without changing its strings."""
+    """Return a script escaped for a <script> element; the values of its string literals do not change."""
     return _SCRIPT_END.sub(r"<\\/", script).replace("<!--", r"<\!--")
 
 
 def csp_hash(inline_text: str) -> str:
-    """Return the hash by which a Content-Security-Policy allows an inline script or style."""
+    """Return the hash with which a Content-Security-Policy allows an inline script or style."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(inline_text.encode()).digest()).decode()}'"

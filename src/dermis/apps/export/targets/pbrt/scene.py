@@ -36,7 +36,8 @@ def directive(directive_name: str, implementation: str, parameters: DirectivePar
 
     directive_name : first word of the directive, such as "Material"
     implementation : pbrt's name of the implementation, such as "subsurface"
-    parameters : values by type and name, such as "float eta": text, texts, Boolean, number or numbers
+    parameters : dictionary from type and name, such as "float eta", to a value: a Boolean, or one or more
+        texts or numbers
     """
     texts = [f'"{key}" [ {_format_value(value)} ]' for key, value in (parameters or {}).items()]
     return " ".join([directive_name, f'"{implementation}"', *texts])
@@ -76,7 +77,10 @@ def camera_lines(camera: Camera, picture_name: str) -> Lines:
 
 
 def light_lines(lights: Iterable[Light], environment: Environment | None) -> Lines:
-    """Return the directives of lights and environment; lights that pbrt lacks are omitted with a warning."""
+    """Return the directives of lights and environment, and warn if pbrt does not support one of them.
+
+    Unsupported lights are replaced or omitted. A panorama is omitted.
+    """
     lines = Lines()
     for number, light in enumerate(supported_lights(lights, PBRT_LIGHTS, "pbrt"), start=1):
         if PBRT_LIGHTS[light.kind] is _omit_unsupported_light:

@@ -90,7 +90,7 @@ def diffusion_table(eta: float) -> DiffusionTable:
 
     eta : index of refraction of the medium
 
-    Source: [Habel2013] in the form of [Pharr2023]; the moments of the Fresnel reflectance are exact here.
+    Source: [Habel2013] in the form of [Pharr2023], but with exact moments of the Fresnel reflectance.
     """
     radius = np.concatenate(
         [[0.0], _FIRST_TABLE_RADIUS * _TABLE_RADIUS_RATIO ** np.arange(_TABLE_RADIUS_COUNT - 1)]
@@ -126,7 +126,7 @@ def _multiple_scattering(radius: Floats, albedo: float, eta: float) -> Floats:
 
 
 def _single_scattering(radius: Floats, eta: float) -> Floats:
-    """Return the radiant exitance (m,) of light scattered once, for unit albedo and extinction coefficient.
+    """Return the radiant exitance (m,) of light scattered once; albedo and extinction coefficient are 1.
 
     radius : (m,) distances from a beam of unit power [mean free paths]
     """
@@ -144,7 +144,7 @@ def _sample_depths() -> Floats:
 
 
 def _integrate_spline(knot_positions: Floats, knot_values: Floats) -> Floats:
-    """Return the running integrals (n, m) of Catmull-Rom splines, from x[0] to each x.
+    """Return the integrals (n, m) of Catmull-Rom splines from the first knot to each knot.
 
     knot_positions : (m,) increasing knots
     knot_values : (n, m) values of each spline at the knots
@@ -181,7 +181,7 @@ class Pbrt(Target):
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the reflectance, and the mean free paths with the profile closest to the reference."""
+        """Return the reflectance, and the mean free paths whose profile is closest to the reference."""
         path = fit_scale(subject.curve, _unit_curve(subject.albedo))
         return _material_parameters(subject, path, "1 / (sigma_a + sigma_s); a unit is 1 mm")
 
@@ -247,7 +247,7 @@ def _ball_scene(ball: Head) -> Scene:
 def _scene_lines(
     subject: Subject, parameters: Parameters, scene: Scene, file_prefix: str
 ) -> tuple[Lines, dict[str, bytes]]:
-    """Return the directives of the scene, and the contents of the mesh and image files by file name.
+    """Return the directives of the scene, and a dictionary from name to content of mesh and image files.
 
     file_prefix : prefix of the names of mesh and image files
     """
@@ -273,9 +273,10 @@ def _scene_lines(
 
 
 def _skin_material(parameters: Parameters, material_textures: dict[str, tuple[str, str]]) -> str:
-    """Return the directive of the skin's material, with textures in place of values where there are maps.
+    """Return the directive of the skin's material; parameters with maps refer to textures or image files.
 
-    material_textures : type and texture or file of each material parameter with a map, see `SkinTextures`
+    material_textures : pbrt type, and name of the texture or image file, of each material parameter with a
+        map
     """
     types = {_REFLECTANCE_NAME: "rgb", _MFP_NAME: "rgb", "remaproughness": "bool"}
     values: dict[str, ArrayLike] = {}
@@ -315,7 +316,7 @@ def _opaque_materials(
 
 
 def _part_textures(subject: Subject, file_prefix: str) -> tuple[Lines, dict[str, bytes]]:
-    """Return the texture directives for parts that are not skin, and the image files by name.
+    """Return the texture directives for parts that are not skin, and a dictionary of image files by name.
 
     file_prefix : prefix of the names of the image files
     """
@@ -338,9 +339,9 @@ class SkinTextures(NamedTuple):
     """Textures of the skin in a pbrt scene.
 
     lines : directives that define the textures
-    files : contents of the image files by file name
-    material_textures : for each parameter of the skin's material with a map: pbrt type, and name of the
-        texture or image file
+    files : dictionary from the name of each image file to its content
+    material_textures : pbrt type, and name of the texture or image file, of each parameter of the skin's
+        material with a map
     """
 
     lines: Lines

@@ -1,4 +1,4 @@
-"""Export to a web page with three.js that lets users move lights and head; the skin diffuses no light."""
+"""Export to a three.js web page on which users can move lights and head; its skin does not diffuse light."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Three(EnginePage):
         )
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the exported parameters, but with MeshPhysicalMaterial's default index of refraction."""
+        """Return the exported parameters with the default index of refraction of MeshPhysicalMaterial."""
         return replace_values(self.parameters(subject, version), {"ior": _DEFAULT_IOR})
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:

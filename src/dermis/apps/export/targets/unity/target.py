@@ -56,7 +56,7 @@ class Unity(Target):
     untested = True
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the scattering colour and multiplier with the profile closest to the reference."""
+        """Return the scattering colour and multiplier for which the profile is closest to the reference."""
         d = fit_burley_width(subject.curve)
         return (
             *_scattering_distances(d, version),
@@ -95,7 +95,7 @@ class Unity(Target):
 
 
 def _scattering_distances(d_mm: Floats, version: str) -> Parameters:
-    """Return Burley widths as parameters: a colour before HDRP 14, a colour and a multiplier from HDRP 14 on.
+    """Return Burley widths as parameters: a colour before HDRP 14; a colour and a multiplier since HDRP 14.
 
     d_mm : (3,) widths of the Burley profiles [mm]
     """
@@ -109,7 +109,7 @@ def _scattering_distances(d_mm: Floats, version: str) -> Parameters:
 
 
 def asset_text(asset_name: str, parameters: Parameters, version: str) -> str:
-    """Return the YAML of the asset, without the profile's hash, which Unity adds on first opening."""
+    """Return the YAML of the asset; the profile's hash is left out, as Unity adds it on first opening."""
     values = {one.name: one.value for one in parameters}
     colour, tint = (_format_rgba(get_numbers(parameters, key)) for key in (_COLOUR_NAME, _TRANSMISSION_NAME))
     low, high = get_numbers(parameters, _THICKNESS_NAME)

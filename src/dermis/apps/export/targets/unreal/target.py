@@ -1,8 +1,7 @@
 """Export to Unreal Engine: an editor script that creates a SubsurfaceProfile, and the maps of a head.
 
 In SubsurfaceProfile.cpp and BurleyNormalizedSSS.cpp, the width d of the Burley profile is the mean free path
-divided by 0.6 s(A), where A is the albedo and s Burley's factor for perpendicular light; the engine's scaling
-of searchlight profiles cancels out.
+divided by 0.6 s(A), where A is the albedo and s is Burley's factor for perpendicular light.
 """
 
 from __future__ import annotations
@@ -60,7 +59,7 @@ class Unreal(Target):
         return _profile_parameters(albedo, path_cm, version)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the reduced mean free path of the tissue, as the name of the parameter suggests."""
+        """Return parameters with the tissue's reduced mean free path, as the parameter's name suggests."""
         path = fit_homogeneous_medium(subject.curve, subject.curve.energy).mfp_mm
         if subject.tissue is not None and subject.tissue.rgb is None:
             path = subject.tissue.medium.layers[-1].mean_free_path_mm
@@ -112,7 +111,7 @@ def _editor_script(
 ) -> str:
     """Return a Python script for the editor that creates the profile and imports the maps beside the script.
 
-    map_files : file names of the maps by role
+    map_files : dictionary from the role of each map to its file name
     """
     settings = [
         f"    {json.dumps(one.name)}: {_python_literal(one.value)},  # {one.unit}\n" for one in parameters

@@ -1,1 +1,1 @@
-"""Export to USD: a stage with the head, its rig, hairs and materials."""
+"""Export to USD: a stage with a head, its rig, hairs and materials."""

@@ -48,14 +48,14 @@ def mesh_polygons(mesh: Mesh) -> Polygons:
 
 
 def point_vertices(mesh: Mesh) -> NDArray[np.intp]:
-    """Return the index of the first vertex at each point (p,); vertices on a uv seam share points."""
+    """Return the index of the first vertex at each point (p,); at uv seams, vertices share a point."""
     return np.unique(mesh.point, return_index=True)[1]
 
 
 def add_mesh(
     stage: Usd.Stage, path: Sdf.Path, head: Head, deformable: DeformableMesh
 ) -> dict[int, UsdGeom.Subset]:
-    """Add the mesh in its rest pose to the stage; return the geometry subset of each material index.
+    """Add the head's mesh in its rest pose to the stage; return the geometry subsets by material index.
 
     deformable : the head's mesh with morph targets and bone weights, all morph targets at weight 0
     """
@@ -129,10 +129,10 @@ def to_metres(positions_mm: NDArray[np.floating]) -> Floats:
 
 
 def add_motion(stage: Usd.Stage, root: Sdf.Path, mesh: Usd.Prim, deformable: DeformableMesh) -> None:
-    """Add blend shapes, a skeleton and a rest animation, with which programs can pose the head.
+    """Add blend shapes, a skeleton and a rest animation, so that programs can pose the head.
 
     root : path of the UsdSkelRoot
-    mesh : mesh that blend shapes and skeleton deform
+    mesh : mesh that the blend shapes and the skeleton deform
     deformable : the head's mesh with morph targets and bone weights, all morph targets at weight 0
     """
     path = root.AppendChild("skeleton")

@@ -1,6 +1,6 @@
 """USD stage of a head in metres, Y up.
 
-Materials are OpenPBR as MaterialX nodes, with UsdPreviewSurface for programs that do not support OpenPBR.
+Each material has MaterialX nodes for OpenPBR, and a UsdPreviewSurface for programs without OpenPBR.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def build_stage(
     """Return the stage with a head's mesh, hairs, rig and materials.
 
     head_name : display name of the head
-    materials : OpenPBR materials by material index in the mesh
+    materials : dictionary from material index in the mesh to OpenPBR material
     file_prefix : prefix of the file names of the maps, which are beside the stage
     """
     stage = Usd.Stage.CreateInMemory()

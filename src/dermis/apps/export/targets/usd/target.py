@@ -1,4 +1,4 @@
-"""Export to USD: a stage with the head, its rig and hairs, and OpenPBR materials as MaterialX nodes."""
+"""Export to USD: a stage with a head, rig, hairs, and OpenPBR materials as MaterialX nodes."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Usd(OpenPbr):
         return (*super().naive_parameters(subject, version), _UNIT_PARAMETER)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
-        """Write the stage, with the maps beside it or in the package."""
+        """Write the stage, with the maps beside the stage file or inside the .usdz package."""
         import_extra("pxr", "writing USD")
         file = self.main_file(output, subject, _BINARY_SUFFIX)
         prefix = file_prefix(file, subject)

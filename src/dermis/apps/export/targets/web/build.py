@@ -1,4 +1,4 @@
-"""Capture of the frames that the web page replays, for GPUs and software adapters, in several sizes."""
+"""Capture of the frames that the web page replays, in several sizes, for GPUs and software adapters."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ INTERACTIVE_QUALITY = {"software": (256, 1, 2)}
 class PageContent:
     """Data that the web page embeds: frames, buffers, maps and the poster.
 
-    frames_by_kind : JSON description of the captured frames by kind of adapter, "gpu" or "software"
-    byte_runs : collector of the buffers and textures, which compresses them
+    frames_by_kind : dictionary from kind of adapter, "gpu" or "software", to the JSON of its captured frames
+    byte_runs : collector that stores and compresses the data of buffers and textures
     maps : maps encoded as pictures
-    pictures : WebP files of the maps; `picture_entries` has indices in this list
-    picture_entries : for each role, mip level and layer of a map: index in `pictures`, index of the value
-        curves in `ByteRunCollector.runs`, and number of colour channels
+    pictures : WebP files of the maps, to which `picture_entries` refers by index
+    picture_entries : dictionary from (role, mip level, layer) of a map to the index in `pictures`, the index
+        of the value curves in `ByteRunCollector.runs`, and the number of colour channels
     poster : (h, w, 3) sRGB picture that the page shows until it renders
     """
 
@@ -77,12 +77,12 @@ class PageContent:
 class PageRequest:
     """Scene, sliders and settings for which the frames of the page are captured.
 
-    settings : settings of all frames, except size and technique, which each frame sets
-    sizes : sides of the square pictures by kind of adapter [pixel], see `PICTURE_SIDES`; a page does not run
-        on an adapter of a kind without sizes
+    settings : settings of all frames, except the size and the technique, which differ between frames
+    sizes : dictionary from kind of adapter to the sides of the square pictures [pixel], see `PICTURE_SIDES`;
+        the page does not run on a kind of adapter that is absent
     adapter : adapter on which the frames are captured
-    interactive : reduced quality while the user drags a control, by kind of adapter, see
-        `INTERACTIVE_QUALITY`; full quality for a kind that is absent
+    interactive : dictionary from kind of adapter to the quality while the user drags a control, see
+        `INTERACTIVE_QUALITY`; a kind that is absent keeps full quality
     """
 
     scene: Scene
@@ -93,7 +93,7 @@ class PageRequest:
     interactive: dict[str, tuple[int, int, int]] = field(default_factory=dict)
 
     def frames(self, adapter_kind: str) -> Iterator[tuple[Settings, int]]:
-        """Yield the settings of each frame, and the number of hairs merged into one (0 at full quality).
+        """Yield the settings of each frame, and the number of hairs drawn as one hair (0 at full quality).
 
         adapter_kind : kind of adapter, "gpu" or "software"
         """
@@ -107,8 +107,8 @@ class PageRequest:
     def settings_for(self, picture_side: int, technique: str = PAGE_TECHNIQUES[0]) -> Settings:
         """Return the settings of a frame with a given picture side and technique.
 
-        Interreflection is off without diffusion, as links for a second atlas layout would add 0.6 MB to the
-        page.
+        Only the technique with diffusion has interreflection: the other technique has another atlas layout,
+        and its interreflection links would add 0.6 MB to the page.
 
         picture_side : side of the square picture [pixel]
         """
@@ -119,9 +119,9 @@ class PageRequest:
 def build_content(request: PageRequest, on_renderer: OnRenderer = lambda *_: None) -> PageContent:
     """Capture the frames of all kinds of adapter, and return the data that the page embeds.
 
-    on_renderer : function that is called for each kind of adapter, with the renderer, the scene and the
-        settings, after the page's maps were uploaded to the renderer; tests use it to compare pictures of the
-        renderer with pictures of the page
+    on_renderer : function that is called with the renderer, the scene and the settings for each kind of
+        adapter, after the page's maps have been uploaded to the renderer; used by tests that compare pictures
+        of the renderer and the page
     """
     content = PageContent()
     for adapter_kind in (one for one in ADAPTER_KINDS if request.sizes.get(one)):
@@ -171,7 +171,7 @@ def _frame_changes(
     default_inputs: FrameInputs,
     named_frame: NamedFrame,
 ) -> Json:
-    """Return, by slider name, how a frame's records and buffers change at each node of the slider.
+    """Return the JSON of the changes of a frame's records and buffers at each node of each slider.
 
     default_inputs : inputs of the frame with all sliders at their default values
     """
@@ -192,7 +192,7 @@ def _frame_changes(
 
 
 def _mip_entries(content: PageContent, picture_map: PictureMap) -> list[list[tuple[int, int, int]]]:
-    """Return the entries in `PageContent.picture_entries` of each mip level and layer of a map."""
+    """Return the entries in `PageContent.picture_entries` for all layers of each mip level of a map."""
     layers = 1 + max(layer for role, _, layer in content.maps.pictures if role == picture_map.role)
     return [
         [content.add_picture((picture_map.role, mip, k)) for k in range(layers)]
@@ -201,10 +201,10 @@ def _mip_entries(content: PageContent, picture_map: PictureMap) -> list[list[tup
 
 
 def _colour_maps(content: PageContent, renderer: Renderer, request: PageRequest, maps: PictureMaps) -> Json:
-    """Return the JSON of the colour maps of slider nodes.
+    """Return the JSON of the colour maps that replace the head's colour map at nodes of sliders.
 
-    The JSON has the resource index of the colour map and, by slider name, the picture entry that replaces the
-    colour map at each node.
+    The JSON contains the resource index of the head's colour map and, for each slider, the picture entries of
+    the colour maps at its nodes.
     """
     map_index = next((k for k, one in maps.items() if one.role == "colour_map"), None)
     if map_index is None:
@@ -221,7 +221,7 @@ def _colour_maps(content: PageContent, renderer: Renderer, request: PageRequest,
 def _colour_entry(
     content: PageContent, renderer: Renderer, scene: Scene | None, settings: Settings, role: str
 ) -> tuple[int, int, int] | None:
-    """Return the picture entry of the colour map in a slider node's scene; None if the map is unchanged.
+    """Return the picture entry of the colour map at a slider's node; None if the map is unchanged there.
 
     role : role under which the picture is stored
     """
@@ -238,9 +238,9 @@ def _colour_entry(
 
 
 def _interaction_json(scene: Scene, inputs: FrameInputs) -> Json:
-    """Return the JSON with which the page moves camera and lights: views, lights and the head's outline.
+    """Return the JSON that the page needs to move the camera and the lights.
 
-    The page fits shadow maps to this outline.
+    The JSON also contains the head's outline, to which the page fits shadow maps.
     """
     camera, settings = scene.camera, inputs.settings
     projection, outline = pinhole(camera, scene.head, settings), scene.head.mesh.outline

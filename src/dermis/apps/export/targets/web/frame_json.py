@@ -39,8 +39,8 @@ class PictureMap(NamedTuple):
 
     role : name of the map's binding in shaders, such as "colour_map"
     mips : number of mip levels stored as pictures
-    mip_passes : passes that compute further mip levels on the device; None if further levels are stored as
-        texels
+    mip_passes : passes that compute the remaining mip levels on the device; None if these levels are stored
+        as texels
     """
 
     role: str
@@ -63,9 +63,10 @@ def frames_json(
 
     Data that is all zero is not stored, as the page creates resources filled with zeros.
 
-    picture_maps : maps that are stored as pictures, by resource index
-    quantisation_steps : quantisation step of each column of a quantised float buffer, by resource index
-    byte_runs : collector of the data, to which the JSON refers by byte run
+    picture_maps : dictionary from resource index to map, for the maps that are stored as pictures
+    quantisation_steps : dictionary from the resource index of a buffer of float vectors to the rounding steps
+        of the components of a vector
+    byte_runs : collector of the data; the JSON refers to the data by index of the byte run
     """
     pictures = [[capture.resource(f.picture.bytes), capture.resource(f.picture.exposed)] for f in frames]
     captured_frames = [frame.captured for frame in frames]
@@ -96,13 +97,14 @@ def frames_json(
 def _column_packer(byte_runs: ByteRunCollector) -> Callable[[Bytes], int]:
     """Return a function that adds a triangle table to `byte_runs` and returns the index of the byte run.
 
-    A triangle table has three columns of equal length, one after the other; each column is packed separately.
+    A triangle table consists of three columns of equal length, stored one after another. Each column is
+    packed separately.
     """
     return lambda data: byte_runs.add_parts(np.split(data, 3) if len(data) % 3 == 0 else [data])
 
 
 def _mip_bytes(capture: FrameCapture, resource_index: int) -> list[Bytes]:
-    """Return the bytes of each mip level of a texture, with its layers joined; a buffer has one level.
+    """Return the bytes of each mip level of a texture, with all layers of the level joined.
 
     resource_index : index of the texture or buffer in the capture
     """
@@ -138,7 +140,7 @@ def _view_record_index(captured: CapturedFrame, stage_name: str) -> int:
 
 
 def _passes_json(captured: CapturedFrame, byte_runs: ByteRunCollector) -> list[Json]:
-    """Return the passes of a frame; bytes that the host writes are given as buffer index and byte run."""
+    """Return the JSON of a frame's passes; bytes written by the host become a buffer index and a byte run."""
     writes = ((one, one.written) for one in captured.passes)
     return [{**vars(one), "written": data and (data[0], byte_runs.add(data[1]))} for one, data in writes]
 
@@ -151,7 +153,7 @@ def _program_json(program_entry: Json) -> Json:
 
 
 def _struct_json(dtype: np.dtype[Any]) -> Json:
-    """Return the size of a uniform struct [bytes], and offset and size of each member in words of 4 bytes."""
+    """Return the size of a uniform struct [bytes], and each member's offset and size [words of 4 bytes]."""
     members = {name: _member_json(kind, offset) for name, (kind, offset, *_) in (dtype.fields or {}).items()}
     return {"size": dtype.itemsize, "members": members}
 
@@ -176,9 +178,9 @@ def _camel_case(snake_case: str) -> str:
 
 
 def resources_read_first(capture: FrameCapture, frames: Frames) -> list[int]:
-    """Return the sorted indices of the resources that a frame reads before writing.
+    """Return the sorted indices of the resources that a frame reads before writing to them.
 
-    The page stores the data of these resources. Views are replaced by their textures, so that a texture
+    The page stores the data of these resources. A view of a texture counts as the whole texture, so a texture
     counts as written if any part of the texture is written.
     """
     found: set[int] = set()
@@ -193,7 +195,7 @@ def resources_read_first(capture: FrameCapture, frames: Frames) -> list[int]:
 def resources_bound_as(
     capture: FrameCapture, frames: Frames, binding_names: tuple[str, ...]
 ) -> dict[int, str]:
-    """Return, by resource index, the name of `binding_names` under which shaders bind the resource."""
+    """Return a dictionary from resource index to the name in `binding_names` under which shaders bind it."""
     found: dict[int, str] = {}
     for one in (one for frame in frames for one in frame.passes if one.program is not None):
         bound_names = [name for _, name, _ in capture.programs[one.program or 0]["bindings"]]

@@ -32,8 +32,9 @@ _COLOUR_CHANNELS = 3
 class Picture:
     """One layer of a map, encoded as a WebP picture.
 
-    data : WebP file; for a map that is not a colour, a grey picture with the channels below each other
-    curves : (c, 256) decoded value of each of the 256 levels of a channel
+    data : WebP file: a colour picture for a colour map, otherwise a grey picture of the channels, stacked
+        vertically
+    curves : (c, 256) value to which each of the 256 levels of a channel is decoded
     texels : (h, w, c) texels decoded from the picture
     """
 
@@ -46,7 +47,7 @@ def encode_picture(texels: Halves, is_colour_map: bool) -> Picture:
     """Return one layer of a map encoded as a WebP picture.
 
     texels : (h, w, c) texels
-    is_colour_map : whether the first three channels are a colour; further channels are then constant
+    is_colour_map : whether the first three channels are a colour; all further channels are then constant
     """
     curves = np.stack([_value_curve(texels[..., k].astype(np.float64)) for k in range(texels.shape[2])])
     steps = np.stack([_nearest_steps(texels[..., k], curves[k]) for k in range(len(curves))], axis=-1)
@@ -109,23 +110,23 @@ _MAP_ROLES = (_COLOUR_ROLE, "relief_map", "slope_map", "specular_map", "roughnes
 
 @dataclass
 class MapPictures:
-    """WebP pictures of all maps that the page stores, by role, mip level and layer.
+    """WebP pictures of all maps that the page stores; the keys are role, mip level and layer.
 
-    For a map whose further mip levels the device can compute, only the first mip level is stored.
+    If the device can compute the further mip levels of a map, only the first level is stored.
     """
 
     pictures: dict[PictureKey, Picture] = field(default_factory=dict)
     _encoded_texels: dict[str, NDArray[np.float16]] = field(default_factory=dict)
 
     def matches_picture(self, role: str, texels: NDArray[np.float16]) -> bool:
-        """Return whether texels equal the texels from which the stored picture of a role was encoded."""
+        """Return whether texels equal the texels of the first picture with a given role before encoding."""
         return bool(np.array_equal(self._encoded_texels[role], texels))
 
     def replace_textures(self, renderer: Renderer, capture: FrameCapture, frames: Frames) -> PictureMaps:
         """Encode the frames' maps as pictures, and upload the decoded texels to the renderer's textures.
 
-        The renderer then draws with the maps that the page decodes. Returns the replaced maps by resource
-        index.
+        The renderer then draws with the same maps as the page. Returns a dictionary from resource index to
+        replaced map.
         """
         maps = {}
         for index, role in _picture_textures(capture, frames).items():
@@ -174,9 +175,9 @@ def _reduce_map(texels: NDArray[np.float32], max_side: int) -> NDArray[np.float3
 
 
 def quantise_hairs(renderer: Renderer, capture: FrameCapture, frames: Frames) -> dict[int, tuple[float, ...]]:
-    """Round the hair knots in the device's buffers to multiples of a step, so that the buffers compress well.
+    """Round the hair knots in the device's buffers to multiples of steps, so that the buffers compress well.
 
-    Returns the steps of a buffer's columns, by resource index of the buffer.
+    Returns a dictionary from resource index of a buffer to the steps of x, y, z and radius of a knot [mm].
     """
     buffers = resources_bound_as(capture, frames, ("knots",))
     for index in buffers:
@@ -198,9 +199,10 @@ def read_texels(capture: FrameCapture, resource_index: int, mip_level: int) -> N
 
 
 def _picture_textures(capture: FrameCapture, frames: Frames) -> dict[int, str]:
-    """Return the roles of half-float map textures that are stored as image files, by resource index.
+    """Return a dictionary from resource index to role, for the map textures that are stored as pictures.
 
-    Maps smaller than MIN_PICTURE_SIDE stay raw values. The role of a texture is its name in the shaders.
+    These are half-float textures; sides shorter than MIN_PICTURE_SIDE exclude a texture. The role of a
+    texture is its name in the shaders.
     """
     return {
         index: role

@@ -1,4 +1,4 @@
-"""Compression of buffers: differences of rows are split into byte planes before gzip (see packed.js)."""
+"""Compression of buffers by gzip, after differences of rows are split into byte planes (see packed.js)."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class ByteRunCollector:
         return len(self.runs) - 1
 
     def add_floats(self, floats: NDArray[np.float32], column_steps: tuple[float, ...]) -> int:
-        """Add a run of floats as integer multiples of one step per column; return the run's index in `runs`.
+        """Add floats as a run of integer multiples of one step per column; return the run's index in `runs`.
 
         floats : (n, c) floats that are multiples of the steps
         column_steps : (c,) steps, powers of two
@@ -89,7 +89,7 @@ def quantise(floats: NDArray[np.float32], column_steps: tuple[float, ...]) -> ND
 
 
 def encode_seven_bits(raw_bytes: bytes) -> str:
-    """Return bytes as text with 7 bits per character, so that HTML can contain them.
+    """Return bytes as text with 7 bits per character, which HTML can contain.
 
     Code points that HTML would change are increased by 256.
     """
@@ -100,11 +100,11 @@ def encode_seven_bits(raw_bytes: bytes) -> str:
 
 
 def byte_planes(raw_bytes: Bytes, bytes_per_word: int, words_per_row: int, difference_order: int) -> bytes:
-    """Return the bytes of a table of words, one byte column after another, which improves compression.
+    """Return the bytes of a table of words, reordered column by column to improve compression.
 
     raw_bytes : bytes of the table, row by row
     bytes_per_word, words_per_row : number of bytes per word, and number of words per row
-    difference_order : number of times that rows are replaced by their differences from the previous rows
+    difference_order : number of times that each row is replaced by its difference from the previous row
     """
     words = raw_bytes.view(_UNSIGNED_TYPE_BY_WORD_BYTES[bytes_per_word]).copy()
     for _ in range(difference_order):

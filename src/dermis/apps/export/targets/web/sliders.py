@@ -35,7 +35,7 @@ class Slider:
     values : increasing values of the nodes; one of them is `default_value`
     default_value : value with which the page starts
     scenes : scene at each node; None at the node of the default value
-    changes_pose_only : whether these scenes differ from the default scene only in the head's pose
+    changes_pose_only : whether all `scenes` differ from the default scene only in the head's pose
     """
 
     name: str
@@ -66,10 +66,11 @@ def node_inputs(
 def node_changes(
     default_frame: CapturedFrame, node_frame: CapturedFrame, byte_runs: ByteRunCollector
 ) -> Json:
-    """Return how records and written buffers of a slider node's frame differ from the default frame.
+    """Return the JSON of how a slider node's frame differs from the default frame.
 
-    Each change is the index of the record or pass, the first word that differs, and the byte run of the
-    differences. Integers, such as indices of interreflection links, are kept from the default frame.
+    Uniform records, and bytes that the host writes to buffers, are compared. Each change consists of the
+    index of the record or pass, the index of the first word that differs, and the byte run of the
+    differences. Integers, such as indices of interreflection links, keep their values in the default frame.
 
     default_frame, node_frame : captured frames at the default value and at the node
 
@@ -98,7 +99,7 @@ def _record_floats(record: UniformRecord) -> Floats:
 
 
 def _float_word_mask(dtype: np.dtype[Any]) -> NDArray[np.bool_]:
-    """Return a mask of the 4-byte words of a record that hold floats."""
+    """Return a mask that is true for each 4-byte word of a record that holds a float."""
     is_float = np.zeros(dtype.itemsize // 4, np.bool_)
     for member, offset, *_ in (dtype.fields or {}).values():
         words = slice(offset // 4, (offset + member.itemsize) // 4)

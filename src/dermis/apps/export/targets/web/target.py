@@ -1,4 +1,4 @@
-"""Export to a web page with captured frames of a head and the WebGPU player that replays them."""
+"""Export to a web page with captured frames of a head and a WebGPU player that replays the frames."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ class Web(Target):
         )
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the exported parameters: the page has no parameters that a user could set."""
+        """Return the exported parameters, as the page has no parameters that a user could set."""
         return self.parameters(subject, version)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:

@@ -1,1 +1,1 @@
-"""The spectral model of skin against measured reflectance spectra of people, for docs/measured.md."""
+"""Comparison of the spectral skin model with measured reflectance spectra of people, for docs/measured.md."""

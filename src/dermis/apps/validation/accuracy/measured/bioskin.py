@@ -30,7 +30,7 @@ def bioskin_model(weights_path: Path) -> SpectralModel:
 
     weights_path : the published file pretrained_models/BioSkin.pt
 
-    Raises DermisError if the file is not that of BioSkin.
+    Raises DermisError if the file is not the published one.
 
     Source: [Aliaga2023].
     """
@@ -56,7 +56,7 @@ class _TensorReader(pickle.Unpickler):
     """Unpickler that loads a dictionary of tensors and refuses to construct any other object."""
 
     def find_class(self, module_name: str, name: str) -> object:
-        """Return the object for a name in files of weights; raise UnpicklingError for any other name."""
+        """Return a class or function that files of weights need; raise UnpicklingError for any other name."""
         if (module_name, name) == ("torch._utils", "_rebuild_tensor_v2"):
             return lambda storage, offset, size, *rest: (storage, offset, size)
         if (module_name, name) == ("collections", "OrderedDict"):

@@ -61,7 +61,7 @@ _NOTABLE_CORRELATION = 0.85
 
 
 def extended_model(constants: Mapping[str, float]) -> ExtendedModel:
-    """Return the model of skin with the given constants; all others have the package's values."""
+    """Return the model of skin with the given constants; all other constants have the package's values."""
     return ExtendedModel(dict(constants))
 
 
@@ -69,7 +69,7 @@ def extended_model(constants: Mapping[str, float]) -> ExtendedModel:
 class ExtendedModel:
     """Spectral model of skin with additions that the package's model does not have.
 
-    constants : values of some of `CONSTANTS`; parameters of the same names in a call override them
+    constants : values of some of `CONSTANTS`; in a call, parameters of the same names replace these values
     """
 
     constants: dict[str, float]
@@ -115,7 +115,7 @@ class ExtendedModel:
 
 
 def _blood_in_bands(oxygen: float, half_width_nm: float) -> Floats:
-    """Return the absorption of blood averaged over triangular bands (31,) [1/mm]."""
+    """Return the absorption (31,) of blood, averaged over triangular bands of wavelengths [1/mm]."""
     if half_width_nm < 0.5:
         return blood(WAVELENGTHS_NM, oxygen)
     offsets = np.linspace(-half_width_nm, half_width_nm, 21)
@@ -126,9 +126,9 @@ def _blood_in_bands(oxygen: float, half_width_nm: float) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class SharedFit:
-    """Constants that all spectra share, and separate unknowns for each spectrum, as fitted together.
+    """Result of a fit of constants that all spectra share and of separate unknowns for each spectrum.
 
-    constants : values by name
+    constants : values of the constants by name
     fit : unknowns of each spectrum
     confounded : pairs of constants that the spectra hardly tell apart, with the correlation of their errors
     """
@@ -145,7 +145,7 @@ def fit_constants(
     criterion: Criterion = "spectrum",
     fixed_constants: Mapping[str, float] | None = None,
 ) -> SharedFit:
-    """Fit shared constants and each spectrum's unknowns by least squares, in alternation.
+    """Fit shared constants and each spectrum's unknowns in alternation, by least squares.
 
     unknowns : names of the parameters that each spectrum has separately
     free_constants : names of the `CONSTANTS` to fit, which all spectra share

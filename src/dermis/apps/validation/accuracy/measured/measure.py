@@ -1,4 +1,4 @@
-"""Command that measures the spectral model of skin on the archive, and writes docs/measured.md."""
+"""Command that compares the spectral model of skin with measured spectra, and writes docs/measured.md."""
 
 from __future__ import annotations
 
@@ -81,10 +81,10 @@ def measured(bioskin: Path | None = None, only: str | None = None) -> None:
     ----------
     only:
         Part to measure again (models, surface, limits, folds, alternatives, additions, sites, site_folds or
-        edge); the
-        other parts keep their last results.
+        edge); the other parts keep their last results.
     bioskin:
-        File pretrained_models/BioSkin.pt of facebookresearch/BioSkin, to compare with its decoder.
+        File pretrained_models/BioSkin.pt of facebookresearch/BioSkin; with it, BioSkin's decoder is also
+        compared.
     """
     archive = read_archive()
     parts: dict[str, Callable[[], object]] = {
@@ -113,7 +113,7 @@ def measured_page() -> None:
 
 
 def _default_skin_errors(archive: Archive) -> JsonObject:
-    """Return fit errors of the former default skin, the present default skin, and two skins between them."""
+    """Return errors of fits with the former default skin, the present one, and two skins between these."""
     skins = {
         "former": FORMER_SKIN,
         "half": replace(FORMER_SKIN, baseline=0.5),
@@ -163,9 +163,10 @@ def _default_skin_errors(archive: Archive) -> JsonObject:
 def _smooth_surface_errors(archive: Archive) -> JsonObject:
     """Return the differences between colours and a smooth surface through the colours of other people.
 
-    Models with two unknowns per spectrum, and the same constants for all people, cannot do better. The third
-    coordinate of a colour is predicted from the first two by local linear regression. "each site" has a
-    surface for each site, through the colours of other people at this site.
+    These are lower bounds: the colours of a model with two unknowns per spectrum and the same constants for
+    all people lie on a surface. The third coordinate of a colour is predicted from the first two by local
+    linear regression. For "each site", every site has its own surface, through the colours of other people
+    at this site.
     """
     face = np.isin(archive.site, CHEEK_AND_FOREHEAD)
     sites = [_surface_distances(archive.rows(archive.site == site)) for site in range(len(SITES))]
@@ -177,7 +178,7 @@ def _smooth_surface_errors(archive: Archive) -> JsonObject:
 
 
 def _surface_distances(archive_part: Archive) -> Floats:
-    """Return the difference (n,) of each colour from a surface through the colours of other people."""
+    """Return the difference (n,) of each colour from a smooth surface through the colours of other people."""
     from scipy.spatial import cKDTree
 
     colours = lab(archive_part.spectra @ rgb_weights().T)
@@ -197,9 +198,10 @@ def _surface_distances(archive_part: Archive) -> Floats:
 
 
 def _limit_fractions(archive: Archive) -> JsonObject:
-    """Return fractions of the colour fits with three unknowns, by kind of failure.
+    """Return the fractions of colour fits with three unknowns that fail, by kind of failure.
 
-    none, all : fractions of the fits with oxygenation 0 and 1
+    none : fraction of the fits with an oxygenation of 0
+    all : fraction of the fits with an oxygenation of 1
     unmatched : fraction of the fits that do not reproduce the measured colour
     """
     fit = fit_skin(archive.spectra, THREE_UNKNOWNS, "colour")
@@ -219,7 +221,13 @@ def _category_errors(
     three_unknown_fit: SpectralFit,
     five_unknown_fit: SpectralFit,
 ) -> list[list[float]]:
-    """Return number of spectra, median colour errors and median RMS for each group or site."""
+    """Return a row for each category, a group or a site: number of spectra and median errors.
+
+    The errors are the colour errors with two and with three unknowns, and the RMS with five unknowns.
+
+    categories : groups or sites
+    labels : (n,) category of each spectrum
+    """
     rows = []
     for category in categories:
         chosen = labels == category
@@ -229,7 +237,7 @@ def _category_errors(
 
 
 def _illuminant_errors(fits: dict[str, SpectralFit]) -> JsonObject:
-    """Return the colour differences of fits under each illuminant."""
+    """Return percentiles of the colour differences between spectra and fits under each illuminant."""
     return {
         name: {light: _percentiles(fit.delta_e(colour_weights(light))) for light in ILLUMINANTS}
         for name, fit in fits.items()
@@ -237,7 +245,7 @@ def _illuminant_errors(fits: dict[str, SpectralFit]) -> JsonObject:
 
 
 def _fold_errors(archive: Archive) -> list[JsonObject]:
-    """Return, for each fold of people, constants fitted to the other folds, and the errors of the fold."""
+    """Return, for each fold of people, constants fitted to the other folds, and their errors in this fold."""
     rows = []
     for fold in range(FOLD_COUNT):
         known = archive.rows(archive.fold != fold).sample(_CONSTANTS_SAMPLE_COUNT, fold)
@@ -261,7 +269,7 @@ def _fold_errors(archive: Archive) -> list[JsonObject]:
 
 
 def _published_model_errors(archive: Archive, bioskin: Path | None) -> JsonObject:
-    """Return errors of published models of skin on a sample, with two, three and five unknowns."""
+    """Return fit errors of published models of skin, with two, three and five unknowns per spectrum."""
     sets = (TWO_UNKNOWNS, THREE_UNKNOWNS, FIVE_UNKNOWNS)
 
     def errors(
@@ -312,7 +320,7 @@ def _jacques_model(parameter_values: ParameterValues) -> Floats:
 
 
 def _addition_errors(sample: Archive) -> list[JsonObject]:
-    """Return the errors with each addition to the model, with three and with five unknowns per spectrum."""
+    """Return fit errors for each addition to the model, with three and with five unknowns per spectrum."""
     rows = []
     for name, free in _CONSTANTS_BY_ADDITION.items():
         row: JsonObject = {"name": name}
@@ -331,7 +339,10 @@ def _addition_errors(sample: Archive) -> list[JsonObject]:
 
 
 def _site_fits(archive: Archive) -> list[JsonObject]:
-    """Return thickness and oxygen that fit each site best, by colour with two unknowns and by spectrum."""
+    """Return the thickness of the epidermis and the oxygenation that fit each site best.
+
+    Fits to colours, with two unknowns per spectrum, and fits to spectra have separate results.
+    """
     rows = []
     for site in range(len(SITES)):
         sample = archive.rows(archive.site == site).sample(_SITE_SAMPLE_COUNT, site)
@@ -352,9 +363,9 @@ def _site_fits(archive: Archive) -> list[JsonObject]:
 
 
 def _site_fold_errors(archive: Archive) -> JsonObject:
-    """Return errors with two unknowns by colour, where each site has its own thickness and oxygen.
+    """Return colour errors of fits with two unknowns, where each site has its own thickness and oxygenation.
 
-    Both are fitted to samples of people of the other folds.
+    Thickness and oxygenation are fitted to samples of people of other folds.
     """
     error = np.zeros(len(archive.spectra))
     fixed = {"baseline": DEFAULT_SKIN.baseline}
@@ -377,7 +388,10 @@ def _site_fold_errors(archive: Archive) -> JsonObject:
 
 
 def _edge_loss_errors(sample: Archive) -> JsonObject:
-    """Return the light that apertures miss, and the constants fitted to spectra corrected for this loss."""
+    """Return the fractions of light that apertures miss, and constants fitted to corrected spectra.
+
+    The spectra are corrected for the light that each aperture misses.
+    """
     skins = [replace(DEFAULT_SKIN, melanin=m, blood=0.008) for m in _EDGE_LOSS_MELANIN]
     losses = [edge_loss(one, _EDGE_LOSS_WAVELENGTHS_NM) for one in skins]
     model = ExtendedModel({"baseline": DEFAULT_SKIN.baseline, "oxygen": DEFAULT_SKIN.oxygen})
@@ -411,7 +425,7 @@ def _percentiles(errors: Floats, percentiles: Sequence[float] = _ERROR_PERCENTIL
 
 
 def _arrays_to_lists(nested_value: object) -> JsonObject:
-    """Return nested dictionaries in which lists replace arrays."""
+    """Return nested dictionaries and lists in which all arrays are converted to lists."""
     if isinstance(nested_value, np.ndarray):
         return nested_value.tolist()  # type: ignore[no-any-return]
     if isinstance(nested_value, dict):

@@ -60,7 +60,7 @@ def write_measured_page() -> None:
 
 
 def measured_parts(results: JsonObject) -> dict[str, str]:
-    """Return the tables and sentences of the page by placeholder."""
+    """Return the tables and sentences of the page, keyed by placeholder."""
     present = results["models"]["present"]
     return {
         "spectra": f"{results['counts']['spectra']:,}",
@@ -140,7 +140,11 @@ def _folds_table(folds: Sequence[JsonObject]) -> str:
 
 
 def _confounded_texts(results: JsonObject) -> dict[str, str]:
-    """Return pairs of constants that the spectra hardly distinguish, and constants of corrected spectra."""
+    """Return texts on the constants of the model, keyed by placeholder.
+
+    The texts list pairs of constants that the spectra hardly distinguish, and baselines fitted to spectra
+    that are corrected for the light that apertures miss.
+    """
     pairs = {}
     for row in results["additions"]:
         for label in ("three", "five"):
@@ -246,7 +250,7 @@ def _edge_loss_table(edge: JsonObject) -> str:
 
 
 def _corrected_constants_text(edge: JsonObject) -> str:
-    """Return text on constants fitted to spectra as measured, and to spectra corrected for lost light."""
+    """Return text on constants fitted to spectra as measured, and to spectra corrected for missed light."""
     parts = [
         f"{_constants_text(edge[name]['constants'])} (RMS {edge[name]['rms']:.4f}) {label}"
         for name, label in (

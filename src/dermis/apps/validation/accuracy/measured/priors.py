@@ -1,4 +1,4 @@
-"""Command that fits the distribution of people's pigments and writes the package's table of it."""
+"""Command that fits the distribution of people's pigments and writes it as a table of the package."""
 
 from __future__ import annotations
 
@@ -52,8 +52,8 @@ def fit_mixture(points: Floats, component_count: int) -> SkinPrior:
     """Fit a mixture of normal distributions by expectation maximisation.
 
     points : (n, d) points
-    component_count : number of distributions; each starts from an equal part of the points, in order along
-        the first axis
+    component_count : number of distributions; at the start, each is fitted to an equal share of the points,
+        sorted by their first coordinate
     """
     count, dimensions = points.shape
     parts = np.argsort(np.argsort(points[:, 0])) * component_count // count

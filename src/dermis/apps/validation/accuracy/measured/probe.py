@@ -17,7 +17,7 @@ _RADIUS_COUNT = 400  # number of points of the measured disc, by their radii
 def edge_loss(
     skin: SkinParameters, wavelength_nm: Floats, photon_count: int = 60_000, seed: int = 1
 ) -> dict[str, Floats]:
-    """Return the fraction of the reflected light that each aperture misses, by wavelength [-].
+    """Return the fraction (n,) of the reflected light that each aperture misses at each wavelength [-].
 
     A spectrophotometer compares skin with an opaque white tile. In skin, some light that enters near the edge
     of the lit disc leaves outside the disc, and no light returns from the dark surroundings in exchange.
@@ -42,10 +42,13 @@ def _missed_fraction(run: SlabResult, measured_mm: float, lit_mm: float) -> floa
 
 
 def lit_fraction(distance_mm: Floats, measured_mm: float, lit_mm: float) -> Floats:
-    """Return the mean fraction (n,) of circles around points of the measured disc inside the lit disc [-].
+    """Return the fraction (n,) of a circle's circumference that lies in the lit disc [-].
+
+    The fraction is averaged over circles around all points of the measured disc.
 
     distance_mm : (n,) radii of the circles
-    measured_mm, lit_mm : radii of the two concentric discs
+    measured_mm : radius of the measured disc
+    lit_mm : radius of the lit disc, which has the same centre
     """
     r = np.maximum(distance_mm, 1e-12)
     point = np.sqrt((np.arange(_RADIUS_COUNT) + 0.5) / _RADIUS_COUNT)[:, None] * measured_mm

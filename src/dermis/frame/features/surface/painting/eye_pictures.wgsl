@@ -1,4 +1,4 @@
-// Pictures of an eyeball along its axis: colours, and normals of the surface below the tear film.
+// Pictures of an eyeball seen along its axis: colours, and normals of the surface below the tear film.
 //#include "surface/eye_colours.wgsl"
 
 struct EyePicture {

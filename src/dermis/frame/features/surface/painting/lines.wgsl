@@ -1,4 +1,4 @@
-// Height of the skin above its smooth surface, as fine as maps resolve [mm].
+// Height of the skin above its smooth surface, in as much detail as maps resolve [mm].
 //#include "spot.wgsl"
 
 // Artistic values.

@@ -1,4 +1,4 @@
-// Freckles, moles, age spots and stubble: dots with densities of the skin and its zones.
+// Freckles, moles, age spots and stubble: dots whose density depends on the person and on the zones of the face.
 //#include "spot.wgsl"
 
 fn scatter_dots(spot: Spot, scalp: f32, lip: f32) {

@@ -1,4 +1,4 @@
-// Finds the triangle that covers each texel of the skin's maps; around charts, the nearest triangle.
+// Finds the triangle that covers each texel of the skin's maps, or outside charts the nearest triangle.
 //#include "each.wgsl"
 //#include "painted_surface.wgsl"
 

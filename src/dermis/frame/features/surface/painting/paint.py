@@ -1,4 +1,4 @@
-"""Painted maps of human skin: colour, gloss and relief at rest, and their changes by expressions."""
+"""Painted maps of human skin: colour, gloss and relief at rest, and the changes that expressions make."""
 
 from __future__ import annotations
 
@@ -67,12 +67,12 @@ _FOLDING_VALUE_COUNT = FOLD_MOVEMENT_COUNT + 1  # numbers in `folding` of the sh
 
 
 def painting_lists() -> Mapping[str, Callable[[], Sequence[ShaderListMember]]]:
-    """Return the names of noises, dot layers, zone amounts and noise regions, for lists in shaders."""
+    """Return the lists over which the painting shaders loop: noises, dot layers, zones, noise regions."""
     return {name: _as_members(names) for name, names in _PAINTING_LISTS.items()}
 
 
 def painting_constants() -> dict[str, float]:
-    """Return the values that `//#fill` lines insert in the painting shaders, by name."""
+    """Return the named values that `//#fill` lines insert into the painting shaders."""
     counts = {name: len(names) for name, names in _PAINTING_LISTS.items()} | table_sizes()
     rows = {"noise_rows": len(noise_table()), "amount_rows": len(ZONE_AMOUNTS) // 4}
     sizes = {"degrees": float(HAIRLINE_STEP_DEGREES), "tile_mm": TILE_LENGTH_MM}
@@ -88,8 +88,8 @@ class PaintInputs(NamedTuple):
 
     paint : uniform record of the look: pigments, gloss, age, ...
     tables : tables of the face: noises, dots, zones, folds and hairline
-    colours : (3, n, n, 3) colour tables of skin with the lowest and the highest oxygen saturation, and of
-        lips, linear Rec. 709 [-]
+    colours : (3, n, n, 3) colour tables, linear Rec. 709 [-]: of skin with the lowest oxygen saturation, of
+        skin with the highest oxygen saturation, and of lips
     surface : mesh that is painted
     """
 
@@ -119,7 +119,7 @@ def paint_inputs(surface: PaintedSurface, look: SkinLook, map_side: int) -> Pain
 
 
 def cache_key(inputs: PaintInputs, driver_name: str) -> str:
-    """Return the disk cache key of painted maps, a hash of inputs, shaders and driver."""
+    """Return the disk cache key of painted maps: a hash of inputs, shaders and driver name."""
     source = "\n".join((driver_name, _shader_text(_SKIN_SHADER), _shader_text(_TEXEL_TRIANGLE_SHADER)))
     records = (np.frombuffer(record.tobytes(), np.uint8) for record in (inputs.paint, inputs.tables))
     return array_key([*records, inputs.colours, inputs.surface.vertices, inputs.surface.triangles], source)
@@ -155,7 +155,7 @@ class RestMaps(NamedTuple):
 
     colour, specular, roughness : textures with views of their mip levels
     heights : buffer of heights with a border of one texel [mm]
-    deltas : texture of the changes by expressions, None if they were not requested
+    deltas : texture of the changes that expressions make, None if they were not requested
     """
 
     colour: map_mips.MippedTexture
@@ -173,7 +173,7 @@ def cached_rest_maps(
     Only the first maps that a device paints are stored, because programs that render many people rarely need
     the same person again.
 
-    with_expressions : whether to include the changes by expressions
+    with_expressions : whether to include the changes that expressions make
     """
     if device.adapter.kind != "CPU":
         return paint_rest_maps(device, inputs, map_side)
@@ -219,7 +219,7 @@ def paint_rest_maps(device: Device, inputs: PaintInputs, map_side: int) -> RestM
 
 
 def _surface_buffers(device: Device, inputs: PaintInputs, map_side: int) -> dict[str, Buffer]:
-    """Return buffers of the painted mesh and of the triangle that owns each texel, cached for all people."""
+    """Return buffers of the painted mesh and of each texel's triangle, cached for all people."""
     surface = inputs.surface
     cache = device.cached("painted surfaces", WeakKeyDictionary[PaintedSurface, dict[int, dict[str, Buffer]]])
     sides: dict[int, dict[str, Buffer]] = cache.setdefault(surface, {})
@@ -270,9 +270,9 @@ def _upload_arrays(device: Device, arrays: Arrays, map_side: int) -> RestMaps:
 
 @dataclass(frozen=True, eq=False)
 class ExpressionMaps:
-    """Painted maps that change with expressions, with the inputs of the pass that fills them.
+    """Painted maps that change with expressions, and the inputs of the pass that fills these maps.
 
-    bindings : resources of expression.wgsl by their names there
+    bindings : dictionary from names in expression.wgsl to resources
     heights : buffer of heights from which the relief is computed [mm]
     colour, relief : textures with all mip levels
     """
@@ -334,7 +334,7 @@ def paint_textures(
     """Paint the maps of a look as textures.
 
     map_side : side of the maps [texels]
-    with_expressions : whether expressions change colour and relief, which `draw_expression` then fills
+    with_expressions : whether expressions change colour and relief; if so, `draw_expression` fills these maps
     """
     maps = cached_rest_maps(device, paint_inputs(surface, look, map_side), map_side, with_expressions)
     colour = map_mips.empty_map(device, (map_side, map_side)) if with_expressions else maps.colour

@@ -1,4 +1,4 @@
-"""Heads whose painted maps and eyes are arrays, for files and for programs without the painting shaders."""
+"""Heads with painted maps and eyes as arrays, for files and for programs without the painting shaders."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ EYE_PICTURE_SIDE = 1024
 
 
 def paint_eye(device: Device, look: EyeLook, picture_side: int = EYE_PICTURE_SIDE) -> EyeTextures:
-    """Paint pictures of an eye along its axis through the cornea, for programs without the eye shader.
+    """Paint pictures of an eye, seen along its axis through the cornea, for programs without the eye shader.
 
     picture_side : side of the pictures [pixels]
     """

@@ -1,4 +1,4 @@
-// Surface that is painted: triangles of a human, with positions of their corners on the average person.
+// Surface that is painted: triangles of a human mesh, with the positions of their corners on the average person.
 
 const MARGIN: f32 = 8.0; // width around charts that is painted too [texels]
 const ID_BITS: u32 = 20u;

@@ -1,4 +1,4 @@
-// A bit for each pair of blocks of tiles: whether translucent pairs between them are possible.
+// One bit for each pair of blocks of tiles, set if translucent pairs between the two blocks are possible.
 //#include "bounds.wgsl"
 
 @group(0) @binding(3) var<storage, read> blocks: array<Bounds>;

@@ -1,4 +1,4 @@
-// Bounding box and normal cone of each block of tiles, from those of its tiles.
+// Bounding box and normal cone of each block of tiles, from the boxes and cones of the tiles.
 //#include "bounds.wgsl"
 
 @group(0) @binding(3) var<storage, read> tiles: array<Bounds>;

@@ -1,4 +1,4 @@
-// Bounding boxes with cones of normals, and whether translucent pairs are possible between two of them.
+// Bounding boxes with cones of normals, and a test whether translucent pairs are possible between two boxes.
 //#include "translucency/translucent_pair.wgsl"
 //#include "each.wgsl"
 //#include "search.wgsl"

@@ -1,4 +1,5 @@
-// Positions in gutters that show each source: the mean position of each cluster of texels that copy its texel or a neighbour.
+// Positions in gutters where each source appears: the mean position of each cluster of gutter texels that copy the texel of
+// the source or a neighbour of this texel.
 //#include "translucency/translucent_pair.wgsl"
 //#include "map_positions.wgsl"
 //#include "each.wgsl"

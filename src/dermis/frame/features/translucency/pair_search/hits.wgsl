@@ -1,4 +1,5 @@
-// Sources that form a pair with each receiver, as a word of bits for each tile that is a partner of the receiver's tile.
+// Sources that form a pair with each receiver. The sources of each tile that is paired with the receiver's tile are stored as
+// bits of a word.
 //#include "bounds.wgsl"
 
 @group(0) @binding(3) var<storage, read> receiver_points: array<Receiver>;

@@ -1,4 +1,4 @@
-// Positions in the atlas, as integers.
+// Positions in the atlas, stored as integers.
 
 const FINE: i32 = 8; // steps per texel
 const COPIES: u32 = 8u; // of a source in gutters, at most

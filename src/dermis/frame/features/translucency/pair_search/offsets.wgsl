@@ -1,4 +1,5 @@
-// Offset in the atlas from each receiver to its source: the nearest copy that blurs reach, in the chart or its gutter.
+// Offset in the atlas from the receiver to the source of each pair. The source may appear at its texel and again in gutters;
+// the offset is to the nearest of these positions from which blurs carry light to the receiver.
 //#include "translucency/translucent_pair.wgsl"
 //#include "map_positions.wgsl"
 //#include "atlas/reach.wgsl"

@@ -1,4 +1,4 @@
-// List of the pairs that hits.wgsl found, and marks of the sources that are in a pair.
+// List of the pairs that hits.wgsl found, and a mark for each source that is in a pair.
 //#include "each.wgsl"
 //#include "search.wgsl"
 

@@ -1,4 +1,4 @@
-"""Search for translucent pairs of cells, among tiles of cells whose normals are opposed."""
+"""Search for translucent pairs of cells, restricted to tiles (groups of cells) with opposed normals."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _PAIR_BYTES = 12
 
 
 class SearchPasses:
-    """Passes of a search, submitted in batches, as the size of later passes depends on earlier results.
+    """Passes of a search, submitted in batches because the sizes of later passes depend on earlier results.
 
     commands : command list of the passes that are not yet submitted
     blocks : number of blocks of tiles along a side of the atlas
@@ -78,7 +78,7 @@ def upload_words(device: Device, *columns: NDArray[np.integer]) -> Buffer:
 
 
 def list_offsets(list_lengths: Index) -> Index:
-    """Return (n + 1,) offsets of n lists that are stored one after the other, and their total length.
+    """Return the offsets of n lists that are stored one after another, and their total length, (n + 1,).
 
     list_lengths : (n,) lengths of the lists
     """
@@ -91,8 +91,8 @@ class TilePairs:
 
     bounds : buffer of the bounding box and normal cone of each tile
     tile : (t,) indices of the tiles that are in at least one pair
-    first : (t + 1,) range of each of these tiles in `partners`
-    partners : buffer of the tiles that each tile is paired with
+    first : (t + 1,) offsets into `partners`; the partners of tile[i] are from first[i] up to first[i + 1]
+    partners : buffer of the tiles with which each tile is paired
     """
 
     bounds: Buffer
@@ -121,7 +121,7 @@ def find_tile_pairs(passes: SearchPasses, surface: Bindings, cells: Cells) -> Ti
 
 
 def _find_block_pairs(passes: SearchPasses, surface: Bindings, cells: Cells, tile_bounds: Buffer) -> Buffer:
-    """Return a buffer with a bit for each pair of blocks of tiles: whether translucent pairs are possible.
+    """Return a buffer with one bit for each pair of blocks of tiles, set if translucent pairs are possible.
 
     tile_bounds : buffer to fill with the bounding box and normal cone of each tile
     """
@@ -143,11 +143,12 @@ def _find_block_pairs(passes: SearchPasses, surface: Bindings, cells: Cells, til
 class CandidateCells:
     """Cells that may be in translucent pairs, ordered by their tiles.
 
-    receiver : (r,) indices among the cells that receive light
-    source : (s,) indices of cells that emit light, in the coarse atlas
-    first, end : (r,) bounds of the range in `TilePairs.partners` that belongs to the tile of each receiver
-    sources_first, sources_end : (t,) bounds of the range in `source` that belongs to each of the t tiles of
-        the atlas
+    receiver : (r,) cells that receive light, as indices into the list of such cells
+    source : (s,) cells that emit light, as indices into the coarse atlas
+    first : (r,) index in `TilePairs.partners` where the partners of each receiver's tile start
+    end : (r,) index where these partners end
+    sources_first : (t,) index in `source` where the sources of each of the t tiles of the atlas start
+    sources_end : (t,) index where these sources end
     """
 
     receiver: Index
@@ -171,9 +172,12 @@ def candidate_cells(cells: Cells, tile_pairs: TilePairs) -> CandidateCells:
 
 
 def _expand_ranges(range_starts: Index, chosen_ranges: Index) -> tuple[Index, Index]:
-    """Return all integers of chosen ranges, one range after another; range i ends where range i + 1 starts.
+    """Return the integers in chosen ranges, and for each integer the position of its range.
 
-    The second result holds, for each integer, the index in `chosen_ranges` of its range.
+    The ranges keep their order. A position is an index into `chosen_ranges`.
+
+    range_starts : start of each range; a range ends where the next range starts
+    chosen_ranges : indices of the chosen ranges
     """
     count = range_starts[chosen_ranges + 1] - range_starts[chosen_ranges]
     position = np.repeat(np.arange(len(chosen_ranges)), count)
@@ -186,7 +190,7 @@ def _expand_ranges(range_starts: Index, chosen_ranges: Index) -> tuple[Index, In
 def compute_positions(
     passes: SearchPasses, surface: Bindings, cells: Cells, candidates: CandidateCells
 ) -> Bindings:
-    """Return buffers of the positions and normals of all candidates, by their names in the shaders.
+    """Return a dictionary from names in shaders to buffers of the candidates' positions and normals.
 
     surface : resources of geometry.wgsl and of the atlas
     """
@@ -204,8 +208,8 @@ def compute_positions(
 def upload_hit_ranges(passes: SearchPasses, candidates: CandidateCells) -> tuple[Bindings, int]:
     """Upload the ranges of sources that hits.wgsl tests for each receiver.
 
-    The second result is the number of words that hits.wgsl writes: one for each receiver and tile to test,
-    with a bit for each source.
+    The second result is the number of words that hits.wgsl writes: one for each receiver and each tile to
+    test. A word has one bit for each source in the tile.
     """
     word = list_offsets(candidates.end - candidates.first)
     unused = np.zeros(len(candidates.receiver), np.int64)
@@ -218,7 +222,7 @@ def upload_hit_ranges(passes: SearchPasses, candidates: CandidateCells) -> tuple
 
 
 def draw_gutter_copies(passes: SearchPasses, cells: Cells, source_cells: Index, bindings: Bindings) -> Buffer:
-    """Return a buffer of the gutter positions at which sources appear again, see gutter_copies.wgsl.
+    """Return a buffer of the positions in gutters that show copies of sources, see gutter_copies.wgsl.
 
     source_cells : (n,) indices of cells that emit light
     bindings : further resources of gutter_copies.wgsl
@@ -240,7 +244,7 @@ def draw_gutter_copies(passes: SearchPasses, cells: Cells, source_cells: Index, 
 def upload_receivers(device: Device, cells: Cells, receiver_index: Index) -> tuple[Buffer, int]:
     """Upload the surface point and the cell of each receiver; return the buffer and its number of rows.
 
-    receiver_index : (n,) indices among the cells that receive light
+    receiver_index : (n,) indices into the list of cells that receive light
     """
     columns = (
         *cells.receiver_points[receiver_index].T,
@@ -253,7 +257,7 @@ def upload_receivers(device: Device, cells: Cells, receiver_index: Index) -> tup
 def upload_sources(device: Device, cells: Cells, source_cells: Index) -> tuple[Buffer, int]:
     """Upload the packed (x, y) of cells that emit light; return the buffer and its number of rows.
 
-    source_cells : (n,) indices of cells in the coarse atlas
+    source_cells : (n,) indices of these cells in the coarse atlas
     """
     return upload_words(device, source_cells % cells.side | (source_cells // cells.side << 16)), len(
         source_cells
@@ -264,10 +268,11 @@ def upload_sources(device: Device, cells: Cells, source_cells: Index) -> tuple[B
 class PairTable:
     """Translucent pairs as the search returns them, ordered by receiver.
 
-    receiver : (m,) receivers that are in a pair, as indices among the cells that receive light
-    first : (m + 1,) range of the pairs of each receiver
+    receiver : (m,) receivers that are in a pair, as indices into the list of cells that receive light
+    first : (m + 1,) offsets into the list of pairs; receiver[i] has the pairs from first[i] up to first[i +
+        1]
     source : (n,) cells that emit light in at least one pair
-    pairs : buffer of three words for each pair: source, receiver, and offset between them in the atlas
+    pairs : buffer of three words for each pair: source, receiver, and the offset in the atlas between the two
     """
 
     receiver: Index
@@ -277,7 +282,7 @@ class PairTable:
 
 
 def search_pairs(device: Device, surface: Bindings, cells: Cells) -> PairTable | None:
-    """Return all pairs that transmit a relevant amount of light, None if a buffer cannot hold the pairs.
+    """Return all pairs that transmit a relevant amount of light, None if they do not fit in a buffer.
 
     surface : resources of geometry.wgsl for the shape to search in, and of the atlas
     """

@@ -1,4 +1,4 @@
-// For each tile, the number or the list of tiles with which translucent pairs are possible.
+// For each tile, the number or the list of those tiles with which translucent pairs are possible.
 //#include "bounds.wgsl"
 
 override LISTED: bool = false; // whether to write the list instead of the number

@@ -1,4 +1,4 @@
-// Bounding box and normal cone of each tile of the atlas, from the triangles clipped to it.
+// Bounding box and normal cone of each tile of the atlas, from the triangles clipped to the tile.
 //#include "shape/geometry.wgsl"
 //#include "bounds.wgsl"
 
