@@ -55,10 +55,10 @@ def list_names(names: Collection[str]) -> str:
     return ", ".join(shown) + (f" and {more} more" if more > 0 else "")
 
 
-def run_starts(inside_mask: Mask) -> Index:
+def run_starts(run_mask: Mask) -> Index:
     """Return the index at which each run of consecutive True values in a mask (n,) starts."""
-    first = inside_mask.copy()
-    first[1:] &= ~inside_mask[:-1]
+    first = run_mask.copy()
+    first[1:] &= ~run_mask[:-1]
     return np.flatnonzero(first)
 
 

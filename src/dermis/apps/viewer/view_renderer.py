@@ -378,11 +378,11 @@ def run_in_thread(task: Callable[[], T]) -> Future[T]:
     future: Future[T] = Future()
     future.set_running_or_notify_cancel()
 
-    def set_result() -> None:
+    def run_task() -> None:
         try:
             future.set_result(task())
         except Exception as error:
             future.set_exception(error)
 
-    threading.Thread(target=set_result, name="preparing", daemon=True).start()
+    threading.Thread(target=run_task, name="preparing", daemon=True).start()
     return future
