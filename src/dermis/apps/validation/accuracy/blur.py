@@ -51,16 +51,16 @@ MIN_FACING_COSINE = 0.4  # least cosine between the normal at a seam and the lig
 
 
 def blur(adapter: str = "auto") -> None:
-    """Print the tables of points of light, curvature and seams.
+    """Print tables of the errors of blurs: for points of light, on curved surfaces and across seams.
 
-    The tables of curvature and seams need the folder `tests` of a checkout.
+    The tables of curved surfaces and of seams need the folder `tests` of a checkout.
     """
     print_tables({name: str(text) for name, text in point_tables(open_device(adapter)).items()})
     print_tables(surface_tables(adapter))
 
 
 def point_tables(device: Device) -> dict[str, object]:
-    """Return texts on blurred light for docs/templates/accuracy.md, keyed by placeholder."""
+    """Return table rows and errors of blurred light for docs/templates/accuracy.md, keyed by placeholder."""
     return {
         "rows": "\n".join(point_row(device, density) for density in (0.75, 1.0, 1.5, 3.0, 6.0, 12.0)),
         "leaning": "\n".join(sheared_row(device, degrees) for degrees in (90, 80, 60, 45)),
@@ -70,7 +70,7 @@ def point_tables(device: Device) -> dict[str, object]:
 
 
 def blurred_levels(device: Device, mesh: Mesh, irradiance: Array, stretch_mode: str = "full") -> list[Array]:
-    """Return all pyramid levels (n, n) of light blurred on the atlas of a mesh, at full resolution.
+    """Blur light on the atlas of a mesh; return all pyramid levels (n, n), resampled to full resolution.
 
     irradiance : (n, n) irradiance
     stretch_mode : stretch map that the blur uses: "full", or "axes", which ignores the angle between u and v
@@ -103,9 +103,10 @@ def point_row(device: Device, texels_per_mm: float) -> str:
 
 
 def sheared_row(device: Device, shear_degrees: float) -> str:
-    """Return a Markdown row with the ratios of a blurred point's two principal widths to the exact width.
+    """Return a Markdown row with errors of the shape of a blurred point of light on a sheared uv map.
 
-    Ratios for the stretch map "axes" come first, then ratios for the stretch map "full".
+    Each of the stretch maps "axes" and "full" has two cells: the ratios of the smaller and of the larger
+    principal width of the blurred point to the exact width.
 
     shear_degrees : angle between the uv axes on the flat surface [degrees]
     """
@@ -144,10 +145,11 @@ def surface_tables(adapter: str) -> dict[str, str]:
 
 
 def harmonic_row(renderer: Renderer, radius_mm: float) -> str:
-    """Return a Markdown row with the factors by which blurs on a sphere scale light proportional to x.
+    """Return a Markdown row that compares three ways of blurring light on a sphere with the widest Gaussian.
 
-    The widest Gaussian is applied in three ways: on the atlas, by the heat equation on the sphere, and as a
-    function of the chord length.
+    The ways are the blur on the atlas, the heat equation on the sphere, and an integral over the sphere as a
+    function of Euclidean distance. The irradiance is proportional to x, so each blur only scales it; the
+    cells are the scale factors.
     """
     from atlas_reading import shown
     from cut_meshes import cut_sphere
@@ -221,7 +223,7 @@ def seam_rows(renderer: Renderer) -> list[str]:
 
 
 def all_points(positions: Array) -> Flags:
-    """Return a mask that selects all positions (n, 3), relative to the head's centre [mm]."""
+    """Return a mask (n,) that selects all positions (n, 3)."""
     return np.ones(len(positions), bool)
 
 
@@ -248,7 +250,7 @@ def hidden_points(positions: Array) -> Flags:
 def seam_row(
     renderer: Renderer, row_title: str, head: Head, atlas_side: int, point_filter: PointFilter
 ) -> str:
-    """Return a Markdown row with the discontinuities across seams, with a column for each seam method.
+    """Return a Markdown row with the discontinuity of light across seams, in one cell for each seam method.
 
     atlas_side : side of the atlas [texel]
     point_filter : function that returns the mask of the seam points to use, given their positions
@@ -262,7 +264,7 @@ def seam_row(
 
 
 def seam_side_points(head: Head, point_filter: PointFilter) -> tuple[Points, Points]:
-    """Return corresponding points on the two sides of seams, where they face the lights.
+    """Return pairs of points on the two sides of seams, where the surface faces the front or the back.
 
     point_filter : function that returns the mask of the seam points to use, given their positions
     """
@@ -283,7 +285,7 @@ def seam_side_points(head: Head, point_filter: PointFilter) -> tuple[Points, Poi
 
 
 def striped_scene(head: Head) -> Scene:
-    """Return a scene with sharp stripes of light and a little even light, from the front and the back."""
+    """Return a scene lit from the front and the back by sharp stripes of light and weak uniform light."""
     x = head.mesh.positions[:, 0] - head.centre_mm[0]
     positions = np.arange(max(x.min(), -90.0), min(x.max(), 90.0), STRIPE_SPACING_MM)
     stripe = partial(StripeLight, up=(0.4, 1, 0), width_mm=STRIPE_WIDTH_MM, shadows=False)
@@ -303,11 +305,11 @@ def seam_jumps(
     first_side: Points,
     second_side: Points,
 ) -> Array:
-    """Return the relative differences of scattered red light between corresponding points across seams.
+    """Return the relative differences (n,) of scattered red light between the two sides of seams.
 
     seam_method : key of `SEAM_METHODS`
     atlas_side : side of the atlas [texel]
-    first_side, second_side : corresponding points on the two sides of seams
+    first_side, second_side : n pairs of points on the two sides of seams
     """
     from atlas_reading import lit_at
 

@@ -1,6 +1,6 @@
 """Highlights and skins rendered by dermis, compared with renderings by Cycles for docs/accuracy.md.
 
-Both comparisons need Blender's Python, so the page shows their last results (benchmarks/results).
+The comparisons need Blender's Python. The page therefore shows stored results from benchmarks/results.
 """
 
 from __future__ import annotations
@@ -236,7 +236,7 @@ def principled_skin(head: Head) -> PrincipledSkin:
 def skin_renders(renderer: dermis.Renderer, head_title: str) -> dict[str, list[SkinRender]]:
     """Return three renderings of a head for each view, as a dictionary from view to renderings.
 
-    The first has the skin of the 2007 talk, the second the default skin, and the third is by Cycles.
+    The first shows the preset skin "deck-2007", the second the default skin, and the third is by Cycles.
 
     head_title : key of `HEAD_NAMES`
     """

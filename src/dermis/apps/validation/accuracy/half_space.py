@@ -39,7 +39,7 @@ def half_space(adapter: str = "auto") -> None:
 
 
 def direction_table(head: Head, adapter: str) -> str:
-    """Return a Markdown table of reflection by direction, and of the errors of two kinds of skin."""
+    """Return a Markdown table of reflection by direction, with errors of Lambertian and half-space skin."""
     layer = published_media()["skin1"].layers[0]
     albedo = layer.sigma_s_prime / (layer.sigma_a + layer.sigma_s_prime)
     forward = layer.sigma_s_prime / (layer.sigma_a * (1.0 - FORWARD_G) + layer.sigma_s_prime)
@@ -137,7 +137,7 @@ def _reflected_fraction(cosine: float, albedo: float, mean_cosine: float, eta: f
 
 
 def _scattered_cosines(downward_cosines: Floats, g: float, rng: np.random.Generator) -> Floats:
-    """Return the cosines (n,) between photons and the downward axis after scattering.
+    """Return cosines (n,) of the angles between photon directions and the downward axis, after scattering.
 
     Scattering angles are distributed according to [HenyeyGreenstein1941].
 
@@ -154,9 +154,9 @@ def _scattered_cosines(downward_cosines: Floats, g: float, rng: np.random.Genera
 
 
 def _studio_ratios(head: Head, adapter: str) -> tuple[list[float], list[float]]:
-    """Return the median and the 99th percentile of brightness ratios by channel, in studio light.
+    """Return ratios of the brightness of half-space skin to that of Lambertian skin, in studio light.
 
-    The ratios are those of half-space skin to Lambertian skin in the pixels of a picture.
+    The result is the median and the 99th percentile over the pixels of a picture, by channel.
     """
     renderer, settings = Renderer(adapter), Settings(size=(256, 298), atlas=1024)
 

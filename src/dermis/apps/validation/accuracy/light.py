@@ -96,11 +96,11 @@ def irradiance_error(panorama_name: str, normal_count: int = 200) -> float:
 def reflection_error(
     panorama_name: str, roughness_m: float, view_degrees: float, normal_count: int = 320
 ) -> float:
-    """Return the relative RMS error of the reflection of a panorama in a lobe, over random normals.
+    """Return the relative RMS error of a panorama's light that a specular lobe reflects, over random normals.
 
-    Lookups in the prefiltered panorama are compared with a sum over all texels.
+    Lookups in the prefiltered panorama are compared with a sum over all texels of the panorama.
 
-    roughness_m : roughness of the lobe
+    roughness_m : roughness of the specular lobe
     view_degrees : angle between view and normal [degrees]
     normal_count : number of normals
     """
@@ -158,7 +158,7 @@ def lobe_parameters(cosine: float, roughness_m: float) -> Array:
 def lobe_radiance(layers: Array, directions: Array, roughness_m: float) -> Array:
     """Return the radiance (k, 3) of a prefiltered panorama in the directions of isotropic lobes.
 
-    The two layers nearest in roughness are interpolated.
+    The radiance is interpolated between the two layers whose roughness is nearest to that of the lobes.
 
     layers : (n, h, w, 3) layers of the prefiltered panorama, in order of roughness
     directions : (k, 3) directions of the lobes

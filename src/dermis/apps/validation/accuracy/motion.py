@@ -125,7 +125,7 @@ def picture_error(
 
 
 def _with_centre(head: Head, shaped_head: Head) -> Head:
-    """Set the centre of a head to the centre of `shaped_head`, and return the head.
+    """Change the centre of a head in place to the centre of `shaped_head`, and return the head.
 
     Lights and cameras are relative to the centre.
     """
@@ -189,7 +189,7 @@ def seam_rows(renderer: Renderer, head: Head, persons: Mapping[str, Points]) -> 
 def _seam_row(renderer: Renderer, row_title: str, head: Head, shaped_head: Head, pose: Pose | None) -> str:
     """Return a Markdown row with the discontinuity of light across the seams of a posed head.
 
-    shaped_head : head loaded in the shape of the pose, on which points beside seams are found
+    shaped_head : head loaded in the shape of the pose; used to find the points beside seams
     """
     cells = []
     for where in (blur.neck_points, blur.back_points):

@@ -51,7 +51,7 @@ def tissue_by_name(tissue_name: str) -> Tissue:
 
 
 def models_table() -> str:
-    """Return Markdown rows with the errors of total and ring energies, by diffusion model and tissue."""
+    """Return Markdown rows with errors of diffusion models, in total energy and in the energies of rings."""
     return "\n".join(row for name in COMPARED_TISSUES for row in _model_rows(name, tissue_by_name(name)))
 
 
@@ -96,7 +96,7 @@ def counted_table() -> str:
 def fits_table() -> str:
     """Return Markdown rows with errors of fitted Gaussians and Burley profiles, by tissue.
 
-    Both are fitted to the ring energies of layered diffusion.
+    Both are fitted to the energies of a layered-diffusion profile in rings around its centre.
     """
     rows = []
     for name in COMPARED_TISSUES:
@@ -109,9 +109,10 @@ def fits_table() -> str:
 
 
 def pointwise_table() -> str:
-    """Return Markdown rows with shape and energy errors of fits of six Gaussians to points of profiles.
+    """Return Markdown rows with shape and energy errors of six Gaussians fitted to point samples of profiles.
 
-    The channels share the variances of the Gaussians. Only profiles that are finite at radius 0 are fitted.
+    The channels share the variances of the Gaussians. Each profile is fitted twice: without a constraint, and
+    with its total energy conserved.
     """
     rows = []
     for name, model, clamp in (
@@ -132,7 +133,7 @@ def pointwise_table() -> str:
 
 
 def transmission_table() -> str:
-    """Return Markdown rows, one per thickness, with transmitted light by Monte Carlo, slabs and Gaussians."""
+    """Return Markdown rows with the transmittance of slabs, by Monte Carlo and by three approximations."""
     rows = []
     for name in ("skin1", "dj3"):
         tissue = tissue_by_name(name)
@@ -164,10 +165,7 @@ def error_against_published_sum(profile: RadialProfile) -> Floats:
 
 
 def published_errors() -> str:
-    """Return text with the errors of diffusion models for the tissue "dj3".
-
-    The errors are computed by `error_against_published_sum`.
-    """
+    """Return text with errors of diffusion models of the tissue "dj3", see `error_against_published_sum`."""
     variants: tuple[tuple[str, DiffusionModel, Clamp], ...] = (
         ("multipole as printed", "multipole", "none"),
         ("multipole", "multipole", "layer"),

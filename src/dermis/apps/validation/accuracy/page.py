@@ -10,7 +10,7 @@ PAGE = DOCS / "accuracy.md"
 
 
 def page(adapter: str = "auto") -> None:
-    """Measure the approximations of the frame and write docs/accuracy.md."""
+    """Measure the errors of the approximations that frames use, and write docs/accuracy.md."""
     device = open_device(adapter)
     fill_page(
         PAGE,

@@ -1,7 +1,7 @@
 """People rendered by dermis and by path tracing, with the same model of the skin, for docs/path_traced.md.
 
-Each comparison is written to a file of results when it is finished, and paths are cached while they are
-traced, so an interrupted run continues where it stopped. The page is written from the file of results.
+Each finished comparison is written to a file of results, and traced paths are cached on disk. An interrupted
+run therefore continues where it stopped. The page is written from the file of results.
 """
 
 from __future__ import annotations
@@ -114,13 +114,13 @@ def measurements() -> list[Measurement]:
 
 
 class Measuring:
-    """Measurements of people and heads rendered by dermis and by path tracing, with common options.
+    """Renderer of people and heads by dermis and by path tracing, with the same options for all comparisons.
 
     renderer : renderer of the frames
     side : side of the pictures [pixel]
     samples : paths per pixel
     variant : variant of Mitsuba
-    folder : folder for the files of diffusion profiles
+    folder : folder in which the files of diffusion profiles are written
     """
 
     def __init__(
@@ -132,14 +132,14 @@ class Measuring:
         self._skins: dict[tuple[str, str], SharedSkin] = {}
 
     def measure(self, measurement: Measurement) -> Figures:
-        """Return the figures of a comparison; pictures that the page shows are kept in the cache."""
+        """Make a comparison and return its figures; pictures that the page shows are kept in the cache."""
         head, textures = self._person(measurement.person)
         skin = self._shared_skin(measurement.person, head, measurement.truth)
         subject = PersonSubject(view_scene(head, ALL_VIEWS[measurement.view]), textures)
         if measurement.cause is not None:
             subject = without_cause(subject, measurement.cause)
         samples = round(self.samples * ALL_VIEWS[measurement.view].sample_factor)
-        options: dict[str, Any] = {"side": self.side, "samples": samples, "variant": self.variant}
+        options: dict[str, Any] = {"picture_side": self.side, "samples": samples, "variant": self.variant}
         pair = compare_person(self.renderer, subject, skin, measurement.view, **options)
         figures = pair_figures(pair)
         if measurement.truth == "matched":
@@ -173,7 +173,7 @@ class Measuring:
         return self._skins[key]
 
     def measure_head(self, head_name: str, light_name: str, medium: Medium) -> Figures:
-        """Return the figures of a comparison of a head without maps or surface reflection.
+        """Compare renderings of a head without maps or surface reflection; return errors, paths and notes.
 
         head_name : key of `_HEAD_FILES`
         light_name : key of `scenes.LIGHTS`
@@ -231,7 +231,7 @@ def save_panels(view_name: str, comparison: PersonComparison) -> None:
 
 
 def picture_sheet(view_names: Sequence[str]) -> bytes:
-    """Return a WebP file that shows views from the cache: frame, path-traced picture and difference."""
+    """Return a WebP file with the frame, the path-traced picture and the difference of each cached view."""
     panels: dict[str, NDArray[np.uint8]] = {}
     for view in view_names:
         found = load_arrays(_PANEL_FOLDER, _panel_key(view), _PANEL_NAMES)
@@ -436,7 +436,7 @@ def cause_table(people: Figures) -> str:
 
 
 def iris_cells(people: Figures) -> dict[str, str]:
-    """Return texts with the errors of the iris in the view "eye", keyed by placeholder."""
+    """Return texts with errors of the iris in the view "eye", keyed by the placeholder that each replaces."""
     row = people.get(Measurement("human", "eye", "matched").key) or {}
     iris = row.get("iris", {})
     names = "right", "down", "brightness", "left_half", "right_half"

@@ -125,9 +125,9 @@ def forward_error_rows(renderer: dermis.Renderer) -> str:
 
 
 def forward_direction_rows() -> str:
-    """Return Markdown rows with errors of radiance below the surface of the medium "skin1".
+    """Return Markdown rows with RMS errors of radiance below the surface of forward-scattering "skin1".
 
-    The medium is taken as forward-scattering. Each error is over all directions of light and view.
+    The errors are over all directions of light and view, by index of refraction, in red, green and blue.
     """
     rows = []
     for g in (0.0, FORWARD_G):
@@ -154,9 +154,10 @@ def _direction_pairs_error(albedo: float, eta: float, g: float) -> float:
 
 
 def _error_cells(response: Array, reference: Array) -> str:
-    """Return table cells with the RMS error and, for each angle, the ratio of red light to the reference.
+    """Return two table cells for transmittance, and then two for reflectance.
 
-    Cells of transmittance come first, then cells of reflectance.
+    The first cell of each pair has the RMS error. The second has the ratio of red light to the reference, for
+    each angle of incidence.
     """
     flux, cells = np.sqrt(np.cos(np.radians(INCIDENT_DEGREES)))[:, None], []
     for side in (1, 0):
@@ -168,7 +169,7 @@ def _error_cells(response: Array, reference: Array) -> str:
 
 
 def forward_rows() -> str:
-    """Return Markdown rows on red light through forward-scattering and isotropic slabs, by Monte Carlo."""
+    """Return Markdown rows with red light through isotropic and forward-scattering slabs, by Monte Carlo."""
     rows = []
     for eta in (1.0, 1.4):
         layer = published_media()["skin1"].layers[0]

@@ -40,7 +40,7 @@ def read_albedo(lobe_model: str, cosine: Floats, roughness_m: Floats) -> Floats:
 
 
 def albedo_rows() -> str:
-    """Return Markdown rows, one per lobe: errors of quadrature and of table interpolation, computing time."""
+    """Return Markdown rows with errors of each lobe's quadrature and table, and the time to compute the table."""
     m, c = np.linspace(0.1, 0.5, 17)[:, None], np.linspace(0.05, 1.0, 39)
     rows = []
     for name, model in MODELS.items():
@@ -55,7 +55,7 @@ def albedo_rows() -> str:
 
 
 def beckmann_table_error() -> float:
-    """Return the largest relative error of the interpolated Beckmann table, where the lobe is visible [-]."""
+    """Return the largest relative error of the interpolated Beckmann table where the lobe is visible [-]."""
     m, c = np.meshgrid(np.linspace(0.1, 0.5, 23), np.linspace(0.05, 1.0, 61), indexing="ij")
     rows, columns = beckmann_table().shape
     axes = [(np.arange(rows) + 0.5) / rows, np.arange(columns) / (columns - 1)]

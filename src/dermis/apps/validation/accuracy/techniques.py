@@ -142,12 +142,12 @@ def _error_and_energy_cells(comparison: Comparison, comparison_row: ComparisonRo
 
 
 def lambertian_limit(head: Head, medium: str, path_traced: Comparison, adapter: str) -> str:
-    """Return text with the least error that Lambertian skin can have under the front light.
+    """Return text with the error and energy of an ideal Lambertian skin under the front light.
 
-    This error is reached by skin whose albedo is the directional albedo of a half-space; the text also has
-    the energy of this skin.
+    The ideal skin reflects as much light as a half-space does for the same angle of incidence. No Lambertian
+    skin has a smaller error.
 
-    path_traced : comparison with path tracing under this light
+    path_traced : comparison with path tracing under the front light
     """
     renderer = dermis.Renderer(adapter)
     scene = comparison_scene(head, "front", default_region("front"), "gpu-gems-3")

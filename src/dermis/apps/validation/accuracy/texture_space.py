@@ -62,11 +62,11 @@ def tables(head: Head, settings: Settings, adapter: str) -> dict[str, str]:
 
 
 def render(subject: ComparisonSubject, technique: str, **changed_settings: object) -> Floats:
-    """Return the linear radiance (h, w, 3) of a technique.
+    """Render a technique to linear radiance (h, w, 3).
 
     Like the references, the image has one sample per pixel and no interreflection.
 
-    changed_settings : further settings
+    changed_settings : settings that replace those of the subject
     """
     fixed_settings = {"technique": technique, "samples": 1, "interreflection": False}
     values = subject.settings.model_dump() | fixed_settings | changed_settings
@@ -133,8 +133,7 @@ def mean_and_percentile(uniform_light: Floats) -> str:
 def region_rows(subject: ComparisonSubject, integral_image: ReferenceImage, light_name: str) -> list[str]:
     """Return Markdown rows with errors of texture-space diffusion, one row per region of the face.
 
-    The rows also have the errors that diffusion would have in a perfect uv map, that is, on the surface
-    itself, by the heat equation.
+    For comparison, each row also has the error of diffusion on the surface itself, by the heat equation.
     """
     landmarks = known_landmarks(subject.scene.head)
     assert landmarks is not None

@@ -92,7 +92,7 @@ def integrated_light(mesh: Mesh, light_direction: Array, points: Array, spacing_
 
 
 def slab_rows(renderer: dermis.Renderer) -> str:
-    """Return Markdown rows with the light through slabs as rendered by dermis and as given by the profile.
+    """Return Markdown rows with the light through slabs, as rendered and as computed from the profile.
 
     The light is measured far from the rim of the slabs.
     """
@@ -153,13 +153,13 @@ def comparison_cells(
     *,
     compares_without_air: bool,
 ) -> str:
-    """Return table cells with energy ratio and relative RMSE against the surface integral.
+    """Return table cells with the energy ratio and relative RMSE of frames against the surface integral.
 
-    Cells of a frame without light through thin parts come first, then cells of a frame with this light.
+    The first two cells are of a frame without light through thin parts, the next two of a frame with it.
 
     point_filter : function that returns the mask of the points to compare, given positions and normals
     spacing_mm : largest distance of the irradiance samples [mm]
-    compares_without_air : whether to add the energy ratio to an integral that leaves out light across air
+    compares_without_air : whether to add the energy ratio to the integral without `light_across_air`
     """
     cells = []
     for transmission in ("none", "thin"):

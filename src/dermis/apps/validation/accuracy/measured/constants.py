@@ -69,7 +69,7 @@ def extended_model(constants: Mapping[str, float]) -> ExtendedModel:
 class ExtendedModel:
     """Spectral model of skin with additions that the package's model does not have.
 
-    constants : values of some of `CONSTANTS`; in a call, parameters of the same names replace these values
+    constants : values of some of `CONSTANTS`, used for parameters that a call of the model does not state
     """
 
     constants: dict[str, float]

@@ -161,12 +161,11 @@ def _default_skin_errors(archive: Archive) -> JsonObject:
 
 
 def _smooth_surface_errors(archive: Archive) -> JsonObject:
-    """Return the differences between colours and a smooth surface through the colours of other people.
+    """Return percentiles of the distances of colours from a smooth surface through other people's colours.
 
-    These are lower bounds: the colours of a model with two unknowns per spectrum and the same constants for
-    all people lie on a surface. The third coordinate of a colour is predicted from the first two by local
-    linear regression. For "each site", every site has its own surface, through the colours of other people
-    at this site.
+    They are lower bounds of the colour errors of models with two unknowns per spectrum and the same constants
+    for all people, because the colours of such a model lie on a surface. The entry "each site" has a separate
+    surface for each site of the body.
     """
     face = np.isin(archive.site, CHEEK_AND_FOREHEAD)
     sites = [_surface_distances(archive.rows(archive.site == site)) for site in range(len(SITES))]
@@ -178,7 +177,10 @@ def _smooth_surface_errors(archive: Archive) -> JsonObject:
 
 
 def _surface_distances(archive_part: Archive) -> Floats:
-    """Return the difference (n,) of each colour from a smooth surface through the colours of other people."""
+    """Return the difference (n,) of each colour from a smooth surface through the colours of other people.
+
+    The surface is a local linear regression of the third principal coordinate on the first two.
+    """
     from scipy.spatial import cKDTree
 
     colours = lab(archive_part.spectra @ rgb_weights().T)
@@ -200,9 +202,8 @@ def _surface_distances(archive_part: Archive) -> Floats:
 def _limit_fractions(archive: Archive) -> JsonObject:
     """Return the fractions of colour fits with three unknowns that fail, by kind of failure.
 
-    none : fraction of the fits with an oxygenation of 0
-    all : fraction of the fits with an oxygenation of 1
-    unmatched : fraction of the fits that do not reproduce the measured colour
+    The keys are "none" for an oxygenation of 0, "all" for an oxygenation of 1, and "unmatched" for fits that
+    do not reproduce the measured colour.
     """
     fit = fit_skin(archive.spectra, THREE_UNKNOWNS, "colour")
     oxygen = fit.values["oxygen"]
@@ -245,7 +246,7 @@ def _illuminant_errors(fits: dict[str, SpectralFit]) -> JsonObject:
 
 
 def _fold_errors(archive: Archive) -> list[JsonObject]:
-    """Return, for each fold of people, constants fitted to the other folds, and their errors in this fold."""
+    """Return cross-validated results: for each fold, constants fitted to all other folds, and errors."""
     rows = []
     for fold in range(FOLD_COUNT):
         known = archive.rows(archive.fold != fold).sample(_CONSTANTS_SAMPLE_COUNT, fold)
@@ -339,9 +340,9 @@ def _addition_errors(sample: Archive) -> list[JsonObject]:
 
 
 def _site_fits(archive: Archive) -> list[JsonObject]:
-    """Return the thickness of the epidermis and the oxygenation that fit each site best.
+    """Return the thickness of the epidermis and the oxygenation that fit the spectra of each site best.
 
-    Fits to colours, with two unknowns per spectrum, and fits to spectra have separate results.
+    Each row has results of fits to spectra, and under "colour" those of fits to colours.
     """
     rows = []
     for site in range(len(SITES)):
@@ -365,7 +366,7 @@ def _site_fits(archive: Archive) -> list[JsonObject]:
 def _site_fold_errors(archive: Archive) -> JsonObject:
     """Return colour errors of fits with two unknowns, where each site has its own thickness and oxygenation.
 
-    Thickness and oxygenation are fitted to samples of people of other folds.
+    The errors are cross-validated: thickness and oxygenation are fitted to people of other folds.
     """
     error = np.zeros(len(archive.spectra))
     fixed = {"baseline": DEFAULT_SKIN.baseline}

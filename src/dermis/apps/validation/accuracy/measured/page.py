@@ -140,10 +140,10 @@ def _folds_table(folds: Sequence[JsonObject]) -> str:
 
 
 def _confounded_texts(results: JsonObject) -> dict[str, str]:
-    """Return texts on the constants of the model, keyed by placeholder.
+    """Return paragraphs and numbers of the page, keyed by the placeholder that each replaces.
 
-    The texts list pairs of constants that the spectra hardly distinguish, and baselines fitted to spectra
-    that are corrected for the light that apertures miss.
+    "confounded" lists pairs of constants that the spectra hardly distinguish. "wide_factor" and
+    "small_factor" are baselines fitted to spectra that are corrected for the light that an aperture misses.
     """
     pairs = {}
     for row in results["additions"]:
