@@ -46,12 +46,15 @@ def equivalent_medium(profile: GaussianSum, total_reflectance: Floats, eta: floa
 
 @lru_cache(maxsize=CACHED_COLUMN_COUNT)
 def _half_space_column(eta: float, from_photons: bool, total_reflectance: float) -> Floats:
-    """Return two numbers (2,), as a table column, for the half-space with a given reflectance.
+    """Return albedo and width of the half-space with a given reflectance, as a column (2,) of a table.
 
-    The first number is the square root of 1 minus the single-scattering albedo [-]. The second number is the
-    frequency, per mean free path, at which the Hankel transform of R(r) has fallen to half of its value at
-    frequency 0. R(r) comes from a table of photon counts if `from_photons` is true and the table exists, and
-    else from layered diffusion.
+    The first element is the square root of 1 minus the single-scattering albedo [-]. The second element is
+    the frequency at which the Hankel transform of R(r) has fallen to half of its value at 0 [1 / mean free
+    path].
+
+    from_photons : whether R(r) comes from a table of photon counts, if one exists, instead of layered
+        diffusion
+    total_reflectance : reflectance for light at normal incidence [-]
     """
     albedo = albedo_for_total(total_reflectance, eta, from_photons)
     kind = tabulated_kind_for_index(eta) if from_photons else None
@@ -138,9 +141,8 @@ def _half_frequency(transform: Callable[[float], float]) -> float:
 def oblique_offset_mm(medium: Medium) -> float:
     """Return the lateral shift of grazing light, as the mean over all channels [mm].
 
-    This is the distance from the entry point to the mean exit point. For light at an angle t to the normal,
-    the mean exit point is shifted by sin t times this distance along the surface, in the direction in which
-    the light travels.
+    The shift is the distance along the surface from the point where light enters to the mean point where it
+    leaves. At an angle t to the normal, the shift is sin t times that of grazing light.
 
     medium : medium with one layer
 

@@ -51,9 +51,9 @@ class _PhotonTable(NamedTuple):
 
 
 def tabulated_kind_for_index(eta: float) -> HalfSpaceKind | None:
-    """Return the tabulated kind of half-space, lit perpendicularly, for an index of refraction.
+    """Return the name of the photon-count table for an index of refraction, or None if there is none.
 
-    The result is None if no table exists for this index.
+    The half-spaces in these tables are lit at normal incidence.
     """
     return "skin" if eta == SKIN_ETA else "matched" if eta == 1.0 else None
 

@@ -49,11 +49,11 @@ class RadialProfile:
 
     @property
     def finite_at_centre(self) -> bool:
-        """Return whether R(r) is finite at r = 0; only then can it be fitted at points."""
+        """Return whether R(r) is finite at r = 0; otherwise, only its ring energies can be fitted."""
         return self.model not in ("layered", "montecarlo", "counted")
 
     def points(self) -> PointTarget:
-        """Return R(r) at points as the target of a fit."""
+        """Return the samples of R(r) as the target of a fit."""
         return PointTarget(self.radius_mm, self.reflectance, self.total)
 
     def rings(self) -> RingTarget:

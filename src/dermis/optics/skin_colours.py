@@ -84,9 +84,9 @@ def spectral_table(parameters: SkinParameters, node_count: int = _COLOUR_TABLE_N
 
 
 def _select_rows(layer: Layer, row_indices: NDArray[np.int64]) -> Layer:
-    """Return one layer that has the coefficients of several layers, one after the other, as its channels.
+    """Return a layer whose channels are selected rows of coefficients, one row after the other.
 
-    layer : n layers in one, with coefficients (n, c)
-    row_indices : rows of the coefficients to take, which may repeat
+    layer : layer with an array of coefficients (n, c)
+    row_indices : (k,) indices of the selected rows, which may repeat; the result has k c channels
     """
     return replace(layer, **{name: getattr(layer, name)[row_indices].ravel() for name in _COEFFICIENT_FIELDS})

@@ -151,12 +151,14 @@ def solve_doubled_slabs(
 def half_space_radiance(
     albedo: float, eta: float, direction_nodes: int, g: float
 ) -> tuple[Floats, Floats, Floats]:
-    """Return discrete directions in a half-space, their shares of uniform light, and the emerging radiance.
+    """Return the radiance that emerges from a half-space in each of m discrete directions.
 
-    The results are the cosines (m,) of the directions below the surface; the fraction (m,) of the light
-    entering from a uniform sky that has each direction; and the emerging radiance (m, m) for each exit
-    direction (row) and entry direction (column). The radiance is scaled so that its mean over exit
-    directions, weighted by the fractions, is the reflectance.
+    The results are:
+
+    - the cosines (m,) of the directions below the surface;
+    - the fraction (m,) of the light from a uniform sky that enters in each direction;
+    - the emerging radiance (m, m) by exit direction (row) and entry direction (column), scaled so that its
+      mean over exit directions, weighted by these fractions, is the reflectance.
     """
     transport = _Transport.create(albedo, eta, direction_nodes, g)
     doublings = transport.doubling_count(DEEP_OPTICAL_DEPTH)
@@ -276,7 +278,7 @@ def _add_faces(
     The results (n, m, m) are pi times the radiance at the upper face and at the lower face, for unit power
     from each direction.
 
-    up, down : (n, m, m) `R` and `T` as operators, multiplied by the flux of the directions
+    up, down : (n, m, m) `R` and `T` with each column multiplied by the flux of its direction
     unscattered : (n, m) fraction of light that crosses the slab without scattering [-]
     internal : (m,) reflectance of a face from inside [-]
     R, T : (n, m, m) reflection and transmission of the slabs without faces, as pi times the radiance
@@ -305,10 +307,9 @@ def anisotropic_response(total_reflectance: ArrayLike, eta: float, g: float) -> 
     eta : index of refraction relative to air, at least 1 [-]
     g : mean cosine of the scattering angle, at least 0 [-]
 
-    The kernel 1/(a + b), where a and b are the cosines of the incident and the exit direction, is multiplied
-    by a factor that is fitted to the emerging radiance by least squares, once for the mean cosine g and once
-    for isotropic scattering. The difference of these two factors is added to the single-scattering factor of
-    `angular_response`, which is for isotropic scattering.
+    The field `single_scattering` is that of `angular_response` plus a correction for anisotropy. For the
+    correction, the factor of the kernel is fitted to the emerging radiance by least squares, for g and for
+    isotropic scattering; the correction is the difference of these two factors.
     """
     isotropic = angular_response(total_reflectance, eta)
     if g == 0.0:

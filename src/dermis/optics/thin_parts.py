@@ -117,7 +117,7 @@ def _oblique_column(eta: float, from_photons: bool, g: float, total_reflectance:
 
 
 def _deep_transmittance(albedo: float, eta: float, direction_nodes: int, g: float) -> tuple[Slabs, Floats]:
-    """Return a half-space, and the relative transmittance of deep slabs for its incident directions.
+    """Return a half-space with m incident directions, and the relative transmittance (m,) of deep slabs.
 
     For the definition of relative transmittance, see `oblique_transmittance`.
     """
@@ -129,7 +129,7 @@ def _deep_transmittance(albedo: float, eta: float, direction_nodes: int, g: floa
 def _relative_transmittance(slabs: Slabs, half_space: Slabs) -> Floats:
     """Return the transmittance (n, m) of n slabs for m directions, divided by a half-space's reflectance [-].
 
-    Before that, transmittance and reflectance are divided by their values for uniform light.
+    Transmittance and reflectance are first divided by their values for uniform light.
     """
     reflected = half_space.reflected[0] / (half_space.reflected @ half_space.flux)
     transmitted = np.maximum(slabs.transmitted @ slabs.flux, _MIN_TRANSMITTANCE)[:, None]
@@ -166,7 +166,7 @@ def _slab_totals(layer: Layer, thickness_mm: Floats, eta: float, g: float) -> It
 
 @lru_cache(maxsize=CACHED_COLUMN_COUNT)
 def _totals_column(eta: float, g: float, root_absorption: float) -> Floats:
-    """Return the four fields (n, 4) of `_SlabTotals` at `_OPTICAL_DEPTHS`, as a table column for one albedo.
+    """Return the four fields of `_SlabTotals` for one albedo, (n, 4), at the n depths `_OPTICAL_DEPTHS`.
 
     root_absorption : square root of 1 minus the reduced albedo, the coordinate of the table [-]
     """

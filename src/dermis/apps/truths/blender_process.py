@@ -18,11 +18,11 @@ _INSTALL_HINT = (
 
 
 class BlenderTask(NamedTuple):
-    """What Blender is run for, as the error messages name it.
+    """Purpose of a run of Blender, in words for error messages.
 
-    renderer : name of the program in the message
+    renderer : name of the renderer, such as "Cycles"
     goal : purpose as an infinitive, such as "to render the head"
-    advice : what the user can do when the task fails
+    advice : what the user can do when the run fails
     """
 
     renderer: str
@@ -46,7 +46,7 @@ def blender_python(python: str | Path | None = None) -> Path:
 def run_blender(
     python: Path, script: Path, options: Sequence[str], timeout_s: float, task: BlenderTask
 ) -> None:
-    """Run a script in Blender's Python, which can import neither the user's modules nor the script's folder.
+    """Run a script in Blender's Python, isolated from the user's modules and from the script's folder.
 
     options : command-line arguments of the script
 

@@ -179,9 +179,9 @@ def read_passes(folder: Path, samples: Sequence[int], picture_size: tuple[int, i
 
 @dataclass(frozen=True)
 class BeckmannSurface:
-    """Skin with surface reflection alone: black below a rough boundary of Beckmann facets and index 1.4.
+    """Skin with surface reflection alone, by Beckmann facets with an index of refraction of 1.4.
 
-    The head's normal map is applied.
+    Light that enters the skin is absorbed. The head's normal map is applied.
 
     roughness : Beckmann's m [-]
     """
@@ -191,10 +191,10 @@ class BeckmannSurface:
 
 @dataclass(frozen=True, eq=False)
 class PrincipledSkin:
-    """Skin as Blender users model it: Principled BSDF, a random walk below a rough boundary of index 1.4.
+    """Skin as Blender users model it: a Principled BSDF with random-walk subsurface scattering.
 
-    The head's normal map is applied. Cycles uses GGX facets here; only light that the facets do not reflect
-    enters the skin.
+    Its surface has GGX facets with an index of refraction of 1.4; light that they do not reflect enters the
+    skin. The head's normal map is applied.
 
     colour : (h, w, 3) diffuse reflectance, linear Rec. 709 [-]
     radius_mm : (3,) subsurface radius of Cycles, 4 pi mean free paths [mm]
@@ -268,12 +268,11 @@ def _diffuse_material(colour: Sequence[float]) -> SceneDict:
 def _skin_material(medium: SkinMaterial, subsurface_method: str) -> SceneDict:
     """Return the description of the skin's material for Cycles, with colour and subsurface radius.
 
-    The colour is the diffuse reflectance of the medium, and the radius is 4 pi mean free paths. Cycles
-    divides the radius by 4 pi, and derives the albedo of its random walk from the colour by a fit, which
-    inverts `diffuse_albedo` within 1 %. The random walk therefore takes place in this medium, but light
-    enters and leaves the medium through a Lambertian surface. The method "burley" uses the profile of
-    [ChristensenBurley2015] for the same colour and radius. The reflectance of a ball under uniform light
-    differs from the given colour by up to 3 % with the random walk, and by up to 0.5 % with the profile.
+    The colour is the diffuse reflectance of the medium, and the radius is 4 pi mean free paths. From these,
+    Cycles' random walk recovers the mean free path, and the albedo within 1 %, but light enters and leaves
+    through a Lambertian surface. The method "burley" uses the profile of [ChristensenBurley2015] for the
+    same colour and radius. The reflectance of a ball under uniform light differs from the given colour by up
+    to 3 % with the random walk, and by up to 0.5 % with the profile.
     """
     if isinstance(medium, Lambertian):
         return _diffuse_material(medium.albedo)

@@ -62,14 +62,10 @@ def sample_irradiance(
 
     light : function of `MeshPoints` that returns irradiance (n, 3); called for new points only
     spacing_mm : longest side of a small triangle [mm]
-    min_spacing_mm : shortest side that further halving may produce where the irradiance changes much along a
-        side; None for no further halving [mm]
-    contrast_threshold : change of irradiance between the ends of a side above which the side is halved
-        further, relative to the largest irradiance [-]
-
-    For the same number of samples, linear interpolation between triangle corners has a smaller error than
-    random points, evenly distributed points [Turk1992] or triangle centroids. A sum over points without
-    interpolation misses the peak of the diffusion profile where it lies between two points.
+    min_spacing_mm : lower limit of the side lengths where sides of high contrast are halved further; None for
+        no further halving [mm]
+    contrast_threshold : contrast above which a side is halved further: the difference of the irradiance at
+        its ends, relative to the largest irradiance [-]
 
     Source: [JensenBuhler2002] for sampling the irradiance on the surface.
     """
@@ -100,9 +96,9 @@ def sample_irradiance(
 class _Subdivision:
     """Small triangles that subdivide the triangles of a mesh.
 
-    corners : (m, 3) sample indices
+    corners : (m, 3) sample indices of the small triangles' corners
     face : (m,) index of the mesh triangle that contains each small triangle
-    barycentric : (m, 3, 3) weights of each small corner in that mesh triangle
+    barycentric : (m, 3, 3) barycentric weights of the small triangles' corners in these mesh triangles
     """
 
     mesh: Mesh

@@ -51,32 +51,33 @@ def relative_rmse(
 ) -> Estimate:
     """Return the relative root mean square error of an image, corrected for the noise of the reference [-].
 
-    The error is sqrt(E), where E is sum((image - reference)²) / sum(reference²) without noise.
+    The error is sqrt(sum((image - reference)²) / sum(reference²)), where the variance of the noise is
+    subtracted from each squared value. Its standard error assumes normally distributed noise, which is
+    independent between pixels but may be correlated between channels.
 
     image, reference : (h, w) or (h, w, c) linear images; all channels are summed
     mask : (h, w) pixels to compare
     variance : (h, w) or (h, w, c) unbiased estimate of the variance of each value of `reference`: the
         variance between its samples, divided by the number of samples
     image_variance : variance of each value of `image`; when given, the noise of the image is removed too
-
-    Let the reference be T = t + n with noise n of mean 0 and variance s², and let D = I - T. On average, D²
-    is (I - t)² + s² and T² is t² + s², so noise does not bias the estimate E = sum(D² - s²) / sum(T² - s²).
-
-    Each pixel contributes U = D² - s² - E (T² - s²) to the error e of E.
-    The random part of U is -2 n (I - t + E t) + (1 - E)(n² - s²).
-    For normally distributed n, the variance of U is 4 s² (I - t + E t)² + 2 (1 - E)² s⁴.
-    Its unbiased estimate is 4 s² (D + E T)² - 2 (1 - E)² s⁴.
-    For skewed noise, E is still unbiased but e is too small, by 7 to 16 % if the reference is the mean of 64
-    exponentially distributed samples.
-
-    Pixels are independent of one another. Channels may share paths, so the standard deviations of the
-    channels are added, which overestimates e by at most sqrt(c). The standard error of sqrt(E) is the larger
-    of its distances to sqrt(E + e) and to sqrt(max(E - e, 0)).
-
-    Noise of variance v in the image adds v to D², and 4 v D² - 4 v s² - 2 v² to the estimate of the variance
-    of U. Only 4 v D² is counted, because v² is poorly known after few passes; the standard error is then too
-    large rather than too small.
     """
+    # Let the reference be T = t + n with noise n of mean 0 and variance s², and let D = I - T. On average, D²
+    # is (I - t)² + s² and T² is t² + s², so noise does not bias the estimate E = sum(D² - s²) / sum(T² - s²).
+    #
+    # Each pixel contributes U = D² - s² - E (T² - s²) to the error e of E.
+    # The random part of U is -2 n (I - t + E t) + (1 - E)(n² - s²).
+    # For normally distributed n, the variance of U is 4 s² (I - t + E t)² + 2 (1 - E)² s⁴.
+    # Its unbiased estimate is 4 s² (D + E T)² - 2 (1 - E)² s⁴.
+    # For skewed noise, E is still unbiased but e is too small, by 7 to 16 % if the reference is the mean of
+    # 64 exponentially distributed samples.
+    #
+    # Pixels are independent of one another. Channels may share paths, so the standard deviations of the
+    # channels are added, which overestimates e by at most sqrt(c). The standard error of sqrt(E) is the
+    # larger of its distances to sqrt(E + e) and to sqrt(max(E - e, 0)).
+    #
+    # Noise of variance v in the image adds v to D², and 4 v D² - 4 v s² - 2 v² to the estimate of the
+    # variance of U. Only 4 v D² is counted, because v² is poorly known after few passes; the standard error
+    # is then too large rather than too small.
     I, T, s2 = _masked_pixels(image, reference, mask, variance)
     v = _masked_pixels(image, reference, mask, image_variance)[2]
     D, energy = I - T, float((T**2 - s2).sum())

@@ -197,7 +197,10 @@ def _material_mesh(
 
 
 def layer_interfaces(mi: Mitsuba, head: Head, medium: Medium) -> tuple[SceneDict, tuple[str, ...]]:
-    """Return closed surfaces around and between the skin's layers, and notes for the user on changes made."""
+    """Return closed surfaces around and between the skin's layers, and notes on changes made to the head.
+
+    The notes are shown to the user.
+    """
     skin = closed_skin(head.mesh, head.name)
     skin = replace(skin, positions=(skin.positions - np.array(head.centre_mm)).astype(np.float32))
     notes = [f"{skin.caps} openings closed, {skin.cap_area:.0f} mm2"] if skin.caps else []
@@ -237,9 +240,11 @@ def inner_interfaces(
 
 
 def interface_gap_mm(mi: Mitsuba, skin_surface: ClosedSurface) -> Doubles:
-    """Return at each point the distance (p,) between the two surfaces that form an interface [mm].
+    """Return the gap (p,) at each point between the upper and the lower surface of an interface [mm].
 
-    skin_surface : closed skin surface relative to the head's centre
+    Each interface between two media consists of two such surfaces, copies of the skin.
+
+    skin_surface : closed skin surface of p points, relative to the head's centre
     """
     return np.asarray(
         _RELATIVE_INTERFACE_GAP * (1.0 + np.abs(skin_surface.positions).max(axis=1)) * mi.math.RayEpsilon

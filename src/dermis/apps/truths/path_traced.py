@@ -75,8 +75,9 @@ def path_trace(
     """Return the path-traced image of a scene with a medium inside its skin.
 
     Maps, diffusion profile and surface reflection of the scene are ignored. Light passes the surface without
-    refraction, so that paths can connect to point lights from inside the medium; compare such images with
-    frames whose profile has eta 1. Lights are invisible and do not shadow one another.
+    refraction, so that paths can connect to point lights from inside the medium. Such images are comparable
+    with the real-time renderer's if its profile has eta 1. Lights are invisible and cast no shadows on one
+    another.
 
     medium : index-matched (eta 1), isotropically scattering medium with three channels; the interfaces
         between its layers are copies of the skin, offset inwards by the depths of the layers. Or a

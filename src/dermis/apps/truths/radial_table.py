@@ -103,9 +103,8 @@ class ProfileTable(NamedTuple):
 def tabulate_profile(profile: Profile) -> ProfileTable:
     """Return the table of a profile, with the permitted error distributed over the radii.
 
-    Replacing a patch of second moment m by a point at its centre causes an error of up to m times the
-    curvature. For a given sum of these errors, the number of patches is smallest if m is proportional to
-    1 / sqrt(curvature) (Lagrange). The permitted error is therefore proportional to sqrt(curvature).
+    The permitted error is mainly proportional to the square root of the curvature, which keeps the number
+    of surface patches small.
     """
     end = profile.end_mm
     root = np.linspace(0.0, np.sqrt(end), TABLE_ROWS)
@@ -152,7 +151,7 @@ def _error_density(curvature: Floats, r: Floats) -> Floats:
 
 
 def _plane_integral(radial_values: Floats, r: Floats) -> Floats:
-    """Return the integrals (k,) of radial functions f over the plane: of 2 pi r f(r) dr.
+    """Return the integrals (k,) of k radial functions f over the plane, of 2 pi r f(r) over r.
 
     radial_values : (rows, k) values of k functions at the radii r
     """

@@ -29,7 +29,7 @@ _CYCLES_FROM_DERMIS_AXES = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1
 
 
 def check_camera(camera: Camera, renderer: str) -> None:
-    """Raise DermisError for a shifted principal point or non-square pixels, which references do not support.
+    """Raise DermisError for a shifted principal point or non-square pixels, which a renderer cannot use.
 
     renderer : name of the renderer that the message mentions
     """

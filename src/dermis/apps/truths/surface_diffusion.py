@@ -1,4 +1,4 @@
-"""Diffusion of light along a surface by the heat equation: what a blur on any uv map should result in.
+"""Diffusion of light along a surface by the heat equation: the reference for blurs on uv maps.
 
 Blurring along a surface by a Gaussian of variance v is the diffusion of heat for the time v/2. The heat
 equation is solved on the triangles of the surface, so the result depends on no uv map, seam or stretch. No
@@ -52,8 +52,8 @@ def diffuse_on_surface(
     variances_mm2 : (k,) increasing variances above 0 [mm2]
     steps : number of time steps per level
 
-    Raises DermisError when an edge is longer than half the standard deviation that a level adds to the level
-    before; `refine_patch` makes edges shorter.
+    Raises DermisError when an edge is longer than half the standard deviation that a level adds to the next
+    smaller level; `refine_patch` makes edges shorter.
 
     Source: [Bank1985] for TR-BDF2, [BobenkoSpringborn2007] for the Laplacian.
     """
@@ -82,11 +82,12 @@ def longest_edge_mm(positions: ArrayLike, triangles: ArrayLike) -> float:
 
 
 def resolved_levels(variances_mm2: ArrayLike, edge_mm: float) -> NDArray[np.bool_]:
-    """Return the mask (k,) of blur levels that are resolved by edges of a given length.
+    """Return the mask (k,) of Gaussian blurs that a mesh with edges of a given length resolves.
 
-    A level is resolved if it adds a standard deviation of at least two edge lengths to the level before.
+    Each blur starts from the result of the next smaller blur that is resolved. It is resolved if it adds a
+    standard deviation of at least two edge lengths.
 
-    variances_mm2 : (k,) increasing variances above 0 [mm2]
+    variances_mm2 : (k,) increasing variances of the blurs, above 0 [mm2]
     edge_mm : length of the longest edge, see `longest_edge_mm` [mm]
     """
     min_variance, last_variance, allowed = (EDGES_PER_SIGMA * edge_mm) ** 2, 0.0, []
@@ -97,20 +98,22 @@ def resolved_levels(variances_mm2: ArrayLike, edge_mm: float) -> NDArray[np.bool
 
 
 def max_edge_mm(variances_mm2: ArrayLike) -> float:
-    """Return the largest edge length that resolves all blur levels [mm].
+    """Return the largest edge length of a mesh that resolves all given Gaussian blurs [mm].
 
-    It is half the smallest standard deviation that a level adds to the level before.
+    It is half the smallest standard deviation that a blur adds to the next smaller blur.
 
-    variances_mm2 : (k,) increasing variances above 0 [mm2]
+    variances_mm2 : (k,) increasing variances of the blurs, above 0 [mm2]
     """
     min_variance = float(np.diff(_checked_variances(variances_mm2), prepend=0.0).min())
     return float(np.sqrt(min_variance)) / EDGES_PER_SIGMA
 
 
 def patch_margin_mm(variances_mm2: ArrayLike) -> float:
-    """Return by how much a patch must extend beyond its ball: four sigmas of the widest blur level [mm].
+    """Return by how much a patch must extend beyond the ball where blurred light is valid [mm].
 
-    variances_mm2 : (k,) increasing variances [mm2]
+    It is four standard deviations of the widest blur.
+
+    variances_mm2 : (k,) increasing variances of the blurs [mm2]
     """
     return PATCH_MARGIN_SIGMAS * float(np.sqrt(_checked_variances(variances_mm2)[-1]))
 
@@ -272,9 +275,8 @@ def _interior_edges(corners: Index, side_edges: Index, edge_count: int) -> NDArr
 def _independent_flips(side_edges: Index, non_delaunay: NDArray[np.bool_], cotangent_weight: Floats) -> Index:
     """Return non-Delaunay edges that can be flipped together, because no two of them share a triangle.
 
-    Each triangle votes for its worst edge, and edges with the votes of both triangles are taken. The worst
-    edge of all is always among them. The result (2, m) has for each edge the indices of its two triangle
-    sides in `side_edges.ravel()`.
+    An edge is selected if it is the worst edge of both of its triangles. The result (2, m) has for each
+    selected edge the indices of its two triangle sides in `side_edges.ravel()`.
 
     side_edges : (f, 3) edge index of each side
     non_delaunay : (e,) mask of non-Delaunay edges
@@ -293,7 +295,7 @@ def _independent_flips(side_edges: Index, non_delaunay: NDArray[np.bool_], cotan
 
 
 def _flip_edges(triangulation: IntrinsicTriangulation, side_pairs: Index) -> None:
-    """Replace each given edge ab, shared by triangles abc and bad, by the edge cd, in place.
+    """Flip edges in place: replace each edge (a, b), shared by triangles (a, b, c) and (b, a, d), by (c, d).
 
     side_pairs : (2, m) indices of the two triangle sides of each edge, from `_independent_flips`
     """
@@ -336,9 +338,8 @@ def mass_and_stiffness(surface: IntrinsicTriangulation, vertex_count: int) -> tu
     """Return the mass matrix M [mm2] and the stiffness matrix K [-] of linear finite elements, each (n, n).
 
     The heat equation is M du/dt = -K u for vertex values u. M is the mean of the lumped and the consistent
-    mass matrix. The errors that these two matrices cause in the speed of heat are opposite; on regular
-    triangles they cancel to fourth order in the edge length. Each row of M sums to the area of its vertex,
-    and each row of K sums to 0. A vertex without triangles keeps its value.
+    mass matrix, whose errors nearly cancel. Each row of M sums to the area of its vertex, and each row of K
+    sums to 0. A vertex without triangles keeps its value.
 
     vertex_count : number n of vertices
 

@@ -32,11 +32,9 @@ def integrate_exitance(
     profile : profile R, a function of the Euclidean distance, so light also passes through thin parts
     error : expected root mean square error of the integral relative to its mean, from 1e-5 to 0.05 [-]
 
-    A node of the octree, a triangle or a part of a triangle is replaced by three points if the remainder of
-    Taylor's theorem is below its share of an error bound. Otherwise, the children of the node are visited, or
-    the triangle is split. The steep centre of the profile is thus integrated finely enough. Nearly all errors
-    cancel, so the actual error is much smaller than the bound; which bound leads to a given `error` was
-    measured.
+    Irradiance is gathered from an octree. A node or triangle is replaced by three points if the remainder of
+    Taylor's theorem is small enough; otherwise it is divided. Most of these errors cancel, so the limit of
+    the remainder is derived from `error` by a measured relation.
 
     Source: [JensenBuhler2002], but with Taylor's remainder as criterion in place of the solid angle.
     """
@@ -69,11 +67,12 @@ def integrate_exitance(
 
 
 def _weight_error_bounds(tree: Octree, error_weight: float) -> Octree:
-    """Return the octree with `moment_error` and `centroid_error` weighted more, because they hardly cancel.
+    """Return the octree with larger bounds for errors that hardly cancel in the sum over nodes.
 
-    The weighted `moment_error` is added to `second_moment`.
+    `centroid_error` is multiplied by a weight, and `moment_error` times this weight is added to
+    `second_moment`.
 
-    error_weight : factor of both bounds
+    error_weight : weight of both bounds
     """
     second_moment = tree.second_moment + error_weight * tree.moment_error
     return tree._replace(second_moment=second_moment, centroid_error=error_weight * tree.centroid_error)

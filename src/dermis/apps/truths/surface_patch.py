@@ -94,7 +94,7 @@ def mesh_patch(mesh: Mesh, centre_mm: ArrayLike, radius_mm: float, variances_mm2
     variances_mm2 : (k,) increasing variances; the smallest difference between successive variances determines
         the edge length, and the largest variance determines the margin [mm2]
 
-    Short edges over a wide margin are costly: use separate patches for narrow and wide levels.
+    Short edges over a wide margin are costly, so use separate patches for small and large variances.
     """
     edge_mm, margin_mm = max_edge_mm(variances_mm2), patch_margin_mm(variances_mm2)
     return refine_patch(*welded_surface(mesh), centre_mm, radius_mm, edge_mm, margin_mm)

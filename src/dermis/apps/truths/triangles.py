@@ -24,9 +24,9 @@ Two halved sides leave a quadrilateral; the last entry splits it along the other
 
 
 def triangle_edges(positions: Floats, corners: Index) -> tuple[Index, Index, Floats]:
-    """Return the ends (e, 2) and the lengths (e,) of the edges, and the edge of each triangle side (f, 3).
+    """Return the edges of a mesh: vertices at their ends, the edge of each triangle side, and lengths.
 
-    The order of the results is ends, edge indices of the sides, and lengths [mm].
+    The results are the vertex indices (e, 2), the edge indices (f, 3) and the lengths (e,) [mm].
 
     positions : (n, 3) vertex positions [mm]
     corners : (f, 3) vertex indices; side k runs from corner k to corner k + 1
@@ -42,10 +42,11 @@ def split_triangles(
     """Split triangles at halved sides; return the new triangles with their parents and weights.
 
     The results are the vertex indices (m, 3) of the new triangles; the index (m,) of the triangle that each
-    of them is a part of; and the barycentric weights (m, 3, 3) of their corners in the coarse triangle.
+    of them is a part of; and the barycentric weights (m, 3, 3) of their corners, defined as in `barycentric`.
 
     corners : (f, 3) vertex indices of the triangles
-    barycentric : (f, 3, 3) barycentric weights of the triangles' corners in a coarse triangle
+    barycentric : (f, 3, 3) barycentric weights of the triangles' corners in the unsplit mesh triangle that
+        contains the triangle
     side_midpoints : (f, 3) index of the vertex at the middle of each side; -1 for sides that are not halved
     positions : (n, 3) positions of all vertices; with these, quadrilaterals are split along their shorter
         diagonal [mm]

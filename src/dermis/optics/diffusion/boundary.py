@@ -73,8 +73,8 @@ def diffuse_reflectance(eta: float, integral_method: DiffuseIntegral = "polynomi
 def boundary_mismatch(eta: float, integral_method: DiffuseIntegral = "polynomial") -> float:
     """Return the boundary mismatch A = (1 + F_dr) / (1 - F_dr), which is 1 at an index-matched surface [-].
 
-    F_dr is the `diffuse_reflectance`. In diffusion theory, the extrapolated fluence is zero above the
-    surface, at the distance 2 A D.
+    F_dr is the `diffuse_reflectance`. In diffusion theory, the fluence, extrapolated linearly beyond the
+    surface, is zero at the height 2 A D, where D is the diffusion coefficient.
 
     integral_method : "polynomial" or "exact", see `diffuse_reflectance`
 

@@ -39,11 +39,14 @@ class _Face(NamedTuple):
 class _DownwardTransfer(NamedTuple):
     """Coefficients for computing the fluence at the lower face of a sublayer from that at its upper face.
 
+    The fluence is a sum of three solutions of the diffusion equation: one that decays downwards, one that
+    grows downwards, and a particular solution for the light source, which is 0 at the upper face.
+
     E : attenuation exp(-q d) across the thickness d of the sublayer [-]
-    rho : reflection coefficient of the lower face for the solution that decays downwards [-]
-    common : 1 / (1 + E^2 rho), the sum of the reflections between both faces [-]
-    beta : amplitude, at the lower face, of the solution that grows downwards; only the part due to sources
-    lower : value at the lower face of the particular solution that is 0 at the upper face
+    rho : ratio of the growing to the decaying solution at the lower face, if there is no source [-]
+    common : 1 / (1 + E^2 rho), which sums the reflections between both faces [-]
+    beta : part of the growing solution that the sources cause at the lower face
+    lower : particular solution at the lower face
 
     All coefficients are 0 for a semi-infinite sublayer. Only the last sublayer of a medium can be
     semi-infinite.

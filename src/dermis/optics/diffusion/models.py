@@ -86,7 +86,7 @@ def diffusion_rings(
     clamp: Clamp = "layer",
     rgb_weights: Floats | None = None,
 ) -> RingTarget:
-    """Return only the ring energies of `diffusion_profile`; this is faster, for fits to many media."""
+    """Return only the ring energies of `diffusion_profile`, which is faster than the whole profile."""
     grid, values, total = _sampled_profile(medium, model, clamp, rgb_weights)
     edges = ring_edges()
     return RingTarget(edges, np.diff(enclosed_energy(edges, grid, values), axis=0), total)
@@ -253,7 +253,7 @@ def truncated_medium(medium: Medium, thickness_mm: float) -> Medium:
 class ModelError:
     """Relative error of a diffusion model's ring energies, with Monte Carlo as the reference.
 
-    smallest, largest : (3,) smallest and largest error of the tissues, in red, green and blue [-]
+    smallest, largest : (3,) smallest and largest error among the tissues, in red, green and blue [-]
     tissues : names of the tissues for which the error was measured
     """
 

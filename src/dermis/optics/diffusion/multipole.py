@@ -101,14 +101,14 @@ def transmittance(radius_mm: ArrayLike, slab: Slab, tolerance: float = 1e-8) -> 
 
 
 def _image_sum(frequency: ArrayLike, slab: Slab, real_source: Floats, image_source: Floats) -> Floats:
-    """Return the Hankel transform (n, c) of R(r) or T(r) of a slab: a series of sources minus their images.
+    """Return the Hankel transform (n, c) of R(r) or T(r) of a slab, a sum over periodic point sources.
 
-    Each series is half the albedo times the sum over all integers i of sign(z + i P) exp(-|z + i P| q). Here,
-    z is the signed distance from the face to one source, P is the period, and q^2 = sigma_tr^2 + s^2 at the
-    frequency s.
+    The result is half the albedo times the difference of two series, one for the real sources and one for
+    their images. Each series is the sum of sign(z + i P) exp(-|z + i P| q) over all integers i. Here, P is
+    the period of the sources and q = sqrt(sigma_tr^2 + s^2).
 
     frequency : (n,) frequencies s [1/mm]
-    real_source, image_source : (c,) signed distances z of one real source and of one image [mm]
+    real_source, image_source : (c,) signed distances z from the face to one real source and to one image [mm]
     """
     q = np.sqrt(slab.layer.sigma_tr**2 + np.asarray(frequency, dtype=np.float64)[..., None] ** 2)
     P = slab.period_mm
@@ -134,12 +134,10 @@ def _image_series(
 
 
 def image_pairs_needed(slab: Slab, tolerance: float, max_pairs: int = 2000) -> int:
-    """Return how many image pairs are needed on each side, so that the rest has less light than `tolerance`.
+    """Return how many pairs of image sources the multipole model needs on each side of a slab.
 
-    An image at depth z contributes exp(-|z| sigma_tr) / 2, so the light of the other images is at most a
-    geometric series. Without absorption, this series does not converge, and the result is `max_pairs`. The
-    two images of a pair nearly cancel: the flux of a pair falls with the inverse cube of its distance, and
-    after 2000 pairs it is 1e-7 of the flux of the first pair.
+    tolerance : upper bound of the light from all omitted pairs, per power that enters [-]
+    max_pairs : largest result; it is returned if the slab does not absorb, where no bound can be computed
     """
     decay = float((slab.period_mm * slab.layer.sigma_tr).min())
     if decay <= 0.0:

@@ -172,11 +172,10 @@ class UnrealParameters:
 def unreal_parameters(profile: BurleyProfile) -> UnrealParameters:
     """Return the subsurface profile settings of Unreal Engine that reproduce a fitted Burley profile.
 
-    According to public copies of the engine's source code (SubsurfaceProfile.cpp, BurleyNormalizedSSS.cpp),
-    the engine gets the diffuse mean free path from the mean free path l (colour times distance), multiplied
-    by `shape_factor_diffuse` / (0.6 `shape_factor`). The shape s is `shape_factor_diffuse` divided by the
-    diffuse mean free path, so s = 0.6 `shape_factor` / l. The engine's kernel divides millimetres by ten to
-    get scene units, so a scene in centimetres is life-size at scale 1.
+    The engine computes the shape s = 0.6 `shape_factor` / l, where l is the mean free path (colour times
+    distance). It converts millimetres to scene units by dividing them by ten, so a scene in centimetres is
+    life-size at scale 1. Both facts are from public copies of its source code (SubsurfaceProfile.cpp,
+    BurleyNormalizedSSS.cpp).
     """
     _check_rgb(profile)
     mean_free_path = 0.1 * UNREAL_SHAPE_RATIO * shape_factor(profile.albedo) / profile.shape

@@ -37,9 +37,9 @@ class GaussianFit:
     """Sum of Gaussians fitted to a diffusion profile, with the errors of the fit.
 
     profile : fitted sum of Gaussians
-    error : (c,) relative root-mean-square error of R(r) at points, or of the ring energies [-]
+    error : (c,) relative root-mean-square error of the samples of R(r), or of the ring energies [-]
     energy_error : (c,) relative error of the total reflectance [-]
-    kind : "pointwise" or "annulus", whether `error` is over points or rings
+    kind : "pointwise" if the fit was to samples of R(r), "annulus" if it was to ring energies
     shared : whether all channels use the same variances
     """
 
@@ -62,7 +62,7 @@ def fit_gaussians(
 ) -> GaussianFit:
     """Fit a sum of Gaussians with the smallest error to a diffusion profile.
 
-    target : R(r) at points, or light through rings
+    target : samples of R(r), or light through rings
     terms : number of Gaussians in each channel, 1 to 8
     shared : whether all channels use the same variances, which then minimise the root mean square of the
         channels' errors. Otherwise, each channel has separate variances, and the weight 0 for the variances
@@ -146,9 +146,10 @@ def _log_variance_bounds(target: FitTarget) -> tuple[float, float]:
 
 
 def _with_energy_equation(target: FitTarget) -> tuple[DesignFunction, Floats]:
-    """Return a target's design and samples with one more equation: the weights must sum to the total.
+    """Return the least-squares equations of a target, plus one: the weights sum to the total reflectance.
 
-    The equation has so large a weight that it is fulfilled almost exactly.
+    The results are the design function and the right-hand sides. The added equation has so large a weight
+    that it holds almost exactly.
     """
     width = target.mean_radius_at([0.5]) ** 2 / 2.0
     stiffness = _ENERGY_EQUATION_WEIGHT * float(np.linalg.norm(target.design(width)[0]))

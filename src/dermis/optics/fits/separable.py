@@ -88,7 +88,7 @@ def evaluate_kernel(kernel: SeparableKernel, target: RingTarget) -> SeparableFit
 
 
 def fit_separable(target: RingTarget) -> SeparableFit:
-    """Fit a separable kernel of two Gaussians to ring energies, with the target's total in each channel.
+    """Fit a separable kernel of two Gaussians to ring energies, without changing any channel's total.
 
     Source: [Jimenez2015], the artist-friendly model.
     """
@@ -101,7 +101,7 @@ def fit_separable(target: RingTarget) -> SeparableFit:
 
 
 def _fit_channel(target: RingTarget) -> Floats:
-    """Fit one channel; return three numbers, the first Gaussian's weight and both variances' logarithms."""
+    """Fit one channel; return (3,): weight of the first Gaussian, and logarithms of both variances."""
     from scipy.optimize import least_squares
 
     scale = np.sqrt(SECTORS_PER_QUADRANT) / np.linalg.norm(target.energy)

@@ -1,4 +1,4 @@
-"""Data to which profiles are fitted: R(r) at points, or the light that emerges through rings."""
+"""Data to which profiles are fitted: samples of R(r), or the light that emerges through rings."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from dermis.optics.media import Floats
 
 @dataclass(frozen=True)
 class PointTarget:
-    """Diffusion profile R(r) at points as the target of a fit, for profiles that are finite at r = 0.
+    """Samples of a diffusion profile R(r) as the target of a fit, if the profile is finite at r = 0.
 
     radius_mm : (n,) radii r, increasing, preferably log-spaced from 1e-4 to 60 [mm]
     reflectance : (n, c) R(r) in c channels [1/mm2]

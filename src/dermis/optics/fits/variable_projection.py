@@ -23,10 +23,10 @@ _QR_ROWS_PER_BLOCK = 512
 
 
 class WeightedFit(NamedTuple):
-    """Gaussians at one step, with optimal weights and with derivatives for the next step.
+    """Sum of Gaussians at one step of a fit, with the derivatives that the next step needs.
 
     log_variance : (k,) logarithms of the variances
-    weight : (k, c) weights in c channels
+    weight : (k, c) weights in c channels, optimal for these variances
     cost : sum of squared residuals
     gradient : (k,) gradient of half the cost with respect to the logarithms
     curvature : (k, k) Gauss-Newton matrix of half the cost with respect to the logarithms

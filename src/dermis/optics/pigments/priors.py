@@ -74,9 +74,9 @@ class SkinPrior:
 
 @cache
 def skin_prior() -> SkinPrior:
-    """Return the distribution of pigments over all groups of people and sites of the body in an archive.
+    """Return the distribution of pigments in an archive of measured skin, over all people and body sites.
 
-    Source: [Lu2025]; the package's skin model converts the spectra of this archive to pigments.
+    Source: [Lu2025] for the spectra, which the package's skin model converts to pigments.
     """
     rows = read_rows("dermis.optics", "data/skin_priors")
     count = len(PRIOR_NAMES)

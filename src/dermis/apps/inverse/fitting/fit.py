@@ -126,9 +126,9 @@ class InitialGuess:
     def minima(self, best: FitPoint) -> list[Floats]:
         """Return a range of melanin fractions around each local minimum of the residual, lowest first.
 
-        Both dark skin in strong light and pale skin in weak light can be a minimum. Minima with a residual
-        much larger than the smallest residual are left out. If one minimum remains, its range is the whole
-        grid.
+        There can be several minima, such as dark skin in strong light and pale skin in weak light. Minima
+        with a residual much larger than the smallest residual are left out. A single minimum gets the whole
+        grid as its range.
 
         best : result of `best`
         """
@@ -161,7 +161,7 @@ class InitialGuess:
         return trials, np.array([self._squared_residual(one, sun_indices) for one in trials])
 
     def _select_suns(self, log_skin: Floats, sun_count: int) -> list[int]:
-        """Return the indices of `sun_count` suns with a small residual, each chosen as the best next sun.
+        """Return the indices of `sun_count` suns, chosen greedily: each lowers the residual the most.
 
         log_skin : (4,) logarithms of the skin unknowns
         """
@@ -341,7 +341,10 @@ def note_residual(photo_source: object, residual: float) -> None:
 
 
 def _find_skin(frames: FaceRenderer, photo: Photograph) -> FitPoint:
-    """Set the renderer's mask to the pixels of lit skin; return the prior's skin with all candidate suns."""
+    """Set the renderer's mask to the pixels of lit skin; return the point where the coarse search starts.
+
+    This point has the median skin of the priors, and all candidate suns.
+    """
     camera = frames.scene.camera
     view_direction = np.subtract(camera.position, camera.target)
     candidate = prior_point(candidate_suns(view_direction / np.linalg.norm(view_direction)))

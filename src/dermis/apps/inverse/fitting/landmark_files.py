@@ -126,8 +126,8 @@ def _identify_five_landmarks(pixels: Floats) -> tuple[str, Sequence[int]]:
     """Return the landmark set that five points belong to, and the number of each point in this set.
 
     If the first four points lie on a line, they are the corners of the eyes, as in the files of dlib.
-    Otherwise, they are eyes, nose and mouth, as face detectors write them. If the file starts with the other
-    side of the face than usual, the numbers of left and right are exchanged.
+    Otherwise, they are eyes, nose and mouth, as face detectors write them. Files with left and right in
+    reverse order are recognised.
     """
     spread = np.linalg.svd(pixels[:4] - pixels[:4].mean(axis=0), compute_uv=False)
     is_dlib = bool(spread[1] < _MAX_EYE_LINE_DEVIATION * spread[0])

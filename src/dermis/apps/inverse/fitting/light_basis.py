@@ -95,10 +95,10 @@ def solve_normal_equations(gram: Floats, right_side: Floats) -> Floats:
 
 
 def mixing_matrix(sun_count: int) -> Floats:
-    """Return the matrix (9 + k, n + k) that converts strengths of n distributed lobes to the 9 ambient lobes.
+    """Return the matrix (9 + k, n + k) from strengths of the n lobes of `lobe_mixtures` to light strengths.
 
-    The distributed lobes are those of `lobe_mixtures`; if their strengths are not negative, the ambient light
-    is not negative in any direction. The strengths of k suns come after those of the lobes and do not change.
+    Light strengths are those of the 9 ambient lobes, followed by those of k suns, which the matrix does not
+    change. If the strengths of the n lobes are not negative, no direction has negative ambient light.
 
     sun_count : number k of suns
     """

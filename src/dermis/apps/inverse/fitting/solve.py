@@ -213,9 +213,9 @@ def _normal_equations(problem: FitProblem, fit_state: FitState, derivatives: Flo
 
 
 def _eliminate_lights(fit_state: FitState, J: Floats) -> tuple[Floats, Floats]:
-    """Return weighted derivatives without the part that light strengths can undo, and weighted residuals.
+    """Return the derivatives (3 p, u) orthogonal to changes of light strengths, and weighted residuals (3 p,).
 
-    The strength of a sun is not eliminated if it is 0, because it cannot decrease.
+    A sun of strength 0 is left out of the light strengths, because it cannot decrease.
 
     J : (3 p, u) derivatives of the radiance, multiplied by the weights
     """
@@ -238,9 +238,9 @@ _MIN_NOTABLE_CORRELATION = 0.95
 class Uncertainty:
     """Uncertainty of a fit's unknowns.
 
-    sd : dictionary from unknown to standard deviation. It is that of the logarithm for the skin and for the
-        light's colour, and an angle for directions [rad]. It accounts for residuals that are correlated
-        within blocks of the picture, for errors of the renderer and for assumed parameters of the skin
+    sd : dictionary from unknown to standard deviation: of the logarithm for the skin and for the light's
+        colour, of the angle for directions [rad]. It includes errors of the renderer and of assumed skin
+        parameters
     undetermined : unknowns whose standard deviation exceeds half that of their prior, and unknowns at a limit
     correlated : pairs of unknowns that the photograph cannot separate, with their correlation
     singular_values : singular values of the weighted derivatives, with each unknown in standard deviations of

@@ -116,7 +116,7 @@ def recolour(
     estimate : (h, w, 3) melanin, blood and the third unknown before the change
     residual : (h, w, 3) original colour divided by the model's colour
     factors : (3,) factors by which melanin, blood and the third unknown are multiplied
-    added_fractions : (3,) constants that are then added to them
+    added_fractions : (3,) constants that are added to melanin, blood and the third unknown after that
     """
     table, shader = _table_texture(device, model), _unmixing_program(device, "recolour", model)
     change = shader.record("Change", factors=factors, added=added_fractions)

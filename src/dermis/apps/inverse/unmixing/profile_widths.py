@@ -111,12 +111,12 @@ def _ring_fractions(tissue: Tissue) -> Floats:
 
 
 def _mixture_weights(node_fractions: Floats, corner_fractions: Floats) -> Floats:
-    """Return weights (n, k) with which mixtures of k profiles approximate n skins, the nodes of a grid.
+    """Return weights (n, k) of k profiles, whose mixtures approximate the profiles of n skins.
 
-    The mixtures fit the fractions of light that emerge through rings. The weights of each node are not
+    The weights fit the fractions of light that emerge through rings. The weights of each skin are not
     negative and sum to 1.
 
-    node_fractions : ring fractions of the skins at the n nodes
+    node_fractions : ring fractions of the n skins, which are the nodes of a grid of pigments
     corner_fractions : ring fractions of the k profiles that are mixed
     """
     from scipy.optimize import nnls

@@ -175,10 +175,10 @@ def solve_pigments(
 ) -> PigmentEstimate:
     """Return the most probable melanin, blood and third unknown of each colour, computed in float64.
 
-    The cost has a squared difference between the logarithms of the colour and of the model's colour for each
-    channel, and squared deviations from the prior means of blood and of the third unknown. Each term is
-    divided by its variance. The cost is minimised by Gauss-Newton steps with Levenberg's damping; an unknown
-    at a limit stays fixed if the step would cross the limit.
+    The cost is a sum of squares, each divided by its variance: the difference between the logarithms of the
+    given and the model's colour in each channel, and the deviations of blood and of the third unknown from
+    their prior means. It is minimised by Gauss-Newton steps with Levenberg's damping. An unknown at a limit
+    stays fixed if the step would cross the limit.
 
     colours : (t, 3) diffuse reflectance, linear Rec. 709 [-]
     relative_noise : relative standard deviation of a channel [-]

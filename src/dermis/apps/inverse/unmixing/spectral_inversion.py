@@ -155,8 +155,8 @@ def invert_spectra(
     unknowns : parameters that vary; the model supplies all others
     criterion : "spectrum" minimises the RMS difference of the spectra; "colour" minimises the difference of
         their colours under D65, in a space where small distances equal CIEDE2000 differences
-    start : dictionary from parameter name to the values (n,) from which the fit starts; by default, each
-        starts from the `start` of its unknown
+    start : dictionary from parameter name to the values (n,) from which the fit starts; by default, the field
+        `start` of each unknown
     max_steps : largest number of steps
     """
     first = {} if start is None else start

@@ -149,9 +149,9 @@ class UnmixResult:
     def summary(self) -> dict[str, Any]:
         """Return medians of the pigments, colour differences, skin tone, and the fraction of skin texels.
 
-        They are computed from every n-th texel, about 512 along the longer side. Black texels do not count as
-        skin. "sd" is the standard deviation due to noise. "skin_sd" is the standard deviation due to the
-        values assumed for oxygen and epidermal thickness, which vary among people.
+        They are computed from about 512 evenly spaced texels along the longer side. Black texels do not count
+        as skin. The entry "sd" is the standard deviation due to noise, and "skin_sd" that due to the values
+        assumed for oxygen and epidermal thickness, which vary among people.
         """
         step = max(1, max(self.melanin.shape) // _SUMMARY_SIDE)
         maps = {name: one[::step, ::step].astype(np.float64) for name, one in self.maps().items()}
@@ -336,7 +336,7 @@ def save_maps(
 
 
 def __getattr__(name: str) -> Any:
-    """Return the object of this module that had a given name in the last release."""
+    """Return an object of this module by the name that it had in the last release, for compatibility."""
     if new := successor(__name__, name):
         return globals()[new]
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -116,7 +116,7 @@ def deepest_albedo(medium: Medium, colour: ArrayLike) -> Doubles:
 
 @cache
 def _reflectance_table(layers: tuple[tuple[float, float, float], ...], eta: float) -> Doubles:
-    """Return the counted reflectance of a stack of layers for each tabulated albedo of its last layer [-].
+    """Return the Monte Carlo reflectance of a stack of layers, for a series of albedos of its last layer [-].
 
     layers : absorption and scattering [1/mm] and thickness [mm] of each layer
     """
@@ -173,7 +173,7 @@ def skin_media(mi: Mitsuba, person: Person, camera: Camera, medium: Medium) -> l
     The deepest layer has a grid of albedos around the camera's target, which give the skin its painted
     colours.
 
-    medium : layers of a skin that has the mean colour
+    medium : layers of a skin that has the mean of the painted colours
     """
     *above, last = medium.layers
     low, high = _voxel_box(person, camera)

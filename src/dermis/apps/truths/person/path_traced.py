@@ -56,15 +56,15 @@ def path_trace_person(
 ) -> PathTraced:
     """Return the path-traced image of the person in a scene, with the given textures.
 
-    The skin consists of layers below a surface that reflects by the two specular lobes of the frame. If the
-    medium has an index of refraction of 1, light also passes this surface without refraction. If it has
-    `SKIN_ETA`, the surface refracts. The deepest layer has a grid of albedos, from the painted colours.
-    Lights must have a size, because the cornea refracts the light on its way to the iris. The skin settings
-    of the scene are ignored.
+    The skin consists of layers below a surface with the two specular lobes of the real-time renderer. Light
+    passes this surface without refraction if the medium has an index of refraction of 1, and is refracted if
+    it has `SKIN_ETA`. A grid of albedos in the deepest layer gives the skin its painted colours. Lights must
+    have a size, because the cornea refracts the light on its way to the iris. The skin settings of the scene
+    are ignored.
 
     textures : textures of skin, eyes and teeth
-    medium : layers of a skin that has the mean colour, see `uniform_skin` and `pigmented_skin`; None for
-        Lambertian skin with the painted colours
+    medium : layers of a skin that has the mean of the painted colours, see `uniform_skin` and
+        `pigmented_skin`; None for Lambertian skin with the painted colours
     size : width and height of the image [pixel]
     max_depth : largest number of scattering events plus 1, so 2 for direct light; None for no limit
     samples, variant, use_cache, progress : as in `path_trace`

@@ -23,7 +23,7 @@ class SkinTextures:
 
     colour : (n, n, 3) colour map of the skin [-]
     roughness : (n, n) roughness map of the skin [-]
-    strength : (n, n) specular strength of the skin, `Surface.rho_s` of the frame [-]
+    strength : (n, n) specular strength of the skin, as the field `rho_s` of `Surface` [-]
     height_mm : (n, n) relief of the skin [mm]
     iris : (k, k, 3) texture of the iris plane, from -reach_mm to reach_mm along x and y of the eye
     reach_mm : half the side of the iris texture [mm]

@@ -37,12 +37,11 @@ def mitsuba_texture(mi: Mitsuba, texels: NDArray[np.floating]) -> SceneDict:
 
 
 def coat_bsdf(mi: Mitsuba, textures: SkinTextures) -> MitsubaObject:
-    """Return the BSDF of skin that reflects by the frame's two lobes and transmits without refraction.
+    """Return the BSDF of skin with the two specular lobes of the real-time renderer, without refraction.
 
-    Paths cannot connect to a point light through a refracting surface, so most paths pass this surface
-    undeflected. A small fraction of the paths is reflected by the lobes, whose reflectance is divided by this
-    fraction. The reflection then has its full strength, and light from below is weakened by this fraction
-    only.
+    Most paths pass the surface undeflected, so that they can connect to point lights. The others meet the
+    lobes, whose reflectance is divided by the fraction of these paths, so the reflection has its full
+    strength. Light from below is weakened by this small fraction only.
     """
     mirror_fraction = 1.0 - COAT_TRANSMITTANCE
     coat = {
@@ -96,7 +95,7 @@ def refracting_bsdfs(mi: Mitsuba, textures: SkinTextures) -> tuple[MitsubaObject
 
 
 def painted_diffuse_bsdf(mi: Mitsuba, textures: SkinTextures) -> MitsubaObject:
-    """Return the BSDF of skin with the frame's two specular lobes over a Lambertian base, as painted."""
+    """Return the BSDF of skin with two specular lobes over a Lambertian base of the painted colours."""
     fraction = 1.0 - COAT_TRANSMITTANCE
     base = {
         "type": "diffuse",
