@@ -1,1 +1,1 @@
-"""Atlases: uv layouts in which light is diffused, with stitched seams, form factors and thin parts."""
+"""Atlases: uv layouts in which light is diffused, with tables for interreflection and for thin parts."""

@@ -33,11 +33,10 @@ class Atlas:
     gutter : (a, 2) uint16 gutter texels (x, y), into which the light of other texels is copied
     source : (a, 2) float32 position from which the light of each gutter texel is copied, integer at texel
         centres [texel]
-    outside : (r, 2) uint16 texels (x, y) outside their chart, which have the stretch of the chart's nearest
-        edge
+    outside : (r, 2) uint16 texels (x, y) outside the triangles of their chart
     border_triangle : (r,) int32 index of the triangle at the nearest edge of each texel in `outside`
-    border_weights : (r, 2) uint16 weights of that triangle's second and third corner at the point of the edge
-        nearest to the texel [1/65535]
+    border_weights : (r, 2) uint16 weights of that triangle's second and third corner at the nearest point of
+        this edge [1/65535]
     texels_per_uv : (f,) float32 texels per unit of the mesh's own uv in each triangle
     mapped : (f,) mask of triangles that own texels; light on the remaining triangles (opaque, collapsed,
         overlapped in uv) is not diffused

@@ -40,9 +40,9 @@ _LINE_INDEX_STRIDE = 4096  # stride of line indices: more than the lines along a
 class FormFactors:
     """Form factors from the cells and patches of the uv square to the patches that they face.
 
-    A cell receives light; a patch of 2 x 2 cells emits it. The form factors of cells and those of patches are
-    two sparse matrices, stored row by row: the entries of row k start at index `..._first[k]` and end before
-    index `..._first[k + 1]`.
+    The uv square is divided into cells, which receive light, and into patches of 2 x 2 cells, which emit it.
+    The form factors of all cells are a sparse matrix, and so are those of all patches. Both are stored row by
+    row: the entries of row k start at index `..._first[k]` and end before index `..._first[k + 1]`.
 
     cell_first : (CELLS_PER_SIDE^2 + 1,) index of the first entry of each cell
     cell_target : (k,) index of the patch that the cell faces
@@ -310,9 +310,10 @@ def _sparse_rows(
 
 
 def _divide_into_patches(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> tuple[Index, Words, Words]:
-    """Return the patch of each cell, and the triangles and weights of the sample points of all patches.
+    """Return the patch of each cell, and the triangle and weights of each patch's sample points.
 
-    The patch indices have the shape (CELLS_PER_SIDE^2,) and are -1 for cells without texels.
+    The patch indices have the shape (CELLS_PER_SIDE^2,) and are -1 for cells without texels. The weights are
+    packed barycentric weights, as in `FormFactors`.
     """
     triangle, weights, rank = _sample_points(mesh, mapped)
     half, cell = CELLS_PER_SIDE // 2, _cell_index(corner_uv[triangle], weights)
@@ -330,10 +331,10 @@ def _divide_into_patches(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> tuple[I
 
 
 def _sample_points(mesh: Mesh, mapped: Mask) -> tuple[Index, Doubles, Doubles]:
-    """Return random points on the triangles that have texels: triangle indices, weights and random ranks.
+    """Return random points on the triangles that have texels: triangle indices, weights and ranks.
 
-    Each triangle has at least one point. The points with the lowest ranks, whatever their number, are
-    uniformly distributed over the surface.
+    Each triangle has at least one point, so points are denser on small triangles. The ranks are random
+    numbers; any number of points with the lowest ranks is uniformly distributed over the surface.
     """
     a, b, c = (mesh.positions[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
     area = np.where(mapped, 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1), 0.0)

@@ -1,4 +1,4 @@
-"""Rasterisation of triangles in uv: charts, texels of triangles, and the atlas of a mesh's own layout."""
+"""Rasterisation of triangles in uv, search for charts, and the atlas of a mesh's own uv layout."""
 
 from __future__ import annotations
 
@@ -286,7 +286,7 @@ def _edge_distance(texel_chart: Ints) -> NDArray[np.uint16]:
 
 
 def run_lengths(joined: Mask) -> tuple[Ints, Ints]:
-    """Return the number of connected texels before and after each texel in its row, (h, w) each.
+    """Return how many connected texels lie before and after each texel in its row, (h, w) each.
 
     joined : (h, w) mask of texels that are connected to the texel before them in the row
     """

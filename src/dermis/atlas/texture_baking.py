@@ -125,7 +125,10 @@ class _Baker:
         return values
 
     def _finish_colours(self, tile: Tile, values: Floats) -> None:
-        """Multiply a tile's colours and opacity (h, w, 4) in place by vertex colours and opacity picture."""
+        """Apply vertex colours and the opacity texture to the colours of a tile, in place.
+
+        values : (h, w, 4) colour and opacity; an opacity with a cutoff is shifted so that the cutoff is 0.5
+        """
         material = self._tile_material(tile)
         if "opacity" in material.textures:
             values[..., 3:] *= self._sample_picture(tile, material.textures["opacity"], "opacity")

@@ -57,12 +57,15 @@ class Tile:
 
 
 def base_texture(material: FileMaterial) -> Texture | None:
-    """Return the texture whose mapping determines a material's uv layout: colour, or else the first one."""
+    """Return the texture whose uv mapping a material's tile uses: colour, or else the first texture."""
     return material.textures.get("colour") or next(iter(material.textures.values()), None)
 
 
 def file_uv(mesh: Mesh, surface: FileSurface, uv_set: int, vertices: NDArray[np.integer]) -> Doubles:
-    """Return uv coordinates of vertices as in the file (n, 2), with v down."""
+    """Return the uv coordinates (n, 2) of vertices in one of the file's uv sets, with v down.
+
+    uv_set : index of the uv set; set 0 is the mesh's own uv
+    """
     uv: Floats = mesh.uv if uv_set == 0 else surface.other_uv[uv_set]
     return np.asarray(uv[vertices], np.float64)
 

@@ -1,4 +1,4 @@
-"""Bind groups, created by direct calls of the native library for speed, as a new head needs dozens."""
+"""Bind groups, created by direct calls of the native library, which is faster than through wgpu's Python."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ class ResourceCache(Generic[T]):
             self._keys_of(resource).add(cache_key)
 
     def _keys_of(self, resource: object) -> set[ResourceKey]:
-        """Return the cache keys that contain a resource; the release of a new resource is then watched."""
+        """Return the cache keys that contain a resource; if it is new, start to watch for its release."""
         identity = id(resource)
         if identity not in self._keys:
             this = weakref.ref(self)

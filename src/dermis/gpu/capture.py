@@ -45,8 +45,8 @@ class CapturedPass:
 
     stage : name of the stage
     program : index of the program; None for a write from the host
-    bound : for each binding of the program, the index of the resource or uniform record; empty for a write
-        from the host
+    bound : for each binding of the program, the index of the resource, or -1 - k for the uniform record k;
+        empty for a write from the host
     groups : for a compute pass, the workgroups along each axis; for a render pass, the number of vertices;
         for a write from the host, the number of bytes
     completes : index of the resource that the pass extends in place (see `Recorder.dispatch`); -1 if none

@@ -168,10 +168,12 @@ class Dependencies:
             valid -= overwritten
 
     def _find_stale_unless(self, valid_states: set[ResourceState]) -> list[bool]:
-        """Return for each pass whether it writes a needed output that is not in `valid_states`.
+        """Return for each pass whether it writes an output that is needed and not up to date.
 
         An output is needed if it is the final content of a resource that is not scratch, or the input of a
         stale pass.
+
+        valid_states : resources whose final content is already up to date
         """
         stale, needed = [False] * len(self.passes), set[tuple[int | None, ResourceState]]()
         for index in range(len(stale) - 1, -1, -1):

@@ -107,7 +107,7 @@ class Device:
         self._samplers: dict[tuple[tuple[str, str], ...], Sampler] = {}
 
     def cached(self, object_name: str, make_object: Callable[[], T]) -> T:
-        """Return the object of this device called `object_name`; `make_object` creates it on first use."""
+        """Return an object that is cached by name on this device; `make_object` creates it on first use."""
         if object_name not in self._cached:
             self._cached[object_name] = make_object()
         found: T = self._cached[object_name]

@@ -187,7 +187,7 @@ class Graph(Recorder):
         self._epoch += 1
 
     def begin(self) -> None:
-        """Begin a frame without passes."""
+        """Begin a new frame: forget the passes that were declared for the last frame."""
         self._passes.clear()
         self._uniforms.clear()
         self._readbacks.clear()

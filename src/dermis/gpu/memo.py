@@ -39,7 +39,7 @@ class Memo:
 
     cache_size : number of results to keep for each function, for callers that alternate between a few sets of
         arguments
-    cache_ttl : number of frames for which the results of an unused function are kept, raised to at least
+    cache_ttl : number of frames after which the results of an unused function are dropped; at least
         `cache_size` squared
     """
 
@@ -140,7 +140,8 @@ class Memo:
     def _mark_hits_used(self, function_key: FunctionKey | None = None) -> None:
         """Move the results that this frame used to the front of the cache.
 
-        function_key : key on which the moved results depend; None to move all used results
+        function_key : key of a function, to move only its results and those computed from them; None to move
+            all results that this frame used
         """
         for one, result in self._hits:
             if function_key is None or function_key in result.keys:

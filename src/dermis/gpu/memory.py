@@ -116,7 +116,7 @@ def check_memory(
 
 
 def probe_memory(device: Device, max_bytes: float) -> float:
-    """Return the free memory of a device, at most `max_bytes`, which is found by trial allocation [byte]."""
+    """Measure the free memory of a device, up to `max_bytes`, by allocating and freeing buffers [byte]."""
     buffers: list[Buffer] = []
     total, size = 0, min(int(max_bytes), device.max_storage_bytes) // 4 * 4
     while size >= _MIN_PROBE_BYTES and total < max_bytes:

@@ -138,7 +138,11 @@ class Program:
         return KeyError(f"{self.name}.wgsl declares {key_error.args[0]!r}, and nothing is bound to it")
 
     def _make_group(self, bound_resources: Sequence[Bindable], resources: Bindings) -> BindGroup:
-        """Create the bind group for bound resources, followed by the buffers of the uniform records."""
+        """Create the bind group for some resources.
+
+        bound_resources : resources in the order of the bindings, the buffers of uniform records last
+        resources : resources and uniform records by their names in the shader
+        """
         records: UniformRecords = resources  # type: ignore[assignment]  # no cast, which costs time
         sizes = [records[one.name].nbytes for one in self._uniforms]
         return make_bind_group(

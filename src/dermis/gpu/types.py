@@ -1,6 +1,6 @@
 """Typing protocols for the textures, buffers and samplers of wgpu, which has no type annotations.
 
-The protocols are distinguished by the types of their native handles.
+Type checkers tell the protocols apart by the types of their native handles.
 """
 
 from __future__ import annotations

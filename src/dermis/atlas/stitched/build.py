@@ -42,7 +42,7 @@ def find_pieces(surface: FlatSurface) -> tuple[Index, Doubles]:
     """Divide charts into pieces; return a piece index (f,) and a uv scale (f,) for each triangle.
 
     A piece is a chart, or a part of a chart whose uv is mirrored. Triangles in no piece have the index -1.
-    Scaling uv by these factors gives all pieces a similar texel density.
+    If uv is multiplied by the scales, all pieces have a similar texel density.
     """
     mirrored = (surface.area_uv < 0).astype(np.int64)
     neighbour = surface.uv_neighbour
@@ -121,15 +121,17 @@ def build_stitched(mesh: Mesh, atlas_side: int, gutter_mm: float) -> Atlas | Non
 
 
 def layout_table(gutter_mm: float) -> str:
-    """Return the name of the table with the stitched layout for maps of at least 512 x 512 texels.
+    """Return the name of the table that contains a mesh's stitched layout, for `shipped_arrays`.
 
-    The table contains the pieces of the charts and their positions.
+    The layout is that of maps of at least 512 x 512 texels: the pieces of the charts and their positions.
     """
     return f"layout {_LAYOUT_VERSION} {gutter_mm:g}"
 
 
 def find_stitched_layout(mesh: Mesh, gutter_mm: float) -> dict[str, NDArray[Any]]:
-    """Return the arrays of the table `layout_table` for a mesh: piece indices (f,), scale and origins.
+    """Return the piece indices (f,) of a mesh's triangles, and scale and origins of the `PieceLayout`.
+
+    These are the arrays of the table that `layout_table` names.
 
     Raises ValueError if the charts do not fit.
     """

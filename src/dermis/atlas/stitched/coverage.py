@@ -167,11 +167,9 @@ def texel_metric(surface: FlatSurface, packing: Packing, coverage: Coverage) -> 
 
 
 def edge_distances(surface: FlatSurface, packing: Packing, coverage: Coverage) -> NDArray[np.uint16]:
-    """Return for each texel the distance in four directions to the end of its piece or to a gap, (h, w, 4).
+    """Return how far each texel's piece and gutter extend left, right, up and down, (h, w, 4) [texel].
 
-    The unit is a texel, and the directions are left, right, up and down. There is a gap between two texels if
-    their surface points are farther apart than `gap_limit_mm` and their anchors are farther apart than either
-    texel is from its anchor.
+    A piece also ends at a gap: between adjacent texels whose surface points are far apart, see `_has_gap`.
     """
     anchor = coverage.anchor_triangle
     owner = np.where(anchor >= 0, np.where(coverage.distance_mm > 0, -1, anchor), -2)
@@ -197,6 +195,8 @@ def _has_gap(
     axis: int,
 ) -> Mask:
     """Return the mask of pairs of adjacent texels whose surface points are not adjacent on the surface.
+
+    A pair has a gap if both `anchors_diverge` and `gap_limit_mm` say so.
 
     first_texels, second_texels : (n,) flat indices of the texels
     axis : 0 for pairs along x, 1 along y

@@ -173,7 +173,10 @@ def border_points(sides: BorderSides, nearest: NearestPoints) -> Doubles:
 
 
 def border_steps(sides: BorderSides, nearest: NearestPoints) -> Doubles:
-    """Return, at border points, the surface vectors (n, 2, 2) of a texel step to the right and down [mm]."""
+    """Return the surface vectors (n, 2, 2) of a step of one texel right, and of one down, at border points.
+
+    The unit is mm.
+    """
     first, second = np.moveaxis(sides.steps[nearest.side], 1, 0)
     return _interpolate_linearly(first, second, nearest.fraction[:, None, None])
 

@@ -46,12 +46,12 @@ class NearestPoints(NamedTuple):
 
 
 class _SideMetric(NamedTuple):
-    """Surface metric at the border sides (k,), by which texel offsets are measured in mm.
+    """Surface metric at k border sides, used to measure offsets on the texel grid in mm.
 
-    x, y, down : (k,) coefficients: the texel offset (dx, dy) is as long as the vector (x dx + y dy, down dy)
-        [mm]
-    along : (k, 2) progress along the side, as a fraction of its length, for a texel step in x and in y
-    half_extent : (k, 2) margin around the side's bounding box that contains its gutter [texel]
+    x, y, down : (k,) coefficients; the length of an offset (dx, dy) on the surface is that of the vector
+        (x dx + y dy, down dy) [mm]
+    along : (k, 2) distance along the side of a texel step in x and of one in y, as a fraction of the side
+    half_extent : (k, 2) margin in x and y around the side's bounding box, wide enough for the gutter [texel]
     """
 
     x: Doubles

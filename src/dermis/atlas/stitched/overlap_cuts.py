@@ -50,7 +50,9 @@ _MAX_RELATIVE_AREA_GROWTH = 0.25  # largest growth of the area of all pieces by 
 
 
 class Conflicts(NamedTuple):
-    """Pairs of border points of a chart piece that are apart on the surface although their gutters meet.
+    """Conflicts in the gutters of a chart piece: pairs of border points whose gutters meet.
+
+    Where they meet, the two gutters show points that are apart on the surface.
 
     first, second : (n, 2) positions of the two border points of each pair, in uv scaled to texels [texel]
     inside : (m, 2) texels that the piece covers, in the same coordinates [texel]
@@ -273,10 +275,9 @@ def _within_reach(points: Doubles, others: Doubles, reach: float) -> Mask:
 def _conflict_strip(
     surface: FlatSurface, member_triangles: Index, overlap: Conflicts, half_mask: Mask, gutter_texels: float
 ) -> Mask:
-    """Return the mask (t,) of triangles that are near meeting gutters and on one side of a line.
+    """Return the mask (t,) of triangles near conflicts between gutters, on one side of a line.
 
-    The line divides the piece. Of its two sides, the side on which such triangles have the smaller area is
-    chosen.
+    The line divides the piece. The result is on the side where the triangles near conflicts have less area.
 
     half_mask : (t,) mask of triangles on one side of the line
     gutter_texels : gutter width [texel]

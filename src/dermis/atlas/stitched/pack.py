@@ -56,6 +56,7 @@ def _free_positions(occupied_cells: int, spans: Sequence[CellRun], cells_per_sid
     """Return the free positions for the upper left cell of a shape, as a bit mask of n x n cells.
 
     occupied_cells : bit mask of the occupied cells
+    spans : cells of the shape as runs, see `place_shapes`
     """
     height = 1 + max(row for row, _, _ in spans)
     width = 1 + max(last for _, _, last in spans)
@@ -160,7 +161,7 @@ def pack_pieces(
 def find_layout(
     surface: FlatSurface, triangle_piece: Index, uv_scale: Doubles, map_side: int, width: GutterWidth
 ) -> PieceLayout | None:
-    """Return the layout with which `pack_pieces` packs the same pieces; None if they do not fit."""
+    """Search for a layout of chart pieces, to be passed to `pack_pieces`; return None if they do not fit."""
     return _find_layout(_prepare_pieces(surface, triangle_piece, uv_scale)[1], map_side, width)
 
 
@@ -207,9 +208,9 @@ def _find_layout(pieces: list[_Piece], map_side: int, width: GutterWidth) -> Pie
 
 
 def _find_largest_scale(masks: list[_PieceMask], cells_per_side: int, max_scale: float) -> PieceLayout | None:
-    """Return the layout with the largest scale below a maximum, for the best of several packing orders.
+    """Return the layout with the largest scale up to a maximum, or None if no scale fits.
 
-    The best order is determined with coarse cells.
+    Several packing orders are compared with coarse cells; only the best order is tried with fine cells.
     """
     coarse, best = None, 0
     for order in range(_ORDER_COUNT):
@@ -306,7 +307,10 @@ def _scaled_mask(mask: _PieceMask, scale: float) -> tuple[Mask, Doubles]:
 
 
 def _piece_mask(piece: _Piece, scale: float, width: GutterWidth) -> _PieceMask:
-    """Return the cells in which a piece and its gutter may need a texel, at a scale of the packing."""
+    """Return the cells in which a piece and its gutter may need a texel.
+
+    scale : cells per unit of the piece's scaled uv
+    """
     margin = np.ceil(_gutter_extent(piece, scale, width)) + 2
     columns, rows = np.ceil(piece.extent * scale + 2 * margin).astype(int) + 1
     ones = np.ones(len(piece.uv))

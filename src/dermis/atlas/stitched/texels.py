@@ -28,7 +28,7 @@ def rasterise_texel_triangles(corners: Doubles, drawn_triangles: Index, grid_sha
 
 
 def mostly_hidden_triangles(corners: Doubles, drawn_triangles: Index, texel_triangle: Ints) -> Mask:
-    """Return the mask (f,) of triangles for which other triangles own most of the covered texels.
+    """Return the mask (f,) of triangles that own less than half of the texels that they cover.
 
     corners : (f, 3, 2) corners of all triangles [texel]
     drawn_triangles : (t,) indices of the drawn triangles
@@ -92,7 +92,7 @@ def unconnected_pairs(surface: FlatSurface, texel_triangle: Ints, axis: int) -> 
 
 
 def anchors_diverge(first_texels: AnchoredTexels, second_texels: AnchoredTexels) -> Mask:
-    """Return the mask of texel pairs whose anchors are farther apart than either texel is from its anchor.
+    """Return the mask of texel pairs whose anchors are farther apart than each texel is from its own anchor.
 
     The anchor of a texel is the nearest point of its chart.
     """
@@ -104,7 +104,7 @@ def anchors_diverge(first_texels: AnchoredTexels, second_texels: AnchoredTexels)
 
 
 def gap_limit_mm(first_texels: AnchoredTexels, second_texels: AnchoredTexels, axis: int) -> Doubles:
-    """Return the distance (n,) of surface points beyond which there is a gap between adjacent texels [mm].
+    """Return the largest distance (n,) between the surface points of adjacent texels without a gap [mm].
 
     axis : 0 for texels adjacent along x, 1 along y
     """

@@ -1,1 +1,1 @@
-"""Cells of an atlas between which light passes through thin parts: ears, nostrils, lips and eyelids."""
+"""Division of an atlas into cells, for light that passes through ears, nostrils, lips and eyelids."""

@@ -1,4 +1,4 @@
-"""Coarse cells of an atlas, between which light through thin parts is transported, grouped into tiles."""
+"""Division of an atlas into coarse cells and into tiles of cells, for light through thin parts."""
 
 from __future__ import annotations
 
@@ -33,12 +33,11 @@ class Cells:
     """Division of an atlas into side x side cells, and of the cells into tiles, for light through thin parts.
 
     Cells are numbered row by row. An array that is sorted by tile comes with an array `..._first`: the
-    entries of tile k start at index `..._first[k]` and end before index `..._first[k + 1]`. The shape of the
-    surface only affects the size of the cells.
+    entries of tile k start at index `..._first[k]` and end before index `..._first[k + 1]`.
 
     size : texels along each side of the atlas
     side : cells along each side of the atlas
-    max_sigma_mm : standard deviation of the widest Gaussian [mm]
+    max_sigma_mm : standard deviation of the widest Gaussian of the diffusion profiles [mm]
     cell_mm : median side of a cell on the surface [mm]
     stride : a source cell averages the light of every `stride`-th texel along each axis [texel]
     receiver_mask : (side, side) mask of the cells that receive light: cells with lit texels, and their
@@ -70,7 +69,7 @@ class Cells:
 
     @property
     def radius_mm(self) -> float:
-        """Return the largest distance between the entry and the exit cell of a translucent pair [mm]."""
+        """Return the largest distance from a cell in which light enters to the cell where it leaves [mm]."""
         return _PAIR_RADIUS_SIGMAS * self.max_sigma_mm
 
     @property
@@ -80,10 +79,10 @@ class Cells:
 
 
 def divide_into_cells(atlas: Atlas, max_sigma_mm: float, relative_cell_size: float = 1.0) -> Cells:
-    """Divide an atlas into cells for the light that Gaussians spread through thin parts.
+    """Divide an atlas into cells, between which light passes through thin parts.
 
-    max_sigma_mm : standard deviation of the widest Gaussian, clipped so that the light enters and leaves at
-        most 32 mm apart [mm]
+    max_sigma_mm : standard deviation of the widest Gaussian of the diffusion profiles; 10 mm is used for
+        larger values [mm]
     relative_cell_size : cell size relative to the default [-]
     """
     sigma_mm, texel_mm = min(max_sigma_mm, _MAX_SIGMA_MM), _texel_mm(atlas)
@@ -163,9 +162,9 @@ def _source_cells(lit_mask: Mask, tiles_per_side: int) -> tuple[Index, Index]:
 
 
 def _tile_of(atlas: Atlas, points: Words, cells_per_side: int, tiles_per_side: int) -> Ints:
-    """Return the index (m,) of the atlas tile that contains each surface point.
+    """Return the index (m,) of the tile in which the chart of each surface point shows the point.
 
-    A point that a gutter texel shows is in the tile of the texel whose light the gutter texel copies.
+    Gutter texels, which show points of other charts, do not count.
 
     points : (m, 2) triangle index, and packed barycentric weights
     """
@@ -210,10 +209,10 @@ def _gutter_copies(atlas: Atlas, cells_per_side: int) -> tuple[Index, Words]:
 
 
 def _rim_texels(atlas: Atlas) -> tuple[NDArray[np.uint16], Floats]:
-    """Return lit texels at chart rims, and the position elsewhere in the atlas of the point each one shows.
+    """Return the lit texels outside their chart, and the atlas positions of the points that they show.
 
-    Both arrays are (r, 2): texel indices, and positions [texel]. Rim texels are outside the triangles of
-    their chart, but interpolation inside the chart reads them.
+    Both arrays are (r, 2): x and y of the texels, and positions [texel]. These texels lie at the rim of a
+    chart, and interpolation inside the chart reads them. They show points that other texels show as well.
     """
     inner, view = np.pad(atlas.lit, GUTTER_TEXELS), np.lib.stride_tricks.sliding_window_view
     for axis in (0, 1):

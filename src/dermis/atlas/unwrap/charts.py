@@ -96,7 +96,7 @@ def _stray_triangles(triangle_chart: Index, adjacent_triangles: Index) -> Mask:
 def grow_charts(positions: Doubles, triangles: Index, chart_count: int, seed: int = 0) -> Index:
     """Grow about `chart_count` charts from random triangles; return the chart of each triangle (f,).
 
-    Distances are increased across bends of the surface, so chart borders tend to follow the bends.
+    A bend of the surface counts as additional distance, so chart borders tend to follow bends.
 
     positions : (n, 3) vertices [mm]
     triangles : (f, 3) vertex indices

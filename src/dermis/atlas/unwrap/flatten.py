@@ -212,7 +212,7 @@ def _stiffness_weights(a: Complexes, b: Complexes) -> Doubles:
 def _rigid_step(
     positions: Complexes, triangles: Index, component: Index, shapes: Complexes, stretch_weight: Doubles
 ) -> Complexes:
-    """Return complex positions after some as-rigid-as-possible iterations with fixed weights.
+    """Make a flat map as rigid as possible, in some iterations with fixed weights; return complex positions.
 
     shapes : (f, 3) desired shape and size of the triangles
     stretch_weight : (f,) weight of each triangle's stretch in the minimised sum [-]
