@@ -1,1 +1,1 @@
-"""Frame: all that the device computes to render one picture of a scene, and the renderer that submits it."""
+"""Frame: everything that the device computes for one picture of a scene, and the renderer that submits it."""

@@ -196,8 +196,8 @@ def _make_layout(
     """Return the resources of one atlas layout; each frame adds the uniform record of its lights.
 
     layout_atlas : the atlas, and its textures on the device
-    shared : result of `_shared_bindings`, with the maps of the head
-    layout_index : index of the layout, which identifies its resources in the cache
+    shared : result of `_shared_bindings`, to which the maps of the head have been added
+    layout_index : index of the layout, part of the keys of its resources in the cache
     """
     cached, layout_key, head, (atlas, textures) = memo.get, str(layout_index), request.topology, layout_atlas
     geometry = cached(

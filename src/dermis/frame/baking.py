@@ -134,9 +134,11 @@ def _available_outputs(
     output_names: tuple[str, ...],
     absence_reasons: dict[str, str],
 ) -> tuple[str, ...]:
-    """Return `output_names` if the scene has these outputs, else ().
+    """Return `output_names` if the renderer can compute these outputs for the scene, else ().
 
-    absence_reasons : dictionary to which the reason is added if the result is ()"""
+    absence_reasons : dictionary from the name of a missing output to the reason; if the result is (), the
+        outputs are added to this dictionary
+    """
     try:
         renderer.draw(scene, settings, timed=False, outputs=output_names)
     except DermisError:

@@ -84,9 +84,9 @@ def observation_jobs(
     previous: Scene | Iterable[Scene | None] | None,
     settings: Iterable[Settings],
 ) -> Iterator[tuple[Callable[[], Readback], Callable[[Readback], Observation]]]:
-    """Yield two functions for each scene: the first submits a frame, the second returns the observation.
+    """Yield two functions for each scene: one submits a frame, the other reads its observation.
 
-    submit_frame : function of a scene, the previous scene and `settings`, which submits a frame
+    submit_frame : function that submits a frame, given a scene, the previous scene and `settings`
     previous : previous scenes for motion vectors, see `pair_with_previous`
     settings : settings of each scene
     """
@@ -115,9 +115,9 @@ def pair_with_previous(
 ) -> Iterator[tuple[Scene, Scene | None]]:
     """Yield each scene with its previous scene, from which motion is measured, or with None.
 
-    previous : either an iterable with one previous scene or None for each scene, or only the previous scene
-        of the first scene, or None. In the latter cases, each later scene is paired with the scene before it,
-        or with None if the head changes
+    previous : an iterable sets the previous scene (or None) of each scene. A scene, or None, sets only the
+        previous scene of the first; all further scenes follow the scene before them, or None if the head
+        changes
     """
     if isinstance(previous, Iterable):
         for one, before in zip_longest(scenes, previous, fillvalue=_NO_PREVIOUS_SCENE):

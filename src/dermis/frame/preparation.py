@@ -179,7 +179,7 @@ class Preparation:
     def _previous_scene(self, scene: Scene, previous: Scene, inputs: FrameInputs) -> PreviousScene:
         """Return the pose and the camera of the previous scene, for motion vectors.
 
-        Raises DermisError for a scene of another head.
+        Raises DermisError if the two scenes show different heads.
         """
         head = scene.head.bare
         if not are_equal(previous.head.bare, head):
@@ -214,7 +214,7 @@ def _motion_bytes(head: Head, motion: Motion, at_rest: MotionBytes) -> MotionByt
 
 
 def _rest_positions_mm(scene: Scene) -> NDArray[np.float32] | None:
-    """Return the person's (p, 3) control points at rest [mm], None if the topology has the same points."""
+    """Return the person's (p, 3) control points at rest [mm], None if they are those of the shared mesh."""
     motion = scene.motion or scene.head.control.rest
     positions_mm = motion.positions_mm
     return None if positions_mm is scene.head.topology.control.positions_mm else positions_mm

@@ -25,8 +25,8 @@ class FrameRequest:
     """Everything on which the cached resources of a frame depend.
 
     profile : diffusion profile of the skin, the first profile if a map blends several profiles
-    rest_positions_mm : (p, 3) control points of the person at rest [mm], None if they equal the control
-        points of the topology
+    rest_positions_mm : (p, 3) control points of the person at rest [mm], None if they are those of
+        `topology`, the head without hair and maps
     environment_map : prefiltered map of `environment`
     light_part_counts : number of parts into which each light is divided, suns of the environment last
     shadow_layers : number of shadow maps
@@ -77,7 +77,10 @@ class FrameRequest:
 
     @cached_property
     def split(self) -> ProfileSplit:
-        """Return the profile and any other profiles, each split into relit and blurred Gaussians."""
+        """Return the profile and any other profiles, each split by how its Gaussians are evaluated.
+
+        The narrowest Gaussian may be evaluated per pixel (relit); the others blur the atlas.
+        """
         profiles = self.profile, *self.other_profiles
         first, *others = (self.technique.split(profile, self.albedo_from_map) for profile in profiles)
         fine = {} if others else first.fine  # with blends, stripes are as fine as texels

@@ -39,8 +39,8 @@ class Resources:
     layouts : atlas layouts in which light is diffused; the picture is shaded from the first layout
     scattered : texture of the exitance of light that scattered below the surface
     technique : tables and textures of the technique; None if the technique needs none
-    output_layers : textures in which the technique diffuses the light of outputs; None if the technique needs
-        none
+    output_layers : textures in which the technique diffuses subsurface light for outputs, apart from the
+        picture's textures; None if the technique needs none
     sky : visible fraction of the sky at the vertices, None if occlusion does not follow the shape
     hair : resources of the hair, None if no hair is drawn
     visibility : texture of the triangle at each sample of the picture

@@ -94,7 +94,7 @@ def irradiance_at(
 ) -> Floats:
     """Return (n, 3) irradiance at points of the surface, times the skin colour applied before scattering [-].
 
-    scene : scene without maps and environment, which would need the positions of the points in the atlas;
+    scene : scene without maps and environment, because the positions of the points in the atlas are unknown;
         interreflection is ignored
     triangle : (n,) indices of the triangles on which the points lie
     barycentric : (n, 3) barycentric weights of the points

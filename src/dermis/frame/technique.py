@@ -23,7 +23,7 @@ class ProfileSplit:
 
     relit : (3,) weights of the relit Gaussian [-]
     total : (3,) sums of the weights of all Gaussians [-]
-    blurred_mm2 : (k,) variances of the Gaussians that blur [mm2]
+    blurred_mm2 : (k,) variances of the Gaussians that blur [mm^2]
     weight : (k, 3) weights of the Gaussians that blur [-]
     others : splits of the other profiles that a map blends with this profile; all have the same Gaussians
     fine : members of the shader struct Fine, which corrects light that varies within a texel; empty for no

@@ -90,9 +90,9 @@ def add_suns(memo: Memo, scene: Scene, environment_map: EnvironmentMap) -> Scene
 
 
 def peak_irradiance(scene: Scene, environment_map: EnvironmentMap) -> float:
-    """Return an upper bound of irradiance [-].
+    """Return an upper bound of the irradiance in a scene [-].
 
-    The bound is the irradiance of a surface that faces every light and the brightest part of the environment.
+    A surface would receive it if it faced every light and the brightest part of the environment.
 
     scene : scene whose lights include the suns of its environment
     """

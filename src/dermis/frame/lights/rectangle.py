@@ -19,7 +19,10 @@ class _Rectangle(Kind[RectangleLight]):
     round = False
 
     def parts(self, light: RectangleLight) -> list[Light]:
-        """Divide the rectangle into at most 3 x 3 parts, preferably with sides below 0.35 of the distance."""
+        """Divide the rectangle into parts whose sides are at most 0.35 of the distance to its target.
+
+        At most 3 x 3 parts are made, even if they are larger.
+        """
         path = vector_between(light.position, light.target)
         distance = math.hypot(*path)
         columns, rows = (_part_count(side, distance) for side in (light.width_mm, light.height_mm))
@@ -57,10 +60,11 @@ KIND = _Rectangle()
 
 
 def _part_count(side_mm: float, distance_mm: float) -> int:
-    """Return the number of parts along one side of a rectangle.
+    """Return the number of parts into which a rectangular light is divided along one side.
 
     side_mm : length of the side [mm]
-    distance_mm : distance from the rectangle to its target [mm]"""
+    distance_mm : distance from the light to its target [mm]
+    """
     return min(max(math.ceil(side_mm / (_MAX_PART_SIDE_PER_DISTANCE * distance_mm)), 1), _MAX_PARTS_PER_SIDE)
 
 

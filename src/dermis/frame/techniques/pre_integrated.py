@@ -98,10 +98,10 @@ def sphere_table(profile: GaussianSum) -> Floats:
     """Return the irradiance max(N.L, 0) after scattering on spheres, (n, m, c) [-].
 
     N is the normal and L the direction to the light. The n rows are for curvatures from 0 to
-    `MAX_CURVATURE_PER_MM`, the m columns for N.L from -1 to 1. How far light spreads depends on straight
-    distance: on a sphere of radius r, a Gaussian of variance v is exp(r^2/v (cos a - 1)) at the central angle
-    a, normalised over the sphere. [Penner2011] integrates around a ring instead, which does not conserve
-    energy.
+    `MAX_CURVATURE_PER_MM`, the m columns for N.L from -1 to 1, and c is the number of colour channels.
+
+    The profile is integrated over the sphere and normalised there. [Penner2011] integrates around a ring
+    instead, which does not conserve energy.
     """
     cosines = np.linspace(-1.0, 1.0, _COSINE_COUNT)
     rows = [np.repeat(np.maximum(cosines, 0.0)[:, None], len(profile.albedo), axis=1)]

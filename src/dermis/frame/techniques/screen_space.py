@@ -45,8 +45,8 @@ class SubsurfaceLayers(TechniqueResources):
     subsurface : view of the first layer
     transmittance : view of the second layer
     scratch : texture for light that is diffused along rows, but not yet along columns
-    result : texture of the finished picture, None for outputs, which need only the subsurface light
-    kernel : kernel of the profile, None for outputs, which are diffused with the kernel of the picture
+    result : texture for the picture with diffused light, None if only the subsurface light is needed
+    kernel : diffusion kernel of the profile, None if the caller provides the kernel
     """
 
     layers: Texture
@@ -82,7 +82,7 @@ class ScreenSpace(Technique):
         return replace(layers, kernel=memo.get(make_kernel, device, profile))
 
     def make_subsurface_layers(self, memo: Memo, device: Device, settings: Settings) -> SubsurfaceLayers:
-        """Return the textures in which the light of outputs is diffused, without a finished picture."""
+        """Return textures for diffusing subsurface light for outputs, without `result` and `kernel`."""
         return memo.get(make_subsurface_layers, device, settings.size, False, caller_name="outputs")
 
     def subsurface_layers(self, resources: TechniqueResources | None) -> Texture | None:
@@ -90,7 +90,7 @@ class ScreenSpace(Technique):
         return resources.layers if isinstance(resources, SubsurfaceLayers) else None
 
     def finish(self, graph: Graph, inputs: FrameInputs, radiance: Texture) -> Texture:
-        """Declare the passes that diffuse the subsurface light, and return the finished picture."""
+        """Declare the passes that diffuse the subsurface light, and return the picture with this light."""
         layers = inputs.resources.technique
         assert isinstance(layers, SubsurfaceLayers) and layers.kernel is not None
         return draw(graph, layers, layers.kernel, inputs.window, radiance)
@@ -98,7 +98,7 @@ class ScreenSpace(Technique):
     def blur_subsurface_layers(
         self, graph: Graph, inputs: FrameInputs
     ) -> tuple[TextureOrView, TextureOrView]:
-        """Declare the passes that diffuse the light of outputs.
+        """Declare the passes that diffuse the subsurface light for outputs.
 
         Returns texture views of the diffused light, and of the fraction of this light that leaves towards the
         camera.
@@ -118,7 +118,7 @@ def make_subsurface_layers(
 ) -> SubsurfaceLayers:
     """Create the textures of `SubsurfaceLayers` for a picture of size (width, height), without a kernel.
 
-    with_result : whether a texture for the finished picture is needed
+    with_result : whether to create the texture for the picture with diffused light
     """
     layers = make_texture(device, picture_size, "rgba32float", layer_count=2)
     subsurface, transmittance = (make_view(layers, layer=k) for k in range(2))
@@ -136,7 +136,7 @@ def make_kernel(device: Device, profile: GaussianSum) -> Kernel:
 def draw(
     graph: Recorder, layers: SubsurfaceLayers, kernel: Kernel, window: Window, surface_light: Texture
 ) -> Texture:
-    """Declare the passes that diffuse the light of `layers`, and return the finished picture.
+    """Declare the passes that diffuse the light of `layers`, and return the picture with this light.
 
     window : rectangle of the image plane that the picture shows
     surface_light : shaded picture without the subsurface light
@@ -190,7 +190,10 @@ def kernel_table(kernel: SeparableKernel) -> tuple[NDArray[np.float64], float]:
 
 
 def _kernel_reach_mm(kernel: SeparableKernel) -> float:
-    """Return the distance beyond which at most 0.05 % of a channel's light lies on either side [mm]."""
+    """Return the distance from the kernel's centre to where at most 0.05 % of the light lies beyond [mm].
+
+    The limit holds for each channel and each side.
+    """
     distance = np.geomspace(_MIN_KERNEL_REACH_MM, _MAX_KERNEL_REACH_MM, 4096)
     beyond = (0.5 - kernel.half_line_integral(distance)).max(axis=1) > _MAX_TAIL_FRACTION
     return float(distance[min(int(beyond.sum()), len(distance) - 1)])

@@ -63,7 +63,7 @@ class Technique(TechniqueTraits):
     def add_intermediate_levels(
         self, split: ProfileSplit, atlas: AtlasTextures, edge: str
     ) -> tuple[ProfileSplit, tuple[int, ...]]:
-        """Insert Gaussians of weight 0 that make blurs cheaper; return the new split and the inserted levels.
+        """Insert Gaussians of weight 0 that make blurs cheaper; return the new split and their level indices.
 
         In this base class, no Gaussians are inserted.
 
@@ -87,7 +87,7 @@ class Technique(TechniqueTraits):
     def make_subsurface_layers(
         self, memo: Memo, device: Device, settings: Settings
     ) -> TechniqueResources | None:
-        """Return textures in which subsurface light is diffused for outputs, None if none are needed."""
+        """Return textures for diffusing subsurface light for output images, None if none are needed."""
         return None
 
     def write_view_record(
@@ -126,7 +126,9 @@ class Technique(TechniqueTraits):
         raise NotImplementedError
 
     def sum_translucency(self, graph: Graph, inputs: FrameInputs, into: tuple[Texture, ...]) -> Texture:
-        """Sum only the light through thin parts, for outputs; return the texture that combines all layouts.
+        """Fill textures with only the light through thin parts; return the texture that combines all layouts.
+
+        Outputs that separate this light from the rest of the picture need these textures.
 
         into : textures of the atlas, one for each layout and, if there are several layouts, one for their
             blend
@@ -180,7 +182,7 @@ class AtlasTechnique(Technique):
         return choose_halvings(split.blurred_mm2, atlas.median_texels_per_mm, max_halvings)
 
     def scatter(self, graph: Graph, inputs: FrameInputs) -> Texture:
-        """Declare the passes that compute, blur and sum the light of each layout and blend two layouts."""
+        """Declare the passes that light, blur and sum each atlas layout, and blend two layouts."""
         resources = inputs.resources
         levels, layouts, mixture = resources.diffusion.levels, inputs.layouts, resources.diffusion.mixture
         if not inputs.blurs:
@@ -244,9 +246,8 @@ class AtlasTechnique(Technique):
     ) -> None:
         """Declare the passes that add the other profiles of a mixture to the exitance of the first profile.
 
-        Light transport is reciprocal: the fraction of light from y that leaves at x equals the fraction from
-        x that leaves at y. Therefore each Gaussian has the weight (w(x) + w(y)) / 2, where w is the blend
-        weight, x the exit point and y the entry point.
+        Each profile is weighted by the mean of its blend weights at the points where light enters and leaves,
+        so that light transport is reciprocal.
 
         layout : index of the atlas layout
         into : texture for the exitance
@@ -260,7 +261,7 @@ class AtlasTechnique(Technique):
         mix.draw(graph, mixture, layout, into)
 
     def sum_translucency(self, graph: Graph, inputs: FrameInputs, into: tuple[Texture, ...]) -> Texture:
-        """Sum the light through thin parts alone, with weights of 0 for the blurred levels."""
+        """Fill textures with only the light through thin parts; the blurred levels get weights of 0."""
         layouts, levels = inputs.layouts, inputs.resources.diffusion.levels
         for layout, blur, texture in zip(layouts, inputs.blurs, into, strict=False):
             unblurred, thin = replace(blur, weight=np.zeros_like(blur.weight)), layout.translucency

@@ -231,8 +231,8 @@ class AtlasMip:
 def halve_mip(atlas_mip: AtlasMip) -> AtlasMip:
     """Return the masks and gutters of an atlas at half its resolution.
 
-    A gutter texel next to a chart becomes the average of finer texels; a gutter texel farther away still
-    copies light from across the seam.
+    Gutter texels next to a chart are computed like the texels of the chart, as averages of finer texels. All
+    other gutter texels still copy light from across the seam.
     """
     from scipy.ndimage import binary_dilation
 
@@ -277,7 +277,14 @@ def _halved_reach(reach: NDArray[np.uint16], measured_texels: NDArray[np.bool_])
 def _halved_gutter(
     mip: AtlasMip, stitched_squares: NDArray[np.bool_]
 ) -> tuple[NDArray[np.uint16], NDArray[np.float32]]:
-    """Return the coordinates (x, y) of stitched 2 x 2 squares, and the mean source of each square."""
+    """Return the gutter texels of the halved atlas, and the positions from which they copy light.
+
+    Both results have the shape (b, 2) and are in texels of the halved atlas, as in `AtlasMip`. A position is
+    the mean over the finer gutter texels that become one coarser texel, without outliers.
+
+    mip : atlas at the finer resolution
+    stitched_squares : mask of the coarser texels that copy light from across a seam
+    """
     x, y = (mip.gutter.astype(np.int64) // 2).T
     used = stitched_squares[y, x]
     source = mip.source[used].astype(np.float64)

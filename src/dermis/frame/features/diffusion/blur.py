@@ -61,7 +61,7 @@ def _halve(
 
     finer_level : view of the level at the finer resolution
     level_index : index of the level
-    halvings : number of times that the resolution of the copy is halved from full resolution
+    halvings : number of halvings from full resolution to the resolution of the copy
     """
     halved = levels.layer(level_index, halvings)
     shader = program(graph.device, "diffusion/diffuse_halve.wgsl", (), levels.texel, levels.texel)
@@ -102,7 +102,7 @@ def _kernel_texture(device: Device) -> Texture:
 def _spread_members(
     variance_mm2: NDArray[np.float64], halvings: tuple[int, ...]
 ) -> Iterator[dict[str, float]]:
-    """Yield, for each blurred level, the members of the shader struct `Spread`, which are variances."""
+    """Yield the members of the shader struct `Spread` for each blurred level: variances of its blurs."""
     source_mm2 = previous_resampling = previous_mm2 = 0.0
     for variance, (source_halvings, level_halvings) in zip(variance_mm2, pairwise(halvings), strict=True):
         halved = level_halvings > source_halvings

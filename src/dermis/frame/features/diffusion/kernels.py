@@ -88,7 +88,7 @@ def add_intermediate_levels(
     max_halvings : largest number of times that the resolution may be halved
 
     An intermediate level is blurred just enough for `choose_halvings` to halve the resolution of the next
-    level, and its standard deviation is at least one texel of its resolution. Level 0 is the unblurred light.
+    level. Level 0 is the unblurred light.
     """
     profile_mm2 = tuple(float(v) for v in variance_mm2)
     return _add_intermediate_levels(profile_mm2, float(texels_per_mm), max_halvings)

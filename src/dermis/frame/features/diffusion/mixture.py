@@ -31,9 +31,9 @@ class Mixture:
     entering : for each profile but the first, a blur pyramid of the entering light times the profile's blend
         weight
     atlas_weights : for each layout, a texture over the atlas of the same blend weights
-    sums : texture array of exitance. Layer 0 holds the exitance if all light scatters by the first profile.
-        For each other profile, two layers hold the exitance by that profile minus the exitance by the first:
-            one layer for all light, one layer for the light in the profile's pyramid in `entering`
+    sums : texture array. Layer 0 holds the exitance of skin that has the first profile everywhere. Two more
+        layers for each other profile hold the change of exitance when the first profile is replaced by that
+        profile: one layer for all entering light, one layer for the weighted light in `entering`
     """
 
     uv_weights: Texture

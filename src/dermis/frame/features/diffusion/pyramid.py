@@ -29,9 +29,9 @@ class PyramidLevels:
     """Textures of the blur pyramid: unblurred light as level 0, the blurred levels, and scratch space.
 
     stacks : one texture array for each resolution, finest first, with a layer for each level of that
-        resolution; at coarser resolutions, layer 0 is a reduced copy of the last level of the next finer
-        resolution
-    first : for each stack, the index of the level in layer 0
+        resolution. All arrays but the first begin with a copy, at half the resolution, of the last level of
+        the array before
+    first : index of the level in layer 0 of each array in `stacks`
     scratch : texture for light that is blurred along u but not yet along v
     size : side of the atlas at full resolution [texels]
     texel : texture format
@@ -45,7 +45,7 @@ class PyramidLevels:
     _views: dict[tuple[int, int], TextureView] = field(default_factory=dict)
 
     def layer(self, level_index: int, halvings: int = 0) -> TextureView:
-        """Return a view of a level in the stack whose resolution is halved `halvings` times."""
+        """Return a view of a level in the texture array whose resolution is halved `halvings` times."""
         if (level_index, halvings) not in self._views:
             layer = level_index - self.first[halvings]
             self._views[level_index, halvings] = make_view(self.stacks[halvings], layer=layer)
@@ -119,10 +119,12 @@ def make_levels(device: Device, atlas_side: int, halvings: Halvings, texel_forma
 
 
 def levels_by_resolution(halvings: Halvings) -> tuple[range, ...]:
-    """Return the range of levels that each resolution stores, finest first.
+    """Return the range of level indices that each resolution stores, finest resolution first.
 
-    At a coarser resolution, the range begins with the last finer level, of which a reduced copy is stored.
-    Each range covers the levels of all layouts.
+    A range covers the levels of all layouts. At all resolutions but the finest, it begins with the last
+    level of the next finer resolution, of which a copy at half the resolution is stored.
+
+    halvings : for each layout, the number of times that the resolution of each level is halved
     """
     coarsest = max(map(max, halvings))
     return tuple(
@@ -138,7 +140,7 @@ def half_precision_scale(texel_format: str, irradiance_sum: float) -> float:
     """Return the factor that brings irradiance into the range of half floats; 1 for 32-bit floats.
 
     texel_format : texture format of the levels
-    irradiance_sum : sum of the irradiances of all lights; skin close to a light receives more than this sum
+    irradiance_sum : sum of the irradiances of all lights and of the environment
 
     The factor is a power of two, so that scaling is exact.
     """
@@ -156,10 +158,9 @@ def choose_halvings(
     texels_per_mm : texel density of the atlas at full resolution
     max_halvings : largest number of times that the resolution of any level may be halved
 
-    Each level is computed by blurring the previous level, whose standard deviation [mm] must be at least
-    `MIN_SMOOTHNESS` times the squared side of a texel [mm^2]. A texel side twice as large thus needs four
-    times the blur. Where texels are sparse, the error then stays the same fraction of the image
-    (docs/performance.md lists the errors).
+    A level is computed by blurring the level before it. Its resolution is halved once more if the level
+    before it is smooth enough to be sampled at half the resolution, as set by `MIN_SMOOTHNESS`.
+    docs/performance.md lists the errors.
     """
     halvings = [0]
     for source_mm2 in (0.0, *variance_mm2[:-1]):

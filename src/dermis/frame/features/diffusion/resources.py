@@ -26,7 +26,7 @@ class BlurScheme(Protocol):
     def add_intermediate_levels(
         self, split: ProfileSplit, atlas: AtlasTextures, edge: str
     ) -> tuple[ProfileSplit, tuple[int, ...]]:
-        """Insert Gaussians of weight 0 that make blurs cheaper; return the new split and the inserted levels.
+        """Insert Gaussians of weight 0 that make blurs cheaper; return the new split and their level indices.
 
         edge : filter mode at the edges of charts
         """

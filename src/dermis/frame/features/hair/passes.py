@@ -185,9 +185,8 @@ def rows_per_invocation(device: Device, segments: int) -> int:
 
     segments : estimate of the largest number of segments in a tile
 
-    On software adapters, pixels without hair are only cheap if they are skipped in a loop over several
-    pixels. Software adapters also end the loops of a shader after 65,535 iterations in total, which limits
-    the number of pixels. Powers of two limit the number of shader variants.
+    The result is 1 on GPUs. Software adapters skip pixels without hair faster in a loop over several pixels,
+    but they end a shader's loops after 65,535 iterations in total, which limits the number of pixels.
     """
     if device.adapter.kind != "CPU":
         return 1

@@ -54,10 +54,10 @@ _HAIRS_DTYPE = np.dtype([*((name, "u4") for name in _COUNT_MEMBERS), ("width_sca
 
 
 class Detail(NamedTuple):
-    """Level of detail of coarse strands on one kind of adapter.
+    """Level of detail of coarse strands (scalp hair and beard) on one kind of adapter.
 
     drawn_knots : largest total number of knots of the drawn strands
-    casters : largest number of strands that cast shadows, in place of all strands
+    casters : largest number of strands that are drawn into shadow maps to represent all strands
     caster_knots : largest number of knots of each of these strands
     width_px : least width of drawn strands [pixel]
     segment_px : least length of the segments of drawn strands [pixel]
@@ -130,7 +130,10 @@ def strand_counts(strands: Strands | None) -> StrandCounts:
 
 
 def coarse_counts(device: Device, head: Head) -> StrandCounts:
-    """Return the largest number of coarse strands to draw, and the largest number of knots of each."""
+    """Return how many coarse strands to draw at most, and how many knots each may have.
+
+    Coarse strands are scalp hair and beard. The limits depend on the device.
+    """
     if head.hair is None:
         return StrandCounts(0, 2)
     fitting = device.max_storage_bytes // _PROJECTED_KNOT_BYTES - _KNOT_CAPACITY_STEP
@@ -139,7 +142,10 @@ def coarse_counts(device: Device, head: Head) -> StrandCounts:
 
 
 def caster_counts(device: Device, coarse: StrandCounts) -> StrandCounts:
-    """Return the number of coarse strands that cast shadows in place of all, and of the knots of each."""
+    """Return how many strands represent all coarse strands in shadow maps, and how many knots each has.
+
+    coarse : result of `coarse_counts`
+    """
     detail = adapter_detail(device)
     return StrandCounts(min(coarse.hairs, detail.casters), min(coarse.knots, detail.caster_knots))
 
@@ -237,7 +243,7 @@ class StrandTables:
     buffers : buffers that each frame fills
     fine : number of fine strands, and of the knots of each
     coarse : largest number of coarse strands to draw, and largest number of knots of each
-    casters : number of coarse strands that cast shadows in place of all, and of the knots of each
+    casters : number of strands that represent all coarse strands in shadow maps, and of the knots of each
     detail : level of detail of the coarse strands
     groom : tables from which coarse strands grow, None if there are no coarse strands
     possible : total number of coarse strands of the person
@@ -329,7 +335,7 @@ def make_strand_tables(
     buffers : buffers that each frame fills
     groom : tables from which coarse strands grow, None if there are no coarse strands
 
-    Raises DermisError for strands that are rooted in another mesh.
+    Raises DermisError for strands whose roots do not lie on the head's mesh.
     """
     fine, hair = head.strands, head.hair
     rows, knots = np.zeros(1, _STRAND_DTYPE), np.zeros((1, 4), np.float32)
@@ -413,7 +419,7 @@ def mean_skin_albedo(head: Head) -> tuple[float, ...]:
 def make(memo: Memo, device: Device, request: FrameRequest) -> Resources | None:
     """Return the resources for the hair of the requested head, None if no strands are drawn.
 
-    Raises DermisError for strands that are rooted in another mesh.
+    Raises DermisError for strands whose roots do not lie on the head's mesh.
     """
     head, cached, layers = request.head, memo.get, request.shadow_layers
     if not has_strands(head, request.settings):

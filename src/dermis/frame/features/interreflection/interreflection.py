@@ -33,9 +33,10 @@ class InterreflectionBuffers:
 
     sample_points : buffer of the surface points at which patches are lit, and the number of points
     patch_links : dictionary from names in shaders to buffers of the form factors between patches
-    cell_links : dictionary from names in shaders to buffers of the form factors from atlas cells to patches
-    stores_means : whether a cell stores the mean exitance of the patches that it sees, instead of the sum of
-        exitance times form factor
+    cell_links : dictionary from names in shaders to buffers of the form factors from cells (squares of a
+        coarse grid over the atlas) to patches
+    stores_means : whether a cell stores the mean exitance of the patches that it sees, instead of the
+        irradiance from these patches
     sample_exitance : buffer of the exitance of the sample points
     direct_exitance : buffer of the exitance of the patches by direct light
     uniform_exitance : buffer of the exitance of the patches under a uniform irradiance of 1
@@ -64,7 +65,7 @@ class InterreflectionBuffers:
 
 
 class Interreflection(NamedTuple):
-    """Buffers of interreflection, and the (3,) albedo of the profile, which is the sum of its weights [-]."""
+    """Buffers of interreflection, and the (3,) albedo of the skin's diffusion profile [-]."""
 
     buffers: InterreflectionBuffers
     albedo: NDArray[np.float64]
@@ -82,9 +83,9 @@ def make_interreflection(
 ) -> Interreflection | None:
     """Return the interreflection of a head, None for a head where no skin sees other skin.
 
-    profile_albedo : (3,) albedo of the profile
+    profile_albedo : (3,) albedo of the skin's diffusion profile [-]
     has_occlusion : whether there is a map of the visible fraction of the sky
-    light_key : cache key of the light, for callers that draw several scenes in turn
+    light_key : cache key of the scene's light; callers that draw several scenes in turn use different keys
     layout_key : name of the atlas layout in the cache
     """
     form_factors = memo.get(_form_factors, head, atlas, caller_name=layout_key)
@@ -176,7 +177,7 @@ def draw(graph: Recorder, bindings: Bindings, interreflection: Interreflection, 
 
 
 def _draw_bounces(graph: Recorder, buffers: InterreflectionBuffers) -> None:
-    """Declare the passes in which light bounces between patches and then reaches the atlas cells."""
+    """Declare the passes in which light bounces between patches of skin and then reaches the atlas."""
     device = graph.device
     team = (
         1 if device.adapter.kind == "CPU" else _INVOCATIONS_PER_PATCH

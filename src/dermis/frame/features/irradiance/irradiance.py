@@ -26,9 +26,9 @@ def fine_light_members(
 ) -> dict[str, float | NDArray[np.floating]]:
     """Return the members of the shader struct `Fine`, which corrects light that varies within a texel.
 
-    variance_mm2 : (k,) variances of the Gaussians that blur [mm2]
+    variance_mm2 : (k,) variances of the Gaussians that blur [mm^2]
     weight : (k, 3) weights of the Gaussians that blur [-]
-    relit_mm2 : variance of the relit Gaussian, whose light is evaluated per pixel instead of blurred [mm2]
+    relit_mm2 : variance of the relit Gaussian, whose light is evaluated per pixel instead of blurred [mm^2]
     """
     count = min(len(variance_mm2), MAX_FINE_GAUSSIANS)
     level = np.zeros((MAX_FINE_GAUSSIANS, 4), np.float32)

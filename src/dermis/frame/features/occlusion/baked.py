@@ -62,7 +62,7 @@ def bake_occlusion(
     `result_side` rows of the result are the texels of the atlas, NaN where there is no surface; the other
     rows hold the vertices of the mesh.
 
-    bindings : resources of the lighting, in which geometry and lights are replaced
+    bindings : resources that lighting shaders read; the geometry and the lights among them are not used
     surface_texels : texture of the surface point of each atlas texel
     result_side : side of the atlas in the result [texels]
     direction_count : number of depth maps
@@ -138,7 +138,7 @@ def cached_occlusion_map(
     """Return a texture of the visible fraction of the sky at texels and vertices, baked or read from disk.
 
     hair : hair of the head, which hides a part of the sky from the skin below it
-    bindings : resources of the lighting, in which geometry and lights are replaced
+    bindings : resources that lighting shaders read; the geometry and the lights among them are not used
     surface_texels : texture of the surface point of each atlas texel
     """
     side = min(atlas.size, _MAX_OCCLUSION_MAP_SIDE)
@@ -159,10 +159,11 @@ def cached_occlusion_map(
 def _hair_transmittance(
     mesh: Mesh, hair: Groom, packed_texels: NDArray[np.uint32], result_side: int
 ) -> NDArray[np.float32]:
-    """Return the fraction of the sky's light that passes through the hair, in the layout of `fill_gaps` [-].
+    """Return the fraction of the sky's light that passes through the hair to each point of the skin [-].
 
     Scalp hair and beard are modelled as a plane layer over the roots, which absorbs some of the diffuse
-    light; light that is not absorbed is scattered and reaches the skin.
+    light; light that is not absorbed is scattered and reaches the skin. The result has the shape and the
+    order of the result of `fill_gaps`.
 
     packed_texels : (s, s, 2) words of the atlas texels: triangle index plus 1, and packed barycentric weights
     result_side : side of the atlas in the result [texels]

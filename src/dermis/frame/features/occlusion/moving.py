@@ -99,7 +99,7 @@ def _view_axes() -> Floats:
 
 
 def make_anchors(head: Head) -> RotationAnchors:
-    """Return the anchors of a head, weighted by a Gaussian around its centre (shoulders count little)."""
+    """Return the anchors of a head; a Gaussian around the head's centre makes shoulders count little."""
     rig = head.control
     points = np.unique(np.linspace(0, len(rig.positions_mm) - 1, _MAX_ANCHOR_COUNT).astype(np.intp))
     positions = rig.positions_mm[points].astype(np.float64)

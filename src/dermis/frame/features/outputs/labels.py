@@ -24,7 +24,8 @@ class LabelBuffers:
     """Buffers that label.wgsl and strand_labels.wgsl read and write.
 
     tables : dictionary from names in label.wgsl to label tables of the mesh
-    field_count : number of distance fields; their zero lines are borders of classes within triangles
+    field_count : number of distance fields. A field is a signed distance at each vertex, which is 0 on the
+        border of a class that crosses triangles
     hair_classes : buffer of the class of each strand, None if the head has no hair
     hair_labels : buffer of the class of the hair in each pixel, written by the hair pass
     """
@@ -79,7 +80,7 @@ def draw_labels(graph: Recorder, planes: Planes, buffers: LabelBuffers, inputs: 
 
 
 def _upload_tables(device: Device, labels: MeshLabels) -> MutableBindings:
-    """Upload the label tables of a mesh, and for each class of dermis its number in FaceSynthetics."""
+    """Upload the label tables of a mesh, and the number of each label class in FaceSynthetics."""
     face_synthetics = [one.face_synthetics for one in label_classes()]
     arrays = {
         "label_base": labels.base.astype(np.uint32),

@@ -83,7 +83,7 @@ def make_light_outputs(
 
 
 def draw_light(graph: Recorder, planes: Planes, resources: LightOutputs, inputs: StageInputs) -> None:
-    """Declare the passes that shade pixel centres for outputs of light.
+    """Declare the passes that shade the surface at pixel centres for outputs such as radiance and albedo.
 
     Screen-space techniques also diffuse the subsurface light over the picture.
     """
@@ -163,7 +163,10 @@ def _shading_bindings(shader: ComputeProgram, inputs: StageInputs) -> MutableBin
 def _translucent_pairs(
     request: FrameRequest, translucency: Sequence[Translucency | None]
 ) -> PairBuffers | None:
-    """Return the translucent pairs of the first layout, None if no requested output depends on pairs."""
+    """Return the pairs of cells between which light crosses thin parts, None if no output needs them.
+
+    Raises DermisError if an output needs pairs, but no light crosses thin parts.
+    """
     culprit = next((name for name in request.outputs if name in _TRANSLUCENCY_OUTPUTS), None)
     if culprit is None:
         return None

@@ -62,7 +62,7 @@ class StageInputs:
     visibility : texture of the triangle at each sample of the picture
     centres : texture of the triangle at each pixel centre; equals `visibility` if this is the only sample
     shape : current shape of the head
-    picture : textures of the finished picture
+    picture : textures of the picture
     has_hair : whether hair is drawn
     previous : pose and camera of the previous scene, None if no motion vectors are requested
     translucency : resources of light through thin parts for the first layout, None if no light crosses them

@@ -13,7 +13,12 @@ _OMITTED_HALVING_COUNT = 4  # omitted halvings: the widest Gaussian spans a sixt
 
 @dataclass(frozen=True, eq=False)
 class BloomTextures:
-    """Textures of the bloom: repeatedly halved pictures, their sums from coarse to fine, and the result."""
+    """Textures of the bloom.
+
+    halved : picture at a half, a quarter, ... of its resolution
+    sums : for each of these resolutions but the coarsest, the sum of this and all coarser pictures
+    result : picture with bloom
+    """
 
     halved: list[Texture]
     sums: list[Texture]

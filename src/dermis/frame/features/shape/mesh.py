@@ -59,7 +59,7 @@ def upload_geometry(
 ) -> HeadGeometry:
     """Upload the triangles of a head with their atlas coordinates, and add the vertices of its shape.
 
-    part_maps : maps of the parts that are not skin, whose opacity may cut holes into a part; if None, parts
+    part_maps : maps of the parts that are not skin. The opacity map may cut holes into a part. If None, parts
         with holes are left out
     """
     table, cut_out = _triangle_table(mesh, atlas), mesh.cut_out
@@ -122,7 +122,8 @@ def rest_geometry(
     """Return the triangles of an atlas layout with the vertices of the head at rest.
 
     geometry : triangles of the layout, with the vertices of the posed head
-    rest_positions_mm : (p, 3) control points of another person at rest [mm], None for the head itself
+    rest_positions_mm : (p, 3) control points at rest of a person who shares the mesh of `head` [mm]; None for
+        the control points of `head`
     layout_index : index of the atlas layout
     """
     positions, owner = rest_positions_mm, "person"

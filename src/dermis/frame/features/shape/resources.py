@@ -16,8 +16,8 @@ class Resources:
 
     shape : buffers of the posed shape
     tables : buffers that are constant for a mesh
-    rest_shape : buffers of the person at rest, None if the person's control points equal the control points
-        of the topology (the head without hair and maps)
+    rest_shape : buffers of the person at rest, None if the person's control points at rest are those of the
+        mesh, which several people may share
     curvature : buffers of the surface's curvature, None unless the technique reads it
     """
 

@@ -152,7 +152,7 @@ def _vertex_resources(device: Device, vertex_count: int) -> dict[str, Texture | 
 
 
 def _morph_tables(rig: Rig) -> dict[str, NDArray[np.generic]]:
-    """Return the tables of shape_pose.wgsl: displacements, bone weights and contacts of each point."""
+    """Return the tables of shape_pose.wgsl: each point's displacements, bone weights and eyeball contact."""
     count = len(rig.positions_mm)
     return {
         "first": _run_offsets(rig.targets.point, count),
@@ -165,7 +165,9 @@ def _morph_tables(rig: Rig) -> dict[str, NDArray[np.generic]]:
 def displacements(targets: MorphTargets, template_targets: MorphTargets) -> NDArray[np.float32]:
     """Return (n, 4) displacements [mm] with morph target indices, ordered by point, for shape_pose.wgsl.
 
-    template_targets : morph targets of the template, which displace the same points and define the order
+    targets : morph targets of a person
+    template_targets : morph targets of the person's template, which displace the same points in the same
+        order
     """
     target_index = np.repeat(np.arange(len(targets.names), dtype=np.uint32), np.diff(targets.first))
     order = template_targets.point_order
@@ -253,9 +255,12 @@ def normals_in_vertex_frames(mesh: Mesh) -> Doubles:
 
 
 def _run_offsets(sorted_index: NDArray[np.integer], run_count: int) -> Words:
-    """Return the start of each run of 0, 1, ... in a sorted array, then the length of the array.
+    """Return where the values 0, 1, ... start in a sorted array, then the length of the array.
 
-    The shape of the result is (run_count + 1,)."""
+    The shape of the result is (run_count + 1,).
+
+    sorted_index : sorted integers from 0 to run_count - 1
+    """
     return np.concatenate([[0], np.cumsum(np.bincount(sorted_index, minlength=run_count))]).astype(np.uint32)
 
 

@@ -110,9 +110,9 @@ def mean_half_space(skin: Skin, maps: Maps, profile: GaussianSum) -> tuple[Float
 
 
 def _direction_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, ArrayLike]:
-    """Return the members for direction.wgsl: reflectance and transmittance for each light direction.
+    """Return the members of the struct `Skin` for direction.wgsl: how skin responds to each light direction.
 
-    Both are computed for a half-space with the mean colour of the skin.
+    Reflectance and transmittance are computed for a half-space with the mean colour of the skin.
     """
     half_space = mean_half_space(skin, maps, profile)
     response = anisotropic_response(*half_space, skin.anisotropy)
@@ -134,8 +134,7 @@ def _direction_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str
 def _relief_band(maps: Maps) -> float:
     """Return the mip level at which the height map is as large as the normal map, -1 if there is none.
 
-    Only relief finer than that level is taken from the height map and added to the normal map; otherwise all
-    relief of the height map is added.
+    From the height map, only relief finer than this level is added to the normal map; for -1, all of it.
     """
     if maps.normal is None or maps.height is None:
         return _NO_RELIEF_LEVEL

@@ -1,4 +1,4 @@
-"""Creation of the resources of translucency: pairs, and tables of the light that thin parts transmit."""
+"""Creation of the resources of translucency, the light that crosses thin parts between cells of the skin."""
 
 from __future__ import annotations
 
@@ -66,13 +66,13 @@ def _level_tables(
     variance_mm2: Floats,
     weight: Floats,
 ) -> ThinParts:
-    """Return the transmittance of thin parts as a function of thickness, as weights of the blurred levels.
+    """Return the transmittance of thin parts for each thickness: one weight for each blurred level.
 
     The weights are scaled so that no level loses more light than it has.
 
-    colour : (3,) diffuse reflectance of the half-space [-]
-    eta : index of refraction of the half-space [-]
-    g : anisotropy [-]
+    colour : (3,) diffuse reflectance of thick skin [-]
+    eta : index of refraction of skin [-]
+    g : anisotropy of scattering [-]
     total_weight : (3,) sums of the weights of all Gaussians of the profile [-]
     variance_mm2 : (k,) variances of the blurred levels [mm^2]
     weight : (k, 3) weights of the blurred levels [-]
@@ -99,6 +99,8 @@ def make_translucency(
 ) -> Translucency:
     """Return the resources for light that is transmitted through thin parts of a head.
 
+    A pair is a cell of the atlas where light enters a thin part, and a cell where this light leaves.
+
     surface : resources of geometry.wgsl and of the atlas, for the current shape
     rest_surface : resources of geometry.wgsl and of the atlas, for the shape in which pairs are searched
     variance_mm2 : (k,) variances of the blurred levels [mm^2]
@@ -120,14 +122,17 @@ def make_translucency(
 
 
 def _cell_divisions(atlas: Atlas) -> Callable[[float], Cells]:
-    """Return a function that divides an atlas into cells for the width of the widest Gaussian [mm].
+    """Return a cached function that divides the atlas into cells.
 
-    The function caches its last few results."""
+    The parameter of the returned function is the standard deviation of the widest Gaussian [mm].
+    """
     return lru_cache(_CACHED_PAIR_SEARCHES)(partial(divide_into_cells, atlas))
 
 
 class PairCache:
     """Cache of the translucent pairs of a surface, for the last few divisions of its atlas into cells.
+
+    A pair is a cell of the atlas where light enters a thin part, and a cell where this light leaves.
 
     surface : resources of geometry.wgsl and of the atlas, for the shape in which pairs are searched
     """
@@ -148,7 +153,9 @@ class PairCache:
 
 
 def rounded_width(widest_sigma_mm: float) -> float:
-    """Round a width to the nearest power of sqrt(2) [mm], so that skins with similar profiles share pairs.
+    """Round a standard deviation to the nearest power of sqrt(2) [mm].
+
+    Cells of the atlas depend only on the rounded width, so that skins with similar profiles share them.
 
     widest_sigma_mm : standard deviation of the widest Gaussian [mm]
     """
@@ -208,7 +215,7 @@ def with_profile(
     weight: Floats,
     thickness_tables: ThinParts | None = None,
 ) -> Translucency:
-    """Return a copy of the translucency resources with the weights of a profile.
+    """Return a copy of the translucency resources with the weights of a diffusion profile.
 
     variance_mm2 : (k,) variances of the blurred levels [mm^2]
     weight : (k, 3) weights of the blurred levels [-]

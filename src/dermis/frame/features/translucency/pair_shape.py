@@ -1,4 +1,4 @@
-"""Choice of the shape in which translucent pairs are searched: the head at rest, or another shape."""
+"""Choice of the shape in which translucent pairs are searched: the head at rest or a deformed head."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _STRAIN_QUANTILE = 0.9  # quantile of the changes of length; it ignores the few 
 
 
 class StrainGauge:
-    """Short distances on a head at rest, with which the distances in other shapes are compared."""
+    """Short distances on a head at rest, from which the strain of the deformed head is measured."""
 
     def __init__(self, head: Head) -> None:
         from scipy.spatial import cKDTree
@@ -32,7 +32,7 @@ class StrainGauge:
     def strain(self, positions_mm: Floats) -> float:
         """Return the strain of a shape: the relative change that nine in ten distances do not exceed [-].
 
-        positions_mm : (p, 3) control points of another shape [mm]
+        positions_mm : (p, 3) control points of the shape [mm]
         """
         lengths = self._lengths(positions_mm, self._pairs)
         return float(np.quantile(np.abs(lengths / self._rest_lengths - 1.0), _STRAIN_QUANTILE))
@@ -46,9 +46,8 @@ class StrainGauge:
 def pair_positions_mm(memo: Memo, request: FrameRequest) -> Floats | None:
     """Return the control points of the shape in which pairs are searched [mm], None for the head at rest.
 
-    Pairs found for the head at rest are reused for other shapes of the same topology, such as the frames of a
-    mesh sequence; only the weights of the pairs are computed again. A new search is made for a shape whose
-    strain exceeds `MAX_SHARED_PAIR_STRAIN`. People of one template always share the pairs of the template.
+    A pair is two cells of the skin between which light crosses a thin part. The pairs of the head at rest are
+    used for all shapes with a strain up to `MAX_SHARED_PAIR_STRAIN`, and for all people of one template.
     """
     positions = request.rest_positions_mm
     if positions is None or request.is_shared:

@@ -103,9 +103,10 @@ def draw(
 def draw_direction_factors(
     graph: Recorder, layout: LitAtlas, thin_parts: Translucency, constants: Constants
 ) -> None:
-    """Declare the pass that computes how directions of light change the transmission of each source.
+    """Declare the pass that computes how the directions of incident light change the transmission.
 
-    The resulting factors apply to deep slabs.
+    The result is one factor for each source, which applies in full where the thin part is thick enough for
+    light to scatter many times.
 
     constants : pipeline constants of the lights
     """
@@ -174,9 +175,9 @@ def draw_weights(graph: Recorder, thin_parts: Translucency) -> None:
 
 
 def choose_source_level(source_spacing_mm: float, variance_mm2: Floats) -> int:
-    """Return the index of the narrowest blurred level that is smooth enough to sample at the sources.
+    """Return the index of the narrowest blurred level that is smooth enough to be sampled once per source.
 
-    source_spacing_mm : distance between sources [mm]
+    source_spacing_mm : distance between neighbouring sources, the cells where light enters [mm]
     variance_mm2 : (k,) variances of the blurred levels [mm^2]
     """
     smooth = np.flatnonzero(variance_mm2 >= (_MIN_SOURCE_SMOOTHNESS * source_spacing_mm) ** 2)
@@ -219,7 +220,7 @@ def _transmittance_table(
 ) -> NDArray[np.float32]:
     """Return the transmittance for each thickness and each of k Gaussians, (THICKNESS_ROWS k, 4).
 
-    The fourth channel holds the directionality for the first Gaussian of each thickness, else 0. Without
+    The fourth channel holds `ThinParts.directionality` in the first row of each thickness, else 0. Without
     `thickness_tables`, the result is one row of zeros.
     """
     if thickness_tables is None or transmittance is None:

@@ -45,7 +45,7 @@ class Translucency:
     source_light : buffer of the light that enters at each source
     unit_light : buffer that holds light of 1 at all sources
     direction_factors : buffer of one factor per source: how the directions of its incident light change the
-        transmission through deep slabs
+        transmission, from `passes.draw_direction_factors`
     weight_bindings : resources of translucency_weights.wgsl for transmitted light
     loss_bindings : resources of translucency_weights.wgsl for light that thin tissue does not return
     gaussian_count : number of Gaussians that blur light

@@ -86,7 +86,7 @@ def _as_members(member_names: Sequence[str]) -> Callable[[], Sequence[ShaderList
 class PaintInputs(NamedTuple):
     """Inputs of the shader that paints skin.
 
-    paint : uniform record of the look: pigments, gloss, age, ...
+    paint : uniform record of the skin's appearance: pigments, gloss, age, ...
     tables : tables of the face: noises, dots, zones, folds and hairline
     colours : (3, n, n, 3) colour tables, linear Rec. 709 [-]: of skin with the lowest oxygen saturation, of
         skin with the highest oxygen saturation, and of lips
@@ -134,7 +134,7 @@ def _face_tables(recession: float, sites: SiteDifferences) -> bytes:
     """Return the tables of the face that spot.wgsl reads: noises, dots, zones, folds and the hairline.
 
     recession : recession of the hairline [-]
-    sites : differences of pigments between measured sites
+    sites : differences of pigments between the measured sites of the face
     """
     folds, edge = face.fold_curves(), face.hairline_heights(recession)
     ends = np.column_stack([folds.first[:-1], folds.first[1:] - 1]).astype(np.float32)

@@ -143,7 +143,7 @@ def _find_block_pairs(passes: SearchPasses, surface: Bindings, cells: Cells, til
 class CandidateCells:
     """Cells that may be in translucent pairs, ordered by their tiles.
 
-    receiver : (r,) cells that receive light, as indices into the list of such cells
+    receiver : (r,) cells that receive light, as indices into `Cells.receivers`
     source : (s,) cells that emit light, as indices into the coarse atlas
     first : (r,) index in `TilePairs.partners` where the partners of each receiver's tile start
     end : (r,) index where these partners end
@@ -160,7 +160,7 @@ class CandidateCells:
 
 
 def candidate_cells(cells: Cells, tile_pairs: TilePairs) -> CandidateCells:
-    """Return the cells of all tiles that are in a pair of tiles."""
+    """Return the cells of all tiles that `find_tile_pairs` paired with at least one tile."""
     tile = tile_pairs.tile
     receiver, receiver_tile = _expand_ranges(cells.receiver_first, tile)
     source, _ = _expand_ranges(cells.source_first, tile)
@@ -172,9 +172,7 @@ def candidate_cells(cells: Cells, tile_pairs: TilePairs) -> CandidateCells:
 
 
 def _expand_ranges(range_starts: Index, chosen_ranges: Index) -> tuple[Index, Index]:
-    """Return the integers in chosen ranges, and for each integer the position of its range.
-
-    The ranges keep their order. A position is an index into `chosen_ranges`.
+    """Return the integers in chosen ranges, and for each integer the index of its range in `chosen_ranges`.
 
     range_starts : start of each range; a range ends where the next range starts
     chosen_ranges : indices of the chosen ranges
@@ -208,8 +206,8 @@ def compute_positions(
 def upload_hit_ranges(passes: SearchPasses, candidates: CandidateCells) -> tuple[Bindings, int]:
     """Upload the ranges of sources that hits.wgsl tests for each receiver.
 
-    The second result is the number of words that hits.wgsl writes: one for each receiver and each tile to
-    test. A word has one bit for each source in the tile.
+    Also returns the number of words that hits.wgsl writes: one for each receiver and each tile that is
+    tested. A word has one bit for each source in the tile.
     """
     word = list_offsets(candidates.end - candidates.first)
     unused = np.zeros(len(candidates.receiver), np.int64)
@@ -222,7 +220,7 @@ def upload_hit_ranges(passes: SearchPasses, candidates: CandidateCells) -> tuple
 
 
 def draw_gutter_copies(passes: SearchPasses, cells: Cells, source_cells: Index, bindings: Bindings) -> Buffer:
-    """Return a buffer of the positions in gutters that show copies of sources, see gutter_copies.wgsl.
+    """Return a buffer of the gutter texels that hold copies of source cells, see gutter_copies.wgsl.
 
     source_cells : (n,) indices of cells that emit light
     bindings : further resources of gutter_copies.wgsl
@@ -244,7 +242,7 @@ def draw_gutter_copies(passes: SearchPasses, cells: Cells, source_cells: Index, 
 def upload_receivers(device: Device, cells: Cells, receiver_index: Index) -> tuple[Buffer, int]:
     """Upload the surface point and the cell of each receiver; return the buffer and its number of rows.
 
-    receiver_index : (n,) indices into the list of cells that receive light
+    receiver_index : (n,) indices into `Cells.receivers`, the cells that receive light
     """
     columns = (
         *cells.receiver_points[receiver_index].T,
@@ -268,9 +266,8 @@ def upload_sources(device: Device, cells: Cells, source_cells: Index) -> tuple[B
 class PairTable:
     """Translucent pairs as the search returns them, ordered by receiver.
 
-    receiver : (m,) receivers that are in a pair, as indices into the list of cells that receive light
-    first : (m + 1,) offsets into the list of pairs; receiver[i] has the pairs from first[i] up to first[i +
-        1]
+    receiver : (m,) cells that receive light from at least one source, as indices into `Cells.receivers`
+    first : (m + 1,) offsets into `pairs`; the pairs of receiver[i] end before those of receiver[i + 1] start
     source : (n,) cells that emit light in at least one pair
     pairs : buffer of three words for each pair: source, receiver, and the offset in the atlas between the two
     """
@@ -282,7 +279,7 @@ class PairTable:
 
 
 def search_pairs(device: Device, surface: Bindings, cells: Cells) -> PairTable | None:
-    """Return all pairs that transmit a relevant amount of light, None if they do not fit in a buffer.
+    """Return all pairs of cells between which enough light crosses thin parts, None if a buffer is too small.
 
     surface : resources of geometry.wgsl for the shape to search in, and of the atlas
     """
@@ -313,7 +310,7 @@ def _list_pairs(
     hit_bindings: Bindings,
     map_bindings: Bindings,
 ) -> PairTable:
-    """Convert the hit bits to a table of pairs, and drop the cells that are in no pair.
+    """Convert the bits that hits.wgsl wrote to a table of pairs, and drop the cells that are in no pair.
 
     pair_count : (r,) number of pairs of each receiver
     hit_bindings : resources that hits.wgsl and pairs.wgsl share
