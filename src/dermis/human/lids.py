@@ -82,9 +82,9 @@ class LidSide(NamedTuple):
     clearances_mm: Points
 
     def reindexed(self, point: Index) -> LidSide:
-        """Return a copy in which each point index is replaced by its position in an array of indices.
+        """Return a copy with indices into the array `point` instead of point indices.
 
-        point : sorted array of indices that contains all indices of the lids
+        point : sorted point indices, which include all points of the lids
         """
         names = "rings", "point", "contact"
         return self._replace(**{name: np.searchsorted(point, getattr(self, name)) for name in names})
@@ -140,7 +140,7 @@ def lid_contact(first_eye_point: int, eyeball_point_count: int, apex: int, back:
     """Return the lid points that slide over the eyeballs, with minimum distances from the eyeballs.
 
     first_eye_point : index of the first point of the left eyeball
-    eyeball_point_count : number of points of an eyeball; the points of the right eyeball come second
+    eyeball_point_count : number of points of an eyeball; the right eyeball's points follow the left eyeball's
     apex, back : indices of the front and rear poles within an eyeball's points
     """
     both = lid_sides()
@@ -155,10 +155,10 @@ def lid_contact(first_eye_point: int, eyeball_point_count: int, apex: int, back:
 
 
 def _lid_displacements(rings: Points, socket: EyeSocket, lid_is_closed: bool | Flags) -> Points:
-    """Return the displacements (..., r, 3) of lid points from MakeHuman's to the anatomical eyeball [mm].
+    """Return the displacements (..., r, 3) that move MakeHuman's lids onto an anatomical eyeball [mm].
 
-    Seen from the front, the points stay in place except near the outline of the eyeball. The edges of the
-    lids touch the eyeball, and the thickness of the lids is kept.
+    Seen from the front, only points near the outline of the eyeball move. The edges of the lids touch the
+    eyeball, and the lids keep their thickness.
     """
     published = (rings - socket.centre) / socket.size
     relative, is_closed = published.copy(), np.asarray(lid_is_closed)
@@ -189,7 +189,7 @@ def _close_upper_lid(rings: Points) -> None:
 
 
 def _compress_radius(axis_distance: Points) -> Points:
-    """Compress distances from the viewing axis near the outline of the eyeball, so lid points stay on it.
+    """Compress large distances of lid points from the viewing axis, so that the points stay on the eyeball.
 
     axis_distance : distances from the axis divided by the radius of the eyeball [-]
     """
@@ -271,8 +271,8 @@ class _LidTargets(NamedTuple):
     point : (n,) indices of the points around both eyes
     lid_sides : lid points of the left and of the right eye, as indices into `point`
     target_index : indices of the targets that move the lid points of the left and of the right eye
-    row : (m,) rows of `MorphTargets.delta_mm` that displace points around the eyes
-    target, point_index : (m,) index of the target of each row, and position of the displaced point in `point`
+    row : (m,) indices into `MorphTargets.delta_mm` of the displacements around the eyes
+    target, point_index : (m,) target of each of these displacements, and its point as an index into `point`
     """
 
     closed: Flags

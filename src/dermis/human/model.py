@@ -171,7 +171,7 @@ class Template:
     refinement: Refinement | None
 
     def refine_head(self, control_head: Head) -> Head:
-        """Return the subdivided head of a person; atlas and tables are taken from the template's head.
+        """Return the subdivided head of a person, which shares the uv atlas of the template's head.
 
         control_head : head before subdivision, with the uv layout of the template
         """

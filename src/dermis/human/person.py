@@ -518,7 +518,7 @@ class Human:
         return control_points_mm(self.weights())
 
     def weights(self) -> dict[str, float]:
-        """Return a dictionary from MakeHuman's morph targets that shape this person to their weights."""
+        """Return the nonzero weights of MakeHuman's morph targets for this person, by target name."""
         weights = {**self._ancestry_weights(), **self._build_weights()}
         for name, weight in self.targets.items():
             weights[name] = weights.get(name, 0.0) + weight

@@ -12,8 +12,8 @@ from dermis.base.summary import ShortRepr
 class FileVertices(ShortRepr):
     """Correspondence between the vertices of a mesh file and the points of a head, for mesh sequences.
 
-    A vertex of the file may belong to several points, where coincident sheets of the surface were separated,
-    or to no point.
+    Repairs of the mesh may leave a vertex of the file without a point, or give it several points where two
+    layers of the surface were separated.
 
     count : number of vertices that the triangles of the file use
     vertex : (n,) vertex indices in the file

@@ -30,9 +30,9 @@ def weld(vertex_rows: ArrayLike) -> Ints:
 
 
 def compact_vertices(triangles: NDArray[np.integer]) -> tuple[Index, Index]:
-    """Return the indices (n,) of vertices that triangles use, and the triangles with new indices.
+    """Return the indices (n,) of the vertices that triangles use, and the triangles renumbered to match.
 
-    triangles : (f, 3) vertex indices, which the result replaces by positions in the returned array
+    triangles : (f, 3) vertex indices; the returned triangles are indices into the returned vertex array
     """
     used = np.zeros(int(triangles.max()) + 1, bool)
     used[triangles] = True
@@ -58,10 +58,10 @@ def merge_near_points(
 
 
 def edges(triangles: NDArray[np.integer]) -> tuple[Index, Index, Index]:
-    """Return the unique edges (e, 2) of triangles, the edge of each side (3f,) and the sides per edge (e,).
+    """Return the unique edges (e, 2) of triangles, the edge of each triangle side, and the sides per edge.
 
-    The sides from corner 0 to corner 1 of all triangles come first, then the sides from 1 to 2, then from 2
-    to 0.
+    The second array (3f,) is the index of each side's edge: first of the sides from corner 0 to corner 1 of
+    all triangles, then from 1 to 2, then from 2 to 0. The third array (e,) is the number of sides.
 
     triangles : (f, 3) point indices
     """
@@ -90,9 +90,9 @@ def triangle_keys(corners: NDArray[np.integer], point_count: int) -> Index:
 
 
 def unique_sides(sides: NDArray[np.integer]) -> tuple[Index, Index, Index]:
-    """Return the unique edges (e, 2), the edge of each side (n,) and the number of sides per edge (e,).
+    """Return the unique edges (e, 2), the edge index of each side (n,) and the sides per edge (e,).
 
-    sides : (n, 2) point indices, in either order
+    sides : (n, 2) point indices at the two ends of each triangle side, in either order
     """
     sides = np.sort(sides.astype(np.int64), axis=1)
     stride = int(sides.max()) + 1 if len(sides) else 1

@@ -21,14 +21,14 @@ GUIDE_ANCHORS = 4
 class Guides:
     """Guide curves of `GUIDE_KNOTS` knots from root to tip; each knot follows the quads nearest to it.
 
-    The arrays are for g guides, k knots per guide and a quads per knot.
+    The arrays are for g guides with k knots each, where each knot follows m quads.
 
-    corner : (g, k, a, 4) control points at the corners of the quads, in order around each quad
-    local_mm : (g, k, a, 3) position of each knot relative to each quad: components along the quad, across it
+    corner : (g, k, m, 4) control points at the corners of the quads, in order around each quad
+    local_mm : (g, k, m, 3) position of each knot relative to each quad: components along the quad, across it
         and along its normal, from the mean of the corners [mm]
-    weight : (g, k, a) weights of the quads, which add up to 1 for each knot [-]
+    weight : (g, k, m) weights of the quads, which add up to 1 for each knot [-]
     rest_mm : (g, k, 4) position of each knot on the mean person at rest, and its height above the skin [mm]
-    cut : (g,) fraction of the length of each guide at which the style cuts it [-]
+    cut : (g,) where the style cuts each guide, as a fraction of the guide's length [-]
     """
 
     corner: Ints
@@ -40,7 +40,9 @@ class Guides:
 
 @dataclass(frozen=True, eq=False)
 class StrandRoots:
-    """Possible strands of a hair style, in random order; the look of a person decides which of them grow.
+    """Roots of all strands that a hair style can have, in random order, with their guides and clumps.
+
+    Which of the strands grow depends on hair density, hairline and baldness of the person.
 
     roots : n roots on quads of the control mesh
     guide, guide_weight : (n, 4) guides between which each strand is interpolated, and their weights
@@ -48,9 +50,8 @@ class StrandRoots:
     place : (n, 4) place of each root on the head: angle from the front [degrees]; height above the midpoint
         of the eyes [mm], to be compared with the height of the hairline; thinning of the hair if the crown
         recedes, 0 to 1; and position from the nape (0) to the top of the head (1)
-    along_mm : (n,) position of each clump along its cornrow, so that the braids of consecutive clumps join
-        [mm]
-    part : (n,) index of the part of the groom, such as scalp or beard
+    along_mm : (n,) position of each strand's clump along its cornrow [mm]
+    part : (n,) row of `Groom.parameters` for each strand, which is that of scalp hair or beard
     """
 
     roots: Roots
@@ -62,7 +63,7 @@ class StrandRoots:
     part: Ints
 
     def __len__(self) -> int:
-        """Return the number of possible strands."""
+        """Return the number of roots."""
         return len(self.clump)
 
 
@@ -70,10 +71,10 @@ class StrandRoots:
 class Groom:
     """Hair of a person: guides and roots that all people with a style share, and parameters of the person.
 
-    guides, roots : guides and possible strands of the style
-    parameters : (p,) structured array with the parameters of each part of the groom, such as scalp or beard
-    strands : number of possible strands to use, from the start of `roots`; if some are unused, the strands
-        are widened to keep coverage
+    guides, roots : guides and strand roots of the style
+    parameters : (p,) structured array with one row of parameters for scalp hair and one for the beard
+    strands : number of roots to use, from the start of `roots`; if some are unused, the strands are widened
+        to keep coverage
     knots : number of knots per strand
     hairline_mm : (91,) heights of the hairline at angles of 0 to 180 degrees from the front [mm]
     centre_mm : (3,) centre of the roots on the mean person [mm]
@@ -99,5 +100,5 @@ class Groom:
         return replace(self, roots=roots)
 
     def __len__(self) -> int:
-        """Return the number of strands, including strands that the look of the person leaves out."""
+        """Return the number of roots in use; low density or baldness may leave some without a strand."""
         return self.strands

@@ -1,4 +1,4 @@
-"""Strands grown from a groom on the CPU, as strands_grow.wgsl grows them, for exports and path tracing."""
+"""Growth of strands from a groom on the CPU, as in strands_grow.wgsl, for exports and path tracing."""
 
 from __future__ import annotations
 
@@ -31,11 +31,12 @@ _FALLBACK_AXIS = np.array([0.31, 0.2, 0.93])
 def grow_strands(
     groom: Groom, mesh: Mesh, points_mm: NDArray[np.floating], max_strands: int = MAX_EXPORTED_STRANDS
 ) -> Strands:
-    """Return the strands of a groom on a posed skin, without strands that the person's look leaves out.
+    """Return the strands that grow from the roots of a groom on a posed skin.
 
-    mesh : mesh of quads in which the strands are rooted
+    mesh : mesh of quads on which the strands are rooted
     points_mm : (p, 3) points of the mesh in a pose [mm]
-    max_strands : largest number of strands; if the groom has more, the strands are widened to keep coverage
+    max_strands : largest number of roots to use; if the groom has more, the strands are widened to keep
+        coverage
     """
     count = min(len(groom), max_strands)
     guides = _posed_guides(groom, points_mm)
@@ -81,7 +82,9 @@ def hair_cover(groom: Groom, mesh: Mesh) -> Doubles:
 
 
 def absorbed_by_hair(groom: Groom) -> float:
-    """Return the fraction of diffuse light that a hair absorbs, averaged over channels and groom parts."""
+    """Return the fraction of diffuse light that a hair absorbs, the mean over channels and parts of the groom.
+
+    The parts are scalp hair and beard."""
     parts = groom.parameters
     chord = 0.5 * np.pi * (parts["radius_mm"] / parts["hairs_per_strand"])[:, None]
     absorption = np.maximum((1.0 - parts["grey"][:, None]) * parts["dark"], parts["white"])
@@ -198,7 +201,7 @@ def _above_hairline(groom: Groom, index: Ints) -> Doubles:
 
 
 def _growing(groom: Groom, count: int) -> Ints:
-    """Return the indices of the strands that grow, among the first `count` strands."""
+    """Return the indices of the roots from which a strand grows, among the first `count` roots."""
     index = np.arange(count, dtype=np.int32)
     roots, part = groom.roots, groom.parameters[groom.roots.part[:count]]
     fade = _smoothstep(*_HAIRLINE_FADE_MM, _above_hairline(groom, index))
@@ -264,7 +267,7 @@ def _curves(
 
 
 def _axes_across(at: _Curves) -> tuple[Doubles, Doubles]:
-    """Return two unit vectors (n, k, 3) per point of curves, orthogonal to the curve and to each other."""
+    """Return two unit vectors (n, k, 3) at each point, orthogonal to the curve and to each other."""
     side = np.cross(at.tangent, at.normal)
     upright = (side**2).sum(axis=-1, keepdims=True) < 0.08
     side = _unit(np.where(upright, np.cross(at.tangent, _FALLBACK_AXIS), side))

@@ -50,7 +50,7 @@ class Head:
     levels : int, optional
         Levels of subdivision of the mesh.
     template : Head, optional
-        Head of the same topology and uv layout, whose atlas and tables this head uses.
+        Head with the same triangles and uv, whose uv atlas and other precomputed data this head reuses.
     file_vertices : FileVertices, optional
         Correspondence between points and vertices of the mesh file, for mesh sequences.
 
@@ -103,9 +103,9 @@ class Head:
 
     @property
     def topology(self) -> Head:
-        """Return the head whose atlas and tables this head uses.
+        """Return the head for which the uv atlas and other shared data are computed: the template or `bare`.
 
-        This is the template if the rig has the same template, and `bare` otherwise.
+        It is the template if the rig is derived from the rig of the template.
         """
         template = self.template
         if template is None or self.rig is None or self.rig.template is not template.rig:

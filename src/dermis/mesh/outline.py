@@ -176,10 +176,9 @@ def _select_extreme(
 
 
 def _project_on_directions(positions: Floats, direction_count: int) -> Iterator[Floats]:
-    """Yield the projections of points (p, 3) on unit vectors, for blocks of n directions, (n, p) each.
+    """Yield the projections (n, p) of points (p, 3) on unit vectors, in blocks of n directions.
 
-    A block is small enough for NumPy to multiply it on one thread. Several threads would wait for each other
-    on busy cores.
+    The blocks are small, so that NumPy multiplies each of them on a single thread.
 
     direction_count : total number of directions
     """

@@ -97,8 +97,8 @@ class Rig(ShortRepr):
     bone_rotations : rotations of bones by morph targets
     rigid_followers : points that are not in the file, such as fitted eyeballs; they follow the file's points
     contact : lids that must stay outside the eyeballs; None if lids may intersect eyeballs
-    template : rig of the same topology, whose outline points are used in addition to the extreme points of
-        this rig; None to search for outline points
+    template : rig with corresponding points, targets and bones, whose outline points are reused together with
+        the extreme points of this rig; None to search for outline points
     """
 
     positions_mm: Floats
@@ -153,7 +153,7 @@ class Rig(ShortRepr):
         return self._outline_for(motion.positions_mm).pose(motion.weights, motion.matrices)
 
     def _outline_for(self, rest_positions: Floats) -> RigOutline:
-        """Return the outline of this rig for other rest positions of its control points.
+        """Return the outline of this rig with its control points at other rest positions.
 
         The last outline is cached, and returned again if the outline points have the same positions.
 
@@ -203,8 +203,8 @@ class Rig(ShortRepr):
     def _lid_edges(self) -> tuple[Intp, Doubles, RigOutline]:
         """Return the data from which `lid_edges_mm` computes the points of the lid edges.
 
-        Returns the indices (n,) of control points; their weights (e, n) in the e points of the edges; and an
-        outline that poses the control points.
+        The data are the indices (n,) of the control points around the edges, their weights (e, n) in the e
+        points of the edges, and a `RigOutline` of these control points, which can be posed.
         """
         assert self.contact is not None
         edge = self.contact.edge.ravel().astype(np.intp)

@@ -38,7 +38,7 @@ class SubdividedMesh(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Refinement:
-    """Subdivision of all meshes of one topology, from p control points to v vertices at q points.
+    """Subdivision for all meshes with the same triangles: p control points become q points with v vertices.
 
     weights : (q, p) weights of the control points in each finer point
     stencils : the same weights in the format of a rig
@@ -55,7 +55,7 @@ class Refinement:
     quads: Ints
 
     def mesh(self, coarse: Mesh) -> Mesh:
-        """Return the subdivision of a mesh of this topology."""
+        """Return a mesh, which must have the triangles of this refinement, after subdivision."""
         positions = (self.weights @ coarse.points_mm)[self.point]
         topology = {"point": self.point, "quads": self.quads}
         return build_mesh(positions, self.uv, self.triangles, self.material, coarse.materials, **topology)
@@ -191,7 +191,7 @@ def coarse_triangles(head: Head, min_faces: int, tolerance_mm: float) -> Ints:
 
     The indices refer to the vertices of the subdivided mesh. Triangles with an opacity map are left out.
 
-    min_faces : smallest number of faces of the coarsest level
+    min_faces : least number of faces that the mesh has at the coarsest level used
     tolerance_mm : largest distance between a vertex that is dropped and the coarse edge that replaces it
     """
     mesh, levels = head.mesh, head.levels
@@ -210,11 +210,11 @@ def coarse_triangles(head: Head, min_faces: int, tolerance_mm: float) -> Ints:
 
 
 def _coarsen_triangles(triangles: Ints, positions_mm: Floats, levels: int, tolerance_mm: float) -> Ints:
-    """Return triangles with fewer levels of Loop subdivision in flat regions.
+    """Return triangles of a mesh after Loop subdivision, but of a coarser level in flat regions.
 
     Loop's rules divide a triangle into four, the first three of which are at its corners.
 
-    levels : largest number of levels to leave out
+    levels : number of levels to leave out in flat regions
     """
     coarse, finer = triangles, triangles
     for _ in range(levels):
@@ -226,11 +226,11 @@ def _coarsen_triangles(triangles: Ints, positions_mm: Floats, levels: int, toler
 
 
 def _coarsen_quads(quads: Corners, positions_mm: Floats, levels: int, tolerance_mm: float) -> Ints:
-    """Return triangles with fewer levels of Catmull-Clark subdivision in flat regions.
+    """Return triangles of a mesh after Catmull-Clark subdivision, but of a coarser level in flat regions.
 
     The rules divide a polygon into quads, one from each corner to its centre.
 
-    levels : largest number of levels to leave out
+    levels : number of levels to leave out in flat regions
     """
     coarse = quads
     for _ in range(levels - 1):

@@ -93,9 +93,7 @@ def hairline_waves(points: Doubles) -> Doubles:
 
 
 def zone_amounts(name: str, recession: float, points: Doubles) -> Doubles:
-    """Return the change (n,) in an amount, such as hair density, that receding hair causes at points.
-
-    The change is the sum over those Gaussian zones of the face that depend on the recession.
+    """Return how much a receding hairline changes an amount, such as hair density, at points, (n,).
 
     name : one of `ZONE_AMOUNTS`
     recession : recession of the hairline, 0 to 1, see `SkinLook`
@@ -165,10 +163,10 @@ def quad_areas_cm2(control_mesh: Mesh, quad: Index) -> Doubles:
 
 
 def _sum_zones(name: str, rows: Floats, points: Doubles) -> Doubles:
-    """Return an amount (n,), such as that of hair or beard, summed over the Gaussian zones of the face.
+    """Return an amount, such as hair density, at points, (n,): a sum of Gaussians, one for each zone.
 
     name : one of `ZONE_AMOUNTS`
-    rows : (k, 24) zones from `zone_table`
+    rows : (k, 24) zones of the face, from `zone_table`
     points : (n, 3 or more) positions on the average person [mm]
     """
     column, total = _amount_column(name), np.zeros(len(points))

@@ -1,6 +1,7 @@
 """Complete hair of a person: scalp hair, beard, brows and lashes as strands.
 
-Brows and lashes are rooted on the quads of the template person, whose topology all people share.
+The roots of brows and lashes are found on the mean person, and used for all people, whose meshes have the
+same quads.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ def add_hair(
     """Return a head with strands for scalp hair, beard, brows and lashes.
 
     head, control_head : the subdivided head, and the same head before subdivision
-    root_finder : root finder of the template person, on whom brows and lashes are defined
+    root_finder : root finder of the mean person, on whom brows and lashes are defined
     look : length, density, curl and colour of the hair
     recession : recession of the hairline, 0 to 1, see `SkinLook`
     hairs : fraction of scalp and beard hairs to generate; the hairs are widened by the inverse of this
@@ -131,7 +132,7 @@ def _concatenate(parts: Iterable[Roots]) -> Roots:
 
 
 def _repeat_per_hair(groups: list[HairGroup], name: str) -> Doubles:
-    """Return a scalar field of hair groups, such as "cover", as one value for each hair (n,)."""
+    """Return the values of a scalar field of `HairGroup`, such as "cover", repeated for each hair, (n,)."""
     return np.concatenate([np.full(len(group.radius), getattr(group, name)) for group in groups])
 
 

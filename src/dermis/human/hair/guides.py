@@ -47,7 +47,7 @@ class Growth(NamedTuple):
     skin_normal, height_mm : (g, 3) unit normals of the skin below the ends, and (g,) heights of the ends
         above it [mm]
     length_mm : (g,) current lengths [mm]
-    tied_mm : (g,) length at which each guide reached the tie of its style [mm]; infinite before that
+    tied_mm : (g,) length at which each guide reached the hair tie [mm]; infinite before that
     """
 
     root_mm: Doubles
@@ -92,7 +92,7 @@ def row_of(points_mm: Doubles) -> Doubles:
 
 
 def fringe_weight(points_mm: Doubles, style: Style) -> Doubles:
-    """Return how far hair with roots at points (n, 3) belongs to the fringe, as weights (n,) from 0 to 1."""
+    """Return weights (n,) of points (n, 3) on the scalp: 1 where the fringe has its roots, 0 elsewhere."""
     if style.fringe_y_mm is None:
         return np.zeros(len(points_mm))
     return smoothstep(-48.0, -34.0, points_mm[:, 2]) * smoothstep(56.0, 44.0, np.abs(points_mm[:, 0]))
@@ -290,9 +290,9 @@ def _steer(state: Growth, style: Style) -> Doubles:
 
 
 def _tie_offsets(state: Growth, style: Style) -> Doubles:
-    """Return the points (g, 3) where guides pass through the tie of a ponytail, relative to its middle [mm].
+    """Return where guides pass through the hair tie of a ponytail or bun, relative to its middle (g, 3) [mm].
 
-    Each guide passes the middle of the tie on the side where its root is.
+    A guide passes through the side of the tie that is nearest to the root of the guide.
     """
     outward = unit(np.array(style.tie_mm) - _SKULL_CENTRE_MM)
     away = tangent_component(
@@ -303,9 +303,9 @@ def _tie_offsets(state: Growth, style: Style) -> Doubles:
 
 
 def _tail(state: Growth, style: Style, pull: Doubles) -> Doubles:
-    """Return the directions (g, 3) of hair beyond its tie: outwards, then down and slightly apart.
+    """Return the directions (g, 3) of hair beyond the hair tie: outwards, then down and slightly apart.
 
-    pull : (g, 3) vectors of the pull of gravity
+    pull : (g, 3) pull of gravity, as vectors
     """
     outward = unit(np.array(style.tie_mm) - _SKULL_CENTRE_MM)[None]
     since = np.maximum(state.length_mm - np.where(np.isfinite(state.tied_mm), state.tied_mm, 0.0), 0.0)[
@@ -317,7 +317,7 @@ def _tail(state: Growth, style: Style, pull: Doubles) -> Doubles:
 
 
 def _since_tie(state: Growth, length: Doubles) -> Doubles:
-    """Return the length (g,) of each guide beyond its tie [mm]; 0 for guides that have not reached the tie.
+    """Return the length (g,) of each guide beyond the hair tie [mm]; 0 before the guide reaches the tie.
 
     length : (g,) lengths from the roots [mm]
     """
@@ -325,7 +325,7 @@ def _since_tie(state: Growth, length: Doubles) -> Doubles:
 
 
 def _bun(state: Growth, length: Doubles, style: Style) -> Doubles:
-    """Return points (g, 3) of guides that are wound into a bun beyond their tie [mm].
+    """Return points (g, 3) on guides that are wound into a bun beyond the hair tie [mm].
 
     length : (g,) lengths from the roots to the points [mm]
     """
@@ -355,7 +355,7 @@ def _clear_face(points: Doubles) -> Doubles:
 
 
 def cut_fractions(knots: Doubles, style: Style) -> Doubles:
-    """Return the fraction (g,) of the length of each guide at which the style cuts it; 1 for uncut guides.
+    """Return where the style cuts each guide, as a fraction (g,) of the guide's length; 1 for uncut guides.
 
     knots : (g, k, 3) knots of the guides on the mean person [mm]
     """
@@ -376,7 +376,7 @@ def cut_fractions(knots: Doubles, style: Style) -> Doubles:
 
 
 def _first_below(knots: Doubles, level: Doubles) -> Doubles:
-    """Return the fraction (g,) of the length of each curve at which it first falls below a height.
+    """Return where each curve first falls below a height, as a fraction (g,) of the curve's length.
 
     The fraction is 1 for curves that do not fall below the height.
 
@@ -394,7 +394,7 @@ def _first_below(knots: Doubles, level: Doubles) -> Doubles:
 def bind_guides(
     control_mesh: Mesh, points_mm: Doubles, knots: Doubles, heights: Doubles, cut: Doubles
 ) -> Guides:
-    """Return guides whose knots follow the nearest quads of the skin.
+    """Return guides that move with the skin: each knot follows the quads nearest to it.
 
     control_mesh : control mesh of the mean person
     points_mm : (p, 3) positions of the control points on the subdivided mean person [mm]

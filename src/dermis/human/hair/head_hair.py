@@ -1,4 +1,4 @@
-"""Groom of scalp hair and beard: tables that depend on the style only, and parameters of the person."""
+"""Scalp hair and beard of a person: guides and roots of a hair style, with the parameters of the person."""
 
 from __future__ import annotations
 
@@ -92,10 +92,10 @@ def _part(
     thinning: float = 0.0,
     hairline: float = 0.0,
 ) -> tuple[object, ...]:
-    """Return the parameters of one part of a groom, scalp hair or beard, as a row of `PART_DTYPE`.
+    """Return the parameters of scalp hair or of a beard as a row of `PART_DTYPE`.
 
-    densities : number of possible strands per area [1/cm2], number of hairs per area [1/cm2], and fraction of
-        the possible strands that grow
+    densities : number of strand roots per area [1/cm2], number of real hairs per area [1/cm2], and fraction
+        of the roots from which a strand grows
     """
     strands_per_cm2, hairs_per_cm2, density = densities
     hairs_per_strand = hairs_per_cm2 / strands_per_cm2
@@ -136,9 +136,9 @@ def _part(
 
 
 def _knot_count(parameters: NDArray[np.void]) -> int:
-    """Return the number of knots per strand that is enough for the length and the curls of all strands.
+    """Return a number of knots per strand that resolves the longest and most tightly curled strands.
 
-    parameters : (p,) rows of `PART_DTYPE`
+    parameters : (p,) rows of `PART_DTYPE`, for scalp hair and beard
     """
     lengths, pitches, curls, ropes = (
         parameters[name] for name in ("length_mm", "pitch_mm", "curl_mm", "rope_mm")

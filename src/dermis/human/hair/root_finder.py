@@ -1,4 +1,4 @@
-"""Hair roots of brows and lashes on the quads of the template person, computed once for all people."""
+"""Hair roots of brows and lashes on the quads of the mean person, computed once for all people."""
 
 from __future__ import annotations
 
@@ -48,8 +48,8 @@ class _LidEdge(NamedTuple):
 
     lengths_mm : (m,) arc length from the first point to each point [mm]
     quad : (m - 1,) index of the adjacent quad of each segment
-    frame : (m - 1, 4, 2) bilinear coordinates of the corners of this quad, 0 or 1: first the two ends of the
-        segment, then the two opposite corners
+    frame : (m - 1, 4, 2) corners of this quad in its bilinear coordinates, 0 or 1: first the start and end of
+        the segment, then the corners opposite to start and end
     """
 
     lengths_mm: Doubles
@@ -120,7 +120,7 @@ class RootFinder:
         )[0]
 
     def lid_edge_roots(self, lid: lashes.LashRow, side: float, u: Doubles, across: Doubles) -> Roots:
-        """Return lash roots along the edge of a lid, on the adjacent quads of the outer side of the lid.
+        """Return lash roots near the edge of a lid, on the quads that adjoin the edge on the outside.
 
         lid : row of lashes on the lid
         side : 1 for the left eye, -1 for the right eye

@@ -1,4 +1,4 @@
-"""Possible strands of a hair style: their roots on scalp or chin, their guides and their clumps."""
+"""Strands that a hair style or beard can have: their roots on the skin, their guides and their clumps."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ _ROOT_FIELDS = "quad", "position", "guide", "guide_weight", "clump", "place", "a
 class StyleTables(NamedTuple):
     """Guides and roots of scalp hair and beard, shared by all people with the same styles.
 
-    guides : guide curves of all parts
-    roots : possible strands of all parts
+    guides : guide curves of scalp hair and beard
+    roots : roots of all strands that scalp hair and beard can have
     centre_mm : (3,) mean position of the roots on the mean person [mm]
     """
 
@@ -89,7 +89,7 @@ def _cached_part(style: Style, root_finder: RootFinder) -> Arrays:
 
 
 def _make_part(style: Style, root_finder: RootFinder) -> Arrays:
-    """Return the guides and the roots of one style as a dictionary from field name to array."""
+    """Return the guides and roots of one style, as arrays by field name of `Guides` and `StrandRoots`."""
     mesh, rng = root_finder.mesh, np.random.default_rng(_SEED)
     beard = style is BEARD
     where = density.beard_density() if beard else density.scalp_density(0.0)
@@ -123,10 +123,10 @@ def _make_part(style: Style, root_finder: RootFinder) -> Arrays:
 
 
 def _agreeing_weights(weight: Doubles, guide: NDArray[np.int64], knots: Doubles) -> Doubles:
-    """Return the weights (n, 4) of the guides of strands, reduced to 0 for guides far from the main guide.
+    """Reduce the weights of guides that are far from a strand's main guide; return the weights (n, 4).
 
-    The main guide of a strand is the guide with the largest weight. A strand between two guides on opposite
-    sides of the head would otherwise pass through the head.
+    The main guide of a strand is the guide with the largest weight. Without this, a strand between guides on
+    opposite sides of the head would pass through the head.
 
     weight, guide : (n, 4) original weights of the guides, and their indices
     knots : (g, k, 3) knots of all guides [mm]
@@ -139,7 +139,7 @@ def _agreeing_weights(weight: Doubles, guide: NDArray[np.int64], knots: Doubles)
 
 
 def _places(weight: Doubles, corners: Doubles) -> Doubles:
-    """Return the field `place` (n, 4) of `StrandRoots`.
+    """Return the place of each root on the head, (n, 4), as defined by `StrandRoots.place`.
 
     weight : (n, 4) weights of the corners of the quad on which each strand is rooted
     corners : (n, 4, 4) rows of `average_points` at these corners
@@ -157,8 +157,8 @@ def _clump_middles(
 ) -> NDArray[np.int64]:
     """Return for each strand the index (n,) of the strand in the middle of its clump.
 
-    In cornrows, the middle is the nearest strand on the centreline of the row. In other styles, random
-    strands are middles, and each strand belongs to the nearest of them.
+    In cornrows, this is the strand nearest to the point beside it on the centreline of the row. In other
+    styles, some random strands are chosen as middles, and each strand joins the clump of the nearest one.
 
     root_mm : (n, 3) roots on the mean person [mm]
     half_mm : (n, 3) points of the strands at half the length of their guides [mm]

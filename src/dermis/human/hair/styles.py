@@ -21,7 +21,7 @@ class Style:
     length_mm : usual length of the hair, which `HairLook` may replace
     tilt : tangent of the angle between standing hair and the normal of the skin
     lift : tangent of the angle between combed hair and the skin at the root
-    parting_mm : x coordinate of the parting
+    parting_mm : x coordinate of the parting in the hair
     volume_mm : height of the outermost hair above the skin
     stiffness : weight of the previous direction of a guide, against gravity, in each step of growth
     gravity : strength of gravity
@@ -34,8 +34,8 @@ class Style:
     clump_mm : size of the clumps
     rope_mm : radius of the ropes into which hair is twisted or braided; 0 for loose hair
     braid : whether ropes are braids of three bundles instead of twists
-    tie_mm : position at which hair is gathered
-    coil_mm : radius of a bun around the tie; 0 for a tail
+    tie_mm : position of the hair tie of a ponytail or bun
+    coil_mm : radius of the bun; 0 for a ponytail
     crown : minimum recession of the hair at crown and temples, which the recession of `SkinLook` may exceed
     women, men : relative probabilities of the style among women and among men
     tight : whether tightly coiled hair is worn in this style

@@ -1,4 +1,4 @@
-"""Label classes of hairs and meshes; the borders of facial parts on a mesh are signed distance fields."""
+"""Label classes of hairs and meshes, with the borders of facial parts as signed distance fields."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def dense_fields() -> tuple[Doubles, Doubles]:
 def hair_classes(head: Head) -> NDArray[np.uint8]:
     """Return the label class (n,) of each hair of a head: brows and lashes first, then scalp and beard.
 
-    Hair on meshes of another topology has the class "hair".
+    If the mesh is not that of the parametric human, all hairs have the class "hair".
     """
     quads = {}
     if head.strands is not None:
@@ -112,9 +112,9 @@ def hair_classes(head: Head) -> NDArray[np.uint8]:
 
 @cache
 def _quad_hair_classes() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """Return for each control quad the class of fine hair (brow or lash) and of other hair (scalp or beard).
+    """Return for each control quad the label classes of hairs rooted there, as two arrays (q,).
 
-    Both arrays are (q,).
+    The first array is for fine hair, which is brow or lashes; the second is for scalp hair or beard.
     """
     mesh = average_head().mesh
     around = quad_corners(mesh, np.arange(len(mesh.quads)))
@@ -252,10 +252,10 @@ def _skin_fields(head: Head) -> dict[str, Doubles]:
 
 
 def _warped_fields(head: Head, landmarks: Mapping[str, tuple[float, float, float]]) -> dict[str, Doubles]:
-    """Return a dictionary from class name to the label field (p,) of a head of another topology [mm].
+    """Return the label fields (p,) of a head that is not a parametric human, by class name [mm].
 
-    Each point is warped onto the average human by the landmarks, and gets the fields of the nearest point
-    there.
+    The landmarks define a warp from the head to the average human. Each point of the head gets the fields of
+    the average human at the nearest point to its warped position.
     """
     from scipy.spatial import cKDTree
 

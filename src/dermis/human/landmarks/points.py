@@ -45,7 +45,8 @@ def landmark_points(head: Head, set_or_table: str) -> LandmarkPoints:
     set_or_table : one of `LANDMARK_SETS`, or a CSV file with columns name,vertex, where vertex is an index
         into `Head.positions_mm`
 
-    Raises DermisError for a published set on a head of another topology, and for tables that cannot be read.
+    Raises DermisError for a published set if the head is not a parametric human, and for tables that cannot
+    be read.
     """
     if set_or_table not in LANDMARK_SETS:
         return _table_landmarks(head, set_or_table)

@@ -43,8 +43,8 @@ _CACHE_VERSION = 2  # increment when `with_regions` returns different maps for t
 def with_regions(head: Head, table: RegionTable | str | Path = DEFAULT_TABLE_NAME) -> tuple[Head, float]:
     """Return a head with roughness and specular maps by region of the face.
 
-    The specular map contains rho_s itself. The renderer scales specular maps to a mean of `Skin.rho_s`, so
-    set `Skin.rho_s` to the returned mean. Fine detail of existing roughness and specular maps is kept:
+    The renderer scales the specular map to a mean of `Skin.rho_s`; set `Skin.rho_s` to the returned mean, so
+    that the regions get the values of the table. Fine detail of existing roughness and specular maps is kept:
     the new map is multiplied by the ratio of the existing map to its local mean.
 
     Parameters
@@ -168,7 +168,7 @@ def with_default_regions(head: Head) -> Head:
     """Return a head with roughness and specular maps from the package's region table.
 
     A head with unknown regions or with a roughness map is returned unchanged. An existing specular map is
-    kept. A new specular map is relative, because the renderer scales it to a mean of `Skin.rho_s`.
+    kept. The mean of a new specular map has no effect, because the renderer scales it to `Skin.rho_s`.
     """
     if head.maps.has_roughness or known_landmarks(head) is None:
         return head

@@ -124,9 +124,10 @@ def _check_landmarks(head: Head, landmarks: Landmarks, reference_landmarks: Land
 def label_texels(head: Head, atlas: Atlas, region_table: RegionTable) -> NDArray[np.uint8]:
     """Return the region (n,) of each covered atlas texel in row order, as an index into `REGIONS`.
 
-    The first available source is used: the label map of the table, the landmarks of the table, the label map
-    of the head, the regions of the parametric human, landmarks known to the package. Raises DermisError for a
-    head without any of these sources.
+    Labels come from the first of these that is available: the label map or the landmarks in the table, the
+    label map of the head, the regions of the parametric human, landmarks known to the package.
+
+    Raises DermisError if none of them is available.
     """
     if region_table.labels is not None:
         return _labels_from_map(load_labels(region_table.labels), atlas, str(region_table.labels))
@@ -160,6 +161,6 @@ def _labels_from_landmarks(head: Head, atlas: Atlas, landmarks: Landmarks) -> ND
 
 
 def _labels_of_human(head: Head, atlas: Atlas) -> NDArray[np.uint8]:
-    """Return the region labels of a parametric human's texels, from the topology that all people share."""
+    """Return the region labels of a parametric human's texels, by the control quad below each texel."""
     points = atlas.interpolate(head.mesh, average_positions(head))[atlas.coverage]
     return classify_surface(points, control_quads(head, atlas.triangle[atlas.coverage]))

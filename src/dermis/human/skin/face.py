@@ -72,8 +72,8 @@ def zone_table(recession: float = 0.0, sites: SiteDifferences | None = None) -> 
     The columns are the centre (3) [mm], a zero, the inverse radii (3) [1/mm], a zero, and the sixteen
     `ZONE_AMOUNTS`.
 
-    recession : thinning of hair at the crown, 0 to 1, see `SkinLook`
-    sites : differences in pigments between measured sites; None for the same pigments everywhere
+    recession : recession of the hair, 0 to 1, see `SkinLook`; it thins the hair at the crown
+    sites : differences in pigments between sites of the face and the cheek; None for no differences
     """
     rows = read_rows(__package__, "zones")
     for row in rows:
@@ -91,11 +91,10 @@ def zone_table(recession: float = 0.0, sites: SiteDifferences | None = None) -> 
 
 @cache
 def _site_amounts() -> NDArray[np.float64]:
-    """Return the amounts (k, 7) of the k zones that produce a pigment difference of 1 at each of seven sites.
+    """Return the amounts (k, 7) that k overlapping zones need for a change of pigment at only one site.
 
-    Column 0 is for the cheek, the other columns are for `FACE_SITES`. Zones with the amounts of one column
-    add up to exactly 1 at the position of its site and to 0 at the positions of the other sites, although the
-    zones overlap.
+    Each column is for one of seven sites: first the cheek, then `FACE_SITES`. With its amounts, the sum of
+    all zones is 1 at this site and 0 at the other six.
     """
     zones, names = read_rows(__package__, "zones"), (_REFERENCE_SITE, *FACE_SITES)
     places = {row["site"]: row for row in read_rows(__package__, "sites")}

@@ -119,7 +119,7 @@ class SkinLook:
 
 
 def _checked_sites(site_differences: Any) -> SiteDifferences:
-    """Return differences between sites as `SiteDifferences`; files of people contain them as mappings."""
+    """Convert a mapping, as in files of people, to `SiteDifferences`; return `SiteDifferences` unchanged."""
     known = [one.name for one in fields(SiteDifferences)]
     if isinstance(site_differences, Mapping) and site_differences.keys() <= set(known):
         return SiteDifferences(**site_differences)

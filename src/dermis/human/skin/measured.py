@@ -323,7 +323,7 @@ def _pigments_and_sites(
     normals: Doubles,
     site_normals: Doubles | None,
 ) -> tuple[MeasuredPigments, SiteDifferences]:
-    """Return the pigments of a person and their differences between sites.
+    """Return the pigments of a person's cheek, and the differences of other sites from the cheek.
 
     normals : (4,) independent samples of the standard normal distribution, zeros for a typical person
     site_normals : (12, 2) independent samples of the standard normal distribution; None for a typical person
@@ -464,7 +464,7 @@ class MeasuredTone(NamedTuple):
     """Colour of a site of the body.
 
     colour : (3,) diffuse reflectance, linear Rec. 709 [-]
-    note : text for the user about the origin of the colour and the pigments of such skin
+    note : text for the user, which states the origin of the colour and the pigments of such skin
     """
 
     colour: Doubles

@@ -56,10 +56,10 @@ class _EyeShape(NamedTuple):
 def with_fitted_eyes(head: Head, coarse: Mesh | None = None, look: EyeLook | None = None) -> Head:
     """Return a head whose two eyeballs from a file are replaced by standard eyeballs with a cornea.
 
-    The fitted eyeballs have the radius and position of the file's eyeballs, and move rigidly with the bones
-    and morph targets of these. They look along the axes of the file's corneas or, for eyeballs without
-    corneas, through the opening of the lids. If the file does not have two eyeballs, the head is returned
-    unchanged, with the reason in its `note`.
+    The fitted eyeballs have the radius and position of the file's eyeballs, and follow the same bones and
+    morph targets as rigid bodies. They look along the axes of the file's corneas or, if the file's eyeballs
+    have no corneas, through the opening of the lids. If the file does not have two eyeballs, the head is
+    returned unchanged, with the reason in its `note`.
 
     coarse : for a subdivided head, its mesh before subdivision, in which the lids still touch the eyeballs
     look : appearance of the eyes
@@ -148,7 +148,7 @@ def _shape_points(eye_shape: _EyeShape) -> Doubles:
 
 
 def _extend_stencils(stencils: Stencils, first_point: int, point_count: int) -> Stencils:
-    """Return stencils with additional mesh points that coincide with additional control points.
+    """Return stencils for a mesh with additional points, each equal to one additional control point.
 
     first_point : index of the first additional control point
     point_count : number of additional points

@@ -86,8 +86,7 @@ class Lids:
     def opening_angles(self) -> tuple[float, float]:
         """Return the angles (side, up) of an eye that looks through the middle of the lids' opening [rad].
 
-        The angles are 0 if lids are missing on some side. In files, the lids are the best indication of the
-        gaze, because eyeballs and lids seldom have the same centre.
+        Both angles are 0 if lids are missing on one side of the opening.
         """
         angles = []
         for axis, other, shift in ((0, 1, 0.0), (1, 0, _IRIS_RISE_FRACTION)):
