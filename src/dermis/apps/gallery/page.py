@@ -124,9 +124,9 @@ def _format_number(number: float) -> str:
 
 
 def _deck_rows(pictures: Sequence[GalleryPicture]) -> str:
-    """Return HTML table rows for the slides of the 2007 talk, with links to the pictures of each slide.
+    """Return HTML table rows for the slides of the talk "Advanced Skin Rendering" (2007).
 
-    Each row also has a command that draws these pictures.
+    Each row has links to the pictures that show the slide, and a command that draws them.
     """
     rows = csv.DictReader(
         line for line in _read_resource("deck.csv").splitlines() if not line.startswith("#")

@@ -31,7 +31,7 @@ class Script:
     path : file of the script
     title : first line of the docstring
     caption : explanation below the first line of the docstring
-    deck : slides of the 2007 talk that the picture reproduces, as rows in the table of slides, such as "S11"
+    deck : rows of deck.csv, such as "S11": slides of the talk "Advanced Skin Rendering" that the script shows
     equation : equation of the technique; "" for a script without an equation
     sources : keys of the bibliography
     slider : captions of two panels that the page compares with a slider; None without a slider
@@ -155,7 +155,7 @@ class GalleryPicture:
 
 
 def draw_pictures(scripts: Sequence[Script], studio: Studio) -> Iterator[GalleryPicture]:
-    """Run the scripts and yield their pictures; the picture of a script that fails only holds the reason."""
+    """Run the scripts and yield their pictures; if a script fails, its picture holds only the reason."""
     for script in scripts:
         started, studio.frames_ms = time.perf_counter(), []
         try:

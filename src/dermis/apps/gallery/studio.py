@@ -93,7 +93,7 @@ class Studio:
         return self.renderer.reopening_device.run(draw_view)
 
     def light_map(self, scene: Scene, pyramid_level: int, **settings: Any) -> NDArray[np.float32]:
-        """Return the blurred irradiance in the atlas, divided by pi, (n, n, 3).
+        """Return the blurred irradiance (n, n, 3) in the atlas, divided by pi.
 
         pyramid_level : 0 for the light as it enters the skin, higher for light blurred more strongly
         settings : fields of `Settings`

@@ -42,7 +42,7 @@ class BenchmarkCase:
     targets : number of morph targets that move in each frame, together with four bones; 0 for a static head
     samples : samples per pixel
     technique : scattering technique of `Settings`, or `FRAGMENT_TECHNIQUE`
-    varies : name of the parameter that differs from the base frame; "" for the base frame
+    varies : name of the parameter whose value differs from that of the base frame; "" for the base frame
     """
 
     image: tuple[int, int] = (1920, 1080)

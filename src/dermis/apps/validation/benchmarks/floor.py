@@ -60,9 +60,8 @@ def frame_traffic(device: Device, inputs: FrameInputs, vertex_count: int) -> Fra
 def stage_bytes(traffic: FrameTraffic) -> dict[str, float]:
     """Return the least memory traffic of each stage: inputs read once and results written once [byte].
 
-    Texels without a surface and pixels without the head are not counted if a stage does not need them.
-    Repeated reads within a stage or a blur, scratch data between passes, and tables that fit in caches are
-    not counted either.
+    Some traffic is not counted: texels without a surface and pixels without the head if a stage does not need
+    them, repeated reads within a stage or a blur, scratch data between passes, tables that fit in caches.
     """
     inputs, picture = traffic.inputs, traffic.inputs.resources.post.picture
     pixels, shadow = picture.size[0] * picture.size[1], inputs.resources.shadow_maps.texture
@@ -105,9 +104,10 @@ def _scattering_bytes(traffic: FrameTraffic, shadow_bytes: int) -> dict[str, flo
 
 
 def _blur_surface_bytes(inputs: FrameInputs, texel_count: int) -> float:
-    """Return the bytes that blurs read besides light: stretch map, extent of charts, and gutters.
+    """Return the memory traffic of blurs besides light: stretch map, reach map and gutters [byte].
 
-    For the passes of GPU Gems 3, return the bytes for blurring the stretch map along with the light.
+    The reach map says how far the chart extends from each texel. The passes of GPU Gems 3 have neither a
+    reach map nor gutters, but blur the stretch map along with the light.
 
     texel_count : number of atlas texels that show the surface
     """
@@ -126,10 +126,11 @@ def _blur_surface_bytes(inputs: FrameInputs, texel_count: int) -> float:
 
 
 def _translucency_bytes(translucency: Translucency, levels: PyramidLevels, blur: Blur) -> float:
-    """Return the memory traffic of translucency: pairs with their texels, source light, transmitted light.
+    """Return the memory traffic of light that passes through thin parts of the head [byte].
 
-    If pairs are weighted by tables of slabs, the surface at the sources is read too, because these tables
-    depend on the direction of the light.
+    The light is carried by pairs of texels: sources, where light enters, and receivers, where it leaves. The
+    stage reads the pairs and the light at the sources, and writes the light at the receivers. It also reads
+    the positions and normals of sources if the transmittance depends on the direction of the light.
     """
     pairs, halving = translucency.pairs, blur.halvings[blur.profile_levels[1 + translucency.source_level]]
     receivers, sources = pairs.receivers[1], pairs.sources[1]

@@ -27,8 +27,8 @@ _POINTS_PER_SIDE_ON_CPU, _LIGHTS_PER_POINT_ON_CPU = 256, 16
 def lobe_cost_ns(device: Device) -> dict[tuple[str, str], float]:
     """Return the device time per evaluation of each lobe model with each Fresnel term [ns].
 
-    The time is the inverse throughput of the whole device, minus the time of the loop without the lobe. The
-    keys are pairs of names in MODELS and FRESNEL.
+    The time is the inverse throughput of the whole device, minus the time of a loop that evaluates no lobe.
+    Keys of the result are pairs of names in MODELS and FRESNEL.
     """
     on_cpu = device.adapter.kind == "CPU"
     side, lights = (

@@ -60,8 +60,8 @@ class BenchmarkRow:
 
     triangles : number of triangles of the head
     frame_ms : elapsed time per frame in a sequence, with several frames in flight
-    gpu_ms : device time of each stage, measured in separate passes, and "total"; on GPUs, the total is
-        measured in frames whose stages share a pass as usual, and is less than the sum of the stages
+    gpu_ms : device time of each stage, measured in separate passes, and of the whole frame as "total"; the
+        total is less than the sum on GPUs, where it is measured in frames whose stages share a pass
     floor_ms : lower bound of each stage's time, derived from its memory traffic, and their sum as "total"
     python_ms : host time to prepare, record and submit a frame while the device is idle
     image_ms : time from the end of a frame until its picture is in NumPy
@@ -130,7 +130,7 @@ def _measure_case(
 def sequence_ms(renderer: Renderer, scenes: Iterator[Scene], frame_count: int, settings: Settings) -> float:
     """Return the elapsed time of drawing consecutive frames until the last one is done [ms].
 
-    scenes : scenes that all differ, so that no result that depends on camera and lights is reused
+    scenes : scenes that all differ in camera and lights, so no frame can reuse results of another frame
     frame_count : number of frames
     """
 

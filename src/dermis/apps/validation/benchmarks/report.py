@@ -86,8 +86,8 @@ def cells(benchmark_row: BenchmarkRow) -> tuple[str, ...]:
 def stage_table(benchmark: Benchmark) -> list[tuple[str, ...]]:
     """Return a table of the stages of the base frame, with column titles as its first row.
 
-    The columns are the device time, its lower bound, the ratio of the two, and the device times with the
-    passes of GPU Gems 3.
+    The columns are the device time, its lower bound, the ratio of the two, and the device times of the frame
+    when it is drawn with the passes of GPU Gems 3.
     """
     if benchmark.base_row is None:
         return []
@@ -105,7 +105,10 @@ def stage_table(benchmark: Benchmark) -> list[tuple[str, ...]]:
 
 
 def published_text(benchmark: Benchmark) -> str:
-    """Return a sentence with the relative time of the passes of GPU Gems 3; empty without measurements."""
+    """Return a sentence with the time of a frame by the passes of GPU Gems 3, relative to the base frame.
+
+    The text is empty if these passes were not measured.
+    """
     names = {GPU_GEMS_3: "as compute", FRAGMENT_TECHNIQUE: "as fragments"}
     ratios = {form: benchmark.ratio(name) for name, form in names.items()}
     parts = [f"{ratio:.2f} times as long {form}" for form, ratio in ratios.items() if ratio is not None]

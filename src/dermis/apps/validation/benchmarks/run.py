@@ -64,12 +64,12 @@ class Benchmark:
         return next((row for row in self.rows if not row.case.varies), None)
 
     def row_of(self, technique: str) -> BenchmarkRow | None:
-        """Return the measurements of the base frame with another technique; None if the case was skipped."""
+        """Return the measurements of the base frame drawn with `technique`; None if the case was skipped."""
         rows = (row for row in self.rows if row.case.varies == "technique")
         return next((row for row in rows if row.case.technique == technique), None)
 
     def ratio(self, technique: str) -> float | None:
-        """Return the device time of the base frame with another technique, relative to the base frame.
+        """Return the device time of the base frame drawn with `technique`, relative to its usual technique.
 
         Returns None if one of the two was not measured.
         """

@@ -164,7 +164,7 @@ def check_names(reference_name: str, light_name: str, region_name: str, medium_n
 def _render(subject: ComparisonSubject, technique: str, reference: ReferenceImage) -> tuple[Floats, float]:
     """Return the linear radiance rendered by a technique, and the device time of a frame at 4 samples [ms].
 
-    reference : reference image; the frame has the same translucency and interreflection
+    reference : reference image; the frame leaves out translucency or interreflection if the reference does
     """
     disabled: dict[str, object] = {} if reference.has_translucency else {"transmission": "none"}
     disabled |= {} if reference.has_interreflection else {"interreflection": False}

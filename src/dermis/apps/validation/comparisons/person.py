@@ -166,7 +166,7 @@ def render_subject_frame(
 ) -> Floats:
     """Return the linear radiance (h, w, 3) of a subject's frame.
 
-    If the skin does not refract, the radiance is the sum of two frames: light scattered by skin without
+    For skin that does not refract, the radiance is the sum of two frames: light scattered by skin without
     surface reflection, and surface reflection alone.
 
     skin : skin of the path-traced reference; None for the default skin
@@ -232,10 +232,10 @@ def compare_person(
 
 
 def render_frame(renderer: Renderer, scene: Scene, settings: Settings) -> Floats:
-    """Return the linear radiance (h, w, 3) of a scene by dermis, drawn at twice the size and averaged.
+    """Render a scene at twice the size, and return its linear radiance (h, w, 3) averaged over 2 x 2 pixels.
 
-    More samples per pixel would be equivalent, but on software adapters many samples with many large lights
-    exceed the time limit of a pass.
+    A frame with more samples per pixel would look the same, but on software adapters it can exceed the time
+    limit of a pass.
     """
     width, height = settings.size
     larger = settings.model_copy(update={"size": (2 * width, 2 * height)})
@@ -288,7 +288,7 @@ def path_trace_view(
 
     The mean distance between entry and exit of light is that of the diffusion profile of the scene's skin.
 
-    textures : maps of the skin as dermis paints them, but with colours under uniform light
+    textures : maps of the skin as dermis paints them, with the reflectance in uniform light as colour
     picture_size : width and height of the picture [pixel]
     samples : paths per pixel
     variant : variant of Mitsuba, as in `path_trace`
@@ -403,7 +403,7 @@ def _image_shift(
 
     Shift and brightness are fitted together by least squares.
 
-    noise_variance : (h, w) variance of the reference
+    noise_variance : (h, w) variance of the noise of the reference
     region_mask : (h, w) mask of the pixels to compare
     """
     down, right = (np.asarray(slope) for slope in np.gradient(dermis_image))

@@ -54,9 +54,9 @@ class Regions:
 def picture_regions(renderer: Renderer, scene: Scene, picture_side: int) -> Regions:
     """Return the regions of the skin that a square picture of a parametric human shows.
 
-    Besides parts of the face, there is "rim", skin seen at a grazing angle, and regions by the direction of
-    the scene's first light: "lit side" is skin that faces this light, "terminator" is skin that the light
-    grazes, and "shadowed side" is skin that faces away from it. Normals are those of the rest pose.
+    There are regions for parts of the head, such as "nose", and "rim" for skin seen at a grazing angle. The
+    regions "lit side", "terminator" and "shadowed side" contain skin that faces the scene's first light, is
+    grazed by it, or faces away from it. Normals are those of the rest pose.
 
     picture_side : side of the picture [pixel]
     """
@@ -90,7 +90,9 @@ def picture_regions(renderer: Renderer, scene: Scene, picture_side: int) -> Regi
 
 
 def _nearest_zone(positions_mm: Floats) -> NDArray[np.int64]:
-    """Return the index (n,) of the region whose zone is nearest to each point.
+    """Return the region (n,) of each point, as an index into `ZONES`.
+
+    The region contains the zone whose centre is nearest to the point, relative to the radii of the zone.
 
     positions_mm : (n, 3) points
     """

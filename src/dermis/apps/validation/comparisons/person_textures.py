@@ -62,16 +62,16 @@ def _paint_textures(renderer: Renderer, scene: Scene, look: SkinLook, texture_si
     return SkinTextures(colour, roughness, strength, height, iris, radius, white, (teeth[0], teeth[1]))
 
 
-def _detail_heights_mm(pores: Floats, furrows: Floats, density: Floats) -> Floats:
+def _detail_heights_mm(pores: Floats, furrows: Floats, log2_mm_per_uv: Floats) -> Floats:
     """Return the heights (n, n) of pores and furrows that are too fine for the head's maps [mm].
 
     The patterns are tiled as in skin.wgsl.
 
     pores, furrows : (n, n) weights of the two patterns
-    density : (n, n) binary logarithm of the length on the surface per unit of uv [mm]
+    log2_mm_per_uv : (n, n) binary logarithm of the length on the surface per unit of uv [mm]
     """
     side = len(pores)
-    density = np.clip(density, *_LOG2_MM_PER_UV_RANGE)  # undefined outside the charts
+    density = np.clip(log2_mm_per_uv, *_LOG2_MM_PER_UV_RANGE)  # undefined outside the charts
     level = density - np.log2(TILE_LENGTH_MM)
     octave = np.floor(level)
     blend = np.clip((level - octave - 0.4) / 0.2, 0.0, 1.0)

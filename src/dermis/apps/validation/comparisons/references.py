@@ -52,7 +52,7 @@ class ReferenceImage:
     image : (h, w, 3) linear radiance
     variance : (h, w, 3) variance of the noise of `image`
     mask : (h, w) pixels to compare
-    samples : samples per pixel at which techniques are rendered for a fair comparison
+    samples : samples per pixel at which techniques must be rendered for the comparison with this image
     seconds : duration of the computation [s]
     notes : sentences for the report
     has_translucency : whether the image includes light through thin parts
@@ -88,9 +88,9 @@ def surface_integral(subject: ComparisonSubject, samples: int) -> ReferenceImage
 
 
 def surface_heat(subject: ComparisonSubject, samples: int) -> ReferenceImage:
-    """Return the reference image in which the heat equation on the surface diffuses the irradiance.
+    """Return the reference image obtained by diffusing irradiance along the surface by the heat equation.
 
-    Only the surroundings of the camera's target are computed.
+    Only the skin around the camera's target is computed.
 
     samples : ignored, because the solution has no noise
     """
@@ -112,7 +112,7 @@ def surface_heat_around(
 
     target_mm : point relative to the head's centre; the nearest visible point is the centre of the patch [mm]
     radius_mm : radius of the patch in which pixels are compared [mm]
-    light : irradiance on the whole head, see `irradiance_samples`
+    light : samples of the irradiance on the whole head, see `irradiance_samples`
     min_variance_mm2 : variance below which Gaussians are integrated by Euclidean distance instead [mm2]
     """
     from dermis.apps.truths.surface_diffusion import diffuse_on_surface

@@ -117,7 +117,7 @@ def edge_profile(
     picture : (side, side, 3) radiance
     pixel_mm : size of a pixel [mm]
     azimuth : direction across the edge [rad]
-    x_mm : (n,) evenly spaced distances from the edge, positive in the light
+    x_mm : (n,) evenly spaced distances from the edge, positive on the lit side [mm]
     half_width_mm : half the width of the strip [mm]
     """
     middle = (np.arange(CANVAS_SIDE) + 0.5 - 0.5 * CANVAS_SIDE) * pixel_mm

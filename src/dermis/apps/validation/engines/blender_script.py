@@ -63,7 +63,7 @@ def main(folder: Path) -> None:
 def set_channel(shader: Any, description: dict[str, Any], channel: int) -> None:
     """Give all channels the colour and radius of one channel, so that all paths help to measure this channel.
 
-    description : subsurface parameters of the exported skin
+    description : subsurface parameters of the exported skin, with values for all channels
     """
     shader.inputs["Base Color"].default_value = (*[description["colour"][channel]] * 3, 1.0)
     radius = description["inputs"]["Subsurface Radius"][channel]

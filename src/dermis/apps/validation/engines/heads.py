@@ -75,7 +75,7 @@ def available_renderers(subject: Subject, dermis_picture: Floats) -> dict[str, C
 
     The functions return linear pictures (h, w, 4), one per random seed.
 
-    dermis_picture : (h, w, 4) picture by dermis, whose alpha is used for programs without alpha
+    dermis_picture : (h, w, 4) picture by dermis; its alpha is used for programs that render none
     """
     result: dict[str, Callable[[], list[Floats]]] = {}
     named = [one for one in os.environ.get("DERMIS_BLENDER_PYTHONS", "").split(",") if one]
@@ -171,7 +171,7 @@ def render_cycles(
 
 
 def compare_pictures(dermis_picture: Floats, other_picture: Floats) -> JsonObject:
-    """Return differences between another program's pictures and dermis: outline, colour, relative RMSE.
+    """Compare pictures by another program with that by dermis; return differences in outline and colour.
 
     dermis_picture : (h, w, 4) picture by dermis
     other_picture : (seeds, h, w, 4) pictures of the other program with different random seeds

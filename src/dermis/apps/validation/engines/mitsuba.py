@@ -48,8 +48,8 @@ def half_lit_plane(
 ) -> MitsubaObject:
     """Return a scene of the plane z = 0, lit where x > 0, in an orthographic view around the edge.
 
-    The camera is below a smooth surface, because light along the normal crosses this surface undeflected.
-    The camera is above a rough surface, which deflects light.
+    The camera looks down on a rough surface. If the surface is smooth or absent, the camera is in the medium
+    just below the plane; light along the normal crosses such a surface undeflected.
 
     d_mm : Burley width d of the profile; the view spans 3 d on each side of the edge [mm]
     is_black : whether the medium absorbs all light, so that only the surface reflects
@@ -89,7 +89,10 @@ def half_lit_plane(
 def measured_edge(
     mi: Mitsuba, medium: IsotropicMedium, boundary: Boundary, d_mm: float, samples: int
 ) -> tuple[Floats, Floats, float]:
-    """Return the edge response at the pixels, its standard errors, and the radiance far inside the light.
+    """Measure the light scattered across the edge of a half-lit plane in Mitsuba.
+
+    Returns the edge response (n,) averaged over each pixel, its standard errors (n,), and the radiance in the
+    lit area far from the edge.
 
     d_mm : Burley width of the profile [mm]
     samples : paths per pixel

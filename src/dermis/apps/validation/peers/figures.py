@@ -96,9 +96,9 @@ def common_mask(renders: PeerRenders) -> Mask:
 def mean_of_passes(passes_by_turn: Sequence[Sequence[CyclesPass]]) -> MeanImage:
     """Return the mean image of all passes of a Cycles method, and the variance of its noise.
 
-    The variance follows from the differences between passes with equal numbers of paths and different seeds.
+    The variance follows from the differences between two passes with equal numbers of paths.
 
-    passes_by_turn : list for each of two seeds, with one pass for each number of paths
+    passes_by_turn : two lists of passes; corresponding passes differ only in their random seeds
     """
     levels = [level[0].samples for level in zip(*passes_by_turn, strict=True)]
     image, variance = np.zeros(passes_by_turn[0][0].image.shape), np.zeros(passes_by_turn[0][0].image.shape)
@@ -206,7 +206,10 @@ def _cycles_rows(
 def _equal_error_costs(
     renders: PeerRenders, mean: MeanImage, dermis_row: RendererRow, mask: Mask
 ) -> JsonObject:
-    """Return the cost of Cycles' random walk at the error of dermis, and the cost at low noise.
+    """Return the times that Cycles' random walk needs to reach two goals.
+
+    The goals are "same_error", the error of dermis, and "clean", a noise of `LOW_NOISE_TARGET`. The first is
+    left out if Cycles never reaches it because of bias.
 
     dermis_row : row of dermis; its error against the reference is the target for Cycles
     """

@@ -1,4 +1,4 @@
-"""Interleaved renderings of a scene by dermis, Cycles and Mitsuba, so that all are slowed down alike."""
+"""Renderings of a scene by dermis, Cycles and Mitsuba in turn, so that other load slows all of them alike."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class PeerPlan:
     side : side of the square image [pixel]
     samples : paths per pixel of each pass of Cycles
     paths : paths per pixel of Mitsuba
-    frames : timed frames of dermis in each turn, drawn after an untimed frame
+    frames : timed frames of each variant of dermis between two renderings by other programs
     """
 
     side: int = 512
@@ -101,8 +101,8 @@ class PeerRenders:
     light : name of the scene's light
     region : name of the visible region
     ours : dictionary from a name in `DERMIS_VARIANTS` or `GPU_GEMS_3_VARIANTS` to frames of dermis
-    cycles : dictionary from a method of Cycles to its passes: a list for each seed, with one pass for each
-        number in `PeerPlan.samples`
+    cycles : dictionary from a method of Cycles to a list of passes for each of `FIRST_SEED_BY_TURN`; the list
+        has one pass for each number of paths in `PeerPlan.samples`
     left_out : dictionary from a missing method of Cycles to the reason why it is missing
     reference : path-traced image by Mitsuba
     reference_core_seconds : CPU time of Mitsuba, including loading of the scene [s]

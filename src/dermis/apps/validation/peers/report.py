@@ -192,7 +192,7 @@ def _random_walk_sentence(setting: str, times: dict[str, dict[str, float]]) -> s
 
 
 def _time_text(times: dict[str, float]) -> str:
-    """Return text with the time and paths of Cycles, and with their ratios to a frame of dermis."""
+    """Return text with the time and paths of Cycles, and with its time relative to a frame of dermis."""
     elapsed, cpu = (_ratio_text(times[name]) for name in ("ratio", "core_ratio"))
     cost = f"{times['seconds']:.3g} s ({times['samples']:.0f} paths per pixel)"
     return f"{cost}: {elapsed} times our frame, {cpu} in CPU time"

@@ -163,9 +163,9 @@ def _normal_scores(variables: Doubles, archive_rows: Archive) -> Doubles:
 def _site_differences(archive: Archive, variables: Doubles) -> tuple[Doubles, Doubles, Doubles]:
     """Return how sites differ from the cheek: medians (g, 12, 3), slopes (12, 2) and spreads (12, 2).
 
-    A slope says how the difference of a person changes with the deviation of the person's cheek from the
-    median of the group. If a group has too few people, its median is blended with the mean of the other
-    groups, weighted by their numbers of people.
+    Slopes say how much of a person's deviation from the median of the group, measured at the cheek, adds to
+    the difference of the site. Medians of groups with too few people are blended with the mean over groups
+    with enough people.
     """
     shifts, counts = np.zeros((len(GROUP_OF_CODE), len(SITES), 3)), np.zeros((len(GROUP_OF_CODE), len(SITES)))
     slope, spread = np.zeros((len(SITES), 2)), np.zeros((len(SITES), 2))
@@ -274,14 +274,14 @@ def _drawn_cheeks(document: dict[str, Any], group: str, people: _Population) -> 
     return found, found.variables(weights, people.sexes, people.ages, scores)
 
 
-def _matching_shift(variables: Doubles, target_colour: Doubles, people_count: int) -> tuple[Doubles, Doubles]:
+def _matching_shift(variables: Doubles, target_colour: Doubles, free_count: int) -> tuple[Doubles, Doubles]:
     """Return the shift (4,) of variables that brings their median colour to a target, and the error left.
 
     variables : (n, 4) variables of people
     target_colour : (3,) median colour to reach [CIELAB]
-    people_count : number of variables that may be shifted, counted from the first
+    free_count : number of variables that may be shifted, counted from the first
     """
-    shift, used = np.zeros(4), np.arange(4) < people_count
+    shift, used = np.zeros(4), np.arange(4) < free_count
 
     def median(offset: Doubles) -> Doubles:
         return np.asarray(np.median(model_lab(variables + offset), axis=0))
