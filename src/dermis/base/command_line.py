@@ -32,7 +32,10 @@ _OUT_OF_MEMORY_TEXTS = (
 
 
 def make_app(program_name: str, help_text: str | None) -> App:
-    """Return a cyclopts app without commands; its help is plain text, and calls return commands' results."""
+    """Return a cyclopts app without commands.
+
+    Its help is plain text. A call of the app returns the result of the command instead of exiting.
+    """
     return App(
         name=program_name,
         help=help_text,
@@ -111,7 +114,7 @@ def print_failure(program_name: str, message: str) -> int:
 
 
 def _show_warnings_as_notes() -> None:
-    """In a with block, show each `DermisWarning` once, as a note on stderr, and other warnings as usual."""
+    """Show each `DermisWarning` in a with block once, as a note on stderr; show other warnings as usual."""
     default, shown = warnings.showwarning, set[str]()
 
     def show_once(message: Warning | str, category: type[Warning], *args: Any, **kwargs: Any) -> None:

@@ -14,8 +14,9 @@ Treatment = Literal["drawn", "drawn with a note", "noted", "refused", "no effect
 class FileProperty:
     """Property of a file, and what the reader does with this property.
 
-    treatment : "drawn" if the scene follows the property; "noted" if the property is ignored and a note says
-        so; "no effect" if the property is ignored without a note; "refused" if the reader raises an error
+    treatment : "drawn" if the scene follows the property; "drawn with a note" if a note is also printed;
+        "noted" if the property is ignored and a note says so; "no effect" if it is ignored without a note;
+        "refused" if the reader raises an error
     name : property as the documentation shows it, in Markdown
     detail : how the property is drawn, or why it is not drawn, in Markdown
     keys : words by which the reader recognises the property, such as statements or extensions

@@ -19,7 +19,7 @@ class Registry(Mapping[str, T], Generic[T]):
 
     Parameters
     ----------
-    kind : str
+    entry_noun : str
         What an entry is, for error messages, such as "technique".
     entries : Mapping of str to object or str, optional
         Initial entries: a mapping from name to entry.

@@ -27,7 +27,7 @@ def _to_int(_: type, tokens: Sequence[Token]) -> int:
 def _to_choice(
     model: type[FrozenModel], field_name: str, choice_type: object, tokens: Sequence[Token]
 ) -> str:
-    """Return the word that was typed, after a check against all choices, including choices from plug-ins."""
+    """Return the word that the user typed; raise CoercionError unless the field has this choice."""
     from dermis.scene.frozen_model import field_choices
 
     if (word := tokens[0].value) in (choices := field_choices(model, field_name)):

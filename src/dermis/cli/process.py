@@ -66,7 +66,7 @@ class StandardStreams:
         return next((fault for fault in faults if not isinstance(fault, BrokenPipeError)), None)
 
     def discard_stdout(self) -> None:
-        """Discard buffered output to stdout after an interruption, as the reader may be blocked."""
+        """Discard all further output to stdout, which nobody may be reading after an interruption."""
         for raw in self._raw:
             if raw.descriptor == 1:
                 raw.fault = raw.fault or BrokenPipeError()
@@ -267,9 +267,11 @@ def _running_loop() -> AbstractEventLoop | None:
 
 
 def _caller_swallows_exceptions(stack_frame: FrameType | None) -> bool:
-    """Return whether the library that called the code in a stack frame would swallow an exception.
+    """Return whether a library on the call stack would swallow an exception that is raised now.
 
-    Examples of such code are callbacks of a graphics driver, and modules during an import.
+    This is the case during callbacks of a graphics driver and during imports.
+
+    stack_frame : innermost frame of the call stack
     """
     while stack_frame is not None:
         package, name = (

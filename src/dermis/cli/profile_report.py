@@ -101,7 +101,10 @@ class ProfileReport:
 
     @property
     def ring_error(self) -> Floats:
-        """Return the relative error of the Gaussians (3,) in the light that emerges through rings [-]."""
+        """Return the relative error (3,) of the fitted Gaussians for each colour channel [-].
+
+        The error is measured in the light that emerges through concentric rings around the point of entry.
+        """
         return self.radial.rings().error(self.fit.profile.variance_mm2, self.fit.profile.weight)
 
     @property
@@ -169,7 +172,7 @@ class ProfileReport:
         return lines
 
     def _model_lines(self) -> list[str]:
-        """Return text lines about the error of the diffusion model, which no fit can reduce."""
+        """Return lines with the error of the diffusion model relative to Monte Carlo; empty if unknown."""
         error = self.model_error
         if error is None:
             return []
@@ -240,7 +243,11 @@ class ProfileReport:
         return {"burley": values | engines}
 
     def _transmitted_colours(self) -> dict[str, Floats]:
-        """Return a dictionary from methods to transmittances (n, 3) of slabs as thick as `through_mm` [-]."""
+        """Return the transmittances (n, 3) of slabs by name of the method [-].
+
+        The n slabs have the thicknesses `through_mm`. The methods are "gaussians" (from the fit) and "slab"
+        (from the tissue, if it is known).
+        """
         if not self.through_mm:
             return {}
         gaussians = {"gaussians": gaussian_transmittance(self.fit.profile, self.through_mm)}

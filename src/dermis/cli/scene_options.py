@@ -61,7 +61,7 @@ if not TYPE_CHECKING:
 class SceneOptions:
     """Options of a scene on the command line.
 
-    The options generated from a model are one dictionary from field names to values.
+    The fields `settings`, `skin`, `environment` and `head` are dictionaries of the options given by the user.
     """
 
     settings: SettingsOptions = field(default_factory=dict)
@@ -141,9 +141,10 @@ def assemble_scene(head_or_scene: str, options: SceneOptions) -> tuple[Scene, Se
 
 
 def fit_atlas(scene: Scene, settings: Settings, adapter_kind: str) -> Settings:
-    """Return settings that suit an adapter: software adapters get an atlas no larger than the picture needs.
+    """Return settings with a smaller atlas for a software adapter, as large as the picture needs.
 
-    A note tells the user. An atlas size that the user or the scene file specifies is kept.
+    The atlas is the texture in which light is diffused. A note on stderr states its new size. A size that
+    the user or the scene file specifies is kept.
 
     adapter_kind : kind of the graphics adapter, "CPU" for software
     """
@@ -231,13 +232,13 @@ def _merge_environment(scene_environment: Environment | None, options: Options) 
 def _select_lights(
     scene: Scene, rig_or_file: str | None, environment: Environment | None, *, replaces_environment: bool
 ) -> tuple[Light, ...]:
-    """Return the lights that the command line options select.
+    """Return the lights that the options --lights and --env select.
 
-    These are the lights of --lights; without --lights, no lights if --env is given, else the lights of the
-    scene.
+    Without --lights, these are the lights of the scene, or no lights if --env is given.
 
     rig_or_file : value of --lights (name of a lighting rig, or path of a file); None without this option
-    replaces_environment : whether --env replaces the environment
+    environment : environment of the final scene; if it is None, a rig without lights raises DermisError
+    replaces_environment : whether --env is given
     """
     from dermis.scene import load_lights
 

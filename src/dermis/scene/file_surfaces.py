@@ -39,7 +39,9 @@ def with_missing_uv(rigged: RiggedMesh) -> RiggedMesh:
 
 
 def direct_material(rigged: RiggedMesh, materials: Sequence[FileMaterial]) -> FileMaterial | None:
-    """Return the material whose pictures serve unchanged as skin maps; None if pictures must be packed.
+    """Return the material whose pictures can be used unchanged as skin maps; None if there is none.
+
+    Without such a material, the pictures of several materials must be packed into common maps.
 
     rigged : mesh of the file
     materials : materials of the file
@@ -100,9 +102,9 @@ def _has_colours(mesh: Mesh, surface: FileSurface, material_mask: Mask) -> bool:
 def with_file_textures(
     rigged: RiggedMesh, materials: Sequence[FileMaterial], pack_skin: bool
 ) -> tuple[Mesh, Maps, tuple[str, ...]]:
-    """Pack pictures of materials into common maps; return the mesh with uv in these, the maps, and notes.
+    """Pack pictures of materials into common maps; return the mesh, the maps and notes for the user.
 
-    The notes tell users which detail was lost.
+    The uv of the returned mesh refer to the common maps. The notes say which detail was lost.
 
     rigged : mesh of the file
     materials : materials of the file
@@ -128,7 +130,7 @@ def with_file_textures(
 
 
 def _with_mean_colours(mesh: Mesh, materials: list[Material], maps: PartMaps) -> list[Material]:
-    """Return materials in the mean colour of their maps, for programs that do not read the maps."""
+    """Return copies of the materials; those with maps get the mean colour of the maps as uniform colour."""
     size = np.array(maps.colour.shape[1::-1])
     coloured = []
     for index, material in enumerate(materials):
@@ -240,7 +242,7 @@ def unused_properties(
 
 
 def _replaced_by_skin(material: FileMaterial) -> list[str]:
-    """Return names of the material properties that are replaced by the skin settings."""
+    """Return the properties of a material in the file that the skin settings replace, as texts for a note."""
     replaced = []
     if "roughness" not in material.textures and material.roughness not in (None, 1.0):
         replaced.append(f"roughness {material.roughness:g}")

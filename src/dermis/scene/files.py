@@ -194,8 +194,8 @@ def head_and_skin(
 ) -> tuple[Head, Skin]:
     """Return the head of a [head] table, and the skin settings of the head.
 
-    If the [head] table names a table of face regions, rho_s of the returned skin is the mean over the
-    regions.
+    If the [head] table names a table of face regions, the returned skin has the mean specular strength
+    rho_s of these regions.
 
     skin : skin settings of the scene file
     scene_folder : folder to which file names are relative

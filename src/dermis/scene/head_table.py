@@ -122,7 +122,10 @@ class HeadTable(FrozenModel):
 
 
 def has_region_table(head_fields: Mapping[str, Any]) -> bool:
-    """Return whether a [head] table names a table of face regions, which overrides roughness and rho_s."""
+    """Return whether a [head] table names a table of face regions.
+
+    Such a table overrides the roughness and the specular strength of the skin.
+    """
     return head_fields.get("regions", AUTO) not in (AUTO, NO_REGIONS)
 
 

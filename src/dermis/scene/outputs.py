@@ -78,7 +78,7 @@ class Output:
 
     @property
     def wgsl_type(self) -> str:
-        """Return the WGSL type of one channel in the output buffer, which has four bytes."""
+        """Return the four-byte WGSL type of a channel in the shader's output buffer: f32, i32 or u32."""
         return _WGSL_TYPE_OF_CHANNEL[self.kind]
 
 

@@ -1,6 +1,6 @@
-"""Side of the atlas that suits the resolution of a picture.
+"""Size of the atlas, the square texture in which light is diffused, that a picture needs.
 
-Software adapters, which diffuse light slowly, use this side by default.
+Software adapters, on which diffusion is slow, get an atlas of this size by default.
 """
 
 from __future__ import annotations
@@ -22,8 +22,9 @@ _MIN_ATLAS_SIDE = 1024  # coarser texels would blur the light of the narrowest p
 def resolved_atlas_side(scene: Scene, settings: Settings) -> int:
     """Return the side of the smallest atlas with at least one texel per three pixels of the picture [texel].
 
-    The side is a power of two, at least 1024 and at most the side in `settings`. The size of a pixel on the
-    skin is taken at the target of the camera; the size of a texel follows from the area of the skin.
+    The atlas is the square texture in which light is diffused. Its side is a power of two, at least 1024 and
+    at most the side in `settings`. The lengths of pixels and texels on the skin are estimated from the
+    height visible at the camera's target and from the area of the skin.
     """
     pixels_per_mm = settings.size[1] / scene.camera.frame_mm
     side = (

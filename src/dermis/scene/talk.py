@@ -1,4 +1,4 @@
-"""Settings that reproduce faults and historical methods of the 2007 talk, for comparison.
+"""Settings that reproduce faults and older methods described in the 2007 talk, for comparison.
 
 These settings are fields of `Skin` and `Settings`, as the gallery uses them to draw its pictures. Help texts
 and the viewer list the fields last, under a separate heading.

@@ -31,17 +31,16 @@ def directional_albedo(
 ) -> Floats:
     """Return the directional-hemispherical reflectance rho_dt of a lobe of specular strength rho_s = 1 [-].
 
-    cos_theta : cosine of the angle between normal and viewer or, for reciprocal lobes, normal and light
+    cos_theta : cosine between the normal and the direction to the viewer; for reciprocal lobes, the result
+        is the same for the direction to the light
     m : roughness; broadcast against cos_theta [-]
     lobe : BRDF to integrate
-    fresnel : Fresnel reflectance of the lobe
+    fresnel : function that returns the Fresnel reflectance of the lobe
     nodes : number of quadrature nodes along and across the plane of incidence
 
-    The integral is taken over the slopes (x, y) of the half vector. As a function of these slopes, a lobe is
-    smooth and about m wide. The light is above the surface if the slopes are within a circle of radius 1 /
-    cos theta around (tan theta, 0). Over this circle, Gauss-Legendre rules in atan(x / m) and atan(y / m)
-    resolve narrow peaks and grazing angles. The 80 x 80 directions of the published method do not resolve
-    them.
+    The integral is taken over the slopes of the half vector. Gauss-Legendre rules with nodes that are dense
+    near the peak of the lobe resolve narrow peaks and grazing angles; the 80 x 80 directions of the published
+    method do not.
 
     Source: [dEonLuebke2007] section 14.3, for the definition of rho_dt.
     """

@@ -19,7 +19,11 @@ _NORMAL = np.array([0.0, 0.0, 1.0])
 
 
 def normal_incidence_peak(model: str, m: float) -> float:
-    """Return the BRDF of a model with rho_s = 1 when light and viewer are both on the normal [1/sr]."""
+    """Return the BRDF of a model when light and viewer are both in the direction of the normal [1/sr].
+
+    model : name of the specular model, evaluated for the specular strength rho_s = 1
+    m : roughness [-]
+    """
     return float(MODELS[model].lobe(cosines(_NORMAL, _NORMAL, _NORMAL), m))
 
 
@@ -40,7 +44,7 @@ def reciprocity_error(model: str) -> float:
 
 
 def albedo_rows(model: str) -> list[dict[str, float]]:
-    """Return the directional albedo rho of a model for all compared roughnesses and cosines.
+    """Return the directional albedo rho of a model at `COMPARED_ROUGHNESSES` and `COMPARED_COSINES`.
 
     Each row of the result has the keys m, cos_theta and rho, for a CSV file.
     """

@@ -82,7 +82,7 @@ class EnergyScheme:
     returns_internal_light: bool
 
     def entering_fraction(self, albedo: ArrayLike, rho_s: float) -> Floats:
-        """Return the fraction of light from a direction that enters the skin [-].
+        """Return how large a fraction of the light from one direction enters the skin [-].
 
         albedo : directional albedo of the lobe for this direction [-]
         rho_s : specular strength [-]

@@ -25,8 +25,8 @@ _REFERENCE_FIBRE_RADIUS_MM = 0.04  # radius of a hair; the absorptions above are
 class FibreParameters(NamedTuple):
     """Widths of the scattering lobes of a hair fibre.
 
-    variance : longitudinal variances of the lobes R, TT and TRT, and of all lobes with more internal
-        reflections
+    variance : longitudinal variances of four lobes: R (reflected light), TT (transmitted light), TRT (light
+        reflected once inside the fibre), and all light with more internal reflections
     width : scale of the azimuthal logistic distribution [rad]
     """
 
@@ -186,7 +186,8 @@ def tilted_sine(sin_o: ArrayLike, p: int) -> Floats:
     """Return the sine of the viewer's inclination for one lobe, corrected for the tilt of the cuticle scales.
 
     sin_o : sine of the angle by which the direction to the viewer is inclined towards the tip of the fibre
-    p : index of the lobe: 0 for R, 1 for TT, 2 for TRT, 3 for all further lobes
+    p : number of passes of the light through the fibre: 0 for the lobe R, 1 for TT, 2 for TRT; 3 stands for
+        all further lobes
     """
     angle = np.arcsin(np.clip(np.asarray(sin_o, float), -1, 1))
     return np.asarray(np.sin(angle + (-2.0, 1.0, 4.0, 0.0)[p] * CUTICLE_TILT))

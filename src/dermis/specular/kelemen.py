@@ -14,7 +14,7 @@ from dermis.specular.models import Model
 
 
 def kelemen(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
-    """Return the BRDF D F / (4 pi (v.h)^2) for rho_s = 1, without the factor n.l [1/sr].
+    """Return the BRDF D F / (4 pi (v.h)^2) of specular strength rho_s = 1, without the factor n.l [1/sr].
 
     m : roughness of the Beckmann distribution D; broadcast against the angles [-]
     fresnel : function that returns F from the cosine v.h

@@ -18,7 +18,10 @@ if TYPE_CHECKING:
 
 
 class Lobe(Protocol):
-    """Specular BRDF for rho_s = 1, without the factor n.l [1/sr]; 0 below the surface."""
+    """Specular BRDF of strength rho_s = 1, without the factor n.l [1/sr].
+
+    The BRDF is 0 if light or viewer is below the surface.
+    """
 
     def __call__(self, angles: Cosines, m: ArrayLike, fresnel: Fresnel = ...) -> Floats:
         """Return the BRDF for arrays of cosines.

@@ -65,7 +65,7 @@ def sampled_camera(
     )
 
     def aim(offset_fraction: float) -> AimOffset:
-        """Return the aim offset of the camera at which the face has a fraction of its sampled offset."""
+        """Return the aim offset that moves the face in the picture by a fraction of its sampled offset."""
         return -0.5 * frame * offset_fraction * offset[0], -0.5 * frame * offset_fraction * offset[1]
 
     fraction, low, high = 1.0, 0.0, 1.0

@@ -36,7 +36,7 @@ TableRows = Iterable[Sequence[object]]
 def write_datasheet(out: Path, spec: Spec) -> None:
     """Write README.md and dataset.json of a data set from its spec, index and shards.
 
-    Both files depend only on the spec and on the shards.
+    Data sets with equal specs and equal shards get equal files.
 
     Raises DermisError if the index is missing, or if a file cannot be written.
     """

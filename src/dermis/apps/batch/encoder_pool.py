@@ -22,8 +22,8 @@ class EncoderPool:
     """Pool of processes that encode images as files; the images are assigned to the processes in turn.
 
     process_count : number of processes; if 0, the calling process encodes the images
-    encode : picklable function, called with the arguments in a job, that returns the number and the files of
-        an image
+    encode : picklable function that receives the elements of a job as arguments, and returns the number and
+        the files of an image
     """
 
     def __init__(self, process_count: int, encode: Callable[..., EncodedImage]) -> None:
@@ -126,9 +126,11 @@ def _round_up_to_page(byte_count: int) -> int:
 def _run_encoder(
     pipe: Connection, shared_memory: ctypes.Array[ctypes.c_ubyte], encode: Callable[..., EncodedImage]
 ) -> None:
-    """Encode the jobs whose offsets arrive through the pipe; an encoder process runs this function.
+    """Encode jobs until the pipe is closed; an encoder process runs this function.
 
-    shared_memory : memory shared with the parent process, which holds the jobs
+    pipe : pipe that delivers the positions of each job in the shared memory and takes the encoded images
+    shared_memory : memory shared with the parent process, which writes the jobs into it
+    encode : function that encodes an image, see `EncoderPool`
     """
     view = memoryview(shared_memory).cast("B")
     while True:

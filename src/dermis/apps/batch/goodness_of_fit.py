@@ -148,7 +148,10 @@ def _parameter_test(parameter: str, distribution: Distribution, samples: Samples
 
 
 def _number_test(parameter: str, distribution: Distribution, sorted_samples: Array) -> FitTest:
-    """Return the Kolmogorov-Smirnov test of sorted samples, rounded to six significant digits."""
+    """Return the Kolmogorov-Smirnov test of the samples of a numeric parameter.
+
+    sorted_samples : (n,) samples in ascending order, each of which was rounded to six significant digits
+    """
     count, error = len(sorted_samples), _RELATIVE_ROUNDING_ERROR * np.abs(sorted_samples)
     up_to = np.searchsorted(sorted_samples, sorted_samples, "right") / count
     below = np.searchsorted(sorted_samples, sorted_samples, "left") / count

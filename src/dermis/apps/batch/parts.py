@@ -57,8 +57,12 @@ def _matches_sha256(path: Path, expected_sha256: str) -> bool:
 
 
 def copy_images(writer: ShardWriter, source_path: Path, first_image: int, stop_image: int) -> None:
-    """Copy a range of images from a shard or part, and the reasons recorded for images missing from it.
+    """Copy a range of images from a shard or part to another one.
 
+    For images of the range that could not be rendered, the recorded reasons are copied.
+
+    writer : writer of the shard or part to which the images are copied
+    source_path : path of the shard or part that contains the images
     first_image, stop_image : first image number, and the number after the last image
 
     Raises DermisError if the shard or part cannot be read.

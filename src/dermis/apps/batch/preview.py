@@ -68,7 +68,7 @@ class Estimate(TypedDict):
 
 
 def dry_run(spec: Spec, adapter: str = "auto") -> tuple[list[ParameterRow], NDArray[np.uint8], Estimate]:
-    """Return the parameter table of a data set, an sRGB contact sheet (h, w, 3), and an estimate.
+    """Return the parameter table, an sRGB contact sheet (h, w, 3), and the estimated size and duration.
 
     Raises DermisError as `SceneBuilder.build` and `Renderer.draw` do.
     """
@@ -76,9 +76,9 @@ def dry_run(spec: Spec, adapter: str = "auto") -> tuple[list[ParameterRow], NDAr
 
 
 def estimate(spec: Spec, adapter: str = "auto") -> Estimate:
-    """Return the size and the duration of a data set, by rendering the first images as a worker does.
+    """Estimate the size of a data set and the duration of its rendering, from its first images.
 
-    The first two images, which fill caches, are not timed.
+    These images are rendered by a `Worker`. The first two of them, which fill caches, are not timed.
     """
     count = min(spec.count, spec.shard_size, _MEASURED_IMAGES)
     times = [time.monotonic()]
@@ -93,7 +93,7 @@ def estimate(spec: Spec, adapter: str = "auto") -> Estimate:
 
 
 def estimate_line(estimate: Estimate) -> str:
-    """Return an estimate as a line of text."""
+    """Return the estimated size and duration of a data set as a line of text."""
     size, hours = f"{estimate['bytes'] / 1e9:.3g} GB", f"{estimate['hours']:.3g} hours with one worker"
     return f"{estimate['images']:,} images: about {size} and {hours}, from {estimate['measured']} images"
 

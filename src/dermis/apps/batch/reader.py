@@ -109,10 +109,10 @@ def read_dataset(
 def decode_image(files: Mapping[str, object], culprit: object = "") -> Image:
     """Return an image of a data set from the files of the image, with the keys that `read_dataset` lists.
 
-    Raises DermisError for damaged files.
-
     files : content of each file as bytes, by suffix, as the library webdataset provides them
     culprit : name of the image in error messages; by default the image's key
+
+    Raises DermisError for damaged files.
     """
     source = culprit or files.get("__key__", "an image")
     data = {suffix: content for suffix, content in files.items() if not suffix.startswith("__")}

@@ -37,13 +37,16 @@ class WorkerPool(Protocol):
     """Protocol of worker pools: `ProcessPool` on this machine, or `DaskCluster` on several."""
 
     def render(self, options: RunOptions, tasks: Sequence[Shard]) -> Iterator[WorkerEvent]:
-        """Process the tasks as `Worker.process` does, render damaged parts again, and yield all events."""
+        """Render parts and verify shards; yield the events that the workers send.
+
+        tasks : parts to render and shards to verify; damaged parts are rendered again
+        """
         ...
 
 
 @dataclass
 class Progress:
-    """Progress of a run, reported to `on_progress`.
+    """Progress of a run, passed to the argument `on_progress` of the function `run`.
 
     total : number of images in the parts that were missing at the start
     images : how many of these images were rendered so far, or were found on the disk

@@ -138,7 +138,7 @@ class SceneBuilder:
 
 
 def sampled_person(parameters: Parameters) -> Human:
-    """Return the random person for the sampled seed, with sampled parameters in place of random fields."""
+    """Return the random person for the sampled seed; sampled parameters replace some of the random fields."""
     fields: dict[str, object] = {}
     appearance: dict[str, dict[str, object]] = {}
     for name, value in table_values(parameters, "person").items():

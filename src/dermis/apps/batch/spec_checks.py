@@ -160,11 +160,11 @@ def _check_table(
     allowed_keys: Sequence[str],
     make_model: Callable[..., object],
 ) -> None:
-    """Raise DermisError for unknown keys of a spec table, and for distributions whose limits a model rejects.
+    """Raise DermisError for unknown keys of a spec table, and for distributions with invalid samples.
 
     allowed_keys : allowed keys of the table
-    make_model : class or function that makes the model; called with the key and each limit of its
-        distribution
+    make_model : class or function that accepts the keys as keyword arguments and raises DermisError for
+        invalid values; called with the smallest and the largest sample of each distribution
     """
     for name, distribution in table_values(distributions, table_name).items():
         if name not in allowed_keys:

@@ -182,7 +182,7 @@ class Worker:
         unwritten_parts: deque[tuple[Part, KeptImages]],
         send_event: Callable[[WorkerEvent], None],
     ) -> Iterator[int]:
-        """Yield the numbers of the images to render; complete tasks that need no rendering immediately.
+        """Yield the numbers of the images to render, and send the events of tasks that need no rendering.
 
         unwritten_parts : queue to which each part that must be written is appended, with the images to copy
             into this part
@@ -209,7 +209,9 @@ class Worker:
     def _encoder_jobs(
         self, numbers: Iterator[int], failures: list[Failure]
     ) -> Iterator[tuple[int, Observation, Parameters, SkinTone | None]]:
-        """Yield number, observation, parameters and skin tone of each image that can be rendered, in order.
+        """Render images; yield the number, observation, parameters and skin tone of each, in order.
+
+        An observation holds the picture and the output arrays of an image.
 
         numbers : numbers of the images to render
         failures : list to which images that cannot be rendered are appended

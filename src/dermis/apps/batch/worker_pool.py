@@ -50,9 +50,9 @@ class SlotRequest:
     def slots(self) -> tuple[list[WorkerSlot], int]:
         """Return one slot per worker, and the number of encoder processes per worker.
 
-        The adapters are assigned to the workers in turn. A software adapter shares the processor cores with
-        Python and the encoders; by default, there is then one worker for every two cores, the threads of all
-        workers together use all cores, and each worker encodes its images itself.
+        The adapters are assigned to the workers in turn. On a software adapter, there is by default one
+        worker for every two processor cores, and each worker encodes its images itself. The threads of all
+        workers together then use all cores.
         """
         adapters, cores = self.adapters(), available_cores()
         software = adapters[0].kind == "CPU"
@@ -73,12 +73,12 @@ def available_cores() -> int:
 
 @dataclass(frozen=True)
 class ProcessPool:
-    """Pool of worker processes on this machine, one per slot."""
+    """Pool of worker processes on this machine, one for each `WorkerSlot`."""
 
     slots: Sequence[WorkerSlot]
 
     def render(self, options: RunOptions, tasks: Sequence[Shard]) -> Iterator[WorkerEvent]:
-        """Process the tasks on all slots, and yield the events of the workers as they arrive.
+        """Process the tasks with one worker per slot, and yield the events of the workers as they arrive.
 
         Raises DermisError, after stopping all workers, for errors that would recur on another attempt.
         """
