@@ -73,10 +73,10 @@ def zonal_factors(kernel: Callable[[Floats], Floats], degree: int) -> Floats:
 
 
 def synthesise_panoramas(coefficients: list[Complex], factors: Floats, height: int) -> Floats:
-    """Return k panoramas (k, height, 2 height, c), each from the coefficients times a set of factors.
+    """Return k panoramas (k, height, 2 height, c) whose harmonic coefficients are multiplied by factors.
 
     coefficients : coefficients of the spherical harmonics, see `analyse_panorama`
-    factors : (k, degree + 1) factor for each panorama and degree, such as k results of `zonal_factors`
+    factors : (k, degree + 1) factor for each panorama and degree, see `zonal_factors`
     """
     width, channels = 2 * height, coefficients[0].shape[1]
     count, degree = factors.shape[0], factors.shape[1] - 1

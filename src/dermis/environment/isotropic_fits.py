@@ -62,10 +62,9 @@ def fit_isotropic_lobes(lobe: Lobe) -> Floats:
     in the plane of incidence; elsewhere, they are mirror images on opposite sides of this plane.
 
     The fit minimises the expected difference between two reflections of a random environment: by the specular
-    lobe, and by the sum of the isotropic lobes. The environment surrounds the surface on all sides, also
-    below the horizon, and its power falls with the harmonic degree. Fits proceed from rough surfaces and
-    grazing views to smooth surfaces and views along the normal. Each fit starts at the mean parameters of the
-    adjacent table nodes that are already fitted, so that lobes vary smoothly over the table.
+    lobe, and by the sum of the isotropic lobes. Table nodes are fitted one after another, from rough surfaces
+    and grazing views to smooth surfaces and views along the normal. Each fit starts at the mean parameters of
+    the adjacent nodes that are already fitted, so that lobes vary smoothly over the table.
     """
     found: dict[TableNode, Floats] = {}
     cosines, roughnesses = LOBE_TABLE_COSINES.tolist(), LOBE_TABLE_ROUGHNESSES.tolist()
@@ -138,7 +137,7 @@ def _is_elongated(target: LobeTarget) -> bool:
 
 
 def _arrange_pair(initial: Floats, target: LobeTarget, view_index: int) -> Floats:
-    """Return initial parameters (4, 5) in which the pair of lobes is placed as the specular lobe requires.
+    """Return initial parameters (4, 5) of a fit, with the last two lobes ("the pair") placed as follows.
 
     If the specular lobe is elongated, both lobes of the pair are placed in the plane of incidence. Otherwise
     they are placed on opposite sides of this plane.
@@ -190,7 +189,7 @@ def _fit_parameters(target: LobeTarget, view_index: int, initial: Floats, neighb
 
     @lru_cache(maxsize=2)
     def reduced_system(vector: bytes) -> Floats:
-        """Return the Jacobian and the residuals, reduced by QR from about 8,000 rows to 16.
+        """Return the Jacobian and the residuals, reduced by QR decomposition to as many rows as columns.
 
         vector : parameters along the free directions, as bytes of float64
         """

@@ -43,15 +43,13 @@ def isotropic_lobe_table(model: str = "kelemen") -> Floats:
 
     model : name in MODELS
 
-    The direction (x, y) is in stereographic coordinates about the mirror direction. Its unit vector has three
-    components: 2x away from the viewer (in the plane of incidence), 2y perpendicular to the plane of
-    incidence, and 1 - x^2 - y^2 along the mirror direction, each divided by 1 + x^2 + y^2. When the table is
-    interpolated between views, the lobes thus follow the mirror direction; the last two views are 29 degrees
-    apart.
+    The direction (x, y) is the stereographic projection of a unit vector about the mirror direction: x points
+    away from the viewer in the plane of incidence, and y is perpendicular to this plane. The components of
+    the unit vector along x, y and the mirror direction are 2x, 2y and 1 - x^2 - y^2, each divided by
+    1 + x^2 + y^2. Lobes thus follow the mirror direction when the table is interpolated between views.
 
-    The weighted sum of the five lobes approximates the specular lobe. At grazing views, the specular lobe is
-    elongated, deviates from the mirror direction, and ends at the horizon. Lobes of weight 0 need no lookup.
-    Models without a shipped table are fitted on first use, which takes half a minute.
+    Lobes of weight 0 need no lookup. Models without a shipped table are fitted on first use, which takes half
+    a minute.
     """
     rows = [row for row in read_rows("dermis.environment", "data/mirrors") if row["model"] == model]
     columns = [

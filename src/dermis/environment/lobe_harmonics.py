@@ -51,8 +51,8 @@ class LobeTarget(NamedTuple):
 class IsotropicLobes(NamedTuple):
     """Parameters of five isotropic lobes, (5,) each.
 
-    angle : angle from the normal to the direction after its projection onto the plane of incidence [rad]
-    out_of_plane : angle between the direction and the plane of incidence [rad]
+    angle : angle between the normal and the projection of the lobe's axis onto the plane of incidence [rad]
+    out_of_plane : angle between the lobe's axis and the plane of incidence [rad]
     log_roughness : logarithm of the roughness
     weight : weights, which sum to 1
     """
@@ -98,9 +98,8 @@ def lobe_target(lobe: Lobe, view_cosine: float, m: float) -> LobeTarget:
 def harmonic_terms(degree: int) -> tuple[NDArray[np.intp], NDArray[np.intp], Floats]:
     """Return degree, order and weight of the n harmonics that are symmetric about the plane of incidence.
 
-    The weights are chosen for comparisons of two lobes that reflect the same, randomly rotated environment.
-    The expected squared difference of the two reflections is a sum over the harmonics: the difference of the
-    two coefficients is multiplied by the weight and squared.
+    The weights serve to compare two lobes: the sum of the squared, weighted differences of their coefficients
+    is the expected squared difference of their reflections of a randomly rotated environment.
     """
     pairs = [(l, m) for m in range(degree + 1) for l in range(m, degree + 1, 2)]
     degrees, orders = np.array(pairs, np.intp).T
@@ -174,10 +173,10 @@ def _interpolate_legendre(degree: int, out_of_plane: Floats) -> tuple[Floats, Fl
 
 
 def _layer_convolution_factors(log_roughness: float, degree: int) -> Floats:
-    """Return the convolution factors of a prefiltered lobe, and their derivatives, for each harmonic, (2, n).
+    """Return the factors (first row) by which a lobe multiplies harmonics, and their derivatives, (2, n).
 
-    The factors are interpolated between two prefiltered layers, as in the shader. The derivatives are with
-    respect to the logarithm of the roughness.
+    The factors are interpolated between two layers of the prefiltered panorama, as in the shader. The
+    derivatives are with respect to the logarithm of the roughness.
 
     log_roughness : logarithm of the roughness
     """
@@ -191,9 +190,9 @@ def _layer_convolution_factors(log_roughness: float, degree: int) -> Floats:
 
 @cache
 def _layer_factor_table() -> Floats:
-    """Return the convolution factor of each prefiltered layer for each degree, (layers, degrees).
+    """Return the convolution factor of each reflection layer of a prefiltered panorama, (layers, degrees).
 
-    Factors for degrees above the highest degree of the layers are 0.
+    Factors for degrees above the highest harmonic degree of the panorama are 0.
     """
     kernels = np.stack([isotropic_kernel(float(m)) for m in LAYER_ROUGHNESSES])
     return np.pad(kernels, ((0, 0), (0, max(_FIT_DEGREES[-1] + 1 - kernels.shape[1], 0))))

@@ -148,7 +148,7 @@ class Sun:
 
 
 def split_suns(radiance: Floats) -> tuple[Floats, list[Sun]]:
-    """Split a panorama into a remaining panorama and suns, which together have the light of the original.
+    """Extract suns from a panorama; return the panorama without the light of the suns, and the suns.
 
     Suns are sorted by irradiance, the strongest first.
 

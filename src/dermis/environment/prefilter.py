@@ -27,8 +27,8 @@ def isotropic_lobe(theta: Floats, m: float) -> Floats:
     m : roughness [-]
 
     The weight is the Kelemen lobe times cos(theta), up to a constant factor. Normal, view and mirror
-    direction are assumed to be equal [Karis2013]. The half vector h is then at the angle theta / 2 from the
-    normal, and h.h is 4 cos^2(theta / 2) before normalisation.
+    direction are assumed to be equal [Karis2013], so the half vector is at the angle theta / 2 from the
+    normal.
     """
     half = np.cos(0.5 * theta)
     with np.errstate(under="ignore"):
@@ -48,8 +48,8 @@ def reflection_constants() -> dict[str, float]:
 class Prefiltered:
     """Panorama convolved with a cosine and with lobes of several roughnesses, for lookups by the shader.
 
-    layers : (14, h, 2 h, 3) a layer of irradiance by normal direction, then for each roughness a layer of
-        weighted mean radiance by mirror direction
+    layers : (14, h, 2 h, 3) panoramas: first the irradiance by normal direction, then, for each of
+        `LAYER_ROUGHNESSES`, the weighted mean radiance by mirror direction
     suns : suns that were removed from the panorama before the convolution
     """
 
@@ -79,7 +79,7 @@ def prefilter(panorama_name: str) -> Prefiltered:
 
 
 def isotropic_kernel(m: float) -> Floats:
-    """Return the factor for each degree (161,) of the convolution with an isotropic lobe of roughness m.
+    """Return the factors (161,) by which convolution with a lobe of roughness m multiplies each degree.
 
     The lobe is normalised to unit integral.
     """

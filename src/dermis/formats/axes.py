@@ -38,11 +38,11 @@ class Axes(NamedTuple):
         return "-y" if self.up in ("z", "-z") else "z"
 
     def or_stated(self, stated_axes: Axes) -> Axes:
-        """Return these axes, which the user chose; axes that the user left open are taken from the file.
+        """Return these axes, with unknown axes replaced by the axes that a file states.
 
         stated_axes : axes that the file states
 
-        The stated front is used only if the resulting up axis is also the stated one.
+        An unknown front is replaced only if the up axis of the result is the up axis of the file.
         """
         chosen = self._replace(up=self.up or stated_axes.up)
         same = chosen.front == "auto" and chosen.top == stated_axes.top

@@ -1,7 +1,7 @@
 """Deformation data of exported meshes: morph targets and bone weights of every vertex.
 
-Export formats allow four bones per vertex. For vertices of a subdivided mesh, bones and weights are fitted so
-that linear blend skinning moves a vertex to where subdivision of the skinned control mesh would place it.
+Export formats allow four bones per vertex. The bones and weights of a subdivided mesh are fitted: its skinned
+vertices are as close as possible to the vertices that subdivision of the skinned control mesh would give.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class DeformableMesh:
 
     @cached_property
     def refinement(self) -> csr_array | None:
-        """Return the (q, p) subdivision matrix, control points to mesh points; None without subdivision."""
+        """Return the subdivision matrix (q, p) from control to mesh points; None without subdivision."""
         from scipy.sparse import csr_array
 
         stencils = self.rig.stencils
@@ -144,10 +144,9 @@ def point_bone_influences(rig: Rig, refinement: csr_array | None) -> tuple[Index
 
     refinement : (q, p) subdivision matrix from control points to mesh points; None without subdivision
 
-    Without subdivision, the weights of the rig are kept. With subdivision, a point may depend on more than
-    four bones, and linear blend skinning does not commute with subdivision. Four bones and their weights are
-    therefore fitted: they minimise the squared distance between the skinned point and the point that results
-    from subdivision of the skinned control mesh, averaged over rotations of each bone about all axes.
+    Without subdivision, the weights of the rig are kept. With subdivision, four bones and their weights are
+    fitted. The fit minimises the squared distance between the skinned mesh point and the point that
+    subdivision of the skinned control mesh gives, averaged over rotations of each bone about all axes.
     """
     skeleton = rig.skeleton
     assert skeleton is not None
@@ -220,13 +219,12 @@ def _quadratic_error(
     refinement: csr_array,
     descendant_matrix: Doubles,
 ) -> tuple[Doubles, Doubles]:
-    """Return the matrices H (n, u, u) and vectors g (n, u) of a quadratic error of n skinned points.
+    """Return the error of n skinned points as a quadratic function of their bone weights.
 
-    For each point, the squared error is w H w - 2 g w [mm²], up to a constant. The vector w (u,) contains the
-    weights of u candidate bones.
+    The function is w H w - 2 g w [mm²], up to a constant. The vector w (u,) contains the weights of u
+    candidate bones. The result is the matrices H (n, u, u) and the vectors g (n, u) of all points.
 
-    followed_fractions : (p, b) fraction of each bone's rotation that each control point follows: the summed
-        weights of the bone and its descendants
+    followed_fractions : (p, b) sum of a control point's weights for each bone and the descendants of the bone
     refinement : (n, p) subdivision matrix from control points to the n points
     descendant_matrix : (b, u) 1 where candidate bone u is bone b or one of its descendants, else 0
     """

@@ -157,7 +157,7 @@ def _load_uncached(
 
 
 def _resolve_axes(user_axes: Axes, file_axes: Axes, mesh_path: Path) -> Axes:
-    """Return the axes that the user chose; axes that the user left open are taken from the file.
+    """Return the axes that the user chose, with unknown axes replaced by those that the file states.
 
     Raises DermisError if the front is parallel to the up axis.
     """
@@ -173,8 +173,8 @@ def _find_front(
 ) -> tuple[Axes, str]:
     """Detect the front axis from the shape of the mesh; return the axes with this front, and a note.
 
-    The note is empty if the front is the default. A front that is already set is kept, and so is the default
-    front of files that this package wrote.
+    The axes are unchanged, and the note is empty, if `axes` has a front, if this package wrote the file, or
+    if the detected front is the default.
 
     joined_part : mesh part with all vertices of the file
     skin_triangles : (f,) mask of triangles that are skin

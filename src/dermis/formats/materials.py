@@ -29,7 +29,7 @@ IDENTITY_UV_TRANSFORM: UvTransform = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 class Texture:
     """Picture of a material, with its mapping to the surface.
 
-    uv_set : index of the uv coordinates of the vertices
+    uv_set : index of the uv set of the mesh
     transform : (a, b, c, d, e, f) with u' = a u + b v + c and v' = d u + e v + f, where v points down
     wrap : continuation beyond the picture along u and v
     channel : index of the picture's channel that is used; None for colours, normals and grey pictures
@@ -57,7 +57,7 @@ class FileMaterial:
     """Material of a mesh file, described by the parameters of glTF's metallic-roughness model.
 
     name : name of the material, empty if there is none
-    textures : pictures by role; the factors among the other fields multiply the values of the pictures
+    textures : pictures by role; their values are multiplied by the fields `colour`, `alpha` and so on
     colour : linear base colour [-]; None if not stated
     alpha : opacity [-]
     roughness : perceptual roughness, the square root of the width alpha of GGX [-]; None if not stated
@@ -66,9 +66,9 @@ class FileMaterial:
     normal_scale : glTF's normalTexture.scale
     scatters : whether the file states that light scatters below the surface
     maps : keyword arguments of `load_maps` that files of this package store; they replace `textures`
-    skin_only : properties that are drawn on skin only; for parts that are not skin, a note lists them
+    skin_only : names of properties that have an effect only on skin
     missing : dictionary from role to a sentence on the missing picture
-    unused : properties that have no effect in this package, for a note to the user
+    unused : names of properties that have no effect in this package, for a note to the user
     """
 
     name: str = ""
@@ -98,7 +98,7 @@ class FileMaterial:
         return self.alpha_cutoff if self.alpha_mode == "mask" else _BLENDED_OPACITY_CUTOFF
 
     def skin_pictures(self) -> dict[str, object]:
-        """Return keyword arguments of `load_maps` for skin whose uv layout is also that of the pictures."""
+        """Return the pictures as keyword arguments of `load_maps`, for skin in the uv layout of the file."""
         if self.maps is not None:
             return dict(self.maps)
         return {role: self.textures[role].picture for role in ("colour", "normal") if role in self.textures}

@@ -139,8 +139,8 @@ def repair_mesh(
 
     Degenerate and repeated triangles are dropped. Sheets of the surface that meet at non-manifold edges (of
     more than two triangles) are separated. Connected components that are wound inside out are reversed, and
-    inward normals are turned outwards. uv slightly outside [0, 1] are clamped, and charts in other tiles are
-    moved by whole tiles. A mesh without faults is returned unchanged.
+    inward normals are turned outwards. uv slightly outside [0, 1] are clamped, and uv charts in other tiles
+    are moved to [0, 1]. A mesh without faults is returned unchanged.
 
     materials : for each material of the mesh, its description in the file; None for a material without
         description
@@ -269,11 +269,11 @@ def _separate_sheets(mesh: RawMesh, notes: list[str]) -> RawMesh:
 
 
 def _continue_sheets(mesh: RawMesh, max_pairs_per_edge: int = _MAX_TRIANGLES_PER_EDGE // 2) -> Index:
-    """Return pairs of triangle sides (n, 2) across which sheets continue at non-manifold edges.
+    """Return pairs of triangle sides (n, 2) that connect the sheets of a surface at non-manifold edges.
 
-    The pairs of an edge are chosen one after another. Two sides of the same material are preferred, then
-    sides that run in opposite directions, then sides whose triangles continue each other with the least bend.
-    All pairs of an edge except the first must have opposite directions.
+    The pairs of an edge are chosen one after another. Pairs of the same material are preferred, then pairs
+    that run in opposite directions, then pairs whose two triangles are closest to a flat surface.
+    All pairs of an edge except the first must run in opposite directions.
 
     max_pairs_per_edge : largest number of pairs at an edge
     """
@@ -321,10 +321,10 @@ def _directions_from_sides(mesh: RawMesh, sides: Index) -> Floats:
 def _split_points(mesh: RawMesh, side_pairs: Index) -> Index:
     """Split points at non-manifold edges; return the new point index at each corner, (f, 3).
 
-    Corners at a point form groups whose triangles are connected around the point by `side_pairs`. The largest
-    group keeps the point, and each other group gets a new point.
+    The corners at a point are grouped: triangles that `side_pairs` connects around the point are in the same
+    group. The largest group keeps the point, and each other group gets a new point.
 
-    side_pairs : (n, 2) pairs of sides across which sheets continue
+    side_pairs : (n, 2) pairs of triangle sides that stay connected
     """
     sides, flat = mesh.sides, mesh.corners.ravel()
     crowded = sides.side[sides.first[sides.counts > 2]]
@@ -447,13 +447,13 @@ class _PieceSurface:
         return total / np.where(length > 0, length, 1)
 
     def visible_balance(self, doubtful_pieces: Mask) -> tuple[Doubles, bool]:
-        """Return the visible balance of each component, and whether backs prevail in the mesh.
+        """Return which side of each component is visible from outside, and whether most samples show backs.
 
-        The visible balance of a component is 1 if only its front is visible from outside, -1 if only its back
-        is visible, and 0 if hardly any part of it is visible. Backs prevail if they are more than two
-        thirds of all visible samples.
+        The side is a number for each component: 1 if only its front is visible, -1 if only its back is
+        visible, values between if both are, and 0 if hardly any part is visible. The second result is whether
+        more than two thirds of the visible samples of the whole mesh show the back of a triangle.
 
-        doubtful_pieces : mask of components that get additional samples, so that small components have enough
+        doubtful_pieces : mask of components that get additional samples, because they may be small
         """
         component_area = np.bincount(self.piece, self.double_area)
         more = _DOUBTFUL_SAMPLE_FRACTION * doubtful_pieces / (component_area * doubtful_pieces.sum())
@@ -507,9 +507,9 @@ class _PieceSurface:
 def _inside_out_pieces(surface: _PieceSurface, doubtful_pieces: Mask, normals_cosine: Doubles) -> Mask:
     """Return the mask of connected components that are wound inside out.
 
-    A component is judged by the side that is visible from outside. If both sides are equally visible, the
-    normals of the file decide. A component of which neither side is visible is inside out if backs prevail in
-    the whole mesh.
+    A component is inside out if mainly its back is visible from outside. If both sides or neither side is
+    visible, the component is inside out if the normals of the file say so. If neither side is visible, it is
+    also inside out if the whole mesh mainly shows the backs of triangles.
 
     doubtful_pieces : mask of components that may be inside out
     normals_cosine : for each component, the mean cosine between the file's normals and the triangles' normals

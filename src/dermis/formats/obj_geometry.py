@@ -160,7 +160,7 @@ def _plain_text(obj_text: str) -> str:
 def _split_statements(
     path: Path, plain_text: str
 ) -> tuple[dict[str, _StatementRows], list[_Statement], dict[str, None]]:
-    """Return numeric statements by kind, other statements that are used, and first words of the rest."""
+    """Return numeric statements by first word, other statements, and first words of unknown statements."""
     data = np.frombuffer(f"{plain_text}\n".encode("utf-8", "replace"), np.uint8)
     end = np.flatnonzero(data == _LINE_FEED)
     start = np.concatenate([[0], end[:-1] + 1])
@@ -257,7 +257,7 @@ def _parse_polypaint(hex_digits: str, vertex_count: int) -> tuple[Doubles | None
 def _parse_number_table(
     path: Path, statement_rows: _StatementRows, statement_key: str
 ) -> tuple[Doubles, Index]:
-    """Return the first six numbers of each statement, padded with NaN (n, 6), and its number count (n,)."""
+    """Return the first six numbers of n statements, padded with NaN, (n, 6), and how many each has, (n,)."""
     words = run_starts(statement_rows.text > _SPACE)
     first = np.searchsorted(words, statement_rows.start)
     counts = np.diff(first, append=len(words))

@@ -252,8 +252,7 @@ def with_materials(
     Parts whose pictures are a sequence of UDIM tiles are divided into one part for each tile.
 
     path : path of the OBJ file
-    mesh_parts : mesh parts; if a part has a material, the name of the material is the first name of the
-        part's group
+    mesh_parts : mesh parts, whose groups have the names of their materials
     """
     materials: list[FileMaterial] = []
     notes = [f"mtllib: {name} is not in its folder. {_MISSING_ADVICE}" for name in library.missing]

@@ -64,7 +64,7 @@ class PartPictures:
             return dict(zip(levels, pool.map(encode_png, levels.values()), strict=True))
 
     def emission(self, material: Material) -> tuple[float, tuple[float, ...]]:
-        """Return the strength of a part's emission (a radiance), and the colour that multiplies it.
+        """Return the emission of a part as a strength and a colour; their product is a radiance.
 
         With an emission map, the strength is the largest radiance in the map and the colour is white. Without
         a map, strength times colour is the emission of the material.

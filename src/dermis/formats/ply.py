@@ -131,7 +131,7 @@ class _Header(NamedTuple):
 
 
 class _Columns(dict[str, "Numbers | _ListColumn"]):
-    """Dictionary from property name to column of an element, which records the columns that were used."""
+    """Columns of an element by property name, with a record of the columns that the importer has used."""
 
     def __init__(self) -> None:
         super().__init__()

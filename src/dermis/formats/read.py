@@ -82,7 +82,7 @@ def select_vertices(mesh_part: MeshPart, vertices: Index) -> MeshPart:
 
     vertices : (n,) indices of the vertices, possibly repeated
 
-    Triangles, uv and normals are unchanged, and so still refer to the vertices of `mesh_part`.
+    Only data of vertices are selected; `triangles`, `uv` and `normals` remain those of `mesh_part`.
     """
     order, count = (
         np.argsort(vertices, kind="stable"),

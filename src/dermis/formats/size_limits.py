@@ -1,4 +1,4 @@
-"""Size limits of mesh files: high enough for any head, low enough to load in seconds and two gigabytes."""
+"""Size limits of mesh files: above the size of any head, but small enough to load quickly within 2 GB."""
 
 from __future__ import annotations
 

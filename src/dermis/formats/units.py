@@ -67,9 +67,9 @@ def with_settled_unit(rigged: RiggedMesh, path: Path, unit_mm: float | None, cul
 def guess_unit_mm(positions: Floats, triangles: Ints) -> float:
     """Return the likely length unit of a mesh whose file states no unit [mm].
 
-    The guess is the millimetre if this makes the mesh 100 to 1000 mm large and the mesh is not a standing
-    figure. Otherwise the guess is a unit of `COMMON_UNITS_MM`: with this unit, a standing figure is closest
-    in size to an adult, a flat or slender mesh to a hand, and any other mesh to a head.
+    If the mesh is not a standing figure and is 100 to 1000 units large, the guess is the millimetre.
+    Otherwise the guess is the unit of `COMMON_UNITS_MM` that makes the mesh most similar in size to an adult
+    (standing figures), to a hand (flat or slender meshes), or to a head (all other meshes).
 
     positions : (v, 3) vertices in the unit of the file, Y up
     triangles : (f, 3) vertex indices

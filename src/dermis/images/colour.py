@@ -82,12 +82,9 @@ def lab(linear: ArrayLike) -> Doubles:
 
 
 def linear_of_xyz(xyz_over_white: ArrayLike) -> Doubles:
-    """Return linear Rec. 709 colours (..., 3) that look under D65 like other colours in another light.
+    """Convert CIE XYZ under any light to the linear Rec. 709 colours (..., 3) with the same L*a*b* under D65.
 
-    The L*a*b* of the returned colours under D65 equals that of the other colours in the other light.
-
-    xyz_over_white : (..., 3) X, Y and Z of the colours in the other light, divided by X, Y and Z of white in
-        that light
+    xyz_over_white : (..., 3) X, Y and Z of the colours, divided by X, Y and Z of white in the same light
     """
     xyz = np.asarray(xyz_over_white, np.float64) * _WHITE_XYZ
     return np.asarray(xyz @ np.linalg.inv(_XYZ_OF_REC709).T)

@@ -83,10 +83,11 @@ class EmbeddedPicture:
 
 
 def read_image(path: str | Path | EmbeddedPicture) -> Pixels:
-    """Return the stored pixels (H, W, C) of a picture of numbers, such as a height map; row 0 is at the top.
+    """Return the stored pixels (H, W, C) of a picture without colour conversion, for data such as heights.
 
-    C is 1 (grey), 3 (RGB) or 4 (RGBA); grey with alpha becomes RGBA, CMYK becomes RGB. Colour profiles and
-    camera orientation are ignored. Notes tell the user which other properties of the file are ignored.
+    Row 0 is at the top. C is 1 (grey), 3 (RGB) or 4 (RGBA); grey with alpha becomes RGBA, CMYK becomes RGB.
+    Colour profiles and camera orientation are ignored. Notes tell the user which other properties of the file
+    are ignored.
 
     path : PNG, JPEG, TIFF, WebP, AVIF or HEIC, returned as uint8 or uint16 (a float TIFF as float32), or EXR
         or HDR, returned as linear float32; the format is recognised by content, not by suffix
@@ -99,7 +100,7 @@ def read_image(path: str | Path | EmbeddedPicture) -> Pixels:
 
 
 def read_colours(path: str | Path | EmbeddedPicture, upright: bool = False) -> tuple[Pixels, ColourSpace]:
-    """Return the pixels (H, W, C) of a picture of colours, as `read_image` reads them, and the colour space.
+    """Return the stored pixels (H, W, C) of a colour picture, see `read_image`, and their colour space.
 
     The colour space is given by the file's profile or primaries; pictures of glTF files are sRGB or linear
     Rec. 709, as glTF requires.
@@ -118,9 +119,9 @@ def read_colours(path: str | Path | EmbeddedPicture, upright: bool = False) -> t
 
 
 def note_properties(path: str | Path | EmbeddedPicture, read_as_colours: bool) -> None:
-    """Issue the note that reading a picture would issue; used if the picture is taken from a cache instead.
+    """Issue the note that reading a picture would issue, for a picture that is taken from a cache instead.
 
-    read_as_colours : whether the picture is read as colours by `read_colours`, not as numbers by `read_image`
+    read_as_colours : whether the note is that of `read_colours`; otherwise, that of `read_image`
     """
     _issue_note(path, _read_header(path, read_bytes(path)), read_as_colours, upright=False)
 

@@ -102,7 +102,8 @@ class ImageWriter:
 class FrameFiles:
     """Numbered picture files of a sequence, named by a pattern such as frames/%05d.png.
 
-    A hidden record file stores the content key of the sequence to which the existing pictures belong.
+    A hidden record file stores the content key of the sequence to which the existing pictures belong: a text
+    that is equal for sequences with equal frames.
     """
 
     pattern: Path

@@ -114,9 +114,9 @@ def _weight_track(
 ) -> AnimationTrack:
     """Return the track of the morph target weights of a node.
 
-    culprit : names of the clip and the channel, for errors
-    mesh_targets : dictionary from mesh index to the names of the morph targets; this function adds the mesh
-        of the node
+    sampler : JSON tree of the animation sampler
+    culprit : file, clip and channel, for errors
+    mesh_targets : cache: dictionary from mesh index to the names of the mesh's morph targets
     """
     mesh = document.items("nodes")[node].get("mesh")
     if mesh is not None and mesh not in mesh_targets:
@@ -167,9 +167,9 @@ def _read_keyframes(document: Document, sampler: Tree, component_count: int, cul
 
 @dataclass(frozen=True, eq=False)
 class AnimationCurve:
-    """Animated property of m nodes with the same key times, as a function of time.
+    """Animated property of m nodes as a function of time, with n components for each node.
 
-    A value has n components; the weights of n morph targets are one value (m = 1).
+    All nodes have the same key times. For weights of n morph targets, m is 1.
 
     times_s : (k,) times of the keys, not decreasing [s]
     values : (k, m, n) values at the keys; for a cubic spline (k, 3, m, n): in-tangent, value, out-tangent

@@ -26,7 +26,7 @@ def embedded_materials(path: Path) -> tuple[FileMaterial, ...]:
 
 
 def embedded_eye_look(path: Path) -> EyeLook:
-    """Return the eye parameters from the person description in a .glb or .gltf file; defaults without one.
+    """Return the eye parameters that this package stored in a .glb or .gltf file; defaults for other files.
 
     Raises DermisError for invalid parameters.
     """

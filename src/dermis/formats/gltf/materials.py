@@ -32,8 +32,7 @@ _DEFAULT_ROUGHNESS = 0.8
 class SkinAdditions:
     """Properties that an export adds to the glTF material of skin.
 
-    surface : members for `pbrMetallicRoughness`, which replace the base colour texture; empty to keep this
-        texture
+    surface : members for `pbrMetallicRoughness`; unless empty, they replace the base colour texture
     extensions : dictionary from name to member for the material's `extensions`
     extras : dictionary from name to member for the material's `extras`
     pictures : dictionary from name to PNG file; textures reference a picture as {"index": name}

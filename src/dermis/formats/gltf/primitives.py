@@ -47,7 +47,7 @@ class SurfacePrimitive:
 
     deformable : mesh of the head with its deformation
     faces : (f,) indices of the triangles
-    eye : index of the eye whose uv layout a textured eyeball uses; -1 for other surfaces
+    eye : index of the eye if the triangles are a textured eyeball, else -1
     """
 
     deformable: DeformableMesh
@@ -112,7 +112,7 @@ class SurfacePrimitive:
 
 @dataclass(frozen=True, eq=False)
 class HairPrimitive:
-    """Hairs as tubes; the colours of the hairs are the texels of a picture with one row."""
+    """Hairs as tubes, coloured by a picture with one row of texels."""
 
     deformable: DeformableMesh
     fibres: FibreTubes
@@ -179,7 +179,7 @@ def _bone_attributes(
 
 @dataclass(frozen=True, eq=False)
 class FibreTubes:
-    """Tubes around n hairs with m vertices each; a tube is rigid and follows the skin at its root.
+    """Tubes around n hairs, with m vertices each; tubes do not bend, and move with the skin at their roots.
 
     mesh : mesh of the skin on which the hairs grow
     """
@@ -189,10 +189,10 @@ class FibreTubes:
 
     @classmethod
     def from_strands(cls, strands: Strands, mesh: Mesh, max_hairs: int, knot_count: int) -> FibreTubes:
-        """Return tubes for at most `max_hairs` hairs with `knot_count` knots each.
+        """Return tubes for the first `max_hairs` hairs, through `knot_count` points along each hair.
 
-        The tubes are widened to cover as much area as all hairs of `strands`, and their absorption is reduced
-        accordingly.
+        If hairs are left out, the tubes are widened to cover the same area in total, and their absorption
+        is reduced accordingly.
         """
         count = min(len(strands), max_hairs)
         width_factor = len(strands) / count
@@ -214,7 +214,7 @@ class FibreTubes:
 
     @property
     def vertices_per_hair(self) -> int:
-        """Return the number of vertices of a hair: a ring at each knot, and a single vertex at the tip."""
+        """Return the number of vertices of a tube: a ring at each point of the hair, a vertex at the tip."""
         return _TUBE_SIDES * (self._knot_count - 1) + 1
 
     @property
@@ -232,7 +232,7 @@ class FibreTubes:
 
     @cached_property
     def _tube_rings(self) -> tuple[Doubles, Doubles]:
-        """Return the vertices [mm] and normals of the tubes, (n, m, 3) each, in the frames of the roots."""
+        """Return the vertices [mm] and normals of the tubes, (n, m, 3) each, in local axes at each root."""
         knots = self.strands.knots_mm.astype(np.float64)
         tangent = np.gradient(knots, axis=1)
         tangent /= np.maximum(np.linalg.norm(tangent, axis=2, keepdims=True), _MIN_VECTOR_LENGTH)

@@ -88,9 +88,10 @@ def read_armature(document: Document, nodes: Nodes) -> Armature | None:
 
 
 def _with_static_root(bones: Bones) -> Bones:
-    """Return the bones, preceded by a new root bone at the origin for meshes that no bone moves.
+    """Return the bones of a scene, preceded by a new root bone at the origin for meshes that no bone moves.
 
-    bones : bones whose parent indices already count the new bone as bone 0
+    bones : bones of the scene; the parent indices must already be those of the result, where the new bone is
+        bone 0
     """
     name = node_names([{"name": known} for known in (*bones.names, _STATIC_BONE_NAME)])[-1]
     parent = np.concatenate([[-1], bones.parent]).astype(np.int32)

@@ -52,8 +52,8 @@ _MAX_TARGET_WEIGHT = 100.0
 class Avatar:
     """Properties that a VRM file adds to glTF; the defaults describe glTF files without VRM.
 
-    expressions : dictionary from `id(tree)`, where `tree` is the JSON tree of a mesh, to the expressions of
-        the mesh: a dictionary from expression name to the weights by morph target index
+    expressions : three nested dictionaries: keys are the `id` of the JSON tree of a mesh, the name of an
+        expression, and the index of a morph target; values are weights
     """
 
     axes: Axes = DEFAULT_AXES

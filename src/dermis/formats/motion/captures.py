@@ -129,8 +129,8 @@ def frame_rate(times: Doubles) -> float | None:
 def to_seconds(culprit: object, times: Doubles, unit: float | None) -> Doubles:
     """Return times (k,) in seconds.
 
-    unit : unit of the times [s]; None to assume the largest unit in which frames are at most 2 s apart, and
-        to issue a note on this unit
+    unit : unit of the times [s]; None to guess the largest unit in which frames are at most 2 s apart; a note
+        tells the user of the guess
     """
     if unit is None:
         steps = np.diff(times)

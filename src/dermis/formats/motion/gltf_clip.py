@@ -27,11 +27,11 @@ class _BoneTransforms(NamedTuple):
 
 
 class _UsedTrack(NamedTuple):
-    """Animation curve, restricted to the bones or morph targets that the head has.
+    """Animation curve of a track, with the n bones or morph targets of the track that the head has.
 
     path : "translation", "rotation", "scale" or "weights"
-    columns : indices of these bones or morph targets in the track
-    indices : indices of the same bones or morph targets among all animated bones or morph targets of the head
+    columns : (n,) indices of the bones or morph targets in the track
+    indices : (n,) indices of the same bones or morph targets in the result of `_used_names`
     """
 
     path: str

@@ -204,8 +204,8 @@ def _complete_table(
 def _rows_without_face(cell_values: Doubles, is_angle: Mask, has_shape_count: Mask) -> Mask:
     """Return the mask (k,) of rows without a face: rows of empty cells, and certain rows of zeros.
 
-    Rows of zeros show no face if most other rows contain rotations. They also show no face if they state no
-    number of blend shapes although other rows do.
+    A row of zeros has no face if most other rows contain rotations. It also has no face if other rows state
+    a number of blend shapes above 0 and this row does not.
     """
     numbers = np.nan_to_num(cell_values)
     zero = np.asarray(~numbers.any(axis=1))

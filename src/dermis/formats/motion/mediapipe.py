@@ -231,7 +231,7 @@ def _first_face(json_faces: object) -> tuple[object, int]:
 
 
 def _is_list_object(json_value: object) -> bool:
-    """Return whether a value is an object that wraps blend shapes, as MediaPipe and Java's Optional do."""
+    """Return whether a value is an object that contains the list of blend shapes under a known key."""
     return isinstance(json_value, dict) and (
         bool(json_value.keys() & _CATEGORY_LIST_KEYS) or json_value.keys() == {"value"}
     )

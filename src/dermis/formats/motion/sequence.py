@@ -285,7 +285,10 @@ class FrameReader:
         return FrameVertices(positions[used], corners.astype(np.int32), part.uv[used].astype(np.float32))
 
     def _read_pattern(self, path: Path, unit: float) -> _ObjPattern | None:
-        """Return the pattern of the first file; None if the pattern does not reproduce the positions."""
+        """Return the fingerprint of the first file, an OBJ file.
+
+        Returns None if fast reading with the fingerprint gives other positions than full parsing.
+        """
         assert self._first is not None
         data = read_obj_text(path).encode()
         pattern = _find_pattern(path, data)
@@ -307,12 +310,12 @@ def _split_vertex_lines(obj_bytes: bytes) -> tuple[list[tuple[bytes, bytes, byte
 
 
 def _find_pattern(path: Path, obj_bytes: bytes) -> _ObjPattern:
-    """Return the pattern of an OBJ file.
+    """Return the fingerprint of an OBJ file.
 
     obj_bytes : text of the file in UTF-8
 
-    The file is parsed after the x coordinate of each `v` line was replaced by the index of the line. The x
-    coordinate of a parsed vertex then tells from which line the vertex comes.
+    To find the line of each vertex, the x coordinate of each `v` line is replaced by the index of the line
+    before the file is parsed.
     """
     positions, digest = _split_vertex_lines(obj_bytes)
     count = iter(range(len(positions)))
@@ -324,10 +327,10 @@ def _find_pattern(path: Path, obj_bytes: bytes) -> _ObjPattern:
 
 
 def _parse_positions(obj_bytes: bytes, pattern: _ObjPattern) -> Doubles | None:
-    """Return the vertex positions (v, 3) of an OBJ file in file units; None if its pattern differs.
+    """Return the vertex positions (v, 3) of an OBJ file in file units; None if its fingerprint differs.
 
     obj_bytes : bytes of the file
-    pattern : pattern of the first file of the sequence
+    pattern : fingerprint of the first file of the sequence
     """
     rows, digest = _split_vertex_lines(obj_bytes)
     if len(rows) != pattern.line_count or digest != pattern.digest:

@@ -178,7 +178,8 @@ class _SceneReader:
     def _material_groups(self, prim: Usd.Prim, face_count: int) -> tuple[list[int], Index]:
         """Return the material indices of a mesh, and the position of each face's material in this list.
 
-        The material index -1 means no material. The positions have the shape (face_count,); holes have -1.
+        The material index -1 means no material. The positions have the shape (face_count,); faces that are
+        holes have the position -1.
         """
         binding = self.shade.MaterialBindingAPI(prim)
         materials, group = [self._bound_material_index(binding)], np.zeros(face_count, np.int64)

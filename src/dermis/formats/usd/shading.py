@@ -77,7 +77,7 @@ class MaterialReader:
         self.shade: Any = import_extra("pxr.UsdShade", f"{path}: USD scenes")
 
     def read(self, material: UsdShade.Material) -> Tree:
-        """Return a material as keyword arguments of `FileMaterial`, with its textures as trees.
+        """Return a material as keyword arguments of `FileMaterial`, with its textures as dictionaries.
 
         The entries "uv" and "vertex_colours" are names of primvars.
         """
