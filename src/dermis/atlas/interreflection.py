@@ -73,37 +73,37 @@ class FormFactors:
         return len(self.patch_first) - 1
 
 
-def cached_form_factors(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> FormFactors:
+def cached_form_factors(mesh: Mesh, corner_uv: Floats, mapped_triangles: Mask) -> FormFactors:
     """Return the result of `compute_form_factors`, from the package or the cache on disk if possible."""
     names = [field.name for field in fields(FormFactors)]
-    if shipped := shipped_arrays(mesh, form_factor_table(mapped), names):
+    if shipped := shipped_arrays(mesh, form_factor_table(mapped_triangles), names):
         return FormFactors(**shipped)
     cut_out = [np.packbits(mesh.cut_out)] if mesh.cut_out.any() else []
     digest = hashlib.sha256(
         f"{_FORM_FACTOR_CACHE_VERSION} {CELLS_PER_SIDE} {SAMPLES_PER_PATCH} "
         f"{LINE_BUNDLE_COUNT} {LINES_PER_SIDE_RANGE} {_MIN_FORM_FACTOR}".encode()
     )
-    for array in (mesh.positions, mesh.triangles, corner_uv, np.packbits(mapped), *cut_out):
+    for array in (mesh.positions, mesh.triangles, corner_uv, np.packbits(mapped_triangles), *cut_out):
         digest.update(np.ascontiguousarray(array).tobytes())
 
     @logged_step("computing form factors of the skin")
     def make() -> dict[str, NDArray[np.generic]]:
-        form_factors = compute_form_factors(mesh, corner_uv, mapped)
+        form_factors = compute_form_factors(mesh, corner_uv, mapped_triangles)
         return {name: getattr(form_factors, name) for name in names}
 
     return FormFactors(**load_or_make("interreflection", digest.hexdigest()[:40], names, make))
 
 
-def form_factor_table(mapped: Mask) -> str:
+def form_factor_table(mapped_triangles: Mask) -> str:
     """Return the name of the table with the form factors of a mesh.
 
-    mapped : (f,) mask of triangles that have texels
+    mapped_triangles : (f,) mask of triangles that have texels
     """
-    mapped_hash = hashlib.sha256(np.packbits(mapped).tobytes()).hexdigest()[:16]
+    mapped_hash = hashlib.sha256(np.packbits(mapped_triangles).tobytes()).hexdigest()[:16]
     return f"form factors {_FORM_FACTOR_CACHE_VERSION} {mapped_hash}"
 
 
-def compute_form_factors(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> FormFactors:
+def compute_form_factors(mesh: Mesh, corner_uv: Floats, mapped_triangles: Mask) -> FormFactors:
     """Compute form factors of skin from bundles of random parallel lines [Sbert1993].
 
     The lines are distributed uniformly over all directions and positions. The form factor from one patch to
@@ -111,18 +111,20 @@ def compute_form_factors(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> FormFac
     surface.
 
     corner_uv : (f, 3, 2) uv of the triangles' corners in the atlas
-    mapped : (f,) mask of triangles that have texels; all other triangles only block light, except that
-        triangles with an opacity map, such as hair cards, are ignored
+    mapped_triangles : (f,) mask of triangles that have texels; the other triangles only block light, or are
+        ignored if they have an opacity map, such as hair cards
     """
-    facing, line_counts = _trace_lines(mesh, corner_uv, mapped, _TRIAL_BUNDLE_COUNT, _TRIAL_LINES_PER_SIDE)
+    facing, line_counts = _trace_lines(
+        mesh, corner_uv, mapped_triangles, _TRIAL_BUNDLE_COUNT, _TRIAL_LINES_PER_SIDE
+    )
     if len(facing):
         lines = int(np.clip(np.sqrt(len(mesh.triangles)), *LINES_PER_SIDE_RANGE))
-        facing, line_counts = _trace_lines(mesh, corner_uv, mapped, LINE_BUNDLE_COUNT, lines)
-    return _form_factors(facing, line_counts, mesh, corner_uv, mapped)
+        facing, line_counts = _trace_lines(mesh, corner_uv, mapped_triangles, LINE_BUNDLE_COUNT, lines)
+    return _form_factors(facing, line_counts, mesh, corner_uv, mapped_triangles)
 
 
 def _trace_lines(
-    mesh: Mesh, corner_uv: Floats, mapped: Mask, bundle_count: int, lines_per_side: int
+    mesh: Mesh, corner_uv: Floats, mapped_triangles: Mask, bundle_count: int, lines_per_side: int
 ) -> tuple[Index, Doubles]:
     """Return pairs of cells (m, 2) that lines connect through the air, and line counts for all cells.
 
@@ -132,7 +134,7 @@ def _trace_lines(
     lines_per_side : number of lines along each side of a bundle
     """
     blocks = ~mesh.cut_out
-    corner_uv, mapped = corner_uv[blocks], mapped[blocks]
+    corner_uv, mapped_triangles = corner_uv[blocks], mapped_triangles[blocks]
     used, corner = np.unique(mesh.triangles[blocks], return_inverse=True)
     vertices, corner = mesh.positions[used].astype(np.float64), corner.reshape(-1, 3)
     vertices -= 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
@@ -140,7 +142,7 @@ def _trace_lines(
     if len(corner) > _MAX_TRACED_TRIANGLES:
         vertices, corner = merge_near_points(vertices, corner, _MERGE_DISTANCE_LINES / per_mm)
         proper = np.flatnonzero((corner != np.roll(corner, 1, axis=1)).all(axis=1))
-        corner, corner_uv, mapped = corner[proper], corner_uv[proper], mapped[proper]
+        corner, corner_uv, mapped_triangles = corner[proper], corner_uv[proper], mapped_triangles[proper]
     x, y, z = np.ascontiguousarray(vertices.T)[:, :, None]
     rng = np.random.default_rng(_LINE_SEED)
     bundle_axes = [
@@ -159,7 +161,9 @@ def _trace_lines(
         for first in range(0, max(len(corner), 1), _TRIANGLES_PER_BATCH):
             part = slice(first, first + _TRIANGLES_PER_BATCH)
             line, depth, outward, triangle, weights = intersect_lines(points[corner[part]])
-            cell = np.where(mapped[part][triangle], _cell_index(corner_uv[part][triangle], weights), -1)
+            cell = np.where(
+                mapped_triangles[part][triangle], _cell_index(corner_uv[part][triangle], weights), -1
+            )
             met.append((line, depth, outward, cell))
         line, depth, outward, cell = (np.concatenate(parts) for parts in zip(*met, strict=True))
         return _facing_cells(line, depth, outward, cell), cell[cell >= 0]
@@ -172,15 +176,15 @@ def _trace_lines(
     return np.concatenate(facing), line_counts
 
 
-def intersect_lines(points: Doubles) -> tuple[Index, Doubles, Mask, Index, Doubles]:
+def intersect_lines(corners: Doubles) -> tuple[Index, Doubles, Mask, Index, Doubles]:
     """Intersect triangles with all lines parallel to z whose x and y are integers.
 
     Returns five arrays with one entry for each of n intersections: the line index, z, whether the surface
     faces +z, the triangle index, and the barycentric weights (n, 3) of the triangle's corners.
 
-    points : (f, 3, 3) corners of the triangles
+    corners : (f, 3, 3) corners of the triangles
     """
-    x, y, z = np.ascontiguousarray(points.transpose(2, 1, 0))
+    x, y, z = np.ascontiguousarray(corners.transpose(2, 1, 0))
     (left, width), (bottom, height) = _integer_range(x), _integer_range(y)
     count = width * height
     triangle, line_in_box = expand_runs(np.zeros_like(count), count)
@@ -210,16 +214,16 @@ def _integer_range(corner_coordinates: Doubles) -> tuple[Doubles, Index]:
     return low, np.maximum(high - low + 1, 0).astype(np.int64)
 
 
-def _facing_cells(line_index: Index, depth: Doubles, outward: Mask, cell_index: Index) -> Index:
+def _facing_cells(line_index: Index, depth: Doubles, faces_forward: Mask, cell_index: Index) -> Index:
     """Return pairs of cells (m, 2): the cell that a line leaves, and the cell that it meets next.
 
     Each line is followed in both directions; if it meets no other surface, there is no pair. The second cell
     is -1 where the surface that the line meets has no texels.
     """
     order = np.lexsort((depth, line_index))
-    line_index, outward, cell_index = line_index[order], outward[order], cell_index[order]
+    line_index, faces_forward, cell_index = line_index[order], faces_forward[order], cell_index[order]
     # Light leaves a body where the surface faces along the line, and meets the next one where it faces back.
-    through_air = (line_index[1:] == line_index[:-1]) & outward[:-1] & ~outward[1:]
+    through_air = (line_index[1:] == line_index[:-1]) & faces_forward[:-1] & ~faces_forward[1:]
     pair = np.stack([cell_index[:-1][through_air], cell_index[1:][through_air]], axis=1)
     return np.concatenate([pair, pair[:, ::-1]])
 
@@ -251,14 +255,14 @@ def _line_axes(direction: Doubles, roll_angle: float) -> Doubles:
 
 
 def _form_factors(
-    facing_cells: Index, line_counts: Doubles, mesh: Mesh, corner_uv: Floats, mapped: Mask
+    facing_cells: Index, line_counts: Doubles, mesh: Mesh, corner_uv: Floats, mapped_triangles: Mask
 ) -> FormFactors:
     """Return the form factors that follow from the number of lines between cells.
 
     facing_cells : (m, 2) pairs of cells that lines connect, from `_trace_lines`
     line_counts : (CELLS_PER_SIDE^2,) number of lines that left each cell
     """
-    patch_of, triangle, weights = _divide_into_patches(mesh, corner_uv, mapped)
+    patch_of, triangle, weights = _divide_into_patches(mesh, corner_uv, mapped_triangles)
     count = len(triangle) // SAMPLES_PER_PATCH
     has_texels = (facing_cells >= 0).all(axis=1)
     cell, target = facing_cells[has_texels, 0], patch_of[facing_cells[has_texels, 1]]
@@ -309,13 +313,13 @@ def _sparse_rows(
     return first.astype(np.uint32), column[large].astype(np.uint32), factor.astype(np.float32)
 
 
-def _divide_into_patches(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> tuple[Index, Words, Words]:
+def _divide_into_patches(mesh: Mesh, corner_uv: Floats, mapped_triangles: Mask) -> tuple[Index, Words, Words]:
     """Return the patch of each cell, and the triangle and weights of each patch's sample points.
 
     The patch indices have the shape (CELLS_PER_SIDE^2,) and are -1 for cells without texels. The weights are
     packed barycentric weights, as in `FormFactors`.
     """
-    triangle, weights, rank = _sample_points(mesh, mapped)
+    triangle, weights, rank = _sample_points(mesh, mapped_triangles)
     half, cell = CELLS_PER_SIDE // 2, _cell_index(corner_uv[triangle], weights)
     patch = (cell // CELLS_PER_SIDE // 2) * half + cell % CELLS_PER_SIDE // 2
     order = np.lexsort((rank, patch))
@@ -330,18 +334,18 @@ def _divide_into_patches(mesh: Mesh, corner_uv: Floats, mapped: Mask) -> tuple[I
     return patch_of, triangle[chosen].astype(np.uint32), words.astype(np.uint32)
 
 
-def _sample_points(mesh: Mesh, mapped: Mask) -> tuple[Index, Doubles, Doubles]:
+def _sample_points(mesh: Mesh, mapped_triangles: Mask) -> tuple[Index, Doubles, Doubles]:
     """Return random points on the triangles that have texels: triangle indices, weights and ranks.
 
     Each triangle has at least one point, so points are denser on small triangles. The ranks are random
     numbers; any number of points with the lowest ranks is uniformly distributed over the surface.
     """
     a, b, c = (mesh.positions[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
-    area = np.where(mapped, 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1), 0.0)
+    area = np.where(mapped_triangles, 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1), 0.0)
     each = 1 + np.floor(
         CELLS_PER_SIDE * CELLS_PER_SIDE * SAMPLES_PER_PATCH * area / max(area.sum(), 1e-30)
     ).astype(np.int64)
-    triangle = np.repeat(np.flatnonzero(mapped), each[mapped])
+    triangle = np.repeat(np.flatnonzero(mapped_triangles), each[mapped_triangles])
     rng, count = np.random.default_rng(_LINE_SEED), each[triangle]
     u, v = np.sqrt(rng.random(len(triangle))), rng.random(len(triangle))
     weights = np.stack([1.0 - u, u * (1.0 - v), u * v], axis=1)

@@ -36,12 +36,12 @@ def triangle_uv_area(mesh: Mesh) -> Doubles:
     return np.asarray(np.abs(uv_cross(mesh.uv[mesh.triangles])) / 2)
 
 
-def chart_uv_area(mesh: Mesh, chart: Ints) -> Doubles:
+def chart_uv_area(mesh: Mesh, triangle_chart: Ints) -> Doubles:
     """Return the unsigned uv area of each chart (c,), as a fraction of the map.
 
-    chart : (f,) chart index of each triangle
+    triangle_chart : (f,) chart index of each triangle
     """
-    return np.asarray(np.bincount(chart, weights=triangle_uv_area(mesh)), dtype=np.float64)
+    return np.asarray(np.bincount(triangle_chart, weights=triangle_uv_area(mesh)), dtype=np.float64)
 
 
 def usable_triangles(mesh: Mesh, map_side: int, min_texels: float = _MIN_BLURRED_CHART_TEXELS) -> Mask:
@@ -183,7 +183,7 @@ def _overlapped_charts(
 
 
 def _assign_texels(
-    mesh: Mesh, mapped: Mask, texel: Index, triangle: Index, atlas_side: int
+    mesh: Mesh, mapped_triangles: Mask, texel: Index, triangle: Index, atlas_side: int
 ) -> tuple[Ints, Mask]:
     """Return the triangle that owns each texel, and the mask (f,) of triangles that own too few texels.
 
@@ -191,12 +191,12 @@ def _assign_texels(
 
     texel, triangle : (k,) flat texel index and triangle index of each covered texel centre
     """
-    is_mapped = mapped[triangle]
+    is_mapped = mapped_triangles[triangle]
     texel, triangle = texel[is_mapped], triangle[is_mapped]
     order = np.argsort(uv_cross(mesh.uv[mesh.triangles])[triangle] < 0, kind="stable")
     owner: Ints = np.full((atlas_side, atlas_side), -1, dtype=np.int32)
     owner.ravel()[texel[order]] = triangle[order]
-    count = len(mapped)
+    count = len(mapped_triangles)
     area = np.bincount(triangle, minlength=count)
     own = np.bincount(triangle[owner.ravel()[texel] == triangle], minlength=count)
     return owner, own < 0.5 * area
@@ -285,16 +285,16 @@ def _edge_distance(texel_chart: Ints) -> NDArray[np.uint16]:
     return np.stack((left, right, up.T, down.T), axis=-1).astype(np.uint16)
 
 
-def run_lengths(joined: Mask) -> tuple[Ints, Ints]:
+def run_lengths(connected_mask: Mask) -> tuple[Ints, Ints]:
     """Return how many connected texels lie before and after each texel in its row, (h, w) each.
 
-    joined : (h, w) mask of texels that are connected to the texel before them in the row
+    connected_mask : (h, w) mask of texels that are connected to the texel before them in the row
     """
-    after = np.zeros_like(joined)
-    after[:, :-1] = joined[:, 1:]
-    return _run_before(joined), _run_before(after[:, ::-1])[:, ::-1]
+    after = np.zeros_like(connected_mask)
+    after[:, :-1] = connected_mask[:, 1:]
+    return _run_length_before(connected_mask), _run_length_before(after[:, ::-1])[:, ::-1]
 
 
-def _run_before(joined: Mask) -> Ints:
-    index = np.arange(joined.shape[1], dtype=np.int32)
-    return index - np.maximum.accumulate(np.where(joined, 0, index), axis=1)
+def _run_length_before(connected_mask: Mask) -> Ints:
+    index = np.arange(connected_mask.shape[1], dtype=np.int32)
+    return index - np.maximum.accumulate(np.where(connected_mask, 0, index), axis=1)

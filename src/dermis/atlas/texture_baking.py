@@ -51,14 +51,14 @@ def pack_textures(
     surface: FileSurface,
     materials: Sequence[FileMaterial],
     material_mask: Mask,
-    required: Sequence[Role] = ("colour",),
+    required_roles: Sequence[Role] = ("colour",),
 ) -> PackedTextures:
     """Bake one uv layout and one set of texture maps for selected materials of a mesh.
 
     surface : surface data of the mesh's file
     materials : materials of the mesh's file
     material_mask : (m,) mask of the mesh's materials that share the maps
-    required : roles for which a map is baked even if no material has a picture for the role
+    required_roles : roles for which a map is baked even if no material has a picture for the role
     """
     tiles, side, scale = lay_out_tiles(mesh, surface, materials, material_mask)
     baker = _Baker(mesh, surface, materials, tiles, side)
@@ -66,7 +66,7 @@ def pack_textures(
     return PackedTextures(
         np.concatenate([tile.vertices for tile in tiles]),
         np.concatenate([tile.layout_uv(side) for tile in tiles]).astype(np.float32),
-        {role: baker.bake(role) for role in baker.roles(required)},
+        {role: baker.bake(role) for role in baker.roles(required_roles)},
         notes,
     )
 
@@ -92,7 +92,7 @@ class _Baker:
         channels = len(default) + (role == "colour")  # opacity
         baked = np.zeros((self.side, self.side, channels), np.float32)
         for tile in self.tiles:
-            values = self._tile_values(tile, role)
+            values = self._tile_map(tile, role)
             padded = np.pad(
                 values,
                 (
@@ -109,7 +109,7 @@ class _Baker:
     def _tile_material(self, tile: Tile) -> FileMaterial:
         return self.materials[tile.material] if tile.material >= 0 else FileMaterial()
 
-    def _tile_values(self, tile: Tile, role: Role) -> Floats:
+    def _tile_map(self, tile: Tile, role: Role) -> Floats:
         """Return a tile's map (h, w, k) of a role: the picture multiplied by the material's factors."""
         material, (width, height) = self._tile_material(tile), tile.size
         texture = material.textures.get(role)
@@ -121,25 +121,25 @@ class _Baker:
             values = self._sample_picture(tile, texture, role)
         values *= factor
         if role == "colour":
-            self._finish_colours(tile, values)
+            self._finish_colour_map(tile, values)
         return values
 
-    def _finish_colours(self, tile: Tile, values: Floats) -> None:
+    def _finish_colour_map(self, tile: Tile, colour_map: Floats) -> None:
         """Apply vertex colours and the opacity texture to the colours of a tile, in place.
 
-        values : (h, w, 4) colour and opacity; an opacity with a cutoff is shifted so that the cutoff is 0.5
+        colour_map : (h, w, 4) colour and opacity; opacity is shifted so that the material's cutoff becomes 0.5
         """
         material = self._tile_material(tile)
         if "opacity" in material.textures:
-            values[..., 3:] *= self._sample_picture(tile, material.textures["opacity"], "opacity")
+            colour_map[..., 3:] *= self._sample_picture(tile, material.textures["opacity"], "opacity")
         is_opaque = material.alpha_mode == "opaque"
-        values[..., 3] = 1.0 if is_opaque else values[..., 3] + 0.5 - material.cutoff
+        colour_map[..., 3] = 1.0 if is_opaque else colour_map[..., 3] + 0.5 - material.cutoff
         if self.surface.colours is not None:
-            values[..., :3] *= self._interpolate_to_texels(tile, self.surface.colours[tile.vertices])
+            colour_map[..., :3] *= self._interpolate_to_texels(tile, self.surface.colours[tile.vertices])
 
     def _sample_picture(self, tile: Tile, texture: Texture, role: Role) -> Floats:
         """Return a picture resampled to the texels of a tile, (h, w, k)."""
-        picture = read_role(texture, role)
+        picture = read_linear_picture(texture, role)
         base = base_texture(self._tile_material(tile))
         if base is not None and base.mapping == texture.mapping:
             (width, height), span = tile.size, tile.high - tile.low
@@ -150,7 +150,7 @@ class _Baker:
         position = self._interpolate_to_texels(tile, vertex_uv)
         return sample_points(picture, position, texture.wrap)
 
-    def _interpolate_to_texels(self, tile: Tile, values: Numbers) -> Floats:
+    def _interpolate_to_texels(self, tile: Tile, vertex_values: Numbers) -> Floats:
         """Interpolate values (n, k) at a tile's vertices to its texels (h, w, k).
 
         Texels outside all triangles get the value of the nearest texel inside a triangle.
@@ -163,10 +163,12 @@ class _Baker:
         texel, which = covered_texels(place, (height, width))
         y, x = np.divmod(texel, width)
         weights = _barycentric_coordinates(place[which], np.stack([x, y], axis=1).astype(np.float64))
-        baked = np.zeros((height * width, values.shape[1]), np.float32)
-        baked[texel] = np.einsum("nk,nkc->nc", weights, np.asarray(values, np.float64)[corner[which]])
+        baked = np.zeros((height * width, vertex_values.shape[1]), np.float32)
+        baked[texel] = np.einsum("nk,nkc->nc", weights, np.asarray(vertex_values, np.float64)[corner[which]])
         if len(texel) == 0:
-            return np.broadcast_to(values.mean(axis=0), (height, width, values.shape[1])).astype(np.float32)
+            return np.broadcast_to(
+                vertex_values.mean(axis=0), (height, width, vertex_values.shape[1])
+            ).astype(np.float32)
         uncovered = np.ones(height * width, bool)
         uncovered[texel] = False
         near = distance_transform_edt(
@@ -199,7 +201,7 @@ def _material_factor(material: FileMaterial, role: Role, has_vertex_colours: boo
     return np.array(factors[role], np.float32)
 
 
-def read_role(texture: Texture, role: Role) -> Floats:
+def read_linear_picture(texture: Texture, role: Role) -> Floats:
     """Return a texture's picture as linear values (H, W, k), converted as its role requires."""
     if role == "normal":
         return slope_map(texture.picture, "up")
@@ -209,15 +211,15 @@ def read_role(texture: Texture, role: Role) -> Floats:
             return colours
         image = read_image(texture.picture)
         opaque = np.ones((*colours.shape[:2], 1), np.float32)
-        opacity = _unit_range(image[..., 3:]) if image.shape[2] == 4 else opaque
+        opacity = _scale_to_unit_range(image[..., 3:]) if image.shape[2] == 4 else opaque
         return np.concatenate([colours, opacity], axis=2)
     image = read_image(texture.picture)
     last = image.shape[2] - 1
     channel = last if role == "opacity" and last == 3 else min(texture.channel or 0, last)
-    return _unit_range(image[..., channel : channel + 1])
+    return _scale_to_unit_range(image[..., channel : channel + 1])
 
 
-def _unit_range(image: Numbers) -> Floats:
+def _scale_to_unit_range(image: Numbers) -> Floats:
     if image.dtype == np.float32:
         return np.asarray(np.clip(image, 0.0, 1.0), np.float32)
     return np.asarray(image / np.float32(np.iinfo(image.dtype.str).max), np.float32)

@@ -90,7 +90,7 @@ def lay_out_tiles(
                 mesh, surface, materials[index] if index >= 0 else FileMaterial(), index, triangles
             )
         )
-    tiles = _set_plain_sizes(mesh, tiles, materials)
+    tiles = _set_sizes_without_pictures(mesh, tiles, materials)
     return _pack_tiles(tiles)
 
 
@@ -105,7 +105,7 @@ def _unplaced_tile(
     texture = base_texture(material)
     uv = file_uv(mesh, surface, texture.uv_set if texture else 0, vertices)
     if texture:
-        uv = _move_charts(mesh, texture, texture.map_uv(uv), vertices, triangles)
+        uv = _shift_charts_to_unit_square(mesh, texture, texture.map_uv(uv), vertices, triangles)
     low, high = uv.min(axis=0), uv.max(axis=0)
     inside = (low > -UV_TOLERANCE) & (high < 1.0 + UV_TOLERANCE)
     low, high = np.where(inside, np.minimum(low, 0.0), low), np.where(inside, np.maximum(high, 1.0), high)
@@ -120,7 +120,7 @@ def _picture_size(material: FileMaterial) -> tuple[int, int]:
     return max((width for width, _ in sizes), default=0), max((height for _, height in sizes), default=0)
 
 
-def _move_charts(
+def _shift_charts_to_unit_square(
     mesh: Mesh, texture: Texture, uv: Doubles, vertices: NDArray[np.integer], triangles: NDArray[np.integer]
 ) -> Doubles:
     """Return uv (n, 2) in which the charts of repeating textures are shifted by whole periods into [0, 1]."""
@@ -137,7 +137,9 @@ def _move_charts(
     return np.asarray(uv - period * np.floor(middle / np.where(period > 0, period, 1.0)))
 
 
-def _set_plain_sizes(mesh: Mesh, tiles: list[Tile], materials: Sequence[FileMaterial]) -> list[Tile]:
+def _set_sizes_without_pictures(
+    mesh: Mesh, tiles: list[Tile], materials: Sequence[FileMaterial]
+) -> list[Tile]:
     """Set the sizes of tiles without pictures; skin gets the median texel density of tiles with pictures."""
     areas = [float(triangle_areas(mesh.positions[mesh.triangles[tile.triangles]]).sum()) for tile in tiles]
     density = [tile.size[0] * tile.size[1] / max(mm2, 1e-9) for tile, mm2 in zip(tiles, areas, strict=True)]

@@ -186,9 +186,9 @@ class Dependencies:
                     break
         return stale
 
-    def set_versions(self, executed: Sequence[bool], versions: Sequence[int]) -> None:
+    def set_versions(self, ran_by_pass: Sequence[bool], versions: Sequence[int]) -> None:
         """Set the versions of all resources that the executed passes wrote."""
-        for (*_, writes), now, version in zip(self.passes, executed, versions, strict=True):
+        for (*_, writes), now, version in zip(self.passes, ran_by_pass, versions, strict=True):
             if now:
                 for state in writes:
                     state.set_version(version)

@@ -183,7 +183,7 @@ class Device:
         spare = self._staging.get(min_bytes)
         if spare:
             return spare.pop()
-        return self._buffer(
+        return self._allocate_buffer(
             "copy for reading", min_bytes, "MAP_READ", partial(self.handle.create_buffer, size=min_bytes)
         )
 
@@ -201,15 +201,17 @@ class Device:
         """
         content = np.ascontiguousarray(content)
         create = partial(self.handle.create_buffer_with_data, data=content)
-        return self._buffer(buffer_name, content.nbytes, usage, create)
+        return self._allocate_buffer(buffer_name, content.nbytes, usage, create)
 
     def storage_buffer(self, byte_count: int, buffer_name: str = "buffer") -> Buffer:
         """Create a storage buffer of `byte_count` bytes, all zero."""
-        return self._buffer(
+        return self._allocate_buffer(
             buffer_name, byte_count, "STORAGE", partial(self.handle.create_buffer, size=byte_count)
         )
 
-    def _buffer(self, buffer_name: str, byte_count: int, usage: str, create: Callable[..., Buffer]) -> Buffer:
+    def _allocate_buffer(
+        self, buffer_name: str, byte_count: int, usage: str, create: Callable[..., Buffer]
+    ) -> Buffer:
         import wgpu
 
         flags = getattr(wgpu.BufferUsage, usage) | wgpu.BufferUsage.COPY_DST

@@ -20,7 +20,7 @@ from dermis.gpu.uniforms import Uniforms
 
 T = TypeVar("T")
 Ts = TypeVarTuple("Ts")
-_CACHED_DEPENDENCIES = 8  # for frames that alternate, such as pictures, readbacks and several views
+_MAX_CACHED_DEPENDENCIES = 8  # for frames that alternate, such as pictures, readbacks and several views
 
 
 @dataclass
@@ -316,7 +316,7 @@ class Graph(Recorder):
         for known in self._dependencies:
             if known.passes == passes:
                 return known
-        self._dependencies = [Dependencies(passes), *self._dependencies][:_CACHED_DEPENDENCIES]
+        self._dependencies = [Dependencies(passes), *self._dependencies][:_MAX_CACHED_DEPENDENCIES]
         return self._dependencies[0]
 
     def _declare_pass(

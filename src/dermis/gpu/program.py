@@ -26,7 +26,7 @@ UniformRecords = Mapping[str, NDArray[np.generic]]
 
 P = TypeVar("P")
 
-_TOOLKIT_SHADERS = Path(__file__).parent / "wgsl"
+_TOOLKIT_SHADER_FOLDER = Path(__file__).parent / "wgsl"
 
 _MIN_LARGE_RECORD_BYTES = 2048  # the record of a skin is smaller, and few shaders read all of it
 
@@ -93,7 +93,7 @@ class Program:
         key = resource_key(bound)
         group = self.bind_groups.find(key)
         if group is None:
-            group = self._make_group(bound, resources)
+            group = self._make_bind_group(bound, resources)
             self.bind_groups.add(key, bound, group)
         return group, [offset for _, offset in located]
 
@@ -137,7 +137,7 @@ class Program:
     def _unbound_error(self, key_error: KeyError) -> KeyError:
         return KeyError(f"{self.name}.wgsl declares {key_error.args[0]!r}, and nothing is bound to it")
 
-    def _make_group(self, bound_resources: Sequence[Bindable], resources: Bindings) -> BindGroup:
+    def _make_bind_group(self, bound_resources: Sequence[Bindable], resources: Bindings) -> BindGroup:
         """Create the bind group for some resources.
 
         bound_resources : resources in the order of the bindings, the buffers of uniform records last
@@ -271,7 +271,7 @@ def shader_source(path: Path, folders: Sequence[Folder]) -> ShaderSource:
 
     folders : folders that are searched for included files, before the toolkit's own
     """
-    return compose_shader(path, (*folders, _TOOLKIT_SHADERS))
+    return compose_shader(path, (*folders, _TOOLKIT_SHADER_FOLDER))
 
 
 def _binding_getter(resource_names: Sequence[str]) -> Callable[[Bindings], Sequence[Bindable]]:

@@ -149,12 +149,12 @@ def _weak_copy(argument: object) -> object:
         return argument
     kind: Any = type(argument)
     fields = tuple(_weak_copy(getattr(argument, name)) for name in dataclass_field_names(kind) or ())
-    return _WeakFields(kind, fields) if any(map(_is_weak, fields)) else argument
+    return _WeakFields(kind, fields) if any(map(_contains_weak_reference, fields)) else argument
 
 
-def _is_weak(weak_copy: object) -> bool:
+def _contains_weak_reference(weak_copy: object) -> bool:
     return isinstance(weak_copy, weakref.ref | _WeakFields) or (
-        isinstance(weak_copy, tuple) and any(map(_is_weak, weak_copy))
+        isinstance(weak_copy, tuple) and any(map(_contains_weak_reference, weak_copy))
     )
 
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from dermis.atlas.texture_baking import PackedTextures, pack_textures, read_role
+from dermis.atlas.texture_baking import PackedTextures, pack_textures, read_linear_picture
 from dermis.atlas.texture_tiles import UV_TOLERANCE
-from dermis.atlas.unwrap.missing_uv import with_layout
+from dermis.atlas.unwrap.missing_uv import unwrap_triangles
 from dermis.base.arrays import Floats, Mask
 from dermis.formats.load import FileSurface, RiggedMesh
 from dermis.formats.materials import IDENTITY_UV_TRANSFORM, FileMaterial, Role
@@ -28,7 +28,7 @@ def with_missing_uv(rigged: RiggedMesh) -> RiggedMesh:
     )
     if not bare.any():
         return rigged
-    laid_out, vertex = with_layout(mesh, bare[mesh.material])
+    laid_out, vertex = unwrap_triangles(mesh, bare[mesh.material])
     changed = surface._replace(
         colours=None if surface.colours is None else surface.colours[vertex],
         other_uv={index: uv[vertex] for index, uv in surface.other_uv.items()},
@@ -82,7 +82,7 @@ def with_factors(maps: Maps, material: FileMaterial, user_roles: Collection[str]
     if maps.normal is not None and "normal" not in user_roles and material.normal_scale != 1.0:
         changed["normal"] = maps.normal * np.float32(material.normal_scale)
     if material.maps is None and "roughness" not in user_roles and "roughness" in material.textures:
-        values = read_role(material.textures["roughness"], "roughness")[..., 0]
+        values = read_linear_picture(material.textures["roughness"], "roughness")[..., 0]
         changed["roughness"] = (values * np.float32(material.roughness)) ** 2
     return replace(maps, **changed)
 

@@ -59,28 +59,28 @@ def find_pieces(surface: FlatSurface) -> tuple[Index, Doubles]:
     return renumber_pieces(piece), np.where(piece >= 0, target / np.maximum(density, 1e-12), 1.0)
 
 
-def renumber_pieces(piece: Index) -> Index:
+def renumber_pieces(triangle_piece: Index) -> Index:
     """Renumber piece indices (f,) of triangles from 0 without gaps; -1 for triangles in no piece is kept."""
-    numbers, index = np.unique(piece, return_inverse=True)
+    numbers, index = np.unique(triangle_piece, return_inverse=True)
     return np.asarray(index.reshape(-1) - np.count_nonzero(numbers < 0), dtype=np.int64)
 
 
-def _merge_specks(surface: FlatSurface, chart: Index, piece: Index) -> Index:
+def _merge_specks(surface: FlatSurface, triangle_chart: Index, triangle_piece: Index) -> Index:
     """Merge pieces (parts of charts) of less than 1 mm2 into the largest piece of their chart."""
-    area = np.bincount(piece, surface.area_mm2 * surface.valid)
-    order = np.argsort(area[piece], kind="stable")
-    largest = np.zeros(int(chart.max()) + 1, np.int64)
-    largest[chart[order]] = piece[order]
-    return np.where(area[piece] < _MAX_SPECK_MM2, largest[chart], piece)
+    area = np.bincount(triangle_piece, surface.area_mm2 * surface.valid)
+    order = np.argsort(area[triangle_piece], kind="stable")
+    largest = np.zeros(int(triangle_chart.max()) + 1, np.int64)
+    largest[triangle_chart[order]] = triangle_piece[order]
+    return np.where(area[triangle_piece] < _MAX_SPECK_MM2, largest[triangle_chart], triangle_piece)
 
 
-def _uv_density(surface: FlatSurface, piece: Index) -> tuple[Doubles, float]:
+def _uv_density(surface: FlatSurface, triangle_piece: Index) -> tuple[Doubles, float]:
     """Return the uv density of each triangle's piece (f,), and the mean over all pieces [1/mm].
 
     The density is the length in uv of 1 mm on the surface, the square root of uv area divided by surface
     area.
     """
-    inside, index = piece >= 0, np.maximum(piece, 0)
+    inside, index = triangle_piece >= 0, np.maximum(triangle_piece, 0)
     uv = np.bincount(index, np.abs(surface.area_uv) * inside)
     mm2 = np.bincount(index, surface.area_mm2 * inside)
     mean = float(np.sqrt(uv.sum() / max(mm2.sum(), 1e-12)))
@@ -146,7 +146,9 @@ def find_stitched_layout(mesh: Mesh, gutter_mm: float) -> dict[str, NDArray[Any]
     return {name: np.asarray(value) for name, value in zip(LAYOUT_ARRAY_NAMES, values, strict=True)}
 
 
-def _assemble_atlas(surface: FlatSurface, packing: Packing, coverage: Coverage, mapped: Mask) -> Atlas:
+def _assemble_atlas(
+    surface: FlatSurface, packing: Packing, coverage: Coverage, mapped_triangles: Mask
+) -> Atlas:
     size = len(coverage.triangle)
     metric = texel_metric(surface, packing, coverage)
     distances = edge_distances(surface, packing, coverage)
@@ -154,7 +156,7 @@ def _assemble_atlas(surface: FlatSurface, packing: Packing, coverage: Coverage, 
     bc = coverage.weights[y, x].astype(np.float64)
     weights = np.column_stack((1 - bc.sum(axis=1), bc))
     source = np.einsum("nk,nka->na", weights, packing.corners[coverage.triangle[y, x]])
-    corner_uv = np.where(mapped[:, None, None], (packing.corners + 0.5) / size, 0.0)
+    corner_uv = np.where(mapped_triangles[:, None, None], (packing.corners + 0.5) / size, 0.0)
     # the rim of a piece shows the surface across a seam, but with the stretch of its own side
     elsewhere = (coverage.anchor_triangle != coverage.triangle) | coverage.gutter
     row, column = np.nonzero((coverage.anchor_triangle >= 0) & elsewhere)
@@ -172,5 +174,5 @@ def _assemble_atlas(surface: FlatSurface, packing: Packing, coverage: Coverage, 
         border_triangle=coverage.anchor_triangle[row, column],
         border_weights=np.floor(coverage.anchor_weights[row, column] * 65535.0).astype(np.uint16),
         texels_per_uv=packing.texels_per_uv.astype(np.float32),
-        mapped=mapped,
+        mapped=mapped_triangles,
     )

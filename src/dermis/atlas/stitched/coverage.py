@@ -49,22 +49,22 @@ class Coverage:
 
 def compute_coverage(
     surface: FlatSurface,
-    piece: Index,
+    triangle_piece: Index,
     member_triangles: Index,
     border: Border,
     packing: Packing,
-    width: GutterWidth,
+    gutter_width: GutterWidth,
     grid_shape: tuple[int, int],
 ) -> Coverage:
     """Compute the surface points that the texels of packed pieces and their gutters show.
 
-    piece : (f,) piece of each triangle, -1 if there is none
+    triangle_piece : (f,) piece of each triangle, -1 if there is none
     member_triangles : (t,) indices of the triangles to rasterise
     border : border of the pieces, see `find_border`
     grid_shape : height and width of the grid of texels
     """
     owner = rasterise_texel_triangles(
-        packing.corners, _drawing_order(surface, piece, member_triangles), grid_shape
+        packing.corners, _drawing_order(surface, triangle_piece, member_triangles), grid_shape
     )
     weights = centre_weights(packing.corners, owner)
     coverage = Coverage(
@@ -76,12 +76,12 @@ def compute_coverage(
         gutter=np.zeros(grid_shape, np.bool_),
         distance_mm=np.zeros(grid_shape, np.float32),
     )
-    _add_gutters(coverage, piece, trace_gutter(surface, border, packing, width, owner))
-    coverage.piece[:] = np.where(coverage.anchor_triangle >= 0, piece[coverage.anchor_triangle], -1)
+    _add_gutters(coverage, triangle_piece, trace_gutter(surface, border, packing, gutter_width, owner))
+    coverage.piece[:] = np.where(coverage.anchor_triangle >= 0, triangle_piece[coverage.anchor_triangle], -1)
     return coverage
 
 
-def _add_gutters(coverage: Coverage, piece: Index, texels: GutterTexels) -> None:
+def _add_gutters(coverage: Coverage, triangle_piece: Index, texels: GutterTexels) -> None:
     """Add rim and gutter texels to a coverage that so far contains only the pieces of charts."""
     y, x = texels.y, texels.x
     coverage.triangle[y, x], coverage.weights[y, x] = texels.triangle, texels.weights
@@ -93,24 +93,24 @@ def _add_gutters(coverage: Coverage, piece: Index, texels: GutterTexels) -> None
     ended[y, x] = ~texels.complete
     incomplete = ~texels.complete & ~texels.rim
     coverage.triangle[y[incomplete], x[incomplete]] = -1
-    _repeat_edge(coverage, piece, ended, y[incomplete], x[incomplete])
+    _repeat_edge(coverage, triangle_piece, ended, y[incomplete], x[incomplete])
     # gutters end where the surface has no texels in the atlas
-    unlit = coverage.gutter & ((coverage.triangle < 0) | (piece[coverage.triangle] < 0))
+    unlit = coverage.gutter & ((coverage.triangle < 0) | (triangle_piece[coverage.triangle] < 0))
     for grid in (coverage.triangle, coverage.anchor_triangle):
         grid[unlit] = -1
     coverage.gutter[unlit] = False
 
 
-def hidden_triangles(surface: FlatSurface, piece: Index, packing: Packing, atlas_side: int) -> Mask:
+def hidden_triangles(surface: FlatSurface, triangle_piece: Index, packing: Packing, atlas_side: int) -> Mask:
     """Return the mask (f,) of triangles that other triangles of their piece mostly hide in uv."""
-    members = np.flatnonzero(piece >= 0)
+    members = np.flatnonzero(triangle_piece >= 0)
     owner = rasterise_texel_triangles(
-        packing.corners, _drawing_order(surface, piece, members), (atlas_side, atlas_side)
+        packing.corners, _drawing_order(surface, triangle_piece, members), (atlas_side, atlas_side)
     )
     return mostly_hidden_triangles(packing.corners, members, owner)
 
 
-def _drawing_order(surface: FlatSurface, piece: Index, member_triangles: Index) -> Index:
+def _drawing_order(surface: FlatSurface, triangle_piece: Index, member_triangles: Index) -> Index:
     """Return triangle indices sorted so that triangles mirrored within their piece come first.
 
     Other triangles are drawn later and therefore own the texels that they share with mirrored triangles.
@@ -118,21 +118,23 @@ def _drawing_order(surface: FlatSurface, piece: Index, member_triangles: Index) 
     member_triangles : (t,) indices of the triangles
     """
     return member_triangles[
-        np.argsort(~_mirrored_triangles(surface, piece[member_triangles], member_triangles), kind="stable")
+        np.argsort(
+            ~_mirrored_triangles(surface, triangle_piece[member_triangles], member_triangles), kind="stable"
+        )
     ]
 
 
-def _mirrored_triangles(surface: FlatSurface, piece: Index, member_triangles: Index) -> Mask:
+def _mirrored_triangles(surface: FlatSurface, member_piece: Index, member_triangles: Index) -> Mask:
     """Return the mask (t,) of triangles that are mirrored in uv relative to most triangles of their piece.
 
-    piece : (t,) piece of each triangle to examine
+    member_piece : (t,) piece of each triangle to examine
     member_triangles : (t,) indices of these triangles
     """
-    total = np.bincount(piece, surface.area_uv[member_triangles])
-    return np.asarray(np.sign(total)[piece] != np.sign(surface.area_uv[member_triangles]))
+    total = np.bincount(member_piece, surface.area_uv[member_triangles])
+    return np.asarray(np.sign(total)[member_piece] != np.sign(surface.area_uv[member_triangles]))
 
 
-def _repeat_edge(coverage: Coverage, piece: Index, beyond_end: Mask, y: Index, x: Index) -> None:
+def _repeat_edge(coverage: Coverage, triangle_piece: Index, beyond_end: Mask, y: Index, x: Index) -> None:
     """Copy neighbouring texels to gutter texels just beyond an edge at which the surface ends.
 
     A blur along the edge then reads the same light from a gutter as from the rim of a piece.
@@ -141,11 +143,11 @@ def _repeat_edge(coverage: Coverage, piece: Index, beyond_end: Mask, y: Index, x
     y, x : (n,) rows and columns of the gutter texels to fill, all of which are in this mask
     """
     last = np.array(beyond_end.shape) - 1
-    piece_of_texel, from_y, from_x = piece[coverage.anchor_triangle[y, x]], y.copy(), x.copy()
+    piece_of_texel, from_y, from_x = triangle_piece[coverage.anchor_triangle[y, x]], y.copy(), x.copy()
     for dy, dx in ((0, -1), (0, 1), (-1, 0), (1, 0)):
         next_y, next_x = np.clip(y + dy, 0, last[0]), np.clip(x + dx, 0, last[1])
         anchor = coverage.anchor_triangle[next_y, next_x]
-        same = (anchor >= 0) & ~beyond_end[next_y, next_x] & (piece[anchor] == piece_of_texel)
+        same = (anchor >= 0) & ~beyond_end[next_y, next_x] & (triangle_piece[anchor] == piece_of_texel)
         from_y, from_x = np.where(same, next_y, from_y), np.where(same, next_x, from_x)
     for grid in (coverage.triangle, coverage.weights):
         grid[y, x] = grid[from_y, from_x]

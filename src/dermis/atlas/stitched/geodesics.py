@@ -12,7 +12,7 @@ from dermis.base.arrays import Doubles, Index, Ints, Mask
 
 Complex = NDArray[np.complex128]
 
-START_SHIFT = 1e-3
+START_SHIFT_FRACTION = 1e-3
 """Fraction of the way to an inner point of the triangle by which start points move, to avoid corners."""
 
 INNER_POINT_WEIGHTS = 0.3547, 0.3141, 0.3312
@@ -111,7 +111,7 @@ def _leave_first_triangle(
 ) -> Geodesics:
     """Return the geodesics that leave their first triangle; store the ends of all others in `ends`."""
     corners = _as_complex(adjacency.planar_corners[triangle])
-    start = start + START_SHIFT * (corners @ np.array(INNER_POINT_WEIGHTS) - start)
+    start = start + START_SHIFT_FRACTION * (corners @ np.array(INNER_POINT_WEIGHTS) - start)
     corners, direction = corners - start[:, None], target - start
     after = np.roll(corners, -1, axis=1)
     leaves_through = (_cross(direction[:, None], corners) <= 0.0) & (_cross(direction[:, None], after) >= 0.0)

@@ -55,22 +55,25 @@ class GutterWidth(NamedTuple):
     max_texels: float
 
 
-def find_border(surface: FlatSurface, piece: Index, member_triangles: Index) -> Border:
+def find_border(surface: FlatSurface, triangle_piece: Index, member_triangles: Index) -> Border:
     """Return the triangle sides that form the borders of chart pieces.
 
-    piece : (f,) piece of each triangle, -1 if there is none
+    triangle_piece : (f,) piece of each triangle, -1 if there is none
     member_triangles : (t,) indices of the triangles whose sides are examined; each triangle is in a piece
     """
     neighbour = surface.uv_neighbour[member_triangles]
     row, index = np.nonzero(
-        (neighbour == member_triangles[:, None]) | (piece[member_triangles, None] != piece[neighbour])
+        (neighbour == member_triangles[:, None])
+        | (triangle_piece[member_triangles, None] != triangle_piece[neighbour])
     )
     triangle = member_triangles[row]
     across = surface.adjacency.neighbour[triangle, index]
     return Border(triangle, index, (across >= 0) & surface.adjacency.passable[across])
 
 
-def border_sides(surface: FlatSurface, border: Border, packing: Packing, width: GutterWidth) -> BorderSides:
+def border_sides(
+    surface: FlatSurface, border: Border, packing: Packing, gutter_width: GutterWidth
+) -> BorderSides:
     """Return the border sides on the texel grid, with surface metric and gutter width."""
     triangle, both = border.triangle, (border.side, (border.side + 1) % 3)
     ends = np.stack([packing.corners[triangle, k] for k in both], axis=1)
@@ -78,9 +81,10 @@ def border_sides(surface: FlatSurface, border: Border, packing: Packing, width: 
     steps = steps / packing.texels_per_uv[triangle][:, None, None, None]
     # slivers may be stretched a hundredfold, where gutters in proportion would waste space
     max_texels = np.minimum(
-        width.max_texels, _MAX_GUTTER_STRETCH * width.gutter_mm * packing.texels_per_mm[triangle]
+        gutter_width.max_texels,
+        _MAX_GUTTER_STRETCH * gutter_width.gutter_mm * packing.texels_per_mm[triangle],
     )
-    return BorderSides(ends, steps, np.where(border.seam, width.gutter_mm, 0.0), max_texels)
+    return BorderSides(ends, steps, np.where(border.seam, gutter_width.gutter_mm, 0.0), max_texels)
 
 
 def needed_texels(
@@ -88,7 +92,7 @@ def needed_texels(
     member_triangles: Index,
     border: Border,
     packing: Packing,
-    width: GutterWidth,
+    gutter_width: GutterWidth,
     grid_shape: tuple[int, int],
 ) -> Mask:
     """Return the mask (h, w) of texels that pieces, their rims and their gutters may need.
@@ -98,7 +102,9 @@ def needed_texels(
     """
     found = np.zeros(grid_shape, np.bool_)
     found.ravel()[covered_texels(packing.corners[member_triangles], grid_shape)[0]] = True
-    found.ravel()[nearest_border_points(border_sides(surface, border, packing, width), found).texel] = True
+    found.ravel()[
+        nearest_border_points(border_sides(surface, border, packing, gutter_width), found).texel
+    ] = True
     return found
 
 
@@ -127,14 +133,14 @@ class GutterTexels(NamedTuple):
 
 
 def trace_gutter(
-    surface: FlatSurface, border: Border, packing: Packing, width: GutterWidth, texel_triangle: Ints
+    surface: FlatSurface, border: Border, packing: Packing, gutter_width: GutterWidth, texel_triangle: Ints
 ) -> GutterTexels:
     """Find the gutter texels of a border, and trace geodesics to the surface points that they show.
 
     texel_triangle : (h, w) index of the triangle that covers each texel of the pieces, -1 outside
     """
     nearest = nearest_border_points(
-        sides := border_sides(surface, border, packing, width), texel_triangle >= 0
+        sides := border_sides(surface, border, packing, gutter_width), texel_triangle >= 0
     )
     texels = np.column_stack(np.divmod(nearest.texel, texel_triangle.shape[1])[::-1])
     ends, weights = trace_from_border(surface, border, sides, nearest, texels)

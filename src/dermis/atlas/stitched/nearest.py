@@ -61,18 +61,18 @@ class _SideMetric(NamedTuple):
     half_extent: Doubles
 
 
-def nearest_border_points(sides: BorderSides, inside: Mask) -> NearestPoints:
+def nearest_border_points(sides: BorderSides, inside_mask: Mask) -> NearestPoints:
     """Return the nearest border point of each texel that is in a gutter or in the rim of a piece.
 
     Distances are measured by the surface metric at each border side. The rim consists of the texels that
     bilinear interpolation at some point of the border reads.
 
-    inside : (h, w) mask of texels that chart pieces cover
+    inside_mask : (h, w) mask of texels that chart pieces cover
     """
     metric = _side_metric(sides)
-    k, x, y = _candidate_texels(sides, metric, inside.shape)
-    texel = y * inside.shape[1] + x
-    outside = ~inside.ravel()[texel]
+    k, x, y = _candidate_texels(sides, metric, inside_mask.shape)
+    texel = y * inside_mask.shape[1] + x
+    outside = ~inside_mask.ravel()[texel]
     k, x, y, texel = k[outside], x[outside], y[outside], texel[outside]
     offset, along = np.stack((x, y)) - sides.ends[k, 0].T, np.diff(sides.ends, axis=1)[k, 0].T
     fraction = np.clip((metric.along[k].T * offset).sum(axis=0), 0.0, 1.0)
@@ -80,12 +80,12 @@ def nearest_border_points(sides: BorderSides, inside: Mask) -> NearestPoints:
     distance2 = (metric.x[k] * v[0] + metric.y[k] * v[1]) ** 2 + (metric.down[k] * v[1]) ** 2
     rim = _within_a_texel(offset, along)
     near = np.flatnonzero(rim | (distance2 < sides.gutter_mm[k] ** 2))
-    nearest2 = np.full(inside.size, np.inf)
+    nearest2 = np.full(inside_mask.size, np.inf)
     np.minimum.at(nearest2, texel[near], distance2[near])
-    first = np.full(inside.size, -1)
+    first = np.full(inside_mask.size, -1)
     best = near[distance2[near] == nearest2[texel[near]]][::-1]
     first[texel[best]] = best
-    on_rim = np.zeros(inside.size, np.bool_)
+    on_rim = np.zeros(inside_mask.size, np.bool_)
     on_rim[texel[rim]] = True
     found = first[first >= 0]
     return NearestPoints(

@@ -94,11 +94,11 @@ class _PieceGrid(NamedTuple):
 
 
 def find_conflicts(
-    surface: FlatSurface, mapped: Mask, member_triangles: Index, gutter_mm: float
+    surface: FlatSurface, mapped_triangles: Mask, member_triangles: Index, gutter_mm: float
 ) -> Conflicts:
     """Find where gutters of one chart piece meet, by drawing the piece on a separate texel grid.
 
-    mapped : (f,) mask of triangles that belong to any piece
+    mapped_triangles : (f,) mask of triangles that belong to any piece
     member_triangles : (t,) indices of the triangles of this piece
     """
     mm2, area_uv = surface.area_mm2[member_triangles].sum(), np.abs(surface.area_uv[member_triangles]).sum()
@@ -109,11 +109,11 @@ def find_conflicts(
     )
     texels_per_uv = float(np.sqrt(mm2 / area_uv) / texel_mm)
     width = GutterWidth(gutter_mm, np.ceil(2 * gutter_mm / texel_mm))
-    margin, ones = width.max_texels + 2, np.ones(len(mapped))
+    margin, ones = width.max_texels + 2, np.ones(len(mapped_triangles))
     corners = np.zeros(surface.uv.shape)
     corners[member_triangles] = (surface.uv[member_triangles] - low) * texels_per_uv + margin
     columns, rows = np.ceil((high - low) * texels_per_uv + 2 * margin + 1).astype(int)
-    piece = np.where(mapped, 1, -1)
+    piece = np.where(mapped_triangles, 1, -1)
     piece[member_triangles] = 0
     packing, shape = Packing(corners, texels_per_uv * ones, ones / texel_mm), (int(rows), int(columns))
     grid = _draw_grid(
@@ -123,16 +123,16 @@ def find_conflicts(
         width,
         rasterise_texel_triangles(corners, member_triangles, shape),
     )
-    first, second = (grid.anchored.select(texels) for texels in _gap_pairs(surface, mapped, grid))
+    first, second = (grid.anchored.select(texels) for texels in _gap_pairs(surface, mapped_triangles, grid))
     origin = low * texels_per_uv - margin
     inside = grid.anchored.texels[: np.count_nonzero(grid.owner >= 0)] + origin
     return Conflicts(first.anchors + origin, second.anchors + origin, inside, texels_per_uv, texel_mm)
 
 
 def _draw_grid(
-    surface: FlatSurface, border: Border, packing: Packing, width: GutterWidth, texel_triangle: Ints
+    surface: FlatSurface, border: Border, packing: Packing, gutter_width: GutterWidth, texel_triangle: Ints
 ) -> _PieceGrid:
-    sides = border_sides(surface, border, packing, width)
+    sides = border_sides(surface, border, packing, gutter_width)
     sides = sides._replace(gutter_mm=_CONFLICT_RANGE_FRACTION * sides.gutter_mm)
     nearest, covered = nearest_border_points(sides, texel_triangle >= 0), np.flatnonzero(texel_triangle >= 0)
     f, texel = texel_triangle.ravel()[covered], np.concatenate((covered, nearest.texel))
@@ -146,7 +146,7 @@ def _draw_grid(
     return _PieceGrid(labels, row, AnchoredTexels(texels, anchors, step_mm), packing, border, sides, nearest)
 
 
-def _gap_pairs(surface: FlatSurface, mapped: Mask, grid: _PieceGrid) -> tuple[Index, Index]:
+def _gap_pairs(surface: FlatSurface, mapped_triangles: Mask, grid: _PieceGrid) -> tuple[Index, Index]:
     """Return pairs of adjacent texels whose surface points are not adjacent on the surface, (n,) each."""
     found = []
     for axis in (0, 1):
@@ -155,13 +155,15 @@ def _gap_pairs(surface: FlatSurface, mapped: Mask, grid: _PieceGrid) -> tuple[In
         a, b = a[far], b[far]
         found.append((a, b, gap_limit_mm(grid.anchored.select(a), grid.anchored.select(b), axis)))
     first, second, limit = (np.concatenate(part) for part in zip(*found, strict=True))
-    points = _texel_points(surface, mapped, grid, np.concatenate((first, second)))
+    points = _texel_points(surface, mapped_triangles, grid, np.concatenate((first, second)))
     # points beyond the end of the surface are NaN, which compares as no gap
     gap = np.linalg.norm(points[first] - points[second], axis=1) > limit
     return first[gap], second[gap]
 
 
-def _texel_points(surface: FlatSurface, mapped: Mask, grid: _PieceGrid, chosen_texels: Index) -> Doubles:
+def _texel_points(
+    surface: FlatSurface, mapped_triangles: Mask, grid: _PieceGrid, chosen_texels: Index
+) -> Doubles:
     """Return the surface points (n, 3) of all texels of the grid, NaN for points that are not computed [mm].
 
     Points are computed only for the texels in `chosen_texels`, and not for texels beyond the end of the
@@ -175,25 +177,29 @@ def _texel_points(surface: FlatSurface, mapped: Mask, grid: _PieceGrid, chosen_t
     points[members] = surface.points(f, barycentric_weights(grid.packing.corners[f], texels[members]))
     nearest = NearestPoints._make(part[beyond] for part in grid.nearest)
     ends, _ = trace_from_border(surface, grid.border, grid.sides, nearest, texels[len(owner) + beyond])
-    there = nearest.rim | (ends.complete & mapped[ends.triangle])
+    there = nearest.rim | (ends.complete & mapped_triangles[ends.triangle])
     points[len(owner) + beyond[there]] = surface.points(ends.triangle, ends.weights)[there]
     return points
 
 
-def cut_overlaps(surface: FlatSurface, piece: Index, gutter_mm: float) -> Index:
+def cut_overlaps(surface: FlatSurface, triangle_piece: Index, gutter_mm: float) -> Index:
     """Cut charts along straight lines until gutters hardly overlap; return piece indices (f,).
 
-    piece : (f,) piece of each triangle before the cuts, -1 if there is none
+    triangle_piece : (f,) piece of each triangle before the cuts, -1 if there is none
     gutter_mm : width of the gutters [mm]
     """
-    done, count = np.full(len(piece), -1, np.int64), 0
-    order = np.argsort(piece, kind="stable")[np.count_nonzero(piece < 0) :]
-    starts = np.flatnonzero(np.diff(piece[order])) + 1
+    done, count = np.full(len(triangle_piece), -1, np.int64), 0
+    order = np.argsort(triangle_piece, kind="stable")[np.count_nonzero(triangle_piece < 0) :]
+    starts = np.flatnonzero(np.diff(triangle_piece[order])) + 1
     queue = [(members, 0) for members in np.split(order, starts) if len(members)]
     budget_mm2 = _MAX_RELATIVE_AREA_GROWTH * surface.area_mm2[order].sum()
     while queue:
         members, depth = queue.pop()
-        parts = _cut_piece(surface, piece >= 0, members, gutter_mm) if depth < _MAX_SUCCESSIVE_CUTS else None
+        parts = (
+            _cut_piece(surface, triangle_piece >= 0, members, gutter_mm)
+            if depth < _MAX_SUCCESSIVE_CUTS
+            else None
+        )
         cost_mm2 = 0.0 if parts is None else 2 * gutter_mm * _cut_length_mm(surface, members, parts)
         if parts is None or cost_mm2 > budget_mm2:
             done[members] = count
@@ -219,12 +225,14 @@ def _cut_length_mm(surface: FlatSurface, member_triangles: Index, part_of_triang
     return float(length[(other >= 0) & (other != part_of_triangle[:, None])].sum()) / 2
 
 
-def _cut_piece(surface: FlatSurface, mapped: Mask, member_triangles: Index, gutter_mm: float) -> Index | None:
+def _cut_piece(
+    surface: FlatSurface, mapped_triangles: Mask, member_triangles: Index, gutter_mm: float
+) -> Index | None:
     """Cut a chart piece where its gutters meet; return the part of each triangle (t,), or None if uncut.
 
     member_triangles : (t,) indices of the piece's triangles
     """
-    conflicts = find_conflicts(surface, mapped, member_triangles, gutter_mm)
+    conflicts = find_conflicts(surface, mapped_triangles, member_triangles, gutter_mm)
     reach = gutter_mm / conflicts.texel_mm
     part = np.zeros(len(member_triangles), np.int64)
     for row, cluster in enumerate(_conflict_clusters(conflicts, reach), start=1):
@@ -257,14 +265,17 @@ def _conflict_clusters(conflicts: Conflicts, gutter_texels: float) -> list[Index
     return [np.flatnonzero(label == k) for k in range(label.max(initial=-1) + 1)]
 
 
-def _within_reach(points: Doubles, others: Doubles, reach: float) -> Mask:
-    """Return the mask (...) of `points` (..., 2) within about `reach` of any point in `others` (n, 2)."""
+def _within_reach(points: Doubles, target_points: Doubles, reach: float) -> Mask:
+    """Return the mask (...) of points (..., 2) within about `reach` of any target point.
+
+    target_points : (n, 2) points to which the distances are measured
+    """
     cell = reach / _CELLS_PER_GUTTER
-    low = np.floor(others.min(axis=0) / cell) - _CELLS_PER_GUTTER - 1
+    low = np.floor(target_points.min(axis=0) / cell) - _CELLS_PER_GUTTER - 1
     disc = np.argwhere(
         np.hypot(*(np.indices((2 * _CELLS_PER_GUTTER + 1,) * 2) - _CELLS_PER_GUTTER)) <= _CELLS_PER_GUTTER
     )
-    centre = np.floor(others / cell - low).astype(np.int64) - _CELLS_PER_GUTTER
+    centre = np.floor(target_points / cell - low).astype(np.int64) - _CELLS_PER_GUTTER
     found = np.zeros(centre.max(axis=0) + 2 * _CELLS_PER_GUTTER + 2, np.bool_)
     found[tuple(np.moveaxis(centre[:, None] + disc, 2, 0))] = True
     index = np.floor(points / cell - low).astype(np.int64)
@@ -273,7 +284,7 @@ def _within_reach(points: Doubles, others: Doubles, reach: float) -> Mask:
 
 
 def _conflict_strip(
-    surface: FlatSurface, member_triangles: Index, overlap: Conflicts, half_mask: Mask, gutter_texels: float
+    surface: FlatSurface, member_triangles: Index, conflicts: Conflicts, half_mask: Mask, gutter_texels: float
 ) -> Mask:
     """Return the mask (t,) of triangles near conflicts between gutters, on one side of a line.
 
@@ -282,28 +293,28 @@ def _conflict_strip(
     half_mask : (t,) mask of triangles on one side of the line
     gutter_texels : gutter width [texel]
     """
-    corners = surface.uv[member_triangles] * overlap.texels_per_uv
+    corners = surface.uv[member_triangles] * conflicts.texels_per_uv
     points = np.concatenate((corners, corners.mean(axis=1, keepdims=True)), axis=1)
     near = np.asarray(
-        _within_reach(points, np.concatenate((overlap.first, overlap.second)), gutter_texels).any(axis=1)
+        _within_reach(points, np.concatenate((conflicts.first, conflicts.second)), gutter_texels).any(axis=1)
     )
     area = surface.area_mm2[member_triangles]
     return near & (half_mask if area[near & half_mask].sum() < area[near & ~half_mask].sum() else ~half_mask)
 
 
-def _best_line(overlap: Conflicts, gutter_texels: float) -> tuple[Doubles, float, int]:
+def _best_line(conflicts: Conflicts, gutter_texels: float) -> tuple[Doubles, float, int]:
     """Return the line that separates the most conflicts relative to the length of a cut along the line.
 
     A line separates a conflict if the two border points of the conflict are on different sides. Returns the
     line's normal and offset, and the number of separated conflicts.
     """
-    close = overlap.inside[
-        _within_reach(overlap.inside, np.concatenate((overlap.first, overlap.second)), gutter_texels)
+    close = conflicts.inside[
+        _within_reach(conflicts.inside, np.concatenate((conflicts.first, conflicts.second)), gutter_texels)
     ]
     best, line = -1.0, (np.array([1.0, 0.0]), 0.0, 0)
     for angle in np.arange(_LINE_DIRECTION_COUNT) * np.pi / _LINE_DIRECTION_COUNT:
         normal = np.array([np.cos(angle), np.sin(angle)])
-        one, other, inside = (points @ normal for points in (overlap.first, overlap.second, close))
+        one, other, inside = (points @ normal for points in (conflicts.first, conflicts.second, close))
         low, high = np.minimum(one, other), np.maximum(one, other)
         first, last = low.min(), high.max()
         offsets = first + (last - first) * (np.arange(_LINE_OFFSET_COUNT)[:, None] + 0.5) / _LINE_OFFSET_COUNT

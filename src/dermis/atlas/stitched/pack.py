@@ -22,7 +22,7 @@ _FINE_BISECTION_COUNT, _MAX_FINE_SCALE_GAIN = (
     4,
     1.12,
 )  # trials with fine cells, and the largest factor of scale to gain
-_ORDER_COUNT = 6  # number of packing orders: by area, height and width, each by rows and by columns
+_PACKING_ORDER_COUNT = 6  # number of packing orders: by area, height and width, each by rows and by columns
 _MIN_SCALE_GAIN = 1.003  # gain of scale for which the search is repeated with another order
 _MAX_MASK_ATTEMPTS = 4  # number of attempts with masks of different scales
 _MIN_MASK_SCALE_RATIO = (
@@ -132,7 +132,7 @@ def pack_pieces(
     triangle_piece: Index,
     uv_scale: Doubles,
     map_side: int,
-    width: GutterWidth,
+    gutter_width: GutterWidth,
     layout: PieceLayout | None = None,
 ) -> Packing | None:
     """Pack chart pieces with their gutters at the largest common scale; return None if they do not fit.
@@ -147,7 +147,7 @@ def pack_pieces(
     packing = Packing(np.zeros(surface.uv.shape), *np.zeros((2, len(triangle_piece))))
     if not pieces:
         return packing
-    found = layout or _find_layout(pieces, map_side, width)
+    found = layout or _find_layout(pieces, map_side, gutter_width)
     if found is None:
         return None
     per_cell = map_side / min(map_side, MAX_CELLS_PER_SIDE)
@@ -159,10 +159,10 @@ def pack_pieces(
 
 
 def find_layout(
-    surface: FlatSurface, triangle_piece: Index, uv_scale: Doubles, map_side: int, width: GutterWidth
+    surface: FlatSurface, triangle_piece: Index, uv_scale: Doubles, map_side: int, gutter_width: GutterWidth
 ) -> PieceLayout | None:
     """Search for a layout of chart pieces, to be passed to `pack_pieces`; return None if they do not fit."""
-    return _find_layout(_prepare_pieces(surface, triangle_piece, uv_scale)[1], map_side, width)
+    return _find_layout(_prepare_pieces(surface, triangle_piece, uv_scale)[1], map_side, gutter_width)
 
 
 def _prepare_pieces(
@@ -193,14 +193,14 @@ def _single_piece(
     return _Piece(subset, uv, uv.max(axis=(0, 1)), uv_scale, uv_per_mm, border)
 
 
-def _find_layout(pieces: list[_Piece], map_side: int, width: GutterWidth) -> PieceLayout | None:
+def _find_layout(pieces: list[_Piece], map_side: int, gutter_width: GutterWidth) -> PieceLayout | None:
     """Return the layout with the largest scale that the search finds, or None if no scale fits."""
     cells = min(map_side, MAX_CELLS_PER_SIDE)
-    width = width._replace(max_texels=width.max_texels * cells / map_side)
+    gutter_width = gutter_width._replace(max_texels=gutter_width.max_texels * cells / map_side)
     area = sum(float(np.abs(one.surface.area_uv).sum()) * one.scale**2 for one in pieces)
     top = cells / float(np.sqrt(area))
     for _ in range(_MAX_MASK_ATTEMPTS):
-        found = _find_largest_scale([_piece_mask(one, top, width) for one in pieces], cells, top)
+        found = _find_largest_scale([_piece_mask(one, top, gutter_width) for one in pieces], cells, top)
         if found is None or found.scale > _MIN_MASK_SCALE_RATIO * top:
             return found
         top = _NEXT_MASK_SCALE_RATIO * found.scale
@@ -213,7 +213,7 @@ def _find_largest_scale(masks: list[_PieceMask], cells_per_side: int, max_scale:
     Several packing orders are compared with coarse cells; only the best order is tried with fine cells.
     """
     coarse, best = None, 0
-    for order in range(_ORDER_COUNT):
+    for order in range(_PACKING_ORDER_COUNT):
         lower = coarse.scale if coarse else 0.0
         if order == 0 or (
             coarse and _try_scale(masks, lower * _MIN_SCALE_GAIN, cells_per_side // _COARSE_CELL_SIDE, order)
@@ -306,18 +306,18 @@ def _scaled_mask(mask: _PieceMask, scale: float) -> tuple[Mask, Doubles]:
     return np.cumsum(steps, axis=1)[:, :-1] > 0, -low.astype(np.float64)
 
 
-def _piece_mask(piece: _Piece, scale: float, width: GutterWidth) -> _PieceMask:
+def _piece_mask(piece: _Piece, scale: float, gutter_width: GutterWidth) -> _PieceMask:
     """Return the cells in which a piece and its gutter may need a texel.
 
     scale : cells per unit of the piece's scaled uv
     """
-    margin = np.ceil(_gutter_extent(piece, scale, width)) + 2
+    margin = np.ceil(_gutter_extent(piece, scale, gutter_width)) + 2
     columns, rows = np.ceil(piece.extent * scale + 2 * margin).astype(int) + 1
     ones = np.ones(len(piece.uv))
     corners = piece.uv * scale + margin - 0.5
     packing = Packing(corners, ones * piece.scale * scale, ones * piece.uv_per_mm * scale)
     mask = needed_texels(
-        piece.surface, np.arange(len(ones)), piece.border, packing, width, (int(rows), int(columns))
+        piece.surface, np.arange(len(ones)), piece.border, packing, gutter_width, (int(rows), int(columns))
     )
     # a cell may contain a needed texel although its centre is not needed
     mask[1:] |= mask[:-1].copy()
@@ -334,7 +334,7 @@ def _cell_runs(cell_mask: Mask) -> Index:
     return np.column_stack((row, begin, np.nonzero(step < 0)[1] - 1))
 
 
-def _gutter_extent(piece: _Piece, scale: float, width: GutterWidth) -> Doubles:
+def _gutter_extent(piece: _Piece, scale: float, gutter_width: GutterWidth) -> Doubles:
     """Return the largest width (2,) of a piece's gutters along u and v [cell]."""
     steps = piece.surface.uv_steps[piece.border.triangle] / (piece.scale * scale)
     if not len(steps):
@@ -342,5 +342,5 @@ def _gutter_extent(piece: _Piece, scale: float, width: GutterWidth) -> Doubles:
     e, g = ((steps[..., k, :] ** 2).sum(axis=-1) for k in (0, 1))
     f = (steps[..., 0, :] * steps[..., 1, :]).sum(axis=-1)
     det = np.maximum(e * g - f * f, 1e-9 * e * g)
-    half = width.gutter_mm * np.sqrt(np.array([(g / det).max(), (e / det).max()]))
-    return np.asarray(np.clip(half, 1.0, max(width.max_texels, 1.0)))
+    half = gutter_width.gutter_mm * np.sqrt(np.array([(g / det).max(), (e / det).max()]))
+    return np.asarray(np.clip(half, 1.0, max(gutter_width.max_texels, 1.0)))

@@ -11,7 +11,7 @@ from dermis.atlas.stitched.surface import FlatSurface
 from dermis.base.arrays import Doubles, Floats, Index, Ints, Mask
 
 # There is a gap between texels whose surface points are farther apart than this many steps plus the slack.
-_MAX_CONNECTED_STEPS, _GAP_SLACK_MM = 2.0, 0.5
+_GAP_LIMIT_TEXEL_STEPS, _GAP_SLACK_MM = 2.0, 0.5
 _INNER_MARGIN_TEXELS = 1e-3  # texel centres this far inside an edge are not in the triangle across it [texel]
 
 
@@ -109,7 +109,7 @@ def gap_limit_mm(first_texels: AnchoredTexels, second_texels: AnchoredTexels, ax
     axis : 0 for texels adjacent along x, 1 along y
     """
     return (
-        _MAX_CONNECTED_STEPS * np.maximum(first_texels.step_mm[:, axis], second_texels.step_mm[:, axis])
+        _GAP_LIMIT_TEXEL_STEPS * np.maximum(first_texels.step_mm[:, axis], second_texels.step_mm[:, axis])
         + _GAP_SLACK_MM
     )
 

@@ -85,7 +85,7 @@ def divide_into_cells(atlas: Atlas, max_sigma_mm: float, relative_cell_size: flo
         larger values [mm]
     relative_cell_size : cell size relative to the default [-]
     """
-    sigma_mm, texel_mm = min(max_sigma_mm, _MAX_SIGMA_MM), _texel_mm(atlas)
+    sigma_mm, texel_mm = min(max_sigma_mm, _MAX_SIGMA_MM), _median_texel_mm(atlas)
     side = int(np.ceil(atlas.size * texel_mm / (_CELL_SIDE_SIGMAS * sigma_mm * relative_cell_size)))
     side = min(max(side, 1), atlas.size)
     stride = max(1, atlas.size // max(_MAX_AVERAGED_TEXELS_PER_SIDE, side))
@@ -96,7 +96,7 @@ def divide_into_cells(atlas: Atlas, max_sigma_mm: float, relative_cell_size: flo
     receiver = _dilate_cells(lit) & (triangle >= 0)
     weights = atlas.barycentric[np.ix_(centre, centre)][receiver]
     points = np.column_stack([triangle[receiver].astype(np.uint32), _pack_words(*weights.T)])
-    order, first = _sort_by_tile(_tile_of(atlas, points, side, tiles), tiles)
+    order, first = _sort_by_tile(_tiles_of_points(atlas, points, side, tiles), tiles)
     return Cells(
         atlas.size,
         side,
@@ -113,7 +113,7 @@ def divide_into_cells(atlas: Atlas, max_sigma_mm: float, relative_cell_size: flo
     )
 
 
-def _texel_mm(atlas: Atlas) -> float:
+def _median_texel_mm(atlas: Atlas) -> float:
     """Return the median side of a lit texel on the surface [mm]."""
     step = max(1, atlas.size // _MAX_AVERAGED_TEXELS_PER_SIDE)
     lit, stretch = atlas.lit[::step, ::step], atlas.stretch[::step, ::step].astype(np.float32)
@@ -161,7 +161,7 @@ def _source_cells(lit_mask: Mask, tiles_per_side: int) -> tuple[Index, Index]:
     return (y * len(lit_mask) + x)[order], first
 
 
-def _tile_of(atlas: Atlas, points: Words, cells_per_side: int, tiles_per_side: int) -> Ints:
+def _tiles_of_points(atlas: Atlas, points: Words, cells_per_side: int, tiles_per_side: int) -> Ints:
     """Return the index (m,) of the tile in which the chart of each surface point shows the point.
 
     Gutter texels, which show points of other charts, do not count.

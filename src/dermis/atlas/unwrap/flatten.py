@@ -127,7 +127,7 @@ def flatten(points: Doubles, triangles: Index, length_ratio: Doubles, stretch_we
     scaled = shapes * length_ratio[:, None]
     for _ in range(_REWEIGHTING_COUNT):
         a, b = affine_coefficients(scaled, z[triangles])
-        z = _rigid_step(
+        z = _make_rigid(
             z, triangles, component, scaled, stretch_weight / length_ratio**2 * _stiffness_weights(a, b)
         )
     return untangle(np.column_stack((z.real, z.imag)), triangles)
@@ -171,7 +171,7 @@ def _conformal_map(points: Doubles, triangles: Index, component: Index, shapes: 
     fixed[low] = fixed[high] = True
     z = np.zeros(n, dtype=np.complex128)
     z[high] = np.linalg.norm(points[high] - points[low], axis=1)
-    z[~fixed] = _factorise(energy[~fixed][:, ~fixed])(-(energy[~fixed] @ z))
+    z[~fixed] = _sparse_solver(energy[~fixed][:, ~fixed])(-(energy[~fixed] @ z))
     return z
 
 
@@ -187,7 +187,7 @@ def _extreme_points(points: Doubles, component: Index) -> tuple[Index, Index]:
     return order[np.roll(last, 1)], order[last]
 
 
-def _factorise(matrix: Any) -> Any:
+def _sparse_solver(matrix: Any) -> Any:
     """Return a function that solves linear systems with a symmetric or Hermitian sparse matrix."""
     from scipy.sparse.linalg import splu
 
@@ -197,19 +197,22 @@ def _factorise(matrix: Any) -> Any:
     return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=symmetric).solve
 
 
-def _stiffness_weights(a: Complexes, b: Complexes) -> Doubles:
+def _stiffness_weights(conformal_part: Complexes, mirrored_part: Complexes) -> Doubles:
     """Return weights (f,): 1 for unstretched triangles, larger for compressed and mirrored triangles.
 
-    a, b : (f,) coefficients of the affine maps, from `affine_coefficients`
+    conformal_part, mirrored_part : (f,) coefficients of the affine maps, from `affine_coefficients`
     """
-    total = np.zeros(len(a))
-    for value in (np.abs(a) + np.abs(b), np.abs(a) - np.abs(b)):
+    total = np.zeros(len(conformal_part))
+    for value in (
+        np.abs(conformal_part) + np.abs(mirrored_part),
+        np.abs(conformal_part) - np.abs(mirrored_part),
+    ):
         sigma = np.clip(value, 0.2, 5.0)
         total += (1 + sigma) * (1 + sigma**2) / (8 * sigma**3)
     return total
 
 
-def _rigid_step(
+def _make_rigid(
     positions: Complexes, triangles: Index, component: Index, shapes: Complexes, stretch_weight: Doubles
 ) -> Complexes:
     """Make a flat map as rigid as possible, in some iterations with fixed weights; return complex positions.
@@ -220,7 +223,7 @@ def _rigid_step(
     n, cot = len(positions), _cotangents(shapes) * stretch_weight[:, None]
     free = np.ones(n, dtype=bool)
     free[np.unique(component, return_index=True)[1]] = False
-    solve = _factorise(_laplacian(triangles, cot, n)[free][:, free])
+    solve = _sparse_solver(_laplacian(triangles, cot, n)[free][:, free])
     weighted_edges = cot * (np.roll(shapes, -1, axis=1) - shapes)
     start, end = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
     for _ in range(_RIGID_ITERATION_COUNT):

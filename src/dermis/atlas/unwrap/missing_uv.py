@@ -17,15 +17,15 @@ from dermis.mesh.mesh import Mesh
 _LAYOUT_CACHE_VERSION = 1  # increment when `unwrap_mesh` returns other layouts
 
 
-def with_layout(mesh: Mesh, unwrapped: Mask) -> tuple[Mesh, Index]:
+def unwrap_triangles(mesh: Mesh, triangle_mask: Mask) -> tuple[Mesh, Index]:
     """Unwrap some triangles of a mesh; return the new mesh, and the old vertex of each new vertex.
 
     The order of the triangles is unchanged; vertices on the new seams are duplicated. The layout is cached on
     disk.
 
-    unwrapped : (f,) mask of the triangles that need a layout
+    triangle_mask : (f,) mask of the triangles that need a layout
     """
-    used_vertices, corners = compact_vertices(mesh.triangles[unwrapped])
+    used_vertices, corners = compact_vertices(mesh.triangles[triangle_mask])
     point = np.unique(mesh.point[used_vertices], return_inverse=True)[1]
     part = Mesh(
         mesh.positions[used_vertices],
@@ -33,18 +33,18 @@ def with_layout(mesh: Mesh, unwrapped: Mask) -> tuple[Mesh, Index]:
         np.zeros((len(used_vertices), 2), np.float32),
         point.reshape(-1).astype(np.int32),
         corners.astype(np.int32),
-        mesh.material[unwrapped],
+        mesh.material[triangle_mask],
         mesh.materials,
     )
     arrays = _cached_layout(part)
     # Corners keep their order, so that each new vertex comes from the vertex at the same corner.
     source = np.empty(len(arrays["uv"]), np.int64)
-    source[arrays["triangles"].ravel()] = mesh.triangles[unwrapped].ravel()
-    remaining = mesh.triangles[~unwrapped]
+    source[arrays["triangles"].ravel()] = mesh.triangles[triangle_mask].ravel()
+    remaining = mesh.triangles[~triangle_mask]
     kept, others = compact_vertices(remaining) if len(remaining) else (used_vertices[:0], corners[:0])
     triangles = np.empty_like(mesh.triangles)
-    triangles[~unwrapped] = others
-    triangles[unwrapped] = arrays["triangles"] + len(kept)
+    triangles[~triangle_mask] = others
+    triangles[triangle_mask] = arrays["triangles"] + len(kept)
     vertex = np.concatenate([kept, source])
     laid_out = replace(
         mesh,

@@ -136,22 +136,22 @@ def flatten_charts(mesh: ChartMesh, triangle_chart: Index) -> FlatCharts:
     return flat
 
 
-def _repair_charts(mesh: ChartMesh, flat: FlatCharts, change_count: int) -> Index:
+def _repair_charts(mesh: ChartMesh, flat_charts: FlatCharts, change_count: int) -> Index:
     """Return the chart of each triangle (f,) after a repair of charts with faulty triangles.
 
     The first repairs move faulty triangles to adjacent charts; later repairs split the charts.
 
     change_count : number of repairs made so far
     """
-    if not flat.faulty.any():
-        return flat.chart
+    if not flat_charts.faulty.any():
+        return flat_charts.chart
     chart = (
-        _reassign_faulty_triangles(mesh, flat)
+        _reassign_faulty_triangles(mesh, flat_charts)
         if change_count < _MAX_REASSIGNMENTS
-        else _split_faulty_charts(mesh, flat)
+        else _split_faulty_charts(mesh, flat_charts)
     )
-    changed = flat.faulty | (chart != flat.chart)
-    affected = np.isin(flat.chart, flat.chart[changed]) | np.isin(chart, chart[changed])
+    changed = flat_charts.faulty | (chart != flat_charts.chart)
+    affected = np.isin(flat_charts.chart, flat_charts.chart[changed]) | np.isin(chart, chart[changed])
     subset = mesh.subset(affected)
     chart[affected] = (
         chart.max() + 1 + _repair_charts(subset, subset.flatten(chart[affected]), change_count + 1)
@@ -159,17 +159,17 @@ def _repair_charts(mesh: ChartMesh, flat: FlatCharts, change_count: int) -> Inde
     return chart
 
 
-def _reassign_faulty_triangles(mesh: ChartMesh, flat: FlatCharts) -> Index:
+def _reassign_faulty_triangles(mesh: ChartMesh, flat_charts: FlatCharts) -> Index:
     """Return charts (f,) in which faulty triangles belong to an adjacent chart, if there is one."""
-    adjacent = flat.chart[neighbour_triangles(mesh.triangles)]
-    other = np.where(adjacent == flat.chart[:, None], -1, adjacent).max(axis=1)
-    return merge_strays(np.where(flat.faulty & (other >= 0), other, flat.chart), mesh.triangles)
+    adjacent = flat_charts.chart[neighbour_triangles(mesh.triangles)]
+    other = np.where(adjacent == flat_charts.chart[:, None], -1, adjacent).max(axis=1)
+    return merge_strays(np.where(flat_charts.faulty & (other >= 0), other, flat_charts.chart), mesh.triangles)
 
 
-def _split_faulty_charts(mesh: ChartMesh, flat: FlatCharts) -> Index:
+def _split_faulty_charts(mesh: ChartMesh, flat_charts: FlatCharts) -> Index:
     """Return charts (f,) in which each chart with faulty triangles is split in two."""
-    chart = 2 * flat.chart
-    for k in np.unique(flat.chart[flat.faulty]):
-        own = np.flatnonzero(flat.chart == k)
+    chart = 2 * flat_charts.chart
+    for k in np.unique(flat_charts.chart[flat_charts.faulty]):
+        own = np.flatnonzero(flat_charts.chart == k)
         chart[own] += np.minimum(grow_charts(mesh.positions, mesh.triangles[own], 2), 1)
     return chart

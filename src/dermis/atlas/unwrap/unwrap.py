@@ -170,36 +170,36 @@ def _check_areas(positions: Doubles, triangles: Index) -> None:
         refuse("mesh", "triangles with an area", f"{degenerate} have none", "Remove them first")
 
 
-def _orient_charts(flat: FlatCharts, upright_coordinate: Doubles) -> Doubles:
+def _orient_charts(flat_charts: FlatCharts, upright_coordinate: Doubles) -> Doubles:
     """Rotate each chart so that `upright_coordinate` increases upwards; return positions (v, 2).
 
     upright_coordinate : (f, 3) coordinate of each triangle corner along the up direction in space [mm]
     """
-    z = flat.uv_mm[:, 0] + 1j * flat.uv_mm[:, 1]
-    z3 = z[flat.corners]
+    z = flat_charts.uv_mm[:, 0] + 1j * flat_charts.uv_mm[:, 1]
+    z3 = z[flat_charts.corners]
     # i times the edge opposite a corner is the direction of the gradient of its hat function
     slope = 1j * (upright_coordinate * (np.roll(z3, -2, axis=1) - np.roll(z3, -1, axis=1))).sum(axis=1)
-    up = np.bincount(flat.chart, slope.real) + 1j * np.bincount(flat.chart, slope.imag)
+    up = np.bincount(flat_charts.chart, slope.real) + 1j * np.bincount(flat_charts.chart, slope.imag)
     rotation = np.where(np.abs(up) > 0, 1j * np.conj(up) / np.maximum(np.abs(up), 1e-300), 1)
-    z *= rotation[_vertex_charts(flat)]
+    z *= rotation[_vertex_charts(flat_charts)]
     return np.column_stack((z.real, z.imag))
 
 
-def _vertex_charts(flat: FlatCharts) -> Index:
+def _vertex_charts(flat_charts: FlatCharts) -> Index:
     """Return the chart index of each vertex (v,)."""
-    chart = np.empty(len(flat.point), dtype=np.int64)
-    chart[flat.corners] = flat.chart[:, None]
+    chart = np.empty(len(flat_charts.point), dtype=np.int64)
+    chart[flat_charts.corners] = flat_charts.chart[:, None]
     return chart
 
 
-def _packed_uv(uv_mm: Doubles, flat: FlatCharts, padding: float) -> Doubles:
+def _packed_uv(uv_mm: Doubles, flat_charts: FlatCharts, padding: float) -> Doubles:
     """Pack the charts; return the uv (v, 2) of all vertices, v down."""
-    edges, triangle = border_edges(flat.corners)
-    chart = flat.chart[triangle]
+    edges, triangle = border_edges(flat_charts.corners)
+    chart = flat_charts.chart[triangle]
     order = np.argsort(chart, kind="stable")
     starts = np.flatnonzero(np.diff(chart[order])) + 1
     scale, offset = pack_charts([uv_mm[some] for some in np.split(edges[order], starts)], padding)
-    uv = scale * uv_mm + offset[_vertex_charts(flat)]
+    uv = scale * uv_mm + offset[_vertex_charts(flat_charts)]
     return np.column_stack((uv[:, 0], 1 - uv[:, 1]))
 
 

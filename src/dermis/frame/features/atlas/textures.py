@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.atlas import GUTTER_TEXELS, MAX_SHEAR, Atlas
-from dermis.atlas.stitched.geodesics import INNER_POINT_WEIGHTS, START_SHIFT
+from dermis.atlas.stitched.geodesics import INNER_POINT_WEIGHTS, START_SHIFT_FRACTION
 from dermis.base.disk import cached_arrays
 from dermis.frame.seams import FEATHER_MM, SEAM_METHODS, SeamMethod
 from dermis.gpu import Buffer, Constants, Device, Texture, make_texture, mark_scratch
@@ -33,7 +33,7 @@ def atlas_constants() -> dict[str, int | float]:
     """Return the named values that `//#fill` lines insert into shaders of the atlas."""
     _, inner_b, inner_c = INNER_POINT_WEIGHTS
     tracing = {
-        "inward": START_SHIFT,
+        "inward": START_SHIFT_FRACTION,
         "inner_b": inner_b,
         "inner_c": inner_c,
         "same_source": SAME_SOURCE_TEXELS,
