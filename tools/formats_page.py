@@ -10,7 +10,7 @@ from dermis.base.command_line import run_script
 from dermis.base.file_properties import FileProperty
 from dermis.formats.mesh_formats import MESH_FORMATS
 from dermis.images.hdr import EXR_PROPERTIES, RADIANCE_PROPERTIES
-from dermis.images.io import ODD_PIXEL_PROPERTIES, UNSUPPORTED_PICTURE_PROPERTIES
+from dermis.images.io import INVALID_PIXEL_PROPERTIES, UNSUPPORTED_PICTURE_PROPERTIES
 from dermis.images.opening import PICTURE_PROPERTIES
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "formats.md"
@@ -18,7 +18,7 @@ _PICTURES = {
     "pictures": (*PICTURE_PROPERTIES, *UNSUPPORTED_PICTURE_PROPERTIES),
     "exr": EXR_PROPERTIES,
     "radiance": RADIANCE_PROPERTIES,
-    "odd_pixels": ODD_PIXEL_PROPERTIES,
+    "odd_pixels": INVALID_PIXEL_PROPERTIES,
 }
 
 

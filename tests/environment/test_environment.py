@@ -23,8 +23,8 @@ from dermis.environment.panorama import (
 from dermis.environment.prefilter import (
     LAYER_HEIGHT,
     LAYER_ROUGHNESSES,
-    isotropic_kernel,
     isotropic_lobe,
+    isotropic_lobe_factors,
     prefilter,
 )
 from dermis.images.colour import luminance
@@ -190,7 +190,7 @@ def test_uniform_light_is_uniform() -> None:
 
 def test_kernels_are_too_smooth_to_ring() -> None:
     for m in LAYER_ROUGHNESSES:
-        factors = isotropic_kernel(float(m))
+        factors = isotropic_lobe_factors(float(m))
         assert (
             factors[0] == pytest.approx(1.0) and abs(factors[-1]) < 1e-3 and np.abs(factors).max() < 1 + 1e-9
         )

@@ -18,7 +18,7 @@ from dermis.atlas.build import cached_atlas
 from dermis.base.errors import DermisError
 from dermis.environment.isotropic_lobes import isotropic_lobe_table
 from dermis.environment.panorama import texel_directions, texel_solid_angles
-from dermis.environment.prefilter import SMOOTHEST, prefilter
+from dermis.environment.prefilter import MIN_LAYER_ROUGHNESS, prefilter
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
 from dermis.gpu.textures import texture_from_array
@@ -203,7 +203,7 @@ def test_suns_count_among_the_lights(renderer: Renderer, room: str) -> None:
         renderer.draw(full, settings_of(occlusion="none"))
 
 
-SEEN = {"background": "environment", "background_blur": SMOOTHEST}
+SEEN = {"background": "environment", "background_blur": MIN_LAYER_ROUGHNESS}
 
 
 @pytest.mark.parametrize("rotation", [60.0, -150.0])

@@ -20,7 +20,7 @@ from dermis.environment.panorama import load_panorama
 from dermis.formats.maps import load_maps
 from dermis.images.hdr import EXR_PROPERTIES, RADIANCE_PROPERTIES
 from dermis.images.io import (
-    ODD_PIXEL_PROPERTIES,
+    INVALID_PIXEL_PROPERTIES,
     UNSUPPORTED_PICTURE_PROPERTIES,
     EmbeddedPicture,
     read_colours,
@@ -243,7 +243,7 @@ TABLES = {
     "others": (UNSUPPORTED_PICTURE_PROPERTIES, OTHERS),
     "exr": (EXR_PROPERTIES, EXRS),
     "radiance": (RADIANCE_PROPERTIES, RADIANCE),
-    "odd": (ODD_PIXEL_PROPERTIES, ODD),
+    "odd": (INVALID_PIXEL_PROPERTIES, ODD),
 }
 CASES = [(rows, change) for rows, changes in TABLES.values() for change in changes]
 EXERCISED_ELSEWHERE = {"alpha of photographs": "tests/fitting/test_photographs.py, by a fit"}

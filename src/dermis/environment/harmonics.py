@@ -51,7 +51,7 @@ def analyse_panorama(radiance: Floats, degree: int) -> list[Complex]:
     around = np.fft.rfft(weighted, axis=1)
     table = _legendre_table(height, degree)
     return [
-        _complex_product(table[m], around[:, m] * np.exp(-1j * m * _first_azimuth(width)))
+        _complex_product(table[m], around[:, m] * np.exp(-1j * m * _first_column_azimuth(width)))
         if m < around.shape[1]
         else np.zeros((degree + 1 - m, radiance.shape[2]), complex)
         for m in range(degree + 1)
@@ -84,7 +84,7 @@ def synthesise_panoramas(coefficients: list[Complex], factors: Floats, height: i
     around = np.zeros((height, width // 2 + 1, count, channels), complex)
     for m in range(min(degree, width // 2 - 1) + 1):
         scaled = (coefficients[m][:, None] * factors.T[m:, :, None]).reshape(-1, count * channels)
-        rows = _complex_product(table[m].T, scaled) * np.exp(1j * m * _first_azimuth(width))
+        rows = _complex_product(table[m].T, scaled) * np.exp(1j * m * _first_column_azimuth(width))
         around[:, m] = rows.reshape(height, count, channels)
     return np.moveaxis(np.fft.irfft(around, width, axis=1) * width, 2, 0)
 
@@ -128,5 +128,5 @@ def _row_weights(height: int) -> Floats:
     return np.asarray(2.0 / height * (1.0 - series))
 
 
-def _first_azimuth(width: int) -> float:
+def _first_column_azimuth(width: int) -> float:
     return 2.0 * np.pi * (0.5 / width - 0.5)

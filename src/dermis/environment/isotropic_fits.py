@@ -20,7 +20,7 @@ from dermis.environment.lobe_harmonics import (
     isotropic_sum,
     lobe_target,
 )
-from dermis.environment.prefilter import ROUGHEST, SMOOTHEST
+from dermis.environment.prefilter import MAX_LAYER_ROUGHNESS, MIN_LAYER_ROUGHNESS
 from dermis.optics.fits.variable_projection import qr_factor
 from dermis.specular.models import Lobe
 
@@ -31,7 +31,7 @@ LOBE_TABLE_ROUGHNESSES = np.geomspace(0.05, 1.0, ROUGHNESS_COUNT)
 """Roughnesses of the rows of the table."""
 LOBE_TABLE_COSINES = np.maximum(np.linspace(0.0, 1.0, VIEW_COUNT) ** 2, 0.02)
 """Cosines of the view angles, one for each column of the table, raised to at least 0.02."""
-_IN_PLANE_LOBES = (3,) * 10 + (2,) * 3 + (1,) * 3
+_IN_PLANE_LOBE_COUNTS = (3,) * 10 + (2,) * 3 + (1,) * 3
 """Number of lobes in the plane of incidence for each view angle, without the pair (`fit_isotropic_lobes`)."""
 _MIN_LOBE_ELONGATION = 1.8  # ratio of length to width above which the pair lies in the plane
 _FIT_PASS_COUNT = 2
@@ -39,7 +39,7 @@ _REGULARISATION_WEIGHT = 0.01  # strength of the pull of undetermined parameters
 _MAX_FIT_EVALUATIONS = 30
 _MAX_LOBE_OFFSET_DEVIATIONS = 5.0  # bound of positions [widths of the lobe] and of logarithms of weights
 _PAIR_SEPARATION_DEVIATIONS = 0.4  # initial separation of a pair
-_POSITION, _OUT_OF_PLANE, _LOG_WIDTH, _LOG_WEIGHT = range(4)
+_IN_PLANE_POSITION, _OUT_OF_PLANE_POSITION, _LOG_WIDTH, _LOG_WEIGHT = range(4)
 _INITIAL_LOBES = np.array(
     [
         [-1.0, 1.0, -0.3, 0.3, 0.3],
@@ -92,13 +92,13 @@ def _active_lobes(view_index: int) -> NDArray[np.bool_]:
 
     view_index : index of the view in LOBE_TABLE_COSINES
     """
-    return np.array([k < _IN_PLANE_LOBES[view_index] or k >= LOBE_COUNT - 2 for k in range(LOBE_COUNT)])
+    return np.array([k < _IN_PLANE_LOBE_COUNTS[view_index] or k >= LOBE_COUNT - 2 for k in range(LOBE_COUNT)])
 
 
 def _parameter_direction(parameter_kind: int, *lobe_amounts: tuple[int, float]) -> Floats:
     """Return a direction (20,) in the space of lobe parameters that changes one parameter of some lobes.
 
-    parameter_kind : parameter that changes, such as `_POSITION`
+    parameter_kind : parameter that changes, such as `_IN_PLANE_POSITION`
     lobe_amounts : pairs of a lobe index and the amount by which the parameter of this lobe changes
     """
     change = np.zeros((4, LOBE_COUNT))
@@ -120,15 +120,17 @@ def _free_directions(target: LobeTarget, view_index: int) -> Floats:
     if view_index == VIEW_COUNT - 1:  # at normal incidence the lobe is isotropic, and so is the fit
         groups, sizes = ([(0, 1.0)], [left, right]), (_LOG_WIDTH, _LOG_WEIGHT)
         return np.stack([_parameter_direction(kind, *group) for group in groups for kind in sizes], 1)
-    kinds = _POSITION, _LOG_WIDTH, _LOG_WEIGHT
+    kinds = _IN_PLANE_POSITION, _LOG_WIDTH, _LOG_WEIGHT
     in_plane = [
-        _parameter_direction(kind, (k, 1.0)) for k in range(_IN_PLANE_LOBES[view_index]) for kind in kinds
+        _parameter_direction(kind, (k, 1.0))
+        for k in range(_IN_PLANE_LOBE_COUNTS[view_index])
+        for kind in kinds
     ]
     if _is_elongated(target):
         pair = [_parameter_direction(kind, one) for one in (left, right) for kind in kinds]
     else:
         pair = [_parameter_direction(kind, left, right) for kind in kinds]
-        pair += [_parameter_direction(_OUT_OF_PLANE, left, (LOBE_COUNT - 1, -1.0))]
+        pair += [_parameter_direction(_OUT_OF_PLANE_POSITION, left, (LOBE_COUNT - 1, -1.0))]
     return np.stack([*in_plane, *pair], axis=1)
 
 
@@ -136,32 +138,34 @@ def _is_elongated(target: LobeTarget) -> bool:
     return target.along_deviation > _MIN_LOBE_ELONGATION * target.across_deviation
 
 
-def _arrange_pair(initial: Floats, target: LobeTarget, view_index: int) -> Floats:
+def _arrange_pair(initial_parameters: Floats, target: LobeTarget, view_index: int) -> Floats:
     """Return initial parameters (4, 5) of a fit, with the last two lobes ("the pair") placed as follows.
 
     If the specular lobe is elongated, both lobes of the pair are placed in the plane of incidence. Otherwise
     they are placed on opposite sides of this plane.
 
-    initial : (4, 5) initial parameters; axes: kind of parameter, lobe
+    initial_parameters : (4, 5) initial parameters; axes: kind of parameter, lobe
     view_index : index of the view in LOBE_TABLE_COSINES
     """
-    lobes = initial.copy()
-    separation = lobes[_POSITION, -1] - lobes[_POSITION, -2]
+    lobes = initial_parameters.copy()
+    separation = lobes[_IN_PLANE_POSITION, -1] - lobes[_IN_PLANE_POSITION, -2]
     if _is_elongated(target) and abs(separation) < _PAIR_SEPARATION_DEVIATIONS:
-        lobes[_POSITION, -2:] = (
-            lobes[_POSITION, -2:].mean() + np.array([-0.5, 0.5]) * _PAIR_SEPARATION_DEVIATIONS
+        lobes[_IN_PLANE_POSITION, -2:] = (
+            lobes[_IN_PLANE_POSITION, -2:].mean() + np.array([-0.5, 0.5]) * _PAIR_SEPARATION_DEVIATIONS
         )
-    if not _is_elongated(target) and abs(lobes[_OUT_OF_PLANE, -2]) < _PAIR_SEPARATION_DEVIATIONS:
-        lobes[_OUT_OF_PLANE, -2:] = _PAIR_SEPARATION_DEVIATIONS, -_PAIR_SEPARATION_DEVIATIONS
-    lobes[_OUT_OF_PLANE, :-2] = 0.0
+    if not _is_elongated(target) and abs(lobes[_OUT_OF_PLANE_POSITION, -2]) < _PAIR_SEPARATION_DEVIATIONS:
+        lobes[_OUT_OF_PLANE_POSITION, -2:] = _PAIR_SEPARATION_DEVIATIONS, -_PAIR_SEPARATION_DEVIATIONS
+    lobes[_OUT_OF_PLANE_POSITION, :-2] = 0.0
     if _is_elongated(target) or view_index == VIEW_COUNT - 1:
-        lobes[_OUT_OF_PLANE] = 0.0
+        lobes[_OUT_OF_PLANE_POSITION] = 0.0
     if view_index == VIEW_COUNT - 1:
-        lobes[_POSITION] = 0.0
+        lobes[_IN_PLANE_POSITION] = 0.0
     return lobes
 
 
-def _fit_parameters(target: LobeTarget, view_index: int, initial: Floats, neighbour_mean: Floats) -> Floats:
+def _fit_parameters(
+    target: LobeTarget, view_index: int, initial_parameters: Floats, neighbour_mean: Floats
+) -> Floats:
     """Fit five isotropic lobes to a specular lobe and return their parameters (4, 5).
 
     The four parameters of a lobe are its position along the plane of incidence, its distance from this plane,
@@ -169,7 +173,7 @@ def _fit_parameters(target: LobeTarget, view_index: int, initial: Floats, neighb
     of the specular lobe.
 
     view_index : index of the view in LOBE_TABLE_COSINES
-    initial : initial parameters (4, 5)
+    initial_parameters : initial parameters (4, 5)
     neighbour_mean : mean parameters (4, 5) of adjacent table nodes; regularisation pulls the fit towards
         these
     """
@@ -178,11 +182,11 @@ def _fit_parameters(target: LobeTarget, view_index: int, initial: Floats, neighb
     scale, active = harmonic_terms(target.degree)[2], _active_lobes(view_index)
     free = _free_directions(target, view_index)
     lengths = (free**2).sum(axis=0)
-    initial, neighbour_mean = (
-        _arrange_pair(one, target, view_index).ravel() for one in (initial, neighbour_mean)
+    initial_parameters, neighbour_mean = (
+        _arrange_pair(one, target, view_index).ravel() for one in (initial_parameters, neighbour_mean)
     )
-    first, mean = (free.T @ one / lengths for one in (initial, neighbour_mean))
-    fixed = np.where(free.any(axis=1), 0.0, initial)
+    first, mean = (free.T @ one / lengths for one in (initial_parameters, neighbour_mean))
+    fixed = np.where(free.any(axis=1), 0.0, initial_parameters)
     kinds = np.abs(free).argmax(axis=0) // LOBE_COUNT
     low, high = _parameter_bounds(target, kinds)
     regularisation = _REGULARISATION_WEIGHT * np.where(kinds == _LOG_WEIGHT, 0.5, 1.0)
@@ -196,8 +200,8 @@ def _fit_parameters(target: LobeTarget, view_index: int, initial: Floats, neighb
         x = np.frombuffer(vector)
         parameters = (fixed + free @ x).reshape(4, LOBE_COUNT)
         total, slopes = isotropic_sum(_to_isotropic_lobes(parameters, target, active), target.degree)
-        slopes[:, _POSITION] *= target.along_deviation
-        slopes[:, _OUT_OF_PLANE] *= target.across_deviation
+        slopes[:, _IN_PLANE_POSITION] *= target.along_deviation
+        slopes[:, _OUT_OF_PLANE_POSITION] *= target.across_deviation
         residuals = np.append((total - target.coefficients) * scale, regularisation * (x - mean))
         jacobian = np.einsum("nk,kj->nj", slopes.reshape(len(slopes), -1), free) * scale[:, None]
         system = np.column_stack([np.vstack([jacobian, np.diag(regularisation)]), residuals])
@@ -217,9 +221,9 @@ def _fit_parameters(target: LobeTarget, view_index: int, initial: Floats, neighb
 
 
 def _parameter_bounds(target: LobeTarget, parameter_kinds: NDArray[np.intp]) -> tuple[Floats, Floats]:
-    smoothest, roughest = np.log([SMOOTHEST, ROUGHEST]) - np.log(target.across_deviation)
+    smoothest, roughest = np.log([MIN_LAYER_ROUGHNESS, MAX_LAYER_ROUGHNESS]) - np.log(target.across_deviation)
     low, high = (np.full(4, side * _MAX_LOBE_OFFSET_DEVIATIONS) for side in (-1.0, 1.0))
-    low[_OUT_OF_PLANE], high[_OUT_OF_PLANE] = (
+    low[_OUT_OF_PLANE_POSITION], high[_OUT_OF_PLANE_POSITION] = (
         0.0,
         min(_MAX_LOBE_OFFSET_DEVIATIONS, 0.45 * np.pi / target.across_deviation),
     )

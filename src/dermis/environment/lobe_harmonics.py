@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.environment.harmonics import legendre_functions
-from dermis.environment.prefilter import LAYER_ROUGHNESSES, isotropic_kernel
+from dermis.environment.prefilter import LAYER_ROUGHNESSES, isotropic_lobe_factors
 from dermis.specular.cosines import cosines
 from dermis.specular.models import Lobe
 
@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 _FIT_DEGREES = (40, 80, 128)
 """Degrees up to which lobes are fitted."""
-_DEGREE_TIMES_WIDTH = 10.0  # least product of a fit's degree and the lobe's deviation across the plane
+_MIN_DEGREE_TIMES_WIDTH = 10.0  # least product of a fit's degree and the lobe's deviation across the plane
 _SKY_POWER_FALLOFF = 1.0  # exponent by which light falls with the degree: 0 for lamps, 2 for smooth light
 _DEGREE_1_WEIGHT = 10.0  # additional weight of degree 1, which determines the mean direction
 _NODES_ALONG_INCIDENCE, _NODES_ACROSS_INCIDENCE = (
@@ -86,7 +86,7 @@ def lobe_target(lobe: Lobe, view_cosine: float, m: float) -> LobeTarget:
     mean_angle = np.arctan2((weight * light[..., 0]).sum(), (weight * light[..., 2]).sum())
     along, across = (float(np.sqrt((weight * x**2).sum())) for x in (a - mean_angle, light[..., 1]))
     degree = min(
-        (one for one in _FIT_DEGREES if one > _DEGREE_TIMES_WIDTH / across), default=_FIT_DEGREES[-1]
+        (one for one in _FIT_DEGREES if one > _MIN_DEGREE_TIMES_WIDTH / across), default=_FIT_DEGREES[-1]
     )
     around = np.exp(-1j * np.outer(np.arange(degree + 1), angles)) @ weight
     order = harmonic_terms(degree)[1]
@@ -134,7 +134,7 @@ def isotropic_sum(lobes: IsotropicLobes, degree: int) -> tuple[Complex, Complex]
     )
 
 
-def _legendre_from_plane(sine: Floats, degree: int) -> Floats:
+def _symmetric_legendre_functions(sine: Floats, degree: int) -> Floats:
     """Return the associated Legendre functions (n, k) of the harmonics that `harmonic_terms` lists.
 
     sine : (k,) sines of the angle from the plane of incidence, which are cosines of the polar angle
@@ -149,27 +149,27 @@ def _legendre_at_nodes(roughness: float, degree: int) -> Floats:
     roughness : roughness of the lobe, which determines the largest angle
     """
     t = (np.arange(_NODES_ACROSS_INCIDENCE) + 0.5) / _NODES_ACROSS_INCIDENCE
-    return _legendre_from_plane(np.sin(min(10.0 * roughness + 0.05, 0.5 * np.pi) * t**2), degree)
+    return _symmetric_legendre_functions(np.sin(min(10.0 * roughness + 0.05, 0.5 * np.pi) * t**2), degree)
 
 
 @cache
 def _legendre_table(degree: int) -> Floats:
     """Return the associated Legendre functions (k, n) at k angles from the plane of incidence to the pole."""
-    return _legendre_from_plane(
+    return _symmetric_legendre_functions(
         np.sin(np.append(np.arange(0.0, 0.5 * np.pi, _LEGENDRE_TABLE_STEP_RADIANS), 0.5 * np.pi)), degree
     ).T.copy()
 
 
-def _interpolate_legendre(degree: int, out_of_plane: Floats) -> tuple[Floats, Floats]:
+def _interpolate_legendre(degree: int, plane_angles: Floats) -> tuple[Floats, Floats]:
     """Interpolate the associated Legendre functions to k angles; return values and derivatives, (n, k) each.
 
-    out_of_plane : (k,) angles from the plane of incidence [rad]
+    plane_angles : (k,) angles from the plane of incidence [rad]
     """
-    table, position = _legendre_table(degree), np.abs(out_of_plane) / _LEGENDRE_TABLE_STEP_RADIANS
+    table, position = _legendre_table(degree), np.abs(plane_angles) / _LEGENDRE_TABLE_STEP_RADIANS
     low = np.minimum(position.astype(int), len(table) - 2)
     step = table[low + 1] - table[low]
     value = table[low] + (position - low)[:, None] * step
-    return value.T, (np.where(out_of_plane < 0.0, -1.0, 1.0)[:, None] * step / _LEGENDRE_TABLE_STEP_RADIANS).T
+    return value.T, (np.where(plane_angles < 0.0, -1.0, 1.0)[:, None] * step / _LEGENDRE_TABLE_STEP_RADIANS).T
 
 
 def _layer_convolution_factors(log_roughness: float, degree: int) -> Floats:
@@ -194,5 +194,5 @@ def _layer_factor_table() -> Floats:
 
     Factors for degrees above the highest harmonic degree of the panorama are 0.
     """
-    kernels = np.stack([isotropic_kernel(float(m)) for m in LAYER_ROUGHNESSES])
+    kernels = np.stack([isotropic_lobe_factors(float(m)) for m in LAYER_ROUGHNESSES])
     return np.pad(kernels, ((0, 0), (0, max(_FIT_DEGREES[-1] + 1 - kernels.shape[1], 0))))

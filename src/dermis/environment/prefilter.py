@@ -13,8 +13,8 @@ from dermis.environment.panorama import Sun, load_panorama, split_suns
 from dermis.specular.beckmann import beckmann
 
 Floats = NDArray[np.float64]
-SMOOTHEST, ROUGHEST = 0.018, 1.0
-LAYER_ROUGHNESSES = np.geomspace(SMOOTHEST, ROUGHEST, 13)
+MIN_LAYER_ROUGHNESS, MAX_LAYER_ROUGHNESS = 0.018, 1.0
+LAYER_ROUGHNESSES = np.geomspace(MIN_LAYER_ROUGHNESS, MAX_LAYER_ROUGHNESS, 13)
 """Roughnesses of the reflection layers, uniform in the logarithm; the shader interpolates between them."""
 LAYER_HEIGHT = 192
 _MAX_HARMONIC_DEGREE = 160  # the factor of the smoothest lobe is 2e-4 here, so there is little ringing
@@ -39,8 +39,8 @@ def reflection_constants() -> dict[str, float]:
     """Return the number and roughness range of the layers, as `#fill` constants for environment.wgsl."""
     return {
         "reflections": len(LAYER_ROUGHNESSES),
-        "smoothest_reflection": SMOOTHEST,
-        "roughest_reflection": ROUGHEST,
+        "smoothest_reflection": MIN_LAYER_ROUGHNESS,
+        "roughest_reflection": MAX_LAYER_ROUGHNESS,
     }
 
 
@@ -72,13 +72,13 @@ def prefilter(panorama_name: str) -> Prefiltered:
     coefficients = analyse_panorama(radiance, _MAX_HARMONIC_DEGREE)
     kernels = [
         zonal_factors(np.cos, _MAX_HARMONIC_DEGREE),
-        *(isotropic_kernel(float(m)) for m in LAYER_ROUGHNESSES),
+        *(isotropic_lobe_factors(float(m)) for m in LAYER_ROUGHNESSES),
     ]
     layers = synthesise_panoramas(coefficients, np.stack(kernels), LAYER_HEIGHT)
     return Prefiltered(np.maximum(layers, 0.0).astype(np.float32), tuple(suns))
 
 
-def isotropic_kernel(m: float) -> Floats:
+def isotropic_lobe_factors(m: float) -> Floats:
     """Return the factors (161,) by which convolution with a lobe of roughness m multiplies each degree.
 
     The lobe is normalised to unit integral.

@@ -215,7 +215,7 @@ def _descendant_matrix(skeleton: Skeleton) -> Doubles:
 def _quadratic_error(
     positions_mm: Doubles,
     skeleton: Skeleton,
-    followed_fractions: Doubles,
+    descendant_weights: Doubles,
     refinement: csr_array,
     descendant_matrix: Doubles,
 ) -> tuple[Doubles, Doubles]:
@@ -224,7 +224,7 @@ def _quadratic_error(
     The function is w H w - 2 g w [mm²], up to a constant. The vector w (u,) contains the weights of u
     candidate bones. The result is the matrices H (n, u, u) and the vectors g (n, u) of all points.
 
-    followed_fractions : (p, b) sum of a control point's weights for each bone and the descendants of the bone
+    descendant_weights : (p, b) sum of a control point's weights for each bone and the descendants of the bone
     refinement : (n, p) subdivision matrix from control points to the n points
     descendant_matrix : (b, u) 1 where candidate bone u is bone b or one of its descendants, else 0
     """
@@ -234,7 +234,7 @@ def _quadratic_error(
     for bone in np.flatnonzero(descendant_matrix.any(axis=1)):
         origin, moves = np.array(skeleton.origin_mm[bone]), descendant_matrix[bone]
         arm = points - origin
-        target = np.asarray(refinement @ (followed_fractions[:, bone, None] * (positions_mm - origin)))
+        target = np.asarray(refinement @ (descendant_weights[:, bone, None] * (positions_mm - origin)))
         hessian += (arm**2).sum(axis=1)[:, None, None] * np.outer(moves, moves)
         gradient += (arm * target).sum(axis=1)[:, None] * moves
     return hessian, gradient

@@ -27,7 +27,7 @@ from dermis.images.sizes import MAX_PIXELS
 from dermis.mesh.maps import Maps
 
 PathLike = str | Path | EmbeddedPicture
-A = TypeVar("A", bound=Numbers)
+ArrayType = TypeVar("ArrayType", bound=Numbers)
 
 MAX_MAP_SIDE = 8192
 """Largest number of texels along a side of a map; every device supports textures of this size."""
@@ -39,7 +39,7 @@ _MIN_CACHED_BYTES = 1 << 14  # larger files are cached on disk, as reading is fa
 _CACHE_VERSION = 2  # increment when the same files result in other maps
 
 
-def check_finite(path: PathLike, texels: A) -> A:
+def check_finite(path: PathLike, texels: ArrayType) -> ArrayType:
     """Return a map after checking that all its values are finite.
 
     Raises DermisError for infinite values and NaN.
@@ -269,10 +269,10 @@ def _texel_count(path: PathLike) -> int:
     return width * height
 
 
-def _cached_map(path: PathLike | None, parameters: str, load: MapLoader) -> Any:
+def _cached_map(path: PathLike | None, cache_key_text: str, load: MapLoader) -> Any:
     """Return the map of a picture file, from the disk cache if the file is large; None without a file.
 
-    parameters : text of the map's role and options, which is part of the cache key
+    cache_key_text : text of the map's role and options, which is part of the cache key
     load : function that reads the map from the file
     """
     if path is None:
@@ -284,4 +284,6 @@ def _cached_map(path: PathLike | None, parameters: str, load: MapLoader) -> Any:
 
     note_properties(path, read_as_colours=load is colour_map)
     source = np.frombuffer(data, np.uint8)
-    return cached_array(source, f"map {_CACHE_VERSION} {parameters}", lambda: check_finite(path, load(path)))
+    return cached_array(
+        source, f"map {_CACHE_VERSION} {cache_key_text}", lambda: check_finite(path, load(path))
+    )

@@ -255,20 +255,20 @@ def _separate_sheets(mesh: RawMesh, notes: list[str]) -> RawMesh:
     notes.append(
         f"separated the sheets that meet at {_count_with_noun(count, 'edge')} of more than two triangles"
     )
-    links = np.vstack((mesh.sides.pairs, _continue_sheets(mesh)))
+    links = np.vstack((mesh.sides.pairs, _pair_continuing_sides(mesh)))
     mesh = mesh.with_corners(_split_points(mesh, links))
     sides = mesh.sides
     if (sides.counts > 2).any():  # sheets that are also connected around both ends of an edge
         kept = np.zeros(len(sides.side), bool)
         kept[sides.side[sides.first[sides.counts == 1]]] = True
-        kept[np.concatenate((sides.pairs, _continue_sheets(mesh, max_pairs_per_edge=1)))] = True
+        kept[np.concatenate((sides.pairs, _pair_continuing_sides(mesh, max_pairs_per_edge=1)))] = True
         apart, corners = ~kept.reshape(-1, 3).all(axis=1), mesh.corners.copy()
         corners[apart] = corners.max() + 1 + np.arange(3 * int(apart.sum())).reshape(-1, 3)
         mesh = mesh.with_corners(corners)
     return mesh
 
 
-def _continue_sheets(mesh: RawMesh, max_pairs_per_edge: int = _MAX_TRIANGLES_PER_EDGE // 2) -> Index:
+def _pair_continuing_sides(mesh: RawMesh, max_pairs_per_edge: int = _MAX_TRIANGLES_PER_EDGE // 2) -> Index:
     """Return pairs of triangle sides (n, 2) that connect the sheets of a surface at non-manifold edges.
 
     The pairs of an edge are chosen one after another. Pairs of the same material are preferred, then pairs
@@ -358,7 +358,7 @@ def _turn_outwards(mesh: RawMesh, notes: list[str]) -> RawMesh:
     a, b, c = (x.take(one, axis=1) for one in np.ascontiguousarray(mesh.triangles.T))
     area = cross_columns(b - a, c - a) * np.where(reverse, -1.0, 1.0)
     surface = _PieceSurface(piece, area, np.stack((a, b, c)))
-    agreement = surface.mean_cosine(_corner_normals(mesh))
+    agreement = surface.mean_cosine(_corner_normal_sums(mesh))
     doubtful = (surface.mean_cosine(surface.outward_directions()) < _MIN_MEAN_CONVEXITY_COSINE) | (
         agreement < _MAX_COSINE_OF_OPPOSITE_NORMALS
     )
@@ -404,7 +404,7 @@ def _find_pieces(mesh: RawMesh) -> tuple[Index, Mask]:
     return piece, reverse ^ ((balance > 0)[piece] & (kept != reversed_))
 
 
-def _corner_normals(mesh: RawMesh) -> Doubles:
+def _corner_normal_sums(mesh: RawMesh) -> Doubles:
     """Return the sum (3, f) of the file's normals at the three corners of each triangle."""
     normals = np.where(np.isfinite(mesh.normals), mesh.normals, 0).T
     return np.asarray(sum(normals.take(one, axis=1) for one in np.ascontiguousarray(mesh.triangles.T)))
@@ -446,7 +446,7 @@ class _PieceSurface:
         total = np.bincount(self.piece, dot_columns(self.area_normals, direction))
         return total / np.where(length > 0, length, 1)
 
-    def visible_balance(self, doubtful_pieces: Mask) -> tuple[Doubles, bool]:
+    def visible_sides(self, doubtful_pieces: Mask) -> tuple[Doubles, bool]:
         """Return which side of each component is visible from outside, and whether most samples show backs.
 
         The side is a number for each component: 1 if only its front is visible, -1 if only its back is
@@ -514,7 +514,7 @@ def _inside_out_pieces(surface: _PieceSurface, doubtful_pieces: Mask, normals_co
     doubtful_pieces : mask of components that may be inside out
     normals_cosine : for each component, the mean cosine between the file's normals and the triangles' normals
     """
-    balance, backs_prevail = surface.visible_balance(doubtful_pieces)
+    balance, backs_prevail = surface.visible_sides(doubtful_pieces)
     opposed = (normals_cosine < _MAX_COSINE_OF_OPPOSITE_NORMALS) & (balance <= _MIN_VISIBILITY_BALANCE)
     return np.asarray((balance < -_MIN_VISIBILITY_BALANCE) | opposed | ((balance == 0) & backs_prevail))
 

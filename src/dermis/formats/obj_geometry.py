@@ -20,7 +20,7 @@ from dermis.formats import size_limits as limits
 from dermis.formats.polygons import (
     Polygons,
     check_polygon_sizes,
-    missing_uv,
+    missing_uv_notes,
     refuse_without_faces,
     without_small_polygons,
 )
@@ -28,7 +28,7 @@ from dermis.formats.text_files import list_names, parse_numbers, run_starts
 from dermis.formats.vertex_colours import linear_colours
 
 _MAX_LINES = 12_000_000
-_MAX_LINE_LENGTH, _MAX_VERTEX_LINE = 1 << 17, 256  # characters
+_MAX_LINE_LENGTH, _MAX_VERTEX_LINE_LENGTH = 1 << 17, 256  # characters
 _CONTINUED_LINE = re.compile(r"^(?![ \t]*#)(?:[^\n]*\\\n)+[^\n]*", re.MULTILINE)
 _LEADING_BLANKS = re.compile(r"^[ \t]+", re.MULTILINE)
 _TRAILING_COMMENT = re.compile(r"^((?:v[tn]?|f)[ \t][^#\n]*)#[^\n]*", re.MULTILINE)
@@ -137,7 +137,11 @@ def parse_geometry(path: Path, obj_text: str) -> ObjGeometry:
         refuse_without_faces(path, len(positions))
     uv = np.column_stack((uv[:, 0], np.where(np.isnan(uv[:, 1]), 0.0, uv[:, 1])))
     polygons = Polygons(counts, corners, positions, uv, normals[:, :3], colours)
-    notes += [*faults, *missing_uv(polygons), *_unread_notes(unread, others, has_normals=len(normals) > 0)]
+    notes += [
+        *faults,
+        *missing_uv_notes(polygons),
+        *_unread_notes(unread, others, has_normals=len(normals) > 0),
+    ]
     statements = "\n".join(f"{key} {value}" for _, key, value in others)
     return ObjGeometry(polygons, pairs, pair[kept], statements, notes)
 
@@ -192,12 +196,17 @@ def _split_statements(
     return rows, used, unread
 
 
-def _check_lines(path: Path, text_length: Index, is_vertex: Mask) -> None:
-    if text_length.max() > _MAX_LINE_LENGTH or text_length[is_vertex].max(initial=0) > _MAX_VERTEX_LINE:
-        expected = f"lines of at most {_MAX_LINE_LENGTH:,} characters, {_MAX_VERTEX_LINE} for vertices"
-        refuse(path, expected, f"one has {text_length.max():,}", limits.DAMAGED_ADVICE)
+def _check_lines(path: Path, line_lengths: Index, is_vertex_line: Mask) -> None:
+    if (
+        line_lengths.max() > _MAX_LINE_LENGTH
+        or line_lengths[is_vertex_line].max(initial=0) > _MAX_VERTEX_LINE_LENGTH
+    ):
+        expected = f"lines of at most {_MAX_LINE_LENGTH:,} characters, {_MAX_VERTEX_LINE_LENGTH} for vertices"
+        refuse(path, expected, f"one has {line_lengths.max():,}", limits.DAMAGED_ADVICE)
     items = "lines of vertices, uv and normals"
-    limits.check_limit(path, int(is_vertex.sum()), 3 * limits.MAX_VERTICES, items, limits.DECIMATE_ADVICE)
+    limits.check_limit(
+        path, int(is_vertex_line.sum()), 3 * limits.MAX_VERTICES, items, limits.DECIMATE_ADVICE
+    )
 
 
 def _refuse_line(
@@ -298,20 +307,21 @@ def _parse_faces(path: Path, rows_of_statement: Mapping[str, _StatementRows]) ->
     counts = np.diff(np.searchsorted(corner_start, faces.start), append=len(corner_start))
     check_polygon_sizes(path, counts)
 
-    def refuse_at(faulty: Mask, starts: Index, expected: str, actual: str = "") -> None:
-        if faulty.any():
-            face = np.searchsorted(faces.start, starts[faulty.argmax()], side="right") - 1
+    def refuse_first_fault(is_faulty: Mask, text_positions: Index, expected: str, actual: str = "") -> None:
+        if is_faulty.any():
+            position = text_positions[is_faulty.argmax()]
+            face = np.searchsorted(faces.start, position, side="right") - 1
             _refuse_line(path, faces, int(face), expected, actual)
 
     try:
         values = parse_numbers(spaced.text, len(index_start), np.int64)
     except ValueError:
         _refuse_line(path, faces, _first_non_numeric(spaced, np.int64), "faces by whole numbers")
-    refuse_at(values == 0, index_start, "faces by indices from 1", "there is a 0")
+    refuse_first_fault(values == 0, index_start, "faces by indices from 1", "there is a 0")
     corner = np.searchsorted(corner_start, index_start, side="right") - 1
     slashes = np.cumsum(slash, dtype=np.int32)
     column = slashes[index_start] - (slashes - slash)[corner_start[corner]]
-    refuse_at(column > 2, index_start, "corners of faces as position/uv/normal")
+    refuse_first_fault(column > 2, index_start, "corners of faces as position/uv/normal")
     corners = np.zeros((len(corner_start), 3), np.int64)
     corners[corner, column] = values
     given, sizes = corners != 0, [len(rows_of_statement[kind].line) for kind in _VERTEX_STATEMENTS]
@@ -322,7 +332,7 @@ def _parse_faces(path: Path, rows_of_statement: Mapping[str, _StatementRows]) ->
         corners = np.where(corners < 0, corners + np.repeat(before, counts, axis=0) + 1, corners)
     faulty = (given & ((corners < 1) | (corners > sizes))).any(axis=1) | ~given[:, 0]
     expected = "faces by indices of its {:,} vertices, {:,} uv and {:,} normals"
-    refuse_at(faulty, corner_start, expected.format(*sizes))
+    refuse_first_fault(faulty, corner_start, expected.format(*sizes))
     return counts, corners - 1
 
 

@@ -68,7 +68,7 @@ MTL_PROPERTIES = (
 )
 """Statements of .mtl files."""
 _STATEMENTS_WITHOUT_EFFECT = tuple(key.lower() for key in keys_of(MTL_PROPERTIES, "no effect"))
-_ROLES_OF_PARTS: Mapping[str, Role] = {
+_ROLE_BY_MTL_ROLE: Mapping[str, Role] = {
     "colour": "colour",
     "roughness": "roughness",
     "metalness": "metalness",
@@ -88,7 +88,7 @@ _OPTION_PATTERN = re.compile(
 _NEUTRAL_OPTIONS = ("mm 0 1", "blendu on", "blendv on", "boost 0", "cc off")
 _NUMBER_PATTERN = re.compile(_NUMBER_REGEX)
 _UDIM_PATTERN = re.compile(r"<udim>|%\(udim\)d", re.IGNORECASE)
-_MISSING_ADVICE = "Put it there, or set maps by options (--colour, --normal, ...)"
+_MISSING_FILE_ADVICE = "Put it there, or set maps by options (--colour, --normal, ...)"
 _USUAL_KD_VALUES = (0.0, 0.588, 0.64, 0.8, 1.0)  # default values of programs, which accompany a colour map
 _MAX_LINE_LENGTH = 4096  # characters
 _LIBRARY_LINE = re.compile(r"^[ \t]*mtllib[ \t]([^\n]*)", re.MULTILINE)
@@ -255,7 +255,7 @@ def with_materials(
     mesh_parts : mesh parts, whose groups have the names of their materials
     """
     materials: list[FileMaterial] = []
-    notes = [f"mtllib: {name} is not in its folder. {_MISSING_ADVICE}" for name in library.missing]
+    notes = [f"mtllib: {name} is not in its folder. {_MISSING_FILE_ADVICE}" for name in library.missing]
     index: dict[tuple[str, int], int] = {}
     assigned = []
     for part in mesh_parts:
@@ -302,14 +302,14 @@ def _file_material(path: Path, material_name: str, material: MtlMaterial, udim_t
         written = picture_name(texture, udim_tile)
         file = find_referenced_file(path, written)
         if file is None:
-            missing[role] = f"{texture.key}: {written} is not in its folder. {_MISSING_ADVICE}"
-        elif role not in _ROLES_OF_PARTS:
+            missing[role] = f"{texture.key}: {written} is not in its folder. {_MISSING_FILE_ADVICE}"
+        elif role not in _ROLE_BY_MTL_ROLE:
             skin_only.append(f"picture of {texture.key}")
         else:
             a, b, c, d, e, f = texture.transform
             if written != texture.name:
                 c, f = c - column, f + row
-            textures[_ROLES_OF_PARTS[role]] = Texture(
+            textures[_ROLE_BY_MTL_ROLE[role]] = Texture(
                 file, 0, (a, b, c, d, e, f), (texture.wrap, texture.wrap)
             )
         unused += [f"option {option} of {written}" for option in texture.unused]

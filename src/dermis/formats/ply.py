@@ -21,7 +21,7 @@ from dermis.formats.parts import MaterialGroup, MeshFile, to_floats
 from dermis.formats.polygons import (
     Polygons,
     check_polygon_sizes,
-    missing_uv,
+    missing_uv_notes,
     refuse_without_faces,
     without_small_polygons,
 )
@@ -31,7 +31,7 @@ from dermis.formats.vertex_colours import linear_colours
 from dermis.mesh.geometry import expand_runs, weld
 
 _MAX_HEADER_BYTES = 1 << 16  # bytes
-_MAX_ELEMENTS = {"vertex": limits.MAX_VERTICES, "face": limits.MAX_TRIANGLES}
+_MAX_COUNT_OF_ELEMENT = {"vertex": limits.MAX_VERTICES, "face": limits.MAX_TRIANGLES}
 _MAX_PROPERTIES_PER_ELEMENT, _MAX_LISTS_PER_ELEMENT = 256, 8
 _BYTE_ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
 _SPACE_BYTE = 32
@@ -51,7 +51,7 @@ _NUMPY_TYPES = {
 UV_NAMES = (("texture_u", "texture_v"), ("u", "v"), ("s", "t"), ("s_coord", "t_coord"), ("tu", "tv"))
 COLOUR_NAMES = (("red", "green", "blue"), ("diffuse_red", "diffuse_green", "diffuse_blue"), ("r", "g", "b"))
 _FACE_LIST_NAMES = ("vertex_indices", "vertex_index")
-_SCALAR_PREFIX = "scalar_"  # prefix that CloudCompare writes before names of scanner values
+_CLOUDCOMPARE_PREFIX = "scalar_"  # prefix that CloudCompare writes before names of scanner values
 _ALPHA_NAMES = (("alpha",), ("diffuse_alpha",), ("a",))
 _SCANNER_PROPERTIES = (
     *("confidence", "quality", "intensity", "density", "curvature", "radius", "flags", "value"),
@@ -77,7 +77,7 @@ PLY_PROPERTIES = (
     drawn("`comment TextureFile NAME`", "colour picture in the folder of the file"),
     noted("`comment TextureFile NAME` of a missing file"),
     no_effect(
-        f"values of scanners: {in_code(_SCANNER_PROPERTIES)}, `{_SCALAR_PREFIX}...`",
+        f"values of scanners: {in_code(_SCANNER_PROPERTIES)}, `{_CLOUDCOMPARE_PREFIX}...`",
         "they do not describe the look of a surface",
         *_SCANNER_PROPERTIES,
     ),
@@ -181,7 +181,7 @@ def read_ply(path: Path) -> MeshFile:
     directions = np.empty((0, 3)) if normals is None else to_floats(normals)
     polygons = Polygons(counts, corners, np.asarray(positions, np.float64), uv, directions, colours)
     picture, unused = _main_picture(header.pictures, faces.take(("texnumber",)))
-    notes += [*faults, *missing_uv(polygons), *unused, *_unread_notes(tables)]
+    notes += [*faults, *missing_uv_notes(polygons), *unused, *_unread_notes(tables)]
     materials: tuple[FileMaterial, ...] = ()
     if picture is not None and (file := find_referenced_file(path, picture)) is not None:
         materials = (FileMaterial(textures={"colour": Texture(file)}),)
@@ -234,7 +234,7 @@ def _declared_element(path: Path, header_words: Sequence[str], remaining_bytes: 
     if not (count.isdecimal() and len(count) < 12):
         actual = f"got {' '.join(header_words)[:80]!r}"
         refuse(path, "elements with a name and a number", actual, limits.DAMAGED_ADVICE)
-    limit = min(_MAX_ELEMENTS.get(name, limits.MAX_TRIANGLES), remaining_bytes)
+    limit = min(_MAX_COUNT_OF_ELEMENT.get(name, limits.MAX_TRIANGLES), remaining_bytes)
     limits.check_limit(path, int(count), limit, f"elements named {name!r}", limits.DECIMATE_ADVICE)
     return _Element(name, int(count), [])
 
@@ -521,6 +521,6 @@ def _unread_notes(element_columns: Mapping[str, _Columns]) -> list[str]:
         for name in columns
         if columns.used
         and name not in (*columns.used, *_PROPERTIES_WITHOUT_EFFECT)
-        and not name.startswith(_SCALAR_PREFIX)
+        and not name.startswith(_CLOUDCOMPARE_PREFIX)
     ]
     return [f"these are left out: {list_names(ignored)}"] if ignored else []

@@ -96,7 +96,7 @@ class Polygons:
         )
 
 
-def missing_uv(polygons: Polygons) -> list[str]:
+def missing_uv_notes(polygons: Polygons) -> list[str]:
     """Return a list with a note if some polygons have uv and others have none, else an empty list."""
     has_uv = polygons.has_uv()
     missing = np.count_nonzero(~has_uv)

@@ -20,7 +20,7 @@ from dermis.mesh.geometry import compact_vertices, expand_runs
 
 MAX_ABSOLUTE_UV = 1e4
 """Largest valid absolute uv coordinate; larger ones are a sign of a damaged file, not of many tiles."""
-S = TypeVar("S", np.int64, np.float64)
+NumberType = TypeVar("NumberType", np.int64, np.float64)
 Origin = Literal["auto", "top", "bottom"]
 _BLENDER_ADVICE = "Convert it in Blender: {}File > Export > glTF 2.0"
 _UNSUPPORTED_SUFFIXES = (".3ds", ".c4d", ".dae", ".lwo", ".ma", ".max", ".mb", ".wrl", ".x3d", ".zpr", ".ztl")
@@ -118,7 +118,7 @@ def _part_normals(mesh_part: MeshPart) -> Doubles:
     return np.full(mesh_part.positions.shape, np.nan)
 
 
-def _stack_padded(vertex_arrays: list[NDArray[S] | None]) -> NDArray[S] | None:
+def _stack_padded(vertex_arrays: list[NDArray[NumberType] | None]) -> NDArray[NumberType] | None:
     """Stack arrays (n, k) vertically, padded with 0 to the largest k; None if one of the arrays is None."""
     present = [array for array in vertex_arrays if array is not None]
     if len(present) < len(vertex_arrays):

@@ -81,7 +81,7 @@ def fetch_sample(name: str) -> dict[str, Path]:
     paths = {role: _sample_folder(sample) / file.name for role, file in sample.files.items()}
     missing = [role for role, file in sample.files.items() if not _has_expected_hash(paths[role], file)]
     if missing and _data_folder():
-        _refuse_data(paths[missing[0]])
+        _refuse_sample_file(paths[missing[0]])
     if missing:
         _download_files(sample, missing)
     return paths
@@ -177,7 +177,7 @@ class _DownloadProgress:
             self._bars.stop()
 
 
-def _refuse_data(path: Path) -> NoReturn:
+def _refuse_sample_file(path: Path) -> NoReturn:
     actual = "it is another file (its sha256 differs)" if path.is_file() else "it is not there"
     advice = f"Put it there, or unset {DATA_VARIABLE} so that the samples are downloaded"
     refuse(path, f"a file of the sample data below {DATA_VARIABLE}", actual, advice)

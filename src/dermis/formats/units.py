@@ -21,15 +21,15 @@ COMMON_UNITS_MM = (1.0, 10.0, 25.4, 100.0, 1000.0)
 _ACCEPTED_SIZE_RANGE_MM = (1.0, 3000.0)  # smallest and largest accepted size
 # sizes in units of the file for which the unit is assumed to be the millimetre
 _SIZE_RANGE_OF_MM_FILES = (100.0, 1000.0)
-_TYPICAL_FIGURE_MM, _TYPICAL_HEAD_MM, _TYPICAL_PIECE_MM = 1700.0, 270.0, 150.0  # typical sizes
+_TYPICAL_FIGURE_MM, _TYPICAL_HEAD_MM, _TYPICAL_HAND_MM = 1700.0, 270.0, 150.0  # typical sizes
 _MAX_FLATNESS = 0.25  # thickness relative to length below which a mesh is a patch of skin or a hand
 _INCH_MM = 25.4
 _INCH_LOG_SIZE_PENALTY = {
     _TYPICAL_FIGURE_MM: 0.4,
     _TYPICAL_HEAD_MM: 0.4,
-    _TYPICAL_PIECE_MM: 9.0,
+    _TYPICAL_HAND_MM: 9.0,
 }  # added to the error of log(size)
-_EXPORTED_UNITS_MM = (1.0, 10.0)  # units that programs write although the format requires metres
+_COMMON_WRONG_UNITS_MM = (1.0, 10.0)  # units that programs write although the format requires metres
 # usual sizes of standing figures (True) and of other meshes (False)
 _USUAL_SIZE_RANGE_MM = {True: (1200.0, 2200.0), False: (150.0, 500.0)}
 
@@ -80,7 +80,7 @@ def guess_unit_mm(positions: Floats, triangles: Ints) -> float:
         if size == 0 or _is_in_mm(positions):
             return 1.0
         is_piece = length > MAX_ELONGATION * width or thickness < _MAX_FLATNESS * length
-        typical = _TYPICAL_PIECE_MM if is_piece else _TYPICAL_HEAD_MM
+        typical = _TYPICAL_HAND_MM if is_piece else _TYPICAL_HEAD_MM
     penalty = _INCH_LOG_SIZE_PENALTY[typical]
     return min(
         COMMON_UNITS_MM, key=lambda unit: abs(log(size * unit / typical)) + penalty * (unit == _INCH_MM)
@@ -113,7 +113,7 @@ def _refuse_size(mesh: Mesh, unit_mm: float, culprit: object) -> None:
     """
     low, high = _USUAL_SIZE_RANGE_MM[is_standing_figure(mesh.positions, mesh.triangles)]
     advice = "Set the millimetres per unit of the file with --unit-mm"
-    for other in _EXPORTED_UNITS_MM:
+    for other in _COMMON_WRONG_UNITS_MM:
         sizes = mesh.size_mm * (other / unit_mm)
         if low <= sizes.max() <= high:
             program = "millimetres" if other == 1.0 else "centimetres"

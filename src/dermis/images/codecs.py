@@ -63,7 +63,7 @@ def decode_with_pillow(file_bytes: bytes, convert_lookup_tables: bool = False) -
     if picture.format == "PNG":
         open_picture(file_bytes).verify()  # the checksums, which Pillow does not check when it decodes
     to_srgb = table_transform(picture) if convert_lookup_tables or picture.mode == "CMYK" else None
-    pixel_format = None if to_srgb else _format_of_16_bit(file_bytes, picture)
+    pixel_format = None if to_srgb else _ffmpeg_format_of_16_bit(file_bytes, picture)
     if pixel_format:
         image = decode_up_filtered_png(file_bytes)
         return _decode_16_bit(file_bytes, pixel_format, picture) if image is None else image
@@ -93,7 +93,7 @@ def row_strips(image: Numbers) -> Iterator[slice]:
         yield slice(top, min(top + rows, len(image)))
 
 
-def _format_of_16_bit(file_bytes: bytes, picture: Image) -> str | None:
+def _ffmpeg_format_of_16_bit(file_bytes: bytes, picture: Image) -> str | None:
     """Return FFmpeg's name for the pixel format of a 16-bit colour picture; None for other pictures.
 
     Pillow would reduce 16-bit colours to 8 bits, so FFmpeg decodes these pictures.

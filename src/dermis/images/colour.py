@@ -68,8 +68,8 @@ def _linear_by_level(level_count: int) -> Floats:
     return table
 
 
-def _as_float(values: ArrayLike) -> NDArray[np.floating]:
-    array = np.asarray(values)
+def _as_float(numbers: ArrayLike) -> NDArray[np.floating]:
+    array = np.asarray(numbers)
     return array if array.dtype == np.float32 else array.astype(np.float64)
 
 

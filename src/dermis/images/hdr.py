@@ -241,7 +241,7 @@ def decode_radiance(file_bytes: bytes) -> Floats:
 
     Raises ValueError for a file that is truncated or damaged.
     """
-    header = _radiance_header(file_bytes)
+    header = _parse_radiance_header(file_bytes)
     (height, width), offset = header.lengths, header.offset
     exposure, correction = header.values["EXPOSURE"], header.values["COLORCORR"]
     compressed = file_bytes[offset : offset + 4] == _scanline_marker(width) and 8 <= width < 32768
@@ -264,7 +264,7 @@ def decode_radiance(file_bytes: bytes) -> Floats:
 
 def radiance_header(file_bytes: bytes) -> PictureHeader:
     """Return the header of a Radiance .hdr file."""
-    header = _radiance_header(file_bytes)
+    header = _parse_radiance_header(file_bytes)
     rows_first = "Y" in header.axes[0]
     size = header.lengths[::-1] if rows_first else header.lengths
     primaries = _XYZ_PRIMARIES if header.is_xyz else header.values["PRIMARIES"]
@@ -278,7 +278,7 @@ def radiance_header(file_bytes: bytes) -> PictureHeader:
     return PictureHeader(size, space, notes=tuple(notes), colour_note=colour_note)
 
 
-def _radiance_header(file_bytes: bytes) -> _RadianceHeader:
+def _parse_radiance_header(file_bytes: bytes) -> _RadianceHeader:
     found = re.search(
         rb"\n\n([-+][XY]) (\d{1,9}) ([-+][XY]) (\d{1,9})\n", file_bytes[:_MAX_RADIANCE_HEADER_BYTES]
     )

@@ -54,7 +54,7 @@ UNSUPPORTED_PICTURE_PROPERTIES = (
     refused(", ".join(dict.fromkeys(_UNSUPPORTED_FORMATS_BY_SIGNATURE.values())), "by name"),
 )
 """Picture formats that are not read."""
-ODD_PIXEL_PROPERTIES = (
+INVALID_PIXEL_PROPERTIES = (
     drawn_with_note("infinite", "the largest finite value"),
     drawn_with_note("NaN, negative", "0"),
     refused("more than half of the pixels not finite, or none above 0"),

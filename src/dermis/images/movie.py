@@ -137,7 +137,7 @@ class MovieWriter:
         self.path, self.size, self.rate = check_movie(path, size, crf), size, parse_frame_rate(rate)
         self._crf, self._count = crf, 0
         self._queue: deque[Future[None]] = deque()
-        self._context = self._writing()
+        self._context = self._movie_file_context()
 
     def __enter__(self) -> Self:
         """Open the movie file."""
@@ -149,7 +149,7 @@ class MovieWriter:
         self._context.__exit__(*exception)
 
     @contextmanager
-    def _writing(self) -> Iterator[None]:
+    def _movie_file_context(self) -> Iterator[None]:
         with atomic_file(self.path) as temporary:
             self._open_movie(temporary)
             try:

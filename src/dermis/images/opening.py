@@ -224,7 +224,7 @@ def _read_exif(picture: Image) -> Exif:
 def _colour_space(file_bytes: bytes, picture: Image, exif: Exif) -> tuple[ColourSpace, str | None]:
     """Return the colour space of the decoded pixels, and a note if this space is not sRGB or is unknown."""
     icc = picture.info.get("icc_profile")
-    coded = _code_points(file_bytes, picture)
+    coded = _colour_code_points(file_bytes, picture)
     if icc and not (coded and picture.format == "PNG"):
         return _profiled_space(picture, icc)
     if coded:
@@ -261,7 +261,7 @@ def _profiled_space(picture: Image, icc_profile: bytes) -> tuple[ColourSpace, st
     return space, None if space.is_default else _conversion_note(name)
 
 
-def _code_points(file_bytes: bytes, picture: Image) -> tuple[int, int] | None:
+def _colour_code_points(file_bytes: bytes, picture: Image) -> tuple[int, int] | None:
     """Return the code points of primaries and transfer function in a PNG, AVIF or HEIC file.
 
     Returns None for a file without code points.
@@ -305,7 +305,7 @@ def _header_notes(file_bytes: bytes, picture: Image) -> Iterator[str]:
         profile = profile_name(picture.info.get("icc_profile", b"")) if table_transform(picture) else ""
         how = f"by its profile, {profile}" if profile else "without a profile, so that its colours are rough"
         yield f"its CMYK is converted to sRGB {how}"
-    if (bits := _stored_bits(file_bytes, picture)) > 8:
+    if (bits := _stored_bits_per_channel(file_bytes, picture)) > 8:
         yield f"its {bits} bits a channel are reduced to 8"
     if picture.info.get("turned"):
         yield "it is turned upright as its EXIF says"
@@ -313,7 +313,7 @@ def _header_notes(file_bytes: bytes, picture: Image) -> Iterator[str]:
         yield "it has several pictures, and only the first is read"
 
 
-def _stored_bits(file_bytes: bytes, picture: Image) -> int:
+def _stored_bits_per_channel(file_bytes: bytes, picture: Image) -> int:
     """Return the stored bits per channel of AVIF and HEIC, and of TIFF in CMYK; 8 for other files."""
     if picture.format == "AVIF" and (start := file_bytes.find(b"av1C")) > 0 and file_bytes[start + 6] & 0x40:
         return 12 if file_bytes[start + 6] & 0x20 else 10

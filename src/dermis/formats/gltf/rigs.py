@@ -22,7 +22,7 @@ from dermis.formats.size_limits import (
 )
 from dermis.mesh.rig import BONES_PER_POINT
 
-_NODE_PATHS = {"translation", "rotation", "scale"}
+_NODE_ANIMATION_PATHS = {"translation", "rotation", "scale"}
 _STATIC_BONE_NAME = "scene"
 _VERTICES_PER_BATCH = 1 << 16
 
@@ -102,7 +102,9 @@ def _with_static_root(bones: Bones) -> Bones:
 def _animated_nodes(document: Document) -> set[int]:
     channels = [channel for clip in document.items("animations") for channel in clip["channels"]]
     targets = [channel["target"] for channel in channels]
-    return {target["node"] for target in targets if target["path"] in _NODE_PATHS and "node" in target}
+    return {
+        target["node"] for target in targets if target["path"] in _NODE_ANIMATION_PATHS and "node" in target
+    }
 
 
 def _node_skin(document: Document, node: int) -> Tree:

@@ -140,21 +140,23 @@ def _gltf_asset(head: Head, notes: FrozenTree | None) -> Tree:
 def _gltf_mesh(
     deformable: DeformableMesh,
     binary: BufferBuilder,
-    parts: list[PrimitiveSource],
+    primitive_sources: list[PrimitiveSource],
     weights: Mapping[str, float],
 ) -> Tree:
     """Return the glTF mesh with its primitives, morph targets and default weights.
 
-    parts : geometry of each primitive; primitive i has material i
+    primitive_sources : geometry of each primitive; primitive i has material i
     """
-    primitives = [part.add_primitive(binary) | {"material": number} for number, part in enumerate(parts)]
+    primitives = [
+        source.add_primitive(binary) | {"material": number} for number, source in enumerate(primitive_sources)
+    ]
     mesh: Tree = {"name": _mesh_name(deformable.head), "primitives": primitives}
     names, rest = deformable.rig.targets.names, deformable.rig.targets.rest
     if not names:
         return mesh
     for target in deformable.targets():
-        for primitive, part in zip(primitives, parts, strict=True):
-            primitive.setdefault("targets", []).append(part.add_target(binary, target))
+        for primitive, source in zip(primitives, primitive_sources, strict=True):
+            primitive.setdefault("targets", []).append(source.add_target(binary, target))
     resting = {} if rest is None else dict(zip(names, rest.tolist(), strict=True))
     values = [float({**resting, **weights}.get(name, 0.0)) for name in names]
     return mesh | {"weights": values, "extras": {"targetNames": list(names)}}

@@ -34,7 +34,7 @@ SECONDS_PER_TIME_KEY: Mapping[str, float | None] = {
 """Unit [s] of a frame's time, by the plain key under which it is stored; None if the key states no unit."""
 FRAME_NUMBER_KEYS = ("frame", "frameindex", "framenumber", "frameid")
 """Plain keys under which the number of a frame is stored."""
-NEUTRAL_SCORE = "_neutral"
+NEUTRAL_SHAPE_NAME = "_neutral"
 """MediaPipe's score of the neutral face, which is not a blend shape."""
 MAX_STATED_TIME = 1e19
 """Largest time of a frame in any unit: nanoseconds of three centuries."""
@@ -42,11 +42,11 @@ _MAX_FRAME_INTERVAL_S = 2.0  # largest plausible median interval between frames 
 _TIME_UNIT_NAMES = {1.0: "seconds", 1e-3: "milliseconds", 1e-6: "microseconds", 1e-9: "nanoseconds"}
 # range of the largest weight of a capture in percent; fractions are smaller
 _PERCENT_WEIGHT_RANGE = (10.0, 200.0)
-_IMPLAUSIBLE_WEIGHT = 2.0  # larger than the weights of exaggerated poses
+_MAX_PLAUSIBLE_WEIGHT = 2.0  # larger than the weights of exaggerated poses
 _COMMON_FRAME_RATES = (24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 100.0, 120.0)
 _FRAME_RATE_TOLERANCE = 0.02
 _SIDE_LETTERS = {"l": "left", "r": "right"}
-_PREFIX_WORDS = re.compile("mixamorig|cc|base|def|org|rig|bip|bone|joint|jnt|skel|j|c|x|m")
+_PREFIX_WORD_PATTERN = re.compile("mixamorig|cc|base|def|org|rig|bip|bone|joint|jnt|skel|j|c|x|m")
 """Words that programs add to the names of bones."""
 _SIDE_OF_WORD = {"left": "left", "l": "left", "right": "right", "r": "right"}
 _NECK_WORDS, _EYE_WORDS = (["neck"], ["neck", "twist"]), (["eye"], ["eyeball"])
@@ -107,8 +107,8 @@ def capture_clip(culprit: object, clip_name: str, samples: CaptureSamples, head:
 
 def refuse_unmatched(culprit: object, capture_names: Sequence[str], head: Head) -> None:
     """Raise an error for a motion in which no name matches a morph target or bone of the head."""
-    targets = _short_list(head.targets) if head.targets else "none"
-    actual = f"it has {_short_list(capture_names)} and the head {targets}"
+    targets = _abbreviated_list(head.targets) if head.targets else "none"
+    actual = f"it has {_abbreviated_list(capture_names)} and the head {targets}"
     advice = "Use a head with targets of these names, such as those of ARKit"
     refuse(culprit, "names of targets or bones of the head", actual, advice)
 
@@ -179,7 +179,7 @@ def to_fractions(culprit: object, weights: Doubles) -> Doubles:
     if _PERCENT_WEIGHT_RANGE[0] < largest <= _PERCENT_WEIGHT_RANGE[1]:
         notify(f"{culprit}: weights of up to {largest:g} are taken as percent")
         return weights / 100
-    if _IMPLAUSIBLE_WEIGHT < largest <= _PERCENT_WEIGHT_RANGE[0]:
+    if _MAX_PLAUSIBLE_WEIGHT < largest <= _PERCENT_WEIGHT_RANGE[0]:
         notify(f"{culprit}: weights of up to {largest:g} are used as they are, where 1 is the full shape")
     return weights
 
@@ -210,7 +210,7 @@ def check_size(culprit: object, frame_count: int, column_count: int) -> None:
         refuse(culprit, expected, actual, "Shorten it, or remove columns that heads do not have")
 
 
-def _short_list(names: Sequence[str]) -> str:
+def _abbreviated_list(names: Sequence[str]) -> str:
     listed = ", ".join(names[:6])
     return f"{listed} and {len(names) - 6} more" if len(names) > 6 else listed
 
@@ -330,6 +330,6 @@ def _bone_ancestors(skeleton: Skeleton, bone: int) -> set[int]:
 def _bone_words(bone_name: str) -> tuple[list[str], str]:
     """Return the words of a bone's name without numbers and prefixes, and its side: "left", "right" or ""."""
     separated = re.sub(r"(?<=[a-z])(?=[A-Z])|[\W_]|\d+", " ", bone_name.rpartition(":")[2])
-    words = [word for word in separated.lower().split() if not _PREFIX_WORDS.fullmatch(word)]
+    words = [word for word in separated.lower().split() if not _PREFIX_WORD_PATTERN.fullmatch(word)]
     sides = [_SIDE_OF_WORD[word] for word in words if word in _SIDE_OF_WORD]
     return [word for word in words if word not in _SIDE_OF_WORD], sides[0] if len(sides) == 1 else ""

@@ -21,7 +21,7 @@ from dermis.formats.motion.captures import (
     FRAME_NUMBER_KEYS,
     MAX_CLIP_BYTES,
     MAX_STATED_TIME,
-    NEUTRAL_SCORE,
+    NEUTRAL_SHAPE_NAME,
     SECONDS_PER_TIME_KEY,
     CaptureSamples,
     RotationBones,
@@ -41,9 +41,15 @@ from dermis.mesh.clip import Clip
 from dermis.mesh.head import Head
 from dermis.mesh.rotations import angles_matrix, matrix_quaternion
 
-_COUNT_COLUMN = "blendshapecount"
+_SHAPE_COUNT_COLUMN = "blendshapecount"
 _TIME_COLUMNS: Mapping[str, float | None] = {"timecode": None, **SECONDS_PER_TIME_KEY}
-_COLUMNS_WITHOUT_MOTION = (*_TIME_COLUMNS, *FRAME_NUMBER_KEYS, _COUNT_COLUMN, plain_key(NEUTRAL_SCORE), "")
+_COLUMNS_WITHOUT_MOTION = (
+    *_TIME_COLUMNS,
+    *FRAME_NUMBER_KEYS,
+    _SHAPE_COUNT_COLUMN,
+    plain_key(NEUTRAL_SHAPE_NAME),
+    "",
+)
 _ROTATED_OBJECTS = ("head", "lefteye", "righteye")
 _ANGLE_COLUMNS = [f"{part}{angle}" for part in _ROTATED_OBJECTS for angle in ("pitch", "yaw", "roll")]
 _TIMECODE_PATTERN = re.compile(
@@ -107,7 +113,7 @@ def _read_table(path: Path, fps: float | None) -> _CaptureTable:
         keys = [plain_key(name) for name in header]
         columns = [k for k, key in enumerate(keys) if key not in _COLUMNS_WITHOUT_MOTION]
         time = next((keys.index(key) for key in (*_TIME_COLUMNS, *FRAME_NUMBER_KEYS) if key in keys), None)
-        count = keys.index(_COUNT_COLUMN) if _COUNT_COLUMN in keys else None
+        count = keys.index(_SHAPE_COUNT_COLUMN) if _SHAPE_COUNT_COLUMN in keys else None
         lines, times, rows, states_shapes = [], [], [], []
         for row in filter(_has_text, reader):
             culprit = f"{path}, line {reader.line_num}"
@@ -155,14 +161,14 @@ def _check_header(culprit: str, header: Sequence[str]) -> None:
 
 
 def _row_values(
-    culprit: str, header: Sequence[str], table_row: Sequence[str], column_index: Sequence[int]
+    culprit: str, header: Sequence[str], table_row: Sequence[str], column_indices: Sequence[int]
 ) -> Doubles:
-    """Return the values of the columns `column_index` of a row; empty cells are NaN.
+    """Return the values of the columns `column_indices` of a row; empty cells are NaN.
 
     Numbers may have a decimal comma.
     """
-    values = np.full(len(column_index), np.nan)
-    for index, column in enumerate(column_index):
+    values = np.full(len(column_indices), np.nan)
+    for index, column in enumerate(column_indices):
         cell = table_row[column].strip()
         try:
             values[index] = float(cell.replace(",", ".") or "nan")

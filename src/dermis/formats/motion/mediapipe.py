@@ -19,7 +19,7 @@ from dermis.formats.motion.captures import (
     FRAME_NUMBER_KEYS,
     MAX_CLIP_BYTES,
     MAX_STATED_TIME,
-    NEUTRAL_SCORE,
+    NEUTRAL_SHAPE_NAME,
     SECONDS_PER_TIME_KEY,
     CaptureSamples,
     RotationBones,
@@ -216,21 +216,21 @@ def _first_face(json_faces: object) -> tuple[object, int]:
     """
     faces = 1
     while True:
-        if isinstance(json_faces, dict) and _is_list_object(json_faces):
+        if isinstance(json_faces, dict) and _wraps_blend_shapes(json_faces):
             json_faces = next(
                 item for key, item in json_faces.items() if key in (*_CATEGORY_LIST_KEYS, "value")
             )
         elif (
             isinstance(json_faces, list)
             and json_faces
-            and (isinstance(json_faces[0], list) or _is_list_object(json_faces[0]))
+            and (isinstance(json_faces[0], list) or _wraps_blend_shapes(json_faces[0]))
         ):
             faces, json_faces = max(faces, len(json_faces)), json_faces[0]
         else:
             return json_faces, faces
 
 
-def _is_list_object(json_value: object) -> bool:
+def _wraps_blend_shapes(json_value: object) -> bool:
     """Return whether a value is an object that contains the list of blend shapes under a known key."""
     return isinstance(json_value, dict) and (
         bool(json_value.keys() & _CATEGORY_LIST_KEYS) or json_value.keys() == {"value"}
@@ -254,7 +254,7 @@ def _shape_scores(culprit: str, shapes: object) -> dict[str, float]:
     for name, score in shapes.items():
         if type(score) not in (int, float):
             refuse(culprit, "scores as numbers", f"{name} is {format_value(score)}", _LINE_ADVICE)
-    return {name: score for name, score in shapes.items() if name != NEUTRAL_SCORE}
+    return {name: score for name, score in shapes.items() if name != NEUTRAL_SHAPE_NAME}
 
 
 def _facial_transformation(culprit: str, json_matrix: object) -> Doubles | None:
@@ -268,7 +268,7 @@ def _facial_transformation(culprit: str, json_matrix: object) -> Doubles | None:
     """
     by_columns = False
     while isinstance(json_matrix, dict) or (
-        isinstance(json_matrix, list) and json_matrix and not _is_row(json_matrix[0])
+        isinstance(json_matrix, list) and json_matrix and not _is_row_or_number(json_matrix[0])
     ):
         by_columns = True
         if isinstance(json_matrix, dict):
@@ -292,7 +292,7 @@ def _facial_transformation(culprit: str, json_matrix: object) -> Doubles | None:
     return matrix.T if last_row > last_column or (no_translation and flat and by_columns) else matrix
 
 
-def _is_row(json_value: object) -> bool:
+def _is_row_or_number(json_value: object) -> bool:
     """Return whether an entry of a list is a row or a number of a matrix, as opposed to a whole matrix."""
     is_nested = isinstance(json_value, list) and (len(json_value) != 4 or isinstance(json_value[0], list))
     return not is_nested and not isinstance(json_value, dict)

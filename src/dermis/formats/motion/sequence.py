@@ -32,7 +32,7 @@ from dermis.mesh.pose import Pose
 FRAME_SUFFIXES = (".obj", ".ply")
 DEFAULT_FRAME_RATE = 30.0
 _FRAME_NUMBER_TOLERANCE = 1e-6
-_FRAME_SIZE_RANGE = (0.33, 3.0)
+_FRAME_TO_HEAD_SIZE_RANGE = (0.33, 3.0)
 _FRAME_NUMBER_FIELD = re.compile(r"%0?\d*d")
 _VERTEX_LINE = re.compile(rb"^[ \t]*v[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)[^\n]*\n?", re.MULTILINE)
 _NORMAL_LINE = re.compile(rb"^[ \t]*vn[ \t][^\n]*\n?", re.MULTILINE)
@@ -103,7 +103,9 @@ def load_sequence(
     axes, source = Axes(up, front), head.file_vertices
     to_head = to_y_up(np.eye(3), axes).T if source is None or axes != DEFAULT_AXES else source.to_head
     reader = FrameReader(unit_mm, to_head)
-    if unit_mm is None and (unit := _unit_of_head(files[0], head, reader)) != default_unit_mm(files[0]):
+    if unit_mm is None and (unit := _unit_matching_head_size(files[0], head, reader)) != default_unit_mm(
+        files[0]
+    ):
         reader = FrameReader(unit, to_head)
     frames = _FrameCache(tuple(files), head, reader)
     for index in {0, len(files) // 2, len(files) - 1}:
@@ -173,14 +175,14 @@ class _FrameCache:
 
     def _check_size(self, mesh_file: Path, positions: Floats) -> None:
         sizes = [float(np.linalg.norm(np.ptp(one, axis=0))) for one in (positions, self.head.positions_mm)]
-        if not _FRAME_SIZE_RANGE[0] <= sizes[0] / sizes[1] <= _FRAME_SIZE_RANGE[1]:
+        if not _FRAME_TO_HEAD_SIZE_RANGE[0] <= sizes[0] / sizes[1] <= _FRAME_TO_HEAD_SIZE_RANGE[1]:
             actual = f"it is {sizes[0] / sizes[1]:.3g} times as large"
             refuse(
                 mesh_file, "a frame of about the size of the head", actual, "Set the files' unit (unit_mm)"
             )
 
 
-def _unit_of_head(mesh_file: Path, head: Head, reader: FrameReader) -> float:
+def _unit_matching_head_size(mesh_file: Path, head: Head, reader: FrameReader) -> float:
     """Return the unit with which the mesh in a file is about as large as the head [mm].
 
     The unit of the file's format is preferred; if another unit is chosen, a note states it.
@@ -190,7 +192,7 @@ def _unit_of_head(mesh_file: Path, head: Head, reader: FrameReader) -> float:
         for one in (reader.read(mesh_file).positions_mm, head.positions_mm)
     )
     default = default_unit_mm(mesh_file)
-    low, high = _FRAME_SIZE_RANGE
+    low, high = _FRAME_TO_HEAD_SIZE_RANGE
     if low <= read_mm / head_mm <= high:
         return default
     unit = min(COMMON_UNITS_MM, key=lambda one: abs(np.log(one / default * read_mm / head_mm)))

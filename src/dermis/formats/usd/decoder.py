@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 _MM_PER_METRE = 1000.0
 _UV_NAMES = ("st", "UVMap", "map1", "st0", "st_0", "uv")
-_TYPES_WITHOUT_NOTE = ("", "Xform", "Scope", "Mesh", "GeomSubset", "Material", "Shader", "NodeGraph")
+_PRIM_TYPES_WITHOUT_NOTE = ("", "Xform", "Scope", "Mesh", "GeomSubset", "Material", "Shader", "NodeGraph")
 _HIDDEN_PURPOSES = ("guide", "proxy")
 _SEVERAL_UV_NOTE = "faces of one mesh read different texture coordinates: those of the first are used"
 
@@ -95,7 +95,7 @@ class _SceneReader:
                 if self._is_visible(prim):
                     limits.check_limit(self.path, len(meshes), limits.MAX_GROUPS, "meshes", "Join some")
                     meshes.append(self._add_mesh(self.geom.Mesh(prim), str(len(meshes))))
-            elif prim.GetTypeName() not in _TYPES_WITHOUT_NOTE:
+            elif prim.GetTypeName() not in _PRIM_TYPES_WITHOUT_NOTE:
                 unread[str(prim.GetTypeName())] += 1
         if unread:
             names = ", ".join(f"{name} ({count})" for name, count in unread.most_common(8))

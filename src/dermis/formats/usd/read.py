@@ -20,7 +20,7 @@ from dermis.formats.axes import Axes, Axis
 from dermis.formats.maps import PathLike
 from dermis.formats.materials import FileMaterial, Role, Texture, check_pictures
 from dermis.formats.parts import DEFAULT_COLOUR, MaterialGroup, MeshFile, MeshPart, parse_colour
-from dermis.formats.polygons import Polygons, check_polygon_sizes, missing_uv, without_small_polygons
+from dermis.formats.polygons import Polygons, check_polygon_sizes, missing_uv_notes, without_small_polygons
 from dermis.formats.referenced_files import find_referenced_file
 from dermis.formats.size_limits import DAMAGED_ADVICE, MAX_FILE_BYTES
 from dermis.images.io import EmbeddedPicture
@@ -121,7 +121,9 @@ def _mesh_parts(
         mesh.get("normals", none),
         mesh.get("colours"),
     )
-    return geometry.parts(groups, mesh["group"][kept][polygons], "by polygon"), notes + missing_uv(geometry)
+    return geometry.parts(groups, mesh["group"][kept][polygons], "by polygon"), notes + missing_uv_notes(
+        geometry
+    )
 
 
 def _select_polygons(corner_counts: Index, corners: Index, polygon_mask: Mask) -> tuple[Index, Index]:

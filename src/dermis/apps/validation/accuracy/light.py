@@ -20,7 +20,13 @@ from dermis.environment.panorama import (
     texel_directions,
     texel_solid_angles,
 )
-from dermis.environment.prefilter import LAYER_ROUGHNESSES, ROUGHEST, SMOOTHEST, Prefiltered, prefilter
+from dermis.environment.prefilter import (
+    LAYER_ROUGHNESSES,
+    MAX_LAYER_ROUGHNESS,
+    MIN_LAYER_ROUGHNESS,
+    Prefiltered,
+    prefilter,
+)
 from dermis.frame.features.occlusion.baked import SKY_DIRECTION_COUNT, bake_occlusion
 from dermis.frame.lights.rectangle import facing_irradiance
 from dermis.frame.projection import view_axes_array
@@ -164,7 +170,11 @@ def lobe_radiance(layers: Array, directions: Array, roughness_m: float) -> Array
     directions : (k, 3) directions of the lobes
     roughness_m : roughness of the lobes
     """
-    level = (len(LAYER_ROUGHNESSES) - 1) * np.log(roughness_m / SMOOTHEST) / np.log(ROUGHEST / SMOOTHEST)
+    level = (
+        (len(LAYER_ROUGHNESSES) - 1)
+        * np.log(roughness_m / MIN_LAYER_ROUGHNESS)
+        / np.log(MAX_LAYER_ROUGHNESS / MIN_LAYER_ROUGHNESS)
+    )
     low = int(np.clip(level, 0, len(LAYER_ROUGHNESSES) - 2))
     f = float(np.clip(level - low, 0, 1))
     below, above = (sample_panorama(layers[1 + k], directions) for k in (low, low + 1))
