@@ -52,15 +52,15 @@ def cached_atlas(mesh: Mesh, atlas_side: int, layout: str = "mesh", gutter_mm: f
     names = [field.name for field in fields(Atlas)]
 
     @logged_step("mapping the skin to the atlas")
-    def make() -> Arrays:
+    def make_arrays() -> Arrays:
         atlas = build_atlas(mesh, atlas_side, layout, gutter_mm)
         return {name: getattr(atlas, name) for name in names}
 
-    return Atlas(**load_or_make("atlas", _atlas_key(mesh, atlas_side, layout, gutter_mm), names, make))
+    return Atlas(**load_or_make("atlas", _atlas_key(mesh, atlas_side, layout, gutter_mm), names, make_arrays))
 
 
 def cached_occlusion(mesh: Mesh, atlas: Atlas, inputs_key: str, bake_occlusion: Callable[[], Array]) -> Array:
-    """Return the occlusion that `bake_occlusion` computes for the texels of an atlas, with a cache on disk.
+    """Return the occlusion of the texels of an atlas, from the cache on disk or from `bake_occlusion`.
 
     inputs_key : text that identifies all inputs of `bake_occlusion` except the mesh and the atlas
     """

@@ -87,11 +87,11 @@ def cached_form_factors(mesh: Mesh, corner_uv: Floats, mapped_triangles: Mask) -
         digest.update(np.ascontiguousarray(array).tobytes())
 
     @logged_step("computing form factors of the skin")
-    def make() -> dict[str, NDArray[np.generic]]:
+    def make_arrays() -> dict[str, NDArray[np.generic]]:
         form_factors = compute_form_factors(mesh, corner_uv, mapped_triangles)
         return {name: getattr(form_factors, name) for name in names}
 
-    return FormFactors(**load_or_make("interreflection", digest.hexdigest()[:40], names, make))
+    return FormFactors(**load_or_make("interreflection", digest.hexdigest()[:40], names, make_arrays))
 
 
 def form_factor_table(mapped_triangles: Mask) -> str:
@@ -153,7 +153,7 @@ def _trace_lines(
         for direction in _hemisphere_directions(bundle_count)
     ]
 
-    def trace(bundle: tuple[Doubles, Doubles]) -> tuple[Index, Index]:
+    def trace_bundle(bundle: tuple[Doubles, Doubles]) -> tuple[Index, Index]:
         axes, offset = bundle
         # a matrix product would depend on the number of threads in its last bits
         points = x * axes[:, 0] + y * axes[:, 1] + z * axes[:, 2] + np.append(offset, 0.0)
@@ -170,7 +170,7 @@ def _trace_lines(
 
     line_counts, facing = np.zeros(CELLS_PER_SIDE * CELLS_PER_SIDE), [np.zeros((0, 2), np.int64)]
     with ThreadPoolExecutor(min(os.cpu_count() or 1, _MAX_TRACING_THREADS)) as pool:
-        for pairs, cells in pool.map(trace, bundle_axes):
+        for pairs, cells in pool.map(trace_bundle, bundle_axes):
             facing.append(pairs)
             line_counts += np.bincount(cells, minlength=len(line_counts))
     return np.concatenate(facing), line_counts

@@ -127,7 +127,7 @@ class _Baker:
     def _finish_colour_map(self, tile: Tile, colour_map: Floats) -> None:
         """Apply vertex colours and the opacity texture to the colours of a tile, in place.
 
-        colour_map : (h, w, 4) colour and opacity; opacity is shifted so that the material's cutoff becomes 0.5
+        colour_map : (h, w, 4) colour and opacity; opacity is shifted so that the alpha cutoff becomes 0.5
         """
         material = self._tile_material(tile)
         if "opacity" in material.textures:

@@ -152,9 +152,10 @@ def trace_gutter(
 def trace_from_border(
     surface: FlatSurface, border: Border, sides: BorderSides, nearest: NearestPoints, texels: NDArray[Any]
 ) -> tuple[GeodesicEnds, Doubles]:
-    """Trace geodesics from border points to texels; return their ends, and the weights of the border points.
+    """Trace a geodesic from the nearest border point of each texel to the surface point that the texel shows.
 
-    The weights (n, 2) are the barycentric weights of the second and third corner of the border triangle.
+    Returns the ends of the geodesics, and the barycentric weights (n, 2) of their starting points: those of
+    the second and third corner of the border triangle.
 
     sides : border sides on the texel grid
     nearest : nearest border point of each texel
