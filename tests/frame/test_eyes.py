@@ -14,7 +14,7 @@ from dermis.base.errors import DermisError
 from dermis.frame.renderer import Renderer
 from dermis.gpu.textures import texture_from_array
 from dermis.mesh.eye_look import EyeLook
-from dermis.mesh.eyeball import CORNEA_MM, apex_mm, cornea_centre_mm, iris_mm
+from dermis.mesh.eyeball import CORNEA_MM, apex_mm, cornea_centre_mm, iris_plane_mm
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.pose import Pose
@@ -48,7 +48,7 @@ def traced(places: Floats, ways: Floats) -> Floats:
         length = np.linalg.norm(beside)
         beside = beside / length if length > 1e-12 else beside
         t = np.sin(inside) * beside - np.cos(inside) * n
-        found.append((p + t * (iris_mm() - p[2]) / t[2])[:2])
+        found.append((p + t * (iris_plane_mm() - p[2]) / t[2])[:2])
     return np.array(found).reshape(*places.shape[:2], 2)
 
 

@@ -14,7 +14,7 @@ from dermis.apps.truths.mitsuba_scene import load_mitsuba, mesh_shape, mitsuba_s
 from dermis.apps.truths.person import shapes as eyes
 from dermis.apps.truths.person.person import Person
 from dermis.mesh.eye_look import EYE_LOOK_RANGES
-from dermis.mesh.eyeball import CORNEA_MM, LIMBUS_MM, SCLERA_MM, apex_mm, cornea_centre_mm, iris_mm
+from dermis.mesh.eyeball import CORNEA_MM, LIMBUS_MM, SCLERA_MM, apex_mm, cornea_centre_mm, iris_plane_mm
 from dermis.scene.camera import Camera
 
 pytest.importorskip("mitsuba")
@@ -72,7 +72,7 @@ def by_snell(positions: NDArray[np.float64], directions: NDArray[np.float64]) ->
     cosine = -(directions * n).sum(axis=-1, keepdims=True)
     inner = np.sqrt(1.0 - (1.0 - cosine**2) / eyes.CORNEA_INDEX**2)
     bent = directions / eyes.CORNEA_INDEX + (cosine / eyes.CORNEA_INDEX - inner) * n
-    far = (iris_mm() - positions[..., 2:]) / bent[..., 2:]
+    far = (iris_plane_mm() - positions[..., 2:]) / bent[..., 2:]
     return np.asarray((positions + far * bent)[..., :2])
 
 

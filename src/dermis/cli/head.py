@@ -152,7 +152,7 @@ def head(
     from dermis.frame.features.surface.painting.painted_head import paint_head
     from dermis.gpu.failures import run_on_device
     from dermis.human.makehuman import human_targets
-    from dermis.human.person_file import person_numbers, write_person_json
+    from dermis.human.person_file import person_parameters, write_person_json
 
     if list_targets:
         print_report(as_json, list(human_targets()), human_targets)
@@ -170,7 +170,7 @@ def head(
         eyes=_with_values(person.iris, eye, "--eye"),
         hair=_with_hair_values(person.hairdo, hair),
     )
-    report: Options = {"head": str(output), "person": person_numbers(person)}
+    report: Options = {"head": str(output), "person": person_parameters(person)}
     if output.suffix.lower() == ".json":
         report |= {"bytes": write_person_json(output, person)}
         print_report(as_json, report, lambda: [f"{output}  {report['bytes']} bytes"])

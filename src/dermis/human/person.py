@@ -29,8 +29,8 @@ from dermis.human.skin.measured import (
     ANCESTRY_UNIONS,
     ITA_RANGE,
     SKIN_ANCESTRIES,
+    group_probabilities,
     group_weights,
-    likely_groups,
     pigment_ancestry,
 )
 from dermis.human.skin.painted import PaintedMaps
@@ -178,7 +178,8 @@ def _sample_ancestry(
     name = str(fixed_fields.get("skin_ancestry") or "")
     if name or (fixed_fields.get("ita") is not None and not shape_given):
         group = _pick_name(
-            group_weights(0, 0, 0, name) if name else likely_groups(float(fixed_fields["ita"])), picks[0]
+            group_weights(0, 0, 0, name) if name else group_probabilities(float(fixed_fields["ita"])),
+            picks[0],
         )
         shape = ancestry if shape_given else rng.dirichlet(_SHAPE_CONCENTRATIONS_OF_SKIN[group])
         return shape, {group: 1.0}
@@ -503,7 +504,7 @@ class Human:
         fractions = self.african / total, self.asian / total, self.caucasian / total
         groups = group_weights(*fractions, self.skin_ancestry)
         if self.ita is not None and not self.skin_ancestry and len(set(fractions)) == 1:
-            groups = likely_groups(self.ita)  # no ancestry is given
+            groups = group_probabilities(self.ita)  # no ancestry is given
         return Demographics(*fractions, self.sex, self.age, groups, self.ita)
 
     @property

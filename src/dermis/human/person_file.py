@@ -29,7 +29,7 @@ _STRETCH_ATLAS_SIDE = 1024
 """Largest side of the atlas from which texel lengths on the skin are computed; they vary slowly [texel]."""
 
 
-def person_numbers(person: Human) -> dict[str, Any]:
+def person_parameters(person: Human) -> dict[str, Any]:
     """Return all parameters of a person as a dictionary, with the typical looks of skin, eyes and hair."""
     numbers = {one.name: getattr(person, one.name) for one in fields(person)}
     numbers |= {"targets": dict(person.targets), "skin": asdict(person.look)}
@@ -38,7 +38,7 @@ def person_numbers(person: Human) -> dict[str, Any]:
 
 def write_person_json(path: Path, person: Human) -> int:
     """Write the parameters of a person as JSON, atomically, and return the file size [byte]."""
-    data = (json.dumps({"person": person_numbers(person)}, indent=2, default=float) + "\n").encode()
+    data = (json.dumps({"person": person_parameters(person)}, indent=2, default=float) + "\n").encode()
     with atomic_file(path) as temporary:
         temporary.write_bytes(data)
     return len(data)
@@ -96,7 +96,7 @@ def write_person_glb(
     weights : weights of the expression morph targets, stored as default weights in the file
     eyes : colour and normal textures of the eyes; if None, the eyes are exported with one colour
     """
-    notes = {"person": person_numbers(person)}
+    notes = {"person": person_parameters(person)}
     data = encode_head(
         head, roughness=roughness, weights=weights, slopes=relief_slopes(head), notes=notes, eyes=eyes
     )

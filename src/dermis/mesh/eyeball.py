@@ -45,7 +45,7 @@ def apex_mm() -> float:
     return cornea_centre_mm() + CORNEA_MM
 
 
-def iris_mm() -> float:
+def iris_plane_mm() -> float:
     """Return the distance from the ball's centre to the plane of the iris, along the axis [mm]."""
     return apex_mm() - IRIS_BEHIND_MM
 

@@ -16,15 +16,15 @@ from dermis.mesh.strands import Roots, Strands, cover_of_points, root_frames, to
 Words = NDArray[np.uint32]
 MAX_EXPORTED_STRANDS = 40_000
 """Number of strands with which exports and path tracing show hair."""
-_SMOOTH_REACH, _SMOOTH_HEIGHTS_MM = 8, (2.0, 18.0)
-_MIN_HEIGHT_MM, _RISE_MM = 0.35, 4.0
-_HAIRLINE_FADE_MM, _SHORT_HAIRLINE_MM = (-3.0, 11.0), (-2.0, 14.0)
+_SMOOTHING_KNOTS, _SMOOTH_HEIGHTS_MM = 8, (2.0, 18.0)
+_MIN_HEIGHT_MM, _RISE_LENGTH_MM = 0.35, 4.0
+_HAIRLINE_FADE_MM, _SHORT_HAIR_HEIGHTS_MM = (-3.0, 11.0), (-2.0, 14.0)
 _HAIRLINE_STEP_DEGREES = 2.0
-_TIP_FRACTION, _TIP_WIDTH = 0.12, 0.35
-_COLOURED_HAIRS = 5
-_COVERING_MM = 60.0  # length from the root along which hair covers the skin around it
-_HEAD_RADIUS_MM, _LIFTED_MM = 80.0, 20.0
-_CHUNK = 4_000  # strands that are grown at once
+_TIP_FRACTION, _TIP_WIDTH_RATIO = 0.12, 0.35
+_COLOUR_SAMPLES = 5
+_COVERING_LENGTH_MM = 60.0  # length from the root along which hair covers the skin around it
+_HEAD_RADIUS_MM, _LIFTED_HEIGHT_MM = 80.0, 20.0
+_STRANDS_PER_CHUNK = 4_000  # strands that are grown at once
 _FALLBACK_AXIS = np.array([0.31, 0.2, 0.93])
 
 
@@ -47,10 +47,10 @@ def grow_strands(
     every = groom.roots.roots
     middles = Roots(every.quad.take(middle), every.position.take(middle, axis=0))
     middle_mm, _ = root_frames(mesh, middles, points_mm)
-    grown = _growing(groom, count)
+    grown = _growing_indices(groom, count)
     parts = [
-        _grow(groom, guides, index, root_mm[index], frames[index], middle_mm[index])
-        for index in np.array_split(grown, max(1, -(-len(grown) // _CHUNK)))
+        _grow_chunk(groom, guides, index, root_mm[index], frames[index], middle_mm[index])
+        for index in np.array_split(grown, max(1, -(-len(grown) // _STRANDS_PER_CHUNK)))
     ]
     knots, radius, absorption, cover = (np.concatenate(columns) for columns in zip(*parts, strict=True))
     kept = Roots(roots.quad[grown], roots.position[grown])
@@ -72,19 +72,22 @@ def hair_strands(head: Head, points_mm: NDArray[np.floating] | None = None) -> S
 
 def hair_cover(groom: Groom, mesh: Mesh) -> Doubles:
     """Return the projected area of the hair rooted around each point of a mesh, per area of skin (p,) [-]."""
-    index = _growing(groom, len(groom.roots))
+    index = _growing_indices(groom, len(groom.roots))
     part = groom.parameters[groom.roots.part[index]]
-    number = index.astype(np.uint32) + part["seed"].astype(np.uint32) * np.uint32(131071)
-    length = part["guide_mm"] * _lengths(groom, index, part, number, _above_hairline(groom, index))
+    strand_number = index.astype(np.uint32) + part["seed"].astype(np.uint32) * np.uint32(131071)
+    length = part["guide_mm"] * _length_fractions(
+        groom, index, part, strand_number, _above_hairline(groom, index)
+    )
     roots = groom.roots.roots
     kept = Roots(roots.quad.take(index), roots.position.take(index, axis=0))
-    return cover_of_points(mesh, kept, 2.0 * part["radius_mm"] * np.minimum(length, _COVERING_MM))
+    return cover_of_points(mesh, kept, 2.0 * part["radius_mm"] * np.minimum(length, _COVERING_LENGTH_MM))
 
 
 def absorbed_by_hair(groom: Groom) -> float:
-    """Return the fraction of diffuse light that a hair absorbs, the mean over channels and parts of the groom.
+    """Return the fraction of diffuse light that a hair absorbs: a mean over channels and parts of the groom.
 
-    The parts are scalp hair and beard."""
+    The parts are scalp hair and beard.
+    """
     parts = groom.parameters
     chord = 0.5 * np.pi * (parts["radius_mm"] / parts["hairs_per_strand"])[:, None]
     absorption = np.maximum((1.0 - parts["grey"][:, None]) * parts["dark"], parts["white"])
@@ -120,15 +123,15 @@ def _posed_guides(groom: Groom, points_mm: NDArray[np.floating]) -> tuple[Double
     bound, outward = (weight * knots).sum(axis=2), _unit((weight * normal).sum(axis=2))
     moved, total = bound - guides.rest_mm[..., :3], 0.0
     smooth = np.zeros_like(moved)
-    for step in range(-_SMOOTH_REACH, _SMOOTH_REACH + 1):
-        factor = 1.0 - abs(step) / (_SMOOTH_REACH + 1)
+    for step in range(-_SMOOTHING_KNOTS, _SMOOTHING_KNOTS + 1):
+        factor = 1.0 - abs(step) / (_SMOOTHING_KNOTS + 1)
         smooth += factor * moved[:, np.clip(np.arange(GUIDE_KNOTS) + step, 0, GUIDE_KNOTS - 1)]
         total += factor
     far = _smoothstep(*_SMOOTH_HEIGHTS_MM, guides.rest_mm[..., 3].astype(np.float64))[..., None]
     return (1.0 - far) * bound + far * (guides.rest_mm[..., :3] + smooth / total), outward
 
 
-def _grow(
+def _grow_chunk(
     groom: Groom,
     guides: tuple[Doubles, Doubles],
     index: Ints,
@@ -146,52 +149,64 @@ def _grow(
     """
     roots, seed = groom.roots, groom.parameters["seed"].astype(np.uint32) * np.uint32(131071)
     part = groom.parameters[roots.part[index]]
-    number = index.astype(np.uint32) + seed[roots.part[index]]
+    strand_number = index.astype(np.uint32) + seed[roots.part[index]]
     clump = roots.clump[index]
     clump_number = clump.astype(np.uint32) + seed[roots.part[index]]
-    above = _above_hairline(groom, index)
+    above_hairline_mm = _above_hairline(groom, index)
     t = np.linspace(0.0, 1.0, groom.knots)[None]
-    u = t * _lengths(groom, index, part, number, above)[:, None]
-    own, at = _curves(groom, guides, index, u, root_mm), _curves(groom, guides, clump, u, middle_mm)
+    u = t * _length_fractions(groom, index, part, strand_number, above_hairline_mm)[:, None]
+    own, at = (
+        _interpolate_guides(groom, guides, index, u, root_mm),
+        _interpolate_guides(groom, guides, clump, u, middle_mm),
+    )
     s = u * _column(part, "guide_mm")
     near = 1.0 - np.exp(-((s / _column(part, "clump_start_mm")) ** 1.5))
     rope = _column(part, "rope_mm") > 0
-    pull = _column(part, "clump") * near * np.where(rope, 1.0, 0.6 + 0.4 * _random(number, 2)[:, None])
+    pull = _column(part, "clump") * near * np.where(rope, 1.0, 0.6 + 0.4 * _random(strand_number, 2)[:, None])
     side, other = _axes_across(at)
     to_middle = pull[..., None] * (at.position - own.position)
-    across = near * np.where(rope, 1.0, 0.0) * _rope_offsets(number, part, s + roots.along_mm[index, None])
-    across = across + np.where(rope, 0.0, 1.0) * _curl_offsets(number, clump_number, part, s)
-    across = across + _frizz_offsets(number, part, s)
+    across = (
+        near * np.where(rope, 1.0, 0.0) * _rope_offsets(strand_number, part, s + roots.along_mm[index, None])
+    )
+    across = across + np.where(rope, 0.0, 1.0) * _curl_offsets(strand_number, clump_number, part, s)
+    across = across + _frizz_offsets(strand_number, part, s)
     varied = across[0][..., None] * side + across[1][..., None] * other
     height = (1.0 - pull) * own.height + pull * at.height + (varied * own.normal).sum(axis=-1)
-    least = _MIN_HEIGHT_MM * np.minimum(s / _RISE_MM, 1.0)
+    least = _MIN_HEIGHT_MM * np.minimum(s / _RISE_LENGTH_MM, 1.0)
     positions = own.position + to_middle + varied + np.maximum(least - height, 0.0)[..., None] * own.normal
-    taper = 1.0 - (1.0 - _TIP_WIDTH) * _smoothstep(1.0 - _TIP_FRACTION, 1.0, t)
-    edge = 1.0 - part["hairline"] * (0.45 - 0.45 * _smoothstep(*_SHORT_HAIRLINE_MM, above))
-    radius = (part["radius_mm"] * (0.8 + 0.4 * _random(number, 3)) * edge)[:, None] * taper
-    return to_frames(frames, positions - root_mm[:, None]), radius, _absorption(number, part), part["cover"]
+    taper = 1.0 - (1.0 - _TIP_WIDTH_RATIO) * _smoothstep(1.0 - _TIP_FRACTION, 1.0, t)
+    edge = 1.0 - part["hairline"] * (0.45 - 0.45 * _smoothstep(*_SHORT_HAIR_HEIGHTS_MM, above_hairline_mm))
+    radius = (part["radius_mm"] * (0.8 + 0.4 * _random(strand_number, 3)) * edge)[:, None] * taper
+    return (
+        to_frames(frames, positions - root_mm[:, None]),
+        radius,
+        _strand_absorption(strand_number, part),
+        part["cover"],
+    )
 
 
 def _column(part: NDArray[np.void], name: str) -> Doubles:
     return part[name].astype(np.float64)[:, None]
 
 
-def _random(strand: Words, stream: int) -> Doubles:
+def _random(strand_number: Words, stream: int) -> Doubles:
     """Return a uniform random number (n,) for each strand, 0 to 1.
 
-    strand : (n,) numbers that identify the strands
+    strand_number : (n,) numbers that identify the strands
     stream : number that selects one of several random numbers of a strand
 
     Source: PCG hash [JarzynskiOlano2020].
     """
     with np.errstate(over="ignore"):
-        state = (strand * np.uint32(64) + np.uint32(stream)) * np.uint32(747796405) + np.uint32(2891336453)
+        state = (strand_number * np.uint32(64) + np.uint32(stream)) * np.uint32(747796405) + np.uint32(
+            2891336453
+        )
         word = ((state >> ((state >> np.uint32(28)) + np.uint32(4))) ^ state) * np.uint32(277803737)
         return np.asarray((((word >> np.uint32(22)) ^ word) >> np.uint32(8)) / 16777216.0)
 
 
-def _random_normal(strand: Words, stream: int) -> Doubles:
-    return np.asarray(2.0 * (sum(_random(strand, stream + k) for k in range(3)) - 1.5))
+def _random_normal(strand_number: Words, stream: int) -> Doubles:
+    return np.asarray(2.0 * (sum(_random(strand_number, stream + k) for k in range(3)) - 1.5))
 
 
 def _above_hairline(groom: Groom, index: Ints) -> Doubles:
@@ -200,34 +215,36 @@ def _above_hairline(groom: Groom, index: Ints) -> Doubles:
     return np.asarray(place[:, 1] - np.interp(place[:, 0], angles, groom.hairline_mm))
 
 
-def _growing(groom: Groom, count: int) -> Ints:
+def _growing_indices(groom: Groom, count: int) -> Ints:
     """Return the indices of the roots from which a strand grows, among the first `count` roots."""
     index = np.arange(count, dtype=np.int32)
     roots, part = groom.roots, groom.parameters[groom.roots.part[:count]]
     fade = _smoothstep(*_HAIRLINE_FADE_MM, _above_hairline(groom, index))
     density = 1.0 + part["hairline"] * (fade - 1.0)
     density = density * part["density"] * (1.0 - part["thinning"] * roots.place[:count, 2])
-    number = index.astype(np.uint32) + part["seed"].astype(np.uint32) * np.uint32(131071)
-    return np.flatnonzero(_random(number, 0) < density).astype(np.int32)
+    strand_number = index.astype(np.uint32) + part["seed"].astype(np.uint32) * np.uint32(131071)
+    return np.flatnonzero(_random(strand_number, 0) < density).astype(np.int32)
 
 
-def _lengths(groom: Groom, index: Ints, part: NDArray[np.void], number: Words, above: Doubles) -> Doubles:
+def _length_fractions(
+    groom: Groom, index: Ints, part: NDArray[np.void], strand_number: Words, above_hairline_mm: Doubles
+) -> Doubles:
     """Return the length (n,) of each strand as a fraction of the length of its guides.
 
     index : (n,) indices of the strands
     part : (n,) parameters of the part of the groom to which each strand belongs
-    number : (n,) numbers that identify the strands, for `_random`
-    above : (n,) heights of the roots above the hairline [mm]
+    strand_number : (n,) numbers that identify the strands, for `_random`
+    above_hairline_mm : (n,) heights of the roots above the hairline [mm]
     """
     roots = groom.roots
     cut = (roots.guide_weight[index] * groom.guides.cut[roots.guide[index]]).sum(axis=1)
     sides = 1.0 - part["fade"] * (1.0 - roots.place[index, 3])
-    edge = 1.0 - part["hairline"] * (0.75 - 0.75 * _smoothstep(*_SHORT_HAIRLINE_MM, above))
+    edge = 1.0 - part["hairline"] * (0.75 - 0.75 * _smoothstep(*_SHORT_HAIR_HEIGHTS_MM, above_hairline_mm))
     length = np.minimum(cut, part["length_mm"] / part["guide_mm"] * sides) * edge
-    return np.asarray(length * (1.0 - part["layers"] * _random(number, 1)))
+    return np.asarray(length * (1.0 - part["layers"] * _random(strand_number, 1)))
 
 
-def _curves(
+def _interpolate_guides(
     groom: Groom, guides: tuple[Doubles, Doubles], index: Ints, u: Doubles, root_mm: Doubles
 ) -> _Curves:
     """Return curves of strands, interpolated between the guides of each strand.
@@ -260,80 +277,91 @@ def _curves(
         heights = (1.0 - part[..., 0]) * height_mm[guide, first] + part[..., 0] * height_mm[guide, first + 1]
         height += weight[..., 0] * heights
     normal = _unit(normal)
-    near = 1.0 / (1.0 + (np.maximum(height, 0.0) / _LIFTED_MM) ** 2)
+    near = 1.0 / (1.0 + (np.maximum(height, 0.0) / _LIFTED_HEIGHT_MM) ** 2)
     sag = near * np.maximum(square - (middle**2).sum(axis=-1), 0.0) / (2.0 * _HEAD_RADIUS_MM)
     position += sag[..., None] * normal
     return _Curves(position, height, normal, _unit(tangent + 1e-9 * normal))
 
 
-def _axes_across(at: _Curves) -> tuple[Doubles, Doubles]:
+def _axes_across(curves: _Curves) -> tuple[Doubles, Doubles]:
     """Return two unit vectors (n, k, 3) at each point, orthogonal to the curve and to each other."""
-    side = np.cross(at.tangent, at.normal)
+    side = np.cross(curves.tangent, curves.normal)
     upright = (side**2).sum(axis=-1, keepdims=True) < 0.08
-    side = _unit(np.where(upright, np.cross(at.tangent, _FALLBACK_AXIS), side))
-    return side, np.cross(side, at.tangent)
+    side = _unit(np.where(upright, np.cross(curves.tangent, _FALLBACK_AXIS), side))
+    return side, np.cross(side, curves.tangent)
 
 
-def _rope_offsets(number: Words, part: NDArray[np.void], s: Doubles) -> Doubles:
+def _rope_offsets(strand_number: Words, part: NDArray[np.void], length_mm: Doubles) -> Doubles:
     """Return the offsets (2, n, k) of strands from the middle of their twisted or braided ropes [mm].
 
-    number : (n,) numbers that identify the strands, for `_random`
+    strand_number : (n,) numbers that identify the strands, for `_random`
     part : (n,) parameters of the part of the groom to which each strand belongs
-    s : (n, k) lengths from the root along the rope [mm]
+    length_mm : (n, k) lengths from the root along the rope [mm]
     """
     rope = np.maximum(_column(part, "rope_mm"), 1e-6)
-    radius, turn = rope * np.sqrt(_random(number, 4))[:, None], 2 * np.pi * _random(number, 5)[:, None]
-    bundle = np.floor(3.0 * _random(number, 6))[:, None]
-    phase = 2 * np.pi * (s / (8.0 * rope) + bundle / 3.0)
+    radius, turn = (
+        rope * np.sqrt(_random(strand_number, 4))[:, None],
+        2 * np.pi * _random(strand_number, 5)[:, None],
+    )
+    bundle = np.floor(3.0 * _random(strand_number, 6))[:, None]
+    phase = 2 * np.pi * (length_mm / (8.0 * rope) + bundle / 3.0)
     middle = rope * np.sin(phase), 0.45 * rope * np.sin(2 * phase)
     braided = np.stack([middle[0] + 0.5 * radius * np.cos(turn), middle[1] + 0.5 * radius * np.sin(turn)])
-    phase = turn + 2 * np.pi * s / (7.0 * rope)
+    phase = turn + 2 * np.pi * length_mm / (7.0 * rope)
     twisted = np.stack([radius * np.cos(phase), radius * np.sin(phase)])
     return np.where(_column(part, "braid") > 0, braided, twisted)
 
 
-def _curl_offsets(number: Words, clump: Words, part: NDArray[np.void], s: Doubles) -> Doubles:
+def _curl_offsets(
+    strand_number: Words, clump_number: Words, part: NDArray[np.void], length_mm: Doubles
+) -> Doubles:
     """Return the offsets (2, n, k) by which curls displace the points of strands [mm].
 
-    number, clump : (n,) numbers that identify the strands and their clumps, for `_random`
+    strand_number, clump_number : (n,) numbers that identify the strands and their clumps, for `_random`
     part : (n,) parameters of the part of the groom to which each strand belongs
-    s : (n, k) lengths from the root along the strand [mm]
+    length_mm : (n, k) lengths from the root along the strand [mm]
     """
-    pitch = _column(part, "pitch_mm") * (0.85 + 0.3 * _random(clump, 8))[:, None]
-    phase = 2 * np.pi * (s / pitch + (_random(clump, 9) + part["incoherence"] * _random(number, 7))[:, None])
-    radius = _column(part, "curl_mm") * (0.75 + 0.5 * _random(number, 10))[:, None]
-    radius = radius * np.minimum(s / (0.5 * _column(part, "pitch_mm") + 4.0), 1.0)
+    pitch = _column(part, "pitch_mm") * (0.85 + 0.3 * _random(clump_number, 8))[:, None]
+    shift = _random(clump_number, 9) + part["incoherence"] * _random(strand_number, 7)
+    phase = 2 * np.pi * (length_mm / pitch + shift[:, None])
+    radius = _column(part, "curl_mm") * (0.75 + 0.5 * _random(strand_number, 10))[:, None]
+    radius = radius * np.minimum(length_mm / (0.5 * _column(part, "pitch_mm") + 4.0), 1.0)
     return np.stack([radius * np.cos(phase), radius * np.sin(phase)])
 
 
-def _frizz_offsets(number: Words, part: NDArray[np.void], s: Doubles) -> Doubles:
+def _frizz_offsets(strand_number: Words, part: NDArray[np.void], length_mm: Doubles) -> Doubles:
     """Return smooth random offsets (2, n, k) by which frizz displaces the points of strands [mm].
 
-    number : (n,) numbers that identify the strands, for `_random`
+    strand_number : (n,) numbers that identify the strands, for `_random`
     part : (n,) parameters of the part of the groom to which each strand belongs
-    s : (n, k) lengths from the root along the strand [mm]
+    length_mm : (n, k) lengths from the root along the strand [mm]
     """
-    amount = part["frizz_mm"] * np.where(_random(number, 11) < part["flyaways"], 5.0, 1.0)
-    amount = amount[:, None] * np.minimum(s / 25.0, 1.0)
-    x, y = (2 * np.pi * _random(number, stream)[:, None] for stream in (12, 13))
-    slow, fast = 2 * np.pi * s / 90.0, 2 * np.pi * s / 31.0
+    amount = part["frizz_mm"] * np.where(_random(strand_number, 11) < part["flyaways"], 5.0, 1.0)
+    amount = amount[:, None] * np.minimum(length_mm / 25.0, 1.0)
+    x, y = (2 * np.pi * _random(strand_number, stream)[:, None] for stream in (12, 13))
+    slow, fast = 2 * np.pi * length_mm / 90.0, 2 * np.pi * length_mm / 31.0
     waves = np.sin(slow + x) + 0.4 * np.sin(fast + y), np.cos(slow + y) + 0.4 * np.cos(fast + x)
     return np.stack(
-        [amount * _random_normal(number, k)[:, None] * wave for k, wave in zip((14, 17), waves, strict=True)]
+        [
+            amount * _random_normal(strand_number, k)[:, None] * wave
+            for k, wave in zip((14, 17), waves, strict=True)
+        ]
     )
 
 
-def _absorption(number: Words, part: NDArray[np.void]) -> Doubles:
+def _strand_absorption(strand_number: Words, part: NDArray[np.void]) -> Doubles:
     """Return the absorption coefficients (n, 3) of strands [1/mm].
 
     Each strand represents several hairs, some of which may be white.
 
-    number : (n,) numbers that identify the strands, for `_random`
+    strand_number : (n,) numbers that identify the strands, for `_random`
     part : (n,) parameters of the part of the groom to which each strand belongs
     """
-    white = sum(_random(number, 20 + k) < part["grey"] for k in range(_COLOURED_HAIRS)) / _COLOURED_HAIRS
+    white = (
+        sum(_random(strand_number, 20 + k) < part["grey"] for k in range(_COLOUR_SAMPLES)) / _COLOUR_SAMPLES
+    )
     white = np.asarray(white)[:, None]
-    dark = part["dark"] * np.exp(0.12 * _random_normal(number, 26))[:, None]
+    dark = part["dark"] * np.exp(0.12 * _random_normal(strand_number, 26))[:, None]
     mixed = (1.0 - white) ** 2 * ((1.0 - white) * dark + white * dark.mean(axis=1, keepdims=True))
     return np.asarray(np.maximum(mixed, part["white"]) / part["hairs_per_strand"][:, None])
 

@@ -156,7 +156,7 @@ def find_outline_points(positions: Floats, targets: MorphTargets, skeleton: Skel
         random_weights = rng.random(len(targets.names)) * (
             rng.random(len(targets.names)) < _ACTIVE_TARGET_FRACTION
         )
-        matrices = rest if skeleton is None else _random_pose(skeleton, rng)
+        matrices = rest if skeleton is None else _random_bone_matrices(skeleton, rng)
         _select_extreme(chosen, outline.pose(random_weights.astype(np.float32), matrices))
     return candidates[chosen]
 
@@ -213,7 +213,7 @@ def _outline_candidates(positions: Floats, targets: MorphTargets, skeleton: Skel
     return np.unique(np.concatenate(found))
 
 
-def _random_pose(skeleton: Skeleton, rng: np.random.Generator) -> Floats:
+def _random_bone_matrices(skeleton: Skeleton, rng: np.random.Generator) -> Floats:
     """Return bone matrices (b, 3, 4) for random rotations of a few bones.
 
     Bones are chosen with a probability proportional to the number of points that follow them.

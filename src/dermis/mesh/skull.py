@@ -12,7 +12,7 @@ from dermis.base.arrays import Doubles, Floats, Ints
 
 Point = tuple[float, float, float]
 _CROWN_TO_CENTRE_MM = 120.0  # half the height of an adult head
-_HEAD_HEIGHT_MM = 100.0, 1000.0  # smallest and largest height of heads and busts
+_HEAD_HEIGHT_RANGE_MM = 100.0, 1000.0  # smallest and largest height of heads and busts
 _MIN_BODY_HEIGHT_MM = 300.0
 MAX_ELONGATION = 2.4
 """Largest ratio of length to width of a head with neck or shoulders; forearms have 3 and more [-]."""
@@ -32,7 +32,7 @@ _MAX_HEAD_WIDTH, _MAX_NECK_WIDTH, _MIN_SHOULDERS_TO_NECK = 0.25, 0.16, 1.6
 def is_head_sized(positions: Floats) -> bool:
     """Return whether vertices (v, 3) have the size and proportions of a head or bust [mm]."""
     width, height, depth = np.ptp(positions, axis=0)
-    low, high = _HEAD_HEIGHT_MM
+    low, high = _HEAD_HEIGHT_RANGE_MM
     if not (low <= height <= high and max(width, depth) <= _MAX_RELATIVE_WIDTH * height):
         return False
     _, across, along = principal_sizes(positions)

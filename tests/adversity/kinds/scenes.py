@@ -156,9 +156,9 @@ def _take_camera(plan: Plan) -> None:
 
 def _person(rng: Random) -> Input:
     from dermis.human.person import Human
-    from dermis.human.person_file import person_numbers
+    from dermis.human.person_file import person_parameters
 
-    numbers = json.dumps({"person": person_numbers(Human.drawn(rng.randrange(100)))}, default=float)
+    numbers = json.dumps({"person": person_parameters(Human.drawn(rng.randrange(100)))}, default=float)
     return Input({"person.json": numbers.encode()}, {"file": "person.json", "words": ["person.json"]})
 
 

@@ -41,7 +41,7 @@ class SurfacePoints(NamedTuple):
     derivative_x: Doubles
     derivative_y: Doubles
 
-    def step(self, directions: Doubles, length: Doubles) -> tuple[Doubles, Doubles]:
+    def front_plane_step(self, directions: Doubles, length: Doubles) -> tuple[Doubles, Doubles]:
         """Convert steps along the skin to steps (dx, dy) in the front plane, each (n,) [mm].
 
         directions : (n, 3) directions of the steps; only their tangential components count
@@ -204,7 +204,7 @@ def grow_brow_hairs(
     for k in range(2, KNOTS_PER_HAIR, 2):  # odd knots are interpolated, with an error of at most 0.16 mm
         angle = first_angle + bend * (t[k - 1] + t[k]) / 2
         direction = np.stack([side * np.cos(angle), np.sin(angle), np.zeros(len(angle))], axis=-1)
-        across, up = skin_points.step(direction, 2 * length / (KNOTS_PER_HAIR - 1))
+        across, up = skin_points.front_plane_step(direction, 2 * length / (KNOTS_PER_HAIR - 1))
         x, y = x + across, y + up
         skin_points = skin.sample(side, x, y)
         base = skin_points.position_mm + root_offset

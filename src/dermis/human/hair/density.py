@@ -29,7 +29,7 @@ _HAIRLINE_WAVES = np.array([[0.37, 0.0, 0.23], [0.81, -0.5, 0.0]])  # wave vecto
 
 _SCALP_MARGIN_MM = 25.0  # distance below the hairline down to which quads may have hair
 _BROW_MARGIN_MM = 8.0  # distance from quads of the brows within which their hairs may touch the skin
-_MIN_BEARD = 0.02  # zone amount above which quads may have a beard
+_MIN_BEARD_AMOUNT = 0.02  # zone amount above which quads may have a beard
 
 
 class HairDensity(NamedTuple):
@@ -92,16 +92,16 @@ def hairline_waves(points: Doubles) -> Doubles:
     return np.asarray(sum(np.sin(points[:, :3] @ wave) for wave in _HAIRLINE_WAVES))
 
 
-def zone_amounts(name: str, recession: float, points: Doubles) -> Doubles:
+def recession_effect(amount_name: str, recession: float, points: Doubles) -> Doubles:
     """Return how much a receding hairline changes an amount, such as hair density, at points, (n,).
 
-    name : one of `ZONE_AMOUNTS`
+    amount_name : one of `ZONE_AMOUNTS`
     recession : recession of the hairline, 0 to 1, see `SkinLook`
     points : (n, 3 or more) positions on the average person [mm]
     """
-    column = _amount_column(name)
+    column = _amount_column(amount_name)
     receding = zone_table(recession)[:, column] != zone_table()[:, column]
-    return _sum_zones(name, zone_table(recession)[receding], points)
+    return _sum_zones(amount_name, zone_table(recession)[receding], points)
 
 
 def scalp_density(recession: float) -> HairDensity:
@@ -137,7 +137,7 @@ def _scalp_candidates() -> NDArray[np.bool_]:
 
 @cache
 def _beard_candidates() -> NDArray[np.bool_]:
-    return _sum_zones("beard", zone_table(), average_points()) > _MIN_BEARD
+    return _sum_zones("beard", zone_table(), average_points()) > _MIN_BEARD_AMOUNT
 
 
 def _beard_amount(points: Doubles) -> Doubles:
@@ -162,16 +162,16 @@ def quad_areas_cm2(control_mesh: Mesh, quad: Index) -> Doubles:
     return np.asarray(np.sqrt(dot_columns(across, across)) / 200.0)
 
 
-def _sum_zones(name: str, rows: Floats, points: Doubles) -> Doubles:
+def _sum_zones(amount_name: str, zone_rows: Floats, points: Doubles) -> Doubles:
     """Return an amount, such as hair density, at points, (n,): a sum of Gaussians, one for each zone.
 
-    name : one of `ZONE_AMOUNTS`
-    rows : (k, 24) zones of the face, from `zone_table`
+    amount_name : one of `ZONE_AMOUNTS`
+    zone_rows : (k, 24) zones of the face, from `zone_table`
     points : (n, 3 or more) positions on the average person [mm]
     """
-    column, total = _amount_column(name), np.zeros(len(points))
+    column, total = _amount_column(amount_name), np.zeros(len(points))
     mirrored = np.abs(points[:, 0]), points[:, 1], points[:, 2]
-    for zone in rows[rows[:, column] != 0.0].astype(np.float64):
+    for zone in zone_rows[zone_rows[:, column] != 0.0].astype(np.float64):
         distance2 = sum(((mirrored[c] - zone[c]) * zone[4 + c]) ** 2 for c in range(3))
         total += zone[column] * np.exp(-distance2)
     return total
@@ -193,8 +193,8 @@ def skin_vertices_near_hair(root_finder: RootFinder) -> Index:
     return np.flatnonzero(tree.query(positions, distance_upper_bound=_BROW_MARGIN_MM)[0] < _BROW_MARGIN_MM)
 
 
-def _amount_column(name: str) -> int:
-    return 8 + ZONE_AMOUNTS.index(name)
+def _amount_column(amount_name: str) -> int:
+    return 8 + ZONE_AMOUNTS.index(amount_name)
 
 
 @cache

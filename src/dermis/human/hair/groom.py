@@ -32,7 +32,7 @@ def add_hair(
     root_finder: RootFinder,
     look: HairLook,
     recession: float = 0.0,
-    hairs: float = 1.0,
+    hair_fraction: float = 1.0,
 ) -> Head:
     """Return a head with strands for scalp hair, beard, brows and lashes.
 
@@ -40,18 +40,19 @@ def add_hair(
     root_finder : root finder of the mean person, on whom brows and lashes are defined
     look : length, density, curl and colour of the hair
     recession : recession of the hairline, 0 to 1, see `SkinLook`
-    hairs : fraction of scalp and beard hairs to generate; the hairs are widened by the inverse of this
-        fraction, so that coverage stays the same
+    hair_fraction : fraction of scalp and beard hairs to generate; the hairs are widened by the inverse of
+        this fraction, so that coverage stays the same
     """
     near = skin_vertices_near_hair(root_finder)
     skin = SkinSurface(head.mesh.positions[near], head.mesh.normals[near])
-    surface = GrowthSurface(head, control_head.mesh, skin, hairs)
+    surface = GrowthSurface(head, control_head.mesh, skin, hair_fraction)
     rngs = [np.random.default_rng((look.seed, int(side > 0))) for side in SIDE_SIGNS]
     left, right = _grow_brows(surface, root_finder, look, rngs)
     rows = list(_grow_lashes(surface, root_finder, eye_centres(control_head.mesh), rngs))
     groups = [left, *rows[:2], right, *rows[2:]]
     strands = _join_groups(groups, _fine_hair_absorption(groups, look))
-    return replace(head, strands=strands, hair=make_groom(look, recession, root_finder, head.levels, hairs))
+    groom = make_groom(look, recession, root_finder, head.levels, hair_fraction)
+    return replace(head, strands=strands, hair=groom)
 
 
 def _grow_brows(
@@ -66,7 +67,7 @@ def _grow_brows(
         roots.append(Roots(found.quad[index], found.position[index]))
         shape = brows.sample_shapes(u[index], v[index], rng, look)
         parameters.append(np.vstack([np.full(len(index), side), x[index], y[index], shape]))
-    frames, hair = surface.root_frames(_concatenate(roots)), np.concatenate(parameters, axis=1)
+    frames, hair = surface.root_frames(_concatenate_roots(roots)), np.concatenate(parameters, axis=1)
     grid_mm = surface.root_frames(root_finder.brow_grid_roots).positions_mm
     brow_surface = BrowSurface(*surface.skin.project(grid_mm))
     knots, radius = brows.grow_brow_hairs(brow_surface, frames.positions_mm, hair[0], hair[1:3], hair[3:])
@@ -88,7 +89,7 @@ def _grow_lashes(
             shape = lashes.sample_shapes(row, u, rng, clumps)
             parameters.append(np.vstack([np.full((len(u), 4), [side, *eye]).T, shape]))
             clumps += len(u) + 1
-    frames, hair = surface.root_frames(_concatenate(roots)), np.concatenate(parameters, axis=1)
+    frames, hair = surface.root_frames(_concatenate_roots(roots)), np.concatenate(parameters, axis=1)
     knots, radius = lashes.grow_lashes(frames.positions_mm, hair[1:4].T, hair[0], hair[4:])
     group = _hair_group(frames, knots, radius, _LASH_PIGMENT_FACTOR)
     yield from _split_group(group, [len(part.quad) for part in roots])
@@ -119,21 +120,21 @@ def _join_groups(groups: list[HairGroup], absorption: Doubles) -> Strands:
     absorption : (n, 3) absorption coefficients of single hairs [1/mm]; a strand that represents several hairs
         gets a lower coefficient
     """
-    roots = _concatenate(group.roots for group in groups)
+    roots = _concatenate_roots(group.roots for group in groups)
     knots, radius = (np.concatenate([group[k] for group in groups]) for k in (1, 2))
     hairs_per_strand, cover = (_repeat_per_hair(groups, name) for name in ("hairs_per_strand", "cover"))
     strand_absorption = (absorption / hairs_per_strand[:, None]).astype(np.float32)
     return Strands(roots, knots, radius, strand_absorption, cover.astype(np.float32))
 
 
-def _concatenate(parts: Iterable[Roots]) -> Roots:
+def _concatenate_roots(parts: Iterable[Roots]) -> Roots:
     quads, positions = zip(*parts, strict=True)
     return Roots(np.concatenate(quads), np.concatenate(positions))
 
 
-def _repeat_per_hair(groups: list[HairGroup], name: str) -> Doubles:
+def _repeat_per_hair(groups: list[HairGroup], field_name: str) -> Doubles:
     """Return the values of a scalar field of `HairGroup`, such as "cover", repeated for each hair, (n,)."""
-    return np.concatenate([np.full(len(group.radius), getattr(group, name)) for group in groups])
+    return np.concatenate([np.full(len(group.radius), getattr(group, field_name)) for group in groups])
 
 
 def _fine_hair_absorption(groups: list[HairGroup], look: HairLook) -> Doubles:

@@ -16,9 +16,9 @@ from dermis.mesh.groom import GUIDE_ANCHORS, GUIDE_KNOTS, Guides
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.strands import quad_corners
 
-ROW_MM = 14.0
+CORNROW_SPACING_MM = 14.0
 """Distance between the middles of cornrows [mm]."""
-_STEP_MM = 5.0  # largest step of the growth of guides
+_MAX_STEP_MM = 5.0  # largest step of the growth of guides
 _MIN_HEIGHT_MM = 0.5  # least height of guides above the skin, away from their roots
 _LAYER_LENGTH_MM = 35.0  # length along which hair rises to the outermost layer
 _WHORL_MM = np.array([9.0, 86.0, -131.0])
@@ -27,8 +27,8 @@ _ROUND_RADII_MM = np.array([75.0, 96.0, 92.0])  # semi-axes of the skull
 # Elliptic cylinder around the face that combed hair avoids: centre (z), semi-axes along x and z, and the
 # heights between which it begins [mm].
 _FACE_CENTRE_Z, _FACE_RADII_MM, _FACE_TOP_MM = -60.0, (74.0, 118.0), (78.0, 40.0)
-_ANCHOR_MM = 6.0  # distance below which the quads that a knot follows have about equal weights
-_OVER_EARS = "fall", "twist"  # combs of hair that bulges over the ears
+_ANCHOR_SOFTENING_MM = 6.0  # distance below which the quads that a knot follows have about equal weights
+_COMBS_OVER_EARS = "fall", "twist"  # combs of hair that bulges over the ears
 _EAR_CENTRE_MM = np.array([75.0, -22.0, -76.0])
 _EAR_SPREAD_MM = np.array([1.0, 42.0, 34.0])
 _EAR_HEIGHT_MM, _EAR_BEGIN_X = 17.0, 55.0  # height of the ears above the head; x beyond which they begin
@@ -85,10 +85,10 @@ def parting_side(points_mm: Doubles, style: Style) -> Doubles:
     )
 
 
-def row_of(points_mm: Doubles) -> Doubles:
+def cornrow_position(points_mm: Doubles) -> Doubles:
     """Return the position (n,) of points across the cornrows, in multiples of the distance between rows."""
     x, y = points_mm[:, 0], points_mm[:, 1] - _SKULL_CENTRE_MM[1]
-    return np.asarray(np.arctan2(x, np.maximum(y, -60.0) + 75.0) * 110.0 / ROW_MM)
+    return np.asarray(np.arctan2(x, np.maximum(y, -60.0) + 75.0) * 110.0 / CORNROW_SPACING_MM)
 
 
 def fringe_weight(points_mm: Doubles, style: Style) -> Doubles:
@@ -98,7 +98,7 @@ def fringe_weight(points_mm: Doubles, style: Style) -> Doubles:
     return smoothstep(-48.0, -34.0, points_mm[:, 2]) * smoothstep(56.0, 44.0, np.abs(points_mm[:, 0]))
 
 
-def _fall(points: Doubles, style: Style) -> Doubles:
+def _parted_directions(points: Doubles, style: Style) -> Doubles:
     """Return the directions (n, 3) of hair that falls to either side of a parting."""
     x, y, z = points.T
     side, top = (
@@ -113,37 +113,37 @@ def _fall(points: Doubles, style: Style) -> Doubles:
     return np.asarray((1.0 - fringe) * ((1.0 - back) * sides + back * behind) + fringe * forward)
 
 
-def _back(points: Doubles, style: Style) -> Doubles:
+def _swept_back_directions(points: Doubles, style: Style) -> Doubles:
     """Return the directions (n, 3) of hair combed back, and combed down at the nape and below the temples."""
     x, y, z = points.T
     down = np.maximum(smoothstep(60.0, -10.0, y), smoothstep(-100.0, -150.0, z))
     return np.stack([x / 400.0, -0.9 * down, -1.0 + 0.75 * smoothstep(-110.0, -150.0, z)], axis=1)
 
 
-def _spiral(points: Doubles, style: Style) -> Doubles:
+def _uncombed_directions(points: Doubles, style: Style) -> Doubles:
     """Return the directions (n, 3) of uncombed hair: away from the whorl, and downwards at sides and nape."""
     away = points - _WHORL_MM
     low = 70.0 * smoothstep(40.0, -30.0, points[:, 1])
     return np.asarray(away + np.stack([0.0 * low, -low, -0.3 * low], axis=1))
 
 
-def _twist(points: Doubles, style: Style) -> Doubles:
+def _rope_directions(points: Doubles, style: Style) -> Doubles:
     """Return the directions (n, 3) of hair in twisted ropes, which fall to all sides of the head."""
     away = points - np.array([0.0, 100.0, -70.0])
     return np.asarray(away * [1.0, 0.6, 0.9])
 
 
-def _beard(points: Doubles, style: Style) -> Doubles:
+def _beard_directions(points: Doubles, style: Style) -> Doubles:
     sideways = 0.4 * np.clip(points[:, 0] / 25.0, -1.0, 1.0)
     return np.stack([sideways, np.full(len(points), -1.0), np.zeros(len(points))], axis=1)
 
 
-def _to_tie(points: Doubles, style: Style) -> Doubles:
+def _tie_directions(points: Doubles, style: Style) -> Doubles:
     return np.asarray(np.array(style.tie_mm) - points)
 
 
-def _rows(points: Doubles, style: Style) -> Doubles:
-    """Return the directions (n, 3) of hair in cornrows: backwards along curves of constant `row_of`."""
+def _cornrow_directions(points: Doubles, style: Style) -> Doubles:
+    """Return the directions (n, 3) of hair in cornrows: backwards, at a constant `cornrow_position`."""
     x, y, z = points.T
     angle = np.arctan2(x, np.maximum(y - _SKULL_CENTRE_MM[1], -60.0) + 75.0)
     down = smoothstep(-90.0, -150.0, z)
@@ -153,13 +153,13 @@ def _rows(points: Doubles, style: Style) -> Doubles:
 
 
 COMBS: dict[str, Callable[[Doubles, Style], Doubles]] = {
-    "up": _spiral,
-    "fall": _fall,
-    "back": _back,
-    "rows": _rows,
-    "gather": _to_tie,
-    "twist": _twist,
-    "beard": _beard,
+    "up": _uncombed_directions,
+    "fall": _parted_directions,
+    "back": _swept_back_directions,
+    "rows": _cornrow_directions,
+    "gather": _tie_directions,
+    "twist": _rope_directions,
+    "beard": _beard_directions,
 }
 """Directions (n, 3) along which hair is combed at points (n, 3) of the scalp, by the comb of a style."""
 
@@ -212,13 +212,13 @@ def grow_guides(root_finder: RootFinder, points: Doubles, style: Style) -> tuple
 
     points : (g, 3) roots on the skin of the mean person [mm]
     """
-    surface = body_surface(root_finder, ears=style.comb not in _OVER_EARS)
+    surface = body_surface(root_finder, ears=style.comb not in _COMBS_OVER_EARS)
     _, normal = surface.project(points)
-    state = Growth(points, normal, points, _first_direction(points, normal, style), normal,
+    state = Growth(points, normal, points, _root_directions(points, normal, style), normal,
                    np.zeros(len(points)), np.zeros(len(points)), np.full(len(points), np.inf))  # fmt: skip
     knots = [(points, normal, state.height_mm)]
     segment = style.max_length_mm / (GUIDE_KNOTS - 1)
-    substeps = max(1, int(np.ceil(segment / _STEP_MM)))
+    substeps = max(1, int(np.ceil(segment / _MAX_STEP_MM)))
     for _ in range(GUIDE_KNOTS - 1):
         for _ in range(substeps):
             state = _advance(surface, state, segment / substeps, style)
@@ -227,7 +227,7 @@ def grow_guides(root_finder: RootFinder, points: Doubles, style: Style) -> tuple
     return positions, normals, heights
 
 
-def _first_direction(points: Doubles, normals: Doubles, style: Style) -> Doubles:
+def _root_directions(points: Doubles, normals: Doubles, style: Style) -> Doubles:
     combed = unit(tangent_component(COMBS[style.comb](points, style), normals))
     if style.comb == "up":
         return unit(normals + style.tilt * combed)
@@ -250,17 +250,17 @@ def _advance(surface: SkinSurface, state: Growth, step: float, style: Style) -> 
     moved = state.position_mm + step * direction
     base, normal = surface.project(moved)
     height = ((moved - base) * normal).sum(axis=1)
-    height_of_ears = _EAR_HEIGHT_MM * ear_weight(base) if style.comb in _OVER_EARS else 0.0
+    height_of_ears = _EAR_HEIGHT_MM * ear_weight(base) if style.comb in _COMBS_OVER_EARS else 0.0
     layer = style.volume_mm * (1.0 - np.exp(-length / _LAYER_LENGTH_MM)) * np.minimum(length / 20.0, 1.0)
     least = np.minimum(length / 6.0, 1.0) * (_MIN_HEIGHT_MM + layer + height_of_ears)
     pushed = np.clip(least - height, 0.0, 0.8 * step)[:, None]
     moved += pushed * normal
     if style.comb == "fall":
         loose = fringe_weight(state.root_mm, style)[:, None] < 0.5
-        moved = np.where(loose, _clear_face(moved), moved)
+        moved = np.where(loose, _move_off_face(moved), moved)
     if style.coil_mm:
         wound = np.clip((length - tied) / 25.0, 0.0, 1.0)[:, None]
-        moved += wound * (_bun(state, length, style) - moved)
+        moved += wound * (_bun_points(state, length, style) - moved)
     # hair that is held out slides along the obstacle: it loses its inward motion, but gains no outward motion
     inward = np.minimum((direction * normal).sum(axis=1, keepdims=True), 0.0)
     direction = np.where(
@@ -283,7 +283,7 @@ def _steer(state: Growth, style: Style) -> Doubles:
             to_tie = np.array(style.tie_mm) + _tie_offsets(state, style) - state.position_mm
             distance = np.linalg.norm(to_tie, axis=1, keepdims=True)
             combed = unit(np.where(distance < 35.0, to_tie, combed))
-            tail = _tail(state, style, pull)
+            tail = _tail_directions(state, style, pull)
             return np.where(np.isfinite(state.tied_mm)[:, None], tail, unit(0.5 * state.direction + combed))
         return unit(0.6 * state.direction + 0.8 * close * combed + 0.3 * (1.0 - close) * pull)
     return unit(style.stiffness * state.direction + (1.0 - style.stiffness) * pull)
@@ -302,7 +302,7 @@ def _tie_offsets(state: Growth, style: Style) -> Doubles:
     return np.asarray(_TIE_RADIUS_MM * np.minimum(reach / 60.0, 1.0) * unit(away))
 
 
-def _tail(state: Growth, style: Style, pull: Doubles) -> Doubles:
+def _tail_directions(state: Growth, style: Style, pull: Doubles) -> Doubles:
     """Return the directions (g, 3) of hair beyond the hair tie: outwards, then down and slightly apart.
 
     pull : (g, 3) pull of gravity, as vectors
@@ -316,7 +316,7 @@ def _tail(state: Growth, style: Style, pull: Doubles) -> Doubles:
     return unit(0.85 * state.direction + 0.15 * pull + 0.3 * np.exp(-since / 25.0) * outward + spread * apart)
 
 
-def _since_tie(state: Growth, length: Doubles) -> Doubles:
+def _length_beyond_tie(state: Growth, length: Doubles) -> Doubles:
     """Return the length (g,) of each guide beyond the hair tie [mm]; 0 before the guide reaches the tie.
 
     length : (g,) lengths from the roots [mm]
@@ -324,7 +324,7 @@ def _since_tie(state: Growth, length: Doubles) -> Doubles:
     return np.maximum(length - np.where(np.isfinite(state.tied_mm), state.tied_mm, length), 0.0)
 
 
-def _bun(state: Growth, length: Doubles, style: Style) -> Doubles:
+def _bun_points(state: Growth, length: Doubles, style: Style) -> Doubles:
     """Return points (g, 3) on guides that are wound into a bun beyond the hair tie [mm].
 
     length : (g,) lengths from the roots to the points [mm]
@@ -335,7 +335,7 @@ def _bun(state: Growth, length: Doubles, style: Style) -> Doubles:
     offset = _tie_offsets(state, style)
     turn = np.arctan2(offset @ up, offset @ side)
     rank = np.linalg.norm(offset, axis=1) / _TIE_RADIUS_MM
-    since = _since_tie(state, length)
+    since = _length_beyond_tie(state, length)
     radius = style.coil_mm * (0.7 + 0.3 * rank)
     tilt = 1.9 - 1.5 * smoothstep(0.0, 260.0, since) + 0.25 * np.sin(3.0 * turn)
     turn = turn + since / (0.8 * radius)
@@ -344,7 +344,7 @@ def _bun(state: Growth, length: Doubles, style: Style) -> Doubles:
     return np.asarray(centre + radius[:, None] * (across + np.cos(tilt)[:, None] * outward))
 
 
-def _clear_face(points: Doubles) -> Doubles:
+def _move_off_face(points: Doubles) -> Doubles:
     """Return points (g, 3) after moving them sideways out of an elliptic cylinder around the face [mm]."""
     x, y, z = points.T
     along = np.clip((z - _FACE_CENTRE_Z) / _FACE_RADII_MM[1], -1.0, 1.0)
@@ -362,10 +362,10 @@ def cut_fractions(knots: Doubles, style: Style) -> Doubles:
     cut = np.ones(len(knots))
     root = knots[:, 0]
     if style.cut_y_mm is not None:
-        cut = np.minimum(cut, _first_below(knots, np.full(len(knots), style.cut_y_mm)))
+        cut = np.minimum(cut, _first_crossing_fractions(knots, np.full(len(knots), style.cut_y_mm)))
     if style.fringe_y_mm is not None:
         fringe = fringe_weight(root, style) > 0.5
-        cut = np.where(fringe, _first_below(knots, np.full(len(knots), style.fringe_y_mm)), cut)
+        cut = np.where(fringe, _first_crossing_fractions(knots, np.full(len(knots), style.fringe_y_mm)), cut)
     if style.round:
         radius = np.linalg.norm((knots - _SKULL_CENTRE_MM) / _ROUND_RADII_MM, axis=2)
         limit = 1.0 + style.round * style.max_length_mm / 90.0
@@ -375,15 +375,15 @@ def cut_fractions(knots: Doubles, style: Style) -> Doubles:
     return cut
 
 
-def _first_below(knots: Doubles, level: Doubles) -> Doubles:
+def _first_crossing_fractions(knots: Doubles, height_mm: Doubles) -> Doubles:
     """Return where each curve first falls below a height, as a fraction (g,) of the curve's length.
 
     The fraction is 1 for curves that do not fall below the height.
 
     knots : (g, k, 3) knots of the curves [mm]
-    level : (g,) height for each curve [mm]
+    height_mm : (g,) height for each curve [mm]
     """
-    y = knots[..., 1] - level[:, None]
+    y = knots[..., 1] - height_mm[:, None]
     crosses = (y[:, 1:] < 0) & (y[:, :-1] >= 0)
     first = crosses.argmax(axis=1)
     row = np.arange(len(y))
@@ -408,7 +408,7 @@ def bind_guides(
     corners = quad_corners(control_mesh, skin)
     around = points_mm[corners]
     distance, near = cKDTree(around.mean(axis=1)).query(knots, k=GUIDE_ANCHORS)
-    weight = np.asarray(1.0 / (distance**2 + _ANCHOR_MM**2))
+    weight = np.asarray(1.0 / (distance**2 + _ANCHOR_SOFTENING_MM**2))
     weight /= weight.sum(axis=-1, keepdims=True)
     origin, axes = quad_frames(around)
     local = np.einsum("gkaic,gkac->gkai", axes[near], knots[:, :, None] - origin[near])

@@ -19,25 +19,25 @@ BEARD_PER_CM2 = 60.0
 """Density of beards [1/cm2]."""
 _HAIR_RADIUS_MM, _BEARD_RADIUS_MM = 0.034, 0.048
 _MIN_EUMELANIN = 0.07  # white hair is not quite white
-_MAX_SEED = 1 << 24  # seeds are exact as float32
+_SEED_COUNT = 1 << 24  # seeds are exact as float32
 # Radius and pitch of the curls of hair, by the dial `HairLook.curl` [mm].
-_CURLS = np.array([0.0, 0.1, 0.3, 0.6, 0.8, 1.0])
+_CURL_NODES = np.array([0.0, 0.1, 0.3, 0.6, 0.8, 1.0])
 _CURL_RADIUS_MM = np.array([0.0, 0.5, 5.0, 6.5, 3.6, 1.7])
 _CURL_PITCH_MM = np.array([150.0, 130.0, 95.0, 34.0, 15.0, 7.5])
-_INCOHERENCE = np.array([0.3, 0.3, 0.12, 0.2, 0.5, 1.0])
+_CURL_INCOHERENCE = np.array([0.3, 0.3, 0.12, 0.2, 0.5, 1.0])
 _FRIZZ_MM = np.array([0.25, 0.35, 0.6, 0.9, 0.8, 0.5])
-_FLYAWAYS = 0.012
+_FLYAWAY_FRACTION = 0.012
 _KNOTS_PER_TURN = 7.0
-_KNOT_MM = 14.0  # length of the segments of straight hair
+_STRAIGHT_SEGMENT_MM = 14.0  # length of the segments of straight hair
 _MIN_KNOTS, _MAX_KNOTS = 5, 64
-_FLOATS = (
+_FLOAT_FIELDS = (
     "density", "hairline", "thinning", "length_mm", "guide_mm", "fade", "layers", "clump", "clump_start_mm",
     "rope_mm", "braid", "curl_mm", "pitch_mm", "incoherence", "frizz_mm", "flyaways", "radius_mm", "cover",
     "grey", "hairs_per_strand",
 )  # fmt: skip
 PART_DTYPE = np.dtype(
     [
-        *((name, "f4") for name in _FLOATS),
+        *((name, "f4") for name in _FLOAT_FIELDS),
         ("dark", "f4", 3),
         ("seed", "f4"),
         ("white", "f4", 3),
@@ -64,25 +64,27 @@ def make_groom(
     if scalp is None and not bearded:
         return None
     tables = style_tables(scalp, bearded, root_finder, levels)
-    parts = [_scalp_part(scalp, look, recession)] if scalp else []
-    parts += [_beard_part(look)] if bearded else []
+    parts = [_scalp_parameters(scalp, look, recession)] if scalp else []
+    parts += [_beard_parameters(look)] if bearded else []
     parameters, strands = np.array(parts, PART_DTYPE), round(hair_fraction * len(tables.roots))
     heights, knots = hairline_heights(max(recession, scalp.crown if scalp else 0.0)), _knot_count(parameters)
     return Groom(tables.guides, tables.roots, parameters, strands, knots, heights, tables.centre_mm)
 
 
-def _scalp_part(style: Style, look: HairLook, recession: float) -> tuple[object, ...]:
+def _scalp_parameters(style: Style, look: HairLook, recession: float) -> tuple[object, ...]:
     length, fade = min(look.length_mm, style.max_length_mm), look.fade if style.fade else 0.0
     densities = STRANDS_PER_CM2, MAX_PER_CM2, look.density
-    return _part(style, look, length, densities, _HAIR_RADIUS_MM, fade, max(recession, style.crown), 1.0)
+    return _part_parameters(
+        style, look, length, densities, _HAIR_RADIUS_MM, fade, max(recession, style.crown), 1.0
+    )
 
 
-def _beard_part(look: HairLook) -> tuple[object, ...]:
+def _beard_parameters(look: HairLook) -> tuple[object, ...]:
     length, densities = min(look.beard_mm, BEARD.max_length_mm), (BEARD_STRANDS_PER_CM2, BEARD_PER_CM2, 1.0)
-    return _part(BEARD, look, length, densities, _BEARD_RADIUS_MM)
+    return _part_parameters(BEARD, look, length, densities, _BEARD_RADIUS_MM)
 
 
-def _part(
+def _part_parameters(
     style: Style,
     look: HairLook,
     length_mm: float,
@@ -90,7 +92,7 @@ def _part(
     hair_radius_mm: float,
     fade: float = 0.0,
     thinning: float = 0.0,
-    hairline: float = 0.0,
+    hairline_effect: float = 0.0,
 ) -> tuple[object, ...]:
     """Return the parameters of scalp hair or of a beard as a row of `PART_DTYPE`.
 
@@ -100,15 +102,15 @@ def _part(
     strands_per_cm2, hairs_per_cm2, density = densities
     hairs_per_strand = hairs_per_cm2 / strands_per_cm2
     curl_mm, pitch_mm, incoherence, frizz_mm = (
-        float(np.interp(look.curl, _CURLS, column))
-        for column in (_CURL_RADIUS_MM, _CURL_PITCH_MM, _INCOHERENCE, _FRIZZ_MM)
+        float(np.interp(look.curl, _CURL_NODES, column))
+        for column in (_CURL_RADIUS_MM, _CURL_PITCH_MM, _CURL_INCOHERENCE, _FRIZZ_MM)
     )
     rope = style.rope_mm > 0.0
     radius = hairs_per_strand * hair_radius_mm
     cover = 0.5 * 2.0 * radius * min(length_mm, 60.0) * strands_per_cm2 * density / 100.0
     values = {
         "density": density,
-        "hairline": hairline,
+        "hairline": hairline_effect,
         "thinning": thinning,
         "length_mm": length_mm,
         "guide_mm": style.max_length_mm,
@@ -122,13 +124,13 @@ def _part(
         "pitch_mm": pitch_mm,
         "incoherence": incoherence,
         "frizz_mm": frizz_mm * min(1.0, length_mm / 60.0) * (0.3 if rope else 1.0),
-        "flyaways": 0.3 * _FLYAWAYS if rope else _FLYAWAYS,
+        "flyaways": 0.3 * _FLYAWAY_FRACTION if rope else _FLYAWAY_FRACTION,
         "radius_mm": radius,
         "cover": min(cover, 4.0),
         "grey": look.grey,
         "hairs_per_strand": hairs_per_strand,
         "dark": tuple(absorption_per_mm(look.eumelanin, look.pheomelanin)),
-        "seed": look.seed % _MAX_SEED,
+        "seed": look.seed % _SEED_COUNT,
         "white": tuple(absorption_per_mm(_MIN_EUMELANIN, 0.0)),
         "pad": 0.0,
     }
@@ -143,7 +145,7 @@ def _knot_count(parameters: NDArray[np.void]) -> int:
     lengths, pitches, curls, ropes = (
         parameters[name] for name in ("length_mm", "pitch_mm", "curl_mm", "rope_mm")
     )
-    straight = lengths / _KNOT_MM + _MIN_KNOTS
+    straight = lengths / _STRAIGHT_SEGMENT_MM + _MIN_KNOTS
     curled = np.where((curls > 1.0) & (ropes == 0.0), _KNOTS_PER_TURN * lengths / pitches, 0.0)
     roped = np.where(ropes > 0.0, _KNOTS_PER_TURN * lengths / (7.0 * np.maximum(ropes, 1.0)), 0.0)
     return int(np.clip(np.ceil(np.max([straight, curled, roped])), _MIN_KNOTS, _MAX_KNOTS))

@@ -23,12 +23,12 @@ FIELD_RANGES = {
 """Ranges of the fields whose range is not 0 to 1."""
 # Artist's values.
 _TYPICAL_CURL = {"african": 0.95, "asian": 0.0, "caucasian": 0.2}
-_TIGHT_CURL = 0.6  # curl above which hair is worn in the styles of tightly coiled hair
+_MIN_TIGHT_CURL = 0.6  # curl above which hair is worn in the styles of tightly coiled hair
 _BALD_CHANCES = {
     False: 0.01,
     True: 0.1,
 }  # chance of a bald or shaved head of women and of men, beside styles.toml
-_BALD = Style("up", max_length_mm=500.0, length_mm=6.0)
+_BALD_STYLE = Style("up", max_length_mm=500.0, length_mm=6.0)
 _MAX_BEARD_MM = 14.0
 _DARK_EUMELANIN = 3.0  # eumelanin above which shaved hair has full visibility
 
@@ -96,7 +96,7 @@ class HairLook:
             refuse(
                 "style", f"one of {', '.join(HAIR_STYLES)}", f"got {format_value(self.style)}", "Choose one"
             )
-        style = styles().get(self.style, _BALD)
+        style = styles().get(self.style, _BALD_STYLE)
         for name in ("length_mm", "fade"):
             if getattr(self, name) is None:
                 object.__setattr__(self, name, getattr(style, name))
@@ -120,7 +120,7 @@ def typical_hair(demographics: Demographics, eumelanin: float, pheomelanin: floa
     curl, woman = demographics.weighted_mean(_TYPICAL_CURL), demographics.sex < 0.5
     loose, tight = ("shoulder-length", "afro") if woman else ("short", "cropped")
     return HairLook(
-        style=tight if curl > _TIGHT_CURL else loose,
+        style=tight if curl > _MIN_TIGHT_CURL else loose,
         density=0.9 - 0.25 * old,
         curl=curl,
         bushy=min(1.0, 0.25 + 0.5 * demographics.sex + 0.25 * old * demographics.sex),
@@ -139,8 +139,8 @@ def sample_hair(rng: np.random.Generator, demographics: Demographics, typical: H
     n, style_chance, beard_chance = rng.normal(size=4), rng.random(), rng.random()
     man = demographics.sex > 0.5
     curl = float(np.clip(typical.curl + 0.12 * n[0], 0.0, 1.0))
-    name = _style_at(style_chance, man, curl > _TIGHT_CURL)
-    style = styles().get(name, _BALD)
+    name = _pick_style(style_chance, man, curl > _MIN_TIGHT_CURL)
+    style = styles().get(name, _BALD_STYLE)
     length = style.length_mm * float(np.exp(0.2 * n[1]))
     beard = float(np.exp(rng.uniform(np.log(0.8), np.log(_MAX_BEARD_MM))))
     return replace(
@@ -155,15 +155,15 @@ def sample_hair(rng: np.random.Generator, demographics: Demographics, typical: H
     )
 
 
-def _style_at(chance: float, man: bool, tight: bool) -> str:
+def _pick_style(chance: float, is_man: bool, is_tightly_coiled: bool) -> str:
     """Return the hair style that a uniformly distributed number selects by the probabilities of the styles.
 
     chance : uniformly distributed number, 0 to 1
-    man : whether the person is a man
-    tight : whether the hair is tightly coiled
+    is_man : whether the person is a man
+    is_tightly_coiled : whether the hair is tightly coiled
     """
-    worn = {name: one for name, one in styles().items() if (one.tight if tight else one.loose)}
-    chances = np.array([_BALD_CHANCES[man], *(one.men if man else one.women for one in worn.values())])
+    worn = {name: one for name, one in styles().items() if (one.tight if is_tightly_coiled else one.loose)}
+    chances = np.array([_BALD_CHANCES[is_man], *(one.men if is_man else one.women for one in worn.values())])
     index = int(np.searchsorted(np.cumsum(chances) / chances.sum(), chance, side="right"))
     return ("none", *worn)[min(index, len(worn))]
 

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from dermis.base.arrays import Doubles
 from dermis.base.disk import Arrays, cached_arrays
 from dermis.human.hair import density
-from dermis.human.hair.density import average_points, zone_amounts
+from dermis.human.hair.density import average_points, recession_effect
 from dermis.human.hair.guides import (
-    ROW_MM,
+    CORNROW_SPACING_MM,
     bind_guides,
+    cornrow_position,
     cut_fractions,
     grow_guides,
     parting_side,
-    row_of,
     smoothstep,
 )
 from dermis.human.hair.root_finder import RootFinder
@@ -30,11 +30,12 @@ STRANDS_PER_CM2 = 150.0
 """Density of the possible strands of the scalp [1/cm2]."""
 BEARD_STRANDS_PER_CM2 = 60.0
 """Density of the possible strands of beards [1/cm2]."""
-_VERSION = 9  # of this module's algorithm, part of the keys of cached tables
-_CACHED_STYLES = 8
-_APART_MM = 25.0, 55.0  # distances between guides from which strands are not interpolated between them
+_CACHE_VERSION = 9  # of this module's algorithm, part of the keys of cached tables
+_MAX_CACHED_STYLES = 8
+# Distances between guides from which strands are less, and then not at all, interpolated between them [mm].
+_GUIDE_SEPARATION_MM = 25.0, 55.0
 _SEED = 20
-_CENTRE_ROOTS = 2000  # number of roots whose mean is the centre of the hair
+_CENTRE_ROOT_COUNT = 2000  # number of roots whose mean is the centre of the hair
 _GUIDE_FIELDS = "corner", "local_mm", "weight", "rest_mm", "cut"
 _ROOT_FIELDS = "quad", "position", "guide", "guide_weight", "clump", "place", "along_mm"
 
@@ -52,17 +53,19 @@ class StyleTables(NamedTuple):
     centre_mm: Doubles
 
 
-@lru_cache(_CACHED_STYLES)
-def style_tables(scalp: Style | None, bearded: bool, root_finder: RootFinder, levels: int) -> StyleTables:
+@lru_cache(_MAX_CACHED_STYLES)
+def style_tables(
+    scalp_style: Style | None, has_beard: bool, root_finder: RootFinder, levels: int
+) -> StyleTables:
     """Return the guides and the roots of a hair style and a beard.
 
-    scalp : style of the hair of the head; None for a bald head
-    bearded : whether to include the beard
+    scalp_style : style of the hair of the head; None for a bald head
+    has_beard : whether to include the beard
     root_finder : root finder of the mean person
     levels : subdivision levels of the mesh on whose quads the roots lie
     """
-    worn = [*([scalp] if scalp else []), *([BEARD] if bearded else [])]
-    parts = [_cached_part(style, root_finder) for style in worn]
+    worn = [*([scalp_style] if scalp_style else []), *([BEARD] if has_beard else [])]
+    parts = [_cached_style_arrays(style, root_finder) for style in worn]
     guides = Guides(*(np.concatenate([part[name] for part in parts]) for name in _GUIDE_FIELDS))
     counts = [len(part["quad"]) for part in parts]
     order = np.random.default_rng(_SEED).permutation(sum(counts))
@@ -74,21 +77,21 @@ def style_tables(scalp: Style | None, bearded: bool, root_finder: RootFinder, le
     columns["clump"] = place[columns["clump"] + np.repeat(first_strand[:-1], counts)].astype(np.int32)
     columns["part"] = np.repeat(np.arange(len(parts), dtype=np.int32), counts)
     quad, position, *rest = (columns[name].take(order, axis=0) for name in (*_ROOT_FIELDS, "part"))
-    some = slice(None, _CENTRE_ROOTS)
+    some = slice(None, _CENTRE_ROOT_COUNT)
     corners_mm = root_finder.mean_mesh.points_mm[quad_corners(root_finder.mesh, quad[some])]
     centre_mm = np.einsum("nk,nkc->nc", quad_weights(position[some]), corners_mm).mean(axis=0)
     roots = refine_roots(root_finder.mesh, Roots(quad, position), levels)
     return StyleTables(guides, StrandRoots(roots, *rest), centre_mm)
 
 
-@lru_cache(_CACHED_STYLES)
-def _cached_part(style: Style, root_finder: RootFinder) -> Arrays:
+@lru_cache(_MAX_CACHED_STYLES)
+def _cached_style_arrays(style: Style, root_finder: RootFinder) -> Arrays:
     names, points_mm = [*_GUIDE_FIELDS, *_ROOT_FIELDS], root_finder.mean_mesh.points_mm
-    parameters = f"groom {_VERSION} {style}"
-    return cached_arrays(points_mm, parameters, names, lambda: _make_part(style, root_finder))
+    parameters = f"groom {_CACHE_VERSION} {style}"
+    return cached_arrays(points_mm, parameters, names, lambda: _build_style_arrays(style, root_finder))
 
 
-def _make_part(style: Style, root_finder: RootFinder) -> Arrays:
+def _build_style_arrays(style: Style, root_finder: RootFinder) -> Arrays:
     """Return the guides and roots of one style, as arrays by field name of `Guides` and `StrandRoots`."""
     mesh, rng = root_finder.mesh, np.random.default_rng(_SEED)
     beard = style is BEARD
@@ -108,7 +111,7 @@ def _make_part(style: Style, root_finder: RootFinder) -> Arrays:
         total = one_sided.sum(axis=1, keepdims=True)
         weight = np.where(total > 1e-3, one_sided / np.maximum(total, 1e-9), weight)
     weight = _agreeing_weights(weight, guide, knots)
-    place = _places(weight, average_points()[corners])
+    place = _root_places(weight, average_points()[corners])
     guides = bind_guides(mesh, points_mm, knots, heights, cut_fractions(knots, style))
     clump = _clump_middles(
         root_mm, np.einsum("nk,nkc->nc", weight, knots[guide, GUIDE_KNOTS // 2]), style, rng
@@ -134,11 +137,11 @@ def _agreeing_weights(weight: Doubles, guide: NDArray[np.int64], knots: Doubles)
     main = np.take_along_axis(guide, weight.argmax(axis=1)[:, None], axis=1)
     some = knots[:, :: GUIDE_KNOTS // 8]
     apart = np.linalg.norm(some[guide] - some[main], axis=-1).max(axis=2)
-    agreeing = weight * smoothstep(_APART_MM[1], _APART_MM[0], apart)
+    agreeing = weight * smoothstep(_GUIDE_SEPARATION_MM[1], _GUIDE_SEPARATION_MM[0], apart)
     return np.asarray(agreeing / agreeing.sum(axis=1, keepdims=True))
 
 
-def _places(weight: Doubles, corners: Doubles) -> Doubles:
+def _root_places(weight: Doubles, corners: Doubles) -> Doubles:
     """Return the place of each root on the head, (n, 4), as defined by `StrandRoots.place`.
 
     weight : (n, 4) weights of the corners of the quad on which each strand is rooted
@@ -147,7 +150,7 @@ def _places(weight: Doubles, corners: Doubles) -> Doubles:
     points = np.einsum("nk,nkc->nc", weight, corners)
     angle = density.hairline_angle(points)
     height = points[:, 1] + density.hairline_waves(points)
-    thinning = -zone_amounts("hair", 1.0, points)
+    thinning = -recession_effect("hair", 1.0, points)
     top = smoothstep(-45.0, 62.0, points[:, 1] + 0.15 * (points[:, 2] - density.HEAD_AXIS_Z))
     return np.stack([angle, height, np.clip(thinning, 0.0, 1.0), top], axis=1)
 
@@ -166,10 +169,10 @@ def _clump_middles(
     from scipy.spatial import cKDTree
 
     if style.comb == "rows":
-        across = row_of(root_mm)
+        across = cornrow_position(root_mm)
         along = root_mm[:, 1:]
-        found = cKDTree(np.column_stack([ROW_MM * across, along])).query(
-            np.column_stack([ROW_MM * np.round(across), along])
+        found = cKDTree(np.column_stack([CORNROW_SPACING_MM * across, along])).query(
+            np.column_stack([CORNROW_SPACING_MM * np.round(across), along])
         )[1]
         return np.asarray(found, np.int64)
     count = max(1, round(len(root_mm) / (STRANDS_PER_CM2 * (style.clump_mm / 10.0) ** 2)))

@@ -77,8 +77,8 @@ def neck_distance_mm(points: Doubles) -> Doubles:
 def torso_distance_mm(points: Doubles) -> Doubles:
     """Return the vertical distance (n,) of each point below the base of the neck [mm].
 
-    The base of the neck runs from the notch between the collar bones over the shoulders to the lowest vertebra
-    of the neck. The distance is positive on the torso and negative on neck and head.
+    The base of the neck runs from the notch between the collar bones to the lowest vertebra of the neck, over
+    the shoulders. The distance is positive on the torso and negative on neck and head.
 
     points : (n, 3) positions on the average human [mm]
     """

@@ -161,7 +161,7 @@ def table_sizes() -> dict[str, int]:
     The sizes are found without computing splines, because that would import SciPy, which is slow.
     """
     lengths = Counter(row["fold"] for row in read_rows(__package__, "folds")).values()
-    knots = sum(map(_sample_count, lengths))
+    knots = sum(map(_spline_sample_count, lengths))
     return {
         "zones": len(zone_table()),
         "folds": len(lengths),
@@ -170,7 +170,7 @@ def table_sizes() -> dict[str, int]:
     }
 
 
-def _sample_count(knot_count: int) -> int:
+def _spline_sample_count(knot_count: int) -> int:
     """Return the number of samples that represent a spline with `knot_count` knots."""
     return _FOLD_SAMPLES_PER_SEGMENT * (knot_count - 1) + 1
 
@@ -180,7 +180,9 @@ def _spline_points(knots: NDArray[np.float64]) -> NDArray[np.float64]:
     from scipy.interpolate import CubicSpline
 
     index = np.arange(len(knots))
-    return np.asarray(CubicSpline(index, knots)(np.linspace(0, len(knots) - 1, _sample_count(len(knots)))))
+    return np.asarray(
+        CubicSpline(index, knots)(np.linspace(0, len(knots) - 1, _spline_sample_count(len(knots))))
+    )
 
 
 def _bounding_sphere(points: NDArray[np.float64]) -> NDArray[np.float64]:

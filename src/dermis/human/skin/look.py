@@ -17,7 +17,7 @@ from dermis.human.skin.measured import (
     pigment_ancestry,
     sample_pigments,
     typical_pigments,
-    typical_sites,
+    typical_site_differences,
 )
 from dermis.mesh.eye_look import EyeLook
 from dermis.optics.pigments.parameters import DEFAULT_SKIN
@@ -109,7 +109,7 @@ class SkinLook:
     oil: float = 0.4
     age: float = 0.1
     seed: int = 0
-    sites: SiteDifferences = field(default_factory=typical_sites)
+    sites: SiteDifferences = field(default_factory=typical_site_differences)
 
     def __post_init__(self) -> None:
         """Raise DermisError for fields out of range."""

@@ -196,14 +196,15 @@ class MeasuredTable(NamedTuple):
         sexes, terms = np.asarray(sex, np.float64) - 0.5, age_term(age) - self.mean_age_term
         return np.asarray(values + sexes[..., None] * self.sex + terms[..., None] * self.age)
 
-    def site_variables(self, weights: Weights, cheek_variables: Doubles, normals: Doubles) -> Doubles:
+    def site_variables(self, weights: Weights, cheek_variables: Doubles, normal_samples: Doubles) -> Doubles:
         """Return the differences (n, 12, 3) between all sites and the cheek.
 
         The differences are in melanin [doublings], blood [doublings] and oxygen [-].
 
         weights : weight of each group in the mixture
         cheek_variables : (n, 4) variables of the cheek
-        normals : (n, 12, 2) independent samples of the standard normal distribution, zeros for typical people
+        normal_samples : (n, 12, 2) independent samples of the standard normal distribution, zeros for typical
+            people
         """
         middle = self.mixture("quantiles", weights)[:2, len(self.probabilities) // 2]
         deviation = np.clip(
@@ -212,7 +213,7 @@ class MeasuredTable(NamedTuple):
             _MAX_CHEEK_DEVIATION_DOUBLINGS,
         )
         found = np.broadcast_to(self.mixture("sites", weights), (len(cheek_variables), len(SITES), 3)).copy()
-        found[:, :, :2] += self.site_slope * deviation + self.site_spread * normals
+        found[:, :, :2] += self.site_slope * deviation + self.site_spread * normal_samples
         return found
 
 
@@ -253,15 +254,15 @@ def group_weights(
     skin_ancestry : name of the ancestry of the skin, which replaces the fractions; "" for none
     """
     if skin_ancestry:
-        return _spread_union(skin_ancestry, 1.0)
+        return _split_union_weight(skin_ancestry, 1.0)
     parts = {"african": african, "asian": asian, "caucasian": caucasian}
     weights: dict[str, float] = {}
     for name, fraction in parts.items():
-        weights |= {one: part for one, part in _spread_union(name, fraction).items() if part > 0.0}
+        weights |= {one: part for one, part in _split_union_weight(name, fraction).items() if part > 0.0}
     return weights
 
 
-def _spread_union(union_name: str, weight: float) -> dict[str, float]:
+def _split_union_weight(union_name: str, weight: float) -> dict[str, float]:
     members = ANCESTRY_UNIONS.get(union_name, (union_name,))
     return {one: weight / len(members) for one in members}
 
@@ -273,7 +274,7 @@ def pigment_ancestry(weights: Weights) -> tuple[float, float, float]:
     return african, 1.0 - african - european, european
 
 
-def likely_groups(ita: float) -> dict[str, float]:
+def group_probabilities(ita: float) -> dict[str, float]:
     """Return a dictionary from group to the probability that a person with an ITA belongs to the group.
 
     All groups are taken as equally common.
@@ -320,13 +321,13 @@ def _pigments_and_sites(
     sex: float,
     age: float,
     ita: float | None,
-    normals: Doubles,
-    site_normals: Doubles | None,
+    normal_samples: Doubles,
+    site_normal_samples: Doubles | None,
 ) -> tuple[MeasuredPigments, SiteDifferences]:
     """Return the pigments of a person's cheek, and the differences of other sites from the cheek.
 
-    normals : (4,) independent samples of the standard normal distribution, zeros for a typical person
-    site_normals : (12, 2) independent samples of the standard normal distribution; None for a typical person
+    normal_samples : (4,) independent samples of the standard normal distribution, zeros for a typical person
+    site_normal_samples : (12, 2) independent samples of the same distribution; None for a typical person
     """
     table = measured_table()
     correlation = table.mixture("correlation", weights)
@@ -334,16 +335,18 @@ def _pigments_and_sites(
     if ita is not None:
         slope = correlation[:4, 4]
         mean, covariance = slope * _ita_score(ita, weights), covariance - np.outer(slope, slope)
-    scores = mean + symmetric_square_root(covariance) @ normals
+    scores = mean + symmetric_square_root(covariance) @ normal_samples
     variables = table.variables(weights, sex, age, scores[None])
     pigments = _clipped_pigments(variables[0])
     if ita is not None:
         pigments = with_ita(pigments, ita)
         variables[0, 0] = np.log2(pigments.melanin)
-    typical = site_normals is None
-    normals_or_zeros = np.zeros((1, len(SITES), 2)) if site_normals is None else site_normals[None]
+    typical = site_normal_samples is None
+    samples_or_zeros = (
+        np.zeros((1, len(SITES), 2)) if site_normal_samples is None else site_normal_samples[None]
+    )
     middle = variables if not typical or ita is not None else np.tile(_median_variables(weights), (1, 1))
-    sites = table.site_variables(weights, middle, normals_or_zeros)[0]
+    sites = table.site_variables(weights, middle, samples_or_zeros)[0]
     oxygen = variables[0, 2] + sites[:, 2]  # may exceed 1, where skin is redder than the model allows
     sites[:, 2] = np.clip(oxygen, 0.0, 1.0) - pigments.oxygen
     names = [name.replace(" ", "_") for name in SITES]
@@ -502,7 +505,7 @@ def measured_tone(tone_name: str) -> MeasuredTone:
 
 
 @cache
-def typical_sites() -> SiteDifferences:
+def typical_site_differences() -> SiteDifferences:
     """Return the median differences between sites, averaged over all groups with equal weights."""
     count = len(GROUP_OF_CODE)
     return typical_pigments(dict.fromkeys(GROUP_OF_CODE.values(), 1.0 / count), 0.5, 30.0)[1]

@@ -20,7 +20,7 @@ from dermis.apps.truths.mitsuba_solid import ClosedSurface, closed_skin, offset_
 from dermis.apps.truths.person.medium import COAT_INDEX, COAT_TRANSMITTANCE
 from dermis.apps.truths.person.person import HairFibres, Person, SkinTextures
 from dermis.apps.truths.scene_description import Mitsuba, MitsubaObject, SceneDict, mitsuba_rgb
-from dermis.mesh.eyeball import LIMBUS_MM, SCLERA_MM, cornea_centre_mm, iris_mm, profile_mm
+from dermis.mesh.eyeball import LIMBUS_MM, SCLERA_MM, cornea_centre_mm, iris_plane_mm, profile_mm
 from dermis.optics.media import Medium
 from dermis.specular.two_lobe import MAX_ROUGHNESS, MIN_ROUGHNESS, NARROW_FACTOR, NARROW_WEIGHT, WIDE_FACTOR
 
@@ -238,17 +238,17 @@ def cornea_weight_map() -> Doubles:
 
 def iris_disc() -> tuple[Doubles, Index, float]:
     """Return the iris as a disc that nearly touches the eyeball: positions [mm], triangles, radius [mm]."""
-    radius = float(np.sqrt(SCLERA_MM**2 - iris_mm() ** 2)) - _IRIS_GAP_MM
+    radius = float(np.sqrt(SCLERA_MM**2 - iris_plane_mm() ** 2)) - _IRIS_GAP_MM
     azimuth = 2.0 * np.pi * np.arange(_EYEBALL_STEPS_AROUND) / _EYEBALL_STEPS_AROUND
     rim = np.stack(
-        [radius * np.cos(azimuth), radius * np.sin(azimuth), np.full(_EYEBALL_STEPS_AROUND, iris_mm())],
+        [radius * np.cos(azimuth), radius * np.sin(azimuth), np.full(_EYEBALL_STEPS_AROUND, iris_plane_mm())],
         axis=-1,
     )
     k = np.arange(_EYEBALL_STEPS_AROUND)
     triangles = np.stack(
         [np.full(_EYEBALL_STEPS_AROUND, _EYEBALL_STEPS_AROUND), k, (k + 1) % _EYEBALL_STEPS_AROUND], axis=-1
     )
-    return np.concatenate([rim, [[0.0, 0.0, iris_mm()]]]), triangles, radius
+    return np.concatenate([rim, [[0.0, 0.0, iris_plane_mm()]]]), triangles, radius
 
 
 def eye_bsdfs(mi: Mitsuba, textures: SkinTextures) -> tuple[MitsubaObject, MitsubaObject]:

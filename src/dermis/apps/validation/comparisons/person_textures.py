@@ -19,7 +19,7 @@ from dermis.human.skin.look import SkinLook
 from dermis.human.skin.painted import PaintedMaps
 from dermis.human.skin.surface import painted_surface
 from dermis.human.skin.textures import TILE_LENGTH_MM, detail_heights_mm
-from dermis.mesh.eyeball import SCLERA_MM, iris_mm
+from dermis.mesh.eyeball import SCLERA_MM, iris_plane_mm
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
@@ -54,7 +54,7 @@ def _paint_textures(renderer: Renderer, scene: Scene, look: SkinLook, texture_si
     height = height + _detail_heights_mm(gloss[..., 1], rough[..., 1], gloss[..., 2])
     roughness = np.maximum(scene.skin.smoothing * rough[..., 0], _MIN_ROUGHNESS)
     strength = np.ascontiguousarray(scene.skin.strength * gloss[..., 0])
-    radius = float(np.sqrt(SCLERA_MM**2 - iris_mm() ** 2))
+    radius = float(np.sqrt(SCLERA_MM**2 - iris_plane_mm() ** 2))
     iris, white, *teeth = (
         _part_texture(renderer, scene, part, radius) for part in range(len(_TEXTURED_PARTS))
     )

@@ -10,7 +10,7 @@ from dermis.gpu.shader_types import struct_dtype
 from dermis.gpu.wgsl_source import ShaderListMember
 from dermis.human import teeth
 from dermis.mesh.eye_look import EyeLook
-from dermis.mesh.eyeball import CORNEA_MM, LIMBUS_MM, SCLERA_MM, apex_mm, cornea_centre_mm, iris_mm
+from dermis.mesh.eyeball import CORNEA_MM, LIMBUS_MM, SCLERA_MM, apex_mm, cornea_centre_mm, iris_plane_mm
 from dermis.mesh.maps import Maps
 from dermis.optics.equivalent_medium import equivalent_medium, oblique_offset_mm
 from dermis.optics.gaussians import GaussianSum
@@ -48,7 +48,7 @@ def eye_constants() -> dict[str, float]:
         "sclera_mm": SCLERA_MM,
         "cornea_mm": CORNEA_MM,
         "apex_at": apex_mm(),
-        "iris_at": iris_mm(),
+        "iris_at": iris_plane_mm(),
         "arch_mm": teeth.MM_PER_U,
         "crown_mm": teeth.MM_PER_V,
         "bite": teeth.BITING_EDGE_V,

@@ -11,7 +11,7 @@ from dermis.apps.export.subject import Subject
 from dermis.apps.export.targets.gltf.volume import multiscatter_for_reflectance
 from dermis.formats.gltf.materials import SkinAdditions, encode_colours_png
 from dermis.formats.gltf.write import encode_head
-from dermis.human.person_file import person_numbers, relief_slopes
+from dermis.human.person_file import person_parameters, relief_slopes
 from dermis.mesh.head import Head
 from dermis.scene.heads import is_person_name, load_person
 
@@ -29,7 +29,7 @@ def encode_glb(subject: Subject, extensions: Extensions, draft_notice: str) -> b
     head = subject.head_or_ball
     notes: dict[str, object] = {"draft": draft_notice} if draft_notice else {}
     if is_person_name(subject.name):
-        notes["person"] = person_numbers(load_person(subject.name))
+        notes["person"] = person_parameters(load_person(subject.name))
     elif head.eyes is not None:
         notes["person"] = {"eyes": asdict(head.eyes.look)}
     return encode_head(
@@ -45,8 +45,8 @@ def encode_glb(subject: Subject, extensions: Extensions, draft_notice: str) -> b
 def _skin_additions(subject: Subject, head: Head, extensions: Extensions, draft_notice: str) -> SkinAdditions:
     """Return the skin material's extensions, uniform colour and, if needed, map of multiscatter colours.
 
-    The draft extension needs such a map for a head with a colour map: the map replaces the uniform
-    multiscatter colour.
+    A map of multiscatter colours replaces the uniform multiscatter colour of the draft extension if the head
+    has a colour map.
     """
     if not draft_notice:
         colour = {"baseColorFactor": [*(float(x) for x in subject.albedo), 1.0]}
