@@ -133,7 +133,7 @@ def measured_run(plan: Plan, pool: WorkerPool, spec: Spec, encoders: int, count:
 
 def workers(plan: Plan, count: int, *, moving: bool = False) -> JsonObject:
     """Measure a run with the given number of local workers."""
-    slots, encoders = SlotRequest(plan.adapter, workers=count, encoders=plan.encoders).slots()
+    slots, encoders = SlotRequest(plan.adapter, workers=count, encoders=plan.encoders).worker_slots()
     spec = spec_for(plan, plan.images * count, moving=moving)
     found = measured_run(plan, ProcessPool(slots), spec, encoders, count)
     return {"workers": count, "encoders": encoders, "adapters": len({one.adapter for one in slots}), **found}
@@ -142,7 +142,7 @@ def workers(plan: Plan, count: int, *, moving: bool = False) -> JsonObject:
 def dask(plan: Plan, count: int) -> JsonObject:
     """Measure the same run with local processes and with dask workers, and the ratio of their rates."""
     distributed = import_extra("distributed", "the comparison with dask")
-    slots, encoders = SlotRequest(plan.adapter, workers=count, encoders=plan.encoders).slots()
+    slots, encoders = SlotRequest(plan.adapter, workers=count, encoders=plan.encoders).worker_slots()
     spec = spec_for(plan, plan.images * count)
     threads = {"LP_NUM_THREADS": str(slots[0].threads)} if slots[0].threads else {}
     plain = measured_run(plan, ProcessPool(slots), spec, encoders)
@@ -194,7 +194,7 @@ def disk(plan: Plan) -> JsonObject:
 
 def machine_description(plan: Plan) -> JsonObject:
     """Return the description of the machine."""
-    adapters = SlotRequest(plan.adapter).adapters()
+    adapters = SlotRequest(plan.adapter).matching_adapters()
     return {
         "adapters": [one.name for one in adapters],
         "is_software": adapters[0].kind == "CPU",

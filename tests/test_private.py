@@ -13,7 +13,7 @@ import pytest
 
 from dermis.base import disk
 from dermis.base.errors import DermisWarning
-from dermis.base.private import make_private_folder, open_private_file, other_writers
+from dermis.base.private import describe_other_writers, make_private_folder, open_private_file
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="owners and modes are POSIX's")
 _NOBODY = 54321
@@ -101,10 +101,10 @@ def test_links_are_followed_step_by_step(place: Path) -> None:
     (place / "open" / "inner").mkdir(0o700)
     (place / "one").symlink_to(place / "open" / ".." / "open" / "inner")
     (place / "cache").symlink_to("one")
-    assert other_writers(place / "cache") == f"other users can write to {place / 'open'}"
+    assert describe_other_writers(place / "cache") == f"other users can write to {place / 'open'}"
     (place / "round").symlink_to("round")
     with pytest.raises(OSError, match="symbolic links"):
-        other_writers(place / "round" / "more")
+        describe_other_writers(place / "round" / "more")
 
 
 def test_file_writable_by_others_is_recomputed(place: Path) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from dermis.apps.batch import worker_pool
-from dermis.apps.batch.dask_worker import local_rank
+from dermis.apps.batch.dask_worker import hold_local_rank
 from dermis.apps.batch.worker_pool import SlotRequest
 
 
@@ -20,7 +20,7 @@ def patch_machine(monkeypatch: pytest.MonkeyPatch, cores: int, kind: str, *numbe
 
 
 def slot_adapters(request: SlotRequest) -> list[str]:
-    return [slot.adapter for slot in request.slots()[0]]
+    return [slot.adapter for slot in request.worker_slots()[0]]
 
 
 def test_each_gpu_has_a_worker_or_several(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -34,9 +34,9 @@ def test_each_gpu_has_a_worker_or_several(monkeypatch: pytest.MonkeyPatch) -> No
 @pytest.mark.parametrize(("workers", "encoders"), [(1, 7), (2, 3), (8, 1), (16, 1)])
 def test_encoders_share_the_cores(monkeypatch: pytest.MonkeyPatch, workers: int, encoders: int) -> None:
     patch_machine(monkeypatch, 8, "DiscreteGPU", 0)
-    found, each = SlotRequest(workers=workers).slots()
+    found, each = SlotRequest(workers=workers).worker_slots()
     assert each == encoders and all(slot.threads == 0 for slot in found)
-    assert SlotRequest(workers=workers, encoders=5).slots()[1] == 5
+    assert SlotRequest(workers=workers, encoders=5).worker_slots()[1] == 5
 
 
 @pytest.mark.parametrize(("cores", "workers", "threads"), [(1, 1, 1), (2, 1, 2), (8, 4, 2)])
@@ -44,12 +44,12 @@ def test_a_software_adapter_shares_the_cores(
     monkeypatch: pytest.MonkeyPatch, cores: int, workers: int, threads: int
 ) -> None:
     patch_machine(monkeypatch, cores, "CPU", 0)
-    found, encoders = SlotRequest().slots()
+    found, encoders = SlotRequest().worker_slots()
     assert (len(found), found[0].threads, encoders) == (workers, threads, 0)
 
 
 def test_ranks_of_a_host_are_its_own_and_free_again() -> None:
-    with local_rank() as first, local_rank() as second:
+    with hold_local_rank() as first, hold_local_rank() as second:
         assert (first, second) == (0, 1)
-    with local_rank() as again:
+    with hold_local_rank() as again:
         assert again == 0

@@ -19,7 +19,7 @@ from dermis.cli.options import option_name
 from dermis.scene.frozen_model import fields_under
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
-from dermis.scene.talk import COMPARISONS
+from dermis.scene.talk import COMPARISONS_HEADING
 
 Run = Callable[..., Any]
 
@@ -103,8 +103,10 @@ def test_help_of_render_explains_every_option(run: Run) -> None:
 
 def test_comparisons_of_the_talk_are_a_group_of_their_own_after_all_others(run: Run) -> None:
     *before, last = re.split(r"╭─+ ", run("render", "--help").stdout)
-    assert last.startswith(f"{COMPARISONS} ")
-    options = {option_name(name) for kind in (Skin, Settings) for name in fields_under(COMPARISONS, kind)}
+    assert last.startswith(f"{COMPARISONS_HEADING} ")
+    options = {
+        option_name(name) for kind in (Skin, Settings) for name in fields_under(COMPARISONS_HEADING, kind)
+    }
     assert set(re.findall(r"│ (--[\w-]+)", last)) == options
     assert not options & set(re.findall(r"--[\w-]+", "".join(before)))
 

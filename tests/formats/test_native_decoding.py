@@ -10,7 +10,7 @@ import pytest
 
 from dermis.base import native_decoding
 from dermis.base.errors import DermisError
-from dermis.base.native_decoding import as_text, run_decoder
+from dermis.base.native_decoding import run_decoder, text_from_array
 
 MODULE = "looping_decoder"
 
@@ -30,7 +30,7 @@ def test_arrays_pass_through_the_decoder_process(tmp_path: Path, monkeypatch: py
     monkeypatch.chdir(tmp_path)
     answer = answer_to("sound")
     np.testing.assert_array_equal(answer["sound"], np.arange(3))
-    assert str(tmp_path) not in as_text(answer["path"]).split("\n") and "" not in answer
+    assert str(tmp_path) not in text_from_array(answer["path"]).split("\n") and "" not in answer
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems limit less")

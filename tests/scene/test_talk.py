@@ -9,7 +9,7 @@ from small_head import write_head
 
 import dermis
 from dermis.scene.frozen_model import FrozenModel, field_heading, field_help, fields_under
-from dermis.scene.talk import COMPARISONS
+from dermis.scene.talk import COMPARISONS_HEADING
 
 FIELDS: dict[type[FrozenModel], list[str]] = {
     dermis.Skin: ["specular_colour", "energy"],
@@ -29,12 +29,12 @@ gamma = "wrong"
 
 @pytest.mark.parametrize("kind", FIELDS)
 def test_settings_of_the_talk_are_listed_under_their_heading(kind: type[FrozenModel]) -> None:
-    assert fields_under(COMPARISONS, kind) == FIELDS[kind]
-    assert {field_heading(kind, name) for name in kind.model_fields} == {"", COMPARISONS}
+    assert fields_under(COMPARISONS_HEADING, kind) == FIELDS[kind]
+    assert {field_heading(kind, name) for name in kind.model_fields} == {"", COMPARISONS_HEADING}
     assert all(field_help(kind, name) for name in FIELDS[kind])
     text = (kind.__doc__ or "").partition("\nExamples\n")[0]
     _, parameters, comparisons = text.split("\n----")
-    assert parameters.rstrip("-").endswith(COMPARISONS)
+    assert parameters.rstrip("-").endswith(COMPARISONS_HEADING)
     assert all(f"\n{name} : " in comparisons and f"\n{name} : " not in parameters for name in FIELDS[kind])
 
 

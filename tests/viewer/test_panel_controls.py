@@ -19,7 +19,7 @@ from dermis.scene.environment import Environment
 from dermis.scene.frozen_model import FrozenModel, field_help, slider
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Pigments, Skin, TissueLayer
-from dermis.scene.talk import COMPARISONS
+from dermis.scene.talk import COMPARISONS_HEADING
 
 BUTTONS = {"undo", "redo", "help", "hide", "save", "load", "screenshot", "reset", "freeze"}
 BUTTONS |= {"open", "search", "bones", "size", "head", "seed", "dice", "path", "open file"}
@@ -126,7 +126,7 @@ def test_every_field_has_a_help_text(kind: type[FrozenModel]) -> None:
 
 
 def test_talk_comparisons_are_the_last_collapsed_section(driver: InputDriver) -> None:
-    assert SECTIONS[-1].title == COMPARISONS and not SECTIONS[-1].is_open
+    assert SECTIONS[-1].title == COMPARISONS_HEADING and not SECTIONS[-1].is_open
     labels = {"energy", "reflection", "stretch", "seams", "gamma"}
     session, opened = driver.viewer.session, ("Technique", "Picture")
     for section in opened:
@@ -134,12 +134,12 @@ def test_talk_comparisons_are_the_last_collapsed_section(driver: InputDriver) ->
     session.positions.clear()
     driver.frame()
     assert not labels & set(session.positions) and {"BRDF", "tone", "technique"} <= set(session.positions)
-    others = max(y for name, (_, y) in session.positions.items() if name != COMPARISONS)
-    assert session.positions[COMPARISONS][1] > others
-    driver.press(COMPARISONS)
+    others = max(y for name, (_, y) in session.positions.items() if name != COMPARISONS_HEADING)
+    assert session.positions[COMPARISONS_HEADING][1] > others
+    driver.press(COMPARISONS_HEADING)
     driver.frame()
     assert labels <= set(session.positions)
-    for section in (COMPARISONS, *opened):
+    for section in (COMPARISONS_HEADING, *opened):
         driver.press(section)
 
 

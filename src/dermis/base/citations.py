@@ -17,7 +17,7 @@ _ENTRY_HEAD_PATTERN = re.compile(r"@(?P<kind>\w+)\s*\{\s*(?P<key>[^\s,{}]+)\s*,"
 
 def citation_keys() -> frozenset[str]:
     """Return the keys of the bibliography, which docstrings cite in brackets."""
-    return frozenset(_references())
+    return frozenset(_package_bibliography())
 
 
 def bibtex(keys: Iterable[str]) -> str:
@@ -27,7 +27,7 @@ def bibtex(keys: Iterable[str]) -> str:
 
     Raises DermisError for a key that is not in `base/references.bib`.
     """
-    known = _references()
+    known = _package_bibliography()
     unique = tuple(dict.fromkeys(keys))
     for key in unique:
         if key not in known:
@@ -63,7 +63,7 @@ def parse_bibtex(bibtex_text: str, source_name: str = "base/references.bib") -> 
 
 
 @cache
-def _references() -> dict[str, str]:
+def _package_bibliography() -> dict[str, str]:
     return parse_bibtex(files("dermis").joinpath("base/references.bib").read_text(encoding="utf-8"))
 
 

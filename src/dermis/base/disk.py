@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.errors import notify
-from dermis.base.private import cache_folder, make_private_folder, open_private_file, other_writers
+from dermis.base.private import cache_folder, describe_other_writers, make_private_folder, open_private_file
 
 Array = NDArray[Any]
 Arrays = dict[str, Array]
@@ -135,7 +135,7 @@ def save_arrays(folder: str, cache_key: str, arrays: Arrays) -> None:
 
 def _is_trusted(folder: Path) -> bool:
     """Return whether no other user can write to a folder; if others can, warn once."""
-    if reason := other_writers(folder):
+    if reason := describe_other_writers(folder):
         advice = "make it private, or name another in DERMIS_CACHE"
         _notify_once(f"{cache_folder()} is not used, because {reason}: {advice}")
     return not reason

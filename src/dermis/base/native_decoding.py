@@ -71,9 +71,14 @@ def run_decoder(
         output.seek(0)
         answer = _unpack_arrays(output.read())
     if _REFUSED_KEY in answer:
-        raise DermisError(shorten(as_text(answer[_REFUSED_KEY]), _MAX_MESSAGE_LENGTH))
+        raise DermisError(shorten(text_from_array(answer[_REFUSED_KEY]), _MAX_MESSAGE_LENGTH))
     if _FAILED_KEY in answer:
-        refuse(culprit, expected, f"it cannot be decoded ({as_text(answer[_FAILED_KEY])})", _DAMAGED_ADVICE)
+        refuse(
+            culprit,
+            expected,
+            f"it cannot be decoded ({text_from_array(answer[_FAILED_KEY])})",
+            _DAMAGED_ADVICE,
+        )
     return answer
 
 
@@ -89,20 +94,20 @@ def answer_request(decode: Callable[[Arrays], Arrays]) -> None:
     try:
         answer = _pack_arrays(decode(_unpack_arrays(sys.stdin.buffer.read())))
     except DermisError as error:
-        answer = _pack_arrays({_REFUSED_KEY: from_text(str(error))})
+        answer = _pack_arrays({_REFUSED_KEY: array_from_text(str(error))})
     except Exception as error:
         text = " ".join(f"{type(error).__name__}: {error}"[:_MAX_MESSAGE_LENGTH].split())
-        answer = _pack_arrays({_FAILED_KEY: from_text(shorten(text, 200))})
+        answer = _pack_arrays({_FAILED_KEY: array_from_text(shorten(text, 200))})
     with output:
         output.write(answer)
 
 
-def as_text(array: Bytes) -> str:
+def text_from_array(array: Bytes) -> str:
     """Decode UTF-8 text from an array of a request to a decoder, or of the decoder's answer."""
     return array.tobytes().decode("utf-8", "replace")
 
 
-def from_text(text: str) -> Bytes:
+def array_from_text(text: str) -> Bytes:
     """Encode a text as a UTF-8 array for a request to a decoder, or for the decoder's answer."""
     return np.frombuffer(text.encode("utf-8", "replace"), np.uint8)
 

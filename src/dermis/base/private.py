@@ -42,7 +42,7 @@ def make_private_folder(folder: Path) -> None:
         raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(folder))
 
 
-def other_writers(folder: Path) -> str:
+def describe_other_writers(folder: Path) -> str:
     """Return a clause that says how other users can write to a folder; empty if no other user can.
 
     Folders above the user's home and folders that only root can write to count as safe.

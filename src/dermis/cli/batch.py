@@ -177,7 +177,7 @@ def _local_processes(
         _check_count("--workers-per-gpu", workers_per_gpu, 1) or 1,
         _check_count("--encoders", encoders, 0),
     )
-    slots, encoder_count = request.slots()
+    slots, encoder_count = request.worker_slots()
     return ProcessPool(slots), encoder_count
 
 

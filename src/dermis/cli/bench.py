@@ -84,7 +84,7 @@ def bench(
 def _report_lines(benchmark: Benchmark) -> list[str]:
     from dermis.apps.validation.benchmarks import report
 
-    rows = _align_columns([report.COLUMNS, *map(report.cells, benchmark.rows)])
+    rows = _align_columns([report.COLUMNS, *map(report.row_cells, benchmark.rows)])
     stages = _align_columns(report.stage_table(benchmark))
     default_lines = ["", "the default frame:", *stages] if stages else []
     published_lines = ["", text] if (text := report.published_text(benchmark)) else []

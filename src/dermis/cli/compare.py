@@ -207,7 +207,7 @@ def _compare_techniques(
 
 
 def _report_lines(comparison: Comparison) -> Sequence[str]:
-    from dermis.apps.validation.comparisons.report import cells
+    from dermis.apps.validation.comparisons.report import error_cells
 
     truth = comparison.reference
     lines = [
@@ -217,7 +217,7 @@ def _report_lines(comparison: Comparison) -> Sequence[str]:
         f"{'technique':18}{'relative RMSE':>20}{'FLIP':>8}{'energy ratio':>20}{'ms':>9}",
     ]
     for row in comparison.rows:
-        name, error, flip, energy, ms = cells(row)
+        name, error, flip, energy, ms = error_cells(row)
         lines.append(f"{name:18}{error:>20}{flip:>8}{energy:>20}{ms:>9}")
     return lines
 

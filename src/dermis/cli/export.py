@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 else:
     TargetName = Annotated[str, Parameter(help=f"Program to write for: {', '.join(TARGETS)}.")]
 
-Model = Literal["montecarlo", "layered", "multipole", "dipole", "better-dipole"]
+ProfileModelName = Literal["montecarlo", "layered", "multipole", "dipole", "better-dipole"]
 
 
 def export(
@@ -30,7 +30,7 @@ def export(
     version: str | None = None,
     variant: str | None = None,
     diffuse_transmission: FlagOption = False,
-    model: Model | None = None,
+    model: ProfileModelName | None = None,
     profile: str | None = None,
     library: Path | None = None,
     map_side: int = 2048,

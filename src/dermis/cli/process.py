@@ -168,12 +168,12 @@ class Interruption:
             handler = signal.getsignal(signal_number)
             if handler in (signal.SIG_DFL, signal.default_int_handler):
                 self._original[signal_number] = handler
-                signal.signal(signal_number, self._handle)
+                signal.signal(signal_number, self._handle_signal)
         self._original_hook, sys.unraisablehook = sys.unraisablehook, self._on_unraisable
         self._reading, self._writing = socket.socketpair()
         self._writing.setblocking(False)
         self._original_fd = signal.set_wakeup_fd(self._writing.fileno(), warn_on_full_buffer=False)
-        self._thread = threading.Thread(target=self._watch, daemon=True, name="dermis-signals")
+        self._thread = threading.Thread(target=self._watch_signals, daemon=True, name="dermis-signals")
         self._thread.start()
         return self
 
@@ -191,7 +191,7 @@ class Interruption:
         self._thread.join()
         self._writing.close()
 
-    def _handle(self, signal_number: int, stack_frame: FrameType | None) -> None:
+    def _handle_signal(self, signal_number: int, stack_frame: FrameType | None) -> None:
         self.code = self.code or _SIGNAL_EXIT_BASE + signal_number
         if self._is_raised:
             return
@@ -199,23 +199,23 @@ class Interruption:
             self._is_raised = True
             loop.call_soon_threadsafe(_raise_keyboard_interrupt)
         elif _caller_swallows_exceptions(stack_frame):
-            self._raise_later()
+            self._raise_interrupt_later()
         else:
             self._is_raised = True
             _raise_keyboard_interrupt()
 
-    def _raise_later(self) -> None:
+    def _raise_interrupt_later(self) -> None:
         self._is_raised, self._is_postponed = False, True
         self._writing.send(_RETRY_BYTE)
 
     def _on_unraisable(self, error: sys.UnraisableHookArgs) -> None:
         """Repeat a KeyboardInterrupt that Python ignored, such as one raised in a destructor."""
         if self.code and issubclass(error.exc_type, KeyboardInterrupt):
-            self._raise_later()
+            self._raise_interrupt_later()
         else:
             self._original_hook(error)
 
-    def _watch(self) -> None:
+    def _watch_signals(self) -> None:
         """Wait for signals in a thread: end the process after a second signal, and repeat a postponed signal.
 
         A separate thread is needed because the main thread handles signals only between Python instructions,
@@ -228,12 +228,12 @@ class Interruption:
                     [self._reading], [], [], _SIGNAL_RETRY_S if self._is_postponed else None
                 )[0]:
                     self._is_postponed = False
-                    self._send_again()
+                    self._send_signal_again()
                     continue
                 received = self._reading.recv(1)
                 if received == _END_BYTE:
                     return
-                if received[0] not in self._original or signal.getsignal(received[0]) != self._handle:
+                if received[0] not in self._original or signal.getsignal(received[0]) != self._handle_signal:
                     continue  # a server has installed its own handler
                 if self._resent:
                     self._resent -= 1
@@ -242,7 +242,7 @@ class Interruption:
                 elif time.monotonic() - first_signal_s > _MIN_SECOND_SIGNAL_DELAY_S:
                     os._exit(_SIGNAL_EXIT_BASE + received[0])
 
-    def _send_again(self) -> None:
+    def _send_signal_again(self) -> None:
         self._resent += 1
         signal_number = self.code - _SIGNAL_EXIT_BASE
         if hasattr(signal, "pthread_kill"):

@@ -24,7 +24,7 @@ from dermis.cli.options import (
 from dermis.optics.pigments.parameters import DEFAULT_SKIN, DEFAULT_STRUCTURE, SKINS
 from dermis.scene.skin import Pigments
 
-_OPTION_NAMES = {"structure": "skin"}
+_PIGMENT_OPTION_NAMES = {"structure": "skin"}
 
 
 def _default_pigments() -> dict[str, str]:
@@ -45,10 +45,14 @@ if TYPE_CHECKING:
 
     PigmentOptions = Options
 else:
-    PigmentOptions = model_options(Pigments, option_names=_OPTION_NAMES, shown_defaults=_default_pigments())
+    PigmentOptions = model_options(
+        Pigments, option_names=_PIGMENT_OPTION_NAMES, shown_defaults=_default_pigments()
+    )
 
 Clamp = Literal["layer", "none"]
-Model = Literal["counted", "dipole", "better-dipole", "multipole", "layered", "layered-point", "montecarlo"]
+ProfileModelName = Literal[
+    "counted", "dipole", "better-dipole", "multipole", "layered", "layered-point", "montecarlo"
+]
 
 _DEFAULT_TERM_COUNT, _DEFAULT_PHOTON_COUNT, _MAX_PHOTON_COUNT = 6, 1_000_000, 10**10
 
@@ -57,7 +61,7 @@ def profile(
     name: str,
     /,
     *,
-    model: Model | None = None,
+    model: ProfileModelName | None = None,
     clamp: Clamp = "layer",
     eta: float | None = None,
     photons: IntegerOption = None,
@@ -209,7 +213,7 @@ def _refuse_tissue_options(medium_name: str, options: Options) -> None:
     for option, value in options.items():
         if value is not None:
             expected, actual = "a medium or a pigmented skin", f"{medium_name} is a table of Gaussians"
-            refuse(option_name(option, _OPTION_NAMES), expected, actual, "Remove the option")
+            refuse(option_name(option, _PIGMENT_OPTION_NAMES), expected, actual, "Remove the option")
 
 
 def _load_tissue(medium_name: str, options: Options, eta: float | None) -> Tissue:
@@ -223,13 +227,15 @@ def _load_tissue(medium_name: str, options: Options, eta: float | None) -> Tissu
     return tissue if eta is None else replace(tissue, medium=tissue.medium.with_eta(eta))
 
 
-def _reflectance_spectrum(tissue: Tissue, model: Model | None, clamp: Clamp) -> Floats | None:
+def _reflectance_spectrum(tissue: Tissue, model: ProfileModelName | None, clamp: Clamp) -> Floats | None:
     if model is None or model == "counted" or model == "montecarlo":
         return tissue.spectrum(clamp=clamp)
     return tissue.spectrum(model, clamp)
 
 
-def _compute_profile(tissue: Tissue, model: Model | None, clamp: Clamp, tracing: Options) -> RadialProfile:
+def _compute_profile(
+    tissue: Tissue, model: ProfileModelName | None, clamp: Clamp, tracing: Options
+) -> RadialProfile:
     if model != "montecarlo":
         return tissue.profile(model, clamp)
     from dermis.apps.truths.slab_mc import monte_carlo_profile

@@ -121,7 +121,7 @@ class ProfileReport:
                 "name": radial.name,
                 "model": radial.model,
                 **self._tissue_json(),
-                "per": self._normalisation(),
+                "per": self._normalisation_text(),
                 "radius_mm": radial.radius_mm,
                 "reflectance_per_mm2": radial.reflectance,
                 "standard_error_per_mm2": radial.standard_error,
@@ -150,7 +150,7 @@ class ProfileReport:
     def lines(self) -> list[str]:
         """Return the report as lines of text."""
         radial, fit = self.radial, self.fit
-        total = f"total      {_format_row(radial.total)}  {self._normalisation()}"
+        total = f"total      {_format_row(radial.total)}  {self._normalisation_text()}"
         lines = [f"{radial.name}, model {radial.model}", total]
         if self.tone is not None:
             lines += [f"tone       {self.tone.as_text()}", f"           ({SKIN_CLASS_DISCLAIMER})"]
@@ -204,11 +204,11 @@ class ProfileReport:
             remarks |= {"eta": medium.eta, "layers": [layer.name for layer in medium.layers]}
             if self.tissue.parameters is not None:
                 remarks |= asdict(self.tissue.parameters)
-        remarks |= {"total": self.radial.total, "per": self._normalisation(), "error": self.fit.error}
+        remarks |= {"total": self.radial.total, "per": self._normalisation_text(), "error": self.fit.error}
         remarks |= {"error_kind": self.fit.kind, "energy_error": self.fit.energy_error}
         write_profile(path, self.fit.profile, remarks)
 
-    def _normalisation(self) -> str:
+    def _normalisation_text(self) -> str:
         if self.radial.model == "table":
             return "as the table has it"
         is_incident = self.radial.incident

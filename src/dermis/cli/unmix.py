@@ -122,7 +122,7 @@ def unmix(
     if find == "all":
         refuse("--find", "none or oxygen for a colour map", "got all", "Colours do not determine more")
     check_folder(output, UNMIX_SUMMARY_FILE)
-    change = _parse_change(melanin, blood, oxygen, eumelanin)
+    change = _parse_pigment_change(melanin, blood, oxygen, eumelanin)
     with progress_bar("unmixing") as report_progress:
         options: Options = {"third": find, "noise": noise, "shading": shading, "adapter": adapter}
         result = unmixed(colour_map, skin=skin, progress=report_progress, **options)
@@ -158,7 +158,7 @@ def _unmix_spectra(
     return 0
 
 
-def _parse_change(
+def _parse_pigment_change(
     melanin: str | None, blood: str | None, oxygen: float | None, eumelanin: float | None
 ) -> PigmentChange | None:
     """Return the change of pigments that the recolouring options request; None without such options."""

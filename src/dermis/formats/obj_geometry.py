@@ -15,7 +15,15 @@ import numpy as np
 
 from dermis.base.arrays import Bytes, Doubles, Index, Mask
 from dermis.base.errors import refuse
-from dermis.base.file_properties import drawn, drawn_with_note, in_code, keys_of, no_effect, noted, refused
+from dermis.base.file_properties import (
+    drawn,
+    drawn_with_note,
+    keys_of,
+    markdown_code,
+    no_effect,
+    noted,
+    refused,
+)
 from dermis.formats import size_limits as limits
 from dermis.formats.polygons import (
     Polygons,
@@ -66,7 +74,7 @@ OBJ_PROPERTIES = (
     noted("`s` in a file without normals", "the surface is smooth everywhere (no note for one group)"),
     no_effect("`s` in a file with normals", "the normals decide"),
     no_effect("`mg`", "for curves only", "mg"),
-    *(noted(f"{kind}: {in_code(keys)}", "", *keys) for kind, keys in _LEFT_OUT_STATEMENTS.items()),
+    *(noted(f"{kind}: {markdown_code(keys)}", "", *keys) for kind, keys in _LEFT_OUT_STATEMENTS.items()),
     noted("other statements"),
 )
 """Statements of OBJ files; `parse_geometry` reads those that are drawn, and `s`."""

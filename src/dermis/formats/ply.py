@@ -13,7 +13,15 @@ import numpy as np
 
 from dermis.base.arrays import Bytes, Doubles, Index, Numbers
 from dermis.base.errors import refuse
-from dermis.base.file_properties import drawn, drawn_with_note, in_code, keys_of, no_effect, noted, refused
+from dermis.base.file_properties import (
+    drawn,
+    drawn_with_note,
+    keys_of,
+    markdown_code,
+    no_effect,
+    noted,
+    refused,
+)
 from dermis.base.reading import read_file
 from dermis.formats import size_limits as limits
 from dermis.formats.materials import FileMaterial, Texture
@@ -61,13 +69,13 @@ _SCANNER_PROPERTIES = (
 PLY_PROPERTIES = (
     drawn("vertex: `x`, `y`, `z`", "positions"),
     drawn("vertex: `nx`, `ny`, `nz`", "normals; missing ones are computed"),
-    drawn(f"vertex: {'; '.join(map(in_code, UV_NAMES))}", "uv"),
+    drawn(f"vertex: {'; '.join(map(markdown_code, UV_NAMES))}", "uv"),
     drawn(
-        f"vertex: {'; '.join(map(in_code, COLOUR_NAMES))}",
+        f"vertex: {'; '.join(map(markdown_code, COLOUR_NAMES))}",
         "sRGB colours; integers of any size, or floats from 0 to 1",
     ),
     drawn_with_note("the same as floats above 1", "sRGB colours from 0 to 255"),
-    noted(f"vertex: {in_code(name for (name,) in _ALPHA_NAMES)}", "no note if all are the same"),
+    noted(f"vertex: {markdown_code(name for (name,) in _ALPHA_NAMES)}", "no note if all are the same"),
     drawn(f"face: {' or '.join(f'`{name}`' for name in _FACE_LIST_NAMES)}", "polygons"),
     noted("faces of one or two corners"),
     drawn("face: `texcoord`", "uv of the corners of a face"),
@@ -77,7 +85,7 @@ PLY_PROPERTIES = (
     drawn("`comment TextureFile NAME`", "colour picture in the folder of the file"),
     noted("`comment TextureFile NAME` of a missing file"),
     no_effect(
-        f"values of scanners: {in_code(_SCANNER_PROPERTIES)}, `{_CLOUDCOMPARE_PREFIX}...`",
+        f"values of scanners: {markdown_code(_SCANNER_PROPERTIES)}, `{_CLOUDCOMPARE_PREFIX}...`",
         "they do not describe the look of a surface",
         *_SCANNER_PROPERTIES,
     ),

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from dermis.base.arrays import Bytes, Doubles, Floats, Index
 from dermis.base.errors import shorten
-from dermis.base.file_properties import drawn, drawn_with_note, in_code, no_effect, noted, refused
+from dermis.base.file_properties import drawn, drawn_with_note, markdown_code, no_effect, noted, refused
 from dermis.images.colour_spaces import SRGB, ColourSpace, gamma_space
 from dermis.images.exr_layers import ExrLayer, choose_layer
 from dermis.images.header import PictureHeader, UnsupportedError
@@ -65,7 +65,7 @@ RADIANCE_PROPERTIES = (
     drawn("size: `-Y`, `+Y`, `-X`, `+X`, rows or columns first", "upright"),
     drawn("`EXPOSURE`, `COLORCORR`, also several", "pixels are divided by them"),
     drawn_with_note("`PRIMARIES`", "converted to Rec. 709; zeros, as Photoshop writes them, are not used"),
-    noted(in_code(_UNUSED_RADIANCE_HEADER_NAMES), "no note if they are 1"),
+    noted(markdown_code(_UNUSED_RADIANCE_HEADER_NAMES), "no note if they are 1"),
     refused("run-length coding of before 1991"),
     no_effect("`VIEW`, `SOFTWARE`, comments"),
 )

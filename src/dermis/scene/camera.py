@@ -24,7 +24,7 @@ _FRAME_SIZE_PER_MESH_SIZE = 1.08  # size of the frame relative to a mesh that is
 _WORLD_UP = (0.0, 1.0, 0.0)
 
 
-_Fraction = Annotated[float, Field(ge=-10, le=10), Reason("lenses do not shift farther")]
+_PictureFraction = Annotated[float, Field(ge=-10, le=10), Reason("lenses do not shift farther")]
 
 
 class Window(NamedTuple):
@@ -68,7 +68,7 @@ class Camera(FrozenModel):
     """Direction that is up in the picture."""
     frame_mm: Annotated[float, Field(ge=0.01, le=1e5), Reason("mm: from a part of a pore to a crowd")] = 340.0
     """Height of the picture in the plane of the target [mm]."""
-    principal_point: tuple[_Fraction, _Fraction] = (0.5, 0.5)
+    principal_point: tuple[_PictureFraction, _PictureFraction] = (0.5, 0.5)
     """Point of the picture on the optical axis, as fractions of width and height from the upper left
     corner."""
     pixel_aspect: Annotated[float, Field(ge=0.1, le=10), Reason("pixels of sensors are nearly square")] = 1.0

@@ -26,12 +26,12 @@ from dermis.mesh.mesh import Mesh
 from dermis.scene.file_surfaces import (
     direct_material,
     unused_properties,
-    with_factors,
     with_file_textures,
+    with_material_factors,
     with_missing_uv,
 )
 from dermis.scene.head_table import NormalY, check_relief
-from dermis.scene.skin_tone import NO_COLOUR_MAP, with_skin_tone
+from dermis.scene.skin_tone import SKIN_WITHOUT_COLOUR_MAP, with_skin_tone
 
 MapFile = str | os.PathLike[str] | None
 
@@ -123,7 +123,7 @@ def _load_sample(sample: Sample, mesh_options: dict[str, Any], map_options: MapO
         refuse(sample.name, "a head", f"this sample is an {sample.kind}", hint)
     files = fetch_sample(sample.name)
     if map_options.skin_site is not None:
-        refuse("skin_site", NO_COLOUR_MAP, f"{sample.name} has a colour map", "Leave it out")
+        refuse("skin_site", SKIN_WITHOUT_COLOUR_MAP, f"{sample.name} has a colour map", "Leave it out")
     sample_options = mesh_options | {"unit_mm": mesh_options["unit_mm"] or sample.unit_mm}
     if sample_options["v_origin"] == "auto":
         sample_options["v_origin"] = sample.v_origin or "auto"
@@ -157,7 +157,9 @@ def _with_materials(
 def _direct_maps(path: Path, material: FileMaterial, map_options: MapOptions) -> tuple[Maps, list[str]]:
     """Return skin maps from the unchanged pictures of a material, and notes on maps that are not used."""
     if path.suffix.lower() != ".obj" or not material.name:
-        return with_factors(map_options.load(material.skin_pictures()), material, map_options.user_files), []
+        return with_material_factors(
+            map_options.load(material.skin_pictures()), material, map_options.user_files
+        ), []
     mtl_maps, faults = obj_maps(
         path,
         material.name,
@@ -167,6 +169,6 @@ def _direct_maps(path: Path, material: FileMaterial, map_options: MapOptions) ->
     )
     loaded = map_options.load({})
     chosen_maps: dict[str, Any] = {role: getattr(loaded, role) for role in map_options.user_files}
-    return with_factors(
+    return with_material_factors(
         replace(mtl_maps, **chosen_maps), material, {*map_options.user_files, "normal", "roughness"}
     ), faults

@@ -61,7 +61,7 @@ def direct_material(rigged: RiggedMesh, materials: Sequence[FileMaterial]) -> Fi
     return material if inside and plain and not _has_colours(mesh, surface, skin) else None
 
 
-def with_factors(maps: Maps, material: FileMaterial, user_roles: Collection[str]) -> Maps:
+def with_material_factors(maps: Maps, material: FileMaterial, user_roles: Collection[str]) -> Maps:
     """Return the maps of a skin material, multiplied by the factors of the material in the file.
 
     The product of roughness map and roughness factor is squared, as files store the square root of the
@@ -112,14 +112,16 @@ def with_file_textures(
     """
     mesh, maps, notes = rigged.mesh, Maps(), list[str]()
     if pack_skin:
-        packed = pack_textures(mesh, rigged.surface, materials, _materials_of_kind(mesh, "skin"))
-        mesh, maps = _with_uv(mesh, packed), _skin_maps(packed)
-        notes += [f"skin: {note}" for note in packed.notes]
+        packed_textures = pack_textures(mesh, rigged.surface, materials, _materials_of_kind(mesh, "skin"))
+        mesh, maps = _with_uv(mesh, packed_textures), _skin_maps(packed_textures)
+        notes += [f"skin: {note}" for note in packed_textures.notes]
     pictured = _pictured_parts(mesh, rigged.surface, materials)
     if pictured.any():
-        packed = pack_textures(mesh, rigged.surface, materials, pictured, ("colour", *_SURFACE_ROLES))
-        mesh, maps = _with_uv(mesh, packed), replace(maps, parts=_part_maps(packed))
-        notes += [f"parts that are not skin: {note}" for note in packed.notes]
+        packed_textures = pack_textures(
+            mesh, rigged.surface, materials, pictured, ("colour", *_SURFACE_ROLES)
+        )
+        mesh, maps = _with_uv(mesh, packed_textures), replace(maps, parts=_part_maps(packed_textures))
+        notes += [f"parts that are not skin: {note}" for note in packed_textures.notes]
     changed = [
         _with_surface(material, materials[index] if index >= 0 else None, has_maps)
         for material, index, has_maps in zip(mesh.materials, rigged.surface.in_file, pictured, strict=True)
@@ -156,9 +158,9 @@ def _pictured_parts(mesh: Mesh, surface: FileSurface, materials: Sequence[FileMa
     return pictured
 
 
-def _with_uv(mesh: Mesh, packed: PackedTextures) -> Mesh:
+def _with_uv(mesh: Mesh, packed_textures: PackedTextures) -> Mesh:
     uv = mesh.uv.copy()
-    uv[packed.vertices] = packed.uv
+    uv[packed_textures.vertices] = packed_textures.uv
     return _with_cached_outline(mesh, replace(mesh, uv=uv))
 
 
@@ -171,8 +173,8 @@ def _with_cached_outline(mesh: Mesh, changed_mesh: Mesh) -> Mesh:
     return changed_mesh
 
 
-def _skin_maps(packed: PackedTextures) -> Maps:
-    maps = packed.maps
+def _skin_maps(packed_textures: PackedTextures) -> Maps:
+    maps = packed_textures.maps
     roughness = maps.get("roughness")
     return Maps(
         colour=np.ascontiguousarray(maps["colour"][..., :3]),
@@ -181,8 +183,8 @@ def _skin_maps(packed: PackedTextures) -> Maps:
     )
 
 
-def _part_maps(packed: PackedTextures) -> PartMaps:
-    maps = packed.maps
+def _part_maps(packed_textures: PackedTextures) -> PartMaps:
+    maps = packed_textures.maps
     surface = np.concatenate([maps[role] for role in _SURFACE_ROLES], axis=2)
     return PartMaps(maps["colour"], surface, _emission_if_any(maps.get("emission")))
 

@@ -31,7 +31,9 @@ from dermis.scene.smoothness import SmoothIn
 P = TypeVar("P", bound=FrozenModel)
 _SCENE_TABLE_NAMES = {"head", "pose", "skin", "lights", "environment", "camera", "render"}
 _MAP_ROLES = ("colour", "normal", "height", "specular", "roughness")
-_Weight = Annotated[float, Field(ge=-MAX_WEIGHT, le=MAX_WEIGHT), Reason("faces break apart long before")]
+_TargetWeight = Annotated[
+    float, Field(ge=-MAX_WEIGHT, le=MAX_WEIGHT), Reason("faces break apart long before")
+]
 
 
 def load_lights(name: str | Path, head: Head | None = None) -> tuple[Light, ...]:
@@ -326,7 +328,7 @@ def _read_scene_file(file_name: str | Path, expected: str) -> dict[str, Any]:
 class PoseTable(FrozenModel):
     """The [pose] table of a scene file: morph target weights and bone rotations."""
 
-    weights: dict[str, _Weight] = Field(default_factory=dict)
+    weights: dict[str, _TargetWeight] = Field(default_factory=dict)
     """Weights of morph targets by name, normally 0 to 1."""
     bones: dict[str, Any] = Field(default_factory=dict)
     """Rotations by name of the bone: angles about the head's x, y and z [degrees], or a (4, 4) matrix."""

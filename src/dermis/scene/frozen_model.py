@@ -73,7 +73,7 @@ Colour = tuple[Intensity, Intensity, Intensity]
 
 
 @dataclass_transform(kw_only_default=True, field_specifiers=(Field, PrivateAttr))
-class _Documented(ModelMetaclass):
+class _DocumentedMeta(ModelMetaclass):
     # Metaclass of all models: signature and docstring list the fields, and `dir` omits the names of pydantic.
     # Type checkers read the fields themselves.
     if not TYPE_CHECKING:
@@ -97,7 +97,7 @@ class _Documented(ModelMetaclass):
             return [name for name, member in public if isinstance(member, _MEMBER_TYPES)]
 
 
-class FrozenModel(BaseModel, metaclass=_Documented):
+class FrozenModel(BaseModel, metaclass=_DocumentedMeta):
     """Base class of immutable settings with validated fields, such as `Camera` and `Skin`.
 
     The string below a field is its help text in Python, on the command line, in the viewer and in the
@@ -202,12 +202,14 @@ def constructor_signature(model: type[BaseModel]) -> Signature:
 
     Fields are keyword-only, except that a single required field may be positional.
     """
-    return Signature(sorted(_parameters(model, _required_fields(model)), key=lambda one: one.kind))
+    return Signature(
+        sorted(_constructor_parameters(model, _required_fields(model)), key=lambda one: one.kind)
+    )
 
 
-def _parameters(model: type[BaseModel], required: list[str]) -> Iterator[Parameter]:
+def _constructor_parameters(model: type[BaseModel], required_fields: list[str]) -> Iterator[Parameter]:
     for name, info in model.model_fields.items():
-        kind = Parameter.POSITIONAL_OR_KEYWORD if required == [name] else Parameter.KEYWORD_ONLY
+        kind = Parameter.POSITIONAL_OR_KEYWORD if required_fields == [name] else Parameter.KEYWORD_ONLY
         default = Parameter.empty if info.is_required() else info.get_default(call_default_factory=True)
         annotation = _without_metadata(info.annotation)
         if words := field_keywords(model, name):

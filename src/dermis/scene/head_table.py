@@ -15,12 +15,12 @@ from dermis.mesh.eye_look import EYE_LOOK_RANGES
 from dermis.scene.field_errors import InvalidFieldsError, Keywords, Reason
 from dermis.scene.frozen_model import FrozenModel
 
-_Relief = Annotated[
+_ReliefHeight = Annotated[
     float | None,
     Field(ge=1e-6, le=MAX_RELIEF_MM),
     Reason("mm: 255 levels from a quarter of a micrometre to a nose and more"),
 ]
-_Unit = Annotated[
+_UnitLength = Annotated[
     float | None, Field(ge=1e-3, le=1e6), Reason("mm: files count in micrometres to kilometres")
 ]
 VOrigin = Literal["auto", "top", "bottom"]
@@ -72,13 +72,13 @@ class HeadTable(FrozenModel):
     """Tangent-space normal map."""
     height: str | None = None
     """Height map; it needs height_mm."""
-    height_mm: _Relief = None
+    height_mm: _ReliefHeight = None
     """Relief of one grey level of an 8-bit height map [mm]."""
     specular: str | None = None
     """Map of the specular strength, scaled so that its mean is rho_s."""
     roughness: str | None = None
     """Map of the roughness m, 0 to 1."""
-    unit_mm: _Unit = None
+    unit_mm: _UnitLength = None
     """Length of the file's unit [mm]; if left out, 1000 for glTF, the length that USD states, or for other
     formats a guess from the size."""
     v_origin: VOrigin = "auto"

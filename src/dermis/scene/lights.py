@@ -30,14 +30,14 @@ __all__ = [
     "studio",
 ]
 
-_Degrees = Annotated[
+_ConeHalfAngle = Annotated[
     float,
     Field(ge=0.01, le=89, json_schema_extra=slider(0.5, 88, logarithmic=True)),
     Reason("degrees: half angle of a cone in front of the lamp"),
 ]
-_LAMP_REASON = Reason("mm: from the thickness of paper to 100 m")
-_Length = Annotated[
-    float, Field(ge=0.1, le=1e5, json_schema_extra=slider(1, 3000, logarithmic=True)), _LAMP_REASON
+_LAMP_LENGTH_REASON = Reason("mm: from the thickness of paper to 100 m")
+_LampLength = Annotated[
+    float, Field(ge=0.1, le=1e5, json_schema_extra=slider(1, 3000, logarithmic=True)), _LAMP_LENGTH_REASON
 ]
 
 _BRIGHTNESS_SYNONYMS = ("brightness", "color", "colour", "energy", "intensity", "power", "strength")
@@ -112,9 +112,9 @@ class SpotLight(PointLight):
 
     kind: Literal["spot"] = "spot"  # type: ignore[assignment]
     """Word for this kind of light in scene files."""
-    inner_degrees: _Degrees = 25.0
+    inner_degrees: _ConeHalfAngle = 25.0
     """Half angle up to which the light has full strength."""
-    outer_degrees: _Degrees = 35.0
+    outer_degrees: _ConeHalfAngle = 35.0
     """Half angle at which the light has faded to zero."""
 
     @model_validator(mode="after")
@@ -138,9 +138,9 @@ class RectangleLight(PointLight):
 
     kind: Literal["rectangle"] = "rectangle"  # type: ignore[assignment]
     """Word for this kind of light in scene files."""
-    width_mm: _Length = 600.0
+    width_mm: _LampLength = 600.0
     """Length of the horizontal sides [mm]."""
-    height_mm: _Length = 600.0
+    height_mm: _LampLength = 600.0
     """Length of the other sides [mm]."""
 
     @property
@@ -162,7 +162,7 @@ class SphereLight(PointLight):
     kind: Literal["sphere"] = "sphere"  # type: ignore[assignment]
     """Word for this kind of light in scene files."""
     radius_mm: Annotated[
-        float, Field(ge=0.1, le=1e5, json_schema_extra=slider(1, 500, logarithmic=True)), _LAMP_REASON
+        float, Field(ge=0.1, le=1e5, json_schema_extra=slider(1, 500, logarithmic=True)), _LAMP_LENGTH_REASON
     ] = 100.0
     """Radius of the sphere [mm]."""
 
@@ -219,9 +219,9 @@ class StripeLight(DirectionalLight):
     """Point in the middle of the sheet [mm]."""
     up: Direction = (0.0, 1.0, 0.0)
     """Direction of the stripe's length."""
-    width_mm: _Length = 1.5
+    width_mm: _LampLength = 1.5
     """Width of the Gaussian cross-section, between its points at 1/e^2 of the maximum [mm]."""
-    length_mm: _Length = 300.0
+    length_mm: _LampLength = 300.0
     """Length of the stripe [mm]."""
 
     @model_validator(mode="after")

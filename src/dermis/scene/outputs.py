@@ -12,7 +12,7 @@ from dermis.base.registry import Registry
 
 _WGSL_TYPE_OF_CHANNEL = {"float32": "f32", "int32": "i32", "uint8": "u32"}
 
-Kind = Literal["float32", "int32", "uint8"]
+ChannelType = Literal["float32", "int32", "uint8"]
 
 
 class Quantisation(NamedTuple):
@@ -64,7 +64,7 @@ class Output:
     name: str
     stage: str
     channel_names: str
-    kind: Kind
+    kind: ChannelType
     unit: str
     description: str
     background: float = 0.0
@@ -82,7 +82,7 @@ class Output:
         return _WGSL_TYPE_OF_CHANNEL[self.kind]
 
 
-_FLOAT_CHANNEL: Kind = "float32"
+_FLOAT_CHANNEL: ChannelType = "float32"
 _SIGNED_ZERO_LEVEL = 1 << 15  # level of the value 0 of signed outputs
 _LENGTH_QUANTISATION = Quantisation(0.1)
 _SIGNED_LENGTH_QUANTISATION = Quantisation(0.1, _SIGNED_ZERO_LEVEL)

@@ -30,8 +30,8 @@ SKIN_PRESETS: dict[str, dict[str, Any]] = {
 
 _Fraction = Annotated[float | None, Field(ge=0, le=1)]
 _COEFFICIENT_REASON = Reason("1/mm: white paint has some hundreds")
-_Absorption = Annotated[float, Field(ge=0, le=1e4), _COEFFICIENT_REASON]
-_Scattering = Annotated[float, Field(ge=1e-6, le=1e4), _COEFFICIENT_REASON]
+_AbsorptionCoefficient = Annotated[float, Field(ge=0, le=1e4), _COEFFICIENT_REASON]
+_ScatteringCoefficient = Annotated[float, Field(ge=1e-6, le=1e4), _COEFFICIENT_REASON]
 _COEFFICIENT_SLIDER = Field(json_schema_extra=slider(1e-4, 50, logarithmic=True))
 
 
@@ -75,9 +75,13 @@ class TissueLayer(FrozenModel):
         Reason("mm: from a cell membrane to more than a body"),
     ] = None
     """Thickness; None for a last layer that is infinitely deep [mm]."""
-    absorption_per_mm: Annotated[tuple[_Absorption, _Absorption, _Absorption], _COEFFICIENT_SLIDER]
+    absorption_per_mm: Annotated[
+        tuple[_AbsorptionCoefficient, _AbsorptionCoefficient, _AbsorptionCoefficient], _COEFFICIENT_SLIDER
+    ]
     """Absorption coefficient [1/mm]."""
-    scattering_per_mm: Annotated[tuple[_Scattering, _Scattering, _Scattering], _COEFFICIENT_SLIDER]
+    scattering_per_mm: Annotated[
+        tuple[_ScatteringCoefficient, _ScatteringCoefficient, _ScatteringCoefficient], _COEFFICIENT_SLIDER
+    ]
     """Reduced scattering coefficient [1/mm]."""
 
     @model_validator(mode="before")

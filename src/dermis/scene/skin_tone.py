@@ -18,7 +18,7 @@ from dermis.optics.pigments.parameters import DEFAULT_SKIN, SPECTRAL_PRESET
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 from dermis.optics.tissue import load_tissue
 
-NO_COLOUR_MAP = "skin without a colour map"
+SKIN_WITHOUT_COLOUR_MAP = "skin without a colour map"
 _WHITE = (1.0, 1.0, 1.0)
 _COLOUR_TOLERANCE = 1e-3  # tolerance for colours that were rounded in files
 
@@ -47,7 +47,9 @@ def with_skin_tone(
     """
     if colour_map_chosen or (maps.colour is not None and maps.colour.shape[:2] != (1, 1)):
         if skin_site is not None:
-            refuse("skin_site", NO_COLOUR_MAP, "the skin has a colour map", "Leave one of the two out")
+            refuse(
+                "skin_site", SKIN_WITHOUT_COLOUR_MAP, "the skin has a colour map", "Leave one of the two out"
+            )
         return maps, ""
     if skin_site is not None:
         measured = measured_tone(skin_site)

@@ -14,7 +14,7 @@ _FRAME_CITATION_KEYS = ("dEonLuebke2007", "Burns2013")
 _FRESNEL_SOURCES = {"schlick": ("Schlick1994", "Dudash2007"), "exact": ("CookTorrance1982",)}
 _HALF_SPACE_SOURCES = ("Chandrasekhar1960", "Jensen2001")
 _ANISOTROPY_SOURCES = ("HenyeyGreenstein1941", "Wiscombe1977")
-_TONE_SOURCES = {"none": (), "filmic": ("Hable2010",), "neutral": ("Khronos2024",)}
+_TONE_MAPPING_SOURCES = {"none": (), "filmic": ("Hable2010",), "neutral": ("Khronos2024",)}
 _SHADOW_SOURCES = ("Williams1978", "Reeves1987", "Hanika2021")
 _RELIEF_SOURCES = ("Mikkelsen2010", "OlanoBaker2010")
 _ENVIRONMENT_SOURCES = ("RamamoorthiHanrahan2001", "KautzMcCool2000", "Karis2013", "Debevec2005")
@@ -43,7 +43,7 @@ def picture_sources(
     keys += _light_sources(lights)
     if environment is not None:
         keys += _ENVIRONMENT_SOURCES + _OCCLUSION_SOURCES * (settings.occlusion != "none")
-    keys += _TONE_SOURCES[settings.tone]
+    keys += _TONE_MAPPING_SOURCES[settings.tone]
     keys += ("BurtAdelson1983",) * (settings.bloom > 0)
     return tuple(dict.fromkeys(keys))
 

@@ -15,31 +15,33 @@ from pydantic import Field
 from dermis.scene.frozen_model import Colour, Heading
 from dermis.specular.models import EnergyName
 
-COMPARISONS = Heading("Comparisons of the 2007 talk")
+COMPARISONS_HEADING = Heading("Comparisons of the 2007 talk")
 
 _SPECULAR_COLOUR_HELP = 'Colour of reflections; "wrong" multiplies them by the colour map.'
-SpecularColour = Annotated[Literal["white", "wrong"], COMPARISONS, Field(description=_SPECULAR_COLOUR_HELP)]
+SpecularColour = Annotated[
+    Literal["white", "wrong"], COMPARISONS_HEADING, Field(description=_SPECULAR_COLOUR_HELP)
+]
 
 _ENERGY_HELP = """Energy conservation of diffuse light: "full" subtracts what the surface reflects,
 "published" subtracts pi times too much, as the talk does, "none" subtracts nothing."""
-Energy = Annotated[EnergyName, COMPARISONS, Field(description=_ENERGY_HELP)]
+Energy = Annotated[EnergyName, COMPARISONS_HEADING, Field(description=_ENERGY_HELP)]
 
 _STRETCH_HELP = """Correction of blur kernels for the uv layout: "full" for stretch and shear, "axes" for
 stretch alone, "none" for the same kernel everywhere."""
-Stretch = Annotated[Literal["full", "axes", "none"], COMPARISONS, Field(description=_STRETCH_HELP)]
+Stretch = Annotated[Literal["full", "axes", "none"], COMPARISONS_HEADING, Field(description=_STRETCH_HELP)]
 
 _SEAMS_HELP = """How seams in the uv layout are treated: "stitch" diffuses light across them; the other
 methods are the talk's. Techniques that cannot stitch use "clear-colour" instead."""
 Seams = Annotated[
     Literal["stitch", "none", "clear-colour", "stretch-map", "alpha", "multi-uv"],
-    COMPARISONS,
+    COMPARISONS_HEADING,
     Field(description=_SEAMS_HELP),
 ]
 
 _SEAM_COLOUR_HELP = 'Light between the charts with seams "clear-colour", as irradiance divided by pi.'
-SeamColour = Annotated[Colour, COMPARISONS, Field(description=_SEAM_COLOUR_HELP)]
+SeamColour = Annotated[Colour, COMPARISONS_HEADING, Field(description=_SEAM_COLOUR_HELP)]
 
 _GAMMA_HELP = (
     'Colour space: "wrong" reads the colour map as linear and leaves out the sRGB encoding of the picture.'
 )
-Gamma = Annotated[Literal["right", "wrong"], COMPARISONS, Field(description=_GAMMA_HELP)]
+Gamma = Annotated[Literal["right", "wrong"], COMPARISONS_HEADING, Field(description=_GAMMA_HELP)]

@@ -18,7 +18,7 @@ TABLE_COSINES: Floats = np.linspace(0.0, 1.0, 64) ** 2
 TABLE_ROUGHNESSES: Floats = np.linspace(MIN_ROUGHNESS_ROOT, 1.0, 32) ** 2
 """Cosines and roughnesses of `albedo_table`, uniform in the square root to resolve grazing angles."""
 
-_TABLE_QUADRATURE_NODES = (24, 12)
+_TABLE_NODE_COUNTS = (24, 12)
 _MIN_COSINE = 1e-3
 
 
@@ -27,7 +27,7 @@ def directional_albedo(
     m: ArrayLike,
     lobe: Lobe = kelemen,
     fresnel: Fresnel = schlick,
-    nodes: tuple[int, int] = (48, 32),
+    node_counts: tuple[int, int] = (48, 32),
 ) -> Floats:
     """Return the directional-hemispherical reflectance rho_dt of a lobe of specular strength rho_s = 1 [-].
 
@@ -36,7 +36,7 @@ def directional_albedo(
     m : roughness; broadcast against cos_theta [-]
     lobe : BRDF to integrate
     fresnel : function that returns the Fresnel reflectance of the lobe
-    nodes : number of quadrature nodes along and across the plane of incidence
+    node_counts : number of quadrature nodes along and across the plane of incidence
 
     The integral is taken over the slopes of the half vector. Gauss-Legendre rules with nodes that are dense
     near the peak of the lobe resolve narrow peaks and grazing angles; the 80 x 80 directions of the published
@@ -47,10 +47,10 @@ def directional_albedo(
     cosine, roughness = np.broadcast_arrays(np.asarray(cos_theta, float), np.asarray(m, float))
     c, m = np.clip(cosine[..., None, None], _MIN_COSINE, 1.0), roughness[..., None, None]
     tangent = np.sqrt(1.0 - c**2) / c
-    y, dy = _slope_quadrature(np.zeros_like(c), 1.0 / c, m, nodes[1])
+    y, dy = _slope_quadrature(np.zeros_like(c), 1.0 / c, m, node_counts[1])
     half_width = np.sqrt(np.maximum(c**-2 - y**2, 0.0))
     y, dy, half_width = (np.swapaxes(a, -1, -2) for a in (y, dy, half_width))
-    x, dx = _slope_quadrature(tangent - half_width, tangent + half_width, m, nodes[0])
+    x, dx = _slope_quadrature(tangent - half_width, tangent + half_width, m, node_counts[0])
     n_h = 1.0 / np.sqrt(1.0 + x**2 + y**2)
     v_h = c * (1.0 + tangent * x) * n_h
     n_l = np.maximum(2.0 * v_h * n_h - c, 0.0)
@@ -84,8 +84,7 @@ def albedo_table(model: str = "kelemen", fresnel: str = "schlick") -> NDArray[np
     lobe, reflectance = MODELS[model].lobe, FRESNEL[fresnel]
     # row by row, so that the nodes fit into the CPU's cache
     rows = [
-        directional_albedo(TABLE_COSINES, m, lobe, reflectance, _TABLE_QUADRATURE_NODES)
-        for m in TABLE_ROUGHNESSES
+        directional_albedo(TABLE_COSINES, m, lobe, reflectance, _TABLE_NODE_COUNTS) for m in TABLE_ROUGHNESSES
     ]
     rho = np.stack(rows)
     mean = np.asarray(2.0 * np.trapezoid(rho * TABLE_COSINES, TABLE_COSINES, axis=1))[:, None]

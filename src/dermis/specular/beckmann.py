@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-BECKMANN_TABLE_SIZE = 512
+BECKMANN_TABLE_SIDE = 512
 _BECKMANN_TABLE_EXPONENT = 0.1
 
 
@@ -28,7 +28,7 @@ def beckmann(cos_h: ArrayLike, m: ArrayLike) -> NDArray[np.float64]:
 
 
 @cache
-def beckmann_table(table_side: int = BECKMANN_TABLE_SIZE) -> NDArray[np.float32]:
+def beckmann_table(table_side: int = BECKMANN_TABLE_SIDE) -> NDArray[np.float32]:
     """Return beckmann(cos_h, m)^0.1 / 2 as a table (table_side, table_side) for the shader.
 
     Each row has one roughness m, the value at the texel's centre. Along a row, cos_h increases from 0 to 1

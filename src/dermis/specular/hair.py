@@ -15,7 +15,7 @@ CUTICLE_TILT = np.radians(2.0)
 """Tilt of the scales of the cuticle towards the tip [rad]."""
 LONGITUDINAL_ROUGHNESS, AZIMUTHAL_ROUGHNESS = 0.22, 0.5
 """Default perceptual roughness along and around the fibre, 0 to 1 [Chiang2016]."""
-FIBRE_SAMPLES = 16
+FIBRE_SAMPLE_COUNT = 16
 """Number of rays across the width of the fibre over which scattering is averaged."""
 _MIN_COS_SQUARED = 1e-5
 _EUMELANIN_ABSORPTION, _PHEOMELANIN_ABSORPTION = np.array([0.419, 0.697, 1.37]), np.array([0.187, 0.4, 1.05])
@@ -62,7 +62,7 @@ def hair_constants() -> dict[str, float]:
         "hair_logistic_norm": float(1.0 / np.tanh(np.pi / (2 * default.width))),
         "hair_variance": default.variance[0],
         "hair_tilt": float(CUTICLE_TILT),
-        "hair_samples": FIBRE_SAMPLES,
+        "hair_samples": FIBRE_SAMPLE_COUNT,
     }
 
 
@@ -170,7 +170,7 @@ def fibre_scattering(
     i, o, phi = np.broadcast_arrays(*(np.asarray(x, float) for x in (sin_i, sin_o, phi)))
     cos_o = np.sqrt(np.maximum(1 - o * o, _MIN_COS_SQUARED))
     total = np.zeros((*o.shape, 3))
-    for h in (np.arange(FIBRE_SAMPLES) + 0.5) * 2 / FIBRE_SAMPLES - 1:
+    for h in (np.arange(FIBRE_SAMPLE_COUNT) + 0.5) * 2 / FIBRE_SAMPLE_COUNT - 1:
         entry, inner = np.arcsin(h), np.arcsin(h * cos_o / np.sqrt(KERATIN_ETA**2 - o * o))
         for p, term in enumerate(lobe_fractions(o, absorption_depth, np.full(o.shape, h))):
             exit_azimuth = 2 * p * inner - 2 * entry + p * np.pi
@@ -178,7 +178,7 @@ def fibre_scattering(
             if p < 3:
                 around = azimuthal_logistic(phi - exit_azimuth, parameters.width)
             along = longitudinal_scattering(i, tilted_sine(o, p), parameters.variance[p])
-            total += term * (along * around / FIBRE_SAMPLES)[..., None]
+            total += term * (along * around / FIBRE_SAMPLE_COUNT)[..., None]
     return total
 
 

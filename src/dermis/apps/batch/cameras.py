@@ -64,18 +64,19 @@ def sampled_camera(
         _max_projected_coordinate(in_view, distance, (0.0, 0.0), frame, aspect) / _MAX_FACE_COORDINATE, 1.0
     )
 
-    def aim(offset_fraction: float) -> AimOffset:
+    def scaled_aim_offset(offset_fraction: float) -> AimOffset:
         """Return the aim offset that moves the face in the picture by a fraction of its sampled offset."""
         return -0.5 * frame * offset_fraction * offset[0], -0.5 * frame * offset_fraction * offset[1]
 
     fraction, low, high = 1.0, 0.0, 1.0
     for _ in range(_AIM_BISECTION_STEPS):  # the first step tries the full offset
         inside = (
-            _max_projected_coordinate(in_view, distance, aim(fraction), frame, aspect) <= _MAX_FACE_COORDINATE
+            _max_projected_coordinate(in_view, distance, scaled_aim_offset(fraction), frame, aspect)
+            <= _MAX_FACE_COORDINATE
         )
         low, high = (fraction, high) if inside else (low, fraction)
         fraction = 0.5 * (low + high)
-    return _aim_camera(centre, axes, distance, frame, aim(low))
+    return _aim_camera(centre, axes, distance, frame, scaled_aim_offset(low))
 
 
 def _aim_camera(

@@ -96,7 +96,7 @@ class PartPlugin(WorkerPlugin):  # type: ignore[misc]
         state = self._state
         with state.lock:
             try:
-                return self._process_in_child(state.child or self._start(), task)
+                return self._process_in_child(state.child or self._start_child(), task)
             except LostProcessError:
                 state.close()
                 raise
@@ -124,10 +124,10 @@ class PartPlugin(WorkerPlugin):  # type: ignore[misc]
             raise LostProcessError(f"a worker: {child.exit_reason()}") from fault
         return WorkerEvent(refusal="the run: expected to continue, but it has ended. Run the command again.")
 
-    def _start(self) -> ChildProcess:
+    def _start_child(self) -> ChildProcess:
         """Start the rendering process, on an adapter chosen by the rank of this dask worker on its host."""
         cleanup = self._state.cleanup
-        rank = cleanup.enter_context(local_rank())
+        rank = cleanup.enter_context(hold_local_rank())
         adapters = similar_adapters(self.adapter)
         spec = parse_spec(tomllib.loads(self.spec_toml), self.folder)
         slot = WorkerSlot(f"#{adapters[rank % len(adapters)].number}")
@@ -152,7 +152,7 @@ def path_exists(file_path: str) -> bool:
 
 
 @contextmanager
-def local_rank() -> Iterator[int]:
+def hold_local_rank() -> Iterator[int]:
     """Yield the smallest rank, counted from 0, that no other process of this user holds on this host.
 
     Dask workers on one host choose different adapters by rank. A process holds a rank by locking a file; the

@@ -22,14 +22,14 @@ from dermis.apps.batch.worker import RunOptions, Worker
 from dermis.frame.renderer import Renderer
 from dermis.scene.toml_text import value_text
 
-SHEET_IMAGES = 16
+SHEET_IMAGE_COUNT = 16
 """Number of images on the contact sheet."""
 MAX_COUNTED_IMAGES = 20_000
 """Largest number of images from which the statistics of the parameter table are computed."""
 _SHEET_COLUMNS, _SHEET_IMAGE_SIDE, _SHEET_GAP = 4, 192, 4  # of the contact sheet; lengths in pixels
 _MAX_PREVIEW_SIDES = {"atlas": 512, "shadow_size": 1024}  # upper limits of settings for the contact sheet
 _MAX_COLUMN_CHARACTERS = 60  # characters
-_MEASURED_IMAGES, _WARM_UP_IMAGES = 6, 2  # images of an estimate; the first of them are not timed
+_MEASURED_IMAGE_COUNT, _WARM_UP_IMAGE_COUNT = 6, 2  # images of an estimate; the first of them are not timed
 _PERSON_IDENTIFIERS = "person.number", "person.seed"
 _MAX_LISTED_TEXTS = 12  # largest number of listed values of a text parameter
 
@@ -72,21 +72,21 @@ def dry_run(spec: Spec, adapter: str = "auto") -> tuple[list[ParameterRow], NDAr
 
     Raises DermisError as `SceneBuilder.build` and `Renderer.draw` do.
     """
-    return parameter_rows(spec), contact_sheet(spec, adapter), estimate(spec, adapter)
+    return parameter_rows(spec), contact_sheet(spec, adapter), estimate_size_and_duration(spec, adapter)
 
 
-def estimate(spec: Spec, adapter: str = "auto") -> Estimate:
+def estimate_size_and_duration(spec: Spec, adapter: str = "auto") -> Estimate:
     """Estimate the size of a data set and the duration of its rendering, from its first images.
 
     These images are rendered by a `Worker`. The first two of them, which fill caches, are not timed.
     """
-    count = min(spec.count, spec.shard_size, _MEASURED_IMAGES)
+    count = min(spec.count, spec.shard_size, _MEASURED_IMAGE_COUNT)
     times = [time.monotonic()]
     with TemporaryDirectory() as name, closing(Worker(adapter, RunOptions(spec, Path(name)))) as worker:
         send = lambda event: times.extend([time.monotonic()] * event.images)  # noqa: E731
         worker.process([Part(0, 0, count)], send)
         size = sum(path.stat().st_size for path in Path(name).rglob("*") if path.is_file())
-    untimed = _WARM_UP_IMAGES if count > _WARM_UP_IMAGES else 0
+    untimed = _WARM_UP_IMAGE_COUNT if count > _WARM_UP_IMAGE_COUNT else 0
     seconds = (times[-1] - times[untimed]) / (count - untimed)
     hours = spec.count * seconds / 3600
     return {"images": spec.count, "measured": count, "bytes": spec.count * size // count, "hours": hours}
@@ -125,7 +125,7 @@ def contact_sheet(spec: Spec, adapter: str = "auto") -> NDArray[np.uint8]:
     width, height = (max(_SHEET_IMAGE_SIDE * side // max(spec.size), 1) for side in spec.size)
     limited = {name: min(side, getattr(spec.render, name)) for name, side in _MAX_PREVIEW_SIDES.items()}
     spec = spec.replace(render=spec.render.replace(size=(width, height), **limited))
-    count = min(spec.count, SHEET_IMAGES)
+    count = min(spec.count, SHEET_IMAGE_COUNT)
     columns = min(count, _SHEET_COLUMNS)
     rows = -(-count // columns)
     size = columns * (width + _SHEET_GAP) - _SHEET_GAP, rows * (height + _SHEET_GAP) - _SHEET_GAP
@@ -144,7 +144,7 @@ def _parameter_row(spec: Spec, parameter: str, samples: Sequence[Parameters]) ->
     values = [sample[parameter] for sample in samples if parameter in sample]
     distribution = spec.distributions.get(parameter)
     text = "" if distribution is None else value_text(distribution.spec_value())
-    first = [sample.get(parameter) for sample in samples[:SHEET_IMAGES]]
+    first = [sample.get(parameter) for sample in samples[:SHEET_IMAGE_COUNT]]
     row: ParameterRow = {"parameter": parameter, "drawn": text, "first": first, "images": len(values)}
     numbers = [value for value in values if not isinstance(value, str)]
     if not numbers:

@@ -19,9 +19,9 @@ PICTURE_SUFFIX, RECORD_SUFFIX = "png", "json"
 """File name suffixes of the picture and of the record."""
 NestedNumbers = list[Union["NestedNumbers", float, None]]
 """Array as nested lists; null where a number is not finite."""
-_PIXEL_DIGITS = 3
-_MM_DIGITS = 4
-_DIRECTION_DIGITS = 8  # rotations and directions
+_PIXEL_DECIMALS = 3
+_MM_DECIMALS = 4
+_DIRECTION_DECIMALS = 8  # rotations and directions
 
 
 class CameraRecord(TypedDict):
@@ -93,16 +93,16 @@ def _make_record(
         "parameters": dict(parameters),
         "skin_tone": None if skin_tone is None else skin_tone.as_json(),
         "camera": {
-            "K": _rounded_list(camera.K, _MM_DIGITS),
-            "R": _rounded_list(camera.R, _DIRECTION_DIGITS),
-            "t": _rounded_list(camera.t, _MM_DIGITS),
+            "K": _rounded_list(camera.K, _MM_DECIMALS),
+            "R": _rounded_list(camera.R, _DIRECTION_DECIMALS),
+            "t": _rounded_list(camera.t, _MM_DECIMALS),
         },
-        "head_pose": _rounded_list(observation.head_pose, _DIRECTION_DIGITS),
-        "gaze": None if gaze is None else _rounded_list(gaze, _DIRECTION_DIGITS),
+        "head_pose": _rounded_list(observation.head_pose, _DIRECTION_DECIMALS),
+        "gaze": None if gaze is None else _rounded_list(gaze, _DIRECTION_DECIMALS),
         "landmarks": {
             names.get(path, path): {
-                "pixels": _rounded_list(one.pixels, _PIXEL_DIGITS),
-                "positions_mm": _rounded_list(one.positions_mm, _MM_DIGITS),
+                "pixels": _rounded_list(one.pixels, _PIXEL_DECIMALS),
+                "positions_mm": _rounded_list(one.positions_mm, _MM_DECIMALS),
                 "visible": np.asarray(one.visible, bool).tolist(),
             }
             for path, one in observation.landmarks.items()

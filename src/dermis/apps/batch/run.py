@@ -22,7 +22,7 @@ from dermis.apps.batch.shards import (
     shard_exists,
     shard_path,
 )
-from dermis.apps.batch.spec import COUNT_LINE_PATTERN, GENERATOR, GENERATOR_LINE_PATTERN, Spec
+from dermis.apps.batch.spec import COUNT_LINE_PATTERN, GENERATOR_LINE_PATTERN, GENERATOR_NUMBER, Spec
 from dermis.apps.batch.worker import Failure, RunOptions, WorkerEvent
 from dermis.base.atomic_write import refuse_output
 from dermis.base.errors import notify, refuse
@@ -160,9 +160,14 @@ def _must_grow(existing_toml: str, spec: Spec, out: Path) -> bool:
     other_folder, count = "Choose another folder", COUNT_LINE_PATTERN.search(existing_toml)
     generator = GENERATOR_LINE_PATTERN.search(existing_toml)
     number = int(generator[1]) if generator else 1  # earlier versions wrote none
-    if number != GENERATOR:
+    if number != GENERATOR_NUMBER:
         actual = f"it was made with number {number}, by another version of dermis"
-        refuse(out, f"a data set of generator number {GENERATOR}", actual, f"{other_folder}, or that version")
+        refuse(
+            out,
+            f"a data set of generator number {GENERATOR_NUMBER}",
+            actual,
+            f"{other_folder}, or that version",
+        )
     if not count or COUNT_LINE_PATTERN.sub("", existing_toml, count=1) != COUNT_LINE_PATTERN.sub(
         "", spec.to_toml(), count=1
     ):

@@ -214,19 +214,19 @@ class Sampler:
         """
         weights = self.cholesky_rows.get(parameter)
         if weights is None:
-            return self._uniform(image_number, parameter)
+            return self._uniform_number(image_number, parameter)
         return float(
-            ndtr(sum(weight * self._normal(image_number, other) for other, weight in weights.items()))
+            ndtr(sum(weight * self._normal_number(image_number, other) for other, weight in weights.items()))
         )
 
-    def _uniform(self, image_number: int, parameter: str) -> float:
+    def _uniform_number(self, image_number: int, parameter: str) -> float:
         number = (
             image_number // self.images_per_person if parameter.startswith(_PERSON_PREFIX) else image_number
         )
         return hashed_uniform(self.seed, number, parameter)
 
-    def _normal(self, image_number: int, parameter: str) -> float:
-        return float(ndtri(self._uniform(image_number, parameter)))
+    def _normal_number(self, image_number: int, parameter: str) -> float:
+        return float(ndtri(self._uniform_number(image_number, parameter)))
 
     def _target_weights(self, image_number: int, sampled_parameters: Parameters) -> dict[str, float]:
         """Return the weights that all morph targets used by the spec have in one image.
@@ -237,7 +237,7 @@ class Sampler:
         name = str(sampled_parameters["expression.name"])
         if name == RANDOM_EXPRESSION:
             weights: Weights = random_expression(
-                lambda part: self._uniform(image_number, f"expression.mixture.{part}")
+                lambda part: self._uniform_number(image_number, f"expression.mixture.{part}")
             )
         else:
             weights = self.expressions[name]
@@ -249,7 +249,7 @@ class Sampler:
             intensity,
             asymmetry,
             variation,
-            lambda name: self._normal(image_number, f"expression.variation.{name}"),
+            lambda name: self._normal_number(image_number, f"expression.variation.{name}"),
         )
         target_weights: dict[str, float | str] = {**varied}
         for target, distribution in table_values(self.distributions, "pose").items():

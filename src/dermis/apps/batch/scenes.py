@@ -37,7 +37,10 @@ _FULL_HAIR_PICTURE_SIDE = 1000  # side from which pictures have all hairs [pixel
 _MIN_HAIR_FRACTION = 0.2
 _GAZE_DISTANCE_MM = 1e4  # distance of the gaze target if the gaze is given by angles
 _SEED_PARAMETER, _HEAD_PARAMETER = "person.seed", "person.head"
-_CACHED_SAMPLED_PEOPLE, _CACHED_FILE_HEADS = 1, 8  # a sampled person is not used again, a named head is
+_MAX_CACHED_SAMPLED_PEOPLE, _MAX_CACHED_FILE_HEADS = (
+    1,
+    8,
+)  # a sampled person is not used again, a named head is
 _PARAMETERS_NOT_OF_HUMAN = "number", "seed", "head"  # parameters of people that are not fields of `Human`
 
 
@@ -70,7 +73,7 @@ class SceneBuilder:
 
         Raises DermisError for heads and environments that cannot be read.
         """
-        person = self._person(parameters)
+        person = self._cached_person(parameters)
         head, (width, height) = person.head, self.spec.size
         pose = Pose(
             self._pose_weights(parameters, head), _bone_angles(_head_rotation(parameters), person.bones)
@@ -85,19 +88,19 @@ class SceneBuilder:
             lights=sampled_lights(parameters),
             camera=camera,
             skin=person.skin.replace(**skin_values) if skin_values else person.skin,
-            environment=self._environment(parameters),
+            environment=self._sampled_environment(parameters),
             pose=_with_gaze(parameters, head, pose, camera.position),
         )
         return scene, self.spec.render.replace(**_background_settings(parameters))
 
-    def _person(self, parameters: Parameters) -> _Person:
+    def _cached_person(self, parameters: Parameters) -> _Person:
         values = table_values(parameters, "person")
         key = frozenset((name, value) for name, value in values.items() if name != "number")
         if key not in self._people:
             self._people[key] = self._build_person(parameters)
         self._people.move_to_end(key)
         while len(self._people) > (
-            _CACHED_FILE_HEADS if _HEAD_PARAMETER in parameters else _CACHED_SAMPLED_PEOPLE
+            _MAX_CACHED_FILE_HEADS if _HEAD_PARAMETER in parameters else _MAX_CACHED_SAMPLED_PEOPLE
         ):
             self._people.popitem(last=False)
         return self._people[key]
@@ -129,7 +132,7 @@ class SceneBuilder:
             if weight and (name in posed or name in head.control.target_index)
         }
 
-    def _environment(self, parameters: Parameters) -> Environment | None:
+    def _sampled_environment(self, parameters: Parameters) -> Environment | None:
         if parameters["environment.name"] == NO_ENVIRONMENT:
             return None
         numbers = table_numbers(parameters, "environment")

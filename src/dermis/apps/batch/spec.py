@@ -29,7 +29,7 @@ from dermis.scene.settings import Settings
 from dermis.scene.toml_text import key_text, table_text
 
 MAX_IMAGES = 10**9
-GENERATOR = 3
+GENERATOR_NUMBER = 3
 """Number of the rules by which seeds become people and pictures: other rules make other people of a seed.
 
 Number 1 stands for the people of version 0.1, number 2 for people with the skin of measured people.
@@ -64,8 +64,10 @@ class Spec(FrozenModel):
     seed: Annotated[int, Field(ge=0, le=2**32 - 1), Reason("32 bits")] = 0
     """Seed of all random numbers."""
     generator: Annotated[
-        int, Field(ge=GENERATOR, le=GENERATOR), Reason("this version makes other images from a spec")
-    ] = GENERATOR
+        int,
+        Field(ge=GENERATOR_NUMBER, le=GENERATOR_NUMBER),
+        Reason("this version makes other images from a spec"),
+    ] = GENERATOR_NUMBER
     """Number of the rules by which seeds become pictures; data sets of another number are not continued."""
     images_per_person: Annotated[int, Field(ge=1, le=10**6), Reason("a million of each")] = 1
     """Number of consecutive images that show the same person."""
@@ -158,7 +160,7 @@ class Spec(FrozenModel):
 
     def to_toml(self) -> str:
         """Return the spec as canonical TOML with all values, from which `parse_spec` makes an equal spec."""
-        values = plain_values(self)
+        values = fields_except_none(self)
         values = {"count": values.pop("count"), "seed": values.pop("seed"), "size": self.size} | values
         values["render"] = self.render.model_dump(exclude=set(NON_RENDER_SETTINGS), exclude_none=True)
         del values["folder"]
@@ -180,7 +182,7 @@ def _table_distributions(table_name: str, table_value: object) -> dict[str, Dist
     """
     if isinstance(table_value, Distribution):
         return {table_name: table_value}
-    parts = plain_values(table_value) if isinstance(table_value, FrozenModel) else table_value
+    parts = fields_except_none(table_value) if isinstance(table_value, FrozenModel) else table_value
     if not isinstance(parts, Mapping):
         return {}
     found: dict[str, Distribution] = {}
@@ -211,12 +213,12 @@ def parse_spec(toml_data: Mapping[str, object], folder: Path = Path()) -> Spec:
     """
     if "folder" in toml_data:
         refuse("folder", "no such key", "it is given", "Paths are relative to the folder of the spec")
-    if toml_data.get("generator", GENERATOR) != GENERATOR:
+    if toml_data.get("generator", GENERATOR_NUMBER) != GENERATOR_NUMBER:
         actual = f"got {format_value(toml_data['generator'])}"
         advice = "Remove it to start another data set, or use the version of dermis that wrote it"
-        refuse("generator", f"{GENERATOR}, the generator number of this version", actual, advice)
+        refuse("generator", f"{GENERATOR_NUMBER}, the generator number of this version", actual, advice)
     fields = {k: v if k == "files" else _expand_patterns(v, folder, k) for k, v in toml_data.items()}
-    fields["render"] = _parse_render(fields.pop("size", (512, 512)), fields.get("render", {}))
+    fields["render"] = _parse_render_table(fields.pop("size", (512, 512)), fields.get("render", {}))
     if isinstance(groups := fields.get("correlated", ()), list | tuple):
         fields["correlated"] = tuple(_build_model(tables.CorrelationGroup, "correlated", g) for g in groups)
     spec = _build_model(Spec, "", fields | {"folder": folder})
@@ -234,7 +236,7 @@ def example_toml() -> str:
     return resources.files(__package__).joinpath("example.toml").read_text("utf-8")
 
 
-def _parse_render(picture_size: object, render_table: object) -> Settings:
+def _parse_render_table(picture_size: object, render_table: object) -> Settings:
     if not isinstance(render_table, Mapping):
         return _build_model(Settings, "render", render_table)
     for key in NON_RENDER_SETTINGS.keys() & render_table.keys():
@@ -266,7 +268,7 @@ def _build_model(model_class: type[P], table_name: str, toml_table: object) -> P
         raise InvalidFieldsError(table_name or "spec", error.messages) from None
 
 
-def plain_values(spec_table: FrozenModel) -> dict[str, object]:
+def fields_except_none(spec_table: FrozenModel) -> dict[str, object]:
     """Return the fields of a spec table that are not None, by name."""
     values = {name: getattr(spec_table, name) for name in type(spec_table).model_fields}
     return {name: value for name, value in values.items() if value is not None}
@@ -281,9 +283,11 @@ def _toml_lines(table_name: str, table_values: Mapping[str, object]) -> list[str
     for name, value in table_values.items():
         path = f"{table_name}.{key_text(name)}" if table_name else key_text(name)
         if isinstance(value, FrozenModel | Mapping):
-            sub_lines += _toml_lines(path, plain_values(value) if isinstance(value, FrozenModel) else value)
+            sub_lines += _toml_lines(
+                path, fields_except_none(value) if isinstance(value, FrozenModel) else value
+            )
         elif isinstance(value, tuple) and value and isinstance(value[0], FrozenModel):
-            sub_lines += [table_text(f"[[{path}]]", plain_values(one)) for one in value]
+            sub_lines += [table_text(f"[[{path}]]", fields_except_none(one)) for one in value]
         else:
             own_values[name] = value.spec_value() if isinstance(value, Distribution) else value
     if sub_lines and not own_values:

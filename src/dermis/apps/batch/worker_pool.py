@@ -38,7 +38,7 @@ class SlotRequest:
     workers_per_gpu: int = 1
     encoders: int | None = None
 
-    def adapters(self) -> list[Adapter]:
+    def matching_adapters(self) -> list[Adapter]:
         """Return the adapters that match the request.
 
         Raises DermisError if a requested adapter does not exist.
@@ -47,14 +47,14 @@ class SlotRequest:
             return similar_adapters(self.adapter)
         return [similar_adapters(f"#{number}")[0] for number in self.numbers]
 
-    def slots(self) -> tuple[list[WorkerSlot], int]:
+    def worker_slots(self) -> tuple[list[WorkerSlot], int]:
         """Return one slot per worker, and the number of encoder processes per worker.
 
         The adapters are assigned to the workers in turn. On a software adapter, there is by default one
         worker for every two processor cores, and each worker encodes its images itself. The threads of all
         workers together then use all cores.
         """
-        adapters, cores = self.adapters(), available_cores()
+        adapters, cores = self.matching_adapters(), available_cores()
         software = adapters[0].kind == "CPU"
         default = max(1, cores // 2) if software else len(adapters) * self.workers_per_gpu
         workers = self.workers or default

@@ -8,7 +8,15 @@ from collections.abc import Mapping
 from typing import Any
 
 from dermis.base.errors import refuse
-from dermis.base.file_properties import drawn, drawn_with_note, in_code, keys_of, no_effect, noted, refused
+from dermis.base.file_properties import (
+    drawn,
+    drawn_with_note,
+    keys_of,
+    markdown_code,
+    no_effect,
+    noted,
+    refused,
+)
 from dermis.formats.gltf.document import Document, Tree
 from dermis.formats.materials import (
     IDENTITY_UV_TRANSFORM,
@@ -82,9 +90,9 @@ GLTF_MATERIALS = (
     drawn("`wrapS`, `wrapT`", "repeated, mirrored or clamped"),
     noted("`magFilter`", "always interpolated (no note if it is linear)"),
     no_effect("`minFilter`", "maps always have mip levels"),
-    drawn("pictures in PNG, JPEG, WebP, AVIF", in_code(_SOURCE_EXTENSIONS), *_SOURCE_EXTENSIONS),
+    drawn("pictures in PNG, JPEG, WebP, AVIF", markdown_code(_SOURCE_EXTENSIONS), *_SOURCE_EXTENSIONS),
     refused(f"`{_BASISU_EXTENSION}` without another picture", "KTX2"),
-    drawn_with_note(in_code(_SCATTERING_EXTENSIONS), "the material is skin", *_SCATTERING_EXTENSIONS),
+    drawn_with_note(markdown_code(_SCATTERING_EXTENSIONS), "the material is skin", *_SCATTERING_EXTENSIONS),
     drawn_with_note(f"`{_GLOSS_EXTENSION}`", "without the specular colour", _GLOSS_EXTENSION),
     *(noted(f"`{name}`", text, name) for name, text in _UNDRAWN_EXTENSIONS.items()),
     noted("other extensions of materials"),

@@ -10,7 +10,15 @@ import numpy as np
 
 from dermis.base.arrays import Doubles, Index
 from dermis.base.errors import refuse
-from dermis.base.file_properties import drawn, drawn_with_note, in_code, keys_of, no_effect, noted, refused
+from dermis.base.file_properties import (
+    drawn,
+    drawn_with_note,
+    keys_of,
+    markdown_code,
+    no_effect,
+    noted,
+    refused,
+)
 from dermis.formats import size_limits as limits
 from dermis.formats.gltf import draco, vrm
 from dermis.formats.gltf.document import Document, Tree, read_document
@@ -56,7 +64,7 @@ GLTF_PROPERTIES = (
         draco.DRACO_EXTENSION,
     ),
     refused(
-        f"{in_code(_MESHOPT_EXTENSIONS)}, if required",
+        f"{markdown_code(_MESHOPT_EXTENSIONS)}, if required",
         "its Python package has no wheels; write the file without it: `gltfpack` without `-c` and `-cc`, or "
         "`gltf-transform copy`",
     ),

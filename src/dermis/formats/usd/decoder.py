@@ -14,7 +14,7 @@ from dermis.base.arrays import Doubles, Index, Numbers
 from dermis.base.disk import Arrays
 from dermis.base.errors import refuse
 from dermis.base.extras import import_extra
-from dermis.base.native_decoding import answer_request, as_text, from_text
+from dermis.base.native_decoding import answer_request, array_from_text, text_from_array
 from dermis.formats import size_limits as limits
 from dermis.formats.usd.layers import open_stage
 from dermis.formats.usd.shading import MaterialReader, Tree
@@ -107,7 +107,7 @@ class _SceneReader:
             "materials": self.materials,
             "notes": list(self.notes),
         }
-        return self.arrays | {"scene": from_text(json.dumps(scene))}
+        return self.arrays | {"scene": array_from_text(json.dumps(scene))}
 
     def _prims(self) -> Iterator[Usd.Prim]:
         predicate = self.usd.TraverseInstanceProxies(self.usd.PrimDefaultPredicate)
@@ -286,7 +286,7 @@ def decode(request: Arrays) -> Arrays:
 
     request : absolute path of the file under "file", and the path that the user typed under "path"
     """
-    file, path = (Path(as_text(request[name])) for name in ("file", "path"))
+    file, path = (Path(text_from_array(request[name])) for name in ("file", "path"))
     stage, folder = open_stage(file, path, Path.cwd())
     return _SceneReader(path, stage, folder).read()
 

@@ -14,7 +14,7 @@ from dermis.base.arrays import Index, Mask
 from dermis.base.disk import Arrays
 from dermis.base.errors import refuse
 from dermis.base.file_properties import drawn, drawn_with_note, no_effect, noted, refused
-from dermis.base.native_decoding import as_text, from_text, run_decoder
+from dermis.base.native_decoding import array_from_text, run_decoder, text_from_array
 from dermis.base.reading import parse_json, read_file
 from dermis.formats.axes import Axes, Axis
 from dermis.formats.maps import PathLike
@@ -66,9 +66,9 @@ def read_usd(path: Path) -> MeshFile:
     the file.
     """
     data = read_file(path, "a USD file", MAX_FILE_BYTES)
-    request = {"file": from_text(str(path.resolve())), "path": from_text(str(path))}
+    request = {"file": array_from_text(str(path.resolve())), "path": array_from_text(str(path))}
     answer = run_decoder(_DECODER_MODULE, request, len(data), path, "a valid USD file")
-    scene: Tree = parse_json(as_text(answer["scene"]), path, "a valid USD file")
+    scene: Tree = parse_json(text_from_array(answer["scene"]), path, "a valid USD file")
     pictures = _UsdPictures(path, data)
     materials = tuple(pictures.material(tree) for tree in scene["materials"])
     check_pictures(path, materials)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dermis.base.errors import refuse
 from dermis.base.extras import import_extra
-from dermis.base.file_properties import drawn, drawn_with_note, in_code, noted
+from dermis.base.file_properties import drawn, drawn_with_note, markdown_code, noted
 
 if TYPE_CHECKING:
     from pxr import Usd, UsdShade
@@ -48,7 +48,7 @@ USD_MATERIALS = (
     noted("another picture of the `opacity`"),
     drawn("`scale`, `wrapS`, `wrapT`, `UsdTransform2d`"),
     noted("`bias`, `wrap...` of `black`, `sourceColorSpace` of `raw`", "normals use their `bias`"),
-    noted(in_code(_INPUTS_WITHOUT_EFFECT), "no note for values that change nothing"),
+    noted(markdown_code(_INPUTS_WITHOUT_EFFECT), "no note for values that change nothing"),
     drawn_with_note("emission without a `diffuseColor`", "taken for the reflectance, as in scans"),
     noted("shaders other than `UsdPreviewSurface`", "drawn in the colour of the mesh"),
     noted("a picture that is missing"),

@@ -46,7 +46,7 @@ def albedo_rows() -> str:
     for name, model in MODELS.items():
         if name == "kelemen-direct":
             continue
-        dense = directional_albedo(c, m, model.lobe, nodes=REFERENCE_NODE_COUNTS)
+        dense = directional_albedo(c, m, model.lobe, node_counts=REFERENCE_NODE_COUNTS)
         ms = 1e3 * min(timeit.repeat(partial(albedo_table.__wrapped__, name), number=1, repeat=5))
         errors = (directional_albedo(c, m, model.lobe), read_albedo(name, c, m)[..., 0])
         cells = [f"{100 * np.abs(one / dense - 1).max():.1g} %" for one in errors]

@@ -44,7 +44,7 @@ from dermis.scene.environment import Environment
 from dermis.scene.frozen_model import SliderRange, field_choices, fields_under
 from dermis.scene.heads import HUMAN
 from dermis.scene.lights import LIGHTS, Light, SpotLight, light_presets
-from dermis.scene.talk import COMPARISONS
+from dermis.scene.talk import COMPARISONS_HEADING
 
 _CUSTOM_CHOICE = "custom"
 _NO_ENVIRONMENT = "none"
@@ -60,11 +60,11 @@ _STAGE_HUE_STEP = 0.618034  # golden ratio of the hue circle, so that colours of
 _PERSON_SEED_COUNT = 10_000
 _ON_ENTER_FLAG = int(imgui.InputTextFlags_.enter_returns_true)
 _PRESET_BUTTONS_PER_ROW = 3
-_MAP_SIZES = (256, 512, 1024, 2048, 4096)
+_MAP_SIDES = (256, 512, 1024, 2048, 4096)
 _SETTING_STYLES = {
     **TECHNIQUE_STYLES,
-    "atlas": FieldStyle(options=_MAP_SIZES),
-    "shadow_size": FieldStyle("shadow map", options=_MAP_SIZES),
+    "atlas": FieldStyle(options=_MAP_SIDES),
+    "shadow_size": FieldStyle("shadow map", options=_MAP_SIDES),
     "samples": FieldStyle(options=(1, 2, 4, 8, 16)),
     "exposure": FieldStyle(custom_value=lambda session: session.view_renderer.exposure),
     "background": FieldStyle(custom_value=lambda session: (0.2, 0.2, 0.2)),
@@ -167,15 +167,15 @@ def _draw_environment(session: Session) -> None:
         draw_fields(session, environment, make_state, _ENVIRONMENT_STYLES)
 
 
-def has_expressions(session: Session) -> bool:
-    """Return whether the head has morph targets or bones, and so needs sliders for them."""
+def has_pose_controls(session: Session) -> bool:
+    """Return whether the head has morph targets or bones, each of which gets a slider."""
     head = session.state.scene.head
     return bool(head.targets or head.bones)
 
 
 def can_move(session: Session) -> bool:
     """Return whether a motion is loaded, or the head has morph targets or bones."""
-    return has_expressions(session) or session.player.has_motion
+    return has_pose_controls(session) or session.player.has_motion
 
 
 def draw_expressions(session: Session) -> None:
@@ -187,7 +187,7 @@ def draw_expressions(session: Session) -> None:
     imgui.same_line()
     if draw_button(session, "rest"):
         session.player.stop()
-        session.change(session.state.with_pose(posing.rest_pose(session.state.scene)))
+        session.change(session.state.with_pose(posing.reset_pose(session.state.scene)))
     targets = posing.filter_names(head.targets, session.search)
     bones = posing.filter_names(head.bones, session.search)
     animated = _animated_names(session)
@@ -378,11 +378,14 @@ def draw_picture(session: Session) -> None:
     )
 
 
-def draw_talk(session: Session) -> None:
-    """Draw controls for the skin fields and settings that reproduce faults shown in the talk of 2007."""
+def draw_talk_comparisons(session: Session) -> None:
+    """Draw controls that reproduce faults and historical methods for comparison.
+
+    Source: [dEonLuebke2007].
+    """
     state, skin, settings = session.state, session.state.scene.skin, session.state.settings
-    draw_fields(session, skin, state.with_skin, SURFACE_STYLES, fields_under(COMPARISONS, type(skin)))
-    names = fields_under(COMPARISONS, type(settings))
+    draw_fields(session, skin, state.with_skin, SURFACE_STYLES, fields_under(COMPARISONS_HEADING, type(skin)))
+    names = fields_under(COMPARISONS_HEADING, type(settings))
     if settings.seams != "clear-colour":
         names.remove("seam_colour")
     draw_fields(session, settings, state.with_settings, _SETTING_STYLES, names)
@@ -412,7 +415,7 @@ def draw_files(session: Session) -> None:
 
 def draw_timing(session: Session) -> None:
     """Plot the device times of the stages over the last frames, and list the times of the last frame."""
-    series = stage_series(list(session.view_renderer.stage_times))
+    series = stage_times_by_name(list(session.view_renderer.stage_times))
     if not series:
         imgui.text_disabled("this adapter reports no times")
         return
@@ -426,7 +429,7 @@ def draw_timing(session: Session) -> None:
     imgui.text(f"{total[-1]:8.2f} ms in total, mean of {len(total)} frames {total.mean():.2f}")
 
 
-def stage_series(frame_times_ms: Sequence[dict[str, float]]) -> dict[str, Floats]:
+def stage_times_by_name(frame_times_ms: Sequence[dict[str, float]]) -> dict[str, Floats]:
     """Return the times (n,) of each stage in n frames, by stage name [ms].
 
     The time is 0 in frames without the stage.
@@ -462,7 +465,7 @@ SECTIONS = (
     Section("Head", draw_head, is_open=True),
     Section("View", draw_view, is_open=True),
     Section("Before and after", draw_comparison),
-    Section("Expressions", draw_expressions, is_open=True, applies=has_expressions),
+    Section("Expressions", draw_expressions, is_open=True, applies=has_pose_controls),
     Section("Motion", draw_motion, is_open=True, applies=can_move),
     Section("Profile", draw_profile, is_open=True),
     Section("Surface", draw_surface, is_open=True),
@@ -471,5 +474,5 @@ SECTIONS = (
     Section("Picture", draw_picture),
     Section("Timing", draw_timing),
     Section("Scene", draw_files, is_open=True),
-    Section(COMPARISONS, draw_talk),
+    Section(COMPARISONS_HEADING, draw_talk_comparisons),
 )
