@@ -81,7 +81,7 @@ def load_rigged(
 
     unit_mm : length of the file's unit [mm]; None for the unit stated by the file or its format
         (`default_unit_mm`)
-    v_origin : edge of the map at v = 0, "top" as in glTF, "bottom" as in OBJ and PLY; "auto" selects by
+    v_origin : edge of textures at v = 0, "top" as in glTF, "bottom" as in OBJ and PLY; "auto" selects by
         format
     up : axis of the file that points upwards, see `to_y_up`; by default the axis that the file states
     front : axis of the file along which the face looks; by default the axis that `face_direction` finds

@@ -139,7 +139,7 @@ class _Header(NamedTuple):
 
 
 class _Columns(dict[str, "Numbers | _ListColumn"]):
-    """Columns of an element by property name, with a record of the columns that the importer has used."""
+    """Columns of an element by property name; `take` and similar methods record which columns are used."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -94,7 +94,7 @@ def row_strips(image: Numbers) -> Iterator[slice]:
 
 
 def _ffmpeg_format_of_16_bit(file_bytes: bytes, picture: Image) -> str | None:
-    """Return FFmpeg's name for the pixel format of a 16-bit colour picture; None for other pictures.
+    """Return FFmpeg's name for the pixel format of a 16-bit picture; None for other pictures.
 
     Pillow would reduce 16-bit colours to 8 bits, so FFmpeg decodes these pictures.
     """

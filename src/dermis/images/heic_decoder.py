@@ -12,7 +12,7 @@ from dermis.images.sizes import MAX_PIXELS
 
 
 def decode(request: Arrays) -> Arrays:
-    """Return the size, ICC profile, properties and pixels of a HEIC picture; called by `answer_request`.
+    """Return the size, ICC profile, properties and pixels of a HEIC picture.
 
     The properties are the bits per channel in the file, whether the picture was turned upright, and whether
     the file has more pictures. The pixels of a picture that is too large are left out.

@@ -239,7 +239,7 @@ def _parse_json_tree(path: Path, json_text: bytes) -> Tree:
 def _glb_chunks(glb_data: bytes) -> list[tuple[int, bytes]]:
     """Return the type and the bytes of each chunk of a .glb file, the last chunk first.
 
-    The order lets `dict` of this list keep the first chunk of each type, as the last entry of a key wins.
+    `dict` of this list thus contains the first chunk of each type in the file.
     """
     chunks, offset = [], 12
     while offset + 8 <= len(glb_data):

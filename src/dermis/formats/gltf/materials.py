@@ -1,4 +1,4 @@
-"""Materials of exported glTF heads: plain glTF materials, whose extras hold all maps of this package."""
+"""Materials of exported glTF heads; their extras list the maps that this package reads back."""
 
 from __future__ import annotations
 

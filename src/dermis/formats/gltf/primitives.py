@@ -214,7 +214,7 @@ class FibreTubes:
 
     @property
     def vertices_per_hair(self) -> int:
-        """Return the number of vertices of a tube: a ring at each point of the hair, a vertex at the tip."""
+        """Return the number of vertices of a tube: rings along the hair, and one vertex at the tip."""
         return _TUBE_SIDES * (self._knot_count - 1) + 1
 
     @property

@@ -52,7 +52,7 @@ class Armature:
     static_bone: int | None
 
     def bone_for_node(self, nodes: Nodes, node: int) -> int | None:
-        """Return the bone that moves the mesh of a node, if the mesh has no skin; None if no bone moves it.
+        """Return the bone that moves a mesh without a skin at a node; None if no bone moves it.
 
         The bone belongs to the node itself, or to the nearest ancestor that has a bone. If no ancestor has a
         bone, the result is `static_bone`.

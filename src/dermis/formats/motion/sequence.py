@@ -287,7 +287,7 @@ class FrameReader:
         return FrameVertices(positions[used], corners.astype(np.int32), part.uv[used].astype(np.float32))
 
     def _read_pattern(self, path: Path, unit: float) -> _ObjPattern | None:
-        """Return the fingerprint of the first file, an OBJ file.
+        """Return the fingerprint of the first OBJ file of a sequence.
 
         Returns None if fast reading with the fingerprint gives other positions than full parsing.
         """
