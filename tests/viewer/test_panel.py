@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from offscreen_input import InputDriver
 
-from dermis.apps.viewer.panel.sections import stage_series
+from dermis.apps.viewer.panel.sections import stage_times_by_name
 from dermis.apps.viewer.panel.skin import _CHANNEL_COLOURS
 
 PANEL = np.s_[:, :190]
@@ -19,7 +19,7 @@ def count_of(image: NDArray[np.uint8], colour: tuple[float, float, float]) -> in
 
 
 def test_stages_without_time_in_a_frame_are_empty() -> None:
-    found = stage_series([{"shade": 2.0, "total": 2.0}, {"blur": 1.0, "shade": 3.0, "total": 4.0}])
+    found = stage_times_by_name([{"shade": 2.0, "total": 2.0}, {"blur": 1.0, "shade": 3.0, "total": 4.0}])
     assert {name: values.tolist() for name, values in found.items()} == {"shade": [2, 3], "blur": [0, 1]}
 
 

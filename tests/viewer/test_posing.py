@@ -13,7 +13,7 @@ from dermis.apps.viewer.posing import (
     filter_names,
     posed_positions,
     poses_equal,
-    rest_pose,
+    reset_pose,
     target_weight,
     with_bone_angles,
     with_target_weight,
@@ -40,7 +40,7 @@ def test_reset_target_is_at_rest(rigged_head: Head) -> None:
     assert with_target_weight(moved, "jawOpen", 0.0) is None
     turned = Scene(rigged_head, pose=Pose(bones={"neck": (1.0, 2.0, 3.0)}))
     assert with_bone_angles(turned, "neck", (0.0, 0.0, 0.0)) is None
-    assert rest_pose(turned) is None
+    assert reset_pose(turned) is None
 
 
 def test_rest_weight_is_shown(rigged_head: Head) -> None:
@@ -55,7 +55,7 @@ def test_rest_weight_is_shown(rigged_head: Head) -> None:
 def test_the_person_stays_at_rest(rigged_head: Head) -> None:
     person = 1.1 * rigged_head.positions_mm
     scene = Scene(rigged_head, pose=Pose({"jawOpen": 1.0}, positions_mm=person))
-    rest = rest_pose(scene)
+    rest = reset_pose(scene)
     assert rest is not None and rest.positions_mm is person and not rest.weights
 
 

@@ -80,8 +80,8 @@ def gaussian_curve(variance_mm2: Floats, gaussian_weight: Floats, energy: Floats
     return CumulativeProfile.from_function(fraction_within, energy)
 
 
-def scale_lengths(unit_profile: CumulativeProfile, scale_mm: ArrayLike) -> CumulativeProfile:
-    """Return the cumulative profile `unit_profile` with the radii of each channel multiplied by a length.
+def scale_radii(unit_profile: CumulativeProfile, scale_mm: ArrayLike) -> CumulativeProfile:
+    """Return a cumulative profile with the radii of each channel multiplied by a length.
 
     unit_profile : cumulative profile whose radii are in units of `scale_mm`
     scale_mm : (3,) length by which the radii of each channel are multiplied [mm]
@@ -94,13 +94,13 @@ def scale_lengths(unit_profile: CumulativeProfile, scale_mm: ArrayLike) -> Cumul
     return CumulativeProfile.from_function(fraction_within, unit_profile.energy)
 
 
-def fit_scale(curve: CumulativeProfile, unit_profile: CumulativeProfile) -> Floats:
+def fit_radius_scale(curve: CumulativeProfile, unit_profile: CumulativeProfile) -> Floats:
     """Return the lengths (3,) by which the radii of `unit_profile` are multiplied to match `curve` [mm].
 
     In each channel, the largest difference between `curve` and the scaled `unit_profile` is minimised.
     """
     middle = np.log(curve.radius_at_fraction(0.5) / unit_profile.radius_at_fraction(0.5))
-    return _fit_scale_in_range(
+    return _fit_radius_scale_in_range(
         curve, unit_profile, middle, _LOG_LENGTH_SEARCH_RANGE, _LENGTH_BISECTION_STEPS - 1
     )
 
@@ -131,11 +131,11 @@ def fit_homogeneous_medium(
     albedo = tabulated_albedo(half_space_kind, curve.energy if energy is None else energy)
     unit = half_space(half_space_kind, albedo, np.ones(3))
     middle = np.log(fit_burley_width(curve) / fit_burley_width(unit))  # ratio of Burley widths
-    mfp = _fit_scale_in_range(curve, unit, middle, 2.0, _MEDIUM_BISECTION_STEPS)
+    mfp = _fit_radius_scale_in_range(curve, unit, middle, 2.0, _MEDIUM_BISECTION_STEPS)
     return HomogeneousMedium(albedo, mfp, half_space(half_space_kind, albedo, mfp))
 
 
-def _fit_scale_in_range(
+def _fit_radius_scale_in_range(
     curve: CumulativeProfile,
     unit_profile: CumulativeProfile,
     middle_log_length: Floats,
@@ -143,7 +143,7 @@ def _fit_scale_in_range(
     bisection_steps: int,
 ) -> Floats:
     def cdf_difference(log_scale: Floats) -> Floats:
-        return scale_lengths(unit_profile, np.exp(log_scale)).fraction - curve.fraction
+        return scale_radii(unit_profile, np.exp(log_scale)).fraction - curve.fraction
 
     return _bisect_minimax(
         cdf_difference, middle_log_length - log_range, middle_log_length + log_range, bisection_steps
@@ -158,10 +158,8 @@ def _bisect_minimax(
 ) -> Floats:
     """Return the lengths (3,) by which a cumulative profile is scaled to match a reference profile.
 
-    The largest absolute difference between the cumulative profiles is minimised in each channel. A longer
-    length widens the scaled profile, so less light lies within each radius: the largest excess over the
-    reference decreases, and the largest deficit increases. The best length is therefore the one at which
-    excess and deficit are equal.
+    The largest absolute difference between the cumulative profiles is minimised in each channel. At the best
+    length, the largest positive difference equals the largest negative difference; bisection finds it.
 
     cdf_difference : function that takes the logarithms of the lengths (3,) and returns the scaled cumulative
         profile minus the reference profile, at n radii (n, 3)
@@ -212,8 +210,8 @@ def fit_length_scale(
 class CurveError:
     """Errors of the profile that a program renders, relative to the reference profile, by colour channel.
 
-    cdf : (3,) largest difference between the fractions of light within a radius [-]
-    edge : (3,) largest difference between the diffused light near a straight edge, such as a shadow edge [-]
+    cdf : (3,) largest difference between the fractions of light within the same radius [-]
+    edge : (3,) largest difference in brightness, after diffusion, near a straight shadow edge [-]
     energy : (3,) relative error of the total energy [-]
     """
 

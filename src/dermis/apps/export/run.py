@@ -140,7 +140,7 @@ def _format_channels(channel_values: Floats) -> str:
 
 
 def _as_single_line(text: str) -> str:
-    """Return a text with line breaks and backticks replaced, as these could end a code block of Markdown."""
+    """Return a text without line breaks and backticks, which could end a code block of Markdown."""
     return text.replace("`", "'").replace("\n", " ").replace("\r", " ")
 
 
@@ -174,8 +174,8 @@ def export_skin(
     variant : str, optional
         Variant of the target, such as a scattering method; the target's first variant by default.
     model : {"montecarlo", "layered", "multipole", "dipole", "better-dipole"}, optional
-        Model of the diffusion profile. By default tabulated Monte Carlo for homogeneous media of the package,
-        layered diffusion for other tissue, and the Gaussians themselves for a table of Gaussians.
+        Model of the diffusion profile. By default, tabulated Monte Carlo for the built-in homogeneous media,
+        and layered diffusion for other tissue. A profile given as a table of Gaussians needs no model.
     profile : str or Path, optional
         Name or file of the profile of a head's skin. By default, the skin of a parametric person has the
         pigments of that person, and other heads have the default skin.

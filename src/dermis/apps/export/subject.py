@@ -99,11 +99,10 @@ class Subject:
         return np.clip(self.albedo, min_albedo, 1.0)
 
     def rescale_energy(self, curve: CumulativeProfile) -> CumulativeProfile:
-        """Return `curve` with an energy that can be compared with the energy of the reference profile.
+        """Return `curve` with its energy scaled for comparison with the reference profile.
 
-        The albedo of the subject can differ from the energy of the reference profile, and the program's skin
-        may return more or less light than this albedo. The new energy is (energy of `curve`) / albedo *
-        (energy of the reference profile).
+        The program renders `curve` for the subject's albedo, which may differ from the energy of the
+        reference profile. The energy of `curve` is multiplied by (energy of the reference profile) / albedo.
 
         curve : cumulative profile that the program renders for the subject's albedo
         """
@@ -118,7 +117,7 @@ class Subject:
         return None if eyes is None else run_on_device("auto", lambda device: paint_eye(device, eyes.look))
 
     def with_painted_maps(self, map_side: int, adapter: str) -> Subject:
-        """Return a copy in which the head's procedural maps are painted as arrays.
+        """Return a copy whose head has arrays of texels, painted on a device, in place of procedural maps.
 
         If the head has no procedural maps, the subject itself is returned.
 
@@ -190,8 +189,8 @@ def reference_curve(
 ) -> tuple[CumulativeProfile, str, Tissue | None]:
     """Return the cumulative reference profile of a skin, the name of its model, and its tissue.
 
-    model : by default tabulated Monte Carlo for homogeneous media of the package, layered diffusion for other
-        tissue, and the Gaussians themselves for a table of Gaussians
+    model : by default, tabulated Monte Carlo for the built-in homogeneous media, and layered diffusion for
+        other tissue; a profile that is given as a table of Gaussians needs no model
 
     Raises DermisError for an unknown model, and for a model requested for a table of Gaussians.
     """

@@ -26,8 +26,8 @@ _DIVIDER_GRAB_RADIUS_PX = 8.0  # distance from the divider within which a pointe
 class Controls:
     """Conversion of input events to steps of the undo history.
 
-    displayed_state : function that returns the state on screen, which is not the current state of the history
-        while a motion plays
+    displayed_state : function that returns the state on screen, which differs from the current state of the
+        history while a motion plays
     light : index of the light that Shift-drag moves; an index after the last light selects the environment
     """
 

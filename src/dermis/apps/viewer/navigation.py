@@ -98,7 +98,7 @@ class CameraEasing:
 def interpolate_cameras(start_camera: Camera, end_camera: Camera, fraction: float) -> Camera:
     """Interpolate between two cameras; return `end_camera` itself if the result would look the same.
 
-    The view direction is rotated, and the distance and the visible height are scaled.
+    The direction is interpolated by rotation, and the distance and visible height by scaling.
 
     fraction : position between the cameras, from 0 (start) to 1 (end)
     """
@@ -160,21 +160,21 @@ def pick(scene: Scene, camera: Camera, x: float, y: float, aspect: float) -> Flo
     return np.asarray(origin + t[hit].min() * ray - head.centre_mm)
 
 
-def drag_light(state: ViewerState, light_index: int, right: float, up: float) -> ViewerState:
+def drag_light(state: ViewerState, light_index: int, right_rad: float, up_rad: float) -> ViewerState:
     """Orbit a light around its target in the direction of a drag, or rotate the environment.
 
     light_index : index of the light; an index after the last light selects the environment
-    right : angle by which the light moves to the right on screen, or by which the environment turns [rad]
-    up : angle by which the light moves up on screen; ignored for the environment [rad]
+    right_rad : angle by which the light moves to the right on screen, or by which the environment turns [rad]
+    up_rad : angle by which the light moves up on screen; ignored for the environment [rad]
     """
     if light_index < len(state.scene.lights):
         lights = list(state.scene.lights)
-        lights[light_index] = orbit_light(lights[light_index], state.scene.camera, right, up)
+        lights[light_index] = orbit_light(lights[light_index], state.scene.camera, right_rad, up_rad)
         return state.with_lights(lights)
     environment = state.scene.environment
     if environment is None:
         return state
-    degrees = (environment.rotation_degrees + math.degrees(right) + 180.0) % 360.0 - 180.0
+    degrees = (environment.rotation_degrees + math.degrees(right_rad) + 180.0) % 360.0 - 180.0
     return state.with_environment(validated_copy(environment, rotation_degrees=degrees))
 
 

@@ -1,4 +1,4 @@
-"""Edits of the pose: morph target weights, bone angles, and the return to rest."""
+"""Edits of the pose: morph target weights, bone angles, and the return to the rest pose."""
 
 from __future__ import annotations
 
@@ -59,10 +59,10 @@ def with_bone_angles(scene: Scene, bone_name: str, angles_degrees: Angles) -> Po
     return _none_if_rest(replace(_pose_or_rest(scene), bones=bones))
 
 
-def rest_pose(scene: Scene) -> Pose | None:
+def reset_pose(scene: Scene) -> Pose | None:
     """Return the pose of a scene without its morph target weights and bone rotations.
 
-    If the pose contains vertex positions, they are kept; otherwise the result is None, meaning the rest pose.
+    Vertex positions in the pose are kept; without them, the result is None, which means the rest pose.
     """
     return _none_if_rest(replace(_pose_or_rest(scene), weights={}, bones={}))
 

@@ -34,7 +34,7 @@ HEAD_FILE_SUFFIXES = (".glb", ".vrm", ".usdz", ".obj", ".ply", ".stl", ".json", 
 """Suffixes of files that a page may upload: meshes, people and scenes."""
 
 _MAX_RECENT_HEADS = 8
-LoadedHead = Head | ViewerState
+LoadedHeadOrScene = Head | ViewerState
 
 
 class HeadLoader:
@@ -49,7 +49,7 @@ class HeadLoader:
         self.request_frame: Callable[[], None] = lambda: None
         self._original_names: dict[str, str] = {}  # original names of uploaded files, by path
         self._executor = ThreadPoolExecutor(1, "head")
-        self._future: Future[LoadedHead] | None = None
+        self._future: Future[LoadedHeadOrScene] | None = None
         self._name = ""
 
     @property
@@ -100,7 +100,7 @@ class HeadLoader:
         return loaded if isinstance(loaded, ViewerState) else _with_head(state, loaded, self._name)
 
 
-def _load_head_or_scene(name_or_path: str) -> LoadedHead:
+def _load_head_or_scene(name_or_path: str) -> LoadedHeadOrScene:
     return (
         load_state(Path(name_or_path))
         if Path(name_or_path).suffix.lower() == ".toml"
@@ -294,9 +294,9 @@ def _shorten(message: str) -> str:
 def apply_regions(
     state: ViewerState, table_name: str, known_states: Iterable[ViewerState] = ()
 ) -> ViewerState:
-    """Return the state with roughness and specular maps from a table of face regions, or without such maps.
+    """Return the state with the roughness and specular maps of a table of face regions, or without them.
 
-    table_name : name of the table, "auto" or "none"
+    table_name : name or file of the table, "auto" or "none"
     known_states : states whose heads are reused if they already have these maps
 
     Raises DermisError for heads without known regions and for heads created in memory.

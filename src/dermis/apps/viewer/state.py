@@ -194,9 +194,9 @@ def states_equal(first_state: ViewerState, second_state: ViewerState) -> bool:
     return is_head_same and compared_values(first_state) == compared_values(second_state)
 
 
-def validated_copy(values: P, **fields: object) -> P:
+def validated_copy(model: P, /, **fields: object) -> P:
     """Return a copy of a pydantic model with new values of some fields, validated."""
-    return type(values)(**(values.model_dump() | fields))
+    return type(model)(**(model.model_dump() | fields))
 
 
 def save_state(path: Path, state: ViewerState) -> None:
@@ -260,7 +260,8 @@ def load_state(path: Path, current: ViewerState | None = None) -> ViewerState:
 def initial_state(scene: Scene, settings: Settings, head_table: Table, rig_name: str) -> ViewerState:
     """Return the initial state of a scene.
 
-    If `settings.parts` selects only the diffuse or only the specular light, that becomes the displayed view.
+    If `settings.parts` selects only the diffuse or only the specular light, the initial view shows only this
+    light.
 
     head_table : table from which the head was loaded, with the keys of the [head] table of a scene file
     rig_name : name of the light preset; empty for custom lights

@@ -117,9 +117,9 @@ class QualityController:
 
 Images = tuple[Texture, Texture | None]
 """Image of the live state, and image of the frozen state; None if no state is frozen."""
-_CACHED_FRAME_RESOURCES = 2  # resources for frames in motion and for still frames
+_CACHED_RESOURCE_SETS = 2  # resources for frames in motion and for still frames
 _PREPARATION_FRAME_SIZE = (96, 64)  # size of small frames that use all shaders [pixel]
-_TIMED_FRAMES = 120
+_TIMED_FRAME_COUNT = 120
 _FROZEN_DIVIDER_SIDE = (
     "before"  # name of its atlas light, kept apart so that a moving camera relights neither side
 )
@@ -145,7 +145,7 @@ class ViewRenderer:
 
     def __init__(self, adapter: str = "auto") -> None:
         self.is_preparing = False
-        self.renderer = Renderer(adapter, cache_size=_CACHED_FRAME_RESOURCES, reopens=False)
+        self.renderer = Renderer(adapter, cache_size=_CACHED_RESOURCE_SETS, reopens=False)
         self.quality_controller = QualityController(
             is_software_adapter=self.renderer.device.adapter.kind == "CPU"
         )
@@ -155,12 +155,12 @@ class ViewRenderer:
         self._image_inputs: tuple[ViewerState, Camera, Settings] | None = None
         self.last_image: Texture | None = None
         self._size = (0, 0)
-        self.stage_times: deque[dict[str, float]] = deque(maxlen=_TIMED_FRAMES)
+        self.stage_times: deque[dict[str, float]] = deque(maxlen=_TIMED_FRAME_COUNT)
         self._frozen: FrozenImage | None = None
         self._atlas_state: tuple[ViewerState, str] | None = None
 
     def prepare(self, state: ViewerState, on_resources_ready: Callable[[], None] = lambda: None) -> None:
-        """Create all resources and shaders for a state by rendering small images at motion and full quality.
+        """Create all resources and shaders for a state by rendering small images, in motion and still.
 
         on_resources_ready : function called when the resources of the head have been created
 
@@ -346,7 +346,7 @@ class HeadPreparation:
         return self._future is not None
 
     def reset(self) -> None:
-        """Discard the prepared meshes and the image shown during preparation; the renderer was replaced."""
+        """Discard the prepared meshes and the image shown during preparation, for a new renderer."""
         self._ready_mesh = self._future = self._next_mesh = self._held_image = None
 
     def prepare_head(self, view_renderer: ViewRenderer, state: ViewerState) -> Texture | None:

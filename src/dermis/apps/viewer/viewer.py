@@ -190,13 +190,13 @@ class Viewer:
         return max(1, width - self._panel_width()), max(1, height)
 
     def _patches(
-        self, live_image: Texture, frozen_image: Texture | None, canvas_size: tuple[int, int]
+        self, live_image: Texture, frozen_image: Texture | None, picture_size: tuple[int, int]
     ) -> list[Patch]:
         """Return patches that show the live image and, if there is one, the frozen image left of the divider.
 
-        canvas_size : width and height of the picture [pixel]
+        picture_size : width and height of the picture [pixel]
         """
-        left, (width, height) = self._panel_width(), canvas_size
+        left, (width, height) = self._panel_width(), picture_size
         viewport = left, 0, width, height
         if frozen_image is None:
             return [Patch(live_image, viewport, viewport)]
@@ -275,7 +275,8 @@ class Viewer:
     def _on_picture_event(self, event: Event) -> None:
         """Handle an event over the picture.
 
-        During a drag, positions stay relative to where the picture's left edge was at the start of the drag.
+        During a drag, positions are relative to the picture's left edge at the start of the drag, even if the
+        edge moves.
         """
         width, height = self.canvas.get_logical_size()
         left = self.panel.width((width, height))

@@ -30,10 +30,10 @@ from dermis.gpu.textures import texture_from_array
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
-LEVEL_VIEWS = {"irradiance": 0} | {f"blur {k}": k for k in range(1, 7)}
+BLUR_LEVELS_BY_VIEW = {"irradiance": 0} | {f"blur {k}": k for k in range(1, 7)}
 """Level of the blur pyramid that each view of irradiance shows."""
 
-ATLAS_LAYERS = (*LEVEL_VIEWS, "stretch", "thickness")
+ATLAS_LAYERS = (*BLUR_LEVELS_BY_VIEW, "stretch", "thickness")
 """Names of the atlas maps that the view "atlas" can show."""
 
 VIEW_NAMES = ("picture", *PART_VIEWS, *ATLAS_LAYERS, "shadow", "normals", ATLAS_VIEW_NAME)
@@ -46,7 +46,7 @@ _SHADER_QUANTITY_NUMBERS = {
     "shadow": 3,
     "normals": 4,
 }  # as in the shaders; irradiance is 0
-_MISSING_LEVEL_ADVICE = "Choose a narrower blur, or the technique texture-space"
+_MISSING_BLUR_ADVICE = "Choose a narrower blur, or the technique texture-space"
 
 
 class IntermediateViews:
@@ -116,18 +116,18 @@ class IntermediateViews:
     ) -> tuple[TextureOrView, float]:
         """Return the texture of an atlas layer, and a scale for displaying it.
 
-        For layers with light, the scale is the factor by which texels are multiplied for display. For the
-        layer "stretch", it is the mean number of texels per mm; for other layers, it is 1.
+        For irradiance and its blurs, the scale is the factor by which texels are multiplied for display. For
+        the layer "stretch", it is the mean number of texels per mm; for other layers, it is 1.
         """
-        if layer_name in LEVEL_VIEWS:
-            level, blur = LEVEL_VIEWS[layer_name], next(iter(inputs.blurs), None)
+        if layer_name in BLUR_LEVELS_BY_VIEW:
+            level, blur = BLUR_LEVELS_BY_VIEW[layer_name], next(iter(inputs.blurs), None)
             count = len(blur.profile_levels) if blur else 0
             if blur is None or level >= count:
                 refuse(
                     f"view {layer_name}",
                     "a pyramid level of the atlas",
                     f"there are {count}",
-                    _MISSING_LEVEL_ADVICE,
+                    _MISSING_BLUR_ADVICE,
                 )
             layer = blur.profile_levels[level]
             texture = inputs.resources.diffusion.levels.layer(layer, blur.halvings[layer])
@@ -164,10 +164,10 @@ class IntermediateViews:
 
 
 def draw_thickness(device: Device, translucency: Translucency, target_texture: Texture) -> Texture:
-    """Fill a texture with the tissue thickness at each cell of the coarse atlas, and return it [mm].
+    """Fill a texture with the tissue thickness at each cell of the coarse atlas [mm]; return the texture.
 
-    The thickness at a cell is its smallest depth below the tangent planes of its source cells, at which
-    transmitted light enters. The thickness is at most the radius within which source cells are searched.
+    Light that is transmitted to a cell enters the tissue at source cells. The thickness is the smallest depth
+    of the cell below the tangent plane of a source cell, but at most the search radius for source cells.
 
     target_texture : texture to fill, with one texel per cell; cells without source cells are unchanged
     """

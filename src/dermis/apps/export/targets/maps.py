@@ -94,7 +94,7 @@ class MapFolder(Target):
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the maps' size, the direction of green in normal maps, and whether light is diffused."""
+        """Return the maps' size, the direction of y in normal maps, and whether light is diffused."""
         return (
             Parameter("size", self.side, "texel", "side of the maps"),
             Parameter(

@@ -91,7 +91,7 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
             self._send_last_frame_to_ready_clients()  # it was encoded while this page was not ready
 
     def _maybe_draw(self) -> None:
-        """Draw a frame, unless too many frames are being encoded or wait for the page's confirmation."""
+        """Draw a frame, unless too many frames are being encoded or await the page's confirmation."""
         info = self._frame_info_per_client.get(self._active_client)
         if info and info["sent"] - info["confirmed"] + self._encoding_count >= self._max_buffered_frames:
             self._pending_maybe_draw = False  # retried after the next frame is encoded or confirmed

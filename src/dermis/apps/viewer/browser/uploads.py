@@ -35,7 +35,7 @@ class Uploads:
     """ASGI middleware that receives files at upload/NAME from the page that has control.
 
     app : application that handles all other requests
-    canvas : canvas that issues the upload ticket that a page must send, and that opens each received file
+    canvas : canvas of the page; it issues the ticket required for an upload, and opens each received file
     folder : folder for the received files; the file names that pages send are only displayed, and not used in
         paths
     """

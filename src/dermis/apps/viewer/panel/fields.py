@@ -237,7 +237,7 @@ def edit_value(session: Session, label: str, change_and_value: tuple[bool, Any],
 def draw_combo(
     session: Session,
     label: str,
-    current: str,
+    current_name: str,
     choices: Iterable[str],
     with_value: ToState,
     display_names: Mapping[str, str] = _EMPTY_DISPLAY_NAMES,
@@ -248,31 +248,31 @@ def draw_combo(
     with_value : function that returns a state, given the chosen name
     display_names : text to show for each name whose text differs from the name
     """
-    chosen = choose_name(session, label, current, choices, display_names)
+    chosen = choose_name(session, label, current_name, choices, display_names)
     if chosen is not None:
         run_action(session, lambda: session.change(with_value(chosen)))
 
 
 def choose_name(
-    session: Session, label: str, current: str, choices: Iterable[str], display_names: Mapping[str, str]
+    session: Session, label: str, current_name: str, choices: Iterable[str], display_names: Mapping[str, str]
 ) -> str | None:
     """Draw a drop-down list; return the name that was clicked, or None if no name was clicked.
 
-    current : name that is selected now
+    current_name : name that is selected now
     choices : names to choose from; "" draws a separator
     display_names : text to show for each name whose text differs from the name
     """
     chosen = None
-    if not imgui.begin_combo(label, display_names.get(current, current), _TALL_LIST_FLAG):
+    if not imgui.begin_combo(label, display_names.get(current_name, current_name), _TALL_LIST_FLAG):
         record_position(session, label)
         return None
     for name in choices:
         if not name:
             imgui.separator()
             continue
-        clicked, _ = imgui.selectable(f"{display_names.get(name, name)}###{name}", name == current)
+        clicked, _ = imgui.selectable(f"{display_names.get(name, name)}###{name}", name == current_name)
         record_position(session, f"{_label_key(label)}/{name}")
-        if clicked and name != current:
+        if clicked and name != current_name:
             chosen = name
     imgui.end_combo()
     return chosen

@@ -112,7 +112,7 @@ class ImguiFrames:
         self._device.handle.queue.submit([encoder.finish()])
 
     def _recreate_context(self) -> None:
-        """Replace the context after an error in Dear ImGui; the sections return to their initial state."""
+        """Replace the context after an error in Dear ImGui; this resets which panel sections are open."""
         self._has_layout = False
         implot.destroy_context(self._plot_context)
         imgui.destroy_context(self._context)

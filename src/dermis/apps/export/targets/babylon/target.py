@@ -28,7 +28,7 @@ RENDERED_WIDTH_RATIO = 2.0
 """Ratio of the rendered width of the profile to the width given by metersPerUnit [-]."""
 _GOLDEN_RATIO = 1.618033988749895
 _PROFILE_NAME = "subSurface.scatteringDiffusionProfile"
-_SCALE_NAME = "subSurfaceConfiguration.metersPerUnit"
+_METERS_PER_UNIT_NAME = "subSurfaceConfiguration.metersPerUnit"
 _CORE_SHA384 = "4Kbm3nj4VMzMufY0FYM9DactmO8CluLjEAe0W1BzVo7hlKEswOLkl46FLI6mxZmx"
 _LOADERS_SHA384 = "4FQhr/DrxLfjm5tCJq7Cs1uJIC29544DNb4rVCt4qVzXM7rw07KsDYgdH8/ayoss"
 
@@ -57,9 +57,8 @@ class Babylon(EnginePage):
     def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the profile's colour c and metersPerUnit for the fitted Burley widths d [mm].
 
-        The shader gives a channel the width 1/c, and distributes the samples by a profile of width max(c),
-        both in units of 2/metersPerUnit mm. With k = sqrt(d_min d_max), c = k/d and metersPerUnit = 2/k, each
-        channel has the width d, and the samples are distributed by the largest width.
+        With k = sqrt(d_min d_max), the colour is c = k/d and metersPerUnit is 2/k. The shader then renders
+        the width d in each channel, and distributes its samples by a profile with the largest width.
         """
         d = fit_burley_width(subject.curve)
         k = float(np.sqrt(d.min() * d.max()))
@@ -71,11 +70,14 @@ class Babylon(EnginePage):
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative profile of the discrete samples that the shader takes."""
-        profile, (metres,) = get_numbers(parameters, _PROFILE_NAME), get_numbers(parameters, _SCALE_NAME)
+        profile, (metres,) = (
+            get_numbers(parameters, _PROFILE_NAME),
+            get_numbers(parameters, _METERS_PER_UNIT_NAME),
+        )
         return spiral_curve(profile, metres, subject.curve.energy)
 
     def library_elements(self, version: str) -> tuple[str, list[str]]:
-        """Return the library's script elements, and the script sources that the page's policy must allow."""
+        """Return the library's script elements, and the sources for the page's Content-Security-Policy."""
         files = self.library_files[version]
         if self.library_folder is None:
             return "\n".join(file.element for file in files), [file.url for file in files]
@@ -89,7 +91,7 @@ def _profile_parameters(subject: Subject, profile_colour: Floats, meters_per_uni
             _PROFILE_NAME, flat_tuple(profile_colour), "-", "inverse widths: smaller numbers diffuse farther"
         ),
         Parameter(
-            _SCALE_NAME,
+            _METERS_PER_UNIT_NAME,
             meters_per_unit,
             "m",
             "widths are 2 mm / (metersPerUnit colour), not a length of the scene",

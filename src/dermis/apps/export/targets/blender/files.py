@@ -22,7 +22,7 @@ from dermis.apps.export.target import Parameters, flat_tuple
 from dermis.apps.truths.blender_process import BlenderTask, blender_python, run_blender
 from dermis.apps.truths.cycles import cycles_camera
 from dermis.apps.truths.lights import CYCLES, cycles_lamp
-from dermis.apps.truths.scene_description import UNIT_MM, SceneDict, cycles_world
+from dermis.apps.truths.scene_description import CYCLES_UNIT_MM, SceneDict, cycles_world
 from dermis.formats.gltf.write import encode_head
 from dermis.human.person_file import relief_slopes
 from dermis.mesh.head import Head
@@ -36,11 +36,11 @@ VersionRange = tuple[list[int], list[int] | None]
 SCRIPT_FILE, HEAD_FILE, PANORAMA_FILE = "skin.py", "head.glb", "panorama.npy"
 """Names of the files in an output folder."""
 METRES_PER_MM = 1e-3
-_CYCLES_UNIT_M = UNIT_MM * METRES_PER_MM
+_CYCLES_UNIT_M = CYCLES_UNIT_MM * METRES_PER_MM
 _Y_UP_TO_Z_UP = np.array(
     [[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
 )
-_BALL_DISTANCE_MM, _BALL_FRAME_MM = 1100.0, 140.0  # camera distance from a ball; visible height
+_BALL_CAMERA_DISTANCE_MM, _BALL_FRAME_HEIGHT_MM = 1100.0, 140.0  # camera distance from a ball; visible height
 _LAMP_LENGTH_FIELDS = ("shadow_soft_size", "size", "size_y")
 _BLENDER_TASK = BlenderTask(
     "Blender",
@@ -99,7 +99,7 @@ def _describe_skin(
         "smoother": float(np.sqrt(skin.smoothing * _GGX_PER_BECKMANN_ROUGHNESS)),
         "ball_m": BALL_DIAMETER_MM * METRES_PER_MM,
         "head": None,
-        "skin_slots": skin_slots(subject.head_or_ball),
+        "skin_slots": skin_material_indices(subject.head_or_ball),
         "size": list(Settings().size),
     }
 
@@ -137,7 +137,7 @@ def _encode_head(subject: Subject, scene: Scene) -> bytes:
     )
 
 
-def skin_slots(head: Head) -> list[int]:
+def skin_material_indices(head: Head) -> list[int]:
     """Return the indices of the skin materials in the .glb file, which omits materials without triangles."""
     used = np.unique(head.mesh.material)
     return [slot for slot, kind in enumerate(used) if head.mesh.materials[kind].kind == "skin"]
@@ -168,7 +168,9 @@ def script_text(export_data: Mapping[str, object]) -> str:
 
 def _ball_scene(ball: Head) -> Scene:
     """Return a scene with a ball, studio lights, and a camera in front of the ball."""
-    return Scene(ball, camera=Camera(position=(0.0, 0.0, _BALL_DISTANCE_MM), frame_mm=_BALL_FRAME_MM))
+    return Scene(
+        ball, camera=Camera(position=(0.0, 0.0, _BALL_CAMERA_DISTANCE_MM), frame_mm=_BALL_FRAME_HEIGHT_MM)
+    )
 
 
 def describe_scene(scene: Scene, centre_mm: ArrayLike) -> tuple[SceneDict, NDArray[np.float32] | None]:
@@ -191,7 +193,7 @@ def describe_scene(scene: Scene, centre_mm: ArrayLike) -> tuple[SceneDict, NDArr
 
 
 def _convert_transform(to_world: ArrayLike, origin_m: Floats) -> list[list[float]]:
-    """Convert a transformation from Y up, with lengths in `UNIT_MM`, to Blender's Z up, in metres.
+    """Convert a transformation from Y up, with lengths in `CYCLES_UNIT_MM`, to Blender's Z up, in metres.
 
     origin_m : (3,) position of the input's origin in the exported scene, with Y up [m]
     """
@@ -201,7 +203,7 @@ def _convert_transform(to_world: ArrayLike, origin_m: Floats) -> list[list[float
 
 
 def _convert_lamp(lamp: SceneDict, origin_m: Floats) -> SceneDict:
-    """Convert the description of a lamp from Y up, with lengths in `UNIT_MM`, to Blender's Z up, in metres.
+    """Convert a lamp's description from Y up, with lengths in `CYCLES_UNIT_MM`, to Blender's Z up, in metres.
 
     origin_m : (3,) position of the input's origin in the exported scene, with Y up [m]
     """

@@ -177,10 +177,10 @@ class RandomWalk(NamedTuple):
 
         radius : radii [mean free paths]
         """
-        return walk_cdf(radius, self.albedo, self.entry) / self.total
+        return walk_cdf(radius, self.albedo, self.entry) / self.emerging_fraction
 
     @property
-    def total(self) -> float:
+    def emerging_fraction(self) -> float:
         """Return the light that leaves the skin along the normal, per incident light [-]."""
         return float(walk_cdf(np.array([_EFFECTIVELY_INFINITE_RADIUS]), self.albedo, self.entry)[0])
 
@@ -296,7 +296,7 @@ class Blender(Target):
         """Return the light (3,) that leaves the skin along the normal, divided by the base colour [-]."""
         if self.variant in ("burley", "eevee"):
             return np.ones(3)
-        total = np.array([walk.total for walk in self._random_walks(subject, version)])
+        total = np.array([walk.emerging_fraction for walk in self._random_walks(subject, version)])
         return total / np.maximum(subject.albedo, 1e-6)
 
 

@@ -18,8 +18,8 @@ SCATTER_VARIANT, TRANSMISSION_VARIANT = "scatter", "diffuse-transmission"
 DRAFT_NOTICE = (
     "KHR_materials_scatter: draft of 2026-06-22 (KhronosGroup/glTF pull request 2579), not ratified"
 )
-_DISTANCE_NAME = "KHR_materials_volume.attenuationDistance"
-_COLOUR_NAME = "KHR_materials_volume.attenuationColor"
+_ATTENUATION_DISTANCE_NAME = "KHR_materials_volume.attenuationDistance"
+_ATTENUATION_COLOUR_NAME = "KHR_materials_volume.attenuationColor"
 _MULTISCATTER_NAME = "KHR_materials_scatter.multiscatterColorFactor"
 _TRANSMISSION_FACTOR_NAME = "KHR_materials_diffuse_transmission.diffuseTransmissionFactor"
 _TRANSMISSION_COLOUR_NAME = "KHR_materials_diffuse_transmission.diffuseTransmissionColorFactor"
@@ -48,13 +48,13 @@ class Gltf(Target):
     part_limitations = ""
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the parameters of the volume closest to the reference, or of the transmission of an ear."""
+        """Return the parameters of the variant: of a fitted scattering volume, or of light through an ear."""
         if self.variant == TRANSMISSION_VARIANT:
             return _diffuse_parameters(subject, *_ear_transmission(subject))
         return _scatter_parameters(fit_volume(subject.curve, subject.albedo))
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the skin's colour as each colour, and the mean exit radius as the attenuation distance."""
+        """Return the skin's colour for all colours, and the profile's mean radius as attenuation distance."""
         if self.variant == TRANSMISSION_VARIANT:
             return _diffuse_parameters(subject, _NAIVE_TRANSMISSION_FACTOR, subject.albedo)
         radius_m = 1e-3 * float(2.5 * fit_burley_width(subject.curve).max())
@@ -91,9 +91,9 @@ def _scatter_parameters(volume: Volume) -> Parameters:
         Parameter(
             "KHR_materials_volume.thicknessFactor", _HEAD_THICKNESS_M, "m", "above 0 enables the volume"
         ),
-        Parameter(_DISTANCE_NAME, volume.distance_m, "m", "the largest mean free path"),
+        Parameter(_ATTENUATION_DISTANCE_NAME, volume.distance_m, "m", "the largest mean free path"),
         Parameter(
-            _COLOUR_NAME,
+            _ATTENUATION_COLOUR_NAME,
             flat_tuple(volume.colour),
             "-",
             "fraction of the light without an event on that path",
@@ -134,11 +134,11 @@ def _diffuse_parameters(
 
 
 def _ear_transmission(subject: Subject) -> tuple[float, Floats]:
-    """Return the fraction [-] and the colour (3,) of the light that leaves an ear on the far face.
+    """Return the fraction [-] and the colour (3,) of the light that an ear transmits to its unlit side.
 
-    The fraction is relative to the light that leaves the ear on both faces.
+    The fraction is relative to the light that leaves the ear on both sides.
 
-    Source: [ChristensenBurley2015], integrated over a plane at the depth of the far face.
+    Source: [ChristensenBurley2015], integrated over the plane of the unlit side.
     """
     d = fit_burley_width(subject.curve)
     transmitted = (
@@ -153,9 +153,9 @@ def _ear_transmission(subject: Subject) -> tuple[float, Floats]:
 
 def _parameter_volume(parameters: Parameters) -> Volume:
     colour, multiscatter = (
-        np.array(get_numbers(parameters, name)) for name in (_COLOUR_NAME, _MULTISCATTER_NAME)
+        np.array(get_numbers(parameters, name)) for name in (_ATTENUATION_COLOUR_NAME, _MULTISCATTER_NAME)
     )
-    return Volume(get_numbers(parameters, _DISTANCE_NAME)[0], colour, multiscatter)
+    return Volume(get_numbers(parameters, _ATTENUATION_DISTANCE_NAME)[0], colour, multiscatter)
 
 
 TARGET = Gltf()

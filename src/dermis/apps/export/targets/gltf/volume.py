@@ -1,4 +1,4 @@
-"""Conversion between media and glTF's scattering volume: a random walk under a refracting surface."""
+"""Conversion between scattering media and volumes of glTF, which lie under a refracting surface."""
 
 from __future__ import annotations
 
@@ -38,7 +38,6 @@ def volume_from_paths(mean_free_path_mm: ArrayLike, multiscatter: ArrayLike) -> 
     """Return the volume with given mean free paths, the longest of which is the attenuation distance.
 
     mean_free_path_mm : (3,) mean free paths [mm]
-
     multiscatter : (3,) multiscatter colour [-]
     """
     path = np.asarray(mean_free_path_mm, np.float64)

@@ -170,7 +170,7 @@ def _scene_elements(
     boundary: Boundary,
     size_and_samples: tuple[int, int, int],
 ) -> list[ET.Element]:
-    """Return the XML elements of the scene without skin, and the element that includes the skin's XML file.
+    """Return the XML elements of the scene except the skin, which is included from its own XML file.
 
     boundary : surface model of the skin that is included by default
     size_and_samples : width and height of the picture [pixel], and samples per pixel

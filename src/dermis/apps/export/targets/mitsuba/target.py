@@ -46,7 +46,7 @@ _LUMINANCE_WEIGHTS = np.array([0.2126, 0.7152, 0.0722])
 _BRIGHT_TEXEL_PERCENTILE = 99.0  # of the colour map; brighter texels are clipped
 _MAX_SAMPLED_MAP_SIDE = 512  # of the map from which the percentile is computed [texel]
 Map = NDArray[np.float32]
-_SIGMA_NAME, _ALBEDO_NAME, _TRANSMITTANCE_NAME, _INDEX_NAME, _ALPHA_NAME = (
+_SIGMA_NAME, _ALBEDO_NAME, _TRANSMITTANCE_NAME, _IOR_NAME, _ALPHA_NAME = (
     "sigma_t",
     "albedo",
     "passing",
@@ -86,7 +86,7 @@ class Mitsuba(Target):
             Parameter(
                 _TRANSMITTANCE_NAME, transmittance, "-", "mean transmittance of the textures, both ways"
             ),
-            Parameter(_INDEX_NAME, BOUNDARIES[boundary], "-", "of the surface; 1 for none"),
+            Parameter(_IOR_NAME, BOUNDARIES[boundary], "-", "of the surface; 1 for none"),
             Parameter(
                 _ALPHA_NAME, mean_roughness(subject), "-", "Beckmann roughness, without a texture of it"
             ),
@@ -133,9 +133,8 @@ class Mitsuba(Target):
 def fit_medium(curve: CumulativeProfile, colours: SkinColours, boundary: Boundary) -> IsotropicMedium:
     """Return the medium that has the colour of the lightest skin and a profile closest to `curve`.
 
-    The colour applies to light from all directions, as heads are lit from all sides. Under an index-matched
-    surface, skin returns up to a quarter more of obliquely incident light than of light incident along the
-    normal; under a refracting surface, the fractions are equal.
+    The colour is matched for light from all directions, as heads are lit from all sides. The profile is
+    matched for light incident along the normal.
 
     curve : reference profile
     boundary : model of the surface above the medium

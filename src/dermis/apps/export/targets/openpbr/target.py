@@ -1,7 +1,7 @@
 """Export to OpenPBR and Standard Surface as a MaterialX document, with the maps of a head beside it.
 
-OpenPBR interprets the radius as the mean free path of a random walk through an index-matched medium, for any
-phase function of this medium. The parameters are fitted so that the random walk has the skin's profile.
+OpenPBR interprets the subsurface radius as the mean free path of a random walk through an index-matched
+medium. The parameters are fitted so that the random walk has the skin's profile.
 """
 
 from __future__ import annotations
@@ -177,8 +177,8 @@ def lowest_layer(subject: Subject) -> Layer | None:
 def walk_curve(colour: Floats, mfp_mm: Floats, subject: Subject) -> CumulativeProfile:
     """Return the cumulative profile of a random walk whose albedo is derived from the base colour.
 
-    The albedo is given by van de Hulst's formula. The energy of the profile, from `Subject.rescale_energy`,
-    therefore includes the error of this formula.
+    The albedo follows from van de Hulst's formula, so the energy of the profile includes the error of this
+    formula.
 
     colour : (3,) base colour
     mfp_mm : (3,) mean free paths [mm]

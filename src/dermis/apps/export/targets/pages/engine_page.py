@@ -125,7 +125,7 @@ class EnginePage(Target):
 
     @abstractmethod
     def library_elements(self, version: str) -> tuple[str, list[str]]:
-        """Return the library's HTML elements, and the script sources that the page's policy must allow."""
+        """Return the library's HTML elements, and the sources for the page's Content-Security-Policy."""
 
     def _page_settings(self, subject: Subject, parameters: Parameters, version: str) -> Json:
         scene = subject.scene or Scene(subject.head_or_ball)

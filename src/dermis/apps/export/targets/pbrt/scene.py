@@ -31,7 +31,9 @@ PICTURE_SIDE, SAMPLES_PER_PIXEL = 1024, 256
 _MAX_BOUNCES = 100
 
 
-def directive(directive_name: str, implementation: str, parameters: DirectiveParameters | None = None) -> str:
+def format_directive(
+    directive_name: str, implementation: str, parameters: DirectiveParameters | None = None
+) -> str:
     """Return a directive of a scene file, such as `Material "subsurface" "float eta" [ 1.4 ]`.
 
     directive_name : first word of the directive, such as "Material"
@@ -69,10 +71,10 @@ def camera_lines(camera: Camera, picture_name: str) -> Lines:
     return [
         "Scale -1 1 1  # pbrt's coordinates are left-handed",
         f"LookAt {_format_value(vectors)}",
-        directive("Camera", "perspective", {"float fov": 90.0, "float screenwindow": screen}),
-        directive("Sampler", "zsobol", {"integer pixelsamples": SAMPLES_PER_PIXEL}),
-        directive("Integrator", "volpath", {"integer maxdepth": _MAX_BOUNCES}),
-        directive("Film", "rgb", film),
+        format_directive("Camera", "perspective", {"float fov": 90.0, "float screenwindow": screen}),
+        format_directive("Sampler", "zsobol", {"integer pixelsamples": SAMPLES_PER_PIXEL}),
+        format_directive("Integrator", "volpath", {"integer maxdepth": _MAX_BOUNCES}),
+        format_directive("Film", "rgb", film),
     ]
 
 
@@ -90,7 +92,7 @@ def light_lines(lights: Iterable[Light], environment: Environment | None) -> Lin
     if environment is not None and environment.name != UNIFORM_PANORAMA:
         notify(f"the panorama {environment.name} is omitted, as pbrt uses another projection")
     elif environment is not None:
-        lines.append(directive("LightSource", "infinite", {"rgb L": [environment.exposure] * 3}))
+        lines.append(format_directive("LightSource", "infinite", {"rgb L": [environment.exposure] * 3}))
     return lines
 
 
@@ -104,7 +106,7 @@ def _point_light_intensity(light: PointLight) -> NDArray[np.float64]:
 
 def _point_light(light: PointLight) -> Lines:
     return [
-        directive(
+        format_directive(
             "LightSource", "point", {"point3 from": light.position, "rgb I": _point_light_intensity(light)}
         )
     ]
@@ -114,7 +116,7 @@ def _spot_light(light: SpotLight) -> Lines:
     cone = {"float coneangle": light.outer_degrees}
     cone["float conedeltaangle"] = light.outer_degrees - light.inner_degrees
     axis = {"point3 from": light.position, "point3 to": light.target}
-    return [directive("LightSource", "spot", {**axis, "rgb I": _point_light_intensity(light), **cone})]
+    return [format_directive("LightSource", "spot", {**axis, "rgb I": _point_light_intensity(light), **cone})]
 
 
 def _rectangle_light(light: RectangleLight) -> Lines:
@@ -130,8 +132,8 @@ def _rectangle_light(light: RectangleLight) -> Lines:
     unit_irradiance = facing_irradiance(light.width_mm, light.height_mm, _light_distance_mm(light))
     radiance = np.divide(light.irradiance, unit_irradiance)
     return [
-        directive("AreaLightSource", "diffuse", {"rgb L": radiance}),
-        directive("Shape", "bilinearmesh", {"point3 P": corners}),
+        format_directive("AreaLightSource", "diffuse", {"rgb L": radiance}),
+        format_directive("Shape", "bilinearmesh", {"point3 P": corners}),
     ]
 
 
@@ -139,14 +141,14 @@ def _sphere_light(light: SphereLight) -> Lines:
     radiance = np.divide(light.irradiance, np.pi * (light.radius_mm / _light_distance_mm(light)) ** 2)
     return [
         f"Translate {_format_value(light.position)}",
-        directive("AreaLightSource", "diffuse", {"rgb L": radiance}),
-        directive("Shape", "sphere", {"float radius": light.radius_mm}),
+        format_directive("AreaLightSource", "diffuse", {"rgb L": radiance}),
+        format_directive("Shape", "sphere", {"float radius": light.radius_mm}),
     ]
 
 
 def _directional_light(light: DirectionalLight) -> Lines:
     points = {"point3 from": (0.0, 0.0, 0.0), "point3 to": light.direction}
-    return [directive("LightSource", "distant", {**points, "rgb L": light.irradiance})]
+    return [format_directive("LightSource", "distant", {**points, "rgb L": light.irradiance})]
 
 
 def _omit_unsupported_light(light: StripeLight) -> Lines:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.apps.export.fitting import fit_scale, scale_lengths
+from dermis.apps.export.fitting import fit_radius_scale, scale_radii
 from dermis.apps.export.scene_parts import mesh_ply
 from dermis.apps.export.subject import Subject
 from dermis.apps.export.target import Parameter, Parameters, Target, flat_tuple, get_numbers, write_files
@@ -21,7 +21,7 @@ from dermis.apps.export.targets.openpbr.materials import (
     map_arrays,
 )
 from dermis.apps.export.targets.openpbr.target import published_mean_free_path_mm
-from dermis.apps.export.targets.pbrt.scene import Lines, camera_lines, directive, light_lines
+from dermis.apps.export.targets.pbrt.scene import Lines, camera_lines, format_directive, light_lines
 from dermis.formats.part_pictures import PartRole
 from dermis.human.person_file import relief_slopes
 from dermis.mesh.head import Head
@@ -52,7 +52,7 @@ _PART_TEXTURES: Mapping[PartRole, tuple[str, str]] = {
 }
 _REFLECTANCE_NAME, _MFP_NAME = "reflectance", "mfp"
 _OPAQUE_PART_ROUGHNESS = 0.3  # of materials other than skin
-_RELATIVE_BALL_DISTANCE, _RELATIVE_BALL_FRAME = (
+_RELATIVE_CAMERA_DISTANCE, _RELATIVE_FRAME_HEIGHT = (
     10.0,
     1.4,
 )  # camera distance and visible height, relative to the ball
@@ -182,7 +182,7 @@ class Pbrt(Target):
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the reflectance, and the mean free paths whose profile is closest to the reference."""
-        path = fit_scale(subject.curve, _unit_curve(subject.albedo))
+        path = fit_radius_scale(subject.curve, _unit_curve(subject.albedo))
         return _material_parameters(subject, path, "1 / (sigma_a + sigma_s); a unit is 1 mm")
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
@@ -194,7 +194,7 @@ class Pbrt(Target):
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative profile that pbrt tabulates for the reflectance and mean free paths."""
         reflectance = np.array(get_numbers(parameters, _REFLECTANCE_NAME))
-        curve = scale_lengths(_unit_curve(reflectance), get_numbers(parameters, _MFP_NAME))
+        curve = scale_radii(_unit_curve(reflectance), get_numbers(parameters, _MFP_NAME))
         return subject.rescale_energy(curve)
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
@@ -237,9 +237,9 @@ def _ball_scene(ball: Head) -> Scene:
     x, y, z = (float(one) for one in -np.array(ball.centre_mm))
     size = float(ball.mesh.size_mm[1])
     camera = Camera(
-        position=(x, y, z + _RELATIVE_BALL_DISTANCE * size),
+        position=(x, y, z + _RELATIVE_CAMERA_DISTANCE * size),
         target=(x, y, z),
-        frame_mm=_RELATIVE_BALL_FRAME * size,
+        frame_mm=_RELATIVE_FRAME_HEIGHT * size,
     )
     return Scene(ball, camera=camera)
 
@@ -267,7 +267,7 @@ def _scene_lines(
         else:
             texts = _opaque_materials(material, roles, f"part_{index}", file_prefix)
         alpha = {"texture alpha": "parts_opacity"} if "opacity" in roles else {}
-        shape = directive("Shape", "plymesh", {"string filename": name, **alpha})
+        shape = format_directive("Shape", "plymesh", {"string filename": name, **alpha})
         lines += ["AttributeBegin", *texts, shape, "AttributeEnd"]
     return lines, files
 
@@ -275,8 +275,8 @@ def _scene_lines(
 def _skin_material(parameters: Parameters, material_textures: dict[str, tuple[str, str]]) -> str:
     """Return the directive of the skin's material; parameters with maps refer to textures or image files.
 
-    material_textures : pbrt type, and name of the texture or image file, of each material parameter with a
-        map
+    material_textures : dictionary from a parameter with a map to two texts: its pbrt type, and the name of
+        the texture or image file
     """
     types = {_REFLECTANCE_NAME: "rgb", _MFP_NAME: "rgb", "remaproughness": "bool"}
     values: dict[str, ArrayLike] = {}
@@ -285,7 +285,7 @@ def _skin_material(parameters: Parameters, material_textures: dict[str, tuple[st
         values[f"{input_type} {one.name}"] = value
     if "normalmap" in material_textures:
         values["string normalmap"] = material_textures["normalmap"][1]
-    return directive("Material", "subsurface", values)
+    return format_directive("Material", "subsurface", values)
 
 
 def _opaque_materials(
@@ -307,11 +307,13 @@ def _opaque_materials(
     if "normal" in roles:
         values["string normalmap"] = f"{file_prefix}{PART_PREFIX}normal.png"
     if "metalness" not in roles:
-        return [directive("Material", "coateddiffuse", values)]
+        return [format_directive("Material", "coateddiffuse", values)]
     names = {f"{material_name}_{kind}": kind for kind in ("coateddiffuse", "conductor")}
     mix: dict[str, ArrayLike | Sequence[str]] = {"string materials": [*names]}
-    mixed = directive("Material", "mix", {**mix, "texture amount": "parts_metalness"})
-    named = [directive("MakeNamedMaterial", one, {"string type": names[one], **values}) for one in names]
+    mixed = format_directive("Material", "mix", {**mix, "texture amount": "parts_metalness"})
+    named = [
+        format_directive("MakeNamedMaterial", one, {"string type": names[one], **values}) for one in names
+    ]
     return [*named, mixed]
 
 
@@ -332,7 +334,7 @@ def _part_textures(subject: Subject, file_prefix: str) -> tuple[Lines, dict[str,
 
 def _image_directive(texture_name: str, texture_type: str, encoding: str, file_name: str) -> str:
     options = {"string filename": file_name, "string encoding": encoding, "string wrap": "clamp"}
-    return directive(f'Texture "{texture_name}" "{texture_type}"', "imagemap", options)
+    return format_directive(f'Texture "{texture_name}" "{texture_type}"', "imagemap", options)
 
 
 class SkinTextures(NamedTuple):
@@ -340,8 +342,8 @@ class SkinTextures(NamedTuple):
 
     lines : directives that define the textures
     files : dictionary from the name of each image file to its content
-    material_textures : pbrt type, and name of the texture or image file, of each parameter of the skin's
-        material with a map
+    material_textures : dictionary from a parameter of the skin's material with a map to two texts: its pbrt
+        type, and the name of the texture or image file
     """
 
     lines: Lines

@@ -28,7 +28,7 @@ from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.fits.burley import BurleyProfile, unity_parameters
 from dermis.optics.media import Floats
 
-_COLOUR_NAME, _MULTIPLIER_NAME, _SCALE_NAME, _IOR_NAME = (
+_SCATTERING_DISTANCE_NAME, _MULTIPLIER_NAME, _WORLD_SCALE_NAME, _IOR_NAME = (
     "scatteringDistance",
     "scatteringDistanceMultiplier",
     "worldScale",
@@ -60,7 +60,7 @@ class Unity(Target):
         d = fit_burley_width(subject.curve)
         return (
             *_scattering_distances(d, version),
-            Parameter(_SCALE_NAME, 1.0, "m", "metres per scene unit"),
+            Parameter(_WORLD_SCALE_NAME, 1.0, "m", "metres per scene unit"),
             Parameter(_IOR_NAME, _SKIN_IOR, "-", "of the specular reflection"),
             Parameter(_TRANSMISSION_NAME, (1.0, 1.0, 1.0), "-", "factor of light through thin parts"),
             Parameter(
@@ -74,14 +74,17 @@ class Unity(Target):
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
         """Return the skin's colour as the scattering colour, as the inspector suggests, with multiplier 1."""
         colour = flat_tuple(subject.clipped_albedo())
-        values: dict[str, ParameterValue] = {_COLOUR_NAME: colour, _MULTIPLIER_NAME: _NAIVE_MULTIPLIER_MM}
+        values: dict[str, ParameterValue] = {
+            _SCATTERING_DISTANCE_NAME: colour,
+            _MULTIPLIER_NAME: _NAIVE_MULTIPLIER_MM,
+        }
         return replace_values(self.parameters(subject, version), values)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative Burley profile that HDRP derives from scattering colour and multiplier."""
         colour, scale = (
-            np.array(get_numbers(parameters, _COLOUR_NAME)),
-            get_numbers(parameters, _SCALE_NAME)[0],
+            np.array(get_numbers(parameters, _SCATTERING_DISTANCE_NAME)),
+            get_numbers(parameters, _WORLD_SCALE_NAME)[0],
         )
         multiplier = 1.0 if version == _VERSION_BEFORE_14 else get_numbers(parameters, _MULTIPLIER_NAME)[0]
         return burley_curve(colour * multiplier / scale, subject.curve.energy)
@@ -100,10 +103,15 @@ def _scattering_distances(d_mm: Floats, version: str) -> Parameters:
     d_mm : (3,) widths of the Burley profiles [mm]
     """
     if version == _VERSION_BEFORE_14:
-        return (Parameter(_COLOUR_NAME, flat_tuple(d_mm), "mm", "d as a linear HDR colour"),)
+        return (Parameter(_SCATTERING_DISTANCE_NAME, flat_tuple(d_mm), "mm", "d as a linear HDR colour"),)
     profile = unity_parameters(BurleyProfile(np.ones(3), 1.0 / d_mm))
     return (
-        Parameter(_COLOUR_NAME, profile.scattering_colour, "-", "d relative to its largest channel, linear"),
+        Parameter(
+            _SCATTERING_DISTANCE_NAME,
+            profile.scattering_colour,
+            "-",
+            "d relative to its largest channel, linear",
+        ),
         Parameter(_MULTIPLIER_NAME, profile.multiplier_mm, "mm", "largest d of the channels"),
     )
 
@@ -111,7 +119,9 @@ def _scattering_distances(d_mm: Floats, version: str) -> Parameters:
 def asset_text(asset_name: str, parameters: Parameters, version: str) -> str:
     """Return the YAML of the asset; the profile's hash is left out, as Unity adds it on first opening."""
     values = {one.name: one.value for one in parameters}
-    colour, tint = (_format_rgba(get_numbers(parameters, key)) for key in (_COLOUR_NAME, _TRANSMISSION_NAME))
+    colour, tint = (
+        _format_rgba(get_numbers(parameters, key)) for key in (_SCATTERING_DISTANCE_NAME, _TRANSMISSION_NAME)
+    )
     low, high = get_numbers(parameters, _THICKNESS_NAME)
     multiplier = (
         f"    {_MULTIPLIER_NAME}: {values[_MULTIPLIER_NAME]:.6g}\n" if _MULTIPLIER_NAME in values else ""
@@ -124,7 +134,7 @@ def asset_text(asset_name: str, parameters: Parameters, version: str) -> str:
         tint=tint,
         low=f"{low:.6g}",
         high=f"{high:.6g}",
-        scale=f"{values[_SCALE_NAME]:.6g}",
+        scale=f"{values[_WORLD_SCALE_NAME]:.6g}",
         ior=f"{values[_IOR_NAME]:.6g}",
         form=_FILE_VERSIONS[version],
     )

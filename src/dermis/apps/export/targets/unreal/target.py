@@ -27,13 +27,17 @@ from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.fits.burley import UNREAL_SHAPE_RATIO, BurleyProfile, shape_factor, unreal_parameters
 from dermis.optics.media import Floats
 
-ALBEDO_NAME, COLOUR_NAME, DISTANCE_NAME = "surface_albedo", "mean_free_path_color", "mean_free_path_distance"
-SCALE_NAME, DEPTH_SCALE_NAME = "world_unit_scale", "distance_scale"
+ALBEDO_NAME, MEAN_FREE_PATH_COLOUR_NAME, MEAN_FREE_PATH_DISTANCE_NAME = (
+    "surface_albedo",
+    "mean_free_path_color",
+    "mean_free_path_distance",
+)
+WORLD_UNIT_SCALE_NAME, DISTANCE_SCALE_NAME = "world_unit_scale", "distance_scale"
 _MIN_MEAN_FREE_PATH_COLOUR, _MAX_DISTANCE_CM, _MIN_ALBEDO = 0.001, 50.0, 1e-3
 _MIN_ENGINE_COLOUR = 0.009  # lower limit that the engine applies
 _MM_PER_CM = 10.0
 _IMPORTED_MAPS = "colour", "normal", "roughness"
-_VERSIONS_BEFORE_58 = ("5.3", "5.4", "5.5", "5.6", "5.7")
+_VERSIONS_BEFORE_5_8 = ("5.3", "5.4", "5.5", "5.6", "5.7")
 
 
 class Unreal(Target):
@@ -42,7 +46,7 @@ class Unreal(Target):
     name = "unreal"
     title = "Unreal Engine"
     suffixes = ("", ".py")
-    versions = (*_VERSIONS_BEFORE_58, "5.8")
+    versions = (*_VERSIONS_BEFORE_5_8, "5.8")
     needs_maps = True
     limitations = (
         "The base colour of the material, not the profile, colours the light. Before 5.8, thicknesses are "
@@ -67,12 +71,12 @@ class Unreal(Target):
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative Burley profile that the engine's screen-space pass renders."""
-        colour = np.maximum(get_numbers(parameters, COLOUR_NAME), _MIN_ENGINE_COLOUR)
+        colour = np.maximum(get_numbers(parameters, MEAN_FREE_PATH_COLOUR_NAME), _MIN_ENGINE_COLOUR)
         path = (
             _MM_PER_CM
             * colour
-            * get_numbers(parameters, DISTANCE_NAME)[0]
-            * get_numbers(parameters, SCALE_NAME)[0]
+            * get_numbers(parameters, MEAN_FREE_PATH_DISTANCE_NAME)[0]
+            * get_numbers(parameters, WORLD_UNIT_SCALE_NAME)[0]
         )
         albedo = np.array(get_numbers(parameters, ALBEDO_NAME))
         return burley_curve(path / (UNREAL_SHAPE_RATIO * shape_factor(albedo)), subject.curve.energy)
@@ -90,18 +94,21 @@ def _profile_parameters(albedo: Floats, mean_free_path_cm: Floats, version: str)
     distance = float(np.clip(mean_free_path_cm.max(), 0.1, _MAX_DISTANCE_CM))
     colour = np.clip(mean_free_path_cm / distance, _MIN_MEAN_FREE_PATH_COLOUR, 1.0)
     depth = Parameter(
-        DEPTH_SCALE_NAME, 0.1, "-", "for thin parts; its product with the unit scale must be 0.1"
+        DISTANCE_SCALE_NAME, 0.1, "-", "for thin parts; its product with the unit scale must be 0.1"
     )
     return (
         Parameter("enable_burley", True, "-", "Burley's profile instead of six Gaussians"),
         Parameter("enable_mean_free_path", True, "-", "else the editor converts these values on loading"),
         Parameter(ALBEDO_NAME, flat_tuple(albedo), "-", "A of s(A); does not affect the colour"),
         Parameter(
-            COLOUR_NAME, flat_tuple(colour), "-", "mean free path 0.6 s(A) d relative to the distance, linear"
+            MEAN_FREE_PATH_COLOUR_NAME,
+            flat_tuple(colour),
+            "-",
+            "mean free path 0.6 s(A) d relative to the distance, linear",
         ),
-        Parameter(DISTANCE_NAME, distance, "cm", "mean free path at a colour of 1"),
-        Parameter(SCALE_NAME, 1.0, "-", "1 for a scene in centimetres"),
-        *(() if version in _VERSIONS_BEFORE_58 else (depth,)),
+        Parameter(MEAN_FREE_PATH_DISTANCE_NAME, distance, "cm", "mean free path at a colour of 1"),
+        Parameter(WORLD_UNIT_SCALE_NAME, 1.0, "-", "1 for a scene in centimetres"),
+        *(() if version in _VERSIONS_BEFORE_5_8 else (depth,)),
         Parameter("ior", 1.4, "-", "of the specular reflection"),
     )
 

@@ -47,7 +47,7 @@ def mesh_polygons(mesh: Mesh) -> Polygons:
     )
 
 
-def point_vertices(mesh: Mesh) -> NDArray[np.intp]:
+def first_vertex_by_point(mesh: Mesh) -> NDArray[np.intp]:
     """Return the index of the first vertex at each point (p,); at uv seams, vertices share a point."""
     return np.unique(mesh.point, return_index=True)[1]
 
@@ -60,7 +60,7 @@ def add_mesh(
     deformable : the head's mesh with morph targets and bone weights, all morph targets at weight 0
     """
     mesh, polygons = head.mesh, mesh_polygons(head.mesh)
-    vertex = point_vertices(mesh)
+    vertex = first_vertex_by_point(mesh)
     prim = UsdGeom.Mesh.Define(stage, path)
     points = Vt.Vec3fArray.FromNumpy(to_metres(deformable.positions_mm[vertex]))
     prim.CreatePointsAttr(points)
@@ -128,7 +128,7 @@ def to_metres(positions_mm: NDArray[np.floating]) -> Floats:
     return np.ascontiguousarray(METRES_PER_MM * positions_mm.astype(np.float64), np.float32)
 
 
-def add_motion(stage: Usd.Stage, root: Sdf.Path, mesh: Usd.Prim, deformable: DeformableMesh) -> None:
+def add_rig(stage: Usd.Stage, root: Sdf.Path, mesh: Usd.Prim, deformable: DeformableMesh) -> None:
     """Add blend shapes, a skeleton and a rest animation, so that programs can pose the head.
 
     root : path of the UsdSkelRoot
@@ -207,7 +207,7 @@ def _bind_joints(binding: UsdSkel.BindingAPI, deformable: DeformableMesh) -> Non
 def _add_blend_shapes(
     stage: Usd.Stage, mesh: Usd.Prim, deformable: DeformableMesh, shape_names: Sequence[str]
 ) -> None:
-    vertex = point_vertices(deformable.head.mesh)
+    vertex = first_vertex_by_point(deformable.head.mesh)
     point = np.full(len(deformable.head.mesh.positions), -1, np.int32)
     point[vertex] = np.arange(len(vertex))
     titles = deformable.rig.targets.names

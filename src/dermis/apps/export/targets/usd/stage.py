@@ -11,7 +11,7 @@ import numpy as np
 from pxr import Sdf, Usd, UsdGeom, UsdShade, UsdSkel
 
 from dermis.apps.export.targets.openpbr.materials import MAP_TYPES, InputValue, OpenPbrMaterial, hair_material
-from dermis.apps.export.targets.usd.geometry import add_hairs, add_mesh, add_motion, unique_usd_names
+from dermis.apps.export.targets.usd.geometry import add_hairs, add_mesh, add_rig, unique_usd_names
 from dermis.formats.deformable_mesh import DeformableMesh
 from dermis.mesh.grown_strands import hair_strands
 from dermis.mesh.head import Head
@@ -43,7 +43,7 @@ def build_stage(
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
     root = Sdf.Path("/" + unique_usd_names([head_name])[0])
     deformable = DeformableMesh(head)
-    root_type = UsdSkel.Root if _has_motion(deformable) else UsdGeom.Xform
+    root_type = UsdSkel.Root if _has_rig(deformable) else UsdGeom.Xform
     top = root_type.Define(stage, root).GetPrim()
     top.SetDisplayName(head_name)
     Usd.ModelAPI(top).SetKind("component")
@@ -52,14 +52,14 @@ def build_stage(
         stage.GetRootLayer().customLayerData = {"attribution": head.attribution}
     path = root.AppendChild("mesh")
     subsets = add_mesh(stage, path, head, deformable)
-    if _has_motion(deformable):
-        add_motion(stage, root, stage.GetPrimAtPath(path), deformable)
+    if _has_rig(deformable):
+        add_rig(stage, root, stage.GetPrimAtPath(path), deformable)
     _add_materials(stage, root.AppendChild("materials"), subsets, materials, file_prefix)
     _add_hairs(stage, root, head)
     return stage
 
 
-def _has_motion(deformable: DeformableMesh) -> bool:
+def _has_rig(deformable: DeformableMesh) -> bool:
     return bool(deformable.rig.targets.names) or deformable.rig.skeleton is not None
 
 

@@ -44,8 +44,9 @@ class PageContent:
     byte_runs : collector that stores and compresses the data of buffers and textures
     maps : maps encoded as pictures
     pictures : WebP files of the maps, to which `picture_entries` refers by index
-    picture_entries : dictionary from (role, mip level, layer) of a map to the index in `pictures`, the index
-        of the value curves in `ByteRunCollector.runs`, and the number of colour channels
+    picture_entries : dictionary from (role, mip level, layer) of a map to three integers: index in
+        `pictures`, index in `ByteRunCollector.runs` of the curves that decode the channels, and number of
+        colour channels
     poster : (h, w, 3) sRGB picture that the page shows until it renders
     """
 
@@ -57,9 +58,9 @@ class PageContent:
     poster: NDArray[np.uint8] | None = None
 
     def add_picture(self, picture_key: PictureKey) -> tuple[int, int, int]:
-        """Add the picture and value curves of a map layer unless present; return the layer's picture entry.
+        """Add the picture of a layer of a map unless present; return its entry in `picture_entries`.
 
-        picture_key : role, mip level and layer
+        picture_key : role, mip level and layer of the map
         """
         if picture_key not in self.picture_entries:
             picture = self.maps.pictures[picture_key]
@@ -79,7 +80,7 @@ class PageRequest:
 
     settings : settings of all frames, except the size and the technique, which differ between frames
     sizes : dictionary from kind of adapter to the sides of the square pictures [pixel], see `PICTURE_SIDES`;
-        the page does not run on a kind of adapter that is absent
+        the page does not run on kinds of adapter that are not in it
     adapter : adapter on which the frames are captured
     interactive : dictionary from kind of adapter to the quality while the user drags a control, see
         `INTERACTIVE_QUALITY`; a kind that is absent keeps full quality
@@ -107,8 +108,7 @@ class PageRequest:
     def settings_for(self, picture_side: int, technique: str = PAGE_TECHNIQUES[0]) -> Settings:
         """Return the settings of a frame with a given picture side and technique.
 
-        Only the technique with diffusion has interreflection: the other technique has another atlas layout,
-        and its interreflection links would add 0.6 MB to the page.
+        Interreflection is disabled for the technique without diffusion, as it would add 0.6 MB to the page.
 
         picture_side : side of the square picture [pixel]
         """
@@ -119,9 +119,8 @@ class PageRequest:
 def build_content(request: PageRequest, on_renderer: OnRenderer = lambda *_: None) -> PageContent:
     """Capture the frames of all kinds of adapter, and return the data that the page embeds.
 
-    on_renderer : function that is called with the renderer, the scene and the settings for each kind of
-        adapter, after the page's maps have been uploaded to the renderer; used by tests that compare pictures
-        of the renderer and the page
+    on_renderer : function called for each kind of adapter, once the renderer holds the maps of the page; it
+        receives the renderer, the scene and the settings; tests compare the renderer with the page
     """
     content = PageContent()
     for adapter_kind in (one for one in ADAPTER_KINDS if request.sizes.get(one)):
@@ -171,7 +170,9 @@ def _frame_changes(
     default_inputs: FrameInputs,
     named_frame: NamedFrame,
 ) -> Json:
-    """Return the JSON of the changes of a frame's records and buffers at each node of each slider.
+    """Return as JSON how a frame's records and buffers change at each node of each slider.
+
+    A node is a value of a slider for which a frame is captured.
 
     default_inputs : inputs of the frame with all sliders at their default values
     """
@@ -201,10 +202,10 @@ def _mip_entries(content: PageContent, picture_map: PictureMap) -> list[list[tup
 
 
 def _colour_maps(content: PageContent, renderer: Renderer, request: PageRequest, maps: PictureMaps) -> Json:
-    """Return the JSON of the colour maps that replace the head's colour map at nodes of sliders.
+    """Return the JSON of the colour maps that replace the head's colour map when a slider is moved.
 
-    The JSON contains the resource index of the head's colour map and, for each slider, the picture entries of
-    the colour maps at its nodes.
+    The JSON contains the resource index of the head's colour map and, for each slider, an entry of
+    `PageContent.picture_entries` for each captured value.
     """
     map_index = next((k for k, one in maps.items() if one.role == "colour_map"), None)
     if map_index is None:
@@ -212,17 +213,20 @@ def _colour_maps(content: PageContent, renderer: Renderer, request: PageRequest,
     settings, entries = request.settings_for(min(map(min, request.sizes.values()))), {}
     for slider in (one for one in request.sliders if not one.changes_pose_only):
         scenes = enumerate(slider.scenes)
-        nodes = [_colour_entry(content, renderer, one, settings, f"{slider.name} {k}") for k, one in scenes]
+        nodes = [
+            _colour_map_entry(content, renderer, one, settings, f"{slider.name} {k}") for k, one in scenes
+        ]
         if any(nodes):
             entries[slider.name] = nodes
     return {"map": map_index, "dials": entries} if entries else {}
 
 
-def _colour_entry(
+def _colour_map_entry(
     content: PageContent, renderer: Renderer, scene: Scene | None, settings: Settings, role: str
 ) -> tuple[int, int, int] | None:
-    """Return the picture entry of the colour map at a slider's node; None if the map is unchanged there.
+    """Return the picture entry of the colour map of a scene; None if it is the head's default colour map.
 
+    scene : scene at a captured value of a slider; None at the default value
     role : role under which the picture is stored
     """
     if scene is None:
@@ -240,7 +244,7 @@ def _colour_entry(
 def _interaction_json(scene: Scene, inputs: FrameInputs) -> Json:
     """Return the JSON that the page needs to move the camera and the lights.
 
-    The JSON also contains the head's outline, to which the page fits shadow maps.
+    The JSON also contains the points of the head's outline, around which the page fits shadow maps.
     """
     camera, settings = scene.camera, inputs.settings
     projection, outline = pinhole(camera, scene.head, settings), scene.head.mesh.outline
@@ -258,11 +262,11 @@ def _interaction_json(scene: Scene, inputs: FrameInputs) -> Json:
         "slack": outline.margin_mm,
         "middle": list(outline.centre_mm),
         "shadow_size": settings.shadow_size,
-        "lights": [_movable_light(light) for light in scene.lights],
+        "lights": [_movable_light_json(light) for light in scene.lights],
     }
 
 
-def _movable_light(light: Light) -> Json | None:
+def _movable_light_json(light: Light) -> Json | None:
     """Return the JSON of a spot light with shadows; None for other lights, which the user cannot drag."""
     if not isinstance(light, SpotLight) or not light.shadows:
         return None

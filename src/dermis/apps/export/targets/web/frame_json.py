@@ -71,7 +71,7 @@ def frames_json(
     pictures = [[capture.resource(f.picture.bytes), capture.resource(f.picture.exposed)] for f in frames]
     captured_frames = [frame.captured for frame in frames]
     contents, tables = {}, set(resources_bound_as(capture, captured_frames, _TRIANGLE_TABLE_BINDINGS))
-    for index in resources_read_first(capture, captured_frames):
+    for index in resources_read_before_write(capture, captured_frames):
         if index in quantisation_steps:
             floats = (
                 capture.read_content(index)[0].view(np.float32).reshape(-1, len(quantisation_steps[index]))
@@ -140,7 +140,7 @@ def _view_record_index(captured: CapturedFrame, stage_name: str) -> int:
 
 
 def _passes_json(captured: CapturedFrame, byte_runs: ByteRunCollector) -> list[Json]:
-    """Return the JSON of a frame's passes; bytes written by the host become a buffer index and a byte run."""
+    """Return the JSON of a frame's passes, and store the data that the host writes to buffers."""
     writes = ((one, one.written) for one in captured.passes)
     return [{**vars(one), "written": data and (data[0], byte_runs.add(data[1]))} for one, data in writes]
 
@@ -177,7 +177,7 @@ def _camel_case(snake_case: str) -> str:
     return first + "".join(word.title() for word in others)
 
 
-def resources_read_first(capture: FrameCapture, frames: Frames) -> list[int]:
+def resources_read_before_write(capture: FrameCapture, frames: Frames) -> list[int]:
     """Return the sorted indices of the resources that a frame reads before writing to them.
 
     The page stores the data of these resources. A view of a texture counts as the whole texture, so a texture

@@ -24,8 +24,8 @@ PictureKey = tuple[str, int, int]
 MIN_PICTURE_SIDE = 64
 """Minimum side of a map that is stored as a picture [texel]."""
 _WEBP_QUALITY = 88
-_CHANNEL_LEVELS = 256
-_COLOUR_CHANNELS = 3
+_LEVEL_COUNT = 256
+_COLOUR_CHANNEL_COUNT = 3
 
 
 @dataclass(frozen=True)
@@ -50,17 +50,17 @@ def encode_picture(texels: Halves, is_colour_map: bool) -> Picture:
     is_colour_map : whether the first three channels are a colour; all further channels are then constant
     """
     curves = np.stack([_value_curve(texels[..., k].astype(np.float64)) for k in range(texels.shape[2])])
-    steps = np.stack([_nearest_steps(texels[..., k], curves[k]) for k in range(len(curves))], axis=-1)
+    steps = np.stack([_nearest_levels(texels[..., k], curves[k]) for k in range(len(curves))], axis=-1)
     image = (
-        steps[..., :_COLOUR_CHANNELS]
+        steps[..., :_COLOUR_CHANNEL_COUNT]
         if is_colour_map
         else steps.transpose(2, 0, 1).reshape(-1, steps.shape[1])
     )
     data = _encode_webp(image)
     levels = _decode_webp(data)
     if is_colour_map:
-        levels = np.concatenate([levels, steps[..., _COLOUR_CHANNELS:]], axis=-1)
-        levels[..., _COLOUR_CHANNELS:] = steps[:1, :1, _COLOUR_CHANNELS:]  # constant channels
+        levels = np.concatenate([levels, steps[..., _COLOUR_CHANNEL_COUNT:]], axis=-1)
+        levels[..., _COLOUR_CHANNEL_COUNT:] = steps[:1, :1, _COLOUR_CHANNEL_COUNT:]  # constant channels
     else:
         levels = levels[..., 0].reshape(len(curves), *texels.shape[:2]).transpose(1, 2, 0)
     decoded = np.stack([curves[k][levels[..., k]] for k in range(len(curves))], axis=-1)
@@ -74,11 +74,11 @@ def _value_curve(texels: NDArray[np.float64]) -> NDArray[np.float64]:
     """
     limits = np.array([texels.min(), texels.max()])
     first, last = np.sign(limits) * np.sqrt(np.abs(limits))
-    root = np.linspace(first, last, _CHANNEL_LEVELS)
+    root = np.linspace(first, last, _LEVEL_COUNT)
     return np.asarray(np.sign(root) * root * root)
 
 
-def _nearest_steps(texels: Halves, curve: NDArray[np.float64]) -> NDArray[np.uint8]:
+def _nearest_levels(texels: Halves, curve: NDArray[np.float64]) -> NDArray[np.uint8]:
     """Return the index of the curve value nearest to each texel.
 
     curve : increasing values
@@ -119,7 +119,7 @@ class MapPictures:
     _encoded_texels: dict[str, NDArray[np.float16]] = field(default_factory=dict)
 
     def matches_picture(self, role: str, texels: NDArray[np.float16]) -> bool:
-        """Return whether texels equal the texels of the first picture with a given role before encoding."""
+        """Return whether texels equal those that were encoded as the first picture of a role."""
         return bool(np.array_equal(self._encoded_texels[role], texels))
 
     def replace_textures(self, renderer: Renderer, capture: FrameCapture, frames: Frames) -> PictureMaps:
@@ -201,7 +201,7 @@ def read_texels(capture: FrameCapture, resource_index: int, mip_level: int) -> N
 def _picture_textures(capture: FrameCapture, frames: Frames) -> dict[int, str]:
     """Return a dictionary from resource index to role, for the map textures that are stored as pictures.
 
-    These are half-float textures; sides shorter than MIN_PICTURE_SIDE exclude a texture. The role of a
+    These are the half-float textures whose sides have at least `MIN_PICTURE_SIDE` texels. The role of a
     texture is its name in the shaders.
     """
     return {

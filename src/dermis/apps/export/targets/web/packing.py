@@ -1,4 +1,7 @@
-"""Compression of buffers by gzip, after differences of rows are split into byte planes (see packed.js)."""
+"""Compression of buffers: rows are replaced by differences, reordered by byte and compressed by gzip.
+
+The script packed.js of the page reverses these steps.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,7 @@ and the step of each float in a row. With 0 bytes per word, the last entry has t
 concatenated instead."""
 _ESCAPED_CHARACTERS = frozenset({0, 13, ord("<")})
 """Characters that HTML changes in a script element, or that end it."""
-_ROW_LENGTHS = (1, 2, 3, 4, 6, 8, 12, 16, 24)
+_WORDS_PER_ROW_CHOICES = (1, 2, 3, 4, 6, 8, 12, 16, 24)
 _DIFFERENCE_ORDERS = (0, 1, 2)
 _LAYOUT_SAMPLE_BYTES, _LAYOUT_SAMPLE_COUNT = 3 << 15, 3  # parts of a run on which layouts are compared
 _LAYOUT_SAMPLE_ALIGNMENT = 192  # bytes; a multiple of the bytes of all rows
@@ -117,7 +120,7 @@ def _possible_layouts(byte_count: int) -> Iterable[tuple[int, int, int]]:
     for word, row in (
         (word, row)
         for word in _UNSIGNED_TYPE_BY_WORD_BYTES
-        for row in _ROW_LENGTHS
+        for row in _WORDS_PER_ROW_CHOICES
         if byte_count % (word * row) == 0
     ):
         yield from ((word, row, order) for order in _DIFFERENCE_ORDERS)

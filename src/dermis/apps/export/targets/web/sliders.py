@@ -66,11 +66,11 @@ def node_inputs(
 def node_changes(
     default_frame: CapturedFrame, node_frame: CapturedFrame, byte_runs: ByteRunCollector
 ) -> Json:
-    """Return the JSON of how a slider node's frame differs from the default frame.
+    """Return as JSON how the frame at a node of a slider differs from the frame at the default value.
 
-    Uniform records, and bytes that the host writes to buffers, are compared. Each change consists of the
-    index of the record or pass, the index of the first word that differs, and the byte run of the
-    differences. Integers, such as indices of interreflection links, keep their values in the default frame.
+    Uniform records, and data that the host writes to buffers, are compared. Each change has the index of the
+    record or pass, the index of the first word that differs, and the index of the byte run with the
+    differences. Integers in records are not compared.
 
     default_frame, node_frame : captured frames at the default value and at the node
 
