@@ -13,7 +13,12 @@ import warnings
 from pathlib import Path
 
 import dermis
-from dermis.apps.gallery.example_files import unpack_mesh, write_avatar, write_pictures, write_vertex_colours
+from dermis.apps.gallery.example_files import (
+    unpack_mesh,
+    write_avatar,
+    write_three_meshes,
+    write_vertex_colours,
+)
 from dermis.apps.gallery.script import draw_script
 
 
@@ -22,7 +27,7 @@ def draw(studio):
     with tempfile.TemporaryDirectory() as name, warnings.catch_warnings():
         warnings.simplefilter("ignore")  # notes on what is skin, and of which size
         folder = Path(name)
-        files = [write_avatar(studio, folder), write_pictures(scan, folder)]
+        files = [write_avatar(studio, folder), write_three_meshes(scan, folder)]
         files += [write_vertex_colours(scan, folder), *(unpack_mesh(one, folder) for one in ("hand", "body"))]
         avatar, three, coloured, hand, body = (studio.head(str(file)) for file in files)
     side = dermis.Camera(position=(600, 40, 620), target=(0, -35, -50), frame_mm=330)

@@ -28,7 +28,7 @@ from dermis.apps.validation.benchmarks.measure import (
 from dermis.apps.validation.benchmarks.report import (
     COLUMNS,
     benchmark_json,
-    cells,
+    row_cells,
     skipped_lines,
     stage_table,
     write_report,
@@ -184,10 +184,10 @@ def benchmark_of_one_row(row: BenchmarkRow) -> Benchmark:
 
 
 def test_published_passes_are_included(benchmark_of_one_row: Benchmark, row: BenchmarkRow) -> None:
-    assert benchmark_of_one_row.ratio(GPU_GEMS_3) == 1e3 / row.gpu_ms["total"]
-    assert benchmark_of_one_row.ratio(FRAGMENT_TECHNIQUE) == 5e3 / row.gpu_ms["total"]
-    assert replace(benchmark_of_one_row, rows=(row,)).ratio(GPU_GEMS_3) is None
-    assert replace(benchmark_of_one_row, rows=benchmark_of_one_row.rows[1:]).ratio(GPU_GEMS_3) is None
+    assert benchmark_of_one_row.relative_time(GPU_GEMS_3) == 1e3 / row.gpu_ms["total"]
+    assert benchmark_of_one_row.relative_time(FRAGMENT_TECHNIQUE) == 5e3 / row.gpu_ms["total"]
+    assert replace(benchmark_of_one_row, rows=(row,)).relative_time(GPU_GEMS_3) is None
+    assert replace(benchmark_of_one_row, rows=benchmark_of_one_row.rows[1:]).relative_time(GPU_GEMS_3) is None
 
 
 def test_json_contains_the_requested_cases(benchmark_of_one_row: Benchmark) -> None:
@@ -199,8 +199,8 @@ def test_json_contains_the_requested_cases(benchmark_of_one_row: Benchmark) -> N
     assert fields["rows"][0]["image"] == [48, 32] and fields["copy_gb_s"] == 2.0
     assert "total" in fields["rows"][0]["gpu_ms"]
     assert (fields["published_ratio"], fields["published_fragments_ratio"]) == (
-        benchmark_of_one_row.ratio(GPU_GEMS_3),
-        benchmark_of_one_row.ratio(FRAGMENT_TECHNIQUE),
+        benchmark_of_one_row.relative_time(GPU_GEMS_3),
+        benchmark_of_one_row.relative_time(FRAGMENT_TECHNIQUE),
     )
     (skipped,) = fields["left_out"]
     assert (skipped["image"], skipped["reason"]) == ([9999, 32], "size: <too large>")
@@ -214,7 +214,7 @@ def test_report_is_self_contained(benchmark_of_one_row: Benchmark, tmp_path: Pat
     for stage, *_ in stage_table(benchmark_of_one_row)[1:]:
         assert f"<td>{stage}</td>" in page
     assert page.count("<tr>") == 1 + len(benchmark_of_one_row.rows) + len(stage_table(benchmark_of_one_row))
-    assert all(len(cells(row)) == len(COLUMNS) for row in benchmark_of_one_row.rows)
+    assert all(len(row_cells(row)) == len(COLUMNS) for row in benchmark_of_one_row.rows)
     assert "2007, fragments" in page and "9999x32" in page and "&lt;too large&gt;" in page
 
 
@@ -227,10 +227,12 @@ def test_report_without_the_base_frame_is_written(benchmark_of_one_row: Benchmar
 
 def test_slow_frames_are_drawn_less_often() -> None:
     effort = FrameCounts()
-    assert effort.within(30.0, frame_ms=1.0) == effort
-    half = effort.within(0.5 * 1e-3 * (100 + 2 * 100 + 2 * 9 * 6), frame_ms=1.0)
+    assert effort.limited_to(30.0, frame_ms=1.0) == effort
+    half = effort.limited_to(0.5 * 1e-3 * (100 + 2 * 100 + 2 * 9 * 6), frame_ms=1.0)
     assert half == FrameCounts(warmup=50, between=2, timed=4, sequence=50)
-    assert CPU_FRAME_COUNTS.within(1.0, frame_ms=1e6) == FrameCounts(warmup=0, between=0, timed=1, sequence=1)
+    assert CPU_FRAME_COUNTS.limited_to(1.0, frame_ms=1e6) == FrameCounts(
+        warmup=0, between=0, timed=1, sequence=1
+    )
 
 
 def test_a_run_measures_every_case(device: Device, head_file: str, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -252,7 +254,7 @@ def test_a_run_measures_every_case(device: Device, head_file: str, monkeypatch: 
     assert benchmark.rows[3].triangles == 4 * benchmark.rows[0].triangles
     assert benchmark.adapter == device.adapter.name and benchmark.versions["wgpu"]
     for technique in (GPU_GEMS_3, FRAGMENT_TECHNIQUE):
-        assert (benchmark.ratio(technique) or 0.0) > 0.0
+        assert (benchmark.relative_time(technique) or 0.0) > 0.0
     (skipped,) = benchmark.skipped
     assert skipped.case == cases[3] and "atlas" in skipped.reason
     assert str(device.max_texture_size) in skipped_lines(benchmark)[0]

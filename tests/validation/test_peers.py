@@ -151,7 +151,7 @@ def test_progress_bar_ends_with_the_work(peers: Any) -> None:
     done: list[int] = []
     renderer = FakeRenderer()
     rendering.render_peers(BALL, "front", peers.QUICK_PLAN, renderer, done.append)  # type: ignore[arg-type]
-    assert sum(done) == peers.QUICK_PLAN.work
+    assert sum(done) == peers.QUICK_PLAN.progress_steps
     assert renderer.techniques.count(GPU_GEMS_3) == renderer.techniques.count(FRAGMENT_TECHNIQUE)
     assert renderer.techniques.count(GPU_GEMS_3) == renderer.techniques.count("screen-space")
 

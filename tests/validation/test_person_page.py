@@ -26,7 +26,7 @@ def noisy(name: str, side: int) -> PersonComparison:
 
 def measured(view: str, truth: page.TruthName = "matched", cause: page.Cause | None = None) -> page.Figures:
     """Return figures of one comparison, keyed as in the file of results."""
-    figures = page.pair_figures(noisy(view, 8))
+    figures = page.comparison_figures(noisy(view, 8))
     figures |= {"regions": {"ear": [0.9, 0.01]}, "default": [0.3, 0.01, 0.8, 0.01]}
     return {page.Measurement("human", view, truth, cause).key: figures}
 
@@ -45,7 +45,7 @@ def test_tables_state_regions_and_causes() -> None:
 
 
 def test_all_comparisons_have_keys_of_their_own() -> None:
-    keys = [one.key for one in page.measurements()]
+    keys = [one.key for one in page.list_measurements()]
     assert len(set(keys)) == len(keys)
 
 

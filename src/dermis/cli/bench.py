@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal
 
 from dermis.base.console import print_report, progress_bar
-from dermis.cli.head_options import HEAD_OPTION_NAMES, FileOptions, check_head
+from dermis.cli.head_options import HEAD_OPTION_NAMES, FileOptions, check_head_options
 from dermis.cli.options import NO_OPTIONS, AdapterOption, JsonOption, OptionalOutputPath, refuse_options
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def bench(
     if head == "auto":
         refuse_options(file, HEAD_OPTION_NAMES, "without a file", "Add --head")
         name = "lee_perry_smith" if is_available("lee_perry_smith") else "human"
-    check_head(head, file)
+    check_head_options(head, file)
     is_software = select_adapters(adapter)[0][0].kind == "CPU"
     cases = BENCHMARK_PRESETS[preset or ("cpu" if is_software else "interactive")].cases()
     with progress_bar("measuring") as report_progress:

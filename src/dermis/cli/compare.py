@@ -15,7 +15,7 @@ from dermis.base.atomic_write import atomic_file, refuse_output
 from dermis.base.console import print_report, spinner
 from dermis.base.errors import refuse
 from dermis.base.extras import import_extra
-from dermis.cli.head_options import ShapeOptions, check_head, note_eyes
+from dermis.cli.head_options import ShapeOptions, check_head_options, note_eyes
 from dermis.cli.options import (
     NO_OPTIONS,
     AdapterOption,
@@ -187,7 +187,7 @@ def _compare_techniques(
     from dermis.base.atomic_write import check_output
     from dermis.scene.heads import load_head
 
-    check_head(head, shape)
+    check_head_options(head, shape)
     comparison.check_names(*(arguments[option] for option in ("against", "light", "region", "medium")))
     if output is not None:
         check_output(output, (".html",), "Choose such a name")

@@ -121,7 +121,7 @@ def write_avatar(studio: Studio, folder: Path) -> Path:
     return file.write(folder / "avatar.glb")
 
 
-def write_pictures(head: Head, folder: Path) -> Path:
+def write_three_meshes(head: Head, folder: Path) -> Path:
     """Write a head's skin as a .glb file with three meshes, each with its own part of the colour map.
 
     Returns the path of the file.

@@ -25,7 +25,7 @@ _CHECKOUT_HINT = "Install the package from a clone of the project (make setup) a
 SOFTWARE_WEBGL = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
 
-def in_checkout(path: Path) -> Path:
+def require_in_checkout(path: Path) -> Path:
     """Check that a path exists in the checkout of the project, and return it.
 
     Raises DermisError if the package is installed without a checkout of the project.
@@ -42,7 +42,7 @@ def add_tests_to_path() -> None:
 
     Raises DermisError if the tests are missing.
     """
-    folder = str(in_checkout(CHECKOUT / "tests"))
+    folder = str(require_in_checkout(CHECKOUT / "tests"))
     if folder not in sys.path:
         sys.path.append(folder)
 
@@ -60,7 +60,7 @@ def data_file(file_name: str) -> Path:
 
 def write_page(page: Path, page_text: str) -> None:
     """Write a page of the documentation atomically."""
-    in_checkout(page.parent)
+    require_in_checkout(page.parent)
     with atomic_file(page) as file:
         file.write_text(page_text, encoding="utf-8")
 
@@ -75,7 +75,9 @@ def fill_page(page: Path, **placeholder_texts: object) -> None:
 
     placeholder_texts : text or number for each placeholder of the template
     """
-    write_page(page, in_checkout(template_path(page)).read_text(encoding="utf-8").format(**placeholder_texts))
+    write_page(
+        page, require_in_checkout(template_path(page)).read_text(encoding="utf-8").format(**placeholder_texts)
+    )
 
 
 def print_tables(tables: Mapping[str, str]) -> None:
@@ -83,20 +85,20 @@ def print_tables(tables: Mapping[str, str]) -> None:
     print_lines(*(f"{name}\n{text}\n" for name, text in tables.items()))
 
 
-def write_results(path: Path, figures: Mapping[str, Any], digits: int | None = None) -> None:
+def write_results(path: Path, results: Mapping[str, Any], digits: int | None = None) -> None:
     """Write measured results to a JSON file, atomically.
 
-    figures : measured values, JSON-compatible
+    results : measured values, JSON-compatible
     digits : significant digits of floats; None for all digits
     """
-    values = figures if digits is None else _rounded(figures, digits)
+    values = results if digits is None else _rounded(results, digits)
     with atomic_file(path) as file:
         file.write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
 
 
 def read_results(path: Path) -> Any:
     """Return the results of the last measurement from a JSON file of the checkout."""
-    return json.loads(in_checkout(path).read_text(encoding="utf-8"))
+    return json.loads(require_in_checkout(path).read_text(encoding="utf-8"))
 
 
 def _rounded(nested_value: object, digits: int) -> object:

@@ -53,14 +53,14 @@ class Archive(NamedTuple):
         """Return the CIELAB colours (n, 3) of the spectra under D65."""
         return lab(self.spectra @ rgb_weights(WAVELENGTHS_NM).T)
 
-    def rows(self, selection: NDArray[np.bool_] | NDArray[np.int64]) -> Archive:
+    def select_rows(self, selection: NDArray[np.bool_] | NDArray[np.int64]) -> Archive:
         """Return selected measurements, by a mask or by indices."""
         columns: Any = (column[selection] for column in self)
         return Archive(*columns)
 
-    def sample(self, count: int, seed: int = 0) -> Archive:
+    def sample_rows(self, count: int, seed: int = 0) -> Archive:
         """Return at most `count` measurements, chosen at random."""
-        return self.rows(np.random.default_rng(seed).permutation(len(self.spectra))[:count])
+        return self.select_rows(np.random.default_rng(seed).permutation(len(self.spectra))[:count])
 
 
 @cache

@@ -40,12 +40,12 @@ if TYPE_CHECKING:
 
 BLUR_PROFILE = load_profile("gpu-gems-3")
 Array = NDArray[np.floating]
-Flags = NDArray[np.bool_]
-PointFilter = Callable[[Array], Flags]
+Mask = NDArray[np.bool_]
+PointFilter = Callable[[Array], Mask]
 FLAT_PATCH_SIDE = 256  # side of flat patches [texels]
 HUMAN_FILE = "heads/makehuman/head_young_male_light.obj"
 SPHERE_RADII_MM = (5.0, 10.0, 20.0, 50.0, 100.0)
-BALL_SIDE, HEAD_SIDE = 320, 1024
+BALL_ATLAS_SIDE, HEAD_ATLAS_SIDE = 320, 1024
 STRIPE_SPACING_MM, STRIPE_WIDTH_MM = 12.0, 6.0  # of stripes of light across seams
 MIN_FACING_COSINE = 0.4  # least cosine between the normal at a seam and the light
 
@@ -155,7 +155,7 @@ def harmonic_row(renderer: Renderer, radius_mm: float) -> str:
     from cut_meshes import cut_sphere
 
     mesh = cut_sphere(radius_mm, 20)
-    atlas = build_atlas(mesh, BALL_SIDE, "stitched")
+    atlas = build_atlas(mesh, BALL_ATLAS_SIDE, "stitched")
     light = np.nan_to_num(shown(atlas, mesh, own=True))[..., :1] / radius_mm
     remaining = widest_level(renderer, *blur_light(renderer.device, mesh, atlas, light))
     density = np.maximum(atlas.stretch.astype(float).prod(axis=-1, keepdims=True), 1e-6)
@@ -213,36 +213,36 @@ def seam_rows(renderer: Renderer) -> list[str]:
     human = dermis.load_head("human")
     makehuman = replace(dermis.load_head(data_file(HUMAN_FILE), unit_mm=100, subdivide=0), maps=Maps())
     rows = (
-        ("sphere in six charts", Head("sphere", cut_sphere(30.0, 20), Maps()), BALL_SIDE, all_points),
-        ("human, neck and back of the head", human, HEAD_SIDE, visible_points),
-        ("human, eye sockets and inside of the mouth", human, HEAD_SIDE, hidden_points),
-        ("MakeHuman, neck", makehuman, HEAD_SIDE, neck_points),
-        ("MakeHuman, back of the head", makehuman, HEAD_SIDE, back_points),
+        ("sphere in six charts", Head("sphere", cut_sphere(30.0, 20), Maps()), BALL_ATLAS_SIDE, all_points),
+        ("human, neck and back of the head", human, HEAD_ATLAS_SIDE, visible_points),
+        ("human, eye sockets and inside of the mouth", human, HEAD_ATLAS_SIDE, hidden_points),
+        ("MakeHuman, neck", makehuman, HEAD_ATLAS_SIDE, neck_points),
+        ("MakeHuman, back of the head", makehuman, HEAD_ATLAS_SIDE, back_points),
     )
     return [seam_row(renderer, *row) for row in rows]
 
 
-def all_points(positions: Array) -> Flags:
+def all_points(positions: Array) -> Mask:
     """Return a mask (n,) that selects all positions (n, 3)."""
     return np.ones(len(positions), bool)
 
 
-def neck_points(positions: Array) -> Flags:
+def neck_points(positions: Array) -> Mask:
     """Return the mask of positions on and below the neck."""
     return np.asarray((positions[:, 1] < -90.0) & (positions[:, 2] < 60.0))
 
 
-def back_points(positions: Array) -> Flags:
+def back_points(positions: Array) -> Mask:
     """Return the mask of positions on the back of the head."""
     return np.asarray((positions[:, 1] > -90.0) & (positions[:, 2] < -30.0))
 
 
-def visible_points(positions: Array) -> Flags:
+def visible_points(positions: Array) -> Mask:
     """Return the mask of positions where seams of the package's human are visible: neck and back."""
     return np.asarray(neck_points(positions) | back_points(positions))
 
 
-def hidden_points(positions: Array) -> Flags:
+def hidden_points(positions: Array) -> Mask:
     """Return the mask of positions where seams of the package's human are hidden: eye sockets and mouth."""
     return ~visible_points(positions)
 
@@ -276,7 +276,7 @@ def seam_side_points(head: Head, point_filter: PointFilter) -> tuple[Points, Poi
     selected = point_filter(positions) & (
         np.abs(first.on(mesh.normals[mesh.triangles])[:, 2]) > MIN_FACING_COSINE
     )
-    for size in (BALL_SIDE, HEAD_SIDE):
+    for size in (BALL_ATLAS_SIDE, HEAD_ATLAS_SIDE):
         for layout in ("mesh", "stitched"):
             mapped = cached_atlas(head.topology.mesh, size, layout).mapped
             selected &= mapped[first.triangle] & mapped[second.triangle]

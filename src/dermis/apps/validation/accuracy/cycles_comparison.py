@@ -15,7 +15,7 @@ from scipy.ndimage import gaussian_filter
 import dermis
 from dermis.apps.truths.cycles import BeckmannSurface, PrincipledSkin, cycles_passes
 from dermis.apps.validation.accuracy.person import sheet_bytes
-from dermis.apps.validation.pages import DOCS, RESULTS, in_checkout, read_results, write_results
+from dermis.apps.validation.pages import DOCS, RESULTS, read_results, require_in_checkout, write_results
 from dermis.atlas.build import build_atlas
 from dermis.base.console import print_lines
 from dermis.frame.features.surface.painting.painted_head import with_painted_maps
@@ -78,7 +78,7 @@ class SkinRender(NamedTuple):
 
 def highlights(adapter: str = "auto") -> None:
     """Compare highlights with Cycles and write benchmarks/results/highlights.json."""
-    in_checkout(RESULTS)
+    require_in_checkout(RESULTS)
     renderer, head = dermis.Renderer(adapter), scan_with_normal_map()
     rows = [row for view in HIGHLIGHT_VIEWS for row in highlight_rows(renderer, head, view)]
     write_results(HIGHLIGHT_RESULTS, {"paths": HIGHLIGHT_PATHS, "rows": rows})
@@ -86,7 +86,7 @@ def highlights(adapter: str = "auto") -> None:
 
 def looks(adapter: str = "auto") -> None:
     """Render skins by dermis and by Cycles; write benchmarks/results/look.json and docs/images/look.webp."""
-    in_checkout(LOOK_PICTURE.parent)
+    require_in_checkout(LOOK_PICTURE.parent)
     renderer, rows, panels = dermis.Renderer(adapter), list[dict[str, object]](), dict[str, Picture]()
     renders = {head: skin_renders(renderer, head) for head in HEAD_NAMES}
     for view in LOOK_VIEWS:
@@ -135,13 +135,13 @@ def relief_slopes(mesh: Mesh, height_map: Picture) -> Picture:
     return np.asarray(np.stack([right, -down], axis=-1) * stretch, np.float32)
 
 
-def grain_contrast(picture: Picture, lit: NDArray[np.bool_]) -> float:
+def grain_contrast(picture: Picture, lit_mask: NDArray[np.bool_]) -> float:
     """Return the contrast of fine detail: the relative RMS difference between a picture and its blurred copy.
 
-    lit : (h, w) mask of the pixels to compare
+    lit_mask : (h, w) mask of the pixels to compare
     """
     smooth = gaussian_filter(picture, GRAIN_BLUR_PX)
-    return float(np.sqrt((((picture - smooth) / np.maximum(smooth, 1e-9))[lit] ** 2).mean()))
+    return float(np.sqrt((((picture - smooth) / np.maximum(smooth, 1e-9))[lit_mask] ** 2).mean()))
 
 
 def traced_highlights(scene: Scene, settings: Settings, lobes: tuple[tuple[float, float], ...]) -> Picture:

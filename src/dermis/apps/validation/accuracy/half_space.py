@@ -96,10 +96,10 @@ def _direction_errors(albedo: float) -> tuple[float, float]:
     half_space = lambertian * (entering + response.single_scattering[0] * single)
     importance = np.outer(area, area)
 
-    def error(radiance: Floats) -> float:
+    def relative_rmse(radiance: Floats) -> float:
         return float(np.sqrt((importance * (radiance - exact) ** 2).sum() / (importance * exact**2).sum()))
 
-    return error(lambertian), error(half_space)
+    return relative_rmse(lambertian), relative_rmse(half_space)
 
 
 def _monte_carlo_ratio(albedo: float, mean_cosine: float, eta: float) -> float:
@@ -160,10 +160,10 @@ def _studio_ratios(head: Head, adapter: str) -> tuple[list[float], list[float]]:
     """
     renderer, settings = Renderer(adapter), Settings(size=(256, 298), atlas=1024)
 
-    def picture(direction: Literal["lambertian", "half-space"]) -> Floats:
+    def render_picture(direction: Literal["lambertian", "half-space"]) -> Floats:
         return renderer.draw(Scene(head, skin=Skin(direction=direction)), settings).linear().astype(float)
 
-    lambertian, half_space = picture("lambertian"), picture("half-space")
+    lambertian, half_space = render_picture("lambertian"), render_picture("half-space")
     visible = lambertian.min(axis=-1) > 0.02
     middle, high = np.percentile(half_space[visible] / lambertian[visible], (50.0, 99.0), axis=0)
     return middle.tolist(), high.tolist()

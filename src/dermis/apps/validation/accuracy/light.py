@@ -40,7 +40,7 @@ from dermis.specular.kelemen import kelemen
 
 PANORAMAS = ("royal_esplanade", "lebombo")
 VIEW_DEGREES = (0, 15, 30, 45, 60, 70, 75, 80, 85)  # angle between view and normal [degrees]
-FINE_ROUGHNESS = 0.25  # below this roughness, lobes are summed over smaller texels
+MAX_ROUGHNESS_FOR_FINE_TEXELS = 0.25  # below this roughness, lobes are summed over smaller texels
 Array = NDArray[np.floating]
 UP_AXIS = np.array([0.0, 1.0, 0.0])
 
@@ -50,13 +50,13 @@ def light(adapter: str = "auto") -> None:
     print_tables(tables(adapter))
 
 
-def sample_panorama(layer: Array, directions: Array) -> Array:
+def sample_panorama(panorama_image: Array, directions: Array) -> Array:
     """Return the radiance (n, 3) of a panorama in given directions, interpolated as in the shader.
 
-    layer : (h, w, 3) panorama
+    panorama_image : (h, w, 3) panorama
     directions : (n, 3) directions
     """
-    height, width = layer.shape[:2]
+    height, width = panorama_image.shape[:2]
     x = (0.5 + np.arctan2(directions[:, 0], -directions[:, 2]) / (2 * np.pi)) * width - 0.5
     y = np.arccos(np.clip(directions[:, 1], -1, 1)) / np.pi * height - 0.5
     left, top = np.floor(x).astype(int), np.floor(y).astype(int)
@@ -64,7 +64,7 @@ def sample_panorama(layer: Array, directions: Array) -> Array:
     for i in (0, 1):
         for j in (0, 1):
             weight = np.abs(1 - i - (y - top)) * np.abs(1 - j - (x - left))
-            total += weight[:, None] * layer[np.clip(top + i, 0, height - 1), (left + j) % width]
+            total += weight[:, None] * panorama_image[np.clip(top + i, 0, height - 1), (left + j) % width]
     return total
 
 
@@ -74,7 +74,7 @@ def normalise(vectors: Array) -> Array:
 
 
 @cache
-def panorama(panorama_name: str, row_count: int = 256) -> tuple[Array, Array, Prefiltered]:
+def prefiltered_panorama(panorama_name: str, row_count: int = 256) -> tuple[Array, Array, Prefiltered]:
     """Return directions (n, 3) and light (n, 3) of a panorama's texels, and the prefiltered panorama.
 
     Light is radiance times solid angle; suns are removed.
@@ -93,7 +93,7 @@ def irradiance_error(panorama_name: str, normal_count: int = 200) -> float:
 
     normal_count : number of normals
     """
-    towards, light, prefiltered = panorama(panorama_name)
+    towards, light, prefiltered = prefiltered_panorama(panorama_name)
     normals = normalise(np.random.default_rng(1).normal(size=(normal_count, 3)))
     exact = np.array([np.maximum(towards @ normal, 0) @ light for normal in normals])
     return float(np.abs(sample_panorama(prefiltered.layers[0], normals) / exact - 1).max())
@@ -111,7 +111,9 @@ def reflection_error(
     normal_count : number of normals
     """
     cosine = float(np.cos(np.radians(view_degrees)))
-    towards, light, prefiltered = panorama(panorama_name, 512 if roughness_m < FINE_ROUGHNESS else 256)
+    towards, light, prefiltered = prefiltered_panorama(
+        panorama_name, 512 if roughness_m < MAX_ROUGHNESS_FOR_FINE_TEXELS else 256
+    )
     rng = np.random.default_rng(2)
     normals = normalise(rng.normal(size=(normal_count, 3)))
     along = normalise(np.cross(normals, rng.normal(size=(normal_count, 3))))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 import dermis
 from dermis.apps.validation.accuracy import blur
-from dermis.apps.validation.pages import DOCS, add_tests_to_path, data_file, fill_page, in_checkout
+from dermis.apps.validation.pages import DOCS, add_tests_to_path, data_file, fill_page, require_in_checkout
 from dermis.atlas.build import cached_atlas
 from dermis.formats.maps import load_maps
 from dermis.frame.features.occlusion.baked import bake_occlusion
@@ -69,7 +69,7 @@ def motion(adapter: str = "auto") -> None:
     Takes some minutes. Needs the published heads of MakeHuman in DERMIS_DATA, and a checkout with its folder
     `tests`.
     """
-    in_checkout(PAGE)
+    require_in_checkout(PAGE)
     add_tests_to_path()
     renderer = dermis.Renderer(adapter)
     person = Human(age=25).head(load_maps(colour=data_file(SKIN_MAP_FILE)), "hm08", 0)
@@ -196,7 +196,7 @@ def _seam_row(renderer: Renderer, row_title: str, head: Head, shaped_head: Head,
         sides = blur.seam_side_points(shaped_head, where)
         scene = replace(blur.striped_scene(head), pose=pose)
         _with_centre(scene.head, shaped_head)
-        errors = blur.seam_jumps(renderer, scene, "stitch", blur.HEAD_SIDE, *sides)
+        errors = blur.seam_jumps(renderer, scene, "stitch", blur.HEAD_ATLAS_SIDE, *sides)
         cells.append(f"{100 * errors.mean():.1f} / {100 * np.percentile(errors, 95):.1f}")
     return f"| {row_title} | {' | '.join(cells)} |"
 

@@ -78,7 +78,7 @@ def _model_rows(tissue_name: str, tissue: Tissue) -> Iterator[str]:
         yield f"| | {label} | {total} | {rings} |"
 
 
-def counted_table() -> str:
+def photon_counts_table() -> str:
     """Return Markdown rows with errors of tabulated photon counts and of layered diffusion, by medium."""
     rows = []
     for name in ("skin1", "skin2"):
@@ -108,7 +108,7 @@ def fits_table() -> str:
     return "\n".join(rows)
 
 
-def pointwise_table() -> str:
+def point_fits_table() -> str:
     """Return Markdown rows with shape and energy errors of six Gaussians fitted to point samples of profiles.
 
     The channels share the variances of the Gaussians. Each profile is fitted twice: without a constraint, and
@@ -149,7 +149,7 @@ def transmission_table() -> str:
                 slab_transmittance(tissue.medium, [thickness], "multipole")[0],
                 gaussian_transmittance(gaussian_sum, [thickness])[0],
             ]
-            rows.append(f"| {name} | {thickness:g} mm | {' | '.join(map(_cells, variants))} |")
+            rows.append(f"| {name} | {thickness:g} mm | {' | '.join(map(_fractions_text, variants))} |")
     return "\n".join(rows)
 
 
@@ -182,9 +182,9 @@ def tables() -> dict[str, str]:
     """Return Markdown rows for docs/templates/accuracy.md, keyed by placeholder."""
     return {
         "models": models_table(),
-        "counted": counted_table(),
+        "counted": photon_counts_table(),
         "fits": fits_table(),
-        "pointwise": pointwise_table(),
+        "pointwise": point_fits_table(),
         "transmission": transmission_table(),
         "published": published_errors(),
         "photons": f"{PHOTON_COUNT:,}",
@@ -198,5 +198,5 @@ def _percentages_text(fractions: Floats, with_sign: bool = True) -> str:
     )
 
 
-def _cells(fractions: Floats) -> str:
+def _fractions_text(fractions: Floats) -> str:
     return " ".join(f"{value:.3f}" for value in fractions)

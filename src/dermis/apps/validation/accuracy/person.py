@@ -42,7 +42,14 @@ from dermis.apps.validation.comparisons.person_regions import picture_regions
 from dermis.apps.validation.comparisons.person_textures import person_textures
 from dermis.apps.validation.comparisons.person_views import EYE_FRAME_MM, VIEWS, View, view_scene
 from dermis.apps.validation.comparisons.scenes import default_region, medium_scene
-from dermis.apps.validation.pages import DOCS, RESULTS, fill_page, in_checkout, read_results, write_results
+from dermis.apps.validation.pages import (
+    DOCS,
+    RESULTS,
+    fill_page,
+    read_results,
+    require_in_checkout,
+    write_results,
+)
 from dermis.base.console import print_lines
 from dermis.base.disk import load_arrays, try_save_arrays
 from dermis.frame.renderer import Renderer
@@ -54,7 +61,7 @@ from dermis.scene.settings import Settings
 
 PAGE = DOCS / "path_traced.md"
 PICTURE = DOCS / "images" / "path_traced.webp"
-FIGURES = RESULTS / "path_traced.json"
+RESULTS_FILE = RESULTS / "path_traced.json"
 PICTURE_SIDE, PATHS_PER_PIXEL = 160, 48
 SHEET_COLUMNS = 6
 MAX_SHEET_BYTES = 300_000
@@ -70,8 +77,8 @@ _PEOPLE: dict[PersonName, Callable[[], Head]] = {
     "old": lambda: Human(caucasian=1.0, african=0.0, asian=0.0, age=80.0).head(),
 }
 _PEOPLE_VIEWS = "portrait", "three-quarter, lebombo", "moved"
-_MOVED = {"moved": View(VIEWS["three-quarter"].camera, "window", "surprise")}
-ALL_VIEWS: Mapping[str, View] = VIEWS | _MOVED
+_MOVED_VIEW = {"moved": View(VIEWS["three-quarter"].camera, "window", "surprise")}
+ALL_VIEWS: Mapping[str, View] = VIEWS | _MOVED_VIEW
 _HEAD_FILES = {
     "scan": "lee_perry_smith",
     "old man": "heads/makehuman/head_old_male_dark.obj",
@@ -87,7 +94,7 @@ class Measurement:
 
     person : key of `_PEOPLE`
     view : key of `ALL_VIEWS`
-    truth : kind of path-traced reference
+    truth : kind of path-traced reference, one of `comparisons.person.TRUTHS`
     cause : cause of error that is left out of both pictures, or None
     """
 
@@ -102,7 +109,7 @@ class Measurement:
         return f"{self.person} / {self.view} / {self.truth} / {self.cause or 'everything'}"
 
 
-def measurements() -> list[Measurement]:
+def list_measurements() -> list[Measurement]:
     """Return all comparisons of people, the most important ones first."""
     found = [Measurement("human", view, "matched") for view in ALL_VIEWS]
     found += [Measurement("human", view, "layered") for view in VIEWS]
@@ -113,7 +120,7 @@ def measurements() -> list[Measurement]:
     return found
 
 
-class Measuring:
+class ComparisonRunner:
     """Renderer of people and heads by dermis and by path tracing, with the same options for all comparisons.
 
     renderer : renderer of the frames
@@ -133,7 +140,7 @@ class Measuring:
 
     def measure(self, measurement: Measurement) -> Figures:
         """Make a comparison and return its figures; pictures that the page shows are kept in the cache."""
-        head, textures = self._person(measurement.person)
+        head, textures = self._load_person(measurement.person)
         skin = self._shared_skin(measurement.person, head, measurement.truth)
         subject = PersonSubject(view_scene(head, ALL_VIEWS[measurement.view]), textures)
         if measurement.cause is not None:
@@ -141,7 +148,7 @@ class Measuring:
         samples = round(self.samples * ALL_VIEWS[measurement.view].sample_factor)
         options: dict[str, Any] = {"picture_side": self.side, "samples": samples, "variant": self.variant}
         pair = compare_person(self.renderer, subject, skin, measurement.view, **options)
-        figures = pair_figures(pair)
+        figures = comparison_figures(pair)
         if measurement.truth == "matched":
             regions = picture_regions(self.renderer, subject.scene, self.side)
             figures["regions"] = {name: list(ratio) for name, ratio in regions.light_ratios(pair).items()}
@@ -157,7 +164,7 @@ class Measuring:
                 save_panels(measurement.view, pair)
         return figures
 
-    def _person(self, person_name: PersonName) -> tuple[Head, Any]:
+    def _load_person(self, person_name: PersonName) -> tuple[Head, Any]:
         if person_name not in self._people:
             head = _PEOPLE[person_name]()
             textures = person_textures(self.renderer, view_scene(head, VIEWS["portrait"]))
@@ -202,7 +209,7 @@ def _load_named_head(head_name: str) -> Head:
     return load_head(str(data_file(file)) if "/" in file else file)
 
 
-def pair_figures(comparison: PersonComparison) -> Figures:
+def comparison_figures(comparison: PersonComparison) -> Figures:
     """Return errors of a comparison as JSON-compatible figures."""
     return {
         "error": list(comparison.relrmse),
@@ -304,22 +311,22 @@ def person(
     seconds:
         Time after which no further comparison starts; 0 for no limit [s].
     """
-    in_checkout(PICTURE.parent)
+    require_in_checkout(PICTURE.parent)
     started, renderer = time.perf_counter(), Renderer(adapter)
     chosen: Any = fastest_variant() if variant == "auto" else variant
     device = f"{renderer.device.adapter.name}, {renderer.device.adapter.backend}"
-    figures = read_results(FIGURES) if FIGURES.exists() else {}
+    figures = read_results(RESULTS_FILE) if RESULTS_FILE.exists() else {}
     settings = {"side": side, "samples": samples}
     if figures.get("settings") != settings:
         figures = {"settings": settings, "people": {}, "heads": {}}
     figures |= {"adapter": device, "variant": chosen}
     with tempfile.TemporaryDirectory() as folder:
-        measuring = Measuring(renderer, side, samples, chosen, Path(folder))
-        for group, key, measure in _measurement_jobs(measuring):
+        runner = ComparisonRunner(renderer, side, samples, chosen, Path(folder))
+        for group, key, measure in _measurement_jobs(runner):
             if key in figures[group] or (seconds and time.perf_counter() - started > seconds):
                 continue
             figures[group][key] = measure()
-            write_results(FIGURES, figures, digits=5)
+            write_results(RESULTS_FILE, figures, digits=5)
             print_lines(f"{key}: {figures[group][key]['error']} {figures[group][key]['energy']}")
     PICTURE.write_bytes(picture_sheet(list(ALL_VIEWS)))
     person_page()
@@ -328,17 +335,17 @@ def person(
 _Job = tuple[str, str, Callable[[], Figures]]
 
 
-def _measurement_jobs(measuring: Measuring) -> list[_Job]:
+def _measurement_jobs(runner: ComparisonRunner) -> list[_Job]:
     """Return the group, key and function of each comparison, in the order in which they are run.
 
     The most important comparisons of people are first, then heads, then other comparisons of people.
     """
-    people: list[_Job] = [("people", one.key, partial(measuring.measure, one)) for one in measurements()]
+    people: list[_Job] = [("people", one.key, partial(runner.measure, one)) for one in list_measurements()]
     heads: list[_Job] = [
         (
             "heads",
             f"{name} / {light} / {medium}",
-            partial(measuring.measure_head, name, light, published_media()[medium].with_eta(1.0)),
+            partial(runner.measure_head, name, light, published_media()[medium].with_eta(1.0)),
         )
         for medium in _HEAD_MEDIA
         for name in _HEAD_FILES
@@ -350,7 +357,7 @@ def _measurement_jobs(measuring: Measuring) -> list[_Job]:
 
 def person_page() -> None:
     """Write docs/path_traced.md from the last measurement."""
-    figures = read_results(FIGURES)
+    figures = read_results(RESULTS_FILE)
     fill_page(
         PAGE,
         adapter=figures["adapter"],

@@ -40,7 +40,7 @@ def read_albedo(lobe_model: str, cosine: Floats, roughness_m: Floats) -> Floats:
 
 
 def albedo_rows() -> str:
-    """Return Markdown rows with the errors of each lobe's quadrature and table, and the table's build time."""
+    """Return Markdown rows with errors of each lobe's quadrature and table, and the table's build time."""
     m, c = np.linspace(0.1, 0.5, 17)[:, None], np.linspace(0.05, 1.0, 39)
     rows = []
     for name, model in MODELS.items():

@@ -14,9 +14,9 @@ from dermis.apps.truths.metrics import energy_ratio, relative_rmse
 from dermis.apps.validation.accuracy import blur, half_space, texture_space
 from dermis.apps.validation.comparisons.compare import Comparison, ComparisonRow, compare
 from dermis.apps.validation.comparisons.references import ReferenceImage
-from dermis.apps.validation.comparisons.report import cells
+from dermis.apps.validation.comparisons.report import error_cells
 from dermis.apps.validation.comparisons.scenes import ModelName, comparison_scene, default_region
-from dermis.apps.validation.pages import DOCS, add_tests_to_path, fill_page, in_checkout
+from dermis.apps.validation.pages import DOCS, add_tests_to_path, fill_page, require_in_checkout
 from dermis.frame.surface_points import irradiance_at, surface_points
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -46,7 +46,7 @@ def techniques(adapter: str = "auto") -> None:
     Needs the sample data, Mitsuba and the folder tests of a checkout. Traced paths are cached on disk, so
     only the first run takes long.
     """
-    in_checkout(PAGE)
+    require_in_checkout(PAGE)
     add_tests_to_path()
     head = dermis.load_head("lee_perry_smith", subdivide=0)
     parts: dict[str, str] = {}
@@ -81,7 +81,7 @@ def _compare(
 
 def technique_row(first_cell: str, comparison_row: ComparisonRow) -> str:
     """Return a Markdown row with `first_cell` and the errors of a technique."""
-    return f"| {first_cell} | " + " | ".join(cells(comparison_row)) + " |"
+    return f"| {first_cell} | " + " | ".join(error_cells(comparison_row)) + " |"
 
 
 def technique_rows(
@@ -154,11 +154,14 @@ def lambertian_limit(head: Head, medium: str, path_traced: Comparison, adapter: 
     visible = surface_points(renderer, scene, SETTINGS)
     mesh = head.mesh
 
-    def interpolate(values: Floats) -> Floats:
-        corners = values[mesh.triangles[visible.triangle]]
+    def interpolate_to_pixels(vertex_values: Floats) -> Floats:
+        corners = vertex_values[mesh.triangles[visible.triangle]]
         return np.asarray(np.einsum("nk,nkc->nc", visible.barycentric, corners))
 
-    normal, position = interpolate(mesh.normals), interpolate(mesh.positions) - np.array(head.centre_mm)
+    normal, position = (
+        interpolate_to_pixels(mesh.normals),
+        interpolate_to_pixels(mesh.positions) - np.array(head.centre_mm),
+    )
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     (light,) = scene.lights
     assert not isinstance(light, DirectionalLight)
@@ -213,7 +216,7 @@ def _direction_rows(
                 model="layered",
                 **values,
             )
-            _, error, flip, energy, _ = cells(comparison.rows[0])
+            _, error, flip, energy, _ = error_cells(comparison.rows[0])
             image, reference = comparison.images["texture-space"], comparison.reference
             errors, energies = errors_by_channel(image, reference, reference.mask)
             figures = (error, errors, flip, energy, energies)

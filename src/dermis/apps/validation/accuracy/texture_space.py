@@ -61,7 +61,7 @@ def tables(head: Head, settings: Settings, adapter: str) -> dict[str, str]:
     return {name: "\n".join(lines) for name, lines in rows.items()}
 
 
-def render(subject: ComparisonSubject, technique: str, **changed_settings: object) -> Floats:
+def render_technique(subject: ComparisonSubject, technique: str, **changed_settings: object) -> Floats:
     """Render a technique to linear radiance (h, w, 3).
 
     Like the references, the image has one sample per pixel and no interreflection.
@@ -87,9 +87,9 @@ def atlas_rows(
     integral_image : surface integral
     normalised_image : surface integral divided by the surface integral under uniform light
     """
-    unscattered, rows = render(subject, "none"), []
+    unscattered, rows = render_technique(subject, "none"), []
     for side in ATLAS_SIDES:
-        image, cells = render(subject, "texture-space", atlas=side), [light_name, str(side)]
+        image, cells = render_technique(subject, "texture-space", atlas=side), [light_name, str(side)]
         for reference in (integral_image, normalised_image):
             pair = reference.image, reference.mask
             error, worst = (relative_rmse(one, *pair).value for one in (image, unscattered))
@@ -105,7 +105,7 @@ def zero_width_row(subject: ComparisonSubject, light_name: str) -> str:
     """
     narrow_profile = GaussianSum("narrow", np.array([0.05**2]), np.ones((1, 3)))
     reference = surface_integral(replace(subject, profile=narrow_profile), 0)
-    incident = render(subject, "none") / subject.profile.albedo
+    incident = render_technique(subject, "none") / subject.profile.albedo
     pair = (incident, reference.image, reference.mask)
     return f"| {light_name} | {relative_rmse(*pair).value:.4f} | {energy_ratio(*pair).value:.4f} |"
 
@@ -137,8 +137,8 @@ def region_rows(subject: ComparisonSubject, integral_image: ReferenceImage, ligh
     """
     landmarks = known_landmarks(subject.scene.head)
     assert landmarks is not None
-    none, ours = render(subject, "none"), render(subject, "texture-space")
-    opaque = render(subject, "texture-space", transmission="none")
+    none, ours = render_technique(subject, "none"), render_technique(subject, "texture-space")
+    opaque = render_technique(subject, "texture-space", transmission="none")
     samples, total = (
         irradiance_samples(subject),
         ((ours - integral_image.image)[integral_image.mask] ** 2).sum(),

@@ -81,13 +81,13 @@ def integrated_light(mesh: Mesh, light_direction: Array, points: Array, spacing_
     spacing_mm : largest distance of the irradiance samples [mm]
     """
 
-    def light(samples: MeshPoints) -> Array:
+    def irradiance_at(samples: MeshPoints) -> Array:
         normals = samples.interpolate(mesh, mesh.normals)
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
         return np.repeat(np.maximum(normals @ -light_direction, 0.0)[:, None], 3, axis=1)
 
     profile = ReferenceProfile(BLURRED_PROFILE.weight, BLURRED_PROFILE.variance_mm2)
-    samples = sample_irradiance(mesh, light, spacing_mm)
+    samples = sample_irradiance(mesh, irradiance_at, spacing_mm)
     return integrate_exitance(points, samples, profile, 0.002)
 
 
@@ -118,11 +118,11 @@ def light_across_air(mesh: Mesh, light_direction: Array, points: Array, normals:
     normals : (n, 3) surface normals
     """
 
-    def light(points: MeshPoints) -> Array:
+    def irradiance_at(points: MeshPoints) -> Array:
         cosine = points.interpolate(mesh, mesh.normals) @ -light_direction
         return np.repeat(np.maximum(cosine, 0.0)[:, None], 3, axis=1)
 
-    samples = sample_irradiance(mesh, light, 0.5)
+    samples = sample_irradiance(mesh, irradiance_at, 0.5)
     corners = samples.positions[samples.triangles]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = 0.5 * np.linalg.norm(across, axis=1)
@@ -185,12 +185,12 @@ def wedge_rows(renderer: dermis.Renderer) -> str:
     for angle in WEDGE_DEGREES:
         mesh = wedge(60.0, 0.01, 120.0 * float(np.tan(np.radians(angle / 2))), cells=16)
 
-        def dark(points: Array, normals: Array, half: float = angle / 2) -> Mask:
-            facing = normals @ [-np.sin(np.radians(half)), 0.0, np.cos(np.radians(half))] > 0.99
+        def unlit_points(points: Array, normals: Array, half_angle: float = angle / 2) -> Mask:
+            facing = normals @ [-np.sin(np.radians(half_angle)), 0.0, np.cos(np.radians(half_angle))] > 0.99
             return np.asarray(facing & (points[:, 0] < -15.0) & (np.abs(points[:, 1]) < 15.0))
 
         cells = comparison_cells(
-            renderer, mesh, np.array([0.0, 0.0, 1.0]), dark, 512, 0.7, compares_without_air=False
+            renderer, mesh, np.array([0.0, 0.0, 1.0]), unlit_points, 512, 0.7, compares_without_air=False
         )
         rows.append(f"| {angle:g}° | {cells} |")
     return "\n".join(rows)
@@ -205,12 +205,14 @@ def ear_rows(renderer: dermis.Renderer) -> str:
         for side, z in (("behind", 1.0), ("the front", -1.0)):
             beam = np.array([0.0, 0.0, z])
 
-            def dark(points: Array, normals: Array, z: float = z, centre: Array = centre) -> Mask:
+            def unlit_points(points: Array, normals: Array, z: float = z, centre: Array = centre) -> Mask:
                 local = points - centre
                 ear = (np.abs(local[:, 0]) > EAR_DISTANCE_MM) & (np.abs(local[:, 1]) < 45.0)
                 return np.asarray(ear & (z * normals[:, 2] > 0.3))
 
-            cells = comparison_cells(renderer, mesh, beam, dark, ATLAS_SIDE, 1.5, compares_without_air=True)
+            cells = comparison_cells(
+                renderer, mesh, beam, unlit_points, ATLAS_SIDE, 1.5, compares_without_air=True
+            )
             rows.append(f"| {name} | {side} | {cells} |")
     return "\n".join(rows)
 

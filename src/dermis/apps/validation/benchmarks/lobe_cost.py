@@ -40,7 +40,7 @@ def lobe_cost_ns(device: Device) -> dict[tuple[str, str], float]:
     overrides = [{"IDLE": 1}, *(dict(surface_constants(skin)) for skin in skins)]
     constants = ({"LIGHTS": lights, **one} for one in overrides)
     programs = [ComputeProgram(device, _SHADER, shader_folders(), one) for one in constants]
-    bound = {
+    bindings = {
         "skin": programs[-1].record("Skin", f0=SKIN_F0, eta=SKIN_ETA),
         "beckmann_table": texture_from_array(device, beckmann_table(), "r32float"),
         "nearest_sampler": device.sampler(),
@@ -49,8 +49,8 @@ def lobe_cost_ns(device: Device) -> dict[tuple[str, str], float]:
     }
     started = time.perf_counter()
     while time.perf_counter() - started < _WARM_UP_S:
-        _pass_ms(device, programs[0], bound, side)
-    repeats = [[_pass_ms(device, one, bound, side) for one in programs] for _ in range(_TIMED_REPEATS)]
+        _pass_ms(device, programs[0], bindings, side)
+    repeats = [[_pass_ms(device, one, bindings, side) for one in programs] for _ in range(_TIMED_REPEATS)]
     loop, *lobe_times = (statistics.median(times) for times in zip(*repeats, strict=True))
     return {
         (skin.specular, skin.fresnel): 1e6 * max(0.0, ms - loop) / (side**2 * lights)
@@ -58,17 +58,17 @@ def lobe_cost_ns(device: Device) -> dict[tuple[str, str], float]:
     }
 
 
-def _pass_ms(device: Device, program: ComputeProgram, bound: JsonObject, side: int) -> float:
+def _pass_ms(device: Device, program: ComputeProgram, bindings: JsonObject, side: int) -> float:
     """Return the time of one compute pass [ms].
 
     The time is measured by timestamps, or by `perf_counter` on devices without timestamps.
 
-    bound : dictionary from the name of a binding to its resource
+    bindings : dictionary from the name of a binding to its resource
     side : number of invocations along each of two axes
     """
     frame = CommandList(device)
     started = time.perf_counter()
-    frame.compute("lobe", program, bound, (side, side))
+    frame.compute("lobe", program, bindings, (side, side))
     frame.submit()
     frame.wait()
     wall_ms = 1e3 * (time.perf_counter() - started)

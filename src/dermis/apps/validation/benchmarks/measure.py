@@ -42,10 +42,10 @@ class FrameCounts:
     timed: int = 9
     sequence: int = 100
 
-    def within(self, seconds: float, frame_ms: float) -> FrameCounts:
-        """Return frame counts reduced so that a case takes at most `seconds`, at `frame_ms` per frame."""
+    def limited_to(self, max_seconds: float, frame_ms: float) -> FrameCounts:
+        """Return frame counts reduced so that a case takes at most `max_seconds`, at `frame_ms` per frame."""
         frames = self.warmup + 2 * self.sequence + 2 * self.timed * (1 + self.between)
-        fraction = min(1.0, 1e3 * seconds / (frame_ms * frames))
+        fraction = min(1.0, 1e3 * max_seconds / (frame_ms * frames))
         counts = asdict(self).items()
         return FrameCounts(**{name: min(count, max(1, int(fraction * count))) for name, count in counts})
 
@@ -108,7 +108,7 @@ def _measure_case(
     first, *other_scenes = case_scenes(case, head, folder, max(counts.sequence, counts.timed, 2))
     scenes = cycle([*other_scenes, first])
     renderer.draw(first, settings)
-    counts = counts.within(_MAX_CASE_S, sequence_ms(renderer, scenes, 1, settings))
+    counts = counts.limited_to(_MAX_CASE_S, sequence_ms(renderer, scenes, 1, settings))
     sequence_ms(renderer, scenes, counts.warmup, settings)
     frame_ms = sequence_ms(renderer, scenes, counts.sequence, settings) / counts.sequence
     gpu_ms = stage_ms(renderer, scenes, settings, counts)

@@ -34,8 +34,8 @@ def benchmark_json(benchmark: Benchmark) -> JsonObject:
         "date": benchmark.date,
         "seconds": benchmark.seconds,
         "copy_gb_s": benchmark.copy_bytes_s / 1e9,
-        "published_ratio": benchmark.ratio(GPU_GEMS_3),
-        "published_fragments_ratio": benchmark.ratio(FRAGMENT_TECHNIQUE),
+        "published_ratio": benchmark.relative_time(GPU_GEMS_3),
+        "published_fragments_ratio": benchmark.relative_time(FRAGMENT_TECHNIQUE),
         "rows": [_row_json(row) for row in benchmark.rows],
         "left_out": [{**_case_json(one.case), "reason": one.reason} for one in benchmark.skipped],
     }
@@ -61,7 +61,7 @@ _TIME_COLUMNS = ("frame [ms]", "device [ms]", "floor [ms]", "ratio", "Python [ms
 COLUMNS = (*_CASE_COLUMNS, *_TIME_COLUMNS, "memory [MB]")
 
 
-def cells(benchmark_row: BenchmarkRow) -> tuple[str, ...]:
+def row_cells(benchmark_row: BenchmarkRow) -> tuple[str, ...]:
     """Return a row's parameters and measurements as table cells, in the order of COLUMNS."""
     case, device = (
         benchmark_row.case,
@@ -77,7 +77,8 @@ def cells(benchmark_row: BenchmarkRow) -> tuple[str, ...]:
         str(benchmark_row.triangles),
         case.technique,
         *map(
-            three_digits, (benchmark_row.frame_ms, *device, benchmark_row.python_ms, benchmark_row.image_ms)
+            format_three_digits,
+            (benchmark_row.frame_ms, *device, benchmark_row.python_ms, benchmark_row.image_ms),
         ),
         f"{benchmark_row.memory_mb:.0f}",
     )
@@ -92,15 +93,15 @@ def stage_table(benchmark: Benchmark) -> list[tuple[str, ...]]:
     if benchmark.base_row is None:
         return []
     base_row = benchmark.base_row
-    other_rows = {title: benchmark.row_of(name) for name, title in _PUBLISHED_COLUMNS.items()}
+    other_rows = {title: benchmark.row_with_technique(name) for name, title in _PUBLISHED_COLUMNS.items()}
     other_times = {title: row.gpu_ms for title, row in other_rows.items() if row}
     table = [("stage", "device [ms]", "floor [ms]", "ratio", *other_times)]
     for stage, ms in base_row.gpu_ms.items():
         floor = base_row.floor_ms.get(stage)
-        floor_cells = (three_digits(floor), f"{ms / floor:.1f}") if floor else ("-", "-")
+        floor_cells = (format_three_digits(floor), f"{ms / floor:.1f}") if floor else ("-", "-")
         others = (times.get(stage) for times in other_times.values())
-        other_cells = ("-" if time is None else three_digits(time) for time in others)
-        table.append((stage, three_digits(ms), *floor_cells, *other_cells))
+        other_cells = ("-" if time is None else format_three_digits(time) for time in others)
+        table.append((stage, format_three_digits(ms), *floor_cells, *other_cells))
     return table
 
 
@@ -110,7 +111,7 @@ def published_text(benchmark: Benchmark) -> str:
     The text is empty if these passes were not measured.
     """
     names = {GPU_GEMS_3: "as compute", FRAGMENT_TECHNIQUE: "as fragments"}
-    ratios = {form: benchmark.ratio(name) for name, form in names.items()}
+    ratios = {form: benchmark.relative_time(name) for name, form in names.items()}
     parts = [f"{ratio:.2f} times as long {form}" for form, ratio in ratios.items() if ratio is not None]
     return f"With the passes of 2007 it takes {' and '.join(parts)}." if parts else ""
 
@@ -146,7 +147,7 @@ def write_report(path: Path, benchmark: Benchmark) -> None:
     page = text.substitute(
         summary=html.escape(summary_line(benchmark)),
         published=published_text(benchmark),
-        rows=_table_html([COLUMNS, *(cells(row) for row in benchmark.rows)]),
+        rows=_table_html([COLUMNS, *(row_cells(row) for row in benchmark.rows)]),
         skipped="".join(f"<p>{html.escape(line)}</p>" for line in skipped_lines(benchmark)),
         stages=_table_html(stage_table(benchmark)),
         bars=stage_bars(benchmark.base_row) if benchmark.base_row else "",
@@ -156,10 +157,10 @@ def write_report(path: Path, benchmark: Benchmark) -> None:
         output.write_text(page, encoding="utf-8")
 
 
-def _table_html(lines: Sequence[tuple[str, ...]]) -> str:
+def _table_html(table_rows: Sequence[tuple[str, ...]]) -> str:
     """Return an HTML table whose first row has the column titles."""
     rows = []
-    for index, line in enumerate(lines):
+    for index, line in enumerate(table_rows):
         tag = "td" if index else "th"
         rows.append("".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in line))
     return "<table>" + "".join(f"<tr>{row}</tr>" for row in rows) + "</table>"
@@ -175,7 +176,7 @@ _SCALING_AXES: dict[str, tuple[str, Callable[[BenchmarkRow], float]]] = {
 }
 
 
-def three_digits(value: float) -> str:
+def format_three_digits(value: float) -> str:
     """Return a number as text with three significant digits, without an exponent."""
     return f"{value:.0f}" if value >= 1000 else f"{value:.3g}"
 
@@ -245,7 +246,7 @@ def _set_ticks(axis: Axis, positions: list[float] | None) -> None:
 
     axis.set_major_locator(FixedLocator(positions) if positions else LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.set_minor_locator(NullLocator())
-    axis.set_major_formatter(FuncFormatter(lambda value, _: three_digits(value)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: format_three_digits(value)))
 
 
 def _figure_svg(figure: Figure) -> str:

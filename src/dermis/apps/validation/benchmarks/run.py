@@ -63,17 +63,17 @@ class Benchmark:
         """Return the measurements of the base frame; None if the base frame was skipped."""
         return next((row for row in self.rows if not row.case.varies), None)
 
-    def row_of(self, technique: str) -> BenchmarkRow | None:
+    def row_with_technique(self, technique: str) -> BenchmarkRow | None:
         """Return the measurements of the base frame drawn with `technique`; None if the case was skipped."""
         rows = (row for row in self.rows if row.case.varies == "technique")
         return next((row for row in rows if row.case.technique == technique), None)
 
-    def ratio(self, technique: str) -> float | None:
+    def relative_time(self, technique: str) -> float | None:
         """Return the device time of the base frame drawn with `technique`, relative to its usual technique.
 
         Returns None if one of the two was not measured.
         """
-        other = self.row_of(technique)
+        other = self.row_with_technique(technique)
         return other.gpu_ms["total"] / self.base_row.gpu_ms["total"] if other and self.base_row else None
 
 

@@ -118,7 +118,7 @@ def compare(
         compared = replace(subject, scene=replace(subject.scene, skin=skin))
         images, ms = {}, {}
         for technique in techniques:
-            images[technique], ms[technique] = _render(compared, technique, reference)
+            images[technique], ms[technique] = _render_technique(compared, technique, reference)
         name = subject.renderer.device.adapter.name
     title = f"{head.name}, {medium}, light: {light}, region: {region}, {settings.size[0]}x{settings.size[1]}"
     model_name = "photons" if subject.profile.from_photons else "diffusion"
@@ -161,7 +161,9 @@ def check_names(reference_name: str, light_name: str, region_name: str, medium_n
             refuse(f"--{option}", f"one of {', '.join(known)}", f"got {name!r}", "Choose one of them")
 
 
-def _render(subject: ComparisonSubject, technique: str, reference: ReferenceImage) -> tuple[Floats, float]:
+def _render_technique(
+    subject: ComparisonSubject, technique: str, reference: ReferenceImage
+) -> tuple[Floats, float]:
     """Return the linear radiance rendered by a technique, and the device time of a frame at 4 samples [ms].
 
     reference : reference image; the frame leaves out translucency or interreflection if the reference does
@@ -175,7 +177,7 @@ def _render(subject: ComparisonSubject, technique: str, reference: ReferenceImag
     return image, (timed.gpu_ms or {"total": timed.frame_ms})["total"]
 
 
-def _comparison_row(comparison: Comparison, technique: str, ms: float) -> ComparisonRow:
+def _comparison_row(comparison: Comparison, technique: str, frame_ms: float) -> ComparisonRow:
     from dermis.apps.truths.metrics import energy_ratio, flip, relative_rmse
 
     reference, image = comparison.reference, comparison.images[technique]
@@ -183,7 +185,7 @@ def _comparison_row(comparison: Comparison, technique: str, ms: float) -> Compar
     energy = energy_ratio(image, reference.image, reference.mask, reference.variance)
     pictures = comparison.tone_mapped(image), comparison.tone_mapped(reference.image)
     flip_error = flip(*pictures, reference.mask).mean if find_spec("flip_evaluator") else None
-    return ComparisonRow(technique, comparison.against, *error, flip_error, *energy, ms)
+    return ComparisonRow(technique, comparison.against, *error, flip_error, *energy, frame_ms)
 
 
 _REFERENCE_SOURCES = {

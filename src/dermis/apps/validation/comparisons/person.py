@@ -112,7 +112,7 @@ def shared_skin(renderer: Renderer, head: Head, truth: TruthName, folder: Path) 
 
     In homogeneous skin, the mean distance between entry and exit of light is that of the default skin.
 
-    truth : kind of path-traced reference
+    truth : kind of path-traced reference, one of `TRUTHS`
     folder : existing folder in which the file of the profile is written
     """
     maps, eta = head.maps, SKIN_ETA if truth == "refracting" else 1.0
@@ -252,7 +252,7 @@ def path_trace_subject(
     variant: MitsubaVariant = "scalar_rgb",
     progress: Callable[[int, int], None] | None = None,
 ) -> PathTraced:
-    """Path-trace a person with the same skin as in the frame.
+    """Path-trace a person with the skin that frames by dermis show too.
 
     picture_size : width and height of the picture [pixel]
     samples : paths per pixel
@@ -295,8 +295,10 @@ def path_trace_view(
     """
     mean = scene.head.maps.mean_colour
     assert mean is not None  # painted maps always have one
-    medium = uniform_skin(at_normal_incidence(mean), mean_distance_mm(renderer.skin_profile(scene.skin)), 1.0)
-    colour = at_normal_incidence(textures.colour).astype(np.float32)
+    medium = uniform_skin(
+        normal_incidence_reflectance(mean), mean_distance_mm(renderer.skin_profile(scene.skin)), 1.0
+    )
+    colour = normal_incidence_reflectance(textures.colour).astype(np.float32)
     textures = replace(textures, colour=colour, strength=np.ones((1, 1), np.float32))
     return path_trace_person(scene, textures, medium, picture_size, samples, variant=variant)
 
@@ -307,7 +309,7 @@ def mean_distance_mm(profile: GaussianSum) -> Floats:
     return np.asarray((weight * width[:, None]).sum(axis=0) / weight.sum(axis=0))
 
 
-def at_normal_incidence(diffuse_reflectance: ArrayLike) -> Floats:
+def normal_incidence_reflectance(diffuse_reflectance: ArrayLike) -> Floats:
     """Convert reflectances of half-spaces in uniform light to their reflectances at normal incidence [-].
 
     The half-spaces are index-matched.

@@ -41,13 +41,13 @@ class Regions:
 
     masks: dict[str, Mask]
 
-    def light_ratios(self, pair: PersonComparison) -> dict[str, Estimate]:
+    def light_ratios(self, comparison: PersonComparison) -> dict[str, Estimate]:
         """Return the frame's light divided by the reference's light, for regions with enough pixels [-]."""
         found = {}
         for name, mask in self.masks.items():
-            inside = mask & pair.mask
+            inside = mask & comparison.mask
             if inside.sum() >= _MIN_REGION_PIXELS:
-                found[name] = energy_ratio(pair.ours, pair.reference, inside, pair.variance)
+                found[name] = energy_ratio(comparison.ours, comparison.reference, inside, comparison.variance)
         return found
 
 
@@ -78,11 +78,11 @@ def picture_regions(renderer: Renderer, scene: Scene, picture_side: int) -> Regi
     found = {name: on_skin & (zone == k) & ~lips & ~lids for k, name in enumerate(ZONES)}
     found |= {"lips": on_skin & lips, "lids": on_skin & lids, "eyes and mouth": ~on_skin}
     centre = np.array(head.centre_mm)
-    facing = _cosines(normals, np.array(scene.camera.position) + centre - positions)
+    facing = _cosines_to_normals(normals, np.array(scene.camera.position) + centre - positions)
     found["rim"] = on_skin & (facing < _RIM_COSINE)
     if scene.lights:
         key = np.array(getattr(scene.lights[0], "position", (0.0, 0.0, 0.0))) + centre
-        cosine = _cosines(normals, key - positions)
+        cosine = _cosines_to_normals(normals, key - positions)
         found["lit side"] = on_skin & (cosine > _TERMINATOR_COSINE)
         found["terminator"] = on_skin & (np.abs(cosine) <= _TERMINATOR_COSINE)
         found["shadowed side"] = on_skin & (cosine < -_TERMINATOR_COSINE)
@@ -107,7 +107,7 @@ def _nearest_zone(positions_mm: Floats) -> NDArray[np.int64]:
     return np.asarray(np.argmin(distances, axis=0))
 
 
-def _cosines(normals: Floats, directions: Floats) -> Floats:
+def _cosines_to_normals(normals: Floats, directions: Floats) -> Floats:
     return np.asarray((normals * directions).sum(axis=1) / np.linalg.norm(directions, axis=1))
 
 

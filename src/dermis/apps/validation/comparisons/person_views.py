@@ -16,7 +16,7 @@ from dermis.scene.environment import Environment
 from dermis.scene.lights import Light, PointLight, RectangleLight, preset_lights
 from dermis.scene.model import Scene
 
-_SOFTBOX_MM = 500.0
+_SOFTBOX_SIDE_MM = 500.0
 EYE_FRAME_MM = 30.0
 """Height of the field of view for pictures of an eye."""
 _LIPS_FRAME_MM, _EAR_FRAME_MM = 72.0, 120.0
@@ -115,4 +115,4 @@ def as_softbox(light: Light) -> Light:
     if type(light) is RectangleLight or not isinstance(light, PointLight) or hasattr(light, "radius_mm"):
         return light
     shared = light.model_dump(include={"position", "target", "irradiance"})
-    return RectangleLight(**shared, width_mm=_SOFTBOX_MM, height_mm=_SOFTBOX_MM)
+    return RectangleLight(**shared, width_mm=_SOFTBOX_SIDE_MM, height_mm=_SOFTBOX_SIDE_MM)

@@ -181,10 +181,10 @@ REFERENCES: dict[str, Callable[[ComparisonSubject, int], ReferenceImage]] = {
 }
 
 
-def _reference_image(traced: PathTraced, *notes: str) -> ReferenceImage:
-    image, variance = traced.image.astype(np.float64), traced.variance.astype(np.float64)
-    mask, notes = traced.mask > _FULL_COVERAGE, (*notes, *traced.notes)
-    return ReferenceImage(image, variance, mask, PIXEL_SAMPLES, traced.seconds, notes)
+def _reference_image(path_traced: PathTraced, *notes: str) -> ReferenceImage:
+    image, variance = path_traced.image.astype(np.float64), path_traced.variance.astype(np.float64)
+    mask, notes = path_traced.mask > _FULL_COVERAGE, (*notes, *path_traced.notes)
+    return ReferenceImage(image, variance, mask, PIXEL_SAMPLES, path_traced.seconds, notes)
 
 
 def _irradiance(subject: ComparisonSubject, triangle: NDArray[np.int64], barycentric: Floats) -> Floats:

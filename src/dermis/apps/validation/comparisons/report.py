@@ -26,7 +26,7 @@ def write_report(path: Path, comparison: Comparison) -> None:
     Raises DermisError when the file cannot be written.
     """
     text = Template((resources.files(__package__) / "report.html").read_text(encoding="utf-8"))
-    reference = _figure("reference", comparison.tone_mapped(comparison.reference.image))
+    reference = _figure_html("reference", comparison.tone_mapped(comparison.reference.image))
     figures = [_technique_figures(comparison, row) for row in comparison.rows]
     page = text.substitute(
         title=html.escape(comparison.title),
@@ -42,7 +42,7 @@ def write_report(path: Path, comparison: Comparison) -> None:
         file.write_text(page, encoding="utf-8")
 
 
-def cells(comparison_row: ComparisonRow) -> tuple[str, ...]:
+def error_cells(comparison_row: ComparisonRow) -> tuple[str, ...]:
     """Return the errors of a technique as table cells, with standard errors if the reference has noise."""
     flip = "-" if comparison_row.flip is None else f"{comparison_row.flip:.3f}"
     return (
@@ -54,13 +54,13 @@ def cells(comparison_row: ComparisonRow) -> tuple[str, ...]:
     )
 
 
-def _with_error(value: float, standard_error: float) -> str:
-    return f"{value:.4f}" + (f" ± {standard_error:.4f}" if standard_error > 0 else "")
+def _with_error(estimate: float, standard_error: float) -> str:
+    return f"{estimate:.4f}" + (f" ± {standard_error:.4f}" if standard_error > 0 else "")
 
 
 def _errors_table(rows: tuple[ComparisonRow, ...]) -> str:
     head = "".join(f"<th>{name}</th>" for name in _COLUMN_TITLES)
-    body = ["".join(f"<td>{html.escape(cell)}</td>" for cell in cells(row)) for row in rows]
+    body = ["".join(f"<td>{html.escape(cell)}</td>" for cell in error_cells(row)) for row in rows]
     return f"<table><tr>{head}</tr>" + "".join(f"<tr>{row}</tr>" for row in body) + "</table>"
 
 
@@ -73,10 +73,10 @@ def _technique_figures(comparison: Comparison, comparison_row: ComparisonRow) ->
         comparison_row.technique: comparison.tone_mapped(image),
         f"{comparison_row.technique}: difference": difference,
     }
-    return "\n".join(_figure(caption, picture) for caption, picture in pictures.items())
+    return "\n".join(_figure_html(caption, picture) for caption, picture in pictures.items())
 
 
-def _figure(caption: str, picture: Floats) -> str:
+def _figure_html(caption: str, picture: Floats) -> str:
     png = base64.b64encode(encode_png(np.rint(255 * picture).astype(np.uint8))).decode("ascii")
     return (
         f'<figure><img src="data:image/png;base64,{png}" alt="{html.escape(caption)}">'

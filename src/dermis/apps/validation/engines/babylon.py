@@ -26,7 +26,7 @@ from dermis.base.errors import refuse
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-PAGE = Path(__file__).with_name("babylon.html")
+PAGE_FILE = Path(__file__).with_name("babylon.html")
 RESULTS_FILE = RESULTS / "engines_babylon.json"
 LIBRARY_VARIABLE = "DERMIS_BABYLON"
 CANVAS_SIDE, FULLY_LIT_RADIANCE = 640, 0.9
@@ -58,7 +58,7 @@ def babylon_library() -> Path:
 def babylon_page(library: Path) -> Iterator[Page]:
     """Open the measurement page with Babylon.js in Chromium for the duration of a context."""
     with chromium_page(CANVAS_SIDE) as page:
-        page.goto(PAGE.as_uri())
+        page.goto(PAGE_FILE.as_uri())
         page.add_script_tag(path=str(library / "babylonjs" / "babylon.js"))
         yield page
 
@@ -183,7 +183,7 @@ def fitted_widths(x_mm: Floats, edge_response: Floats) -> list[float]:
     return [round(float(d), 4) for d in widths[error.argmin(axis=0)]]
 
 
-def exported_skin(page: Page, skin_name: str) -> JsonObject:
+def measure_exported_skin(page: Page, skin_name: str) -> JsonObject:
     """Return the edge responses of an exported skin, and their errors against the skin's own profile."""
     subject, target = load_subject(skin_name), TARGETS["babylon"].with_variant(None)
     rows = target.parameters(subject, target.resolve_version(None))
@@ -211,7 +211,7 @@ def babylon() -> None:
             name: edge_responses(page, np.array(colour), 1e-3, RENDERED_WIDTH_RATIO / np.array(colour))
             for name, colour in DIFFUSION_COLOURS.items()
         }
-        skins = {name: exported_skin(page, name) for name in ("skin1", "skin2", "dj3")}
+        skins = {name: measure_exported_skin(page, name) for name in ("skin1", "skin2", "dj3")}
         engine = "babylonjs " + page.evaluate("BABYLON.Engine.Version")
     settings = {"engine": engine, "turns": AZIMUTH_COUNT, "samples": 40, "noise": 0.002}
     write_results(RESULTS_FILE, settings | {"plain": plain, "skins": skins})

@@ -1,8 +1,7 @@
-"""Script that renders a half-lit plane of exported skin in Cycles, run by Blender's Python: SCRIPT FOLDER.
+"""Script for Blender's Python that renders a plane of exported skin in Cycles, lit where x > 0.
 
-FOLDER contains skin.py, as written by `dermis export --to blender`, and passes.json. The script adds
-done.json: Blender's version and, for each pass, the radiance of each column of pixels. The plane is lit where
-x > 0.
+Its argument is a folder with skin.py, as written by `dermis export --to blender`, and passes.json. The script
+adds done.json: Blender's version and, for each pass, the radiance of each column of pixels.
 """
 
 from __future__ import annotations
@@ -54,13 +53,13 @@ def main(folder: Path) -> None:
     passes = json.loads((folder / "passes.json").read_text(encoding="utf-8"))
     columns = []
     for k, one in enumerate(passes):
-        set_channel(shader, skin.EXPORT, one.pop("channel"))
+        isolate_channel(shader, skin.EXPORT, one.pop("channel"))
         columns.append(column_radiance(skin, camera, folder / f"{k}.exr", **one))
     report = {"version": bpy.app.version_string, "columns": columns}
     (folder / "done.json").write_text(json.dumps(report), encoding="utf-8")
 
 
-def set_channel(shader: Any, description: dict[str, Any], channel: int) -> None:
+def isolate_channel(shader: Any, description: dict[str, Any], channel: int) -> None:
     """Give all channels the colour and radius of one channel, so that all paths help to measure this channel.
 
     description : subsurface parameters of the exported skin, with values for all channels

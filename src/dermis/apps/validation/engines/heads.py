@@ -24,7 +24,14 @@ from dermis.apps.export.subject import Subject, load_subject
 from dermis.apps.truths.metrics import relative_rmse
 from dermis.apps.truths.mitsuba_scene import load_mitsuba, mitsuba_variant
 from dermis.apps.validation.engines.babylon import LIBRARY_VARIABLE, babylon_library
-from dermis.apps.validation.pages import DOCS, RESULTS, JsonObject, chromium_page, in_checkout, write_results
+from dermis.apps.validation.pages import (
+    DOCS,
+    RESULTS,
+    JsonObject,
+    chromium_page,
+    require_in_checkout,
+    write_results,
+)
 from dermis.base.console import print_lines
 from dermis.frame.renderer import Renderer
 from dermis.images.colour import decode_srgb, encode_srgb
@@ -39,8 +46,8 @@ HEAD_LIGHTS = (
     DirectionalLight(direction=(0.8, -0.5, -0.7), irradiance=(3.4, 3.3, 3.1)),
     DirectionalLight(direction=(-0.9, -0.2, -0.3), irradiance=(0.8, 0.85, 0.95)),
 )
-LIT_FRACTION_OF_MEAN = 0.25  # fraction of the mean light; darker pixels are in shadow
-HIGHLIGHT_RADIANCE = 0.75  # radiance above which a pixel is a highlight; white skin has 1
+MIN_LIT_FRACTION_OF_MEAN = 0.25  # fraction of the mean light; darker pixels are in shadow
+MIN_HIGHLIGHT_RADIANCE = 0.75  # radiance above which a pixel is a highlight; white skin has 1
 HIGHLIGHT_WIDTH_PX = 9  # width of the square around a highlight that is excluded
 Floats = NDArray[np.float64]
 
@@ -52,7 +59,7 @@ def heads() -> None:
     programs are found by environment variables: DERMIS_BLENDER_PYTHONS names Python programs that have bpy
     4.5 and 5.2, separated by a comma; DERMIS_BABYLON names a folder into which npm installed babylonjs.
     """
-    in_checkout(PICTURE.parent)
+    require_in_checkout(PICTURE.parent)
     subject = load_subject("human").with_painted_maps(EXPORTED_MAP_SIDE, "auto")
     assert subject.head is not None and subject.scene is not None
     hairless = replace(subject.head, hair=None, strands=None)
@@ -181,8 +188,8 @@ def compare_pictures(dermis_picture: Floats, other_picture: Floats) -> JsonObjec
     outline_distance = max(distance_transform_edt(~b)[a].max(), distance_transform_edt(~a)[b].max())
     covered = (dermis_picture[..., 3] > 0.999) & (mean[..., 3] > 0.999)
     light = dermis_picture[..., :3].mean(axis=-1)
-    lit = covered & (light > LIT_FRACTION_OF_MEAN * light[covered].mean())
-    bright = np.maximum(dermis_picture[..., :3], mean[..., :3]).max(axis=-1) > HIGHLIGHT_RADIANCE
+    lit = covered & (light > MIN_LIT_FRACTION_OF_MEAN * light[covered].mean())
+    bright = np.maximum(dermis_picture[..., :3], mean[..., :3]).max(axis=-1) > MIN_HIGHLIGHT_RADIANCE
     matte = covered & ~maximum_filter(bright, HIGHLIGHT_WIDTH_PX)
     errors = [
         relative_rmse(dermis_picture[..., :3], mean[..., :3], on, variance[..., :3])

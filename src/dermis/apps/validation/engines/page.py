@@ -7,7 +7,14 @@ from collections.abc import Iterable, Sequence
 from dermis.apps.export.registry import TARGETS
 from dermis.apps.export.run import evaluate_export
 from dermis.apps.export.subject import load_subject
-from dermis.apps.validation.pages import DOCS, RESULTS, JsonObject, in_checkout, read_results, write_page
+from dermis.apps.validation.pages import (
+    DOCS,
+    RESULTS,
+    JsonObject,
+    read_results,
+    require_in_checkout,
+    write_page,
+)
 from dermis.base.console import print_lines
 
 PAGE = DOCS / "engines.md"
@@ -34,7 +41,7 @@ _BLENDER_HEAD_HEADER = """\
 
 def page() -> None:
     """Replace the tables in docs/engines.md, and print the tables for Blender."""
-    write_page(PAGE, fill_tables(in_checkout(PAGE).read_text("utf-8")))
+    write_page(PAGE, fill_tables(require_in_checkout(PAGE).read_text("utf-8")))
     print_lines(blender_tables())
 
 

@@ -74,7 +74,7 @@ class PeerPlan:
     frames: int = 5
 
     @property
-    def work(self) -> int:
+    def progress_steps(self) -> int:
         """Return the number of steps of the progress bar for one scene."""
         cycles = (
             len(FIRST_SEED_BY_TURN)
@@ -122,7 +122,7 @@ def render_peers(
     light: str,
     plan: PeerPlan,
     renderer: Renderer,
-    on_progress: Callable[[int], None] = lambda work: None,
+    on_progress: Callable[[int], None] = lambda step_count: None,
 ) -> PeerRenders:
     """Render a head under one light by all renderers.
 
@@ -143,19 +143,19 @@ def render_peers(
     with TECHNIQUES.including(FRAGMENT_TECHNIQUE, FRAGMENT_PASSES), scene_context as (scene, _):
         for seed in FIRST_SEED_BY_TURN:
             for method in CYCLES_METHODS:
-                _add_frames(ours, renderer, scene, plan)
+                _time_frames(ours, renderer, scene, plan)
                 on_progress(_PROGRESS_STEPS_BY_RENDERER["ours"])
                 try:
                     cycles[method].append(_cycles_passes(scene, medium, plan, settings, method, seed))
                 except DermisError as fault:
                     left_out[method] = str(fault)
                 on_progress(_PROGRESS_STEPS_BY_RENDERER[method] * sum(plan.samples))
-        _add_frames(ours, renderer, scene, plan)
+        _time_frames(ours, renderer, scene, plan)
         on_progress(_PROGRESS_STEPS_BY_RENDERER["ours"])
         cpu_started = time.process_time()
         reference = path_trace(scene, medium, plan.paths, settings, use_cache=False, progress=report_pass)
         core_seconds = time.process_time() - cpu_started
-        _add_frames(ours, renderer, scene, plan)
+        _time_frames(ours, renderer, scene, plan)
         on_progress(_PROGRESS_STEPS_BY_RENDERER["ours"])
     complete = {method: turns for method, turns in cycles.items() if method not in left_out}
     return PeerRenders(light, default_region(light), ours, complete, left_out, reference, core_seconds)
@@ -171,7 +171,7 @@ def _cycles_passes(
     return cycles_passes(scene, medium, (1, *plan.samples), settings, method=method, seed=seed)[1:]
 
 
-def _add_frames(
+def _time_frames(
     dermis_frames: dict[str, FrameTimes], renderer: Renderer, scene: Scene, plan: PeerPlan
 ) -> None:
     """Time further frames of each variant of dermis; each frame recomputes all stages, with warm caches.

@@ -92,12 +92,12 @@ def compare_peers(head: str, lights: list[str], plan: PeerPlan, adapter: str) ->
     with progress_bar("measuring") as bar:
         done = 0
 
-        def report(work: int) -> None:
+        def report_steps(step_count: int) -> None:
             nonlocal done
-            done += work
-            bar(done, len(lights) * plan.work)
+            done += step_count
+            bar(done, len(lights) * plan.progress_steps)
 
-        scenes = [render_peers(loaded, light, plan, renderer, report) for light in lights]
+        scenes = [render_peers(loaded, light, plan, renderer, report_steps) for light in lights]
     return {
         "date": date.today().isoformat(),
         "head": head,
@@ -182,16 +182,16 @@ def _scene_sentences(scene: JsonObject) -> list[str]:
 
 
 def _random_walk_sentence(setting: str, times: dict[str, dict[str, float]]) -> str:
-    walk, clean = f"{setting}: Cycles' random walk", f"noise of 5 % takes {_time_text(times['clean'])}"
+    walk, clean = f"{setting}: Cycles' random walk", f"noise of 5 % takes {_cost_text(times['clean'])}"
     if "same_error" not in times:
         return f"{walk} never has as small an error, because its bias is larger; {clean}."
     same = times["same_error"]
     reached = "reached" if same["ratio"] >= TARGET_TIME_RATIO else "not reached"
     goal = f"goal {TARGET_TIME_RATIO:.0f} {reached}"
-    return f"{walk} has the same error after {_time_text(same)}, {goal}; {clean}."
+    return f"{walk} has the same error after {_cost_text(same)}, {goal}; {clean}."
 
 
-def _time_text(times: dict[str, float]) -> str:
+def _cost_text(times: dict[str, float]) -> str:
     """Return text with the time and paths of Cycles, and with its time relative to a frame of dermis."""
     elapsed, cpu = (_ratio_text(times[name]) for name in ("ratio", "core_ratio"))
     cost = f"{times['seconds']:.3g} s ({times['samples']:.0f} paths per pixel)"

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from dermis.base.command_line import run_script
 
-HERE = "dermis.apps.validation.people"
+PACKAGE = "dermis.apps.validation.people"
 COMMANDS = {
-    f"{HERE}.table:table": "Write the table of measured people in the package.",
-    f"{HERE}.drawn:people": "Print a comparison of drawn people with the archive.",
-    f"{HERE}.drawn:page": "Measure the variation of people and write docs/measured.md.",
+    f"{PACKAGE}.table:table": "Write the table of measured people in the package.",
+    f"{PACKAGE}.drawn:people": "Print a comparison of drawn people with the archive.",
+    f"{PACKAGE}.drawn:page": "Measure the variation of people and write docs/measured.md.",
 }
 """Functions that run as commands, with their descriptions."""
 
 if __name__ == "__main__":
-    run_script(COMMANDS, f"python -m {HERE}")
+    run_script(COMMANDS, f"python -m {PACKAGE}")

@@ -62,7 +62,7 @@ def draw_people(group: str, seeds: Sequence[int]) -> DrawnPeople:
     return DrawnPeople(colours, np.array([one.age for one in drawn]), np.array([one.sex for one in drawn]))
 
 
-def draw_all(seed_count: int = _SEED_COUNT) -> dict[str, DrawnPeople]:
+def draw_all_groups(seed_count: int = _SEED_COUNT) -> dict[str, DrawnPeople]:
     """Return a dictionary from each group to drawn people; all groups have the same random seeds."""
     return {group: draw_people(group, range(seed_count)) for group in GROUP_OF_CODE.values()}
 
@@ -91,12 +91,12 @@ def page(seeds: int = _SEED_COUNT) -> None:
 
 
 def _people_tables(seeds: int) -> dict[str, str]:
-    archive, drawn = read_archive(), draw_all(seeds)
+    archive, drawn = read_archive(), draw_all_groups(seeds)
     return {
         "people_cheek": cheek_table(archive, drawn),
         "people_sites": sites_table(archive, drawn),
         "people_sex_age": sex_age_table(archive, drawn),
-        "people_empty": empty_cells(archive),
+        "people_empty": unmeasured_sites_text(archive),
         "people_seeds": f"{seeds:,}",
     }
 
@@ -199,7 +199,7 @@ def sex_age_table(archive: Archive, drawn: Mapping[str, DrawnPeople]) -> str:
     return "\n".join(lines)
 
 
-def empty_cells(archive: Archive) -> str:
+def unmeasured_sites_text(archive: Archive) -> str:
     """Return text that lists, for each group, the sites without measurements.
 
     The package uses pooled values for these sites.
@@ -215,7 +215,7 @@ def empty_cells(archive: Archive) -> str:
 
 
 def _measured_colours(archive: Archive, group_code: str, site: str) -> Archive:
-    return archive.rows((archive.group == group_code) & (archive.site == SITES.index(site)))
+    return archive.select_rows((archive.group == group_code) & (archive.site == SITES.index(site)))
 
 
 def _with_ita(cielab: Doubles) -> Doubles:

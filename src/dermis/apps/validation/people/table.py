@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 from scipy.stats import rankdata
 
-from dermis.apps.validation.pages import CHECKOUT, in_checkout
+from dermis.apps.validation.pages import CHECKOUT, require_in_checkout
 from dermis.apps.validation.people.inversion import invert_spectra, model_lab
 from dermis.apps.validation.spectral_archive import AGE_MIDDLES, Archive, read_archive
 from dermis.base.arrays import Doubles
@@ -34,11 +34,13 @@ HUMAN_DATA_FOLDER = CHECKOUT / "src" / "dermis" / "human" / "data"
 TABLE_FILE, CELLS_FILE = "measured.json", "measured_cells.csv"
 _QUANTILE_PROBABILITIES = (0.005, 0.025, 0.1, 0.25, 0.5, 0.75, 0.9, 0.975, 0.995)
 _CHEEK_SITE_INDEX = SITES.index("cheek")
-_POOLING_PEOPLE = 30.0  # number of people of a group that weigh as much as the pooled correlation
+_POOLED_CORRELATION_WEIGHT = 30.0  # number of people of a group that weigh as much as the pooled correlation
 _MIN_CELL_PEOPLE = (
     20  # least number of people of a cell (group and site) that is not filled from the pooled model
 )
-_SMALL_CELL_PEOPLE = 10.0  # number of people of a small cell that weigh as much as the pooled difference
+_POOLED_DIFFERENCE_WEIGHT = (
+    10.0  # number of people of a small cell that weigh as much as the pooled difference
+)
 _POPULATION_SIZE = 2000
 _VARIABLE_SHIFT_SD: Final = np.array([0.5, 0.5, 0.15, 0.15])
 """Typical size of the corrections of the four variables by which median colours are made to agree."""
@@ -71,7 +73,7 @@ def table() -> None:
     archive = read_archive()
     variables = invert_spectra(archive.spectra)
     document = build_table(archive, variables)
-    folder = in_checkout(HUMAN_DATA_FOLDER)
+    folder = require_in_checkout(HUMAN_DATA_FOLDER)
     with atomic_file(folder / TABLE_FILE) as file:
         file.write_text(json.dumps(document, separators=(",", ":")) + "\n", "utf-8")
     text = cells_text(archive, variables, parse_table(document))
@@ -97,14 +99,16 @@ def build_table(archive: Archive, variables: Doubles) -> dict[str, Any]:
         "mean_age_term": round(float(age_term(ages).mean()), 4),
     }
     adjusted = y - _centred_terms(cheek, sex, age)
-    scores = {code: _normal_scores(adjusted[rows], cheek.rows(rows)) for code, rows in _by_group(cheek)}
+    scores = {
+        code: _normal_scores(adjusted[rows], cheek.select_rows(rows)) for code, rows in _group_masks(cheek)
+    }
     pooled = np.corrcoef(np.concatenate(list(scores.values())).T)
     shifts, slope, spread = _site_differences(archive, variables)
     document |= {"site_slope": _rounded(slope), "site_spread": _rounded(spread), "groups": {}}
-    for code, rows in _by_group(cheek):
+    for code, rows in _group_masks(cheek):
         n, own = int(rows.sum()), np.corrcoef(scores[code].T)
-        mixed = (n * own + _POOLING_PEOPLE * pooled) / (n + _POOLING_PEOPLE)
-        ita = ita_degrees(cheek.rows(rows).cielab)
+        mixed = (n * own + _POOLED_CORRELATION_WEIGHT * pooled) / (n + _POOLED_CORRELATION_WEIGHT)
+        ita = ita_degrees(cheek.select_rows(rows).cielab)
         document["groups"][GROUP_OF_CODE[code]] = {
             "quantiles": _rounded(np.quantile(adjusted[rows], _QUANTILE_PROBABILITIES, axis=0).T),
             "ita": _rounded(np.quantile(ita, _QUANTILE_PROBABILITIES), 2),
@@ -125,7 +129,7 @@ def person_medians(archive: Archive, variables: Doubles, site_index: int) -> tup
     return Archive(*(column[middle] for column in archive)), variables[middle]
 
 
-def _by_group(archive: Archive) -> Iterator[tuple[str, NDArray[np.bool_]]]:
+def _group_masks(archive: Archive) -> Iterator[tuple[str, NDArray[np.bool_]]]:
     for code in GROUP_OF_CODE:
         yield code, archive.group == code
 
@@ -147,7 +151,7 @@ def _centred_terms(cheek: Archive, sex: Doubles, age: Doubles) -> Doubles:
     """Return the part (n, 4) of the variables that sex and age explain, relative to the mean of the group."""
     result = np.zeros((len(cheek.group), 4))
     for values, effect in ((cheek.sex, sex), (age_term(cheek.age), age)):
-        for _, rows in _by_group(cheek):
+        for _, rows in _group_masks(cheek):
             known = rows & np.isfinite(values)
             if known.any():
                 result[known] += (values[known] - values[known].mean())[:, None] * effect
@@ -188,7 +192,7 @@ def _site_differences(archive: Archive, variables: Doubles) -> tuple[Doubles, Do
         spread[site] = _TRUE_SPREAD_FRACTION * np.std(d - slope[site] * x, axis=0)
         filled = counts[:, site] >= _MIN_CELL_PEOPLE
         pooled = np.average(shifts[filled, site], axis=0, weights=counts[filled, site])
-        weight = (counts[:, site] / (counts[:, site] + _SMALL_CELL_PEOPLE))[~filled, None]
+        weight = (counts[:, site] / (counts[:, site] + _POOLED_DIFFERENCE_WEIGHT))[~filled, None]
         shifts[~filled, site] = weight * shifts[~filled, site] + (1.0 - weight) * pooled
     return shifts, slope, spread
 
@@ -219,8 +223,8 @@ def _calibrate(document: dict[str, Any], archive: Archive, ages: Doubles, sexes:
         rng.standard_normal((_POPULATION_SIZE, 4)),
         rng.standard_normal((_POPULATION_SIZE, len(SITES), 2)),
     )
-    for code, rows in _by_group(archive):
-        name, own = GROUP_OF_CODE[code], archive.rows(rows)
+    for code, rows in _group_masks(archive):
+        name, own = GROUP_OF_CODE[code], archive.select_rows(rows)
         trials = []
         for thickness in _LOG_THICKNESS_TRIALS:
             group = dict(document["groups"][name])
@@ -283,15 +287,15 @@ def _matching_shift(variables: Doubles, target_colour: Doubles, free_count: int)
     """
     shift, used = np.zeros(4), np.arange(4) < free_count
 
-    def median(offset: Doubles) -> Doubles:
+    def median_colour(offset: Doubles) -> Doubles:
         return np.asarray(np.median(model_lab(variables + offset), axis=0))
 
     for _ in range(_CALIBRATION_STEPS):
-        error = target_colour - median(shift)
+        error = target_colour - median_colour(shift)
         steps = 0.1 * np.diag(_VARIABLE_SHIFT_SD)
         J = np.column_stack(
             [
-                (median(shift + one) - median(shift - one)) / (0.2 * sd)
+                (median_colour(shift + one) - median_colour(shift - one)) / (0.2 * sd)
                 for one, sd in zip(steps, _VARIABLE_SHIFT_SD, strict=True)
             ]
         )
@@ -300,7 +304,7 @@ def _matching_shift(variables: Doubles, target_colour: Doubles, free_count: int)
         normal = scaled.T @ scaled + np.eye(4)  # the prior of the shift is 0
         step = np.linalg.solve(normal, scaled.T @ error / _MEDIAN_COLOUR_SD - shift / _VARIABLE_SHIFT_SD)
         shift += _VARIABLE_SHIFT_SD * np.clip(step, -_MAX_CORRECTION_STEP, _MAX_CORRECTION_STEP)
-    return shift, target_colour - median(shift)
+    return shift, target_colour - median_colour(shift)
 
 
 def cells_text(archive: Archive, variables: Doubles, measured_table: MeasuredTable) -> str:
@@ -314,7 +318,7 @@ def cells_text(archive: Archive, variables: Doubles, measured_table: MeasuredTab
     names = "group site sex age people measurements L a b melanin blood oxygen thickness_mm"
     names += " lab_covariance covariance"
     writer.writerow(names.split())
-    for code, rows in _by_group(archive):
+    for code, rows in _group_masks(archive):
         for site, name in enumerate(SITES):
             here = rows & (archive.site == site)
             if not here.any():

@@ -21,7 +21,7 @@ BIOSKIN_UNKNOWNS = {
     name: SpectralUnknown(name, 0.0, 1.0, _MIDDLE_INPUT_VALUES[name]) for name in _DECODER_INPUTS
 }
 """Inputs of the decoder, which its authors map to 0 to 1; fits start from plausible values."""
-BIOSKIN_SETS = (("melanin", "blood"), ("melanin", "blood", "oxygen"), _DECODER_INPUTS)
+BIOSKIN_UNKNOWN_SETS = (("melanin", "blood"), ("melanin", "blood", "oxygen"), _DECODER_INPUTS)
 """Inputs to fit, with two, three and five unknowns."""
 
 

@@ -19,8 +19,8 @@ from dermis.optics.media import Floats
 from dermis.optics.pigments.spectra import (
     WAVELENGTHS_NM,
     baseline_absorption,
-    blood,
-    melanosome,
+    blood_absorption,
+    melanosome_absorption,
 )
 from dermis.optics.skin_spectra import two_layer_reflectance
 
@@ -53,10 +53,10 @@ _ABSORPTION_BANDS_NM = {
     "carotene": (480.0, 20.0),
     "methaemoglobin": (630.0, 18.0),
 }
-_CONSTANT_STEPS = 6  # of the constants
-_UNKNOWN_STEPS = 4  # of the unknowns of spectra, in each outer step
+_CONSTANT_ITERATIONS = 6  # of the constants
+_UNKNOWN_ITERATIONS = 4  # of the unknowns of spectra, in each outer step
 _DERIVATIVE_STEP = 0.02
-_MIN_GAIN = 1e-4
+_MIN_ERROR_REDUCTION = 1e-4
 _NOTABLE_CORRELATION = 0.85
 
 
@@ -81,35 +81,37 @@ class ExtendedModel:
         """
         defaults = {"vessel_mm": 0.0, "bandwidth_nm": 0.0, "scattering": 1.0}
 
-        def parameter(name: str) -> Floats:
+        def parameter_column(name: str) -> Floats:
             fallback = self.constants.get(name, defaults.get(name, CONSTANTS[name].start))
             return np.asarray(parameter_values.get(name, np.float64(fallback)))[..., None]
 
         wavelength = WAVELENGTHS_NM
-        bloodless = parameter("baseline") * baseline_absorption(wavelength)
-        eu, oxygen = parameter("eumelanin"), parameter("oxygen")
-        pigment = eu * melanosome(wavelength, 1.0) + (1.0 - eu) * melanosome(wavelength, 0.0)
+        bloodless = parameter_column("baseline") * baseline_absorption(wavelength)
+        eu, oxygen = parameter_column("eumelanin"), parameter_column("oxygen")
+        pigment = eu * melanosome_absorption(wavelength, 1.0) + (1.0 - eu) * melanosome_absorption(
+            wavelength, 0.0
+        )
         half_width = float(self.constants.get("bandwidth_nm", 0.0))
         vessels = oxygen * _blood_in_bands(1.0, half_width) + (1.0 - oxygen) * _blood_in_bands(
             0.0, half_width
         )
-        depth = np.maximum(vessels * parameter("vessel_mm"), 1e-9)
+        depth = np.maximum(vessels * parameter_column("vessel_mm"), 1e-9)
         vessels = vessels * -np.expm1(-depth) / depth
-        m, b = parameter("melanin"), parameter("blood")
+        m, b = parameter_column("melanin"), parameter_column("blood")
         dermis = b * vessels + (1.0 - b) * bloodless
         for name, (centre, width) in _ABSORPTION_BANDS_NM.items():
             dermis = dermis + self.constants.get(name, 0.0) * np.exp(
                 -0.5 * ((wavelength - centre) / width) ** 2
             )
         fibres = self.constants.get("small_fibres", 1.0)
-        scattering = parameter("scattering") * (
+        scattering = parameter_column("scattering") * (
             14.74 * wavelength**-0.22 + fibres * 2.2e11 * wavelength**-4.0
         )
         return two_layer_reflectance(
             m * pigment + (1.0 - m) * bloodless,
             np.maximum(dermis, 1e-6),
             scattering,
-            parameter("epidermis_mm"),
+            parameter_column("epidermis_mm"),
             self.constants.get("dermis", 0.5),
         )
 
@@ -117,10 +119,10 @@ class ExtendedModel:
 def _blood_in_bands(oxygen: float, half_width_nm: float) -> Floats:
     """Return the absorption (31,) of blood, averaged over triangular bands of wavelengths [1/mm]."""
     if half_width_nm < 0.5:
-        return blood(WAVELENGTHS_NM, oxygen)
+        return blood_absorption(WAVELENGTHS_NM, oxygen)
     offsets = np.linspace(-half_width_nm, half_width_nm, 21)
     weights = 1.0 - np.abs(offsets) / half_width_nm
-    bands = blood(np.clip(WAVELENGTHS_NM[:, None] + offsets, 380.0, 780.0), oxygen)
+    bands = blood_absorption(np.clip(WAVELENGTHS_NM[:, None] + offsets, 380.0, 780.0), oxygen)
     return np.asarray(bands @ (weights / weights.sum()))
 
 
@@ -155,24 +157,24 @@ def fit_constants(
     shared = [CONSTANTS[name] for name in free_constants]
     z = np.array([one.coordinate(dict(fixed_constants or {}).get(one.name, one.start)) for one in shared])
 
-    def constants(point: Floats) -> dict[str, float]:
-        values = {one.name: float(one.values(point[i : i + 1])[0]) for i, one in enumerate(shared)}
+    def constants_at(point: Floats) -> dict[str, float]:
+        values = {one.name: float(one.parameter_values(point[i : i + 1])[0]) for i, one in enumerate(shared)}
         return dict(fixed_constants or {}) | values
 
-    def solve(point: Floats, start: SpectralFit | None, steps: int) -> tuple[SpectralFit, Floats]:
-        model = extended_model(constants(point))
+    def fit_unknowns(point: Floats, start: SpectralFit | None, iterations: int) -> tuple[SpectralFit, Floats]:
+        model = extended_model(constants_at(point))
         first = None if start is None else start.values
-        found = invert_spectra(spectra, model, separate, criterion, first, steps)
+        found = invert_spectra(spectra, model, separate, criterion, first, iterations)
         return found, found.weighted_residual(criterion).ravel()
 
-    fit, r = solve(z, None, 25)
+    fit, r = fit_unknowns(z, None, 25)
     damping = 1e-2
-    for _ in range(_CONSTANT_STEPS):
+    for _ in range(_CONSTANT_ITERATIONS):
         columns = []
         for i in range(len(z)):
             moved = z.copy()
             moved[i] += _DERIVATIVE_STEP
-            columns.append((solve(moved, fit, _UNKNOWN_STEPS)[1] - r) / _DERIVATIVE_STEP)
+            columns.append((fit_unknowns(moved, fit, _UNKNOWN_ITERATIONS)[1] - r) / _DERIVATIVE_STEP)
         J = np.stack(columns, axis=-1)
         H, g = J.T @ J, -J.T @ r
         for _ in range(5):
@@ -182,7 +184,7 @@ def fit_constants(
                 [one.coordinate(one.low) for one in shared],
                 [one.coordinate(one.high) for one in shared],
             )
-            trial_fit, trial_r = solve(trial, fit, 2 * _UNKNOWN_STEPS)
+            trial_fit, trial_r = fit_unknowns(trial, fit, 2 * _UNKNOWN_ITERATIONS)
             if trial_r @ trial_r < r @ r:
                 break
             damping *= 8.0
@@ -190,13 +192,15 @@ def fit_constants(
             break
         gain = 1.0 - float(trial_r @ trial_r) / float(r @ r)
         z, fit, r, damping = trial, trial_fit, trial_r, 0.3 * damping
-        if gain < _MIN_GAIN:
+        if gain < _MIN_ERROR_REDUCTION:
             break
-    return SharedFit(constants(z), fit, _confounded_pairs(free_constants, H))
+    return SharedFit(constants_at(z), fit, _confounded_pairs(free_constants, H))
 
 
-def _confounded_pairs(constant_names: Sequence[str], H: Floats) -> tuple[tuple[str, str, float], ...]:
-    covariance = np.linalg.inv(H + 1e-12 * np.eye(len(H)))
+def _confounded_pairs(
+    constant_names: Sequence[str], normal_matrix: Floats
+) -> tuple[tuple[str, str, float], ...]:
+    covariance = np.linalg.inv(normal_matrix + 1e-12 * np.eye(len(normal_matrix)))
     sd = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(sd, sd)
     return tuple(

@@ -20,7 +20,11 @@ from dermis.apps.inverse.unmixing.spectral_inversion import (
     fit_skin,
     invert_spectra,
 )
-from dermis.apps.validation.accuracy.measured.bioskin import BIOSKIN_SETS, BIOSKIN_UNKNOWNS, bioskin_model
+from dermis.apps.validation.accuracy.measured.bioskin import (
+    BIOSKIN_UNKNOWN_SETS,
+    BIOSKIN_UNKNOWNS,
+    bioskin_model,
+)
 from dermis.apps.validation.accuracy.measured.constants import ExtendedModel, fit_constants
 from dermis.apps.validation.accuracy.measured.illuminants import ILLUMINANTS, colour_weights
 from dermis.apps.validation.accuracy.measured.page import GROUP_LABELS, RESULT_FILE, write_measured_page
@@ -35,9 +39,9 @@ from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
 from dermis.optics.pigments.spectra import (
     WAVELENGTHS_NM,
     baseline_absorption,
-    blood,
+    blood_absorption,
     jacques_1998,
-    melanosome,
+    melanosome_absorption,
     rgb_weights,
 )
 from dermis.optics.skin_spectra import two_layer_reflectance
@@ -51,7 +55,7 @@ _SPECTRA_SAMPLE_COUNT, _CONSTANTS_SAMPLE_COUNT = (
     600,
 )  # numbers of spectra, for published models and for fits of constants
 _SITE_SAMPLE_COUNT = 300  # number of spectra of a site, for fits of its constants
-_OXYGEN_LIMIT_TOLERANCE, _MATCHED_DELTA_E = (
+_OXYGEN_LIMIT_TOLERANCE, _MAX_MATCHED_DELTA_E = (
     1e-6,
     0.25,
 )  # tolerance of oxygen at a bound [-], and of a matched colour [CIEDE2000]
@@ -93,11 +97,13 @@ def measured(bioskin: Path | None = None, only: str | None = None) -> None:
         "surface": lambda: _smooth_surface_errors(archive),
         "limits": lambda: _limit_fractions(archive),
         "folds": lambda: _fold_errors(archive),
-        "alternatives": lambda: _published_model_errors(archive.sample(_SPECTRA_SAMPLE_COUNT, 2), bioskin),
-        "additions": lambda: _addition_errors(archive.sample(_CONSTANTS_SAMPLE_COUNT, 3)),
+        "alternatives": lambda: _published_model_errors(
+            archive.sample_rows(_SPECTRA_SAMPLE_COUNT, 2), bioskin
+        ),
+        "additions": lambda: _addition_errors(archive.sample_rows(_CONSTANTS_SAMPLE_COUNT, 3)),
         "sites": lambda: _site_fits(archive),
         "site_folds": lambda: _site_fold_errors(archive),
-        "edge": lambda: _edge_loss_errors(archive.sample(_CONSTANTS_SAMPLE_COUNT, 3)),
+        "edge": lambda: _edge_loss_errors(archive.sample_rows(_CONSTANTS_SAMPLE_COUNT, 3)),
     }
     results: JsonObject = {} if only is None else read_results(RESULT_FILE)
     for name in parts if only is None else [only]:
@@ -168,10 +174,10 @@ def _smooth_surface_errors(archive: Archive) -> JsonObject:
     surface for each site of the body.
     """
     face = np.isin(archive.site, CHEEK_AND_FOREHEAD)
-    sites = [_surface_distances(archive.rows(archive.site == site)) for site in range(len(SITES))]
+    sites = [_surface_distances(archive.select_rows(archive.site == site)) for site in range(len(SITES))]
     return {
         "all": _percentiles(_surface_distances(archive)),
-        "cheek and forehead": _percentiles(_surface_distances(archive.rows(face))),
+        "cheek and forehead": _percentiles(_surface_distances(archive.select_rows(face))),
         "each site": _percentiles(np.concatenate(sites)),
     }
 
@@ -210,7 +216,7 @@ def _limit_fractions(archive: Archive) -> JsonObject:
     return {
         "none": float((oxygen <= _OXYGEN_LIMIT_TOLERANCE).mean()),
         "all": float((oxygen >= 1.0 - _OXYGEN_LIMIT_TOLERANCE).mean()),
-        "unmatched": float((fit.delta_e() > _MATCHED_DELTA_E).mean()),
+        "unmatched": float((fit.delta_e() > _MAX_MATCHED_DELTA_E).mean()),
     }
 
 
@@ -222,12 +228,12 @@ def _category_errors(
     three_unknown_fit: SpectralFit,
     five_unknown_fit: SpectralFit,
 ) -> list[list[float]]:
-    """Return a row for each category, a group or a site: number of spectra and median errors.
+    """Return a row for each group of people or for each site: number of spectra and three median errors.
 
     The errors are the colour errors with two and with three unknowns, and the RMS with five unknowns.
 
-    categories : groups or sites
-    labels : (n,) category of each spectrum
+    categories : all groups or all sites
+    labels : (n,) group or site of each spectrum
     """
     rows = []
     for category in categories:
@@ -249,8 +255,8 @@ def _fold_errors(archive: Archive) -> list[JsonObject]:
     """Return cross-validated results: for each fold, constants fitted to all other folds, and errors."""
     rows = []
     for fold in range(FOLD_COUNT):
-        known = archive.rows(archive.fold != fold).sample(_CONSTANTS_SAMPLE_COUNT, fold)
-        held = archive.rows(archive.fold == fold)
+        known = archive.select_rows(archive.fold != fold).sample_rows(_CONSTANTS_SAMPLE_COUNT, fold)
+        held = archive.select_rows(archive.fold == fold)
         spectral = fit_constants(known.spectra, THREE_UNKNOWNS, ("baseline", "epidermis_mm"))
         colour = fit_constants(known.spectra, TWO_UNKNOWNS, ("oxygen",), "colour", spectral.constants)
         skin = replace(DEFAULT_SKIN, **colour.constants | {"oxygen": min(1.0, colour.constants["oxygen"])})
@@ -273,12 +279,12 @@ def _published_model_errors(archive: Archive, bioskin: Path | None) -> JsonObjec
     """Return fit errors of published models of skin, with two, three and five unknowns per spectrum."""
     sets = (TWO_UNKNOWNS, THREE_UNKNOWNS, FIVE_UNKNOWNS)
 
-    def errors(
-        model: SpectralModel | None, skin: SkinParameters, names: Sequence[Sequence[str]]
+    def model_errors(
+        model: SpectralModel | None, skin: SkinParameters, unknown_sets: Sequence[Sequence[str]]
     ) -> JsonObject:
-        known = BIOSKIN_UNKNOWNS if names is BIOSKIN_SETS else UNKNOWNS
+        known = BIOSKIN_UNKNOWNS if unknown_sets is BIOSKIN_UNKNOWN_SETS else UNKNOWNS
         result: JsonObject = {}
-        for one in names:
+        for one in unknown_sets:
             for criterion in ("spectrum", "colour"):
                 if criterion == "colour" and len(one) > 3:
                     continue
@@ -292,13 +298,13 @@ def _published_model_errors(archive: Archive, bioskin: Path | None) -> JsonObjec
         return result
 
     results = {
-        "present": errors(None, DEFAULT_SKIN, sets),
-        "former": errors(None, FORMER_SKIN, sets),
-        "donner": errors(None, _DONNER_JENSEN_SKIN, sets),
-        "jacques": errors(_jacques_model, FORMER_SKIN, sets),
+        "present": model_errors(None, DEFAULT_SKIN, sets),
+        "former": model_errors(None, FORMER_SKIN, sets),
+        "donner": model_errors(None, _DONNER_JENSEN_SKIN, sets),
+        "jacques": model_errors(_jacques_model, FORMER_SKIN, sets),
     }
     if bioskin is not None:
-        results["bioskin"] = errors(bioskin_model(bioskin), DEFAULT_SKIN, BIOSKIN_SETS)
+        results["bioskin"] = model_errors(bioskin_model(bioskin), DEFAULT_SKIN, BIOSKIN_UNKNOWN_SETS)
     return results
 
 
@@ -306,16 +312,22 @@ def _jacques_model(parameter_values: ParameterValues) -> Floats:
     """Return the reflectance (n, 31) of skins with the baseline and scattering of [Jacques1998]."""
     bloodless, sigma_s_prime = baseline_absorption(WAVELENGTHS_NM), jacques_1998(WAVELENGTHS_NM)
 
-    def parameter(name: str, default: float) -> Floats:
+    def parameter_column(name: str, default: float) -> Floats:
         return np.asarray(parameter_values.get(name, np.float64(default)))[..., None]
 
-    m, b, oxygen = parameter("melanin", 0.0), parameter("blood", 0.0), parameter("oxygen", 0.75)
-    vessels = oxygen * blood(WAVELENGTHS_NM, 1.0) + (1.0 - oxygen) * blood(WAVELENGTHS_NM, 0.0)
+    m, b, oxygen = (
+        parameter_column("melanin", 0.0),
+        parameter_column("blood", 0.0),
+        parameter_column("oxygen", 0.75),
+    )
+    vessels = oxygen * blood_absorption(WAVELENGTHS_NM, 1.0) + (1.0 - oxygen) * blood_absorption(
+        WAVELENGTHS_NM, 0.0
+    )
     return two_layer_reflectance(
-        m * melanosome(WAVELENGTHS_NM, 1.0) + (1.0 - m) * bloodless,
+        m * melanosome_absorption(WAVELENGTHS_NM, 1.0) + (1.0 - m) * bloodless,
         b * vessels + (1.0 - b) * bloodless,
-        parameter("scattering", 1.0) * sigma_s_prime,
-        parameter("epidermis_mm", 0.06),
+        parameter_column("scattering", 1.0) * sigma_s_prime,
+        parameter_column("epidermis_mm", 0.06),
         1.0,
     )
 
@@ -346,7 +358,7 @@ def _site_fits(archive: Archive) -> list[JsonObject]:
     """
     rows = []
     for site in range(len(SITES)):
-        sample = archive.rows(archive.site == site).sample(_SITE_SAMPLE_COUNT, site)
+        sample = archive.select_rows(archive.site == site).sample_rows(_SITE_SAMPLE_COUNT, site)
         fixed = {"baseline": DEFAULT_SKIN.baseline}
         spectral = fit_constants(sample.spectra, THREE_UNKNOWNS, ("epidermis_mm",), fixed_constants=fixed)
         colour = fit_constants(sample.spectra, TWO_UNKNOWNS, ("epidermis_mm", "oxygen"), "colour", fixed)
@@ -374,7 +386,7 @@ def _site_fold_errors(archive: Archive) -> JsonObject:
         for site in range(len(SITES)):
             here = archive.site == site
             held = here & (archive.fold == fold)
-            sample = archive.rows(here & (archive.fold != fold)).sample(_SITE_SAMPLE_COUNT, site)
+            sample = archive.select_rows(here & (archive.fold != fold)).sample_rows(_SITE_SAMPLE_COUNT, site)
             free = ("epidermis_mm", "oxygen")
             constants = fit_constants(sample.spectra, TWO_UNKNOWNS, free, "colour", fixed).constants
             unknowns = [UNKNOWNS[name] for name in TWO_UNKNOWNS]

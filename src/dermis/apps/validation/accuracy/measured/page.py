@@ -219,10 +219,10 @@ def _sites_table(sites: Sequence[JsonObject]) -> str:
     return _markdown_table(heads, rows)
 
 
-def _illuminants_table(lights: JsonObject) -> str:
+def _illuminants_table(errors_by_fit: JsonObject) -> str:
     labels = {"two": "two, by colour", "three": "three, by colour", "five": "five, by spectrum"}
     rows = [
-        [label, *(_joined_numbers(lights[name][one]) for one in ILLUMINANTS)]
+        [label, *(_joined_numbers(errors_by_fit[name][one]) for one in ILLUMINANTS)]
         for name, label in labels.items()
     ]
     return _markdown_table(("unknowns", *ILLUMINANTS), rows)
@@ -239,20 +239,20 @@ def _published_models_table(errors_by_model: JsonObject) -> str:
     return _markdown_table(heads, rows)
 
 
-def _edge_loss_table(edge: JsonObject) -> str:
-    heads = ("aperture, lit disc", "melanin", *(f"{nm:.0f} nm" for nm in edge["wavelength_nm"]))
+def _edge_loss_table(edge_results: JsonObject) -> str:
+    heads = ("aperture, lit disc", "melanin", *(f"{nm:.0f} nm" for nm in edge_results["wavelength_nm"]))
     rows = [
         [name, f"{100 * melanin:g} %", *(f"{100 * one:.1f} %" for one in loss)]
         for name in APERTURES_MM
-        for melanin, loss in zip(edge["melanin"], edge[name]["loss"], strict=True)
+        for melanin, loss in zip(edge_results["melanin"], edge_results[name]["loss"], strict=True)
     ]
     return _markdown_table(heads, rows)
 
 
-def _corrected_constants_text(edge: JsonObject) -> str:
+def _corrected_constants_text(edge_results: JsonObject) -> str:
     """Return text on constants fitted to spectra as measured, and to spectra corrected for missed light."""
     parts = [
-        f"{_constants_text(edge[name]['constants'])} (RMS {edge[name]['rms']:.4f}) {label}"
+        f"{_constants_text(edge_results[name]['constants'])} (RMS {edge_results[name]['rms']:.4f}) {label}"
         for name, label in (
             ("uncorrected", "as measured"),
             ("8 mm of 11 mm", "corrected for 8 mm"),

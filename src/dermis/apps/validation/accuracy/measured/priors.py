@@ -30,7 +30,7 @@ _CSV_HEADER = """# quantity: mixture of normal distributions of log melanin, log
 def priors() -> None:
     """Fit the distribution of people's pigments to the archive, and write it as a table of the package."""
     archive = read_archive()
-    living = archive.rows(~np.isin(archive.site, [SITES.index(name) for name in _CALLOUS_SITES]))
+    living = archive.select_rows(~np.isin(archive.site, [SITES.index(name) for name in _CALLOUS_SITES]))
     fit = fit_skin(living.spectra, PRIOR_NAMES)
     prior = fit_mixture(prior_points(fit.values), _MIXTURE_COMPONENTS)
     path = Path(str(files("dermis.optics"))) / "data" / "skin_priors.csv"

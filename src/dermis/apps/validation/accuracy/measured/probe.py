@@ -33,24 +33,25 @@ def edge_loss(
     }
 
 
-def _missed_fraction(run: SlabResult, measured_mm: float, lit_mm: float) -> float:
+def _missed_fraction(slab_result: SlabResult, measured_radius_mm: float, lit_radius_mm: float) -> float:
     """Return the fraction of the reflected light that an aperture misses [-]."""
-    inner, outer = run.edges_mm[:-1], run.edges_mm[1:]
-    energy = run.reflectance * np.pi * (outer**2 - inner**2)
+    inner, outer = slab_result.edges_mm[:-1], slab_result.edges_mm[1:]
+    energy = slab_result.reflectance * np.pi * (outer**2 - inner**2)
     middle = np.sqrt(0.5 * (outer**2 + inner**2))
-    return 1.0 - float(energy @ lit_fraction(middle, measured_mm, lit_mm)) / run.total_reflectance
+    returned = float(energy @ lit_fraction(middle, measured_radius_mm, lit_radius_mm))
+    return 1.0 - returned / slab_result.total_reflectance
 
 
-def lit_fraction(distance_mm: Floats, measured_mm: float, lit_mm: float) -> Floats:
+def lit_fraction(distance_mm: Floats, measured_radius_mm: float, lit_radius_mm: float) -> Floats:
     """Return the fraction (n,) of a circle's circumference that lies in the lit disc [-].
 
     The fraction is averaged over circles around all points of the measured disc.
 
     distance_mm : (n,) radii of the circles
-    measured_mm : radius of the measured disc
-    lit_mm : radius of the lit disc, which has the same centre
+    measured_radius_mm : radius of the measured disc
+    lit_radius_mm : radius of the lit disc, which has the same centre
     """
     r = np.maximum(distance_mm, 1e-12)
-    point = np.sqrt((np.arange(_RADIUS_COUNT) + 0.5) / _RADIUS_COUNT)[:, None] * measured_mm
-    cosine = (lit_mm**2 - point**2 - r**2) / (2.0 * point * r)
+    point = np.sqrt((np.arange(_RADIUS_COUNT) + 0.5) / _RADIUS_COUNT)[:, None] * measured_radius_mm
+    cosine = (lit_radius_mm**2 - point**2 - r**2) / (2.0 * point * r)
     return np.asarray((1.0 - np.arccos(np.clip(cosine, -1.0, 1.0)) / np.pi).mean(axis=0))
