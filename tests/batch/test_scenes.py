@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dermis.apps.batch.cameras import face_points
+from dermis.apps.batch.cameras import face_hull_indices
 from dermis.apps.batch.lighting import blackbody_colour, sampled_lights
 from dermis.apps.batch.scenes import SceneBuilder, sampled_person
 from dermis.apps.batch.spec import Spec, example_toml, parse_spec
@@ -79,7 +79,7 @@ def test_cameras_have_the_sampled_parameters_if_the_face_fits() -> None:
     drawn = spec("[camera]\nyaw_deg = 90\npitch_deg = 30\ndistance_mm = 1000\nframe_mm = 500\noffset_x = 0.2")
     scene, settings = SceneBuilder(drawn).build(drawn.parameters(0))
     camera, head = scene.camera, scene.head
-    face = head.control.pose_points(face_points(head), scene.motion) - np.array(head.centre_mm)
+    face = head.control.pose_points(face_hull_indices(head), scene.motion) - np.array(head.centre_mm)
     middle = 0.5 * (face.min(axis=0) + face.max(axis=0))
     away = np.array(camera.position) - middle
     assert np.linalg.norm(away) == pytest.approx(1000)

@@ -20,7 +20,7 @@ from dermis.apps.batch.shards import (
     is_intact,
     list_shards,
     read_manifest,
-    remove_unfinished,
+    remove_unfinished_files,
     shard_exists,
     shard_path,
 )
@@ -151,10 +151,10 @@ def test_temporary_files_of_killed_runs_are_removed_and_those_of_others_kept(
     write_shard(tmp_path, list_shards(spec)[2], spec)
     left = {path.name for path in tmp_path.iterdir()}
     assert len(left) == 5 and not [name for name in left if "part" in name or "tmp" in name]
-    remove_unfinished(tmp_path, [shard_path(tmp_path, first, spec).name])
+    remove_unfinished_files(tmp_path, [shard_path(tmp_path, first, spec).name])
     assert sum(path.name.startswith(".shard-00001") for path in tmp_path.iterdir()) == 1
     assert len(list(tmp_path.iterdir())) == 3
-    remove_unfinished(tmp_path)
+    remove_unfinished_files(tmp_path)
     whole = shard_path(tmp_path, list_shards(spec)[2], spec).name
     assert {path.name for path in tmp_path.iterdir()} == {".mine", whole}
 
@@ -215,7 +215,7 @@ def test_files_that_others_remove_meanwhile_are_written_again(tmp_path: Path) ->
         path.write_bytes(b"whole")
         tries.append(path)
         if len(tries) < 3:
-            remove_unfinished(tmp_path)
+            remove_unfinished_files(tmp_path)
 
     atomic_write(tmp_path / "index.parquet", write)
     assert len(tries) == 3 and contents(tmp_path) == {"index.parquet": b"whole"}

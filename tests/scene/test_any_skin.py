@@ -18,7 +18,7 @@ from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Mesh
 from dermis.scene import Camera, Settings
-from dermis.scene.camera import CAMERA_PRESETS, find_preset
+from dermis.scene.camera import CAMERA_PRESETS, find_camera_preset
 from dermis.scene.lights import PointLight, SpotLight, light_presets, preset_lights
 from dermis.scene.skin_tone import default_skin_colour
 
@@ -82,9 +82,10 @@ def test_the_guide_lists_all_presets() -> None:
 
 def test_names_of_presets_have_hyphens_or_underscores() -> None:
     assert (
-        find_preset("full-body") is dermis.full_body and find_preset("three_quarter") is dermis.three_quarter
+        find_camera_preset("full-body") is dermis.full_body
+        and find_camera_preset("three_quarter") is dermis.three_quarter
     )
-    assert find_preset("selfie") is None
+    assert find_camera_preset("selfie") is None
 
 
 @pytest.mark.parametrize("name", light_presets())

@@ -22,8 +22,8 @@ from dermis.cli.scene_options import (
     DEFAULT_SCENE_OPTIONS,
     SceneOptions,
     assemble_scene,
-    fit_atlas,
     note_subdivision,
+    shrink_atlas_on_cpu,
 )
 
 if TYPE_CHECKING:
@@ -142,7 +142,7 @@ def animate(
     if motion_clip.note:
         note(f"note: {motion_clip.note}")
     note_subdivision(head, scene, animated.head)
-    settings = fit_atlas(animated, settings, select_adapters(adapter)[0][0].kind)
+    settings = shrink_atlas_on_cpu(animated, settings, select_adapters(adapter)[0][0].kind)
     animation = _AnimatedScene(animated, settings, motion_clip, rate, numbers[0])
     missing = target.frames_to_render(
         numbers, settings.size, _frame_digest(animation, scene, head, motion_path)

@@ -86,5 +86,5 @@ def _picture_sources(scene_file: Path | None, settings: Options, skin: Options) 
         Settings(**(scene_settings.model_dump() | dict(settings))),
         scene.lights,
         scene.environment,
-        relief=maps.normal is not None or maps.height is not None,
+        has_relief=maps.normal is not None or maps.height is not None,
     )

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from dermis.apps.export.registry import TARGETS
 from dermis.base.console import print_report, spinner
 from dermis.base.errors import refuse
-from dermis.cli.head_options import HeadOptions, check_head
+from dermis.cli.head_options import HeadOptions, check_head_options
 from dermis.cli.options import NO_OPTIONS, AdapterOption, FlagOption, JsonOption, OutputPath, drop_none
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ def export(
     """
     from dermis.apps.export.run import export_skin
 
-    check_head(subject, head)
+    check_head_options(subject, head)
     if diffuse_transmission:
         if variant is not None:
             actual = f"it is given with --variant {variant}"

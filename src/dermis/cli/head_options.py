@@ -34,7 +34,7 @@ else:
     )
 
 
-def check_head(head_name: str, options: Options) -> None:
+def check_head_options(head_name: str, options: Options) -> None:
     """Validate the options of a head.
 
     head_name : name of the head or its file

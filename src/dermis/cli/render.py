@@ -23,8 +23,8 @@ from dermis.cli.scene_options import (
     DEFAULT_SCENE_OPTIONS,
     SceneOptions,
     assemble_scene,
-    fit_atlas,
     note_subdivision,
+    shrink_atlas_on_cpu,
 )
 from dermis.scene.techniques import TECHNIQUES
 
@@ -102,7 +102,7 @@ def render(
         note_subdivision(head, scene, loaded_scene.head)
         with spinner("rendering"):
             renderer = future.result()
-            settings = fit_atlas(loaded_scene, settings, renderer.device.adapter.kind)
+            settings = shrink_atlas_on_cpu(loaded_scene, settings, renderer.device.adapter.kind)
             rendered = renderer.draw(loaded_scene, settings, timed=False, outputs=frame_outputs.names)
             values = {name: rendered.output(name) for name in frame_outputs.names}
             setup_ms = rendered.setup_ms

@@ -19,7 +19,7 @@ from dermis.cli.head_options import (
     HeadOptions,
     LookAtOption,
     WeightsOption,
-    check_head,
+    check_head_options,
     note_eyes,
     parse_bone_angles,
     parse_weights,
@@ -140,7 +140,7 @@ def assemble_scene(head_or_scene: str, options: SceneOptions) -> tuple[Scene, Se
     return assembled, final_settings
 
 
-def fit_atlas(scene: Scene, settings: Settings, adapter_kind: str) -> Settings:
+def shrink_atlas_on_cpu(scene: Scene, settings: Settings, adapter_kind: str) -> Settings:
     """Return settings with a smaller atlas for a software adapter, as large as the picture needs.
 
     The atlas is the texture in which light is diffused. A note on stderr states its new size. A size that
@@ -148,11 +148,11 @@ def fit_atlas(scene: Scene, settings: Settings, adapter_kind: str) -> Settings:
 
     adapter_kind : kind of the graphics adapter, "CPU" for software
     """
-    from dermis.scene.resolved_atlas import resolved_atlas_side
+    from dermis.scene.resolved_atlas import atlas_side_for_picture
 
     if adapter_kind != "CPU" or "atlas" in settings.model_fields_set:
         return settings
-    side = resolved_atlas_side(scene, settings)
+    side = atlas_side_for_picture(scene, settings)
     if side < settings.atlas and TECHNIQUES[settings.technique].uses_atlas:
         note(f"note: --atlas {side} without a GPU, as the picture resolves no more texels")
     return settings.model_copy(update={"atlas": side})
@@ -182,7 +182,7 @@ def _check_values(head_or_scene: str, options: SceneOptions) -> None:
 
     eye_values = options.head.get("eye", {})
     check_fields(EyeTable, eye_values, {field_: f"eye {field_}" for field_ in eye_values})
-    check_head(head_or_scene, options.head)
+    check_head_options(head_or_scene, options.head)
     check_fields(Skin, options.skin)
     check_fields(Settings, options.settings)
     check_fields(Environment, {"name": "uniform"} | options.environment, ENVIRONMENT_OPTION_NAMES)
@@ -203,7 +203,7 @@ def _note_profile_map(skin: Skin, settings: Settings) -> None:
 def _base_scene(head_or_scene: str, options: SceneOptions) -> tuple[Scene, Settings]:
     """Return the scene of a scene file, or a default scene of a head, before options are applied."""
     from dermis.scene import Scene, load_camera, load_scene
-    from dermis.scene.files import head_and_skin
+    from dermis.scene.files import load_head_and_skin
     from dermis.scene.smoothness import SmoothIn
 
     if Path(head_or_scene).suffix.lower() == ".toml":
@@ -216,7 +216,7 @@ def _base_scene(head_or_scene: str, options: SceneOptions) -> tuple[Scene, Setti
         refuse(option_name("rho_s"), "only one of the two", actual, "Remove one, or use --oiliness")
     camera_for = partial(load_camera, options.camera or "portrait")
     picture = SmoothIn(camera_for, Settings(**options.settings).size)
-    head, skin = head_and_skin(table, Skin(), Path(), picture)
+    head, skin = load_head_and_skin(table, Skin(), Path(), picture)
     return Scene(head, skin=skin), Settings()
 
 

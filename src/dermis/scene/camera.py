@@ -16,7 +16,7 @@ from dermis.base.renamed import renamed_attribute
 from dermis.mesh.head import Head
 from dermis.scene.field_errors import Reason
 from dermis.scene.frozen_model import Direction, FrozenModel, Vector
-from dermis.scene.opencv import OpenCvCamera, extrinsics, from_opencv, intrinsics
+from dermis.scene.opencv import OpenCvCamera, camera_fields, extrinsics, intrinsics
 
 _DEFAULT_DISTANCE_MM = 1100.0  # as in portrait photography; from closer, the nose looks large
 _MIN_DISTANCE_PER_MESH_SIZE = 3.0  # least distance relative to the size of a mesh that is shown completely
@@ -108,7 +108,7 @@ class Camera(FrozenModel):
         DermisError
             For a K with skew, an R that is not a rotation, and arrays with another shape.
         """
-        return cls(**from_opencv(K, R, t, size))
+        return cls(**camera_fields(K, R, t, size))
 
     def to_opencv(self, size: tuple[int, int]) -> OpenCvCamera:
         """Return K, R and t of OpenCV: X_cam = R X + t, x to the right, y down, z forward.
@@ -241,7 +241,7 @@ def full_body(head: Head) -> Camera:
     >>> round(camera.position[2]), round(camera.frame_mm)
     (2700, 972)
     """
-    return _show_all(head, 0.0)
+    return _camera_showing_all(head, 0.0)
 
 
 def cheek(head: Head) -> Camera:
@@ -250,10 +250,10 @@ def cheek(head: Head) -> Camera:
     The key light of the light preset "studio" grazes the pores there.
     """
     beside = (40.0, -35.0) if head.skull_mm is not None else (0.0, 0.0)
-    focus = _to_scene(head, head.frontmost(*beside))
-    view_direction = _to_scene(head, _direction_at_azimuth(58.0))
+    focus = _to_scene_axes(head, head.frontmost(*beside))
+    view_direction = _to_scene_axes(head, _direction_at_azimuth(58.0))
     position = _offset_point(focus, view_direction, 300.0)
-    return Camera(position=position, target=focus, up=_to_scene(head, _WORLD_UP), frame_mm=48.0)
+    return Camera(position=position, target=focus, up=_to_scene_axes(head, _WORLD_UP), frame_mm=48.0)
 
 
 def ear(head: Head) -> Camera:
@@ -261,9 +261,9 @@ def ear(head: Head) -> Camera:
     p = head.seen_positions_mm
     near_ear = p[(np.abs(p[:, 1] + 10.0) < 40.0) & (np.abs(p[:, 2]) < 60.0)]
     x, y, z = (near_ear if len(near_ear) else p)[np.argmax((near_ear if len(near_ear) else p)[:, 0])]
-    focus = _to_scene(head, (float(x), float(y), float(z)))
-    position = _offset_point(focus, _to_scene(head, _direction_at_azimuth(75.0)), 600.0)
-    return Camera(position=position, target=focus, up=_to_scene(head, _WORLD_UP), frame_mm=120.0)
+    focus = _to_scene_axes(head, (float(x), float(y), float(z)))
+    position = _offset_point(focus, _to_scene_axes(head, _direction_at_azimuth(75.0)), 600.0)
+    return Camera(position=position, target=focus, up=_to_scene_axes(head, _WORLD_UP), frame_mm=120.0)
 
 
 CAMERA_PRESETS = {
@@ -282,14 +282,14 @@ def camera_preset(preset_name: str, head: Head) -> Camera:
 
     Raises DermisError for a name that is not in `CAMERA_PRESETS`.
     """
-    preset = find_preset(preset_name)
+    preset = find_camera_preset(preset_name)
     if preset is None:
         expected = f"one of {', '.join(CAMERA_PRESETS)} or a TOML file"
         refuse(f"camera {preset_name}", expected, "it is neither", "Check the name")
     return preset(head)
 
 
-def find_preset(preset_name: str) -> Callable[[Head], Camera] | None:
+def find_camera_preset(preset_name: str) -> Callable[[Head], Camera] | None:
     """Return the function of a camera preset, or None for a name that is not a preset."""
     by_name = {key.replace("-", "_"): preset for key, preset in CAMERA_PRESETS.items()}
     return by_name.get(preset_name.replace("-", "_"))
@@ -297,7 +297,7 @@ def find_preset(preset_name: str) -> Callable[[Head], Camera] | None:
 
 def _camera_at_azimuth(head: Head, azimuth_degrees: float) -> Camera:
     if head.skull_mm is None:
-        return _show_all(head, azimuth_degrees)
+        return _camera_showing_all(head, azimuth_degrees)
     middle = (0.0, -25.0, 0.0)
     return Camera(
         position=_offset_point(middle, _direction_at_azimuth(azimuth_degrees), _DEFAULT_DISTANCE_MM),
@@ -305,7 +305,7 @@ def _camera_at_azimuth(head: Head, azimuth_degrees: float) -> Camera:
     )
 
 
-def _show_all(head: Head, azimuth_degrees: float) -> Camera:
+def _camera_showing_all(head: Head, azimuth_degrees: float) -> Camera:
     """Return a camera that shows all of a mesh with a margin.
 
     azimuth_degrees : azimuth of the camera: 0 in front of the head, 90 at its left side [degrees]
@@ -327,7 +327,7 @@ def _show_all(head: Head, azimuth_degrees: float) -> Camera:
     return Camera(position=position, target=target, up=_vector_tuple(axes[1]), frame_mm=round(frame_mm, 3))
 
 
-def _to_scene(head: Head, vector: Vector) -> Vector:
+def _to_scene_axes(head: Head, vector: Vector) -> Vector:
     """Convert a vector from the axes of a head (left, up, front) to the axes of the scene."""
     return _vector_tuple(np.array(vector) @ head.axes)
 

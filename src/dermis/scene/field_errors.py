@@ -81,7 +81,7 @@ def numeric_fields(model: type[BaseModel]) -> Mapping[str, bool]:
     return found
 
 
-def python_numbers(field_value: Any, accepts_text: bool = False) -> Any:
+def to_python_numbers(field_value: Any, accepts_text: bool = False) -> Any:
     """Convert NumPy scalars and arrays to Python numbers, and wrap booleans and text in `_NotANumber`.
 
     accepts_text : whether text is a valid value, which is then not wrapped
@@ -91,9 +91,9 @@ def python_numbers(field_value: Any, accepts_text: bool = False) -> Any:
     if isinstance(field_value, np.generic | np.ndarray):
         field_value = field_value.tolist()
     if isinstance(field_value, list | tuple):
-        return [python_numbers(one) for one in field_value]
+        return [to_python_numbers(one) for one in field_value]
     if isinstance(field_value, Mapping):
-        return {name: python_numbers(one) for name, one in field_value.items()}
+        return {name: to_python_numbers(one) for name, one in field_value.items()}
     if isinstance(field_value, bool | set | frozenset) or (
         isinstance(field_value, _TEXT_TYPES) and not accepts_text
     ):

@@ -24,11 +24,11 @@ from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Mesh
 from dermis.scene.file_surfaces import (
-    direct_material,
+    directly_usable_material,
     unused_properties,
     with_file_textures,
+    with_generated_uv,
     with_material_factors,
-    with_missing_uv,
 )
 from dermis.scene.head_table import NormalY, check_relief
 from dermis.scene.skin_tone import SKIN_WITHOUT_COLOUR_MAP, with_skin_tone
@@ -112,7 +112,7 @@ def load_file_head(
 
 
 def _load_mesh(path: Path, culprit: str, mesh_options: dict[str, Any]) -> RiggedMesh:
-    rigged = with_missing_uv(load_rigged(path, **mesh_options))
+    rigged = with_generated_uv(load_rigged(path, **mesh_options))
     return with_settled_unit(rigged, path, mesh_options["unit_mm"], culprit)
 
 
@@ -143,10 +143,10 @@ def _with_materials(
 
     The notes name properties of the materials that are not drawn.
     """
-    direct = direct_material(rigged, materials)
+    direct = directly_usable_material(rigged, materials)
     pack_skin = direct is None and not map_options.user_files
     mesh, packed, notes = with_file_textures(rigged, materials, pack_skin)
-    loaded, faults = _direct_maps(path, direct or FileMaterial(), map_options)
+    loaded, faults = _unpacked_maps(path, direct or FileMaterial(), map_options)
     roles = [one.name for one in fields(Maps)]
     loaded_maps = {role: one for role in roles if (one := getattr(loaded, role)) is not None}
     maps = replace(packed, **loaded_maps)
@@ -154,7 +154,7 @@ def _with_materials(
     return mesh, maps, [*notes, *faults, unused]
 
 
-def _direct_maps(path: Path, material: FileMaterial, map_options: MapOptions) -> tuple[Maps, list[str]]:
+def _unpacked_maps(path: Path, material: FileMaterial, map_options: MapOptions) -> tuple[Maps, list[str]]:
     """Return skin maps from the unchanged pictures of a material, and notes on maps that are not used."""
     if path.suffix.lower() != ".obj" or not material.name:
         return with_material_factors(

@@ -20,7 +20,7 @@ from dermis.mesh.mesh import Material, Mesh
 _SURFACE_ROLES: tuple[Role, ...] = ("normal", "roughness", "metalness")
 
 
-def with_missing_uv(rigged: RiggedMesh) -> RiggedMesh:
+def with_generated_uv(rigged: RiggedMesh) -> RiggedMesh:
     """Return a mesh in which skin groups without uv have a new uv layout and are named in a note."""
     mesh, surface = rigged.mesh, rigged.surface
     bare = np.array(
@@ -38,7 +38,7 @@ def with_missing_uv(rigged: RiggedMesh) -> RiggedMesh:
     return rigged._replace(mesh=laid_out, notes=(*rigged.notes, note), surface=changed)
 
 
-def direct_material(rigged: RiggedMesh, materials: Sequence[FileMaterial]) -> FileMaterial | None:
+def directly_usable_material(rigged: RiggedMesh, materials: Sequence[FileMaterial]) -> FileMaterial | None:
     """Return the material whose pictures can be used unchanged as skin maps; None if there is none.
 
     Without such a material, the pictures of several materials must be packed into common maps.
@@ -108,14 +108,15 @@ def with_file_textures(
 
     rigged : mesh of the file
     materials : materials of the file
-    pack_skin : whether pictures of the skin are packed too; False if `direct_material` returns a material
+    pack_skin : whether pictures of the skin are packed too; False if `directly_usable_material` returns a
+        material
     """
     mesh, maps, notes = rigged.mesh, Maps(), list[str]()
     if pack_skin:
         packed_textures = pack_textures(mesh, rigged.surface, materials, _materials_of_kind(mesh, "skin"))
         mesh, maps = _with_uv(mesh, packed_textures), _skin_maps(packed_textures)
         notes += [f"skin: {note}" for note in packed_textures.notes]
-    pictured = _pictured_parts(mesh, rigged.surface, materials)
+    pictured = _pictured_material_mask(mesh, rigged.surface, materials)
     if pictured.any():
         packed_textures = pack_textures(
             mesh, rigged.surface, materials, pictured, ("colour", *_SURFACE_ROLES)
@@ -145,7 +146,7 @@ def _with_mean_colours(mesh: Mesh, materials: list[Material], maps: PartMaps) ->
     return coloured
 
 
-def _pictured_parts(mesh: Mesh, surface: FileSurface, materials: Sequence[FileMaterial]) -> Mask:
+def _pictured_material_mask(mesh: Mesh, surface: FileSurface, materials: Sequence[FileMaterial]) -> Mask:
     """Return the mask (m,) of opaque materials with pictures or vertex colours."""
     opaque = _materials_of_kind(mesh, "opaque")
     if any(one.maps is not None for one in materials):  # this package wrote the file; eyes are fitted again

@@ -16,7 +16,7 @@ from dermis.human.regions.apply import with_regions
 from dermis.human.regions.region_table import load_region_table
 from dermis.mesh.head import Head
 from dermis.mesh.pose import MAX_WEIGHT, Pose
-from dermis.scene.camera import CAMERA_PRESETS, Camera, find_preset
+from dermis.scene.camera import CAMERA_PRESETS, Camera, find_camera_preset
 from dermis.scene.environment import Environment
 from dermis.scene.field_errors import InvalidFieldsError, Reason
 from dermis.scene.frozen_model import FrozenModel
@@ -73,7 +73,7 @@ def load_lights(name: str | Path, head: Head | None = None) -> tuple[Light, ...]
 
 def load_camera(preset_or_path: str | Path, head: Head) -> Camera:
     """Return the camera of a preset, placed for a head, or the camera of a TOML file's [camera] table."""
-    preset = find_preset(str(preset_or_path))
+    preset = find_camera_preset(str(preset_or_path))
     if preset is not None:
         return preset(head)
     table = _read_scene_file(preset_or_path, f"a preset ({', '.join(CAMERA_PRESETS)}) or a TOML file").get(
@@ -155,7 +155,7 @@ def load_scene(
     picture = SmoothIn(resolve_camera, size or settings.size)
     with error_context(path):
         if head is None:
-            head, skin = head_and_skin(head_entry, skin, path.parent, picture)
+            head, skin = load_head_and_skin(head_entry, skin, path.parent, picture)
     environment = _parse_environment(path, table["environment"]) if "environment" in table else None
     pose = _parse_pose(path, table["pose"], head) if "pose" in table else None
     lights = table.get("lights")
@@ -191,8 +191,8 @@ def with_absolute_paths(head_fields: Mapping[str, Any], scene_folder: Path) -> d
     return {**head_fields} | {role: str(file.resolve()) for role, file in named.items() if is_file(file)}
 
 
-def head_and_skin(
-    head_fields: HeadTable, skin: Skin, scene_folder: Path, picture: SmoothIn | None = None
+def load_head_and_skin(
+    head_fields: HeadTable, skin: Skin, scene_folder: Path, smooth_in: SmoothIn | None = None
 ) -> tuple[Head, Skin]:
     """Return the head of a [head] table, and the skin settings of the head.
 
@@ -201,7 +201,7 @@ def head_and_skin(
 
     skin : skin settings of the scene file
     scene_folder : folder to which file names are relative
-    picture : camera and picture size for which subdivision levels are chosen if the table does not state
+    smooth_in : camera and picture size for which subdivision levels are chosen if the table does not state
         levels
 
     Raises DermisError for files that cannot be used.
@@ -215,8 +215,8 @@ def head_and_skin(
     if regions is not None:
         options["regions"] = NO_REGIONS
     options |= {role: scene_folder / options[role] for role in _MAP_ROLES if role in options}
-    if picture is not None and head_fields.subdivide == AUTO:
-        options["subdivide"] = picture
+    if smooth_in is not None and head_fields.subdivide == AUTO:
+        options["subdivide"] = smooth_in
     head = load_head(_resolve_file(scene_folder, head_fields.name), **options)
     if regions is None:
         return head, skin

@@ -36,7 +36,7 @@ from dermis.scene.field_errors import (
     field_keywords,
     messages_by_field,
     numeric_fields,
-    python_numbers,
+    to_python_numbers,
 )
 
 if TYPE_CHECKING:
@@ -115,7 +115,7 @@ class FrozenModel(BaseModel, metaclass=_DocumentedMeta):
             data[_positional_field(model, value)] = value[0]
         for name, text in numeric_fields(model).items():
             if name in data:
-                data[name] = python_numbers(data[name], text)
+                data[name] = to_python_numbers(data[name], text)
         try:
             super().__init__(**data)
         except ValidationError as error:

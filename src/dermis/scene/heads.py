@@ -167,13 +167,13 @@ def load_head(
     )
     if is_person_name(name):
         mesh_options |= {"eyes": eyes, "skin_site": skin_site}
-        return _with_look(_load_human(name, map_files, height_mm, normal_y, mesh_options, levels), eye)
+        return _with_eye_look(_load_human(name, map_files, height_mm, normal_y, mesh_options, levels), eye)
     if name not in SAMPLES and not is_file(path):
         _refuse_name(name)
     loaded, look = load_file_head(name, mesh_options, map_options)
     coarse, loaded = loaded.mesh, subdivide_head(loaded, levels)
     loaded = with_default_regions(loaded) if regions == AUTO else loaded
-    return _with_look(with_fitted_eyes(loaded, coarse, look) if eyes == "fitted" else loaded, eye)
+    return _with_eye_look(with_fitted_eyes(loaded, coarse, look) if eyes == "fitted" else loaded, eye)
 
 
 def is_person_name(head_name: str) -> bool:
@@ -183,7 +183,7 @@ def is_person_name(head_name: str) -> bool:
     )
 
 
-def _with_look(head: Head, look: Mapping[str, float] | None) -> Head:
+def _with_eye_look(head: Head, look: Mapping[str, float] | None) -> Head:
     """Return the head with some fields of its eye look replaced.
 
     look : dictionary from fields of `EyeLook` to new values; None to change nothing

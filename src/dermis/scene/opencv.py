@@ -34,7 +34,7 @@ class OpenCvCamera(NamedTuple):
     t: Doubles
 
 
-def from_opencv(K: ArrayLike, R: ArrayLike, t: ArrayLike, size: tuple[int, int]) -> dict[str, Any]:
+def camera_fields(K: ArrayLike, R: ArrayLike, t: ArrayLike, size: tuple[int, int]) -> dict[str, Any]:
     """Return the fields of a `Camera` from OpenCV matrices.
 
     K : intrinsic matrix [pixel], see `OpenCvCamera`

@@ -19,7 +19,7 @@ _FILLED_ATLAS_FRACTION = 0.5  # part of an atlas that shows skin
 _MIN_ATLAS_SIDE = 1024  # coarser texels would blur the light of the narrowest profiles
 
 
-def resolved_atlas_side(scene: Scene, settings: Settings) -> int:
+def atlas_side_for_picture(scene: Scene, settings: Settings) -> int:
     """Return the side of the smallest atlas with at least one texel per three pixels of the picture [texel].
 
     The atlas is the square texture in which light is diffused. Its side is a power of two, at least 1024 and

@@ -27,11 +27,11 @@ def picture_sources(
     lights: Sequence[Light] = (),
     environment: Environment | None = None,
     *,
-    relief: bool = True,
+    has_relief: bool = True,
 ) -> tuple[str, ...]:
     """Return the bibliography keys of all methods used for a picture, without duplicates.
 
-    relief : whether the head has a normal map or height map
+    has_relief : whether the head has a normal map or height map
 
     Raises DermisError for an unknown profile.
     """
@@ -39,7 +39,7 @@ def picture_sources(
     keys += profile_sources(skin)
     if skin.direction == "half-space":
         keys += _HALF_SPACE_SOURCES + _ANISOTROPY_SOURCES * (skin.anisotropy > 0)
-    keys += _RELIEF_SOURCES * relief
+    keys += _RELIEF_SOURCES * has_relief
     keys += _light_sources(lights)
     if environment is not None:
         keys += _ENVIRONMENT_SOURCES + _OCCLUSION_SOURCES * (settings.occlusion != "none")

@@ -23,7 +23,7 @@ Doubles = NDArray[np.float64]
 AimOffset = tuple[float, float]
 
 
-def face_points(head: Head, direction_count: int = 64) -> NDArray[np.int32]:
+def face_hull_indices(head: Head, direction_count: int = 64) -> NDArray[np.int32]:
     """Return the indices (n,) of control points on the convex hull of the face.
 
     A camera that shows all these points shows the whole face.
@@ -48,7 +48,7 @@ def sampled_camera(
     If the picture would cut off the face, the camera shows a larger area, and the face is placed closer to
     the picture's centre.
 
-    face_point_indices : control points of the face, from `face_points`
+    face_point_indices : control points of the face, from `face_hull_indices`
     motion : displacement of the control points by the pose
     aspect : ratio of the picture's width to its height [-]
     """

@@ -77,7 +77,7 @@ def _readme_text(out: Path, spec: Spec, manifests: Sequence[ShardManifest]) -> s
         labels=_labels_section(spec),
         parameters=_markdown_table(("parameter", "images", "values"), parameter_summaries(out)),
         tests=_tests_table(fit_tests(out, spec)),
-        licences=_markdown_table(("part", "by", "licence"), licences(spec)),
+        licences=_markdown_table(("part", "by", "licence"), asset_licences(spec)),
         made_with=_software_table(manifests),
         left_out=failed + _markdown_table(("image", "reason"), left_out[:_MAX_LISTED_FAILURES])
         if left_out
@@ -193,7 +193,7 @@ def landmark_names(set_name: str, spec: Spec) -> list[str]:
     return [landmark for landmark, _ in read_landmark_table(spec.landmark_tables[set_name])]
 
 
-def licences(spec: Spec) -> Iterator[tuple[str, str, str]]:
+def asset_licences(spec: Spec) -> Iterator[tuple[str, str, str]]:
     """Yield name, author and licence of every asset (head, person, environment) that the spec can use."""
     author, _, licence = MAKEHUMAN_CREDIT.rpartition(", ")
     yield "people: the parametric human", author, licence

@@ -110,9 +110,9 @@ def _make_record(
     }
 
 
-def _rounded_list(unrounded: ArrayLike, decimal_digits: int) -> NestedNumbers:
+def _rounded_list(number_array: ArrayLike, decimal_digits: int) -> NestedNumbers:
     """Return rounded numbers as nested lists, with null for numbers that are not finite and 0 for -0."""
-    numbers = np.round(np.asarray(unrounded, np.float64), decimal_digits) + 0.0
+    numbers = np.round(np.asarray(number_array, np.float64), decimal_digits) + 0.0
     nullable = numbers.astype(object)
     nullable[~np.isfinite(numbers)] = None
     return list(nullable.tolist())

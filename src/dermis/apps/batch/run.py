@@ -17,7 +17,7 @@ from dermis.apps.batch.shards import (
     list_parts,
     list_shards,
     part_files,
-    remove_unfinished,
+    remove_unfinished_files,
     shard_at,
     shard_exists,
     shard_path,
@@ -113,16 +113,16 @@ def run(
     removable_names = {
         shard_path(out, one, spec).name for one in (*missing, *(selected if part_selection[1] == 1 else ()))
     }
-    remove_unfinished(out, removable_names)
+    remove_unfinished_files(out, removable_names)
     _remove_joined_parts(out, spec, existing)
     try:
         images, damaged, failed = _process_tasks(pool, options, [*missing, *verified], on_progress)
     finally:
-        remove_unfinished(out, removable_names)
+        remove_unfinished_files(out, removable_names)
     complete_shards = {shard for shard in all_shards if shard_exists(out, shard, spec)}
     complete = len(complete_shards) == len(all_shards)
     if complete:  # concurrent runs that reach this point write the same bytes
-        remove_unfinished(out)
+        remove_unfinished_files(out)
         write_index(out, spec)
         write_datasheet(out, spec)
     kept = existing - damaged

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from dermis.apps.batch.cameras import face_points, sampled_camera
+from dermis.apps.batch.cameras import face_hull_indices, sampled_camera
 from dermis.apps.batch.lighting import direction_from_angles, sampled_lights
 from dermis.apps.batch.sampling import Parameters, table_numbers
 from dermis.apps.batch.spec import Spec
@@ -48,7 +48,7 @@ _PARAMETERS_NOT_OF_HUMAN = "number", "seed", "head"  # parameters of people that
 class _Person:
     """Head and skin of a person, with all data that does not change between the person's images.
 
-    points : control points that must stay in the picture, see `face_points`
+    points : control points that must stay in the picture, see `face_hull_indices`
     bones : fraction of the head's rotation that each bone performs, by bone name
     skin : skin of the person, before the [skin] table of the spec is applied
     """
@@ -116,7 +116,7 @@ class SceneBuilder:
             head, skin = scene.head, scene.skin
         else:
             head, skin = load_head(name, subdivide=SmoothIn(size=size)), Skin()
-        return _Person(head, face_points(head), find_rotation_bones(head.control.skeleton).head, skin)
+        return _Person(head, face_hull_indices(head), find_rotation_bones(head.control.skeleton).head, skin)
 
     def _resolve_file(self, head_or_panorama: float | str) -> str:
         """Return the path of a file in the spec's folder, or the name itself if there is no such file."""

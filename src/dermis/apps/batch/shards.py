@@ -222,7 +222,7 @@ def part_files(out: Path) -> dict[int, Path]:
     return {int(match[1]): path for path, match in found.items() if match}
 
 
-def remove_unfinished(out: Path, removable_names: Collection[str] | None = None) -> None:
+def remove_unfinished_files(out: Path, removable_names: Collection[str] | None = None) -> None:
     """Remove the temporary files that interrupted runs have left in a data set.
 
     removable_names : names of shards and parts that no other run is writing; temporary files of other shards

@@ -25,7 +25,7 @@ from dermis.apps.viewer.view_renderer import ViewRenderer
 from dermis.base.errors import DermisError, refuse
 from dermis.formats.samples import SAMPLES, is_available
 from dermis.mesh.head import Head
-from dermis.scene.files import head_and_skin
+from dermis.scene.files import load_head_and_skin
 from dermis.scene.head_table import AUTO, HeadTable
 from dermis.scene.heads import HUMAN, load_head
 from dermis.scene.skin import Skin
@@ -310,5 +310,5 @@ def apply_regions(
     for other in known_states:
         if dict(other.head_table) == table:
             return state.with_head(other.scene.head, table, other.scene.skin.rho_s)
-    head, skin = head_and_skin(HeadTable(**table), Skin(), Path())
+    head, skin = load_head_and_skin(HeadTable(**table), Skin(), Path())
     return state.with_head(head, table, skin.rho_s)
