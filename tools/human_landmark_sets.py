@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 from human_landmark_candidates import Doubles, Surface, points_along
 
-from dermis.mesh.eyeball import CORNEA_MM, IRIS_BEHIND_MM, SCLERA_MM, apex_mm
+from dermis.mesh.eyeball import CORNEA_MM, IRIS_DEPTH_MM, SCLERA_MM, apex_mm
 
 Anchor = tuple[int, float]
 """Index of a candidate, and depth below the surface."""
 Anchors = dict[str, Anchor]
 
 _REFRACTION = 1.336  # index of refraction of cornea and aqueous humour, as in the frame
-_SEEN_MM = 1.0 / (_REFRACTION / IRIS_BEHIND_MM - (_REFRACTION - 1.0) / CORNEA_MM)
+_SEEN_MM = 1.0 / (_REFRACTION / IRIS_DEPTH_MM - (_REFRACTION - 1.0) / CORNEA_MM)
 PUPIL = _SEEN_MM / (apex_mm() + SCLERA_MM)
 """Apparent position of the pupil, as a fraction of the way from the apex to the back of the eyeball."""
 _NASION_Y, _TIP_Y, _SUBNASALE_Y = 0.2, -36.3, -47.6  # on the average human [mm]

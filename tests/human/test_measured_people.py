@@ -49,8 +49,8 @@ def test_medians_of_all_sites_of_the_head_are_those_of_the_archive(group: str, c
     table, rng, weights = measured_table(), np.random.default_rng(5), {group: 1.0}
     scores = rng.standard_normal((PEOPLE, 4)) @ symmetric_square_root(table.groups[group].correlation[:4, :4])
     ages, sexes = 25.0 + 65.0 * rng.beta(1.2, 2.2, PEOPLE), rng.integers(0, 2, PEOPLE)
-    y = table.variables(weights, sexes, ages, scores)
-    differences = table.site_variables(weights, y, rng.standard_normal((PEOPLE, len(SITES), 2)))
+    y = table.cheek_variables(weights, sexes, ages, scores)
+    differences = table.site_differences(weights, y, rng.standard_normal((PEOPLE, len(SITES), 2)))
     checked = 0
     for cell in cells:
         if cell["group"] == group and cell["site"] in HEAD and int(cell["people"]) >= 50:

@@ -16,10 +16,10 @@ from dermis.mesh.eyeball import SCLERA_MM, LidContact, build_eyeball, radial_dis
 Index = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-PUBLISHED_EYE_RADIUS_MM = 15.4
-"""Mean radius of the published average eyeball, which the published lids touch [mm]."""
+MAKEHUMAN_EYE_RADIUS_MM = 15.4
+"""Mean radius of MakeHuman's eyeball of the average person, which MakeHuman's lids touch [mm]."""
 EYE_OFFSET_MM = 2.2
-"""How far the smaller anatomical eyeball is in front of the published one, to align the corneas [mm]."""
+"""How far the smaller anatomical eyeball is in front of MakeHuman's, to align the corneas [mm]."""
 CONTROL_MESH_SCALE = 1.0045
 """Size of an eyeball's control mesh relative to its smooth surface."""
 _MAX_SKIN_TO_LID_MM = 15.0  # distance up to which skin follows the lids
@@ -94,7 +94,7 @@ def fit_socket(eyeball_points: Points) -> EyeSocket:
     """Return the centre and relative size of MakeHuman's eyeball, computed from its points (b, 3) [mm]."""
     centre = (eyeball_points.min(axis=0) + eyeball_points.max(axis=0)) / 2
     return EyeSocket(
-        centre, float(np.linalg.norm(eyeball_points - centre, axis=1).mean()) / PUBLISHED_EYE_RADIUS_MM
+        centre, float(np.linalg.norm(eyeball_points - centre, axis=1).mean()) / MAKEHUMAN_EYE_RADIUS_MM
     )
 
 
@@ -165,7 +165,7 @@ def _lid_displacements(rings: Points, socket: EyeSocket, lid_is_closed: bool | F
     lids = relative.reshape(-1, len(_LID_ROW_CONTACT), _RING_COUNT, 3)
     for one in np.flatnonzero(is_closed):
         _close_upper_lid(lids[one])
-    above = np.linalg.norm(published, axis=-1) - PUBLISHED_EYE_RADIUS_MM
+    above = np.linalg.norm(published, axis=-1) - MAKEHUMAN_EYE_RADIUS_MM
     above = above.reshape(*is_closed.shape, -1, _RING_COUNT)
     above += (_LID_ROW_CONTACT * (_LID_EDGE_HEIGHT_MM - above[..., _EDGE_COLUMN]))[..., None]
     radius = SCLERA_MM + np.maximum(above.reshape(*is_closed.shape, -1), _MIN_LID_HEIGHT_MM)

@@ -17,7 +17,7 @@ from dermis.base.summary import ShortRepr
 
 SCLERA_MM, CORNEA_MM, LIMBUS_MM = 12.0, 7.8, 5.85
 """Radii of the ball, of the front of the cornea, and of the circle where both meet, in adults [mm]."""
-IRIS_BEHIND_MM = 3.0
+IRIS_DEPTH_MM = 3.0
 """Depth of the plane of the iris behind the cornea's apex [mm]."""
 QUADS_PER_EDGE = 10
 """Quads along each edge of the cube that becomes a ball; even, so that a point is on the axis."""
@@ -47,7 +47,7 @@ def apex_mm() -> float:
 
 def iris_plane_mm() -> float:
     """Return the distance from the ball's centre to the plane of the iris, along the axis [mm]."""
-    return apex_mm() - IRIS_BEHIND_MM
+    return apex_mm() - IRIS_DEPTH_MM
 
 
 def profile_mm(angle_from_axis: Doubles) -> Doubles:

@@ -258,7 +258,7 @@ def label_components(
 
 
 def expand_runs(run_start: Index, run_length: Index) -> tuple[Index, Index]:
-    """Expand r runs of consecutive integers; return for each integer the index of its run, and the integer.
+    """Expand r runs of consecutive integers into two arrays: the run of each integer, and the integer itself.
 
     run_start, run_length : (r,) first integer and length of each run
     """

@@ -48,8 +48,8 @@ class StrandRoots:
     guide, guide_weight : (n, 4) guides between which each strand is interpolated, and their weights
     clump : (n,) index of the strand in the middle of the clump to which each strand belongs
     place : (n, 4) place of each root on the head: angle from the front [degrees]; height above the midpoint
-        of the eyes [mm], to be compared with the height of the hairline; thinning of the hair if the crown
-        recedes, 0 to 1; and position from the nape (0) to the top of the head (1)
+        of the eyes [mm]; thinning of the hair there if the crown recedes, 0 to 1; and position from the nape
+        (0) to the top of the head (1)
     along_mm : (n,) position of each strand's clump along its cornrow [mm]
     part : (n,) row of `Groom.parameters` for each strand, which is that of scalp hair or beard
     """

@@ -76,7 +76,7 @@ def hair_cover(groom: Groom, mesh: Mesh) -> Doubles:
     part = groom.parameters[groom.roots.part[index]]
     strand_number = index.astype(np.uint32) + part["seed"].astype(np.uint32) * np.uint32(131071)
     length = part["guide_mm"] * _length_fractions(
-        groom, index, part, strand_number, _above_hairline(groom, index)
+        groom, index, part, strand_number, _heights_above_hairline(groom, index)
     )
     roots = groom.roots.roots
     kept = Roots(roots.quad.take(index), roots.position.take(index, axis=0))
@@ -152,7 +152,7 @@ def _grow_chunk(
     strand_number = index.astype(np.uint32) + seed[roots.part[index]]
     clump = roots.clump[index]
     clump_number = clump.astype(np.uint32) + seed[roots.part[index]]
-    above_hairline_mm = _above_hairline(groom, index)
+    above_hairline_mm = _heights_above_hairline(groom, index)
     t = np.linspace(0.0, 1.0, groom.knots)[None]
     u = t * _length_fractions(groom, index, part, strand_number, above_hairline_mm)[:, None]
     own, at = (
@@ -209,7 +209,7 @@ def _random_normal(strand_number: Words, stream: int) -> Doubles:
     return np.asarray(2.0 * (sum(_random(strand_number, stream + k) for k in range(3)) - 1.5))
 
 
-def _above_hairline(groom: Groom, index: Ints) -> Doubles:
+def _heights_above_hairline(groom: Groom, index: Ints) -> Doubles:
     place = groom.roots.place[index]
     angles = _HAIRLINE_STEP_DEGREES * np.arange(len(groom.hairline_mm))
     return np.asarray(place[:, 1] - np.interp(place[:, 0], angles, groom.hairline_mm))
@@ -219,7 +219,7 @@ def _growing_indices(groom: Groom, count: int) -> Ints:
     """Return the indices of the roots from which a strand grows, among the first `count` roots."""
     index = np.arange(count, dtype=np.int32)
     roots, part = groom.roots, groom.parameters[groom.roots.part[:count]]
-    fade = _smoothstep(*_HAIRLINE_FADE_MM, _above_hairline(groom, index))
+    fade = _smoothstep(*_HAIRLINE_FADE_MM, _heights_above_hairline(groom, index))
     density = 1.0 + part["hairline"] * (fade - 1.0)
     density = density * part["density"] * (1.0 - part["thinning"] * roots.place[:count, 2])
     strand_number = index.astype(np.uint32) + part["seed"].astype(np.uint32) * np.uint32(131071)

@@ -115,7 +115,7 @@ class Pose(ShortRepr):
         return weights
 
     def _bone_matrices(self, rig: Rig, culprit: object) -> Floats:
-        bone_values = self._all_bones(rig)
+        bone_values = self._bones_with_target_rotations(rig)
         if not bone_values:
             return rig.rest.matrices
         if rig.skeleton is None:
@@ -130,7 +130,7 @@ class Pose(ShortRepr):
             bones, _bone_transforms(rig.skeleton, ordered, bone_values, culprit)
         )
 
-    def _all_bones(self, rig: Rig) -> Mapping[str, ArrayLike]:
+    def _bones_with_target_rotations(self, rig: Rig) -> Mapping[str, ArrayLike]:
         """Return the bones of the pose, with the rotations that active morph targets add to them.
 
         Bones whose pose is a matrix are not changed.

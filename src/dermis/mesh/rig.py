@@ -194,14 +194,14 @@ class Rig(ShortRepr):
         There are k eyes with r points around each opening, see `LidContact.edge`.
         """
         assert self.contact is not None
-        points, weights, outline = self._lid_edges
+        points, weights, outline = self._lid_edge_data
         rest = np.vstack([motion.positions_mm[points].T, outline.rest_mm[3]])
         posed = replace(outline, rest_mm=rest).pose(motion.weights, motion.matrices)
         return np.asarray(weights @ posed).reshape(*self.contact.edge.shape, 3)
 
     @cached_property
-    def _lid_edges(self) -> tuple[Intp, Doubles, RigOutline]:
-        """Return the data from which `lid_edges_mm` computes the points of the lid edges.
+    def _lid_edge_data(self) -> tuple[Intp, Doubles, RigOutline]:
+        """Return the precomputed data for `lid_edges_mm`.
 
         The data are the indices (n,) of the control points around the edges, their weights (e, n) in the e
         points of the edges, and a `RigOutline` of these control points, which can be posed.

@@ -122,21 +122,21 @@ def scalp_density(recession: float) -> HairDensity:
         thinned = _sum_zones("hair", zone_table(recession)[receding], points)
         return np.asarray(fraction * np.clip(1.0 + thinned, 0.0, 1.0))
 
-    return HairDensity(relative, _scalp_candidates())
+    return HairDensity(relative, _scalp_point_mask())
 
 
 def beard_density() -> HairDensity:
     """Return the relative density of the beard, which ends at the lips."""
-    return HairDensity(_beard_amount, _beard_candidates())
+    return HairDensity(_beard_amount, _beard_point_mask())
 
 
 @cache
-def _scalp_candidates() -> NDArray[np.bool_]:
+def _scalp_point_mask() -> NDArray[np.bool_]:
     return height_above_hairline(average_points()) > -_SCALP_MARGIN_MM
 
 
 @cache
-def _beard_candidates() -> NDArray[np.bool_]:
+def _beard_point_mask() -> NDArray[np.bool_]:
     return _sum_zones("beard", zone_table(), average_points()) > _MIN_BEARD_AMOUNT
 
 

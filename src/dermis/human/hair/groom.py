@@ -1,7 +1,7 @@
 """Complete hair of a person: scalp hair, beard, brows and lashes as strands.
 
-The roots of brows and lashes are found on the mean person, and used for all people, whose meshes have the
-same quads.
+Roots of brows and lashes are computed once, on the mean person; they apply to all people, because all of
+their meshes have the same quads.
 """
 
 from __future__ import annotations

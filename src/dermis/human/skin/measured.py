@@ -171,7 +171,7 @@ class MeasuredTable(NamedTuple):
     site_slope: Doubles
     site_spread: Doubles
 
-    def mixture(self, field_name: str, weights: Weights) -> Doubles:
+    def group_mean(self, field_name: str, weights: Weights) -> Doubles:
         """Return a field of `_Group`, averaged over a mixture of groups.
 
         field_name : name of the field
@@ -182,7 +182,9 @@ class MeasuredTable(NamedTuple):
         ]
         return np.asarray(np.sum(parts, axis=0))
 
-    def variables(self, weights: Weights, sex: ArrayLike, age: ArrayLike, normal_scores: Doubles) -> Doubles:
+    def cheek_variables(
+        self, weights: Weights, sex: ArrayLike, age: ArrayLike, normal_scores: Doubles
+    ) -> Doubles:
         """Return the four variables (n, 4) of n people from a mixture of groups.
 
         weights : weight of each group in the mixture
@@ -191,12 +193,14 @@ class MeasuredTable(NamedTuple):
         """
         from scipy.special import ndtri
 
-        nodes, quantiles = ndtri(self.probabilities), self.mixture("quantiles", weights)
+        nodes, quantiles = ndtri(self.probabilities), self.group_mean("quantiles", weights)
         values = np.column_stack([np.interp(normal_scores[:, k], nodes, quantiles[k]) for k in range(4)])
         sexes, terms = np.asarray(sex, np.float64) - 0.5, age_term(age) - self.mean_age_term
         return np.asarray(values + sexes[..., None] * self.sex + terms[..., None] * self.age)
 
-    def site_variables(self, weights: Weights, cheek_variables: Doubles, normal_samples: Doubles) -> Doubles:
+    def site_differences(
+        self, weights: Weights, cheek_variables: Doubles, normal_samples: Doubles
+    ) -> Doubles:
         """Return the differences (n, 12, 3) between all sites and the cheek.
 
         The differences are in melanin [doublings], blood [doublings] and oxygen [-].
@@ -206,13 +210,15 @@ class MeasuredTable(NamedTuple):
         normal_samples : (n, 12, 2) independent samples of the standard normal distribution, zeros for typical
             people
         """
-        middle = self.mixture("quantiles", weights)[:2, len(self.probabilities) // 2]
+        middle = self.group_mean("quantiles", weights)[:2, len(self.probabilities) // 2]
         deviation = np.clip(
             cheek_variables[:, None, :2] - middle,
             -_MAX_CHEEK_DEVIATION_DOUBLINGS,
             _MAX_CHEEK_DEVIATION_DOUBLINGS,
         )
-        found = np.broadcast_to(self.mixture("sites", weights), (len(cheek_variables), len(SITES), 3)).copy()
+        found = np.broadcast_to(
+            self.group_mean("sites", weights), (len(cheek_variables), len(SITES), 3)
+        ).copy()
         found[:, :, :2] += self.site_slope * deviation + self.site_spread * normal_samples
         return found
 
@@ -240,7 +246,7 @@ def parse_table(document: Mapping[str, Any]) -> MeasuredTable:
 def age_term(age: ArrayLike) -> Doubles:
     """Return the progress of ageing in skin colour: 0 up to 38 years, rising to 1 at 65 years and above.
 
-    In the archive, the cheek keeps its colour up to about forty years and is 4 to 5 L* darker after sixty.
+    In the measurements, the cheek keeps its colour up to about 40 years, and is 4 to 5 L* darker after 60.
     """
     t = np.clip((np.asarray(age, np.float64) - 38.0) / 27.0, 0.0, 1.0)
     return np.asarray(t * t * (3.0 - 2.0 * t))
@@ -330,13 +336,13 @@ def _pigments_and_sites(
     site_normal_samples : (12, 2) independent samples of the same distribution; None for a typical person
     """
     table = measured_table()
-    correlation = table.mixture("correlation", weights)
+    correlation = table.group_mean("correlation", weights)
     covariance, mean = correlation[:4, :4], np.zeros(4)
     if ita is not None:
         slope = correlation[:4, 4]
         mean, covariance = slope * _ita_score(ita, weights), covariance - np.outer(slope, slope)
     scores = mean + symmetric_square_root(covariance) @ normal_samples
-    variables = table.variables(weights, sex, age, scores[None])
+    variables = table.cheek_variables(weights, sex, age, scores[None])
     pigments = _clipped_pigments(variables[0])
     if ita is not None:
         pigments = with_ita(pigments, ita)
@@ -346,7 +352,7 @@ def _pigments_and_sites(
         np.zeros((1, len(SITES), 2)) if site_normal_samples is None else site_normal_samples[None]
     )
     middle = variables if not typical or ita is not None else np.tile(_median_variables(weights), (1, 1))
-    sites = table.site_variables(weights, middle, samples_or_zeros)[0]
+    sites = table.site_differences(weights, middle, samples_or_zeros)[0]
     oxygen = variables[0, 2] + sites[:, 2]  # may exceed 1, where skin is redder than the model allows
     sites[:, 2] = np.clip(oxygen, 0.0, 1.0) - pigments.oxygen
     names = [name.replace(" ", "_") for name in SITES]
@@ -356,7 +362,7 @@ def _pigments_and_sites(
 
 def _median_variables(weights: Weights) -> Doubles:
     table = measured_table()
-    return table.mixture("quantiles", weights)[:, len(table.probabilities) // 2]
+    return table.group_mean("quantiles", weights)[:, len(table.probabilities) // 2]
 
 
 def _clipped_pigments(pigment_values: Doubles) -> MeasuredPigments:
@@ -404,7 +410,7 @@ def with_ita(
 
 def _ita_score(ita: float, weights: Weights) -> float:
     """Return the standard normal score of an ITA in a mixture of groups, limited to the range -2.9 to 2.9."""
-    quantiles = measured_table().mixture("ita", weights)
+    quantiles = measured_table().group_mean("ita", weights)
     return float(np.clip(_ita_scores(np.array([ita]), quantiles)[0], -_MAX_NORMAL_SCORE, _MAX_NORMAL_SCORE))
 
 
@@ -431,7 +437,7 @@ class MeasuredCell(NamedTuple):
     site : one of `SITES`
     sex : "F" or "M", or "" for both
     age_group : "1" (under 20), "2" (20 to 29) ... "6" (over 60), or "" for all ages
-    people : number of measured people; 0 if they are too few, and the medians are estimated from all groups
+    people : number of measured people; 0 if they are too few, so that medians are estimated from all groups
     cielab : (3,) CIELAB colour under D65, without surface reflection
     pigments : pigments that the package's model infers from the measurements
     """

@@ -24,7 +24,7 @@ NOISE_REGIONS: tuple[NoiseRegion, ...] = ("all", "lips", "lines", "furrows", "fo
 _OCTAVE_ROTATION = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
 """Rotation between octaves of a fractal, so that their lattices do not align."""
 _OCTAVE_SIZE_RATIO = 0.49  # ratio of the feature sizes of consecutive octaves
-ZONE_BORDER_NOISES = 2
+ZONE_BORDER_NOISE_COUNT = 2
 """Number of noises that warp the borders of zones: the first of `NOISES`, with a single octave each."""
 TILE_SIDE = 512
 """Side of the tile of fine relief [texel]."""

@@ -257,7 +257,7 @@ def _calibrate_group(
     loss += float(error @ error)
     group["quantiles"] = _rounded(np.array(group["quantiles"]) + shift[:, None])
     found, y = _drawn_cheeks(document, group_name, people)
-    differences = found.site_variables({group_name: 1.0}, y, people.site_normals)
+    differences = found.site_differences({group_name: 1.0}, y, people.site_normals)
     sites = np.array(group["sites"])
     for site in range(len(SITES)):
         measured = group_archive.site == site
@@ -274,8 +274,8 @@ def _calibrate_group(
 def _drawn_cheeks(document: dict[str, Any], group: str, people: _Population) -> tuple[MeasuredTable, Doubles]:
     """Return the parsed table, and the variables (n, 4) of the cheeks of people drawn from a group."""
     found, weights = parse_table(document), {group: 1.0}
-    scores = people.normals @ symmetric_square_root(found.mixture("correlation", weights)[:4, :4])
-    return found, found.variables(weights, people.sexes, people.ages, scores)
+    scores = people.normals @ symmetric_square_root(found.group_mean("correlation", weights)[:4, :4])
+    return found, found.cheek_variables(weights, people.sexes, people.ages, scores)
 
 
 def _matching_shift(variables: Doubles, target_colour: Doubles, free_count: int) -> tuple[Doubles, Doubles]:
@@ -375,8 +375,8 @@ def _cell_row(
 
 def _pooled_cell(measured_table: MeasuredTable, group: str, site_index: int) -> list[str]:
     """Return the median colour and pigments that the table predicts for a site without measurements."""
-    y = measured_table.variables({group: 1.0}, 0.5, 30.0, np.zeros((1, 4)))
-    y[:, :3] += measured_table.site_variables({group: 1.0}, y, np.zeros((1, len(SITES), 2)))[:, site_index]
+    y = measured_table.cheek_variables({group: 1.0}, 0.5, 30.0, np.zeros((1, 4)))
+    y[:, :3] += measured_table.site_differences({group: 1.0}, y, np.zeros((1, len(SITES), 2)))[:, site_index]
     colour, (melanin, blood, oxygen, thickness) = model_lab(y)[0], y[0]
     pigments = [
         f"{np.exp2(melanin):.4f}",

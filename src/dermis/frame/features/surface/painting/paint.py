@@ -45,7 +45,7 @@ from dermis.human.skin.textures import (
     NOISE_REGIONS,
     NOISES,
     TILE_LENGTH_MM,
-    ZONE_BORDER_NOISES,
+    ZONE_BORDER_NOISE_COUNT,
     noise_table,
 )
 from dermis.mesh.maps import Maps
@@ -76,7 +76,7 @@ def painting_constants() -> dict[str, float]:
     counts = {name: len(names) for name, names in _PAINTING_LISTS.items()} | table_sizes()
     rows = {"noise_rows": len(noise_table()), "amount_rows": len(ZONE_AMOUNTS) // 4}
     sizes = {"degrees": float(HAIRLINE_STEP_DEGREES), "tile_mm": TILE_LENGTH_MM}
-    return sizes | counts | rows | {"folding": FOLD_MOVEMENT_COUNT, "wander_rows": ZONE_BORDER_NOISES}
+    return sizes | counts | rows | {"folding": FOLD_MOVEMENT_COUNT, "wander_rows": ZONE_BORDER_NOISE_COUNT}
 
 
 def _as_members(member_names: Sequence[str]) -> Callable[[], Sequence[ShaderListMember]]:
@@ -130,20 +130,20 @@ def _shader_text(shader: str) -> str:
     return shader_source(FEATURES_FOLDER / shader, shader_folders()).text
 
 
-def _face_tables(recession: float, sites: SiteDifferences) -> bytes:
+def _face_tables(hairline_recession: float, site_differences: SiteDifferences) -> bytes:
     """Return the tables of the face that spot.wgsl reads: noises, dots, zones, folds and the hairline.
 
-    recession : recession of the hairline [-]
-    sites : differences of pigments between the measured sites of the face
+    hairline_recession : recession of the hairline [-]
+    site_differences : differences of pigments between the measured sites of the face
     """
-    folds, edge = face.fold_curves(), face.hairline_heights(recession)
+    folds, edge = face.fold_curves(), face.hairline_heights(hairline_recession)
     ends = np.column_stack([folds.first[:-1], folds.first[1:] - 1]).astype(np.float32)
     curves = np.pad(np.hstack([folds.curves, ends]), _TRIANGLE_ROW_PADDING)
     hairline = np.pad(np.column_stack([edge, np.append(edge[1:], edge[-1])]), _TRIANGLE_ROW_PADDING)
     tables = (
         textures.noise_table(),
         textures.dot_table(),
-        face.zone_table(recession, sites),
+        face.zone_table(hairline_recession, site_differences),
         curves,
         folds.knots,
     )
@@ -294,10 +294,10 @@ def draw_expression(graph: Graph, maps: ExpressionMaps, movement_strengths: NDAr
         "Expression", folding=folding, pressed=movement_strengths[_FOLDING_VALUE_COUNT], side=side
     )
     graph.compute("maps", shader, maps.bindings | {"expression": record}, (side, side))
-    graph.repeat(_fill_maps, maps)
+    graph.repeat(_fill_expression_maps, maps)
 
 
-def _fill_maps(graph: Recorder, maps: ExpressionMaps) -> None:
+def _fill_expression_maps(graph: Recorder, maps: ExpressionMaps) -> None:
     """Declare the passes that compute the mip levels of the colour, and the relief from the heights."""
     map_mips.fill_mips(graph, maps.colour)
     map_mips.fill_relief(graph, maps.relief, maps.heights)
