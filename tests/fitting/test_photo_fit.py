@@ -74,9 +74,9 @@ def test_fit_recovers_skin_and_light(fitted: FitResult) -> None:
     true = np.array([0.5, 0.4, 0.77])
     assert towards @ true / np.linalg.norm(true) > np.cos(np.radians(3.0))
     assert strength == pytest.approx(2.0, rel=0.1)
-    assert light_basis.panorama(fitted.strengths[: light_basis.AMBIENT_LOBE_COUNT]).mean() == pytest.approx(
-        0.3, rel=0.2
-    )
+    assert light_basis.ambient_panorama(
+        fitted.strengths[: light_basis.AMBIENT_LOBE_COUNT]
+    ).mean() == pytest.approx(0.3, rel=0.2)
     assert fitted.residual < 0.02
 
 
@@ -120,7 +120,7 @@ def test_lobes_span_second_order_harmonics() -> None:
 def test_clipped_pixels_are_excluded() -> None:
     image = np.full((32, 32, 3), 100, np.uint8)
     image[:16, :16, 0] = 255
-    small = read_photograph(image).within(16)
+    small = read_photograph(image).reduced_to(16)
     assert (
         small.size == (16, 16) and small.unclipped[:8, :8].max() == 0.0 and small.unclipped[8:].min() == 1.0
     )
@@ -206,9 +206,9 @@ class TwoWells(InitialGuess):
 
 
 def test_fits_start_from_dark_and_from_pale_skin_that_look_alike() -> None:
-    dark, pale = TwoWells(1.3).minima(TwoWells(1.3).best(1))
+    dark, pale = TwoWells(1.3).melanin_ranges(TwoWells(1.3).best_point(1))
     assert dark[0] > 0.1 and dark[-1] == pytest.approx(0.4)
     assert pale[0] < 0.05 < pale[-1] < 0.2
-    assert np.exp(TwoWells(1.3).best(1, pale).logs[0]) == pytest.approx(0.05, rel=0.2)
-    (everything,) = TwoWells(3.0).minima(TwoWells(3.0).best(1))
+    assert np.exp(TwoWells(1.3).best_point(1, pale).logs[0]) == pytest.approx(0.05, rel=0.2)
+    (everything,) = TwoWells(3.0).melanin_ranges(TwoWells(3.0).best_point(1))
     assert (everything[0], everything[-1]) == pytest.approx((0.002, 0.4))

@@ -35,7 +35,7 @@ SHORT_MM = np.full(3, 0.02)
 @pytest.fixture(autouse=True)
 def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     """Use a coarse colour grid, which is enough for balls of one colour."""
-    monkeypatch.setattr(medium, "GRID_VOXELS", 8)
+    monkeypatch.setattr(medium, "ALBEDO_GRID_SIDE_VOXELS", 8)
 
 
 def middle(person: Any, medium: Medium | None = None, samples: int = 256, **given: Any) -> Any:

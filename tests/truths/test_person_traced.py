@@ -29,7 +29,7 @@ LIGHT = RectangleLight(position=(-300.0, 300.0, 900.0))
 
 @pytest.fixture(autouse=True)
 def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(medium, "GRID_VOXELS", 8)
+    monkeypatch.setattr(medium, "ALBEDO_GRID_SIDE_VOXELS", 8)
 
 
 @cache

@@ -102,7 +102,7 @@ def test_an_eye_is_close_to_its_path_traced_image(
     renderer: Renderer, paint: SkinTextures, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     pytest.importorskip("mitsuba")
-    monkeypatch.setattr(medium, "GRID_VOXELS", 8)
+    monkeypatch.setattr(medium, "ALBEDO_GRID_SIDE_VOXELS", 8)
     subject = PersonSubject(view_scene(head(), VIEWS["eye"]), paint)
     skin = shared_skin(renderer, head(), "matched", tmp_path)
     pair = compare_person(

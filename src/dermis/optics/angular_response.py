@@ -210,15 +210,15 @@ def albedo_for_reflectance(total_reflectance: float, eta: float) -> float:
     """
     from scipy.optimize import brentq
 
-    def excess(albedo: float) -> float:
+    def reflectance_excess(albedo: float) -> float:
         return float(_HalfSpace(albedo, eta).reflectance(1.0)) - total_reflectance
 
     min_albedo = 1e-6
-    if total_reflectance <= 0.0 or excess(min_albedo) >= 0.0:
+    if total_reflectance <= 0.0 or reflectance_excess(min_albedo) >= 0.0:
         return min_albedo
     return (
-        float(brentq(excess, min_albedo, _MAX_SINGLE_SCATTERING_ALBEDO))
-        if excess(_MAX_SINGLE_SCATTERING_ALBEDO) > 0.0
+        float(brentq(reflectance_excess, min_albedo, _MAX_SINGLE_SCATTERING_ALBEDO))
+        if reflectance_excess(_MAX_SINGLE_SCATTERING_ALBEDO) > 0.0
         else _MAX_SINGLE_SCATTERING_ALBEDO
     )
 

@@ -79,17 +79,17 @@ def albedo_for_total(total_reflectance: float, eta: float, from_photons: bool = 
     if kind is not None:
         return float(tabulated_albedo(kind, total_reflectance))
 
-    def excess(albedo: float) -> float:
+    def reflectance_excess(albedo: float) -> float:
         return (
             _reflectance_transform(_unit_medium(albedo, eta), float(hankel.NEAR_ZERO_FREQUENCY[0]))
             - total_reflectance
         )
 
-    if excess(MIN_EQUIVALENT_ALBEDO) >= 0.0:
+    if reflectance_excess(MIN_EQUIVALENT_ALBEDO) >= 0.0:
         return MIN_EQUIVALENT_ALBEDO
     return (
-        float(brentq(excess, MIN_EQUIVALENT_ALBEDO, MAX_EQUIVALENT_ALBEDO))
-        if excess(MAX_EQUIVALENT_ALBEDO) > 0.0
+        float(brentq(reflectance_excess, MIN_EQUIVALENT_ALBEDO, MAX_EQUIVALENT_ALBEDO))
+        if reflectance_excess(MAX_EQUIVALENT_ALBEDO) > 0.0
         else MAX_EQUIVALENT_ALBEDO
     )
 

@@ -122,7 +122,7 @@ def _read_gaussians(path: Path, file_state: tuple[int, ...]) -> GaussianSum | No
     """
     if path.suffix.lower() == ".toml":
         document = read_toml(path)
-        return _from_toml(path, document) if "variances_mm2" in document else None
+        return _gaussians_from_toml(path, document) if "variances_mm2" in document else None
     return _parse_csv(str(path), read_text(path, _PROFILE_CSV_FORMAT))
 
 
@@ -172,8 +172,8 @@ def fit_profile(
 ) -> GaussianSum:
     """Fit six Gaussians to the diffusion profile of a tissue, computed by the tissue's default model.
 
-    Fits to photon counts keep the total reflectance. Counted profiles are steeper than the profiles of
-    diffusion models, so an unconstrained fit would lose up to 2 % of the light.
+    Fits to photon counts keep the total reflectance. Such profiles are steeper at the centre than those of
+    diffusion models, so a fit without this constraint would lose up to 2 % of the light.
 
     similar_fit : fit of a similar tissue, as start of the new fit, which is then several times faster
 
@@ -209,12 +209,14 @@ def _published_profile() -> GaussianSum:
     return _parse_csv(PUBLISHED_PRESET, file.read_text("utf-8"))
 
 
-def _from_toml(path: Path, document: Mapping[str, Any]) -> GaussianSum:
+def _gaussians_from_toml(path: Path, document: Mapping[str, Any]) -> GaussianSum:
     name = f"profile {path}"
     key = "variances_mm2"
     variances = checked_array(f"{name}: {key}", document[key], (0,), 0.0, MAX_VARIANCE_MM2)
     weights = checked_array(f"{name}: weights", document.get("weights"), (0, 3), 0.0, MAX_WEIGHT)
-    return replace(_rgb_sum(path, variances, weights), from_photons=document.get("model") in PHOTON_MODELS)
+    return replace(
+        _checked_rgb_gaussians(path, variances, weights), from_photons=document.get("model") in PHOTON_MODELS
+    )
 
 
 def _parse_csv(profile_name: str, csv_text: str) -> GaussianSum:
@@ -228,10 +230,10 @@ def _parse_csv(profile_name: str, csv_text: str) -> GaussianSum:
         table = np.empty((0, 4))
     if table.ndim != 2 or table.shape[1:] != (4,) or len(table) == 0:
         refuse(f"profile {profile_name}", "rows of four numbers", "it has other rows", _PROFILE_ADVICE)
-    return _rgb_sum(profile_name, table[:, 0], table[:, 1:])
+    return _checked_rgb_gaussians(profile_name, table[:, 0], table[:, 1:])
 
 
-def _rgb_sum(profile_name: object, variance_mm2: Floats, weight: Floats) -> GaussianSum:
+def _checked_rgb_gaussians(profile_name: object, variance_mm2: Floats, weight: Floats) -> GaussianSum:
     if weight.ndim != 2 or weight.shape[1:] != (3,):
         refuse(
             f"profile {profile_name}",

@@ -71,16 +71,16 @@ def radius_grid(radius_count: int = 600) -> Floats:
     return np.geomspace(MIN_RADIUS_MM, MAX_RADIUS_MM, radius_count)
 
 
-def resample_profile(radius_mm: Floats, grid_mm: Floats, values: Floats) -> Floats:
+def resample_profile(radius_mm: Floats, grid_mm: Floats, grid_values: Floats) -> Floats:
     """Return values (n, c) at n radii, by cubic splines in log r through the values at a grid.
 
     radius_mm : (n,) radii [mm]
     grid_mm : (m,) log-spaced radii of the grid [mm]
-    values : (m, c) values at the radii of the grid
+    grid_values : (m, c) values at the radii of the grid
     """
     from scipy.interpolate import CubicSpline
 
-    return np.asarray(CubicSpline(np.log(grid_mm), values)(np.log(radius_mm)))
+    return np.asarray(CubicSpline(np.log(grid_mm), grid_values)(np.log(radius_mm)))
 
 
 def enclosed_energy(radius_mm: Floats, grid_mm: Floats, reflectance: Floats) -> Floats:

@@ -49,14 +49,14 @@ def refuse_mcml(path: Path) -> NoReturn:
     rows = [_parse_numbers(line.partition("#")[0].split()) for line in lines]
     layers = list(takewhile(lambda row: len(row) == 5, dropwhile(lambda row: len(row) != 5, rows)))
     values = [
-        f"layer {k}: {_layer_entries(*layer)}" for k, layer in enumerate(layers[:_MAX_LISTED_LAYERS], 1)
+        f"layer {k}: {_mcml_layer_text(*layer)}" for k, layer in enumerate(layers[:_MAX_LISTED_LAYERS], 1)
     ]
     actual = "it is of MCML, in 1/cm for one wavelength, and its scattering is not reduced"
     advice = "Write for each colour the reduced scattering, mu_s' = mu_s (1 - g)"
     refuse(path, expected, actual, "; ".join([advice, *values]))
 
 
-def _layer_entries(eta: float, mu_a: float, mu_s: float, g: float, thickness_cm: float) -> str:
+def _mcml_layer_text(eta: float, mu_a: float, mu_s: float, g: float, thickness_cm: float) -> str:
     """Return a layer of MCML as text, with the keys and units of this package's TOML files."""
     thickness = (
         f"thickness_mm {10 * thickness_cm:.4g}"

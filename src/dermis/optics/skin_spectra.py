@@ -12,10 +12,10 @@ from dermis.optics.pigments.spectra import (
     DERMIS_SCATTERING_RATIO,
     WAVELENGTHS_NM,
     baseline_absorption,
-    blood,
+    blood_absorption,
     donner_jensen_2006,
-    eumelanin,
-    pheomelanin,
+    eumelanin_absorption,
+    pheomelanin_absorption,
 )
 
 
@@ -43,8 +43,8 @@ def skin_reflectance(
     """
     m, b, ox, eu = map(_as_column, (melanin, blood_fraction, oxygen, eumelanin_fraction))
     bloodless = _as_column(baseline) * baseline_absorption(WAVELENGTHS_NM)
-    pigment = eu * eumelanin(WAVELENGTHS_NM) + (1.0 - eu) * pheomelanin(WAVELENGTHS_NM)
-    vessels = ox * blood(WAVELENGTHS_NM, 1.0) + (1.0 - ox) * blood(WAVELENGTHS_NM, 0.0)
+    pigment = eu * eumelanin_absorption(WAVELENGTHS_NM) + (1.0 - eu) * pheomelanin_absorption(WAVELENGTHS_NM)
+    vessels = ox * blood_absorption(WAVELENGTHS_NM, 1.0) + (1.0 - ox) * blood_absorption(WAVELENGTHS_NM, 0.0)
     sigma_s_prime = _as_column(scattering) * donner_jensen_2006(WAVELENGTHS_NM)
     epidermis = m * pigment + (1.0 - m) * bloodless
     return two_layer_reflectance(

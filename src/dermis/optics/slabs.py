@@ -121,8 +121,8 @@ def solve_slabs(
     tau = np.atleast_1d(np.asarray(optical_depth, np.float64))
     transport = _Transport.create(albedo, eta, direction_nodes, g)
     doublings = transport.doubling_count(float(tau.max()))
-    *_, (R, T, unscattered) = _doubling_steps(transport, tau / 2.0**doublings, doublings)
-    return _slabs_in_air(transport, R, T, unscattered)
+    *_, (R, T, unscattered_fraction) = _doubling_steps(transport, tau / 2.0**doublings, doublings)
+    return _slabs_in_air(transport, R, T, unscattered_fraction)
 
 
 def solve_doubled_slabs(
@@ -133,7 +133,7 @@ def solve_doubled_slabs(
     direction_nodes: int = DIRECTION_NODES,
     g: float = 0.0,
 ) -> Slabs:
-    """Solve slabs and all their successive doublings, in the time that the thickest slabs alone would take.
+    """Solve slabs, and slabs of twice, four times ... their depth; as fast as for the thickest ones alone.
 
     albedo, eta, direction_nodes, g : as in `solve_slabs`
     smallest_depth : (n,) optical depths of similar size [-]
@@ -144,8 +144,8 @@ def solve_doubled_slabs(
     initial_doublings = transport.doubling_count(float(np.max(smallest_depth)))
     tau = np.asarray(smallest_depth, np.float64) / 2.0**initial_doublings
     steps = list(_doubling_steps(transport, tau, initial_doublings + doubling_count))[initial_doublings:]
-    R, T, unscattered = (np.concatenate(part) for part in zip(*steps, strict=True))
-    return _slabs_in_air(transport, R, T, unscattered)
+    R, T, unscattered_fraction = (np.concatenate(part) for part in zip(*steps, strict=True))
+    return _slabs_in_air(transport, R, T, unscattered_fraction)
 
 
 def half_space_radiance(
@@ -163,8 +163,10 @@ def half_space_radiance(
     transport = _Transport.create(albedo, eta, direction_nodes, g)
     doublings = transport.doubling_count(DEEP_OPTICAL_DEPTH)
     tau = np.array([DEEP_OPTICAL_DEPTH / 2.0**doublings])
-    *_, (R, T, unscattered) = _doubling_steps(transport, tau, doublings)
-    reflected, _ = _add_faces(R * transport.flux, T * transport.flux, unscattered, transport.internal, R, T)
+    *_, (R, T, unscattered_fraction) = _doubling_steps(transport, tau, doublings)
+    reflected, _ = _add_faces(
+        R * transport.flux, T * transport.flux, unscattered_fraction, transport.internal, R, T
+    )
     leaving = (transport.flux * (1.0 - transport.internal))[transport.escapes]
     radiance = reflected[0][np.ix_(transport.escapes, transport.escapes)] * leaving.sum()
     return transport.mu[transport.escapes], leaving / leaving.sum(), radiance
@@ -201,35 +203,39 @@ class _Transport:
         return int(np.ceil(np.log2(max(depth * self.phase.extinction / _MIN_OPTICAL_DEPTH, 1.0))))
 
 
-def _slabs_in_air(transport: _Transport, R: Floats, T: Floats, unscattered: Floats) -> Slabs:
+def _slabs_in_air(transport: _Transport, R: Floats, T: Floats, unscattered_fraction: Floats) -> Slabs:
     """Return the reflection and transmission of slabs with faces to air, from those of slabs without faces.
 
     R, T : (n, m, m) reflection and transmission without faces, as pi times the radiance for unit power from
         each direction
-    unscattered : (n, m) fraction of light that crosses the slab without scattering [-]
+    unscattered_fraction : (n, m) fraction of light that crosses the slab without scattering [-]
     """
     flux, escapes = transport.flux, transport.escapes
-    reflected, transmitted = _add_faces(R * flux, T * flux, unscattered, transport.internal, R, T)
+    reflected, transmitted = _add_faces(R * flux, T * flux, unscattered_fraction, transport.internal, R, T)
     leaving = flux * (1.0 - transport.internal)
     entering = leaving[escapes] / leaving[escapes].sum()
     up, down = (np.einsum("k,nkm->nm", leaving, part[..., escapes]) for part in (reflected, transmitted))
     phase = transport.phase
     if phase.extinction < phase.unscaled_extinction:  # light in the truncated forward peak has scattered
-        unscaled = unscattered ** (phase.unscaled_extinction / phase.extinction)
-        scaled_up, scaled_down = _unscattered_exit(unscattered, transport.internal)
+        unscaled = unscattered_fraction ** (phase.unscaled_extinction / phase.extinction)
+        scaled_up, scaled_down = _unscattered_exit(unscattered_fraction, transport.internal)
         true_up, true_down = _unscattered_exit(unscaled, transport.internal)
         up, down = up + (scaled_up - true_up)[:, escapes], down + (scaled_down - true_down)[:, escapes]
     return Slabs(transport.mu[escapes], entering, up, down)
 
 
-def _unscattered_exit(unscattered: Floats, internal: Floats) -> tuple[Floats, Floats]:
+def _unscattered_exit(unscattered_fraction: Floats, face_reflectance: Floats) -> tuple[Floats, Floats]:
     """Return the fractions (n, m) of light that leave unscattered on the side of entry and the far side [-].
 
-    unscattered : (n, m) fraction of light that crosses the slab without scattering [-]
-    internal : (m,) reflectance of a face from inside [-]
+    unscattered_fraction : (n, m) fraction of light that crosses the slab without scattering [-]
+    face_reflectance : (m,) reflectance of a face from inside [-]
     """
-    down = (1.0 - internal) * unscattered / (1.0 - (unscattered * internal) ** 2)
-    return down * unscattered * internal, down
+    down = (
+        (1.0 - face_reflectance)
+        * unscattered_fraction
+        / (1.0 - (unscattered_fraction * face_reflectance) ** 2)
+    )
+    return down * unscattered_fraction * face_reflectance, down
 
 
 def _direction_quadrature(eta: float, direction_nodes: int) -> tuple[Floats, Floats]:
@@ -259,38 +265,49 @@ def _doubling_steps(
     a, b = mu[:, None], mu[None, :]
     R = -0.25 * albedo / (a + b) * np.expm1(-t * (1.0 / a + 1.0 / b)) * transport.phase.backward
     T = 0.25 * albedo * t / (a * b) * np.exp(-0.5 * t * (1.0 / a + 1.0 / b)) * transport.phase.forward
-    unscattered = np.exp(-t[..., 0] / mu)
-    yield R, T, unscattered
+    unscattered_fraction = np.exp(-t[..., 0] / mu)
+    yield R, T, unscattered_fraction
     for _ in range(doubling_count):
-        up, down = R * flux, T * flux + unscattered[:, :, None] * np.eye(len(mu))
-        entering = R * unscattered[:, None, :]
+        up, down = R * flux, T * flux + unscattered_fraction[:, :, None] * np.eye(len(mu))
+        entering = R * unscattered_fraction[:, None, :]
         between = np.linalg.solve(np.eye(len(mu)) - up @ up, T + up @ entering)
-        R, T = R + down @ (up @ between + entering), down @ between + T * unscattered[:, None, :]
-        unscattered = unscattered**2
-        yield R, T, unscattered
+        R, T = R + down @ (up @ between + entering), down @ between + T * unscattered_fraction[:, None, :]
+        unscattered_fraction = unscattered_fraction**2
+        yield R, T, unscattered_fraction
 
 
 def _add_faces(
-    up: Floats, down: Floats, unscattered: Floats, internal: Floats, R: Floats, T: Floats
+    reflection_operator: Floats,
+    transmission_operator: Floats,
+    unscattered_fraction: Floats,
+    face_reflectance: Floats,
+    R: Floats,
+    T: Floats,
 ) -> tuple[Floats, Floats]:
     """Return the scattered light that meets the faces of slabs, including internal reflections.
 
     The results (n, m, m) are pi times the radiance at the upper face and at the lower face, for unit power
     from each direction.
 
-    up, down : (n, m, m) `R` and `T` with each column multiplied by the flux of its direction
-    unscattered : (n, m) fraction of light that crosses the slab without scattering [-]
-    internal : (m,) reflectance of a face from inside [-]
+    reflection_operator, transmission_operator : (n, m, m) `R` and `T`, each column multiplied by the flux of
+        its direction
+    unscattered_fraction : (n, m) fraction of light that crosses the slab without scattering [-]
+    face_reflectance : (m,) reflectance of a face from inside [-]
     R, T : (n, m, m) reflection and transmission of the slabs without faces, as pi times the radiance
     """
-    if not internal.any():
+    if not face_reflectance.any():
         return R, T
-    identity, count = np.eye(len(internal)), len(internal)
-    passing = (down + unscattered[:, :, None] * identity) * internal
-    system = np.block([[identity - up * internal, -passing], [-passing, identity - up * internal]])
+    identity, count = np.eye(len(face_reflectance)), len(face_reflectance)
+    passing = (transmission_operator + unscattered_fraction[:, :, None] * identity) * face_reflectance
+    system = np.block(
+        [
+            [identity - reflection_operator * face_reflectance, -passing],
+            [-passing, identity - reflection_operator * face_reflectance],
+        ]
+    )
     # Unscattered light is reflected back and forth between the faces.
-    passes = 1.0 / (1.0 - (unscattered * internal) ** 2)
-    below = internal * unscattered * passes
+    passes = 1.0 / (1.0 - (unscattered_fraction * face_reflectance) ** 2)
+    below = face_reflectance * unscattered_fraction * passes
     top = R * (passes[:, None, :]) + T * below[:, None, :]
     bottom = T * passes[:, None, :] + R * below[:, None, :]
     solved = np.linalg.solve(system, np.concatenate([top, bottom], axis=1))

@@ -121,8 +121,8 @@ def test_slabs_of_monte_carlo(sample_folder: Path, thickness: float) -> None:
 
 def test_asymmetric_faces_turn_with_the_slab() -> None:
     one = Slab(Layer(np.array([0.1]), np.array([0.9]), 2.0), A, 1.0)
-    assert one.flipped().flipped() == one
+    assert one.upside_down().upside_down() == one
     up, down = (
-        multipole.transmittance_hankel(hankel.NEAR_ZERO_FREQUENCY, s)[0, 0] for s in (one, one.flipped())
+        multipole.transmittance_hankel(hankel.NEAR_ZERO_FREQUENCY, s)[0, 0] for s in (one, one.upside_down())
     )
     assert up != pytest.approx(down, rel=1e-3)

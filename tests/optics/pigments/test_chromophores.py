@@ -32,19 +32,19 @@ def test_haemoglobin_is_the_published_table(sample_folder: Path) -> None:
     table = np.loadtxt(sample_folder / "reference" / "data" / "prahl_hemoglobin.csv", skiprows=2)
     wavelength, oxy, deoxy = table[(table[:, 0] >= 380) & (table[:, 0] <= 780)].T
     assert len(wavelength) == 201
-    assert np.array_equal(chromophores.oxyhaemoglobin(wavelength), oxy)
-    assert np.array_equal(chromophores.deoxyhaemoglobin(wavelength), deoxy)
+    assert np.array_equal(chromophores.oxyhaemoglobin_extinction(wavelength), oxy)
+    assert np.array_equal(chromophores.deoxyhaemoglobin_extinction(wavelength), deoxy)
 
 
 @pytest.mark.parametrize(
     ("extinction", "wavelength", "published"),
     [
-        (chromophores.oxyhaemoglobin, 415, 523100),
-        (chromophores.oxyhaemoglobin, 540, 53240),
-        (chromophores.oxyhaemoglobin, 575, 54425),
-        (chromophores.oxyhaemoglobin, 660, 319.6),
-        (chromophores.deoxyhaemoglobin, 555, 54530),
-        (chromophores.deoxyhaemoglobin, 660, 3227),
+        (chromophores.oxyhaemoglobin_extinction, 415, 523100),
+        (chromophores.oxyhaemoglobin_extinction, 540, 53240),
+        (chromophores.oxyhaemoglobin_extinction, 575, 54425),
+        (chromophores.oxyhaemoglobin_extinction, 660, 319.6),
+        (chromophores.deoxyhaemoglobin_extinction, 555, 54530),
+        (chromophores.deoxyhaemoglobin_extinction, 660, 3227),
     ],
 )
 def test_haemoglobin_at_its_bands(
@@ -58,9 +58,9 @@ def test_coefficients_of_an_independent_computation(sample_folder: Path) -> None
     table = reference(sample_folder)
     wavelength = table["lambda_nm"]
     for name, column in [
-        (chromophores.oxyhaemoglobin, "eps_HbO2_cm1_M1"),
-        (chromophores.deoxyhaemoglobin, "eps_Hb_cm1_M1"),
-        (chromophores.eumelanin, "mua_melanosome_mm1"),
+        (chromophores.oxyhaemoglobin_extinction, "eps_HbO2_cm1_M1"),
+        (chromophores.deoxyhaemoglobin_extinction, "eps_Hb_cm1_M1"),
+        (chromophores.eumelanin_absorption, "mua_melanosome_mm1"),
         (chromophores.baseline_absorption, "mua_baseline_mm1"),
         (chromophores.jacques_1998, "musp_mm1"),
     ]:
@@ -70,34 +70,38 @@ def test_coefficients_of_an_independent_computation(sample_folder: Path) -> None
 def test_blood_of_an_independent_computation(sample_folder: Path) -> None:
     """The independent computation uses 2.303 for ln 10."""
     table = reference(sample_folder)
-    computed = chromophores.blood(table["lambda_nm"], 0.75) * 2.303 / np.log(10.0)
+    computed = chromophores.blood_absorption(table["lambda_nm"], 0.75) * 2.303 / np.log(10.0)
     assert np.allclose(computed, table["mua_blood_S075_mm1"], rtol=PUBLISHED, atol=0.0)
 
 
 def test_isosbestic_points() -> None:
     """Oxygenation does not change absorption at the five wavelengths given in textbooks."""
-    difference = chromophores.oxyhaemoglobin(VISIBLE_NM) - chromophores.deoxyhaemoglobin(VISIBLE_NM)
+    difference = chromophores.oxyhaemoglobin_extinction(
+        VISIBLE_NM
+    ) - chromophores.deoxyhaemoglobin_extinction(VISIBLE_NM)
     found = crossings(difference)
     for published in (500.0, 529.0, 545.0, 570.0, 584.0):
         assert np.abs(found - published).min() < 2.0
-    full, none = chromophores.blood(660.0, 1.0), chromophores.blood(660.0, 0.0)
+    full, none = chromophores.blood_absorption(660.0, 1.0), chromophores.blood_absorption(660.0, 0.0)
     assert none > 5.0 * full  # venous blood is dark red
 
 
 def test_melanin_of_both_kinds() -> None:
     """Pheomelanin absorbs blue relatively more, so it looks red."""
     blue, red = 450.0, 650.0
-    brown = chromophores.melanosome([blue, red], 1.0)
-    ginger = chromophores.melanosome([blue, red], 0.0)
+    brown = chromophores.melanosome_absorption([blue, red], 1.0)
+    ginger = chromophores.melanosome_absorption([blue, red], 0.0)
     assert ginger[0] / ginger[1] > 1.5 * brown[0] / brown[1]
-    assert np.allclose(chromophores.melanosome([blue, red], 0.25), 0.25 * brown + 0.75 * ginger)
+    assert np.allclose(chromophores.melanosome_absorption([blue, red], 0.25), 0.25 * brown + 0.75 * ginger)
 
 
 def test_water_as_measured() -> None:
     """Absorption is 0.0060 per cm at 700 nm, and small compared with tissue."""
-    assert chromophores.water(700.0) == pytest.approx(6.0e-4, rel=5e-3)
+    assert chromophores.water_absorption(700.0) == pytest.approx(6.0e-4, rel=5e-3)
     up_to_700 = VISIBLE_NM[VISIBLE_NM <= 700.0]
-    assert (chromophores.water(up_to_700) < 0.03 * chromophores.baseline_absorption(up_to_700)).all()
+    assert (
+        chromophores.water_absorption(up_to_700) < 0.03 * chromophores.baseline_absorption(up_to_700)
+    ).all()
 
 
 def test_scattering_in_the_reading_per_millimetre() -> None:
@@ -117,12 +121,12 @@ def test_skin_scatters_blue_more(law: chromophores.ScatteringLaw) -> None:
 @pytest.mark.parametrize(
     "spectrum",
     [
-        chromophores.eumelanin,
-        chromophores.pheomelanin,
+        chromophores.eumelanin_absorption,
+        chromophores.pheomelanin_absorption,
         chromophores.baseline_absorption,
-        chromophores.oxyhaemoglobin,
-        chromophores.deoxyhaemoglobin,
-        chromophores.water,
+        chromophores.oxyhaemoglobin_extinction,
+        chromophores.deoxyhaemoglobin_extinction,
+        chromophores.water_absorption,
         chromophores.donner_jensen_2006,
         chromophores.jacques_1998,
     ],
@@ -134,5 +138,7 @@ def test_invisible_light_is_refused(spectrum: Callable[[ArrayLike], Floats], wav
 
 def test_results_have_the_shape_of_the_wavelengths() -> None:
     grid = np.linspace(400.0, 700.0, 6).reshape(2, 3)
-    assert chromophores.blood(grid, 0.5).shape == chromophores.water(grid).shape == (2, 3)
-    assert chromophores.melanosome(500.0, 0.5).shape == ()
+    assert (
+        chromophores.blood_absorption(grid, 0.5).shape == chromophores.water_absorption(grid).shape == (2, 3)
+    )
+    assert chromophores.melanosome_absorption(500.0, 0.5).shape == ()

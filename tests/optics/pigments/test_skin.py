@@ -17,10 +17,10 @@ from dermis.optics.pigments.skin import LEAKED_MELANIN, spectral_medium
 from dermis.optics.pigments.spectra import (
     WAVELENGTHS_NM,
     baseline_absorption,
-    blood,
+    blood_absorption,
     donner_jensen_2006,
     jacques_1998,
-    melanosome,
+    melanosome_absorption,
     rgb_weights,
 )
 
@@ -74,7 +74,7 @@ def test_dj2006_by_hand_at_550_nm() -> None:
 def test_the_sheet_absorbs_a_share_of_the_melanin_above_it() -> None:
     """The optical depth of the sheet does not depend on its nominal thickness."""
     sheet = layer("donner2008", "melanin sheet", SKIN)
-    above = SKIN.melanin * melanosome(WAVELENGTHS_NM, SKIN.eumelanin) * SKIN.epidermis_mm
+    above = SKIN.melanin * melanosome_absorption(WAVELENGTHS_NM, SKIN.eumelanin) * SKIN.epidermis_mm
     assert np.allclose(sheet.sigma_a * sheet.thickness_mm, LEAKED_MELANIN * above)
     assert (sheet.sigma_s_prime * sheet.thickness_mm < 0.02).all()
     assert not layer("donner2008", "melanin sheet", replace(SKIN, melanin=0.0)).sigma_a.any()
@@ -83,7 +83,9 @@ def test_the_sheet_absorbs_a_share_of_the_melanin_above_it() -> None:
 def test_blood_in_the_epidermis() -> None:
     bloody = replace(SKIN, epidermal_blood=0.01)
     added = layer("donner2008", "epidermis", bloody).sigma_a - layer("donner2008", "epidermis", SKIN).sigma_a
-    assert np.allclose(added, 0.01 * (blood(WAVELENGTHS_NM, 0.8) - 0.5 * baseline_absorption(WAVELENGTHS_NM)))
+    assert np.allclose(
+        added, 0.01 * (blood_absorption(WAVELENGTHS_NM, 0.8) - 0.5 * baseline_absorption(WAVELENGTHS_NM))
+    )
     for structure in ("dj2006", "biospec"):
         same = layer(structure, "epidermis", bloody), layer(structure, "epidermis", SKIN)
         assert np.array_equal(same[0].sigma_a, same[1].sigma_a)

@@ -23,7 +23,7 @@ from dermis.apps.truths.lights import cycles_lamp
 from dermis.apps.truths.mitsuba_scene import Lambertian
 from dermis.apps.truths.path_traced import PathTraced
 from dermis.apps.truths.scene_description import (
-    UNIT_MM,
+    CYCLES_UNIT_MM,
     SceneDict,
     check_camera,
     cycles_look_at,
@@ -231,7 +231,7 @@ def describe_scene(
     }
     mesh = scene.head.mesh
     arrays: dict[str, NumericArray] = {
-        "positions": ((mesh.positions - np.array(scene.head.centre_mm)) / UNIT_MM).astype(np.float32),
+        "positions": ((mesh.positions - np.array(scene.head.centre_mm)) / CYCLES_UNIT_MM).astype(np.float32),
         "normals": mesh.normals,
         "triangles": mesh.triangles,
         "material": mesh.material,
@@ -280,14 +280,14 @@ def _skin_material(medium: SkinMaterial, subsurface_method: str) -> SceneDict:
         # Blender's roughness is the square root of Beckmann's m.
         return {"method": "BECKMANN", "roughness": float(np.sqrt(medium.roughness)), "ior": SKIN_ETA}
     if isinstance(medium, PrincipledSkin):
-        radius = [part / UNIT_MM for part in medium.radius_mm]
+        radius = [part / CYCLES_UNIT_MM for part in medium.radius_mm]
         roughness = float(np.sqrt(medium.roughness))
         return {"method": "PRINCIPLED", "roughness": roughness, "ior": SKIN_ETA, "radius": radius}
     if len(medium.layers) != 1:
         actual = f"it has {len(medium.layers)}"
         refuse(medium.name, "one layer, for Cycles", actual, "Take a medium of one layer, such as skin1")
     (layer,) = medium.layers
-    radius_cycles = 4.0 * np.pi * layer.mean_free_path_mm / UNIT_MM
+    radius_cycles = 4.0 * np.pi * layer.mean_free_path_mm / CYCLES_UNIT_MM
     colour = [diffuse_albedo(float(alpha)) for alpha in layer.alpha_prime]
     return {
         "method": CYCLES_METHOD_NAMES[subsurface_method],

@@ -158,29 +158,33 @@ def shape_stripe(light: Any, stripe: dict[str, Any]) -> None:
     light.use_nodes = True
     nodes, links = light.node_tree.nodes, light.node_tree.links
 
-    def math(operation: str, *inputs: Any) -> Any:
+    def math_node(operation: str, *inputs: Any) -> Any:
         node = nodes.new("ShaderNodeMath")
         node.operation = operation
         return set_inputs(links, node, inputs)
 
-    def dot(vector: list[float]) -> Any:
+    def incoming_dot_product(unit_vector: list[float]) -> Any:
         node = nodes.new("ShaderNodeVectorMath")
         node.operation = "DOT_PRODUCT"
-        node.inputs[1].default_value = vector
+        node.inputs[1].default_value = unit_vector
         links.new(nodes.new("ShaderNodeNewGeometry").outputs["Incoming"], node.inputs[0])
         return node.outputs["Value"]
 
-    depth = dot(stripe["forward"])
-    across = math("MULTIPLY", math("DIVIDE", dot(stripe["across"]), depth), stripe["distance"])
-    along = math("MULTIPLY", math("DIVIDE", dot(stripe["along"]), depth), stripe["distance"])
-    gaussian = math("EXPONENT", math("MULTIPLY", math("MULTIPLY", across, across), -2.0))
+    depth = incoming_dot_product(stripe["forward"])
+    across = math_node(
+        "MULTIPLY", math_node("DIVIDE", incoming_dot_product(stripe["across"]), depth), stripe["distance"]
+    )
+    along = math_node(
+        "MULTIPLY", math_node("DIVIDE", incoming_dot_product(stripe["along"]), depth), stripe["distance"]
+    )
+    gaussian = math_node("EXPONENT", math_node("MULTIPLY", math_node("MULTIPLY", across, across), -2.0))
     fade = nodes.new("ShaderNodeMapRange")
     fade.interpolation_type = "SMOOTHSTEP"
     for name, value in zip(("From Min", "From Max", "To Min", "To Max"), (0.95, 1.0, 1.0, 0.0), strict=True):
         fade.inputs[name].default_value = value
-    links.new(math("ABSOLUTE", along), fade.inputs["Value"])
+    links.new(math_node("ABSOLUTE", along), fade.inputs["Value"])
     emission = next(node for node in nodes if node.type == "EMISSION")
-    links.new(math("MULTIPLY", gaussian, fade.outputs["Result"]), emission.inputs["Strength"])
+    links.new(math_node("MULTIPLY", gaussian, fade.outputs["Result"]), emission.inputs["Strength"])
 
 
 def set_inputs(links: Any, node: Any, inputs: Any) -> Any:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.truths.scene_description import (
-    UNIT_MM,
+    CYCLES_UNIT_MM,
     Mitsuba,
     SceneDict,
     camera_axes,
@@ -163,7 +163,7 @@ def cycles_sphere(light: SphereLight) -> SceneDict:
 
 def cycles_rectangle(light: RectangleLight) -> SceneDict:
     """Return Cycles' area light; its power P gives the radiance P / (pi A) on its area A."""
-    width, height = light.width_mm / UNIT_MM, light.height_mm / UNIT_MM
+    width, height = light.width_mm / CYCLES_UNIT_MM, light.height_mm / CYCLES_UNIT_MM
     unit_irradiance = facing_irradiance(light.width_mm, light.height_mm, _target_distance_mm(light)) / (
         np.pi * width * height
     )
@@ -181,7 +181,7 @@ def cycles_directional(light: DirectionalLight) -> SceneDict:
 def cycles_stripe(light: StripeLight) -> SceneDict:
     """Return a distant point light, which cycles_script.py turns into a stripe light by shader nodes."""
     across, along, forward = camera_axes(light.direction, light.up)
-    power = 4.0 * np.pi * (_DISTANT_LIGHT_MM / UNIT_MM) ** 2
+    power = 4.0 * np.pi * (_DISTANT_LIGHT_MM / CYCLES_UNIT_MM) ** 2
     source = light.position - _DISTANT_LIGHT_MM * forward
     distant = cycles_light("POINT", light.irradiance, power, source, light.direction, shadow_soft_size=0.0)
     axes = {
@@ -195,9 +195,9 @@ def cycles_stripe(light: StripeLight) -> SceneDict:
 def _cycles_point_light(
     lamp_type: str, light: PointLight, *, radius_mm: float = 0.0, **fields: float
 ) -> SceneDict:
-    power = 4.0 * np.pi * (_target_distance_mm(light) / UNIT_MM) ** 2
+    power = 4.0 * np.pi * (_target_distance_mm(light) / CYCLES_UNIT_MM) ** 2
     to_target = np.subtract(light.target, light.position)
-    round_light = {"shadow_soft_size": radius_mm / UNIT_MM, "use_soft_falloff": False}
+    round_light = {"shadow_soft_size": radius_mm / CYCLES_UNIT_MM, "use_soft_falloff": False}
     return cycles_light(
         lamp_type, light.irradiance, power, light.position, to_target, **round_light, **fields
     )

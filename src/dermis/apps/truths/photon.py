@@ -136,11 +136,11 @@ def _ring_index(x: float, y: float, squared_ring_edges: Floats) -> int:
 
 @compiled
 def _tally_exit(
-    x: float, y: float, upward: bool, scatterings: int, squared_ring_edges: Floats, tally: PhotonTally
+    x: float, y: float, is_upward: bool, scatterings: int, squared_ring_edges: Floats, tally: PhotonTally
 ) -> None:
     if scatterings == 0:
-        tally.unscattered[0 if upward else 1] += 1
-    elif upward:
+        tally.unscattered[0 if is_upward else 1] += 1
+    elif is_upward:
         tally.reflected[_ring_index(x, y, squared_ring_edges)] += 1
     else:
         tally.transmitted[_ring_index(x, y, squared_ring_edges)] += 1
@@ -160,9 +160,9 @@ def _trace_photon(
     scatterings = 0
     depth = -math.log(random_uniform(rng))  # optical depth to the next scattering
     for _ in range(MAX_PHOTON_EVENTS):
-        upward = uz < 0.0
+        is_upward = uz < 0.0
         path = depth / layer_stack.sigma_t[layer]
-        to_face = (layer_stack.face_mm[layer - 1 if upward else layer] - z) / uz
+        to_face = (layer_stack.face_mm[layer - 1 if is_upward else layer] - z) / uz
         if path < to_face:
             x, y, z = x + path * ux, y + path * uy, z + path * uz
             if random_uniform(rng) > layer_stack.albedo[layer]:
@@ -173,16 +173,16 @@ def _trace_photon(
             scatterings += 1
             continue
         x, y = x + to_face * ux, y + to_face * uy
-        z = layer_stack.face_mm[layer - 1 if upward else layer]
+        z = layer_stack.face_mm[layer - 1 if is_upward else layer]
         depth -= to_face * layer_stack.sigma_t[layer]
-        beyond = layer - 1 if upward else layer + 1
+        beyond = layer - 1 if is_upward else layer + 1
         eta = layer_stack.eta[layer] / layer_stack.eta[beyond]
         F, cosine = refract(abs(uz), eta)
         if F > 0.0 and random_uniform(rng) < F:
             uz = -uz
             continue
         if beyond == 0 or beyond > bottom:
-            _tally_exit(x, y, upward, scatterings, squared_ring_edges, tally)
+            _tally_exit(x, y, is_upward, scatterings, squared_ring_edges, tally)
             return
         ux, uy, uz = eta * ux, eta * uy, math.copysign(cosine, uz)
         layer = beyond

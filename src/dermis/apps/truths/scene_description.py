@@ -22,16 +22,16 @@ MitsubaObject = Any
 """Untyped object of Mitsuba: a scene, a mesh, a transform, a material or a medium."""
 Vector = Sequence[float] | Floats
 """Vector of three components: a position, direction or colour."""
-UNIT_MM = 100.0
+CYCLES_UNIT_MM = 100.0
 """Length of Cycles' unit; a head is a few units in size, as its sampling expects."""
 _UP_AXIS = 0.0, 1.0, 0.0
 _CYCLES_FROM_DERMIS_AXES = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
 
 def check_camera(camera: Camera, renderer: str) -> None:
-    """Raise DermisError for a shifted principal point or non-square pixels, which a renderer cannot use.
+    """Raise DermisError for a camera with a shifted principal point or non-square pixels.
 
-    renderer : name of the renderer that the message mentions
+    renderer : name of the renderer that does not support such cameras, for the message
     """
     if camera.principal_point != (0.5, 0.5) or camera.pixel_aspect != 1.0:
         expected = f"a principal point in the middle and square pixels, for {renderer}"
@@ -92,7 +92,7 @@ def cycles_look_at(position: Vector, forward: Vector, up: Vector = _UP_AXIS) -> 
     """Return the world matrix, in Cycles' units, of an object whose -Z axis is `forward`, with Y upwards."""
     right, upwards, view_direction = camera_axes(forward, up)
     matrix = np.eye(4)
-    matrix[:3] = np.column_stack([right, upwards, -view_direction, np.divide(position, UNIT_MM)])
+    matrix[:3] = np.column_stack([right, upwards, -view_direction, np.divide(position, CYCLES_UNIT_MM)])
     return [[float(value) for value in row] for row in matrix]
 
 

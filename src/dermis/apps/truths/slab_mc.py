@@ -30,7 +30,7 @@ MAX_PHOTONS = 10**10
 
 _MAX_SEED = 2**63 - 1
 _PHOTONS_PER_CALL = 20_000  # between two checks for Ctrl-C
-_REPORTED_PHOTON_LOSS = 1e-3  # fraction of dropped photons from which on a warning reports it
+_REPORTED_UNFINISHED_FRACTION = 1e-3  # fraction of dropped photons from which on a warning reports it
 
 
 def default_ring_edges() -> Floats:
@@ -132,7 +132,7 @@ def monte_carlo_profile(
 
 def _unfinished_warnings(channel_results: Sequence[SlabResult]) -> list[str]:
     lost = max(run.relative_to_entering.unfinished for run in channel_results)
-    if lost < _REPORTED_PHOTON_LOSS:
+    if lost < _REPORTED_UNFINISHED_FRACTION:
         return []
     return [f"{lost:.1%} of the light was dropped after very many scatterings and is missing from the total"]
 
@@ -217,10 +217,10 @@ def _slab_result(tally: PhotonTally, photons: int, edges: Floats, eta: float) ->
     specular = refract(1.0, 1.0 / eta)[0]
     ring_areas = np.pi * np.diff(edges**2)
 
-    def fraction(photon_counts: Counts) -> Floats:
+    def power_fraction(photon_counts: Counts) -> Floats:
         return (1.0 - specular) * photon_counts / photons
 
-    def error(photon_counts: Counts) -> Floats:
+    def standard_error(photon_counts: Counts) -> Floats:
         p = photon_counts / photons
         return (1.0 - specular) * np.sqrt(p * (1.0 - p) / photons)
 
@@ -229,21 +229,21 @@ def _slab_result(tally: PhotonTally, photons: int, edges: Floats, eta: float) ->
         photons=photons,
         edges_mm=edges,
         specular=specular,
-        reflectance=fraction(reflected[:-1]) / ring_areas,
-        reflectance_se=error(reflected[:-1]) / ring_areas,
-        transmittance=fraction(transmitted[:-1]) / ring_areas,
-        transmittance_se=error(transmitted[:-1]) / ring_areas,
-        total_reflectance=float(fraction(reflected.sum())),
-        total_reflectance_se=float(error(reflected.sum())),
-        total_transmittance=float(fraction(transmitted.sum())),
-        total_transmittance_se=float(error(transmitted.sum())),
-        overflow_reflectance=float(fraction(reflected[-1])),
-        overflow_transmittance=float(fraction(transmitted[-1])),
-        unscattered_reflectance=float(fraction(tally.unscattered[0])),
-        unscattered_transmittance=float(fraction(tally.unscattered[1])),
-        absorbed=fraction(tally.absorbed),
-        absorbed_se=error(tally.absorbed),
-        unfinished=float(fraction(tally.unfinished[0])),
+        reflectance=power_fraction(reflected[:-1]) / ring_areas,
+        reflectance_se=standard_error(reflected[:-1]) / ring_areas,
+        transmittance=power_fraction(transmitted[:-1]) / ring_areas,
+        transmittance_se=standard_error(transmitted[:-1]) / ring_areas,
+        total_reflectance=float(power_fraction(reflected.sum())),
+        total_reflectance_se=float(standard_error(reflected.sum())),
+        total_transmittance=float(power_fraction(transmitted.sum())),
+        total_transmittance_se=float(standard_error(transmitted.sum())),
+        overflow_reflectance=float(power_fraction(reflected[-1])),
+        overflow_transmittance=float(power_fraction(transmitted[-1])),
+        unscattered_reflectance=float(power_fraction(tally.unscattered[0])),
+        unscattered_transmittance=float(power_fraction(tally.unscattered[1])),
+        absorbed=power_fraction(tally.absorbed),
+        absorbed_se=standard_error(tally.absorbed),
+        unfinished=float(power_fraction(tally.unfinished[0])),
     )
 
 

@@ -48,7 +48,7 @@ class Slab:
         """Return the depth interval (c,) after which the mirror images repeat [mm]."""
         return np.asarray(2.0 * (self.layer.thickness_mm + sum(self.z_b)))
 
-    def flipped(self) -> Slab:
+    def upside_down(self) -> Slab:
         """Return the slab upside down, to solve for light that enters from below."""
         return Slab(self.layer, self.A_bottom, self.A_top, self.clamp)
 
@@ -113,12 +113,12 @@ def _image_sum(frequency: ArrayLike, slab: Slab, real_source: Floats, image_sour
     q = np.sqrt(slab.layer.sigma_tr**2 + np.asarray(frequency, dtype=np.float64)[..., None] ** 2)
     P = slab.period_mm
 
-    def image_sources(z: Floats) -> Floats:
+    def periodic_source_sum(z: Floats) -> Floats:
         z0 = np.mod(z, P)  # the series is odd and periodic: the sum of two geometric series
         return np.asarray((np.exp(-z0 * q) - np.exp(-(P - z0) * q)) / -np.expm1(-P * q))
 
     return np.asarray(
-        0.5 * slab.layer.alpha_prime * (image_sources(real_source) - image_sources(image_source))
+        0.5 * slab.layer.alpha_prime * (periodic_source_sum(real_source) - periodic_source_sum(image_source))
     )
 
 
@@ -197,5 +197,5 @@ def _single_slab_response(frequency: ArrayLike, slab: Slab) -> StackResponse:
     R, T = reflectance_hankel(frequency, slab), transmittance_hankel(frequency, slab)
     if np.isinf(slab.layer.thickness_mm):  # no light comes from below
         return StackResponse(R, T, np.zeros_like(R), np.zeros_like(R))
-    below = slab.flipped()
+    below = slab.upside_down()
     return StackResponse(R, T, reflectance_hankel(frequency, below), transmittance_hankel(frequency, below))

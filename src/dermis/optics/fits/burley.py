@@ -12,7 +12,7 @@ from dermis.optics.fits.targets import RingTarget, ring_error
 from dermis.optics.media import Floats
 
 _MEDIAN_RADIUS_FACTOR = 1.58  # s times the radius within which half of the light leaves
-_UNITY_ENGINE_CUTOFF = 0.997  # fraction of the light within the radius at which Unity cuts profiles off
+_UNITY_LIGHT_FRACTION_IN_RADIUS = 0.997  # for the radius at which Unity cuts profiles off
 UNREAL_SHAPE_RATIO = 0.6
 _UNREAL_MIN_DISTANCE_CM = 0.1
 
@@ -147,7 +147,7 @@ def unity_parameters(profile: BurleyProfile) -> UnityParameters:
     return UnityParameters(
         scattering_colour=tuple((distance / distance.max()).tolist()),
         multiplier_mm=float(distance.max()),
-        max_radius_mm=float(profile.radius_at_fraction(_UNITY_ENGINE_CUTOFF).max()),
+        max_radius_mm=float(profile.radius_at_fraction(_UNITY_LIGHT_FRACTION_IN_RADIUS).max()),
     )
 
 

@@ -85,7 +85,7 @@ def fit_gaussians(
         )
     groups = [target] if shared else [target.channel(i) for i in range(len(target.total))]
     fits = [
-        _fit_group(group, terms, keep_energy, _variances_of_fit(similar_fit, None if shared else i, terms))
+        _fit_channels(group, terms, keep_energy, _variances_of_fit(similar_fit, None if shared else i, terms))
         for i, group in enumerate(groups)
     ]
     profile = _combine_fits(fits, profile_name)
@@ -98,7 +98,7 @@ def fit_gaussians(
     )
 
 
-def _fit_group(
+def _fit_channels(
     target: FitTarget, gaussian_count: int, keep_energy: bool, start_variances_mm2: Floats | None
 ) -> tuple[Floats, Floats]:
     """Fit k Gaussians to the channels of a target; return variances (k,) and weights (k, c).
@@ -106,20 +106,23 @@ def _fit_group(
     start_variances_mm2 : (k,) variances from which the search starts; None for several default starts [mm2]
     """
     norm = np.linalg.norm(target.samples, axis=0)
-    design, samples = _with_energy_equation(target) if keep_energy else (target.design, target.samples)
+    design, samples = (
+        _with_energy_equation(target) if keep_energy else (target.design_and_derivatives, target.samples)
+    )
     bounds = _log_variance_bounds(target)
 
-    def run(start: Floats, tolerance: float = COST_TOLERANCE) -> WeightedFit:
+    def minimise_from(start: Floats, tolerance: float = COST_TOLERANCE) -> WeightedFit:
         return minimise(design, samples / norm, np.clip(start, *bounds), bounds, tolerance)
 
     best = (
         None
         if start_variances_mm2 is None
-        else run(np.log(start_variances_mm2), _COST_TOLERANCE_FROM_SIMILAR_FIT)
+        else minimise_from(np.log(start_variances_mm2), _COST_TOLERANCE_FROM_SIMILAR_FIT)
     )
     if best is None or not best.weight.any(axis=1).all():  # another start may use all Gaussians
         best = min(
-            (run(start) for start in _initial_variances(target, gaussian_count)), key=lambda fit: fit.cost
+            (minimise_from(start) for start in _initial_variances(target, gaussian_count)),
+            key=lambda fit: fit.cost,
         )
     weight = best.weight * norm
     if not weight.any(axis=0).all():
@@ -152,14 +155,14 @@ def _with_energy_equation(target: FitTarget) -> tuple[DesignFunction, Floats]:
     that it holds almost exactly.
     """
     width = target.mean_radius_at([0.5]) ** 2 / 2.0
-    stiffness = _ENERGY_EQUATION_WEIGHT * float(np.linalg.norm(target.design(width)[0]))
+    stiffness = _ENERGY_EQUATION_WEIGHT * float(np.linalg.norm(target.design_and_derivatives(width)[0]))
 
-    def design(variance_mm2: Floats) -> tuple[Floats, Floats]:
-        columns, slopes = target.design(variance_mm2)
+    def design_and_derivatives(variance_mm2: Floats) -> tuple[Floats, Floats]:
+        columns, slopes = target.design_and_derivatives(variance_mm2)
         row = np.ones((1, len(variance_mm2)))
         return np.vstack([stiffness * row, columns]), np.vstack([0.0 * row, slopes])
 
-    return design, np.vstack([stiffness * target.total, target.samples])
+    return design_and_derivatives, np.vstack([stiffness * target.total, target.samples])
 
 
 def _variances_of_fit(
@@ -202,16 +205,18 @@ def single_gaussian(profile: GaussianSum) -> GaussianSum:
     """
     from scipy.optimize import minimize_scalar
 
-    def candidate(log_variance: float) -> GaussianSum:
+    def gaussian_of_log_variance(log_variance: float) -> GaussianSum:
         name, variance = f"{profile.name}, one blur", np.exp([log_variance])
         return GaussianSum(name, variance, profile.albedo[None], profile.from_photons)
 
-    def misfit(log_variance: float) -> float:
-        gaussian = candidate(log_variance)
+    def squared_error(log_variance: float) -> float:
+        gaussian = gaussian_of_log_variance(log_variance)
         return float((gaussian.inner_product(gaussian) - 2 * gaussian.inner_product(profile)).sum())
 
     ends = np.log(profile.variance_mm2[[0, -1]])
-    return candidate(minimize_scalar(misfit, bounds=(ends[0] - 1e-6, ends[1] + 1e-6), method="bounded").x)
+    return gaussian_of_log_variance(
+        minimize_scalar(squared_error, bounds=(ends[0] - 1e-6, ends[1] + 1e-6), method="bounded").x
+    )
 
 
 def shared_gaussians(

@@ -43,10 +43,10 @@ class PointTarget:
 
     @cached_property
     def samples(self) -> Floats:
-        """Return samples (n, c) of R, weighted so that their squares sum to the integral of r R^2."""
+        """Return samples (n, c) of R(r), weighted so that their squares sum to the integral of r R(r)^2."""
         return self._sqrt_quadrature_weights[:, None] * self.reflectance
 
-    def design(self, variance_mm2: Floats) -> tuple[Floats, Floats]:
+    def design_and_derivatives(self, variance_mm2: Floats) -> tuple[Floats, Floats]:
         """Return weighted samples (n, k) of k unit Gaussians, and their derivatives (n, k).
 
         The derivatives are those with respect to the logarithm of the variance.
@@ -64,7 +64,7 @@ class PointTarget:
 
         Source: [dEonLuebke2007] section 14.4.
         """
-        residual = self.design(variance_mm2)[0] @ weight - self.samples
+        residual = self.design_and_derivatives(variance_mm2)[0] @ weight - self.samples
         return np.asarray(np.sqrt((residual**2).sum(axis=0) / (self.samples**2).sum(axis=0)))
 
     def mean_radius_at(self, fractions: Sequence[float]) -> Floats:
@@ -72,8 +72,8 @@ class PointTarget:
 
         fractions : increasing fractions of the light, 0 to 1 [-]
         """
-        rate = self._sqrt_quadrature_weights[:, None] ** 2 * np.abs(self.reflectance)
-        return _radii_at_fractions(fractions, self.radius_mm, rate)
+        radial_density = self._sqrt_quadrature_weights[:, None] ** 2 * np.abs(self.reflectance)
+        return _radii_at_fractions(fractions, self.radius_mm, radial_density)
 
     def channel(self, channel_index: int) -> PointTarget:
         """Return the target with only one of its channels, to fit this channel separately."""
@@ -109,7 +109,7 @@ class RingTarget:
         """Return the ring energies (n, c); a fit minimises the sum of their squared errors [-]."""
         return self.energy
 
-    def design(self, variance_mm2: Floats) -> tuple[Floats, Floats]:
+    def design_and_derivatives(self, variance_mm2: Floats) -> tuple[Floats, Floats]:
         """Return ring energies (n, k) of k unit Gaussians, and their derivatives (n, k).
 
         The derivatives are those with respect to the logarithm of the variance.
@@ -122,7 +122,7 @@ class RingTarget:
 
     def error(self, variance_mm2: Floats, weight: Floats) -> Floats:
         """Return the relative error (c,) of a sum of Gaussians, as defined by `ring_error` [-]."""
-        return ring_error(self, self.design(variance_mm2)[0] @ weight)
+        return ring_error(self, self.design_and_derivatives(variance_mm2)[0] @ weight)
 
     def mean_radius_at(self, fractions: Sequence[float]) -> Floats:
         """Return the radii within which given fractions of the light emerge, on average over channels [mm].
@@ -149,8 +149,10 @@ def ring_error(target: RingTarget, fitted_energy: Floats) -> Floats:
     return np.asarray(np.sqrt(m * (residual**2).sum(axis=(0, 1)) / (target.energy**2).sum(axis=0)))
 
 
-def _radii_at_fractions(light_fractions: Sequence[float], radius_mm: Floats, rate: Floats) -> Floats:
-    cumulative = np.cumsum(rate / rate.sum(axis=0), axis=0).mean(axis=1)
+def _radii_at_fractions(
+    light_fractions: Sequence[float], radius_mm: Floats, radial_density: Floats
+) -> Floats:
+    cumulative = np.cumsum(radial_density / radial_density.sum(axis=0), axis=0).mean(axis=1)
     return np.asarray(np.interp(light_fractions, cumulative, radius_mm))
 
 

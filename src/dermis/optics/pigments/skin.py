@@ -16,9 +16,9 @@ from dermis.optics.pigments.spectra import (
     WAVELENGTHS_NM,
     ScatteringLaw,
     baseline_absorption,
-    blood,
+    blood_absorption,
     donner_jensen_2006,
-    melanosome,
+    melanosome_absorption,
     visible_wavelengths,
 )
 
@@ -83,7 +83,7 @@ def _build_donner2008(
     parameters: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats
 ) -> tuple[Layer, ...]:
     """Return an epidermis, a melanin sheet and a dermis after equations 11 and 12 of [Donner2008]."""
-    melanin = parameters.melanin * melanosome(wavelength_nm, parameters.eumelanin)
+    melanin = parameters.melanin * melanosome_absorption(wavelength_nm, parameters.eumelanin)
     sheet_sigma_a = LEAKED_MELANIN * melanin * parameters.epidermis_mm / _MELANIN_SHEET_MM
     return (
         _epidermis_layer(parameters, wavelength_nm, sigma_s_prime, parameters.epidermal_blood),
@@ -126,8 +126,8 @@ def _epidermal_absorption(
     parameters: SkinParameters, melanin: float | Floats, wavelength_nm: Floats, blood_fraction: float = 0.0
 ) -> Floats:
     tissue = (1.0 - melanin - blood_fraction) * _bloodless_absorption(parameters, wavelength_nm)
-    pigment = melanin * melanosome(wavelength_nm, parameters.eumelanin)
-    return np.asarray(pigment + blood_fraction * blood(wavelength_nm, parameters.oxygen) + tissue)
+    pigment = melanin * melanosome_absorption(wavelength_nm, parameters.eumelanin)
+    return np.asarray(pigment + blood_fraction * blood_absorption(wavelength_nm, parameters.oxygen) + tissue)
 
 
 def _dermis_layer(
@@ -141,7 +141,7 @@ def _dermis_layer(
 def _dermal_absorption(
     parameters: SkinParameters, blood_fraction: float | Floats, wavelength_nm: Floats
 ) -> Floats:
-    vessels = blood_fraction * blood(wavelength_nm, parameters.oxygen)
+    vessels = blood_fraction * blood_absorption(wavelength_nm, parameters.oxygen)
     return np.asarray(vessels + (1.0 - blood_fraction) * _bloodless_absorption(parameters, wavelength_nm))
 
 

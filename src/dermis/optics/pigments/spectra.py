@@ -22,7 +22,7 @@ WAVELENGTHS_NM.setflags(write=False)
 _PRIMARIES_XY = np.array([[0.64, 0.33], [0.30, 0.60], [0.15, 0.06]])  # red, green, blue; CIE 1931 x, y
 _NM_PER_MM = 1e6
 _MM_PER_CM = 10.0
-_HAEMOGLOBIN_MOLAR = 150.0 / 64500.0  # in whole blood: 150 g/l of 64500 g/mol [mol/l]
+_HAEMOGLOBIN_MOL_PER_LITRE = 150.0 / 64500.0  # in whole blood: 150 g/l of 64500 g/mol [mol/l]
 ScatteringLaw = Callable[[ArrayLike], Floats]
 """Function from wavelengths [nm] to the reduced scattering of the epidermis [1/mm]."""
 DERMIS_SCATTERING_RATIO: Final = 0.5
@@ -91,7 +91,7 @@ def _spectrum_columns(table_name: str) -> dict[str, Floats]:
     return {name: float_columns(rows, name)[:, 0] for name in rows[0]}
 
 
-def eumelanin(wavelength_nm: ArrayLike) -> Floats:
+def eumelanin_absorption(wavelength_nm: ArrayLike) -> Floats:
     """Return the absorption coefficient of melanosomes with eumelanin, which is brown to black [1/mm].
 
     Source: [Jacques1998], as in [DonnerJensen2006].
@@ -99,7 +99,7 @@ def eumelanin(wavelength_nm: ArrayLike) -> Floats:
     return np.asarray(6.6e10 * visible_wavelengths(wavelength_nm) ** -3.33)
 
 
-def pheomelanin(wavelength_nm: ArrayLike) -> Floats:
+def pheomelanin_absorption(wavelength_nm: ArrayLike) -> Floats:
     """Return the absorption coefficient of melanosomes with pheomelanin, which is yellow to red [1/mm].
 
     Source: [DonnerJensen2006], as quoted by public code.
@@ -107,14 +107,14 @@ def pheomelanin(wavelength_nm: ArrayLike) -> Floats:
     return np.asarray(2.9e14 * visible_wavelengths(wavelength_nm) ** -4.75)
 
 
-def melanosome(wavelength_nm: ArrayLike, eumelanin_fraction: float) -> Floats:
+def melanosome_absorption(wavelength_nm: ArrayLike, eumelanin_fraction: float) -> Floats:
     """Return the absorption coefficient of melanosomes with a mixture of eumelanin and pheomelanin [1/mm].
 
     eumelanin_fraction : fraction of the melanosomes that contain eumelanin, 0 to 1 [-]
 
     Source: [DonnerJensen2006].
     """
-    dark, light = eumelanin(wavelength_nm), pheomelanin(wavelength_nm)
+    dark, light = eumelanin_absorption(wavelength_nm), pheomelanin_absorption(wavelength_nm)
     return eumelanin_fraction * dark + (1.0 - eumelanin_fraction) * light
 
 
@@ -126,7 +126,7 @@ def baseline_absorption(wavelength_nm: ArrayLike) -> Floats:
     return np.asarray(0.0244 + 8.53 * np.exp(-(visible_wavelengths(wavelength_nm) - 154.0) / 66.2))
 
 
-def oxyhaemoglobin(wavelength_nm: ArrayLike) -> Floats:
+def oxyhaemoglobin_extinction(wavelength_nm: ArrayLike) -> Floats:
     """Return the decadic molar extinction coefficient of oxygenated haemoglobin [1/(cm M)].
 
     Source: [Prahl1999].
@@ -134,7 +134,7 @@ def oxyhaemoglobin(wavelength_nm: ArrayLike) -> Floats:
     return interpolate_spectrum("haemoglobin", "oxyhaemoglobin", wavelength_nm)
 
 
-def deoxyhaemoglobin(wavelength_nm: ArrayLike) -> Floats:
+def deoxyhaemoglobin_extinction(wavelength_nm: ArrayLike) -> Floats:
     """Return the decadic molar extinction coefficient of haemoglobin without oxygen [1/(cm M)].
 
     Source: [Prahl1999].
@@ -142,23 +142,24 @@ def deoxyhaemoglobin(wavelength_nm: ArrayLike) -> Floats:
     return interpolate_spectrum("haemoglobin", "deoxyhaemoglobin", wavelength_nm)
 
 
-def blood(wavelength_nm: ArrayLike, oxygen: float) -> Floats:
+def blood_absorption(wavelength_nm: ArrayLike, oxygen: float) -> Floats:
     """Return the absorption coefficient of whole blood [1/mm].
 
     oxygen : fraction of oxygenated haemoglobin, 0 to 1 [-]
 
     Source: [Prahl1999].
     """
-    extinction = oxygen * oxyhaemoglobin(wavelength_nm) + (1.0 - oxygen) * deoxyhaemoglobin(wavelength_nm)
-    return np.asarray(np.log(10.0) * _HAEMOGLOBIN_MOLAR * extinction / _MM_PER_CM)
+    extinction = oxygen * oxyhaemoglobin_extinction(wavelength_nm) + (
+        1.0 - oxygen
+    ) * deoxyhaemoglobin_extinction(wavelength_nm)
+    return np.asarray(np.log(10.0) * _HAEMOGLOBIN_MOL_PER_LITRE * extinction / _MM_PER_CM)
 
 
-def water(wavelength_nm: ArrayLike) -> Floats:
+def water_absorption(wavelength_nm: ArrayLike) -> Floats:
     """Return the absorption coefficient of water, 4 pi k / lambda [1/mm].
 
-    Here, k is the imaginary part of the index of refraction. No skin structure uses this spectrum: up to 700
-    nm, it is less than 3 % of `baseline_absorption`, which was measured on moist tissue and so includes
-    water.
+    Here, k is the imaginary part of the index of refraction. The skin models do not need this spectrum,
+    because `baseline_absorption` was measured on moist tissue and so includes water.
 
     Source: [HaleQuerry1973].
     """

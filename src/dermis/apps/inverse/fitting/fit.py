@@ -99,7 +99,7 @@ class InitialGuess:
         self, frames: FaceRenderer, point: FitPoint, photo_radiance: Floats, pixel_weight: Floats
     ) -> None:
         self.point = point
-        diffuse, specular = frames.diffuse_and_specular(point)
+        diffuse, specular = frames.diffuse_and_specular_radiance(point)
         weighted = np.concatenate([diffuse, specular]) * pixel_weight
         weighted_target = photo_radiance * pixel_weight
         self._grams = np.einsum("apc,bpc->cab", weighted, weighted, optimize=True)
@@ -111,29 +111,29 @@ class InitialGuess:
         fixed = pigments.overrides()
         self._table = skin_colour_table(fixed["eumelanin"], fixed["oxygen"], fixed["epidermis_mm"])
 
-    def best(self, sun_count: int, melanin_grid: Floats = _MELANIN_GRID) -> FitPoint:
+    def best_point(self, sun_count: int, melanin_grid: Floats = _MELANIN_GRID) -> FitPoint:
         """Return the point whose pigments, specular strength and `sun_count` suns have the smallest residual.
 
         melanin_grid : melanin fractions to try
         """
         log_skin, suns = self.point.logs, self._select_suns(self.point.logs, sun_count)
         for _ in range(2):
-            trials, residuals = self._trials(log_skin, suns, melanin_grid)
+            trials, residuals = self._try_skins(log_skin, suns, melanin_grid)
             log_skin = trials[int(np.argmin(residuals))]
             suns = self._select_suns(log_skin, sun_count)
         return replace(self.point, logs=log_skin, suns=self.point.suns[suns])
 
-    def minima(self, best: FitPoint) -> list[Floats]:
+    def melanin_ranges(self, best: FitPoint) -> list[Floats]:
         """Return a range of melanin fractions around each local minimum of the residual, lowest first.
 
         There can be several minima, such as dark skin in strong light and pale skin in weak light. Minima
         with a residual much larger than the smallest residual are left out. A single minimum gets the whole
         grid as its range.
 
-        best : result of `best`
+        best : result of `best_point`
         """
         suns = [int(np.argmax(self.point.suns @ one)) for one in best.suns]
-        _, residuals = self._trials(best.logs, suns, _MELANIN_GRID)
+        _, residuals = self._try_skins(best.logs, suns, _MELANIN_GRID)
         profile = residuals.reshape(len(_MELANIN_GRID), -1).min(axis=1)
         padded = np.concatenate([[np.inf], profile, [np.inf]])
         is_minimum = (profile <= padded[:-2]) & (profile <= padded[2:])
@@ -146,12 +146,12 @@ class InitialGuess:
             for k in ordered
         ]
 
-    def _trials(
+    def _try_skins(
         self, log_skin: Floats, sun_indices: list[int], melanin_grid: Floats
     ) -> tuple[list[Floats], Floats]:
-        """Return all skins on a grid as n arrays of 4 logarithms, and the squared residual (n,) of each skin.
+        """Return n trial skins, each as 4 logarithms (4,), and the squared residual (n,) of each skin.
 
-        The grid spans melanin, blood and specular strength.
+        The skins are the nodes of a grid of melanin, blood and specular strength.
 
         log_skin : (4,) logarithms of the skin unknowns, of which only the roughness is used
         sun_indices : indices of the candidate suns
@@ -279,7 +279,7 @@ def fit(
     white_point = _checked_white(white)
     scale = white_point * exposure
     photograph = read_photograph(photo)
-    small = photograph.within(checked_integer("side", side, 32, 1024, "pixels"))
+    small = photograph.reduced_to(checked_integer("side", side, 32, 1024, "pixels"))
     subject = fit_subject(head, camera)
     if landmarks is not None:
         subject = align_to_landmarks(subject, landmarks, photograph.size)
@@ -292,7 +292,7 @@ def fit(
         found = [solve_fit(problem, start, progress) for start in starts]
         state, derivatives = min(found, key=lambda one: block_residual(problem, one[0]))
         scene = frames.lit_scene(state.point, state.strengths)
-        picture = frames.picture(scene) * scale * light_tint(state.point)
+        picture = frames.render_picture(scene) * scale * light_tint(state.point)
     relative_residual = np.abs(state.residual) / np.maximum(problem.target, 1e-6)
     note_residual(photo if isinstance(photo, str | Path) else "photo", block_residual(problem, state))
     return FitResult(
@@ -362,13 +362,13 @@ def _initial_points(problem: FitProblem, candidate: FitPoint, sun_count: int) ->
     """Return the points where fits start: minima of a coarse search, refined by a search near their suns."""
     frames, target, weight = problem.frames, problem.target, problem.initial_weights()
     coarse = InitialGuess(frames, candidate, target, weight)
-    best = coarse.best(sun_count)
+    best = coarse.best_point(sun_count)
     starts = []
-    for melanin in coarse.minima(best):
-        start = coarse.best(sun_count, melanin)
+    for melanin in coarse.melanin_ranges(best):
+        start = coarse.best_point(sun_count, melanin)
         if sun_count:
             nearer = replace(start, suns=neighbouring_suns(start.suns))
-            start = InitialGuess(frames, nearer, target, weight).best(sun_count, melanin)
+            start = InitialGuess(frames, nearer, target, weight).best_point(sun_count, melanin)
         starts.append(start)
     return starts
 

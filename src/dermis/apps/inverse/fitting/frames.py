@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.apps.inverse.fitting.light_basis import AMBIENT_LOBE_COUNT, panorama
+from dermis.apps.inverse.fitting.light_basis import AMBIENT_LOBE_COUNT, ambient_panorama
 from dermis.apps.inverse.fitting.unknowns import FitPoint, sun_lights, with_skin
 from dermis.base.atomic_write import atomic_file
 from dermis.frame.rendered_frame import RenderedFrame
@@ -60,7 +60,7 @@ class FaceRenderer:
         skin = np.isin(label, _SKIN_LABELS) & (alpha > _FULL_COVERAGE) & (view_cosine > _MIN_VIEW_COSINE)
         self.mask = _erode(skin) & (unclipped_pixels > _FULL_COVERAGE)
 
-    def basis(self, point: FitPoint) -> Floats:
+    def single_light_radiance(self, point: FitPoint) -> Floats:
         """Render the face under each light alone; return the radiance (9 + k, p, 3) of the p masked pixels.
 
         The first nine lights are ambient lobes of radiance 1; the other k lights are suns of irradiance 1.
@@ -69,7 +69,7 @@ class FaceRenderer:
             [self._masked_radiance(scene, view) for scene, view in self._single_light_scenes(point)]
         )
 
-    def diffuse_and_specular(self, point: FitPoint) -> tuple[Floats, Floats]:
+    def diffuse_and_specular_radiance(self, point: FitPoint) -> tuple[Floats, Floats]:
         """Return the diffuse radiance (9 + k, p, 3) and the specular radiance under each light alone."""
         scenes = []
         for scene, view in self._single_light_scenes(point):
@@ -78,7 +78,7 @@ class FaceRenderer:
         both = np.asarray(scenes, np.float64)
         return both[:, 0], both[:, 1]
 
-    def combined(self, point: FitPoint, light_strengths: Floats, frame_name: str) -> Floats:
+    def combined_radiance(self, point: FitPoint, light_strengths: Floats, frame_name: str) -> Floats:
         """Render the face under all lights together; return the radiance (p, 3) of the masked pixels.
 
         light_strengths : (9 + k,) strengths of ambient lobes and suns
@@ -93,12 +93,12 @@ class FaceRenderer:
         panorama_name : file name of the panorama in `folder`, without suffix
         """
         suns = sun_lights(point.suns, light_strengths[AMBIENT_LOBE_COUNT:], np.ones(3))
-        radiance = panorama(light_strengths[:AMBIENT_LOBE_COUNT])
+        radiance = ambient_panorama(light_strengths[:AMBIENT_LOBE_COUNT])
         lights = [one for one in suns if max(one.irradiance) > 0.0]
         ambient = self._environment(panorama_name, radiance) if radiance.max() > 0.0 else None
         return with_skin(replace(self._with_lights(lights), environment=ambient), point)
 
-    def picture(self, scene: Scene) -> Floats:
+    def render_picture(self, scene: Scene) -> Floats:
         """Render a scene; return the linear radiance of all pixels (h, w, 3)."""
         return np.asarray(self._draw(scene, "together").linear(), np.float64)
 
@@ -109,7 +109,9 @@ class FaceRenderer:
         for k in range(AMBIENT_LOBE_COUNT):
             path = self.folder / f"lobe_{k}.exr"
             existing = Environment(name=str(path)) if path.exists() else None
-            ambient = existing or self._environment(path.stem, panorama(np.eye(AMBIENT_LOBE_COUNT)[k]))
+            ambient = existing or self._environment(
+                path.stem, ambient_panorama(np.eye(AMBIENT_LOBE_COUNT)[k])
+            )
             scenes.append((replace(base, environment=ambient), f"lobe {k}"))
         for k, sun in enumerate(sun_lights(point.suns, np.ones(len(point.suns)), np.ones(3))):
             scenes.append((replace(base, lights=(sun,)), f"sun {k}"))

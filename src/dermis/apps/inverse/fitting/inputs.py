@@ -45,7 +45,7 @@ class Photograph:
         """Return the width and height of the photograph [pixel]."""
         return self.linear.shape[1], self.linear.shape[0]
 
-    def within(self, max_side: int) -> Photograph:
+    def reduced_to(self, max_side: int) -> Photograph:
         """Return the photograph, reduced if its longer side has more than `max_side` pixels."""
         width, height = self.size
         if max(width, height) <= max_side:
@@ -115,8 +115,8 @@ class FitSubject:
 
     scene : head, camera, pose and surface
     person : parametric person with painted skin; None for other heads
-    table : table [head] for the scene file of the result; empty if the head has neither a name nor a file, in
-        which case the result cannot be saved
+    table : table [head] of the scene file in which the result is saved; empty if the head has neither a name
+        nor a file, and the result therefore cannot be saved
     known : names of the pigments that the scene states; the values of all other pigments are assumed
     """
 

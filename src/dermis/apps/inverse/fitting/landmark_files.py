@@ -39,11 +39,11 @@ _MAX_EYE_LINE_DEVIATION = 0.2  # largest distance of dlib's eye corners from a l
 _KNOWN_LANDMARK_COUNTS = ", ".join(map(str, (5, *_SETS_BY_LANDMARK_COUNT)))
 _JSON_LIST_KEYS = ("facelandmarks", "multifacelandmarks", "landmarks", "landmark", "value")
 _NAME_COLUMNS = ("name", "landmark", "index", "id", "point", "number", "")
-_PTS_LINE = re.compile(r"(version|n_points)\s*:\s*(\S+)", re.IGNORECASE)
+_PTS_HEADER_LINE = re.compile(r"(version|n_points)\s*:\s*(\S+)", re.IGNORECASE)
 _MAX_RELATIVE_COORDINATE = 2.0  # largest coordinate that is taken as relative to the size of the photograph
 
 
-class _Points(NamedTuple):
+class _FileLandmarks(NamedTuple):
     """Landmarks as read from a file.
 
     pixels : (n, 2) coordinates, NaN for missing landmarks [pixel]
@@ -71,11 +71,11 @@ def read_landmarks(path: str | Path, photo_size: tuple[int, int]) -> tuple[str, 
     lines = [line.strip() for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
     with parsing(path, _EXPECTED_FILE_FORMATS, KeyError, TypeError, IndexError, AttributeError, csv.Error):
         if re.match(r'\s*(\[|\{\s*["}])', text):
-            points = _from_json(path, parse_json(text, path, _EXPECTED_FILE_FORMATS), photo_size)
-        elif any(_PTS_LINE.fullmatch(line) for line in lines[:3]) or "{" in lines[:3]:
-            points = _from_pts(path, lines)
+            points = _landmarks_from_json(path, parse_json(text, path, _EXPECTED_FILE_FORMATS), photo_size)
+        elif any(_PTS_HEADER_LINE.fullmatch(line) for line in lines[:3]) or "{" in lines[:3]:
+            points = _landmarks_from_pts(path, lines)
         else:
-            points = _from_table(path, lines, photo_size)
+            points = _landmarks_from_table(path, lines, photo_size)
     name, names = _identify_landmarks(path, points)
     found = np.asarray(np.isfinite(points.pixels).all(axis=1))
     if not found.all():
@@ -91,7 +91,7 @@ def read_landmarks(path: str | Path, photo_size: tuple[int, int]) -> tuple[str, 
     return name, pixels
 
 
-def _identify_landmarks(path: str | Path, file_landmarks: _Points) -> tuple[str, Sequence[str]]:
+def _identify_landmarks(path: str | Path, file_landmarks: _FileLandmarks) -> tuple[str, Sequence[str]]:
     """Return the name of a file's landmark set, and the name in this set of each landmark in the file."""
     count, names = len(file_landmarks.pixels), file_landmarks.names
     if file_landmarks.set_name is not None:
@@ -138,17 +138,17 @@ def _identify_five_landmarks(pixels: Floats) -> tuple[str, Sequence[int]]:
     return name, [numbers[k] for k in order]
 
 
-def _from_pts(path: str | Path, lines: Sequence[str]) -> _Points:
-    headers = {match[1].lower(): match[2] for line in lines if (match := _PTS_LINE.fullmatch(line))}
-    rows = [line.split() for line in lines if not _PTS_LINE.fullmatch(line) and line not in "{}"]
+def _landmarks_from_pts(path: str | Path, lines: Sequence[str]) -> _FileLandmarks:
+    headers = {match[1].lower(): match[2] for line in lines if (match := _PTS_HEADER_LINE.fullmatch(line))}
+    rows = [line.split() for line in lines if not _PTS_HEADER_LINE.fullmatch(line) and line not in "{}"]
     count = headers.get("n_points", str(len(rows)))
     if int(count) != len(rows):
         refuse(path, f"{count} points as it states", f"got {len(rows)}", "Correct the file")
     pixels = np.array([[float(x), float(y)] for x, y in rows])
-    return _Points(pixels - 1.0)
+    return _FileLandmarks(pixels - 1.0)
 
 
-def _from_table(path: str | Path, lines: list[str], photo_size: tuple[int, int]) -> _Points:
+def _landmarks_from_table(path: str | Path, lines: list[str], photo_size: tuple[int, int]) -> _FileLandmarks:
     """Return the landmarks of a table, which may have a header.
 
     The columns are separated by commas, semicolons, tabs or spaces.
@@ -161,7 +161,7 @@ def _from_table(path: str | Path, lines: list[str], photo_size: tuple[int, int])
     )
     rows = [[cell.strip() for cell in row] for row in cells]
     if not any(map(_is_number, rows[0][1:])):
-        return _from_named_columns(path, rows[0], rows[1:], photo_size)
+        return _landmarks_from_named_columns(path, rows[0], rows[1:], photo_size)
     if len(rows) == 1:  # all coordinates in one line
         rows = [rows[0][k : k + 2] for k in range(0, len(rows[0]), 2)]
     first = [row[0] for row in rows]
@@ -170,12 +170,12 @@ def _from_table(path: str | Path, lines: list[str], photo_size: tuple[int, int])
     if len(rows[0]) > start + 2:
         notify(f"{path}: of its {len(rows[0])} columns those from {start + 3} on are not used")
     pixels = np.array([[_parse_number(cell) for cell in row[start : start + 2]] for row in rows])
-    return _Points(_to_pixels(path, pixels, photo_size), first if has_names else None)
+    return _FileLandmarks(_to_pixels(path, pixels, photo_size), first if has_names else None)
 
 
-def _from_named_columns(
+def _landmarks_from_named_columns(
     path: str | Path, header: Sequence[str], table_rows: list[list[str]], photo_size: tuple[int, int]
-) -> _Points:
+) -> _FileLandmarks:
     """Return the landmarks of a table with columns x, y and name, or x_0, y_0, x_1, ... as in OpenFace."""
     if "x_0" in header:
         if len(table_rows) > 1:
@@ -183,7 +183,7 @@ def _from_named_columns(
         count = sum(re.fullmatch(r"x_\d+", name) is not None for name in header)
         columns = [[header.index(f"{axis}_{k}") for axis in "xy"] for k in range(count)]
         pixels = np.array([[_parse_number(table_rows[0][column]) for column in pair] for pair in columns])
-        return _Points(_to_pixels(path, pixels, photo_size))
+        return _FileLandmarks(_to_pixels(path, pixels, photo_size))
     keys = [plain_key(name) for name in header]
     if not {"x", "y"} <= set(keys):
         refuse(
@@ -195,7 +195,7 @@ def _from_named_columns(
     if unused:
         notify(f"{path}: its columns {', '.join(unused)} are not used")
     pixels = np.array([[_parse_number(row[x]), _parse_number(row[y])] for row in table_rows])
-    return _Points(
+    return _FileLandmarks(
         _to_pixels(path, pixels, photo_size), None if name is None else [row[name] for row in table_rows]
     )
 
@@ -227,7 +227,7 @@ def _to_pixels(path: str | Path, coordinates: Floats, photo_size: tuple[int, int
     return np.asarray(coordinates * photo_size - 0.5)
 
 
-def _from_json(path: str | Path, json_value: Any, photo_size: tuple[int, int]) -> _Points:
+def _landmarks_from_json(path: str | Path, json_value: Any, photo_size: tuple[int, int]) -> _FileLandmarks:
     """Return the landmarks in JSON that was written by `dermis render --landmarks` or by MediaPipe."""
     if (
         isinstance(json_value, Mapping)
@@ -236,7 +236,7 @@ def _from_json(path: str | Path, json_value: Any, photo_size: tuple[int, int]) -
     ):
         name, rows = next(iter(json_value["landmarks"].items()))
         pixels = np.array([row["pixel"] for row in rows], np.float64)
-        return _Points(pixels, [str(row["name"]) for row in rows], name)
+        return _FileLandmarks(pixels, [str(row["name"]) for row in rows], name)
     while not (isinstance(json_value, list) and json_value and _is_point(json_value[0])):
         fields = (
             {plain_key(key): value for key, value in json_value.items()}
@@ -253,12 +253,12 @@ def _from_json(path: str | Path, json_value: Any, photo_size: tuple[int, int]) -
         else:
             refuse(path, _EXPECTED_FILE_FORMATS, "no face was found in it", "Find the landmarks again")
     if isinstance(json_value[0], list):
-        return _Points(
+        return _FileLandmarks(
             _to_pixels(path, np.array([point[:2] for point in json_value], np.float64), photo_size)
         )
     points = np.array([[point["x"], point["y"]] for point in json_value], np.float64)
     is_relative = np.abs(points).max() <= _MAX_RELATIVE_COORDINATE
-    return _Points(points * photo_size - 0.5 if is_relative else points)
+    return _FileLandmarks(points * photo_size - 0.5 if is_relative else points)
 
 
 def _is_point(json_value: object) -> bool:

@@ -57,7 +57,7 @@ def lobe_mixtures() -> tuple[Floats, Floats]:
     return np.asarray(weights, np.float64), towards
 
 
-def panorama(lobe_strengths: Floats) -> Floats:
+def ambient_panorama(lobe_strengths: Floats) -> Floats:
     """Return a panorama (h, w) of ambient radiance: the weighted sum of the 9 ambient lobes, clipped at 0.
 
     lobe_strengths : (9,) weights of the lobes, whose axes are `lobe_directions`

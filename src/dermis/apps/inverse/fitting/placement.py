@@ -49,12 +49,12 @@ def align_to_landmarks(subject: FitSubject, landmarks: str | Path, photo_size: t
     person, head = subject.person, subject.scene.head
     model = _LandmarkModel.for_head(person, head, name, pixels_by_name)
     pixels = np.array([pixels_by_name[one] for one in model.names])
-    solution = np.concatenate([np.zeros(6), [_log_focal(photo_size)], np.zeros(model.unknown_count)])
+    solution = np.concatenate([np.zeros(6), [_prior_log_focal(photo_size)], np.zeros(model.unknown_count)])
     solution[:3], solution[5] = (np.pi, 0.0, 0.0), _PORTRAIT_DISTANCE_MM
     for _ in range(_LINEARISATION_COUNT if person else 1):
         solution = _fit_camera_and_identity(model, pixels, photo_size, solution)
         if person is not None:
-            person = model.person(solution[7:])
+            person = model.person_with_identity(solution[7:])
             model = _LandmarkModel.for_head(person, head, name, pixels_by_name)
             solution[7:] = 0.0
     if person is not None:
@@ -113,7 +113,7 @@ class _LandmarkModel:
         model = cls(names, person_landmarks(person), np.zeros((0, 0, 3)), person, details)
         unknowns = range(len(_MACRO_PARAMETERS) + len(details))
         return replace(
-            model, derivatives=np.stack([_derivative(model, person_landmarks, k) for k in unknowns])
+            model, derivatives=np.stack([_landmark_derivative(model, person_landmarks, k) for k in unknowns])
         )
 
     @property
@@ -121,7 +121,7 @@ class _LandmarkModel:
         """Return the number of unknowns of the identity, which is 0 for heads of fixed shape."""
         return len(self.derivatives)
 
-    def person(self, identity: Floats) -> Human:
+    def person_with_identity(self, identity: Floats) -> Human:
         """Return the person with a given identity.
 
         identity : (u,) differences of the unknowns from their values in `prior`, in standard deviations
@@ -139,7 +139,7 @@ class _LandmarkModel:
         return replace(self.prior, **macro, targets=targets, skin=self.prior.look)
 
 
-def _derivative(
+def _landmark_derivative(
     model: _LandmarkModel, person_landmarks: Callable[[Human], Floats], unknown_index: int
 ) -> Floats:
     """Return the derivative (n, 3) of landmark positions with respect to one unknown of the identity.
@@ -151,13 +151,13 @@ def _derivative(
     for step in _IDENTITY_STEP, -_IDENTITY_STEP:
         identity = np.zeros(len(_MACRO_PARAMETERS) + len(model.details))
         identity[unknown_index] = step
-        change = person_landmarks(model.person(identity)) - model.positions
+        change = person_landmarks(model.person_with_identity(identity)) - model.positions
         if change.any():
             break
     return np.asarray(change / step)
 
 
-def _log_focal(photo_size: tuple[int, int]) -> float:
+def _prior_log_focal(photo_size: tuple[int, int]) -> float:
     """Return the mean of the prior: the logarithm of the focal length of a usual portrait, in pixels.
 
     photo_size : width and height of the photograph [pixel]
@@ -197,7 +197,7 @@ def _fit_camera_and_identity(
     """
     from scipy.optimize import least_squares
 
-    prior_median = _log_focal(photo_size)
+    prior_median = _prior_log_focal(photo_size)
 
     def residuals(x: Floats) -> Floats:
         positions = model.positions + np.einsum("u,unc->nc", x[7:], model.derivatives)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.apps.inverse.fitting.inputs import FitSubject
-from dermis.apps.inverse.fitting.light_basis import AMBIENT_LOBE_COUNT, panorama
+from dermis.apps.inverse.fitting.light_basis import AMBIENT_LOBE_COUNT, ambient_panorama
 from dermis.apps.inverse.fitting.solve import Uncertainty
 from dermis.apps.inverse.fitting.unknowns import (
     SKIN_UNKNOWNS,
@@ -101,7 +101,7 @@ class FitResult:
         return {
             "skin": skin,
             "suns": suns,
-            "around": {"mean_radiance": float(panorama(self.strengths[:AMBIENT_LOBE_COUNT]).mean())},
+            "around": {"mean_radiance": float(ambient_panorama(self.strengths[:AMBIENT_LOBE_COUNT]).mean())},
             "white": self.white.tolist(),
             "white_sd": [sd[name] for name in ("white red", "white blue") if name in sd],
             "exposure": self.exposure,
@@ -150,7 +150,7 @@ def save_fit(folder: Path, fit_result: FitResult) -> list[Path]:
         actual = "got a head without a name or file"
         refuse("head", "a Human or a head with a name, for scene.toml", actual, "Fit the Human itself")
     written = []
-    radiance = panorama(fit_result.strengths[:AMBIENT_LOBE_COUNT])
+    radiance = ambient_panorama(fit_result.strengths[:AMBIENT_LOBE_COUNT])
     if radiance.max() > 0.0:
         written.append(folder / "light.exr")
         with atomic_file(written[-1]) as file:
@@ -175,7 +175,7 @@ def save_fit(folder: Path, fit_result: FitResult) -> list[Path]:
 def fitted_scene(fit_result: FitResult, folder: Path) -> Scene:
     """Return the scene with the fitted skin and lights, and with light.exr in `folder` as environment."""
     suns = sun_lights(fit_result.point.suns, fit_result.strengths[AMBIENT_LOBE_COUNT:], fit_result.white)
-    has_sky = panorama(fit_result.strengths[:AMBIENT_LOBE_COUNT]).max() > 0.0
+    has_sky = ambient_panorama(fit_result.strengths[:AMBIENT_LOBE_COUNT]).max() > 0.0
     ambient = Environment(name=str(folder / "light.exr")) if has_sky else None
     lights = [one for one in suns if max(one.irradiance) > 0.0]
     return with_skin(replace(fit_result.subject.scene, lights=lights, environment=ambient), fit_result.point)

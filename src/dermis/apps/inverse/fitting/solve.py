@@ -75,7 +75,7 @@ class FitProblem:
     free_white: bool
     robust: float = ROBUST_LIMIT
 
-    def weights(self, radiance: Floats) -> Floats:
+    def pixel_weights(self, radiance: Floats) -> Floats:
         """Return the inverse standard deviations (p, 3) of pixels with a given radiance."""
         return np.asarray(
             1.0 / (self.noise * (radiance + _NOISE_FLOOR_FRACTION * float(np.median(self.target))))
@@ -83,21 +83,23 @@ class FitProblem:
 
     def initial_weights(self) -> Floats:
         """Return the inverse standard deviations (p, 3) of pixels from their brightness in the photograph."""
-        return self.weights(self.target.mean(axis=1, keepdims=True) * np.ones(3))
+        return self.pixel_weights(self.target.mean(axis=1, keepdims=True) * np.ones(3))
 
-    def state(self, point: FitPoint, pixel_weight: Floats) -> FitState:
+    def render_state(self, point: FitPoint, pixel_weight: Floats) -> FitState:
         """Render the face for the unknowns of `point`; return the state with the best light strengths."""
-        return self._state(point, self.frames.basis(point) * light_tint(point), pixel_weight)
+        return self._best_light_state(
+            point, self.frames.single_light_radiance(point) * light_tint(point), pixel_weight
+        )
 
     def reweighted_state(self, fit_state: FitState) -> FitState:
         """Return the state with new pixel weights: from the model's brightness, and lower for outliers."""
-        weights = self.weights(np.maximum(self.target - fit_state.residual, 0.0))
+        weights = self.pixel_weights(np.maximum(self.target - fit_state.residual, 0.0))
         scaled = np.abs(fit_state.residual * weights)
         limit = self.robust * max(_MAD_TO_SD * float(np.median(scaled)), 1.0)
         weights *= np.sqrt(limit / np.maximum(scaled, limit))
-        return self._state(fit_state.point, fit_state.basis, weights)
+        return self._best_light_state(fit_state.point, fit_state.basis, weights)
 
-    def _state(self, point: FitPoint, basis: Floats, pixel_weight: Floats) -> FitState:
+    def _best_light_state(self, point: FitPoint, basis: Floats, pixel_weight: Floats) -> FitState:
         A = (basis * pixel_weight).reshape(len(basis), -1).T
         x = solve_strengths(A, (self.target * pixel_weight).ravel())
         residual = self.target - np.einsum("a,apc->pc", x, basis)
@@ -113,20 +115,20 @@ class FitProblem:
         frame_name : file name of the ambient light's panorama, without suffix
         """
         point, count = fit_state.point, 2 * len(fit_state.point.suns)
-        centre = self.frames.combined(point, fit_state.strengths, frame_name)
+        centre = self.frames.combined_radiance(point, fit_state.strengths, frame_name)
         shifted = []
-        for k, step in enumerate(self.steps(count)):
+        for k, step in enumerate(self.difference_steps(count)):
             change = np.zeros(len(SKIN_UNKNOWNS) + count + 2)
             limited = k < len(SKIN_UNKNOWNS) and point.logs[k] + step >= np.log(SKIN_UNKNOWNS[k].high)
             change[k] = -step if limited else step
-            neighbour = self.frames.combined(point.stepped(change), fit_state.strengths, frame_name)
+            neighbour = self.frames.combined_radiance(point.stepped(change), fit_state.strengths, frame_name)
             shifted.append((neighbour - centre) / change[k])
         radiance, white = centre * light_tint(point), np.zeros((2, *centre.shape))
         white[0, :, 0], white[1, :, 2] = radiance[:, 0], radiance[:, 2]
         derivatives = np.concatenate([np.asarray(shifted) * light_tint(point), white])
         return np.moveaxis(derivatives, 0, -1)
 
-    def steps(self, sun_angle_count: int) -> list[float]:
+    def difference_steps(self, sun_angle_count: int) -> list[float]:
         """Return the step of the finite difference for each skin unknown and each angle of a sun.
 
         sun_angle_count : number of angles that describe the directions of all suns
@@ -165,7 +167,7 @@ def solve_fit(
 
     progress : function called with the number of finished steps and the largest number of steps
     """
-    state = problem.reweighted_state(problem.state(start, problem.initial_weights()))
+    state = problem.reweighted_state(problem.render_state(start, problem.initial_weights()))
     damping = _INITIAL_DAMPING
     for iteration in range(_MAX_ITERATIONS):
         progress(iteration, _MAX_ITERATIONS)
@@ -193,7 +195,7 @@ def _try_steps(
         step *= min(1.0, _MAX_UNKNOWN_STEP / max(float(np.abs(step).max()), 1e-12))
         if np.abs(step).max() < 0.1 * _STEP_TOLERANCE:
             break
-        trial = problem.state(fit_state.point.stepped(step), fit_state.weight)
+        trial = problem.render_state(fit_state.point.stepped(step), fit_state.weight)
         if trial.cost < fit_state.cost:
             return trial, step, max(0.2 * damping, 1e-6)
         damping = max(30.0 * damping, 0.03)
@@ -213,7 +215,7 @@ def _normal_equations(problem: FitProblem, fit_state: FitState, derivatives: Flo
 
 
 def _eliminate_lights(fit_state: FitState, J: Floats) -> tuple[Floats, Floats]:
-    """Return the derivatives (3 p, u) orthogonal to changes of light strengths, and weighted residuals (3 p,).
+    """Return derivatives (3 p, u) orthogonal to changes of light strengths, and weighted residuals (3 p,).
 
     A sun of strength 0 is left out of the light strengths, because it cannot decrease.
 

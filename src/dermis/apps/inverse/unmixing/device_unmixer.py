@@ -99,7 +99,7 @@ class Unmixer:
         return fractions, residual
 
     def _shader_bindings(self, shader: ComputeProgram, step_count: int) -> MutableBindings:
-        record = _model_record(shader, self.model, self.noise, step_count)
+        record = _model_uniforms(shader, self.model, self.noise, step_count)
         return {"model": record, "table": self._table, "guesses": self._guesses}
 
 
@@ -126,7 +126,7 @@ def recolour(
         inputs = [texture_from_array(device, one, _TEXTURE_FORMAT, "maps") for one in maps]
         size = inputs[0].size[:2]
         texture = make_texture(device, size, _TEXTURE_FORMAT)
-        bound: MutableBindings = {"model": _model_record(shader, model, 1.0, 0), "table": table}
+        bound: MutableBindings = {"model": _model_uniforms(shader, model, 1.0, 0), "table": table}
         bound |= {"estimate": inputs[0], "residual": inputs[1], "recoloured": texture, "change": change}
         frame = CommandList(device, timed=False)
         frame.compute("recolour", shader, bound, size)
@@ -169,7 +169,7 @@ def _unmixing_program(device: Device, shader_name: str, model: SkinModel) -> Com
     return cached_program(device, ("unmixing", shader_name), tuple(constants.items()), make)
 
 
-def _model_record(
+def _model_uniforms(
     shader: ComputeProgram, model: SkinModel, relative_noise: float, step_count: int
 ) -> UniformRecord:
     priors = {"prior_mean": model.prior_mean, "prior_sd": model.prior_sd}

@@ -25,7 +25,7 @@ Pixels = NDArray[np.float32]
 PROFILE_CORNERS = {"profile": (0, 0), "profile_blood": (0, -1), "profile_dark": (-1, -1)}
 """File name of each profile, with its indices on the grid of melanin and blood: pale skin without blood, pale
 skin with blood, and dark skin with blood."""
-MAP_NAME = "profile_map"
+WEIGHT_MAP_NAME = "profile_map"
 _GRID_NODES_PER_AXIS = 4  # number of grid nodes along the logarithms of melanin and of blood
 _GRID_PERCENTILES = 0.5, 99.5  # percentiles of the pigments of the skin texels, which bound the grid
 # Smallest volume fraction of a grid axis, and smallest ratio of its ends.
@@ -88,7 +88,7 @@ def save_mixture(folder: Path, mixture: ProfileMixture) -> list[Path]:
     written = [folder / f"{name}.toml" for name in PROFILE_CORNERS]
     for path, profile in zip(written, mixture.profiles, strict=True):
         write_profile(path, profile, {})
-    path = folder / f"{MAP_NAME}.exr"
+    path = folder / f"{WEIGHT_MAP_NAME}.exr"
     with atomic_file(path) as file:
         file.write_bytes(encode_exr(np.dstack([mixture.weights, np.zeros_like(mixture.weights[..., :1])])))
     return [*written, path]

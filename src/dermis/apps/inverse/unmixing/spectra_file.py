@@ -30,7 +30,7 @@ from dermis.optics.media import Floats
 from dermis.optics.pigments.parameters import DEFAULT_SKIN, SkinParameters
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM
 
-SPECTRAL_SETS = {"none": TWO_UNKNOWNS, "oxygen": THREE_UNKNOWNS, "all": FIVE_UNKNOWNS}
+UNKNOWN_NAMES_BY_SET = {"none": TWO_UNKNOWNS, "oxygen": THREE_UNKNOWNS, "all": FIVE_UNKNOWNS}
 """Names of the unknown parameters, by the name of those that are fitted besides melanin and blood."""
 _EXPECTED_TABLE = "a table of reflectance spectra (CSV), a spectrum in each row or in each column"
 _WAVELENGTH_PATTERN = re.compile(r"[^\d.]{0,20}?(\d{3,4}(?:\.\d+)?)\s*(?:nm)?", re.IGNORECASE)
@@ -199,14 +199,14 @@ def unmix_spectra(
     """Estimate the pigments of each reflectance spectrum of a table.
 
     path : file with the table, see `read_spectra`
-    find : parameters to estimate, as a key of `SPECTRAL_SETS`
+    find : parameters to estimate, as a key of `UNKNOWN_NAMES_BY_SET`
     skin : values of all other parameters
     surface : surface reflection that is subtracted from the spectra; 0 if they do not include it [-]
 
     Raises DermisError when `read_spectra` does, and for an unknown `find` or a `surface` out of range.
     """
-    if find not in SPECTRAL_SETS:
-        refuse("--find", ", ".join(SPECTRAL_SETS), f"got {find!r}", "Choose one of them")
+    if find not in UNKNOWN_NAMES_BY_SET:
+        refuse("--find", ", ".join(UNKNOWN_NAMES_BY_SET), f"got {find!r}", "Choose one of them")
     surface = checked_number("--surface", surface, 0.0, 0.2, "a reflectance")
     table = read_spectra(path)
     complete = np.flatnonzero(np.isfinite(table.reflectance).all(axis=1))
@@ -215,7 +215,7 @@ def unmix_spectra(
         notify(f"{path}: {incomplete} of {len(table.labels)} spectra have missing values and no result")
     if not len(complete):
         refuse(path, "a complete spectrum", "all have missing values", "Fill the missing cells")
-    names: Sequence[str] = SPECTRAL_SETS[find]
+    names: Sequence[str] = UNKNOWN_NAMES_BY_SET[find]
     spectra = table.reflectance[complete] - surface
     parts = [fit_skin(part, names, "spectrum", skin) for part in _spectra_batches(spectra)]
     values = {name: np.concatenate([part.values[name] for part in parts]) for name in names}

@@ -57,7 +57,7 @@ class SpectralUnknown:
         """Return the coordinate, on this parameter's scale, of a parameter value."""
         return float(self.coordinates(np.float64(parameter_value)))
 
-    def values(self, coordinates: Floats) -> Floats:
+    def parameter_values(self, coordinates: Floats) -> Floats:
         """Return the parameter values (n,) at given coordinates (n,), the inverse of `coordinates`."""
         if self.scale == "log":
             return np.exp(coordinates)
@@ -164,20 +164,20 @@ def invert_spectra(
     x = np.stack([np.broadcast_to(column, len(spectra)) for column in columns], axis=-1)
     low, high = (np.array([one.coordinate(getattr(one, end)) for one in unknowns]) for end in ("low", "high"))
 
-    def values(point: Floats) -> dict[str, Floats]:
-        return {one.name: one.values(point[:, i]) for i, one in enumerate(unknowns)}
+    def values_at(point: Floats) -> dict[str, Floats]:
+        return {one.name: one.parameter_values(point[:, i]) for i, one in enumerate(unknowns)}
 
     weights = rgb_weights()
     target = lab(spectra @ weights.T)
     metric = colour_metric(target)
 
     def residual(point: Floats) -> Floats:
-        reflectance = model(values(point))
+        reflectance = model(values_at(point))
         if criterion == "spectrum":
             return np.asarray(reflectance - spectra)
         return np.asarray(np.einsum("nij,nj->ni", metric, lab(reflectance @ weights.T) - target))
 
-    found = values(least_squares(residual, x, low, high, max_steps))
+    found = values_at(least_squares(residual, x, low, high, max_steps))
     return SpectralFit(found, spectra, model(found))
 
 

@@ -54,9 +54,9 @@ def unknown_skin_sd(
 def _unmixed_sample(
     skin: SkinParameters, known_parameters: tuple[str, ...], is_oxygen_fitted: bool
 ) -> tuple[Floats, Floats]:
-    """Unmix skins sampled from the prior; return the logarithms (n, 2) found and their errors (n, 2).
+    """Unmix skins sampled from the prior; return found logarithms (n, 2) and their errors (n, 2).
 
-    The logarithms are those of melanin and blood.
+    The logarithms are those of the fractions of melanin and blood that unmixing finds.
     """
     true = skin_prior().sample(_SAMPLE_COUNT)
     values = true | {name: np.full(_SAMPLE_COUNT, getattr(skin, name)) for name in known_parameters}

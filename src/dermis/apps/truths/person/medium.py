@@ -27,17 +27,17 @@ Floats = NDArray[np.float32]
 COAT_TRANSMITTANCE = 0.98
 """Fraction of light that the coat transmits, see `coat_bsdf`; the medium compensates for it."""
 COAT_INDEX = SKIN_ETA
-GRID_VOXELS = 96
+ALBEDO_GRID_SIDE_VOXELS = 96
 """Number of cells along the longest side of the albedo grid."""
 _HALF_SIDE_PER_FRAME_HEIGHT, _MIN_HALF_SIDE_MM = 0.75, 25.0
 """Half the side of the albedo grid, relative to the height that the picture shows, and its lower limit."""
-_COLOUR_DEPTH_MM = 3.0  # depth to which the medium has the colour of the surface
+_COLOURED_DEPTH_MM = 3.0  # depth to which the medium has the colour of the surface
 _SAMPLES_PER_VOXEL = 3.0  # samples per area of one voxel face
 _MAX_COLOUR = 0.97
 _MIN_ABSORPTION_ROOT = 0.02  # smallest tabulated square root of 1 - albedo
 _DISTANCE_PHOTON_COUNT, _TABLE_PHOTON_COUNT = 40_000, 40_000
-_HALF_SPACE_TABLE_STEPS = 48
-_STACK_TABLE_STEPS = 20
+_HALF_SPACE_TABLE_ALBEDO_COUNT = 48
+_STACK_TABLE_ALBEDO_COUNT = 20
 """Number of tabulated albedos of the last of several layers."""
 
 
@@ -106,7 +106,7 @@ def deepest_albedo(medium: Medium, colour: ArrayLike) -> Doubles:
         )
         for one in medium.layers
     )
-    roots = np.linspace(1.0, _MIN_ABSORPTION_ROOT, _STACK_TABLE_STEPS)
+    roots = np.linspace(1.0, _MIN_ABSORPTION_ROOT, _STACK_TABLE_ALBEDO_COUNT)
     found = [
         np.interp(wanted[..., c], _reflectance_table(tuple(one[c] for one in layers), medium.eta), roots)
         for c in range(3)
@@ -123,7 +123,7 @@ def _reflectance_table(layers: tuple[tuple[float, float, float], ...], eta: floa
     above = [ScatteringLayer(a, s, thickness, eta=eta) for a, s, thickness in layers[:-1]]
     extinction = layers[-1][0] + layers[-1][1]
     totals = []
-    for root in np.linspace(1.0, _MIN_ABSORPTION_ROOT, _STACK_TABLE_STEPS):
+    for root in np.linspace(1.0, _MIN_ABSORPTION_ROOT, _STACK_TABLE_ALBEDO_COUNT):
         last = ScatteringLayer(root**2 * extinction, (1.0 - root**2) * extinction, eta=eta)
         totals.append(trace_slab([*above, last], _TABLE_PHOTON_COUNT).relative_to_entering.total_reflectance)
     return np.maximum.accumulate(totals)
@@ -142,7 +142,7 @@ def _half_space_reflectance_table(eta: float) -> tuple[Doubles, Doubles]:
 
     The reflectances are exact for an index of refraction of 1, and counted by Monte Carlo for `SKIN_ETA`.
     """
-    roots = np.linspace(1.0, _MIN_ABSORPTION_ROOT, _HALF_SPACE_TABLE_STEPS)
+    roots = np.linspace(1.0, _MIN_ABSORPTION_ROOT, _HALF_SPACE_TABLE_ALBEDO_COUNT)
     if eta == 1.0:
         return np.array([float(directional_albedo(1.0, float(1.0 - root**2))) for root in roots]), roots
     if eta != SKIN_ETA:
@@ -178,7 +178,7 @@ def skin_media(mi: Mitsuba, person: Person, camera: Camera, medium: Medium) -> l
     *above, last = medium.layers
     low, high = _voxel_box(person, camera)
     transmittance = COAT_TRANSMITTANCE if medium.eta == 1.0 else 1.0
-    colours = colour_grid(person, low, high, GRID_VOXELS) / transmittance
+    colours = colour_grid(person, low, high, ALBEDO_GRID_SIDE_VOXELS) / transmittance
     grid = deepest_albedo(medium, colours).astype(np.float32)
     to_world = mi.ScalarTransform4f().translate([float(c) for c in low])
     albedo = {
@@ -196,8 +196,8 @@ def _voxel_box(person: Person, camera: Camera) -> tuple[Doubles, Doubles]:
     half_side = max(_HALF_SIDE_PER_FRAME_HEIGHT * camera.frame_mm, _MIN_HALF_SIDE_MM)
     skin = person.mesh.positions[np.unique(_skin_triangles(person))]
     middle = np.array(camera.target, np.float64)
-    low = np.maximum(skin.min(axis=0) - _COLOUR_DEPTH_MM, middle - half_side)
-    high = np.minimum(skin.max(axis=0) + _COLOUR_DEPTH_MM, middle + half_side)
+    low = np.maximum(skin.min(axis=0) - _COLOURED_DEPTH_MM, middle - half_side)
+    high = np.minimum(skin.max(axis=0) + _COLOURED_DEPTH_MM, middle + half_side)
     return low, np.maximum(high, low + 1.0)
 
 
@@ -230,7 +230,7 @@ def colour_grid(person: Person, low_corner: Doubles, high_corner: Doubles, voxel
     )
     is_near = np.zeros(cell_count[::-1], bool)
     is_near[cell[:, 2], cell[:, 1], cell[:, 0]] = True
-    is_near = binary_dilation(is_near, iterations=max(2, int(np.ceil(_COLOUR_DEPTH_MM / cell_mm))))
+    is_near = binary_dilation(is_near, iterations=max(2, int(np.ceil(_COLOURED_DEPTH_MM / cell_mm))))
     near_cells = np.argwhere(is_near)
     cell_centres = low_corner + (near_cells[:, ::-1] + 0.5) / cell_count * (high_corner - low_corner)
     _, nearest = cKDTree(positions).query(cell_centres, k=min(4, len(positions)))
@@ -251,8 +251,8 @@ def _skin_samples(
     mesh, triangles = person.mesh, _skin_triangles(person)
     corners = mesh.positions[triangles].astype(np.float64)
     inside = (
-        (corners.max(axis=1) >= low_corner - _COLOUR_DEPTH_MM)
-        & (corners.min(axis=1) <= high_corner + _COLOUR_DEPTH_MM)
+        (corners.max(axis=1) >= low_corner - _COLOURED_DEPTH_MM)
+        & (corners.min(axis=1) <= high_corner + _COLOURED_DEPTH_MM)
     ).all(axis=1)
     triangles, corners = triangles[inside], corners[inside]
     rng = np.random.default_rng(0)

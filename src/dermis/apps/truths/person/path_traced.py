@@ -23,7 +23,7 @@ from dermis.apps.truths.path_traced import (
     pass_count,
     render_passes,
 )
-from dermis.apps.truths.person.medium import COAT_TRANSMITTANCE, GRID_VOXELS, skin_media
+from dermis.apps.truths.person.medium import ALBEDO_GRID_SIDE_VOXELS, COAT_TRANSMITTANCE, skin_media
 from dermis.apps.truths.person.person import Person, SkinTextures, posed_person
 from dermis.apps.truths.person.shapes import (
     diffuse_skin_shapes,
@@ -75,7 +75,8 @@ def path_trace_person(
     """
     target_count, mi = pass_count(samples), load_mitsuba()
     person = posed_person(scene, textures)
-    constants = f"{SAMPLES_PER_PASS} {RUSSIAN_ROULETTE_DEPTH} {COAT_TRANSMITTANCE} {GRID_VOXELS} {max_depth}"
+    voxels = ALBEDO_GRID_SIDE_VOXELS
+    constants = f"{SAMPLES_PER_PASS} {RUSSIAN_ROULETTE_DEPTH} {COAT_TRANSMITTANCE} {voxels} {max_depth}"
     trace_settings = f"{_CACHE_VERSION} {mi.__version__} {variant} {constants} {size}"
     key = person_key(scene, person, medium, trace_settings) if use_cache else None
     return render_passes(
