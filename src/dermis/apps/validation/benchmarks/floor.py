@@ -142,7 +142,7 @@ def _translucency_bytes(translucency: Translucency, levels: PyramidLevels, blur:
 
 
 def _map_bytes(inputs: FrameInputs, point_count: int) -> int:
-    """Return the bytes read from the head's maps for a number of surface points, one texel per point."""
+    """Return the bytes read from the head's maps to shade a number of points, one texel per map and point."""
     textures = [cast(Texture, inputs.bindings[name]) for name in _MAP_BINDINGS]
     return sum(texel_bytes(one) * min(point_count, one.size[0] * one.size[1]) for one in textures)
 

@@ -135,7 +135,7 @@ def _group_masks(archive: Archive) -> Iterator[tuple[str, NDArray[np.bool_]]]:
 
 
 def _sex_age_effects(cheek: Archive, variables: Doubles) -> tuple[Doubles, Doubles]:
-    """Return the effects (4,) of sex and of `age_term` on the variables.
+    """Return the effects (4,) of sex and of `age_term` on the four skin variables of `model_spectra`.
 
     The effects are fitted by least squares, with an intercept for each group.
     """
@@ -148,7 +148,10 @@ def _sex_age_effects(cheek: Archive, variables: Doubles) -> tuple[Doubles, Doubl
 
 
 def _centred_terms(cheek: Archive, sex: Doubles, age: Doubles) -> Doubles:
-    """Return the part (n, 4) of the variables that sex and age explain, relative to the mean of the group."""
+    """Return the deviations (n, 4) from group means that sex and age explain, for each skin variable.
+
+    sex, age : (4,) effects of sex and of `age_term` on the variables
+    """
     result = np.zeros((len(cheek.group), 4))
     for values, effect in ((cheek.sex, sex), (age_term(cheek.age), age)):
         for _, rows in _group_masks(cheek):
@@ -159,7 +162,7 @@ def _centred_terms(cheek: Archive, sex: Doubles, age: Doubles) -> Doubles:
 
 
 def _normal_scores(variables: Doubles, archive_rows: Archive) -> Doubles:
-    """Return standard normal scores (n, 5) of the ranks of the four variables and of the ITA."""
+    """Return standard normal scores (n, 5) of the ranks of the four skin variables and of the ITA."""
     columns = np.column_stack([variables, ita_degrees(archive_rows.cielab)])
     return np.asarray(ndtri((rankdata(columns, axis=0) - 0.5) / len(columns)))
 
@@ -279,7 +282,7 @@ def _drawn_cheeks(document: dict[str, Any], group: str, people: _Population) -> 
 
 
 def _matching_shift(variables: Doubles, target_colour: Doubles, free_count: int) -> tuple[Doubles, Doubles]:
-    """Return the shift (4,) of variables that brings their median colour to a target, and the error left.
+    """Return the shift (4,) of skin variables that moves their median colour to a target, and the error left.
 
     variables : (n, 4) variables of people
     target_colour : (3,) median colour to reach [CIELAB]
