@@ -45,21 +45,24 @@ class FragmentPasses(GpuGems3):
     Its results differ from those of `GpuGems3` by rounding to half precision only.
     """
 
-    def make_levels(self, device: Device, side: int, halvings: Halvings) -> PyramidLevels:
+    def make_levels(self, device: Device, atlas_side: int, halvings: Halvings) -> PyramidLevels:
         """Return textures for the irradiance and the pyramid levels, all in half precision."""
         count = max(map(len, halvings))
         stack = make_texture(
-            device, (side, side), HALF_TEXEL_FORMAT, layer_count=count, content_source="raster"
+            device, (atlas_side, atlas_side), HALF_TEXEL_FORMAT, layer_count=count, content_source="raster"
         )
         scratch, *stretch = (
-            make_texture(device, (side, side), HALF_TEXEL_FORMAT, content_source="raster") for _ in range(3)
+            make_texture(device, (atlas_side, atlas_side), HALF_TEXEL_FORMAT, content_source="raster")
+            for _ in range(3)
         )
         first, second = (texture.create_view() for texture in stretch)
-        return StretchedLevels((stack,), (0,), scratch, side, HALF_TEXEL_FORMAT, stretch=(first, second))
+        return StretchedLevels(
+            (stack,), (0,), scratch, atlas_side, HALF_TEXEL_FORMAT, stretch=(first, second)
+        )
 
-    def make_sum(self, device: Device, side: int) -> Texture:
+    def make_sum(self, device: Device, atlas_side: int) -> Texture:
         """Return the texture for the weighted sum of the pyramid levels."""
-        return make_texture(device, (side, side), FLOAT_TEXEL_FORMAT, content_source="raster")
+        return make_texture(device, (atlas_side, atlas_side), FLOAT_TEXEL_FORMAT, content_source="raster")
 
     def scatter(self, graph: Graph, inputs: FrameInputs) -> Texture:
         """Record the passes that light the atlas, blur the light and sum the levels; return the sum."""
@@ -93,16 +96,16 @@ class FragmentPasses(GpuGems3):
         self,
         graph: Recorder,
         shader: ComputeProgram | RenderProgram,
-        bound: MutableBindings,
-        into: TexturePair,
-        side: int,
+        shader_resources: MutableBindings,
+        target_pair: TexturePair,
+        atlas_side: int,
     ) -> None:
         """Record the render pass of a blur along one axis.
 
-        into : textures of light and stretch to write
+        target_pair : textures of light and stretch to write
         """
         assert isinstance(graph, Graph) and isinstance(shader, RenderProgram)
-        graph.fill("diffuse", shader, bound, into)
+        graph.fill("diffuse", shader, shader_resources, target_pair)
 
     def _light(
         self,

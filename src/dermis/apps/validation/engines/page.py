@@ -59,7 +59,7 @@ def fill_tables(page_text: str) -> str:
 
 
 def predicted_table() -> str:
-    """Return a Markdown table of predicted errors, for all variants of the newest version of each export target."""
+    """Return a Markdown table of predicted errors, by variant of the newest version of each export target."""
     lines = []
     subjects = [load_subject(name) for name in COMPARED_SKINS]
     for name in sorted(set(TARGETS) - set(_EXCLUDED_TARGETS), key=str.lower):

@@ -147,13 +147,13 @@ def _sex_age_effects(cheek: Archive, variables: Doubles) -> tuple[Doubles, Doubl
     return found[-2], found[-1]
 
 
-def _centred_terms(cheek: Archive, sex: Doubles, age: Doubles) -> Doubles:
+def _centred_terms(cheek: Archive, sex_effect: Doubles, age_effect: Doubles) -> Doubles:
     """Return the deviations (n, 4) from group means that sex and age explain, for each skin variable.
 
-    sex, age : (4,) effects of sex and of `age_term` on the variables
+    sex_effect, age_effect : (4,) effects of sex and of `age_term` on the variables
     """
     result = np.zeros((len(cheek.group), 4))
-    for values, effect in ((cheek.sex, sex), (age_term(cheek.age), age)):
+    for values, effect in ((cheek.sex, sex_effect), (age_term(cheek.age), age_effect)):
         for _, rows in _group_masks(cheek):
             known = rows & np.isfinite(values)
             if known.any():
