@@ -18,7 +18,7 @@ from dermis.frame.features.irradiance.irradiance import LIGHT_FILTER_SIGMA_TEXEL
 from dermis.frame.features.shading.shade import shade_program
 from dermis.frame.lights.records import light_records, light_shadow_views
 from dermis.frame.lights.rectangle import KIND, facing_irradiance
-from dermis.frame.programs import device_constants, strip_constants
+from dermis.frame.programs import device_constants, pixel_column_constants
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
 from dermis.gpu.textures import texture_from_array
@@ -315,5 +315,5 @@ def test_too_many_parts_are_refused(renderer: Renderer) -> None:
 def test_samples_per_strip_stay_below_driver_loop_limits(renderer: Renderer, samples: int) -> None:
     """Under three rectangles of 500 mm with 16 samples, strips of 256 samples left 4 % of a face black."""
     usual = dict(device_constants(renderer.device)).get("STRIP", 1)
-    strip = (dict(strip_constants(renderer.device, samples)) or {"STRIP": usual})["STRIP"]
+    strip = (dict(pixel_column_constants(renderer.device, samples)) or {"STRIP": usual})["STRIP"]
     assert 1 <= strip <= usual and strip * samples <= 64

@@ -12,9 +12,9 @@ from tolerances import KERNEL_VARIANCE
 from dermis.frame.features.diffusion.kernels import (
     KERNEL_TRUNCATION_SIGMAS,
     MAX_TABLE_VARIANCE,
-    ROWS_PER_UNIT,
+    ROWS_PER_UNIT_VARIANCE,
     kernel_table,
-    tap_count,
+    taps_per_side,
 )
 
 VARIANCES = [0.001, 0.02, 0.3, 0.5, 0.999, 1.0, 1.7, 2.3, 4.0, 6.5, 8.99, 9.0]
@@ -22,8 +22,8 @@ VARIANCES = [0.001, 0.02, 0.3, 0.5, 0.999, 1.0, 1.7, 2.3, 4.0, 6.5, 8.99, 9.0]
 
 def kernel(variance: float) -> NDArray[np.float64]:
     """Return the (2 taps + 1,) normalised weights for a variance [step^2], as the shader finds them."""
-    taps = tap_count(variance)
-    row = variance * ROWS_PER_UNIT
+    taps = taps_per_side(variance)
+    row = variance * ROWS_PER_UNIT_VARIANCE
     low, high = kernel_table().astype(np.float64)[[int(row), int(row) + 1], taps]
     n = np.arange(-taps, taps + 1)
     weights = (low + (high - low) * (row % 1.0)) ** (n**2)
@@ -41,8 +41,8 @@ def test_sum_and_variance(variance: float) -> None:
 
 @pytest.mark.parametrize("variance", VARIANCES)
 def test_taps_reach_the_truncation(variance: float) -> None:
-    assert tap_count(variance) == math.ceil(KERNEL_TRUNCATION_SIGMAS * math.sqrt(variance))
-    assert len(kernel(variance)) == 2 * tap_count(variance) + 1
+    assert taps_per_side(variance) == math.ceil(KERNEL_TRUNCATION_SIGMAS * math.sqrt(variance))
+    assert len(kernel(variance)) == 2 * taps_per_side(variance) + 1
 
 
 def test_zero_variance_does_not_blur() -> None:
@@ -60,5 +60,8 @@ def test_wide_kernel_matches_the_gaussian(variance: float) -> None:
 def test_table_covers_the_widest_kernel() -> None:
     """The last two rows of the table are read too, and each column used there holds a ratio in 0..1."""
     table = kernel_table()
-    assert table.shape == (MAX_TABLE_VARIANCE * ROWS_PER_UNIT + 2, tap_count(MAX_TABLE_VARIANCE) + 1)
+    assert table.shape == (
+        MAX_TABLE_VARIANCE * ROWS_PER_UNIT_VARIANCE + 2,
+        taps_per_side(MAX_TABLE_VARIANCE) + 1,
+    )
     assert ((table >= 0) & (table <= 1)).all()

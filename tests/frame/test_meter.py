@@ -13,7 +13,7 @@ from tolerances import HALVES
 
 from dermis.frame.features.post.meter import (
     MAX_CLIPPED_FRACTION,
-    METER_SIDE,
+    METER_GRID_SIDE,
     METERED_IRRADIANCE,
     MIN_HIGHLIGHT_FACTOR,
 )
@@ -36,7 +36,7 @@ def points(renderer: Renderer, scene: Scene) -> NDArray[np.float64]:
     meter = renderer.prepare(scene, settings_of(exposure="auto")).resources.post.meter
     assert meter is not None
     raw = np.frombuffer(renderer.device.handle.queue.read_buffer(meter.points), np.float32)
-    found = raw.reshape(METER_SIDE * METER_SIDE, 2).astype(float)
+    found = raw.reshape(METER_GRID_SIDE * METER_GRID_SIDE, 2).astype(float)
     return found[found[:, 0] >= 0]
 
 
@@ -55,7 +55,7 @@ def test_uneven_light_is_metered_by_its_root_mean_square(renderer: Renderer) -> 
     scene = scene_of(ball, frontal(np.pi), camera=front_camera(ball, frame_mm=80.0), **DULL)
     found = metered(renderer, scene)
     light = points(renderer, scene)[:, 0]
-    assert 500 < len(light) < METER_SIDE * METER_SIDE and light.std() > 0.1
+    assert 500 < len(light) < METER_GRID_SIDE * METER_GRID_SIDE and light.std() > 0.1
     assert found == pytest.approx(METERED_IRRADIANCE / np.sqrt((light**2).mean()), rel=1e-4)
     assert found == pytest.approx(
         METERED_IRRADIANCE * np.sqrt(2.0), rel=0.05
@@ -106,7 +106,7 @@ def test_only_skin_is_metered(renderer: Renderer) -> None:
         scene = scene_of(head, frontal(3.0), **DULL)
         count[name] = metered(renderer, scene), len(points(renderer, scene))
     assert count["both"][0] == pytest.approx(METERED_IRRADIANCE * np.pi / 3.0, rel=1e-5)
-    assert 0.1 < count["both"][1] / METER_SIDE**2 < 0.6
+    assert 0.1 < count["both"][1] / METER_GRID_SIDE**2 < 0.6
     assert count["plain"] == (1.0, 0)
 
 

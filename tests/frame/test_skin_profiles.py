@@ -8,7 +8,7 @@ import pytest
 
 from dermis.base.errors import DermisError
 from dermis.frame.features.diffusion.profiles import SkinProfiles
-from dermis.frame.features.translucency.build import rounded_width
+from dermis.frame.features.translucency.build import rounded_sigma_mm
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.profiles import fit_profile, load_profile
 from dermis.optics.tissue import Tissue
@@ -80,5 +80,5 @@ def test_a_table_has_no_pigments() -> None:
 
 
 def test_nearly_equal_widths_are_merged() -> None:
-    assert rounded_width(2.0) == rounded_width(2.1) == pytest.approx(2.0)
-    assert all(0.84 <= rounded_width(w) / w <= 1.19 for w in (0.6, 0.9, 1.3, 2.6, 7.0))
+    assert rounded_sigma_mm(2.0) == rounded_sigma_mm(2.1) == pytest.approx(2.0)
+    assert all(0.84 <= rounded_sigma_mm(w) / w <= 1.19 for w in (0.6, 0.9, 1.3, 2.6, 7.0))

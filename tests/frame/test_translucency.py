@@ -30,7 +30,11 @@ from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
 from dermis.atlas.translucency.cells import Cells, divide_into_cells
 from dermis.frame.features.translucency import passes as translucency_weights
-from dermis.frame.features.translucency.build import make_buffers, make_pair_buffers, with_profile
+from dermis.frame.features.translucency.build import (
+    make_pair_buffers,
+    make_translucency_buffers,
+    with_profile,
+)
 from dermis.frame.features.translucency.pair_search.search import search_pairs
 from dermis.frame.features.translucency.resources import PairBuffers, Translucency
 from dermis.frame.renderer import Renderer
@@ -110,7 +114,9 @@ def thin(device: Device) -> Thin:
 
 def weighed(device: Device, pairs: PairBuffers, surface: dict[str, Any]) -> Translucency:
     """Return pairs on a surface with the weights of a profile."""
-    made = with_profile(device, make_buffers(device, surface, pairs), BLURRED.variance_mm2, BLURRED.weight)
+    made = with_profile(
+        device, make_translucency_buffers(device, surface, pairs), BLURRED.variance_mm2, BLURRED.weight
+    )
     frame = CommandList(device)
     translucency_weights.draw_weights(frame, made)
     frame.submit()

@@ -12,7 +12,7 @@ from dermis.atlas.atlas import Atlas
 from dermis.frame.features.diffusion.kernels import (
     CHAINED_TRUNCATION_SIGMAS,
     MAX_TABLE_VARIANCE,
-    ROWS_PER_UNIT,
+    ROWS_PER_UNIT_VARIANCE,
     kernel_table,
 )
 from dermis.mesh.head import Head
@@ -34,7 +34,7 @@ DEFAULT_COLOUR = float(np.float16(0.8))  # maps are stored as halves
 def _table_ratio(relative: Floats) -> Floats:
     """Interpolate the kernel table between its rows."""
     taps = np.ceil(CHAINED_TRUNCATION_SIGMAS * np.sqrt(relative)).astype(int)
-    row = relative * ROWS_PER_UNIT
+    row = relative * ROWS_PER_UNIT_VARIANCE
     table = kernel_table().astype(np.float64)
     low, high = table[row.astype(int), taps], table[row.astype(int) + 1, taps]
     return np.asarray(low + (high - low) * (row % 1))

@@ -104,8 +104,8 @@ def make_resources(memo: Memo, device: Device, request: FrameRequest, technique:
 def _shade_constants(request: FrameRequest) -> Constants:
     """Return the pipeline constants of the shading pass for the optional features that the request uses.
 
-    The features are relief finer than the maps, modelled eyes, profiles that are blended by a map, and parts
-    other than skin.
+    The features are relief finer than the maps, modelled eyes, diffusion profiles that a map blends, and mesh
+    parts that are not skin.
     """
     eyes = request.head.eyes is not None
     used = {"DETAIL": request.has_fine_relief, "EYES": eyes, "MIXED": request.mixes_profiles}
@@ -139,13 +139,13 @@ def _shared_bindings(
     device: Device,
     request: FrameRequest,
     shadow_maps: ShadowMaps,
-    shapes: shape.Resources,
+    shape_resources: shape.Resources,
     strands: hair.Resources | None,
 ) -> MutableBindings:
     """Return the shader resources that all atlas layouts share, apart from maps and lights."""
     skin, program = request.skin, shade_program(device)
     environment, total = request.environment, request.split.total
-    curvature, light_count = shapes.curvature, sum(request.light_part_counts)
+    curvature, light_count = shape_resources.curvature, sum(request.light_part_counts)
     return {
         "skin": memo.get(skin_record, program, skin, request.head.maps, request.profile, light_count),
         "environment": environment_record(program, environment, skin, total, request.has_occlusion),
@@ -155,15 +155,15 @@ def _shared_bindings(
         "curvatures": curvature.smoothed if curvature else placeholder_curvature(device),
         "nearest_sampler": device.sampler(),
         "panorama": request.environment_map.panorama,
-        "albedo_table": memo.get(_albedo_texture, device, lobe_name(skin), skin.fresnel),
+        "albedo_table": memo.get(_lobe_albedo_texture, device, lobe_name(skin), skin.fresnel),
     }
 
 
 def _cached_sky_visibility(
-    memo: Memo, device: Device, request: FrameRequest, layout: AtlasLayout, shapes: shape.Resources
+    memo: Memo, device: Device, request: FrameRequest, layout: AtlasLayout, shape_resources: shape.Resources
 ) -> VertexSkyVisibility:
     """Return the sky visibility at the vertices of the head at rest, from the cache or newly computed."""
-    at_rest = rest_geometry(memo, device, layout.head, shapes.tables, request.topology, None, 0)
+    at_rest = rest_geometry(memo, device, layout.head, shape_resources.tables, request.topology, None, 0)
     return memo.get(make_vertex_sky_visibility, device, request.topology, untracked=(at_rest,))
 
 
@@ -189,14 +189,14 @@ def _make_layout(
     request: FrameRequest,
     technique: Technique,
     layout_atlas: LayoutAtlas,
-    shapes: shape.Resources,
-    shared: Bindings,
+    shape_resources: shape.Resources,
+    shared_bindings: Bindings,
     layout_index: int,
 ) -> AtlasLayout:
     """Return the resources of one atlas layout; each frame adds the uniform record of its lights.
 
     layout_atlas : the atlas, and its textures on the device
-    shared : result of `_shared_bindings`, to which the maps of the head have been added
+    shared_bindings : result of `_shared_bindings`, to which the maps of the head have been added
     layout_index : index of the layout, part of the keys of its resources in the cache
     """
     cached, layout_key, head, (atlas, textures) = memo.get, str(layout_index), request.topology, layout_atlas
@@ -205,18 +205,20 @@ def _make_layout(
         device,
         head.mesh,
         atlas,
-        shapes.shape,
+        shape_resources.shape,
         request.head.maps.parts,
         caller_name=layout_key,
     )
-    tables, settings = shapes.tables, request.settings
+    tables, settings = shape_resources.tables, request.settings
     at_rest = partial(rest_geometry, memo, device, geometry, tables, head)
-    bindings: MutableBindings = {**geometry.resources, **shared}
+    bindings: MutableBindings = {**geometry.resources, **shared_bindings}
     gutter_update = None
-    if shapes.rest_shape and textures.gutter:
+    if shape_resources.rest_shape and textures.gutter:
         tracing = cached(make_gutter_tracing, device, head.mesh, atlas, textures, caller_name=layout_key)
         textures = cached(with_separate_gutters, device, textures, caller_name=layout_key)
-        gutter_update = cached(_gutter_update, tracing, geometry, shapes.rest_shape, caller_name=layout_key)
+        gutter_update = cached(
+            _gutter_update, tracing, geometry, shape_resources.rest_shape, caller_name=layout_key
+        )
     if request.has_occlusion:
         inputs = bindings, textures.resources["atlas"]
         hair = request.head.hair if settings.strands else None
@@ -277,7 +279,7 @@ def _visibility_layers(device: Device, picture_size: tuple[int, int], sample_cou
     return make_layers(device, picture_size, sample_count, store_triangles=True)
 
 
-def _albedo_texture(device: Device, lobe_name: str, fresnel_name: str) -> Texture:
+def _lobe_albedo_texture(device: Device, lobe_name: str, fresnel_name: str) -> Texture:
     return texture_from_array(device, albedo_table(lobe_name, fresnel_name), "rg32float")
 
 

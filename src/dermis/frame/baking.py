@@ -57,7 +57,7 @@ class BakedMaps:
 def bake(renderer: Renderer, scene: Scene, settings: Settings, map_side: int) -> BakedMaps:
     """Compute maps of a head's skin: properties of the surface, and light before and after scattering.
 
-    settings : settings of the lighting; size, samples, technique and `strands` are ignored
+    settings : settings of the lighting; `size`, `samples`, `technique` and `strands` are ignored
     map_side : side of the maps, a power of two [texels]
 
     The maps are evaluated at the centres of texels, with a filter as wide as a texel.
@@ -74,7 +74,7 @@ def bake(renderer: Renderer, scene: Scene, settings: Settings, map_side: int) ->
     )
     texel, points = layout_points(scene.head.mesh, map_side)
     job = partial(_bake_points, renderer, scene, settings, outputs, points, map_side)
-    return _to_maps(map_side, texel, renderer.reopening_device.run(job), absent)
+    return _arrange_as_maps(map_side, texel, renderer.reopening_device.run(job), absent)
 
 
 def bake_albedo(
@@ -189,7 +189,7 @@ def _bake_bindings(renderer: Renderer, inputs: FrameInputs, scene: Scene) -> Mut
     return {**inputs.bindings, "shade": inputs.view, "scattered": resources.scattered, **added}
 
 
-def _to_maps(
+def _arrange_as_maps(
     map_side: int, texel_index: NDArray[np.int64], texel_values: Floats, absence_reasons: dict[str, str]
 ) -> BakedMaps:
     """Arrange the channels of skin texels as maps, and fill all other texels from the nearest skin texel.

@@ -98,7 +98,7 @@ def frame_bytes(request: FrameRequest) -> dict[str, float]:
     pixel += _OUTPUT_CHANNEL_PIXEL_BYTES * sum(request.output_channels.values())
     pixel += technique.subsurface_layer_bytes * ("diffuse" in request.outputs)
     texel = atlas_texel_bytes(technique, request.blur_count, len(atlases.layouts))
-    texel += _mixing_bytes(request) if request.blur_count else 0.0
+    texel += _mixing_texel_bytes(request) if request.blur_count else 0.0
     if "translucent" in request.outputs:
         texel += _FLOAT_TEXEL_BYTES * (2 * len(atlases.layouts) - 1)
     return {
@@ -108,7 +108,7 @@ def frame_bytes(request: FrameRequest) -> dict[str, float]:
     }
 
 
-def _mixing_bytes(request: FrameRequest) -> float:
+def _mixing_texel_bytes(request: FrameRequest) -> float:
     """Return the additional memory per atlas texel for blending several profiles [bytes]."""
     others = len(request.other_profiles)
     maps = len(request.atlas_plan.layouts) + sum_layer_count(others)

@@ -65,7 +65,7 @@ def write_multipart(path: Path, picture: PlaneArray, output_arrays: Mapping[str,
     output_arrays : dictionary from the name of an output to its array
     """
     parts = {_PICTURE_PART_NAME: dict(zip("RGBA", np.moveaxis(picture, -1, 0), strict=False))}
-    parts |= {name: _channels(OUTPUTS[name], one) for name, one in output_arrays.items()}
+    parts |= {name: _named_channels(OUTPUTS[name], one) for name, one in output_arrays.items()}
     _write_atomically(path, encode_exr_parts(parts))
 
 
@@ -85,7 +85,7 @@ def quantise(output_name: str, output_array: PlaneArray) -> NDArray[np.uint8 | n
     return words if words.ndim == 2 or words.shape[2] > 2 else np.pad(words, ((0, 0), (0, 0), (0, 1)))
 
 
-def _channels(output: Output, output_array: PlaneArray) -> dict[str, PlaneArray]:
+def _named_channels(output: Output, output_array: PlaneArray) -> dict[str, PlaneArray]:
     """Return a dictionary from channel names in OpenEXR, such as normal.X, to channels of an output."""
     channels = np.atleast_3d(output_array)
     names = output.channel_names or [str(k) for k in range(channels.shape[2])]
@@ -93,7 +93,9 @@ def _channels(output: Output, output_array: PlaneArray) -> dict[str, PlaneArray]
 
 
 def _as_exr(output_name: str, output_array: PlaneArray) -> bytes:
-    return encode_exr_parts({output_name: _channels(OUTPUTS[output_name], output_array)}, run_length=True)
+    return encode_exr_parts(
+        {output_name: _named_channels(OUTPUTS[output_name], output_array)}, run_length=True
+    )
 
 
 def _as_png(output_name: str, output_array: PlaneArray) -> bytes:

@@ -203,14 +203,14 @@ def interreflection_constants(resources: Resources) -> Constants:
     return (("INTERREFLECTION", 1),) if resources.layouts[0].interreflection else ()
 
 
-def _motion_bytes(head: Head, motion: Motion, at_rest: MotionBytes) -> MotionBytes:
+def _motion_bytes(head: Head, motion: Motion, rest_bytes: MotionBytes) -> MotionBytes:
     """Return a pose as bytes for the shaders.
 
-    at_rest : rest pose, whose positions are reused if the control points are the same"""
+    rest_bytes : rest pose, whose positions are reused if the control points are the same"""
     weights, matrices = motion.weights.tobytes(), motion.matrices.tobytes()
     is_rest = motion.positions_mm is head.control.positions_mm
-    positions = at_rest.positions if is_rest else motion.positions_mm.tobytes()
-    return at_rest._replace(positions=positions, weights=weights, matrices=matrices)
+    positions = rest_bytes.positions if is_rest else motion.positions_mm.tobytes()
+    return rest_bytes._replace(positions=positions, weights=weights, matrices=matrices)
 
 
 def _rest_positions_mm(scene: Scene) -> NDArray[np.float32] | None:

@@ -36,8 +36,10 @@ WORKGROUP_SIZE = 64
 """Invocations per workgroup of shaders that process lists, the constant EACH of each.wgsl."""
 _WORKGROUPS_PER_ROW = 32768  # workgroups along x, at most 65535
 _PIXELS_PER_COLUMN = 16  # pixels per invocation of shade.wgsl on software adapters
-_SPLAT_STEP_TEXELS = 2.0  # step along hairs in shadow maps on software adapters [texels]
-_MAX_SAMPLES = 64  # limit of samples per invocation, as a driver ends loops after 65,535 iterations
+_HAIR_SHADOW_STEP_TEXELS = 2.0  # step along hairs in shadow maps on software adapters [texels]
+_MAX_SAMPLES_PER_INVOCATION = (
+    64  # limit of samples per invocation, as a driver ends loops after 65,535 iterations
+)
 
 
 ListMembers = Callable[[], Sequence[ShaderListMember]]
@@ -70,14 +72,14 @@ def _feature_definitions(_: int) -> tuple[dict[str, ListMembers], dict[str, floa
     The parameter, from `registry_version`, only serves as a cache key."""
     constants = light_shader_constants() | isotropic_lobe_constants() | reflection_constants()
     lists: dict[str, ListMembers] = {"lights": light_shaders}
-    for feature in _features():
+    for feature in _feature_packages():
         constants |= getattr(feature, "shader_constants", dict)()
         lists |= getattr(feature, "shader_lists", dict)()
     return {name: cache(members) for name, members in lists.items()}, constants
 
 
 @cache
-def _features() -> tuple[ModuleType, ...]:
+def _feature_packages() -> tuple[ModuleType, ...]:
     names = sorted(one.name for one in pkgutil.iter_modules([str(FEATURES_FOLDER)]))
     return tuple(import_module(f"dermis.frame.features.{name}") for name in names)
 
@@ -153,17 +155,17 @@ def device_constants(device: Device) -> Constants:
     lighting.wgsl, shade.wgsl and strands_shadow.wgsl.
     """
     if device.adapter.kind == "CPU":
-        return (("SKIPS_UNLIT", 1), ("STRIP", _PIXELS_PER_COLUMN), ("SPLAT_STEP", _SPLAT_STEP_TEXELS))
+        return (("SKIPS_UNLIT", 1), ("STRIP", _PIXELS_PER_COLUMN), ("SPLAT_STEP", _HAIR_SHADOW_STEP_TEXELS))
     return (("MESH_IN_BUFFERS", 1),)
 
 
-def strip_constants(device: Device, sample_count: int) -> Constants:
+def pixel_column_constants(device: Device, sample_count: int) -> Constants:
     """Return the pipeline constant that lets an invocation shade fewer pixels, if a pixel has many samples.
 
     On software adapters, an invocation shades a column of pixels, and the driver limits the number of loop
     iterations per invocation. The result is empty if this limit is not reached.
     """
-    strip = max(1, _MAX_SAMPLES // sample_count)
+    strip = max(1, _MAX_SAMPLES_PER_INVOCATION // sample_count)
     return (("STRIP", strip),) if device.adapter.kind == "CPU" and strip < _PIXELS_PER_COLUMN else ()
 
 

@@ -134,7 +134,7 @@ def view_rows(eye: Triple, axes: Axes) -> Rows:
     return (*right, -_dot(right, eye)), (*up, -_dot(up, eye)), (*forward, -_dot(forward, eye))
 
 
-def perspective(rows: Rows, window: Window, near: float, far: float) -> list[Sequence[float]]:
+def perspective_rows(rows: Rows, window: Window, near: float, far: float) -> list[Sequence[float]]:
     """Return the rows of the matrix to clip space for a window on the image plane, with reversed depth.
 
     rows : upper three rows of the view matrix
@@ -186,16 +186,16 @@ def point_shadow_views(
     view_points = (stacked @ outline.homogeneous).reshape(3, len(rows), -1)
     depth = view_points[2]
     near, far = depth.min(axis=1).tolist(), depth.max(axis=1).tolist()
-    _check_outside(lights, [one > _MIN_LIGHT_DISTANCE_MM for one in near])
+    _check_lights_outside(lights, [one > _MIN_LIGHT_DISTANCE_MM for one in near])
     steepest = _largest_tangents(view_points[:2], depth)
-    _check_outside(lights, [one <= _MAX_LIGHT_TANGENT for one in steepest])
+    _check_lights_outside(lights, [one <= _MAX_LIGHT_TANGENT for one in steepest])
     slack = outline.margin_mm
     bounds = [
         (1.02 * h, max(0.98 * n - slack, 0.1 * n), 1.02 * f + slack)
         for h, n, f in zip(steepest, near, far, strict=True)
     ]
     clips = [
-        perspective(r, Window((h, h), _NO_WINDOW_SHIFT), n, f)
+        perspective_rows(r, Window((h, h), _NO_WINDOW_SHIFT), n, f)
         for r, (h, n, f) in zip(rows, bounds, strict=True)
     ]
     return [
@@ -204,7 +204,7 @@ def point_shadow_views(
     ]
 
 
-def _check_outside(lights: Sequence[tuple[str, PointLight]], outside_flags: Sequence[bool]) -> None:
+def _check_lights_outside(lights: Sequence[tuple[str, PointLight]], outside_flags: Sequence[bool]) -> None:
     if not all(outside_flags):
         culprit, light = lights[outside_flags.index(False)]
         actual = f"it is at {[round(c) for c in light.position]} mm"

@@ -123,12 +123,12 @@ class RenderedFrame(ShortRepr):
     def _read_back(self, **options: Any) -> NDArray[Any]:
         return self._read(lambda frame: self.start_readback(frame.picture, **options).image())
 
-    def _read(self, read: Callable[[FrameTextures], T]) -> T:
+    def _read(self, read_textures: Callable[[FrameTextures], T]) -> T:
         if not self.is_current():
             raise RuntimeError(
                 "a newer frame has replaced this picture: read it before drawing the next frame"
             )
-        result: T = self.run_on_device(lambda: read(self.textures))
+        result: T = self.run_on_device(lambda: read_textures(self.textures))
         return result
 
 

@@ -46,7 +46,7 @@ _WARM_UP_FRAMES = 100
 
 def pipeline_frames(
     reopening_device: ReopeningDevice,
-    device: Callable[[], Device],
+    current_device: Callable[[], Device],
     frames: Iterable[tuple[Submit, Receive[T]]],
 ) -> Iterator[T]:
     """Yield the result of each frame in order, while later frames are already submitted.
@@ -54,7 +54,7 @@ def pipeline_frames(
     A frame whose device is lost is submitted again.
 
     reopening_device : object that runs functions, and opens the device again when it is lost
-    device : function that returns the current device
+    current_device : function that returns the current device
     frames : for each frame, a function that submits the frame, and a function that returns the result of its
         readback
     """
@@ -63,7 +63,7 @@ def pipeline_frames(
     def oldest_result() -> T:
         readback, submit, receive = pending.popleft()
         return reopening_device.run(
-            lambda: receive(readback if readback.fetched.device is device() else submit())
+            lambda: receive(readback if readback.fetched.device is current_device() else submit())
         )
 
     for submit, receive in frames:
@@ -407,8 +407,9 @@ class Renderer:
         linear : bool
             True returns float32 linear Rec. 709 instead of sRGB bytes.
         previous : Scene or iterable of Scene, optional
-            Scenes for motion vectors: either an iterable with the previous scene of each scene, or the scene
-            before the first one; each later scene then uses the scene before it, if the head is the same.
+            Scenes for motion vectors: either an iterable with the previous scene of each scene, or only the
+            previous scene of the first scene. In the latter case, each later scene uses the scene before it,
+            if the head is the same.
         landmarks : iterable of str
             Landmark sets (keys of `dermis.human.landmarks.sets.LANDMARK_SETS`), or files of rows name,vertex.
 

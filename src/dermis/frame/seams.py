@@ -8,7 +8,7 @@ from typing import NamedTuple
 from dermis.atlas.build import MIN_ATLAS_SIZE
 from dermis.scene.settings import Settings
 
-FEATHER_MM = 3.0  # width over which an edited stretch map narrows the blur towards an edge
+FEATHER_WIDTH_MM = 3.0  # width over which an edited stretch map narrows the blur towards an edge
 
 
 @dataclass(frozen=True)

@@ -45,10 +45,10 @@ def surface_points(renderer: Renderer, scene: Scene, settings: Settings) -> Surf
 
     settings : settings of the picture; technique and samples are ignored
     """
-    return renderer.reopening_device.run(partial(_surface_points, renderer, scene, settings))
+    return renderer.reopening_device.run(partial(_find_surface_points, renderer, scene, settings))
 
 
-def _surface_points(renderer: Renderer, scene: Scene, settings: Settings) -> SurfacePoints:
+def _find_surface_points(renderer: Renderer, scene: Scene, settings: Settings) -> SurfacePoints:
     single = settings.model_copy(update={"samples": 1, "technique": "none"})
     inputs = renderer.prepare(scene, single)
     frame = CommandList(renderer.device)
@@ -60,10 +60,10 @@ def _surface_points(renderer: Renderer, scene: Scene, settings: Settings) -> Sur
     visible = download(renderer.device, resources.visibility.texture).astype(np.int64)
     mask = visible > 0
     triangle = visible[mask] - 1
-    return SurfacePoints(mask, triangle, _barycentric(scene, inputs.view, triangle, mask))
+    return SurfacePoints(mask, triangle, _barycentric_weights(scene, inputs.view, triangle, mask))
 
 
-def _barycentric(
+def _barycentric_weights(
     scene: Scene, view: NDArray[np.void], triangle_index: Index, head_mask: NDArray[np.bool_]
 ) -> Floats:
     """Return (n, 3) barycentric weights of the points where camera rays meet the triangles, see shade.wgsl.
@@ -107,12 +107,12 @@ def irradiance_at(
     records = pack_surface_points(
         triangles.reshape(side, side), np.rint(65535 * weights).reshape(side, side, 2)
     )
-    return renderer.reopening_device.run(partial(_irradiance, renderer, scene, settings, records))[
+    return renderer.reopening_device.run(partial(_compute_irradiance, renderer, scene, settings, records))[
         : len(triangle)
     ]
 
 
-def _irradiance(
+def _compute_irradiance(
     renderer: Renderer, scene: Scene, settings: Settings, packed_points: NDArray[np.uint32]
 ) -> Floats:
     """Return the (n * n, 3) irradiance at surface points, one in each texel of an n x n atlas [-].

@@ -76,23 +76,23 @@ class TechniqueTraits:
     pixel_bytes: ClassVar[int] = 0
     subsurface_layer_bytes: ClassVar[int] = 0
 
-    def split(self, profile: GaussianSum, normalise: bool) -> ProfileSplit:
+    def split(self, profile: GaussianSum, normalise_weights: bool) -> ProfileSplit:
         """Split a profile into a relit Gaussian and Gaussians that blur; in this class, none blurs.
 
-        normalise : whether to scale the weights of each channel to a sum of 1, so that only the colour map
-            sets the albedo
+        normalise_weights : whether to scale the weights of each channel to a sum of 1, so that only the
+            colour map sets the albedo
         """
-        total = channel_weights(profile, normalise).sum(axis=0)
+        total = channel_weights(profile, normalise_weights).sum(axis=0)
         return ProfileSplit(total, total, np.empty(0), np.empty((0, 3)))
 
     def stretch(self, settings: Settings) -> str:
         """Return the stretch correction of the blurs: "full", "axes" or "none", see `Settings.stretch`."""
         return settings.stretch
 
-    def texel_bytes(self, levels: int) -> float:
+    def texel_bytes(self, blur_count: int) -> float:
         """Return the memory per atlas texel on a software adapter, including temporary textures [bytes].
 
-        levels : number of Gaussians that blur light
+        blur_count : number of Gaussians that blur light
         """
         return 0.0
 

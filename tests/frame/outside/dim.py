@@ -29,7 +29,7 @@ class Dim(AtlasTechnique):
         """Return False."""
         return False
 
-    def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
+    def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str) -> tuple[int, ...]:
         """Return 0 for both levels."""
         return (0, 0)
 

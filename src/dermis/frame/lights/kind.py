@@ -129,17 +129,19 @@ KINDS: Registry[Kind[Any]] = Registry(
 """Kinds of lights by their names in scene files; each has a module and a shader in this folder."""
 
 
-def area_light_members(light: PointLight, radiance: float, half_width: float, half_height: float) -> Members:
+def area_light_members(
+    light: PointLight, radiance: float, half_width_mm: float, half_height_mm: float
+) -> Members:
     """Return the members of the shader struct `Light` for an area light that faces its target.
 
     radiance : radiance that gives an irradiance of 1 at the target [1/sr]
-    half_width, half_height : half the width and half the height of the light [mm]
+    half_width_mm, half_height_mm : half the width and half the height of the light [mm]
     """
     right, up, _ = view_axes(vector_between(light.position, light.target))
     return {
-        "half_u": tuple(half_width * c for c in right),
-        "half_v": tuple(half_height * c for c in up),
-        "extent": (half_width, half_height),
+        "half_u": tuple(half_width_mm * c for c in right),
+        "half_v": tuple(half_height_mm * c for c in up),
+        "extent": (half_width_mm, half_height_mm),
         "irradiance": tuple(radiance * c for c in light.irradiance),
     }
 

@@ -153,7 +153,7 @@ def light_sample_points() -> Floats:
     return np.hstack([disc, 2.0 * even - 1.0])
 
 
-def _light_members(light: Light, centre: Triple, view: ShadowView | None, part_count: int) -> Members:
+def _light_members(light: Light, centre: Triple, shadow_view: ShadowView | None, part_count: int) -> Members:
     """Return the members of the shader struct `Light`; members that are left out are 0.
 
     light : light, or one part of a divided light
@@ -167,8 +167,8 @@ def _light_members(light: Light, centre: Triple, view: ShadowView | None, part_c
         along, position = vector_between(light.position, light.target), world_position(light.position, centre)
         distance = math.hypot(*along)
     shadow: Members = {}
-    if view:
-        clip, texel, position, right, up, near, far = view
+    if shadow_view:
+        clip, texel, position, right, up, near, far = shadow_view
         shadow = {"to_map": clip.T, "map_right": right, "map_up": up, "map_near": near, "map_far": far}
     half_width = round(0.5 * light.softness_mm / (texel * distance))
     return {
@@ -181,7 +181,7 @@ def _light_members(light: Light, centre: Triple, view: ShadowView | None, part_c
         "direction": unit_vector(along),
         "position": position,
         "reference_mm": distance,
-        "texel": texel if view else 0.0,
+        "texel": texel if shadow_view else 0.0,
         # a tent of half width h fades over 2 h texels
         "softness": 0.5 * light.softness_mm,
         "half_width": min(max(half_width, 1), _MAX_SHADOW_FILTER_TEXELS),

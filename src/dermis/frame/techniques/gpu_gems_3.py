@@ -47,19 +47,24 @@ class GpuGems3(AtlasTechnique):
     stitches_seams = False
     supports_translucency = True
 
-    def make_levels(self, device: Device, side: int, halvings: Halvings) -> PyramidLevels:
+    def make_levels(self, device: Device, atlas_side: int, halvings: Halvings) -> PyramidLevels:
         """Create textures for light, its blurred levels and a blurred stretch map."""
-        pyramid = make_levels(device, side, halvings, HALF_TEXEL_FORMAT)
-        first, second = (make_texture(device, (side, side), HALF_TEXEL_FORMAT) for _ in range(2))
+        pyramid = make_levels(device, atlas_side, halvings, HALF_TEXEL_FORMAT)
+        first, second = (make_texture(device, (atlas_side, atlas_side), HALF_TEXEL_FORMAT) for _ in range(2))
         return StretchedLevels(
-            pyramid.stacks, pyramid.first, pyramid.scratch, side, HALF_TEXEL_FORMAT, stretch=(first, second)
+            pyramid.stacks,
+            pyramid.first,
+            pyramid.scratch,
+            atlas_side,
+            HALF_TEXEL_FORMAT,
+            stretch=(first, second),
         )
 
-    def texel_bytes(self, levels: int) -> float:
+    def texel_bytes(self, blur_count: int) -> float:
         """Return the memory per atlas texel of the pyramid levels and the blurred stretch map [bytes]."""
-        return float(TEXEL_FORMAT_BYTES[HALF_TEXEL_FORMAT] * (levels + 4))
+        return float(TEXEL_FORMAT_BYTES[HALF_TEXEL_FORMAT] * (blur_count + 4))
 
-    def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
+    def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str) -> tuple[int, ...]:
         """Return 0 for each level, because all levels have full resolution."""
         return (0,) * (len(split.blurred_mm2) + 1)
 
@@ -104,19 +109,19 @@ class GpuGems3(AtlasTechnique):
         self,
         graph: Recorder,
         shader: ComputeProgram | RenderProgram,
-        bound: MutableBindings,
-        into: TexturePair,
-        side: int,
+        shader_resources: MutableBindings,
+        target_pair: TexturePair,
+        atlas_side: int,
     ) -> None:
         """Declare one blur pass, which writes blurred light and the blurred stretch map.
 
-        bound : resources that the shader reads
-        into : textures for blurred light and for the blurred stretch map
-        side : side of the atlas [texels]
+        shader_resources : resources that the shader reads
+        target_pair : textures for blurred light and for the blurred stretch map
+        atlas_side : side of the atlas [texels]
         """
         assert isinstance(shader, ComputeProgram)
-        bound = bound | {"blurred": into[0], "stretch_blurred": into[1]}
-        graph.compute("diffuse", shader, bound, (side, side))
+        shader_resources = shader_resources | {"blurred": target_pair[0], "stretch_blurred": target_pair[1]}
+        graph.compute("diffuse", shader, shader_resources, (atlas_side, atlas_side))
 
 
 TECHNIQUE = GpuGems3()

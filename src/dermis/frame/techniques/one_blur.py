@@ -21,9 +21,9 @@ class OneBlur(TextureSpace):
         """Return the single Gaussian that replaces a profile."""
         return single_gaussian(profile)
 
-    def split(self, profile: GaussianSum, normalise: bool) -> ProfileSplit:
+    def split(self, profile: GaussianSum, normalise_weights: bool) -> ProfileSplit:
         """Split a profile into one Gaussian that blurs, without corrections for light within a texel."""
-        return AtlasTechnique.split(self, profile, normalise)
+        return AtlasTechnique.split(self, profile, normalise_weights)
 
     def relights_narrowest(self, profile: GaussianSum) -> bool:
         """Return False: no unblurred light replaces the narrowest Gaussian, because all light is blurred."""

@@ -56,7 +56,7 @@ class PreIntegratedSkin(Technique):
         self, memo: Memo, device: Device, settings: Settings, profile: GaussianSum
     ) -> PreIntegratedTables:
         """Return the tables of scattered light for the profile."""
-        return memo.get(pre_integrate, device, profile)
+        return memo.get(make_pre_integrated_tables, device, profile)
 
     def write_view_record(
         self, view: UniformRecord, shade: ComputeProgram, resources: TechniqueResources | None
@@ -81,7 +81,7 @@ class PreIntegratedSkin(Technique):
 TECHNIQUE = PreIntegratedSkin()
 
 
-def pre_integrate(device: Device, profile: GaussianSum) -> PreIntegratedTables:
+def make_pre_integrated_tables(device: Device, profile: GaussianSum) -> PreIntegratedTables:
     """Compute the tables of scattered light for a profile, and upload them."""
     penumbra = penumbra_width_mm(profile)
     edges = [

@@ -48,33 +48,33 @@ class Technique(TechniqueTraits):
     (True, False)
     """
 
-    def make_levels(self, device: Device, side: int, halvings: Halvings) -> PyramidLevels:
+    def make_levels(self, device: Device, atlas_side: int, halvings: Halvings) -> PyramidLevels:
         """Create the textures of the blur pyramid, minimal for techniques that blur no light over the atlas.
 
-        side : side of the atlas [texels]
+        atlas_side : side of the atlas [texels]
         halvings : for each layout, the number of times that the resolution of each level is halved
         """
-        return make_levels(device, side, halvings, FLOAT_TEXEL_FORMAT)
+        return make_levels(device, atlas_side, halvings, FLOAT_TEXEL_FORMAT)
 
-    def make_sum(self, device: Device, side: int) -> Texture:
+    def make_sum(self, device: Device, atlas_side: int) -> Texture:
         """Create the texture for the exitance of scattered light, of side x side texels."""
-        return combine.make_blur_sum(device, side)
+        return combine.make_blur_sum(device, atlas_side)
 
     def add_intermediate_levels(
-        self, split: ProfileSplit, atlas: AtlasTextures, edge: str
+        self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str
     ) -> tuple[ProfileSplit, tuple[int, ...]]:
         """Insert Gaussians of weight 0 that make blurs cheaper; return the new split and their level indices.
 
         In this base class, no Gaussians are inserted.
 
-        edge : filter mode at the edges of charts
+        edge_mode : filter mode at the edges of charts
         """
         return split, ()
 
-    def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
+    def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str) -> tuple[int, ...]:
         """Return how many times the resolution of each level is halved; level 0 is the unblurred light.
 
-        edge : filter mode at the edges of charts
+        edge_mode : filter mode at the edges of charts
         """
         return (0,) * (1 + len(split.blurred_mm2))
 
@@ -125,13 +125,15 @@ class Technique(TechniqueTraits):
         """
         raise NotImplementedError
 
-    def sum_translucency(self, graph: Graph, inputs: FrameInputs, into: tuple[Texture, ...]) -> Texture:
+    def sum_translucency(
+        self, graph: Graph, inputs: FrameInputs, atlas_textures: tuple[Texture, ...]
+    ) -> Texture:
         """Fill textures with only the light through thin parts; return the texture that combines all layouts.
 
         Outputs that separate this light from the rest of the picture need these textures.
 
-        into : textures of the atlas, one for each layout and, if there are several layouts, one for their
-            blend
+        atlas_textures : textures of the atlas, one for each layout and, if there are several layouts, one for
+            their blend
         """
         raise NotImplementedError
 
@@ -149,36 +151,36 @@ class AtlasTechnique(Technique):
         """Return whether unblurred light, evaluated per pixel, replaces the narrowest Gaussian."""
         return bool(profile.variance_mm2[0] <= _RELIT_VARIANCE_MM2)
 
-    def split(self, profile: GaussianSum, normalise: bool) -> ProfileSplit:
+    def split(self, profile: GaussianSum, normalise_weights: bool) -> ProfileSplit:
         """Split a profile into the narrow Gaussian that is relit (if any) and the Gaussians that blur.
 
-        normalise : whether to scale the weights of each channel to a sum of 1, so that only the colour map
-            sets the albedo
+        normalise_weights : whether to scale the weights of each channel to a sum of 1, so that only the
+            colour map sets the albedo
         """
         profile = self.gaussians(profile)
-        weight = channel_weights(profile, normalise)
+        weight = channel_weights(profile, normalise_weights)
         total = weight.sum(axis=0)
         if self.relights_narrowest(profile):
             return ProfileSplit(weight[0], total, profile.variance_mm2[1:], weight[1:])
         return ProfileSplit(np.zeros(3), total, profile.variance_mm2, weight)
 
-    def make_levels(self, device: Device, side: int, halvings: Halvings) -> PyramidLevels:
+    def make_levels(self, device: Device, atlas_side: int, halvings: Halvings) -> PyramidLevels:
         """Create the textures of the blur pyramid in the format that is fastest on the device."""
-        return make_levels(device, side, halvings, level_format(device))
+        return make_levels(device, atlas_side, halvings, level_format(device))
 
-    def texel_bytes(self, levels: int) -> float:
+    def texel_bytes(self, blur_count: int) -> float:
         """Return the peak memory per texel on a software adapter, including temporary textures [bytes]."""
         mips = sum(0.25**halving for halving in range(MAX_ATLAS_HALVINGS + 1))
         return TEXEL_FORMAT_BYTES[FLOAT_TEXEL_FORMAT] * (
-            levels + 2 * mips
+            blur_count + 2 * mips
         )  # upper bound, as if no level were halved
 
-    def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
+    def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str) -> tuple[int, ...]:
         """Return how many times the resolution of each level is halved; level 0 is the unblurred light.
 
-        edge : filter mode at the edges of charts
+        edge_mode : filter mode at the edges of charts
         """
-        max_halvings = len(atlas.mips_for(edge)) - 1
+        max_halvings = len(atlas.mips_for(edge_mode)) - 1
         return choose_halvings(split.blurred_mm2, atlas.median_texels_per_mm, max_halvings)
 
     def scatter(self, graph: Graph, inputs: FrameInputs) -> Texture:
@@ -223,16 +225,18 @@ class AtlasTechnique(Technique):
         graph: Recorder,
         levels: PyramidLevels,
         blur: Blur,
-        thin: Translucency | None,
-        into: TextureOrView,
+        thin_parts: Translucency | None,
+        exitance_texture: TextureOrView,
     ) -> None:
         """Declare the passes that sum the blurred levels as exitance, including light through thin parts.
 
-        thin : resources of the light through thin parts, None if no light crosses thin parts
-        into : texture for the exitance
+        thin_parts : resources of the light through thin parts, None if no light crosses thin parts
+        exitance_texture : texture for the exitance
         """
-        through = translucency.draw(graph, levels, blur, thin) if thin else None
-        combine.draw(graph, levels, blur, into, through, thin.pairs.lost if thin else None)
+        through = translucency.draw(graph, levels, blur, thin_parts) if thin_parts else None
+        combine.draw(
+            graph, levels, blur, exitance_texture, through, thin_parts.pairs.lost if thin_parts else None
+        )
 
     def add_other_profiles(
         self,
@@ -241,33 +245,35 @@ class AtlasTechnique(Technique):
         blur: Blur,
         atlas: AtlasTextures,
         mixture: Mixture,
-        layout: int,
-        into: Texture,
+        layout_index: int,
+        exitance_texture: Texture,
     ) -> None:
         """Declare the passes that add the other profiles of a mixture to the exitance of the first profile.
 
         Each profile is weighted by the mean of its blend weights at the points where light enters and leaves,
         so that light transport is reciprocal.
 
-        layout : index of the atlas layout
-        into : texture for the exitance
+        layout_index : index of the atlas layout
+        exitance_texture : texture for the exitance
         """
         for other, (entering, weight) in enumerate(zip(mixture.entering, blur.weight_changes, strict=True)):
             change = replace(blur, weight=weight)
             combine.draw(graph, levels, change, mixture.sum_layer(1 + 2 * other))
-            mix.draw_entering_light(graph, levels, mixture, layout, other)
+            mix.draw_entering_light(graph, levels, mixture, layout_index, other)
             self.blur_levels(graph, entering, atlas, blur)
             combine.draw(graph, entering, change, mixture.sum_layer(2 + 2 * other))
-        mix.draw(graph, mixture, layout, into)
+        mix.draw(graph, mixture, layout_index, exitance_texture)
 
-    def sum_translucency(self, graph: Graph, inputs: FrameInputs, into: tuple[Texture, ...]) -> Texture:
+    def sum_translucency(
+        self, graph: Graph, inputs: FrameInputs, atlas_textures: tuple[Texture, ...]
+    ) -> Texture:
         """Fill textures with only the light through thin parts; the blurred levels get weights of 0."""
         layouts, levels = inputs.layouts, inputs.resources.diffusion.levels
-        for layout, blur, texture in zip(layouts, inputs.blurs, into, strict=False):
+        for layout, blur, texture in zip(layouts, inputs.blurs, atlas_textures, strict=False):
             unblurred, thin = replace(blur, weight=np.zeros_like(blur.weight)), layout.translucency
             assert thin is not None
             combine.draw(graph, levels, unblurred, texture, thin.pairs.transmitted, thin.pairs.lost)
         if len(layouts) > 1:
-            first, second = (replace(layout, scattered=into[k]) for k, layout in enumerate(layouts))
-            draw_blend(graph, first, second, into[-1])
-        return into[-1]
+            first, second = (replace(layout, scattered=atlas_textures[k]) for k, layout in enumerate(layouts))
+            draw_blend(graph, first, second, atlas_textures[-1])
+        return atlas_textures[-1]

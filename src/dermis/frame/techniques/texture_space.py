@@ -24,24 +24,24 @@ class TextureSpace(AtlasTechnique):
     supports_translucency = True
     mixes_profiles = True
 
-    def split(self, profile: GaussianSum, normalise: bool) -> ProfileSplit:
+    def split(self, profile: GaussianSum, normalise_weights: bool) -> ProfileSplit:
         """Split a profile into relit and blurred Gaussians; `fine` corrects light that varies within a texel.
 
-        normalise : whether to scale the weights of each channel to a sum of 1, so that only the colour map
-            sets the albedo
+        normalise_weights : whether to scale the weights of each channel to a sum of 1, so that only the
+            colour map sets the albedo
         """
-        split = super().split(profile, normalise)
+        split = super().split(profile, normalise_weights)
         relit_mm2 = float(profile.variance_mm2[0]) if self.relights_narrowest(profile) else 0.0
         return replace(split, fine=fine_light_members(split.blurred_mm2, split.weight, relit_mm2))
 
     def add_intermediate_levels(
-        self, split: ProfileSplit, atlas: AtlasTextures, edge: str
+        self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str
     ) -> tuple[ProfileSplit, tuple[int, ...]]:
         """Insert Gaussians of weight 0 that make blurs cheaper; return the new split and their level indices.
 
-        edge : filter mode at the edges of charts
+        edge_mode : filter mode at the edges of charts
         """
-        max_halvings = len(atlas.mips_for(edge)) - 1
+        max_halvings = len(atlas.mips_for(edge_mode)) - 1
         variances, steps = add_intermediate_levels(
             split.blurred_mm2, atlas.median_texels_per_mm, max_halvings
         )

@@ -41,7 +41,9 @@ class GutterTracing:
 
 def make_gutter_tracing(device: Device, mesh: Mesh, atlas: Atlas, textures: AtlasTextures) -> GutterTracing:
     """Upload the constant inputs of gutter tracing, for an atlas that has gutters."""
-    starts, sides = (device.buffer(words, "STORAGE") for words in (_start_words(atlas), _side_words(mesh)))
+    starts, sides = (
+        device.buffer(words, "STORAGE") for words in (_path_start_words(atlas), _neighbour_words(mesh))
+    )
     pairs = pairwise((textures, *textures.coarser))
     halvings = tuple(_halving_buffers(device, finer, coarser) for finer, coarser in pairs if coarser.gutter)
     return GutterTracing(starts, sides, halvings)
@@ -50,18 +52,18 @@ def make_gutter_tracing(device: Device, mesh: Mesh, atlas: Atlas, textures: Atla
 def with_separate_gutters(device: Device, textures: AtlasTextures) -> AtlasTextures:
     """Return a copy of the atlas with separate, empty gutter buffers, which `draw` fills for a person."""
 
-    def with_list(level: AtlasTextures) -> AtlasTextures:
+    def with_gutter_list(level: AtlasTextures) -> AtlasTextures:
         words = np.zeros((len(level.gutter_texels), GUTTER_ENTRY_BYTES // 4), np.uint32)
         return replace(level, gutter=device.buffer(words, "STORAGE")) if len(words) else level
 
-    return replace(with_list(textures), coarser=tuple(map(with_list, textures.coarser)))
+    return replace(with_gutter_list(textures), coarser=tuple(map(with_gutter_list, textures.coarser)))
 
 
-def _start_words(atlas: Atlas) -> Words:
-    """Return (a, 5) words for gutter_trace.wgsl, one row for the path to each gutter texel.
+def _path_start_words(atlas: Atlas) -> Words:
+    """Return (a, 5) words for gutter_trace.wgsl, one row for each gutter texel.
 
-    The words are the packed texel, the triangle where the path starts, the two packed barycentric weights
-    of the start, and as floats the source position (x, y) to use if tracing fails.
+    The words are the packed texel, the triangle and the two packed barycentric weights of the point where
+    the path to its source starts, and as floats the source position (x, y) to use if tracing fails.
     """
     root = np.full((atlas.size, atlas.size), -1, np.int64)
     root[atlas.outside[:, 1], atlas.outside[:, 0]] = np.arange(len(atlas.outside))
@@ -74,7 +76,7 @@ def _start_words(atlas: Atlas) -> Words:
     return np.concatenate([start, np.ascontiguousarray(atlas.source).view(np.uint32)], axis=1)
 
 
-def _side_words(mesh: Mesh) -> Words:
+def _neighbour_words(mesh: Mesh) -> Words:
     """Return (f, 3) words for gutter_trace.wgsl: the packed neighbour across each edge of each triangle.
 
     A word packs the index of the neighbouring triangle, the index of the shared edge in that triangle, and

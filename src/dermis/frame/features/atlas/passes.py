@@ -6,7 +6,7 @@ from dermis.frame.features.atlas.lit_atlas import LitAtlas
 from dermis.frame.features.atlas.textures import GUTTER_ENTRY_BYTES, AtlasTextures
 from dermis.frame.features.shape.mesh import HeadGeometry
 from dermis.frame.programs import TILE_SIDE, program, workgroup_grid
-from dermis.frame.seams import FEATHER_MM
+from dermis.frame.seams import FEATHER_WIDTH_MM
 from dermis.gpu import Device, Recorder, Texture, TextureOrView, make_texture
 
 _STRETCH_SOURCE_BYTES = 12  # size of an entry of stretch_sources in stretch_beyond.wgsl
@@ -83,5 +83,5 @@ def draw_blend(
         "second": second_layout.scattered,
         "blended": blended_light,
     }
-    shader = program(graph.device, "atlas/blend.wgsl", (("FADE_MM", FEATHER_MM),))
+    shader = program(graph.device, "atlas/blend.wgsl", (("FADE_MM", FEATHER_WIDTH_MM),))
     graph.compute("blend", shader, bound, blended_light.size[:2])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dermis.atlas.atlas import GUTTER_TEXELS, MAX_SHEAR, Atlas
 from dermis.atlas.stitched.geodesics import INNER_POINT_WEIGHTS, START_SHIFT_FRACTION
 from dermis.base.disk import cached_arrays
-from dermis.frame.seams import FEATHER_MM, SEAM_METHODS, SeamMethod
+from dermis.frame.seams import FEATHER_WIDTH_MM, SEAM_METHODS, SeamMethod
 from dermis.gpu import Buffer, Constants, Device, Texture, make_texture, mark_scratch
 from dermis.gpu.textures import texture_from_array
 
@@ -25,7 +25,7 @@ GUTTER_ENTRY_BYTES = 16
 _ATLAS_TEXTURE_NAME = "map of the atlas"
 _GUTTER_LIGHT_BYTES = 16  # size of the light of a gutter texel
 _GUTTER_BIT = 1 << 15  # bit of the first component of reach_map that marks gutter texels, see reach.wgsl
-SAME_SOURCE_TEXELS = 4.0
+MAX_SAME_SOURCE_DISTANCE_TEXELS = 4.0
 """Largest distance between sources of gutter texels that are averaged at half the resolution [texels]."""
 
 
@@ -36,7 +36,7 @@ def atlas_constants() -> dict[str, int | float]:
         "inward": START_SHIFT_FRACTION,
         "inner_b": inner_b,
         "inner_c": inner_c,
-        "same_source": SAME_SOURCE_TEXELS,
+        "same_source": MAX_SAME_SOURCE_DISTANCE_TEXELS,
     }
     return {"gutter_bit": _GUTTER_BIT, "max_shear": MAX_SHEAR, **tracing}
 
@@ -100,7 +100,7 @@ def upload_atlas(
             device, edge_distances(atlas), "r32float", _ATLAS_TEXTURE_NAME
         )
     even = _rms_density(atlas.stretch[own]) if stretch_correction == "none" else 0.0
-    feather = FEATHER_MM if seam_method.feathered else 0.0
+    feather = FEATHER_WIDTH_MM if seam_method.feathered else 0.0
     mip = AtlasMip(atlas.coverage, own, atlas.edge_distance, atlas.gutter, atlas.source)
     return _upload_mip(
         device,
@@ -236,9 +236,9 @@ def halve_mip(atlas_mip: AtlasMip) -> AtlasMip:
     """
     from scipy.ndimage import binary_dilation
 
-    own = _square_texels(atlas_mip.lit)
+    own = _split_squares(atlas_mip.lit)
     any_own = own[0] | own[1] | own[2] | own[3]
-    measured = np.where(any_own, own, _square_texels(atlas_mip.covered))
+    measured = np.where(any_own, own, _split_squares(atlas_mip.covered))
     covered = measured[0] | measured[1] | measured[2] | measured[3]
     stitched = covered & ~binary_dilation(any_own, np.ones((3, 3), bool))
     return AtlasMip(
@@ -249,7 +249,7 @@ def halve_mip(atlas_mip: AtlasMip) -> AtlasMip:
     )
 
 
-def _square_texels(texel_values: NDArray[np.generic]) -> NDArray[np.generic]:
+def _split_squares(texel_values: NDArray[np.generic]) -> NDArray[np.generic]:
     """Rearrange an (n, n) image as (4, n/2, n/2); the first axis counts the texels of a 2 x 2 square."""
     return np.stack([texel_values[y::2, x::2] for y in (0, 1) for x in (0, 1)])
 
@@ -260,13 +260,13 @@ def _halved_reach(reach: NDArray[np.uint16], measured_texels: NDArray[np.bool_])
     The reach of a square is the smallest reach of its texels; texels outside `measured_texels` do not count.
 
     reach : (n, n, 4) reach of each texel, see `AtlasMip` [texels]
-    measured_texels : (4, n/2, n/2) mask of texels, as split by `_square_texels`
+    measured_texels : (4, n/2, n/2) mask of texels, as split by `_split_squares`
     """
     squares = np.zeros((*measured_texels.shape[1:], 4), np.uint16)
     within = np.array([[0, 1, 0, 1], [1, 0, 1, 0], [0, 0, 1, 1], [1, 1, 0, 0]])  # steps inside the square
     for side in range(4):
         steps = (
-            _square_texels(reach[..., side]).astype(np.int16) - within[side].astype(np.int16)[:, None, None]
+            _split_squares(reach[..., side]).astype(np.int16) - within[side].astype(np.int16)[:, None, None]
         )
         steps[~measured_texels] = np.iinfo(np.int16).max
         squares[..., side] = np.maximum(steps.min(axis=0), 0) // 2
@@ -291,7 +291,7 @@ def _halved_gutter(
     squares, first, index = np.unique(
         y[used] * stitched_squares.shape[1] + x[used], return_index=True, return_inverse=True
     )
-    near = np.abs(source - source[first][index]).max(axis=1) < SAME_SOURCE_TEXELS
+    near = np.abs(source - source[first][index]).max(axis=1) < MAX_SAME_SOURCE_DISTANCE_TEXELS
     count = np.bincount(index[near], minlength=len(squares))
     mean = np.stack(
         [np.bincount(index[near], source[near, k], minlength=len(squares)) / count for k in (0, 1)], axis=-1

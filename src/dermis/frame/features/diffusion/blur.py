@@ -15,7 +15,7 @@ from dermis.frame.features.diffusion.kernels import (
     KERNEL_TRUNCATION_SIGMAS,
     MAX_CHAINED_SIGMA_TEXELS,
     MAX_TABLE_VARIANCE,
-    ROWS_PER_UNIT,
+    ROWS_PER_UNIT_VARIANCE,
     kernel_table,
 )
 from dermis.frame.features.diffusion.pyramid import Blur, PyramidLevels
@@ -38,7 +38,7 @@ def draw(graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blu
         source_halvings, halvings = blur.halvings[k - 1 : k + 1]
         draw_gutters(graph, "diffuse", sheets[source_halvings], source, levels.texel)
         if halvings > source_halvings:
-            source = _halve(graph, levels, source, k - 1, halvings)
+            source = _draw_halved_level(graph, levels, source, k - 1, halvings)
         # The level after an intermediate one gains most of its width in one blur.
         wide = k > 1 and k - 1 in blur.intermediate_levels and k not in blur.intermediate_levels
         truncation = (
@@ -54,7 +54,7 @@ def draw(graph: Recorder, levels: PyramidLevels, atlas: AtlasTextures, blur: Blu
             source = blurred
 
 
-def _halve(
+def _draw_halved_level(
     graph: Recorder, levels: PyramidLevels, finer_level: TextureOrView, level_index: int, halvings: int
 ) -> TextureOrView:
     """Declare the pass that stores a copy of a level at half its resolution; return a view of the copy.
@@ -86,7 +86,7 @@ def _axis_program(
     sheared : whether to account for an angle between u and v that is not a right angle
     edge_mode : filter mode at the edges of charts
     """
-    table = (("ROWS_PER_UNIT", ROWS_PER_UNIT), ("MAX_TABLE_VARIANCE", MAX_TABLE_VARIANCE))
+    table = (("ROWS_PER_UNIT", ROWS_PER_UNIT_VARIANCE), ("MAX_TABLE_VARIANCE", MAX_TABLE_VARIANCE))
     constants = (("AXIS", axis), *table, ("SHEARED", sheared), ("EDGE", CHART_EDGE_MODES.index(edge_mode)))
     return program(device, "diffusion/diffuse.wgsl", constants, texel_format, texel_format)
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from dermis.frame.features.diffusion.pyramid import MIN_SMOOTHNESS, choose_halvings
 
 Floats = NDArray[np.float64]
-ROWS_PER_UNIT = 64
+ROWS_PER_UNIT_VARIANCE = 64
 """Number of rows of the kernel table per unit of variance."""
 MAX_TABLE_VARIANCE = 9
 """Variance of the last row of the kernel table [step^2]."""
@@ -26,7 +26,7 @@ most 0.014 % of an image.
 """
 MAX_CHAINED_SIGMA_TEXELS = 1.5
 """Largest standard deviation at which `CHAINED_TRUNCATION_SIGMAS` suits unblurred light too [texel]."""
-_MAX_TAP_COUNT = math.ceil(KERNEL_TRUNCATION_SIGMAS * math.sqrt(MAX_TABLE_VARIANCE))
+_MAX_TAPS_PER_SIDE = math.ceil(KERNEL_TRUNCATION_SIGMAS * math.sqrt(MAX_TABLE_VARIANCE))
 _KERNEL_BISECTION_COUNT = 60
 _WIDE_TRUNCATION_SIGMAS, _MAX_TAP_STEP_TEXELS = 4.0, 1.6  # as in diffuse.wgsl
 _FIXED_READS_PER_PASS = 5.0  # texel reads of a pass besides its taps: stretch map, gutters, the result
@@ -37,7 +37,7 @@ _MIN_LEVEL_SIGMA_TEXELS = 1.0  # least standard deviation of an intermediate lev
 _MIN_VARIANCE_RATIO = 1.5  # least ratio of the variances of an intermediate level and any other
 
 
-def tap_count(variance: float, truncation_sigmas: float = KERNEL_TRUNCATION_SIGMAS) -> int:
+def taps_per_side(variance: float, truncation_sigmas: float = KERNEL_TRUNCATION_SIGMAS) -> int:
     """Return the number of taps of a Gaussian kernel on each side of its centre.
 
     variance : variance of the kernel, in units of the squared distance between taps
@@ -56,8 +56,8 @@ def kernel_table() -> NDArray[np.float32]:
     Sampling and truncation reduce the variance of a Gaussian, especially of a narrow Gaussian. Therefore q is
     determined numerically, such that the truncated kernel has exactly the desired variance.
     """
-    variance = np.arange(MAX_TABLE_VARIANCE * ROWS_PER_UNIT + 2)[:, None] / ROWS_PER_UNIT
-    n = np.arange(_MAX_TAP_COUNT + 1)
+    variance = np.arange(MAX_TABLE_VARIANCE * ROWS_PER_UNIT_VARIANCE + 2)[:, None] / ROWS_PER_UNIT_VARIANCE
+    n = np.arange(_MAX_TAPS_PER_SIDE + 1)
     tap_mask = n[None, :] <= n[:, None]  # (column of the table, tap)
     low, high = np.zeros((len(variance), len(n))), np.ones((len(variance), len(n)))
     for _ in range(_KERNEL_BISECTION_COUNT):
@@ -132,7 +132,7 @@ def chain_cost(variance_mm2: list[float], texels_per_mm: float, max_halvings: in
             1.0, math.floor(math.sqrt(min(_MAX_TAP_STEP_TEXELS**2 * before, after - before) * per_mm2))
         )
         scaled = (after - before) * per_mm2 / step**2
-        reach = tap_count(
+        reach = taps_per_side(
             scaled, _WIDE_TRUNCATION_SIGMAS if scaled > MAX_TABLE_VARIANCE else CHAINED_TRUNCATION_SIGMAS
         )
         cost += 2.0 * (2.0 * reach + 1.0 + _FIXED_READS_PER_PASS) / 4.0**halved + _FIXED_READS_PER_LEVEL

@@ -70,12 +70,12 @@ def make_mixture(
     return Mixture(uv_weights, entering_light, atlas_weights, sums)
 
 
-def sum_layer_count(other_count: int) -> int:
+def sum_layer_count(other_profile_count: int) -> int:
     """Return the number of layers of `Mixture.sums`.
 
-    other_count : number of profiles besides the first
+    other_profile_count : number of profiles besides the first
     """
-    return 1 + 2 * other_count
+    return 1 + 2 * other_profile_count
 
 
 def upload_blend_weights(device: Device, blend_weights: NDArray[np.float32]) -> Texture:
@@ -103,11 +103,11 @@ def load_blend_weights(image_path: str) -> NDArray[np.float32]:
     except (OSError, ValueError):
         expected = "a picture: grey, or red and green"
         refuse(f"profile map {image_path}", expected, "there is no such file", "Check the name")
-    return _load_image(path, (status.st_mtime_ns, status.st_size, status.st_ino))
+    return _load_blend_map(path, (status.st_mtime_ns, status.st_size, status.st_ino))
 
 
 @lru_cache(_CACHED_BLEND_MAPS)
-def _load_image(path: Path, _: tuple[int, ...]) -> NDArray[np.float32]:
+def _load_blend_map(path: Path, _: tuple[int, ...]) -> NDArray[np.float32]:
     return mixture_map(path)
 
 

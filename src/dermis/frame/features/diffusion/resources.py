@@ -20,21 +20,21 @@ from dermis.gpu import Device, Memo
 class BlurScheme(Protocol):
     """Interface of a technique that chooses the formats and resolutions of its blurs."""
 
-    def make_levels(self, device: Device, side: int, halvings: Halvings) -> PyramidLevels:
+    def make_levels(self, device: Device, atlas_side: int, halvings: Halvings) -> PyramidLevels:
         """Allocate the blur pyramid for an atlas of side x side texels."""
 
     def add_intermediate_levels(
-        self, split: ProfileSplit, atlas: AtlasTextures, edge: str
+        self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str
     ) -> tuple[ProfileSplit, tuple[int, ...]]:
         """Insert Gaussians of weight 0 that make blurs cheaper; return the new split and their level indices.
 
-        edge : filter mode at the edges of charts
+        edge_mode : filter mode at the edges of charts
         """
 
-    def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
+    def halvings(self, split: ProfileSplit, atlas: AtlasTextures, edge_mode: str) -> tuple[int, ...]:
         """Return how many times the resolution of each level is halved; level 0 is the unblurred light.
 
-        edge : filter mode at the edges of charts
+        edge_mode : filter mode at the edges of charts
         """
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from dermis.frame.features.hair.resources import (
+    KNOTS_PER_WINDOW,
     TILE_PIXELS,
-    WINDOW_KNOTS,
     Resources,
     StrandCounts,
     StrandTables,
@@ -35,8 +35,8 @@ ShadingInputs = tuple[Bindings, UniformRecord, Constants]
 _MAX_ROWS_PER_INVOCATION, _MAX_LOOP_ITERATIONS = 8, 60_000
 _HAIR_EXTENT_MM = 100.0  # side of a square in the picture that holds all hair of a head
 _CROWDING_FACTOR = 14.0  # ratio of the number of segments in a crowded tile to the mean of all tiles
-_CLEARING_GROUPS = 256
-_RAY_STRIDE = 4  # one of four rays to an area light is traced: pictures change by 0.0002 at most
+_CLEARING_WORKGROUP_COUNT = 256
+_SHADOW_RAY_STRIDE = 4  # one of four rays to an area light is traced: pictures change by 0.0002 at most
 
 
 def draw_shadows(
@@ -60,14 +60,18 @@ def pose_guides(graph: Recorder, tables: StrandTables, shape: Shape) -> None:
 
 
 def pose_strands(
-    graph: Recorder, tables: StrandTables, shape: Shape, posed: Buffer, coarse: StrandCounts
+    graph: Recorder, tables: StrandTables, shape: Shape, posed_strands: Buffer, coarse: StrandCounts
 ) -> None:
-    """Declare the passes that move fine strands with the skin, and grow coarse strands between posed guides.
+    """Declare the passes that move brows and lashes with the skin, and grow all other hair between guides.
 
-    posed : buffer to which the posed strands are written
+    posed_strands : buffer to which the posed strands are written
     coarse : number of coarse strands to grow, and number of knots of each
     """
-    shared: Bindings = {"points": shape.surface["points"], "hairs": tables.record(coarse), "posed": posed}
+    shared: Bindings = {
+        "points": shape.surface["points"],
+        "hairs": tables.record(coarse),
+        "posed": posed_strands,
+    }
     if tables.fine.hairs:
         fine: Bindings = {"strands": tables.strands, "knots": tables.knots}
         _dispatch(graph, "hair/strands_pose.wgsl", {**shared, **fine}, tables.fine.all_knots())
@@ -87,9 +91,9 @@ def _draw_deep_opacity(graph: Recorder, strands: Resources, shape: Shape, lighti
     bindings: MutableBindings = {**lighting, "posed": posed, "hairs": tables.record(tables.casters)}
     bindings |= {"windows": strands.shadows, "opacity": strands.shadows}
     clear = program(graph.device, "hair/strands_clear.wgsl")
-    graph.dispatch("strands", clear, bindings, (_CLEARING_GROUPS, 1, 1))
+    graph.dispatch("strands", clear, bindings, (_CLEARING_WORKGROUP_COUNT, 1, 1))
     windows = program(graph.device, "hair/strands_window.wgsl")
-    graph.dispatch("strands", windows, bindings, (max(1, -(-knots // WINDOW_KNOTS)), 1, 1))
+    graph.dispatch("strands", windows, bindings, (max(1, -(-knots // KNOTS_PER_WINDOW)), 1, 1))
     for adds_cover in (0, 1):
         _dispatch(graph, "hair/strands_shadow.wgsl", bindings, segments, (("ADDS_COVER", adds_cover),))
 
@@ -119,7 +123,7 @@ def draw(
     pose_strands(graph, tables, shape, posed, coarse)
     segments = tables.fine.all_segments() + coarse.all_segments()
     knots = tables.fine.all_knots() + coarse.all_knots()
-    light_constants = (*light_constants, ("RAY_STRIDE", _RAY_STRIDE))
+    light_constants = (*light_constants, ("RAY_STRIDE", _SHADOW_RAY_STRIDE))
     light = program(graph.device, "hair/strands_light.wgsl", light_constants)
     record = _view_record(light, strands, view, coarse.hairs)
     hairs = tables.record(coarse)
@@ -142,58 +146,62 @@ def draw(
 
 
 def _view_record(
-    shader: ComputeProgram, strands: Resources, view: UniformRecord, coarse: int
+    shader: ComputeProgram, strands: Resources, view: UniformRecord, coarse_count: int
 ) -> UniformRecord:
     """Return a record of the shader's struct StrandView: camera, samples and number of coarse strands.
 
     view : uniform record of the shading pass
-    coarse : number of coarse strands to draw
+    coarse_count : number of coarse strands to draw
     """
     members = ("eye", "forward", "right", "up", "shift", "samples", "jitter", "light_factors")
     record = shader.record("StrandView", **{name: view[name] for name in members})
-    record["coarse"], record["size"] = coarse, strands.picture.result.size[:2]
+    record["coarse"], record["size"] = coarse_count, strands.picture.result.size[:2]
     record["skin"] = strands.skin_albedo
     return record
 
 
-def _pixel_mm(view: UniformRecord, tables: StrandTables, height: int) -> float:
+def _pixel_mm(view: UniformRecord, tables: StrandTables, picture_height: int) -> float:
     """Return the side of a pixel at the depth of the coarse strands [mm].
 
     view : uniform record of the shading pass
-    height : height of the picture [pixels]
+    picture_height : height of the picture [pixels]
     """
     depth = float(np.dot(tables.centre_mm - view["eye"], view["forward"]))
-    return 2.0 * float(np.linalg.norm(view["up"])) * max(depth, 1.0) / height
+    return 2.0 * float(np.linalg.norm(view["up"])) * max(depth, 1.0) / picture_height
 
 
-def _max_segments_in_tile(tables: StrandTables, segments: int, pixel_mm: float) -> int:
+def _max_segments_in_tile(tables: StrandTables, segment_count: int, pixel_mm: float) -> int:
     """Estimate the number of strand segments in a crowded tile of the picture.
 
     The tile is assumed to contain all segments of fine strands, and several times the mean number of segments
     of coarse strands per tile.
 
-    segments : number of segments of all strands that are drawn
+    segment_count : number of segments of all strands that are drawn
     pixel_mm : side of a pixel at the depth of the strands [mm]
     """
     tiles = max(1.0, (_HAIR_EXTENT_MM / (TILE_PIXELS * pixel_mm)) ** 2)
     fine = tables.fine.all_segments()
-    return int(fine + min(1.0, _CROWDING_FACTOR / tiles) * (segments - fine))
+    return int(fine + min(1.0, _CROWDING_FACTOR / tiles) * (segment_count - fine))
 
 
-def rows_per_invocation(device: Device, segments: int) -> int:
+def rows_per_invocation(device: Device, segment_count: int) -> int:
     """Return the number of vertically adjacent pixels that one shader invocation draws, a power of two.
 
-    segments : estimate of the largest number of segments in a tile
+    segment_count : estimate of the largest number of segments in a tile
 
     The result is 1 on GPUs. Software adapters skip pixels without hair faster in a loop over several pixels,
     but they end a shader's loops after 65,535 iterations in total, which limits the number of pixels.
     """
     if device.adapter.kind != "CPU":
         return 1
-    rows = max(1, min(_MAX_ROWS_PER_INVOCATION, _MAX_LOOP_ITERATIONS // max(1, segments)))
+    rows = max(1, min(_MAX_ROWS_PER_INVOCATION, _MAX_LOOP_ITERATIONS // max(1, segment_count)))
     return 1 << rows.bit_length() - 1
 
 
-def _dispatch(graph: Recorder, name: str, bindings: Bindings, count: int, constants: Constants = ()) -> None:
-    """Declare a hair pass with one shader invocation for each of `count` elements."""
-    graph.dispatch("strands", program(graph.device, name, constants), bindings, workgroup_grid(count))
+def _dispatch(
+    graph: Recorder, shader_path: str, bindings: Bindings, invocation_count: int, constants: Constants = ()
+) -> None:
+    """Declare a hair pass with one shader invocation for each of `invocation_count` elements."""
+    graph.dispatch(
+        "strands", program(graph.device, shader_path, constants), bindings, workgroup_grid(invocation_count)
+    )

@@ -21,7 +21,7 @@ from dermis.specular.hair import hair_constants
 
 TILE_PIXELS = 8
 """Side of a tile of the picture, for which strand segments are listed [pixels]."""
-_GPU_CHAINS = 64  # linked lists of a tile on GPUs: one for each invocation of the tile's workgroup
+_GPU_CHAINS_PER_TILE = 64  # linked lists of a tile on GPUs: one for each invocation of the tile's workgroup
 DEEP_OPACITY_WIDTH = 256
 """Width of a deep opacity map, twice its height [texels]."""
 DEEP_OPACITY_LAYERS = 6
@@ -38,8 +38,8 @@ _WIDTH_PER_COVER_PX, _MAX_DRAWN_COVER = (
     0.2,
     1.0,
 )  # added width per unit of cover: where hair hides hair, fewer strands suffice
-_LEVELS_PER_OCTAVE = 4  # levels of detail for each doubling of the size of a pixel
-WINDOW_KNOTS = 1 << 12
+_DETAIL_LEVELS_PER_OCTAVE = 4  # levels of detail for each doubling of the size of a pixel
+KNOTS_PER_WINDOW = 1 << 12
 """Number of knots for which one workgroup of strands_window.wgsl computes bounds."""
 # Row of the table of strands in strands_pose.wgsl.
 _STRAND_DTYPE = np.dtype([("corner", "u4", 4), ("weight", "f4", 4), ("absorption", "f4", 4)])
@@ -49,8 +49,8 @@ _ROOT_MEMBERS = ("corner", "u4", 4), ("weight", "f4", 4), ("guide", "u4", 4), ("
 _ROOT_DTYPE = np.dtype(
     [*_ROOT_MEMBERS, ("place", "f4", 4), ("clump", "u4"), ("part", "u4"), ("along_mm", "f4"), ("pad", "u4")]
 )
-_COUNT_MEMBERS = "fine", "coarse", "shadow_casters", "fine_knots", "coarse_knots"
-_HAIRS_DTYPE = np.dtype([*((name, "u4") for name in _COUNT_MEMBERS), ("width_scale", "f4")])
+_HAIR_COUNT_MEMBERS = "fine", "coarse", "shadow_casters", "fine_knots", "coarse_knots"
+_HAIRS_DTYPE = np.dtype([*((name, "u4") for name in _HAIR_COUNT_MEMBERS), ("width_scale", "f4")])
 
 
 class Detail(NamedTuple):
@@ -79,13 +79,13 @@ class StrandCounts(NamedTuple):
     hairs: int
     knots: int
 
-    def all_knots(self, hairs: int | None = None) -> int:
-        """Return the total number of knots of the first `hairs` strands, or of all strands."""
-        return (self.hairs if hairs is None else hairs) * self.knots
+    def all_knots(self, strand_count: int | None = None) -> int:
+        """Return the total number of knots of the first `strand_count` strands, or of all strands."""
+        return (self.hairs if strand_count is None else strand_count) * self.knots
 
-    def all_segments(self, hairs: int | None = None) -> int:
-        """Return the number of segments between knots of the first `hairs` strands, or of all strands."""
-        return (self.hairs if hairs is None else hairs) * (self.knots - 1)
+    def all_segments(self, strand_count: int | None = None) -> int:
+        """Return the number of segments between knots of the first `strand_count` strands or all strands."""
+        return (self.hairs if strand_count is None else strand_count) * (self.knots - 1)
 
 
 class StrandCapacity(NamedTuple):
@@ -156,7 +156,7 @@ def adapter_detail(device: Device) -> Detail:
 
 
 def strand_capacity(fine: StrandCounts, coarse: StrandCounts) -> StrandCapacity:
-    """Return the capacity for fine and coarse strands, rounded up so that most heads can share buffers."""
+    """Return the capacity that buffers of strands need, rounded up so that most heads can share buffers."""
     knots = fine.all_knots() + coarse.all_knots()
     step = _KNOT_CAPACITY_STEP if coarse.hairs else _FINE_CAPACITY_STEP
     return StrandCapacity(_round_up(fine.hairs, _FINE_CAPACITY_STEP), _round_up(knots, step))
@@ -174,32 +174,34 @@ def make_strand_buffers(device: Device, capacity: StrandCapacity, casters: Stran
     return StrandBuffers(first, second, _make_buffer(device, 8 * capacity.knots))
 
 
-def make_strand_picture(device: Device, capacity: StrandCapacity, size: tuple[int, int]) -> StrandPicture:
+def make_strand_picture(
+    device: Device, capacity: StrandCapacity, picture_size: tuple[int, int]
+) -> StrandPicture:
     """Allocate the segment lists and the texture with hair for a picture of size (width, height)."""
-    across, down = (-(-side // TILE_PIXELS) for side in size)
+    across, down = (-(-side // TILE_PIXELS) for side in picture_size)
     links = _LINKS_PER_KNOT * capacity.knots + capacity.fine * (across + down)
     links = min(links, _MAX_LINKS, device.max_storage_bytes // 8)
     per_tile = chains_per_tile(device, across * down)
     chains = _make_buffer(device, 1 + per_tile * across * down)
-    result = make_texture(device, size, "rgba32float")
+    result = make_texture(device, picture_size, "rgba32float")
     return StrandPicture(chains, _make_buffer(device, 2 * links), result, per_tile)
 
 
-def chains_per_tile(device: Device, tiles: int) -> int:
+def chains_per_tile(device: Device, tile_count: int) -> int:
     """Return the number of linked lists of segments per tile of the picture.
 
     The number is 1 on software adapters, and if a buffer cannot hold more lists.
 
-    tiles : number of tiles of the picture
+    tile_count : number of tiles of the picture
     """
-    fits = 4 * (1 + _GPU_CHAINS * tiles) <= device.max_storage_bytes
-    return _GPU_CHAINS if fits and device.adapter.kind != "CPU" else 1
+    fits = 4 * (1 + _GPU_CHAINS_PER_TILE * tile_count) <= device.max_storage_bytes
+    return _GPU_CHAINS_PER_TILE if fits and device.adapter.kind != "CPU" else 1
 
 
-def make_deep_opacity(device: Device, lights: int) -> Buffer:
-    """Allocate a buffer for the deep opacity maps of strands, one map for each of `lights` lights."""
+def make_deep_opacity(device: Device, light_count: int) -> Buffer:
+    """Allocate a buffer for the deep opacity maps of strands, one map for each of `light_count` lights."""
     texels = (1 + DEEP_OPACITY_LAYERS) * DEEP_OPACITY_WIDTH**2 // 2
-    return _make_buffer(device, (DEEP_OPACITY_HEADER_WORDS + texels) * max(1, lights))
+    return _make_buffer(device, (DEEP_OPACITY_HEADER_WORDS + texels) * max(1, light_count))
 
 
 def placeholder_strand_shadows(device: Device) -> Buffer:
@@ -207,8 +209,8 @@ def placeholder_strand_shadows(device: Device) -> Buffer:
     return device.cached("no strand shadows", lambda: _make_buffer(device, DEEP_OPACITY_HEADER_WORDS))
 
 
-def _make_buffer(device: Device, words: int) -> Buffer:
-    return device.storage_buffer(4 * words)
+def _make_buffer(device: Device, word_count: int) -> Buffer:
+    return device.storage_buffer(4 * word_count)
 
 
 @dataclass(frozen=True, eq=False)
@@ -295,7 +297,7 @@ class Resources:
 def shader_constants() -> dict[str, float]:
     """Return the named values that `//#fill` lines insert into the hair shaders."""
     opacity = {"strand_window": DEEP_OPACITY_WIDTH, "strand_layers": DEEP_OPACITY_LAYERS}
-    words = {"strand_window_words": DEEP_OPACITY_HEADER_WORDS, "strand_window_knots": WINDOW_KNOTS}
+    words = {"strand_window_words": DEEP_OPACITY_HEADER_WORDS, "strand_window_knots": KNOTS_PER_WINDOW}
     guides = {"guide_anchors": GUIDE_ANCHORS, "guide_knots": GUIDE_KNOTS}
     return {"strand_tile": TILE_PIXELS, **opacity, **words, **guides, **hair_constants()}
 
@@ -319,7 +321,7 @@ def drawn_counts(tables: StrandTables, pixel_mm: float) -> StrandCounts:
     """
     if not tables.coarse.hairs:
         return tables.coarse
-    pixel_mm = 2.0 ** (np.round(_LEVELS_PER_OCTAVE * np.log2(pixel_mm)) / _LEVELS_PER_OCTAVE)
+    pixel_mm = 2.0 ** (np.round(_DETAIL_LEVELS_PER_OCTAVE * np.log2(pixel_mm)) / _DETAIL_LEVELS_PER_OCTAVE)
     drawn_px = tables.detail.width_px + _WIDTH_PER_COVER_PX * min(tables.cover, _MAX_DRAWN_COVER)
     hairs = max(_MIN_DRAWN_STRANDS, tables.possible * tables.width_mm / (drawn_px * pixel_mm))
     knots = max(_MIN_KNOTS, 1 + np.ceil(tables.length_mm / (tables.detail.segment_px * pixel_mm)))
@@ -341,7 +343,7 @@ def make_strand_tables(
     rows, knots = np.zeros(1, _STRAND_DTYPE), np.zeros((1, 4), np.float32)
     if fine is not None and len(fine):
         rows, knots = np.zeros(len(fine), _STRAND_DTYPE), _knot_rows(fine)
-        _fill_rows(rows, head, fine)
+        _fill_strand_rows(rows, head, fine)
     largest = None if hair is None else hair.parameters[hair.parameters["length_mm"].argmax()]
     return StrandTables(
         strands=device.buffer(rows.view(np.uint32), "STORAGE"),
@@ -382,17 +384,17 @@ def make_strand_roots(device: Device, roots: StrandRoots, mesh: Mesh) -> Buffer:
     return device.buffer(rows.view(np.uint32), "STORAGE")
 
 
-def make_groom_tables(device: Device, groom: Groom, style: GuideTables, roots: Buffer) -> GroomTables:
+def make_groom_tables(device: Device, groom: Groom, guide_tables: GuideTables, roots: Buffer) -> GroomTables:
     """Upload the parameters of a person's groom, such as colour and length.
 
-    style : guides of the hair style, shared by all people with that style
+    guide_tables : guides of the hair style, shared by all people with that style
     roots : buffer of the strand roots of the hair style, shared by the same people
     """
     parts = device.buffer(groom.parameters.view(np.float32), "STORAGE")
-    return GroomTables(style, roots, parts, device.buffer(groom.hairline_mm, "STORAGE"))
+    return GroomTables(guide_tables, roots, parts, device.buffer(groom.hairline_mm, "STORAGE"))
 
 
-def _fill_rows(rows: NDArray[np.void], head: Head, strands: Strands) -> None:
+def _fill_strand_rows(rows: NDArray[np.void], head: Head, strands: Strands) -> None:
     if int(strands.roots.quad.max()) >= len(head.mesh.quads):
         actual = f"its mesh has {len(head.mesh.quads)} quads"
         refuse(head.name, "hairs rooted in quads of its mesh", actual, "Leave its strands out")

@@ -110,10 +110,10 @@ def _form_factors(head: Head, atlas: Atlas) -> FormFactors:
 
 def _upload_links(device: Device, form_factors: FormFactors) -> LinkBuffers:
     points = np.stack([form_factors.sample_triangle, form_factors.sample_weights], axis=1)
-    patch_links = _upload_rows(
+    patch_links = _upload_form_factors(
         device, form_factors.patch_first, form_factors.patch_target, form_factors.patch_factor
     )
-    cell_links = _upload_rows(
+    cell_links = _upload_form_factors(
         device, form_factors.cell_first, form_factors.cell_target, form_factors.cell_factor
     )
     cells = np.stack([form_factors.nearest_patch, form_factors.confidence.view(np.uint32)], axis=1)
@@ -121,7 +121,7 @@ def _upload_links(device: Device, form_factors: FormFactors) -> LinkBuffers:
     return (device.buffer(points, "STORAGE"), len(points)), patch_links, cell_links
 
 
-def _upload_rows(
+def _upload_form_factors(
     device: Device,
     row_start: NDArray[np.uint32],
     patch_index: NDArray[np.uint32],
@@ -156,7 +156,7 @@ def _make_buffers(
 
 
 def draw(graph: Recorder, bindings: Bindings, interreflection: Interreflection, constants: Constants) -> None:
-    """Declare the passes that compute the light that reaches skin from other skin.
+    """Declare the passes that compute the light that each part of the skin receives from other skin.
 
     bindings : resources of the lighting
     constants : pipeline constants of the lights

@@ -34,7 +34,7 @@ SKY_DIRECTION_COUNT = 128
 """Number of directions from which a depth map of the head is drawn."""
 DEPTH_MAP_SIDE = 512
 """Side of a depth map [texels]."""
-DIFFUSIVITY = 1.66
+DIFFUSIVITY_FACTOR = 1.66
 """Path of diffuse light through a plane layer relative to its thickness, on average; also in
 strands_light.wgsl."""
 OCCLUSION_CACHE_VERSION = f"1 {SKY_DIRECTION_COUNT} {DEPTH_MAP_SIDE}"
@@ -169,7 +169,7 @@ def _hair_transmittance(
     result_side : side of the atlas in the result [texels]
     """
     absorbed = absorbed_by_hair(hair)
-    passing = np.exp(-DIFFUSIVITY * absorbed * hair_cover(hair, mesh))[mesh.point].astype(np.float32)
+    passing = np.exp(-DIFFUSIVITY_FACTOR * absorbed * hair_cover(hair, mesh))[mesh.point].astype(np.float32)
     rows = ((np.arange(result_side) + 0.5) * len(packed_texels) / result_side).astype(int)
     chosen = packed_texels[np.ix_(rows, rows)]
     corners, triangle = passing[mesh.triangles], chosen[..., 0].astype(np.int64) - 1

@@ -60,7 +60,7 @@ class RotationAnchors:
     points : (s,) indices of the control points
     offsets : (s, 3) vectors from the weighted mean position to each point at rest, times the point's weight
         [mm]
-    outline : positions of the points, and the bones that move them
+    outline : positions of the control points at rest, and the bones that move them
     """
 
     points: NDArray[np.intp]
@@ -73,7 +73,7 @@ def sky_views(outline: Outline, rotation: Floats) -> SkyViews:
 
     rotation : (3, 3) rotation of the head, which also rotates the view directions
     """
-    axes = _view_axes() @ rotation.T
+    axes = _sky_view_axes() @ rotation.T
     local = (axes.reshape(-1, 3).astype(np.float32) @ outline.homogeneous[:3]).reshape(*axes.shape[:2], -1)
     low, high = local.min(axis=2).astype(np.float64), local.max(axis=2).astype(np.float64)
     half, middle = 0.5 * (high - low) + _VIEW_MARGIN_MM, 0.5 * (high + low)
@@ -92,7 +92,7 @@ def sky_views(outline: Outline, rotation: Floats) -> SkyViews:
 
 
 @lru_cache(maxsize=1)
-def _view_axes() -> Floats:
+def _sky_view_axes() -> Floats:
     """Return the right, up and forward axes of all views of a head at rest, (k, 3, 3) unit vectors."""
     up = np.array([0.0, 1.0, 0.0])
     return np.array([view_axes_array(-to_sky, up) for to_sky in fibonacci_sphere(SKY_VIEW_COUNT)])
@@ -165,7 +165,9 @@ def make_vertex_sky_visibility(
         layers, occluders, device.buffer(np.zeros((count, 2), np.float32), "STORAGE"), count
     )
     views = sky_views(Outline(rig.outline_mm(rig.rest)), np.eye(3))
-    _draw_vertices(commands, sky, views, sky_record(device, views, count), rest_geometry, is_at_rest=True)
+    _draw_vertex_visibility(
+        commands, sky, views, sky_record(device, views, count), rest_geometry, is_at_rest=True
+    )
     commands.submit()
     return sky
 
@@ -193,13 +195,13 @@ def draw(
     occlusion_maps : each atlas layout with the resources that update its occlusion map, None if the layout
         has no map to update
     """
-    _draw_vertices(graph, vertex_visibility, views, views_record, occlusion_maps[0][0].head)
+    _draw_vertex_visibility(graph, vertex_visibility, views, views_record, occlusion_maps[0][0].head)
     for layout, occlusion in occlusion_maps:
         if occlusion:
-            _draw_map(graph, vertex_visibility, layout, occlusion)
+            _draw_occlusion_map(graph, vertex_visibility, layout, occlusion)
 
 
-def _draw_map(
+def _draw_occlusion_map(
     graph: Recorder, vertex_visibility: VertexSkyVisibility, layout: LitAtlas, occlusion: MovingOcclusion
 ) -> None:
     """Declare the passes that update the occlusion map of a layout from the values at the vertices.
@@ -236,7 +238,7 @@ def sky_record(device: Device, views: SkyViews, vertex_count: int) -> UniformRec
     return record
 
 
-def _draw_vertices(
+def _draw_vertex_visibility(
     graph: Recorder,
     vertex_visibility: VertexSkyVisibility,
     views: SkyViews,

@@ -56,12 +56,12 @@ def make_label_buffers(memo: Memo, device: Device, request: FrameRequest) -> Lab
         return None
     head, settings = request.head.bare, request.settings
     labels = cached(mesh_labels, head)
-    tables = cached(_upload_tables, device, labels)
+    tables = cached(_upload_label_tables, device, labels)
     if not has_strands(request.head, settings):
-        unused = cached(_word_buffer, device, 1, caller_name="no hair labels")
+        unused = cached(_hair_label_buffer, device, 1, caller_name="no hair labels")
         return LabelBuffers(tables, len(labels.classes), None, unused)
     pixels = settings.size[0] * settings.size[1]
-    hair_labels = cached(_word_buffer, device, pixels, caller_name="hair labels")
+    hair_labels = cached(_hair_label_buffer, device, pixels, caller_name="hair labels")
     return LabelBuffers(tables, len(labels.classes), cached(_upload_hair_classes, device, head), hair_labels)
 
 
@@ -79,7 +79,7 @@ def draw_labels(graph: Recorder, planes: Planes, buffers: LabelBuffers, inputs: 
     draw_planes(graph, planes, shader, bindings)
 
 
-def _upload_tables(device: Device, labels: MeshLabels) -> MutableBindings:
+def _upload_label_tables(device: Device, labels: MeshLabels) -> MutableBindings:
     """Upload the label tables of a mesh, and the number of each label class in FaceSynthetics."""
     face_synthetics = [one.face_synthetics for one in label_classes()]
     arrays = {
@@ -94,5 +94,5 @@ def _upload_hair_classes(device: Device, head: Head) -> Buffer:
     return device.buffer(hair_classes(head).astype(np.uint32), "STORAGE")
 
 
-def _word_buffer(device: Device, word_count: int) -> Buffer:
+def _hair_label_buffer(device: Device, word_count: int) -> Buffer:
     return device.storage_buffer(4 * word_count, "hair labels")

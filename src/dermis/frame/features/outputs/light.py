@@ -83,7 +83,7 @@ def make_light_outputs(
 
 
 def draw_light(graph: Recorder, planes: Planes, resources: LightOutputs, inputs: StageInputs) -> None:
-    """Declare the passes that shade the surface at pixel centres for outputs such as radiance and albedo.
+    """Declare the passes that shade the surface at pixel centres for outputs such as albedo.
 
     Screen-space techniques also diffuse the subsurface light over the picture.
     """

@@ -49,7 +49,7 @@ class Readback:
         """Wait for the picture and return it as an (h, w, channels) array.
 
         This method can be called only once."""
-        return self._image(self.fetched.array())
+        return self._decode_picture(self.fetched.array())
 
     def image_and_outputs(self) -> tuple[PictureArray, dict[str, PlaneArray], LandmarkPositions]:
         """Wait for the readback; return the picture, and dictionaries of outputs and of landmark sets.
@@ -59,19 +59,19 @@ class Readback:
         """
         raw, start, arrays = self.fetched.array(), _WORD_BYTES * self.words, dict[str, PlaneArray]()
         if self.outputs is None:
-            return self._image(raw), {}, {}
+            return self._decode_picture(raw), {}, {}
         for planes in self.outputs.planes:
             end = start + planes.buffer.size
             arrays |= planes.arrays(raw[start:end])
             start = end
         buffers = self.outputs.landmarks
         landmarks = buffers.positions(raw[start : start + buffers.results.size]) if buffers else {}
-        return self._image(raw), {name: arrays[name] for name in self.outputs.names}, landmarks
+        return self._decode_picture(raw), {name: arrays[name] for name in self.outputs.names}, landmarks
 
-    def _image(self, raw: NDArray[np.uint8]) -> PictureArray:
+    def _decode_picture(self, picture_bytes: NDArray[np.uint8]) -> PictureArray:
         width, height = self.size
         count = self.channels * width * height
-        values = raw[: count * np.dtype(self.kind).itemsize].view(self.kind)
+        values = picture_bytes[: count * np.dtype(self.kind).itemsize].view(self.kind)
         return values.reshape(height, width, self.channels)
 
 

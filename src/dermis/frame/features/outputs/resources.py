@@ -77,7 +77,7 @@ def make(
             cached(make_planes, device, stage, tuple(outputs), settings.size, caller_name=stage)
             for stage, outputs in stages.items()
         ),
-        centres=None if settings.samples == 1 else cached(_make_centres, device, settings.size),
+        centres=None if settings.samples == 1 else cached(_make_centre_layers, device, settings.size),
         previous=cached(make_shape, device, tables, caller_name="before") if "motion" in stages else None,
         light=make_light_outputs(memo, device, request, translucency),
         labels=make_label_buffers(memo, device, request),
@@ -85,5 +85,5 @@ def make(
     )
 
 
-def _make_centres(device: Device, picture_size: tuple[int, int]) -> ViewLayers:
+def _make_centre_layers(device: Device, picture_size: tuple[int, int]) -> ViewLayers:
     return make_layers(device, picture_size, 1, store_triangles=True)

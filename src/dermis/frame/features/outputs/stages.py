@@ -26,7 +26,7 @@ _SURFACE_CONSTANTS = ("DETAIL",)  # pipeline constants of surface.wgsl
 
 def hair_labels(graph: Graph, resources: Resources | None, inputs: StageInputs) -> Bindings | None:
     """Return the resources with which the hair pass labels pixels, None if no labels are requested."""
-    if not _labels_hair(resources, inputs):
+    if not _needs_hair_labels(resources, inputs):
         return None
     assert resources is not None and resources.labels is not None
     _draw_centres(graph, inputs)
@@ -37,7 +37,7 @@ def draw(graph: Graph, resources: Resources | None, inputs: StageInputs) -> None
     """Declare the passes of all requested outputs."""
     if resources is None:
         return
-    if not _labels_hair(resources, inputs):  # else `hair_labels` has drawn the centres
+    if not _needs_hair_labels(resources, inputs):  # else `hair_labels` has drawn the centres
         _draw_centres(graph, inputs)
     for planes in resources.planes:
         DRAW_STAGES[planes.stage](graph, planes, resources, inputs)
@@ -45,7 +45,7 @@ def draw(graph: Graph, resources: Resources | None, inputs: StageInputs) -> None
         draw_landmarks(graph, resources.landmarks, inputs)
 
 
-def _labels_hair(resources: Resources | None, inputs: StageInputs) -> bool:
+def _needs_hair_labels(resources: Resources | None, inputs: StageInputs) -> bool:
     labels = resources.labels if resources else None
     return inputs.has_hair and labels is not None and labels.hair_classes is not None
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from dermis.frame.features.post.meter import Meter, exposure_input
+from dermis.frame.features.post.meter import Meter, exposure_inputs
 from dermis.frame.features.shading.view import ray_record
 from dermis.frame.programs import program
 from dermis.gpu import Bindings, Recorder, Texture, UniformRecord
@@ -41,7 +41,7 @@ def draw(
     meter : exposure meter, None for a fixed exposure
     """
     (lighting, view), background = shading, settings.background
-    exposure, metered = exposure_input(graph.device, settings, meter)
+    exposure, metered = exposure_inputs(graph.device, settings, meter)
     shader = program(graph.device, "post/background.wgsl")
     record = shader.record(
         "Background",

@@ -42,17 +42,17 @@ def draw(graph: Recorder, textures: BloomTextures, picture: Texture, scattered_f
     """
     source = picture
     for halved in textures.halved:
-        _draw_step(graph, 0, source, source, halved, 0.0, 0.0)
+        _draw_bloom_step(graph, 0, source, source, halved, 0.0, 0.0)
         source = halved
     for halved, total in zip(reversed(textures.halved[:-1]), reversed(textures.sums), strict=True):
-        _draw_step(graph, 1, halved, source, total, 1.0, 1.0)
+        _draw_bloom_step(graph, 1, halved, source, total, 1.0, 1.0)
         source = total
     weight = scattered_fraction / len(textures.halved)
-    _draw_step(graph, 1, picture, source, textures.result, 1.0 - scattered_fraction, weight)
+    _draw_bloom_step(graph, 1, picture, source, textures.result, 1.0 - scattered_fraction, weight)
     return textures.result
 
 
-def _draw_step(
+def _draw_bloom_step(
     graph: Recorder,
     widening_factor: int,
     picture: Texture,

@@ -11,7 +11,7 @@ from dermis.frame.programs import program
 from dermis.gpu import Bindings, Buffer, Constants, Device, Recorder, Texture, UniformRecord
 from dermis.scene.settings import Settings
 
-METER_SIDE = 64
+METER_GRID_SIDE = 64
 """Number of metered points along each side of a grid over the picture."""
 METERED_IRRADIANCE = 0.85
 """Linear value to which white skin is exposed, such that the exposure of studio light is about 1."""
@@ -24,7 +24,7 @@ MIN_HIGHLIGHT_FACTOR = 0.5
 def shader_constants() -> dict[str, float]:
     """Return the named values that `//#fill` lines insert into the shaders of the exposure meter."""
     highlights = {"meter_clipping": MAX_CLIPPED_FRACTION, "meter_stopped_down": MIN_HIGHLIGHT_FACTOR}
-    return {"meter_side": METER_SIDE, "meter_key": METERED_IRRADIANCE, **highlights}
+    return {"meter_side": METER_GRID_SIDE, "meter_key": METERED_IRRADIANCE, **highlights}
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,8 @@ class Meter:
 def make_meter(device: Device) -> Meter:
     """Allocate the buffers of the exposure meter."""
     return Meter(
-        device.storage_buffer(8 * METER_SIDE * METER_SIDE), device.buffer(np.ones(1, np.float32), "STORAGE")
+        device.storage_buffer(8 * METER_GRID_SIDE * METER_GRID_SIDE),
+        device.buffer(np.ones(1, np.float32), "STORAGE"),
     )
 
 
@@ -61,12 +62,12 @@ def draw(
     camera = shader.record("MeterCamera", rays=ray_record(shader, view), sample=view["jitter"][0, :2])
     images = {"visibility_buffer": visibility, "image": radiance_image}
     bindings = {**lighting, **images, "camera": camera, "points": meter.points}
-    graph.compute("meter", shader, bindings, (METER_SIDE, METER_SIDE))
+    graph.compute("meter", shader, bindings, (METER_GRID_SIDE, METER_GRID_SIDE))
     key = program(graph.device, "post/meter_key.wgsl")
     graph.dispatch("meter", key, {"points": meter.points, "exposure": meter.exposure}, (1, 1, 1))
 
 
-def exposure_input(device: Device, settings: Settings, meter: Meter | None) -> tuple[float, Buffer]:
+def exposure_inputs(device: Device, settings: Settings, meter: Meter | None) -> tuple[float, Buffer]:
     """Return the fixed exposure and the buffer of the metered exposure, the inputs of exposure.wgsl.
 
     The fixed exposure is 0 if the metered exposure is used.

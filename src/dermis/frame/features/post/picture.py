@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from dermis.frame.features.post.meter import Meter, exposure_input
+from dermis.frame.features.post.meter import Meter, exposure_inputs
 from dermis.frame.programs import program
 from dermis.gpu import Buffer, Device, MutableBindings, Recorder, Texture, make_texture
 from dermis.scene.settings import Settings
@@ -52,7 +52,7 @@ def draw(
     meter : exposure meter, None for a fixed exposure
     """
     shader = program(graph.device, "post/post.wgsl")
-    exposure, metered = exposure_input(graph.device, settings, meter)
+    exposure, metered = exposure_inputs(graph.device, settings, meter)
     record = shader.record("Post", exposure=exposure, **encoding_members(settings))
     bindings: MutableBindings = {"settings": record, "image": radiance, "metered": metered}
     bindings |= {"exposed": picture.exposed, "bytes": picture.bytes}

@@ -40,7 +40,7 @@ def make(memo: Memo, device: Device, request: FrameRequest) -> Resources:
     return Resources(
         picture=cached(make_picture, device, settings.size),
         meter=cached(make_meter, device) if settings.exposure == "auto" else None,
-        backdrop=_backdrop(memo, device, request),
+        backdrop=_make_backdrop(memo, device, request),
         bloom=cached(make_bloom, device, settings.size) if settings.bloom else None,
     )
 
@@ -73,7 +73,7 @@ def draw(
     picture.draw(graph, radiance, resources.picture, settings, resources.meter)
 
 
-def _backdrop(memo: Memo, device: Device, request: FrameRequest) -> Backdrop | None:
+def _make_backdrop(memo: Memo, device: Device, request: FrameRequest) -> Backdrop | None:
     """Return the textures of the background, None for a black or transparent background.
 
     The unfiltered panorama is only loaded for a sharp background.

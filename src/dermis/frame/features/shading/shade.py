@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dermis.frame.features.visibility.layers import ViewLayers
-from dermis.frame.programs import program, strip_constants
+from dermis.frame.programs import pixel_column_constants, program
 from dermis.gpu import (
     Bindings,
     ComputeProgram,
@@ -31,9 +31,9 @@ def draw(
     constants: Constants,
     visibility: ViewLayers,
     scattered: Texture,
-    image: Texture,
+    radiance_image: Texture,
     picture_size: tuple[int, int],
-    subsurface: Texture | None = None,
+    subsurface_layers: Texture | None = None,
 ) -> Texture:
     """Declare the pass that shades all samples of all pixels; return the image of radiance and coverage.
 
@@ -41,15 +41,19 @@ def draw(
     view : uniform record of the struct Shade
     constants : pipeline constants of the lights, the surface and the technique
     scattered : texture of scattered light over the atlas, or tables of pre-integrated skin
-    subsurface : texture for the subsurface light (layer 0) and the fraction of that light that leaves towards
-        the camera (layer 1), which is then left out of the image; None to add this light to the image
+    radiance_image : texture for the radiance and, as alpha, the coverage by the head
+    subsurface_layers : texture for the subsurface light (layer 0), and for the fraction of this light that
+        leaves towards the camera (layer 1); None to add the subsurface light to the image instead
     """
     device, (width, height) = graph.device, picture_size
     bindings = {**lighting, "shade": view, "visibility_buffer": visibility.texture, "scattered": scattered}
-    bindings |= {"image": image, "subsurface": subsurface or placeholder_subsurface_layers(device)}
-    shader = shade_program(device, (*constants, *strip_constants(device, visibility.count)))
+    bindings |= {
+        "image": radiance_image,
+        "subsurface": subsurface_layers or placeholder_subsurface_layers(device),
+    }
+    shader = shade_program(device, (*constants, *pixel_column_constants(device, visibility.count)))
     graph.compute("shade", shader, bindings, (width, -(-height // int(shader.constants.get("STRIP", 1)))))
-    return image
+    return radiance_image
 
 
 def placeholder_subsurface_layers(device: Device) -> Texture:

@@ -14,7 +14,7 @@ from dermis.frame.projection import (
     Triple,
     Views,
     depth_range,
-    perspective,
+    perspective_rows,
     pixel_samples,
     vector_between,
     view_axes,
@@ -76,7 +76,7 @@ def camera_views(pinhole: Pinhole, outline: Outline, sample_count: int) -> Views
     sample_count : number of samples per pixel
     """
     rows = view_rows(pinhole.eye, pinhole.axes)
-    clip = perspective(rows, pinhole.window, *depth_range(outline, rows))
+    clip = perspective_rows(rows, pinhole.window, *depth_range(outline, rows))
     return Views(np.array([clip]), pixel_samples(sample_count))
 
 

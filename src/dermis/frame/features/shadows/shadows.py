@@ -40,7 +40,7 @@ def make_shadow_maps(device: Device, layer_count: int, map_side: int) -> ShadowM
     """
     needed = SHADOW_TEXEL_BYTES * layer_count * map_side**2
     check_memory(device, needed, "shadow_size", f"{layer_count} maps of {map_side} texels")
-    side = _square_count(map_side)
+    side = _squares_per_side(map_side)
     bounds = make_texture(device, (side + side // 2, side), "r32float", layer_count=max(2, layer_count))
     return ShadowMaps(make_layers(device, (map_side, map_side), layer_count, store_triangles=False), bounds)
 
@@ -61,11 +61,11 @@ def draw(
             "maps_sampler": graph.device.sampler(),
             "bounds": shadow_maps.bounds,
         }
-        groups = _square_count(shadow_maps.layers.size[0]) // 16
+        groups = _squares_per_side(shadow_maps.layers.size[0]) // 16
         shader = program(graph.device, "shadows/shadow_bounds.wgsl")
         graph.dispatch("shadows", shader, bound, (groups, groups, len(views.clips)))
 
 
-def _square_count(map_side: int) -> int:
+def _squares_per_side(map_side: int) -> int:
     """Return the number of squares of 4 x 4 texels along a shadow map, rounded up to a multiple of 16."""
     return 16 * -(-map_side // 64)

@@ -60,7 +60,7 @@ def make_curvature(device: Device, mesh: Mesh) -> Curvature:
     }
     smoothed, scratch = (device.buffer(np.zeros(count, np.float32), "STORAGE") for _ in range(2))
     buffers = {name: device.buffer(table, "STORAGE") for name, table in tables.items()}
-    return Curvature(smoothed, scratch, buffers, _smoothing_steps(mesh, pairs, directed), count)
+    return Curvature(smoothed, scratch, buffers, _smoothing_step_count(mesh, pairs, directed), count)
 
 
 def placeholder_curvature(device: Device) -> Buffer:
@@ -68,7 +68,7 @@ def placeholder_curvature(device: Device) -> Buffer:
     return device.cached("no curvature", lambda: device.buffer(np.zeros(1, np.float32), "STORAGE"))
 
 
-def _smoothing_steps(mesh: Mesh, edge_points: Index, directed_edges: Index) -> int:
+def _smoothing_step_count(mesh: Mesh, edge_points: Index, directed_edges: Index) -> int:
     """Return the number of smoothing steps whose combined standard deviation is `SMOOTHING_SIGMA_MM`.
 
     edge_points : (e, 2) indices of the two points of each edge of the mesh

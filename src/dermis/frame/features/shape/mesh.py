@@ -65,20 +65,22 @@ def upload_geometry(
     table, cut_out = _triangle_table(mesh, atlas), mesh.cut_out
     if part_maps is None or not cut_out.any():
         table[0, cut_out, :3] = 0
-        return _upload_table(device, table, shape.vertices)
+        return _upload_triangle_table(device, table, shape.vertices)
     table[0, cut_out, 3] |= _CUT_OUT_FLAG
     opacity = texture_from_array(device, part_maps.colour[..., 3:].astype(np.float16), "r16float")
-    return replace(_upload_table(device, table, shape.vertices | {"opacity_map": opacity}), has_cutouts=True)
+    return replace(
+        _upload_triangle_table(device, table, shape.vertices | {"opacity_map": opacity}), has_cutouts=True
+    )
 
 
 def upload_triangles(device: Device, triangle_vertices: NDArray[np.integer]) -> HeadGeometry:
     """Upload only the (t, 3) vertex indices of triangles, to draw the depths of a simplified mesh."""
     table = np.zeros((3, len(triangle_vertices), 4), dtype=np.uint32)
     table[0, :, :3] = triangle_vertices
-    return _upload_table(device, table, {})
+    return _upload_triangle_table(device, table, {})
 
 
-def _upload_table(
+def _upload_triangle_table(
     device: Device, triangle_table: NDArray[np.uint32], vertices: dict[str, Texture | Buffer]
 ) -> HeadGeometry:
     rows = np.concatenate([_arrange_in_rows(part, _TRIANGLES_PER_ROW) for part in triangle_table])

@@ -24,7 +24,7 @@ VERTEX_RESOURCES = ("vertex_table", "vertex_buffer", "vertex_lengths")
 """Names of the vertex textures and buffers in geometry.wgsl and texel_stretch.wgsl."""
 _VERTEX_STRUCT_MEMBERS = ("uv", "f4", 2), ("point", "u4"), ("pad", "u4"), ("normal", "f4", 3), ("last", "u4")
 _VERTEX_DTYPE = np.dtype(list(_VERTEX_STRUCT_MEMBERS))  # struct of a vertex in shape_vertices.wgsl
-MIN_TANGENT = 1e-3
+MIN_RELATIVE_TANGENT = 1e-3
 """Least length of the part of dpdu orthogonal to the normal, relative to dpdu; shorter ones are replaced."""
 
 
@@ -247,7 +247,7 @@ def normals_in_vertex_frames(mesh: Mesh) -> Doubles:
     axis = np.eye(3)[np.abs(smooth).argmin(axis=1)]
     tangent = mesh.dpdu - (mesh.dpdu * smooth).sum(axis=1, keepdims=True) * smooth
     length = np.linalg.norm(tangent, axis=1, keepdims=True)
-    usable = length > MIN_TANGENT * np.linalg.norm(mesh.dpdu, axis=1, keepdims=True)
+    usable = length > MIN_RELATIVE_TANGENT * np.linalg.norm(mesh.dpdu, axis=1, keepdims=True)
     tangent = np.where(usable, tangent, np.cross(axis, smooth))
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
     frame = np.stack([smooth, tangent, np.cross(smooth, tangent)], axis=1)
@@ -329,7 +329,7 @@ def _evaluate_surface(graph: Recorder, shape: Shape) -> None:
         _dispatch(graph, "shape/shape_pose.wgsl", shape.morphs, tables.control, constants)
     if shape.stencils:
         _dispatch(graph, "shape/shape_refine.wgsl", shape.stencils, tables.points)
-    limits = (("MIN_UV_CROSS", MIN_UV_CROSS), ("MIN_TANGENT", MIN_TANGENT))
+    limits = (("MIN_UV_CROSS", MIN_UV_CROSS), ("MIN_TANGENT", MIN_RELATIVE_TANGENT))
     _dispatch(graph, "shape/shape_vertices.wgsl", shape.surface, tables.vertices, limits)
 
 

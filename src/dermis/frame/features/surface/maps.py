@@ -47,7 +47,7 @@ def upload_maps(
     use_colour: bool,
     decode_srgb: bool = True,
     painted_side: int = 0,
-    animated: bool = False,
+    has_expressions: bool = False,
 ) -> UploadedMaps:
     """Upload or paint the maps of a head, with their sampler and the table of Beckmann's distribution.
 
@@ -56,7 +56,7 @@ def upload_maps(
     decode_srgb : False treats the sRGB values of the colour map as linear, a mistake shown in the talk
         [dEonLuebke2007]
     painted_side : side of painted maps [texels]
-    animated : whether expressions change painted maps
+    has_expressions : whether expressions change painted maps
     """
     maps = head.maps
     if not isinstance(maps, PaintedMaps):
@@ -65,7 +65,7 @@ def upload_maps(
         found = paint.paint_arrays(device, _painted_surface(head), maps.look, painted_side)
         maps = replace(maps, colour=found.colour)
         head = replace(head, maps=maps)
-    painted, expression_maps = _paint_maps(device, head, maps, use_colour, (painted_side, animated))
+    painted, expression_maps = _paint_maps(device, head, maps, use_colour, (painted_side, has_expressions))
     return UploadedMaps(_upload_file_maps(device, head, use_colour, decode_srgb) | painted, expression_maps)
 
 

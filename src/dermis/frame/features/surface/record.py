@@ -93,7 +93,7 @@ def _derived_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, 
         "loss": energy.loss,
         "returned": energy.returns_internal_light,
         "tint": skin.specular_colour == "wrong",
-        "relief_band": _relief_band(maps),
+        "relief_band": _normal_map_level(maps),
         **(_direction_members(skin, maps, profile) if skin.direction == "half-space" else {}),
     }
 
@@ -131,7 +131,7 @@ def _direction_members(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str
     }
 
 
-def _relief_band(maps: Maps) -> float:
+def _normal_map_level(maps: Maps) -> float:
     """Return the mip level at which the height map is as large as the normal map, -1 if there is none.
 
     From the height map, only relief finer than this level is added to the normal map; for -1, all of it.

@@ -42,7 +42,9 @@ _MAX_THICKNESS_SIGMAS, _MAX_THICKNESS_MM = (
 )  # thickest part in the tables: in standard deviations, and in mm
 _WIDTH_STEPS_PER_DOUBLING, _MIN_WIDTH_MM = 2, 0.5  # spacing and minimum of rounded widths
 _CACHED_PAIR_SEARCHES = 4
-_UNIT_LIGHT = np.array([0xFE000, 0x3F8FE000], np.uint32)  # white light of 1, encoded as in packed_light.wgsl
+_PACKED_UNIT_LIGHT = np.array(
+    [0xFE000, 0x3F8FE000], np.uint32
+)  # white light of 1, encoded as in packed_light.wgsl
 _CELL_COARSENING_FACTOR = 1.5  # factor of the cell side when memory does not hold the pairs
 
 
@@ -54,17 +56,17 @@ def thin_part_tables(memo: Memo, request: FrameRequest) -> ThinParts | None:
     half_space = surface_record.mean_half_space(request.skin, maps, request.profile)
     g = request.skin.anisotropy
     levels = split.total, split.blurred_mm2, split.weight
-    return memo.get(_level_tables, request.profile, *half_space, g, *levels)
+    return memo.get(_thin_part_weights, request.profile, *half_space, g, *levels)
 
 
-def _level_tables(
+def _thin_part_weights(
     profile: GaussianSum,
     colour: Floats,
     eta: float,
-    g: float,
+    anisotropy: float,
     total_weight: Floats,
     variance_mm2: Floats,
-    weight: Floats,
+    level_weight: Floats,
 ) -> ThinParts:
     """Return the transmittance of thin parts for each thickness: one weight for each blurred level.
 
@@ -72,14 +74,14 @@ def _level_tables(
 
     colour : (3,) diffuse reflectance of thick skin [-]
     eta : index of refraction of skin [-]
-    g : anisotropy of scattering [-]
+    anisotropy : anisotropy of scattering [-]
     total_weight : (3,) sums of the weights of all Gaussians of the profile [-]
     variance_mm2 : (k,) variances of the blurred levels [mm^2]
-    weight : (k, 3) weights of the blurred levels [-]
+    level_weight : (k, 3) weights of the blurred levels [-]
     """
     reach = min(_MAX_THICKNESS_SIGMAS * float(np.sqrt(variance_mm2[-1])), _MAX_THICKNESS_MM)
-    tables = solve_thin_parts(equivalent_medium(profile, colour, eta), variance_mm2, reach, g)
-    blurred = weight.sum(axis=0) / np.maximum(total_weight, MIN_WEIGHT_SUM)
+    tables = solve_thin_parts(equivalent_medium(profile, colour, eta), variance_mm2, reach, anisotropy)
+    blurred = level_weight.sum(axis=0) / np.maximum(total_weight, MIN_WEIGHT_SUM)
     scale = np.minimum(1.0, blurred / np.maximum(tables.lost.sum(axis=1), MIN_WEIGHT_SUM))[:, None]
     lost = tables.lost * scale / np.maximum(blurred, MIN_WEIGHT_SUM)
     return replace(tables, transmitted=tables.transmitted * scale * total_weight, lost=lost)
@@ -112,16 +114,16 @@ def make_translucency(
     layout_key : name of the atlas layout in the cache
     """
     widest_mm = float(np.sqrt(variance_mm2[-1]))
-    widest_mm = rounded_width(widest_mm) if shares_pairs else widest_mm
-    cells = memo.get(_cell_divisions, atlas, caller_name=layout_key)(widest_mm)
+    widest_mm = rounded_sigma_mm(widest_mm) if shares_pairs else widest_mm
+    cells = memo.get(_cached_cell_division, atlas, caller_name=layout_key)(widest_mm)
     pairs = memo.get(PairCache, device, rest_surface, atlas, caller_name=layout_key).find(cells)
-    buffers = memo.get(make_buffers, device, surface, pairs, caller_name=layout_key)
+    buffers = memo.get(make_translucency_buffers, device, surface, pairs, caller_name=layout_key)
     return memo.get(
         with_profile, device, buffers, variance_mm2, weight, thickness_tables, caller_name=layout_key
     )
 
 
-def _cell_divisions(atlas: Atlas) -> Callable[[float], Cells]:
+def _cached_cell_division(atlas: Atlas) -> Callable[[float], Cells]:
     """Return a cached function that divides the atlas into cells.
 
     The parameter of the returned function is the standard deviation of the widest Gaussian [mm].
@@ -152,7 +154,7 @@ class PairCache:
         return pairs
 
 
-def rounded_width(widest_sigma_mm: float) -> float:
+def rounded_sigma_mm(widest_sigma_mm: float) -> float:
     """Round a standard deviation to the nearest power of sqrt(2) [mm].
 
     Cells of the atlas depend only on the rounded width, so that skins with similar profiles share them.
@@ -210,7 +212,7 @@ def _zero_light(device: Device, surface_mask: NDArray[np.bool_]) -> Texture:
 
 def with_profile(
     device: Device,
-    buffers: Translucency,
+    translucency: Translucency,
     variance_mm2: Floats,
     weight: Floats,
     thickness_tables: ThinParts | None = None,
@@ -226,18 +228,20 @@ def with_profile(
     transmitted = weight if thickness_tables is None else thickness_tables.transmitted
     lost = fraction if thickness_tables is None else thickness_tables.lost
     return replace(
-        buffers,
+        translucency,
         weight_bindings=weight_bindings(
-            device, buffers.pairs, variance_mm2, weight, thickness_tables, transmitted
+            device, translucency.pairs, variance_mm2, weight, thickness_tables, transmitted
         ),
-        loss_bindings=weight_bindings(device, buffers.pairs, variance_mm2, fraction, thickness_tables, lost),
+        loss_bindings=weight_bindings(
+            device, translucency.pairs, variance_mm2, fraction, thickness_tables, lost
+        ),
         gaussian_count=len(weight),
         uses_tables=thickness_tables is not None,
-        source_level=choose_source_level(buffers.pairs.cells.cell_mm, variance_mm2),
+        source_level=choose_source_level(translucency.pairs.cells.cell_mm, variance_mm2),
     )
 
 
-def make_buffers(device: Device, surface: Bindings, pairs: PairBuffers) -> Translucency:
+def make_translucency_buffers(device: Device, surface: Bindings, pairs: PairBuffers) -> Translucency:
     """Allocate the buffers of translucency; `with_profile` adds the weights of a profile.
 
     surface : resources of geometry.wgsl and of the atlas, for the current shape
@@ -251,5 +255,5 @@ def make_buffers(device: Device, surface: Bindings, pairs: PairBuffers) -> Trans
         weights=make_element_buffer(device, pairs.count, 8),
         source_light=mark_scratch(device, make_element_buffer(device, sources, 16)),
         direction_factors=mark_scratch(device, make_element_buffer(device, sources, 8)),
-        unit_light=device.buffer(np.tile(_UNIT_LIGHT, (max(sources, 1), 2)), "STORAGE"),
+        unit_light=device.buffer(np.tile(_PACKED_UNIT_LIGHT, (max(sources, 1), 2)), "STORAGE"),
     )

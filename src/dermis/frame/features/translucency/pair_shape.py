@@ -26,19 +26,19 @@ class StrainGauge:
         sample = np.random.default_rng(_SAMPLING_SEED).permutation(count)[:_SAMPLED_LENGTH_COUNT]
         nearest = np.asarray(cKDTree(self._rest_mm[sample]).query(self._rest_mm[sample], 2)[1])
         pairs: Intp = np.column_stack([sample, sample[nearest[:, 1]]])
-        self._pairs = pairs[self._lengths(self._rest_mm, pairs) > 0.0]
-        self._rest_lengths = self._lengths(self._rest_mm, self._pairs)
+        self._pairs = pairs[self._pair_lengths(self._rest_mm, pairs) > 0.0]
+        self._rest_lengths = self._pair_lengths(self._rest_mm, self._pairs)
 
     def strain(self, positions_mm: Floats) -> float:
         """Return the strain of a shape: the relative change that nine in ten distances do not exceed [-].
 
         positions_mm : (p, 3) control points of the shape [mm]
         """
-        lengths = self._lengths(positions_mm, self._pairs)
+        lengths = self._pair_lengths(positions_mm, self._pairs)
         return float(np.quantile(np.abs(lengths / self._rest_lengths - 1.0), _STRAIN_QUANTILE))
 
     @staticmethod
-    def _lengths(positions_mm: Floats, pairs: Intp) -> Floats:
+    def _pair_lengths(positions_mm: Floats, pairs: Intp) -> Floats:
         offset = positions_mm[pairs[:, 0]] - positions_mm[pairs[:, 1]]
         return np.asarray(np.linalg.norm(offset, axis=1))
 

@@ -37,13 +37,13 @@ def make_element_buffer(device: Device, element_count: int, element_bytes: int =
     return device.storage_buffer(element_bytes * max(1, element_count))
 
 
-def draw_points(
+def draw_cell_points(
     graph: Recorder,
     cell_role: str,
     surface: Bindings,
     cells: Cells,
     cell_table: tuple[Buffer, int],
-    points: Buffer,
+    point_buffer: Buffer,
     metric_from_triangles: bool = False,
 ) -> None:
     """Declare the pass that writes the current positions and normals of receivers or sources.
@@ -54,14 +54,14 @@ def draw_points(
     cell_role : "receiver" or "source"
     surface : resources of geometry.wgsl and of the atlas
     cell_table : buffer of cells, and its number of rows
-    points : buffer to write to
+    point_buffer : buffer to write to
     metric_from_triangles : whether to take the metric of receivers from the triangles instead of the stretch
         map
     """
     name, (buffer, count) = f"translucency/translucency_{cell_role}s.wgsl", cell_table
     shader = program(graph.device, name, (("FACETS", 1),) if metric_from_triangles else ())
     record = shader.record("Cells", size=cells.size, side=cells.side, stride=cells.stride, count=count)
-    own: Bindings = {"cells": record, f"{cell_role}s": buffer, f"{cell_role}_points": points}
+    own: Bindings = {"cells": record, f"{cell_role}s": buffer, f"{cell_role}_points": point_buffer}
     graph.dispatch("pairs", shader, {**surface, **own}, workgroup_grid(count))
 
 
@@ -159,8 +159,10 @@ def draw_weights(graph: Recorder, thin_parts: Translucency) -> None:
     The passes also sum the fraction of the blurred light that each receiver loses because its tissue is thin.
     """
     pairs, cells = thin_parts.pairs, thin_parts.pairs.cells
-    draw_points(graph, "receiver", thin_parts.surface, cells, pairs.receivers, thin_parts.receiver_points)
-    draw_points(graph, "source", thin_parts.surface, cells, pairs.sources, thin_parts.source_points)
+    draw_cell_points(
+        graph, "receiver", thin_parts.surface, cells, pairs.receivers, thin_parts.receiver_points
+    )
+    draw_cell_points(graph, "source", thin_parts.surface, cells, pairs.sources, thin_parts.source_points)
     bindings: Bindings = {
         "pairs": pairs.pairs,
         "receiver_points": thin_parts.receiver_points,

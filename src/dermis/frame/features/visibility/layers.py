@@ -93,15 +93,17 @@ def make_layers(
     return make(device, layer_size, max(1, layer_count), store_triangles)
 
 
-def draw_layers(graph: Recorder, stage: str, layers: ViewLayers, views: Views, head: HeadGeometry) -> None:
+def draw_layers(
+    graph: Recorder, stage_name: str, layers: ViewLayers, views: Views, head: HeadGeometry
+) -> None:
     """Declare the passes that fill one layer for each sample position of each view.
 
-    stage : name of the stage in timings
+    stage_name : name of the stage in timings
     """
     if layers.nearness is not None:
-        _draw_compute(graph, stage, layers, views, head)
+        _draw_compute(graph, stage_name, layers, views, head)
     else:
-        _draw_raster(graph, stage, layers, views.matrices(layers.size), head)
+        _draw_raster(graph, stage_name, layers, views.matrices(layers.size), head)
 
 
 def draw(graph: Recorder, visibility: ViewLayers, views: Views, head: HeadGeometry) -> None:
@@ -132,7 +134,7 @@ def _word_buffer(device: Device, word_count: int) -> Buffer:
 
 
 def _raster_layers(
-    device: Device, layer_size: tuple[int, int], count: int, store_triangles: bool
+    device: Device, layer_size: tuple[int, int], view_count: int, store_triangles: bool
 ) -> ViewLayers:
     name = "visibility buffer" if store_triangles else "shadow maps"
 
@@ -148,14 +150,16 @@ def _raster_layers(
         return texture, [make_view(texture, layer=k) for k in range(layer_count)]
 
     if not store_triangles:
-        texture, depth = layered("depth32float", count)
-        return ViewLayers(texture, layer_size, count, store_triangles, depth, [None] * count)
+        texture, depth = layered("depth32float", view_count)
+        return ViewLayers(texture, layer_size, view_count, store_triangles, depth, [None] * view_count)
     _, depth = layered("depth32float", 1)
-    texture, targets = layered("r32uint", count)
-    return ViewLayers(texture, layer_size, count, store_triangles, depth * count, targets)
+    texture, targets = layered("r32uint", view_count)
+    return ViewLayers(texture, layer_size, view_count, store_triangles, depth * view_count, targets)
 
 
-def _draw_compute(graph: Recorder, stage: str, layers: ViewLayers, views: Views, head: HeadGeometry) -> None:
+def _draw_compute(
+    graph: Recorder, stage_name: str, layers: ViewLayers, views: Views, head: HeadGeometry
+) -> None:
     device, triangles, (clips, positions) = graph.device, head.triangles, views
     name = "resolve_triangles" if layers.triangles else "resolve_depth"
     resolve = program(device, f"visibility/{name}.wgsl")
@@ -180,8 +184,8 @@ def _draw_compute(graph: Recorder, stage: str, layers: ViewLayers, views: Views,
     for recorded in passes:
         constants = (("RECORDED", recorded), ("SAMPLES", len(positions)), *work, *head.constants)
         shader = program(device, "visibility/visibility_buffer.wgsl", constants)
-        graph.dispatch(stage, shader, resources, groups)
-    graph.dispatch(stage, resolve, resources, (*_tile_counts(layers.size), layers.count))
+        graph.dispatch(stage_name, shader, resources, groups)
+    graph.dispatch(stage_name, resolve, resources, (*_tile_counts(layers.size), layers.count))
 
 
 def _pass_modes(layers: ViewLayers, triangle_count: int, clip_matrices: Matrix) -> tuple[int, ...]:
@@ -201,7 +205,7 @@ def _pass_modes(layers: ViewLayers, triangle_count: int, clip_matrices: Matrix) 
 
 
 def _draw_raster(
-    graph: Recorder, stage: str, layers: ViewLayers, clip_matrices: Matrix, head: HeadGeometry
+    graph: Recorder, stage_name: str, layers: ViewLayers, clip_matrices: Matrix, head: HeadGeometry
 ) -> None:
     shader = _raster_program(graph.device, layers.triangles, head.has_cutouts)
     resources = {**head.resources, "views": _views_record(shader, layers, clip_matrices, head)}
@@ -209,7 +213,13 @@ def _draw_raster(
         indexed = not (layers.triangles or head.has_cutouts)  # else the shader finds the corners itself
         indices, into = head.indices if indexed else None, DrawTarget(depth, 0.0, target)
         graph.draw(
-            stage, shader, resources, 3 * head.triangles, into, index_buffer=indices, instance_index=layer
+            stage_name,
+            shader,
+            resources,
+            3 * head.triangles,
+            into,
+            index_buffer=indices,
+            instance_index=layer,
         )
 
 
@@ -247,10 +257,10 @@ def _views_record(
 
 
 def _depth_range_mm(clip_matrix: Matrix) -> float:
-    """Return an upper bound of the distance per unit of depth [mm].
+    """Return an upper bound of the change of distance per unit of depth [mm].
 
-    Divided by the number of integer steps from depth 0 to depth 1, the result bounds the error of an integer
-    depth.
+    Where depth is stored as an integer, the error of the distance is at most this bound divided by the number
+    of integer steps.
 
     clip_matrix : (4, 4) matrix from world to clip space
     """

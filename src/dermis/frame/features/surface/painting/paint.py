@@ -219,7 +219,10 @@ def paint_rest_maps(device: Device, inputs: PaintInputs, map_side: int) -> RestM
 
 
 def _surface_buffers(device: Device, inputs: PaintInputs, map_side: int) -> dict[str, Buffer]:
-    """Return buffers of the painted mesh and of each texel's triangle, cached for all people."""
+    """Return buffers of the mesh that is painted, and of the triangle that covers each texel of the maps.
+
+    The buffers are cached on the device for all people who share the mesh.
+    """
     surface = inputs.surface
     cache = device.cached("painted surfaces", WeakKeyDictionary[PaintedSurface, dict[int, dict[str, Buffer]]])
     sides: dict[int, dict[str, Buffer]] = cache.setdefault(surface, {})

@@ -11,7 +11,7 @@ from dermis.atlas.translucency.cells import CELLS_PER_TILE_SIDE, TILE_MARGIN_TEX
 from dermis.frame.features.translucency.passes import (
     RECEIVER_BYTES,
     SOURCE_BYTES,
-    draw_points,
+    draw_cell_points,
     make_element_buffer,
 )
 from dermis.frame.programs import program, workgroup_grid
@@ -46,12 +46,14 @@ class SearchPasses:
             "block": block,
         }
 
-    def add(self, name: str, invocation_count: int, bindings: Bindings, constants: Constants = ()) -> None:
+    def add(
+        self, shader_name: str, invocation_count: int, bindings: Bindings, constants: Constants = ()
+    ) -> None:
         """Add a pass with one shader invocation for each of `invocation_count` elements.
 
-        name : name of the shader in this folder, without its suffix
+        shader_name : name of the shader in this folder, without its suffix
         """
-        shader = program(self.device, f"translucency/pair_search/{name}.wgsl", constants)
+        shader = program(self.device, f"translucency/pair_search/{shader_name}.wgsl", constants)
         record = shader.record("Search", **self._parameters, count=invocation_count)
         self.commands.dispatch(
             "pair search", shader, {**bindings, "search": record}, workgroup_grid(invocation_count)
@@ -196,8 +198,10 @@ def compute_positions(
     receiver_points = make_element_buffer(device, len(candidates.receiver), RECEIVER_BYTES)
     source_points = make_element_buffer(device, len(candidates.source), SOURCE_BYTES)
     receivers = upload_receivers(device, cells, candidates.receiver)
-    draw_points(commands, "receiver", surface, cells, receivers, receiver_points, metric_from_triangles=True)
-    draw_points(
+    draw_cell_points(
+        commands, "receiver", surface, cells, receivers, receiver_points, metric_from_triangles=True
+    )
+    draw_cell_points(
         commands, "source", surface, cells, upload_sources(device, cells, candidates.source), source_points
     )
     return {"receiver_points": receiver_points, "source_points": source_points}
