@@ -224,18 +224,18 @@ class CurveError:
         return {name: [round(float(x), 6) for x in getattr(self, name)] for name in ("cdf", "edge", "energy")}
 
 
-def curve_error(reference: CumulativeProfile, curve: CumulativeProfile) -> CurveError:
+def curve_error(reference_curve: CumulativeProfile, curve: CumulativeProfile) -> CurveError:
     """Return the errors of a cumulative profile relative to a reference profile."""
     steps = np.geomspace(1e-3, 1.0, _EDGE_SAMPLE_COUNT)
     widest = _MAX_RELATIVE_EDGE_DISTANCE * np.maximum(
-        reference.radius_at_fraction(0.5), curve.radius_at_fraction(0.5)
+        reference_curve.radius_at_fraction(0.5), curve.radius_at_fraction(0.5)
     )
     edge = np.zeros(3)
     for i in range(3):
         x = widest[i] * steps
-        edge[i] = np.abs(curve.edge_response(x) - reference.edge_response(x))[:, i].max()
+        edge[i] = np.abs(curve.edge_response(x) - reference_curve.edge_response(x))[:, i].max()
     return CurveError(
-        cdf=np.abs(curve.fraction_within(reference.radii_mm) - reference.fraction).max(axis=0),
+        cdf=np.abs(curve.fraction_within(reference_curve.radii_mm) - reference_curve.fraction).max(axis=0),
         edge=edge,
-        energy=curve.energy / np.maximum(reference.energy, SMALLEST_FLOAT) - 1.0,
+        energy=curve.energy / np.maximum(reference_curve.energy, SMALLEST_FLOAT) - 1.0,
     )

@@ -31,7 +31,7 @@ from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
 Floats = NDArray[np.float32]
-Ranges = dict[str, str | float | list[float]]
+RangeEntries = dict[str, str | float | list[float]]
 NormalY = Literal["up", "down"]
 MAP_SIDES = tuple(1 << k for k in range(8, 14))
 """Supported sides of the maps [texel]."""
@@ -142,7 +142,7 @@ def encode_map_exr(map_name: str, texels: Floats) -> bytes:
     return encode_exr_parts({map_name: dict(zip(names, channels, strict=True))}, run_length=True)
 
 
-def quantise_map(texels: Floats, encoding: PngEncoding) -> tuple[NDArray[np.uint8 | np.uint16], Ranges]:
+def quantise_map(texels: Floats, encoding: PngEncoding) -> tuple[NDArray[np.uint8 | np.uint16], RangeEntries]:
     """Return the integer levels of a map for PNG, and the JSON entries that say how to decode the levels."""
     if encoding == "colour":
         return encode_srgb8(np.clip(texels, 0.0, 1.0)), {"png": "sRGB"}
@@ -211,7 +211,7 @@ def bake_maps(renderer: Renderer, scene: Scene, settings: Settings, map_side: in
 
 def map_files(baked: BakedMaps, scene: Scene, normal_y: NormalY) -> Iterator[tuple[str, bytes]]:
     """Yield name and content of each file: OpenEXR and PNG of each map, then the JSON that describes them."""
-    described: dict[str, Ranges] = {}
+    described: dict[str, RangeEntries] = {}
     for name, info in MAP_INFOS.items():
         if name not in baked.maps:
             continue
@@ -232,7 +232,7 @@ def map_files(baked: BakedMaps, scene: Scene, normal_y: NormalY) -> Iterator[tup
 
 
 def _maps_description(
-    baked: BakedMaps, scene: Scene, normal_y: NormalY, map_entries: dict[str, Ranges]
+    baked: BakedMaps, scene: Scene, normal_y: NormalY, map_entries: dict[str, RangeEntries]
 ) -> dict[str, object]:
     """Return the description of all maps for maps.json: layout, lights, units and ranges.
 

@@ -18,7 +18,7 @@ from dermis.optics.cumulative_profile import CumulativeProfile
 from dermis.optics.fits.burley import shape_factor_diffuse
 from dermis.optics.media import Floats
 
-_COLOUR_NAME, _UNIT_NAME = "subsurfaceColor", "unitLength"
+_COLOUR_NAME, _UNIT_LENGTH_NAME = "subsurfaceColor", "unitLength"
 _DMFP_NAME, _DMFP_COLOUR_NAME = "subsurfaceDmfp", "subsurfaceDmfpColor"
 _MIN_ALBEDO = 1e-3
 
@@ -47,7 +47,7 @@ class RenderMan(JsonTarget):
         """Return the cumulative Burley profile whose width follows from the diffuse mean free paths."""
         path, path_colour, unit, colour = (
             np.array(get_numbers(parameters, name))
-            for name in (_DMFP_NAME, _DMFP_COLOUR_NAME, _UNIT_NAME, _COLOUR_NAME)
+            for name in (_DMFP_NAME, _DMFP_COLOUR_NAME, _UNIT_LENGTH_NAME, _COLOUR_NAME)
         )
         return burley_curve(path * path_colour * unit / shape_factor_diffuse(colour), subject.curve.energy)
 
@@ -64,7 +64,7 @@ def _material_parameters(albedo: Floats, diffuse_mean_free_path_mm: Floats) -> P
             "-",
             "each channel's relative to that, no gamma",
         ),
-        Parameter(_UNIT_NAME, 1.0, "-", "scene units per mm: 0.1 for a scene in cm"),
+        Parameter(_UNIT_LENGTH_NAME, 1.0, "-", "scene units per mm: 0.1 for a scene in cm"),
     )
 
 

@@ -48,8 +48,8 @@ class FieldStyle:
     number_format : printf format of the number
     options : integers to choose from in a drop-down list
     names : text to show for each keyword that the field accepts
-    custom_value : for a field that accepts keywords: function that returns the initial value when the user
-        replaces the keyword by a custom value; None if custom values are not offered
+    custom_value : function that returns the initial value when the user replaces a keyword by a custom value;
+        None if the control offers only keywords
     """
 
     label: str = ""

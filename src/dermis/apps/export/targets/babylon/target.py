@@ -1,9 +1,9 @@
 """Export to a web page with Babylon.js, which diffuses light in screen space.
 
 The formulas follow the shader subSurfaceScattering of babylonjs 9.28.0 and 9.34.0. A diffusion profile is set
-as a colour c. The samples lie on a spiral, with radii distributed by a Burley profile of width max(c). The
-weights of the samples follow a Burley profile that has the width 1/c in each channel. The shader confuses
-half a pixel with a pixel, so all widths are twice as large as they should be for the given metersPerUnit.
+as a colour c. The shader takes samples on a spiral, whose radii are distributed by a Burley profile of width
+max(c), and weights them by a Burley profile that has the width 1/c in each channel. A bug in the shader
+doubles all widths.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ SHADER_SAMPLE_COUNT = 40
 RENDERED_WIDTH_RATIO = 2.0
 """Ratio of the rendered width of the profile to the width given by metersPerUnit [-]."""
 _GOLDEN_RATIO = 1.618033988749895
-_PROFILE_NAME = "subSurface.scatteringDiffusionProfile"
+_DIFFUSION_PROFILE_NAME = "subSurface.scatteringDiffusionProfile"
 _METERS_PER_UNIT_NAME = "subSurfaceConfiguration.metersPerUnit"
 _CORE_SHA384 = "4Kbm3nj4VMzMufY0FYM9DactmO8CluLjEAe0W1BzVo7hlKEswOLkl46FLI6mxZmx"
 _LOADERS_SHA384 = "4FQhr/DrxLfjm5tCJq7Cs1uJIC29544DNb4rVCt4qVzXM7rw07KsDYgdH8/ayoss"
@@ -71,7 +71,7 @@ class Babylon(EnginePage):
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the cumulative profile of the discrete samples that the shader takes."""
         profile, (metres,) = (
-            get_numbers(parameters, _PROFILE_NAME),
+            get_numbers(parameters, _DIFFUSION_PROFILE_NAME),
             get_numbers(parameters, _METERS_PER_UNIT_NAME),
         )
         return spiral_curve(profile, metres, subject.curve.energy)
@@ -88,7 +88,10 @@ class Babylon(EnginePage):
 def _profile_parameters(subject: Subject, profile_colour: Floats, meters_per_unit: float) -> Parameters:
     return (
         Parameter(
-            _PROFILE_NAME, flat_tuple(profile_colour), "-", "inverse widths: smaller numbers diffuse farther"
+            _DIFFUSION_PROFILE_NAME,
+            flat_tuple(profile_colour),
+            "-",
+            "inverse widths: smaller numbers diffuse farther",
         ),
         Parameter(
             _METERS_PER_UNIT_NAME,

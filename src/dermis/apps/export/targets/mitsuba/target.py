@@ -46,7 +46,7 @@ _LUMINANCE_WEIGHTS = np.array([0.2126, 0.7152, 0.0722])
 _BRIGHT_TEXEL_PERCENTILE = 99.0  # of the colour map; brighter texels are clipped
 _MAX_SAMPLED_MAP_SIDE = 512  # of the map from which the percentile is computed [texel]
 Map = NDArray[np.float32]
-_SIGMA_NAME, _ALBEDO_NAME, _TRANSMITTANCE_NAME, _IOR_NAME, _ALPHA_NAME = (
+_EXTINCTION_NAME, _ALBEDO_NAME, _TRANSMITTANCE_NAME, _IOR_NAME, _ALPHA_NAME = (
     "sigma_t",
     "albedo",
     "passing",
@@ -81,7 +81,9 @@ class Mitsuba(Target):
         medium = fit_medium(subject.curve, colours, boundary)
         transmittance = colours.transmittance(boundary)
         return (
-            Parameter(_SIGMA_NAME, medium.sigma_t, "1/mm", "extinction; divided by its maximum in the file"),
+            Parameter(
+                _EXTINCTION_NAME, medium.sigma_t, "1/mm", "extinction; divided by its maximum in the file"
+            ),
             Parameter(_ALBEDO_NAME, medium.albedo, "-", "of single scattering: not the skin's colour"),
             Parameter(
                 _TRANSMITTANCE_NAME, transmittance, "-", "mean transmittance of the textures, both ways"
@@ -98,13 +100,13 @@ class Mitsuba(Target):
             flat_tuple(1.0 / fit_burley_width(subject.curve)),
             flat_tuple(subject.clipped_albedo()),
         )
-        values = {_SIGMA_NAME: extinction, _ALBEDO_NAME: albedo, _TRANSMITTANCE_NAME: (1.0,) * 3}
+        values = {_EXTINCTION_NAME: extinction, _ALBEDO_NAME: albedo, _TRANSMITTANCE_NAME: (1.0,) * 3}
         return replace_values(self.parameters(subject, version), values)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
         """Return the profile of random walks through the medium, for light incident along the normal."""
         boundary = self._boundary
-        names = _SIGMA_NAME, _ALBEDO_NAME, _TRANSMITTANCE_NAME
+        names = _EXTINCTION_NAME, _ALBEDO_NAME, _TRANSMITTANCE_NAME
         sigma, albedo, transmittance = (np.array(get_numbers(parameters, name)) for name in names)
         curve = half_space(_half_space_kind(boundary), albedo, 1.0 / sigma)
         matched = boundary == "matched"
@@ -117,7 +119,7 @@ class Mitsuba(Target):
         """Write the scene with one XML file for each surface model, and with meshes and textures."""
         colours, scene = skin_colours(subject), subject.scene or Scene(subject.head_or_ball)
         media = {each: fit_medium(subject.curve, colours, each) for each in BOUNDARIES}
-        pictured = _pictured_parts(subject)
+        pictured = _picture_roles_by_material(subject)
         opaque = _opaque_meshes(scene, self.adapter, pictured)
         pictures = subject.part_pictures.encode(PART_ROLES) if subject.part_pictures else {}
         appearance = SkinAppearance(media, *skin_textures(subject, colours), opaque, pictured, pictures)
@@ -155,7 +157,7 @@ def _boundary_transmittance(boundary: Boundary) -> float:
     return 1.0 - MATCHED_REFLECTANCE if boundary == "matched" else 1.0
 
 
-def _pictured_parts(subject: Subject) -> dict[int, set[PartRole]]:
+def _picture_roles_by_material(subject: Subject) -> dict[int, set[PartRole]]:
     """Return a dictionary from material index to picture roles, for parts with pictures except eyeballs."""
     head, pictures = subject.head_or_ball, subject.part_pictures
     if pictures is None:

@@ -117,7 +117,7 @@ def surface_parameters(subject: Subject, shader: str, radius_mm: Floats, meaning
 
     shader : node category of the surface, `OPEN_PBR` or `STANDARD_SURFACE`
     radius_mm : (3,) subsurface radii [mm]
-    meaning : meaning of the parameter with the largest radius, for the report
+    meaning : text for the report that explains the parameter with the largest radius
     """
     longest, skin, colour = float(radius_mm.max()), subject.skin, flat_tuple(subject.clipped_albedo())
     roughness = float(np.sqrt(skin.roughness * skin.smoothing))

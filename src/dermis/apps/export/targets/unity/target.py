@@ -38,7 +38,11 @@ _TRANSMISSION_NAME, _THICKNESS_NAME = "transmissionTint", "thicknessRemap"
 _SKIN_IOR, _RELATIVE_MAX_THICKNESS = 1.4, 10.0  # thickness relative to the largest d
 _NAIVE_MULTIPLIER_MM = 1.0
 _VERSION_BEFORE_14 = "12"
-_FILE_VERSIONS = {_VERSION_BEFORE_14: 1, "14": 2, "17": 2}  # m_Version; version 1 has no multiplier
+_FILE_VERSION_BY_HDRP_VERSION = {
+    _VERSION_BEFORE_14: 1,
+    "14": 2,
+    "17": 2,
+}  # m_Version; version 1 has no multiplier
 
 
 class Unity(Target):
@@ -47,7 +51,7 @@ class Unity(Target):
     name = "unity"
     title = "Unity HDRP"
     suffixes = (".asset", "")
-    versions = tuple(_FILE_VERSIONS)
+    versions = tuple(_FILE_VERSION_BY_HDRP_VERSION)
     needs_maps = True
     limitations = (
         "The filter is truncated at 99.7 % of the widest channel. In a scene that is not in metres, "
@@ -136,7 +140,7 @@ def asset_text(asset_name: str, parameters: Parameters, version: str) -> str:
         high=f"{high:.6g}",
         scale=f"{values[_WORLD_SCALE_NAME]:.6g}",
         ior=f"{values[_IOR_NAME]:.6g}",
-        form=_FILE_VERSIONS[version],
+        form=_FILE_VERSION_BY_HDRP_VERSION[version],
     )
 
 

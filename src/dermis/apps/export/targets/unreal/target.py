@@ -36,7 +36,7 @@ WORLD_UNIT_SCALE_NAME, DISTANCE_SCALE_NAME = "world_unit_scale", "distance_scale
 _MIN_MEAN_FREE_PATH_COLOUR, _MAX_DISTANCE_CM, _MIN_ALBEDO = 0.001, 50.0, 1e-3
 _MIN_ENGINE_COLOUR = 0.009  # lower limit that the engine applies
 _MM_PER_CM = 10.0
-_IMPORTED_MAPS = "colour", "normal", "roughness"
+_IMPORTED_MAP_ROLES = "colour", "normal", "roughness"
 _VERSIONS_BEFORE_5_8 = ("5.3", "5.4", "5.5", "5.6", "5.7")
 
 
@@ -85,7 +85,7 @@ class Unreal(Target):
         """Write the editor script, and the maps of a head beside it."""
         file, maps = self.main_file(output, subject), subject.encode_maps()
         names = {role: f"{file.stem}_{role}.png" for role in maps}
-        imported = {role: name for role, name in names.items() if role in _IMPORTED_MAPS}
+        imported = {role: name for role, name in names.items() if role in _IMPORTED_MAP_ROLES}
         file.write_text(_editor_script(subject, parameters, imported, version), encoding="utf-8")
         return [file, *write_files(file.parent, zip(names.values(), maps.values(), strict=True))]
 

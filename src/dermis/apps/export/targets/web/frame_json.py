@@ -64,8 +64,8 @@ def frames_json(
     Data that is all zero is not stored, as the page creates resources filled with zeros.
 
     picture_maps : dictionary from resource index to map, for the maps that are stored as pictures
-    quantisation_steps : dictionary from the resource index of a buffer of float vectors to the rounding steps
-        of the components of a vector
+    quantisation_steps : dictionary from the resource index of a buffer with rounded vectors to the rounding
+        step of each vector component
     byte_runs : collector of the data; the JSON refers to the data by index of the byte run
     """
     pictures = [[capture.resource(f.picture.bytes), capture.resource(f.picture.exposed)] for f in frames]
