@@ -66,7 +66,7 @@ class HeadLoader:
         return self._original_names.get(name_or_path, name_or_path)
 
     def open(self, name_or_path: str, uploaded_as: str = "") -> None:
-        """Start to load a head or a scene; cancel an earlier request whose loading has not begun.
+        """Load a head or a scene in the background, and cancel earlier requests that have not started.
 
         name_or_path : name of a built-in head or sample, or path of a mesh or scene file
         uploaded_as : original name of an uploaded file

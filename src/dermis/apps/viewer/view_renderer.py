@@ -350,11 +350,11 @@ class HeadPreparation:
         self._ready_mesh = self._future = self._next_mesh = self._held_image = None
 
     def prepare_head(self, view_renderer: ViewRenderer, state: ViewerState) -> Texture | None:
-        """Start to prepare the head of a state if it is new; return None once the state can be drawn.
+        """Return None if the head of a state is ready to be drawn; otherwise prepare the head in a thread.
 
-        Until then, return the last image, to be shown in the meantime.
+        While the head is being prepared, the last image is returned, to be shown in the meantime.
 
-        Raises the exception that stopped a preparation, once.
+        Raises the exception, if any, that stopped the preparation.
         """
         if self._future is not None:
             if not self._future.done():

@@ -25,7 +25,7 @@ _MAX_ENCODERS = 2  # frames encoded at the same time while the next one is rende
 
 
 class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
-    """Canvas displayed by web pages; a page that is too slow skips frames and then gets the newest one."""
+    """Canvas displayed by web pages; a slow page skips frames, so that it always gets the newest frame."""
 
     def __init__(self, **kwargs: object) -> None:
         self._encoders = ThreadPoolExecutor(_MAX_ENCODERS, "encoder")

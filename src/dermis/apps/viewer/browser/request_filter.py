@@ -88,7 +88,7 @@ class TextInput(_TimedMessage):
 
 
 class Resize(_TimedMessage):
-    """Event of a new page size: in logical pixels, in physical pixels, and the ratio of the two."""
+    """Event of a change of the page's size: logical size, physical size, and ratio of the two."""
 
     type: Literal["resize"]
     width: Coordinate

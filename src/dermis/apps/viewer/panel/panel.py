@@ -138,7 +138,7 @@ _PANEL_BUTTON_MARGIN, _PANEL_BUTTON_ALPHA = 8.0, 0.6  # of the button that opens
 class Panel:
     """Control panel with its sections.
 
-    The panel decides which input events it processes itself, and which are left to the picture.
+    The panel processes the input events that concern it, and leaves all others to the picture.
 
     is_visible : whether the panel is shown while the window is wide, beside the picture
     is_drawer_open : whether the panel is shown while the window is narrow, as a drawer over the picture

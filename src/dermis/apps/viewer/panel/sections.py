@@ -414,7 +414,7 @@ def draw_files(session: Session) -> None:
 
 
 def draw_timing(session: Session) -> None:
-    """Plot the device times of the stages over the last frames, and list the times of the last frame."""
+    """Plot the device time of each rendering stage in the last frames, and list the last frame's times."""
     series = stage_times_by_name(list(session.view_renderer.stage_times))
     if not series:
         imgui.text_disabled("this adapter reports no times")
