@@ -89,14 +89,14 @@ def fractions_within(
     fraction = table.fraction(_table_position(table, albedo))
     mean_free_path = np.asarray(mean_free_path_mm, np.float64)
 
-    def within(radius_mm: Floats) -> Floats:
+    def fraction_within_radius(radius_mm: Floats) -> Floats:
         columns = [
             interpolate_cumulative(radius_mm / mean_free_path[i], table.edges, fraction[i, :, None])[:, 0]
             for i in range(3)
         ]
         return np.stack(columns, axis=-1)
 
-    return within
+    return fraction_within_radius
 
 
 def tabulated_albedo(half_space_kind: HalfSpaceKind, total_reflectance: ArrayLike) -> Floats:

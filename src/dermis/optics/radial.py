@@ -10,7 +10,7 @@ from dermis.optics.fits.targets import PointTarget, RingTarget
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Floats
 
-NOTABLE_MISSING_FRACTION, SMALLEST_FLOAT = 0.01, float(np.finfo(np.float64).tiny)
+NOTABLE_MISSING_LIGHT_RATIO, SMALLEST_FLOAT = 0.01, float(np.finfo(np.float64).tiny)
 MIN_RADIUS_MM, MAX_RADIUS_MM = 1e-4, 60.0
 """Smallest and largest radius of a sampled profile; errors are integrated between them [mm]."""
 
@@ -111,7 +111,7 @@ def missing_light_warnings(total_reflectance: Floats, ring_energy: Floats) -> li
             / np.maximum(np.abs(total_reflectance), SMALLEST_FLOAT)
         ).max()
     )
-    if missing < NOTABLE_MISSING_FRACTION:
+    if missing < NOTABLE_MISSING_LIGHT_RATIO:
         return []
     return [f"{missing:.0%} of the light leaves beyond the widest radius and is in the total only"]
 

@@ -27,7 +27,7 @@ from dermis.optics.slabs import DEEP_OPTICAL_DEPTH, DIRECTION_NODES, Slabs, solv
 Floats = NDArray[np.float64]
 THICKNESS_ROWS = 32
 """Number of thicknesses of the tables in `ThinParts`."""
-_DEEP_SLAB_DEPTH = (
+_DEEP_SLAB_OPTICAL_DEPTH = (
     10.0  # thickness beyond which relative transmittance by direction is constant [mean free paths]
 )
 _DIRECTION_NODES = 8  # number of discrete directions for uniform light
@@ -122,7 +122,7 @@ def _deep_transmittance(albedo: float, eta: float, direction_nodes: int, g: floa
     For the definition of relative transmittance, see `oblique_transmittance`.
     """
     half_space = solve_slabs(albedo, DEEP_OPTICAL_DEPTH, eta, direction_nodes, g)
-    deep = solve_slabs(albedo, _DEEP_SLAB_DEPTH, eta, direction_nodes, g)
+    deep = solve_slabs(albedo, _DEEP_SLAB_OPTICAL_DEPTH, eta, direction_nodes, g)
     return half_space, _relative_transmittance(deep, half_space)[0]
 
 

@@ -13,7 +13,7 @@ from dermis.base.errors import DermisError
 from dermis.optics.diffusion.boundary import boundary_mismatch
 from dermis.optics.media import Floats, Layer
 from dermis.optics.pigments.parameters import SKINS, SkinParameters, Structure
-from dermis.optics.pigments.skin import LEAKED_MELANIN, spectral_medium
+from dermis.optics.pigments.skin import MELANIN_SHEET_ABSORPTION_RATIO, spectral_medium
 from dermis.optics.pigments.spectra import (
     WAVELENGTHS_NM,
     baseline_absorption,
@@ -75,7 +75,7 @@ def test_the_sheet_absorbs_a_share_of_the_melanin_above_it() -> None:
     """The optical depth of the sheet does not depend on its nominal thickness."""
     sheet = layer("donner2008", "melanin sheet", SKIN)
     above = SKIN.melanin * melanosome_absorption(WAVELENGTHS_NM, SKIN.eumelanin) * SKIN.epidermis_mm
-    assert np.allclose(sheet.sigma_a * sheet.thickness_mm, LEAKED_MELANIN * above)
+    assert np.allclose(sheet.sigma_a * sheet.thickness_mm, MELANIN_SHEET_ABSORPTION_RATIO * above)
     assert (sheet.sigma_s_prime * sheet.thickness_mm < 0.02).all()
     assert not layer("donner2008", "melanin sheet", replace(SKIN, melanin=0.0)).sigma_a.any()
 

@@ -51,40 +51,50 @@ def gather_exitance(
     stack = TriangleStack(np.empty((size, 3, 3)), np.empty((size, 3, 3)), np.empty(size))
     visit_count = 0
     for i in range(len(points)):
-        node = 0
-        while node < len(tree.first):
+        node_index = 0
+        while node_index < len(tree.first):
             visit_count += 1
-            if _node_is_far(points[i], node, tree, profile_table, error_bound):
-                _add_node(points[i], node, tree, profile_table, exitance[i])
-                node = tree.next_node[node]
+            if _node_is_far(points[i], node_index, tree, profile_table, error_bound):
+                _add_node(points[i], node_index, tree, profile_table, exitance[i])
+                node_index = tree.next_node[node_index]
                 continue
-            if tree.next_node[node] == node + 1:
-                for t in range(tree.first[node], tree.end[node]):
+            if tree.next_node[node_index] == node_index + 1:
+                for t in range(tree.first[node_index], tree.end[node_index]):
                     visit_count += _gather_triangle(
                         points[i], t, tree, profile_table, error_bound, stack, exitance[i]
                     )
-            node += 1
+            node_index += 1
     return visit_count
 
 
 @compiled
 def _node_is_far(
-    point: Floats, node: int, tree: Octree, profile_table: ProfileTable, error_bound: float
+    point: Floats, node_index: int, tree: Octree, profile_table: ProfileTable, error_bound: float
 ) -> bool:
-    distance = _distance(point, tree.centre[node, 0], tree.centre[node, 1], tree.centre[node, 2])
-    near, far = _table_rows(distance, tree.radius[node], profile_table)
+    distance = _distance(
+        point, tree.centre[node_index, 0], tree.centre[node_index, 1], tree.centre[node_index, 2]
+    )
+    near, far = _table_rows(distance, tree.radius[node_index], profile_table)
     error = (
-        profile_table.curvature[near] * tree.second_moment[node]
-        + profile_table.slope[near] * tree.centroid_error[node]
+        profile_table.curvature[near] * tree.second_moment[node_index]
+        + profile_table.slope[near] * tree.centroid_error[node_index]
     )
     return bool(error <= error_bound * profile_table.error_density[far])
 
 
 @compiled
-def _add_node(point: Floats, node: int, tree: Octree, profile_table: ProfileTable, exitance: Floats) -> None:
+def _add_node(
+    point: Floats, node_index: int, tree: Octree, profile_table: ProfileTable, exitance: Floats
+) -> None:
     for k in range(3):
-        distance = _distance(point, tree.points[node, k, 0], tree.points[node, k, 1], tree.points[node, k, 2])
-        red, green, blue = tree.flux[node, k, 0], tree.flux[node, k, 1], tree.flux[node, k, 2]
+        distance = _distance(
+            point, tree.points[node_index, k, 0], tree.points[node_index, k, 1], tree.points[node_index, k, 2]
+        )
+        red, green, blue = (
+            tree.flux[node_index, k, 0],
+            tree.flux[node_index, k, 1],
+            tree.flux[node_index, k, 2],
+        )
         _add_flux(distance, red, green, blue, profile_table, exitance)
 
 

@@ -136,9 +136,9 @@ def _ring_index(x: float, y: float, squared_ring_edges: Floats) -> int:
 
 @compiled
 def _tally_exit(
-    x: float, y: float, is_upward: bool, scatterings: int, squared_ring_edges: Floats, tally: PhotonTally
+    x: float, y: float, is_upward: bool, scattering_count: int, squared_ring_edges: Floats, tally: PhotonTally
 ) -> None:
-    if scatterings == 0:
+    if scattering_count == 0:
         tally.unscattered[0 if is_upward else 1] += 1
     elif is_upward:
         tally.reflected[_ring_index(x, y, squared_ring_edges)] += 1
@@ -157,7 +157,7 @@ def _trace_photon(
     x = y = z = ux = uy = 0.0
     uz = 1.0
     layer, bottom = 1, len(layer_stack.eta) - 2
-    scatterings = 0
+    scattering_count = 0
     depth = -math.log(random_uniform(rng))  # optical depth to the next scattering
     for _ in range(MAX_PHOTON_EVENTS):
         is_upward = uz < 0.0
@@ -170,7 +170,7 @@ def _trace_photon(
                 return
             ux, uy, uz = scatter_direction(ux, uy, uz, layer_stack.g[layer], rng)
             depth = -math.log(random_uniform(rng))
-            scatterings += 1
+            scattering_count += 1
             continue
         x, y = x + to_face * ux, y + to_face * uy
         z = layer_stack.face_mm[layer - 1 if is_upward else layer]
@@ -182,7 +182,7 @@ def _trace_photon(
             uz = -uz
             continue
         if beyond == 0 or beyond > bottom:
-            _tally_exit(x, y, is_upward, scatterings, squared_ring_edges, tally)
+            _tally_exit(x, y, is_upward, scattering_count, squared_ring_edges, tally)
             return
         ux, uy, uz = eta * ux, eta * uy, math.copysign(cosine, uz)
         layer = beyond

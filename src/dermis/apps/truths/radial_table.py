@@ -142,18 +142,19 @@ def _bound_from_radius_on(radial_values: Floats, energy: Floats, has_energy: NDA
     return bound
 
 
-def _error_density(curvature: Floats, r: Floats) -> Floats:
+def _error_density(curvature: Floats, radius_mm: Floats) -> Floats:
     ideal = np.sqrt(curvature)
-    ideal /= _plane_integral(ideal[:, None], r)[0]
-    falloff_mm = r[-1] / 4
-    far_density = 1 / (np.pi * falloff_mm**2 * (1 + (r / falloff_mm) ** 2) ** 2)
+    ideal /= _plane_integral(ideal[:, None], radius_mm)[0]
+    falloff_mm = radius_mm[-1] / 4
+    far_density = 1 / (np.pi * falloff_mm**2 * (1 + (radius_mm / falloff_mm) ** 2) ** 2)
     return np.asarray((1 - _FAR_RADII_ERROR_FRACTION) * ideal + _FAR_RADII_ERROR_FRACTION * far_density)
 
 
-def _plane_integral(radial_values: Floats, r: Floats) -> Floats:
+def _plane_integral(radial_values: Floats, radius_mm: Floats) -> Floats:
     """Return the integrals (k,) of k radial functions f over the plane, of 2 pi r f(r) over r.
 
-    radial_values : (rows, k) values of k functions at the radii r
+    radial_values : (rows, k) values of k functions at the radii
+    radius_mm : (rows,) radii r [mm]
     """
-    rings = np.pi * np.diff(r**2)[:, None]
+    rings = np.pi * np.diff(radius_mm**2)[:, None]
     return np.asarray((0.5 * (radial_values[1:] + radial_values[:-1]) * rings).sum(axis=0))

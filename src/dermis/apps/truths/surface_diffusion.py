@@ -36,9 +36,9 @@ _TRAPEZOIDAL_STEP_FRACTION = 2 - np.sqrt(2)
 def diffuse_on_surface(
     positions: ArrayLike,
     triangles: ArrayLike,
-    values: ArrayLike,
+    vertex_values: ArrayLike,
     variances_mm2: ArrayLike,
-    steps: int = TIME_STEPS_PER_LEVEL,
+    step_count: int = TIME_STEPS_PER_LEVEL,
 ) -> Floats:
     """Return vertex values (k, n, c), blurred along the surface by a Gaussian of each of k variances.
 
@@ -48,9 +48,9 @@ def diffuse_on_surface(
 
     positions : (n, 3) vertex positions without duplicates, see `welded_surface` [mm]
     triangles : (f, 3) vertex indices
-    values : (n, c) values at the vertices, interpolated linearly on the triangles
+    vertex_values : (n, c) values at the vertices, interpolated linearly on the triangles
     variances_mm2 : (k,) increasing variances above 0 [mm2]
-    steps : number of time steps per level
+    step_count : number of time steps per level
 
     Raises DermisError when an edge is longer than half the standard deviation that a level adds to the next
     smaller level; `refine_patch` makes edges shorter.
@@ -58,15 +58,15 @@ def diffuse_on_surface(
     Source: [Bank1985] for TR-BDF2, [BobenkoSpringborn2007] for the Laplacian.
     """
     vertices, corners = _checked_surface(positions, triangles)
-    vertex_values = _checked_values(values, len(vertices))
+    checked_values = _checked_values(vertex_values, len(vertices))
     added_variances = np.diff(_checked_variances(variances_mm2), prepend=0.0)
-    _check_resolution(vertices, corners, variances_mm2, steps)
+    _check_resolution(vertices, corners, variances_mm2, step_count)
     mass, stiffness = mass_and_stiffness(
         intrinsic_delaunay(intrinsic_triangulation(vertices, corners)), len(vertices)
     )
-    levels = [vertex_values]
+    levels = [checked_values]
     for variance in added_variances:
-        levels.append(_diffuse(mass, stiffness, levels[-1], float(variance), steps))
+        levels.append(_diffuse(mass, stiffness, levels[-1], float(variance), step_count))
     return np.stack(levels[1:])
 
 
@@ -119,22 +119,24 @@ def patch_margin_mm(variances_mm2: ArrayLike) -> float:
 
 
 def _diffuse(
-    mass: csc_array, stiffness: csc_array, values: Floats, variance: float, step_count: int
+    mass: csc_array, stiffness: csc_array, vertex_values: Floats, variance_mm2: float, step_count: int
 ) -> Floats:
-    """Return vertex values after diffusion by the heat equation for the time variance / 2.
+    """Return vertex values after diffusion by the heat equation for the time `variance_mm2` / 2.
 
     mass, stiffness : matrices from `mass_and_stiffness`
     step_count : number of time steps
     """
-    step = variance / 2 / step_count
+    step = variance_mm2 / 2 / step_count
     solve = _lu_solver((mass + (_TRAPEZOIDAL_STEP_FRACTION / 2 * step) * stiffness).tocsc())
     explicit = (mass - (_TRAPEZOIDAL_STEP_FRACTION / 2 * step) * stiffness).tocsr()
     intermediate_weight = 1 / (_TRAPEZOIDAL_STEP_FRACTION * (2 - _TRAPEZOIDAL_STEP_FRACTION))
     mass_rows = mass.tocsr()
     for _ in range(step_count):
-        intermediate = solve(explicit @ values)
-        values = solve(mass_rows @ (intermediate_weight * intermediate + (1 - intermediate_weight) * values))
-    return values
+        intermediate = solve(explicit @ vertex_values)
+        vertex_values = solve(
+            mass_rows @ (intermediate_weight * intermediate + (1 - intermediate_weight) * vertex_values)
+        )
+    return vertex_values
 
 
 def _lu_solver(matrix: csc_array) -> Callable[[Floats], Floats]:

@@ -23,32 +23,34 @@ _UNCANCELLED_ERROR_WEIGHT = 50.0
 
 
 def integrate_exitance(
-    points: ArrayLike, samples: IrradianceSamples, profile: Profile, error: float = 1e-3
+    points: ArrayLike, samples: IrradianceSamples, profile: Profile, relative_error: float = 1e-3
 ) -> Floats:
     """Return the radiant exitance (n, 3) at points x: the integral of R(|x - y|) E(y) dA over the surface.
 
     points : (n, 3) positions x on the surface [mm]
     samples : irradiance E, linear on small triangles; the caller chooses them small enough for the light
     profile : profile R, a function of the Euclidean distance, so light also passes through thin parts
-    error : expected root mean square error of the integral relative to its mean, from 1e-5 to 0.05 [-]
+    relative_error : expected root mean square error of the integral divided by its mean, 1e-5 to 0.05 [-]
 
     Irradiance is gathered from an octree. A node or triangle is replaced by three points if the remainder of
     Taylor's theorem is small enough; otherwise it is divided. Most of these errors cancel, so the limit of
-    the remainder is derived from `error` by a measured relation.
+    the remainder is derived from `relative_error` by a measured relation.
 
     Source: [JensenBuhler2002], but with Taylor's remainder as criterion in place of the solid angle.
     """
     positions = np.ascontiguousarray(points, dtype=np.float64)
     if positions.ndim != 2 or positions.shape[1] != 3 or not np.isfinite(positions).all():
         refuse("points", "finite positions (n, 3) in mm", f"got {positions.shape}", "Correct them")
-    if not 1e-5 <= error <= 0.05:
-        refuse("error", "a relative error from 1e-5 to 0.05", f"got {error}", "Take 0.001 for pictures")
+    if not 1e-5 <= relative_error <= 0.05:
+        refuse(
+            "error", "a relative error from 1e-5 to 0.05", f"got {relative_error}", "Take 0.001 for pictures"
+        )
     from numba import config
 
     from dermis.apps.truths.octree_gather import gather_exitance
 
-    bound = (error / _OBSERVED_ERROR_PER_BOUND) ** (2 / 3)
-    tree = _weight_error_bounds(build_octree(samples), bound / (_UNCANCELLED_ERROR_WEIGHT * error))
+    bound = (relative_error / _OBSERVED_ERROR_PER_BOUND) ** (2 / 3)
+    tree = _weight_error_bounds(build_octree(samples), bound / (_UNCANCELLED_ERROR_WEIGHT * relative_error))
     table = tabulate_profile(profile)
     exitance = np.zeros_like(positions)
     slices = [slice(i, i + _POINTS_PER_CALL) for i in range(0, len(positions), _POINTS_PER_CALL)]

@@ -19,7 +19,7 @@ from dermis.optics.fits.targets import RingTarget
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Floats, Medium
 from dermis.optics.radial import (
-    NOTABLE_MISSING_FRACTION,
+    NOTABLE_MISSING_LIGHT_RATIO,
     SMALLEST_FLOAT,
     RadialProfile,
     enclosed_energy,
@@ -187,7 +187,7 @@ def _result_warnings(total_reflectance: Floats, ring_energy: Floats) -> Sequence
             "model, or colours outside Rec. 709. No sum of Gaussians fits it there"
         )
     surplus = float(((ring_energy.sum(axis=0) - total_reflectance) / size).max())
-    if surplus > NOTABLE_MISSING_FRACTION:
+    if surplus > NOTABLE_MISSING_LIGHT_RATIO:
         warnings.append(f"R(r) has {surplus:.0%} more light than the total: its radii are too coarse")
     return warnings
 

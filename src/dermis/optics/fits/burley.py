@@ -108,15 +108,15 @@ def fit_burley(target: RingTarget) -> BurleyFit:
 def _fit_shape(target: RingTarget) -> float:
     from scipy.optimize import minimize_scalar
 
-    def error(log_shape: float) -> float:
+    def fit_error(log_shape: float) -> float:
         profile = BurleyProfile(target.total, np.exp(np.array([log_shape])))
         return float(ring_error(target, np.diff(profile.energy_within(target.edges_mm), axis=0))[0])
 
     guess = float(np.log(_MEDIAN_RADIUS_FACTOR / target.mean_radius_at([0.5])[0]))
     grid = guess + np.linspace(-3.0, 3.0, 25)
-    best = int(np.argmin([error(x) for x in grid]))
+    best = int(np.argmin([fit_error(x) for x in grid]))
     bracket = (grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)])
-    result = minimize_scalar(error, bounds=bracket, method="bounded", options={"xatol": 1e-10})
+    result = minimize_scalar(fit_error, bounds=bracket, method="bounded", options={"xatol": 1e-10})
     return float(np.exp(result.x))
 
 

@@ -106,8 +106,10 @@ def _fit_channel(target: RingTarget) -> Floats:
 
     scale = np.sqrt(SECTORS_PER_QUADRANT) / np.linalg.norm(target.energy)
 
-    def residual(x: Floats) -> Floats:
-        cells = _sector_fractions(target.edges_mm, np.exp(x[1:]), np.array([x[0], 1.0 - x[0]]))
+    def sector_residuals(unknowns: Floats) -> Floats:
+        cells = _sector_fractions(
+            target.edges_mm, np.exp(unknowns[1:]), np.array([unknowns[0], 1.0 - unknowns[0]])
+        )
         return np.asarray(scale * (target.total * cells - target.energy / SECTORS_PER_QUADRANT).ravel())
 
     edges = target.edges_mm
@@ -115,7 +117,7 @@ def _fit_channel(target: RingTarget) -> Floats:
     starts = [np.log(target.mean_radius_at(fractions) ** 2 / 2.0) for fractions in _START_LIGHT_FRACTIONS]
     bounds = ([0.0, low, low], [1.0, high, high])
     fits = [
-        least_squares(residual, np.append(0.5, np.clip(start, low, high)), bounds=bounds, xtol=1e-10)
+        least_squares(sector_residuals, np.append(0.5, np.clip(start, low, high)), bounds=bounds, xtol=1e-10)
         for start in starts
     ]
     return np.asarray(min(fits, key=lambda fit: float(fit.cost)).x)

@@ -22,7 +22,7 @@ from dermis.optics.pigments.spectra import (
     visible_wavelengths,
 )
 
-LEAKED_MELANIN: Final = 0.175
+MELANIN_SHEET_ABSORPTION_RATIO: Final = 0.175
 """Ratio of the absorption of the melanin sheet to that of all epidermal melanin, after [Donner2008] [-]."""
 
 _MELANIN_SHEET_MM = 0.001
@@ -84,7 +84,7 @@ def _build_donner2008(
 ) -> tuple[Layer, ...]:
     """Return an epidermis, a melanin sheet and a dermis after equations 11 and 12 of [Donner2008]."""
     melanin = parameters.melanin * melanosome_absorption(wavelength_nm, parameters.eumelanin)
-    sheet_sigma_a = LEAKED_MELANIN * melanin * parameters.epidermis_mm / _MELANIN_SHEET_MM
+    sheet_sigma_a = MELANIN_SHEET_ABSORPTION_RATIO * melanin * parameters.epidermis_mm / _MELANIN_SHEET_MM
     return (
         _epidermis_layer(parameters, wavelength_nm, sigma_s_prime, parameters.epidermal_blood),
         # Diffusion needs scattering everywhere; in so thin a sheet it has no visible effect.
@@ -174,8 +174,8 @@ _STRUCTURES: dict[str, tuple[_LayerBuilder, str, tuple[str, ...]]] = {
     ),
     "donner2008": (
         _build_donner2008,
-        f"the sheet adds {LEAKED_MELANIN:.1%} of what the melanin above it absorbs, as public code reads the "
-        f"paper; carotene is left out; {_THIN_LAYER_NOTE}",
+        f"the sheet adds {MELANIN_SHEET_ABSORPTION_RATIO:.1%} of what the melanin above it absorbs, as public "
+        f"code reads the paper; carotene is left out; {_THIN_LAYER_NOTE}",
         ("Donner2008", "DonnerJensen2006", "Jacques1998", "Prahl1999"),
     ),
     "biospec": (

@@ -13,7 +13,7 @@ from dermis.base.errors import refuse
 from dermis.base.tables import float_columns, read_rows
 from dermis.optics.media import Floats
 
-SHORTEST_NM, LONGEST_NM = 380.0, 780.0
+SHORTEST_WAVELENGTH_NM, LONGEST_WAVELENGTH_NM = 380.0, 780.0
 
 WAVELENGTHS_NM: Floats = np.arange(400.0, 701.0, 10.0)
 """Wavelengths from which colours are computed, (31,) [nm]."""
@@ -35,9 +35,12 @@ def visible_wavelengths(wavelength_nm: ArrayLike) -> Floats:
     Raises DermisError unless all wavelengths are from 380 to 780 nm.
     """
     wavelength = np.asarray(wavelength_nm, dtype=np.float64)
-    inside = (wavelength >= SHORTEST_NM) & (wavelength <= LONGEST_NM)
+    inside = (wavelength >= SHORTEST_WAVELENGTH_NM) & (wavelength <= LONGEST_WAVELENGTH_NM)
     if not inside.all():
-        expected, actual = f"{SHORTEST_NM:g} to {LONGEST_NM:g} nm", f"got {wavelength[~inside].flat[0]:g} nm"
+        expected, actual = (
+            f"{SHORTEST_WAVELENGTH_NM:g} to {LONGEST_WAVELENGTH_NM:g} nm",
+            f"got {wavelength[~inside].flat[0]:g} nm",
+        )
         refuse("wavelength", expected, actual, "Use wavelengths of visible light")
     return wavelength
 

@@ -95,7 +95,7 @@ class FaceRenderer:
         suns = sun_lights(point.suns, light_strengths[AMBIENT_LOBE_COUNT:], np.ones(3))
         radiance = ambient_panorama(light_strengths[:AMBIENT_LOBE_COUNT])
         lights = [one for one in suns if max(one.irradiance) > 0.0]
-        ambient = self._environment(panorama_name, radiance) if radiance.max() > 0.0 else None
+        ambient = self._panorama_environment(panorama_name, radiance) if radiance.max() > 0.0 else None
         return with_skin(replace(self._with_lights(lights), environment=ambient), point)
 
     def render_picture(self, scene: Scene) -> Floats:
@@ -109,7 +109,7 @@ class FaceRenderer:
         for k in range(AMBIENT_LOBE_COUNT):
             path = self.folder / f"lobe_{k}.exr"
             existing = Environment(name=str(path)) if path.exists() else None
-            ambient = existing or self._environment(
+            ambient = existing or self._panorama_environment(
                 path.stem, ambient_panorama(np.eye(AMBIENT_LOBE_COUNT)[k])
             )
             scenes.append((replace(base, environment=ambient), f"lobe {k}"))
@@ -117,7 +117,7 @@ class FaceRenderer:
             scenes.append((replace(base, lights=(sun,)), f"sun {k}"))
         return scenes
 
-    def _environment(self, panorama_name: str, radiance: Floats) -> Environment:
+    def _panorama_environment(self, panorama_name: str, radiance: Floats) -> Environment:
         path = self.folder / f"{panorama_name}.exr"
         with atomic_file(path) as file:
             file.write_bytes(encode_exr(np.repeat(radiance[..., None], 3, axis=2).astype(np.float32)))

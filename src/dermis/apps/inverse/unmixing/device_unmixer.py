@@ -106,23 +106,23 @@ class Unmixer:
 def recolour(
     device: Device,
     model: SkinModel,
-    estimate: Pixels,
+    unmixed_pigments: Pixels,
     residual: Pixels,
-    factors: Floats,
+    pigment_factors: Floats,
     added_fractions: Floats,
 ) -> Pixels:
     """Return the model's colours (h, w, 3) for changed pigments, multiplied by the residual.
 
-    estimate : (h, w, 3) melanin, blood and the third unknown before the change
+    unmixed_pigments : (h, w, 3) melanin, blood and the third unknown before the change
     residual : (h, w, 3) original colour divided by the model's colour
-    factors : (3,) factors by which melanin, blood and the third unknown are multiplied
+    pigment_factors : (3,) factors by which melanin, blood and the third unknown are multiplied
     added_fractions : (3,) constants that are added to melanin, blood and the third unknown after that
     """
     table, shader = _table_texture(device, model), _unmixing_program(device, "recolour", model)
-    change = shader.record("Change", factors=factors, added=added_fractions)
+    change = shader.record("Change", factors=pigment_factors, added=added_fractions)
     output = np.empty(residual.shape, np.float32)
-    for rows in row_strips(*estimate.shape[:2]):
-        maps = (_with_alpha_channel(one[rows]) for one in (estimate, residual))
+    for rows in row_strips(*unmixed_pigments.shape[:2]):
+        maps = (_with_alpha_channel(one[rows]) for one in (unmixed_pigments, residual))
         inputs = [texture_from_array(device, one, _TEXTURE_FORMAT, "maps") for one in maps]
         size = inputs[0].size[:2]
         texture = make_texture(device, size, _TEXTURE_FORMAT)

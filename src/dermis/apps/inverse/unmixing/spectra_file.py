@@ -35,9 +35,9 @@ UNKNOWN_NAMES_BY_SET = {"none": TWO_UNKNOWNS, "oxygen": THREE_UNKNOWNS, "all": F
 _EXPECTED_TABLE = "a table of reflectance spectra (CSV), a spectrum in each row or in each column"
 _WAVELENGTH_PATTERN = re.compile(r"[^\d.]{0,20}?(\d{3,4}(?:\.\d+)?)\s*(?:nm)?", re.IGNORECASE)
 _MAX_FILE_BYTES = 32 << 20
-_MIN_BAND_COUNT, _MAX_STEP_NM, _MAX_END_NM = 16, 21.0, 5.0
+_MIN_BAND_COUNT, _MAX_WAVELENGTH_STEP_NM, _MAX_END_GAP_NM = 16, 21.0, 5.0
 _SPECTRA_PER_BATCH = 10_000  # spectra that are fitted together
-_MAX_FRACTIONAL_REFLECTANCE = 1.5  # largest reflectance above which a table is in percent
+_MAX_MEDIAN_REFLECTANCE = 1.5  # a table with a larger median is in percent
 _MAX_REFLECTANCE = 1.5
 
 
@@ -74,7 +74,7 @@ def read_spectra(path: str | Path) -> SpectraTable:
     values = np.array([[_parse_number(row[k]) for k in order] for row in body]).reshape(len(body), len(grid))
     if not np.isfinite(values).any():
         refuse(path, _EXPECTED_TABLE, "there are no numbers below the wavelengths", "Check the file")
-    if np.nanmedian(values) > _MAX_FRACTIONAL_REFLECTANCE:
+    if np.nanmedian(values) > _MAX_MEDIAN_REFLECTANCE:
         notify(f"{path}: reflectances are read in percent")
         values = values / 100.0
     outside = np.nanmax(values) > _MAX_REFLECTANCE or np.nanmin(values) < -0.1
@@ -135,11 +135,17 @@ def _check_wavelengths(path: str | Path, wavelengths_nm: Floats) -> None:
     if len(wavelengths_nm) < _MIN_BAND_COUNT:
         refuse(path, expected, f"it has {len(wavelengths_nm)}", "Write headings such as 400 or r400")
     inside = wavelengths_nm[
-        (wavelengths_nm > WAVELENGTHS_NM[0] - _MAX_STEP_NM)
-        & (wavelengths_nm < WAVELENGTHS_NM[-1] + _MAX_STEP_NM)
+        (wavelengths_nm > WAVELENGTHS_NM[0] - _MAX_WAVELENGTH_STEP_NM)
+        & (wavelengths_nm < WAVELENGTHS_NM[-1] + _MAX_WAVELENGTH_STEP_NM)
     ]
-    covered = len(inside) > 1 and inside[0] <= 400.0 + _MAX_END_NM and inside[-1] >= 700.0 - _MAX_END_NM
-    if not covered or np.diff(inside).max() > _MAX_STEP_NM or (np.diff(wavelengths_nm) <= 0.0).any():
+    covered = (
+        len(inside) > 1 and inside[0] <= 400.0 + _MAX_END_GAP_NM and inside[-1] >= 700.0 - _MAX_END_GAP_NM
+    )
+    if (
+        not covered
+        or np.diff(inside).max() > _MAX_WAVELENGTH_STEP_NM
+        or (np.diff(wavelengths_nm) <= 0.0).any()
+    ):
         refuse(
             path,
             expected,

@@ -198,7 +198,7 @@ def fit_skin(
 
 
 def least_squares(
-    residual: Callable[[Floats], Floats],
+    residual_function: Callable[[Floats], Floats],
     start_unknowns: Floats,
     lower_limits: Floats,
     upper_limits: Floats,
@@ -208,17 +208,17 @@ def least_squares(
 
     Gauss-Newton steps with Levenberg's damping are used.
 
-    residual : function from the unknowns (n, u) to the residuals (n, r)
+    residual_function : function from the unknowns (n, u) to the residuals (n, r)
     start_unknowns : (n, u) unknowns from which the search starts
     lower_limits, upper_limits : (u,) limits of the unknowns; an unknown at a limit stays fixed if the step
         would cross the limit
     """
     count = start_unknowns.shape[1]
     damping = np.full(len(start_unknowns), 1e-2)
-    r = residual(start_unknowns)
+    r = residual_function(start_unknowns)
     cost = (r**2).sum(axis=1)
     for step_number in range(max_steps):
-        J = _derivatives(residual, start_unknowns, r, upper_limits)
+        J = _derivatives(residual_function, start_unknowns, r, upper_limits)
         H = np.einsum("nri,nrj->nij", J, J)
         g = -np.einsum("nri,nr->ni", J, r)
         H += (damping[:, None] * np.einsum("nii->ni", H) + _MIN_CURVATURE)[:, :, None] * np.eye(count)
@@ -229,7 +229,7 @@ def least_squares(
         H = np.where(fixed[:, :, None] | fixed[:, None, :], np.eye(count), H)
         step = np.linalg.solve(H, np.where(fixed, 0.0, g)[..., None])[..., 0]
         trial = np.clip(start_unknowns + step, lower_limits, upper_limits)
-        trial_r = residual(trial)
+        trial_r = residual_function(trial)
         trial_cost = (trial_r**2).sum(axis=1)
         better = trial_cost <= cost
         gain = np.where(better, cost - trial_cost, 0.0)
@@ -245,7 +245,7 @@ def least_squares(
 
 
 def _derivatives(
-    residual: Callable[[Floats], Floats], unknowns: Floats, residuals: Floats, upper_limits: Floats
+    residual_function: Callable[[Floats], Floats], unknowns: Floats, residuals: Floats, upper_limits: Floats
 ) -> Floats:
     """Return the derivatives (n, r, u) of residuals, by finite differences that stay within the limits."""
     columns = []
@@ -255,7 +255,7 @@ def _derivatives(
         )
         moved = unknowns.copy()
         moved[:, i] += step
-        columns.append((residual(moved) - residuals) / step[:, None])
+        columns.append((residual_function(moved) - residuals) / step[:, None])
     return np.stack(columns, axis=-1)
 
 

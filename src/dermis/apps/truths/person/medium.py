@@ -41,16 +41,16 @@ _STACK_TABLE_ALBEDO_COUNT = 20
 """Number of tabulated albedos of the last of several layers."""
 
 
-def uniform_skin(colour: ArrayLike, distance_mm: ArrayLike, eta: float) -> Medium:
+def uniform_skin(colour: ArrayLike, exit_distance_mm: ArrayLike, eta: float) -> Medium:
     """Return a homogeneous skin with a given colour and a given mean distance from entry to exit of light.
 
     colour : (3,) reflectance of light at normal incidence [-]
-    distance_mm : (3,) mean lateral offset of exit points at normal incidence [mm]
+    exit_distance_mm : (3,) mean lateral offset of exit points at normal incidence [mm]
     eta : index of refraction, 1 or `SKIN_ETA` [-]
     """
     albedo = _half_space_albedo(colour, eta)
     offsets = [_mean_exit_distance(round(float(one), 4), eta) for one in albedo]
-    extinction = np.array(offsets) / np.asarray(distance_mm, np.float64)
+    extinction = np.array(offsets) / np.asarray(exit_distance_mm, np.float64)
     return Medium("uniform", (Layer((1.0 - albedo) * extinction, albedo * extinction, name="skin"),), eta)
 
 
