@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from dermis.base.renamed import find_renamed_modules, successor
+from dermis.base.renamed import install_renamed_module_finder, successor
 
 if TYPE_CHECKING:
     from dermis.apps.batch.reader import read_dataset
@@ -167,4 +167,4 @@ def __dir__() -> list[str]:
     return list({*__all__, "__version__", *(name for name in globals() if name.startswith("__"))})
 
 
-find_renamed_modules()
+install_renamed_module_finder()

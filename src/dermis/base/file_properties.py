@@ -45,7 +45,7 @@ def _file_property(
     *keys: str,
     other_parts: Treatment | None = None,
 ) -> FileProperty:
-    """Return a file property; the functions `drawn`, `noted` and so on fix the treatment."""
+    """Return a file property; `drawn`, `noted` and similar functions call this one with a treatment."""
     return FileProperty(treatment, property_name, detail_text, keys, other_parts)
 
 

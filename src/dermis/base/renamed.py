@@ -92,7 +92,7 @@ def renamed_attribute(old_name: str, new_name: str) -> property:
     return property(get)
 
 
-def find_renamed_modules() -> None:
+def install_renamed_module_finder() -> None:
     """Install an import hook, so that renamed modules can be imported by their old paths."""
     sys.meta_path.insert(0, _RenamedModuleFinder())
 

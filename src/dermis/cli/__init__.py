@@ -29,8 +29,8 @@ _EXIT_INTERRUPTED = 130
 def main() -> None:
     """Run the command line and exit the process.
 
-    The exit status is 2 for errors that the caller can correct, which include a failed write to stdout. It is
-    130 after Ctrl-C, 143 after SIGTERM and 129 after SIGHUP. A closed pipe on stdout is not an error.
+    The exit status is 2 for errors that the user can correct and for a failed write to stdout, 130 after
+    Ctrl-C, 143 after SIGTERM and 129 after SIGHUP. A closed pipe on stdout is not an error.
     """
     from dermis.cli.process import Interruption, StandardStreams
 

@@ -201,7 +201,7 @@ class AnimationOutput:
     def frames_to_render(
         self, frame_numbers: range, frame_size: tuple[int, int], frame_digest: str
     ) -> Sequence[int]:
-        """Return the numbers of frames to render: frames for which no earlier run left a complete image.
+        """Return the numbers of the frames to render: all frames without a complete image of an earlier run.
 
         frame_digest : hash of everything that determines the frames; images with another hash are rendered
             again

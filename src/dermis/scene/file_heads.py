@@ -54,12 +54,12 @@ class MapOptions:
 
     @property
     def user_files(self) -> dict[str, MapFile]:
-        """Return a dictionary from roles to the files that the user has chosen."""
+        """Return a dictionary from map roles, such as "colour", to the files that the user has chosen."""
         return {role: file for role, file in self.files.items() if file is not None}
 
     @property
     def replaced_roles(self) -> set[str]:
-        """Return the roles in which the user's files replace pictures of the mesh file."""
+        """Return the map roles, such as "colour", whose pictures in the mesh file the user replaces."""
         relief = {"normal", "height", "bump"}
         return {*self.user_files, *(relief if relief & self.user_files.keys() else ())}
 

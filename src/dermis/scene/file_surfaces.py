@@ -67,7 +67,7 @@ def with_material_factors(maps: Maps, material: FileMaterial, user_roles: Collec
     The product of roughness map and roughness factor is squared, as files store the square root of the
     roughness m.
 
-    user_roles : roles of the maps that the user replaces; these maps are not multiplied
+    user_roles : roles, such as "colour", of maps that the user replaces; these maps are not multiplied
     """
     changed: dict[str, Any] = {}
     if (
@@ -166,9 +166,9 @@ def _with_uv(mesh: Mesh, packed_textures: PackedTextures) -> Mesh:
 
 
 def _with_cached_outline(mesh: Mesh, changed_mesh: Mesh) -> Mesh:
-    """Give a changed mesh the cached outline of the original mesh, and return the changed mesh.
+    """Copy the convex hull of a mesh, which is slow to compute, to a changed mesh of equal shape.
 
-    changed_mesh : copy of `mesh` with the same shape, but changed uv or materials
+    changed_mesh : copy of `mesh` with changed uv or materials; it is also the returned mesh
     """
     vars(changed_mesh)["outline"] = mesh.outline
     return changed_mesh
@@ -223,7 +223,7 @@ def unused_properties(
     """Return a note on properties of a file's materials that are not drawn; empty if all are drawn.
 
     file_index : (m,) index in the file of each material of the mesh, -1 for a material that the file lacks
-    user_roles : roles of skin maps that the user replaces
+    user_roles : roles, such as "colour", of skin maps that the user replaces
     is_packed : whether pictures of the skin materials are packed into common maps
     """
     if any(one.maps is not None for one in materials):  # this package wrote the file

@@ -201,8 +201,8 @@ def load_head_and_skin(
 
     skin : skin settings of the scene file
     scene_folder : folder to which file names are relative
-    smooth_in : camera and picture size for which subdivision levels are chosen if the table does not state
-        levels
+    smooth_in : choice of the subdivision levels for a camera and picture size; used if the table does not
+        state levels
 
     Raises DermisError for files that cannot be used.
     """

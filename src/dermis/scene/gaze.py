@@ -66,11 +66,11 @@ def looking_at(head: Head, target_mm: ArrayLike, pose: Pose | Mapping[str, float
 
 
 def _eyelid_rotations(rig: Rig, side_name: str) -> list[BoneRotation]:
-    """Return the morph targets that move the lids of an eye when a bone turns the eye.
+    """Return the morph targets that move the lids of an eye, for eyes that a bone turns.
 
-    Each result contains a morph target, and the rotation of the parametric human's eye at which this target
-    has full weight.
+    Each target comes with a rotation of the eye; at this rotation, the target has full weight.
 
+    rig : rig of the head with the targets
     side_name : "Left" or "Right"
     """
     arkit = [rotation for rotation in gaze_rotations() if rotation.target.endswith(side_name)]
@@ -103,6 +103,7 @@ def _unit_vector(vector: Doubles) -> Doubles:
 def _gaze_weights(target_rotations: list[BoneRotation], eye_angles: tuple[float, float]) -> dict[str, Any]:
     """Return a dictionary from names of gaze targets to the weights that turn an eye by given angles.
 
+    target_rotations : gaze targets, each with the rotation of the eye at full weight
     eye_angles : angles about x and y [rad]
     """
     target_weights = {}

@@ -98,8 +98,8 @@ class Silhouette(NamedTuple):
 def silhouette(mesh: Mesh, K: Doubles, R: Doubles, t: Doubles, picture_size: tuple[int, int]) -> Silhouette:
     """Return the silhouette edges of a mesh that lie within the picture, including occluded edges.
 
-    Edges of eyeballs are omitted. If d is the vector along an edge, and n0 and n1 are the unit normals at the
-    ends of the edge, then the smooth curve through the ends deviates from the edge by |(n1 - n0) . d| / 8.
+    Edges of eyeballs are omitted. How far a smooth curve would deviate from each edge is estimated from the
+    normals at the ends of the edge.
 
     K, R, t : camera matrices in OpenCV's convention, which apply to the mesh's positions in mm
     picture_size : width and height of the picture [pixel]

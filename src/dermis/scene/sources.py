@@ -49,7 +49,7 @@ def picture_sources(
 
 
 def scattering_sources(settings: Settings) -> tuple[str, ...]:
-    """Return the bibliography keys of the scattering technique, its seam method, and translucency."""
+    """Return the bibliography keys of the scattering technique, the seam treatment, and translucency."""
     technique = TECHNIQUES[settings.technique]
     substituted = settings.seams != "stitch" or not technique.stitches_seams
     keys: tuple[str, ...] = technique.sources + ("Dudash2007",) * (substituted and technique.uses_atlas)

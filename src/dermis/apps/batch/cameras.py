@@ -26,7 +26,8 @@ AimOffset = tuple[float, float]
 def face_hull_indices(head: Head, direction_count: int = 64) -> NDArray[np.int32]:
     """Return the indices (n,) of control points on the convex hull of the face.
 
-    A camera that shows all these points shows the whole face.
+    Control points are the points of a head's mesh before subdivision. A camera that shows all points of the
+    convex hull shows the whole face.
 
     direction_count : number of directions; the point that lies farthest in each direction is included
     """
@@ -48,8 +49,8 @@ def sampled_camera(
     If the picture would cut off the face, the camera shows a larger area, and the face is placed closer to
     the picture's centre.
 
-    face_point_indices : control points of the face, from `face_hull_indices`
-    motion : displacement of the control points by the pose
+    face_point_indices : indices of points that bound the face, from `face_hull_indices`
+    motion : displacement of the head's points by the pose
     aspect : ratio of the picture's width to its height [-]
     """
     face = head.control.pose_points(face_point_indices, motion) - np.array(head.centre_mm)

@@ -141,6 +141,7 @@ def process_task(plugin_name: str, task: Shard) -> WorkerEvent:
     """Process a task with a plugin of the dask worker that runs this function.
 
     plugin_name : name of the `PartPlugin`
+    task : part to render or shard to verify
     """
     event: WorkerEvent = get_worker().plugins[plugin_name].process(task)
     return event

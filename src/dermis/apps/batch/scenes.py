@@ -37,10 +37,8 @@ _FULL_HAIR_PICTURE_SIDE = 1000  # side from which pictures have all hairs [pixel
 _MIN_HAIR_FRACTION = 0.2
 _GAZE_DISTANCE_MM = 1e4  # distance of the gaze target if the gaze is given by angles
 _SEED_PARAMETER, _HEAD_PARAMETER = "person.seed", "person.head"
-_MAX_CACHED_SAMPLED_PEOPLE, _MAX_CACHED_FILE_HEADS = (
-    1,
-    8,
-)  # a sampled person is not used again, a named head is
+_MAX_CACHED_SAMPLED_PEOPLE = 1  # a sampled person is not used again
+_MAX_CACHED_FILE_HEADS = 8
 _PARAMETERS_NOT_OF_HUMAN = "number", "seed", "head"  # parameters of people that are not fields of `Human`
 
 
@@ -48,7 +46,7 @@ _PARAMETERS_NOT_OF_HUMAN = "number", "seed", "head"  # parameters of people that
 class _Person:
     """Head and skin of a person, with all data that does not change between the person's images.
 
-    points : control points that must stay in the picture, see `face_hull_indices`
+    points : indices of points that must stay in the picture, see `face_hull_indices`
     bones : fraction of the head's rotation that each bone performs, by bone name
     skin : skin of the person, before the [skin] table of the spec is applied
     """

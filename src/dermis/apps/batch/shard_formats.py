@@ -231,5 +231,5 @@ def folder_sha256(folder: Path, file_names: Iterable[str]) -> str:
 
 
 def _file_hash_input(file_name: str, content: bytes) -> bytes:
-    """Return the bytes by which a file enters the SHA-256 of its folder: name, size and content."""
+    """Return the bytes that are hashed for a file of a folder: its name, size and content."""
     return f"{file_name} {len(content)}\n".encode() + content

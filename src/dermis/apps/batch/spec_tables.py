@@ -131,11 +131,11 @@ class CorrelationGroup(FrozenModel):
         return np.full((count, count), self.correlation) + (1.0 - self.correlation) * np.eye(count)
 
     def cholesky_rows(self) -> dict[str, dict[str, float]]:
-        """Return the row of the correlation matrix's Cholesky factor for each parameter.
+        """Return weights that turn independent normal numbers into correlated ones, for each parameter.
 
-        A row is a dictionary of weights by parameter name. Each parameter has an independent normal number.
-        The sum of these numbers, weighted by the row of a parameter, is the correlated normal number of this
-        parameter.
+        The correlated number of a parameter is the weighted sum of the independent numbers of all parameters.
+        The weights of one parameter, by parameter name, are a row of the correlation matrix's Cholesky
+        factor.
         """
         lower = np.linalg.cholesky(self.matrix)
         return {

@@ -105,9 +105,10 @@ class WorkerEvent:
 
 
 class _PlannedImage(NamedTuple):
-    """Image to render, with the scene of the preceding image of the same person, if there is one.
+    """Image to render, with its scene and settings.
 
-    previous : scene relative to which motion vectors are computed; None without a preceding image
+    previous : scene of the preceding image, from which motion vectors are computed; None if that image shows
+        another person or does not exist
     """
 
     number: int
@@ -184,8 +185,8 @@ class Worker:
     ) -> Iterator[int]:
         """Yield the numbers of the images to render, and send the events of tasks that need no rendering.
 
-        unwritten_parts : queue to which each part that must be written is appended, with the images to copy
-            into this part
+        unwritten_parts : queue that receives each part to write, together with the existing images to copy
+            into the part
         """
         out, spec = self._options.out, self._options.spec
         for task in tasks:
@@ -214,7 +215,7 @@ class Worker:
         An observation holds the picture and the output arrays of an image.
 
         numbers : numbers of the images to render
-        failures : list to which images that cannot be rendered are appended
+        failures : list that receives the images that could not be rendered
         """
         groups = deque([numbers])
         while groups:
@@ -242,7 +243,7 @@ class Worker:
 
         numbers : numbers of the images still to plan
         in_flight : queue of the images that are being rendered
-        failures : list to which images that cannot be rendered are appended
+        failures : list that receives the images whose scenes could not be built
         """
         for number in numbers:
             parameters = self._options.spec.parameters(number)
