@@ -24,7 +24,7 @@ def capture_renderer(device_kind: str, adapter: str) -> Renderer:
     """Return a renderer that records passes for GPUs or for software adapters.
 
     device_kind : kind of adapter on which the passes will be replayed, "gpu" or "software"
-    adapter : selector of the adapter on which the renderer runs, which may be of the other kind
+    adapter : selector of the adapter on which the renderer runs, which need not be of that kind
     """
     renderer = Renderer(adapter, cache_size=_RENDERER_CACHE_SIZE, cache_ttl=1000)
     if renderer.device.adapter.kind != ADAPTER_KINDS[device_kind]:
@@ -41,9 +41,9 @@ def capture_frame(capture: FrameCapture, inputs: FrameInputs) -> CapturedFrame:
 
 
 def reduce_hair(captured_frame: CapturedFrame, hair_divisor: int) -> CapturedFrame:
-    """Return a captured frame with fewer coarse hairs, which are widened to cover the same area.
+    """Return a captured frame with fewer but wider strands of scalp hair and beard, which cover the same area.
 
-    hair_divisor : number by which the number of coarse hairs is divided; 0 keeps all hairs
+    hair_divisor : number of strands before, divided by the number after; 0 keeps all strands
     """
     for _, record in (one for one in captured_frame.records if one[0] == "StrandView" and hair_divisor > 1):
         count = int(record["coarse"]) // hair_divisor

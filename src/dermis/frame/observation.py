@@ -115,9 +115,9 @@ def pair_with_previous(
 ) -> Iterator[tuple[Scene, Scene | None]]:
     """Yield each scene with its previous scene, from which motion is measured, or with None.
 
-    previous : an iterable sets the previous scene (or None) of each scene. A scene, or None, sets only the
-        previous scene of the first; all further scenes follow the scene before them, or None if the head
-        changes
+    previous : an iterable gives the previous scene (or None) of each scene. A single scene (or None) is the
+        previous scene of the first scene only; each later scene is paired with the scene before it, or with
+        None if the head changes
     """
     if isinstance(previous, Iterable):
         for one, before in zip_longest(scenes, previous, fillvalue=_NO_PREVIOUS_SCENE):

@@ -1,4 +1,4 @@
-"""Passes that fill the blur pyramid: each level is the previous level blurred along u, then along v."""
+"""Passes that fill the blur pyramid: each level is the level before it, blurred along u and then along v."""
 
 from __future__ import annotations
 

@@ -128,7 +128,7 @@ def _check_size(
 
 
 def _packed_buffer(device: Device, picture: Picture, word_count: int) -> Buffer:
-    """Return the buffer for the packed picture; the buffer is kept with the picture for later readbacks.
+    """Return the buffer for the packed picture, which is kept in `Picture.packed` for later readbacks.
 
     word_count : size of the packed picture [4 bytes]
     """

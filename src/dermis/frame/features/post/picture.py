@@ -20,8 +20,7 @@ class Picture:
     exposed : linear light after exposure
     bytes : sRGB bytes
     size : (width, height) [pixel]
-    packed : dictionary from a size [4 bytes] to the buffer of that size in which the picture is packed for
-        readback
+    packed : buffers for the picture as packed for readback, keyed by their size in words of four bytes
     """
 
     radiance: Texture
