@@ -41,7 +41,7 @@ def capture_frame(capture: FrameCapture, inputs: FrameInputs) -> CapturedFrame:
 
 
 def reduce_hair(captured_frame: CapturedFrame, hair_divisor: int) -> CapturedFrame:
-    """Return a captured frame with fewer but wider strands of scalp hair and beard, which cover the same area.
+    """Return a captured frame with fewer but wider strands of scalp hair and beard, of the same total area.
 
     hair_divisor : number of strands before, divided by the number after; 0 keeps all strands
     """
