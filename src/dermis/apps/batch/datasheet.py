@@ -173,7 +173,7 @@ def output_formats(spec: Spec) -> dict[str, OutputFormat]:
 
 
 def label_names(spec: Spec) -> dict[str, dict[int, str]]:
-    """Return, for each label output of the spec, a dictionary from pixel value to class name."""
+    """Return, for each output of the spec that labels pixels, a dictionary from pixel value to class name."""
     by_output: dict[str, dict[int, str]] = {}
     for one in label_classes():
         for output, level in zip(_LABEL_OUTPUTS, (one.number, one.face_synthetics), strict=True):

@@ -1,4 +1,4 @@
-"""Joining of complete parts into a shard, and reuse of images that were rendered before a data set grew."""
+"""Joining of complete parts into a shard, and reuse of existing images when a data set is enlarged."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _MAX_JOIN_ATTEMPTS = 3
 
 
 class KeptImages(NamedTuple):
-    """Images at the beginning of a part that were rendered before the data set grew.
+    """Images at the beginning of a part that exist already, because the data set was enlarged afterwards.
 
     path : shard or part that contains these images; None if there are no such images
     stop : number after the last of these images
@@ -40,7 +40,7 @@ class KeptImages(NamedTuple):
 
 
 def kept_images(out: Path, part: Part, spec: Spec) -> KeptImages:
-    """Return the images of a part that were already rendered before the data set grew."""
+    """Return the images of a part that were rendered before the data set was enlarged."""
     for piece in (part, shard_at(part.index, spec)):
         path = shard_path(out, piece, spec)
         with suppress(DermisError):

@@ -187,7 +187,7 @@ def read_manifest(path: Path) -> ShardManifest:
 def shard_exists(out: Path, shard: Shard, spec: Spec) -> bool:
     """Return whether a complete shard or part exists at its final path.
 
-    A shard is not complete if it was written before the data set grew and therefore has too few images.
+    A shard with too few images, written before the data set was enlarged, is not complete.
 
     Raises DermisError for a shard of another data set.
     """

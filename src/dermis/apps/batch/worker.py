@@ -107,8 +107,8 @@ class WorkerEvent:
 class _PlannedImage(NamedTuple):
     """Image to render, with its scene and settings.
 
-    previous : scene of the preceding image, from which motion vectors are computed; None if that image shows
-        another person or does not exist
+    previous : scene of the preceding image, from which motion vectors are computed; None if no motion vectors
+        can be computed
     """
 
     number: int
@@ -277,7 +277,11 @@ class Worker:
             )
 
     def _previous_scene(self, image_number: int) -> Scene | None:
-        """Return the previous image's scene for motion vectors; None if that image shows another person."""
+        """Return the scene of the image before `image_number`, from which motion vectors are computed.
+
+        The result is None without the output "motion", and if that image shows another person or cannot be
+        rendered.
+        """
         spec = self._options.spec
         if "motion" not in spec.outputs or image_number % spec.images_per_person == 0:
             return None
