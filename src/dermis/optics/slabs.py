@@ -113,7 +113,8 @@ def solve_slabs(
     albedo : single-scattering albedo, or the reduced albedo if scattering is anisotropic [-]
     optical_depth : (n,) thicknesses in mean free paths, reduced if scattering is anisotropic, above 0 [-]
     eta : index of refraction relative to the air on both sides, at least 1 [-]
-    direction_nodes : number of directions that escape from the slab, and also of totally reflected directions
+    direction_nodes : number of directions that escape from the slab; if eta is above 1, as many more are
+        totally reflected
     g : mean cosine of the scattering angle, at least 0 [-]
 
     Source: [Chandrasekhar1960] section 50 for the addition of layers.
@@ -253,7 +254,7 @@ def _direction_quadrature(eta: float, direction_nodes: int) -> tuple[Floats, Flo
 def _doubling_steps(
     transport: _Transport, tau: Floats, doubling_count: int
 ) -> Iterator[tuple[Floats, Floats, Floats]]:
-    """Yield reflection, transmission and unscattered light of thin slabs, and again after each doubling.
+    """Yield reflection, transmission and unscattered light of slabs, and again each time they are doubled.
 
     Reflection and transmission (n, m, m) are pi times the radiance for unit power from each direction. The
     unscattered light (n, m) is the fraction that crosses the slab without scattering.
@@ -325,8 +326,8 @@ def anisotropic_response(total_reflectance: ArrayLike, eta: float, g: float) -> 
     g : mean cosine of the scattering angle, at least 0 [-]
 
     The field `single_scattering` is that of `angular_response` plus a correction for anisotropy. For the
-    correction, the factor of the kernel is fitted to the emerging radiance by least squares, for g and for
-    isotropic scattering; the correction is the difference of these two factors.
+    correction, this factor is fitted to the emerging radiance by least squares, both for g and for isotropic
+    scattering. The correction is the difference of the two fits.
     """
     isotropic = angular_response(total_reflectance, eta)
     if g == 0.0:

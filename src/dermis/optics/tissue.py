@@ -111,7 +111,7 @@ class Tissue:
         R(r) is per power that enters the tissue or, for a skin made of pigments, per incident power.
 
         model : model that computes the profile; by default `default_model`
-        clamp : position of the multipole's source in layers thinner than a mean free path
+        clamp : depth of the multipole's source in thin layers, "none" or "layer", see `Slab`
 
         Raises DermisError when the model is not valid for the medium.
         """

@@ -269,10 +269,11 @@ def _skin_material(medium: SkinMaterial, subsurface_method: str) -> SceneDict:
     """Return the description of the skin's material for Cycles, with colour and subsurface radius.
 
     The colour is the diffuse reflectance of the medium, and the radius is 4 pi mean free paths. From these,
-    Cycles' random walk recovers the mean free path, and the albedo within 1 %, but light enters and leaves
-    through a Lambertian surface. The method "burley" uses the profile of [ChristensenBurley2015] for the
-    same colour and radius. The reflectance of a ball under uniform light differs from the given colour by up
-    to 3 % with the random walk, and by up to 0.5 % with the profile.
+    Cycles' random walk recovers the mean free path and, by a fit that is accurate within 1 %, the albedo. The
+    method "burley" uses the profile of [ChristensenBurley2015] for the same colour and radius.
+
+    In Cycles, light enters and leaves through a Lambertian surface. The reflectance of a ball under uniform
+    light differs from the given colour by up to 3 % with the random walk, and by up to 0.5 % with "burley".
     """
     if isinstance(medium, Lambertian):
         return _diffuse_material(medium.albedo)

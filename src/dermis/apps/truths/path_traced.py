@@ -218,7 +218,7 @@ class PassStatistics:
     def empty(
         cls, picture_size: tuple[int, int], mask: NDArray[np.floating], notes: tuple[str, ...]
     ) -> PassStatistics:
-        """Return statistics of no passes.
+        """Return statistics from before the first pass.
 
         picture_size : width and height of the image [pixel]
         """

@@ -39,8 +39,8 @@ class _Face(NamedTuple):
 class _DownwardTransfer(NamedTuple):
     """Coefficients for computing the fluence at the lower face of a sublayer from that at its upper face.
 
-    The fluence is a sum of three solutions of the diffusion equation: one that decays downwards, one that
-    grows downwards, and a particular solution for the light source, which is 0 at the upper face.
+    The fluence is a sum of three solutions of the diffusion equation: one decays downwards, one grows
+    downwards, and a particular solution accounts for the source of light and is 0 at the upper face.
 
     E : attenuation exp(-q d) across the thickness d of the sublayer [-]
     rho : ratio of the growing to the decaying solution at the lower face, if there is no source [-]

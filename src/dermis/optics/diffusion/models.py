@@ -54,7 +54,7 @@ def diffusion_profile(
 
     medium : stack of layers
     model : "dipole" and "better-dipole" require one half-space; the other models accept any stack
-    clamp : position of the multipole's source in layers thinner than a mean free path, see `Slab`
+    clamp : depth of the multipole's source in thin layers, "none" or "layer", see `Slab`
     rgb_weights : (3, c) weights that convert wavelengths to linear Rec. 709; the result then has three
         channels and is per incident power. By default, the result has the medium's channels and is per power
         that enters

@@ -177,7 +177,7 @@ def stack_response(frequency: ArrayLike, medium: Medium, A: float, clamp: Clamp 
     """Return the response of the stack of all layers of a medium, at frequencies s [1/mm].
 
     A : boundary mismatch with air, above and below; internal interfaces are index-matched [-]
-    clamp : position of the source in layers thinner than a mean free path, see `Slab`
+    clamp : depth of the source in thin layers, "none" or "layer", see `Slab`
     """
     slabs = layer_slabs(medium, A, clamp)
     stack = _single_slab_response(frequency, slabs[-1])

@@ -174,8 +174,8 @@ _STRUCTURES: dict[str, tuple[_LayerBuilder, str, tuple[str, ...]]] = {
     ),
     "donner2008": (
         _build_donner2008,
-        f"the sheet adds {MELANIN_SHEET_ABSORPTION_RATIO:.1%} of what the melanin above it absorbs, as public "
-        f"code reads the paper; carotene is left out; {_THIN_LAYER_NOTE}",
+        f"the sheet adds {MELANIN_SHEET_ABSORPTION_RATIO:.1%} of what the melanin above it absorbs, as "
+        f"public code reads the paper; carotene is left out; {_THIN_LAYER_NOTE}",
         ("Donner2008", "DonnerJensen2006", "Jacques1998", "Prahl1999"),
     ),
     "biospec": (

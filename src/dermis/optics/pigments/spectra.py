@@ -173,8 +173,8 @@ def water_absorption(wavelength_nm: ArrayLike) -> Floats:
 def donner_jensen_2006(wavelength_nm: ArrayLike) -> Floats:
     """Return the reduced scattering coefficient of the epidermis after [DonnerJensen2006] [1/mm].
 
-    The source states no unit. It is taken to be 1/mm, because half of this coefficient, which is used for
-    the dermis, then equals the measured scattering of skin in [Bashkatov2005].
+    The unit could not be checked against the paper. It is taken to be 1/mm, because half of this coefficient,
+    which is used for the dermis, then equals the scattering of skin in [Bashkatov2005].
 
     Source: [DonnerJensen2006], as quoted by public code.
     """

@@ -326,7 +326,7 @@ def _assumed_sd(subject: FitSubject, point: FitPoint) -> dict[str, float]:
 
 
 def note_residual(photo_source: object, residual: float) -> None:
-    """Notify the user if the residual of a fit is so large that the picture probably shows something else.
+    """Notify the user if a fit is so poor that the picture probably does not show the given head.
 
     photo_source : name of the photograph, for the notification
     residual : median relative residual over blocks of the picture [-]

@@ -42,10 +42,11 @@ _STACK_TABLE_ALBEDO_COUNT = 20
 
 
 def uniform_skin(colour: ArrayLike, exit_distance_mm: ArrayLike, eta: float) -> Medium:
-    """Return a homogeneous skin with a given colour and a given mean distance from entry to exit of light.
+    """Return a homogeneous skin that has a given colour and moves light by a given mean distance.
 
     colour : (3,) reflectance of light at normal incidence [-]
-    exit_distance_mm : (3,) mean lateral offset of exit points at normal incidence [mm]
+    exit_distance_mm : (3,) mean distance along the surface between the points where light enters, at normal
+        incidence, and leaves [mm]
     eta : index of refraction, 1 or `SKIN_ETA` [-]
     """
     albedo = _half_space_albedo(colour, eta)
