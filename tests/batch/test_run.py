@@ -58,9 +58,9 @@ def test_two_workers_that_have_encoders_write_the_same(
 def test_shares_of_shards_make_the_whole_in_any_order(
     small_spec: Spec, undisturbed: Files, tmp_path: Path
 ) -> None:
-    first = drawn(small_spec, tmp_path, shards=(1, 2))
+    first = drawn(small_spec, tmp_path, shard_selection=(1, 2))
     assert not first.is_complete and "index.parquet" not in contents(tmp_path)
-    second = drawn(small_spec, tmp_path, shards=(0, 2))
+    second = drawn(small_spec, tmp_path, shard_selection=(0, 2))
     assert second.is_complete and first.shards + second.shards == SHARDS
     assert contents(tmp_path) == undisturbed
 
@@ -79,7 +79,7 @@ def test_sets_of_another_generator_are_not_continued(
 def test_shares_of_parts_make_the_whole_in_any_order(
     small_spec: Spec, undisturbed: Files, tmp_path: Path
 ) -> None:
-    reports = [drawn(small_spec, tmp_path, parts=(share, 2)) for share in (1, 0)]
+    reports = [drawn(small_spec, tmp_path, part_selection=(share, 2)) for share in (1, 0)]
     assert [one.is_complete for one in reports] == [False, True]
     assert [one.images for one in reports] == [
         sum(stop - first for first, stop in PARTS[k::2]) for k in (1, 0)
@@ -91,7 +91,7 @@ def test_a_set_that_grows_is_the_one_made_at_once(
     small_spec: Spec, undisturbed: Files, tmp_path: Path
 ) -> None:
     """An interrupted run ends in the middle of a part, and other workers add to it."""
-    first = drawn(small_spec.replace(count=35), tmp_path, shards=(1, 2))
+    first = drawn(small_spec.replace(count=35), tmp_path, shard_selection=(1, 2))
     assert (first.images, first.shards, first.is_complete) == (15, 1, False)
     second = drawn(small_spec, tmp_path, 4)
     assert (second.images, second.shards, second.is_complete) == (COUNT - 15, SHARDS, True)

@@ -144,7 +144,7 @@ def test_triangles_crossing_the_camera_plane_are_clipped(renderer: Renderer, com
 @pytest.mark.parametrize("triangles", [False, True])
 def test_previous_view_leaves_no_trace(renderer: Renderer, triangles: bool) -> None:
     """Layers that are drawn again hold only the new view."""
-    options = {"triangles": triangles, "compute": True}
+    options = {"store_triangles": triangles, "use_compute_pass": True}
     used, fresh = (make_layers(renderer.device, SIZE, 2, **options) for _ in range(2))
     for turned, layers in ((False, used), (True, used), (True, fresh)):
         inputs = run_frame(renderer, view_of(HEADS["sphere"], turned), size=SIZE, samples=2)

@@ -132,7 +132,7 @@ def test_tiles_are_cleared_between_views(
 ) -> None:
     """A ball that leaves tiles and returns leaves no trace, nor do layers that are no longer drawn."""
     monkeypatch.setattr(visibility_buffer, "_MAX_DEPTH_STEP_MM", 0.0 if apart else 0.1)
-    options = {"triangles": triangles, "compute": True}
+    options = {"store_triangles": triangles, "use_compute_pass": True}
     used = make_layers(renderer.device, SIZE, 2, **options)
     for aside, samples in ((40, 2), (-40, 2), (-40, 2), (5, 1), (40, 2), (500, 2)):
         camera = front_camera(BALL, (aside, 0, 0), frame_mm=80.0)

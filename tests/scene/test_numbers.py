@@ -98,10 +98,10 @@ def test_each_number_of_a_model_has_a_documented_range(model: type[FrozenModel],
 
 @pytest.mark.parametrize("kind", PEOPLE)
 def test_invalid_numbers_of_people_are_refused(kind: Callable[..., object]) -> None:
-    names = [one.name for one in fields(kind) if one.type in ("float", "int")]  # type: ignore[arg-type]
-    assert len(names) > 3
-    for name in names:
-        for value in [*NONE, None]:
+    numbers = [one for one in fields(kind) if one.type in ("float", "int")]  # type: ignore[arg-type]
+    assert len(numbers) > 3
+    for name, default in ((one.name, one.default) for one in numbers):
+        for value in [*NONE, *([] if default is None else [None])]:
             with pytest.raises(DermisError, match=r"expected a (whole )?number from"):
                 kind(**{name: value})
 

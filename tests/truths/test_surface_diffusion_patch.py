@@ -146,12 +146,12 @@ def test_the_ear_of_a_scan_keeps_its_light() -> None:
     ("change", "complaint"),
     [
         ({"centre_mm": [99.0, 0, 0]}, "there is none at"),
-        ({"edge_mm": 0.0}, "edge and radius above 0"),
+        ({"max_edge_mm": 0.0}, "edge and radius above 0"),
         ({"radius_mm": -1.0}, "edge and radius above 0"),
-        ({"edge_mm": 1e-4, "radius_mm": 5.0}, "make more than 8000000"),
+        ({"max_edge_mm": 1e-4, "radius_mm": 5.0}, "make more than 8000000"),
     ],
 )
 def test_invalid_patches_are_refused(change: dict[str, float], complaint: str) -> None:
-    settings = {"centre_mm": PLACE, "radius_mm": 1.0, "edge_mm": 0.5, "margin_mm": 0.0} | change
+    settings = {"centre_mm": PLACE, "radius_mm": 1.0, "max_edge_mm": 0.5, "margin_mm": 0.0} | change
     with pytest.raises(DermisError, match=complaint):
         refine_patch(*COARSE, **settings)

@@ -64,7 +64,7 @@ class RenderedFrame(ShortRepr):
     unscattered_fraction: float
     suns: int
     settings: Settings
-    start_readback: Callable[..., Readback]
+    start_readback: Callable[[Picture, Settings | None], Readback]
     run_on_device: Callable[[Callable[[], Any]], Any]
     is_current: Callable[[], bool]
 
@@ -93,7 +93,7 @@ class RenderedFrame(ShortRepr):
 
         As in PNG files, colours are not multiplied by alpha.
         """
-        return self._read_back(alpha=self.settings)
+        return self._read_back(self.settings)
 
     def linear_rgba(self) -> NDArray[np.float32]:
         """Return (h, w, 4) linear floats of a frame with background "none", premultiplied by alpha."""
@@ -120,8 +120,8 @@ class RenderedFrame(ShortRepr):
     def _download_exposed(self) -> NDArray[np.float32]:
         return self._read(lambda frame: download(frame.device, frame.picture.exposed))
 
-    def _read_back(self, **options: Any) -> NDArray[Any]:
-        return self._read(lambda frame: self.start_readback(frame.picture, **options).image())
+    def _read_back(self, alpha_settings: Settings | None = None) -> NDArray[Any]:
+        return self._read(lambda frame: self.start_readback(frame.picture, alpha_settings).image())
 
     def _read(self, read_textures: Callable[[FrameTextures], T]) -> T:
         if not self.is_current():

@@ -168,9 +168,9 @@ class Renderer:
         while len(self._in_flight) > FRAMES_IN_FLIGHT:
             self.device.wait(self._in_flight.popleft())
 
-    def _start_readback(self, picture: Picture, **options: Any) -> Readback:
+    def _start_readback(self, picture: Picture, alpha_settings: Settings | None) -> Readback:
         self.graph.begin()
-        readback = start_readback(self.graph, picture, **options)
+        readback = start_readback(self.graph, picture, alpha_settings=alpha_settings)
         self.graph.submit()
         return readback
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.base.arrays import Doubles, Floats, Ints
+from dermis.base.summary import ShortRepr
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.strands import Roots, refine_roots
 
@@ -17,8 +18,8 @@ GUIDE_ANCHORS = 4
 """Number of quads that each knot of a guide follows."""
 
 
-@dataclass(frozen=True, eq=False)
-class Guides:
+@dataclass(frozen=True, eq=False, repr=False)
+class Guides(ShortRepr):
     """Guide curves of `GUIDE_KNOTS` knots from root to tip; each knot follows the quads nearest to it.
 
     The arrays are for g guides with k knots each, where each knot follows m quads.
@@ -38,8 +39,8 @@ class Guides:
     cut: Floats
 
 
-@dataclass(frozen=True, eq=False)
-class StrandRoots:
+@dataclass(frozen=True, eq=False, repr=False)
+class StrandRoots(ShortRepr):
     """Roots of all strands that a hair style can have, in random order, with their guides and clumps.
 
     Which of the strands grow depends on hair density, hairline and baldness of the person.
@@ -67,8 +68,8 @@ class StrandRoots:
         return len(self.clump)
 
 
-@dataclass(frozen=True, eq=False)
-class Groom:
+@dataclass(frozen=True, eq=False, repr=False)
+class Groom(ShortRepr):
     """Hair of a person: guides and roots that all people with a style share, and parameters of the person.
 
     guides, roots : guides and strand roots of the style

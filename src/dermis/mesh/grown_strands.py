@@ -195,7 +195,7 @@ def _random(strand_number: Words, stream: int) -> Doubles:
     strand_number : (n,) numbers that identify the strands
     stream : number that selects one of several random numbers of a strand
 
-    Source: PCG hash [JarzynskiOlano2020].
+    Source: PCG hash [Jarzynski2020].
     """
     with np.errstate(over="ignore"):
         state = (strand_number * np.uint32(64) + np.uint32(stream)) * np.uint32(747796405) + np.uint32(

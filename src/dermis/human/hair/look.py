@@ -24,10 +24,7 @@ FIELD_RANGES = {
 # Artist's values.
 _TYPICAL_CURL = {"african": 0.95, "asian": 0.0, "caucasian": 0.2}
 _MIN_TIGHT_CURL = 0.6  # curl above which hair is worn in the styles of tightly coiled hair
-_BALD_CHANCES = {
-    False: 0.01,
-    True: 0.1,
-}  # chance of a bald or shaved head of women and of men, beside styles.toml
+_BALD_CHANCES = {False: 0.01, True: 0.1}  # of women and of men; those of the styles are in styles.toml
 _BALD_STYLE = Style("up", max_length_mm=500.0, length_mm=6.0)
 _MAX_BEARD_MM = 14.0
 _DARK_EUMELANIN = 3.0  # eumelanin above which shaved hair has full visibility

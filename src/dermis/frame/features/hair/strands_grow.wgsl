@@ -68,7 +68,7 @@ fn point_at(index: u32) -> vec3f {
     return vec3f(points[3u * index], points[3u * index + 1u], points[3u * index + 2u]);
 }
 
-// Uniform random number of a strand, 0 to 1. Source: PCG hash [JarzynskiOlano2020].
+// Uniform random number of a strand, 0 to 1. Source: PCG hash [Jarzynski2020].
 fn random(strand: u32, stream: u32) -> f32 {
     let state = (strand * 64u + stream) * 747796405u + 2891336453u;
     let word = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;
