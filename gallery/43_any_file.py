@@ -1,8 +1,7 @@
 """Skin in files of any kind.
 
-An avatar (.glb) has skin, eyes, a sweater that a mask cuts at the neck, and cards of hair, brows and lashes.
-Only the skin scatters light. A scan has three materials with a picture each; another has colours at its
-vertices and no uv. A hand and a body (.obj) have no colour at all: they get that of the default pigments.
+An avatar has skin, eyes, a sweater that a mask cuts at the neck, and cards of hair, brows and lashes. One
+scan has three materials, another has vertex colours and no uv; a hand and a body get default pigments.
 
 Deck: +
 Columns: 4
@@ -13,12 +12,7 @@ import warnings
 from pathlib import Path
 
 import dermis
-from dermis.apps.gallery.example_files import (
-    unpack_mesh,
-    write_avatar,
-    write_three_meshes,
-    write_vertex_colours,
-)
+from dermis.apps.gallery import example_files as examples
 from dermis.apps.gallery.script import draw_script
 
 
@@ -27,8 +21,9 @@ def draw(studio):
     with tempfile.TemporaryDirectory() as name, warnings.catch_warnings():
         warnings.simplefilter("ignore")  # notes on what is skin, and of which size
         folder = Path(name)
-        files = [write_avatar(studio, folder), write_three_meshes(scan, folder)]
-        files += [write_vertex_colours(scan, folder), *(unpack_mesh(one, folder) for one in ("hand", "body"))]
+        files = [examples.write_avatar(studio, folder), examples.write_three_meshes(scan, folder)]
+        files += [examples.write_vertex_colours(scan, folder), examples.unpack_mesh("hand", folder)]
+        files.append(examples.unpack_mesh("body", folder))
         avatar, three, coloured, hand, body = (studio.head(str(file)) for file in files)
     side = dermis.Camera(position=(600, 40, 620), target=(0, -35, -50), frame_mm=330)
     near = dermis.Camera(position=(60, 20, 500), target=(4, 0, 0), frame_mm=95)

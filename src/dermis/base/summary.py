@@ -25,7 +25,8 @@ class ShortRepr:
 def short_repr(value: object) -> str:
     """Return the repr of a value; for arrays and long collections, the type with the shape or length."""
     if isinstance(value, np.ndarray):
-        return f"{value.dtype}{list(value.shape)}"
+        names = value.dtype.names
+        return f"{value.dtype if names is None else f'{len(names)} fields'}{list(value.shape)}"
     if isinstance(value, Collection) and (len(value) > _MAX_SHOWN_ITEMS or not _is_short(value)):
         return value.__repr__() if isinstance(value, str) else f"<{len(value):,} in a {type(value).__name__}>"
     text = repr(value)
