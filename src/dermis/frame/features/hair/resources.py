@@ -33,11 +33,12 @@ _MAX_LINKS = 1 << 22
 # Steps to which capacities for fine strands and for knots are rounded up, so that most heads share them.
 _FINE_CAPACITY_STEP, _KNOT_CAPACITY_STEP = 1 << 12, 1 << 19
 _PROJECTED_KNOT_BYTES = 32
-_MIN_DRAWN_STRANDS, _MIN_KNOTS = 5_000, 5
-_WIDTH_PER_COVER_PX, _MAX_DRAWN_COVER = (
-    0.2,
-    1.0,
-)  # added width per unit of cover: where hair hides hair, fewer strands suffice
+_MIN_DRAWN_STRANDS, _MIN_KNOTS = 5_000, 4
+# Width added per unit of cover: where hair hides hair, fewer strands suffice.
+_WIDTH_PER_COVER_PX, _MAX_DRAWN_COVER = 0.2, 1.0
+_MIN_STRANDS_PER_PIXEL = 2.0  # where all strands are short; fewer would look like dots
+_ROOT_AREA_MM2 = 6e4  # approximate area of the skin on which scalp hair and beard grow
+_MAX_SHORT_KNOTS_FRACTION = 0.4  # largest fraction of `Detail.drawn_knots` that is spent against dots
 _DETAIL_LEVELS_PER_OCTAVE = 4  # levels of detail for each doubling of the size of a pixel
 KNOTS_PER_WINDOW = 1 << 12
 """Number of knots for which one workgroup of strands_window.wgsl computes bounds."""
@@ -251,7 +252,8 @@ class StrandTables:
     possible : total number of coarse strands of the person
     centre_mm : (3,) centre of the roots of the coarse strands at rest [mm]
     length_mm : length of the part of the hair with the longest strands [mm]
-    width_mm : width of a strand in this part [mm]
+    shortest_mm : length of the part with the shortest strands [mm]
+    width_mm : width of a strand in the part with the longest strands [mm]
     cover : projected area of hair per area of skin in this part [-]
     """
 
@@ -266,6 +268,7 @@ class StrandTables:
     possible: int
     centre_mm: NDArray[np.float64]
     length_mm: float
+    shortest_mm: float
     width_mm: float
     cover: float
 
@@ -315,7 +318,8 @@ def strand_constants(head: Head, settings: Settings) -> Constants:
 def drawn_counts(tables: StrandTables, pixel_mm: float) -> StrandCounts:
     """Return the number of coarse strands to draw, and the number of knots of each.
 
-    Where strands are thinner than a pixel, fewer but wider strands are drawn, which cover the same area.
+    Where strands are thinner than a pixel, fewer but wider strands are drawn, which cover the same area. More
+    strands are drawn of short hair, because few short strands look like dots.
 
     pixel_mm : side of a pixel at the depth of the strands [mm]
     """
@@ -325,6 +329,8 @@ def drawn_counts(tables: StrandTables, pixel_mm: float) -> StrandCounts:
     drawn_px = tables.detail.width_px + _WIDTH_PER_COVER_PX * min(tables.cover, _MAX_DRAWN_COVER)
     hairs = max(_MIN_DRAWN_STRANDS, tables.possible * tables.width_mm / (drawn_px * pixel_mm))
     knots = max(_MIN_KNOTS, 1 + np.ceil(tables.length_mm / (tables.detail.segment_px * pixel_mm)))
+    crossing = _MIN_STRANDS_PER_PIXEL * _ROOT_AREA_MM2 / (pixel_mm * tables.shortest_mm)
+    hairs = max(hairs, min(crossing, _MAX_SHORT_KNOTS_FRACTION * tables.detail.drawn_knots / knots))
     return StrandCounts(int(min(tables.coarse.hairs, hairs)), int(min(tables.coarse.knots, knots)))
 
 
@@ -344,7 +350,8 @@ def make_strand_tables(
     if fine is not None and len(fine):
         rows, knots = np.zeros(len(fine), _STRAND_DTYPE), _knot_rows(fine)
         _fill_strand_rows(rows, head, fine)
-    largest = None if hair is None else hair.parameters[hair.parameters["length_mm"].argmax()]
+    parts = None if hair is None else hair.parameters[hair.parameters["density"] > 0.0]
+    largest = None if parts is None or not len(parts) else parts[parts["length_mm"].argmax()]
     return StrandTables(
         strands=device.buffer(rows.view(np.uint32), "STORAGE"),
         knots=device.buffer(knots, "STORAGE"),
@@ -357,6 +364,7 @@ def make_strand_tables(
         possible=0 if hair is None else len(hair.roots),
         centre_mm=np.zeros(3) if hair is None else hair.centre_mm,
         length_mm=0.0 if largest is None else float(largest["length_mm"]),
+        shortest_mm=1.0 if parts is None else max(1.0, float(parts["length_mm"].min(initial=500.0))),
         width_mm=0.0 if largest is None else 2.0 * float(largest["radius_mm"]),
         cover=0.0 if largest is None else float(largest["cover"]),
     )
