@@ -137,7 +137,7 @@ class Camera(FrozenModel):
     half_tangent = renamed_attribute("half_tangent", "half_view_tangent")
 
     def window(self, aspect: float) -> Window:
-        """Return the image rectangle at distance 1, from which projection and view rays are computed.
+        """Return the image rectangle in the plane at distance 1 in front of the camera.
 
         aspect : width of the picture divided by its height
         """
@@ -152,12 +152,12 @@ def portrait(head: Head) -> Camera:
     Parameters
     ----------
     head : Head
-        The head. A mesh without a head, such as a hand, is shown as a whole.
+        The head. If the mesh has no head, for example a hand, the camera shows the whole mesh.
 
     Returns
     -------
     Camera
-        Camera at a distance of 1.1 m.
+        Camera 1.1 m from the head, or farther from a large mesh without a head.
 
     Examples
     --------
@@ -171,17 +171,17 @@ def portrait(head: Head) -> Camera:
 
 
 def three_quarter(head: Head) -> Camera:
-    """Return a camera 40 degrees to the left of the face, as seen by the head.
+    """Return a camera for a three-quarter view, 40 degrees from the front towards the head's left.
 
     Parameters
     ----------
     head : Head
-        The head. A mesh without a head, such as a hand, is shown as a whole.
+        The head. If the mesh has no head, for example a hand, the camera shows the whole mesh.
 
     Returns
     -------
     Camera
-        Camera at a distance of 1.1 m.
+        Camera 1.1 m from the head, or farther from a large mesh without a head.
 
     Examples
     --------
@@ -201,12 +201,12 @@ def side(head: Head) -> Camera:
     Parameters
     ----------
     head : Head
-        The head. A mesh without a head, such as a hand, is shown as a whole.
+        The head. If the mesh has no head, for example a hand, the camera shows the whole mesh.
 
     Returns
     -------
     Camera
-        Camera at a distance of 1.1 m.
+        Camera 1.1 m from the head, or farther from a large mesh without a head.
 
     Examples
     --------
@@ -220,17 +220,17 @@ def side(head: Head) -> Camera:
 
 
 def full_body(head: Head) -> Camera:
-    """Return a camera that shows all of a mesh from the front, such as a whole body.
+    """Return a camera that shows the whole mesh of a head from the front, including any body.
 
     Parameters
     ----------
     head : Head
-        The head, with all meshes of the file.
+        The head, whose mesh may include a body.
 
     Returns
     -------
     Camera
-        Camera at a distance of 1.1 m, or of three times the size of the mesh if that is farther.
+        Camera 1.1 m from the centre of the mesh, or three times the mesh's size if this is farther.
 
     Examples
     --------
@@ -306,7 +306,7 @@ def _camera_at_azimuth(head: Head, azimuth_degrees: float) -> Camera:
 
 
 def _camera_showing_all(head: Head, azimuth_degrees: float) -> Camera:
-    """Return a camera that shows all of a mesh with a margin.
+    """Return a camera that shows the whole mesh of a head, with a margin.
 
     azimuth_degrees : azimuth of the camera: 0 in front of the head, 90 at its left side [degrees]
     """

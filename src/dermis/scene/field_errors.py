@@ -72,7 +72,7 @@ class _NotANumber:
 
 @cache
 def numeric_fields(model: type[BaseModel]) -> Mapping[str, bool]:
-    """Return a mapping from each numeric field of a model to whether the field also accepts text."""
+    """Return a mapping from the names of a model's numeric fields to whether the field also accepts text."""
     found = {}
     for name, info in model.model_fields.items():
         kinds = set(_leaf_types(info.annotation))

@@ -46,7 +46,7 @@ else:
 
 MAX_COORDINATE_MM = 1e6
 _MAX_DISPLAYED_BOUND = 1e5  # larger bounds are not shown to users, as they only keep numbers finite
-_MEMBER_TYPES = FunctionType, classmethod, property
+_PUBLIC_MEMBER_TYPES = FunctionType, classmethod, property
 _DOCSTRING_WIDTH = 92
 
 
@@ -94,7 +94,7 @@ class _DocumentedMeta(ModelMetaclass):
             bases = self.__mro__[: self.__mro__.index(BaseModel)]
             members = {name: member for base in reversed(bases) for name, member in vars(base).items()}
             public = ((name, member) for name, member in members.items() if name[0] != "_")
-            return [name for name, member in public if isinstance(member, _MEMBER_TYPES)]
+            return [name for name, member in public if isinstance(member, _PUBLIC_MEMBER_TYPES)]
 
 
 class FrozenModel(BaseModel, metaclass=_DocumentedMeta):
@@ -160,7 +160,7 @@ def slider(low: float, high: float, *, logarithmic: bool = False) -> dict[str, A
 
 
 def field_help(model: type[BaseModel], field: str) -> str:
-    """Return the help text of a field as one line; add a summary of each registered name that is accepted."""
+    """Return the help text of a field as one line, with a summary of each registered name it accepts."""
     info = model.model_fields[field]
     text = re.sub(r"\s+", " ", info.description or "")
     summaries = [one for named in _registry_names(info) for one in named.registry.summaries()]

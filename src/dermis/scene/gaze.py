@@ -66,9 +66,9 @@ def looking_at(head: Head, target_mm: ArrayLike, pose: Pose | Mapping[str, float
 
 
 def _eyelid_rotations(rig: Rig, side_name: str) -> list[BoneRotation]:
-    """Return the morph targets that move the lids of an eye, for eyes that a bone turns.
+    """Return the morph targets that move the eyelids of an eye, for a head whose eyes are turned by bones.
 
-    Each target comes with a rotation of the eye; at this rotation, the target has full weight.
+    Each target comes with the rotation of the eye at which the target has full weight.
 
     rig : rig of the head with the targets
     side_name : "Left" or "Right"

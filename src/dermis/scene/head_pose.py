@@ -21,7 +21,7 @@ def head_pose(scene: Scene) -> Doubles:
     does not move.
     """
     rotation, shift = _camera_extrinsics(scene)
-    head_rotation, head_shift = _rigid_motion(scene)
+    head_rotation, head_shift = _head_bone_motion(scene)
     return np.column_stack([rotation @ head_rotation, rotation @ head_shift + shift])
 
 
@@ -49,8 +49,8 @@ def _pose_motion(scene: Scene) -> Motion:
     return scene.head.control.rest if scene.motion is None else scene.motion
 
 
-def _rigid_motion(scene: Scene) -> tuple[Doubles, Doubles]:
-    """Return the rotation (3, 3) and translation (3,) [mm] of the head bone, about the centre of the head."""
+def _head_bone_motion(scene: Scene) -> tuple[Doubles, Doubles]:
+    """Return the head bone's motion: rotation (3, 3) about the head's centre, and translation (3,) [mm]."""
     names = [name.replace(":", " ").split()[-1:] for name in scene.head.bones]
     bone = next((k for k, name in enumerate(names) if [part.lower() for part in name] == [_HEAD_BONE]), None)
     if bone is None:

@@ -256,7 +256,7 @@ reference; exports write a registered light as the class that it derives from.""
 # Reach of a typical head, and largest reach for which the lights of presets are not moved away.
 _HEAD_REACH_MM, _MAX_HEAD_REACH_MM = 400.0, 1000.0
 _NARROW_SPOT_DEGREES = 10.0
-_SIZE_FIELDS = "width_mm", "height_mm", "radius_mm"
+_LAMP_SIZE_FIELDS = "width_mm", "height_mm", "radius_mm"
 _VECTOR_FIELDS = "position", "target", "direction", "up"
 NO_LIGHTS = "none"
 """Name of the preset without lights, for an environment alone."""
@@ -287,11 +287,11 @@ def preset_lights(preset_name: str, head: Head | None = None) -> tuple[Light, ..
 
 def _place_light(light: Light, head: Head) -> Light:
     reach = head.reach_mm
-    factor = reach / _HEAD_REACH_MM if reach > _MAX_HEAD_REACH_MM and not _keeps_distance(light) else 1.0
+    factor = reach / _HEAD_REACH_MM if reach > _MAX_HEAD_REACH_MM and not _ignores_body_size(light) else 1.0
     if factor == 1.0 and np.array_equal(head.axes, np.eye(3)):
         return light
     values: dict[str, Any] = {
-        name: factor * getattr(light, name) for name in _SIZE_FIELDS if hasattr(light, name)
+        name: factor * getattr(light, name) for name in _LAMP_SIZE_FIELDS if hasattr(light, name)
     }
     for name in _VECTOR_FIELDS:
         if hasattr(light, name):
@@ -302,7 +302,7 @@ def _place_light(light: Light, head: Head) -> Light:
     return light.replace(**values)
 
 
-def _keeps_distance(light: Light) -> bool:
+def _ignores_body_size(light: Light) -> bool:
     """Return whether a light is not moved away from large bodies: a directional light or a narrow spot."""
     return not isinstance(light, PointLight) or (
         isinstance(light, SpotLight) and light.outer_degrees < _NARROW_SPOT_DEGREES

@@ -46,7 +46,7 @@ class Output:
     unit : str
         Unit of the pixel values; empty for dimensionless outputs.
     description : str
-        A few words for help texts.
+        Short description for help texts.
     background : float
         Pixel value where there is neither head nor hair.
     quantisation : Quantisation, optional

@@ -15,7 +15,7 @@ from dermis.scene.frozen_model import Colour, FrozenModel, slider
 from dermis.scene.talk import Gamma, SeamColour, Seams, Stretch
 from dermis.scene.techniques import TECHNIQUES
 
-_Side = Annotated[int, Field(ge=1, le=16384), Reason("pixels: what the largest GPUs hold")]
+_PictureSide = Annotated[int, Field(ge=1, le=16384), Reason("pixels: what the largest GPUs hold")]
 _MAX_SAMPLES_PER_PIXEL = 64
 MAX_SAMPLE_COUNT = 2**27
 _HEX_COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
@@ -70,7 +70,7 @@ class Settings(FrozenModel):
 
     synonyms: ClassVar[Mapping[str, str]] = {"resolution": "size", "spp": "samples"}
 
-    size: Annotated[tuple[_Side, _Side], BeforeValidator(_square_size)] = (1024, 1024)
+    size: Annotated[tuple[_PictureSide, _PictureSide], BeforeValidator(_square_size)] = (1024, 1024)
     """Width and height of the picture [pixel]."""
     atlas: Annotated[int, Field(ge=64, le=16384), Reason("texels: what the largest GPUs hold")] = 2048
     """Side of the atlas, the map in which light is diffused [texel]."""

@@ -15,7 +15,7 @@ from dermis.scene.frozen_model import FrozenModel, slider
 from dermis.scene.talk import Energy, SpecularColour
 from dermis.specular.models import FresnelName, SpecularName
 
-DirectionName = Literal["lambertian", "half-space"]
+DiffuseDirectionName = Literal["lambertian", "half-space"]
 MAX_LAYERS = 8
 MAX_OTHER_PROFILES = 2
 """Number of profiles that a map can mix with the main profile."""
@@ -86,7 +86,7 @@ class TissueLayer(FrozenModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _check_reduced(cls, fields: object) -> object:
+    def _check_reduced_scattering(cls, fields: object) -> object:
         if isinstance(fields, Mapping):
             check_reduced("layers", fields)
         return fields
@@ -135,7 +135,7 @@ class Skin(FrozenModel):
     """Fresnel reflectance: Schlick's approximation with F0 = 0.028, or exact for an index of 1.4."""
     specular_colour: SpecularColour = "white"
     energy: Energy = "full"
-    direction: DirectionName = "half-space"
+    direction: DiffuseDirectionName = "half-space"
     """Directional dependence of diffuse light: "lambertian" for none; "half-space" as for a scattering
     half-space of the skin's mean colour, which reflects more at oblique incidence and for oblique views."""
     anisotropy: Annotated[

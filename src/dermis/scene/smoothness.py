@@ -36,8 +36,8 @@ _NEAR_PLANE_MM = 1.0
 class SmoothIn:
     """Choice of the subdivision levels at which the outline of a head looks smooth in a picture.
 
-    An instance can be called with a head and returns the levels; `load_head` accepts it as `subdivide`. The
-    result depends only on the camera, the size and the head in rest pose.
+    An instance is a function from a head to the number of levels; `load_head` accepts it as `subdivide`. The
+    number depends only on the camera, the size and the head in rest pose.
 
     camera : function that returns a camera for the head before subdivision
     size : width and height of the picture [pixel]

@@ -1,7 +1,7 @@
-"""Settings that reproduce faults and older methods described in the 2007 talk, for comparison.
+"""Settings that reproduce faults and older methods of the 2007 talk on skin rendering, for comparison.
 
-These settings are fields of `Skin` and `Settings`, as the gallery uses them to draw its pictures. Help texts
-and the viewer list the fields last, under a separate heading.
+These settings are fields of `Skin` and `Settings`. Help texts and the viewer list them last, under a separate
+heading.
 
 Source: [dEonLuebke2007].
 """

@@ -24,7 +24,7 @@ from dermis.images.colour import encode_srgb
 from dermis.mesh.head import Head
 from dermis.optics.media import published_media
 from dermis.scene.settings import Settings
-from dermis.scene.skin import DirectionName, Skin
+from dermis.scene.skin import DiffuseDirectionName, Skin
 from dermis.scene.sources import scattering_sources
 
 Floats = NDArray[np.float64]
@@ -87,7 +87,7 @@ def compare(
     region: str = "portrait",
     medium: str = "skin1",
     settings: Settings | None = None,
-    direction: DirectionName | None = None,
+    direction: DiffuseDirectionName | None = None,
     model: ModelName | None = None,
     samples: int = 64,
     adapter: str = "auto",

@@ -17,7 +17,7 @@ from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Medium
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
-from dermis.scene.skin import DirectionName
+from dermis.scene.skin import DiffuseDirectionName
 
 if TYPE_CHECKING:
     from dermis.apps.truths.irradiance_samples import IrradianceSamples
@@ -68,7 +68,7 @@ class ReferenceImage:
     notes: tuple[str, ...] = ()
     has_translucency: bool = True
     has_interreflection: bool = True
-    direction: DirectionName = "lambertian"
+    direction: DiffuseDirectionName = "lambertian"
 
 
 def surface_integral(subject: ComparisonSubject, samples: int) -> ReferenceImage:
