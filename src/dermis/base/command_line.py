@@ -1,4 +1,4 @@
-"""Framework of command-line programs: commands are functions; errors are one line and exit status 2."""
+"""Framework for command-line programs, whose commands are functions; errors print one line to stderr."""
 
 from __future__ import annotations
 

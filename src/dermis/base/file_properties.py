@@ -14,11 +14,11 @@ Treatment = Literal["drawn", "drawn with a note", "noted", "refused", "no effect
 class FileProperty:
     """Property of a file, and what the reader does with this property.
 
-    treatment : "drawn" if the scene follows the property; "drawn with a note" if a note is also printed;
+    treatment : "drawn" if the property affects the picture; "drawn with a note" if a note is also printed;
         "noted" if the property is ignored and a note says so; "no effect" if it is ignored without a note;
         "refused" if the reader raises an error
     name : property as the documentation shows it, in Markdown
-    detail : how the property is drawn, or why it is not drawn, in Markdown
+    detail : how the property affects the picture, or why it does not, in Markdown
     keys : words by which the reader recognises the property, such as statements or extensions
     other_parts : treatment in materials of parts that are not skin; None if it is the same as in skin
     """
@@ -57,7 +57,8 @@ no_effect = partial(_file_property, "no effect")
 
 
 def keys_of(properties: Iterable[FileProperty], *treatments: Treatment) -> tuple[str, ...]:
-    """Return the keys of the properties with one of the given treatments; by default of all properties."""
+    """Return the keys of the properties that have one of the given treatments, or of all properties if none is
+    given."""
     chosen = (item for item in properties if not treatments or item.treatment in treatments)
     return tuple(dict.fromkeys(key for item in chosen for key in item.keys))
 

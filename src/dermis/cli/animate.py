@@ -188,7 +188,7 @@ def _render_frames(
 
 
 def _common_exposure(animated_scene: _AnimatedScene, renderer: Renderer) -> float:
-    """Return the exposure of all frames: the value of --exposure, or the metered exposure of the first."""
+    """Return the exposure of all frames: the value of --exposure, or else as metered on the first frame."""
     if animated_scene.settings.exposure != "auto":
         return animated_scene.settings.exposure
     (scene,) = animated_scene.scenes([animated_scene.first])
@@ -338,7 +338,7 @@ def load_clip(
 
 
 def animatable_names(head_or_scene: str, head: Head) -> dict[str, tuple[str, ...]]:
-    """Return a dictionary from kinds (morph targets, bones, and clips in the head's file) to names."""
+    """Return the names of the morph targets, the bones, and the clips in the head's file, by kind."""
     from dermis.formats.gltf.animations import clip_names
     from dermis.formats.parts import is_gltf
 
@@ -348,7 +348,7 @@ def animatable_names(head_or_scene: str, head: Head) -> dict[str, tuple[str, ...
 
 
 def _head_table(head_or_scene: str) -> Options:
-    """Return the [head] table of a scene file; an empty table for any other head name."""
+    """Return the [head] table of a scene file, or an empty table if the argument is not a scene file."""
     from dermis.scene.files import head_table
 
     return head_table(Path(head_or_scene)) if Path(head_or_scene).suffix.lower() == ".toml" else {}

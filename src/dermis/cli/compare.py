@@ -314,7 +314,7 @@ def _draw_lobes_and_albedo(folder: Path, roughness: float) -> None:
 
 
 def _distinct_models() -> list[str]:
-    """Return the names of the specular models except "kelemen-direct", which has the lobe of "kelemen"."""
+    """Return the names of the specular models, except "kelemen-direct", whose lobe is that of "kelemen"."""
     return [name for name in MODELS if name != _DUPLICATE_MODEL]
 
 

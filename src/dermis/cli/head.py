@@ -204,7 +204,7 @@ def _build_person(seed: int | None, numbers: Options, tone: Options, targets: di
 def _with_values(look: Look, option_values: list[str] | None, option_name: str) -> Look:
     """Return a copy of a skin, eye or hair look with the fields set on the command line.
 
-    option_values : texts "NAME=NUMBER,..." of the option, such as --skin
+    option_values : values "NAME=NUMBER,..." of an option such as --skin
     """
     from dermis.human.skin.look import SITES_FIELD
 

@@ -112,7 +112,7 @@ def parse_weights(option_values: Sequence[str], option_name: str = POSE_OPTION) 
 def parse_bone_angles(option_values: Sequence[str]) -> dict[str, list[float]]:
     """Return a dictionary from bones to angles about x, y and z [degrees].
 
-    option_values : texts such as "head=0,25,0"
+    option_values : values of the option --bone, such as "head=0,25,0"
     """
     return dict(
         _parse_pairs(
@@ -177,7 +177,7 @@ def pose_with_gaze(option_value: str, scene: Scene) -> Pose:
 
 
 def _parse_numbers(option_value: str) -> list[float] | None:
-    """Return the numbers of a comma-separated text; None if a part is not a number or is beyond 1e10."""
+    """Return comma-separated numbers; None if an element is not a number, or exceeds 1e10 in magnitude."""
     try:
         numbers = [float(part) for part in option_value.split(",")]
     except ValueError:

@@ -28,7 +28,7 @@ _PIGMENT_OPTION_NAMES = {"structure": "skin"}
 
 
 def _default_pigments() -> dict[str, str]:
-    """Return the default of each pigment option as help text, with the values of named skins that differ."""
+    """Return the help text of each pigment option: its default, and the differing values of named skins."""
     defaults: dict[str, str] = {"structure": DEFAULT_STRUCTURE}
     for field in Pigments.model_fields.keys() - defaults.keys():
         default = getattr(DEFAULT_SKIN, field)
@@ -100,7 +100,8 @@ def profile(
         Model of the profile. counted: tabulated photon counts, the default for one semi-infinite layer of
         index 1 or 1.4; layered: layered diffusion, the default for all other media; layered-point: layered
         with a finite value at r = 0; dipole, better-dipole: for one semi-infinite layer; multipole: the model
-        of the 2007 talk; montecarlo: the reference, for which photons are traced now.
+        of the talk "Advanced Skin Rendering" (2007); montecarlo: the reference, for which photons are traced
+        now.
     clamp:
         Source depth of the multipole in layers thinner than one mean free path: layer (moved inside the
         layer), or none (below the layer, as published).

@@ -72,8 +72,8 @@ class EnergyScheme:
     albedo rho_dt of the lobe and k = `loss` times the specular strength rho_s. The divisor c is 1 minus k
     times the mean albedo if `returns_internal_light` is true, otherwise 1.
 
-    loss : factor on the reflected light that is subtracted: 0 subtracts nothing, 1 subtracts exactly the
-        light that the lobe reflects, and pi is the published factor
+    loss : ratio of the light subtracted from the diffuse light to the light that the lobe reflects: 0 for no
+        subtraction, 1 for conservation of energy, and pi in the published method
     returns_internal_light : whether light that the surface reflects back into the skin leaves the skin later;
         if False, this light is lost
     """
@@ -82,7 +82,7 @@ class EnergyScheme:
     returns_internal_light: bool
 
     def entering_fraction(self, albedo: ArrayLike, rho_s: float) -> Floats:
-        """Return how large a fraction of the light from one direction enters the skin [-].
+        """Return the fraction of the light from one direction that enters the skin [-].
 
         albedo : directional albedo of the lobe for this direction [-]
         rho_s : specular strength [-]

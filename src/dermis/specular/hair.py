@@ -113,7 +113,7 @@ def azimuthal_logistic(x: ArrayLike, width: float) -> Floats:
 
 
 def fresnel(cosine: ArrayLike) -> Floats:
-    """Return the Fresnel reflectance of keratin at a cosine of incidence [-]."""
+    """Return the Fresnel reflectance of keratin for the cosine of the angle of incidence [-]."""
     c = np.clip(np.asarray(cosine, float), 0.0, 1.0)
     t = np.sqrt(1 - (1 - c * c) / KERATIN_ETA**2)
     parallel, across = (

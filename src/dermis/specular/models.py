@@ -49,7 +49,7 @@ class Model:
     reciprocal : bool
         Whether the BRDF is unchanged when light and view are exchanged.
     sources : tuple of str
-        Keys of the bibliography.
+        Keys of entries in the bibliography.
     numbers : mapping
         Dictionary from the names of the placeholders in the shader to their values.
 

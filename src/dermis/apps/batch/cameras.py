@@ -66,7 +66,7 @@ def sampled_camera(
     )
 
     def scaled_aim_offset(offset_fraction: float) -> AimOffset:
-        """Return the aim offset that moves the face in the picture by a fraction of its sampled offset."""
+        """Return the aim offset [mm] that moves the face by a fraction of the sampled picture offset."""
         return -0.5 * frame * offset_fraction * offset[0], -0.5 * frame * offset_fraction * offset[1]
 
     fraction, low, high = 1.0, 0.0, 1.0

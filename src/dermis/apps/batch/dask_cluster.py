@@ -1,4 +1,4 @@
-"""Worker pool of dask.distributed, on one machine or several, with one adapter per worker."""
+"""Pool of dask.distributed workers on one or several machines; each worker uses one graphics adapter."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ _CONNECTION_TIMEOUT_S = 60.0  # for the scheduler, and for its first worker
 
 @dataclass(frozen=True)
 class DaskCluster:
-    """Pool of dask workers, each of which renders one part at a time.
+    """Pool of dask workers, each of which renders one part of a shard at a time.
 
     address : address of the scheduler; None if `file` is given
     file : scheduler file, written by `dask scheduler --scheduler-file`
-    adapter : adapters to use, as in `SlotRequest`; the workers of a host are assigned the matching adapters
-        in turn
+    adapter : graphics adapters to use, as in `SlotRequest`; the workers of a host are assigned the matching
+        adapters in turn
     """
 
     address: str | None
@@ -41,7 +41,7 @@ class DaskCluster:
     def render(self, options: RunOptions, tasks: Sequence[Shard]) -> Iterator[WorkerEvent]:
         """Process the tasks as dask tasks, and yield an event for each completed task.
 
-        tasks : parts to render and shards to verify
+        tasks : parts of shards to render, and complete shards to verify
 
         Raises DermisError if no worker can be reached, if a worker does not share the disk, and for errors
         that would recur on another attempt.

@@ -60,7 +60,7 @@ class PartPlugin(WorkerPlugin):  # type: ignore[misc]
     out : output folder of the run
     encoders : number of encoder processes, as in `RunOptions`
     keep_going : whether to omit images that cannot be rendered, as in `RunOptions`
-    adapter : adapters to use, as in `DaskCluster`
+    adapter : graphics adapters to use, as in `DaskCluster`
     """
 
     spec_toml: str
@@ -89,7 +89,7 @@ class PartPlugin(WorkerPlugin):  # type: ignore[misc]
             self._state.lock.release()
 
     def process(self, task: Shard) -> WorkerEvent:
-        """Process a task as `Worker.process` does, and return the event of its completion or its refusal.
+        """Process a task as `Worker.process` does; return an event that reports its completion or an error.
 
         Raises LostProcessError if the process or its device was lost; dask then retries the task.
         """
@@ -141,7 +141,7 @@ def process_task(plugin_name: str, task: Shard) -> WorkerEvent:
     """Process a task with a plugin of the dask worker that runs this function.
 
     plugin_name : name of the `PartPlugin`
-    task : part to render or shard to verify
+    task : part of a shard to render, or complete shard to verify
     """
     event: WorkerEvent = get_worker().plugins[plugin_name].process(task)
     return event

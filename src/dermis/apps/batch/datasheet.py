@@ -141,8 +141,8 @@ def _markdown_table(column_names: Sequence[str], table_rows: TableRows) -> str:
 class OutputFormat(TypedDict):
     """File format of an output array, for programs that read the data set.
 
-    A stored number `level` stands for the value (level - zero) * step. A step of 1 and a zero of 0 mean that
-    values are stored unscaled.
+    A stored number `level` stands for the value (level - zero) * step. If `step` is 1 and
+    `zero` is 0, values are stored unscaled.
     """
 
     file: str

@@ -37,13 +37,14 @@ class FitTest(NamedTuple):
 
     parameter : name of the parameter
     sample_count : number of samples: one per image, or one per person for a parameter of people
-    expected : mean and standard deviation of the distribution, or, for texts, the probability of each
-    observed : mean and standard deviation of the samples, or, for texts, the fraction of each
-    distance : Kolmogorov-Smirnov distance, or, for texts, the largest difference between the expected and the
-        observed probability of a text [-]
+    expected : mean and standard deviation of the distribution; probability of each value if the parameter is
+        categorical
+    observed : mean and standard deviation of the samples; fraction of each value if categorical
+    distance : Kolmogorov-Smirnov distance; if categorical, largest difference between the probability and the
+        observed fraction of a value [-]
     expected_distance : mean distance for `sample_count` random samples of the distribution; 0 if only one
-        text is possible [-]
-    p_value : p-value of the distance, or of a chi-square test of the probabilities [-]
+        value is possible [-]
+    p_value : p-value of the Kolmogorov-Smirnov test, or of the chi-square test if categorical [-]
     """
 
     parameter: str
@@ -84,7 +85,7 @@ def fit_tests(out: Path, spec: Spec) -> Iterator[FitTest]:
 
 
 def fit_test(parameter: str, distribution: Distribution, samples: Samples) -> FitTest:
-    """Return the goodness-of-fit test of samples: Kolmogorov-Smirnov for numbers, chi-square for texts."""
+    """Return the goodness-of-fit test of samples: Kolmogorov-Smirnov for numbers, chi-square for strings."""
     if any(isinstance(bound, str) for bound in distribution.support):
         return _text_test(parameter, text_probabilities(distribution), [str(value) for value in samples])
     return _number_test(parameter, distribution, np.sort(np.array(samples, np.float64)))
@@ -123,7 +124,7 @@ def cumulative_probability(distribution: Distribution, numbers: Array, *, is_inc
 
 
 def text_probabilities(distribution: Distribution) -> dict[str, float]:
-    """Return the probability of each text that a distribution can give."""
+    """Return the probability of each possible string of a categorical distribution."""
     if isinstance(distribution, distributions.FileChoice):
         return dict.fromkeys(distribution.names, 1.0 / len(distribution.names))
     if isinstance(distribution, Constant):
@@ -176,10 +177,10 @@ def _number_test(parameter: str, distribution: Distribution, sorted_samples: Arr
 def _text_test(
     parameter: str, expected_probabilities: Mapping[str, float], sampled_texts: Sequence[str]
 ) -> FitTest:
-    """Return the chi-square test of sampled texts.
+    """Return the chi-square test of the samples of a categorical parameter.
 
-    expected_probabilities : probability of each text
-    sampled_texts : texts that were sampled for the parameter
+    expected_probabilities : probability of each value
+    sampled_texts : sampled values of the parameter
     """
     count, counts = len(sampled_texts), Counter(sampled_texts)
     distance = max(
@@ -206,11 +207,13 @@ def _format_probabilities(probabilities: Mapping[str, float]) -> str:
 def _chi_square(
     probabilities: Mapping[str, float], observed_counts: Counter[str], sample_count: int
 ) -> float:
-    """Return the p-value of a chi-square test of counts; texts with few expected samples are pooled.
+    """Return the p-value of a chi-square test of the samples of a categorical parameter.
 
-    probabilities : probability of each text
-    observed_counts : number of samples of each text
-    sample_count : number of samples of all texts
+    Values with few expected samples are pooled.
+
+    probabilities : probability of each value
+    observed_counts : number of samples of each value
+    sample_count : total number of samples
     """
     cells = [
         (observed_counts[text], sample_count * p)

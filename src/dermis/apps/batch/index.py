@@ -1,4 +1,4 @@
-"""Index of a data set: a Parquet table with the parameters of each image; summaries of its columns."""
+"""Index of a data set (a Parquet table with the parameters of each image), and summaries of its columns."""
 
 from __future__ import annotations
 
@@ -35,8 +35,9 @@ def write_index(out: Path, spec: Spec) -> Path:
     "camera.t", "head_pose" and "gaze" are flattened matrices; columns that begin with "skin_tone." describe
     the colour of the skin; all other columns are parameters, with null for images without the parameter.
 
-    Equal shards give equal bytes. Raises DermisError if a shard is damaged, if pyarrow is missing, or if the
-    file cannot be written.
+    Identical shards give an identical index.
+
+    Raises DermisError if a shard is damaged, if pyarrow is missing, or if the file cannot be written.
     """
     parquet, target = import_extra("pyarrow.parquet", "the index of a data set"), out / INDEX_FILE
     schema = _index_schema(out, spec)

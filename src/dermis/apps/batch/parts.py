@@ -29,9 +29,9 @@ _MAX_JOIN_ATTEMPTS = 3
 
 
 class KeptImages(NamedTuple):
-    """Images at the beginning of a part that exist already, because the data set was enlarged afterwards.
+    """Images at the beginning of a shard's part that were rendered before the data set was enlarged.
 
-    path : shard or part that contains these images; None if there are no such images
+    path : path of the existing shard or part that contains them; None if there are no such images
     stop : number after the last of these images
     """
 
@@ -82,8 +82,8 @@ def join_parts(out: Path, shard: Shard, spec: Spec) -> tuple[Part, ...]:
     """Join the parts of a shard if all parts exist, then remove the parts; return the damaged parts.
 
     If there are damaged parts, nothing is joined: the damaged parts are removed, and must be rendered again.
-    Several processes may join the same parts at once: all write equal bytes, and parts are only removed when
-    the shard exists.
+    Several processes may join the same parts at once: all write identical bytes, and parts are only removed
+    when the shard exists.
 
     Raises DermisError if the shard cannot be written.
     """

@@ -41,7 +41,7 @@ class ParameterRow(TypedDict):
     first : samples of the first 16 images; None for an image without this parameter
     images : number of images with this parameter, among the first 20,000 images
     min, mean, max : statistics of numeric samples
-    counts : for text samples, number of images with each text
+    counts : number of images with each value, if the values are strings
     """
 
     parameter: str

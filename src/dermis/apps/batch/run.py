@@ -1,4 +1,4 @@
-"""Run of a data set: render the missing parts, then write the index and the datasheet."""
+"""Rendering of a data set: missing parts of shards are rendered, then index and datasheet are written."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class WorkerPool(Protocol):
     def render(self, options: RunOptions, tasks: Sequence[Shard]) -> Iterator[WorkerEvent]:
         """Render parts and verify shards; yield the events that the workers send.
 
-        tasks : parts to render and shards to verify; damaged parts are rendered again
+        tasks : parts of shards to render, and complete shards to verify; damaged parts are rendered again
         """
         ...
 
@@ -194,7 +194,7 @@ def _process_tasks(
     tasks: Sequence[Shard],
     on_progress: Callable[[Progress], None],
 ) -> tuple[int, set[Shard], tuple[Failure, ...]]:
-    """Process the tasks; return the number of rendered images, the damaged shards, and the failed images."""
+    """Render parts and verify shards; return the number of rendered images, damaged shards, and failures."""
     to_render = [task for task in tasks if isinstance(task, Part)]
     progress = Progress(total=sum(map(len, to_render)), to_verify=len(tasks) - len(to_render))
     rendered, damaged, failed, notes = 0, set[Shard](), list[Failure](), set[str]()

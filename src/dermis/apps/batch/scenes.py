@@ -117,7 +117,7 @@ class SceneBuilder:
         return _Person(head, face_hull_indices(head), find_rotation_bones(head.control.skeleton).head, skin)
 
     def _resolve_file(self, head_or_panorama: float | str) -> str:
-        """Return the path of a file in the spec's folder, or the name itself if there is no such file."""
+        """Return the path of the file in the spec's folder, or the argument if there is no such file."""
         file = self.spec.folder / str(head_or_panorama)
         return str(file) if is_file(file) else str(head_or_panorama)
 
@@ -161,7 +161,7 @@ def _subdivision_levels(picture_size: tuple[int, int]) -> int:
 
 
 def _hair_count_fraction(picture_size: tuple[int, int]) -> float:
-    """Return the fraction of the hairs to generate, which is smaller for small pictures.
+    """Return which fraction of a person's hairs is generated; it is smaller for small pictures.
 
     picture_size : width and height of the picture [pixel]
     """

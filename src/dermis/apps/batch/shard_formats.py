@@ -34,7 +34,7 @@ class ShardManifest:
     first, stop : first image number, and the number after the last image
     left_out : numbers of the images that could not be rendered, with the reasons
     sha256 : SHA-256 of all bytes before the manifest
-    made_with : adapter and software versions with which the images were rendered
+    made_with : graphics adapter and software versions with which the images were rendered
     """
 
     spec: str

@@ -27,7 +27,7 @@ _MIN_PART_IMAGES, _MAX_PART_IMAGES = 16, 32
 
 @dataclass(frozen=True, order=True, slots=True)
 class Shard:
-    """Number of a shard, and the shard's range of image numbers, from `first` up to but excluding `stop`."""
+    """Shard: its number and its range of image numbers, from `first` up to but excluding `stop`."""
 
     index: int
     first: int
@@ -43,7 +43,7 @@ class Shard:
 
 
 class Part(Shard):
-    """Part of a shard, the unit of work: number of the shard, and range of image numbers of the part."""
+    """Part of a shard, the unit of work: the number of the shard, and the part's range of image numbers."""
 
     __slots__ = ()
 
@@ -66,9 +66,9 @@ def shard_at(shard_number: int, spec: Spec) -> Shard:
 def list_parts(shard: Shard, spec: Spec) -> list[Part]:
     """Return the parts of a shard in order.
 
-    The part size is the smallest multiple of the number of images per person that is between 16 and 32, or 16
-    if there is none. Except for the first part of a shard, every part starts at an image number that is a
-    multiple of the part size. The first and the last part may therefore be smaller.
+    The part size is the smallest multiple of the number of images per person that is between 16 and 32; it
+    is 16 if there is no such multiple. Except for the first part of a shard, every part starts at an image
+    number that is a multiple of the part size. The first and the last part may therefore be smaller.
     """
     group = spec.images_per_person
     size = -(-_MIN_PART_IMAGES // group) * group if group <= _MAX_PART_IMAGES else _MIN_PART_IMAGES
@@ -96,7 +96,7 @@ def image_key(image_number: int) -> str:
 class ShardWriter:
     """Context manager that writes a shard or a part, and renames it to its final path on a normal exit.
 
-    adapter : name of the adapter that renders the images, for the manifest; "" if all images are copied
+    adapter : name of the graphics adapter to record in the manifest; "" if all images are copied
 
     Raises DermisError if the shard cannot be written; the temporary file is then removed.
     """

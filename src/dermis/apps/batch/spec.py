@@ -144,11 +144,11 @@ class Spec(FrozenModel):
 
     @property
     def pose_targets(self) -> frozenset[str]:
-        """Return the morph targets that the [pose] table names, directly or as a pair of left and right."""
+        """Return the morph targets in the [pose] table, which names each target or a left and right pair."""
         return frozenset(expand_targets(self.pose))
 
     def parameters(self, k: int) -> Parameters:
-        """Return the sampled parameters of image k by name: texts, and numbers with six significant digits.
+        """Return the sampled parameters of image k, by name; numbers are rounded to six significant digits.
 
         The parameters are the same on every machine and for any order of images. Changing or adding the
         distribution of one parameter does not change the samples of the others. Parameters that an image does
@@ -196,7 +196,8 @@ def load_spec(path: str | Path, **values: object) -> Spec:
 
     values : `count`, `seed`, `size` or `format`, replacing the values in the file
 
-    Raises DermisError, naming table and key, for values that cannot be rendered; also for missing files.
+    Raises DermisError for missing files, and for values that cannot be rendered; the message states their
+    table and key.
     """
     path = checked_path(path, "a spec of a data set in TOML")
     data = read_toml(path, "a spec of a data set in TOML")

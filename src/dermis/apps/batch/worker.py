@@ -70,10 +70,10 @@ class RunOptions:
 
 @dataclass(frozen=True)
 class WorkerSlot:
-    """Adapter and thread count with which one worker renders.
+    """Graphics adapter and number of threads with which one worker renders.
 
-    adapter : name or number of the adapter, as for `Renderer`
-    threads : threads of a software adapter; 0 for the default of the adapter
+    adapter : name or number of the graphics adapter, as for `Renderer`
+    threads : number of threads if the adapter is a software renderer; 0 for the adapter's default
     """
 
     adapter: str
@@ -119,11 +119,13 @@ class _PlannedImage(NamedTuple):
 
 
 class Worker:
-    """Renderer of parts on one device; an image depends only on the spec and on the image's number.
+    """Worker that renders parts of shards on one device.
+
+    Each image depends only on the spec and on the image's number.
 
     The device is opened when the first image is rendered.
 
-    adapter : name or number of the adapter, as for `Renderer`
+    adapter : name or number of the graphics adapter, as for `Renderer`
     """
 
     def __init__(self, adapter: str, options: RunOptions) -> None:
@@ -315,7 +317,7 @@ def available_tasks(pipe: Connection) -> Iterator[Shard]:
 
 
 def _forward_notes(forward_note: Callable[[str], None]) -> None:
-    """Redirect the package's warnings to a function; other warnings are shown as usual."""
+    """Redirect the warnings of this package to a function; other warnings are shown as usual."""
     default = warnings.showwarning
 
     def forward_or_show(

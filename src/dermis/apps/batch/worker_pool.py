@@ -22,7 +22,7 @@ _MAX_ENCODERS_PER_WORKER = 8  # per worker: more would wait for the renderer
 
 @dataclass(frozen=True)
 class SlotRequest:
-    """Requested number and adapters of the workers; None selects a default for this machine.
+    """Requested number of workers, and their graphics adapters; None selects a default for this machine.
 
     adapter : "auto", "cpu", a number such as "#1", or a part of an adapter's name; if several adapters match,
         all that are of the same kind as the best one are used
@@ -122,7 +122,8 @@ class _PoolState:
     def receive(self, worker: _WorkerProcess) -> WorkerEvent:
         """Return the next event of a worker; then send the worker a task, replace the worker, or stop it.
 
-        Raises DermisError for a refusal, and for a part that failed `MAX_TASK_ATTEMPTS` times.
+        Raises DermisError if the event requires the run to end, or if a task failed `MAX_TASK_ATTEMPTS`
+        times.
         """
         try:
             event: WorkerEvent = worker.child.pipe.recv()
