@@ -46,8 +46,7 @@ def burley_curve(d_mm: ArrayLike, energy: ArrayLike) -> CumulativeProfile:
 def fit_burley_width(curve: CumulativeProfile) -> Floats:
     """Return the widths d (3,) of the Burley profiles closest to a cumulative profile [mm].
 
-    For each channel, the largest difference between the cumulative Burley profile and `curve` is minimised. A
-    sum of squared differences would depend on the spacing of the radii.
+    For each channel, the largest difference between the cumulative Burley profile and `curve` is minimised.
     """
     median = np.array([np.interp(0.5, curve.fraction[:, i], curve.radii_mm) for i in range(3)])
     middle = np.log(median / _BURLEY_MEDIAN_RADIUS)
@@ -156,13 +155,13 @@ def _bisect_minimax(
     max_log_length: Floats,
     bisection_steps: int,
 ) -> Floats:
-    """Return the lengths (3,) by which a cumulative profile is scaled to match a reference profile.
+    """Return the lengths (3,) by which a profile's radii are multiplied to match a reference profile.
 
-    The largest absolute difference between the cumulative profiles is minimised in each channel. At the best
-    length, the largest positive difference equals the largest negative difference; bisection finds it.
+    In each channel, the length that minimises the largest absolute difference between the cumulative profiles
+    is found by bisection. At this length, the largest positive and negative differences have equal magnitude.
 
-    cdf_difference : function that takes the logarithms of the lengths (3,) and returns the scaled cumulative
-        profile minus the reference profile, at n radii (n, 3)
+    cdf_difference : function that takes the logarithms of the lengths (3,) and returns the differences (n, 3)
+        between the scaled and the reference cumulative profile, at n radii
     min_log_length, max_log_length : (3,) bounds of the logarithms of the lengths
     bisection_steps : number of times that the interval between the bounds is halved
     """
@@ -180,11 +179,11 @@ def _bisect_minimax(
 def fit_length_scale(
     curve: CumulativeProfile, colour_channel: int, unit_cdf: Callable[[Floats], Floats]
 ) -> float:
-    """Return the length by which a profile's radii are multiplied to match one channel of `curve` [mm].
+    """Return the length by which the radii of `unit_cdf` are multiplied to match a channel of `curve` [mm].
 
-    The sum of squared differences between the cumulative profiles is minimised, at radii spaced evenly in log
-    r.
+    The sum of squared differences is minimised at radii that are spaced evenly on a logarithmic scale.
 
+    curve : cumulative reference profile
     colour_channel : index of the channel of `curve`, 0 for red
     unit_cdf : cumulative profile for a length of 1: a function that takes radii (n,) and returns the fraction
         of light (n,) within each radius
@@ -211,7 +210,7 @@ class CurveError:
     """Errors of the profile that a program renders, relative to the reference profile, by colour channel.
 
     cdf : (3,) largest difference between the fractions of light within the same radius [-]
-    edge : (3,) largest difference in brightness, after diffusion, near a straight shadow edge [-]
+    edge : (3,) largest difference in brightness across a straight shadow edge blurred by the profile [-]
     energy : (3,) relative error of the total energy [-]
     """
 

@@ -33,15 +33,15 @@ _DEFAULT_MAP_SIDE = 2048
 class ExportReport:
     """Report of one export.
 
-    target, title, version, variant : name, title, version and variant of the target program; the variant is
-        empty if the target has no variants
+    target, variant : name and variant of the export target; the variant is "" if there are no variants
+    title, version : displayed name and version of the program
     subject : name of the exported skin or head
     model : name of the model from which the skin's reference profile was computed
     parameters : exported parameters
     naive_parameters : parameters that a user might choose without knowing their meaning in the program
     d_mm : (3,) width of the Burley profile closest to the reference profile [mm]
-    error, naive_error : errors of the profile that the program renders with the exported parameters, and with
-        the naive parameters; predicted by the formulas of the program
+    error, naive_error : predicted errors of the profile that the program renders, with the exported
+        parameters and with the naive parameters
     limitations : sentences on what the program cannot reproduce
     untested : whether the export has never been tried in the program itself
     files : paths of all written files
@@ -158,7 +158,7 @@ def export_skin(
     adapter: str = "auto",
     **head: Any,
 ) -> ExportReport:
-    """Write a skin or a head for another program, and report the remaining error.
+    """Write a skin or a head for another program, and report how wrongly the program will render the skin.
 
     Parameters
     ----------
@@ -230,7 +230,7 @@ def export_skin(
 
 
 def evaluate_export(subject: Subject, target: Target, version: str) -> ExportReport:
-    """Return the report of an export without writing any file: parameters and predicted errors."""
+    """Return a report with the parameters and predicted errors of an export, without writing any file."""
     part_limitations = () if subject.part_pictures is None else (target.part_limitations,)
     parameters, naive = target.parameters(subject, version), target.naive_parameters(subject, version)
     errors = [

@@ -1,4 +1,4 @@
-"""Lights that other renderers support, and triangle meshes as PLY files."""
+"""Replacement of lights that a program does not support, and encoding of triangle meshes as PLY files."""
 
 from __future__ import annotations
 

@@ -78,12 +78,12 @@ class Subject:
 
     @cached_property
     def part_pictures(self) -> PartPictures | None:
-        """Return the pictures of the head's parts that are not skin, or None if no part has pictures."""
+        """Return the texture images of the parts of the head that are not skin; None if there are none."""
         return None if self.head is None else PartPictures.of(self.head)
 
     @property
     def identifier(self) -> str:
-        """Return the name for files and materials, reduced to ASCII letters, digits and underscores."""
+        """Return the subject's name in ASCII letters, digits and underscores, for files and materials."""
         name = re.sub(r"[^A-Za-z0-9]+", "_", Path(self.name).stem or self.name).strip("_")[
             :_MAX_IDENTIFIER_LENGTH
         ]
@@ -101,8 +101,8 @@ class Subject:
     def rescale_energy(self, curve: CumulativeProfile) -> CumulativeProfile:
         """Return `curve` with its energy scaled for comparison with the reference profile.
 
-        The program renders `curve` for the subject's albedo, which may differ from the energy of the
-        reference profile. The energy of `curve` is multiplied by (energy of the reference profile) / albedo.
+        The subject's albedo may differ from the energy of its reference profile. The energy of `curve` is
+        therefore multiplied by (energy of the reference profile) / albedo.
 
         curve : cumulative profile that the program renders for the subject's albedo
         """
@@ -117,12 +117,12 @@ class Subject:
         return None if eyes is None else run_on_device("auto", lambda device: paint_eye(device, eyes.look))
 
     def with_painted_maps(self, map_side: int, adapter: str) -> Subject:
-        """Return a copy whose head has arrays of texels, painted on a device, in place of procedural maps.
+        """Return a copy of the subject in which the head's procedural maps are replaced by arrays of texels.
 
         If the head has no procedural maps, the subject itself is returned.
 
         map_side : side of the maps, a power of two from 256 to 4096 [texel]
-        adapter : adapter that paints the maps
+        adapter : graphics adapter on which the maps are computed
         """
         head = self.head
         if self.scene is None or head is None or not head.maps.is_painted:

@@ -297,13 +297,13 @@ class Target(ABC):
 
 
 class JsonTarget(Target):
-    """Base class of targets that write a JSON file of parameters, which were not tested in the program."""
+    """Base class of targets that only write a JSON file of parameters and were not tested in the program."""
 
     suffixes = (".json", "")
     untested = True
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
-        """Write the parameters with units and meanings as JSON, marked as not tested."""
+        """Write a JSON file of the parameters with their units and meanings, and the remark "not run"."""
         file = self.main_file(output, subject)
         rows = {p.name: {"value": p.value, "unit": p.unit, "meaning": p.meaning} for p in parameters}
         content = {

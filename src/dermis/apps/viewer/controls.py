@@ -24,8 +24,9 @@ _DIVIDER_GRAB_RADIUS_PX = 8.0  # distance from the divider within which a pointe
 
 
 class Controls:
-    """Conversion of input events to steps of the undo history.
+    """Handler of pointer, touch and keyboard input over the picture, which changes the viewer state.
 
+    history : undo history, which receives the changed states
     displayed_state : function that returns the state on screen, which differs from the current state of the
         history while a motion plays
     light : index of the light that Shift-drag moves; an index after the last light selects the environment
@@ -79,7 +80,7 @@ class Controls:
         self._pinch = _measure_pinch(event)
 
     def _release(self, event: Event, picture_size: Point) -> None:
-        """End a drag where the pointer was released, which may differ from its last reported position."""
+        """End a drag at the position at which the pointer was released."""
         if self._pressed_button and not self._pinch and (event["x"], event["y"]) != self._pointer_position:
             self._drag(event, picture_size)
         self._pressed_button, self._pinch = 0, None
@@ -102,7 +103,7 @@ class Controls:
         self.history.change(new_state, f"drag {self._gesture_count}")
 
     def _pan_and_zoom(self, pinch: tuple[float, float, float] | None, picture_size: Point) -> None:
-        """Pan and zoom by moving two fingers; when one of them is lifted, the picture does not jump.
+        """Pan and zoom by the motion of two fingers since the last event; do nothing when a finger is lifted.
 
         pinch : midpoint (x, y) and distance of the two fingers [logical pixel]; None for fewer than two
             fingers

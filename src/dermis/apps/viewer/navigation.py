@@ -79,7 +79,7 @@ def focus(camera: Camera, point: ArrayLike) -> Camera:
 
 
 class CameraEasing:
-    """Smooth motion of the displayed camera towards the state's camera, independent of the frame rate."""
+    """Smooth motion of the displayed camera towards a target camera, independent of the frame rate."""
 
     def __init__(self, camera: Camera) -> None:
         self.camera = camera
@@ -98,7 +98,7 @@ class CameraEasing:
 def interpolate_cameras(start_camera: Camera, end_camera: Camera, fraction: float) -> Camera:
     """Interpolate between two cameras; return `end_camera` itself if the result would look the same.
 
-    The direction is interpolated by rotation, and the distance and visible height by scaling.
+    Targets and directions are interpolated linearly, the distance and the visible height geometrically.
 
     fraction : position between the cameras, from 0 (start) to 1 (end)
     """

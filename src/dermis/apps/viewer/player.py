@@ -1,4 +1,4 @@
-"""Playback of a motion in the viewer; when it pauses, its pose becomes a step of the undo history."""
+"""Playback of a motion in the viewer; pausing the motion adds the current pose to the undo history."""
 
 from __future__ import annotations
 

@@ -140,7 +140,7 @@ class ViewRenderer:
 
     adapter : "auto", "cpu" or part of an adapter's name
 
-    is_preparing : whether `prepare` is running; nothing else may be drawn during that time
+    is_preparing : whether `prepare` is running; no other method may render during that time
     """
 
     def __init__(self, adapter: str = "auto") -> None:
@@ -160,7 +160,7 @@ class ViewRenderer:
         self._atlas_state: tuple[ViewerState, str] | None = None
 
     def prepare(self, state: ViewerState, on_resources_ready: Callable[[], None] = lambda: None) -> None:
-        """Create all resources and shaders for a state by rendering small images, in motion and still.
+        """Create all resources and shaders for a state by rendering small images of it.
 
         on_resources_ready : function called when the resources of the head have been created
 
@@ -328,9 +328,9 @@ T = TypeVar("T")
 class HeadPreparation:
     """Preparation of new heads for rendering, one at a time, in a separate thread.
 
-    Nothing else is drawn while a head is being prepared.
+    No frame is drawn while a head is being prepared.
 
-    request_frame : function that requests a frame, called from that thread when a preparation ends
+    request_frame : function that requests a frame, called from the separate thread after each preparation
     """
 
     def __init__(self, request_frame: Callable[[], None]) -> None:
@@ -346,7 +346,7 @@ class HeadPreparation:
         return self._future is not None
 
     def reset(self) -> None:
-        """Discard the prepared meshes and the image shown during preparation, for a new renderer."""
+        """Discard the prepared meshes and the image shown meanwhile, because the renderer was replaced."""
         self._ready_mesh = self._future = self._next_mesh = self._held_image = None
 
     def prepare_head(self, view_renderer: ViewRenderer, state: ViewerState) -> Texture | None:

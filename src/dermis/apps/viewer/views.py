@@ -155,7 +155,7 @@ class IntermediateViews:
         return draw_thickness(self._renderer.device, translucency, self._thickness_maps[translucency.pairs])
 
     def _mean_density(self, stretch: Texture) -> float:
-        """Return the geometric mean of all texel densities in a stretch map [texels/mm]."""
+        """Return the geometric mean of the texel density that a stretch map contains [texels/mm]."""
         if stretch not in self._density:
             metric = download(self._renderer.device, stretch)[..., :2].astype(np.float64)
             covered = metric[(metric > 0.0).all(axis=-1)]
@@ -164,12 +164,12 @@ class IntermediateViews:
 
 
 def draw_thickness(device: Device, translucency: Translucency, target_texture: Texture) -> Texture:
-    """Fill a texture with the tissue thickness at each cell of the coarse atlas [mm]; return the texture.
+    """Fill a texture with the tissue thickness at each texel of the coarse atlas [mm]; return the texture.
 
-    Light that is transmitted to a cell enters the tissue at source cells. The thickness is the smallest depth
-    of the cell below the tangent plane of a source cell, but at most the search radius for source cells.
+    Light that leaves the skin at a texel has entered it at other texels, the sources. The thickness is the
+    smallest depth of the texel below the tangent plane of a source, but at most the search radius.
 
-    target_texture : texture to fill, with one texel per cell; cells without source cells are unchanged
+    target_texture : texture with the size of the coarse atlas; texels without sources are left unchanged
     """
     pairs, shader = translucency.pairs, program(device, Path(__file__).parent / "thickness.wgsl")
     count = pairs.receivers[1]

@@ -143,7 +143,7 @@ def encode_map_exr(map_name: str, texels: Floats) -> bytes:
 
 
 def quantise_map(texels: Floats, encoding: PngEncoding) -> tuple[NDArray[np.uint8 | np.uint16], RangeEntries]:
-    """Return the integer levels of a map for PNG, and the JSON entries that say how to decode the levels."""
+    """Return a map quantised to integers for PNG, and JSON entries that say how to decode the integers."""
     if encoding == "colour":
         return encode_srgb8(np.clip(texels, 0.0, 1.0)), {"png": "sRGB"}
     if encoding == "light":
@@ -193,7 +193,7 @@ def check_side(map_side: object) -> int:
 
 
 def bake_maps(renderer: Renderer, scene: Scene, settings: Settings, map_side: int) -> BakedMaps:
-    """Return the skin's maps: material, baked light of the scene, and heights if the head has a height map.
+    """Return the maps of the skin: its material, the irradiance in the scene, and the heights, if any.
 
     map_side : side of the maps [texel]
     """

@@ -113,7 +113,7 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
         future.add_done_callback(partial(self._send_frame, self._drawn_number, is_lossless_redraw))
 
     def _cancel_lossless_draw(self) -> None:
-        """Cancel the lossless redraw of the last frame, even if it is already being encoded."""
+        """Cancel the lossless redraw of the last frame, even after its encoding has started."""
         self._lossless_number = 0
         super()._cancel_lossless_draw()
 

@@ -25,7 +25,7 @@ ShortText = Annotated[str, Field(max_length=32)]
 
 
 class _StrictModel(BaseModel):
-    """Base class of the models of messages: unknown fields are ignored, and numbers must be finite."""
+    """Base class of message models: types are checked, numbers are finite, unknown fields are dropped."""
 
     model_config = ConfigDict(strict=True, extra="ignore", allow_inf_nan=False)
 

@@ -216,7 +216,7 @@ def draw_slider(
 
 
 def clamp(value: float, value_range: SliderRange) -> float:
-    """Clamp a value to a range that typed or rounded values may exceed."""
+    """Clamp a value, such as one that the user has typed, to the range of a slider."""
     return min(value_range.high, max(value_range.low, value))
 
 

@@ -140,8 +140,8 @@ class Panel:
 
     The panel processes the input events that concern it, and leaves all others to the picture.
 
-    is_visible : whether the panel is shown while the window is wide, beside the picture
-    is_drawer_open : whether the panel is shown while the window is narrow, as a drawer over the picture
+    is_visible : whether a wide window shows the panel beside the picture
+    is_drawer_open : whether a narrow window shows the panel as a drawer over the picture
     """
 
     def __init__(self, session: Session) -> None:
@@ -242,7 +242,10 @@ class Panel:
         return True
 
     def _close_topmost(self) -> bool:
-        """Close the popup, else the help, else clear the search; return False if nothing was open."""
+        """Close the popup or the help, or clear the search text; return False if there was none of these.
+
+        Only the first of these that exists is closed.
+        """
         if self._has_popup:
             imgui.internal.close_popup_to_level(0, False)
             self._has_popup = False
@@ -255,7 +258,7 @@ class Panel:
         return True
 
     def _is_over_panel(self, x: float, y: float, window_size: tuple[float, float]) -> bool:
-        """Return whether the pointer is over the panel; Dear ImGui would only know this one frame later.
+        """Return whether the pointer is over the panel, its button or a popup.
 
         x, y : position of the pointer in the window
         window_size : width and height of the window [logical pixel]

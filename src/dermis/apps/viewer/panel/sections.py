@@ -379,7 +379,7 @@ def draw_picture(session: Session) -> None:
 
 
 def draw_talk_comparisons(session: Session) -> None:
-    """Draw controls that reproduce faults and historical methods for comparison.
+    """Draw controls that reproduce the faults and older methods that a conference talk compared.
 
     Source: [dEonLuebke2007].
     """

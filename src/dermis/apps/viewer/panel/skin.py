@@ -147,7 +147,7 @@ def _plot_profile(session: Session) -> None:
 
 @lru_cache(maxsize=16)
 def _profile_layers(profile_name: str) -> tuple[TissueLayer, ...]:
-    """Return the tissue layers of a named profile, or () if the profile is a sum of Gaussians (cached)."""
+    """Return the tissue layers of a named profile, or () if the profile is a sum of Gaussians."""
     try:
         return tissue_layers(Skin(profile=profile_name))
     except (

@@ -65,7 +65,7 @@ class Babylon(EnginePage):
         return _profile_parameters(subject, k / d, RENDERED_WIDTH_RATIO / k)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the Burley widths [mm] as the colour, and 1 as metersPerUnit, as the scene is in metres."""
+        """Return parameters with the Burley widths [mm] as the colour c, and metersPerUnit 1."""
         return _profile_parameters(subject, fit_burley_width(subject.curve), 1.0)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
@@ -77,7 +77,7 @@ class Babylon(EnginePage):
         return spiral_curve(profile, metres, subject.curve.energy)
 
     def library_elements(self, version: str) -> tuple[str, list[str]]:
-        """Return the library's script elements, and the sources for the page's Content-Security-Policy."""
+        """Return the library's script elements, and the URLs or hashes that the page's policy must allow."""
         files = self.library_files[version]
         if self.library_folder is None:
             return "\n".join(file.element for file in files), [file.url for file in files]
@@ -108,8 +108,8 @@ def spiral_samples(
 ) -> tuple[Floats, Floats, Floats]:
     """Return radii (n,), angles (n,) [rad] and normalised weights (n, 3) of the shader's samples.
 
-    The radii are for metersPerUnit 1 and without the shader's width error: multiply the radii by
-    `RENDERED_WIDTH_RATIO` / metersPerUnit to get mm.
+    The radii are for metersPerUnit 1 and for a shader without the bug that doubles the widths. Multiplied by
+    `RENDERED_WIDTH_RATIO` / metersPerUnit, they are in mm.
 
     profile_colour : (3,) diffusion profile as Babylon.js defines it: inverse widths
     """

@@ -1,4 +1,4 @@
-"""Skin in Blender, written by dermis: a head or a ball with its material, lights and camera, in metres.
+"""Blender scene written by dermis: a head or a ball with a skin material, lights and a camera, in metres.
 
     blender --python THIS_FILE                   # or open it in the text editor and run it
     blender -b --python THIS_FILE -- --render picture.png --samples 64 --save scene.blend
@@ -63,7 +63,7 @@ def check_version() -> None:
 
 
 def data_folder() -> Path:
-    """Return the folder of the head and panorama files; this also works in Blender's text editor."""
+    """Return the folder that contains the files of the head and the panorama."""
     texts = [Path(bpy.path.abspath(text.filepath)) for text in bpy.data.texts if text.filepath]
     folders = [Path(__file__).resolve().parent, *(file.parent for file in texts)]
     name = EXPORT["head"] or EXPORT["world"].get("panorama")

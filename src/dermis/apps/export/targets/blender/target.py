@@ -53,7 +53,7 @@ def burley_cdf(radius: ArrayLike) -> Floats:
 
 
 def burley_shape_factor(base_colour: ArrayLike) -> Floats:
-    """Return Burley's factor s(A) (3,); in EEVEE, the profile's width is the radius divided by s(A) [-].
+    """Return Burley's factor s(A) (3,), by which EEVEE divides the subsurface radius to get the width [-].
 
     base_colour : (3,) base colour; A is the colour divided by its brightest channel
 
@@ -131,7 +131,7 @@ def walk_cdf(radius: ArrayLike, albedo: float, walk_entry: WalkEntry) -> Floats:
 def _interpolate_walk_table(albedo: float, walk_entry: WalkEntry) -> tuple[Floats, Floats]:
     """Return radii [mean free paths] and the fraction of light within each radius [-], for one albedo.
 
-    The tabulated fractions are interpolated to this albedo, and to eight times as many radii.
+    The fractions are interpolated in a table. There are eight times as many radii as in the table.
     """
     from scipy.interpolate import PchipInterpolator
 
@@ -145,10 +145,10 @@ def _interpolate_walk_table(albedo: float, walk_entry: WalkEntry) -> tuple[Float
 
 @cache
 def _load_walk_table() -> dict[WalkEntry, tuple[Floats, Floats, Floats]]:
-    """Return the tables of Cycles' random walks, one for each way in which a walk enters the medium.
+    """Return a table of Cycles' random walks for each way in which a walk enters the medium.
 
-    A table consists of sqrt(1 - albedo) (n,) [-], radii (m,) [mean free paths], and the fraction of light
-    that leaves within each radius (n, m) [-].
+    A table is a tuple of n values of sqrt(1 - albedo) [-], m radii [mean free paths], and the fraction of
+    light (n, m) that leaves the medium within each radius [-].
     """
     by_entry: dict[str, list[list[float]]] = {}
     for row in read_rows(__package__, "cycles_walk"):
@@ -181,7 +181,7 @@ class RandomWalk(NamedTuple):
 
     @property
     def emerging_fraction(self) -> float:
-        """Return the light that leaves the skin along the normal, per incident light [-]."""
+        """Return the light that leaves the skin along its normal, as a fraction of the incident light [-]."""
         return float(walk_cdf(np.array([_EFFECTIVELY_INFINITE_RADIUS]), self.albedo, self.entry)[0])
 
 
@@ -202,18 +202,18 @@ class Blender(Target):
     part_limitations = ""
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the subsurface radius for which the method's profile is closest to the reference."""
+        """Return parameters with the subsurface radius whose profile is closest to the reference profile."""
         units = self._unit_cdfs(subject, version)
         fitted = np.array([fit_length_scale(subject.curve, k, unit) for k, unit in enumerate(units)])
         radius = fitted / self._unit_lengths(subject, version)
         return self._parameters(tuple(round(float(x), 5) for x in radius), version)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return published diffuse mean free paths of skin as the subsurface radius."""
+        """Return parameters with published diffuse mean free paths of skin as the subsurface radius."""
         return self._parameters(JENSEN_DMFP_MM, version)
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the cumulative profile by the formulas of Cycles' kernel and EEVEE's shader."""
+        """Return the cumulative profile, predicted by the formulas of Cycles' kernel and EEVEE's shader."""
         metres = np.array(get_numbers(parameters, _RADIUS_NAME)) * get_numbers(parameters, _SCALE_NAME)[0]
         lengths = np.maximum(metres / _METRES_PER_MM * self._unit_lengths(subject, version), 1e-9)
         units = self._unit_cdfs(subject, version)

@@ -43,10 +43,10 @@ def encode_glb(subject: Subject, extensions: Extensions, draft_notice: str) -> b
 
 
 def _skin_additions(subject: Subject, head: Head, extensions: Extensions, draft_notice: str) -> SkinAdditions:
-    """Return the skin material's extensions, uniform colour and, if needed, map of multiscatter colours.
+    """Return the extensions and the base colour of the skin material, and the map that an extension needs.
 
-    A map of multiscatter colours replaces the uniform multiscatter colour of the draft extension if the head
-    has a colour map.
+    If the head has a colour map, the draft extension gets a map of multiscatter colours instead of a uniform
+    multiscatter colour.
     """
     if not draft_notice:
         colour = {"baseColorFactor": [*(float(x) for x in subject.albedo), 1.0]}

@@ -48,13 +48,16 @@ class Gltf(Target):
     part_limitations = ""
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the parameters of the variant: of a fitted scattering volume, or of light through an ear."""
+        """Return the parameters of a fitted scattering volume or, in the other variant, of transmission.
+
+        The transmission is that of an ear.
+        """
         if self.variant == TRANSMISSION_VARIANT:
             return _diffuse_parameters(subject, *_ear_transmission(subject))
         return _scatter_parameters(fit_volume(subject.curve, subject.albedo))
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the skin's colour for all colours, and the profile's mean radius as attenuation distance."""
+        """Return parameters with the skin's colour for all colours, and a guess of all other parameters."""
         if self.variant == TRANSMISSION_VARIANT:
             return _diffuse_parameters(subject, _NAIVE_TRANSMISSION_FACTOR, subject.albedo)
         radius_m = 1e-3 * float(2.5 * fit_burley_width(subject.curve).max())
@@ -62,14 +65,14 @@ class Gltf(Target):
         return _scatter_parameters(Volume(radius_m, colour, colour))
 
     def predicted_curve(self, parameters: Parameters, subject: Subject, version: str) -> CumulativeProfile:
-        """Return the profile of the volume; in the transmission variant, all light leaves where it enters."""
+        """Return the profile of the volume or, in the variant with transmission, a step at radius 0."""
         if self.variant == TRANSMISSION_VARIANT:
             reflected = (1.0 - get_numbers(parameters, _TRANSMISSION_FACTOR_NAME)[0]) * subject.curve.energy
             return CumulativeProfile.from_function(lambda r: np.tile(r[:, None] > 0.0, 3), reflected)
         return subject.rescale_energy(volume_curve(_parameter_volume(parameters)))
 
     def write(self, subject: Subject, parameters: Parameters, output: Path, version: str) -> list[Path]:
-        """Write a .glb file whose skin material has the extensions, which programs may ignore."""
+        """Write a .glb file whose skin material has glTF extensions with the parameters."""
         extensions: dict[str, dict[str, ParameterValue | list[float]]] = {
             "KHR_materials_ior": {"ior": SKIN_ETA}
         }
@@ -108,9 +111,9 @@ def _scatter_parameters(volume: Volume) -> Parameters:
 def _diffuse_parameters(
     subject: Subject, transmitted_fraction: float, transmitted_colour: Floats
 ) -> Parameters:
-    """Return the parameters of the variant "diffuse-transmission", in which light is not scattered.
+    """Return the parameters of the variant "diffuse-transmission", which has no subsurface scattering.
 
-    transmitted_fraction : fraction of the diffuse light that is transmitted [-]
+    transmitted_fraction : fraction of the diffuse light that leaves through the unlit side [-]
     transmitted_colour : (3,) colour of the transmitted light
     """
     return (

@@ -1,4 +1,4 @@
-"""Conversion between scattering media and volumes of glTF, which lie under a refracting surface."""
+"""Conversion between scattering media and glTF's volumes, whose surfaces refract light."""
 
 from __future__ import annotations
 
@@ -67,7 +67,10 @@ def multiscatter_colour(albedo: ArrayLike) -> Floats:
 
 
 def multiscatter_for_reflectance(energy: ArrayLike) -> Floats:
-    """Return the multiscatter colour with which skin returns a given fraction of the entering light [-]."""
+    """Return the multiscatter colour with which skin reflects a given fraction of the incident light [-].
+
+    energy : diffusely reflected light per incident light [-]
+    """
     return multiscatter_colour(tabulated_albedo("skin", energy))
 
 

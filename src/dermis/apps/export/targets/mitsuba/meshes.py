@@ -22,12 +22,11 @@ _SEGMENTS_PER_EDGE = 4  # segments per edge
 
 
 def skin_meshes(backend: XmlBackend, head: Head) -> dict[str, bytes]:
-    """Return a dictionary from shape name to the PLY file of a surface of the skin.
+    """Return the meshes of the skin's surface as PLY files, in a dictionary by shape name.
 
-    Positions are in mm, relative to the head's centre.
-
-    "skin" has normals and uv, and "caps" closes the openings of "skin". "upper" and "upper_caps" lie slightly
-    outside "skin" and "caps", and are the outer layer of the index-matched surface.
+    Positions are in mm, relative to the head's centre. The shape "skin" has normals and uv, and "caps" closes
+    its openings. The shapes "upper" and "upper_caps" lie slightly outside "skin" and "caps". They are the
+    outer layer of an index-matched surface.
 
     Raises DermisError if the skin does not enclose a volume.
     """

@@ -59,10 +59,10 @@ class SkinAppearance(NamedTuple):
         for uniform skin
     dimming : (n, n) fraction of the emerging light that an index-matched surface absorbs; None for uniform
         skin
-    opaque : dictionary from material index to PLY file, for all materials except skin
-    pictured : dictionary from material index to the roles of the material's pictures; materials without
-        pictures are absent
-    pictures : dictionary from role to PNG file of the pictures, which all materials share
+    opaque : dictionary from material index to the PLY file of a mesh, for all materials except skin
+    pictured : dictionary from material index to the roles of the texture images that the material uses, such
+        as "colour"; materials without texture images are absent
+    pictures : dictionary from role to the PNG file of a texture image, which all materials share
     """
 
     media: Mapping[Boundary, IsotropicMedium]
@@ -231,9 +231,9 @@ def _skin_elements(
 
 
 def _part_bsdf(roles: set[PartRole]) -> SceneDict:
-    """Return Mitsuba's description of a surface that is not skin and has pictures.
+    """Return Mitsuba's BSDF for a material that is not skin and has texture images.
 
-    roles : roles of these pictures
+    roles : roles of these images, such as "colour"
     """
     bsdf: SceneDict = {"type": "principled", "eta": _PART_IOR, "roughness": _OPAQUE_PART_ROUGHNESS}
     bsdf |= {name: _part_texture(role) for role, name in _PART_INPUTS.items() if role in roles}

@@ -76,7 +76,7 @@ class Mitsuba(Target):
     )
 
     def parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the parameters of the medium, fitted to the profile and the colour of the lightest skin."""
+        """Return the parameters of the medium, fitted to the skin's profile and lightest colour."""
         boundary, colours = self._boundary, skin_colours(subject)
         medium = fit_medium(subject.curve, colours, boundary)
         transmittance = colours.transmittance(boundary)
@@ -95,7 +95,7 @@ class Mitsuba(Target):
         )
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return the skin's colour as albedo, and 1/d of a fitted Burley profile as extinction."""
+        """Return parameters with the skin's colour as albedo, and the inverse Burley width as extinction."""
         extinction, albedo = (
             flat_tuple(1.0 / fit_burley_width(subject.curve)),
             flat_tuple(subject.clipped_albedo()),
@@ -133,12 +133,13 @@ class Mitsuba(Target):
 
 
 def fit_medium(curve: CumulativeProfile, colours: SkinColours, boundary: Boundary) -> IsotropicMedium:
-    """Return the medium that has the colour of the lightest skin and a profile closest to `curve`.
+    """Return the medium that has the skin's lightest colour and, with it, the profile closest to `curve`.
 
     The colour is matched for light from all directions, as heads are lit from all sides. The profile is
     matched for light incident along the normal.
 
     curve : reference profile
+    colours : mean and lightest colour of the skin
     boundary : model of the surface above the medium
     """
     energy = colours.medium_colour(boundary) / _boundary_transmittance(boundary)
@@ -158,7 +159,7 @@ def _boundary_transmittance(boundary: Boundary) -> float:
 
 
 def _picture_roles_by_material(subject: Subject) -> dict[int, set[PartRole]]:
-    """Return a dictionary from material index to picture roles, for parts with pictures except eyeballs."""
+    """Return the roles of the texture images of each material, by material index; eyeballs are left out."""
     head, pictures = subject.head_or_ball, subject.part_pictures
     if pictures is None:
         return {}
@@ -170,7 +171,7 @@ def _picture_roles_by_material(subject: Subject) -> dict[int, set[PartRole]]:
 def _opaque_meshes(scene: Scene, adapter: str, picture_materials: Container[int]) -> dict[int, bytes]:
     """Return a dictionary from material index to PLY file, for the head's materials except skin.
 
-    picture_materials : indices of the materials with pictures; files of other materials have vertex colours
+    picture_materials : indices of the materials with texture images; other meshes get vertex colours
     """
     mesh, centre = scene.head.mesh, scene.head.centre_mm
     opaque = [k for k in np.unique(mesh.material).tolist() if mesh.materials[k].kind != "skin"]
@@ -190,12 +191,12 @@ def _opaque_meshes(scene: Scene, adapter: str, picture_materials: Container[int]
 
 @dataclass(frozen=True, eq=False)
 class SkinColours:
-    """Mean and brightest colour of a skin.
+    """Mean and brightest colour of the colour map of a skin.
 
-    The medium has the brightest colour, and textures darken this colour to the colours of the skin's map.
+    The medium has the brightest colour. Where the map is darker, a texture dims the light of the medium.
 
     mean, brightest : (3,) mean and brightest colour, linear Rec. 709; equal for uniform skin
-    lightness_ratio : luminance of the lightest texels, relative to the mean luminance [-]
+    lightness_ratio : luminance of the lightest texels divided by the mean luminance [-]
     """
 
     mean: Floats
@@ -216,7 +217,7 @@ class SkinColours:
 
 
 def skin_colours(subject: Subject) -> SkinColours:
-    """Return the colours in the subject's colour map or, without such a map, the colour of the profile."""
+    """Return the mean and brightest colour of a subject's colour map; without a map, both are its albedo."""
     texels = None if subject.head is None else subject.head.maps.colour
     if texels is None:
         colour = np.asarray(subject.albedo, np.float64)

@@ -33,15 +33,15 @@ _KIND_BY_PLUGIN = {plugin: kind for kind, plugins in _PLUGINS_BY_KIND.items() fo
 
 
 class Transform:
-    """Affine transformation, composed as in Mitsuba: each method prepends another transformation."""
+    """Affine transformation; each method returns this transformation applied after another one."""
 
     def __init__(self, matrix: ArrayLike | None = None) -> None:
         self.matrix = np.eye(4) if matrix is None else np.asarray(matrix, np.float64).reshape(4, 4)
 
     def look_at(self, origin: ArrayLike, target: ArrayLike, up: ArrayLike) -> Transform:
-        """Return this transformation, preceded by a transformation that moves a camera to `origin`.
+        """Return a transformation that places a camera at `origin`, and then applies this transformation.
 
-        The +Z axis of the camera then points towards `target`.
+        The +Z axis of the camera points towards `target`.
         """
         forward = _normalise(np.subtract(target, origin))
         left = _normalise(np.cross(np.asarray(up, np.float64), forward))
@@ -50,7 +50,7 @@ class Transform:
         return Transform(self.matrix @ matrix)
 
     def scale(self, factors: ArrayLike) -> Transform:
-        """Return this transformation, preceded by a scaling along the axes.
+        """Return a transformation that scales along the axes, and then applies this transformation.
 
         factors : one factor, or (3,) factors of x, y and z
         """
@@ -59,7 +59,7 @@ class Transform:
 
 @dataclass(eq=False)
 class Bitmap:
-    """Image of a texture or light that is written to its own file."""
+    """Image of a texture or an environment light, to be written to its own file."""
 
     values: NDArray[np.float32]
 

@@ -1,4 +1,4 @@
-"""OpenPBR materials of a head: values of inputs, maps that set inputs, and the files of these maps."""
+"""OpenPBR materials of a head, and the files of the maps that set inputs of these materials."""
 
 from __future__ import annotations
 
@@ -163,7 +163,7 @@ def opaque_material(material: Material) -> OpenPbrMaterial:
 
 
 def part_material(material: Material, pictures: PartPictures) -> OpenPbrMaterial:
-    """Return the OpenPBR material of a part with pictures."""
+    """Return the OpenPBR material of a part of the head, such as hair or clothes, with texture images."""
     roles = pictures.roles(material)
     maps = {name: f"{PART_PREFIX}{role}" for role, name in _PART_INPUTS.items() if role in roles}
     values = {**opaque_material(material).values, "specular_ior": _PART_IOR}
@@ -250,10 +250,10 @@ def write_maps(subject: Subject, folder: Path, prefix: str) -> dict[str, Path]:
 def write_part_pictures(
     subject: Subject, folder: Path, prefix: str, roles: Iterable[PartRole] = ()
 ) -> list[Path]:
-    """Write the pictures of parts that are not skin as PNG files, and return their paths.
+    """Write the texture images of parts that are not skin as PNG files, and return their paths.
 
     prefix : prefix of the file names
-    roles : additional roles whose pictures are written although OpenPBR does not use them
+    roles : roles of additional images to write, which OpenPBR does not use
     """
     if subject.part_pictures is None:
         return []

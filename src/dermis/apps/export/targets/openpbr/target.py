@@ -117,7 +117,7 @@ def surface_parameters(subject: Subject, shader: str, radius_mm: Floats, meaning
 
     shader : node category of the surface, `OPEN_PBR` or `STANDARD_SURFACE`
     radius_mm : (3,) subsurface radii [mm]
-    meaning : text for the report that explains the parameter with the largest radius
+    meaning : explanation of subsurface_radius for the report
     """
     longest, skin, colour = float(radius_mm.max()), subject.skin, flat_tuple(subject.clipped_albedo())
     roughness = float(np.sqrt(skin.roughness * skin.smoothing))
@@ -187,7 +187,9 @@ def walk_curve(colour: Floats, mfp_mm: Floats, subject: Subject) -> CumulativePr
 
 
 def materialx_profile(mfp_mm: Floats, subject: Subject) -> CumulativeProfile:
-    """Return the cumulative profile by MaterialX's specification, where the radius is Burley's width d.
+    """Return the cumulative profile of renderers that follow MaterialX's specification.
+
+    In this specification, the subsurface radius is the width d of Burley's profile.
 
     mfp_mm : (3,) exported radii [mm]
     """

@@ -125,7 +125,10 @@ class EnginePage(Target):
 
     @abstractmethod
     def library_elements(self, version: str) -> tuple[str, list[str]]:
-        """Return the library's HTML elements, and the sources for the page's Content-Security-Policy."""
+        """Return the library's HTML elements, and the script sources that the page's policy must allow.
+
+        The policy is the page's Content-Security-Policy; a source is a URL, a scheme or a hash.
+        """
 
     def _page_settings(self, subject: Subject, parameters: Parameters, version: str) -> Json:
         scene = subject.scene or Scene(subject.head_or_ball)
@@ -148,11 +151,10 @@ def html_safe_json(json_value: Json) -> str:
 
 
 def module_url(module_text: str, import_names: Mapping[str, str]) -> str:
-    """Return a JavaScript module as a data URL, with its imports renamed to names that the page defines.
+    """Return a JavaScript module as a data URL; its import statements use names of the page's import map.
 
     module_text : source of the module
-    import_names : mapping from a name in the import statements of the module to the name that the page
-        defines
+    import_names : dictionary from each name that the module's source imports to the name in the import map
     """
     for old, new in import_names.items():
         module_text = re.sub(rf"(\bfrom\s*)(['\"]){re.escape(old)}\2", rf"\1\2{new}\2", module_text)
@@ -184,7 +186,7 @@ def page_camera(scene: Scene, centre_mm: Sequence[float]) -> Json:
 
 
 def page_light(light: Light) -> Json:
-    """Return a light as the JSON of a directional light that has the same irradiance at the head."""
+    """Return the JSON of a directional light that replaces a light, with the same irradiance at the head."""
     if isinstance(light, DirectionalLight):
         direction = np.asarray(light.direction, np.float64)
     else:

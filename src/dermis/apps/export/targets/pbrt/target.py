@@ -273,10 +273,10 @@ def _scene_lines(
 
 
 def _skin_material(parameters: Parameters, material_textures: dict[str, tuple[str, str]]) -> str:
-    """Return the directive of the skin's material; parameters with maps refer to textures or image files.
+    """Return the directive of the skin's material, in which maps replace the values of some parameters.
 
-    material_textures : dictionary from a parameter with a map to two texts: its pbrt type, and the name of
-        the texture or image file
+    material_textures : for each parameter that a map sets, pbrt's type of the parameter, and the name of the
+        texture or image file
     """
     types = {_REFLECTANCE_NAME: "rgb", _MFP_NAME: "rgb", "remaproughness": "bool"}
     values: dict[str, ArrayLike] = {}
@@ -291,9 +291,10 @@ def _skin_material(parameters: Parameters, material_textures: dict[str, tuple[st
 def _opaque_materials(
     material: Material, roles: set[PartRole], material_name: str, file_prefix: str
 ) -> Lines:
-    """Return the material directives for a part that is not skin, with references to the part's pictures.
+    """Return the material directives for a part of the head that is not skin.
 
-    material_name : prefix of the names of the two materials that are mixed for a metal part
+    roles : roles of the texture images that the part uses, such as "colour"
+    material_name : name of the part's material; partly metallic parts mix two materials with this prefix
     file_prefix : prefix of the names of the image files
     """
     values: dict[str, ArrayLike | Sequence[str]] = {"rgb reflectance": material.colour}
@@ -342,8 +343,8 @@ class SkinTextures(NamedTuple):
 
     lines : directives that define the textures
     files : dictionary from the name of each image file to its content
-    material_textures : dictionary from a parameter of the skin's material with a map to two texts: its pbrt
-        type, and the name of the texture or image file
+    material_textures : for each parameter of the skin's material that a map sets, pbrt's type of the
+        parameter, and the name of the texture or image file
     """
 
     lines: Lines

@@ -1,4 +1,7 @@
-"""Export to a three.js web page on which users can move lights and head; its skin does not diffuse light."""
+"""Export to a web page with three.js, which draws the head without subsurface scattering.
+
+The user of the page can move the lights and the head.
+"""
 
 from __future__ import annotations
 
@@ -62,7 +65,7 @@ class Three(EnginePage):
         return CumulativeProfile.from_function(lambda r: np.ones((len(r), 3)), subject.curve.energy)
 
     def library_elements(self, version: str) -> tuple[str, list[str]]:
-        """Return the import map of three.js, and the sources for the page's Content-Security-Policy."""
+        """Return the import map of three.js, and the script sources that the page's policy must allow."""
         files = self.library_files[version]
         if self.library_folder is None:
             imports = {file.name: file.url for file in files}

@@ -1,7 +1,7 @@
 """Export to Unity HDRP: a DiffusionProfileSettings asset, and the maps of a head.
 
-In DiffusionProfileSettings.cs, the width d of the Burley profile is the scattering colour times the
-multiplier [mm], if the world scale is the length of a scene unit in metres.
+In DiffusionProfileSettings.cs, the width d of the Burley profile [mm] is the scattering colour times the
+multiplier. The world scale must be the length of a scene unit in metres.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Export to Unreal Engine: an editor script that creates a SubsurfaceProfile, and the maps of a head.
 
 In SubsurfaceProfile.cpp and BurleyNormalizedSSS.cpp, the width d of the Burley profile is the mean free path
-divided by 0.6 s(A), where A is the albedo and s is Burley's factor for perpendicular light.
+divided by 0.6 s(A), where A is the albedo and s is Burley's factor for light at normal incidence.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class Unreal(Target):
         return _profile_parameters(albedo, path_cm, version)
 
     def naive_parameters(self, subject: Subject, version: str) -> Parameters:
-        """Return parameters with the tissue's reduced mean free path, as the parameter's name suggests."""
+        """Return parameters with the reduced mean free path of the tissue as "mean free path"."""
         path = fit_homogeneous_medium(subject.curve, subject.curve.energy).mfp_mm
         if subject.tissue is not None and subject.tissue.rgb is None:
             path = subject.tissue.medium.layers[-1].mean_free_path_mm

@@ -48,7 +48,7 @@ def mesh_polygons(mesh: Mesh) -> Polygons:
 
 
 def first_vertex_by_point(mesh: Mesh) -> NDArray[np.intp]:
-    """Return the index of the first vertex at each point (p,); at uv seams, vertices share a point."""
+    """Return the index (p,) of the first vertex at each point; the vertices at a uv seam share a point."""
     return np.unique(mesh.point, return_index=True)[1]
 
 

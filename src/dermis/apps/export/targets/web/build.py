@@ -40,13 +40,12 @@ INTERACTIVE_QUALITY = {"software": (256, 1, 2)}
 class PageContent:
     """Data that the web page embeds: frames, buffers, maps and the poster.
 
-    frames_by_kind : dictionary from kind of adapter, "gpu" or "software", to the JSON of its captured frames
-    byte_runs : collector that stores and compresses the data of buffers and textures
-    maps : maps encoded as pictures
-    pictures : WebP files of the maps, to which `picture_entries` refers by index
-    picture_entries : dictionary from (role, mip level, layer) of a map to three integers: index in
-        `pictures`, index in `ByteRunCollector.runs` of the curves that decode the channels, and number of
-        colour channels
+    frames_by_kind : JSON of the captured frames for each kind of adapter, "gpu" or "software"
+    byte_runs : compressed data of buffers and textures
+    maps : layers of maps, encoded as WebP images
+    pictures : WebP files of these images, in the order in which the page stores them
+    picture_entries : how to decode a layer of a map, by role, mip level and layer: index of the file in
+        `pictures`, index of the channels' decoding curves in `byte_runs`, and number of colour channels
     poster : (h, w, 3) sRGB picture that the page shows until it renders
     """
 
@@ -58,7 +57,7 @@ class PageContent:
     poster: NDArray[np.uint8] | None = None
 
     def add_picture(self, picture_key: PictureKey) -> tuple[int, int, int]:
-        """Add the picture of a layer of a map unless present; return its entry in `picture_entries`.
+        """Add the WebP file of one layer of a map, unless present; return its entry in `picture_entries`.
 
         picture_key : role, mip level and layer of the map
         """
@@ -119,8 +118,8 @@ class PageRequest:
 def build_content(request: PageRequest, on_renderer: OnRenderer = lambda *_: None) -> PageContent:
     """Capture the frames of all kinds of adapter, and return the data that the page embeds.
 
-    on_renderer : function called for each kind of adapter, once the renderer holds the maps of the page; it
-        receives the renderer, the scene and the settings; tests compare the renderer with the page
+    on_renderer : function called for each kind of adapter after its frames were captured; it receives the
+        renderer, whose maps are those of the page, the scene and the settings
     """
     content = PageContent()
     for adapter_kind in (one for one in ADAPTER_KINDS if request.sizes.get(one)):
@@ -170,11 +169,12 @@ def _frame_changes(
     default_inputs: FrameInputs,
     named_frame: NamedFrame,
 ) -> Json:
-    """Return as JSON how a frame's records and buffers change at each node of each slider.
+    """Return as JSON how a frame's uniform records and buffers change when a slider is moved.
 
-    A node is a value of a slider for which a frame is captured.
+    For each slider, the JSON contains the changes at each value for which a frame is captured.
 
     default_inputs : inputs of the frame with all sliders at their default values
+    named_frame : captured frame with all sliders at their default values
     """
     capture = FrameCapture(renderer.device)
 
@@ -193,7 +193,7 @@ def _frame_changes(
 
 
 def _mip_entries(content: PageContent, picture_map: PictureMap) -> list[list[tuple[int, int, int]]]:
-    """Return the entries in `PageContent.picture_entries` for all layers of each mip level of a map."""
+    """Return an entry of `PageContent.picture_entries` for each layer of each mip level of a map."""
     layers = 1 + max(layer for role, _, layer in content.maps.pictures if role == picture_map.role)
     return [
         [content.add_picture((picture_map.role, mip, k)) for k in range(layers)]
@@ -204,8 +204,8 @@ def _mip_entries(content: PageContent, picture_map: PictureMap) -> list[list[tup
 def _colour_maps(content: PageContent, renderer: Renderer, request: PageRequest, maps: PictureMaps) -> Json:
     """Return the JSON of the colour maps that replace the head's colour map when a slider is moved.
 
-    The JSON contains the resource index of the head's colour map and, for each slider, an entry of
-    `PageContent.picture_entries` for each captured value.
+    The JSON contains the resource index of the head's colour map. For each slider, it contains one entry of
+    `PageContent.picture_entries` per captured value.
     """
     map_index = next((k for k, one in maps.items() if one.role == "colour_map"), None)
     if map_index is None:
@@ -224,10 +224,10 @@ def _colour_maps(content: PageContent, renderer: Renderer, request: PageRequest,
 def _colour_map_entry(
     content: PageContent, renderer: Renderer, scene: Scene | None, settings: Settings, role: str
 ) -> tuple[int, int, int] | None:
-    """Return the picture entry of the colour map of a scene; None if it is the head's default colour map.
+    """Return the entry in `PageContent.picture_entries` of a scene's colour map; None for the default map.
 
     scene : scene at a captured value of a slider; None at the default value
-    role : role under which the picture is stored
+    role : role under which the map is stored, such as "melanin 0"
     """
     if scene is None:
         return None

@@ -59,14 +59,14 @@ def frames_json(
     quantisation_steps: dict[int, tuple[float, ...]],
     byte_runs: ByteRunCollector,
 ) -> Json:
-    """Return the JSON of frames with shaders, resources and passes, and collect the data of the resources.
+    """Return captured frames as JSON (shaders, resources and passes); add their data to `byte_runs`.
 
     Data that is all zero is not stored, as the page creates resources filled with zeros.
 
-    picture_maps : dictionary from resource index to map, for the maps that are stored as pictures
-    quantisation_steps : dictionary from the resource index of a buffer with rounded vectors to the rounding
-        step of each vector component
-    byte_runs : collector of the data; the JSON refers to the data by index of the byte run
+    picture_maps : dictionary from resource index to map, for the maps that are stored as WebP images
+    quantisation_steps : for each buffer of rounded vectors, by resource index, the rounding step of each
+        vector component
+    byte_runs : collector of buffer and texture data, to which the JSON refers by index
     """
     pictures = [[capture.resource(f.picture.bytes), capture.resource(f.picture.exposed)] for f in frames]
     captured_frames = [frame.captured for frame in frames]
@@ -95,10 +95,9 @@ def frames_json(
 
 
 def _column_packer(byte_runs: ByteRunCollector) -> Callable[[Bytes], int]:
-    """Return a function that adds a triangle table to `byte_runs` and returns the index of the byte run.
+    """Return a function that adds a buffer of triangle data to `byte_runs` and returns its index there.
 
-    A triangle table consists of three columns of equal length, stored one after another. Each column is
-    packed separately.
+    The buffer contains three columns of equal length, one after another. Each column is packed separately.
     """
     return lambda data: byte_runs.add_parts(np.split(data, 3) if len(data) % 3 == 0 else [data])
 

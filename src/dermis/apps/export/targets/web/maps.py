@@ -110,16 +110,18 @@ _MAP_ROLES = (_COLOUR_ROLE, "relief_map", "slope_map", "specular_map", "roughnes
 
 @dataclass
 class MapPictures:
-    """WebP pictures of all maps that the page stores; the keys are role, mip level and layer.
+    """Maps encoded as WebP images.
 
-    If the device can compute the further mip levels of a map, only the first level is stored.
+    If the device can compute the mip levels of a map, only mip level 0 is encoded.
+
+    pictures : one image for each layer of a mip level of a map; the keys are role, mip level and layer
     """
 
     pictures: dict[PictureKey, Picture] = field(default_factory=dict)
     _encoded_texels: dict[str, NDArray[np.float16]] = field(default_factory=dict)
 
     def matches_picture(self, role: str, texels: NDArray[np.float16]) -> bool:
-        """Return whether texels equal those that were encoded as the first picture of a role."""
+        """Return whether texels equal the original texels of the first image encoded for a role."""
         return bool(np.array_equal(self._encoded_texels[role], texels))
 
     def replace_textures(self, renderer: Renderer, capture: FrameCapture, frames: Frames) -> PictureMaps:
@@ -175,9 +177,9 @@ def _reduce_map(texels: NDArray[np.float32], max_side: int) -> NDArray[np.float3
 
 
 def quantise_hairs(renderer: Renderer, capture: FrameCapture, frames: Frames) -> dict[int, tuple[float, ...]]:
-    """Round the hair knots in the device's buffers to multiples of steps, so that the buffers compress well.
+    """Round the knots of hairs in the device's buffers, so that the buffers compress well.
 
-    Returns a dictionary from resource index of a buffer to the steps of x, y, z and radius of a knot [mm].
+    Returns the rounding steps of a knot's x, y, z and radius [mm] for each buffer, by resource index.
     """
     buffers = resources_bound_as(capture, frames, ("knots",))
     for index in buffers:

@@ -1,4 +1,4 @@
-"""Compression of buffers: rows are replaced by differences, reordered by byte and compressed by gzip.
+"""Compression of buffers: differences between rows are reordered by byte and compressed by gzip.
 
 The script packed.js of the page reverses these steps.
 """

@@ -25,16 +25,16 @@ _SLIDER_EXPRESSIONS = {"smile": "full-smile", "open mouth": "open-jaw", "frown":
 """Expression at the upper end of a slider, by the slider's name."""
 _ROUGHNESS_FACTORS = (0.5, 1.0, 1.7)
 PIGMENT_FACTORS = (0.4, 1.0, 3.0)
-"""Factors of a person's melanin and blood at the nodes of their sliders."""
+"""Factors of a person's melanin and blood at the captured values of their sliders."""
 
 
 @dataclass(frozen=True)
 class Slider:
-    """Slider of the web page, which interpolates between frames captured at certain values (nodes).
+    """Slider of the web page, which interpolates between the frames captured at a few values.
 
-    values : increasing values of the nodes; one of them is `default_value`
+    values : increasing values for which frames are captured; one of them is `default_value`
     default_value : value with which the page starts
-    scenes : scene at each node; None at the node of the default value
+    scenes : scene at each of these values; None at the default value
     changes_pose_only : whether all `scenes` differ from the default scene only in the head's pose
     """
 
@@ -48,7 +48,7 @@ class Slider:
 def node_inputs(
     slider: Slider, prepare_inputs: Callable[[Scene], FrameInputs], default_inputs: FrameInputs
 ) -> Iterator[FrameInputs | None]:
-    """Yield the frame inputs at each node of a slider; None at the node of the default value.
+    """Yield the frame inputs at each captured value of a slider; None at the default value.
 
     prepare_inputs : function that returns the frame inputs of a scene
     default_inputs : frame inputs of the default scene
@@ -66,15 +66,15 @@ def node_inputs(
 def node_changes(
     default_frame: CapturedFrame, node_frame: CapturedFrame, byte_runs: ByteRunCollector
 ) -> Json:
-    """Return as JSON how the frame at a node of a slider differs from the frame at the default value.
+    """Return as JSON how the frame at one value of a slider differs from the frame at the default value.
 
-    Uniform records, and data that the host writes to buffers, are compared. Each change has the index of the
-    record or pass, the index of the first word that differs, and the index of the byte run with the
-    differences. Integers in records are not compared.
+    The floats in uniform records, and the data that the host writes to buffers, are compared. Each change has
+    the index of the record or pass, the index of the first word that differs, and the index of the
+    differences in `byte_runs`.
 
-    default_frame, node_frame : captured frames at the default value and at the node
+    default_frame, node_frame : captured frames at the default value and at the other value
 
-    Raises DermisError if the node's frame has different passes.
+    Raises DermisError if the two frames have different passes.
     """
     stages = [[one.stage for one in captured.passes] for captured in (default_frame, node_frame)]
     if stages[0] != stages[1]:
