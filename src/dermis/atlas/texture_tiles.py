@@ -57,7 +57,10 @@ class Tile:
 
 
 def base_texture(material: FileMaterial) -> Texture | None:
-    """Return the texture whose uv mapping a material's tile uses: colour, or else the first texture."""
+    """Return the texture of a material whose uv mapping its tile uses; None for a material without textures.
+
+    This is the colour texture or, if the material has none, its first texture.
+    """
     return material.textures.get("colour") or next(iter(material.textures.values()), None)
 
 

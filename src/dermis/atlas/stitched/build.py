@@ -18,7 +18,7 @@ from dermis.atlas.stitched.coverage import (
 )
 from dermis.atlas.stitched.gutter import GutterWidth, Packing, find_border
 from dermis.atlas.stitched.overlap_cuts import cut_overlaps
-from dermis.atlas.stitched.pack import MAX_CELLS_PER_SIDE, PieceLayout, find_layout, pack_pieces
+from dermis.atlas.stitched.pack import MAX_CELLS_PER_SIDE, PieceLayout, find_piece_layout, pack_pieces
 from dermis.atlas.stitched.surface import FlatSurface, flat_surface
 from dermis.atlas.unwrap.charts import connected_pieces
 from dermis.base.arrays import Doubles, Index, Mask
@@ -100,7 +100,7 @@ def build_stitched(mesh: Mesh, atlas_side: int, gutter_mm: float) -> Atlas | Non
     piece, scale = find_pieces(surface)
     width = GutterWidth(gutter_mm, _MAX_GUTTER_FRACTION * atlas_side)
     shipped = (
-        shipped_arrays(mesh, layout_table(gutter_mm), LAYOUT_ARRAY_NAMES)
+        shipped_arrays(mesh, layout_table_name(gutter_mm), LAYOUT_ARRAY_NAMES)
         if atlas_side >= MAX_CELLS_PER_SIDE
         else None
     )
@@ -120,18 +120,18 @@ def build_stitched(mesh: Mesh, atlas_side: int, gutter_mm: float) -> Atlas | Non
     return _assemble_atlas(surface, packing, coverage, piece >= 0)
 
 
-def layout_table(gutter_mm: float) -> str:
-    """Return the name of the table that contains a mesh's stitched layout, for `shipped_arrays`.
+def layout_table_name(gutter_mm: float) -> str:
+    """Return the name under which the package stores the stitched layout of a mesh, for `shipped_arrays`.
 
-    The layout is that of maps of at least 512 x 512 texels: the pieces of the charts and their positions.
+    The stored layout consists of the chart pieces and their positions in maps of at least 512 x 512 texels.
     """
     return f"layout {_LAYOUT_VERSION} {gutter_mm:g}"
 
 
 def find_stitched_layout(mesh: Mesh, gutter_mm: float) -> dict[str, NDArray[Any]]:
-    """Return the piece indices (f,) of a mesh's triangles, and scale and origins of the `PieceLayout`.
+    """Compute the stitched layout of a mesh, which the package stores under the name `layout_table_name`.
 
-    These are the arrays of the table that `layout_table` names.
+    Returns three arrays: the piece index (f,) of each triangle, and scale and origins of the `PieceLayout`.
 
     Raises ValueError if the charts do not fit.
     """
@@ -139,7 +139,7 @@ def find_stitched_layout(mesh: Mesh, gutter_mm: float) -> dict[str, NDArray[Any]
     piece, scale = find_pieces(surface)
     piece = cut_overlaps(surface, piece, gutter_mm)
     width = GutterWidth(gutter_mm, _MAX_GUTTER_FRACTION * MAX_CELLS_PER_SIDE)
-    layout = find_layout(surface, piece, scale, MAX_CELLS_PER_SIDE, width)
+    layout = find_piece_layout(surface, piece, scale, MAX_CELLS_PER_SIDE, width)
     if layout is None:
         raise ValueError("the charts do not fit")
     values = piece.astype(np.int16), np.float64(layout.scale), layout.origins

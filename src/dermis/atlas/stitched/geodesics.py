@@ -127,7 +127,7 @@ def _leave_first_triangle(
 
 
 def _cross_edge(adjacency: Adjacency, rays: Geodesics, ends: GeodesicEnds) -> Geodesics:
-    """Continue geodesics into the next triangle; store in `ends` where geodesics end there."""
+    """Continue geodesics into the next triangle; return those that go on, and store the others in `ends`."""
     neighbour = adjacency.neighbour[rays.triangle, rays.exit_side]
     ended = (neighbour < 0) | ~adjacency.passable[neighbour]
     if ended.any():

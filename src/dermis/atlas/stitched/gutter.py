@@ -167,7 +167,7 @@ def trace_from_border(
     corners = surface.adjacency.planar_corners
     start = _interpolate_linearly(corners[anchor_triangle, first], corners[anchor_triangle, second], t)
     offset = texels - border_points(sides, nearest)
-    step = np.einsum("ns,nsa->na", offset, border_steps(sides, nearest))
+    step = np.einsum("ns,nsa->na", offset, border_texel_steps(sides, nearest))
     corner = np.zeros((len(anchor_triangle), 3))
     corner[rows, first], corner[rows, second] = 1 - t[:, 0], t[:, 0]
     return trace_geodesics(surface.adjacency, anchor_triangle, start, start + step), corner[:, 1:]
@@ -179,10 +179,10 @@ def border_points(sides: BorderSides, nearest: NearestPoints) -> Doubles:
     return _interpolate_linearly(first, second, nearest.fraction[:, None])
 
 
-def border_steps(sides: BorderSides, nearest: NearestPoints) -> Doubles:
-    """Return the surface vectors (n, 2, 2) of a step of one texel right, and of one down, at border points.
+def border_texel_steps(sides: BorderSides, nearest: NearestPoints) -> Doubles:
+    """Return the surface vectors (n, 2, 2) [mm] of a step by one texel at each of n border points.
 
-    The unit is mm.
+    The first vector belongs to a step to the right, the second to a step down.
     """
     first, second = np.moveaxis(sides.steps[nearest.side], 1, 0)
     return _interpolate_linearly(first, second, nearest.fraction[:, None, None])

@@ -127,7 +127,7 @@ def flatten(points: Doubles, triangles: Index, length_ratio: Doubles, stretch_we
     scaled = shapes * length_ratio[:, None]
     for _ in range(_REWEIGHTING_COUNT):
         a, b = affine_coefficients(scaled, z[triangles])
-        z = _make_rigid(
+        z = _make_map_rigid(
             z, triangles, component, scaled, stretch_weight / length_ratio**2 * _stiffness_weights(a, b)
         )
     return untangle(np.column_stack((z.real, z.imag)), triangles)
@@ -212,10 +212,13 @@ def _stiffness_weights(conformal_part: Complexes, mirrored_part: Complexes) -> D
     return total
 
 
-def _make_rigid(
+def _make_map_rigid(
     positions: Complexes, triangles: Index, component: Index, shapes: Complexes, stretch_weight: Doubles
 ) -> Complexes:
-    """Make a flat map as rigid as possible, in some iterations with fixed weights; return complex positions.
+    """Make a flat map as rigid as possible [Liu2008]; return the positions (n,) as complex numbers.
+
+    positions : (n,) positions before the first iteration, as complex numbers
+    component : (n,) connected component of each vertex
 
     shapes : (f, 3) desired shape and size of the triangles
     stretch_weight : (f,) weight of each triangle's stretch in the minimised sum [-]
