@@ -1,4 +1,4 @@
-"""Errors of diffusion by blurs on the atlas: impulse responses, curved surfaces and seams."""
+"""Errors of scattered light computed by blurs on the atlas: impulse responses, curved surfaces, seams."""
 
 from __future__ import annotations
 
@@ -51,16 +51,16 @@ MIN_FACING_COSINE = 0.4  # least cosine between the normal at a seam and the lig
 
 
 def blur(adapter: str = "auto") -> None:
-    """Print tables of the errors of blurs: for points of light, on curved surfaces and across seams.
+    """Print tables of the errors of blurred light: for a single lit texel, on spheres and across seams.
 
-    The tables of curved surfaces and of seams need the folder `tests` of a checkout.
+    The tables of spheres and of seams need the folder `tests` of a checkout.
     """
     print_tables({name: str(text) for name, text in point_tables(open_device(adapter)).items()})
     print_tables(surface_tables(adapter))
 
 
 def point_tables(device: Device) -> dict[str, object]:
-    """Return table rows and errors of blurred light for docs/templates/accuracy.md, keyed by placeholder."""
+    """Return texts on the errors of blurred light for docs/templates/accuracy.md, keyed by placeholder."""
     return {
         "rows": "\n".join(point_row(device, density) for density in (0.75, 1.0, 1.5, 3.0, 6.0, 12.0)),
         "leaning": "\n".join(sheared_row(device, degrees) for degrees in (90, 80, 60, 45)),
@@ -72,7 +72,7 @@ def point_tables(device: Device) -> dict[str, object]:
 def blurred_levels(device: Device, mesh: Mesh, irradiance: Array, stretch_mode: str = "full") -> list[Array]:
     """Blur light on the atlas of a mesh; return all pyramid levels (n, n), resampled to full resolution.
 
-    irradiance : (n, n) irradiance
+    irradiance : (n, n) irradiance of the texels of the atlas
     stretch_mode : stretch map that the blur uses: "full", or "axes", which ignores the angle between u and v
     """
     levels, blur = blur_light(
@@ -82,9 +82,11 @@ def blurred_levels(device: Device, mesh: Mesh, irradiance: Array, stretch_mode: 
 
 
 def point_row(device: Device, texels_per_mm: float) -> str:
-    """Return a Markdown row with the shape and energy errors of a blurred point of light on a flat patch.
+    """Return a Markdown row with the shape and energy errors of a lit texel, blurred on a flat surface.
 
     The reference is the analytic sum of Gaussians.
+
+    texels_per_mm : resolution of the atlas on the surface
     """
     profile = load_profile("gpu-gems-3")
     light = np.zeros((FLAT_PATCH_SIDE, FLAT_PATCH_SIDE), np.float32)
@@ -103,10 +105,10 @@ def point_row(device: Device, texels_per_mm: float) -> str:
 
 
 def sheared_row(device: Device, shear_degrees: float) -> str:
-    """Return a Markdown row with errors of the shape of a blurred point of light on a sheared uv map.
+    """Return a Markdown row with the widths of a lit texel, blurred on a flat surface with a sheared uv map.
 
-    Each of the stretch maps "axes" and "full" has two cells: the ratios of the smaller and of the larger
-    principal width of the blurred point to the exact width.
+    The widths are divided by the exact width. The cells are the smallest and the largest width with the
+    stretch map "axes", then the same with "full".
 
     shear_degrees : angle between the uv axes on the flat surface [degrees]
     """
@@ -145,11 +147,12 @@ def surface_tables(adapter: str) -> dict[str, str]:
 
 
 def harmonic_row(renderer: Renderer, radius_mm: float) -> str:
-    """Return a Markdown row that compares three ways of blurring light on a sphere with the widest Gaussian.
+    """Return a Markdown row that compares three ways to blur light on a sphere.
 
-    The ways are the blur on the atlas, the heat equation on the sphere, and an integral over the sphere as a
-    function of Euclidean distance. The irradiance is proportional to x, so each blur only scales it; the
-    cells are the scale factors.
+    They are the blur on the atlas, the heat equation on the sphere, and an integral over the sphere in which
+    the weight of a point depends on its Euclidean distance. Each blurs by the widest Gaussian of
+    `BLUR_PROFILE`. The irradiance is proportional to x, so that each blur multiplies it by a constant. The
+    row contains these constants.
     """
     from atlas_reading import shown
     from cut_meshes import cut_sphere
@@ -170,8 +173,11 @@ def harmonic_row(renderer: Renderer, radius_mm: float) -> str:
 def blur_light(
     device: Device, mesh: Mesh, atlas: Atlas, irradiance: Array, stretch_mode: str = "full"
 ) -> tuple[PyramidLevels, Blur]:
-    """Blur grey light (n, n, 1) on the atlas of a mesh by all Gaussians of `BLUR_PROFILE` but the narrowest.
+    """Blur grey light on the atlas of a mesh, and return the pyramid levels and the parameters of the blur.
 
+    The light is blurred by each Gaussian of `BLUR_PROFILE` except the narrowest.
+
+    irradiance : (n, n, 1) irradiance of the texels of the atlas
     stretch_mode : stretch map that the blur uses: "full", or "axes", which ignores the angle between u and v
     """
     textures, variance = upload_atlas(device, atlas, stretch_mode), BLUR_PROFILE.variance_mm2[1:]
@@ -199,7 +205,7 @@ def resampled_level(device: Device, levels: PyramidLevels, blur: Blur, level_ind
 
 
 def widest_level(renderer: Renderer, levels: PyramidLevels, blur: Blur) -> Array:
-    """Return the pyramid level of the widest Gaussian (n, n, 1), at the full resolution of the atlas."""
+    """Return the light (n, n, 1) blurred by the widest Gaussian, at the full resolution of the atlas."""
     return resampled_level(renderer.device, levels, blur, len(blur.halvings) - 1)[..., None]
 
 
@@ -264,7 +270,9 @@ def seam_row(
 
 
 def seam_side_points(head: Head, point_filter: PointFilter) -> tuple[Points, Points]:
-    """Return pairs of points on the two sides of seams, where the surface faces the front or the back.
+    """Return points on one side of the seams of a head, and the opposite points on the other side.
+
+    Points where the surface faces neither the front nor the back of the head are left out.
 
     point_filter : function that returns the mask of the seam points to use, given their positions
     """
@@ -285,7 +293,10 @@ def seam_side_points(head: Head, point_filter: PointFilter) -> tuple[Points, Poi
 
 
 def striped_scene(head: Head) -> Scene:
-    """Return a scene lit from the front and the back by sharp stripes of light and weak uniform light."""
+    """Return a scene with a head lit by sharp stripes of light and by weak uniform light.
+
+    Both come from the front and from the back.
+    """
     x = head.mesh.positions[:, 0] - head.centre_mm[0]
     positions = np.arange(max(x.min(), -90.0), min(x.max(), 90.0), STRIPE_SPACING_MM)
     stripe = partial(StripeLight, up=(0.4, 1, 0), width_mm=STRIPE_WIDTH_MM, shadows=False)
@@ -305,11 +316,11 @@ def seam_jumps(
     first_side: Points,
     second_side: Points,
 ) -> Array:
-    """Return the relative differences (n,) of scattered red light between the two sides of seams.
+    """Return the relative differences (n,) between the scattered red light on the two sides of seams.
 
     seam_method : key of `SEAM_METHODS`
     atlas_side : side of the atlas [texel]
-    first_side, second_side : n pairs of points on the two sides of seams
+    first_side, second_side : n points on one side of the seams, and the opposite points
     """
     from atlas_reading import lit_at
 

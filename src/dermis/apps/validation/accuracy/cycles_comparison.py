@@ -56,8 +56,8 @@ class HighlightRow(TypedDict):
     view : camera preset
     model : model of surface reflection
     energy : ratio of the reflected light to that of Cycles [-]
-    grain : contrast of fine detail in the picture by dermis [-]
-    grain_of_cycles : contrast of fine detail in the picture by Cycles [-]
+    grain : contrast of fine detail in the picture rendered by dermis [-]
+    grain_of_cycles : contrast of fine detail in the picture rendered by Cycles [-]
     correlation : correlation of the two pictures in bright pixels [-]
     """
 
@@ -85,7 +85,7 @@ def highlights(adapter: str = "auto") -> None:
 
 
 def looks(adapter: str = "auto") -> None:
-    """Render skins by dermis and by Cycles; write benchmarks/results/look.json and docs/images/look.webp."""
+    """Render skin with dermis and Cycles; write benchmarks/results/look.json and docs/images/look.webp."""
     require_in_checkout(LOOK_PICTURE.parent)
     renderer, rows, panels = dermis.Renderer(adapter), list[dict[str, object]](), dict[str, Picture]()
     renders = {head: skin_renders(renderer, head) for head in HEAD_NAMES}
@@ -100,7 +100,7 @@ def looks(adapter: str = "auto") -> None:
 
 
 def tables() -> dict[str, object]:
-    """Return Markdown rows of the last measurement for docs/templates/accuracy.md, keyed by placeholder."""
+    """Return texts on the last measurement for docs/templates/accuracy.md, keyed by placeholder."""
     highlight_rows, look_rows = read_results(HIGHLIGHT_RESULTS)["rows"], read_results(LOOK_RESULTS)["rows"]
     cells = (" | ".join(f"{100 * share:.1f} %" for share in row["shares"]) for row in look_rows)
     return {
@@ -119,7 +119,7 @@ def tables() -> dict[str, object]:
 
 
 def scan_with_normal_map() -> Head:
-    """Return the scanned head with its relief as a normal map and without other maps."""
+    """Return the scanned head with a normal map made from its height map, and without other maps."""
     head = dermis.load_head("lee_perry_smith", subdivide=1, regions="none")
     assert head.maps.height is not None
     return replace(head, maps=Maps(normal=relief_slopes(head.mesh, head.maps.height)))
@@ -185,7 +185,7 @@ def highlight_rows(renderer: dermis.Renderer, head: Head, view: str) -> list[Hig
 
 
 def render_skin(renderer: dermis.Renderer, scene: Scene) -> SkinRender:
-    """Render a scene by dermis, and again with surface reflection alone to find the reflected fraction."""
+    """Render a scene with dermis, and again without scattered light to find the reflected fraction."""
     options = {"size": (LOOK_SIDE, LOOK_SIDE), "atlas": 1024, "strands": False}
     settings = Settings.model_validate(options), Settings.model_validate(options | {"parts": "specular"})
     picture, surface_pass = (renderer.draw(scene, one).linear() for one in settings)
@@ -193,7 +193,7 @@ def render_skin(renderer: dermis.Renderer, scene: Scene) -> SkinRender:
 
 
 def render_cycles_skin(scene: Scene, skin: PrincipledSkin) -> SkinRender:
-    """Render a scene by Cycles, and again with black skin to find the fraction that the surface reflects."""
+    """Render a scene with Cycles, and again with black skin to find the reflected fraction."""
     settings = Settings(size=(LOOK_SIDE, LOOK_SIDE))
     black = replace(skin, colour=np.zeros_like(skin.colour))
     (image_pass,) = cycles_passes(scene, skin, [HIGHLIGHT_PATHS], settings)
@@ -212,7 +212,7 @@ def downsample_map(texels: Picture) -> Picture:
 
 
 def with_normal_map(head: Head) -> Head:
-    """Return the head with its relief converted to a normal map, for Cycles."""
+    """Return the head with its height map converted to a normal map, for Cycles."""
     if head.maps.height is None:
         return head
     relief = relief_slopes(head.mesh, downsample_map(head.maps.height))
@@ -220,10 +220,10 @@ def with_normal_map(head: Head) -> Head:
 
 
 def principled_skin(head: Head) -> PrincipledSkin:
-    """Return a Cycles material that has a head's colours and scatters light as far as the default skin.
+    """Return a Cycles material with the colours of a head and the mean scattering distance of default skin.
 
-    For Burley's profile, the mean distance between entry and exit of light is 2.5 d, where d is the mean free
-    path divided by a factor that depends on the colour.
+    The scattering distance is the distance between the points where light enters and leaves. For Burley's
+    profile its mean is 2.5 d, where d is the mean free path divided by a function of the colour.
     """
     assert head.maps.colour is not None and head.maps.mean_colour is not None
     profile, colour = load_profile(Skin().profile), head.maps.mean_colour
@@ -234,9 +234,9 @@ def principled_skin(head: Head) -> PrincipledSkin:
 
 
 def skin_renders(renderer: dermis.Renderer, head_title: str) -> dict[str, list[SkinRender]]:
-    """Return three renderings of a head for each view, as a dictionary from view to renderings.
+    """Return a dictionary from the name of a view to three renderings of a head.
 
-    The first shows the preset skin "deck-2007", the second the default skin, and the third is by Cycles.
+    The first shows the preset skin "deck-2007", the second the default skin. The third is rendered by Cycles.
 
     head_title : key of `HEAD_NAMES`
     """

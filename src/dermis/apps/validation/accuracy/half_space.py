@@ -1,4 +1,4 @@
-"""Directional reflection of a half-space under a boundary of index 1.4, for docs/techniques.md."""
+"""Reflection of a half-space with index of refraction 1.4, by direction, for docs/techniques.md."""
 
 from __future__ import annotations
 
@@ -34,12 +34,17 @@ _QUADRATURE_NODE_COUNT = 48
 
 
 def half_space(adapter: str = "auto") -> None:
-    """Print the table of reflection by direction; this takes less than a minute."""
+    """Print a table that shows how the reflection of skin depends on the directions of light and view."""
     print_lines(direction_table(load_head("lee_perry_smith", subdivide=0), adapter))
 
 
 def direction_table(head: Head, adapter: str) -> str:
-    """Return a Markdown table of reflection by direction, with errors of Lambertian and half-space skin."""
+    """Return a Markdown table that shows how the reflection of skin depends on direction.
+
+    The table also has the errors of the directional models "lambertian" and "half-space".
+
+    head : head that is rendered in studio light for the last two rows
+    """
     layer = published_media()["skin1"].layers[0]
     albedo = layer.sigma_s_prime / (layer.sigma_a + layer.sigma_s_prime)
     forward = layer.sigma_s_prime / (layer.sigma_a * (1.0 - FORWARD_G) + layer.sigma_s_prime)
@@ -69,10 +74,10 @@ def _oblique_ratio(albedo: float, eta: float) -> float:
 
 
 def _direction_errors(albedo: float) -> tuple[float, float]:
-    """Return relative RMS errors of Lambertian and of half-space skin over directions of light and view [-].
+    """Return the relative RMS errors of the directional models "lambertian" and "half-space" [-].
 
-    The reference combines the exact radiance of an index-matched half-space with all internal reflections at
-    the surface.
+    The errors are averaged over the directions of light and view. The reference combines the exact radiance
+    of an index-matched half-space with all internal reflections at the surface.
 
     albedo : single-scattering albedo [-]
     """
@@ -154,9 +159,9 @@ def _scattered_cosines(downward_cosines: Floats, g: float, rng: np.random.Genera
 
 
 def _studio_ratios(head: Head, adapter: str) -> tuple[list[float], list[float]]:
-    """Return ratios of the brightness of half-space skin to that of Lambertian skin, in studio light.
+    """Return ratios of a picture with skin direction "half-space" to one with "lambertian", in studio light.
 
-    The result is the median and the 99th percentile over the pixels of a picture, by channel.
+    The ratios are the median and the 99th percentile over the pixels of the head, each by channel.
     """
     renderer, settings = Renderer(adapter), Settings(size=(256, 298), atlas=1024)
 

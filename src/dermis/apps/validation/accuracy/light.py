@@ -1,4 +1,4 @@
-"""Errors of lighting: environments, white furnaces, area lights, ambient occlusion."""
+"""Errors of lighting: environments, area lights, ambient occlusion, energy in white furnace tests."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ UP_AXIS = np.array([0.0, 1.0, 0.0])
 
 
 def light(adapter: str = "auto") -> None:
-    """Print the tables of environments, white furnaces, area lights and ambient occlusion."""
+    """Print tables with errors of environments, area lights, ambient occlusion and white furnace tests."""
     print_tables(tables(adapter))
 
 
@@ -102,9 +102,9 @@ def irradiance_error(panorama_name: str, normal_count: int = 200) -> float:
 def reflection_error(
     panorama_name: str, roughness_m: float, view_degrees: float, normal_count: int = 320
 ) -> float:
-    """Return the relative RMS error of a panorama's light that a specular lobe reflects, over random normals.
+    """Return the relative RMS error of the radiance that a specular lobe reflects, over random normals.
 
-    Lookups in the prefiltered panorama are compared with a sum over all texels of the panorama.
+    The radiance from lookups in a prefiltered panorama is compared with a sum over the panorama's texels.
 
     roughness_m : roughness of the specular lobe
     view_degrees : angle between view and normal [degrees]
@@ -186,11 +186,12 @@ def lobe_radiance(layers: Array, directions: Array, roughness_m: float) -> Array
 def furnace_extremes(
     renderer: dermis.Renderer, head: Head, energy_scheme: str, **setting_values: str
 ) -> Array:
-    """Return minimum, mean and maximum ratio of outgoing to incoming radiance on a head in uniform light.
+    """Return minimum, mean and maximum ratio of outgoing to incoming radiance in a white furnace test.
 
-    The colour of the head is white.
+    In this test, a head with a white albedo map is lit by a uniform environment.
 
-    energy_scheme : energy conservation scheme
+    energy_scheme : energy conservation scheme of the skin
+    setting_values : values of further render settings, by name
     """
     white_head = replace(head, maps=replace(head.maps, colour=np.ones((4, 4, 3), np.float32)))
     skin = Skin.preset("deck-2007").replace(energy=energy_scheme)

@@ -153,7 +153,7 @@ def expression_rows(renderer: Renderer, head: Head, persons: Mapping[str, Points
 
 
 def deformation_rows(renderer: Renderer, head: Head) -> Iterator[str]:
-    """Yield Markdown rows, one per deformation, with the strain and the errors of a front and a back view."""
+    """Yield Markdown rows, one per deformation, with its strain and the errors of front and back views."""
     gauge = StrainGauge(head)
     for name, deform in DEFORMATIONS.items():
         points = deform(head.positions_mm)
@@ -162,16 +162,18 @@ def deformation_rows(renderer: Renderer, head: Head) -> Iterator[str]:
 
 
 def _with_thinner_ears(point_positions: Points, thickness_fraction: float) -> Points:
-    """Return the points (p, 3) of the scan with thinner ears: points at the sides are scaled along z.
+    """Return the points (p, 3) of the scanned head with thinner ears, made by scaling the ears along z.
 
-    thickness_fraction : fraction of the thickness that is removed
+    thickness_fraction : fraction of the thickness of the ears that is removed
     """
     ear = np.clip((np.abs(point_positions[:, :1]) - 65.0) / 10.0, 0.0, 1.0)
     return (point_positions * (1.0 - ear * [0.0, 0.0, thickness_fraction])).astype(np.float32)
 
 
 def seam_rows(renderer: Renderer, head: Head, persons: Mapping[str, Points]) -> Iterator[str]:
-    """Yield Markdown rows with discontinuities across seams: at rest, in expressions, and for other people.
+    """Yield Markdown rows with the discontinuity of scattered light across the seams of a head.
+
+    The rows are for the rest pose, for expressions, and for the shapes of other people.
 
     persons : dictionary from the name of a person to positions in the rest pose [mm]
     """
@@ -187,7 +189,7 @@ def seam_rows(renderer: Renderer, head: Head, persons: Mapping[str, Points]) -> 
 
 
 def _seam_row(renderer: Renderer, row_title: str, head: Head, shaped_head: Head, pose: Pose | None) -> str:
-    """Return a Markdown row with the discontinuity of light across the seams of a posed head.
+    """Return a Markdown row with the discontinuity of scattered light across the seams of a posed head.
 
     shaped_head : head loaded in the shape of the pose; used to find the points beside seams
     """
@@ -202,7 +204,7 @@ def _seam_row(renderer: Renderer, row_title: str, head: Head, shaped_head: Head,
 
 
 def occlusion_table(renderer: Renderer, head: Head) -> Iterator[str]:
-    """Yield the Markdown rows on ambient occlusion in several poses."""
+    """Yield Markdown rows with errors of ambient occlusion in several poses."""
     neck = dict.fromkeys(("neck01", "neck02", "neck03", "head"), (0.0, 15.0, 0.0))
     poses = {name: Pose(EXPRESSIONS[name]) for name in ("open jaw", "smile", "blink", "pucker", "surprise")}
     poses["head turned by 60 degrees"] = Pose(bones=neck)
@@ -218,7 +220,7 @@ def occlusion_rows(
 ) -> Iterator[str]:
     """Yield Markdown rows, one per pose, with RMS errors of the visible sky fraction.
 
-    Each error is given over all texels, and over those where the fraction differs from the rest pose.
+    Each cell has the error over all texels, and over those where the pose changes the fraction.
 
     poses_and_shaped_heads : dictionary from the name of a pose to the pose and the head loaded in its shape
     """
@@ -241,10 +243,10 @@ def occlusion_rows(
 
 
 def baked_occlusion(renderer: Renderer, head: Head, shaped_head: Head, *directions_and_side: int) -> Floats:
-    """Return the visible sky fraction (n, n) of a head, baked in an atlas; NaN in texels without a surface.
+    """Return the visible sky fraction of a posed head, baked in an atlas (n, n); NaN outside the charts.
 
-    head : head at rest, whose atlas is used
-    shaped_head : head loaded in the shape of a pose, whose occlusion is computed
+    head : the head in its rest pose; determines the atlas
+    shaped_head : the head loaded in the shape of the pose
     directions_and_side : number of directions, and side of the depth maps [texel]; by default, the values
         that frames use
     """

@@ -121,7 +121,7 @@ def list_measurements() -> list[Measurement]:
 
 
 class ComparisonRunner:
-    """Renderer of people and heads by dermis and by path tracing, with the same options for all comparisons.
+    """Comparisons of people and heads rendered by dermis and by path tracing, all with the same options.
 
     renderer : renderer of the frames
     side : side of the pictures [pixel]
@@ -139,7 +139,10 @@ class ComparisonRunner:
         self._skins: dict[tuple[str, str], SharedSkin] = {}
 
     def measure(self, measurement: Measurement) -> Figures:
-        """Make a comparison and return its figures; pictures that the page shows are kept in the cache."""
+        """Render a person with dermis and by path tracing; return the errors in JSON-compatible form.
+
+        Pictures that docs/path_traced.md shows are kept in the cache.
+        """
         head, textures = self._load_person(measurement.person)
         skin = self._shared_skin(measurement.person, head, measurement.truth)
         subject = PersonSubject(view_scene(head, ALL_VIEWS[measurement.view]), textures)
@@ -180,7 +183,9 @@ class ComparisonRunner:
         return self._skins[key]
 
     def measure_head(self, head_name: str, light_name: str, medium: Medium) -> Figures:
-        """Compare renderings of a head without maps or surface reflection; return errors, paths and notes.
+        """Compare renderings of a head without maps or surface reflection, and return the errors.
+
+        The result also has the number of paths per pixel and the notes of the path tracer.
 
         head_name : key of `_HEAD_FILES`
         light_name : key of `scenes.LIGHTS`
@@ -210,7 +215,7 @@ def _load_named_head(head_name: str) -> Head:
 
 
 def comparison_figures(comparison: PersonComparison) -> Figures:
-    """Return errors of a comparison as JSON-compatible figures."""
+    """Return the errors of a comparison, its paths per pixel and its duration in JSON-compatible form."""
     return {
         "error": list(comparison.relrmse),
         "energy": list(comparison.energy),
@@ -336,9 +341,9 @@ _Job = tuple[str, str, Callable[[], Figures]]
 
 
 def _measurement_jobs(runner: ComparisonRunner) -> list[_Job]:
-    """Return the group, key and function of each comparison, in the order in which they are run.
+    """Return the comparisons in the order in which they are run, each with its group, its key and a function.
 
-    The most important comparisons of people are first, then heads, then other comparisons of people.
+    The group and the key locate its results in the file of results. The function returns these results.
     """
     people: list[_Job] = [("people", one.key, partial(runner.measure, one)) for one in list_measurements()]
     heads: list[_Job] = [
@@ -419,7 +424,7 @@ def head_rows(heads: Figures) -> str:
 
 
 def region_table(people: Figures) -> str:
-    """Return a Markdown table of the frame's light relative to the reference, by region and view."""
+    """Return a Markdown table with the ratio of light in frames to that in references, by region and view."""
     rows = {view: people.get(Measurement("human", view, "matched").key) for view in ALL_VIEWS}
     found = {view: row["regions"] for view, row in rows.items() if row}
     names = list(dict.fromkeys(name for regions in found.values() for name in regions))
@@ -431,7 +436,10 @@ def region_table(people: Figures) -> str:
 
 
 def cause_table(people: Figures) -> str:
-    """Return a Markdown table of relative RMSE and energy, with one cause of error left out in each row."""
+    """Return a Markdown table with the relative RMSE and energy ratio when one cause of error is left out.
+
+    Each row is for one cause, and the first for none.
+    """
     lines = [
         f"| left out on both sides | {' | '.join(f'{view} | energy' for view in _ABLATED_VIEWS)} |",
         "|---" * (2 * len(_ABLATED_VIEWS) + 1) + "|",

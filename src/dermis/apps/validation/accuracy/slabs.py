@@ -1,6 +1,6 @@
-"""Errors of light through slabs by direction of incidence, far from the rim of the slabs.
+"""Errors of the reflectance and transmittance of rendered slabs, by direction of incidence.
 
-The reference is adding and doubling (`optics/slabs.py`), which tests compare with Monte Carlo.
+The reference is adding and doubling, which tests compare with Monte Carlo.
 """
 
 from __future__ import annotations
@@ -39,15 +39,17 @@ SLAB_MEDIA = (("skin1", 1.0), ("skin2", 1.0), ("skin1", 1.4), ("skin2", 1.4))
 
 
 def slabs(adapter: str = "auto") -> None:
-    """Print the tables of light through slabs."""
+    """Print tables with errors of the reflectance and transmittance of rendered slabs."""
     print_tables(tables(adapter))
 
 
 def exact_response(medium: Medium, thickness_mm: float, g: float = 0.0) -> Array:
-    """Return reflectance and transmittance (2, angles, 3) of a slab by adding and doubling.
+    """Return reflectance and transmittance (2, n, 3) of a slab by adding and doubling, for n angles.
+
+    The angles of incidence are `INCIDENT_DEGREES`.
 
     thickness_mm : thickness of the slab [mm]
-    g : mean cosine of the scattering angle; the medium's scattering coefficient already has the factor 1 - g
+    g : mean cosine of the scattering angle [-]; `medium` has reduced scattering coefficients for any g
     """
     layer, response = medium.layers[0], np.empty((2, len(INCIDENT_DEGREES), 3))
     inner_cosine = refracted_cosine(np.cos(np.radians(INCIDENT_DEGREES)), medium.eta)
@@ -60,7 +62,9 @@ def exact_response(medium: Medium, thickness_mm: float, g: float = 0.0) -> Array
 
 
 def rendered_response(renderer: dermis.Renderer, skin: Skin, thickness_mm: float) -> Array:
-    """Return reflectance and transmittance (2, angles, 3) of a slab as rendered by dermis.
+    """Return reflectance and transmittance (2, n, 3) of a slab rendered by dermis, for n angles of incidence.
+
+    They are measured far from the rim of the slab.
 
     thickness_mm : thickness of the slab [mm]
     """
@@ -92,7 +96,7 @@ def skins_by_direction(medium: Medium, folder: str) -> dict[str, Skin]:
 
 
 def error_rows(renderer: dermis.Renderer) -> str:
-    """Return Markdown rows with RMS errors of reflectance and transmittance, by slab and skin."""
+    """Return Markdown rows with errors of reflectance and transmittance, by slab and skin direction."""
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         for name, eta in SLAB_MEDIA:
@@ -106,9 +110,10 @@ def error_rows(renderer: dermis.Renderer) -> str:
 
 
 def forward_error_rows(renderer: dermis.Renderer) -> str:
-    """Return Markdown rows with the errors of half-space skin against forward-scattering slabs.
+    """Return Markdown rows with errors of rendered slabs against references that scatter light forwards.
 
-    Half of the rows ignore forward scattering; the others account for it by the skin's `anisotropy`.
+    The slabs are rendered with the skin direction "half-space". Half of the rows ignore forward scattering;
+    the others account for it by the skin's `anisotropy`.
     """
     rows = []
     with tempfile.TemporaryDirectory() as folder:
@@ -125,9 +130,10 @@ def forward_error_rows(renderer: dermis.Renderer) -> str:
 
 
 def forward_direction_rows() -> str:
-    """Return Markdown rows with RMS errors of radiance below the surface of forward-scattering "skin1".
+    """Return Markdown rows with errors of the skin direction "half-space", over light and view directions.
 
-    The errors are over all directions of light and view, by index of refraction, in red, green and blue.
+    The medium is "skin1" with forward scattering. A row is for one value of the skin's `anisotropy`. A cell
+    is for one index of refraction and has the errors in red, green and blue.
     """
     rows = []
     for g in (0.0, FORWARD_G):
@@ -154,10 +160,10 @@ def _direction_pairs_error(albedo: float, eta: float, g: float) -> float:
 
 
 def _error_cells(response: Array, reference: Array) -> str:
-    """Return two table cells for transmittance, and then two for reflectance.
+    """Return two table cells with errors of transmittance, then two with errors of reflectance.
 
-    The first cell of each pair has the RMS error. The second has the ratio of red light to the reference, for
-    each angle of incidence.
+    Of the two cells, the first has the relative RMS error. The second has the ratio of red light to the
+    reference for each angle of incidence.
     """
     flux, cells = np.sqrt(np.cos(np.radians(INCIDENT_DEGREES)))[:, None], []
     for side in (1, 0):
@@ -169,7 +175,10 @@ def _error_cells(response: Array, reference: Array) -> str:
 
 
 def forward_rows() -> str:
-    """Return Markdown rows with red light through isotropic and forward-scattering slabs, by Monte Carlo."""
+    """Return Markdown rows with transmittance and reflectance of slabs in red light, by Monte Carlo.
+
+    Each row compares isotropic scattering with forward scattering.
+    """
     rows = []
     for eta in (1.0, 1.4):
         layer = published_media()["skin1"].layers[0]

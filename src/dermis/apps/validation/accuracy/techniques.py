@@ -68,9 +68,10 @@ def techniques(adapter: str = "auto") -> None:
 def _compare(
     head: Head, reference_name: str, techniques: Sequence[str], light_name: str, adapter: str, **options: Any
 ) -> Comparison:
-    """Return a comparison whose region and number of samples suit the light, unless `options` sets them.
+    """Return a comparison of techniques with a reference under one light.
 
     reference_name : name of the reference
+    options : further arguments of `compare`; the default region and number of samples depend on the light
     """
     defaults: dict[str, Any] = {"region": default_region(light_name), "samples": SAMPLES_BY_LIGHT[light_name]}
     defaults["settings"] = SETTINGS
@@ -105,9 +106,9 @@ def technique_rows(
 
 
 def fine_atlas_row(head: Head, adapter: str) -> str:
-    """Return a Markdown row with the errors of texture-space diffusion on an atlas of side 2048.
+    """Return a Markdown row with the errors of texture-space diffusion on an atlas of 2048 by 2048 texels.
 
-    The light is the laser, and the reference is the heat equation on the surface.
+    The head is lit by the laser's stripe. The reference is the heat equation on the surface.
     """
     settings, only = SETTINGS.model_copy(update={"atlas": 2048}), ("texture-space",)
     comparison = _compare(
@@ -117,9 +118,9 @@ def fine_atlas_row(head: Head, adapter: str) -> str:
 
 
 def profile_model_rows(head: Head, path_traced: dict[str, dict[str, Comparison]], adapter: str) -> str:
-    """Return Markdown rows of errors against path tracing, by scattering model of the profile.
+    """Return Markdown rows with errors against path tracing, for profiles of two scattering models.
 
-    path_traced : comparisons with Monte Carlo profiles, keyed by medium, then by light
+    path_traced : comparisons for profiles of the model "counted", keyed by medium, then by light
     """
     rows, techniques = [], ("texture-space", "screen-space")
     for light in SAMPLES_BY_LIGHT:
@@ -135,17 +136,17 @@ def profile_model_rows(head: Head, path_traced: dict[str, dict[str, Comparison]]
 
 
 def _error_and_energy_cells(comparison: Comparison, comparison_row: ComparisonRow) -> str:
-    """Return table cells with the relative RMSE, and the energy ratio in red, green and blue."""
+    """Return table cells with the relative RMSE and with the energy ratios in red, green and blue."""
     reference = comparison.reference
     _, energy = errors_by_channel(comparison.images[comparison_row.technique], reference, reference.mask)
     return f"{comparison_row.relrmse:.4f} | {energy}"
 
 
 def lambertian_limit(head: Head, medium: str, path_traced: Comparison, adapter: str) -> str:
-    """Return text with the error and energy of an ideal Lambertian skin under the front light.
+    """Return text with the relative RMSE and energy ratio of an ideal Lambertian skin under the front light.
 
-    The ideal skin reflects as much light as a half-space does for the same angle of incidence. No Lambertian
-    skin has a smaller error.
+    The ideal skin reflects as much light as a half-space does for the same angle of incidence. It shows how
+    small the error of Lambertian skin can become.
 
     path_traced : comparison with path tracing under the front light
     """
@@ -178,9 +179,9 @@ def lambertian_limit(head: Head, medium: str, path_traced: Comparison, adapter: 
 
 
 def direction_rows(head: Head, lights: dict[str, int], settings: Settings, adapter: str) -> str:
-    """Return Markdown rows that compare Lambertian and half-space skin with path tracing.
+    """Return Markdown rows with errors of the skin directions "lambertian" and "half-space".
 
-    The skins are compared on the head under each of `lights`, and on a ball.
+    The reference is path tracing. The rows are for the head under each of `lights`, and for a ball.
 
     lights : dictionary from the name of a light to the number of paths per pixel
     """

@@ -1,4 +1,4 @@
-"""Errors of light through thin parts: slabs, wedges and ears."""
+"""Errors of light transmitted through thin bodies: slabs, wedges and ears."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ EAR_DISTANCE_MM = 66.0  # distance from the scan's middle beyond which a point i
 
 
 def thin(adapter: str = "auto") -> None:
-    """Print the tables of light through slabs, wedges and ears."""
+    """Print tables with errors of light transmitted through slabs, wedges and ears."""
     print_tables(tables(adapter))
 
 
@@ -49,7 +49,7 @@ def scattered_light(
     atlas_side: int,
     **setting_values: str,
 ) -> tuple[Array, Array, Array]:
-    """Return positions, normals and scattered light (n, 3) of a mesh's texels in parallel light.
+    """Return positions, normals and scattered light (n, 3) of the atlas texels of a mesh in parallel light.
 
     light_direction : (3,) direction of the light, which casts no shadows
     atlas_side : side of the atlas [texel]
@@ -73,12 +73,13 @@ def scattered_light(
 
 
 def integrated_light(mesh: Mesh, light_direction: Array, points: Array, spacing_mm: float) -> Array:
-    """Return the scattered light (n, 3) at points by integrating the profile over the surface.
+    """Return the scattered light (n, 3) at points, as an integral of irradiance and profile over the surface.
 
     The profile is a function of Euclidean distance.
 
     light_direction : (3,) direction of the light
-    spacing_mm : largest distance of the irradiance samples [mm]
+    points : (n, 3) positions [mm]
+    spacing_mm : largest distance between neighbouring samples of the irradiance
     """
 
     def irradiance_at(samples: MeshPoints) -> Array:
@@ -92,9 +93,9 @@ def integrated_light(mesh: Mesh, light_direction: Array, points: Array, spacing_
 
 
 def slab_rows(renderer: dermis.Renderer) -> str:
-    """Return Markdown rows with the light through slabs, as rendered and as computed from the profile.
+    """Return Markdown rows with the transmittance of slabs: rendered, and computed from the profile.
 
-    The light is measured far from the rim of the slabs.
+    It is measured far from the rim of the slabs.
     """
     rows = []
     for thickness in THICKNESSES_MM:
@@ -109,9 +110,10 @@ def slab_rows(renderer: dermis.Renderer) -> str:
 
 
 def light_across_air(mesh: Mesh, light_direction: Array, points: Array, normals: Array) -> Array:
-    """Return the red light (n,) that the surface integral carries to each point across air.
+    """Return the red light (n,) that reaches points across air in the surface integral.
 
-    Light crosses air if the straight path between source and point leaves the body.
+    This is an error of the integral. Light crosses air if the straight path from the place where it enters
+    the skin to the point leaves the body.
 
     light_direction : (3,) direction of the light
     points : (n, 3) positions
@@ -153,13 +155,15 @@ def comparison_cells(
     *,
     compares_without_air: bool,
 ) -> str:
-    """Return table cells with the energy ratio and relative RMSE of frames against the surface integral.
+    """Return table cells with the energy ratio and the relative RMSE of rendered light, for two settings.
 
-    The first two cells are of a frame without light through thin parts, the next two of a frame with it.
+    The first two cells are for the setting `transmission` "none", the next two for "thin". The reference is
+    the surface integral.
 
     point_filter : function that returns the mask of the points to compare, given positions and normals
-    spacing_mm : largest distance of the irradiance samples [mm]
-    compares_without_air : whether to add the energy ratio to the integral without `light_across_air`
+    spacing_mm : largest distance between neighbouring samples of the irradiance
+    compares_without_air : whether to add a cell for "thin" with the energy ratio to a reference without
+        `light_across_air`
     """
     cells = []
     for transmission in ("none", "thin"):
@@ -180,7 +184,7 @@ def comparison_cells(
 
 
 def wedge_rows(renderer: dermis.Renderer) -> str:
-    """Return Markdown rows on red light through wedges lit from behind, within 15 mm of their edge."""
+    """Return Markdown rows with errors of red light on the unlit side of wedges, near their edge."""
     rows = []
     for angle in WEDGE_DEGREES:
         mesh = wedge(60.0, 0.01, 120.0 * float(np.tan(np.radians(angle / 2))), cells=16)
@@ -197,7 +201,10 @@ def wedge_rows(renderer: dermis.Renderer) -> str:
 
 
 def ear_rows(renderer: dermis.Renderer) -> str:
-    """Return Markdown rows on red light through ears, lit from behind and from the front."""
+    """Return Markdown rows with errors of red light on the unlit side of ears.
+
+    The ears are lit from behind or from the front.
+    """
     rows = []
     for name in ("lee_perry_smith", "human"):
         head = dermis.load_head(name, subdivide=0)

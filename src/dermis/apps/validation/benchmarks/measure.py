@@ -60,11 +60,11 @@ class BenchmarkRow:
 
     triangles : number of triangles of the head
     frame_ms : elapsed time per frame in a sequence, with several frames in flight
-    gpu_ms : device time of each stage, measured in separate passes, and of the whole frame as "total"; the
-        total is less than the sum on GPUs, where it is measured in frames whose stages share a pass
+    gpu_ms : device time of each stage, and of the whole frame as "total"; stages are timed in separate
+        passes, so that their sum may exceed the total
     floor_ms : lower bound of each stage's time, derived from its memory traffic, and their sum as "total"
     python_ms : host time to prepare, record and submit a frame while the device is idle
-    image_ms : time from the end of a frame until its picture is in NumPy
+    image_ms : time to transfer the picture of a finished frame to a NumPy array
     memory_mb : memory of textures and buffers [MB]
     """
 
@@ -92,7 +92,7 @@ def measure_case(
     On a slow device, fewer frames are drawn.
 
     folder : folder in which the file of the diffusion profile is written
-    bytes_per_s : memory bandwidth of a copy [byte/s]
+    bytes_per_s : memory bandwidth, as measured by `copy_rate` [byte/s]
     counts : numbers of frames to draw
 
     Raises DermisError if the device cannot draw the frames, for example for lack of memory.
@@ -189,7 +189,7 @@ def _floor_ms(
 
     stage_bytes : memory traffic by stage [byte]
     gpu_ms : measured device time by stage
-    bytes_per_s : memory bandwidth of a copy [byte/s]
+    bytes_per_s : memory bandwidth, as measured by `copy_rate` [byte/s]
     """
     floor = {stage: 1e3 * stage_bytes[stage] / bytes_per_s for stage in gpu_ms if stage in stage_bytes}
     return floor | {"total": sum(floor.values())}

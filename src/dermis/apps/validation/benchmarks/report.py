@@ -106,7 +106,7 @@ def stage_table(benchmark: Benchmark) -> list[tuple[str, ...]]:
 
 
 def published_text(benchmark: Benchmark) -> str:
-    """Return a sentence with the time of a frame by the passes of GPU Gems 3, relative to the base frame.
+    """Return a sentence that compares frames rendered with the passes of GPU Gems 3 to the base frame.
 
     The text is empty if these passes were not measured.
     """
@@ -130,7 +130,7 @@ def _case_text(case: BenchmarkCase) -> str:
 
 
 def summary_line(benchmark: Benchmark) -> str:
-    """Return the adapter, the head, the date and the library versions in one line."""
+    """Return a line of text that names the adapter, the head, the date and the library versions."""
     versions = ", ".join(f"{name} {number}" for name, number in benchmark.versions.items())
     return (
         f"{benchmark.adapter} ({benchmark.driver}), {benchmark.head}, {benchmark.date}; {versions}; "

@@ -138,10 +138,10 @@ def comparison_subject(
     adapter: str,
     model: ModelName | None = None,
 ) -> Iterator[ComparisonSubject]:
-    """Yield the subject of a comparison.
+    """Yield the scene of a comparison, with the renderer, settings, profile and medium.
 
-    The diffusion profile is in a temporary file, which is deleted when the context ends. The parameters are
-    described in `compare`.
+    The scene reads the profile from a temporary file, which is deleted when the context ends. The parameters
+    are described in `compare`.
     """
     index_matched = published_media()[medium].with_eta(1.0)
     with medium_scene(head, light, region, index_matched, model) as (scene, profile):
@@ -149,7 +149,7 @@ def comparison_subject(
 
 
 def check_names(reference_name: str, light_name: str, region_name: str, medium_name: str) -> None:
-    """Raise DermisError for unknown names, before any long computation."""
+    """Raise DermisError if any of the names is unknown."""
     choices: dict[str, tuple[str, Collection[str]]] = {
         "against": (reference_name, REFERENCES),
         "light": (light_name, LIGHTS),
@@ -164,7 +164,9 @@ def check_names(reference_name: str, light_name: str, region_name: str, medium_n
 def _render_technique(
     subject: ComparisonSubject, technique: str, reference: ReferenceImage
 ) -> tuple[Floats, float]:
-    """Return the linear radiance rendered by a technique, and the device time of a frame at 4 samples [ms].
+    """Return the linear radiance rendered by a technique, and the device time of a frame [ms].
+
+    The time is measured with 4 samples per pixel.
 
     reference : reference image; the frame leaves out translucency or interreflection if the reference does
     """

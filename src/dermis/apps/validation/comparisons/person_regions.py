@@ -42,7 +42,10 @@ class Regions:
     masks: dict[str, Mask]
 
     def light_ratios(self, comparison: PersonComparison) -> dict[str, Estimate]:
-        """Return the frame's light divided by the reference's light, for regions with enough pixels [-]."""
+        """Return the light in the frame divided by that in the reference, for each region [-].
+
+        Regions with few pixels are left out.
+        """
         found = {}
         for name, mask in self.masks.items():
             inside = mask & comparison.mask
@@ -54,9 +57,9 @@ class Regions:
 def picture_regions(renderer: Renderer, scene: Scene, picture_side: int) -> Regions:
     """Return the regions of the skin that a square picture of a parametric human shows.
 
-    There are regions for parts of the head, such as "nose", and "rim" for skin seen at a grazing angle. The
-    regions "lit side", "terminator" and "shadowed side" contain skin that faces the scene's first light, is
-    grazed by it, or faces away from it. Normals are those of the rest pose.
+    Most regions are parts of the head, such as "nose". The region "rim" is skin seen at a grazing angle. In
+    "lit side", skin faces the first light of the scene; in "shadowed side", it faces away; "terminator" is
+    the skin in between.
 
     picture_side : side of the picture [pixel]
     """
@@ -90,9 +93,10 @@ def picture_regions(renderer: Renderer, scene: Scene, picture_side: int) -> Regi
 
 
 def _nearest_zone(positions_mm: Floats) -> NDArray[np.int64]:
-    """Return the region (n,) of each point, as an index into `ZONES`.
+    """Return the index (n,) of the region in `ZONES` to which each point belongs.
 
-    The region contains the zone whose centre is nearest to the point, relative to the radii of the zone.
+    A region consists of ellipsoidal zones. A point belongs to the region of the zone whose centre is nearest;
+    distances are divided by the radii of the zone.
 
     positions_mm : (n, 3) points
     """

@@ -36,7 +36,7 @@ PIXEL_SAMPLES = 16
 
 @dataclass(frozen=True)
 class ComparisonSubject:
-    """Scene to compare, with the profile and medium of its skin, and the settings of its image."""
+    """Scene in which techniques are compared, with its renderer, its settings, and the profile and medium."""
 
     renderer: Renderer
     scene: Scene
@@ -55,8 +55,8 @@ class ReferenceImage:
     samples : samples per pixel at which techniques must be rendered for the comparison with this image
     seconds : duration of the computation [s]
     notes : sentences for the report
-    has_translucency : whether the image includes light through thin parts
-    has_interreflection : whether the image includes light from skin to skin through the air
+    has_translucency : whether the image includes light transmitted through ears and other thin parts
+    has_interreflection : whether the image includes light that one part of the head reflects to another
     direction : angular distribution of the light that leaves the skin, as in `Skin`
     """
 
@@ -72,7 +72,7 @@ class ReferenceImage:
 
 
 def surface_integral(subject: ComparisonSubject, samples: int) -> ReferenceImage:
-    """Return the reference image obtained by integrating the profile over the surface.
+    """Return the reference image in which irradiance times profile is integrated over the surface.
 
     The profile is a function of Euclidean distance.
 
@@ -88,9 +88,9 @@ def surface_integral(subject: ComparisonSubject, samples: int) -> ReferenceImage
 
 
 def surface_heat(subject: ComparisonSubject, samples: int) -> ReferenceImage:
-    """Return the reference image obtained by diffusing irradiance along the surface by the heat equation.
+    """Return the reference image in which the irradiance diffuses according to the heat equation.
 
-    Only the skin around the camera's target is computed.
+    Light diffuses along the surface. Only the skin around the camera's target is computed.
 
     samples : ignored, because the solution has no noise
     """
@@ -105,10 +105,9 @@ def surface_heat_around(
     light: IrradianceSamples,
     min_variance_mm2: float = _MIN_VARIANCE_MM2,
 ) -> ReferenceImage:
-    """Return the reference image obtained by the heat equation on the surface, around a visible point.
+    """Return the reference image in which light diffuses according to the heat equation, in a round patch.
 
-    Each Gaussian of the profile is replaced by diffusion along the surface for a time proportional to its
-    variance.
+    Each Gaussian of the profile becomes diffusion along the surface, for a time proportional to the variance.
 
     target_mm : point relative to the head's centre; the nearest visible point is the centre of the patch [mm]
     radius_mm : radius of the patch in which pixels are compared [mm]

@@ -119,7 +119,11 @@ def measured_page() -> None:
 
 
 def _default_skin_errors(archive: Archive) -> JsonObject:
-    """Return errors of fits with the former default skin, the present one, and two skins between these."""
+    """Return errors of fits in which all other parameters have the values of one of four skins.
+
+    The skins are the former default skin, the present one, and the former default with less absorption by
+    bloodless tissue.
+    """
     skins = {
         "former": FORMER_SKIN,
         "half": replace(FORMER_SKIN, baseline=0.5),
@@ -167,11 +171,11 @@ def _default_skin_errors(archive: Archive) -> JsonObject:
 
 
 def _smooth_surface_errors(archive: Archive) -> JsonObject:
-    """Return percentiles of the distances of colours from a smooth surface through other people's colours.
+    """Return percentiles of the distances of measured colours from a smooth surface in colour space.
 
-    They are lower bounds of the colour errors of models with two unknowns per spectrum and the same constants
-    for all people, because the colours of such a model lie on a surface. The entry "each site" has a separate
-    surface for each site of the body.
+    The surface is fitted to the colours of other people. A skin model with two unknowns per spectrum also
+    produces colours on a surface, so that its errors are hardly smaller than these distances. For the key
+    "each site", a surface is fitted to each site of the body.
     """
     face = np.isin(archive.site, CHEEK_AND_FOREHEAD)
     sites = [_surface_distances(archive.select_rows(archive.site == site)) for site in range(len(SITES))]
@@ -183,9 +187,9 @@ def _smooth_surface_errors(archive: Archive) -> JsonObject:
 
 
 def _surface_distances(archive_part: Archive) -> Floats:
-    """Return the difference (n,) of each colour from a smooth surface through the colours of other people.
+    """Return the CIEDE2000 differences (n,) of colours from a smooth surface through other people's colours.
 
-    The surface is a local linear regression of the third principal coordinate on the first two.
+    The surface is a local linear regression of the colours' third principal component on the first two.
     """
     from scipy.spatial import cKDTree
 
@@ -206,10 +210,10 @@ def _surface_distances(archive_part: Archive) -> Floats:
 
 
 def _limit_fractions(archive: Archive) -> JsonObject:
-    """Return the fractions of colour fits with three unknowns that fail, by kind of failure.
+    """Return the fractions of implausible or failed fits of three unknowns to measured colours.
 
-    The keys are "none" for an oxygenation of 0, "all" for an oxygenation of 1, and "unmatched" for fits that
-    do not reproduce the measured colour.
+    The keys are "none" for a fitted oxygenation of 0, "all" for an oxygenation of 1, and "unmatched" for fits
+    that do not reproduce the measured colour.
     """
     fit = fit_skin(archive.spectra, THREE_UNKNOWNS, "colour")
     oxygen = fit.values["oxygen"]
@@ -228,9 +232,10 @@ def _category_errors(
     three_unknown_fit: SpectralFit,
     five_unknown_fit: SpectralFit,
 ) -> list[list[float]]:
-    """Return a row for each group of people or for each site: number of spectra and three median errors.
+    """Return the number of spectra and three median errors for each group of people or each site.
 
-    The errors are the colour errors with two and with three unknowns, and the RMS with five unknowns.
+    The errors are the colour errors of fits of two and of three unknowns, and the RMS difference between
+    measured and fitted spectra for five unknowns.
 
     categories : all groups or all sites
     labels : (n,) group or site of each spectrum
@@ -333,7 +338,7 @@ def _jacques_model(parameter_values: ParameterValues) -> Floats:
 
 
 def _addition_errors(sample: Archive) -> list[JsonObject]:
-    """Return fit errors for each addition to the model, with three and with five unknowns per spectrum."""
+    """Return fit errors of the skin model with each additional constant, for three and for five unknowns."""
     rows = []
     for name, free in _CONSTANTS_BY_ADDITION.items():
         row: JsonObject = {"name": name}
@@ -352,9 +357,9 @@ def _addition_errors(sample: Archive) -> list[JsonObject]:
 
 
 def _site_fits(archive: Archive) -> list[JsonObject]:
-    """Return the thickness of the epidermis and the oxygenation that fit the spectra of each site best.
+    """Return the epidermis thickness and the oxygenation that fit the spectra of each site best.
 
-    Each row has results of fits to spectra, and under "colour" those of fits to colours.
+    The values under the key "colour" fit the colours of the spectra best.
     """
     rows = []
     for site in range(len(SITES)):
@@ -376,9 +381,10 @@ def _site_fits(archive: Archive) -> list[JsonObject]:
 
 
 def _site_fold_errors(archive: Archive) -> JsonObject:
-    """Return colour errors of fits with two unknowns, where each site has its own thickness and oxygenation.
+    """Return colour errors of fits with two unknowns per spectrum and two constants per site of the body.
 
-    The errors are cross-validated: thickness and oxygenation are fitted to people of other folds.
+    The constants are the epidermis thickness and the oxygenation. The errors are cross-validated: the
+    constants are fitted to people of other folds.
     """
     error = np.zeros(len(archive.spectra))
     fixed = {"baseline": DEFAULT_SKIN.baseline}
@@ -401,9 +407,9 @@ def _site_fold_errors(archive: Archive) -> JsonObject:
 
 
 def _edge_loss_errors(sample: Archive) -> JsonObject:
-    """Return the fractions of light that apertures miss, and constants fitted to corrected spectra.
+    """Return the edge loss of each aperture, and constants fitted to spectra corrected for it.
 
-    The spectra are corrected for the light that each aperture misses.
+    The edge loss is the fraction of the reflected light that an aperture of a spectrophotometer misses.
     """
     skins = [replace(DEFAULT_SKIN, melanin=m, blood=0.008) for m in _EDGE_LOSS_MELANIN]
     losses = [edge_loss(one, _EDGE_LOSS_WAVELENGTHS_NM) for one in skins]

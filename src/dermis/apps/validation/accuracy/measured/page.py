@@ -60,7 +60,7 @@ def write_measured_page() -> None:
 
 
 def measured_parts(results: JsonObject) -> dict[str, str]:
-    """Return the tables and sentences of the page, keyed by placeholder."""
+    """Return the tables, phrases and numbers of docs/measured.md, keyed by placeholder."""
     present = results["models"]["present"]
     return {
         "spectra": f"{results['counts']['spectra']:,}",
@@ -140,10 +140,11 @@ def _folds_table(folds: Sequence[JsonObject]) -> str:
 
 
 def _confounded_texts(results: JsonObject) -> dict[str, str]:
-    """Return paragraphs and numbers of the page, keyed by the placeholder that each replaces.
+    """Return texts on strongly correlated constants and on corrected spectra, keyed by placeholder.
 
-    "confounded" lists pairs of constants that the spectra hardly distinguish. "wide_factor" and
-    "small_factor" are baselines fitted to spectra that are corrected for the light that an aperture misses.
+    The text "confounded" lists pairs of constants with strongly correlated errors. The numbers "wide_factor"
+    and "small_factor" are baselines, fitted to spectra that are corrected for the edge loss of a wide and of
+    a small aperture.
     """
     pairs = {}
     for row in results["additions"]:
@@ -250,7 +251,7 @@ def _edge_loss_table(edge_results: JsonObject) -> str:
 
 
 def _corrected_constants_text(edge_results: JsonObject) -> str:
-    """Return text on constants fitted to spectra as measured, and to spectra corrected for missed light."""
+    """Return text on constants fitted to the measured spectra, and to spectra corrected for edge loss."""
     parts = [
         f"{_constants_text(edge_results[name]['constants'])} (RMS {edge_results[name]['rms']:.4f}) {label}"
         for name, label in (
