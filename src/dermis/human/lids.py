@@ -178,9 +178,9 @@ def _lid_displacements(rings: Points, socket: EyeSocket, lid_is_closed: bool | F
 
 
 def _close_upper_lid(rings: Points) -> None:
-    """Lower an upper lid in place until its crest is below the crest of the lower lid.
+    """Lower an upper lid in place until its margin overlaps the margin of the lower lid.
 
-    rings : (rows, 4, 3) lid points by row and column of lid_rings.csv, relative to the eye
+    rings : (rows, 4, 3) lid points by row and column of lid_rings.csv, relative to the centre of the eye
     """
     crest = rings[:, _CREST_COLUMN]
     lower = crest[_LOWER_LID_ROWS][np.argsort(crest[_LOWER_LID_ROWS, 0])]
@@ -189,9 +189,9 @@ def _close_upper_lid(rings: Points) -> None:
 
 
 def _compress_radius(axis_distance: Points) -> Points:
-    """Compress large distances of lid points from the viewing axis, so that the points stay on the eyeball.
+    """Limit distances of lid points from the viewing axis smoothly, so that the points stay on the eyeball.
 
-    axis_distance : distances from the axis divided by the radius of the eyeball [-]
+    axis_distance : original distances, divided by the radius of the eyeball [-]
     """
     room = _MAX_COMPRESSED_RADIUS - _MAX_UNCOMPRESSED_RADIUS
     compressed = _MAX_UNCOMPRESSED_RADIUS + room * np.tanh((axis_distance - _MAX_UNCOMPRESSED_RADIUS) / room)
@@ -264,9 +264,9 @@ def fit_lid_targets(points_mm: Points, sockets: tuple[EyeSocket, EyeSocket]) -> 
 
 
 class _LidTargets(NamedTuple):
-    """Index tables of the t morph targets that move the lids; the tables are the same for all people.
+    """Arrays for the t morph targets that move the lids; they are the same for all people.
 
-    closed : (t,) whether each target closes the lids
+    closed : (t,) mask of the targets that close the lids
     axis : (t, 1, 3) viewing direction of the eyes when each target is active
     point : (n,) indices of the points around both eyes
     lid_sides : lid points of the left and of the right eye, as indices into `point`

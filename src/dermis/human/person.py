@@ -160,7 +160,7 @@ def _sample_ancestry(
     sampled_fractions: NDArray[np.float64],
     fixed_fields: Mapping[str, Any],
 ) -> tuple[NDArray[np.float64], dict[str, float]]:
-    """Return the ancestry fractions (3,) of the shape, and the weights of the measured groups for the skin.
+    """Return ancestry fractions (3,) for the shape of a person, and weights of measured groups for the skin.
 
     If the ancestry of the shape is fixed, the skin follows the shape. If only a skin ancestry or an ITA is
     fixed, the shape follows the skin. Otherwise some people of Caucasian shape have South Asian or Middle
@@ -192,10 +192,10 @@ def _sample_ancestry(
 
 
 def _pick_name(weight_of_name: Mapping[str, float], cumulative_chance: float) -> str:
-    """Return the name whose share of the cumulative weights contains a number from 0 to 1.
+    """Return a random name, with probabilities proportional to weights.
 
     weight_of_name : weight of each name
-    cumulative_chance : uniformly distributed number, 0 to 1
+    cumulative_chance : uniformly distributed random number, 0 to 1, which selects the name
     """
     ends = np.cumsum(list(weight_of_name.values()))
     return list(weight_of_name)[
@@ -226,7 +226,9 @@ def _sample_hair_and_skin(
 
 
 def _sample_hair_pigments(rng: np.random.Generator, ancestry: NDArray[np.float64]) -> tuple[float, float]:
-    """Return random eumelanin and pheomelanin of hair, which is nearly black without European ancestry.
+    """Return random amounts of eumelanin and pheomelanin in hair.
+
+    Hair of people without European ancestry is nearly black.
 
     ancestry : (3,) fractions of African, Asian and European ancestry
     """
@@ -293,7 +295,7 @@ def _opposite_targets() -> tuple[_OppositeTargets, ...]:
 
 @dataclass(frozen=True)
 class Human:
-    """Person of the parametric human: ancestry, sex, age, weight, muscle, and MakeHuman's morph targets.
+    """Person described by parameters: ancestry, sex, age, weight, muscle, and MakeHuman's morph targets.
 
     Parameters
     ----------

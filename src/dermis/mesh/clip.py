@@ -18,7 +18,10 @@ _END_TOLERANCE_FRAMES = 1e-6  # fraction of a frame by which rounding may put th
 
 
 def check_frame_rate(culprit: object, frame_rate: object) -> float:
-    """Return a frame rate [1/s] after checking that the rate is positive; raise DermisError if not."""
+    """Return a frame rate [1/s] unchanged if it is within the allowed range; raise DermisError otherwise.
+
+    culprit : name of the option or file in the error message
+    """
     return checked_number(culprit, frame_rate, _MIN_FRAME_RATE, _MAX_FRAME_RATE, "frames a second")
 
 

@@ -28,9 +28,11 @@ UV_DECAY_ANGLE_RADIANS = 0.9
 
 
 def limbus_plane_mm(radius_mm: float) -> float:
-    """Return the distance from a sphere's centre to the plane of the limbus, a circle on the sphere [mm].
+    """Return the distance from a sphere's centre to the plane of the limbus [mm].
 
-    radius_mm : radius of the sphere, such as the ball or the cornea
+    The limbus is the circle in which the spheres of sclera and cornea intersect.
+
+    radius_mm : radius of one of these two spheres [mm]
     """
     return math.sqrt(radius_mm**2 - LIMBUS_MM**2)
 
@@ -62,9 +64,10 @@ def profile_mm(angle_from_axis: Doubles) -> Doubles:
 
 
 def radial_distances_mm(points: Doubles, eye_axis: Doubles) -> tuple[Doubles, Doubles]:
-    """Return distances (...) from the ball's centre, first to points, then to the eyeball's surface [mm].
+    """Return how far points and the eyeball's surface are from the ball's centre [mm].
 
-    The distance to the surface is measured along the ray from the centre through each point.
+    The first array has the distance of each point, the second the distance of the surface along the ray from
+    the centre through that point.
 
     points : (..., 3) positions relative to the ball's centre [mm]
     eye_axis : (..., 3) unit vectors of the eyes' axes
@@ -116,8 +119,8 @@ def build_eyeball(quads_per_edge: int = QUADS_PER_EDGE, position_scale: float = 
     """Return the points (n, 3) [mm] and the quads (q, 4) of an eyeball that looks along +Z.
 
     quads_per_edge : number of quads along each edge of the cube that is projected to the ball
-    position_scale : factor of the positions; above 1 for control points, because a subdivision surface is
-        smaller than its control mesh
+    position_scale : factor by which the positions are multiplied; above 1 for a control mesh, because its
+        subdivision surface is smaller
     """
     points, quads = list[Doubles](), list[Index]()
     grid = np.tan(np.linspace(-np.pi / 4, np.pi / 4, quads_per_edge + 1))  # evenly spaced in angle

@@ -71,7 +71,7 @@ def hair_strands(head: Head, points_mm: NDArray[np.floating] | None = None) -> S
 
 
 def hair_cover(groom: Groom, mesh: Mesh) -> Doubles:
-    """Return the projected area of the hair rooted around each point of a mesh, per area of skin (p,) [-]."""
+    """Return the projected area of the hair rooted around each mesh point (p,), per area of skin [-]."""
     index = _growing_indices(groom, len(groom.roots))
     part = groom.parameters[groom.roots.part[index]]
     strand_number = index.astype(np.uint32) + part["seed"].astype(np.uint32) * np.uint32(131071)
@@ -84,9 +84,9 @@ def hair_cover(groom: Groom, mesh: Mesh) -> Doubles:
 
 
 def absorbed_by_hair(groom: Groom) -> float:
-    """Return the fraction of diffuse light that a hair absorbs: a mean over channels and parts of the groom.
+    """Return the mean fraction of diffuse light that a single hair absorbs [-].
 
-    The parts are scalp hair and beard.
+    The mean is over the colour channels, and over scalp hair and beard.
     """
     parts = groom.parameters
     chord = 0.5 * np.pi * (parts["radius_mm"] / parts["hairs_per_strand"])[:, None]
@@ -139,13 +139,13 @@ def _grow_chunk(
     frames: Doubles,
     middle_mm: Doubles,
 ) -> tuple[NDArray[np.float32], Doubles, Doubles, Doubles]:
-    """Return the knots, radii, absorption coefficients and covers of n strands, see `Strands`.
+    """Return the knots, radii, absorption coefficients and `cover` of n strands, as in `Strands`.
 
     guides : knots of the posed guides, and skin normals below the knots
     index : (n,) indices of the strands
     root_mm : (n, 3) positions of the roots [mm]
-    frames : (n, 3, 3) root frames of the strands
-    middle_mm : (n, 3) roots of the strands in the middle of the clumps [mm]
+    frames : (n, 3, 3) axes of the coordinate system at each root, as rows
+    middle_mm : (n, 3) root of the strand at the centre of each strand's clump [mm]
     """
     roots, seed = groom.roots, groom.parameters["seed"].astype(np.uint32) * np.uint32(131071)
     part = groom.parameters[roots.part[index]]
@@ -284,7 +284,7 @@ def _interpolate_guides(
 
 
 def _axes_across(curves: _Curves) -> tuple[Doubles, Doubles]:
-    """Return two unit vectors (n, k, 3) at each point, orthogonal to the curve and to each other."""
+    """Return two unit vectors (n, k, 3) at each point, orthogonal to the tangent and to each other."""
     side = np.cross(curves.tangent, curves.normal)
     upright = (side**2).sum(axis=-1, keepdims=True) < 0.08
     side = _unit(np.where(upright, np.cross(curves.tangent, _FALLBACK_AXIS), side))
@@ -292,7 +292,9 @@ def _axes_across(curves: _Curves) -> tuple[Doubles, Doubles]:
 
 
 def _rope_offsets(strand_number: Words, part: NDArray[np.void], length_mm: Doubles) -> Doubles:
-    """Return the offsets (2, n, k) of strands from the middle of their twisted or braided ropes [mm].
+    """Return the offsets (2, n, k) of strands from the centre line of their twist or braid [mm].
+
+    The first axis is for the two directions of `_axes_across`.
 
     strand_number : (n,) numbers that identify the strands, for `_random`
     part : (n,) parameters of the part of the groom to which each strand belongs
@@ -317,6 +319,8 @@ def _curl_offsets(
 ) -> Doubles:
     """Return the offsets (2, n, k) by which curls displace the points of strands [mm].
 
+    The first axis is for the two directions of `_axes_across`.
+
     strand_number, clump_number : (n,) numbers that identify the strands and their clumps, for `_random`
     part : (n,) parameters of the part of the groom to which each strand belongs
     length_mm : (n, k) lengths from the root along the strand [mm]
@@ -331,6 +335,8 @@ def _curl_offsets(
 
 def _frizz_offsets(strand_number: Words, part: NDArray[np.void], length_mm: Doubles) -> Doubles:
     """Return smooth random offsets (2, n, k) by which frizz displaces the points of strands [mm].
+
+    The first axis is for the two directions of `_axes_across`.
 
     strand_number : (n,) numbers that identify the strands, for `_random`
     part : (n,) parameters of the part of the groom to which each strand belongs

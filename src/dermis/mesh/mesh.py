@@ -120,12 +120,12 @@ class Mesh(ShortRepr):
 
     @property
     def dpdu(self) -> Floats:
-        """Return the face-averaged derivatives (v, 3) of the position with respect to u [mm]."""
+        """Return the derivatives (v, 3) of the position with respect to u at the vertices [mm]."""
         return self._tangents[0]
 
     @property
     def dpdv(self) -> Floats:
-        """Return the face-averaged derivatives (v, 3) of the position with respect to v [mm]."""
+        """Return the derivatives (v, 3) of the position with respect to v at the vertices [mm]."""
         return self._tangents[1]
 
     @cached_property

@@ -194,7 +194,7 @@ def _directions(direction_count: int) -> Floats:
 
 
 def _outline_candidates(positions: Floats, targets: MorphTargets, skeleton: Skeleton | None) -> Intp:
-    """Return the indices of points that may be outermost in some pose, to limit the search."""
+    """Return the indices of the points among which `find_outline_points` searches."""
     layers = min(_CANDIDATES_PER_DIRECTION, len(positions))
     found: list[Numbers] = [extreme_points(positions, _DIRECTION_COUNTS_OF_PASSES[-1])]
     for height in _project_on_directions(positions, _DIRECTION_COUNT):

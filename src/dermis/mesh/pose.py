@@ -131,9 +131,9 @@ class Pose(ShortRepr):
         )
 
     def _bones_with_target_rotations(self, rig: Rig) -> Mapping[str, ArrayLike]:
-        """Return the bones of the pose, with the rotations that active morph targets add to them.
+        """Return the bone rotations of the pose, with the rotations that active morph targets add to them.
 
-        Bones whose pose is a matrix are not changed.
+        Rotations that are given as matrices are returned unchanged.
         """
         rotations = [one for one in rig.bone_rotations if self.weights.get(one.target)]
         if not rotations:

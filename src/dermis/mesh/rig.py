@@ -33,7 +33,7 @@ _CACHE_VERSION = "outline 6"  # change it when the search returns other points
 
 
 class Motion(NamedTuple):
-    """State of a rig as arrays, which are uploaded to the device.
+    """Pose of a rig as arrays for the GPU.
 
     weights : (t,) weights of the targets, relative to the rest pose
     matrices : (b, 3, 4) bone matrices, which transform points at rest [mm]
@@ -97,8 +97,8 @@ class Rig(ShortRepr):
     bone_rotations : rotations of bones by morph targets
     rigid_followers : points that are not in the file, such as fitted eyeballs; they follow the file's points
     contact : lids that must stay outside the eyeballs; None if lids may intersect eyeballs
-    template : rig with corresponding points, targets and bones, whose outline points are reused together with
-        the extreme points of this rig; None to search for outline points
+    template : rig with corresponding points, targets and bones, whose outline points this rig reuses to avoid
+        a search for its own; None if there is no such rig
     """
 
     positions_mm: Floats
@@ -144,7 +144,7 @@ class Rig(ShortRepr):
         return rig_outline(self.positions_mm, self.targets, self.skeleton, self._outline_points)
 
     def outline_mm(self, motion: Motion) -> Floats:
-        """Return points (s, 3) that bound the head in a pose in every direction, to about a millimetre [mm].
+        """Return points (s, 3) whose convex hull contains the posed head, to about a millimetre [mm].
 
         If `motion` replaces the rest positions, the extreme points of the new positions are added.
         """
@@ -203,8 +203,8 @@ class Rig(ShortRepr):
     def _lid_edge_data(self) -> tuple[Intp, Doubles, RigOutline]:
         """Return the precomputed data for `lid_edges_mm`.
 
-        The data are the indices (n,) of the control points around the edges, their weights (e, n) in the e
-        points of the edges, and a `RigOutline` of these control points, which can be posed.
+        The data are the indices (n,) of the control points around the lid edges, the weights (e, n) of these
+        control points in each of the e returned points, and a `RigOutline` that poses the control points.
         """
         assert self.contact is not None
         edge = self.contact.edge.ravel().astype(np.intp)
@@ -247,7 +247,7 @@ class Rig(ShortRepr):
         return np.asarray(dense)
 
     def pose(self, weights: Doubles, matrices: Doubles | None = None) -> Doubles:
-        """Return all control points (p, 3) in a pose [mm], as a reference for the computation on the device.
+        """Return all control points (p, 3) in a pose, computed on the CPU [mm].
 
         weights : (t,) weights of the targets, relative to the rest pose
         matrices : (b, 3, 4) matrices of the bones, from `Skeleton.matrices`; None for the rest pose

@@ -40,7 +40,7 @@ def is_head_sized(positions: Floats) -> bool:
 
 
 def principal_sizes(positions: Floats) -> Doubles:
-    """Return the sizes (3,) of vertices (v, 3) along their principal axes, the main axis last."""
+    """Return the extents (3,) of a set of vertices (v, 3) along its principal axes, the longest axis last."""
     points = positions.astype(np.float64)
     return np.asarray(np.ptp(points @ np.linalg.eigh(np.cov(points.T)).eigenvectors, axis=0))
 
@@ -71,10 +71,10 @@ def is_standing_figure(positions: Floats, triangles: Ints) -> bool:
 
 
 def skull_below(positions: NDArray[np.floating], crown_height: float) -> Point:
-    """Return the centre of a skull below its crown [mm].
+    """Return the centre of the skull of a head whose crown is at a given height [mm].
 
-    positions : (v, 3) vertices of a head [mm]
-    crown_height : height of the crown [mm]
+    positions : (v, 3) vertices of the head, Y up [mm]
+    crown_height : y coordinate of the crown [mm]
     """
     x, y, z = positions.T
     skull = y > crown_height - 2 * _CROWN_TO_CENTRE_MM
@@ -85,8 +85,8 @@ def skull_below(positions: NDArray[np.floating], crown_height: float) -> Point:
 def body_skull(positions: Floats, triangles: Ints, eyes: Floats) -> Point | None:
     """Return the centre of the skull of a body: at the level of its eyes, or at the top of a standing figure.
 
-    The result is None for a mesh without eyes that is not a standing figure, and for a mesh smaller than a
-    body.
+    The result is None for a mesh without eyes that is not a standing figure, and for a mesh that is too small
+    to be a body.
 
     positions : (v, 3) vertices, Y up [mm]
     triangles : (f, 3) vertex indices

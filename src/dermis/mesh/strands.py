@@ -112,8 +112,8 @@ def quad_weights(bilinear_position: NDArray[np.floating]) -> Doubles:
 def cover_of_points(mesh: Mesh, roots: Roots, area_mm2: Doubles) -> Doubles:
     """Return the projected area of the strands rooted around each point of a mesh, per area of skin (p,) [-].
 
-    The projected area is half the area of a strand seen from the side, because hair is inclined. All of it is
-    assigned to the skin at the root.
+    Because hair is inclined, half the area of a strand seen from the side counts as its projected area. The
+    whole projected area counts as cover of the skin at the root.
 
     area_mm2 : (n,) area of each strand seen from the side [mm2]
     """
@@ -151,7 +151,9 @@ def _root_positions(mesh: Mesh, roots: Roots, points_mm: NDArray[np.floating]) -
 
 
 def interpolate_quads(bilinear_position: NDArray[np.floating], corner_values: Doubles) -> Doubles:
-    """Interpolate quantities bilinearly from the corners of quads to one point in each quad, (c, n).
+    """Interpolate quantities bilinearly from the corners of quads to one point in each quad.
+
+    Returns an array (c, n) of c quantities at n points.
 
     bilinear_position : (n, 2) bilinear coordinates of the points, see `Roots`
     corner_values : (c, 4, n) values of c quantities at the corners of n quads

@@ -38,11 +38,11 @@ class SubdividedMesh(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Refinement:
-    """Subdivision for all meshes with the same triangles: p control points become q points with v vertices.
+    """Subdivision that applies to all meshes with the same triangles, whatever their positions.
 
-    weights : (q, p) weights of the control points in each finer point
+    weights : (q, p) weights of the p control points in each of the q points of the finer mesh
     stencils : the same weights in the format of a rig
-    uv, point : (v, 2) uv and (v,) point of each vertex of the finer mesh
+    uv, point : (v, 2) uv and (v,) point index of each vertex of the finer mesh
     triangles, material, quads : arrays of the finer mesh, see `Mesh`
     """
 
@@ -55,7 +55,10 @@ class Refinement:
     quads: Ints
 
     def mesh(self, coarse: Mesh) -> Mesh:
-        """Return a mesh, which must have the triangles of this refinement, after subdivision."""
+        """Return a subdivided mesh.
+
+        coarse : mesh before subdivision, with the triangles for which this refinement was computed
+        """
         positions = (self.weights @ coarse.points_mm)[self.point]
         topology = {"point": self.point, "quads": self.quads}
         return build_mesh(positions, self.uv, self.triangles, self.material, coarse.materials, **topology)
@@ -96,9 +99,9 @@ def subdivide(mesh: Mesh, levels: int) -> SubdividedMesh:
     """Return a mesh subdivided `levels` times, with smoothed positions and linearly interpolated uv.
 
     A mesh that has more quads than triangles is subdivided by the rules of Catmull and Clark, and its points
-    are moved to the limit surface. Other meshes are subdivided by the rules of Loop. Positions depend on
-    points and not on vertices, so that uv seams neither crack nor crease; open borders are smoothed as
-    curves. Normals and tangents are computed from the subdivided mesh; normals of the file are dropped.
+    are moved to the limit surface. Other meshes are subdivided by the rules of Loop. Vertices at the same
+    point stay together, so that the surface has no cracks or creases at uv seams. Open borders are smoothed
+    as curves. Normals are computed from the subdivided mesh; normals of the file are dropped.
 
     levels : 0 to 3, each of which multiplies the number of triangles by four
     """
@@ -174,9 +177,10 @@ def _compute_refinement(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
 
 
 def polygons(mesh: Mesh) -> tuple[Index, Index, Ints]:
-    """Return a mesh as f polygons: all corner vertices (n,), the numbers of corners (f,), the materials (f,).
+    """Return the triangles and quads of a mesh as f polygons.
 
-    Triangles that belong to no quad come first, then quads.
+    The arrays are the vertices (n,) at the corners of all polygons, and the number (f,) of corners and the
+    material (f,) of each polygon. Triangles that belong to no quad come first, then quads.
     """
     first, second = mesh.quads.T
     loose = np.delete(np.arange(len(mesh.triangles)), mesh.quads.ravel())
@@ -187,12 +191,13 @@ def polygons(mesh: Mesh) -> tuple[Index, Index, Ints]:
 
 
 def coarse_triangles(head: Head, min_faces: int, tolerance_mm: float) -> Ints:
-    """Return triangles (t, 3) for a subdivided head, with fewer levels of subdivision in flat regions.
+    """Return triangles (t, 3) of a subdivided head, with fewer levels of subdivision in flat regions.
 
-    The indices refer to the vertices of the subdivided mesh. Triangles with an opacity map are left out.
+    The triangles are indices of vertices of the subdivided mesh. Triangles with an opacity map are left out.
 
-    min_faces : least number of faces that the mesh has at the coarsest level used
-    tolerance_mm : largest distance between a vertex that is dropped and the coarse edge that replaces it
+    min_faces : coarser levels are used only if the mesh has at least this number of faces at these levels
+    tolerance_mm : largest distance between a dropped vertex and the middle of the coarse edge that replaces
+        it [mm]
     """
     mesh, levels = head.mesh, head.levels
     by_quads = len(mesh.quads) > 0
@@ -210,11 +215,12 @@ def coarse_triangles(head: Head, min_faces: int, tolerance_mm: float) -> Ints:
 
 
 def _coarsen_triangles(triangles: Ints, positions_mm: Floats, levels: int, tolerance_mm: float) -> Ints:
-    """Return triangles of a mesh after Loop subdivision, but of a coarser level in flat regions.
+    """Return triangles (t, 3) of a mesh after Loop subdivision, with fewer levels in flat regions.
 
-    Loop's rules divide a triangle into four, the first three of which are at its corners.
-
-    levels : number of levels to leave out in flat regions
+    triangles : (f, 3) triangles of the finest level; Loop's rules divide a triangle into four, of which the
+        first three are at its corners
+    levels : number of subdivision levels to leave out in flat regions
+    tolerance_mm : largest deviation of a region that counts as flat [mm]
     """
     coarse, finer = triangles, triangles
     for _ in range(levels):
@@ -226,11 +232,12 @@ def _coarsen_triangles(triangles: Ints, positions_mm: Floats, levels: int, toler
 
 
 def _coarsen_quads(quads: Corners, positions_mm: Floats, levels: int, tolerance_mm: float) -> Ints:
-    """Return triangles of a mesh after Catmull-Clark subdivision, but of a coarser level in flat regions.
+    """Return triangles (t, 3) of a mesh after Catmull-Clark subdivision, with fewer levels in flat regions.
 
-    The rules divide a polygon into quads, one from each corner to its centre.
-
-    levels : number of levels to leave out in flat regions
+    quads : (q, 4) quads of the finest level; the rules divide a polygon into quads, one from each corner to
+        its centre
+    levels : number of subdivision levels to leave out in flat regions
+    tolerance_mm : largest deviation of a region that counts as flat [mm]
     """
     coarse = quads
     for _ in range(levels - 1):

@@ -1,6 +1,6 @@
 """Eyebrow hairs: random roots and shapes, and strands traced over the skin around the eyes.
 
-Positions along and across a brow are defined in the front plane, the (x, y) plane of the mean person.
+Positions along and across a brow are defined on the mean person as seen from the front, in the xy plane.
 """
 
 from __future__ import annotations
@@ -32,8 +32,7 @@ class SurfacePoints(NamedTuple):
     """Sampled skin points with their normals and tangents.
 
     position_mm, normal : (n, 3) positions [mm] and unit normals
-    derivative_x, derivative_y : (n, 3) derivatives of the position with respect to x and y of the front plane
-        [-]
+    derivative_x, derivative_y : (n, 3) derivatives of the position with respect to x and to y [-]
     """
 
     position_mm: Doubles
@@ -42,9 +41,9 @@ class SurfacePoints(NamedTuple):
     derivative_y: Doubles
 
     def front_plane_step(self, directions: Doubles, length: Doubles) -> tuple[Doubles, Doubles]:
-        """Convert steps along the skin to steps (dx, dy) in the front plane, each (n,) [mm].
+        """Return the changes (n,) of x and (n,) of y by steps along the skin [mm].
 
-        directions : (n, 3) directions of the steps; only their tangential components count
+        directions : (n, 3) directions of the steps, whose components along the normal are ignored
         length : (n,) length of each step along the skin [mm]
         """
         u, v = self.derivative_x, self.derivative_y
@@ -73,12 +72,11 @@ def _grid_axes() -> tuple[Doubles, Doubles]:
 
 
 class BrowSurface:
-    """Skin around the brows of a person as a height field, which hairs follow as they grow.
+    """Skin around the brows of a person, sampled on a grid; brow hairs follow this surface as they grow.
 
-    The 2 n nodes are those of the left brow, followed by the mirrored nodes of the right brow.
-
-    node_mm : (2 n, 3) nodes of `grid_points`, projected onto the skin [mm]
-    normal : (2 n, 3) unit normals of the skin at the nodes
+    node_mm : (2 n, 3) skin points in front of the n nodes of `grid_points`, and then in front of the mirrored
+        nodes of the right brow [mm]
+    normal : (2 n, 3) unit normals of the skin at these points
     """
 
     def __init__(self, node_mm: Doubles, normal: Doubles) -> None:
@@ -90,10 +88,10 @@ class BrowSurface:
         self._node = np.concatenate([node_mm, normal, *slopes, plane], axis=1)
 
     def sample(self, side: Doubles, x: Doubles, y: Doubles) -> SurfacePoints:
-        """Return the skin at n points of the front plane; points outside the grid are moved to its border.
+        """Return the n skin points with given x and y; positions outside the grid are moved to its border.
 
         side : (n,) 1 for the left brow, -1 for the right brow
-        x, y : (n,) coordinates in the front plane, x outwards from the middle of the face [mm]
+        x, y : (n,) distance from the middle of the face outwards, and height [mm]
         """
         grid = (np.stack([x, y]) - np.array(_GRID_LOW)[:, None]) / _GRID_CELL_MM
         grid = np.clip(grid, 0.0, self._last[:, None] - 1e-9)
@@ -110,11 +108,11 @@ class BrowSurface:
 
 
 def sample_positions(rng: np.random.Generator) -> tuple[Doubles, Doubles, Doubles, Doubles]:
-    """Return random root positions of n brow hairs as four arrays u, v, x and y (n,).
+    """Return random root positions of n brow hairs as four arrays (n,): u, v, x and y.
 
     The position along the brow, u, runs from 0 at the inner end to 1 at the outer end. The position across
-    the brow, v, is -1 at the lower edge and 1 at the upper edge. The coordinates x and y are those of the
-    left brow in the front plane [mm].
+    the brow, v, is -1 at the lower edge and 1 at the upper edge. The coordinates x and y [mm] are for the
+    left brow of the mean person, seen from the front.
     """
     u = rng.random(4 * _MAX_HAIRS)
     accepted = rng.random(len(u)) < np.interp(
@@ -137,7 +135,7 @@ def sample_positions(rng: np.random.Generator) -> tuple[Doubles, Doubles, Double
 
 
 def brow_outline(across: float) -> Doubles:
-    """Return a polyline (k, 2) along the left brow in the front plane, from its inner to its outer end [mm].
+    """Return a polyline (k, 2) along the left brow from its inner to its outer end, seen from the front [mm].
 
     across : -1 for the lower edge of the brow, 0 for its centreline, 1 for the upper edge
     """
@@ -159,9 +157,8 @@ def sample_shapes(u: Doubles, v: Doubles, rng: np.random.Generator, look: HairLo
     """Return random shape parameters (5, n) of brow hairs.
 
     The five rows are: the angle of the hair at its root [rad], the change of this angle from root to tip
-    [rad], the length of the hair [mm], its height above the skin [mm], and its radius at the root [mm]. The
-    angle is measured in the front plane; it is 0 for a hair that points outwards and pi / 2 for a hair that
-    points up.
+    [rad], the length of the hair [mm], its height above the skin [mm], and its radius at the root [mm]. Seen
+    from the front, the angle is 0 for a hair that points outwards and pi / 2 for a hair that points up.
 
     u, v : (n,) positions along and across the brow, from `sample_positions`
     """
@@ -192,7 +189,7 @@ def grow_brow_hairs(
 
     root_mm : (n, 3) positions of the roots on the skin [mm]
     side : (n,) 1 for hairs of the left brow, -1 for the right
-    front_mm : (2, n) x and y of the roots in the front plane, from `sample_positions` [mm]
+    front_mm : (2, n) x and y of the roots, from `sample_positions` [mm]
     shape : (5, n) shape parameters from `sample_shapes`
     """
     (x, y), (first_angle, bend, length, rise, radius) = front_mm, shape

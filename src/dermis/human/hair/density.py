@@ -35,9 +35,9 @@ _MIN_BEARD_AMOUNT = 0.02  # zone amount above which quads may have a beard
 class HairDensity(NamedTuple):
     """Relative density of scalp hair or beard over the skin.
 
-    relative : function from points (n, 4) to their relative density (n,), 0 to 1; the columns of the points
-        are a position on the average person and the distance inside the border of the lips [mm]
-    candidates : (p,) mask of the control points near hair; no hair grows on quads without such a point
+    relative : function that returns the relative density (n,), 0 to 1, at n skin points; its argument is an
+        array (n, 4) with the columns of `average_points`
+    candidates : (p,) mask of the control points near hair; quads without any such corner are skipped
     """
 
     relative: Callable[[Doubles], Doubles]
@@ -93,9 +93,9 @@ def hairline_waves(points: Doubles) -> Doubles:
 
 
 def recession_effect(amount_name: str, recession: float, points: Doubles) -> Doubles:
-    """Return how much a receding hairline changes an amount, such as hair density, at points, (n,).
+    """Return the change (n,) of an amount, such as hair density, at points by a receding hairline.
 
-    amount_name : one of `ZONE_AMOUNTS`
+    amount_name : one of `ZONE_AMOUNTS`, such as "hair"
     recession : recession of the hairline, 0 to 1, see `SkinLook`
     points : (n, 3 or more) positions on the average person [mm]
     """
@@ -146,7 +146,7 @@ def _beard_amount(points: Doubles) -> Doubles:
 
 
 def smoothstep(low: float, high: float, x: Doubles) -> Doubles:
-    """Return a smooth Hermite transition of x from 0 at `low` to 1 at `high`."""
+    """Return a smooth cubic transition of x from 0 at `low` to 1 at `high`, constant outside."""
     t = np.clip((x - low) / (high - low), 0.0, 1.0)
     return np.asarray(t * t * (3.0 - 2.0 * t))
 
@@ -163,10 +163,10 @@ def quad_areas_cm2(control_mesh: Mesh, quad: Index) -> Doubles:
 
 
 def _sum_zones(amount_name: str, zone_rows: Floats, points: Doubles) -> Doubles:
-    """Return an amount, such as hair density, at points, (n,): a sum of Gaussians, one for each zone.
+    """Return an amount (n,), such as hair density, at points, as a sum of one Gaussian for each face zone.
 
-    amount_name : one of `ZONE_AMOUNTS`
-    zone_rows : (k, 24) zones of the face, from `zone_table`
+    amount_name : one of `ZONE_AMOUNTS`, such as "hair"
+    zone_rows : (k, 24) parameters of the zones, from `zone_table`
     points : (n, 3 or more) positions on the average person [mm]
     """
     column, total = _amount_column(amount_name), np.zeros(len(points))
@@ -179,10 +179,7 @@ def _sum_zones(amount_name: str, zone_rows: Floats, points: Doubles) -> Doubles:
 
 @cache
 def skin_vertices_near_hair(root_finder: RootFinder) -> Index:
-    """Return the indices of the vertices of the subdivided mesh that brow hairs may touch.
-
-    A `SkinSurface` for brow hairs needs only these vertices.
-    """
+    """Return the indices of the vertices of the subdivided mesh that brow hairs may touch."""
     from scipy.spatial import cKDTree
 
     brow_points = quad_corners(root_finder.mesh, root_finder.brow_grid_roots.quad)

@@ -58,7 +58,7 @@ def add_hair(
 def _grow_brows(
     surface: GrowthSurface, root_finder: RootFinder, look: HairLook, rngs: list[np.random.Generator]
 ) -> Iterator[HairGroup]:
-    """Yield the hairs of the left and then of the right brow, which are computed in one batch for speed."""
+    """Yield the hairs of the left brow and then those of the right brow."""
     roots, parameters = [], []
     for side, rng in zip(SIDE_SIGNS, rngs, strict=True):
         u, v, x, y = brows.sample_positions(rng)
@@ -77,7 +77,7 @@ def _grow_brows(
 def _grow_lashes(
     surface: GrowthSurface, root_finder: RootFinder, eyes: Doubles, rngs: list[np.random.Generator]
 ) -> Iterator[HairGroup]:
-    """Yield the upper and lower lashes of the left, then of the right eye, computed in one batch for speed.
+    """Yield the upper lashes and the lower lashes of the left eye, then those of the right eye.
 
     eyes : (2, 3) centres of the left and the right eye [mm]
     """

@@ -61,7 +61,7 @@ class Growth(NamedTuple):
 
 
 def smoothstep(low: float, high: float, x: Doubles) -> Doubles:
-    """Return a smooth Hermite transition of x from 0 at `low` to 1 at `high`; `low` may exceed `high`."""
+    """Return a smooth transition of x from 0 at `low` to 1 at `high`; `low` may exceed `high`."""
     t = np.clip((x - low) / (high - low), 0.0, 1.0)
     return np.asarray(t * t * (3.0 - 2.0 * t))
 
@@ -128,7 +128,7 @@ def _uncombed_directions(points: Doubles, style: Style) -> Doubles:
 
 
 def _rope_directions(points: Doubles, style: Style) -> Doubles:
-    """Return the directions (n, 3) of hair in twisted ropes, which fall to all sides of the head."""
+    """Return the directions (n, 3) of hair in twists or braids, which hang down on all sides of the head."""
     away = points - np.array([0.0, 100.0, -70.0])
     return np.asarray(away * [1.0, 0.6, 0.9])
 
@@ -194,7 +194,7 @@ def body_surface(root_finder: RootFinder, ears: bool = True) -> SkinSurface:
 
 
 def _quadratic_terms(points: Doubles) -> Doubles:
-    """Return the terms (n, 6) of a quadratic function of y and z around the middle of the ear."""
+    """Return the monomials (n, 6) up to degree 2 in y and z, measured from the middle of the ear."""
     y, z = points[:, 1:].T - _EAR_CENTRE_MM[1:, None]
     return np.stack([np.ones(len(y)), y, z, y * y, z * z, y * z], axis=1)
 

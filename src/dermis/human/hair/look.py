@@ -130,8 +130,7 @@ def typical_hair(demographics: Demographics, eumelanin: float, pheomelanin: floa
 def sample_hair(rng: np.random.Generator, demographics: Demographics, typical: HairLook) -> HairLook:
     """Return a random hair look around the typical hair look of a person.
 
-    The probabilities of the styles are artist's values from styles.toml. Only men have beards. The order of
-    random draws does not depend on the person.
+    The probabilities of the styles are chosen, not measured; they are in styles.toml. Only men have beards.
     """
     n, style_chance, beard_chance = rng.normal(size=4), rng.random(), rng.random()
     man = demographics.sex > 0.5
@@ -153,9 +152,9 @@ def sample_hair(rng: np.random.Generator, demographics: Demographics, typical: H
 
 
 def _pick_style(chance: float, is_man: bool, is_tightly_coiled: bool) -> str:
-    """Return the hair style that a uniformly distributed number selects by the probabilities of the styles.
+    """Return the name of a random hair style, with the probabilities in styles.toml.
 
-    chance : uniformly distributed number, 0 to 1
+    chance : uniformly distributed random number, 0 to 1, which selects the style
     is_man : whether the person is a man
     is_tightly_coiled : whether the hair is tightly coiled
     """

@@ -30,7 +30,7 @@ _HALF_QUAD_CORNERS = np.array([[0, 1, 2], [2, 3, 0]])  # corners of the two tria
 
 
 class _FrontTriangles(NamedTuple):
-    """Front-facing triangles with a grid in the front plane that accelerates point queries.
+    """Front-facing triangles around the brows, with an xy grid that speeds up the search for a triangle.
 
     triangle_lists : (columns, rows, m) indices of the triangles that overlap each grid cell, padded with -1
     quad, half : (t,) index of the quad of each triangle, and 0 or 1 for the first or second half of the quad
@@ -48,8 +48,8 @@ class _LidEdge(NamedTuple):
 
     lengths_mm : (m,) arc length from the first point to each point [mm]
     quad : (m - 1,) index of the adjacent quad of each segment
-    frame : (m - 1, 4, 2) corners of this quad in its bilinear coordinates, 0 or 1: first the start and end of
-        the segment, then the corners opposite to start and end
+    frame : (m - 1, 4, 2) bilinear coordinates, 0 or 1, of the four corners of this quad: the start of the
+        segment, its end, and the corners opposite to its start and to its end
     """
 
     lengths_mm: Doubles
@@ -58,7 +58,7 @@ class _LidEdge(NamedTuple):
 
 
 class RootFinder:
-    """Finder of hair roots on a quad mesh, from a position in the front plane or along the edge of a lid.
+    """Search for hair roots on a quad mesh, by x and y seen from the front or by a position on a lid's edge.
 
     mesh : control mesh
     points_mm : (p, 3) positions of the control points [mm]
@@ -72,11 +72,11 @@ class RootFinder:
         self._lid_edges: dict[tuple[tuple[int, ...], float], _LidEdge] = {}
 
     def front_roots(self, x: Doubles, y: Doubles) -> tuple[Roots, NDArray[np.bool_]]:
-        """Return the roots at n positions in the front plane, and a mask (n,) of the valid roots.
+        """Return the roots at n positions seen from the front, and a mask (n,) of the valid roots.
 
-        Each root is on the foremost triangle at its position. A root is invalid where there is no triangle.
+        Each root is on the foremost triangle at its x and y. A root is invalid where there is no triangle.
 
-        x, y : (n,) coordinates in the front plane [mm]
+        x, y : (n,) coordinates of the roots [mm]
         """
         front = self._front
         cell = np.floor((np.column_stack([x, y]) - _GRID_LOW) / _GRID_CELL_MM).astype(np.int64)
@@ -108,12 +108,15 @@ class RootFinder:
 
     @cached_property
     def mean_mesh(self) -> Mesh:
-        """Return the control mesh after one level of subdivision; its first points are the control points."""
+        """Return the mesh of the mean person after one level of subdivision.
+
+        Its first points correspond to the control points.
+        """
         return subdivide(self.mesh, 1)[0]
 
     @cached_property
     def brow_grid_roots(self) -> Roots:
-        """Return roots at the nodes of `grid_points`, first of the left and then of the right brow."""
+        """Return roots at the nodes of `grid_points`, which cover the left brow, then at the mirrored nodes."""
         x, y = grid_points()
         return self.front_roots(
             np.concatenate([side * x for side in SIDE_SIGNS]), np.tile(y, len(SIDE_SIGNS))

@@ -62,7 +62,7 @@ class RootFrames:
 
     @cached_property
     def frame_vectors(self) -> Floats:
-        """Return the frame axes as an array (axis, xyz, n), root index last for vectorised operations."""
+        """Return the coordinate frames as an array (3, 3, n): axis, component of the axis, root."""
         return np.ascontiguousarray(self.frame.transpose(1, 2, 0), np.float32)
 
 
@@ -87,7 +87,7 @@ class GrowthSurface:
         return self._columns.T
 
     def root_frames(self, roots: Roots) -> RootFrames:
-        """Convert roots on control quads to roots on the subdivided mesh, with positions and frames."""
+        """Convert roots on quads of the control mesh to roots on the subdivided mesh, with frames."""
         finer = refine_roots(self.control_mesh, roots, self._levels)
         return RootFrames(finer, *root_frames(self._mesh, finer, self.points_mm))
 

@@ -126,10 +126,10 @@ def _build_style_arrays(style: Style, root_finder: RootFinder) -> Arrays:
 
 
 def _agreeing_weights(weight: Doubles, guide: NDArray[np.int64], knots: Doubles) -> Doubles:
-    """Reduce the weights of guides that are far from a strand's main guide; return the weights (n, 4).
+    """Return weights (n, 4) in which guides far from a strand's main guide count less.
 
-    The main guide of a strand is the guide with the largest weight. Without this, a strand between guides on
-    opposite sides of the head would pass through the head.
+    The main guide of a strand is the guide with the largest weight. The reduction prevents that a strand
+    between guides on opposite sides of the head passes through the head.
 
     weight, guide : (n, 4) original weights of the guides, and their indices
     knots : (g, k, 3) knots of all guides [mm]
@@ -142,7 +142,7 @@ def _agreeing_weights(weight: Doubles, guide: NDArray[np.int64], knots: Doubles)
 
 
 def _root_places(weight: Doubles, corners: Doubles) -> Doubles:
-    """Return the place of each root on the head, (n, 4), as defined by `StrandRoots.place`.
+    """Return `StrandRoots.place` (n, 4): the angle, height, thinning and nape-to-top position of each root.
 
     weight : (n, 4) weights of the corners of the quad on which each strand is rooted
     corners : (n, 4, 4) rows of `average_points` at these corners
@@ -158,10 +158,11 @@ def _root_places(weight: Doubles, corners: Doubles) -> Doubles:
 def _clump_middles(
     root_mm: Doubles, half_mm: Doubles, style: Style, rng: np.random.Generator
 ) -> NDArray[np.int64]:
-    """Return for each strand the index (n,) of the strand in the middle of its clump.
+    """Return for each strand the index (n,) of the strand at the centre of its clump.
 
-    In cornrows, this is the strand nearest to the point beside it on the centreline of the row. In other
-    styles, some random strands are chosen as middles, and each strand joins the clump of the nearest one.
+    In cornrows, the root of each strand is moved sideways to the centreline of its row, and the strand
+    nearest to there is the centre. In other styles, random strands are centres, and each strand joins the
+    clump of the nearest centre.
 
     root_mm : (n, 3) roots on the mean person [mm]
     half_mm : (n, 3) points of the strands at half the length of their guides [mm]

@@ -82,7 +82,7 @@ def label_fields() -> Doubles:
 def dense_fields() -> tuple[Doubles, Doubles]:
     """Return points (n, 3) on the average human's outer skin, and their label fields (k, n) [mm].
 
-    The fields are the signed distances of `label_fields`, interpolated on a subdivided mesh.
+    Points and fields are those of a subdivided mesh, with the signed distances of `label_fields`.
     """
     head = AVERAGE_HUMAN.head(subdivide=_DENSE_SUBDIVISION_LEVELS)
     assert head.control.stencils is not None
@@ -145,7 +145,7 @@ def _ear_field() -> Doubles:
 def _brow_field(points: Doubles) -> Doubles:
     """Return the signed distance (p,) of points (p, 3) to the brow outlines, positive inside [mm].
 
-    It is measured in the front plane, as the smallest of the signed distances to four edges of the brow.
+    It is the smallest of the signed distances to the four edges of the brow, measured in x and y only.
     """
     x, y = np.abs(points[:, 0]), points[:, 1]
     low, high = (brows.brow_outline(side) for side in (-1.0, 1.0))
@@ -207,10 +207,10 @@ def _material_class(material: Material) -> str:
 
 
 def _iris_fields(head: Head) -> dict[str, Doubles]:
-    """Return for each iris class the signed distances (p,) of the head's points to the border of the iris.
+    """Return the signed distances (p,) of the head's points to the border of each iris [mm].
 
-    Distances are positive inside the iris, in mm of an eye of average size. Points outside the eyeball get a
-    large negative value.
+    The keys are the label classes of the two irises. Distances are positive inside the iris, and scaled as if
+    the eye had average size. Points outside the eyeball get a large negative value.
     """
     if head.eyes is None:
         return {}
@@ -229,9 +229,10 @@ def _iris_fields(head: Head) -> dict[str, Doubles]:
 
 
 def _skin_fields(head: Head) -> dict[str, Doubles]:
-    """Return for each class of skin parts the signed distances (p,) of the head's points to its border [mm].
+    """Return the signed distances (p,) of the head's points to the borders of parts of the skin [mm].
 
-    Points that are not on the skin get a large negative value.
+    The keys are the label classes of these parts, such as lips, brows and ears. Points that are not on the
+    skin get a large negative value.
     """
     mesh = head.mesh
     count = int(mesh.point.max()) + 1

@@ -138,10 +138,12 @@ def _resize_map(picture: Floats, map_shape: tuple[int, int]) -> Floats:
 
 
 def gaussian_mean(points: Doubles, point_values: Doubles, sigma_mm: float) -> Doubles:
-    """Blur values on a surface with a Gaussian in 3D, which ignores seams of the uv layout; return (n, c).
+    """Return values (n, c) at points of a surface, blurred with a Gaussian in 3D.
 
-    points : (n, 3) positions of the samples [mm]
-    point_values : (n, c) values of the samples
+    Distances in space are used, so that seams of the uv layout have no effect.
+
+    points : (n, 3) positions of the points [mm]
+    point_values : (n, c) values at the points
     sigma_mm : standard deviation of the Gaussian [mm]
     """
     from scipy.ndimage import gaussian_filter, map_coordinates

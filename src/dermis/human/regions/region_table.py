@@ -113,7 +113,7 @@ def classify_regions(points: Doubles, on_lips: Mask, on_ears: Mask) -> NDArray[n
 
 
 def _brow_mask(x: Doubles, y: Doubles) -> Mask:
-    """Return a mask (n,) of points inside the brows, from their coordinates in the front plane [mm]."""
+    """Return a mask (n,) of points inside the brows, from their x and y on the average person [mm]."""
     middle = 20.5 - ((x - 33) / 10) ** 2 * 1.2
     inside = np.abs(y - middle) < 5.5 - 0.06 * np.maximum(x - 20, 0)
     return np.asarray(inside & (x > 9) & (x < 55))

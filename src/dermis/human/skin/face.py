@@ -91,10 +91,10 @@ def zone_table(recession: float = 0.0, sites: SiteDifferences | None = None) -> 
 
 @cache
 def _site_amounts() -> NDArray[np.float64]:
-    """Return the amounts (k, 7) that k overlapping zones need for a change of pigment at only one site.
+    """Return amounts (k, 7) of k overlapping zones that change a pigment at only one site of the face.
 
-    Each column is for one of seven sites: first the cheek, then `FACE_SITES`. With its amounts, the sum of
-    all zones is 1 at this site and 0 at the other six.
+    Each column is for one of seven sites: first the cheek, then `FACE_SITES`. If the zones have the amounts
+    in a column, their sum is 1 at this site and 0 at the other six.
     """
     zones, names = read_rows(__package__, "zones"), (_REFERENCE_SITE, *FACE_SITES)
     places = {row["site"]: row for row in read_rows(__package__, "sites")}
@@ -156,10 +156,7 @@ def fold_curves() -> Folds:
 
 @cache
 def table_sizes() -> dict[str, int]:
-    """Return the number of zones, folds, fold knots and hairline samples, for use as shader constants.
-
-    The sizes are found without computing splines, because that would import SciPy, which is slow.
-    """
+    """Return the number of zones, folds, fold knots and hairline samples, for use as shader constants."""
     lengths = Counter(row["fold"] for row in read_rows(__package__, "folds")).values()
     knots = sum(map(_spline_sample_count, lengths))
     return {

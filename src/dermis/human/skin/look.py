@@ -210,8 +210,6 @@ def sample_skin(
 ) -> SkinLook:
     """Return a random skin look of a person; pigments and site differences are distributed as measured.
 
-    The order of random draws does not depend on the person.
-
     Source: [Lu2025] for the pigments.
     """
     pigments, sites = sample_pigments(pigment_rng, *_pigment_arguments(demographics))

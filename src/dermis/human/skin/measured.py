@@ -132,11 +132,9 @@ class SiteDifferences:
 class _Group(NamedTuple):
     """Distribution of the pigments in one group of people.
 
-    The four variables are those of `MeasuredTable`.
-
-    quantiles : (4, k) quantiles of the four variables
-    ita : (k,) quantiles of the ITA [degrees]
-    correlation : (5, 5) correlation of the normal scores of the four variables and of the ITA
+    quantiles : (4, k) quantiles of the four variables of the cheek that `MeasuredTable` lists
+    ita : (k,) quantiles of the individual typology angle (ITA) [degrees]
+    correlation : (5, 5) correlation of the normal scores of these four variables and of the ITA
     sites : (12, 3) differences between each site and the cheek: melanin [doublings], blood [doublings] and
         oxygen [-]
     """
@@ -185,7 +183,7 @@ class MeasuredTable(NamedTuple):
     def cheek_variables(
         self, weights: Weights, sex: ArrayLike, age: ArrayLike, normal_scores: Doubles
     ) -> Doubles:
-        """Return the four variables (n, 4) of n people from a mixture of groups.
+        """Return the variables (n, 4) that describe the cheeks of n people, in the order of `MeasuredTable`.
 
         weights : weight of each group in the mixture
         sex, age : (n,) sex and age of each person, or one number for all
@@ -206,7 +204,7 @@ class MeasuredTable(NamedTuple):
         The differences are in melanin [doublings], blood [doublings] and oxygen [-].
 
         weights : weight of each group in the mixture
-        cheek_variables : (n, 4) variables of the cheek
+        cheek_variables : (n, 4) result of the method `cheek_variables`
         normal_samples : (n, 12, 2) independent samples of the standard normal distribution, zeros for typical
             people
         """
@@ -225,13 +223,16 @@ class MeasuredTable(NamedTuple):
 
 @cache
 def measured_table() -> MeasuredTable:
-    """Return the package's table of measured people."""
+    """Return the distributions of the pigments of measured people, read from the package's file."""
     text = resources.files("dermis.human").joinpath("data", "measured.json").read_text("utf-8")
     return parse_table(json.loads(text))
 
 
 def parse_table(document: Mapping[str, Any]) -> MeasuredTable:
-    """Return the table of measured people from its JSON object."""
+    """Return the distributions of the pigments of measured people from a JSON object.
+
+    document : content of measured.json
+    """
     groups = {
         name: _Group(*(np.array(one[field], np.float64) for field in _Group._fields))
         for name, one in document["groups"].items()
@@ -283,7 +284,7 @@ def pigment_ancestry(weights: Weights) -> tuple[float, float, float]:
 def group_probabilities(ita: float) -> dict[str, float]:
     """Return a dictionary from group to the probability that a person with an ITA belongs to the group.
 
-    All groups are taken as equally common.
+    The groups are assumed to be equally common.
 
     ita : individual typology angle [degrees]
     """
@@ -312,8 +313,6 @@ def sample_pigments(
     rng: np.random.Generator, weights: Weights, sex: float, age: float, ita: float | None = None
 ) -> tuple[MeasuredPigments, SiteDifferences]:
     """Return random pigments and site differences of a person; pigments are correlated as measured.
-
-    The number of random draws does not depend on the arguments.
 
     weights : weight of each measured group
     """
@@ -453,7 +452,9 @@ class MeasuredCell(NamedTuple):
 
 @cache
 def measured_cells() -> tuple[MeasuredCell, ...]:
-    """Return the medians of measured skin for each group and site, in total and for each sex and age group.
+    """Return the medians of measured skin for each group of people and each site.
+
+    There is one entry for all people of a group, and one for each sex and age group.
 
     Source: [Lu2025].
     """

@@ -1,4 +1,4 @@
-"""Skin maps that the device paints from a skin look, and mean colours of face and lips."""
+"""Skin maps that the GPU paints from a skin look, and mean colours of face and lips."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def painted_colour_tables(look: SkinLook) -> NDArray[np.float32]:
 
 @dataclass(frozen=True, repr=False)
 class PaintedMaps(Maps):
-    """Skin maps that the device paints from a skin look; a map that is not None replaces the painted map.
+    """Skin maps that the GPU paints from a skin look; a map that is not None replaces the painted map.
 
     look : pigments and texture of the skin
     """

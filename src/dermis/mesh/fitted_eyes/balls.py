@@ -56,7 +56,7 @@ class _EyePiece:
 
     @property
     def fault(self) -> str:
-        """Return why this component is not an eyeball, such as "is a ball of ..."; empty for an eyeball."""
+        """Return the reason why this component is not an eyeball; an empty string if it is one."""
         (low, high), (_, radius, deviation) = RADIUS_RANGE_MM, self.sphere
         if len(self.points) < _MIN_EYEBALL_POINTS:
             return f"has only {len(self.points)} points"
@@ -73,8 +73,8 @@ class _EyePiece:
 def find_eyeballs(mesh: Mesh) -> tuple[tuple[DetectedEyeball, DetectedEyeball] | None, str]:
     """Find the left and the right eyeball of a mesh.
 
-    Returns both eyeballs and an empty text, or None and the reason why there are not two. The reason is empty
-    if the file declares no eyes.
+    Returns both eyeballs and an empty string, or None and the reason why two eyeballs were not found. The
+    reason is an empty string if the file declares no eyes.
     """
     eye_triangles = np.flatnonzero(np.array([material.eye for material in mesh.materials])[mesh.material])
     if not len(eye_triangles):
@@ -146,8 +146,10 @@ def _add_gaze(
 class Sphere(NamedTuple):
     """Sphere fitted to points.
 
-    centre, radius : (3,) centre and radius of the sphere [mm]
-    deviation : distance from the sphere within which 85 % of the surface lies, divided by the radius [-]
+    centre : (3,) centre [mm]
+    radius : radius [mm]
+    deviation : distance from the sphere within which 85 % of the fitted surface lies, divided by the radius
+        of the sphere [-]
     """
 
     centre: Doubles

@@ -38,10 +38,10 @@ _INWARD_GAZE_ANGLE_RADIANS = np.radians(2.5)
 class _EyeShape(NamedTuple):
     """Shape of a fitted eye.
 
-    The size of cornea and iris hardly differs between adults: a ball larger than an adult's keeps a cornea of
-    adult size, and an eye smaller than an adult's is scaled as a whole.
+    Cornea and iris have nearly the same size in all adults. A ball larger than an adult's therefore keeps a
+    cornea of adult size. In an eye smaller than an adult's, ball and cornea are scaled by the same factor.
 
-    axis : (3,) unit vector from the centre to the cornea
+    axis : (3,) unit vector from the centre of the ball to the cornea
     radius_mm, centre_offset_mm : radius and offset of the ball before scaling, see `Eyes` [mm]
     scale : size of the eye relative to an adult's, at most 1 [-]
     """

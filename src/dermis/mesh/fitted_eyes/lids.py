@@ -44,14 +44,17 @@ class Lids:
 
     @cached_property
     def ball_front(self) -> Doubles:
-        """Return how far in front of its centre the ball is hit by each ray, (n,) [mm]; 0 for a miss."""
+        """Return the depth (n,) at which each ray hits the ball [mm]; 0 for a ray that misses it.
+
+        Depth is measured from the ball's centre forwards, in the direction in which the eye looks.
+        """
         return np.asarray(np.sqrt(np.maximum(self.ball.radius**2 - (self.ray_positions**2).sum(axis=1), 0.0)))
 
     @cached_property
     def obstacle_front(self) -> Doubles:
-        """Return how far in front of the ball's centre each ray first meets lids or other skin, (n,) [mm].
+        """Return the depth (n,) at which each ray first hits the lids or other skin [mm].
 
-        The distance is -inf for rays that meet no skin.
+        Depth is measured as in `ball_front`, and is -inf for a ray that hits no skin.
         """
         corners = self.corners[self.corners[:, :, 2].max(axis=1) > 0]
         triangle, ray = self._candidate_pairs(corners)
