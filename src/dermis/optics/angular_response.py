@@ -25,7 +25,7 @@ def interpolate_table(column_at: Callable[[float], Floats], table_position: floa
 
     The positions of the table's columns are the multiples of 1 / INTERPOLATION_STEPS from 0 to 1.
 
-    column_at : function from such a position to the column, an array; it should cache its results
+    column_at : function that returns the column, an array, at such a position; it should cache its results
     table_position : position between 0 and 1; values outside this range are clamped
     """
     scaled = min(max(table_position, 0.0), 1.0) * INTERPOLATION_STEPS
@@ -42,7 +42,7 @@ def interpolate_columns(column_at: Callable[[float], Floats], table_positions: A
 
     The columns are stacked along the last axis of the result.
 
-    column_at : function from a position to the column there, see `interpolate_table`
+    column_at : function that returns the column at a position, see `interpolate_table`
     table_positions : (c,) positions between 0 and 1
     """
     values = np.atleast_1d(np.asarray(table_positions, np.float64)).tolist()

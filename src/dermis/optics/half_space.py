@@ -115,7 +115,7 @@ def _table_position(table: _PhotonTable, albedo: ArrayLike) -> Floats:
 
 
 def _root_absorption(albedo: ArrayLike) -> Floats:
-    """Return sqrt(1 - albedo); as functions of it, totals and profiles are smooth up to an albedo of 1."""
+    """Return sqrt(1 - albedo), on which reflectances and profiles depend smoothly up to an albedo of 1."""
     return np.sqrt(np.maximum(1.0 - np.asarray(albedo, np.float64), 0.0))
 
 

@@ -56,7 +56,7 @@ def load_profile(
         Preset ("gpu-gems-3", "dj3", "spectral" ...), or a file: .csv, or .toml as written by
         ``dermis profile``.
     pigments : Mapping of str to float, optional
-        For a skin made of pigments, values that replace fields of its `SkinParameters`.
+        For a skin that is defined by its pigments, values that replace fields of its `SkinParameters`.
     initial : GaussianSum, optional
         Fit of a similar skin, as start of the new fit, which is then several times faster.
 
@@ -138,7 +138,7 @@ def _file_state(path: Path) -> tuple[int, ...]:
 def write_profile(path: Path, profile: GaussianSum, metadata: Mapping[str, Any]) -> None:
     """Write a sum of Gaussians to a .toml file atomically.
 
-    metadata : dictionary from key to value of further entries: text, numbers, and lists of these
+    metadata : further entries of the file, as a dictionary from key to text, number, or list of these
 
     Raises DermisError when the file cannot be written.
     """
@@ -172,8 +172,8 @@ def fit_profile(
 ) -> GaussianSum:
     """Fit six Gaussians to the diffusion profile of a tissue, computed by the tissue's default model.
 
-    Fits to photon counts keep the total reflectance. Such profiles are steeper at the centre than those of
-    diffusion models, so a fit without this constraint would lose up to 2 % of the light.
+    The fit keeps the total reflectance if the profile comes from photon counts. Such profiles are so steep at
+    the centre that a fit without this constraint would lose up to 2 % of the light.
 
     similar_fit : fit of a similar tissue, as start of the new fit, which is then several times faster
 

@@ -64,7 +64,7 @@ def phase_matrices(albedo: float, g: float, cosine: Floats, polynomial_count: in
     albedo : reduced albedo [-]
     g : mean cosine of the scattering angle, at least 0 and less than 1 [-]
     cosine : (m,) cosines of the directions from the normal
-    polynomial_count : number of polynomials; scattering by the rest of the series is treated as no scattering
+    polynomial_count : number of polynomials; light scattered by further terms is treated as unscattered
 
     Sources: [HenyeyGreenstein1941]; [Wiscombe1977] for the truncated forward peak.
     """
@@ -134,7 +134,9 @@ def solve_doubled_slabs(
     direction_nodes: int = DIRECTION_NODES,
     g: float = 0.0,
 ) -> Slabs:
-    """Solve slabs, and slabs of twice, four times ... their depth; as fast as for the thickest ones alone.
+    """Return the reflection and transmission of slabs, and of slabs that are 2, 4, 8 ... times as thick.
+
+    The time is about that of `solve_slabs` for the thickest slabs alone.
 
     albedo, eta, direction_nodes, g : as in `solve_slabs`
     smallest_depth : (n,) optical depths of similar size [-]
@@ -254,7 +256,7 @@ def _direction_quadrature(eta: float, direction_nodes: int) -> tuple[Floats, Flo
 def _doubling_steps(
     transport: _Transport, tau: Floats, doubling_count: int
 ) -> Iterator[tuple[Floats, Floats, Floats]]:
-    """Yield reflection, transmission and unscattered light of slabs, and again each time they are doubled.
+    """Yield reflection, transmission and unscattered light of slabs, then those of slabs twice as thick, etc.
 
     Reflection and transmission (n, m, m) are pi times the radiance for unit power from each direction. The
     unscattered light (n, m) is the fraction that crosses the slab without scattering.

@@ -1,4 +1,4 @@
-"""Separate process in which Blender's Python runs a script."""
+"""Running scripts with Blender's Python, in a separate process."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ _INSTALL_HINT = (
 
 
 class BlenderTask(NamedTuple):
-    """Purpose of a run of Blender, in words for error messages.
+    """Words that describe a run of Blender in error messages.
 
     renderer : name of the renderer, such as "Cycles"
-    goal : purpose as an infinitive, such as "to render the head"
-    advice : what the user can do when the run fails
+    goal : purpose of the run, such as "to render the head"
+    advice : sentence on what the user can do when the run fails
     """
 
     renderer: str

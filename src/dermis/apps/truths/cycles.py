@@ -56,7 +56,7 @@ class CyclesPass:
     image : (h, w, 3) radiance, linear Rec. 709
     coverage : (h, w) fraction of each pixel that the head covers
     samples : paths per pixel
-    seconds : elapsed time; for the first pass including the construction of the scene [s]
+    seconds : elapsed time; that of the first pass includes the construction of the scene [s]
     core_seconds : CPU time, summed over all cores [s]
     version : version of Blender
     """
@@ -179,7 +179,7 @@ def read_passes(folder: Path, samples: Sequence[int], picture_size: tuple[int, i
 
 @dataclass(frozen=True)
 class BeckmannSurface:
-    """Skin with surface reflection alone, by Beckmann facets with an index of refraction of 1.4.
+    """Skin that only reflects light at its surface, by Beckmann facets with an index of refraction of 1.4.
 
     Light that enters the skin is absorbed. The head's normal map is applied.
 
@@ -214,9 +214,9 @@ CYCLES_METHOD_NAMES = {"random-walk": "RANDOM_WALK", "burley": "BURLEY"}
 def describe_scene(
     scene: Scene, medium: SkinMaterial, subsurface_method: str, picture_size: tuple[int, int]
 ) -> tuple[SceneDict, dict[str, NumericArray]]:
-    """Return the contents of the files scene.json and arrays.npz for Cycles, apart from the list of passes.
+    """Return the contents of the files scene.json and arrays.npz, from which Cycles renders the scene.
 
-    The second result is a dictionary from name to array.
+    The first result lacks the list of passes. The second result is a dictionary from name to array.
 
     picture_size : width and height of the picture [pixel]
     """

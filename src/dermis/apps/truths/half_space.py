@@ -18,8 +18,9 @@ def h_function(cosine: ArrayLike, albedo: float) -> Floats:
     cosine : cosines of angles to the normal, an array of any shape
     albedo : single-scattering albedo, below 1 [-]
 
-    Source: [Chandrasekhar1960] section 38: the form of the integral equation in which no digits cancel,
-    solved by iteration at Gaussian nodes.
+    The integral equation is solved by iteration at Gaussian nodes.
+
+    Source: [Chandrasekhar1960] section 38, in the form of the equation that avoids cancellation of digits.
     """
     if not 0.0 <= albedo < 1.0:
         refuse("half-space", "an albedo from 0 to below 1", f"got {albedo:g}", "Correct it")

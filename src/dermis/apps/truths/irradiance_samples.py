@@ -39,7 +39,7 @@ IrradianceFunction = Callable[[MeshPoints], Floats]
 
 @dataclass(frozen=True)
 class IrradianceSamples:
-    """Irradiance on a surface of small triangles, interpolated linearly on each triangle.
+    """Irradiance on a surface that is divided into small triangles, linear on each triangle.
 
     positions : (n, 3) sample positions [mm]
     triangles : (m, 3) sample indices of the corners; the triangles cover the surface without overlaps
@@ -60,12 +60,13 @@ def sample_irradiance(
 ) -> IrradianceSamples:
     """Return irradiance samples at the corners of small triangles that subdivide the skin of a mesh.
 
-    light : function of `MeshPoints` that returns irradiance (n, 3); called for new points only
-    spacing_mm : longest side of a small triangle [mm]
-    min_spacing_mm : lower limit of the side lengths where sides of high contrast are halved further; None for
-        no further halving [mm]
-    contrast_threshold : contrast above which a side is halved further: the difference of the irradiance at
-        its ends, relative to the largest irradiance [-]
+    Sides longer than `spacing_mm` are halved. Then sides of high contrast are halved further. The contrast of
+    a side is the difference between the irradiances at its ends, relative to the largest irradiance.
+
+    light : function that returns the irradiance (n, 3) at `MeshPoints`; called once for each point
+    spacing_mm : greatest side length of the small triangles [mm]
+    min_spacing_mm : smallest side length that the further halving may yield; None for no further halving [mm]
+    contrast_threshold : contrast above which a side is halved further [-]
 
     Source: [JensenBuhler2002] for sampling the irradiance on the surface.
     """

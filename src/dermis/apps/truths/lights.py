@@ -173,7 +173,7 @@ def cycles_rectangle(light: RectangleLight) -> SceneDict:
 
 
 def cycles_directional(light: DirectionalLight) -> SceneDict:
-    """Return Cycles' sun with the angular diameter of a directional light."""
+    """Return Cycles' description of a directional light: a sun lamp with the same angular diameter."""
     angle = float(np.radians(light.angle_degrees))
     return cycles_light("SUN", light.irradiance, 1.0, (0, 0, 0), light.direction, angle=angle)
 

@@ -43,7 +43,7 @@ _REPORTED_FOLDED_FRACTION = 1e-3  # folded fraction of a surface above which a n
 
 @dataclass(frozen=True)
 class Lambertian:
-    """Lambertian skin without scattering or interreflection, to be used in place of a medium.
+    """Lambertian skin without subsurface scattering or interreflection, to be used in place of a medium.
 
     albedo : diffuse reflectance, linear Rec. 709 [-]
     """

@@ -75,18 +75,18 @@ def path_trace(
     """Return the path-traced image of a scene with a medium inside its skin.
 
     Maps, diffusion profile and surface reflection of the scene are ignored. Light passes the surface without
-    refraction, so that paths can connect to point lights from inside the medium. Such images are comparable
-    with the real-time renderer's if its profile has eta 1. Lights are invisible and cast no shadows on one
-    another.
+    refraction, so that paths can connect to point lights from inside the medium. The image is comparable with
+    an image of the real-time renderer if the renderer's diffusion profile has an index of refraction of 1.
+    Lights are invisible and cast no shadows on one another.
 
     medium : index-matched (eta 1), isotropically scattering medium with three channels; the interfaces
-        between its layers are copies of the skin, offset inwards by the depths of the layers. Or a
-        `Lambertian`, for directly lit skin without scattering
+        between its layers are copies of the skin, offset inwards by the depths of the layers. A
+        `Lambertian` gives directly lit skin without subsurface scattering
     samples : smallest number of paths per pixel; each pass traces 4. Passes are cached on disk under a hash
         of the scene, so a later call with more samples only adds the missing passes
     settings : settings of the frame, of which only the size is used
     variant : variant of Mitsuba; "llvm_ad_rgb" takes half the time for many samples but needs a recent LLVM
-        (14 and 15 end the process), and "cuda_ad_rgb" needs an NVIDIA GPU
+        (versions 14 and 15 crash), and "cuda_ad_rgb" needs an NVIDIA GPU
     use_cache : whether to read and write passes on disk; without the cache, `PathTraced.seconds` is the
         duration of this call
     progress : function called with the number of finished passes and the number of all passes
@@ -126,8 +126,8 @@ def render_passes(
     """Return the mean of at least `min_pass_count` passes of Mitsuba, including cached ones.
 
     cache_key : name of the cached passes; None for no cache
-    build_radiance : function that builds the Mitsuba scene that renders radiance, and returns notes with it
-    build_coverage : function that builds the Mitsuba scene whose image is the skin's coverage of each pixel
+    build_radiance : function that returns the Mitsuba scene for radiance, and notes on changes to the head
+    build_coverage : function that returns the Mitsuba scene whose image is the skin's coverage of each pixel
     """
     passes = load_passes(cache_key, picture_size) if cache_key else None
     if passes is None or passes.count < min_pass_count:
@@ -150,7 +150,7 @@ def render_passes(
 
 
 def pass_count(samples: int) -> int:
-    """Return the number of passes that have at least `samples` paths per pixel in total.
+    """Return the number of passes needed for at least `samples` paths per pixel in total.
 
     Raises DermisError when `samples` is below 1 or too large.
     """
@@ -218,7 +218,7 @@ class PassStatistics:
     def empty(
         cls, picture_size: tuple[int, int], mask: NDArray[np.floating], notes: tuple[str, ...]
     ) -> PassStatistics:
-        """Return statistics from before the first pass.
+        """Return the statistics of a rendering before its first pass.
 
         picture_size : width and height of the image [pixel]
         """

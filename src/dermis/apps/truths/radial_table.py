@@ -83,14 +83,15 @@ Profile = GaussianSum | RadialTable
 class ProfileTable(NamedTuple):
     """Diffusion profile R(r) in rows evenly spaced in the square root of r, with bounds of its derivatives.
 
-    Each bound holds for this and all larger radii and for all channels, relative to the channel's energy.
+    Each bound holds at the radius of its row and at all larger radii, for the profile of each channel divided
+    by the channel's energy.
 
     rows_per_root : number of rows per unit of the square root of the radius [mm^(-1/2)]
     R : (rows, 3) profile, 0 in the last row [mm^-2]
     slope : (rows,) upper bound of |dR/dr| [mm^-3]
     curvature : (rows,) upper bound of half the second derivative in any direction [mm^-4]
-    error_density : (rows,) share of the permitted error per area at this radius; it decreases with the
-        radius, and its integral over the plane is 1 [mm^-2]
+    error_density : (rows,) fraction of the total permitted error that a unit of area at the row's radius may
+        cause; it decreases with the radius, and its integral over the plane is 1 [mm^-2]
     """
 
     rows_per_root: float
@@ -101,10 +102,10 @@ class ProfileTable(NamedTuple):
 
 
 def tabulate_profile(profile: Profile) -> ProfileTable:
-    """Return the table of a profile, with the permitted error distributed over the radii.
+    """Return the table of a profile, with bounds of its derivatives and the permitted error at each radius.
 
-    The permitted error is mainly proportional to the square root of the curvature, which keeps the number
-    of surface patches small.
+    The permitted error is mainly proportional to the square root of the curvature. This keeps the number of
+    surface patches small for which the surface integral evaluates the profile.
     """
     end = profile.end_mm
     root = np.linspace(0.0, np.sqrt(end), TABLE_ROWS)
@@ -151,7 +152,7 @@ def _error_density(curvature: Floats, radius_mm: Floats) -> Floats:
 
 
 def _plane_integral(radial_values: Floats, radius_mm: Floats) -> Floats:
-    """Return the integrals (k,) of k radial functions f over the plane, of 2 pi r f(r) over r.
+    """Return the integrals (k,) of k radial functions f(r) over the plane: of 2 pi r f(r) over r.
 
     radial_values : (rows, k) values of k functions at the radii
     radius_mm : (rows,) radii r [mm]

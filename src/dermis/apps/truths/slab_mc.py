@@ -34,7 +34,7 @@ _REPORTED_UNFINISHED_FRACTION = 1e-3  # fraction of dropped photons from which o
 
 
 def default_ring_edges() -> Floats:
-    """Return the default radii of ring edges: 0, then 0.001 mm, then each 12 % larger, up to 40 mm [mm]."""
+    """Return the default radii of ring edges: 0, and a geometric series from 0.001 mm to 40 mm [mm]."""
     return np.concatenate([[0.0], np.geomspace(1e-3, 40.0, 93)])
 
 
@@ -298,18 +298,19 @@ class ScatteringLayer:
 
 @dataclass(frozen=True, eq=False)
 class SlabResult:
-    """Reflected, transmitted and absorbed fractions of the beam's power; `_se` marks standard errors [-].
+    """Reflected, transmitted and absorbed fractions of the beam's power, each with its standard error [-].
 
-    The specular, total, unscattered, absorbed and unfinished fractions sum to 1. The standard errors are
-    those of a binomial distribution, and 0 where no photon was counted.
+    The specular, total, unscattered, absorbed and unfinished fractions sum to 1. Names that end in `_se` are
+    standard errors. They are those of a binomial distribution, and 0 where no photon was counted.
 
     photons : number of photons traced, all of which entered the stack
     edges_mm : (n + 1,) radii of the ring edges, from 0 [mm]
     specular : fraction that the top face reflects
     reflectance, transmittance : (n,) R(r) and T(r) of scattered light, averaged over each ring [1/mm2]
-    total_reflectance, total_transmittance : fractions that scatter and leave above and below, at any radius
-    overflow_reflectance, overflow_transmittance : parts of these totals that leave beyond the last ring
-    unscattered_reflectance, unscattered_transmittance : fractions that leave above and below on the axis,
+    total_reflectance, total_transmittance : fractions that leave through the top and the bottom after
+        scattering, at any radius
+    overflow_reflectance, overflow_transmittance : the part of each total that leaves outside all rings
+    unscattered_reflectance, unscattered_transmittance : fractions that leave through the top and the bottom
         without scattering
     absorbed : (layers,) fraction absorbed in each layer
     unfinished : fraction dropped after `MAX_PHOTON_EVENTS` events; above 0 only where almost nothing absorbs

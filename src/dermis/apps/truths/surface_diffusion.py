@@ -109,9 +109,9 @@ def max_edge_mm(variances_mm2: ArrayLike) -> float:
 
 
 def patch_margin_mm(variances_mm2: ArrayLike) -> float:
-    """Return by how much a patch must extend beyond the ball where blurred light is valid [mm].
+    """Return how far a surface patch must extend beyond the ball in which its blurred values are valid [mm].
 
-    It is four standard deviations of the widest blur.
+    This margin is four standard deviations of the widest blur.
 
     variances_mm2 : (k,) increasing variances of the blurs [mm2]
     """

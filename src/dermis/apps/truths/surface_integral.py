@@ -27,14 +27,14 @@ def integrate_exitance(
 ) -> Floats:
     """Return the radiant exitance (n, 3) at points x: the integral of R(|x - y|) E(y) dA over the surface.
 
-    points : (n, 3) positions x on the surface [mm]
-    samples : irradiance E, linear on small triangles; the caller chooses them small enough for the light
-    profile : profile R, a function of the Euclidean distance, so light also passes through thin parts
-    relative_error : expected root mean square error of the integral divided by its mean, 1e-5 to 0.05 [-]
-
     Irradiance is gathered from an octree. A node or triangle is replaced by three points if the remainder of
-    Taylor's theorem is small enough; otherwise it is divided. Most of these errors cancel, so the limit of
-    the remainder is derived from `relative_error` by a measured relation.
+    Taylor's theorem is below a limit, and is divided otherwise. Most of these errors cancel in the sum, so
+    the limit is derived from `relative_error` by a measured relation.
+
+    points : (n, 3) positions x on the surface [mm]
+    samples : irradiance E, linear on triangles that must be small enough for shadows and other details
+    profile : profile R, a function of the Euclidean distance, so light also passes through ears and nostrils
+    relative_error : expected root mean square error of the integral divided by its mean, 1e-5 to 0.05 [-]
 
     Source: [JensenBuhler2002], but with Taylor's remainder as criterion in place of the solid angle.
     """

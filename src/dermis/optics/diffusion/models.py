@@ -54,7 +54,7 @@ def diffusion_profile(
 
     medium : stack of layers
     model : "dipole" and "better-dipole" require one half-space; the other models accept any stack
-    clamp : depth of the multipole's source in thin layers, "none" or "layer", see `Slab`
+    clamp : whether the multipole's source is kept inside thin layers ("layer") or not ("none"), see `Slab`
     rgb_weights : (3, c) weights that convert wavelengths to linear Rec. 709; the result then has three
         channels and is per incident power. By default, the result has the medium's channels and is per power
         that enters
@@ -175,7 +175,7 @@ def _first_event_albedo(medium: Medium) -> Floats:
 
 
 def _result_warnings(total_reflectance: Floats, ring_energy: Floats) -> Sequence[str]:
-    """Return warnings about negative reflectances, and about rings that do not sum to the total."""
+    """Return warnings about negative reflectances, and about ring energies that do not sum to the total."""
     warnings = missing_light_warnings(total_reflectance, ring_energy)
     if (total_reflectance < 0.0).any():
         warnings.append(f"a total reflectance is negative: {np.round(total_reflectance, 4).tolist()}")
@@ -278,7 +278,7 @@ def measured_model_error(model_name: str, tissue_name: str = "") -> ModelError |
 
 
 def error_against_photons(model_profile: RadialProfile, photon_profile: RadialProfile) -> ModelError:
-    """Return the error of a profile's ring energies relative to photon counts of the same tissue."""
+    """Return the error of a model's ring energies, relative to a Monte Carlo profile of the same tissue."""
     squares = ((model_profile.ring_energy - photon_profile.ring_energy) ** 2).sum(axis=0)
     error = np.sqrt(squares / (photon_profile.ring_energy**2).sum(axis=0))
     return ModelError(error, error, (model_profile.name,))

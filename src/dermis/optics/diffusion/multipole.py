@@ -21,8 +21,8 @@ class Slab:
 
     layer : absorption, scattering and thickness; the thickness may be infinite
     A_top, A_bottom : boundary mismatch of the upper and the lower face; 1 at index-matched faces [-]
-    clamp : "none" for a source one mean free path deep as published, which may be below the slab; "layer" for
-        a source at this depth, but not below the slab
+    clamp : "none" for a source at a depth of one mean free path, as published, even if this is below the
+        slab; "layer" for a source at this depth, but at most at the lower face
 
     Source: [DonnerJensen2005] section 3.1; boundaries after [Contini1997].
     """
@@ -177,7 +177,7 @@ def stack_response(frequency: ArrayLike, medium: Medium, A: float, clamp: Clamp 
     """Return the response of the stack of all layers of a medium, at frequencies s [1/mm].
 
     A : boundary mismatch with air, above and below; internal interfaces are index-matched [-]
-    clamp : depth of the source in thin layers, "none" or "layer", see `Slab`
+    clamp : whether sources are kept inside thin layers ("layer") or not ("none"), see `Slab`
     """
     slabs = layer_slabs(medium, A, clamp)
     stack = _single_slab_response(frequency, slabs[-1])

@@ -95,7 +95,7 @@ class BurleyFit:
 
 
 def fit_burley(target: RingTarget) -> BurleyFit:
-    """Fit Burley's profile to ring energies with the smallest error, without changing any channel's total."""
+    """Fit Burley's profile to ring energies, without changing the total reflectance of any channel."""
     shape = np.array([_fit_shape(target.channel(i)) for i in range(len(target.total))])
     profile = BurleyProfile(target.total, shape)
     return BurleyFit(

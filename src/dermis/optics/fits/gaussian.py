@@ -149,10 +149,10 @@ def _log_variance_bounds(target: FitTarget) -> tuple[float, float]:
 
 
 def _with_energy_equation(target: FitTarget) -> tuple[DesignFunction, Floats]:
-    """Return the least-squares equations of a target, plus one: the weights sum to the total reflectance.
+    """Return the least-squares equations of a target, with an equation for the total reflectance added.
 
-    The results are the design function and the right-hand sides. The added equation has so large a weight
-    that it holds almost exactly.
+    The results are the design function and the right-hand sides. The added equation demands that the weights
+    sum to the total reflectance. It has so large a weight that it holds almost exactly.
     """
     width = target.mean_radius_at([0.5]) ** 2 / 2.0
     stiffness = _ENERGY_EQUATION_WEIGHT * float(np.linalg.norm(target.design_and_derivatives(width)[0]))
@@ -199,9 +199,9 @@ def _combine_fits(fits: list[tuple[Floats, Floats]], profile_name: str) -> Gauss
 
 
 def single_gaussian(profile: GaussianSum) -> GaussianSum:
-    """Fit one Gaussian to a profile by least squares over the plane, without changing any channel's total.
+    """Fit one Gaussian to a profile by least squares over the plane; keep the total reflectance.
 
-    The result reproduces early skin shading, which blurred light maps once [Borshukov2003; Green2004].
+    Early skin shading blurred light maps by a single Gaussian [Borshukov2003; Green2004].
     """
     from scipy.optimize import minimize_scalar
 

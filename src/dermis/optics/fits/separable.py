@@ -26,7 +26,7 @@ class SeparableKernel:
     """Kernel A a(x) a(y), where a(x) is a sum of w exp(-x^2 / 2v) / sqrt(2 pi v); not radially symmetric.
 
     albedo : (c,) total reflectance A [-]
-    variance_mm2 : (k, c) variances v, increasing with k [mm2]
+    variance_mm2 : (k, c) variances v of the k Gaussians, in increasing order [mm2]
     weight : (k, c) weights w, which sum to 1 in each channel [-]
 
     Source: [Jimenez2015].
@@ -60,7 +60,7 @@ class SeparableKernel:
 class SeparableFit:
     """Separable kernel with its errors relative to a diffusion profile.
 
-    kernel : fitted or evaluated kernel
+    kernel : the separable kernel
     error : (c,) relative root-mean-square error of the light through sectors of rings [-]
     energy_error : (c,) relative error of the total reflectance [-]
     """
@@ -88,7 +88,7 @@ def evaluate_kernel(kernel: SeparableKernel, target: RingTarget) -> SeparableFit
 
 
 def fit_separable(target: RingTarget) -> SeparableFit:
-    """Fit a separable kernel of two Gaussians to ring energies, without changing any channel's total.
+    """Fit a separable kernel of two Gaussians to ring energies, without changing the total reflectance.
 
     Source: [Jimenez2015], the artist-friendly model.
     """

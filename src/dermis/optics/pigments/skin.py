@@ -40,7 +40,7 @@ def spectral_medium(
     wavelength_nm: Floats = WAVELENGTHS_NM,
     scattering: ScatteringLaw = donner_jensen_2006,
 ) -> Medium:
-    """Return the medium of a skin made of pigments, with one channel for each wavelength.
+    """Return the medium of a skin with given pigments, with one channel for each wavelength.
 
     structure : "dj2006" is an epidermis on a semi-infinite dermis; "donner2008" has blood in both epidermis
         and dermis, and a thin melanin sheet between them; "biospec" has a stratum corneum, an epidermis and

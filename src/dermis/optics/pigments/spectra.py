@@ -83,7 +83,7 @@ def _weighted_colour_matching() -> Floats:
 
 
 def _primaries_xyz() -> Floats:
-    """Return a matrix (3, 3) with the XYZ colours of the Rec. 709 primaries as columns, at luminance 1."""
+    """Return a matrix (3, 3) with the XYZ colours of the Rec. 709 primaries as columns, each with Y = 1."""
     x, y = _PRIMARIES_XY.T
     return np.array([x / y, np.ones(3), (1.0 - x - y) / y])
 

@@ -70,7 +70,7 @@ def candidate_suns(camera_direction: Floats) -> Floats:
 
 
 def neighbouring_suns(sun_directions: Floats) -> Floats:
-    """Return candidates (n, 3) for a finer search: the given directions and two rings around each of them.
+    """Return candidate suns (n, 3) for a finer search: each given sun and two rings of suns around it.
 
     sun_directions : (k, 3) unit vectors towards suns
     """
@@ -172,7 +172,7 @@ class InitialGuess:
         return selected
 
     def _squared_residual(self, log_skin: Floats, sun_indices: list[int]) -> float:
-        """Return the squared residual for a skin and a set of suns, with the best light strengths.
+        """Return the squared residual for a skin and a set of suns, minimised over the light strengths.
 
         The rendered diffuse radiance is scaled to the colour of the skin, and the rendered specular radiance
         to its specular strength.
@@ -343,7 +343,7 @@ def note_residual(photo_source: object, residual: float) -> None:
 def _find_skin(frames: FaceRenderer, photo: Photograph) -> FitPoint:
     """Set the renderer's mask to the pixels of lit skin; return the point where the coarse search starts.
 
-    This point has the median skin of the priors, and all candidate suns.
+    This point has the median skin parameters of the prior, and all candidate suns.
     """
     camera = frames.scene.camera
     view_direction = np.subtract(camera.position, camera.target)
@@ -374,7 +374,7 @@ def _initial_points(problem: FitProblem, candidate: FitPoint, sun_count: int) ->
 
 
 def _checked_white(white_point: WhitePoint) -> Floats:
-    """Return the light's colour (3,) as the user gives it, scaled to green 1; (1, 1, 1) for "specular".
+    """Return the light's colour (3,) that the user gives, scaled to green 1; for "specular", (1, 1, 1).
 
     Raises DermisError for any other value.
     """

@@ -49,7 +49,7 @@ class FaceRenderer:
     def find_mask(self, point: FitPoint, unclipped_pixels: Floats) -> None:
         """Set the mask (h, w) to the pixels of skin that are neither clipped nor seen at grazing angles.
 
-        point : unknowns of the fit, of which the skin is used
+        point : unknowns of the fit, of which only the skin parameters are used
         unclipped_pixels : (h, w) fraction of each pixel of the photograph in which no channel is clipped
         """
         scene = with_skin(self._with_lights(()), point)

@@ -114,7 +114,7 @@ class FitSubject:
     """Head in a photograph, with its camera, as a scene without light.
 
     scene : head, camera, pose and surface
-    person : parametric person with painted skin; None for other heads
+    person : parametric person whose skin maps are painted from pigments; None for other heads
     table : table [head] of the scene file in which the result is saved; empty if the head has neither a name
         nor a file, and the result therefore cannot be saved
     known : names of the pigments that the scene states; the values of all other pigments are assumed
@@ -160,7 +160,7 @@ def _as_camera(camera_source: object, head: Head) -> Camera | Callable[[Head], C
 
 
 def _painted_person(head: Head) -> Human | None:
-    """Return the person whose shape and painted skin a head has, or None if there is no such person."""
+    """Return the parametric person from which a head and its skin maps were made, or None for other heads."""
     maps = head.maps
     if not isinstance(maps, PaintedMaps) or maps.colour is not None or not is_person_name(head.name):
         return None
@@ -171,10 +171,10 @@ def _painted_person(head: Head) -> Human | None:
 
 
 def _without_light(scene: Scene) -> Scene:
-    """Return the scene without light, with the pigments that a fit keeps fixed.
+    """Return the scene without lights, with values for the pigments that a fit keeps fixed.
 
-    Each of these pigments has the value that the scene states. If the scene states none, it has the value of
-    the painted person, or else a default.
+    The value of each of these pigments is the value that the scene states. If the scene states none, it is
+    the value from which the head's maps were painted, or else a default.
     """
     fixed_pigments = {name: getattr(DEFAULT_SKIN, name) for name in ("epidermis_mm", "eumelanin", "oxygen")}
     if isinstance(scene.head.maps, PaintedMaps):

@@ -158,7 +158,7 @@ def _landmark_derivative(
 
 
 def _prior_log_focal(photo_size: tuple[int, int]) -> float:
-    """Return the mean of the prior: the logarithm of the focal length of a usual portrait, in pixels.
+    """Return the logarithm of the focal length in pixels of a usual portrait: the mean of the prior.
 
     photo_size : width and height of the photograph [pixel]
     """

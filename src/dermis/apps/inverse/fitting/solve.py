@@ -63,7 +63,8 @@ class FitProblem:
     """Photograph to fit, with its noise, and the renderer of the face.
 
     frames : renderer of the face
-    target : (p, 3) values of the photograph's masked pixels, divided by exposure and given light colour
+    target : (p, 3) values of the photograph's masked pixels, divided by the exposure and by the light colour
+        that the user gives
     noise : relative standard deviation of a pixel [-]
     free_white : whether the colour of the light is an unknown
     robust : number of standard deviations beyond which residuals have less weight
@@ -217,7 +218,7 @@ def _normal_equations(problem: FitProblem, fit_state: FitState, derivatives: Flo
 def _eliminate_lights(fit_state: FitState, J: Floats) -> tuple[Floats, Floats]:
     """Return derivatives (3 p, u) orthogonal to changes of light strengths, and weighted residuals (3 p,).
 
-    A sun of strength 0 is left out of the light strengths, because it cannot decrease.
+    The strength of a sun is kept fixed if it is 0, because it cannot decrease further.
 
     J : (3 p, u) derivatives of the radiance, multiplied by the weights
     """
@@ -240,9 +241,9 @@ _MIN_NOTABLE_CORRELATION = 0.95
 class Uncertainty:
     """Uncertainty of a fit's unknowns.
 
-    sd : dictionary from unknown to standard deviation: of the logarithm for the skin and for the light's
-        colour, of the angle for directions [rad]. It includes errors of the renderer and of assumed skin
-        parameters
+    sd : dictionary from name of an unknown to its standard deviation, which includes errors of the renderer
+        and of assumed skin parameters. Directions have standard deviations of angles [rad]; skin parameters
+        and the light's colour have standard deviations of logarithms
     undetermined : unknowns whose standard deviation exceeds half that of their prior, and unknowns at a limit
     correlated : pairs of unknowns that the photograph cannot separate, with their correlation
     singular_values : singular values of the weighted derivatives, with each unknown in standard deviations of

@@ -116,9 +116,9 @@ def tangents(directions: Floats) -> Floats:
 def with_skin(scene: Scene, point: FitPoint) -> Scene:
     """Return the scene with the skin that the unknowns of a fit describe.
 
-    A person with painted skin is painted with the pigments of `point`. The diffusion profile, which is slow
-    to compute, is that of pigments rounded to a coarse grid. Other heads get the uniform colour of the
-    pigments in place of their colour map, whose pigments are unknown.
+    If the head's maps are painted from pigments, they are painted with the pigments of `point`. Their
+    diffusion profile, which is slow to compute, is that of the nearest pigments of a coarse grid. Other heads
+    get the uniform colour of the pigments in place of their colour map, and the profile of these pigments.
     """
     numbers = point.values()
     skin_values: dict[str, object] = {name: numbers[name] for name in ("roughness", "rho_s")}

@@ -116,7 +116,7 @@ def recolour(
     unmixed_pigments : (h, w, 3) melanin, blood and the third unknown before the change
     residual : (h, w, 3) original colour divided by the model's colour
     pigment_factors : (3,) factors by which melanin, blood and the third unknown are multiplied
-    added_fractions : (3,) constants that are added to melanin, blood and the third unknown after that
+    added_fractions : (3,) constants that are added to these products
     """
     table, shader = _table_texture(device, model), _unmixing_program(device, "recolour", model)
     change = shader.record("Change", factors=pigment_factors, added=added_fractions)
@@ -224,7 +224,7 @@ def _weighted_blur(
 
 
 def _upsample(block_means: NDArray[np.float64], picture_shape: tuple[int, int]) -> Pixels:
-    """Return a picture of block means interpolated bilinearly to a given height and width."""
+    """Interpolate block means bilinearly; return a picture of the given height and width."""
     from scipy.ndimage import map_coordinates
 
     output = np.empty(picture_shape, np.float32)

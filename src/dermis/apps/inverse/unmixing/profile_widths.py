@@ -39,9 +39,9 @@ class ProfileMixture:
 
     profiles : profiles of pale skin without blood, of pale skin with blood, and of dark skin with blood
     weights : (h, w, 2) weights of the second and the third profile; all weights sum to 1 [-]
-    error : (3,) relative root-mean-square error of the mixture over a grid of pigments, by channel; it
-        compares the energies that emerge through rings [-]
-    single_error : (3,) the same error if one profile, from the middle of the grid, is used everywhere [-]
+    error : (3,) relative root-mean-square error of the mixture, by channel. The error compares the energies
+        that emerge through rings, for all skins of a grid of pigments [-]
+    single_error : (3,) the same error if the profile from the middle of the grid is used for all skins [-]
     """
 
     profiles: tuple[GaussianSum, ...]
@@ -113,8 +113,8 @@ def _ring_fractions(tissue: Tissue) -> Floats:
 def _mixture_weights(node_fractions: Floats, corner_fractions: Floats) -> Floats:
     """Return weights (n, k) of k profiles, whose mixtures approximate the profiles of n skins.
 
-    The weights fit the fractions of light that emerge through rings. The weights of each skin are not
-    negative and sum to 1.
+    The weights are fitted to fractions of the reflectance, see `_ring_fractions`. The weights of each skin
+    are not negative and sum to 1.
 
     node_fractions : ring fractions of the n skins, which are the nodes of a grid of pigments
     corner_fractions : ring fractions of the k profiles that are mixed
@@ -134,7 +134,7 @@ def _mixture_weights(node_fractions: Floats, corner_fractions: Floats) -> Floats
 
 
 def _rms_error(mixed_fractions: Floats, node_fractions: Floats) -> Floats:
-    """Return the relative root-mean-square error (3,) of ring fractions over all nodes, by channel."""
+    """Return the relative root-mean-square error (3,) of the ring fractions of n skins, by channel."""
     squares = ((mixed_fractions - node_fractions) ** 2).sum(axis=1) / (node_fractions**2).sum(axis=1)
     return np.asarray(np.sqrt(squares.mean(axis=0)))
 

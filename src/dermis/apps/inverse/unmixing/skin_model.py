@@ -87,7 +87,10 @@ class SkinModel:
 
 
 def _node_below(axis_fraction: Floats, node_count: int) -> tuple[NDArray[np.int64], Floats]:
-    """Return the node below each position in [0, 1], and the fraction of the way from it to the next node."""
+    """Return the grid node below each position in [0, 1], and the position between this node and the next.
+
+    The second result is 0 at the node below and 1 at the next node.
+    """
     position = np.clip(axis_fraction, 0.0, 1.0) * (node_count - 1)
     node = np.clip(position.astype(np.int64), 0, max(node_count - 2, 0))
     return node, position - node

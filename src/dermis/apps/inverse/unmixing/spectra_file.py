@@ -45,7 +45,7 @@ _MAX_REFLECTANCE = 1.5
 class SpectraTable:
     """Reflectance spectra read from a file.
 
-    labels : for each spectrum, a dictionary from heading to cell for the cells that are not reflectances
+    labels : for each spectrum, a dictionary from heading to text, for all cells that are not reflectances
     reflectance : (n, 31) reflectance factors at `WAVELENGTHS_NM`, NaN for spectra with missing values [-]
     """
 
@@ -158,10 +158,10 @@ def _check_wavelengths(path: str | Path, wavelengths_nm: Floats) -> None:
 class UnmixedSpectra:
     """Pigments estimated from a table of spectra.
 
-    labels : for each spectrum, a dictionary from heading to cell for the cells that are not reflectances
+    labels : for each spectrum, a dictionary from heading to text, for all cells that are not reflectances
     names : names of the parameters that were estimated
-    fit : parameters of the complete spectra, which have no missing values
-    complete : indices of the complete spectra in the table
+    fit : parameters fitted to the spectra that have no missing values
+    complete : indices of these spectra in the table
     """
 
     labels: list[dict[str, str]]

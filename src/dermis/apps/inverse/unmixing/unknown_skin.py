@@ -30,9 +30,10 @@ def unknown_skin_sd(
 ) -> dict[str, float]:
     """Return the relative standard deviations of melanin and blood that are due to assumed skin parameters.
 
-    Skins are sampled from the prior, and unmixed as if they had the parameters of `skin`. The error of a
-    sample is the logarithm of the ratio of found to true pigment. The result is the root mean square of this
-    error over the samples whose found pigments are near `melanin` and `blood`.
+    Skins are sampled from the prior, and their colours are unmixed as if they had the parameters of `skin`.
+    The error of a sample is the logarithm of the ratio of the estimated to the true fraction of a pigment.
+    The result is the root mean square of this error over the samples with estimates near `melanin` and
+    `blood`.
 
     melanin, blood : volume fractions that were found in a picture [-]
     skin : parameters that are assumed for unmixing
@@ -54,9 +55,9 @@ def unknown_skin_sd(
 def _unmixed_sample(
     skin: SkinParameters, known_parameters: tuple[str, ...], is_oxygen_fitted: bool
 ) -> tuple[Floats, Floats]:
-    """Unmix skins sampled from the prior; return found logarithms (n, 2) and their errors (n, 2).
+    """Unmix skins sampled from the prior; return estimates (n, 2) and their errors (n, 2).
 
-    The logarithms are those of the fractions of melanin and blood that unmixing finds.
+    The estimates are logarithms of the fractions of melanin and blood.
     """
     true = skin_prior().sample(_SAMPLE_COUNT)
     values = true | {name: np.full(_SAMPLE_COUNT, getattr(skin, name)) for name in known_parameters}

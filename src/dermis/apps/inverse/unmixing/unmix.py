@@ -119,8 +119,8 @@ class UnmixResult:
     blood : (h, w) volume fraction of blood in the dermis [-]
     melanin_sd, blood_sd : (h, w) lower bounds of the standard deviations of melanin and blood that are due to
         noise (Cramér-Rao bound) [-]
-    residual : (h, w, 3) colour divided by the model's colour, which shows all that is not skin, such as paint
-        and hair [-]
+    residual : (h, w, 3) colour divided by the model's colour; it differs from 1 where the picture shows
+        something other than skin, such as paint or hair [-]
     third : (h, w) oxygenated fraction of haemoglobin; None if it was not requested [-]
     shading : (h, w) shading by which the colours were divided; None if it was not requested [-]
     skin : parameters of the model's skins other than melanin and blood
@@ -140,7 +140,7 @@ class UnmixResult:
     devices: dict[str, LazyDevice] = field(default_factory=dict)
 
     def maps(self) -> dict[str, Pixels]:
-        """Return a dictionary from file name, without suffix, to map for all maps that were computed."""
+        """Return all maps that were computed, as a dictionary from file name without suffix to map."""
         names = "melanin", "blood", "melanin_sd", "blood_sd", "residual"
         named = {name: getattr(self, name) for name in names}
         optional = {"oxygen": self.third, "shading": self.shading}

@@ -42,11 +42,11 @@ _STACK_TABLE_ALBEDO_COUNT = 20
 
 
 def uniform_skin(colour: ArrayLike, exit_distance_mm: ArrayLike, eta: float) -> Medium:
-    """Return a homogeneous skin that has a given colour and moves light by a given mean distance.
+    """Return a homogeneous skin with a given colour and mean distance between entry and exit of light.
 
     colour : (3,) reflectance of light at normal incidence [-]
-    exit_distance_mm : (3,) mean distance along the surface between the points where light enters, at normal
-        incidence, and leaves [mm]
+    exit_distance_mm : (3,) mean distance along the surface from the point where light enters, at normal
+        incidence, to the point where it leaves [mm]
     eta : index of refraction, 1 or `SKIN_ETA` [-]
     """
     albedo = _half_space_albedo(colour, eta)
@@ -171,10 +171,10 @@ def _mean_exit_distance(albedo: float, eta: float) -> float:
 def skin_media(mi: Mitsuba, person: Person, camera: Camera, medium: Medium) -> list[MitsubaObject]:
     """Return Mitsuba's media of the layers of a skin, topmost first.
 
-    The deepest layer has a grid of albedos around the camera's target, which give the skin its painted
-    colours.
+    The deepest layer has a grid of albedos around the camera's target. These albedos give the skin the
+    colours of its colour map.
 
-    medium : layers of a skin that has the mean of the painted colours
+    medium : layers of a skin that has the mean colour of the colour map
     """
     *above, last = medium.layers
     low, high = _voxel_box(person, camera)
@@ -210,12 +210,12 @@ def _skin_triangles(person: Person) -> NDArray[np.int32]:
 
 
 def colour_grid(person: Person, low_corner: Doubles, high_corner: Doubles, voxels_per_side: int) -> Doubles:
-    """Return the colour (z, y, x, 3) of each cell of a box, averaged over the nearest points of the skin.
+    """Return the skin's colour (z, y, x, 3) in each voxel of a box: the mean of the nearest skin points.
 
-    Cells more than about 3 mm from the skin have the mean colour.
+    Voxels more than about 3 mm from the skin have the mean colour of all points.
 
     low_corner, high_corner : (3,) corners of the box [mm]
-    voxels_per_side : number of cells along the longest side
+    voxels_per_side : number of voxels along the longest side
     """
     from scipy.ndimage import binary_dilation
     from scipy.spatial import cKDTree
@@ -247,7 +247,7 @@ def _skin_samples(
     The random seed is fixed.
 
     low_corner, high_corner : (3,) corners of the box [mm]
-    cell_mm : size of a cell, which determines the number of samples [mm]
+    cell_mm : side length of a voxel; smaller voxels need more positions [mm]
     """
     mesh, triangles = person.mesh, _skin_triangles(person)
     corners = mesh.positions[triangles].astype(np.float64)

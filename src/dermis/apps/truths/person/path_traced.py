@@ -56,15 +56,15 @@ def path_trace_person(
 ) -> PathTraced:
     """Return the path-traced image of the person in a scene, with the given textures.
 
-    The skin consists of layers below a surface with the two specular lobes of the real-time renderer. Light
-    passes this surface without refraction if the medium has an index of refraction of 1, and is refracted if
-    it has `SKIN_ETA`. A grid of albedos in the deepest layer gives the skin its painted colours. Lights must
-    have a size, because the cornea refracts the light on its way to the iris. The skin settings of the scene
-    are ignored.
+    The skin consists of layers below a surface with the two specular lobes of the real-time renderer. This
+    surface refracts light if the medium has the index of refraction `SKIN_ETA`, and does not if the index is
+    1. A grid of albedos in the deepest layer gives the skin the colours of its colour map. Lights must have a
+    size, because the cornea refracts the light on its way to the iris. The skin settings of the scene are
+    ignored.
 
     textures : textures of skin, eyes and teeth
-    medium : layers of a skin that has the mean of the painted colours, see `uniform_skin` and
-        `pigmented_skin`; None for Lambertian skin with the painted colours
+    medium : layers of a skin that has the mean colour of the colour map, see `uniform_skin` and
+        `pigmented_skin`; None for Lambertian skin with the colours of the colour map
     size : width and height of the image [pixel]
     max_depth : largest number of scattering events plus 1, so 2 for direct light; None for no limit
     samples, variant, use_cache, progress : as in `path_trace`
@@ -119,7 +119,7 @@ def person_scene(
 
 
 def _opaque_parts(mi: Mitsuba, person: Person) -> SceneDict:
-    """Return the Mitsuba shapes of materials other than skin and eyes.
+    """Return the Mitsuba shapes of all materials other than skin and eyes.
 
     Teeth and tongue are coated with saliva; all other materials are diffuse.
     """

@@ -74,7 +74,8 @@ class Person:
 
     eyes : (m, 4, 4) transforms from head space to the space of each eye. There, the eye has the size of an
         average eye [mm], and its axis is z
-    eye_materials : (m,) indices of the eyes' materials; refracting eyeballs replace their triangles
+    eye_materials : (m,) indices of the eyes' materials; refracting eyeballs replace the triangles of these
+        materials
     """
 
     name: str

@@ -39,9 +39,9 @@ def mitsuba_texture(mi: Mitsuba, texels: NDArray[np.floating]) -> SceneDict:
 def coat_bsdf(mi: Mitsuba, textures: SkinTextures) -> MitsubaObject:
     """Return the BSDF of skin with the two specular lobes of the real-time renderer, without refraction.
 
-    Most paths pass the surface undeflected, so that they can connect to point lights. The others meet the
-    lobes, whose reflectance is divided by the fraction of these paths, so the reflection has its full
-    strength. Light from below is weakened by this small fraction only.
+    Most paths pass the surface undeflected, so that they can connect to point lights. A small fraction of the
+    paths meets the lobes instead. The reflectance of the lobes is divided by this fraction, which gives the
+    reflection its full strength. The light that leaves the skin is reduced by the same small fraction.
     """
     mirror_fraction = 1.0 - COAT_TRANSMITTANCE
     coat = {
@@ -53,7 +53,7 @@ def coat_bsdf(mi: Mitsuba, textures: SkinTextures) -> MitsubaObject:
 
 
 def _reflection_lobes_bsdf(mi: Mitsuba, textures: SkinTextures, path_fraction: float) -> SceneDict:
-    """Return the BSDF of skin with relief that reflects by the two lobes of `specular.two_lobe`.
+    """Return the BSDF of the skin's surface reflection: its relief with the two lobes of `specular.two_lobe`.
 
     path_fraction : fraction of the paths that meet this BSDF; the reflectance is divided by it [-]
     """
@@ -95,7 +95,7 @@ def refracting_bsdfs(mi: Mitsuba, textures: SkinTextures) -> tuple[MitsubaObject
 
 
 def painted_diffuse_bsdf(mi: Mitsuba, textures: SkinTextures) -> MitsubaObject:
-    """Return the BSDF of skin with two specular lobes over a Lambertian base of the painted colours."""
+    """Return the BSDF of skin with two specular lobes over a Lambertian base with the colour map."""
     fraction = 1.0 - COAT_TRANSMITTANCE
     base = {
         "type": "diffuse",
@@ -157,9 +157,10 @@ def _skin_mask(person: Person) -> NDArray[np.bool_]:
 def _painted_mesh(
     mi: Mitsuba, person: Person, surface: ClosedSurface, bsdf: MitsubaObject, medium: MitsubaObject
 ) -> MitsubaObject:
-    """Return the skin's triangles at the positions of a closed surface, with the head's normals and uv.
+    """Return the skin as a Mitsuba mesh at the positions of a closed surface, with the head's normals and uv.
 
     surface : closed surface of the head, from `closed_skin` and `offset_inwards`
+    bsdf : BSDF of the mesh
     medium : Mitsuba's medium inside the surface
     """
     mesh, triangles = person.mesh, person.mesh.triangles[_skin_mask(person)]
@@ -237,7 +238,10 @@ def cornea_weight_map() -> Doubles:
 
 
 def iris_disc() -> tuple[Doubles, Index, float]:
-    """Return the iris as a disc that nearly touches the eyeball: positions [mm], triangles, radius [mm]."""
+    """Return the iris as a disc: positions [mm], triangles, and its radius [mm].
+
+    Its rim nearly touches the eyeball.
+    """
     radius = float(np.sqrt(SCLERA_MM**2 - iris_plane_mm() ** 2)) - _IRIS_GAP_MM
     azimuth = 2.0 * np.pi * np.arange(_EYEBALL_STEPS_AROUND) / _EYEBALL_STEPS_AROUND
     rim = np.stack(
