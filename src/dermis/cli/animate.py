@@ -197,23 +197,28 @@ def _common_exposure(animated_scene: _AnimatedScene, renderer: Renderer) -> floa
     return exposure
 
 
-def _frame_digest(animation: _AnimatedScene, options: SceneOptions, *files: str) -> str:
+def _frame_digest(animated_scene: _AnimatedScene, options: SceneOptions, *files: str) -> str:
     """Return a hash of everything that determines the frames; images from runs with an equal hash are reused.
 
     files : head and motion as named on the command line; the hash includes the size and modification time of
         each file
     """
-    scene = animation.scene
-    names = [*files, scene.head.name, *map(str, options.head.values()), animation.clip.name]
-    metered_at = animation.first if animation.settings.exposure == "auto" else None
+    scene = animated_scene.scene
+    names = [*files, scene.head.name, *map(str, options.head.values()), animated_scene.clip.name]
+    metered_at = animated_scene.first if animated_scene.settings.exposure == "auto" else None
     scene_values = scene.lights, scene.camera, scene.skin, scene.environment
-    frame_values = *scene_values, animation.settings, animation.rate, metered_at
+    frame_values = *scene_values, animated_scene.settings, animated_scene.rate, metered_at
     option_values = options.head, options.eye, options.pose, options.bone, options.look_at
-    parts = [*map(_file_state, names), *map(repr, option_values), repr(frame_values), str(scene.head.levels)]
+    parts = [
+        *map(_file_fingerprint, names),
+        *map(repr, option_values),
+        repr(frame_values),
+        str(scene.head.levels),
+    ]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 
-def _file_state(file_name: str) -> str:
+def _file_fingerprint(file_name: str) -> str:
     """Return the path, size and modification time of a file as text; for a name without a file, the name."""
     path = Path(file_name.partition("#")[0])
     if not path.exists():

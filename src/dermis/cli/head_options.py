@@ -59,7 +59,7 @@ EyeOptions = Annotated[
 ]
 
 
-def note_eyes(head: Head, eyes_option: str | None) -> None:
+def note_kept_eyeballs(head: Head, eyes_option: str | None) -> None:
     """Print a note on stderr if a mesh file kept its eyeballs instead of getting the package's eyes.
 
     eyes_option : value of the option --eyes
@@ -106,7 +106,7 @@ def parse_weights(option_values: Sequence[str], option_name: str = POSE_OPTION) 
     """Return a dictionary from names to weights for option values such as "jawOpen=0.6,mouthSmileLeft=1"."""
     expected = "NAME=WEIGHT,..., such as jawOpen=0.6,mouthSmileLeft=1"
     parts = (part for text in option_values for part in text.split(","))
-    return {name: weight for name, (weight,) in _parse_pairs(parts, 1, option_name, expected)}
+    return {name: weight for name, (weight,) in _parse_named_numbers(parts, 1, option_name, expected)}
 
 
 def parse_bone_angles(option_values: Sequence[str]) -> dict[str, list[float]]:
@@ -115,13 +115,13 @@ def parse_bone_angles(option_values: Sequence[str]) -> dict[str, list[float]]:
     option_values : values of the option --bone, such as "head=0,25,0"
     """
     return dict(
-        _parse_pairs(
+        _parse_named_numbers(
             option_values, 3, BONE_OPTION, "NAME=X,Y,Z with three angles in degrees, such as head=0,25,0"
         )
     )
 
 
-def _parse_pairs(
+def _parse_named_numbers(
     option_values: Iterable[str], number_count: int, option_name: str, expected: str
 ) -> Iterator[tuple[str, list[float]]]:
     """Yield the name and the numbers of each option value "NAME=NUMBER,...".

@@ -27,7 +27,7 @@ from dermis.scene.skin import Pigments
 _PIGMENT_OPTION_NAMES = {"structure": "skin"}
 
 
-def _default_pigments() -> dict[str, str]:
+def _pigment_default_texts() -> dict[str, str]:
     """Return the help text of each pigment option: its default, and the differing values of named skins."""
     defaults: dict[str, str] = {"structure": DEFAULT_STRUCTURE}
     for field in Pigments.model_fields.keys() - defaults.keys():
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     PigmentOptions = Options
 else:
     PigmentOptions = model_options(
-        Pigments, option_names=_PIGMENT_OPTION_NAMES, shown_defaults=_default_pigments()
+        Pigments, option_names=_PIGMENT_OPTION_NAMES, shown_defaults=_pigment_default_texts()
     )
 
 Clamp = Literal["layer", "none"]
@@ -235,11 +235,11 @@ def _reflectance_spectrum(tissue: Tissue, model: ProfileModelName | None, clamp:
 
 
 def _compute_profile(
-    tissue: Tissue, model: ProfileModelName | None, clamp: Clamp, tracing: Options
+    tissue: Tissue, model: ProfileModelName | None, clamp: Clamp, tracing_options: Options
 ) -> RadialProfile:
     if model != "montecarlo":
         return tissue.profile(model, clamp)
     from dermis.apps.truths.slab_mc import monte_carlo_profile
 
     with progress_bar("tracing photons") as report:
-        return monte_carlo_profile(tissue.medium, tissue.rgb, progress=report, **tracing)
+        return monte_carlo_profile(tissue.medium, tissue.rgb, progress=report, **tracing_options)

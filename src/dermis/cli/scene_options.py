@@ -20,7 +20,7 @@ from dermis.cli.head_options import (
     LookAtOption,
     WeightsOption,
     check_head_options,
-    note_eyes,
+    note_kept_eyeballs,
     parse_bone_angles,
     parse_weights,
     pose_from_options,
@@ -115,7 +115,7 @@ def assemble_scene(head_or_scene: str, options: SceneOptions) -> tuple[Scene, Se
         )
     _check_values(head_or_scene, options)
     scene, settings = _base_scene(head_or_scene, options)
-    note_eyes(scene.head, options.head.get("eyes"))
+    note_kept_eyeballs(scene.head, options.head.get("eyes"))
     if weights or bone_angles:
         from dermis.mesh.pose import merge_poses
 

@@ -43,7 +43,7 @@ def reciprocity_error(model: str) -> float:
     return float(max(errors))
 
 
-def albedo_rows(model: str) -> list[dict[str, float]]:
+def directional_albedo_rows(model: str) -> list[dict[str, float]]:
     """Return the directional albedo rho of a model at `COMPARED_ROUGHNESSES` and `COMPARED_COSINES`.
 
     Each row of the result has the keys m, cos_theta and rho, for a CSV file.

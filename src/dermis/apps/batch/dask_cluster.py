@@ -81,12 +81,12 @@ class DaskCluster:
 
 
 @contextmanager
-def _create_marker_file(out: Path) -> Iterator[Path]:
+def _create_marker_file(dataset_folder: Path) -> Iterator[Path]:
     """Yield a new marker file in the output folder, which every worker that shares the disk can see.
 
     The file is removed at the end of the block.
     """
-    marker = out.resolve() / f".dermis-{secrets.token_hex(6)}"
+    marker = dataset_folder.resolve() / f".dermis-{secrets.token_hex(6)}"
     marker.touch()
     try:
         yield marker

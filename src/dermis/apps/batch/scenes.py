@@ -87,7 +87,7 @@ class SceneBuilder:
             camera=camera,
             skin=person.skin.replace(**skin_values) if skin_values else person.skin,
             environment=self._sampled_environment(parameters),
-            pose=_with_gaze(parameters, head, pose, camera.position),
+            pose=_pose_with_gaze(parameters, head, pose, camera.position),
         )
         return scene, self.spec.render.replace(**_background_settings(parameters))
 
@@ -190,14 +190,16 @@ def _bone_angles(
     return {name: angles[fraction] for name, fraction in rotation_fractions.items()}
 
 
-def _with_gaze(parameters: Parameters, head: Head, pose: Pose, camera_mm: tuple[float, float, float]) -> Pose:
+def _pose_with_gaze(
+    parameters: Parameters, head: Head, pose: Pose, camera_position_mm: tuple[float, float, float]
+) -> Pose:
     """Return the pose with eyes rotated towards the sampled gaze, if the head has eyes that can rotate.
 
-    camera_mm : position of the camera, the default gaze target [mm]
+    camera_position_mm : position of the camera, the default gaze target [mm]
     """
     if head.eyes is None or head.control.skeleton is None:
         return pose
-    target = np.array(camera_mm)
+    target = np.array(camera_position_mm)
     if parameters["gaze.at"] == GAZE_ANGLES:
         gaze = table_numbers(parameters, "gaze")
         direction = np.array(direction_from_angles(gaze["yaw_deg"], -gaze["pitch_deg"]))
