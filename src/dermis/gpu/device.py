@@ -48,7 +48,7 @@ def open_device(adapter: str = "auto", *, bare: bool = False) -> Device:
 
 
 class Device:
-    """Logical device with its queue, on which all resources and programs of a renderer live.
+    """Logical device with its queue, which holds all resources and programs of a renderer.
 
     The device has WebGPU's default limits, even if the adapter offers more, so that a program that exceeds
     them fails on every machine. Only the maximum sizes of textures and buffers are those of the adapter. The
@@ -156,7 +156,7 @@ class Device:
         return False
 
     def _check_alive(self) -> None:
-        """Raise GPUError if the device is lost, which a write of zero bytes to a buffer reveals."""
+        """Raise GPUError if the device is lost; this is tested by writing zero bytes to a buffer."""
         self.write(self._unwritten, b"", 0)
 
     @cached_property

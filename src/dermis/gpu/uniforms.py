@@ -20,7 +20,7 @@ class Uniforms:
 
     Sharing is safe because the queue orders the writes of a frame after the submissions of earlier frames.
 
-    chunk : function from index to a buffer of CHUNK_BYTES; None for the shared buffers of the device
+    make_chunk : function from an index to a buffer of CHUNK_BYTES; None for the device's shared buffers
     """
 
     def __init__(self, device: Device, make_chunk: Callable[[int], Buffer] | None = None) -> None:

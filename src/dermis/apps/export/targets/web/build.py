@@ -18,7 +18,7 @@ from dermis.apps.export.targets.web.maps import (
     read_texels,
 )
 from dermis.apps.export.targets.web.packing import ByteRunCollector
-from dermis.apps.export.targets.web.sliders import Slider, node_changes, node_inputs
+from dermis.apps.export.targets.web.sliders import Slider, slider_frame_changes, slider_frame_inputs
 from dermis.frame.capture import ADAPTER_KINDS, capture_frame, capture_renderer, reduce_hair
 from dermis.frame.features.shading.view import pinhole
 from dermis.frame.inputs import FrameInputs
@@ -28,7 +28,7 @@ from dermis.scene.lights import Light, SpotLight
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
-OnRenderer = Callable[[Renderer, Scene, Settings], None]
+OnFramesCaptured = Callable[[Renderer, Scene, Settings], None]
 PAGE_TECHNIQUES = ("texture-space", "none")
 PICTURE_SIDES = {"gpu": (512, 1024, 1600), "software": (512,)}
 """Sides of the square pictures for each kind of adapter [pixel]."""
@@ -115,10 +115,12 @@ class PageRequest:
         return self.settings.model_copy(update={"size": (picture_side, picture_side), **diffusion})
 
 
-def build_content(request: PageRequest, on_renderer: OnRenderer = lambda *_: None) -> PageContent:
+def build_page_content(
+    request: PageRequest, on_frames_captured: OnFramesCaptured = lambda *_: None
+) -> PageContent:
     """Capture the frames of all kinds of adapter, and return the data that the page embeds.
 
-    on_renderer : function called for each kind of adapter after its frames were captured; it receives the
+    on_frames_captured : function called for each kind of adapter after its frames were captured; it receives the
         renderer, whose maps are those of the page, the scene and the settings
     """
     content = PageContent()
@@ -126,16 +128,16 @@ def build_content(request: PageRequest, on_renderer: OnRenderer = lambda *_: Non
         renderer = capture_renderer(adapter_kind, request.adapter)
         content.frames_by_kind[adapter_kind] = _capture_frames(content, renderer, request, adapter_kind)
         settings = request.settings_for(request.sizes[adapter_kind][0])
-        on_renderer(renderer, request.scene, settings)
+        on_frames_captured(renderer, request.scene, settings)
         if content.poster is None:
             content.poster = renderer.draw(request.scene, settings).srgb8()
     return content
 
 
 def _capture_frames(
-    content: PageContent, renderer: Renderer, request: PageRequest, adapter_kind: str
+    page_content: PageContent, renderer: Renderer, request: PageRequest, adapter_kind: str
 ) -> Json:
-    """Capture the frames for one kind of adapter, add the data to `content`, and return the frames' JSON.
+    """Capture the frames for one kind of adapter, add the data to `page_content`, and return the frames' JSON.
 
     adapter_kind : kind of adapter, "gpu" or "software"
     """
@@ -146,18 +148,18 @@ def _capture_frames(
         base, picture = base or inputs, inputs.resources.post.picture
         captured = reduce_hair(capture_frame(capture, inputs), merged_hairs)
         frames.append(NamedFrame(settings.technique, captured, picture, settings.size, merged_hairs))
-        changes = _frame_changes(content.byte_runs, renderer, request, settings, inputs, frames[-1])
+        changes = _frame_changes(page_content.byte_runs, renderer, request, settings, inputs, frames[-1])
         slider_changes.append(changes)
     captured_frames = [frame.captured for frame in frames]
-    picture_maps = content.maps.replace_textures(renderer, capture, captured_frames)
+    picture_maps = page_content.maps.replace_textures(renderer, capture, captured_frames)
     steps = quantise_hairs(renderer, capture, captured_frames)
-    kind_json = frames_json(capture, frames, picture_maps, steps, content.byte_runs)
+    kind_json = frames_json(capture, frames, picture_maps, steps, page_content.byte_runs)
     for frame_json, changes in zip(kind_json["frames"], slider_changes, strict=True):
         frame_json["dials"] = changes
-    kind_json["maps"] = {str(index): _mip_entries(content, one) for index, one in picture_maps.items()}
+    kind_json["maps"] = {str(index): _mip_entries(page_content, one) for index, one in picture_maps.items()}
     assert base is not None
     kind_json["hands"] = _interaction_json(request.scene, base)
-    kind_json["colours"] = _colour_maps(content, renderer, request, picture_maps)
+    kind_json["colours"] = _colour_maps(page_content, renderer, request, picture_maps)
     return kind_json
 
 
@@ -178,43 +180,49 @@ def _frame_changes(
     """
     capture = FrameCapture(renderer.device)
 
-    def node_json(inputs: FrameInputs | None) -> Json | None:
+    def slider_frame_json(inputs: FrameInputs | None) -> Json | None:
         if inputs is None:
             return None
         node = reduce_hair(capture_frame(capture, inputs), named_frame.merged_hairs)
-        return node_changes(named_frame.captured, node, byte_runs)
+        return slider_frame_changes(named_frame.captured, node, byte_runs)
 
     return {
         slider.name: [
-            *map(node_json, node_inputs(slider, lambda one: renderer.prepare(one, settings), default_inputs))
+            *map(
+                slider_frame_json,
+                slider_frame_inputs(slider, lambda one: renderer.prepare(one, settings), default_inputs),
+            )
         ]
         for slider in request.sliders
     }
 
 
-def _mip_entries(content: PageContent, picture_map: PictureMap) -> list[list[tuple[int, int, int]]]:
+def _mip_entries(page_content: PageContent, picture_map: PictureMap) -> list[list[tuple[int, int, int]]]:
     """Return an entry of `PageContent.picture_entries` for each layer of each mip level of a map."""
-    layers = 1 + max(layer for role, _, layer in content.maps.pictures if role == picture_map.role)
+    layers = 1 + max(layer for role, _, layer in page_content.maps.pictures if role == picture_map.role)
     return [
-        [content.add_picture((picture_map.role, mip, k)) for k in range(layers)]
+        [page_content.add_picture((picture_map.role, mip, k)) for k in range(layers)]
         for mip in range(picture_map.mips)
     ]
 
 
-def _colour_maps(content: PageContent, renderer: Renderer, request: PageRequest, maps: PictureMaps) -> Json:
+def _colour_maps(
+    page_content: PageContent, renderer: Renderer, request: PageRequest, picture_maps: PictureMaps
+) -> Json:
     """Return the JSON of the colour maps that replace the head's colour map when a slider is moved.
 
     The JSON contains the resource index of the head's colour map. For each slider, it contains one entry of
     `PageContent.picture_entries` per captured value.
     """
-    map_index = next((k for k, one in maps.items() if one.role == "colour_map"), None)
+    map_index = next((k for k, one in picture_maps.items() if one.role == "colour_map"), None)
     if map_index is None:
         return {}
     settings, entries = request.settings_for(min(map(min, request.sizes.values()))), {}
     for slider in (one for one in request.sliders if not one.changes_pose_only):
         scenes = enumerate(slider.scenes)
         nodes = [
-            _colour_map_entry(content, renderer, one, settings, f"{slider.name} {k}") for k, one in scenes
+            _colour_map_entry(page_content, renderer, one, settings, f"{slider.name} {k}")
+            for k, one in scenes
         ]
         if any(nodes):
             entries[slider.name] = nodes
@@ -222,7 +230,7 @@ def _colour_maps(content: PageContent, renderer: Renderer, request: PageRequest,
 
 
 def _colour_map_entry(
-    content: PageContent, renderer: Renderer, scene: Scene | None, settings: Settings, role: str
+    page_content: PageContent, renderer: Renderer, scene: Scene | None, settings: Settings, role: str
 ) -> tuple[int, int, int] | None:
     """Return the entry in `PageContent.picture_entries` of a scene's colour map; None for the default map.
 
@@ -231,22 +239,22 @@ def _colour_map_entry(
     """
     if scene is None:
         return None
-    if (role, 0, 0) not in content.maps.pictures:
+    if (role, 0, 0) not in page_content.maps.pictures:
         capture = FrameCapture(renderer.device)
         texture = renderer.prepare(scene, settings).bindings["colour_map"]
-        texels = read_texels(capture, capture.resource(texture), 0)[0]
-        if content.maps.matches_picture("colour_map", texels):
+        texels = read_texels(capture, capture.index_of_resource(texture), 0)[0]
+        if page_content.maps.matches_picture("colour_map", texels):
             return None
-        content.maps.pictures[role, 0, 0] = encode_picture(texels, True)
-    return *content.add_picture((role, 0, 0))[:2], 3
+        page_content.maps.pictures[role, 0, 0] = encode_picture(texels, True)
+    return *page_content.add_picture((role, 0, 0))[:2], 3
 
 
-def _interaction_json(scene: Scene, inputs: FrameInputs) -> Json:
+def _interaction_json(scene: Scene, frame_inputs: FrameInputs) -> Json:
     """Return the JSON that the page needs to move the camera and the lights.
 
     The JSON also contains the points of the head's outline, around which the page fits shadow maps.
     """
-    camera, settings = scene.camera, inputs.settings
+    camera, settings = scene.camera, frame_inputs.settings
     projection, outline = pinhole(camera, scene.head, settings), scene.head.mesh.outline
     return {
         "centre": [*flat_tuple(scene.head.centre_mm)],
@@ -257,7 +265,7 @@ def _interaction_json(scene: Scene, inputs: FrameInputs) -> Json:
             "half": list(projection.window.half),
             "shift": list(projection.window.shift),
         },
-        "samples": inputs.camera_views.sample_positions.tolist(),
+        "samples": frame_inputs.camera_views.sample_positions.tolist(),
         "outline": np.asarray(outline.points_mm, np.float32).round(3).ravel().tolist(),
         "slack": outline.margin_mm,
         "middle": list(outline.centre_mm),

@@ -68,7 +68,10 @@ def frames_json(
         vector component
     byte_runs : collector of buffer and texture data, to which the JSON refers by index
     """
-    pictures = [[capture.resource(f.picture.bytes), capture.resource(f.picture.exposed)] for f in frames]
+    pictures = [
+        [capture.index_of_resource(f.picture.bytes), capture.index_of_resource(f.picture.exposed)]
+        for f in frames
+    ]
     captured_frames = [frame.captured for frame in frames]
     contents, tables = {}, set(resources_bound_as(capture, captured_frames, _TRIANGLE_TABLE_BINDINGS))
     for index in resources_read_before_write(capture, captured_frames):
@@ -81,12 +84,12 @@ def frames_json(
         _, picture_count, mip_passes = picture_maps.get(index, PictureMap("", 0, None))
         mips = [] if mip_passes else _mip_bytes(capture, index)[picture_count:]
         if any(one.any() for one in mips):
-            add = byte_runs.add if index not in tables else _column_packer(byte_runs)
+            add = byte_runs.add if index not in tables else _triangle_column_packer(byte_runs)
             contents[index] = [-1] * picture_count + [add(one) for one in mips]
     return {
         "shaders": capture.shaders,
         "programs": [_program_json(one) for one in capture.programs],
-        "resources": [_camel_keys(one) for one in capture.resources],
+        "resources": [_with_camel_case_keys(one) for one in capture.resources],
         "structs": {name: _struct_json(dtype) for name, dtype in capture.structs.items()},
         "contents": contents,
         "frames": [_frame_json(one, k, byte_runs) for one, k in zip(frames, pictures, strict=True)],
@@ -94,7 +97,7 @@ def frames_json(
     }
 
 
-def _column_packer(byte_runs: ByteRunCollector) -> Callable[[Bytes], int]:
+def _triangle_column_packer(byte_runs: ByteRunCollector) -> Callable[[Bytes], int]:
     """Return a function that adds a buffer of triangle data to `byte_runs` and returns its index there.
 
     The buffer contains three columns of equal length, one after another. Each column is packed separately.
@@ -128,26 +131,28 @@ def _frame_json(named_frame: NamedFrame, picture_entry: list[int], byte_runs: By
     }
 
 
-def _view_record_index(captured: CapturedFrame, stage_name: str) -> int:
+def _view_record_index(captured_frame: CapturedFrame, stage_name: str) -> int:
     """Return the index of the uniform record with a stage's view matrices; -1 if there is no such record.
 
     stage_name : "visibility" or "shadows"
     """
-    views = [k for k, (struct, _) in enumerate(captured.records) if struct == "Views"]
-    records = (-1 - k for one in captured.passes if one.stage == stage_name for k in one.bound if k < 0)
+    views = [k for k, (struct, _) in enumerate(captured_frame.records) if struct == "Views"]
+    records = (-1 - k for one in captured_frame.passes if one.stage == stage_name for k in one.bound if k < 0)
     return next((k for k in records if k in views), -1)
 
 
-def _passes_json(captured: CapturedFrame, byte_runs: ByteRunCollector) -> list[Json]:
+def _passes_json(captured_frame: CapturedFrame, byte_runs: ByteRunCollector) -> list[Json]:
     """Return the JSON of a frame's passes, and store the data that the host writes to buffers."""
-    writes = ((one, one.written) for one in captured.passes)
+    writes = ((one, one.written) for one in captured_frame.passes)
     return [{**vars(one), "written": data and (data[0], byte_runs.add(data[1]))} for one, data in writes]
 
 
 def _program_json(program_entry: Json) -> Json:
     return {
         **program_entry,
-        "bindings": [(index, name, _camel_keys(entry)) for index, name, entry in program_entry["bindings"]],
+        "bindings": [
+            (index, name, _with_camel_case_keys(entry)) for index, name, entry in program_entry["bindings"]
+        ],
     }
 
 
@@ -164,10 +169,10 @@ def _member_json(dtype: np.dtype[Any], offset: int) -> list[int] | Json:
     return {"offset": offset // 4, "each": base.itemsize // 4, "members": _struct_json(base)["members"]}
 
 
-def _camel_keys(nested_value: object) -> object:
+def _with_camel_case_keys(nested_value: object) -> object:
     """Return nested dictionaries with their keys in camel case, as WebGPU's JavaScript interface requires."""
     if isinstance(nested_value, dict):
-        return {_camel_case(name): _camel_keys(one) for name, one in nested_value.items()}
+        return {_camel_case(name): _with_camel_case_keys(one) for name, one in nested_value.items()}
     return nested_value
 
 
@@ -186,8 +191,8 @@ def resources_read_before_write(capture: FrameCapture, frames: Frames) -> list[i
     for frame in frames:
         written: set[int] = set()
         for one in frame.passes:
-            found |= {base_resource(capture, k) for k in resources_read_by(capture, one)} - written
-            written |= {base_resource(capture, k) for k in resources_written_by(capture, one)}
+            found |= {viewed_resource(capture, k) for k in resources_read_by(capture, one)} - written
+            written |= {viewed_resource(capture, k) for k in resources_written_by(capture, one)}
     return sorted(found)
 
 
@@ -206,7 +211,7 @@ def resources_bound_as(
     return found
 
 
-def base_resource(capture: FrameCapture, resource_index: int) -> int:
+def viewed_resource(capture: FrameCapture, resource_index: int) -> int:
     """Return the resource index of a view's texture; any other resource index is returned unchanged.
 
     resource_index : index of the texture or buffer in the capture
@@ -219,7 +224,7 @@ def resources_read_by(capture: FrameCapture, captured_pass: CapturedPass) -> Ite
 
     captured_pass : pass of a captured frame
     """
-    yield from (k for k, entry in _bound_entries(capture, captured_pass) if _allows_reading(entry))
+    yield from (k for k, entry in _binding_entries(capture, captured_pass) if _allows_reading(entry))
     if captured_pass.raster and captured_pass.raster["indices"] >= 0:
         yield int(captured_pass.raster["indices"])
 
@@ -231,14 +236,14 @@ def resources_written_by(capture: FrameCapture, captured_pass: CapturedPass) -> 
     """
     if captured_pass.written:
         yield captured_pass.written[0]
-    yield from (k for k, entry in _bound_entries(capture, captured_pass) if _allows_writing(entry))
+    yield from (k for k, entry in _binding_entries(capture, captured_pass) if _allows_writing(entry))
     if captured_pass.raster:
         yield from (
             int(captured_pass.raster[name]) for name in ("depth", "target") if captured_pass.raster[name] >= 0
         )
 
 
-def _bound_entries(capture: FrameCapture, captured_pass: CapturedPass) -> Iterator[tuple[int, Json]]:
+def _binding_entries(capture: FrameCapture, captured_pass: CapturedPass) -> Iterator[tuple[int, Json]]:
     if captured_pass.program is not None:
         bindings = capture.programs[captured_pass.program]["bindings"]
         yield from (
