@@ -29,12 +29,12 @@ class FileProperty:
     keys: tuple[str, ...] = ()
     other_parts: Treatment | None = None
 
-    def cells(self, is_material: bool) -> list[str]:
+    def documentation_cells(self, has_parts_column: bool) -> list[str]:
         """Return the cells of the row for this property in a table of the documentation.
 
-        is_material : whether the table has separate columns for the treatment in skin and in other parts
+        has_parts_column : whether the table has separate columns for the treatment in skin and in other parts
         """
-        others = [self.other_parts or self.treatment] if is_material else []
+        others = [self.other_parts or self.treatment] if has_parts_column else []
         return [self.name, self.treatment, *others, self.detail]
 
 

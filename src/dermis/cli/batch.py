@@ -274,12 +274,12 @@ def image_progress() -> Iterator[Callable[[Progress], None]]:
         task = bar.add_task("rendering images", rate="", total=None)
         image_rate = ImageRate()
 
-        def report(state: Progress) -> None:
-            if state.images < state.total or not state.to_verify:
-                what, done, total = "rendering images", state.images, state.total
+        def report(progress: Progress) -> None:
+            if progress.images < progress.total or not progress.to_verify:
+                what, done, total = "rendering images", progress.images, progress.total
                 rate = f"{image_rate.update(done):.3g} images/s"
             else:
-                what, done, total, rate = "verifying shards", state.verified, state.to_verify, ""
+                what, done, total, rate = "verifying shards", progress.verified, progress.to_verify, ""
             bar.update(task, description=what, completed=done, total=total, rate=rate)
 
         yield report
@@ -308,12 +308,14 @@ class ImageRate:
 class ProgressLog:
     """Writer of progress messages to log files, at most one message every 30 seconds.
 
-    write : function that writes one line to the log
+    write_line : function that writes one line to the log
     clock : function that returns the current time [s]
     """
 
-    def __init__(self, write: Callable[[str], None], clock: Callable[[], float] = time.monotonic) -> None:
-        self._write, self._clock = write, clock
+    def __init__(
+        self, write_line: Callable[[str], None], clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._write, self._clock = write_line, clock
         self._rate, self._last = ImageRate(clock), clock()
 
     def report(self, progress: Progress) -> None:

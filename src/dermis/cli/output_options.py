@@ -86,7 +86,7 @@ class FrameOutputs:
             write_output(path, name, output_values[name])
 
     @property
-    def report(self) -> dict[str, str]:
+    def written_paths(self) -> dict[str, str]:
         """Return a dictionary from output names to paths of the written files, for JSON reports."""
         return {name: str(path) for name, path in self.paths.items()}
 

@@ -114,7 +114,7 @@ def render(
         landmark_output.write(renderer, loaded_scene, settings)
     report = {
         "image": str(output),
-        **({"outputs": frame_outputs.report} if frame_outputs.names else {}),
+        **({"outputs": frame_outputs.written_paths} if frame_outputs.names else {}),
         **({"landmarks": str(landmark_output.path)} if landmark_output.names else {}),
         "adapter": renderer.device.adapter.name,
         "size": list(settings.size),

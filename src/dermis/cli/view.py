@@ -124,8 +124,8 @@ def _load_motion(motion_path: str | None, fps: float | None, state: ViewerState)
     return motion
 
 
-def _print_url(url: str, is_exposed: bool) -> None:
-    if is_exposed:
+def _print_url(url: str, is_reachable_by_others: bool) -> None:
+    if is_reachable_by_others:
         note("warning: other machines can reach this page; whoever knows its URL controls the viewer")
         note("warning: the connection is not encrypted: use a trusted network or a tunnel")
     print_lines(f"{url}  (Ctrl+C to stop)")

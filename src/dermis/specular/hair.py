@@ -112,9 +112,9 @@ def azimuthal_logistic(x: ArrayLike, width: float) -> Floats:
     return np.asarray(e / (width * (1 + e) ** 2) / np.tanh(np.pi / (2 * width)))
 
 
-def fresnel(cosine: ArrayLike) -> Floats:
+def keratin_reflectance(cos_incidence: ArrayLike) -> Floats:
     """Return the Fresnel reflectance of keratin for the cosine of the angle of incidence [-]."""
-    c = np.clip(np.asarray(cosine, float), 0.0, 1.0)
+    c = np.clip(np.asarray(cos_incidence, float), 0.0, 1.0)
     t = np.sqrt(1 - (1 - c * c) / KERATIN_ETA**2)
     parallel, across = (
         (KERATIN_ETA * c - t) / (KERATIN_ETA * c + t),
@@ -140,7 +140,7 @@ def lobe_fractions(sin_o: ArrayLike, absorption_depth: ArrayLike, h: ArrayLike) 
     sin_inner = h * cos_o / np.sqrt(KERATIN_ETA**2 - o * o)
     path_length = 2 * np.sqrt(1 - sin_inner**2) / np.sqrt(1 - (o / KERATIN_ETA) ** 2)
     attenuation = np.exp(-np.asarray(absorption_depth, float) * path_length[..., None])
-    f = fresnel(cos_o * np.sqrt(1 - h * h))[..., None]
+    f = keratin_reflectance(cos_o * np.sqrt(1 - h * h))[..., None]
     transmitted = (1 - f) ** 2 * attenuation
     internal = transmitted * attenuation * f
     residual = internal * f * attenuation / (1 - f * attenuation)

@@ -116,7 +116,7 @@ def _submit_tasks(client: Client, plugin_name: str, tasks: Sequence[Shard]) -> I
     queue, submitted = deque(tasks), dict[Future, Shard]()
     keys, completed = itertools.count(), as_completed(loop=client.loop)
 
-    def submit() -> None:
+    def submit_waiting_tasks() -> None:
         while queue and len(submitted) < _MAX_TASKS_IN_FLIGHT:
             task = queue.popleft()
             future = client.submit(
@@ -126,7 +126,7 @@ def _submit_tasks(client: Client, plugin_name: str, tasks: Sequence[Shard]) -> I
             completed.add(future)
 
     try:
-        submit()
+        submit_waiting_tasks()
         for done in completed:
             task = submitted.pop(done)
             if done.status != "finished":
@@ -138,7 +138,7 @@ def _submit_tasks(client: Client, plugin_name: str, tasks: Sequence[Shard]) -> I
             if event.refusal:
                 raise DermisError(event.refusal)
             queue.extendleft(reversed(event.missing))
-            submit()
+            submit_waiting_tasks()
             yield event
     finally:
         client.cancel(list(submitted))
